@@ -1,0 +1,53 @@
+"""Exact time derivatives of any order of mechanisms: velocity, acceleration, jerk, jounce and beyond.
+
+Importing this package switches JAX to double precision (``jax_enable_x64``); it has no other side effect.
+"""
+
+import jax as _jax
+
+_jax.config.update("jax_enable_x64", True)
+
+from jounce import jet as jet  # noqa: E402 - after the switch to double precision
+from jounce.constraints import (  # noqa: E402
+    AbstractConstraint as AbstractConstraint,
+    Scalar as Scalar,
+    Vector as Vector,
+    drivers as drivers,
+    planar as planar,
+    rows as rows,
+    spatial as spatial,
+)
+from jounce.errors import (  # noqa: E402
+    AssemblyError as AssemblyError,
+    ExpressionError as ExpressionError,
+    JounceError as JounceError,
+    MechanismError as MechanismError,
+    MechanismFileError as MechanismFileError,
+    MobilityError as MobilityError,
+    OutputError as OutputError,
+    SolveError as SolveError,
+    UnitError as UnitError,
+)
+from jounce.io import load as load  # noqa: E402
+from jounce.jet import Jet as Jet, compose as compose  # noqa: E402
+from jounce.kinematics import Motion as Motion, Status as Status, solve as solve  # noqa: E402
+from jounce.mechanism import (  # noqa: E402
+    AbstractOutput as AbstractOutput,
+    AngleOutput as AngleOutput,
+    AngularVelocityOutput as AngularVelocityOutput,
+    Body as Body,
+    DistanceOutput as DistanceOutput,
+    Mechanism as Mechanism,
+    PlanarRelativeAngleOutput as PlanarRelativeAngleOutput,
+    PointOutput as PointOutput,
+    RelativeAngleOutput as RelativeAngleOutput,
+    TimeGrid as TimeGrid,
+)
+from jounce.trajectory import (  # noqa: E402
+    Expression as Expression,
+    ExpressionMotion as ExpressionMotion,
+    FunctionMotion as FunctionMotion,
+    SplineMotion as SplineMotion,
+)
+
+__version__ = "0.1.0"

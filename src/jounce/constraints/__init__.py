@@ -1,0 +1,11 @@
+"""Joints and drivers: the catalogue of Sommer 2024, one residual each, and the base for one's own."""
+
+from jounce.constraints import drivers as drivers, planar as planar, spatial as spatial
+from jounce.constraints.base import (
+    AbstractConstraint as AbstractConstraint,
+    Motion as Motion,
+    Scalar as Scalar,
+    Vector as Vector,
+    catalogue as catalogue,
+    rows as rows,
+)

@@ -1,0 +1,105 @@
+"""What a joint or a driver is: named values on two or three bodies, and one residual on jets."""
+
+import abc
+import dataclasses
+from typing import Annotated, Any, ClassVar
+
+import equinox as eqx
+import jax.numpy as jnp
+
+from jounce.errors import MechanismError, did_you_mean
+from jounce.jet import Jet
+from jounce.jet.vectors import stack_jets
+
+Scalar = Annotated[Any, "scalar"]
+Vector = Annotated[Any, "vector"]
+Motion = Annotated[Any, "motion"]
+
+_REGISTRY: dict[tuple[str, str], dict[str, type["AbstractConstraint"]]] = {}
+
+
+class AbstractConstraint(eqx.Module):
+    """A joint or driver: one residual, written on the jets of its bodies, that vanishes when it holds.
+
+    A subclass lists its values as fields and defines `residual`; nothing else. Jacobian, right-hand sides of every
+    order, forces and files follow. Fields are annotated `Scalar`, `Vector`, `Motion` or ``str``; the fields ``point_i``
+    and ``point_j`` are the key ``points`` of a mechanism file, and likewise vectors, axes and normals. Given a `type`,
+    the subclass can be used in files by that name.
+
+    Parameters
+    ----------
+    bodies : tuple of str
+        Names of the bodies i, j (and m), ``"ground"`` among them if one is fixed.
+
+    Raises
+    ------
+    MechanismError
+        If the number of bodies is wrong or a body is joined with itself.
+    """
+
+    bodies: tuple[str, ...] = eqx.field(static=True, converter=tuple)
+
+    space: ClassVar[str] = ""
+    role: ClassVar[str] = ""
+    type_name: ClassVar[str] = ""
+    body_count: ClassVar[int] = 2
+
+    def __init_subclass__(cls, type: str = "", space: str = "", role: str = "joint", **keywords: Any):  # noqa: A002
+        super().__init_subclass__(**keywords)
+        if type:
+            cls.type_name, cls.space, cls.role = type, space, role
+            _REGISTRY.setdefault((space, role), {})[type] = cls
+
+    def __check_init__(self):
+        name = self.type_name or type(self).__name__
+        if len(self.bodies) != self.body_count:
+            raise MechanismError(f"{name} joins {self.body_count} bodies", name="bodies", value=list(self.bodies))
+        if len(set(self.bodies)) != len(self.bodies):
+            message = f"{name} must join different bodies, not a body with itself"
+            raise MechanismError(message, name="bodies", value=list(self.bodies))
+
+    @abc.abstractmethod
+    def residual(self, *bodies_and_time: Any) -> Jet:
+        """Return the jet that vanishes when the joint holds: ``residual(self, body_i, body_j, time)``.
+
+        Bodies are poses (`PlanarPose` or `SpatialPose`), `time` is a jet in s. The result has the shape of one row,
+        (...), or of several, (rows, ...), as `rows` joins them.
+        """
+
+    def admissible(self, time: Jet) -> Any:
+        """Tell at which instants the driver's law has a permitted value; true everywhere unless a class says more."""
+        return jnp.ones_like(time.coefficients[0], dtype=bool)
+
+
+def catalogue(space: str, role: str) -> dict[str, type[AbstractConstraint]]:
+    """Return the classes that files may name, by their type: `space` planar or spatial, `role` joint or driver.
+
+    Examples
+    --------
+    >>> from jounce.constraints import catalogue
+    >>> sorted(catalogue("planar", "driver"))
+    ['coordinate', 'distance', 'slide']
+    """
+    return dict(_REGISTRY.get((space, role), {}))
+
+
+def rows(*parts: Any) -> Jet:
+    """Join scalar residuals, of shape (...), and vector ones, of shape (rows, ...), into one of shape (rows, ...)."""
+    whole = [part if len(part.shape) == 3 else part.map(lambda c: c[None]) for part in parts]
+    return stack_jets(whole, jnp.concatenate)
+
+
+def value_fields(kind: type[AbstractConstraint]) -> dict[str, dataclasses.Field]:
+    """Return the fields of a joint or driver that hold values, by name; `bodies` is not among them."""
+    return {field.name: field for field in dataclasses.fields(kind) if field.name != "bodies"}
+
+
+def field_kind(field: dataclasses.Field) -> str:
+    """Return ``scalar``, ``vector``, ``motion`` or ``text``, by the annotation of the field."""
+    return next(iter(getattr(field.type, "__metadata__", ())), "text")
+
+
+def check_text(kind: type[AbstractConstraint], field: str, value: Any, valid: tuple[str, ...]) -> None:
+    """Raise MechanismError unless a word, such as a coordinate, is one of those valid."""
+    if value not in valid:
+        raise MechanismError(f"unknown {field}; {did_you_mean(value, valid)}", name=field, value=value)

@@ -1,0 +1,93 @@
+"""Drivers: constraints with a motion law ``f(t)``. Sommer 2024, equations 39-40, 44-49, 53-55 and 101-111."""
+
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+
+from jounce.constraints.base import AbstractConstraint, Motion, Scalar, Vector, check_text
+from jounce.constraints.planar import COORDINATES, coordinate_of, slide
+from jounce.constraints.spatial import relative_angle
+from jounce.errors import MechanismError
+from jounce.jet import wrap
+
+
+class CoordinateDriver(AbstractConstraint, type="coordinate", space="planar", role="driver"):
+    """Prescribed angle, x or y of body j: ``c_j = K phi_i + C + f(t)``. Sommer 2024, equations 39-40.
+
+    K is 1 unless given (the motion is relative to body i), which from ground makes no difference.
+    """
+
+    coordinate: str = eqx.field(static=True)  # angle, x or y of body j
+    motion: Motion  # rad or m
+    ratio: Scalar = None
+    offset: Scalar = 0.0  # rad or m
+
+    def __check_init__(self):
+        check_text(type(self), "coordinate", self.coordinate, COORDINATES)
+
+    def residual(self, body_i, body_j, time):
+        ratio = 1.0 if self.ratio is None else self.ratio
+        driven = coordinate_of(body_j, self.coordinate) - ratio * body_i.angle
+        return driven - self.offset - self.motion(time)
+
+
+class SlideDriver(AbstractConstraint, type="slide", space="planar", role="driver"):
+    """Prescribed distance along a direction of body i. Sommer 2024, equations 44-49."""
+
+    point_i: Vector  # m, in the frame of body i
+    point_j: Vector
+    vector_i: Vector  # direction of travel
+    motion: Motion  # m
+
+    def residual(self, body_i, body_j, time):
+        return slide(body_i, body_j, self.point_i, self.point_j, self.vector_i) - self.motion(time)
+
+
+class DistanceDriver(AbstractConstraint, type="distance", space="planar", role="driver"):
+    """Prescribed distance of two points, always above zero. Sommer 2024, equations 53-55."""
+
+    point_i: Vector  # m, in the frame of body i
+    point_j: Vector
+    motion: Motion  # m
+
+    def residual(self, body_i, body_j, time):
+        d = body_j.point(self.point_j) - body_i.point(self.point_i)
+        return d.dot(d) - self.motion(time).square()
+
+    def admissible(self, time):
+        return self.motion(time.truncate(0)).coefficients[0] > 0
+
+
+class SpatialSlideDriver(SlideDriver, type="slide", space="spatial", role="driver"):
+    """Prescribed distance along a direction of body i. Sommer 2024, equations 108-111."""
+
+
+class SpatialDistanceDriver(DistanceDriver, type="distance", space="spatial", role="driver"):
+    """Prescribed distance of two points, always above zero. Sommer 2024, equations 104-107."""
+
+
+class RotationDriver(AbstractConstraint, type="rotation", space="spatial", role="driver"):
+    """Prescribed angle of body j about an axis of body i. Sommer 2024, equations 101-103, continuous over turns.
+
+    Without vectors the angle is that of ``A_i^T A_j``; with them, the signed angle from `vector_i` to `vector_j`.
+    What is left of angle minus motion after whole turns must vanish, so that the motion may go on for many turns.
+    """
+
+    axis_i: Vector
+    motion: Motion  # rad
+    vector_i: Vector = None
+    vector_j: Vector = None
+
+    def __check_init__(self):
+        if (self.vector_i is None) != (self.vector_j is None):
+            raise MechanismError("a rotation driver takes two vectors, one on each body, or none", name="vectors")
+
+    def residual(self, body_i, body_j, time):
+        angle = relative_angle(body_i, body_j, self.axis_i, self.vector_i, self.vector_j)
+        return wrap(angle - self.motion(time), 2 * jnp.pi)
+
+
+def driven(constraint: Any) -> bool:
+    """Tell whether a constraint prescribes motion."""
+    return constraint.role == "driver"

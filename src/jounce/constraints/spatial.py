@@ -1,0 +1,170 @@
+"""Spatial joints: the four basic residuals of Sommer 2024, section 5, and the joints composed of them.
+
+In each, ``d = r_j^P - r_i^P`` leads from the joint's point on body i to that on body j.
+"""
+
+from typing import Any
+
+import jax.numpy as jnp
+
+from jounce.constraints.base import AbstractConstraint, Scalar, Vector, rows
+from jounce.constraints.planar import length_of, slide
+from jounce.jet import Jet, atan2, cross, dot, wrap
+
+
+def perpendiculars(axis: Any) -> tuple[Any, Any]:
+    """Return two unit vectors that complete a constant axis, of shape (3, ...), to a right-handed frame."""
+    x, y, z = axis / length_of(axis)[None]
+    sign = jnp.where(z < 0, -1.0, 1.0)
+    a = -1.0 / (sign + z)
+    return (
+        jnp.stack([1.0 + sign * a * x * x, sign * a * x * y, -sign * x]),
+        jnp.stack([a * x * y, sign + a * y * y, -y]),
+    )
+
+
+def relative_angle(body_i: Any, body_j: Any, axis_i: Any, vector_i: Any = None, vector_j: Any = None) -> Jet:
+    """Return the angle in rad, known up to whole turns, by which body j is turned about an axis of body i.
+
+    Without vectors it is that of ``A_i^T A_j``, by ``2 atan2(u.e, e0)`` of the relative Euler parameters, which keeps
+    the sign that Sommer 2024, equation 101, loses; with vectors, the signed angle from the first, on body i, to the
+    second, on body j.
+    """
+    axis = axis_i / length_of(axis_i)[None]
+    if vector_i is None:
+        p, q = body_i.quaternion, body_j.quaternion
+        e = q[1:] * p[0] - p[1:] * q[0] - cross(p[1:], q[1:])
+        return 2.0 * atan2(dot(axis, e), dot(p, q))
+    u, a, b = body_i.direction(axis), body_i.direction(vector_i), body_j.direction(vector_j)
+    return atan2(u.dot(a.cross(b)), a.dot(b) - u.dot(a) * u.dot(b))
+
+
+class Spherical(AbstractConstraint, type="spherical", space="spatial"):
+    """Ball: a point of each body coincides. Sommer 2024, equations 77-82."""
+
+    point_i: Vector  # m, in the frame of body i
+    point_j: Vector
+
+    def residual(self, body_i, body_j, time):
+        return body_j.point(self.point_j) - body_i.point(self.point_i)
+
+
+class DoubleSpherical(AbstractConstraint, type="double_spherical", space="spatial"):
+    """Massless rod: two points at a constant distance. Sommer 2024, equations 83-88."""
+
+    point_i: Vector  # m, in the frame of body i
+    point_j: Vector
+    length: Scalar  # m
+
+    def residual(self, body_i, body_j, time):
+        d = body_j.point(self.point_j) - body_i.point(self.point_i)
+        return d.dot(d) - self.length**2
+
+
+class Dot1(AbstractConstraint, type="dot1", space="spatial"):
+    """A direction of each body stays perpendicular. Sommer 2024, equations 89-94."""
+
+    vector_i: Vector  # in the frame of body i
+    vector_j: Vector
+
+    def residual(self, body_i, body_j, time):
+        return body_i.direction(self.vector_i).dot(body_j.direction(self.vector_j))
+
+
+class Dot2(AbstractConstraint, type="dot2", space="spatial"):
+    """A point of body j stays on a plane of body i, given by a point and its normal. Sommer 2024, equations 95-100."""
+
+    point_i: Vector  # m, in the frame of body i
+    point_j: Vector
+    vector_i: Vector  # normal of the plane
+
+    def residual(self, body_i, body_j, time):
+        d = body_j.point(self.point_j) - body_i.point(self.point_i)
+        return body_i.direction(self.vector_i).dot(d)
+
+
+class Universal(AbstractConstraint, type="universal", space="spatial"):
+    """Hooke joint: spherical and dot-1 of the two cross axes. Sommer 2024, section 5."""
+
+    point_i: Vector  # m, in the frame of body i
+    point_j: Vector
+    vector_i: Vector  # the arm of the cross held by each body
+    vector_j: Vector
+
+    def residual(self, body_i, body_j, time):
+        d = body_j.point(self.point_j) - body_i.point(self.point_i)
+        return rows(d, body_i.direction(self.vector_i).dot(body_j.direction(self.vector_j)))
+
+
+class Revolute(AbstractConstraint, type="revolute", space="spatial"):
+    """Hinge: spherical, and the axes parallel. Sommer 2024, section 5."""
+
+    point_i: Vector  # m, in the frame of body i
+    point_j: Vector
+    axis_i: Vector
+    axis_j: Vector
+
+    def residual(self, body_i, body_j, time):
+        d = body_j.point(self.point_j) - body_i.point(self.point_i)
+        return rows(d, *_parallel(body_i, body_j, self.axis_i, self.axis_j))
+
+
+class Cylindrical(AbstractConstraint, type="cylindrical", space="spatial"):
+    """The axes coincide; the bodies turn about them and slide along them. Sommer 2024, section 5."""
+
+    point_i: Vector  # m, on the axis, in the frame of body i
+    point_j: Vector
+    axis_i: Vector
+    axis_j: Vector
+
+    def residual(self, body_i, body_j, time):
+        return rows(*_collinear(self, body_i, body_j))
+
+
+class Prismatic(AbstractConstraint, type="prismatic", space="spatial"):
+    """Slider: the axes coincide and one more direction stays parallel. Sommer 2024, section 5."""
+
+    point_i: Vector  # m, on the axis, in the frame of body i
+    point_j: Vector
+    axis_i: Vector
+    axis_j: Vector
+    normal_i: Vector  # a perpendicular to the axis on each body that stays parallel
+    normal_j: Vector
+
+    def residual(self, body_i, body_j, time):
+        side = body_i.direction(cross(self.axis_i, self.normal_i) / length_of(self.axis_i)[None])
+        return rows(*_collinear(self, body_i, body_j), side.dot(body_j.direction(self.normal_j)))
+
+
+class Screw(AbstractConstraint, type="screw", space="spatial"):
+    """Nut j on a screw i: cylindrical, and an advance of one lead per turn. Sommer 2024, section 5.
+
+    The advance is counted over turns: what is left of it after whole leads must vanish, so that a continuous motion
+    never loses count.
+    """
+
+    point_i: Vector  # m, on the axis, in the frame of body i
+    point_j: Vector
+    axis_i: Vector
+    axis_j: Vector
+    lead: Scalar  # m per turn of j about the axis of i; negative for a left-hand thread
+    offset: Scalar = None  # m
+
+    def residual(self, body_i, body_j, time):
+        advance = slide(body_i, body_j, self.point_i, self.point_j, self.axis_i)
+        angle = relative_angle(body_i, body_j, self.axis_i)
+        excess = advance - self.lead / (2 * jnp.pi) * angle - self.offset
+        return rows(*_collinear(self, body_i, body_j), wrap(excess, self.lead))
+
+
+def _parallel(body_i: Any, body_j: Any, axis_i: Any, axis_j: Any) -> list[Jet]:
+    """Return the two rows that keep an axis of each body parallel."""
+    axis = body_j.direction(axis_j)
+    return [body_i.direction(side).dot(axis) for side in perpendiculars(axis_i)]
+
+
+def _collinear(joint: Any, body_i: Any, body_j: Any) -> list[Jet]:
+    """Return the four rows that keep the axes of a joint on one line."""
+    d = body_j.point(joint.point_j) - body_i.point(joint.point_i)
+    on_line = [body_i.direction(side).dot(d) for side in perpendiculars(joint.axis_i)]
+    return [*_parallel(body_i, body_j, joint.axis_i, joint.axis_j), *on_line]

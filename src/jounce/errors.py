@@ -1,0 +1,219 @@
+"""The one family of exceptions of the package, and the small helpers that word their messages.
+
+Every error carries what a reader needs to mend the input: the file and line it came from (when it came from a file), the
+dotted name of the entry, what is wrong, and the value received. ``str(error)`` puts these into one friendly sentence.
+"""
+
+from __future__ import annotations
+
+import copy
+import difflib
+from collections.abc import Iterable
+from typing import Any
+
+__all__ = [
+    "AssemblyError",
+    "ExpressionError",
+    "JounceError",
+    "MechanismError",
+    "MechanismFileError",
+    "MobilityError",
+    "OutputError",
+    "SolveError",
+    "UnitError",
+    "did_you_mean",
+    "show_value",
+]
+
+
+class _Unset:
+    """Marks a value that was not given, so that ``None`` can be reported as a value."""
+
+    def __repr__(self) -> str:
+        return "<not given>"
+
+    def __reduce__(self) -> str:
+        return "UNSET"
+
+
+UNSET = _Unset()
+
+
+def show_value(value: object, limit: int = 80) -> str:
+    """Word a received value in one line of at most ``limit`` characters.
+
+    Examples
+    --------
+    >>> show_value([0.0, -9.81])
+    '[0.0, -9.81]'
+    >>> show_value(None)
+    'nothing'
+    >>> show_value("x" * 200, limit=12)
+    "'xxxxxxx..."
+    """
+    if value is None:
+        return "nothing"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, (dict, list, tuple)) and not value:
+        return "an empty mapping" if isinstance(value, dict) else "an empty list"
+    text = _represent(value, limit)
+    text = text.encode("ascii", "backslashreplace").decode("ascii")
+    return text if len(text) <= limit else text[: limit - 3] + "..."
+
+
+def _represent(value: object, limit: int, depth: int = 3) -> str:
+    """``repr`` that never walks deeper or longer than what will be shown."""
+    if isinstance(value, str):
+        return repr(value[: limit + 1])
+    if isinstance(value, dict):
+        if depth == 0:
+            return "{...}"
+        items = list(value.items())[:10]
+        inside = ", ".join(f"{str(key)[:limit]}: {_represent(item, limit, depth - 1)}" for key, item in items)
+        return "{" + inside + (", ...}" if len(value) > 10 else "}")
+    if isinstance(value, (list, tuple)):
+        if depth == 0:
+            return "[...]"
+        inside = ", ".join(_represent(item, limit, depth - 1) for item in value[:10])
+        return "[" + inside + (", ...]" if len(value) > 10 else "]")
+    try:
+        text = repr(value)
+    except ValueError:  # an integer with too many digits to be written
+        return "a number with too many digits"
+    return " ".join(text.split())
+
+
+def did_you_mean(name: object, valid: Iterable[str], limit: int = 20) -> str:
+    """Word a suggestion: the nearest valid name, and the valid names when they are few.
+
+    Examples
+    --------
+    >>> did_you_mean("revolut", ["revolute", "prismatic"])
+    "did you mean 'revolute'? valid: prismatic, revolute"
+    >>> did_you_mean("zzz", ["revolute", "prismatic"])
+    'valid: prismatic, revolute'
+    """
+    names = sorted(set(valid))
+    parts = []
+    near = difflib.get_close_matches(str(name)[:100], names, n=1, cutoff=0.6)
+    if not near:
+        near = [candidate for candidate in names if candidate.lower() == str(name).lower()]
+    if near:
+        parts.append(f"did you mean '{near[0]}'?")
+    if 0 < len(names) <= limit:
+        parts.append(f"valid: {', '.join(names)}")
+    elif not names:
+        parts.append("none is defined")
+    return " ".join(parts)
+
+
+class JounceError(Exception):
+    """Base of every error that the package raises on purpose.
+
+    Parameters
+    ----------
+    message
+        What is wrong, and how to mend it, without the place and the value.
+    path
+        The file, as the user named it.
+    line
+        The line in that file, counted from 1.
+    name
+        The dotted name of the entry, such as ``joints.BC.length``.
+    value
+        The value received; left out of the message when not given.
+
+    Examples
+    --------
+    >>> print(JounceError("must be greater than zero", path="a.yaml", line=12, name="joints.BC.length", value=-0.1))
+    a.yaml, line 12, joints.BC.length: must be greater than zero, got -0.1
+    """
+
+    def __init__(
+        self,
+        message: str,
+        *,
+        path: object = None,
+        line: int | None = None,
+        name: str | None = None,
+        value: Any = UNSET,
+    ) -> None:
+        super().__init__(message)
+        self.message = message
+        self.path = path
+        self.line = line
+        self.name = name
+        self.value = value
+
+    def __str__(self) -> str:
+        place = [] if self.path is None else [str(self.path)]
+        if self.line is not None:
+            place.append(f"line {self.line}")
+        if self.name:
+            place.append(self.name)
+        message = self.message
+        if self.value is not UNSET:  # what is wrong, got this; what to do about it
+            problem, semicolon, advice = message.partition("; ")
+            message = f"{problem}, got {show_value(self.value)}{semicolon}{advice}"
+        return f"{', '.join(place)}: {message}" if place else message
+
+    def located(
+        self, *, path: object = None, line: int | None = None, name: str | None = None, value: Any = UNSET
+    ) -> JounceError:
+        """Return the same error with the places filled in that it does not have yet."""
+        error = copy.copy(self)
+        error.__traceback__ = None
+        error.path = self.path if self.path is not None else path
+        error.line = self.line if self.line is not None else line
+        error.name = self.name if self.name is not None else name
+        error.value = self.value if self.value is not UNSET else value
+        return error
+
+
+class ExpressionError(JounceError):
+    """An expression holds something that is not allowed, or cannot be evaluated.
+
+    ``column`` counts from 1 within the expression; it is None where no single place is at fault.
+    """
+
+    def __init__(self, message: str, *, column: int | None = None, **place: Any) -> None:
+        super().__init__(message, **place)
+        self.column = column
+
+
+class UnitError(JounceError):
+    """A value has a unit that does not exist, or one of the wrong dimension."""
+
+
+class MechanismError(JounceError):
+    """The structure of a mechanism is wrong: a missing body, an axis of zero length, a bad grid of time."""
+
+
+class MechanismFileError(MechanismError):
+    """A mechanism file cannot be read or breaks the schema."""
+
+
+class MobilityError(MechanismError):
+    """The drivers and joints do not leave exactly zero degrees of freedom."""
+
+
+class OutputError(JounceError):
+    """A file of results cannot be written or read."""
+
+
+class SolveError(JounceError):
+    """A solve did not reach its end.
+
+    ``motion`` holds what was computed (None when nothing was), ``status`` the reason, by the names of
+    ``Motion.status``.
+    """
+
+    def __init__(self, message: str, *, motion: Any = None, status: Any = None, **place: Any) -> None:
+        super().__init__(message, **place)
+        self.motion = motion
+        self.status = status
+
+
+class AssemblyError(SolveError):
+    """The bodies cannot be put together from the starting guess."""

@@ -1,0 +1,17 @@
+"""Mechanism files and files of results; the libraries that they need are imported when a file is, not before."""
+
+from __future__ import annotations
+
+from typing import Any
+
+__all__ = ["check_writable", "json_schema", "load", "read", "write"]
+
+_HOMES = {"load": "loader", "json_schema": "export", "check_writable": "results", "read": "results", "write": "results"}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    import importlib
+
+    return getattr(importlib.import_module(f"jounce.io.{_HOMES[name]}"), name)

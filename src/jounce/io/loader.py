@@ -1,0 +1,279 @@
+"""Mechanisms from files."""
+
+from __future__ import annotations
+
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from jounce.constraints import catalogue
+from jounce.errors import JounceError, MechanismFileError, did_you_mean
+from jounce.io.fields import FileKey, file_keys, location_of, output_types
+from jounce.io.source import Location, Source, read_source
+from jounce.mechanism import Body, Mechanism, TimeGrid, time_grid
+from jounce.mechanism.resolve import resolve, resolve_element
+from jounce.trajectory import SplineMotion
+
+__all__ = ["load"]
+
+SPACES = {"planar": 2, "spatial": 3}
+
+
+def load(path: str | PathLike[str]) -> Mechanism:
+    """Read a mechanism from a YAML, TOML or JSON file.
+
+    Parameters
+    ----------
+    path
+        A file ending in .yaml, .yml, .toml or .json. Values in it are in SI units unless they say otherwise.
+
+    Returns
+    -------
+    Mechanism
+        With the instants of the file's time grid, if it has one.
+
+    Raises
+    ------
+    MechanismFileError
+        The file cannot be read or something in it is wrong: the message names the file, the line, the entry and the
+        value, and the nearest valid name where one is unknown.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> mechanism = jn.load("examples/four_bar.yaml")
+    >>> list(mechanism.bodies)
+    ['crank', 'rocker']
+    """
+    source = read_source(path)
+    space = _space(source)
+    model = _validate(source, space)
+    places: dict[str, tuple[Location, tuple[FileKey, ...]]] = {}
+    try:
+        mechanism = _build(source, space, model, places)
+        _check_values(mechanism)
+    except MechanismFileError:
+        raise
+    except JounceError as error:
+        location = _find(error.name, places)
+        known = location if source.line(location) is not None else ()
+        raise source.error(error.message, known or location, value=error.value) from None
+    return mechanism
+
+
+def _space(source: Source) -> str:
+    """Return the space of a file, the one key that decides how the others are read."""
+    if not isinstance(source.data, dict):
+        raise source.error("a mechanism file is a mapping with the keys space, bodies, joints, ...", value=source.data)
+    source.data = {key: value for key, value in source.data.items() if value is not None or key == "space"}
+    if "space" not in source.data:
+        raise source.error("is missing; valid: planar, spatial", ("space",))
+    space = source.data["space"]
+    if not isinstance(space, str) or space not in SPACES:
+        raise source.error(f"unknown space; {did_you_mean(space, SPACES)}", ("space",), value=space)
+    return space
+
+
+def _validate(source: Source, space: str) -> dict[str, Any]:
+    """Check a file against the schema; return its values by key, with numbers and expressions in place of text."""
+    from pydantic import ValidationError
+
+    from jounce.io.problems import first_problem
+    from jounce.io.schema import file_model
+
+    parameters = source.data.get("parameters")
+    names = list(parameters) if isinstance(parameters, dict) else []
+    bodies = source.data.get("bodies", {})
+    if not bodies:
+        raise source.error("a mechanism needs at least one moving body", ("bodies",), value=bodies)
+    context = {
+        "names": names,
+        "bodies": ["ground", *(bodies if isinstance(bodies, dict) else ())],
+        "dimensions": _dimensions(parameters) if names else {},
+    }
+    try:
+        model = file_model(space).model_validate(source.data, context=context)
+    except ValidationError as error:
+        raise first_problem(source, space, error.errors(include_url=False)) from None
+    return _plain(model)
+
+
+def _dimensions(parameters: dict[str, Any]) -> dict[str, Any]:
+    """Return the dimensions of those parameters that have a unit."""
+    from jounce.io.units import parse_value
+
+    found = {}
+    for name, raw in parameters.items():
+        try:
+            dimension = parse_value(raw, "any", parameters).dimension
+        except JounceError:
+            continue
+        if dimension is not None:
+            found[name] = dimension
+    return found
+
+
+def _plain(model: Any) -> dict[str, Any]:
+    """Return the values of a model by the keys of the file; one level, the models inside stay."""
+    return {field.alias: getattr(model, name) for name, field in type(model).model_fields.items()}
+
+
+def _build(source: Source, space: str, model: dict[str, Any], places: dict[str, Any]) -> Mechanism:
+    parameters = model["parameters"]
+    bare = Mechanism(space=space, bodies={"any": Body([0.0] * SPACES[space])}, joints={}, parameters=parameters)
+    try:
+        values = bare.parameter_values
+    except JounceError as error:
+        raise error.located(name="parameters") from None
+    mechanism = Mechanism(
+        space=space,
+        bodies={name: _body(source, name, _plain(body), values) for name, body in model["bodies"].items()},
+        joints=_constraints(source, space, "joint", model["joints"], places),
+        drivers=_constraints(source, space, "driver", model["drivers"], places),
+        outputs=_outputs(space, model["outputs"], places),
+        parameters=parameters,
+        gravity=model["gravity"],
+        time=TimeGrid(**_plain(model["time"])) if model["time"] is not None else None,
+        title=model["title"],
+    )
+    _check_columns(source, mechanism)
+    return mechanism
+
+
+def _body(source: Source, name: str, given: dict[str, Any], parameters: dict[str, Any]) -> Body:
+    """Build a body; its orientation, a starting guess, is turned into Euler parameters with the values of now."""
+    form = given.pop("orientation", None)
+    if form is None:
+        return Body(**given)
+    location = ("bodies", name, "orientation")
+    try:
+        numbers = {key: value if key == "euler" else resolve(value, parameters) for key, value in form.items()}
+        return Body(**given, orientation=_quaternion(numbers))
+    except JounceError as error:
+        raise source.error(error.message, location, value=error.value) from None
+
+
+def _quaternion(form: dict[str, Any]) -> tuple[float, ...]:
+    from jounce.io import orientation
+
+    if "quaternion" in form:
+        return orientation.from_quaternion(form["quaternion"].tolist())
+    if "euler" in form:
+        return orientation.from_euler(form["euler"], form["angles"].tolist())
+    return orientation.from_axis_angle(form["axis"].tolist(), form["angle"])
+
+
+def _arguments(keys: tuple[FileKey, ...], given: dict[str, Any]) -> dict[str, Any]:
+    """Turn values by key into values by field; keys not given are left to their defaults."""
+    found = {}
+    for key in keys:
+        value = given[key.key]
+        if value is not None:
+            found |= dict(zip(key.fields, value if len(key.fields) > 1 else (value,), strict=True))
+    return found
+
+
+def _constraints(
+    source: Source, space: str, role: str, models: dict[str, Any], places: dict[str, Any]
+) -> dict[str, Any]:
+    """Build the joints or drivers, and note where their fields stand in the file."""
+    found = {}
+    for name, model in models.items():
+        given = _plain(model)
+        kind = catalogue(space, role)[given["type"]]
+        keys = file_keys(kind)
+        place = f"{role}s.{name}"
+        places[place] = ((f"{role}s", name), keys)
+        arguments = _arguments(keys, given)
+        for field, value in arguments.items():
+            if hasattr(value, "samples"):
+                arguments[field] = _spline(source, (f"{role}s", name, field), value)
+        try:
+            found[name] = kind(bodies=given["bodies"], **arguments)
+        except JounceError as error:
+            raise error if isinstance(error, MechanismFileError) else _placed(error, place) from None
+    return found
+
+
+def _placed(error: JounceError, place: str) -> JounceError:
+    """Return an error of a constructor, which knows its fields only, with its full dotted name."""
+    error.name = f"{place}.{error.name}" if error.name else place
+    return error
+
+
+def _spline(source: Source, location: Location, samples: Any) -> SplineMotion:
+    from jounce.io.samples import read_samples
+
+    path = Path(source.path).parent / samples.samples
+    try:
+        return SplineMotion(*read_samples(path, samples.time, samples.value), degree=samples.degree)
+    except JounceError as error:
+        raise source.error(str(error), location) from None
+
+
+def _outputs(space: str, models: dict[str, Any], places: dict[str, Any]) -> dict[str, Any]:
+    """Build the outputs, and note where their fields stand in the file."""
+    tags = {f"{space}_{tag.replace(' ', '_')}": kind for tag, (_, kind) in output_types(space).items()}
+    found = {}
+    for name, model in models.items():
+        kind = tags[type(model).__name__]
+        keys, given = file_keys(kind), _plain(model)
+        places[f"outputs.{name}"] = (("outputs", name), keys)
+        bodies = given["bodies"] if kind.body_count > 1 else (given["body"],)
+        try:
+            found[name] = kind(bodies=bodies, **_arguments(keys, given))
+        except JounceError as error:
+            raise _placed(error, f"outputs.{name}") from None
+    return found
+
+
+def _check_columns(source: Source, mechanism: Mechanism) -> None:
+    """Refuse outputs whose columns in a table would have the same name: a point C and an angle C_x."""
+    for name in mechanism.outputs:
+        stem, _, component = name.rpartition("_")
+        if component in ("x", "y", "z") and getattr(mechanism.outputs.get(stem), "point", None) is not None:
+            raise source.error(f"this name is taken by a component of the output '{stem}'", ("outputs", name))
+
+
+def _check_values(mechanism: Mechanism) -> None:
+    """Check what depends on the values of parameters: finite numbers, lengths above zero, axes that are not zero."""
+    parameters, components = mechanism.parameter_values, SPACES[mechanism.space]
+    for kind, elements in mechanism.elements.items():
+        for name, element in elements.items():
+            resolve_element(element, parameters, components, f"{kind}.{name}")
+    for name, body in mechanism.bodies.items():
+        for field in ("position", "angle", "mass", "inertia", "center_of_mass"):
+            _check_body_value(f"bodies.{name}.{field}", getattr(body, field), parameters)
+    if mechanism.gravity is not None:
+        _check_body_value("gravity", mechanism.gravity, parameters)
+    if mechanism.time is not None:
+        time_grid(mechanism.time, parameters)
+
+
+def _check_body_value(name: str, value: Any, parameters: dict[str, Any]) -> None:
+    from jounce.errors import MechanismError
+
+    if value is None:
+        return
+    try:
+        number = resolve(value, parameters)
+    except JounceError as error:
+        raise error.located(name=name) from None
+    if name.endswith((".mass", ".inertia")) and min(_flat(number)) < 0:
+        raise MechanismError("must not be negative", name=name, value=number)
+
+
+def _flat(value: Any) -> list[float]:
+    return [value] if isinstance(value, float) else [float(entry) for entry in value.reshape(-1)]
+
+
+def _find(name: str | None, places: dict[str, tuple[Location, tuple[FileKey, ...]]]) -> Location:
+    """Return the location in the file of a dotted name of the mechanism."""
+    if not name:
+        return ()
+    for place, (location, keys) in places.items():
+        if name.startswith(f"{place}."):
+            return (*location, *location_of(keys, name.removeprefix(f"{place}.")))
+        if name == place:
+            return location
+    return tuple(name.split("."))

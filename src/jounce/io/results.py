@@ -1,0 +1,248 @@
+"""Results of a solve as files: CSV for any spreadsheet, NetCDF 4 with units and names for other programs."""
+
+from __future__ import annotations
+
+import csv
+import itertools
+import os
+import re
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from os import PathLike, fspath
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from jounce.errors import OutputError
+
+__all__ = ["check_writable", "columns", "read", "write"]
+
+SUFFIXES = (".csv", ".nc")
+COMPONENTS = ("x", "y", "z")
+
+
+def check_writable(path: str | PathLike[str]) -> None:
+    """Raise OutputError unless results can be written to a path; meant to be asked before a long computation.
+
+    Parameters
+    ----------
+    path
+        A file ending in .csv or .nc, in a folder that exists. A file there already is left as it is.
+
+    Raises
+    ------
+    OutputError
+        The ending is another, the folder does not exist, or nothing may be written there.
+    """
+    name = fspath(path)
+    if Path(name).suffix.lower() not in SUFFIXES:
+        raise OutputError(f"the kind of an output is told by its ending; valid: {', '.join(SUFFIXES)}", path=name)
+    try:
+        target = Path(os.path.realpath(name))
+        if target.is_dir():
+            raise OutputError("is a directory, the name of a file is needed", path=name)
+        if not target.parent.is_dir():
+            raise OutputError(f"the folder {target.parent} does not exist", path=name)
+        if target.exists() and not (target.is_file() and os.access(target, os.W_OK)):
+            raise OutputError("the file there may not be replaced", path=name)
+        _new_file(target).unlink()
+    except (OSError, ValueError) as error:
+        raise OutputError(f"cannot be written: {_reason(error)}", path=name) from None
+
+
+def _reason(error: Exception) -> str:
+    return getattr(error, "strerror", None) or str(error)
+
+
+def _new_file(target: Path) -> Path:
+    """Create an empty file of a name of its own beside the target."""
+    path = target.with_name(f".jounce-{secrets.token_hex(6)}{target.suffix}")
+    path.touch(exist_ok=False)
+    return path
+
+
+@contextmanager
+def _replacing(path: str | PathLike[str]) -> Iterator[Path]:
+    """Give a file beside the target to write to, and put it in the place of the target only when that went well."""
+    check_writable(path)
+    target = Path(os.path.realpath(path))
+    scratch: Path | None = None
+    try:
+        scratch = _new_file(target)
+        yield scratch
+        scratch.replace(target)
+    except OutputError as error:
+        raise error.located(path=fspath(path)) from None
+    except (OSError, ValueError) as error:
+        raise OutputError(f"cannot be written: {_reason(error)}", path=fspath(path)) from error
+    finally:
+        if scratch is not None:
+            with suppress(OSError):
+                scratch.unlink()
+
+
+def write(dataset: Any, path: str | PathLike[str]) -> None:
+    """Write the dataset of a motion to a .csv or .nc file, whole or not at all.
+
+    A CSV file has the columns ``time``, then for each output ``NAME, NAME_d1, NAME_d2, ...``, and for a vector
+    ``NAME_x, NAME_x_d1, ..., NAME_y, ...``; numbers have 17 significant digits, so that they read back to the bit, and
+    a missing value is ``nan``. A NetCDF 4 file holds the dataset as it is, by the CF conventions.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        With dimensions time, derivative and component, as ``Motion.dataset``.
+    path
+        The file; one of that name is replaced.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import jounce as jn
+    >>> from jounce import io
+    >>> motion = jn.solve(jn.load("examples/four_bar.yaml"), [0.0, 0.1], order=1)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     io.write(motion.dataset, pathlib.Path(folder, "motion.csv"))
+    ...     print(pathlib.Path(folder, "motion.csv").read_text().splitlines()[0])
+    time,psi,psi_d1,C_x,C_x_d1,C_y,C_y_d1
+    """
+    with _replacing(path) as scratch:
+        if Path(fspath(path)).suffix.lower() == ".csv":
+            _write_csv(dataset, scratch)
+        else:
+            _write_netcdf(dataset, scratch)
+
+
+def columns(dataset: Any) -> dict[str, np.ndarray]:
+    """Return the columns of a table of a dataset, by name, each of shape (time,).
+
+    Raises
+    ------
+    OutputError
+        Two columns would have the same name.
+    """
+    found = {"time": np.asarray(dataset["time"], float)}
+    for name, variable in dataset.data_vars.items():
+        if not {"time", "derivative"} <= set(variable.dims) <= {"time", "derivative", "component"}:
+            continue
+        parts: list[tuple[str, Any]] = [(str(name), variable)]
+        if "component" in variable.dims:
+            labels = [str(label) for label in variable["component"].values]
+            parts = [(f"{name}_{label}", variable.isel(component=k)) for k, label in enumerate(labels)]
+        for stem, part in parts:
+            values = part.transpose("derivative", "time").values
+            for order, row in zip(dataset["derivative"].values, values, strict=True):
+                column = f"{stem}_d{order}" if order else stem
+                if column in found:
+                    raise OutputError(f"two outputs make a column of the same name, '{column}'")
+                found[column] = np.asarray(row, float)
+    return found
+
+
+def _write_csv(dataset: Any, path: Path) -> None:
+    table = columns(dataset)
+    rows = np.stack(list(table.values()), axis=1)
+    line = ",".join(["%.17g"] * rows.shape[1]) + "\n"
+    with path.open("w", newline="", encoding="utf-8") as stream:
+        csv.writer(stream, lineterminator="\n").writerow(table)
+        for start in range(0, len(rows), 1000):
+            stream.writelines(line % tuple(row) for row in rows[start : start + 1000].tolist())
+
+
+def _write_netcdf(dataset: Any, path: Path) -> None:
+    named = dataset.assign_attrs({"Conventions": "CF-1.11", "history": f"written by jounce {_version()}"})
+    for name in (*named.data_vars, *named.coords):
+        if "/" in str(name):
+            raise OutputError(f"the name '{name}' cannot stand in a NetCDF file, it has a /")
+        named[name].encoding = {}
+    if "time" in named.coords:
+        usual = {"units": "s", "long_name": "time", "standard_name": "time", "axis": "T"}
+        named = named.assign_coords(time=named["time"].assign_attrs(usual | named["time"].attrs))
+    for holder in (named, *(named[name] for name in named.variables)):
+        holder.attrs = {key: _attribute(value) for key, value in holder.attrs.items() if value is not None}
+    named.to_netcdf(path, engine="h5netcdf", format="NETCDF4")
+
+
+def _attribute(value: Any) -> Any:
+    """Return an attribute as NetCDF can hold it."""
+    plain = isinstance(value, (str, int, float, np.ndarray, np.number)) and not isinstance(value, bool)
+    return value if plain else str(value)
+
+
+def _version() -> str:
+    from importlib import metadata
+
+    try:
+        return metadata.version("jounce")
+    except metadata.PackageNotFoundError:
+        return "(not installed)"
+
+
+def read(path: str | PathLike[str]) -> Any:
+    """Read a file that `write` wrote back into a dataset; values come back to the bit.
+
+    A CSV file has no units, and does not say what is a vector: neighbouring columns ``NAME_x, NAME_y`` (and
+    ``NAME_z``) become the vector NAME.
+
+    Returns
+    -------
+    xarray.Dataset
+        In memory, with dimensions time, derivative and component.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be read, or is not one of results.
+    """
+    import xarray
+
+    name = fspath(path)
+    suffix = Path(name).suffix.lower()
+    if suffix not in SUFFIXES:
+        raise OutputError(f"the kind of a file of results is told by its ending; valid: {', '.join(SUFFIXES)}", path=name)
+    try:
+        if suffix == ".nc":
+            return xarray.load_dataset(path, engine="h5netcdf")
+        with Path(name).open(newline="", encoding="utf-8") as stream:
+            header = next(csv.reader(stream), [])
+            rows = [[float(entry) for entry in row] for row in csv.reader(stream)]
+    except FileNotFoundError:
+        raise OutputError("file not found", path=name) from None
+    except (OSError, ValueError, csv.Error) as error:
+        raise OutputError(f"cannot be read: {_reason(error)}", path=name) from None
+    if header[:1] != ["time"] or not rows:
+        raise OutputError("is not a table of results, whose first column is time", path=name)
+    for line, row in enumerate(rows, start=2):
+        if len(row) != len(header):
+            raise OutputError(f"must have {len(header)} entries", path=name, line=line, value=len(row))
+    return _from_columns(header, np.array(rows))
+
+
+def _from_columns(header: list[str], table: np.ndarray) -> Any:
+    """Build the dataset of a table."""
+    import xarray
+
+    stems: dict[str, list[np.ndarray]] = {}
+    for column, values in zip(header[1:], table.T[1:], strict=True):
+        stems.setdefault(re.sub(r"_d[0-9]+$", "", column), []).append(values)
+    variables: dict[str, Any] = {}
+    for name, group in itertools.groupby(stems, lambda stem: stem[:-2] if stem[-2:] in ("_x", "_y", "_z") else stem):
+        members = list(group)
+        if members in ([f"{name}_{c}" for c in COMPONENTS[:2]], [f"{name}_{c}" for c in COMPONENTS]):
+            values = np.stack([np.stack(stems[member], axis=1) for member in members], axis=2)
+            variables[name] = (("time", "derivative", "component"), values)
+        else:
+            variables |= {member: (("time", "derivative"), np.stack(stems[member], axis=1)) for member in members}
+    coordinates: dict[str, Any] = {"time": ("time", table[:, 0], {"units": "s"})}
+    coordinates["derivative"] = np.arange(max(map(len, stems.values()), default=0))
+    sizes = {values.shape[2] for dims, values in variables.values() if len(dims) == 3}
+    if sizes:
+        coordinates["component"] = list(COMPONENTS[: max(sizes)])
+    return xarray.Dataset(variables, coords=coordinates)

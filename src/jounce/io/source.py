@@ -1,0 +1,234 @@
+"""Text files read into plain data, with the line of every entry remembered for the error messages."""
+
+from __future__ import annotations
+
+import stat
+from dataclasses import dataclass, field
+from os import PathLike, fspath
+from pathlib import Path
+from typing import Any
+
+from jounce.errors import MechanismFileError, did_you_mean
+
+__all__ = ["Builder", "Location", "Source", "dotted", "read_bytes", "read_source"]
+
+MAX_BYTES = 10_000_000
+MAX_LINES = 200_000
+MAX_LINE_LENGTH = 100_000
+MAX_VALUES = 200_000
+MAX_DEPTH = 50
+
+SUFFIXES = (".yaml", ".yml", ".toml", ".json")
+
+Location = tuple[str | int, ...]
+"""Where an entry is: keys and indices from the top, such as ``("joints", "BC", "points", 1)``."""
+
+
+def dotted(location: Location) -> str:
+    """Word a location for a reader.
+
+    Examples
+    --------
+    >>> dotted(("joints", "BC", "points", 1, 0))
+    'joints.BC.points[1][0]'
+    """
+    text = ""
+    for step in location:
+        text += f"[{step}]" if isinstance(step, int) else f".{step}" if text else step
+    return text.encode("ascii", "backslashreplace").decode("ascii")
+
+
+@dataclass
+class Source:
+    """Plain data from a file, and the line of every entry."""
+
+    path: str
+    data: Any
+    lines: dict[Location, int] = field(default_factory=dict)
+
+    def line(self, location: Location) -> int | None:
+        """Return the line of an entry, or of the nearest entry around it whose line is known."""
+        for length in range(len(location), -1, -1):
+            if location[:length] in self.lines:
+                return self.lines[location[:length]]
+        return None
+
+    def error(self, message: str, location: Location = (), **value: Any) -> MechanismFileError:
+        """Return an error that names the file, the line and the dotted name of an entry."""
+        return MechanismFileError(
+            message, path=self.path, line=self.line(location), name=dotted(location) or None, **value
+        )
+
+
+class Builder:
+    """Builds nested data from a stream of small steps, without recursion, within the limits.
+
+    ``open`` a mapping or a list, ``key`` inside a mapping, ``value`` for a leaf, ``close``.
+    """
+
+    def __init__(self, path: str) -> None:
+        self.source = Source(path, None)
+        self._stack: list[tuple[dict[str, Any] | list[Any], Location]] = []
+        self._key: str | None = None
+        self._count = 0
+
+    @property
+    def wants_key(self) -> bool:
+        """Whether the next step must be a key of a mapping, or its close."""
+        return bool(self._stack) and isinstance(self._stack[-1][0], dict) and self._key is None
+
+    def fail(self, message: str, line: int) -> MechanismFileError:
+        """Return an error at a line, named after the entry being built."""
+        return MechanismFileError(message, path=self.source.path, line=line, name=dotted(self._here()) or None)
+
+    def _here(self) -> Location:
+        if not self._stack:
+            return ()
+        container, location = self._stack[-1]
+        if isinstance(container, list):
+            return (*location, len(container))
+        return location if self._key is None else (*location, self._key)
+
+    def key(self, name: Any, line: int) -> None:
+        """Start an entry of the mapping that is open."""
+        container, location = self._stack[-1]
+        if not isinstance(name, str):
+            raise self.fail(f"a key must be a name, got {name!r}; put it in quotes to make it one", line)
+        if name in container:
+            first = self.source.lines[(*location, name)]
+            message = f"duplicate name, already given in line {first}"
+            raise MechanismFileError(message, path=self.source.path, line=line, name=dotted((*location, name)))
+        self._key = name
+        self.source.lines[(*location, name)] = line
+
+    def open(self, container: dict[str, Any] | list[Any], line: int) -> None:
+        """Start a mapping or a list."""
+        location = self._here()
+        if len(location) >= MAX_DEPTH:
+            raise MechanismFileError(
+                f"nested more than {MAX_DEPTH} deep; a mechanism file needs 6", path=self.source.path, line=line
+            )
+        self._put(container, line)
+        self._stack.append((container, location))
+
+    def close(self) -> None:
+        """End the mapping or list opened last."""
+        self._stack.pop()
+
+    def value(self, value: Any, line: int) -> None:
+        """Add a leaf."""
+        self._put(value, line)
+
+    def _put(self, value: Any, line: int) -> None:
+        self._count += 1
+        if self._count > MAX_VALUES:
+            raise MechanismFileError(f"more than {MAX_VALUES} values", path=self.source.path, line=line)
+        location = self._here()
+        self.source.lines.setdefault(location, line)
+        if not self._stack:
+            self.source.data = value
+            return
+        container = self._stack[-1][0]
+        if isinstance(container, list):
+            container.append(value)
+        else:
+            container[location[-1]] = value
+            self._key = None
+
+
+def read_bytes(path: str) -> bytes:
+    """Read a regular file of at most 10 MB, or say why it cannot be.
+
+    Raises
+    ------
+    MechanismFileError
+        The file does not exist, is a directory or a device, is too large, or may not be read.
+    """
+    try:
+        status = Path(path).stat()
+        if stat.S_ISDIR(status.st_mode):
+            raise MechanismFileError("is a directory, a file is needed", path=path)
+        if not stat.S_ISREG(status.st_mode):
+            raise MechanismFileError("is not a regular file", path=path)
+        if status.st_size > MAX_BYTES:
+            raise _too_large(path, status.st_size)
+        with Path(path).open("rb") as stream:
+            content = stream.read(MAX_BYTES + 1)
+    except FileNotFoundError:
+        raise MechanismFileError(f"file not found{_nearby(path)}", path=path) from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise MechanismFileError(f"cannot be read: {reason}", path=path) from None
+    if len(content) > MAX_BYTES:
+        raise _too_large(path, len(content))
+    return content
+
+
+def _too_large(path: str, size: int) -> MechanismFileError:
+    return MechanismFileError(
+        f"the file has {size / 1e6:.3g} MB, at most {MAX_BYTES / 1e6:.3g} MB are read", path=path
+    )
+
+
+def _nearby(path: str) -> str:
+    """Suggest a file of nearly the same name in the same folder."""
+    wanted = Path(path)
+    try:
+        names = [entry.name for entry in wanted.parent.iterdir() if entry.suffix == wanted.suffix][:1000]
+    except (OSError, ValueError):
+        return ""
+    suggestion = did_you_mean(wanted.name, names, limit=0)
+    return f"; {suggestion}" if suggestion.startswith("did") else ""
+
+
+def _decode(path: str, content: bytes) -> str:
+    """Decode UTF-8 text within the limits on lines; refuse anything that is not text."""
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise MechanismFileError("is not text in UTF-8", path=path, line=line) from None
+    line = 0
+    for line, row in enumerate(text.split("\n"), start=1):
+        if len(row) > MAX_LINE_LENGTH:
+            raise MechanismFileError(f"a line has more than {MAX_LINE_LENGTH} characters", path=path, line=line)
+        if not row.isprintable() and any(ord(c) < 32 and c not in "\t\r" or 127 <= ord(c) < 160 for c in row):
+            raise MechanismFileError("holds a control character, it is not a text file", path=path, line=line)
+    if line > MAX_LINES:
+        raise MechanismFileError(f"has {line} lines, at most {MAX_LINES} are read", path=path)
+    if not text.strip():
+        raise MechanismFileError("the file is empty", path=path)
+    return text
+
+
+def read_source(path: str | PathLike[str]) -> Source:
+    """Read a YAML, TOML or JSON file, chosen by its suffix, into plain data with line numbers.
+
+    Parameters
+    ----------
+    path
+        A file ending in .yaml, .yml, .toml or .json.
+
+    Returns
+    -------
+    Source
+        Mappings, lists, text, numbers, booleans and None, and the line of every entry.
+
+    Raises
+    ------
+    MechanismFileError
+        The file cannot be read, breaks the syntax, has a duplicate name, or exceeds a limit on size or nesting.
+    """
+    from jounce.io import readers
+
+    name = fspath(path)
+    name = name if isinstance(name, str) else str(name)
+    if not name:
+        raise MechanismFileError("the name of a file is needed", value=name)
+    suffix = Path(name).suffix.lower()
+    reader = {".toml": readers.read_toml, ".json": readers.read_json}.get(suffix, readers.read_yaml)
+    if suffix not in SUFFIXES and not Path(name).is_dir():
+        raise MechanismFileError(
+            f"the kind of a mechanism file is told by its ending; valid: {', '.join(SUFFIXES)}", path=name
+        )
+    return reader(name, _decode(name, read_bytes(name)))

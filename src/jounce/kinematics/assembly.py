@@ -1,0 +1,138 @@
+"""The first assembly: bodies put together from the starting guess, and degrees of freedom counted and explained."""
+
+import dataclasses
+from functools import partial
+from typing import Any
+
+import jax
+import numpy as np
+
+from jounce.errors import AssemblyError, MobilityError
+from jounce.jet import Jet
+from jounce.kinematics.status import Status
+from jounce.mechanism import Model
+from jounce.mechanism.builder import pose_at
+
+MAX_STEPS = 100
+RANK_TOLERANCE = 1e-9
+
+
+@partial(jax.jit, static_argnames="pose_type")
+def _moved(system: Any, coordinates: dict[str, Any], increment: Any, instant: Any, pose_type: type) -> Any:
+    """Return the coordinates after an increment, with residual and Jacobian there, for one instant."""
+    pose = pose_at(coordinates, pose_type)
+    pose = pose.displaced(*system.coordinates(increment[:, None], pose.shifts))
+    time = Jet([instant[None, None]])
+    moved = {name: jet.coefficients[0] for name, jet in pose.coordinates().items()}
+    return moved, system.residual(pose, time).coefficients[0][:, 0], system.jacobian(pose, time)[:, :, 0]
+
+
+def assemble(model: Model, instant: float, tolerance: float) -> tuple[Model, dict[str, np.ndarray]]:
+    """Put the bodies together at one instant, from the starting guess, by damped Gauss-Newton.
+
+    Returns
+    -------
+    model : Model
+        With its rows scaled by the size of their derivatives at the assembled position.
+    coordinates : dict of str to array
+        The assembled coordinates of all bodies.
+
+    Raises
+    ------
+    AssemblyError
+        If no position near the guess fulfils all joints; the message names those that stay open.
+    MobilityError
+        If joints and drivers leave degrees of freedom, or there are too many of them.
+    """
+    columns = model.system.cells.shape[1]
+    still, instant = np.zeros(columns), np.float64(instant)
+
+    def moved(coordinates: dict[str, Any], increment: np.ndarray) -> Any:
+        result = _moved(model.system, coordinates, increment, instant, model.pose_type)
+        return jax.tree.map(np.asarray, result)
+
+    coordinates, residual, jacobian = moved(model.guess, still)
+    scale = _row_scale(jacobian)
+    for _ in range(MAX_STEPS):
+        step = np.linalg.lstsq(scale[:, None] * jacobian, -scale * residual, rcond=1e-10)[0]
+        size = np.max(np.abs(step), initial=0.0)
+        if not np.isfinite(size):
+            break
+        step *= min(1.0, 0.5 / max(size, 1e-300))  # at most half a radian, or half the mechanism, at a time
+        now = np.linalg.norm(scale * residual)
+        for _halving in range(12):
+            trial = moved(coordinates, step)
+            if np.linalg.norm(scale * trial[1]) < now or size <= tolerance:
+                break
+            step *= 0.5
+        else:
+            break
+        coordinates, residual, jacobian = trial
+        scale = _row_scale(jacobian)
+        if size <= tolerance:
+            break
+    _check_assembled(model, scale * residual, float(instant), tolerance)
+    check_mobility(model, scale[:, None] * jacobian)
+    system = jax.device_put(dataclasses.replace(model.system, row_scale=scale[:, None]))
+    return dataclasses.replace(model, system=system), coordinates
+
+
+def _row_scale(jacobian: np.ndarray) -> np.ndarray:
+    largest = np.max(np.abs(jacobian), axis=1)
+    return 1 / np.where((largest > 0) & np.isfinite(largest), largest, 1.0)
+
+
+def _check_assembled(model: Model, gaps: np.ndarray, instant: float, tolerance: float) -> None:
+    gaps = np.where(np.isfinite(gaps), np.abs(gaps), np.inf)
+    worst = np.argsort(-gaps)
+    if gaps[worst[0]] <= max(1e3 * tolerance, 1e-9):
+        return
+    open_rows = list(dict.fromkeys(model.rows[k] for k in worst if gaps[k] > 0.1 * gaps[worst[0]]))
+    named = ", ".join(open_rows[:4])
+    message = (
+        f"the mechanism cannot be assembled at t = {instant:g} s from its starting guess: {named} "
+        f"{'stays' if len(open_rows) == 1 else 'stay'} open by about {gaps[worst[0]]:.2g} (rad, or sizes of the "
+        "mechanism); check lengths and positions, or guess the pose of the bodies more closely"
+    )
+    raise AssemblyError(message, status=Status.NOT_ASSEMBLED)
+
+
+def check_mobility(model: Model, jacobian: np.ndarray) -> None:
+    """Raise MobilityError, with the bodies and joints concerned, unless the Jacobian is square and regular."""
+    rows, columns = jacobian.shape
+    left, sizes, right = np.linalg.svd(jacobian)
+    rank = int(np.sum(sizes > RANK_TOLERANCE * sizes.max(initial=0.0)))
+    if rows == columns == rank:
+        return
+    free, redundant = columns - rank, rows - rank
+    bodies = len(model.bodies)
+    parts = [
+        f"{bodies} moving {'body has' if bodies == 1 else 'bodies have'} {columns} coordinates; joints and drivers "
+        f"give {rows} equations, {rank} of them independent"
+    ]
+    if free:
+        noun = "degree of freedom is" if free == 1 else "degrees of freedom are"
+        moving = _concerned(np.linalg.norm(right[rank:].reshape(free, bodies, -1), axis=(0, 2)), model.bodies)
+        parts.append(f"{free} {noun} left, with which {moving} can move: add {_count(free, 'driver')}")
+    if redundant:
+        names = tuple(dict.fromkeys(model.rows))
+        weights = np.linalg.norm(left[:, rank:], axis=1)
+        by_name = np.array([max(w for w, n in zip(weights, model.rows, strict=True) if n == name) for name in names])
+        parts.append(
+            f"{_count(redundant, 'equation')} too many among {_concerned(by_name, names)}: free a direction there "
+            "(a spherical or cylindrical joint for a revolute, say), or remove a driver"
+        )
+    if free and redundant and rows == columns:
+        parts.append("or the start is a singular position: start at another instant")
+    raise MobilityError("; ".join(parts))
+
+
+def _concerned(weights: np.ndarray, names: tuple[str, ...]) -> str:
+    order = np.argsort(-weights, kind="stable")
+    chosen = [names[k] for k in order if weights[k] > 0.05 * weights[order[0]]]
+    shown = ", ".join(chosen[:6])
+    return shown + (f" and {len(chosen) - 6} more" if len(chosen) > 6 else "")
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}{'' if number == 1 else 's'}"

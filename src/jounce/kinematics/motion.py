@@ -1,0 +1,161 @@
+"""The result of a solve: outputs and any point of any body, with their derivatives, at every instant."""
+
+import math
+from collections.abc import Sequence
+from functools import cached_property, partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jounce.errors import MechanismError, did_you_mean
+from jounce.jet import Jet
+from jounce.kinematics.status import Status
+from jounce.mechanism import AngleOutput, AngularVelocityOutput, Mechanism, Model, PointOutput
+from jounce.mechanism.mechanism import GROUND
+from jounce.mechanism.system import POSITION_COMPONENTS, Group, group_elements
+
+COMPONENTS = ("x", "y", "z")
+
+
+@partial(jax.jit, static_argnames="pose_type")
+def _evaluated(group: Group, coordinates: dict[str, Any], pose_type: type) -> Any:
+    pose = pose_type.from_coordinates({name: Jet(tuple(c)) for name, c in coordinates.items()})
+    return jnp.stack(group.evaluate(pose).dense().coefficients)
+
+
+class Motion:
+    """The motion of a mechanism at the instants of a time grid.
+
+    Attributes
+    ----------
+    mechanism : Mechanism
+        What was solved.
+    time : numpy.ndarray of shape (time,)
+        Instants, s.
+    order : int
+        Highest derivative of the outputs.
+    status : numpy.ndarray of int, shape (time,)
+        Outcome at each instant, see `Status`; where it is not 0, all results are NaN.
+    failed_bodies : dict of int to str
+        For the instants that failed, by index, the body that is farthest from its prediction.
+    """
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        model: Model,
+        time: np.ndarray,
+        order: int,
+        state: tuple[dict[str, Any], tuple[Any, ...]],
+        status: np.ndarray,
+        failed_bodies: dict[int, str],
+    ):
+        self.mechanism, self.time, self.order, self.status = mechanism, time, order, status
+        self.failed_bodies = failed_bodies
+        self._model = model
+        self._coordinates, groups = state
+        self._groups = dict(zip(model.outputs, groups, strict=True))
+
+    def __repr__(self) -> str:
+        solved = int(np.sum(self.status == Status.OK))
+        title = f"{self.mechanism.title}: " if self.mechanism.title else ""
+        return f"<Motion {title}{solved} of {len(self.time)} instants solved, order {self.order}>"
+
+    @cached_property
+    def outputs(self) -> dict[str, np.ndarray]:
+        """Outputs by name: arrays of shape (time, order + 1) or (time, order + 1, component), SI."""
+        found = {}
+        for names, coefficients in self._groups.items():
+            for k, name in enumerate(names):
+                found[name] = self._derivatives(coefficients[:, :, k])
+        return {name: found[name] for name in self.mechanism.outputs}
+
+    @cached_property
+    def dataset(self) -> Any:
+        """Outputs as an `xarray.Dataset` with dimensions time, derivative and component; units in the attributes.
+
+        The unit of a variable is that of its derivative 0; each derivative adds ``/s``.
+        """
+        import xarray
+
+        variables = {
+            name: self._labelled(name, values, self.mechanism.outputs[name].unit)
+            for name, values in self.outputs.items()
+        }
+        attributes = {"title": self.mechanism.title or "motion of a mechanism", "source": "jounce"}
+        dataset = xarray.Dataset(variables, coords=self._axes(), attrs=attributes)
+        dataset["time"].attrs = {"units": "s", "long_name": "time"}
+        dataset["derivative"].attrs = {"long_name": "order of the time derivative"}
+        return dataset
+
+    def point(self, body: str, point: Sequence[float]) -> Any:
+        """Return the position of any point of a body in the global frame and its derivatives.
+
+        Parameters
+        ----------
+        body : str
+            Name of the body.
+        point : sequence
+            Point in the frame of the body, (2,) or (3,), m.
+
+        Returns
+        -------
+        xarray.DataArray
+            Dimensions time, derivative, component; m and its derivatives by s.
+        """
+        return self.evaluate(PointOutput(body, point), name="position")
+
+    def angle(self, body: str) -> Any:
+        """Return the angle of a planar body and its derivatives, rad, with dimensions time and derivative."""
+        return self.evaluate(AngleOutput(body), name="angle")
+
+    def angular_velocity(self, body: str, frame: str = "global") -> Any:
+        """Return the angular velocity of a body and its derivatives, rad/s, in the frame ``global`` or ``body``.
+
+        The highest derivative of the motion is used up: the result has one order less.
+        """
+        return self.evaluate(AngularVelocityOutput(body, frame), name="angular_velocity")
+
+    def evaluate(self, output: Any, name: str = "output") -> Any:
+        """Return any output, as an `xarray.DataArray`, without solving again.
+
+        Raises
+        ------
+        MechanismError
+            If the output names a body that does not exist or does not fit the space.
+        """
+        names = (GROUND, *self._model.bodies)
+        for body in output.bodies:
+            if body not in names:
+                message = f"no body has this name; {did_you_mean(body, names)}"
+                raise MechanismError(message, name="body", value=body)
+        if output.space and output.space != self.mechanism.space:
+            raise MechanismError(f"this output is {output.space}, the mechanism is {self.mechanism.space}", name=name)
+        components = POSITION_COMPONENTS[self.mechanism.space]
+        index = {body: k for k, body in enumerate(names)}
+        (group,), _ = group_elements({name: output}, self.mechanism.parameter_values, index, components)
+        values = np.asarray(_evaluated(group, self._coordinates, self._model.pose_type))[:, :, 0]
+        return self._labelled(name, self._derivatives(values), output.unit)
+
+    def _derivatives(self, coefficients: np.ndarray) -> np.ndarray:
+        """Turn Taylor coefficients (order, component, time) into derivatives (time, derivative[, component])."""
+        coefficients = coefficients[: self.order + 1]
+        factorials = np.array([math.factorial(k) for k in range(len(coefficients))], float)
+        values = np.moveaxis(coefficients * factorials[:, None, None], (2, 0, 1), (0, 1, 2))
+        values = np.where((self.status == Status.OK)[:, None, None], values, np.nan)
+        return values[..., 0] if values.shape[-1] == 1 else values
+
+    def _labelled(self, name: str, values: np.ndarray, unit: str) -> Any:
+        import xarray
+
+        dims = ("time", "derivative", "component")[: values.ndim]
+        coordinates = {"time": self.time, "derivative": np.arange(values.shape[1])}
+        if values.ndim == 3:
+            coordinates["component"] = list(COMPONENTS[: values.shape[2]])
+        attributes = {"units": unit, "long_name": name}
+        return xarray.DataArray(values, dims=dims, coords=coordinates, name=name, attrs=attributes)
+
+    def _axes(self) -> dict[str, Any]:
+        return {"time": self.time, "derivative": np.arange(self.order + 1)}

@@ -1,0 +1,192 @@
+"""Following a motion: anchors in sequence by safe steps, then all instants of the grid in batches.
+
+A long grid is not solved one instant after another. A few anchors are, at steps that the Taylor series of the last
+anchor calls safe; the instants of the grid then start from their nearest anchor, in levels that halve the spacing, so
+that most are predicted to rounding by an instant solved before and all of a level are solved together.
+"""
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import numpy as np
+
+from jounce.kinematics.advance import Arrival, advance
+from jounce.kinematics.status import Status
+from jounce.mechanism import Model
+
+SMALLEST_STEP = 1e-10  # of the span
+SMALL_BATCH, LARGE_BATCH, LONG_GRID = 64, 512, 1024  # lanes; a batch width compiles once, so a short grid uses one
+
+
+@dataclasses.dataclass(frozen=True)
+class Solver:
+    """A model with the settings under which it is solved."""
+
+    model: Model
+    order: int
+    tolerance: float
+    refine: bool = True
+
+    def __call__(self, known: Any, step: np.ndarray, instant: np.ndarray) -> Arrival:
+        """Solve instants from known neighbours, as many as fit into a batch."""
+        lanes = len(instant)
+        width = SMALL_BATCH if lanes <= SMALL_BATCH else LARGE_BATCH
+        filled = jax.tree.map(lambda x: _filled(x, width), (*self._predictor(known), step, instant))
+        arrival = advance(
+            self.model.system,
+            *filled,
+            self.tolerance,
+            pose_type=self.model.pose_type,
+            order=self.order,
+            refine=self.refine,
+        )
+        return jax.tree.map(lambda x: np.asarray(x)[..., :lanes], arrival)
+
+    def _predictor(self, known: Any) -> tuple[dict[str, Any], tuple[Any, ...]]:
+        """Return what a prediction needs of solved instants: the jets of the pose and of turning angles."""
+        coordinates, outputs = known
+        angles = [o for o, g in zip(outputs, self.model.system.outputs, strict=True) if g.element.turning]
+        return {name: coordinates[name] for name in self.model.pose_type.predictor}, tuple(angles)
+
+
+def _filled(x: np.ndarray, width: int) -> np.ndarray:
+    """Repeat the last lane up to the width of a batch."""
+    missing = width - x.shape[-1]
+    return np.pad(x, [(0, 0)] * (x.ndim - 1) + [(0, missing)], mode="edge") if missing else x
+
+
+@dataclasses.dataclass
+class Track:
+    """Solved instants, in order of time, and where and why following the motion ended early, if it did."""
+
+    instants: list[float]
+    states: list[Any]
+    safe_step: float
+    status: Status = Status.OK
+    ended_at: float = np.inf
+    body: str = ""
+
+
+def follow(solver: Solver, start: Track, stop: float, span: float) -> Track:
+    """Follow the motion from the last instant of a track to another instant, in safe steps, checked one by one.
+
+    A step whose solution departs from its prediction is halved until it does not, or is too small to be halved.
+    """
+    track = Track(start.instants[-1:], start.states[-1:], start.safe_step)
+    now, largest = track.instants[0], np.inf
+    while now < stop:
+        step = min(track.safe_step, largest, stop - now)
+        if stop - now - step < 0.1 * step:
+            step = stop - now  # no sliver of a step at the end
+        while True:
+            target = stop if step == stop - now else now + step
+            arrival = solver(track.states[-1], np.array([target - now]), np.array([target]))
+            if arrival.status[0] == Status.OK:
+                break
+            if step < SMALLEST_STEP * span or target <= now:
+                track.status, track.ended_at = Status(int(arrival.status[0])), target
+                track.body = solver.model.bodies[int(arrival.body[0])]
+                return track
+            step *= 0.5
+        largest, now = 4 * step, target
+        track.instants.append(now)
+        track.states.append((arrival.coordinates, arrival.outputs))
+        track.safe_step = float(arrival.safe_step[0])
+    return track
+
+
+def solve_grid(
+    solver: Solver, track: Track, time: np.ndarray, progress: Callable[[int, int], None] | None
+) -> tuple[Any, np.ndarray, dict[int, str]]:
+    """Solve all instants of a grid from the anchors of a track.
+
+    Returns
+    -------
+    state
+        Jets of all instants, time last.
+    status : array of shape (time,)
+    bodies : dict of int to str
+        For instants that failed, the body farthest from its prediction.
+    """
+    count, anchors = len(time), np.array(track.instants)
+    store = jax.tree.map(lambda *xs: np.concatenate([np.zeros((*xs[0].shape[:-1], count)), *xs], axis=-1), *track.states)
+    instants = np.concatenate([time, anchors])
+    status = np.full(count, int(Status.NOT_REACHED))
+    bodies: dict[int, str] = {}
+    nearest = count + _nearest(anchors, time)
+    reached = time < track.ended_at
+    width = LARGE_BATCH if count > LONG_GRID else SMALL_BATCH
+    done = 0
+    for level, sources in _levels(count, len(anchors)):
+        level = level[reached[level]]
+        if sources is None:
+            source = nearest[level]
+        else:
+            source = np.where(status[level - sources] == Status.OK, level - sources, nearest[level])
+        for first in range(0, len(level), width):
+            lanes, known_at = level[first : first + width], source[first : first + width]
+            known = jax.tree.map(lambda x, at=known_at: x[..., at], store)
+            arrival = solver(known, time[lanes] - instants[known_at], time[lanes])
+            status[lanes] = arrival.status
+            _keep(store, lanes, arrival)
+            for k in np.flatnonzero(arrival.status != Status.OK):
+                bodies[int(lanes[k])] = solver.model.bodies[int(arrival.body[k])]
+                _rescue(solver, track, store, status, bodies, int(lanes[k]), time)
+            done += len(lanes)
+            if progress is not None:
+                progress(done, count)
+    first_lost = int(np.argmin(reached)) if not reached.all() else count
+    if first_lost < count:
+        status[first_lost] = track.status
+        bodies[first_lost] = track.body
+        if progress is not None:
+            progress(count, count)
+    state = jax.tree.map(lambda x: x[..., :count], store)
+    return state, status, bodies
+
+
+def _keep(store: Any, lanes: Any, arrival: Arrival) -> None:
+    def put(whole: np.ndarray, part: np.ndarray) -> None:
+        whole[..., lanes] = part
+
+    jax.tree.map(put, store, (arrival.coordinates, arrival.outputs))
+
+
+def _rescue(
+    solver: Solver, track: Track, store: Any, status: np.ndarray, bodies: dict[int, str], lane: int, time: np.ndarray
+) -> None:
+    """Follow the motion to one instant that its neighbour could not predict, from the anchor before it."""
+    anchor = int(np.searchsorted(track.instants, time[lane], side="right")) - 1
+    start = Track([track.instants[anchor]], [track.states[anchor]], (time[lane] - track.instants[anchor]) / 2)
+    local = follow(solver, start, float(time[lane]), track.instants[-1] - time[0])
+    if local.status != Status.OK:
+        status[lane], bodies[lane] = local.status, local.body
+    elif len(local.states) > 1:
+        status[lane] = Status.OK
+        bodies.pop(lane)
+        jax.tree.map(lambda whole, part: whole.__setitem__((..., lane), part[..., 0]), store, local.states[-1])
+
+
+def _nearest(anchors: np.ndarray, time: np.ndarray) -> np.ndarray:
+    after = np.clip(np.searchsorted(anchors, time), 1, max(len(anchors) - 1, 1))
+    if len(anchors) == 1:
+        return np.zeros(len(time), int)
+    return np.where(time - anchors[after - 1] <= anchors[after] - time, after - 1, after)
+
+
+def _levels(count: int, anchors: int) -> list[tuple[np.ndarray, int | None]]:
+    """Return the instants of each level, with the distance in the grid of the neighbour that each is predicted from.
+
+    The first level starts from the anchors.
+    """
+    stride = 1
+    while count // (2 * stride) >= 2 * anchors:
+        stride *= 2
+    levels: list[tuple[np.ndarray, int | None]] = [(np.arange(0, count, stride), None)]
+    while stride > 1:
+        half = stride // 2
+        levels.append((np.arange(half, count, stride), half))
+        stride = half
+    return levels

@@ -1,0 +1,127 @@
+"""From a mechanism and a time grid to its motion."""
+
+import numbers
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from jounce.errors import MechanismError, SolveError
+from jounce.kinematics.assembly import assemble
+from jounce.kinematics.motion import Motion
+from jounce.kinematics.path import Solver, Track, follow, solve_grid
+from jounce.kinematics.status import Status
+from jounce.mechanism import Mechanism, build, time_grid
+
+LOWEST_ORDER = 4  # of the jets inside: predictions need some, also where the user wants positions only
+HIGHEST_ORDER = 30
+
+
+def solve(
+    mechanism: Mechanism,
+    time: Any = None,
+    order: int = 4,
+    *,
+    tolerance: float = 1e-12,
+    refine: bool = True,
+    strict: bool = True,
+    progress: Callable[[int, int], None] | None = None,
+) -> Motion:
+    """Return the motion of a driven mechanism and its time derivatives up to any order, exact to rounding.
+
+    Positions are found by Newton-Raphson; all derivatives of an instant follow from one factorisation of the
+    Jacobian there (Sommer 2024, equations 1-8 and all orders beyond).
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        Drivers and joints must leave no degree of freedom, and none may be redundant.
+    time : array_like of shape (time,), optional
+        Strictly increasing instants, s; those of the mechanism unless given.
+    order : int, default 4
+        Highest derivative of the outputs: 0 position, 3 jerk, 4 jounce, up to 30.
+    tolerance : float, default 1e-12
+        Largest Newton correction of an accepted position, in rad, or in sizes of the mechanism.
+    refine : bool, default True
+        Correct accepted positions once more, to rounding. Without, they stay as far off as the tolerance lets them.
+    strict : bool, default True
+        Raise if an instant fails. Otherwise it is NaN and `Motion.status` says why.
+    progress : callable, optional
+        Called with the number of instants done and their total.
+
+    Returns
+    -------
+    Motion
+        Outputs, their derivatives and the status of every instant.
+
+    Raises
+    ------
+    MechanismError
+        If the mechanism, the time grid or the order is not valid.
+    AssemblyError
+        If the bodies cannot be put together at the first instant.
+    MobilityError
+        If degrees of freedom are left, or constraints are redundant.
+    SolveError
+        If the motion cannot be followed to an instant (with `strict`); it holds the motion up to there.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> motion = jn.solve(jn.load("examples/four_bar.yaml"), order=6)
+    >>> motion.dataset["psi"].dims
+    ('time', 'derivative')
+    """
+    order = _checked_order(order)
+    if not (isinstance(tolerance, numbers.Real) and np.isfinite(tolerance) and tolerance > 0):
+        raise MechanismError("the tolerance must be a number above zero", name="tolerance", value=tolerance)
+    instants = time_grid(mechanism.time if time is None else time, mechanism.parameter_values)
+    lost = max((output.lost_orders for output in mechanism.outputs.values()), default=0)
+    model, coordinates = assemble(build(mechanism), instants[0], tolerance)
+    solver = Solver(model, max(order + lost, LOWEST_ORDER), float(tolerance), refine)
+    track = follow(solver, _first(solver, coordinates, instants[:1]), instants[-1], instants[-1] - instants[0])
+    state, statuses, bodies = solve_grid(solver, track, instants, progress)
+    motion = Motion(mechanism, model, instants, order, state, statuses, bodies)
+    if strict:
+        raise_for_status(motion)
+    return motion
+
+
+def raise_for_status(motion: Motion) -> None:
+    """Raise SolveError, with the first instant that failed and what to do, unless all were solved."""
+    failed = np.flatnonzero(motion.status != Status.OK)
+    if not failed.size:
+        return
+    first = int(failed[0])
+    status = Status(int(motion.status[first]))
+    body = motion.failed_bodies.get(first, "")
+    where = f"t = {motion.time[first]:g} s" + (f", body {body}" if body else "")
+    total = len(motion.time)
+    message = f"{where}: {_words(status)}: {status.advice}"
+    solved = f"{total - failed.size} of {total} instants were solved"
+    raise SolveError(f"{message} ({solved})", motion=motion, status=status)
+
+
+def _checked_order(order: Any) -> int:
+    whole = isinstance(order, numbers.Integral) and not isinstance(order, bool)
+    if not whole or not 0 <= order <= HIGHEST_ORDER:
+        message = f"the order of derivatives must be a whole number from 0 to {HIGHEST_ORDER}"
+        raise MechanismError(message, name="order", value=order)
+    return int(order)
+
+
+def _first(solver: Solver, coordinates: dict[str, np.ndarray], instant: np.ndarray) -> Track:
+    """Solve the first instant with its derivatives, from its assembled position."""
+    levels = solver.order + 1
+    still = {name: np.stack([x, *[np.zeros_like(x)] * (levels - 1)]) for name, x in coordinates.items()}
+    angles = tuple(np.zeros((levels, 1, group.instances, 1)) for group in solver.model.system.outputs)
+    arrival = solver((still, angles), np.zeros(1), instant)
+    status = Status(int(arrival.status[0]))
+    if status != Status.OK:
+        body = solver.model.bodies[int(arrival.body[0])]
+        raise SolveError(f"t = {instant[0]:g} s, body {body}: {_words(status)}: {status.advice}", status=status)
+    return Track([float(instant[0])], [(arrival.coordinates, arrival.outputs)], float(arrival.safe_step[0]))
+
+
+def _words(status: Status) -> str:
+    return status.name.lower().replace("_", " ")

@@ -1,0 +1,31 @@
+"""Outcomes of a solve, one for each instant, and what to do about them."""
+
+import enum
+
+
+class Status(enum.IntEnum):
+    """Outcome at one instant."""
+
+    OK = 0
+    NOT_ASSEMBLED = 1
+    SINGULAR = 2
+    BRANCH_JUMP = 3
+    NOT_CONVERGED = 4
+    NOT_REACHED = 5
+
+    @property
+    def advice(self) -> str:
+        """What the outcome means and what to do."""
+        return _ADVICE[self]
+
+
+_ADVICE = {
+    Status.OK: "solved",
+    Status.NOT_ASSEMBLED: "the bodies cannot be put together; check lengths and the driver's range",
+    Status.SINGULAR: "the mechanism is at a singular position (a dead point), where its motion is not determined; "
+    "drive another body, or keep the driver's range away from it",
+    Status.BRANCH_JUMP: "the solution left its predicted path for another assembly branch, or a motion law jumps; "
+    "check that the motion laws are continuous and that the mechanism does not pass a dead point",
+    Status.NOT_CONVERGED: "Newton-Raphson did not reach the tolerance; check the lengths, or ask for a larger tolerance",
+    Status.NOT_REACHED: "not computed, because the motion could not be followed up to here",
+}

@@ -1,0 +1,14 @@
+"""Mechanisms: named bodies, joints, drivers, outputs and parameters, and their numeric model."""
+
+from jounce.mechanism.builder import Model as Model, build as build
+from jounce.mechanism.mechanism import Body as Body, Mechanism as Mechanism
+from jounce.mechanism.outputs import (
+    AbstractOutput as AbstractOutput,
+    AngleOutput as AngleOutput,
+    AngularVelocityOutput as AngularVelocityOutput,
+    DistanceOutput as DistanceOutput,
+    PlanarRelativeAngleOutput as PlanarRelativeAngleOutput,
+    PointOutput as PointOutput,
+    RelativeAngleOutput as RelativeAngleOutput,
+)
+from jounce.mechanism.time import TimeGrid as TimeGrid, time_grid as time_grid

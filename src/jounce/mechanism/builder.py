@@ -1,0 +1,173 @@
+"""From names to indices, once: the numeric model of a mechanism and where each of its rows comes from."""
+
+import dataclasses
+from functools import lru_cache
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jounce.constraints.base import field_kind, value_fields
+from jounce.errors import JounceError, MechanismError
+from jounce.jet import Jet
+from jounce.mechanism.mechanism import GROUND, Mechanism
+from jounce.mechanism.resolve import check_value, resolve
+from jounce.mechanism.system import (
+    POSITION_COMPONENTS,
+    Group,
+    System,
+    group_elements,
+    jacobian_cells,
+)
+from jounce.rigid import PlanarPose, SpatialPose
+
+
+@dataclasses.dataclass(frozen=True)
+class Model:
+    """The numeric model of a mechanism.
+
+    Parameters
+    ----------
+    system : System
+        Residual, Jacobian and outputs as functions of the pose of all bodies.
+    pose_type : type
+        PlanarPose or SpatialPose.
+    guess : dict of str to array
+        Coordinates of the starting guess of all bodies, the ground first, shape (..., bodies, 1).
+    rows : tuple of str
+        Name of the joint or driver of each row of the residual.
+    bodies : tuple of str
+        Names of the moving bodies, in the order of the pose.
+    outputs : tuple of tuple of str
+        Names of the outputs in each group of the system.
+    length : float
+        Size of the mechanism, by which positions are scaled, m.
+    """
+
+    system: System
+    pose_type: type
+    guess: dict[str, Any]
+    rows: tuple[str, ...]
+    bodies: tuple[str, ...]
+    outputs: tuple[tuple[str, ...], ...]
+    length: float
+
+
+def build(mechanism: Mechanism) -> Model:
+    """Return the numeric model of a mechanism.
+
+    Raises
+    ------
+    MechanismError
+        If a value does not fit: a vector of wrong length, a zero axis, a negative length, a number not finite.
+    ExpressionError
+        If an expression uses a name that is not a parameter.
+    """
+    parameters = mechanism.parameter_values
+    components = POSITION_COMPONENTS[mechanism.space]
+    body_index = {name: k for k, name in enumerate((GROUND, *mechanism.bodies))}
+    pose_type = PlanarPose if components == 2 else SpatialPose
+    guess = starting_guess(mechanism, parameters, components)
+
+    elements = {f"joints.{k}": v for k, v in mechanism.joints.items()}
+    elements |= {f"drivers.{k}": v for k, v in mechanism.drivers.items()}
+    groups, names = group_elements(elements, parameters, body_index, components)
+    groups = tuple(_with_offsets(group, pose_type, guess) for group in groups)
+    wanted = {f"outputs.{k}": v for k, v in mechanism.outputs.items()}
+    outputs, output_names = group_elements(wanted, parameters, body_index, components)
+
+    row_counts = [_row_count(group, pose_type, guess) for group in groups]
+    row_names = [n for members, count in zip(names, row_counts, strict=True) for _ in range(count) for n in members]
+    length = _size(groups, guess)
+    system = System(
+        groups,
+        outputs,
+        jacobian_cells(groups, row_counts, components + pose_type.turns, len(mechanism.bodies)),
+        np.ones((len(row_names), 1)),
+        np.array([length] * components + [1.0] * pose_type.turns),
+        len(mechanism.bodies),
+    )
+    plain = tuple(tuple(n.removeprefix("outputs.") for n in members) for members in output_names)
+    return Model(system, pose_type, guess, tuple(row_names), tuple(mechanism.bodies), plain, length)
+
+
+def starting_guess(mechanism: Mechanism, parameters: dict[str, Any], components: int) -> dict[str, Any]:
+    """Return the coordinates of all bodies at the starting guess, the ground first."""
+    positions, attitudes = [np.zeros(components)], [np.zeros(()) if components == 2 else np.array([1.0, 0, 0, 0])]
+    for name, body in mechanism.bodies.items():
+        place = f"bodies.{name}"
+        positions.append(_guess(body.position, f"{place}.position", "vector", components, parameters))
+        if components == 2:
+            attitudes.append(_guess(body.angle, f"{place}.angle", "scalar", components, parameters))
+        else:
+            quaternion = [1.0, 0.0, 0.0, 0.0] if body.orientation is None else body.orientation
+            quaternion = _guess(quaternion, f"{place}.orientation", "vector", 4, parameters)
+            if not np.any(quaternion):
+                raise MechanismError("Euler parameters must not all be zero", name=f"{place}.orientation")
+            attitudes.append(quaternion / np.sqrt(np.sum(quaternion * quaternion)))
+    position, attitude = (np.stack([np.asarray(x) for x in xs], axis=-1)[..., None] for xs in (positions, attitudes))
+    return {"position": position, "angle" if components == 2 else "quaternion": attitude}
+
+
+def _guess(value: Any, name: str, kind: str, components: int, parameters: dict[str, Any]) -> Any:
+    try:
+        value = resolve(value, parameters)
+        check_value(name, kind, value, components)
+    except JounceError as error:
+        raise error.located(name=name) from None
+    return value
+
+
+def _row_count(group: Group, pose_type: type, guess: dict[str, Any]) -> int:
+    leaves, structure = jax.tree.flatten((group, guess))
+    return _row_count_of(structure, tuple(jax.ShapeDtypeStruct(np.shape(x), np.float64) for x in leaves), pose_type)
+
+
+@lru_cache(maxsize=1000)
+def _row_count_of(structure: Any, leaves: tuple[Any, ...], pose_type: type) -> int:
+    """Read the number of rows off the shape of the residual; it depends on the structure only, so is kept."""
+
+    def residual(leaves: tuple[Any, ...], time: Any) -> Any:
+        group, guess = jax.tree.unflatten(structure, leaves)
+        return group.residual(pose_at(guess, pose_type), Jet([time])).coefficients[0]
+
+    return jax.eval_shape(residual, leaves, np.zeros((1, 1))).shape[0]
+
+
+def pose_at(coordinates: dict[str, Any], pose_type: type) -> Any:
+    """Return the pose of order zero that has the given coordinates."""
+    return pose_type.from_coordinates({name: Jet([value]) for name, value in coordinates.items()})
+
+
+def _with_offsets(group: Group, pose_type: type, guess: dict[str, Any]) -> Group:
+    """Fill in the offsets that were not given: those with which the starting guess fulfils the joint."""
+    fields = value_fields(type(group.element))
+    if "offset" not in fields or group.element.offset is not None:
+        return group
+
+    def residual(offset: Any) -> Any:
+        trial = eqx.tree_at(lambda g: g.element.offset, group, offset, is_leaf=lambda x: x is None)
+        return trial.residual(pose_at(guess, pose_type), Jet([jnp.zeros((1, 1))])).coefficients[0]
+
+    def fulfilling() -> Any:
+        zero = jnp.zeros((group.instances, 1))
+        value, slope = jax.jvp(residual, (zero,), (jnp.ones_like(zero),))
+        return -jnp.sum(value * slope, axis=0)  # the slope is -1 in the row that holds the offset, else 0
+
+    offset = np.asarray(jax.jit(fulfilling)())
+    return eqx.tree_at(lambda g: g.element.offset, group, offset, is_leaf=lambda x: x is None)
+
+
+def _size(groups: tuple[Group, ...], guess: dict[str, Any]) -> float:
+    """Return the largest distance among the points of the joints and the bodies of the guess, 1 if there is none."""
+    sizes = [np.max(np.linalg.norm(guess["position"], axis=0))]
+    for group in groups:
+        for name, field in value_fields(type(group.element)).items():
+            value = getattr(group.element, name)
+            if field_kind(field) == "vector" and name.startswith("point") and not isinstance(value, jax.core.Tracer):
+                sizes.append(np.max(np.linalg.norm(value, axis=0)))
+            elif name in ("length", "radius") and not isinstance(value, jax.core.Tracer):
+                sizes.append(np.max(value))
+    return float(max(sizes)) or 1.0

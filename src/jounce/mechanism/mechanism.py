@@ -1,0 +1,165 @@
+"""The mechanism as its user sees it: named bodies, joints, drivers, outputs and parameters; frozen."""
+
+import dataclasses
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Any
+
+from jounce.constraints import AbstractConstraint
+from jounce.errors import ExpressionError, MechanismError, did_you_mean
+from jounce.mechanism.outputs import AbstractOutput
+from jounce.trajectory import Expression
+
+GROUND = "ground"
+RESERVED = ("t", "pi", "deg")
+
+
+@dataclasses.dataclass(frozen=True)
+class Body:
+    """A rigid body: where it is guessed to start, and its mass where forces are wanted.
+
+    Parameters
+    ----------
+    position : sequence
+        Starting guess of the origin of its frame in the global frame, (2,) or (3,), m.
+    angle : number or expression, default 0
+        Starting guess of the angle of a planar body, rad.
+    orientation : sequence of 4 numbers, optional
+        Starting guess of the Euler parameters [e0, e1, e2, e3] of a spatial body; normalised when used.
+    mass, inertia, center_of_mass : optional
+        Kept for the dynamics; kinematics does not use them. kg, kg m^2, m.
+    """
+
+    position: Any
+    angle: Any = 0.0
+    orientation: Any = None
+    mass: Any = None
+    inertia: Any = None
+    center_of_mass: Any = None
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Mechanism:
+    """Bodies, the joints and drivers between them, and what is to be known of their motion.
+
+    Parameters
+    ----------
+    space : str
+        ``"planar"`` or ``"spatial"``.
+    bodies : dict of str to Body
+        The moving bodies; the body ``"ground"`` always exists besides.
+    joints, drivers : dict of str to AbstractConstraint
+        By name; their values may be numbers (SI), or expressions of the parameters.
+    outputs : dict of str to AbstractOutput, optional
+        Quantities wanted, by name.
+    parameters : dict of str to number or expression, optional
+        Named values, SI.
+    gravity : sequence, optional
+        Kept for the dynamics, m/s^2.
+    time : array_like, optional
+        The instants that `jounce.solve` takes when it is given none, s.
+    title : str, optional
+        One line for tables and figures.
+
+    Raises
+    ------
+    MechanismError
+        If a name is missing, used twice or reserved, or a joint does not fit the space.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> crank = jn.Mechanism(
+    ...     space="planar",
+    ...     parameters={"speed": 2.0},
+    ...     bodies={"crank": jn.Body(position=[0.0, 0.0])},
+    ...     joints={"O": jn.planar.Revolute(("ground", "crank"), point_i=[0, 0], point_j=[0, 0])},
+    ...     drivers={"theta": jn.drivers.CoordinateDriver(("ground", "crank"), "angle", motion="speed*t")},
+    ...     outputs={"tip": jn.PointOutput("crank", point=[0.1, 0.0])},
+    ... )
+    >>> motion = jn.solve(crank, [0.0, 0.1], order=1)
+    >>> float(motion.dataset["tip"].sel(component="y", derivative=1)[0])
+    0.2
+    """
+
+    space: str
+    bodies: Mapping[str, Body]
+    joints: Mapping[str, AbstractConstraint]
+    drivers: Mapping[str, AbstractConstraint] = dataclasses.field(default_factory=dict)
+    outputs: Mapping[str, AbstractOutput] = dataclasses.field(default_factory=dict)
+    parameters: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    gravity: Any = None
+    time: Any = None
+    title: str = ""
+
+    def __post_init__(self):
+        if self.space not in ("planar", "spatial"):
+            raise MechanismError("space is planar or spatial", name="space", value=self.space)
+        if not self.bodies:
+            raise MechanismError("a mechanism needs at least one moving body", name="bodies", value=dict(self.bodies))
+        if GROUND in self.bodies:
+            raise MechanismError("the body 'ground' always exists and never moves", name="bodies.ground")
+        for name in self.parameters:
+            if name in RESERVED:
+                raise MechanismError(f"the name '{name}' is reserved", name=f"parameters.{name}")
+        for name in self.joints.keys() & self.drivers.keys():
+            raise MechanismError("a joint and a driver have the same name", name=f"drivers.{name}")
+        for kind, elements in self.elements.items():
+            for name, element in elements.items():
+                self._check_element(kind, name, element)
+
+    def _check_element(self, kind: str, name: str, element: Any) -> None:
+        place = f"{kind}.{name}"
+        if element.space and element.space != self.space:
+            raise MechanismError(f"is {element.space}, in a {self.space} mechanism", name=place)
+        for body in element.bodies:
+            if body != GROUND and body not in self.bodies:
+                message = f"no body has this name; {did_you_mean(body, [GROUND, *self.bodies])}"
+                raise MechanismError(message, name=f"{place}.bodies", value=body)
+
+    @property
+    def elements(self) -> dict[str, Mapping[str, Any]]:
+        """Joints, drivers and outputs, by kind."""
+        return {"joints": self.joints, "drivers": self.drivers, "outputs": self.outputs}
+
+    @cached_property
+    def parameter_values(self) -> dict[str, Any]:
+        """Values of all parameters, those given by expressions of others too.
+
+        Raises
+        ------
+        MechanismError
+            If expressions form a circle.
+        """
+        expressions = {k: Expression(v) if isinstance(v, str) else v for k, v in self.parameters.items()}
+        values = {k: v for k, v in expressions.items() if not isinstance(v, Expression)}
+        waiting = {k: v for k, v in expressions.items() if isinstance(v, Expression)}
+        while waiting:
+            ready = [k for k, v in waiting.items() if v.names <= values.keys()]
+            for name in ready:
+                values[name] = waiting.pop(name).evaluate(values)
+            if not ready:
+                name, expression = next(iter(waiting.items()))
+                try:
+                    expression.check(self.parameters)
+                except ExpressionError as error:
+                    raise error.located(name=f"parameters.{name}") from None
+                circle = ", ".join(waiting)
+                raise MechanismError(f"parameters depend on each other in a circle: {circle}", name=f"parameters.{name}")
+        return values
+
+    def with_parameters(self, **values: Any) -> "Mechanism":
+        """Return the mechanism with other values of some parameters, SI.
+
+        Solving it does not compile anything again.
+
+        Raises
+        ------
+        MechanismError
+            If a parameter does not exist.
+        """
+        for name in values:
+            if name not in self.parameters:
+                message = f"no parameter has this name; {did_you_mean(name, self.parameters)}"
+                raise MechanismError(message, name="parameters", value=name)
+        return dataclasses.replace(self, parameters={**self.parameters, **values})

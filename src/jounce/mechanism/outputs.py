@@ -1,0 +1,119 @@
+"""Outputs: what a user wants to know of a motion, each one function on the jets of its bodies."""
+
+import abc
+from typing import Any, ClassVar
+
+import equinox as eqx
+
+from jounce.constraints.base import Vector, check_text
+from jounce.constraints.spatial import relative_angle
+from jounce.errors import MechanismError
+from jounce.jet import Jet, sqrt
+
+FRAMES = ("global", "body")
+
+
+class AbstractOutput(eqx.Module):
+    """A quantity of a motion: one function on jets, as a joint is, with the unit of its value.
+
+    Parameters
+    ----------
+    bodies : tuple of str
+        Names of the bodies that it depends on, in the order of the poses that `evaluate` takes.
+    """
+
+    bodies: tuple[str, ...] = eqx.field(static=True, converter=lambda b: (b,) if isinstance(b, str) else tuple(b))
+
+    unit: ClassVar[str] = "m"
+    space: ClassVar[str] = ""  # planar or spatial where only one makes sense
+    turning: ClassVar[bool] = False  # an angle known up to whole turns, made continuous along the motion
+    lost_orders: ClassVar[int] = 0  # derivatives by which it is shorter than the motion
+    body_count: ClassVar[int] = 1
+
+    def __check_init__(self):
+        if len(self.bodies) != self.body_count:
+            message = f"this output takes {self.body_count} bodies"
+            raise MechanismError(message, name="bodies", value=list(self.bodies))
+
+    @abc.abstractmethod
+    def evaluate(self, *bodies: Any) -> Jet:
+        """Return the jet of the quantity, of shape (...) or (components, ...), from the poses of the bodies."""
+
+
+class PointOutput(AbstractOutput):
+    """Global position of a point of a body, m."""
+
+    point: Vector  # m, in the frame of the body
+
+    def evaluate(self, body):
+        return body.point(self.point)
+
+
+class AngleOutput(AbstractOutput):
+    """Angle of a planar body, rad, continuous over turns."""
+
+    unit = "rad"
+    space = "planar"
+
+    def evaluate(self, body):
+        return body.angle
+
+
+class RelativeAngleOutput(AbstractOutput):
+    """Signed angle about an axis of body i, from a vector of body i to one of body j, rad, continuous over turns.
+
+    Without vectors it is the angle of ``A_i^T A_j`` about the axis.
+    """
+
+    axis: Vector
+    vector_i: Vector = None
+    vector_j: Vector = None
+
+    unit = "rad"
+    space = "spatial"
+    turning = True
+    body_count = 2
+
+    def evaluate(self, body_i, body_j):
+        return relative_angle(body_i, body_j, self.axis, self.vector_i, self.vector_j)
+
+
+class PlanarRelativeAngleOutput(AbstractOutput):
+    """Angle of planar body j relative to body i, rad, continuous over turns."""
+
+    unit = "rad"
+    space = "planar"
+    body_count = 2
+
+    def evaluate(self, body_i, body_j):
+        return body_j.angle - body_i.angle
+
+
+class AngularVelocityOutput(AbstractOutput):
+    """Angular velocity of a body in the global frame or its own, rad/s, shape (3, ...) in space."""
+
+    frame: str = eqx.field(static=True, default="global")
+
+    unit = "rad/s"
+    lost_orders = 1
+
+    def __check_init__(self):
+        check_text(type(self), "frame", self.frame, FRAMES)
+
+    def evaluate(self, body):
+        if hasattr(body, "angle"):
+            return body.angle.differentiate()
+        return body.global_angular_velocity() if self.frame == "global" else body.angular_velocity
+
+
+class DistanceOutput(AbstractOutput):
+    """Distance of a point on body i from one on body j, m."""
+
+    point_i: Vector  # m, in the frame of each body
+    point_j: Vector
+
+    body_count = 2
+
+    def evaluate(self, body_i, body_j):
+        d = body_j.point(self.point_j) - body_i.point(self.point_i)
+        return sqrt(d.dot(d))

@@ -1,0 +1,158 @@
+"""A mechanism in numbers: instances of a type stacked, bodies by index, residual and Jacobian of the whole."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jounce.jet import Jet
+from jounce.jet.vectors import stack_jets
+from jounce.mechanism.resolve import group_key, resolve_element, stack_elements
+
+POSITION_COMPONENTS = {"planar": 2, "spatial": 3}
+
+
+class Group(eqx.Module):
+    """All joints, drivers or outputs of one type, evaluated together.
+
+    Parameters
+    ----------
+    element : AbstractConstraint or AbstractOutput
+        Its values have shape (..., instances, 1).
+    bodies : tuple of tuple of int
+        For each body slot, the indices of the bodies of the instances; 0 is the ground.
+    """
+
+    element: Any
+    bodies: tuple[tuple[int, ...], ...] = eqx.field(static=True)
+
+    @property
+    def instances(self) -> int:
+        """Number of joints, drivers or outputs in the group."""
+        return len(self.bodies[0])
+
+    def residual(self, pose: Any, time: Jet) -> Jet:
+        """Return the residuals, shape (rows, instances, batch)."""
+        return _with_rows(self.element.residual(*self._poses(pose), time))
+
+    def evaluate(self, pose: Any) -> Jet:
+        """Return the outputs, shape (components, instances, batch)."""
+        return _with_rows(self.element.evaluate(*self._poses(pose)))
+
+    def derivative_blocks(self, pose: Any, time: Jet, scale: Any) -> list[Any]:
+        """Return the derivatives of the residuals by the coordinates of the bodies in each slot that may move.
+
+        They are the linear map from the coefficients of order one of a body to those of the residual. Each block has
+        the shape (coordinates, rows, instances, batch).
+        """
+        poses = self._poses(pose)
+        batch = poses[0].position.shape[-2:]
+        still = [p.extended(None, None) for p in poses]
+        directions = jnp.diag(scale)[:, :, None, None]
+        blocks = []
+        for slot in self.moving_slots:
+
+            def slope(shift: Any, turn: Any, slot: int = slot) -> Any:
+                moved = list(still)
+                moved[slot] = poses[slot].extended(shift, turn)
+                value, rate = _with_rows(self.element.residual(*moved, time)).coefficients
+                return jnp.zeros_like(value) if rate is None else rate
+
+            def wide(direction: Any) -> Any:
+                return jnp.broadcast_to(direction, (*direction.shape[:2], *batch))
+
+            split = pose.shifts
+            by_shift = jax.vmap(lambda d: slope(d, None))(wide(directions[:split, :split]))
+            by_turn = jax.vmap(lambda d: slope(None, d))(wide(directions[split:, split:]))
+            blocks.append(jnp.concatenate([by_shift, by_turn]))
+        return blocks
+
+    @property
+    def moving_slots(self) -> tuple[int, ...]:
+        """Slots that hold a body other than the ground."""
+        return tuple(slot for slot, bodies in enumerate(self.bodies) if any(bodies))
+
+    def _poses(self, pose: Any) -> list[Any]:
+        return [pose.take(indices) for indices in self.bodies]
+
+
+def _with_rows(jet: Jet) -> Jet:
+    return jet.map(lambda c: c[None]) if len(jet.shape) == 2 else jet
+
+
+def group_elements(
+    elements: Mapping[str, Any], parameters: Mapping[str, Any], body_index: Mapping[str, int], components: int
+) -> tuple[tuple[Group, ...], tuple[tuple[str, ...], ...]]:
+    """Return the groups of all elements, and the names of the instances in each."""
+    found: dict[Any, list[tuple[str, Any, dict]]] = {}
+    for name, element in elements.items():
+        values = resolve_element(element, parameters, components, name)
+        found.setdefault(group_key(element, values), []).append((name, element, values))
+    groups, names = [], []
+    for members in found.values():
+        instance_names, instances, values = zip(*members, strict=True)
+        slots = zip(*([body_index[b] for b in e.bodies] for e in instances), strict=True)
+        groups.append(Group(stack_elements(instances, values), tuple(slots)))
+        names.append(instance_names)
+    return tuple(groups), tuple(names)
+
+
+class System(eqx.Module):
+    """All constraints of a mechanism as functions on one pose of all its bodies, the ground first.
+
+    Coordinates of positions are scaled by a length of the mechanism, and rows by the size of their derivatives, so
+    that steps and pivots mean the same for a watch and a crane.
+    """
+
+    groups: tuple[Group, ...]
+    outputs: tuple[Group, ...]
+    cells: Any  # where each entry of the Jacobian stands among the blocks of the groups, shape (rows, columns)
+    row_scale: Any  # shape (rows, 1)
+    column_scale: Any  # one for each coordinate of a body
+    body_count: int = eqx.field(static=True)
+
+    def residual(self, pose: Any, time: Jet) -> Jet:
+        """Return the residuals of all constraints, shape (rows, batch), scaled."""
+        parts = [group.residual(pose, time).map(_flat) for group in self.groups]
+        return stack_jets(parts, jnp.concatenate) * self.row_scale
+
+    def jacobian(self, pose: Any, time: Jet) -> Any:
+        """Return the scaled Jacobian at a pose of order zero, shape (rows, columns, batch)."""
+        frozen = Jet.constant(time.coefficients[0], 1)
+        blocks = [b for group in self.groups for b in group.derivative_blocks(pose, frozen, self.column_scale)]
+        entries = jnp.concatenate([*map(_flat, blocks), jnp.zeros_like(time.coefficients[0])])
+        return entries[self.cells] * self.row_scale[:, :, None]
+
+    def coordinates(self, solution: Any, shifts: int) -> tuple[Any, Any]:
+        """Turn a scaled solution, shape (columns, batch), into shifts and turns of all bodies, (c, bodies, batch)."""
+        count = self.column_scale.shape[0]
+        parts = jnp.swapaxes(solution.reshape(self.body_count, count, -1), 0, 1)
+        parts = jnp.pad(parts * self.column_scale[:, None, None], ((0, 0), (1, 0), (0, 0)))
+        return parts[:shifts], parts[shifts:]
+
+
+def _flat(block: Any) -> Any:
+    return block.reshape(-1, block.shape[-1])
+
+
+def jacobian_cells(groups: tuple[Group, ...], rows: list[int], coordinate_count: int, body_count: int) -> np.ndarray:
+    """Return where each entry of the Jacobian stands among the flattened blocks; beyond their end there is a zero."""
+    row_total = sum(r * g.instances for r, g in zip(rows, groups, strict=True))
+    total = sum(r * g.instances * coordinate_count * len(g.moving_slots) for r, g in zip(rows, groups, strict=True))
+    cells = np.full((row_total, body_count * coordinate_count), total, np.int32)
+    first_row = position = 0
+    for r, group in zip(rows, groups, strict=True):
+        n = group.instances
+        block_rows = first_row + np.arange(r * n).reshape(r, n)
+        for bodies in (np.array(group.bodies[slot]) for slot in group.moving_slots):
+            places = position + np.arange(coordinate_count * r * n).reshape(coordinate_count, r, n)
+            for c in range(coordinate_count):
+                moving = bodies > 0
+                columns = (bodies[moving] - 1) * coordinate_count + c
+                cells[block_rows[:, moving], np.broadcast_to(columns, (r, columns.size))] = places[c][:, moving]
+            position += coordinate_count * r * n
+        first_row += r * n
+    return cells

@@ -1,0 +1,85 @@
+"""Time grids: evenly spaced or given instant by instant, checked before any computing."""
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from jounce.errors import MechanismError
+from jounce.mechanism.resolve import resolve
+
+MAX_INSTANTS = 10_000_000
+
+
+@dataclasses.dataclass(frozen=True)
+class TimeGrid:
+    """Evenly spaced instants, s.
+
+    Parameters
+    ----------
+    start, stop : number or expression
+        First instant, and last one where it lies on the grid, s.
+    step : number or expression, optional
+        Spacing, s; or `count`, the number of instants with both ends.
+    """
+
+    start: Any
+    stop: Any
+    step: Any = None
+    count: Any = None
+
+
+def time_grid(time: Any, parameters: Mapping[str, Any]) -> np.ndarray:
+    """Return the instants of a grid, shape (time,), s.
+
+    Raises
+    ------
+    MechanismError
+        If there is none, or they are not finite, not increasing, or more than ten million.
+    """
+    if time is None:
+        raise MechanismError("no time grid is given, by the mechanism or by the call", name="time")
+    if isinstance(time, TimeGrid):
+        return _spaced(time, parameters)
+    try:
+        instants = np.asarray(time, float)
+    except (TypeError, ValueError):
+        raise MechanismError("the instants must be numbers", name="time", value=time) from None
+    if instants.ndim != 1 or not instants.size:
+        raise MechanismError("the time grid must be a list of at least one instant", name="time", value=time)
+    if not np.isfinite(instants).all():
+        first = int(np.flatnonzero(~np.isfinite(instants))[0])
+        raise MechanismError("instants must be finite", name=f"time[{first}]", value=float(instants[first]))
+    if (np.diff(instants) <= 0).any():
+        first = int(np.flatnonzero(np.diff(instants) <= 0)[0]) + 1
+        message = f"instants must increase strictly; this one does not come after {instants[first - 1]:g}"
+        raise MechanismError(message, name=f"time[{first}]", value=float(instants[first]))
+    return instants
+
+
+def _spaced(grid: TimeGrid, parameters: Mapping[str, Any]) -> np.ndarray:
+    given = {k: getattr(grid, k) for k in ("start", "stop", "step", "count") if getattr(grid, k) is not None}
+    values = {k: float(resolve(v, parameters)) for k, v in given.items()}
+    for name, value in values.items():
+        if not np.isfinite(value):
+            raise MechanismError("must be finite", name=f"time.{name}", value=value)
+    start, stop = values["start"], values["stop"]
+    if ("step" in values) == ("count" in values):
+        raise MechanismError("a time grid takes either step or count", name="time", value=given)
+    if stop < start:
+        raise MechanismError(f"stop must not come before start ({start:g} s)", name="time.stop", value=stop)
+    if "count" in values:
+        count = values["count"]
+        if count < 1 or count != int(count) or (count == 1) != (stop == start):
+            message = "count must be a whole number of instants, at least 2 unless start and stop are the same"
+            raise MechanismError(message, name="time.count", value=count)
+    elif values["step"] <= 0:
+        raise MechanismError("the step must be greater than zero", name="time.step", value=values["step"])
+    else:
+        count = np.floor((stop - start) / values["step"] * (1 + 1e-12) + 1e-9) + 1
+    if count > MAX_INSTANTS:
+        raise MechanismError(f"a time grid holds at most {MAX_INSTANTS} instants", name="time", value=int(count))
+    if "count" in values:
+        return np.linspace(start, stop, int(count))
+    return start + values["step"] * np.arange(int(count))

@@ -1,0 +1,31 @@
+"""Selection of bodies from arrays whose last two axes are bodies and batch."""
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jounce.jet import Jet
+
+
+def take_bodies(jet: Jet, bodies: tuple[int, ...]) -> Jet:
+    """Return the jet of the given bodies, in that order, from one of shape (..., bodies, batch).
+
+    The ground alone is a constant, so that nothing is computed with its derivatives.
+    """
+    if any(bodies):
+        return jet.map(lambda c: _taken(c, bodies))
+    return Jet.constant(_taken(jet.coefficients[0], bodies), jet.order)
+
+
+def _taken(array: Any, bodies: tuple[int, ...]) -> Any:
+    """Select by slices where indices are equal or evenly spaced: XLA merges them into what follows, not a gather."""
+    first, *others = bodies
+    stride = others[0] - first if others else 1
+    if len(set(bodies)) == 1:
+        one = jax.lax.slice_in_dim(array, first, first + 1, axis=jnp.ndim(array) - 2)
+        return jnp.broadcast_to(one, (*one.shape[:-2], len(bodies), one.shape[-1]))
+    if stride > 0 and bodies == tuple(range(first, bodies[-1] + 1, stride)):
+        return jax.lax.slice_in_dim(array, first, bodies[-1] + 1, stride, axis=jnp.ndim(array) - 2)
+    return array.at[..., np.array(bodies), :].get(mode="promise_in_bounds")

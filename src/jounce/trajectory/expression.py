@@ -1,0 +1,384 @@
+"""Expressions of named values, parsed with a whitelist over Python's syntax tree and never handed to ``eval``."""
+
+from __future__ import annotations
+
+import ast
+import difflib
+import math
+import numbers
+import re
+import warnings
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, NoReturn
+
+from jounce.errors import ExpressionError, did_you_mean, show_value
+
+__all__ = ["CONSTANTS", "FUNCTIONS", "Expression"]
+
+CONSTANTS: dict[str, float] = {"pi": math.pi, "deg": math.pi / 180.0}
+"""Constants that every expression knows."""
+
+FUNCTIONS: dict[str, tuple[int, Callable[..., float]]] = {
+    "sin": (1, math.sin),
+    "cos": (1, math.cos),
+    "tan": (1, math.tan),
+    "asin": (1, math.asin),
+    "acos": (1, math.acos),
+    "atan": (1, math.atan),
+    "atan2": (2, math.atan2),
+    "sinh": (1, math.sinh),
+    "cosh": (1, math.cosh),
+    "tanh": (1, math.tanh),
+    "exp": (1, math.exp),
+    "log": (1, math.log),
+    "sqrt": (1, math.sqrt),
+    "abs": (1, math.fabs),
+}
+"""Functions that every expression knows: number of arguments, and what to call on plain numbers."""
+
+MAX_CHARACTERS = 2000
+MAX_NESTING = 50
+
+_OPERATORS = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**", ast.UAdd: "pos", ast.USub: "neg"}
+_FOUND = {
+    ast.Attribute: "an attribute",
+    ast.Subscript: "an index in brackets",
+    ast.Lambda: "a lambda",
+    ast.IfExp: "a conditional",
+    ast.Compare: "a comparison",
+    ast.BoolOp: "a logical operator",
+    ast.List: "a list",
+    ast.Tuple: "a comma",
+    ast.Dict: "a mapping",
+    ast.Set: "a set",
+    ast.ListComp: "a comprehension",
+    ast.SetComp: "a comprehension",
+    ast.DictComp: "a comprehension",
+    ast.GeneratorExp: "a comprehension",
+    ast.JoinedStr: "a string",
+    ast.NamedExpr: "an assignment",
+    ast.Starred: "a starred argument",
+    ast.Await: "await",
+    ast.Yield: "yield",
+    ast.YieldFrom: "yield",
+}
+_ALLOWED = "allowed are numbers, names, + - * / **, parentheses and the usual functions"
+
+# One instruction of the postfix program: kind, operand, number of arguments, column.
+_Instruction = tuple[str, Any, int, int]
+
+
+class Expression:
+    """A formula of numbers, names and the usual functions, safe to read from a file.
+
+    Allowed are numbers, names, ``+ - * / **``, parentheses, the constants ``pi`` and ``deg`` (pi/180), and the functions
+    sin cos tan asin acos atan atan2 sinh cosh tanh exp log sqrt abs. Angles are in radians. An expression is frozen,
+    and two of them are equal when their texts are.
+
+    Parameters
+    ----------
+    text : str
+        The formula, at most 2000 ASCII characters, nested at most 50 deep.
+    names : iterable of str, optional
+        The free names that may appear; any name may when not given.
+
+    Attributes
+    ----------
+    text : str
+        The formula, without surrounding spaces.
+    names : frozenset of str
+        The free names in it; constants and functions are not among them.
+
+    Raises
+    ------
+    ExpressionError
+        Anything else is in the text; the message names the piece and its column.
+
+    Examples
+    --------
+    >>> law = Expression("30*deg + 60*deg*sin(2*pi*t/tau)")
+    >>> sorted(law.names)
+    ['t', 'tau']
+    >>> round(law.evaluate({"t": 0.5, "tau": 2.0}) / CONSTANTS["deg"], 9)
+    90.0
+    """
+
+    __slots__ = ("_program", "names", "text")
+
+    text: str
+    names: frozenset[str]
+    _program: tuple[_Instruction, ...]
+
+    def __init__(self, text: str, names: Iterable[str] | None = None) -> None:
+        if not isinstance(text, str):
+            raise ExpressionError("an expression must be text", value=text)
+        clean = re.sub(r"\s", " ", text).strip()
+        object.__setattr__(self, "text", clean)
+        object.__setattr__(self, "_program", _compile(clean))
+        free = frozenset(operand for kind, operand, _, _ in self._program if kind == "name")
+        object.__setattr__(self, "names", free)
+        if names is not None:
+            self.check(names)
+
+    def check(self, names: Iterable[str]) -> None:
+        """Raise ExpressionError unless every free name is among ``names``.
+
+        Parameters
+        ----------
+        names : iterable of str
+            The names that are defined.
+        """
+        known = set(names)
+        for kind, operand, _, column in self._program:
+            if kind == "name" and operand not in known:
+                _refuse_name(operand, column, self.text, known)
+
+    def evaluate(self, environment: Mapping[str, Any] | None = None) -> Any:
+        """Return the value, in the units of the values given.
+
+        Parameters
+        ----------
+        environment : mapping of str to number, array, tracer or Jet
+            The value of every free name; shapes broadcast.
+
+        Returns
+        -------
+        float, array or Jet
+            A float when every value is a plain number.
+
+        Raises
+        ------
+        ExpressionError
+            A name has no value, or plain numbers leave the domain of a function (a division by zero, the logarithm of
+            a negative number, an overflow). Arrays and jets give ``nan`` or ``inf`` there.
+
+        Examples
+        --------
+        >>> Expression("2*a**2 - 1").evaluate({"a": 3})
+        17.0
+        """
+        known = {} if environment is None else environment
+        stack: list[Any] = []
+        for kind, operand, count, column in self._program:
+            if kind == "number":
+                stack.append(operand)
+            elif kind == "name":
+                if operand not in known:
+                    _refuse_name(operand, column, self.text, known)
+                value = known[operand]
+                stack.append(float(value) if isinstance(value, numbers.Real) else value)
+            else:
+                arguments = stack[len(stack) - count :]
+                del stack[len(stack) - count :]
+                stack.append(self._apply(kind, operand, arguments, column))
+        return stack[0]
+
+    def _apply(self, kind: str, operand: str, arguments: list[Any], column: int) -> Any:
+        """Apply one operator or function; plain numbers stay plain."""
+        plain = all(isinstance(argument, float) for argument in arguments)
+        if not plain:
+            return _call_general(operand, arguments) if kind == "call" else _operate(operand, arguments)
+        try:
+            value = FUNCTIONS[operand][1](*arguments) if kind == "call" else _operate_plain(operand, arguments)
+        except (ArithmeticError, ValueError) as error:
+            shown = _show_operation(kind, operand, arguments)
+            problem = "is too large" if isinstance(error, OverflowError) else "is not defined"
+            raise ExpressionError(f"{shown} {problem}{_where(column, self.text)}", column=column) from None
+        if not math.isfinite(value) and all(map(math.isfinite, arguments)):
+            shown = _show_operation(kind, operand, arguments)
+            raise ExpressionError(f"{shown} is too large{_where(column, self.text)}", column=column)
+        return value
+
+    def __setattr__(self, name: str, value: object) -> NoReturn:
+        raise AttributeError(f"an Expression is frozen, cannot set {name}")
+
+    def __delattr__(self, name: str) -> NoReturn:
+        raise AttributeError(f"an Expression is frozen, cannot delete {name}")
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Expression) and self.text == other.text
+
+    def __hash__(self) -> int:
+        return hash((Expression, self.text))
+
+    def __repr__(self) -> str:
+        return f"Expression({self.text!r})"
+
+    def __str__(self) -> str:
+        return self.text
+
+    def __reduce__(self) -> tuple[type[Expression], tuple[str]]:
+        return (Expression, (self.text,))
+
+    def __copy__(self) -> Expression:
+        return self
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Expression:
+        return self
+
+
+def _show_operation(kind: str, operand: str, arguments: list[float]) -> str:
+    """Word one operation on plain numbers, for messages."""
+    if kind == "call":
+        return f"{operand}({', '.join(f'{argument:g}' for argument in arguments)})"
+    return f" {operand} ".join(f"{argument:g}" if argument >= 0 else f"({argument:g})" for argument in arguments)
+
+
+def _operate_plain(operator: str, arguments: list[float]) -> float:
+    """Arithmetic on plain numbers, refusing the complex result of a power."""
+    value = _operate(operator, arguments)
+    if isinstance(value, complex):
+        raise ValueError
+    return value
+
+
+def _operate(operator: str, arguments: list[Any]) -> Any:
+    """Arithmetic by Python's own operators, so that it works on jets, arrays and tracers."""
+    match operator, arguments:
+        case "+", [left, right]:
+            return left + right
+        case "-", [left, right]:
+            return left - right
+        case "*", [left, right]:
+            return left * right
+        case "/", [left, right]:
+            return left / right
+        case "**", [left, right]:
+            if not isinstance(left, float) and isinstance(right, float) and right.is_integer() and abs(right) <= 1e6:
+                return left ** int(right)
+            return left**right
+        case "neg", [operand]:
+            return -operand
+        case _:
+            return arguments[0]
+
+
+def _call_general(function: str, arguments: list[Any]) -> Any:
+    """Call a function of ``jounce.jet``, which takes jets, arrays and numbers; imported here to start quickly."""
+    import jounce.jet
+
+    return getattr(jounce.jet, function)(*arguments)
+
+
+def _where(column: int, text: str) -> str:
+    return f" at column {column} of {show_value(text)}"
+
+
+def _fail(problem: str, column: int, text: str, hint: str = _ALLOWED) -> NoReturn:
+    raise ExpressionError(f"{problem}{_where(column, text)}; {hint}", column=column)
+
+
+def _refuse_name(name: str, column: int, text: str, known: Iterable[str]) -> NoReturn:
+    if name in FUNCTIONS:
+        _fail(f"the function '{name}' stands without its arguments", column, text, f"write {name}(...)")
+    candidates = {*known, *CONSTANTS}
+    _fail(f"unknown name '{name}'", column, text, did_you_mean(name, candidates))
+
+
+def _compile(text: str) -> tuple[_Instruction, ...]:
+    """Parse the text and flatten the tree to a postfix program, without recursion."""
+    if not text:
+        raise ExpressionError("the expression is empty", value=text)
+    if len(text) > MAX_CHARACTERS:
+        raise ExpressionError(
+            f"the expression has {len(text)} characters, at most {MAX_CHARACTERS} are allowed", value=text
+        )
+    for position, character in enumerate(text):
+        if not character.isascii() or not character.isprintable() or character in "#\\`$?;!":
+            _fail(f"forbidden character {character.encode('unicode_escape').decode()!r}", position + 1, text)
+    _check_parentheses(text)
+    body = _parse(text)
+    program: list[_Instruction] = []
+    pending: list[tuple[ast.AST, int]] = [(body, 1)]
+    while pending:  # root first, children pushed left to right and so taken right to left: postfix, backwards
+        node, depth = pending.pop()
+        if depth > MAX_NESTING:
+            _fail(f"the expression is nested more than {MAX_NESTING} deep", _column(node), text, "use parameters")
+        kind, operand, children = _examine(node, text)
+        program.append((kind, operand, len(children), _column(node)))
+        chain = isinstance(node, ast.BinOp) and not isinstance(node.op, ast.Pow)
+        for index, child in enumerate(children):
+            pending.append((child, depth if chain and index == 0 else depth + 1))
+    return tuple(reversed(program))
+
+
+def _check_parentheses(text: str) -> None:
+    """Bound the nesting before Python's parser sees it."""
+    depth = 0
+    for position, character in enumerate(text):
+        depth += (character in "([{") - (character in ")]}")
+        if depth > MAX_NESTING:
+            _fail(f"the expression is nested more than {MAX_NESTING} deep", position + 1, text, "use parameters")
+
+
+def _parse(text: str) -> ast.AST:
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return ast.parse(text, mode="eval").body
+    except SyntaxError as error:
+        column = min(max(error.offset or 1, 1), len(text) + 1)
+        hint = _ALLOWED
+        if re.search(r"[0-9)]\s*[A-Za-z(]|[A-Za-z]\s+[A-Za-z0-9]", re.sub(r"[0-9.]+[eE][-+]?[0-9]+", "0", text)):
+            hint = "a product needs its *, as in 30*deg"
+        _fail("the expression cannot be read", column, text, hint)
+    except (ValueError, RecursionError, MemoryError):
+        raise ExpressionError(f"the expression is nested more than {MAX_NESTING} deep", value=text) from None
+
+
+def _column(node: ast.AST) -> int:
+    return getattr(node, "col_offset", 0) + 1
+
+
+def _examine(node: ast.AST, text: str) -> tuple[str, Any, list[ast.AST]]:
+    """Return kind, operand and children of an allowed node; refuse every other node."""
+    column = _column(node)
+    match node:
+        case ast.Constant(value=bool() | None) | ast.Constant(value=str() | bytes()):
+            shown = "a string" if isinstance(node.value, (str, bytes)) else f"the word '{node.value}'"
+            _fail(f"{shown} is not allowed", column, text)
+        case ast.Constant(value=int() | float()):
+            try:
+                value = float(node.value)
+            except OverflowError:
+                value = math.inf
+            if not math.isfinite(value):
+                _fail("a number too large", column, text, "numbers go up to 1.8e308")
+            return "number", value, []
+        case ast.Name(id=name):
+            return ("number", CONSTANTS[name], []) if name in CONSTANTS else ("name", name, [])
+        case ast.BinOp(left=left, op=operator, right=right) if type(operator) in _OPERATORS:
+            return "operator", _OPERATORS[type(operator)], [left, right]
+        case ast.BinOp(op=ast.BitXor()):
+            _fail("the operator ^ is not allowed", column, text, "a power is written **")
+        case ast.UnaryOp(op=operator, operand=operand) if type(operator) in _OPERATORS:
+            return "operator", _OPERATORS[type(operator)], [operand]
+        case ast.Call(func=ast.Name(id=name), args=arguments, keywords=keywords):
+            return "call", name, _arguments(name, arguments, keywords, column, text)
+        case ast.Call():
+            _fail("something that is not a function is called", column, text, "a product needs its *, as in 2*(a + b)")
+        case ast.Attribute(attr=attribute):
+            _fail(f"an attribute, '.{attribute}', is not allowed", column, text)
+        case ast.BinOp() | ast.UnaryOp():
+            _fail(f"the operator {type(node.op).__name__} is not allowed", column, text)
+        case ast.Constant(value=complex()):
+            _fail("a complex number is not allowed", column, text)
+    shown = _FOUND.get(type(node), "something else")
+    _fail(f"{shown} is not allowed", column, text)
+
+
+def _arguments(
+    name: str, arguments: list[ast.expr], keywords: list[ast.keyword], column: int, text: str
+) -> list[ast.AST]:
+    """Check that a function exists and has its number of arguments."""
+    if name not in FUNCTIONS:
+        near = difflib.get_close_matches(name, FUNCTIONS, n=1)
+        hint = f"did you mean '{near[0]}'?" if near else f"valid: {', '.join(FUNCTIONS)}"
+        _fail(f"unknown function '{name}'", column, text, hint)
+    if keywords:
+        _fail(f"a keyword in the arguments of {name} is not allowed", column, text)
+    count = FUNCTIONS[name][0]
+    if len(arguments) != count:
+        noun = "argument" if count == 1 else "arguments"
+        _fail(f"{name} takes {count} {noun}, not {len(arguments)},", column, text, "separate arguments by commas")
+    return list(arguments)

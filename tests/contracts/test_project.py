@@ -1,0 +1,70 @@
+"""Promises that the project makes about itself: the two commands, the pins, the size of files, plain text."""
+
+import pathlib
+import re
+import tomllib
+
+import pytest
+
+ROOT = pathlib.Path(__file__).parents[2]
+SOURCES = sorted((ROOT / "src").rglob("*.py"))
+
+
+def sh_blocks():
+    return re.findall(r"^```(\w*)\n(.*?)^```$", (ROOT / "README.md").read_text(), re.MULTILINE | re.DOTALL)
+
+
+def test_readme_starts_with_the_two_commands():
+    languages = [language for language, _ in sh_blocks()]
+    assert languages[:2] == ["sh", "sh"]
+    assert languages.count("sh") == 2
+    assert "jounce run examples/four_bar.yaml" in sh_blocks()[0][1]
+
+
+def test_ci_runs_the_test_command_of_the_readme_word_for_word():
+    last = sh_blocks()[1][1].strip().splitlines()[-1]
+    assert "pytest" in last
+    assert last in (ROOT / ".ci" / "run").read_text()
+
+
+def test_ci_script_is_executable():
+    assert (ROOT / ".ci" / "run").stat().st_mode & 0o100
+
+
+def test_constraints_pin_every_direct_dependency_by_version_alone():
+    lines = [line for line in (ROOT / "constraints.txt").read_text().splitlines() if not line.startswith("#")]
+    assert all(re.fullmatch(r"[A-Za-z0-9._-]+==[A-Za-z0-9.+!]+", line) for line in lines)
+    pinned = {normal(line.split("==")[0]) for line in lines}
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    extras = project["optional-dependencies"]
+    wanted = project["dependencies"] + extras["test"] + extras["docs"] + extras["bench"]
+    assert {normal(re.split(r"[\[<>=~!; ]", entry)[0]) for entry in wanted} <= pinned
+
+
+def normal(name):
+    return re.sub(r"[-_.]+", "-", name).lower()
+
+
+def test_version_is_one():
+    version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
+    assert f"version: {version}" in (ROOT / "CITATION.cff").read_text()
+    assert f"## {version}" in (ROOT / "CHANGELOG.md").read_text()
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda p: str(p.relative_to(ROOT / "src")))
+def test_source_file_is_short_and_plain(path):
+    text = path.read_text()
+    assert text.isascii()
+    assert text.count("\n") <= 420
+    assert text.lstrip().startswith('"""'), "a module starts with its docstring"
+
+
+def test_links_between_pages_lead_somewhere():
+    pages = [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")]
+    missing = [
+        f"{page.relative_to(ROOT)}: {target}"
+        for page in pages
+        for target in re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", page.read_text())
+        if "://" not in target and not (page.parent / target).exists()
+    ]
+    assert not missing

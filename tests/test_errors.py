@@ -1,0 +1,65 @@
+"""The wording of messages, and what errors carry."""
+
+import pickle
+
+import pytest
+
+from jounce import errors
+from jounce.errors import JounceError, MechanismError, MechanismFileError, SolveError, did_you_mean, show_value
+
+
+def test_message_puts_place_problem_value_and_advice_in_order():
+    error = MechanismFileError("is odd; try another", path="a.yaml", line=12, name="joints.BC.length", value=-0.1423)
+    assert str(error) == "a.yaml, line 12, joints.BC.length: is odd, got -0.1423; try another"
+
+
+def test_message_leaves_out_what_is_not_known():
+    assert str(JounceError("is odd")) == "is odd"
+    assert str(JounceError("is odd", name="a.b")) == "a.b: is odd"
+    assert str(JounceError("is odd", value=None)) == "is odd, got nothing"
+
+
+def test_located_fills_in_but_never_overwrites():
+    error = MechanismError("is odd", line=3).located(path="a.yaml", line=9, name="a")
+    assert isinstance(error, MechanismError)
+    assert str(error) == "a.yaml, line 3, a: is odd"
+
+
+@pytest.mark.parametrize("kind", [e for e in vars(errors).values() if isinstance(e, type) and issubclass(e, JounceError)])
+def test_every_error_survives_another_process(kind):
+    error = pickle.loads(pickle.dumps(kind("is odd", line=3, value=[1])))
+    assert (type(error), str(error)) == (kind, "line 3: is odd, got [1]")
+    assert str(pickle.loads(pickle.dumps(kind("is odd")))) == "is odd"
+
+
+def test_solve_error_holds_what_was_computed():
+    error = SolveError("stopped", motion="half", status="singular")
+    assert (error.motion, error.status) == ("half", "singular")
+
+
+@pytest.mark.parametrize(
+    "value, words",
+    [
+        (True, "true"),
+        ({}, "an empty mapping"),
+        ([], "an empty list"),
+        ("\u03c8", "'\\u03c8'"),
+        ([[[[1]]]], "[[[[...]]]]"),
+        ({"a": [1, 2]}, "{a: [1, 2]}"),
+        (10**5000, "a number with too many digits"),
+    ],
+)
+def test_values_are_shown_in_plain_short_words(value, words):
+    assert show_value(value) == words
+
+
+def test_long_values_are_cut():
+    assert len(show_value("x" * 10**6)) == 80
+    assert len(show_value(list(range(10**5)))) <= 80
+
+
+def test_suggestions_come_before_the_list():
+    assert did_you_mean("lenght", ["length", "points"]) == "did you mean 'length'? valid: length, points"
+    assert did_you_mean("A", ["a"]) == "did you mean 'a'? valid: a"
+    assert did_you_mean("q", [str(k) for k in range(100)]) == ""
+    assert did_you_mean("q", []) == "none is defined"
