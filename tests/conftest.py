@@ -1,17 +1,11 @@
-"""The regime of all tests: float64, strict promotion of types and ranks, warnings as errors (in pyproject.toml)."""
+"""The regime of all tests: float64, strict promotion of types and ranks; warnings are errors by pyproject.toml."""
 
 import hypothesis
 import jax
-import pytest
 
 import jounce  # noqa: F401 - switches on double precision
 
-hypothesis.settings.register_profile("jounce", deadline=None, print_blob=True, max_examples=50)
+jax.config.update("jax_numpy_dtype_promotion", "strict")
+jax.config.update("jax_numpy_rank_promotion", "raise")
+hypothesis.settings.register_profile("jounce", deadline=None, max_examples=25, derandomize=True)
 hypothesis.settings.load_profile("jounce")
-
-
-@pytest.fixture(autouse=True)
-def _strict_jax():
-    """Make mixtures of types or ranks that the library did not say aloud fail."""
-    with jax.numpy_dtype_promotion("strict"), jax.numpy_rank_promotion("raise"):
-        yield

@@ -25,7 +25,10 @@ def test_located_fills_in_but_never_overwrites():
     assert str(error) == "a.yaml, line 3, a: is odd"
 
 
-@pytest.mark.parametrize("kind", [e for e in vars(errors).values() if isinstance(e, type) and issubclass(e, JounceError)])
+FAMILY = [kind for kind in vars(errors).values() if isinstance(kind, type) and issubclass(kind, JounceError)]
+
+
+@pytest.mark.parametrize("kind", FAMILY)
 def test_every_error_survives_another_process(kind):
     error = pickle.loads(pickle.dumps(kind("is odd", line=3, value=[1])))
     assert (type(error), str(error)) == (kind, "line 3: is odd, got [1]")
@@ -46,7 +49,6 @@ def test_solve_error_holds_what_was_computed():
         ("\u03c8", "'\\u03c8'"),
         ([[[[1]]]], "[[[[...]]]]"),
         ({"a": [1, 2]}, "{a: [1, 2]}"),
-        (10**5000, "a number with too many digits"),
     ],
 )
 def test_values_are_shown_in_plain_short_words(value, words):
@@ -54,6 +56,7 @@ def test_values_are_shown_in_plain_short_words(value, words):
 
 
 def test_long_values_are_cut():
+    assert show_value(10**5000) == "a number with too many digits"
     assert len(show_value("x" * 10**6)) == 80
     assert len(show_value(list(range(10**5)))) <= 80
 

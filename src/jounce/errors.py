@@ -1,7 +1,7 @@
 """The one family of exceptions of the package, and the small helpers that word their messages.
 
-Every error carries what a reader needs to mend the input: the file and line it came from (when it came from a file), the
-dotted name of the entry, what is wrong, and the value received. ``str(error)`` puts these into one friendly sentence.
+Every error carries what a reader needs to mend the input: the file and line (when it came from a file), the dotted name
+of the entry, what is wrong, and the value received. ``str(error)`` puts these into one friendly sentence.
 """
 
 from __future__ import annotations

@@ -91,11 +91,11 @@ class SpatialPose:
     def normalisation(self):
         return dot(self.p, self.p) - 1
 
-    def angular_velocity(self, frame):
-        """Return 2 p' conj(p) (global) or 2 conj(p) p' (body), one order shorter."""
+    def angular_velocity(self, frame=None):
+        """Return 2 conj(p) p' (frame "body") or 2 p' conj(p) (any other: global), one order shorter."""
         p = [Series(x.c[:-1]) for x in self.p]
-        rate = [x.differentiate() for x in self.p]
-        a, b = (rate, [p[0], -p[1], -p[2], -p[3]]) if frame == "global" else ([p[0], -p[1], -p[2], -p[3]], rate)
+        rate, conjugate = [x.differentiate() for x in self.p], [p[0], -p[1], -p[2], -p[3]]
+        a, b = (conjugate, rate) if frame == "body" else (rate, conjugate)
         v = cross(a[1:], b[1:])
         return [2 * (a[0] * b[k + 1] + b[0] * a[k + 1] + v[k]) for k in range(3)]
 

@@ -82,7 +82,8 @@ class Model:
             return mp_joints.unit(vector(orientation["quaternion"], self.names, ctx))
         if "axis" in orientation:
             half = value(orientation["angle"], self.names, ctx) / 2
-            return [ctx.cos(half), *(ctx.sin(half) * u for u in mp_joints.unit(vector(orientation["axis"], self.names, ctx)))]
+            axis = mp_joints.unit(vector(orientation["axis"], self.names, ctx))
+            return [ctx.cos(half), *(ctx.sin(half) * u for u in axis)]
         p = [ctx.mpf(1), *[ctx.mpf(0)] * 3]
         for letter, angle in zip(orientation["euler"], vector(orientation["angles"], self.names, ctx), strict=True):
             k = "xyz".index(letter)
@@ -197,7 +198,7 @@ class Model:
             d = gap(*poses, keys["points"])
             return [sqrt(mp_joints.dot(d, d))]
         if kind == "angular_velocity":
-            return [poses[0].angle.differentiate()] if self.planar else poses[0].angular_velocity(keys.get("frame", "global"))
+            return [poses[0].angle.differentiate()] if self.planar else poses[0].angular_velocity(keys.get("frame"))
         if self.planar:
             return [poses[-1].angle - poses[0].angle] if len(poses) == 2 else [poses[0].angle]
         near = self.branch.get(f"output {name}")

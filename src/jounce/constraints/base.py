@@ -8,8 +8,7 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from jounce.errors import MechanismError, did_you_mean
-from jounce.jet import Jet
-from jounce.jet.vectors import stack_jets
+from jounce.jet import Jet, concatenate
 
 Scalar = Annotated[Any, "scalar"]
 Vector = Annotated[Any, "vector"]
@@ -86,7 +85,7 @@ def catalogue(space: str, role: str) -> dict[str, type[AbstractConstraint]]:
 def rows(*parts: Any) -> Jet:
     """Join scalar residuals, of shape (...), and vector ones, of shape (rows, ...), into one of shape (rows, ...)."""
     whole = [part if len(part.shape) == 3 else part.map(lambda c: c[None]) for part in parts]
-    return stack_jets(whole, jnp.concatenate)
+    return concatenate(whole)
 
 
 def value_fields(kind: type[AbstractConstraint]) -> dict[str, dataclasses.Field]:

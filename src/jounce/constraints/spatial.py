@@ -9,7 +9,8 @@ import jax.numpy as jnp
 
 from jounce.constraints.base import AbstractConstraint, Scalar, Vector, rows
 from jounce.constraints.planar import length_of, slide
-from jounce.jet import Jet, atan2, cross, dot, wrap
+from jounce.jet import Jet, atan2, cross, wrap
+from jounce.jet.algebra import total
 
 
 def perpendiculars(axis: Any) -> tuple[Any, Any]:
@@ -32,9 +33,9 @@ def relative_angle(body_i: Any, body_j: Any, axis_i: Any, vector_i: Any = None, 
     """
     axis = axis_i / length_of(axis_i)[None]
     if vector_i is None:
-        p, q = body_i.quaternion, body_j.quaternion
-        e = q[1:] * p[0] - p[1:] * q[0] - cross(p[1:], q[1:])
-        return 2.0 * atan2(dot(axis, e), dot(p, q))
+        q = body_j.quaternion
+        e = [spin.dot(q) for spin in body_i.spins]
+        return 2.0 * atan2(total(u * x for u, x in zip(axis, e, strict=True)), body_i.quaternion.dot(q))
     u, a, b = body_i.direction(axis), body_i.direction(vector_i), body_j.direction(vector_j)
     return atan2(u.dot(a.cross(b)), a.dot(b) - u.dot(a) * u.dot(b))
 

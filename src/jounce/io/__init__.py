@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from jounce.io.export import json_schema as json_schema
+    from jounce.io.loader import load as load
+    from jounce.io.results import check_writable as check_writable, read as read, write as write
 
 __all__ = ["check_writable", "json_schema", "load", "read", "write"]
 

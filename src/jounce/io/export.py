@@ -38,7 +38,7 @@ def json_schema(*, own_types: bool = True) -> dict[str, Any]:
     from jounce.io.schema import file_model
 
     models = tuple(file_model(space, own_types=own_types) for space in ("planar", "spatial"))
-    union = Annotated[Union[models], Discriminator("space")]  # noqa: UP007
+    union: Any = Annotated[Union[models], Discriminator("space")]  # noqa: UP007
     generated = TypeAdapter(union).json_schema()
     head = {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

@@ -1,8 +1,8 @@
 """The keys of each type in a mechanism file, read off the fields of its class.
 
-Fields that differ only in the body they belong to, such as ``point_i`` and ``point_j``, are one key with a list, ``points``;
-a lone ``vector_i`` is the key ``vector``; every other field keeps its name. So a joint of a user's own is readable from
-files as soon as its class exists.
+Fields that differ only in the body they belong to, such as ``point_i`` and ``point_j``, are one key with a list,
+``points``; a lone ``vector_i`` is the key ``vector``; every other field keeps its name. So a joint of a user's own is
+readable from files as soon as its class exists.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from dataclasses import MISSING, dataclass
 from typing import Any
 
-from jounce.constraints.base import AbstractConstraint, field_kind, value_fields
+from jounce.constraints.base import field_kind, value_fields
 from jounce.mechanism import (
     AbstractOutput,
     AngleOutput,
@@ -53,8 +53,10 @@ class FileKey:
     required: bool
 
 
-def file_keys(kind: type[AbstractConstraint] | type[AbstractOutput]) -> tuple[FileKey, ...]:
-    """Return the keys of a class besides ``type``, ``quantity`` and ``bodies``, words first.
+def file_keys(kind: type[Any]) -> tuple[FileKey, ...]:
+    """Return the keys of a class of joints, drivers or outputs besides ``type``, ``quantity`` and ``bodies``.
+
+    Words come first, since the units of other keys may follow from them.
 
     Examples
     --------
@@ -106,7 +108,7 @@ OUTPUTS: tuple[tuple[str | None, type[AbstractOutput]], ...] = (
 """The word for ``quantity`` in a file (None when there is none) and the class of each output."""
 
 
-def output_tag(quantity: str | None, body_count: int) -> str:
+def output_tag(quantity: object, body_count: int) -> str:
     """Return the name of a form of output, by its quantity and whether it has ``body`` or ``bodies``."""
     return f"{quantity or 'point'} of {'a body' if body_count == 1 else 'bodies'}"
 

@@ -91,9 +91,8 @@ def from_euler(sequence: str, angles: Sequence[float]) -> Quaternion:
     letters = sequence.lower()
     same_case = sequence in (letters, letters.upper())
     if len(letters) != 3 or not same_case or set(letters) - AXES.keys():
-        raise MechanismError(
-            "a sequence of Euler angles has three letters, such as zxz (fixed axes) or ZXZ (moving axes)", value=sequence
-        )
+        message = "a sequence of Euler angles has three letters, such as zxz (fixed axes) or ZXZ (moving axes)"
+        raise MechanismError(message, value=sequence)
     if letters[0] == letters[1] or letters[1] == letters[2]:
         raise MechanismError("neighbouring axes of a sequence of Euler angles must differ", value=sequence)
     whole: Quaternion = (1.0, 0.0, 0.0, 0.0)

@@ -1,4 +1,4 @@
-"""Smallest and largest values of the outputs of a motion and of their derivatives, with their times, and how to word them."""
+"""Smallest and largest values of the outputs of a motion and of their derivatives, with their times and units."""
 
 from __future__ import annotations
 
@@ -30,6 +30,8 @@ class Peak:
         In the unit; NaN where no instant was solved.
     minimum_at, maximum_at : float
         The first instants at which they are reached, s.
+    size : float
+        The largest magnitude that any component of the output has in this derivative.
     """
 
     output: str
@@ -39,11 +41,15 @@ class Peak:
     minimum_at: float
     maximum: float
     maximum_at: float
+    size: float
 
     @property
-    def lowest_is_largest(self) -> bool:
-        """Whether the minimum has the larger magnitude of the two."""
-        return abs(self.minimum) > abs(self.maximum)
+    def largest(self) -> tuple[bool, bool]:
+        """Whether the minimum and the maximum have the largest magnitude; both where they differ by rounding only."""
+        low, high = abs(self.minimum), abs(self.maximum)
+        near = 1e-12 * self.size
+        varies = self.maximum - self.minimum > near
+        return varies and low >= high - near, varies and high >= low - near
 
 
 def derivative_name(order: int) -> str:
@@ -57,7 +63,7 @@ def derivative_name(order: int) -> str:
     if order < len(NAMES):
         return NAMES[order]
     last = order % 10 if order // 10 % 10 != 1 else 0
-    return f"{order}{ {1: 'st', 2: 'nd', 3: 'rd'}.get(last, 'th')}"
+    return str(order) + {1: "st", 2: "nd", 3: "rd"}.get(last, "th")
 
 
 def derivative_unit(unit: str, order: int) -> str:
@@ -68,8 +74,9 @@ def derivative_unit(unit: str, order: int) -> str:
     >>> derivative_unit("m", 0), derivative_unit("m", 1), derivative_unit("rad/s", 3)
     ('m', 'm/s', 'rad/s^4')
     """
-    base, slash, power = re.fullmatch(r"(.*?)(?:(/s)(?:\^(\d+))?)?", unit).groups()
-    total = order + (int(power or 1) if slash else 0)
+    per_time = re.search(r"/s(?:\^(\d+))?$", unit)
+    base = unit[: per_time.start()] if per_time else unit
+    total = order + (int(per_time[1] or 1) if per_time else 0)
     return base if total == 0 else f"{base}/s" if total == 1 else f"{base}/s^{total}"
 
 
@@ -108,15 +115,17 @@ def peaks(motion: Any) -> list[Peak]:
     >>> import jounce as jn
     >>> motion = jn.solve(jn.load("examples/four_bar.yaml"), order=1)
     >>> [(p.output, p.derivative, p.unit, round(p.maximum, 4), p.maximum_at) for p in peaks(motion)][:2]
-    [('psi', 'position', 'rad', 2.2281, 0.5), ('psi', 'velocity', 'rad/s', 1.2002, 0.0)]
+    [('psi', 'position', 'rad', 2.6436, 1.5), ('psi', 'velocity', 'rad/s', 1.5179, 1.07)]
     """
     found = []
     for column, (name, values) in scalar_outputs(motion).items():
         output = motion.mechanism.outputs[name]
         for order in range(values.shape[1]):
             extremes = _extremes(values[:, order], motion.time)
+            magnitudes = np.abs(motion.outputs[name][:, order])
+            size = float(np.max(magnitudes, initial=0.0, where=np.isfinite(magnitudes)))
             unit = derivative_unit(output.unit, order)
-            found.append(Peak(column, derivative_name(order + output.lost_orders), unit, *extremes))
+            found.append(Peak(column, derivative_name(order + output.lost_orders), unit, *extremes, size))
     return found
 
 

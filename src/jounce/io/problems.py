@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from jounce.constraints import catalogue
-from jounce.errors import UNSET, MechanismFileError, did_you_mean
+from jounce.errors import UNSET, MechanismFileError, did_you_mean, show_value
 from jounce.io.fields import file_keys, output_types
 from jounce.io.schema import file_model, output_form
 from jounce.io.source import Location, Source
@@ -54,8 +54,9 @@ def _word(source: Source, space: str, problem: Any) -> MechanismFileError:
     match problem["type"]:
         case "jounce":
             stated = context["value"]
-            value = value if stated is ... else UNSET if stated is None else stated
-            return source.error(context["message"], at, value=value)
+            return source.error(context["message"], at, value=value if stated is ... else stated)
+        case "extra_forbidden" if at[0] == "outputs" and at[-1] in ("joint", "driver"):
+            return _unknown_output(source, space, at[:2], source.data["outputs"][at[1]])
         case "extra_forbidden":
             return source.error(_unknown_key(source, space, at), at)
         case "missing":
@@ -74,7 +75,7 @@ def _word(source: Source, space: str, problem: Any) -> MechanismFileError:
 def _unknown_key(source: Source, space: str, at: Location) -> str:
     valid = _valid_keys(source, space, at[:-1])
     hint = _HINTS.get((space, str(at[-1]))) if at[0] == "bodies" else None
-    return f"unknown key '{at[-1]}'; {hint or did_you_mean(at[-1], valid)}"
+    return f"unknown key {show_value(at[-1])}; {hint or did_you_mean(at[-1], valid)}"
 
 
 def _valid_keys(source: Source, space: str, parent: Location) -> list[str]:

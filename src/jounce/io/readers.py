@@ -1,6 +1,7 @@
 """YAML, JSON and TOML text into plain data with the line of every entry.
 
-None of the three recurses over the data: an input nested without end is refused at the limit, not at the bottom of the stack.
+None of the three recurses over the data: an input nested without end is refused at the limit, not at the bottom of
+the stack.
 """
 
 from __future__ import annotations
@@ -46,8 +47,7 @@ def read_yaml(path: str, text: str) -> Source:
     Aliases, tags and more than one document are refused: a mechanism file does not need them, and they are the usual
     way to make a small file unfold without end.
     """
-    from ruamel.yaml import YAML
-    from ruamel.yaml import events as kinds
+    from ruamel.yaml import YAML, events as kinds
     from ruamel.yaml.error import YAMLError
 
     builder = Builder(path)
@@ -146,7 +146,7 @@ def read_json(path: str, text: str) -> Source:
 def _check_depth(path: str, text: str, quotes: str) -> None:
     """Bound the nesting of brackets outside strings, before a recursive parser sees them."""
     depth = 0
-    for bracket in re.finditer(rf'[\[\]{{}}\n]|[{quotes}](?:\\.|[^{quotes}\\\n])*[{quotes}]?', text):
+    for bracket in re.finditer(rf"[\[\]{{}}\n]|[{quotes}](?:\\.|[^{quotes}\\\n])*[{quotes}]?", text):
         if bracket.group() in "[{":
             depth += 1
             if depth > MAX_DEPTH:

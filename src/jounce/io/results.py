@@ -206,7 +206,7 @@ def read(path: str | PathLike[str]) -> Any:
     name = fspath(path)
     suffix = Path(name).suffix.lower()
     if suffix not in SUFFIXES:
-        raise OutputError(f"the kind of a file of results is told by its ending; valid: {', '.join(SUFFIXES)}", path=name)
+        raise OutputError(f"the kind of results is told by the ending; valid: {', '.join(SUFFIXES)}", path=name)
     try:
         if suffix == ".nc":
             return xarray.load_dataset(path, engine="h5netcdf")

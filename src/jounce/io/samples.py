@@ -13,7 +13,9 @@ __all__ = ["read_samples"]
 MAX_BYTES = 100_000_000
 
 
-def read_samples(path: str | Path, time: str | None = None, value: str | None = None) -> tuple[list[float], list[float]]:
+def read_samples(
+    path: str | Path, time: str | None = None, value: str | None = None
+) -> tuple[list[float], list[float]]:
     """Read the columns of time and value from a CSV file.
 
     Parameters

@@ -34,8 +34,9 @@ def dotted(location: Location) -> str:
     """
     text = ""
     for step in location:
-        text += f"[{step}]" if isinstance(step, int) else f".{step}" if text else step
-    return text.encode("ascii", "backslashreplace").decode("ascii")
+        word = f"[{step}]" if isinstance(step, int) else ascii(step[:100])[1:-1]
+        text += f".{word}" if text and isinstance(step, str) else word
+    return text
 
 
 @dataclass
@@ -91,6 +92,7 @@ class Builder:
 
     def key(self, name: Any, line: int) -> None:
         """Start an entry of the mapping that is open."""
+        self._check_text(name, line)
         container, location = self._stack[-1]
         if not isinstance(name, str):
             raise self.fail(f"a key must be a name, got {name!r}; put it in quotes to make it one", line)
@@ -117,7 +119,16 @@ class Builder:
 
     def value(self, value: Any, line: int) -> None:
         """Add a leaf."""
+        self._check_text(value, line)
         self._put(value, line)
+
+    def _check_text(self, value: Any, line: int) -> None:
+        """Refuse halves of surrogate pairs, which escapes can write but no output can show."""
+        if isinstance(value, str) and not value.isascii():
+            try:
+                value.encode()
+            except UnicodeEncodeError:
+                raise self.fail("is not text in UTF-8", line) from None
 
     def _put(self, value: Any, line: int) -> None:
         self._count += 1
@@ -132,7 +143,7 @@ class Builder:
         if isinstance(container, list):
             container.append(value)
         else:
-            container[location[-1]] = value
+            container[str(location[-1])] = value
             self._key = None
 
 
@@ -165,9 +176,7 @@ def read_bytes(path: str) -> bytes:
 
 
 def _too_large(path: str, size: int) -> MechanismFileError:
-    return MechanismFileError(
-        f"the file has {size / 1e6:.3g} MB, at most {MAX_BYTES / 1e6:.3g} MB are read", path=path
-    )
+    return MechanismFileError(f"the file has {size / 1e6:.3g} MB, at most {MAX_BYTES / 1e6:.3g} MB are read", path=path)
 
 
 def _nearby(path: str) -> str:
@@ -192,7 +201,7 @@ def _decode(path: str, content: bytes) -> str:
     for line, row in enumerate(text.split("\n"), start=1):
         if len(row) > MAX_LINE_LENGTH:
             raise MechanismFileError(f"a line has more than {MAX_LINE_LENGTH} characters", path=path, line=line)
-        if not row.isprintable() and any(ord(c) < 32 and c not in "\t\r" or 127 <= ord(c) < 160 for c in row):
+        if not row.isprintable() and any((ord(c) < 32 and c not in "\t\r") or 127 <= ord(c) < 160 for c in row):
             raise MechanismFileError("holds a control character, it is not a text file", path=path, line=line)
     if line > MAX_LINES:
         raise MechanismFileError(f"has {line} lines, at most {MAX_LINES} are read", path=path)

@@ -1,7 +1,8 @@
 """Values as a mechanism file writes them: a number (SI), a number with a unit, or an expression of parameters.
 
-Common units are in a table, so that a usual file loads without pint; every other unit is asked of pint, which is imported
-only then. Plane angle counts as a dimension of its own here, so that degrees are refused where a length is expected.
+Common units are in a table, so that a usual file loads without pint; every other unit is asked of pint, which is
+imported only then. Plane angle counts as a dimension of its own here, so that degrees are refused where a length is
+expected.
 """
 
 from __future__ import annotations
@@ -36,8 +37,8 @@ _COMMON: dict[str, tuple[Decimal | float, Dimension]] = {
     **{name: (Decimal(size), _LENGTH) for name, size in [("m", "1"), ("dm", "0.1"), ("cm", "0.01"), ("mm", "0.001")]},
     **{name: (Decimal(size), _LENGTH) for name, size in [("um", "1e-6"), ("km", "1e3"), ("in", "0.0254")]},
     **{name: (Decimal(size), _LENGTH) for name, size in [("inch", "0.0254"), ("ft", "0.3048")]},
-    **{name: (CONSTANTS["deg"], _ANGLE) for name in ("deg", "degree", "degrees", "\N{DEGREE SIGN}")},
-    **{name: (_TURN, _ANGLE) for name in ("rev", "turn", "turns")},
+    **dict.fromkeys(("deg", "degree", "degrees", "\N{DEGREE SIGN}"), (CONSTANTS["deg"], _ANGLE)),
+    **dict.fromkeys(("rev", "turn", "turns"), (_TURN, _ANGLE)),
     "rad": (Decimal(1), _ANGLE),
     "mrad": (Decimal("0.001"), _ANGLE),
     "rpm": (_TURN / 60, _dimension(angle=1, time=-1)),
@@ -131,15 +132,18 @@ def _ask_pint(name: str) -> tuple[float, Dimension]:
         if name not in registry:
             raise unknown
         factor, units = registry.get_base_units(name)
-        dimension = _dimension(**{_PINT_BASES.get(base, base): _whole(power) for base, power in units._units.items()})  # noqa: SLF001
-        if not registry._is_multiplicative(name):  # noqa: SLF001
+        powers = dict(registry.Quantity(factor, units).unit_items())
+        dimension = _dimension(
+            **{_PINT_BASES.get(str(base), str(base)): _whole(power) for base, power in powers.items()}
+        )
+        if not registry._is_multiplicative(name):
             raise UnitError(f"the unit '{_ascii(name)}' has no fixed zero, it cannot be used")
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError):
         raise unknown from None
     return float(factor), dimension
 
 
-def _whole(power: float) -> int:
+def _whole(power: int | float) -> int:
     if power != int(power):
         raise UnitError("a unit with a broken power cannot be used")
     return int(power)
@@ -155,7 +159,9 @@ def describe_dimension(dimension: Dimension) -> str:
     Examples
     --------
     >>> describe_dimension((("length", 1), ("time", -2)))
-    'length/time^2'
+    'an acceleration'
+    >>> describe_dimension((("length", 1), ("time", -3)))
+    'length/time^3'
     """
     named = {powers[0]: words.partition(",")[0] for words, powers in KINDS.values() if len(powers) == 1}
     if dimension in named:

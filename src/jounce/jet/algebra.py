@@ -48,13 +48,13 @@ class Jet:
     @classmethod
     def constant(cls, value: Any, order: int) -> "Jet":
         """Return the jet of a quantity that does not change in time."""
-        return cls((jnp.asarray(value), *[None] * order))
+        return cls((jnp.asarray(value), *[None] * _checked(order)))
 
     @classmethod
     def variable(cls, value: Any, order: int) -> "Jet":
         """Return the jet of time itself at the instant (or instants) `value`, in seconds."""
         value = jnp.asarray(value)
-        return cls((value, jnp.ones_like(value), *[None] * (order - 1))[: order + 1])
+        return cls((value, jnp.ones_like(value), *[None] * (order - 1))[: _checked(order) + 1])
 
     @classmethod
     def from_derivatives(cls, derivatives: Any) -> "Jet":
@@ -215,6 +215,12 @@ class Jet:
         from jounce.jet.elementary import power
 
         return power(base, self)
+
+
+def _checked(order: int) -> int:
+    if order < 0:
+        raise ValueError(f"the order of a jet must not be negative, got {order}")
+    return order
 
 
 def total(terms: Iterable[Any]) -> Any:

@@ -1,8 +1,9 @@
 """Composition of a jet with any JAX-traceable function: its program is read off once and run on jets.
 
-Elementary, linear and bilinear operations of the program have exact rules, O(K^2) at order K. A program with any
-other operation (a loop, a special function) is differentiated by nested forward mode instead: exact as well, but
-its cost doubles with each order.
+Elementary, linear and bilinear operations of the program have exact rules, O(K^2) at order K; branches are all run
+and selected from, short loops of known length are unrolled. A program with any other operation (a loop until a
+condition, a special function) is differentiated by nested forward mode instead: exact as well, but its cost doubles
+with each order.
 """
 
 from collections.abc import Callable
@@ -14,6 +15,7 @@ from jax.extend.core import Literal
 
 from jounce.jet import elementary
 from jounce.jet.algebra import Jet, bilinear
+from jounce.jet.vectors import stack
 
 
 def compose(function: Callable[[Any], Any], x: Jet) -> Jet:
@@ -88,17 +90,56 @@ def _run(program: Any, _, *arguments: Any) -> Any:
     for equation in program.jaxpr.eqns:
         operands = [read(v) for v in equation.invars]
         name, parameters = equation.primitive.name, equation.params
-        if inner := _inner_program(parameters):
-            results = _run(inner, None, *operands)
-            results = results if isinstance(results, list) else [results]
-        elif not any(isinstance(x, Jet) for x in operands):
+        if not any(isinstance(x, Jet) for x in operands):
             results = equation.primitive.bind(*operands, **parameters)
             results = results if equation.primitive.multiple_results else [results]
+        elif name in _CONTROL:
+            results = _CONTROL[name](*operands, **parameters)
+        elif inner := _inner_program(parameters):
+            results = _run_all(inner, operands)
         else:
             results = [_apply(equation.primitive, parameters, operands)]
         values.update(zip(equation.outvars, results, strict=True))
     outputs = [read(v) for v in program.jaxpr.outvars]
     return outputs[0] if len(outputs) == 1 else outputs
+
+
+def _run_all(program: Any, operands: list[Any]) -> list[Any]:
+    results = _run(program, None, *operands)
+    return results if isinstance(results, list) else [results]
+
+
+def _branches(which: Any, *operands: Any, branches: Any, **_) -> list[Any]:
+    """Run every branch of a condition and select from the results."""
+    outcomes = zip(*(_run_all(branch, list(operands)) for branch in branches), strict=True)
+    which = jnp.clip(_value(which), 0, len(branches) - 1)
+    return [_pick(which, outcome) for outcome in outcomes]
+
+
+def _pick(which: Any, cases: tuple[Any, ...]) -> Any:
+    chosen = cases[0]
+    for k, case in enumerate(cases[1:], 1):
+        chosen = _select(jnp.broadcast_to(which == k, jnp.shape(_value(case))), chosen, case)
+    return chosen
+
+
+def _unrolled(
+    *operands: Any, jaxpr: Any, length: int, num_consts: int, num_carry: int, reverse: bool, **_
+) -> list[Any]:
+    """Run a loop of known length step by step."""
+    constants, carry = list(operands[:num_consts]), list(operands[num_consts : num_consts + num_carry])
+    sequences, collected = operands[num_consts + num_carry :], []
+    for step in reversed(range(length)) if reverse else range(length):
+        results = _run_all(jaxpr, [*constants, *carry, *(x[step] for x in sequences)])
+        carry = results[:num_carry]
+        collected.append(results[num_carry:])
+    if reverse:
+        collected.reverse()
+    return [*carry, *(stack(steps) for steps in zip(*collected, strict=True))]
+
+
+_CONTROL: dict[str, Callable[..., list[Any]]] = {"cond": _branches, "scan": _unrolled}
+LONGEST_UNROLLED = 100
 
 
 def _apply(primitive: Any, parameters: dict, operands: list[Any]) -> Any:
@@ -162,7 +203,15 @@ _RULES: dict[str, Callable[..., Any]] = {
     "rsqrt": lambda a, **_: 1.0 / elementary.sqrt(a),
     "exp": lambda a, **_: elementary.exp(a),
     "exp2": lambda a, **_: elementary.exp(a * jnp.log(2.0)),
+    "expm1": lambda a, **_: elementary.expm1(a),
     "log": lambda a, **_: elementary.log(a),
+    "log1p": lambda a, **_: elementary.log1p(a),
+    "cbrt": lambda a, **_: elementary.cbrt(a),
+    "erf": lambda a, **_: elementary.erf(a),
+    "erfc": lambda a, **_: 1.0 - elementary.erf(a),
+    "asinh": lambda a, **_: elementary.asinh(a),
+    "acosh": lambda a, **_: elementary.acosh(a),
+    "atanh": lambda a, **_: elementary.atanh(a),
     "sin": lambda a, **_: elementary.sin(a),
     "cos": lambda a, **_: elementary.cos(a),
     "tan": lambda a, **_: elementary.tan(a),
@@ -183,7 +232,7 @@ _RULES: dict[str, Callable[..., Any]] = {
 }
 _LINEAR = frozenset(
     "broadcast_in_dim concatenate convert_element_type copy cumsum dynamic_slice gather pad reduce_sum reshape rev"
-    " slice squeeze transpose".split()
+    " slice squeeze stack transpose".split()
 )
 _BILINEAR = frozenset(("dot_general",))
 _PIECEWISE_CONSTANT = frozenset("ceil eq floor ge gt is_finite le lt ne round sign stop_gradient".split())
@@ -201,10 +250,13 @@ def _inner_program(parameters: dict) -> Any:
 
 
 def _operations(jaxpr: Any) -> Any:
-    """Yield the names of all operations, those inside calls too; loops yield their own name."""
+    """Yield the names of all operations, those inside calls, branches and short loops too."""
     for equation in jaxpr.eqns:
-        inner = _inner_program(equation.params)
-        if inner and equation.primitive.name not in ("scan", "while", "cond"):
+        name, parameters = equation.primitive.name, equation.params
+        if name == "cond":
+            for branch in parameters["branches"]:
+                yield from _operations(branch.jaxpr)
+        elif (inner := _inner_program(parameters)) and (name != "scan" or parameters["length"] <= LONGEST_UNROLLED):
             yield from _operations(inner.jaxpr)
         else:
-            yield equation.primitive.name
+            yield name

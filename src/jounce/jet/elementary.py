@@ -4,9 +4,11 @@ Every function takes a jet, an array or a number; what is not a jet is passed to
 recurrence loses digits, another form of the same equation stands here, with the reason beside it.
 """
 
+import math
 from collections.abc import Callable
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 
 from jounce.jet.algebra import Jet, minus, sum_of_products
@@ -64,13 +66,31 @@ def power(x: Any, exponent: Any) -> Any:
         return _whole_power(x, exponent)
     if isinstance(exponent, float) and exponent == 0.5:
         return sqrt(x)
-    c, exponent = x.coefficients, jnp.asarray(exponent)
+    return _real_power(x, jnp.asarray(exponent, float))
+
+
+def _real_power(x: Jet, exponent: Any) -> Jet:
+    """Return a power whose exponent is known at run time only.
+
+    The recurrence divides by the base, so a whole exponent up to the order is taken from repeated products instead.
+    """
+    at_zero = x.coefficients[0] == 0
+    c = (jnp.where(at_zero, 1.0, x.coefficients[0]), *x.coefficients[1:])
     y = [jnp.power(c[0], exponent)]
     for k in range(1, x.order + 1):
         weighted = [None if c[j] is None else (exponent * j - (k - j)) * c[j] for j in range(1, k + 1)]
         value = sum_of_products(jnp.multiply, weighted, y[k - 1 :: -1])
         y.append(None if value is None else value / (k * c[0]))
-    return Jet(y)
+    whole = [_whole_power(x, m).dense() for m in range(x.order + 1)]
+    beyond = exponent > x.order  # at a base of zero, every coefficient vanishes; other exponents have none there
+
+    def coefficient(k: int, value: Any) -> Any:
+        value = jnp.where(at_zero, jnp.where(beyond | ((exponent > 0) & (k == 0)), 0.0, jnp.nan), value)
+        for m, power_m in enumerate(whole):
+            value = jnp.where(exponent == m, power_m.coefficients[k], value)
+        return value
+
+    return Jet(coefficient(k, value) for k, value in enumerate(Jet(y).dense().coefficients))
 
 
 def _whole_power(x: Jet, exponent: int) -> Jet:
@@ -139,12 +159,22 @@ def tanh(x: Any) -> Any:
 
 
 def _hyperbolic(x: Jet) -> tuple[Jet, Jet]:
-    sine, cosine = [jnp.sinh(x.coefficients[0])], [jnp.cosh(x.coefficients[0])]
+    sine, cosine = ([value] for value in _hyperbolic_values(x.coefficients[0]))
     for _ in range(x.order):
         s, c = _chain(sine, x, cosine), _chain(cosine, x, sine)
         sine.append(s)
         cosine.append(c)
     return Jet(sine), Jet(cosine)
+
+
+def _hyperbolic_values(x: Any) -> tuple[Any, Any]:
+    """Return sinh and cosh; far out by the exponential of half the argument, since XLA's own lose digits there."""
+    half = jnp.exp(jnp.maximum(jnp.abs(x), 1.0) / 2)
+    large = 0.5 * half * half
+    small = 0.25 / large
+    far = jnp.abs(x) > 1
+    sine = jnp.where(far, jnp.sign(x) * (large - small), jnp.sinh(x))
+    return sine, jnp.where(far, large + small, jnp.cosh(x))
 
 
 def sinh(x: Any) -> Any:
@@ -164,18 +194,24 @@ def _from_slope(x: Jet, value: Any, slope: Callable[[Jet], Jet]) -> Jet:
     return (slope(x.truncate(x.order - 1)) * x.differentiate()).integrate(value)
 
 
+def _one_minus_square(x: Jet) -> Jet:
+    """Return 1 - x^2, its value as (1 - x)(1 + x), which keeps the digits of arcsine and arccosine near their ends."""
+    first = x.coefficients[0]
+    return Jet(((1.0 - first) * (1.0 + first), *(-x.square()).coefficients[1:]))
+
+
 def asin(x: Any) -> Any:
-    """Return the arcsine, in radians; 1 - x^2 is taken as (1 - x)(1 + x), which keeps its digits near the ends."""
+    """Return the arcsine, in radians."""
     if not isinstance(x, Jet):
         return jnp.arcsin(x)
-    return _from_slope(x, jnp.arcsin(x.coefficients[0]), lambda u: 1.0 / sqrt((1.0 - u) * (1.0 + u)))
+    return _from_slope(x, jnp.arcsin(x.coefficients[0]), lambda u: 1.0 / sqrt(_one_minus_square(u)))
 
 
 def acos(x: Any) -> Any:
     """Return the arccosine, in radians."""
     if not isinstance(x, Jet):
         return jnp.arccos(x)
-    return _from_slope(x, jnp.arccos(x.coefficients[0]), lambda u: -1.0 / sqrt((1.0 - u) * (1.0 + u)))
+    return _from_slope(x, jnp.arccos(x.coefficients[0]), lambda u: -1.0 / sqrt(_one_minus_square(u)))
 
 
 def atan(x: Any) -> Any:
@@ -205,6 +241,55 @@ def atan2(y: Any, x: Any) -> Any:
     across = Jet((jnp.zeros_like(angle), *across.coefficients[1:]))
     rate = along * across.differentiate() - across * along.differentiate()
     return (rate / (along.truncate(order - 1).square() + across.truncate(order - 1).square())).integrate(angle)
+
+
+def log1p(x: Any) -> Any:
+    """Return ``log(1 + x)``, exact also where x is tiny."""
+    if not isinstance(x, Jet):
+        return jnp.log1p(x)
+    return _from_slope(x, jnp.log1p(x.coefficients[0]), lambda u: 1.0 / (1.0 + u))
+
+
+def expm1(x: Any) -> Any:
+    """Return ``exp(x) - 1``, exact also where x is tiny."""
+    if not isinstance(x, Jet):
+        return jnp.expm1(x)
+    return _from_slope(x, jnp.expm1(x.coefficients[0]), exp)
+
+
+def cbrt(x: Any) -> Any:
+    """Return the real cube root."""
+    if not isinstance(x, Jet):
+        return jnp.cbrt(x)
+    return _real_power(absolute(x), jnp.asarray(1 / 3)) * jnp.where(x.coefficients[0] < 0, -1.0, 1.0)
+
+
+def asinh(x: Any) -> Any:
+    """Return the inverse hyperbolic sine."""
+    if not isinstance(x, Jet):
+        return jnp.arcsinh(x)
+    return _from_slope(x, jnp.arcsinh(x.coefficients[0]), lambda u: 1.0 / sqrt(1.0 + u.square()))
+
+
+def acosh(x: Any) -> Any:
+    """Return the inverse hyperbolic cosine."""
+    if not isinstance(x, Jet):
+        return jnp.arccosh(x)
+    return _from_slope(x, jnp.arccosh(x.coefficients[0]), lambda u: 1.0 / sqrt((u - 1.0) * (u + 1.0)))
+
+
+def atanh(x: Any) -> Any:
+    """Return the inverse hyperbolic tangent."""
+    if not isinstance(x, Jet):
+        return jnp.arctanh(x)
+    return _from_slope(x, jnp.arctanh(x.coefficients[0]), lambda u: 1.0 / _one_minus_square(u))
+
+
+def erf(x: Any) -> Any:
+    """Return the error function."""
+    if not isinstance(x, Jet):
+        return jax.lax.erf(x)
+    return _from_slope(x, jax.lax.erf(x.coefficients[0]), lambda u: 2 / math.sqrt(math.pi) * exp(-u.square()))
 
 
 def absolute(x: Any) -> Any:

@@ -4,7 +4,6 @@ Each lane of the batch is predicted by the Taylor series of a neighbour, correct
 differentiated order after order with the last factorisation of its Jacobian (Sommer 2024, equations 1-8).
 """
 
-from functools import partial
 from typing import Any, NamedTuple
 
 import jax
@@ -12,6 +11,7 @@ import jax.numpy as jnp
 
 from jounce.jet import Jet
 from jounce.jet.algebra import total
+from jounce.kinematics.compilation import compiled
 from jounce.kinematics.linear import DenseFactor
 from jounce.kinematics.status import Status
 from jounce.mechanism.system import System
@@ -39,9 +39,7 @@ def _size(increment: Any) -> Any:
     return jnp.max(jnp.abs(increment), axis=0)
 
 
-def newton_raphson(
-    system: System, pose: Any, time: Jet, tolerance: Any, refine: bool
-) -> tuple[Any, DenseFactor, Any]:
+def newton_raphson(system: System, pose: Any, time: Jet, tolerance: Any, refine: bool) -> tuple[Any, DenseFactor, Any]:
     """Return the assembled pose, the factored Jacobian there, and the size of the last correction.
 
     An instant is accepted when its correction is at most the tolerance. With `refine` that correction is still made,
@@ -82,6 +80,7 @@ def differentiated(system: System, pose: Any, factor: DenseFactor, time: Jet) ->
         trial = pose.extended(None, None)
         right = -system.residual(trial, time.truncate(k)).dense().coefficients[k]
         pose = pose.extended(*system.coordinates(factor.solve(right), pose.shifts))
+        pose = jax.lax.optimization_barrier(pose)  # or XLA computes it again in everything that uses it
     return pose
 
 
@@ -100,7 +99,9 @@ def _terms(system: System, coordinates: dict[str, Jet], predictor: tuple[str, ..
     """Return the size of each Taylor coefficient but the first, rad or sizes of the mechanism: order x (batch,)."""
     scales = {"position": system.column_scale[0]}
     return [
-        jnp.max(jnp.stack([_largest(c) / scales.get(name, 1.0) for name, c in zip(predictor, level, strict=True)]), axis=0)
+        jnp.max(
+            jnp.stack([_largest(c) / scales.get(name, 1.0) for name, c in zip(predictor, level, strict=True)]), axis=0
+        )
         for level in zip(*(coordinates[name].coefficients[1:] for name in predictor), strict=True)
     ]
 
@@ -134,7 +135,7 @@ def _status(correction: Any, departure: Any, travel: Any, pivot_ratio: Any, admi
     return status
 
 
-@partial(jax.jit, static_argnames=("pose_type", "order", "refine"))
+@compiled("pose_type", "order", "refine")
 def advance(
     system: System,
     coordinates: dict[str, Any],
@@ -178,7 +179,8 @@ def advance(
         results.append(jnp.stack(result.dense().coefficients))
     departures = _departures(system, pose, predicted)
     travel = total(term * jnp.abs(step) ** k for k, term in enumerate(_terms(system, moving, pose_type.predictor), 1))
-    admissible = jnp.stack([jnp.all(g.element.admissible(time) & jnp.ones_like(step, bool), 0) for g in system.groups])
+    permitted = [g.element.admissible(time) for g in system.groups]
+    admissible = jnp.stack([jnp.broadcast_to(jnp.all(p, axis=0), step.shape) for p in permitted])
     status = _status(
         correction, jnp.max(departures, axis=0), travel, factor.pivot_ratio(), jnp.all(admissible, axis=0), tolerance
     )

@@ -1,7 +1,6 @@
 """The first assembly: bodies put together from the starting guess, and degrees of freedom counted and explained."""
 
 import dataclasses
-from functools import partial
 from typing import Any
 
 import jax
@@ -9,6 +8,7 @@ import numpy as np
 
 from jounce.errors import AssemblyError, MobilityError
 from jounce.jet import Jet
+from jounce.kinematics.compilation import compiled
 from jounce.kinematics.status import Status
 from jounce.mechanism import Model
 from jounce.mechanism.builder import pose_at
@@ -17,7 +17,7 @@ MAX_STEPS = 100
 RANK_TOLERANCE = 1e-9
 
 
-@partial(jax.jit, static_argnames="pose_type")
+@compiled("pose_type")
 def _moved(system: Any, coordinates: dict[str, Any], increment: Any, instant: Any, pose_type: type) -> Any:
     """Return the coordinates after an increment, with residual and Jacobian there, for one instant."""
     pose = pose_at(coordinates, pose_type)

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any
 
 import jax
@@ -11,6 +11,7 @@ import numpy as np
 
 from jounce.errors import MechanismError, did_you_mean
 from jounce.jet import Jet
+from jounce.kinematics.compilation import compiled
 from jounce.kinematics.status import Status
 from jounce.mechanism import AngleOutput, AngularVelocityOutput, Mechanism, Model, PointOutput
 from jounce.mechanism.mechanism import GROUND
@@ -19,7 +20,7 @@ from jounce.mechanism.system import POSITION_COMPONENTS, Group, group_elements
 COMPONENTS = ("x", "y", "z")
 
 
-@partial(jax.jit, static_argnames="pose_type")
+@compiled("pose_type")
 def _evaluated(group: Group, coordinates: dict[str, Any], pose_type: type) -> Any:
     pose = pose_type.from_coordinates({name: Jet(tuple(c)) for name, c in coordinates.items()})
     return jnp.stack(group.evaluate(pose).dense().coefficients)

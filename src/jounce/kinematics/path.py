@@ -111,7 +111,9 @@ def solve_grid(
         For instants that failed, the body farthest from its prediction.
     """
     count, anchors = len(time), np.array(track.instants)
-    store = jax.tree.map(lambda *xs: np.concatenate([np.zeros((*xs[0].shape[:-1], count)), *xs], axis=-1), *track.states)
+    store = jax.tree.map(
+        lambda *xs: np.concatenate([np.zeros((*xs[0].shape[:-1], count)), *xs], axis=-1), *track.states
+    )
     instants = np.concatenate([time, anchors])
     status = np.full(count, int(Status.NOT_REACHED))
     bodies: dict[int, str] = {}

@@ -26,6 +26,7 @@ _ADVICE = {
     "drive another body, or keep the driver's range away from it",
     Status.BRANCH_JUMP: "the solution left its predicted path for another assembly branch, or a motion law jumps; "
     "check that the motion laws are continuous and that the mechanism does not pass a dead point",
-    Status.NOT_CONVERGED: "Newton-Raphson did not reach the tolerance; check the lengths, or ask for a larger tolerance",
+    Status.NOT_CONVERGED: "Newton-Raphson did not reach the tolerance; the bodies may not reach each other here, or "
+    "the tolerance is too small",
     Status.NOT_REACHED: "not computed, because the motion could not be followed up to here",
 }

@@ -145,7 +145,9 @@ class Mechanism:
                 except ExpressionError as error:
                     raise error.located(name=f"parameters.{name}") from None
                 circle = ", ".join(waiting)
-                raise MechanismError(f"parameters depend on each other in a circle: {circle}", name=f"parameters.{name}")
+                raise MechanismError(
+                    f"parameters depend on each other in a circle: {circle}", name=f"parameters.{name}"
+                )
         return values
 
     def with_parameters(self, **values: Any) -> "Mechanism":

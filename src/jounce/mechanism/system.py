@@ -8,8 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jounce.jet import Jet
-from jounce.jet.vectors import stack_jets
+from jounce.jet import Jet, concatenate
 from jounce.mechanism.resolve import group_key, resolve_element, stack_elements
 
 POSITION_COMPONENTS = {"planar": 2, "spatial": 3}
@@ -117,7 +116,7 @@ class System(eqx.Module):
     def residual(self, pose: Any, time: Jet) -> Jet:
         """Return the residuals of all constraints, shape (rows, batch), scaled."""
         parts = [group.residual(pose, time).map(_flat) for group in self.groups]
-        return stack_jets(parts, jnp.concatenate) * self.row_scale
+        return concatenate(parts) * self.row_scale
 
     def jacobian(self, pose: Any, time: Jet) -> Any:
         """Return the scaled Jacobian at a pose of order zero, shape (rows, columns, batch)."""

@@ -3,7 +3,7 @@
 from jounce.rigid.planar import PlanarPose as PlanarPose, perpendicular as perpendicular
 from jounce.rigid.spatial import (
     SpatialPose as SpatialPose,
-    attitude_matrix as attitude_matrix,
+    body_axes as body_axes,
     to_body as to_body,
     to_global as to_global,
 )

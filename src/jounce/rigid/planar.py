@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 
 from jounce.jet import Jet, next_sine_cosine, sine_cosine
-from jounce.rigid.selection import take_bodies
+from jounce.rigid.selection import body_vector, take_bodies
 
 
 def perpendicular(vector: Any) -> Any:
@@ -49,11 +49,12 @@ class PlanarPose:
         return self.position.order
 
     def point(self, local: Any) -> Jet:
-        """Return the global position of a point given in the body frame, shape (2, ...): Sommer 2024, equations 10-14."""
+        """Return the global position of a point of the body frame, shape (2, ...): Sommer 2024, equations 10-14."""
         return self.position + self.direction(local)
 
     def direction(self, local: Any) -> Jet:
         """Return the global components of a vector given in the body frame: Sommer 2024, equations 19-20."""
+        local = body_vector(local, len(self.angle.shape))
         return self.cosine * local + self.sine * perpendicular(local)
 
     def take(self, bodies: tuple[int, ...]) -> "PlanarPose":

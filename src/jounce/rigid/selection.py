@@ -1,4 +1,4 @@
-"""Selection of bodies from arrays whose last two axes are bodies and batch."""
+"""Shapes: bodies selected from arrays whose last two axes are bodies and batch; constants set before batch axes."""
 
 from typing import Any
 
@@ -29,3 +29,13 @@ def _taken(array: Any, bodies: tuple[int, ...]) -> Any:
     if stride > 0 and bodies == tuple(range(first, bodies[-1] + 1, stride)):
         return jax.lax.slice_in_dim(array, first, bodies[-1] + 1, stride, axis=jnp.ndim(array) - 2)
     return array.at[..., np.array(bodies), :].get(mode="promise_in_bounds")
+
+
+def body_vector(local: Any, batch_axes: int) -> Any:
+    """Return a vector given in a body frame with the batch axes of a pose behind its components; a jet as it is."""
+    if isinstance(local, Jet):
+        return local
+    if not isinstance(local, jax.Array | np.ndarray):
+        local = np.asarray(local, float)
+    missing = 1 + batch_axes - local.ndim
+    return local.reshape(*local.shape, *[1] * missing) if missing > 0 else local

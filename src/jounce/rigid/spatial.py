@@ -5,46 +5,40 @@ quaternion by ``p' = 1/2 p o (0, w')``; no exponential map is ever differentiate
 """
 
 import dataclasses
+from functools import reduce
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 
-from jounce.jet import Jet, dot, matvec, transpose
-from jounce.jet.algebra import sum_of_products
-from jounce.rigid.selection import take_bodies
+from jounce.jet import Jet, components, dot, matvec, stack, transpose
+from jounce.jet.algebra import minus, plus, sum_of_products, total
+from jounce.rigid.selection import body_vector, take_bodies
 
 
-def attitude_matrix(quaternion: Any) -> Any:
-    """Return the attitude matrix, shape (3, 3, ...), of unit Euler parameters [e0, e1, e2, e3], shape (4, ...)."""
+def body_axes(quaternion: Any) -> tuple[Any, Any, Any]:
+    """Return the axes of the body in the global frame, the columns of the attitude matrix A, each of shape (3, ...).
+
+    Parameters
+    ----------
+    quaternion : array of shape (4, ...)
+        Unit Euler parameters [e0, e1, e2, e3].
+    """
     e0, e1, e2, e3 = quaternion
-    return jnp.stack(
-        [
-            jnp.stack([e0 * e0 + e1 * e1 - e2 * e2 - e3 * e3, 2 * (e1 * e2 - e0 * e3), 2 * (e1 * e3 + e0 * e2)]),
-            jnp.stack([2 * (e1 * e2 + e0 * e3), e0 * e0 - e1 * e1 + e2 * e2 - e3 * e3, 2 * (e2 * e3 - e0 * e1)]),
-            jnp.stack([2 * (e1 * e3 - e0 * e2), 2 * (e2 * e3 + e0 * e1), e0 * e0 - e1 * e1 - e2 * e2 + e3 * e3]),
-        ]
+    return (
+        jnp.stack([e0 * e0 + e1 * e1 - e2 * e2 - e3 * e3, 2 * (e1 * e2 + e0 * e3), 2 * (e1 * e3 - e0 * e2)]),
+        jnp.stack([2 * (e1 * e2 - e0 * e3), e0 * e0 - e1 * e1 + e2 * e2 - e3 * e3, 2 * (e2 * e3 + e0 * e1)]),
+        jnp.stack([2 * (e1 * e3 + e0 * e2), 2 * (e2 * e3 - e0 * e1), e0 * e0 - e1 * e1 - e2 * e2 + e3 * e3]),
     )
 
 
-def _rows_cross(matrix: Any, vector: Any) -> Any:
-    """Return ``A skew(w)``: each row of A times w as a vector product."""
-    a, w = matrix, vector
-    return jnp.stack(
-        [a[:, 1] * w[2] - a[:, 2] * w[1], a[:, 2] * w[0] - a[:, 0] * w[2], a[:, 0] * w[1] - a[:, 1] * w[0]], axis=1
-    )
-
-
-def _quaternion_times_vector(quaternion: Any, vector: Any) -> Any:
-    """Return the quaternion product of p and the pure quaternion (0, w)."""
-    (e0, e1, e2, e3), (w1, w2, w3) = quaternion, vector
-    return jnp.stack(
-        [
-            -e1 * w1 - e2 * w2 - e3 * w3,
-            e0 * w1 + e2 * w3 - e3 * w2,
-            e0 * w2 + e3 * w1 - e1 * w3,
-            e0 * w3 + e1 * w2 - e2 * w1,
-        ]
+def quaternion_spins(quaternion: Any) -> tuple[Any, Any, Any]:
+    """Return the quaternion products of p with i, j and k: how it changes as the body turns about its axes."""
+    e0, e1, e2, e3 = components(quaternion)
+    return (
+        jnp.concatenate([-e1, e0, e3, -e2]),
+        jnp.concatenate([-e2, -e3, e0, e1]),
+        jnp.concatenate([-e3, e2, -e1, e0]),
     )
 
 
@@ -63,15 +57,18 @@ class SpatialPose:
         Origins of the body frames in the global frame, shape (3, ...), m.
     quaternion : Jet
         Unit Euler parameters [e0, e1, e2, e3] from the body to the global frame, shape (4, ...).
-    attitude : Jet
-        Attitude matrix A, which takes body components to global ones, shape (3, 3, ...).
+    spins : tuple of 3 Jet
+        Quaternion products of them with i, j and k, each of shape (4, ...).
+    axes : tuple of 3 Jet
+        Axes of the body in the global frame, the columns of the attitude matrix A, each of shape (3, ...).
     angular_velocity : Jet or None
         Body-fixed angular velocity w', shape (3, ...), rad/s, one order shorter; None at order zero.
     """
 
     position: Jet
     quaternion: Jet
-    attitude: Jet
+    spins: tuple[Jet, Jet, Jet]
+    axes: tuple[Jet, Jet, Jet]
     angular_velocity: Jet | None
 
     shifts, turns = 3, 3  # coordinates of each kind: x, y, z; rotation about the three body axes
@@ -81,7 +78,8 @@ class SpatialPose:
     def at(cls, position: Any, quaternion: Any) -> "SpatialPose":
         """Build the pose of order zero; the quaternion is normalised."""
         quaternion = _normalised(quaternion)
-        return cls(Jet([position]), Jet([quaternion]), Jet([attitude_matrix(quaternion)]), None)
+        spins, axes = (tuple(Jet([x]) for x in f(quaternion)) for f in (quaternion_spins, body_axes))
+        return cls(Jet([position]), Jet([quaternion]), spins, axes, None)
 
     @property
     def order(self) -> int:
@@ -94,29 +92,34 @@ class SpatialPose:
 
     def direction(self, local: Any) -> Jet:
         """Return the global components of a vector given in the body frame: Sommer 2024, equations 71-72."""
-        return matvec(self.attitude, local)
+        local = body_vector(local, len(self.position.shape) - 1)
+        return total(axis * part for axis, part in zip(self.axes, components(local), strict=True))
+
+    @property
+    def attitude(self) -> Jet:
+        """Attitude matrix A, which takes body components to global ones, shape (3, 3, ...)."""
+        return transpose(stack(self.axes))
 
     def to_body(self, vector: Any) -> Jet:
         """Return the body components of a vector given in the global frame, with their derivatives."""
-        return matvec(transpose(self.attitude), vector)
+        return stack([dot(axis, vector) for axis in self.axes])
 
     def global_angular_velocity(self) -> Jet:
         """Return the angular velocity in the global frame, to any order: Sommer 2024, equations 73-76."""
-        return to_global(self.attitude, self._angular_velocity())
-
-    def _angular_velocity(self) -> Jet:
         if self.angular_velocity is None:
             raise ValueError("a pose of order 0 has no angular velocity; ask for order 1 or more")
-        return self.angular_velocity
+        return self.direction(self.angular_velocity)
 
     def take(self, bodies: tuple[int, ...]) -> "SpatialPose":
         """Return the poses of the given bodies, by index; body 0 is the ground, which never moves."""
         return jax.tree.map(lambda jet: take_bodies(jet, bodies), self, is_leaf=lambda x: isinstance(x, Jet))
 
     def displaced(self, shift: Any, turn: Any) -> "SpatialPose":
-        """Return the pose of order zero moved by a shift, (3, ...) in m, and a turn about body axes, (3, ...) in rad."""
+        """Return the pose of order zero moved by a shift, (3, ...) in m, and a turn in body axes, (3, ...) in rad."""
         quaternion = self.quaternion.coefficients[0]
-        turned = quaternion + 0.5 * _quaternion_times_vector(quaternion, turn)
+        turned = quaternion + 0.5 * total(
+            s * w for s, w in zip(quaternion_spins(quaternion), components(turn), strict=True)
+        )
         return SpatialPose.at(self.position.coefficients[0] + shift, turned)
 
     def extended(self, shift: Any, turn: Any) -> "SpatialPose":
@@ -132,12 +135,26 @@ class SpatialPose:
             velocity = Jet([jnp.zeros_like(self.position.coefficients[0]) if newest is None else newest])
         # the term with the newest w' stands last: the others are then shared between a trial and the solution
         rates = velocity.coefficients if newest is not None or k > 1 else (None,)
-        attitude = sum_of_products(_rows_cross, self.attitude.coefficients[::-1], rates)
-        quaternion = sum_of_products(_quaternion_times_vector, self.quaternion.coefficients[::-1], rates)
+        w = list(zip(*(components(rate) if rate is not None else [None] * 3 for rate in rates), strict=True))
+
+        def sum_along(jet: Jet, rate: Any) -> Any:
+            return sum_of_products(jnp.multiply, jet.coefficients[::-1], rate)
+
+        def scaled(coefficient: Any, factor: float) -> Any:
+            return None if coefficient is None else coefficient * factor
+
+        axes = []
+        for axis, (i, j) in zip(self.axes, ((1, 2), (2, 0), (0, 1)), strict=True):
+            turned = minus(sum_along(self.axes[i], w[j]), sum_along(self.axes[j], w[i]))
+            axes.append(axis.append(scaled(turned, 1 / k)))
+        spun = reduce(plus, (sum_along(spin, rate) for spin, rate in zip(self.spins, w, strict=True)))
+        quaternion = scaled(spun, 0.5 / k)
+        changes = (None,) * 3 if quaternion is None else quaternion_spins(quaternion)
         return SpatialPose(
             self.position.append(shift),
-            self.quaternion.append(None if quaternion is None else quaternion * (0.5 / k)),
-            self.attitude.append(None if attitude is None else attitude * (1 / k)),
+            self.quaternion.append(quaternion),
+            tuple(spin.append(c) for spin, c in zip(self.spins, changes, strict=True)),
+            tuple(axes),
             velocity,
         )
 

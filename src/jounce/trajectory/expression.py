@@ -71,9 +71,9 @@ _Instruction = tuple[str, Any, int, int]
 class Expression:
     """A formula of numbers, names and the usual functions, safe to read from a file.
 
-    Allowed are numbers, names, ``+ - * / **``, parentheses, the constants ``pi`` and ``deg`` (pi/180), and the functions
-    sin cos tan asin acos atan atan2 sinh cosh tanh exp log sqrt abs. Angles are in radians. An expression is frozen,
-    and two of them are equal when their texts are.
+    Allowed are numbers, names, ``+ - * / **``, parentheses, the constants ``pi`` and ``deg`` (pi/180), and the
+    functions sin cos tan asin acos atan atan2 sinh cosh tanh exp log sqrt abs. Angles are in radians. An expression is
+    frozen, and two of them are equal when their texts are.
 
     Parameters
     ----------
@@ -332,39 +332,53 @@ def _column(node: ast.AST) -> int:
 
 def _examine(node: ast.AST, text: str) -> tuple[str, Any, list[ast.AST]]:
     """Return kind, operand and children of an allowed node; refuse every other node."""
-    column = _column(node)
     match node:
-        case ast.Constant(value=bool() | None) | ast.Constant(value=str() | bytes()):
-            shown = "a string" if isinstance(node.value, (str, bytes)) else f"the word '{node.value}'"
-            _fail(f"{shown} is not allowed", column, text)
-        case ast.Constant(value=int() | float()):
-            try:
-                value = float(node.value)
-            except OverflowError:
-                value = math.inf
-            if not math.isfinite(value):
-                _fail("a number too large", column, text, "numbers go up to 1.8e308")
-            return "number", value, []
-        case ast.Name(id=name):
+        case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
+            return "number", _number(value, _column(node), text), []
+        case ast.Name(id=name) if name not in FUNCTIONS:
             return ("number", CONSTANTS[name], []) if name in CONSTANTS else ("name", name, [])
         case ast.BinOp(left=left, op=operator, right=right) if type(operator) in _OPERATORS:
             return "operator", _OPERATORS[type(operator)], [left, right]
-        case ast.BinOp(op=ast.BitXor()):
-            _fail("the operator ^ is not allowed", column, text, "a power is written **")
         case ast.UnaryOp(op=operator, operand=operand) if type(operator) in _OPERATORS:
             return "operator", _OPERATORS[type(operator)], [operand]
         case ast.Call(func=ast.Name(id=name), args=arguments, keywords=keywords):
-            return "call", name, _arguments(name, arguments, keywords, column, text)
+            return "call", name, _arguments(name, arguments, keywords, _column(node), text)
+    return _refuse(node, _column(node), text)
+
+
+def _refuse(node: ast.AST, column: int, text: str) -> NoReturn:
+    """Name what is not allowed."""
+    match node:
+        case ast.Name(id=name):
+            _refuse_name(name, column, text, ())
+        case ast.BinOp(op=ast.BitXor()):
+            _fail("the operator ^ is not allowed", column, text, "a power is written **")
+        case ast.BinOp(op=operator) | ast.UnaryOp(op=operator):
+            shown = f"the operator {type(operator).__name__}"
         case ast.Call():
             _fail("something that is not a function is called", column, text, "a product needs its *, as in 2*(a + b)")
         case ast.Attribute(attr=attribute):
-            _fail(f"an attribute, '.{attribute}', is not allowed", column, text)
-        case ast.BinOp() | ast.UnaryOp():
-            _fail(f"the operator {type(node.op).__name__} is not allowed", column, text)
+            shown = f"an attribute, '.{attribute}',"
+        case ast.Constant(value=bool() | None):
+            shown = f"the word '{node.value}'"
+        case ast.Constant(value=str() | bytes()):
+            shown = "a string"
         case ast.Constant(value=complex()):
-            _fail("a complex number is not allowed", column, text)
-    shown = _FOUND.get(type(node), "something else")
+            shown = "a complex number"
+        case _:
+            shown = _FOUND.get(type(node), "something else")
     _fail(f"{shown} is not allowed", column, text)
+
+
+def _number(value: int | float, column: int, text: str) -> float:
+    """Return a literal as a finite float."""
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        _fail("a number too large", column, text, "numbers go up to 1.8e308")
+    return number
 
 
 def _arguments(

@@ -1,0 +1,147 @@
+"""What a command shows: the table of peaks, a progress bar, messages; in colour on a terminal, plain text elsewhere."""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from jounce.io.peaks import Peak
+
+__all__ = ["Bar", "complain", "say", "show_peaks", "unexpected"]
+
+WIDTH = 80  # of tables that do not go to a terminal
+PATIENCE = 1.0  # s, before a progress bar is shown
+ROUNDING = 1e-15  # of the other components; what is smaller is shown as 0
+HEADINGS = ("output", "derivative", "unit", "minimum", "at t/s", "maximum", "at t/s")
+
+
+def show_peaks(found: list[Peak]) -> None:
+    """Print a table of peaks."""
+    if not found:
+        say("\nNo outputs are defined, so there is nothing to tabulate.")
+    elif sys.stdout.isatty():
+        _print_table(found)
+    else:
+        say("\n" + "\n".join(_plain_table(found)))
+
+
+def _cells(peak: Peak) -> list[str]:
+    def shown(number: float) -> str:
+        return "-" if math.isnan(number) else f"{number:.6g}"
+
+    low, high = (0.0 if abs(x) < ROUNDING * peak.size else x for x in (peak.minimum, peak.maximum))
+    extremes = (shown(x) for x in (low, peak.minimum_at, high, peak.maximum_at))
+    return [peak.output, peak.derivative, peak.unit, *extremes]
+
+
+def _plain_table(found: list[Peak]) -> list[str]:
+    """Return the lines of a table in plain text; where names are too long for it, they stand on lines of their own."""
+    table = [_cells(peak) for peak in found]
+    for peak, cells in zip(found, table, strict=True):
+        for column, largest in zip((3, 5), peak.largest, strict=True):
+            cells[column] += "*" if largest else " "
+    columns = list(zip(HEADINGS, *table, strict=True))
+    widths = [max(map(len, column)) for column in columns]
+    first = 0 if sum(widths) + 2 * (len(widths) - 1) <= WIDTH else 1
+
+    def line(cells: Sequence[str]) -> str:
+        parts = [c.ljust(w) if k < 3 else c.rjust(w) for k, (c, w) in enumerate(zip(cells, widths, strict=True))]
+        return "  ".join(parts[first:]).rstrip()
+
+    lines = [line(HEADINGS), line(["-" * w for w in widths])]
+    before = ""
+    for cells in table:
+        if cells[0] != before:
+            lines += [""] * bool(before) + [cells[0]] * first
+        before = cells[0]
+        lines.append(line(cells))
+    return [*lines, "", "* largest magnitude"]
+
+
+def _print_table(found: list[Peak]) -> None:
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, header_style="bold")
+    for k, heading in enumerate(HEADINGS):
+        table.add_column(heading, justify="left" if k < 3 else "right", no_wrap=k > 0, style="cyan" if k == 0 else "")
+    before = ""
+    for peak in found:
+        cells = [Text(cell) for cell in _cells(peak)]
+        for column, largest in zip((3, 5), peak.largest, strict=True):
+            cells[column].stylize("bold" if largest else "")
+        cells[0] = Text("" if peak.output == before else _clean(peak.output))
+        if before not in ("", peak.output):
+            table.add_section()
+        before = peak.output
+        table.add_row(*cells)
+    Console().print(table, "bold: largest magnitude", sep="\n")
+
+
+class Bar:
+    """A progress bar on the terminal's standard error, shown only when work goes on for more than a moment."""
+
+    def __init__(self, task: str):
+        self._task = task
+        self._started: float | None = None
+        self._bar: Any = None
+
+    def __enter__(self) -> Bar:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+
+    def __call__(self, done: int, total: int) -> None:
+        """Tell how much is done; compiling, before the first call, does not count as work."""
+        if self._bar is None:
+            now = time.monotonic()
+            self._started = now if self._started is None else self._started
+            if done >= total or now - self._started < PATIENCE or not sys.stderr.isatty():
+                return
+            from rich.console import Console
+            from rich.progress import Progress
+
+            self._bar = Progress(console=Console(stderr=True), transient=True)
+            self._bar.start()
+            self._id = self._bar.add_task(self._task, total=total)
+        self._bar.update(self._id, completed=done, total=total)
+
+
+def _clean(text: str) -> str:
+    """Replace control characters, with which a file could steer the terminal."""
+    return "".join(c if c.isprintable() or c == "\n" else "?" for c in text)
+
+
+def say(text: str) -> None:
+    """Print text on standard output."""
+    sys.stdout.write(_clean(text) + "\n")
+    sys.stdout.flush()
+
+
+def complain(error: object) -> None:
+    """Print an error on standard error, in one line."""
+    text = _clean(" ".join(str(error).split()))
+    if sys.stderr.isatty():
+        from rich.console import Console
+        from rich.text import Text
+
+        Console(stderr=True, soft_wrap=True).print(Text.assemble(("error: ", "bold red"), text))
+    else:
+        sys.stderr.write(f"error: {text}\n")
+
+
+def unexpected(error: Exception) -> str:
+    """Word an error that no check foresaw, with the innermost line that is the user's or this package's own."""
+    import traceback
+
+    words = f"unexpected {type(error).__name__}: {str(error).strip().partition(chr(10))[0]}".rstrip(": ")
+    frames = [f for f in traceback.extract_tb(error.__traceback__) if "site-packages" not in f.filename]
+    return f"{words} ({Path(frames[-1].filename).name}, line {frames[-1].lineno})" if frames else words

@@ -1,0 +1,233 @@
+"""Annotations of single values for the schema: scalars, vectors, motion laws, orientations.
+
+Each checks a value as a file holds it, turns it into a number in SI units or an expression, and describes itself in the
+JSON Schema. Imported only when a file is loaded, since pydantic takes a while.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field
+from pydantic_core import PydanticCustomError, core_schema
+
+from jounce.errors import UNSET, ExpressionError, JounceError, did_you_mean, show_value
+from jounce.io.units import KINDS, Value, parse_value
+
+__all__ = ["Checked", "Samples", "inertia", "motion", "orientation", "problem", "scalar", "vector", "vectors"]
+
+
+def problem(message: str, *at: str | int, value: object = ...) -> PydanticCustomError:
+    """Return an error for pydantic to collect; ``at`` leads on from the entry being validated.
+
+    The value shown is that of the entry unless another is given, and none when it is ``UNSET``.
+    """
+    return PydanticCustomError("jounce", "{message}", {"message": message, "at": at, "value": value})
+
+
+def _below(error: PydanticCustomError, *at: str | int) -> PydanticCustomError:
+    """Return the same error one or more steps further down."""
+    context = error.context or {}
+    return problem(context["message"], *at, *context["at"], value=context["value"])
+
+
+class Checked:
+    """An annotation: validated by a function of the value and pydantic's context, with a JSON schema of its own."""
+
+    def __init__(self, function: Callable[[Any, Any], Any], schema: dict[str, Any]) -> None:
+        self.function = function
+        self.schema = schema
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> core_schema.CoreSchema:
+        return core_schema.with_info_plain_validator_function(self.function)
+
+    def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> dict[str, Any]:
+        return self.schema
+
+
+def _parse(raw: Any, quantity: str, info: Any, extra_names: tuple[str, ...] = ()) -> Value:
+    if quantity in ("of coordinate", "per angle"):
+        turning = info.data.get("coordinate") == "angle"
+        by_coordinate = {"of coordinate": ("length", "angle"), "per angle": ("length per angle", "ratio")}
+        quantity = by_coordinate[quantity][turning]
+    context = info.context or {}
+    try:
+        names = (*context.get("names", ()), *extra_names)
+        return parse_value(raw, quantity, names, context.get("dimensions"))
+    except JounceError as error:
+        quoted = isinstance(error, ExpressionError) and error.column is not None  # the text is in the message
+        raise problem(error.message, value=UNSET if quoted else raw) from None
+
+
+def _words(quantity: str) -> str:
+    if quantity in KINDS:
+        return KINDS[quantity][0]
+    return {"of coordinate": "a length or an angle", "per angle": "a pure number or a length"}.get(quantity, "a value")
+
+
+def _scalar_schema(quantity: str, described: str = "") -> dict[str, Any]:
+    text = f"{_words(quantity)}: a number (SI), a number with a unit, or an expression of parameters{described}"
+    return {"description": text, "anyOf": [{"type": "number"}, {"type": "string", "minLength": 1}]}
+
+
+def scalar(quantity: str) -> Any:
+    """Return the annotation of one value of a kind of ``units.KINDS``."""
+    return Annotated[Any, Checked(lambda raw, info: _parse(raw, quantity, info).value, _scalar_schema(quantity))]
+
+
+def _vector_value(raw: Any, size: int, quantity: str, info: Any, *at: str | int) -> tuple[Any, ...]:
+    if not isinstance(raw, (list, tuple)) or len(raw) != size:
+        raise problem(f"must be a list of {size} values", *at, value=raw)
+    parsed = []
+    for index, item in enumerate(raw):
+        try:
+            parsed.append(_parse(item, "any" if quantity == "direction" else quantity, info))
+        except PydanticCustomError as error:
+            raise _below(error, *at, index) from None
+    if quantity == "direction":
+        used = {item.dimension for item in parsed if item.value != 0 and isinstance(item.value, float)}
+        if len(used) > 1:
+            raise problem("the components of a direction must all have the same unit, or none", *at, value=raw)
+    return tuple(item.value for item in parsed)
+
+
+def _vector_schema(size: int, quantity: str) -> dict[str, Any]:
+    words = "a direction, of any length but zero" if quantity == "direction" else _words(quantity)
+    items = {"anyOf": [{"type": "number"}, {"type": "string", "minLength": 1}]}
+    return {"type": "array", "description": words, "items": items, "minItems": size, "maxItems": size}
+
+
+def vector(size: int, quantity: str) -> Any:
+    """Return the annotation of a list of values of one kind."""
+    return Annotated[
+        Any, Checked(lambda raw, info: _vector_value(raw, size, quantity, info), _vector_schema(size, quantity))
+    ]
+
+
+def vectors(count: int, size: int, quantity: str) -> Any:
+    """Return the annotation of a list of vectors, one on each body."""
+
+    def check(raw: Any, info: Any) -> tuple[Any, ...]:
+        if not isinstance(raw, (list, tuple)) or len(raw) != count:
+            raise problem(f"must be a list of {count} vectors, one on each body")
+        return tuple(_vector_value(item, size, quantity, info, index) for index, item in enumerate(raw))
+
+    schema = {"type": "array", "items": _vector_schema(size, quantity), "minItems": count, "maxItems": count}
+    return Annotated[Any, Checked(check, schema)]
+
+
+class Samples(BaseModel):
+    """A motion law through samples: a CSV file, the degree of the spline, and the columns of time and value."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+    samples: str
+    degree: int = Field(default=5, ge=1, le=11)
+    time: str | None = None
+    value: str | None = None
+
+
+def motion(quantity: str) -> Any:
+    """Return the annotation of a motion law."""
+
+    def check(raw: Any, info: Any) -> Any:
+        if not isinstance(raw, dict):
+            return _parse(raw, quantity, info, ("t",)).value
+        if raw.keys() == {"expression"}:
+            try:
+                return _parse(raw["expression"], quantity, info, ("t",)).value
+            except PydanticCustomError as error:
+                raise _below(error, "expression") from None
+        valid = ["expression"] if "expression" in raw else list(Samples.model_fields)
+        valid += [] if {"expression", "samples"} & raw.keys() else ["expression"]
+        for key in raw.keys() - set(valid):
+            raise problem(f"unknown key {show_value(key)}; {did_you_mean(key, valid)}", key, value=UNSET)
+        if "samples" not in raw:
+            raise problem("must be an expression, or samples: the name of a CSV file")
+        for key, kind in (("samples", str), ("degree", int), ("time", str), ("value", str)):
+            if key in raw and (not isinstance(raw[key], kind) or isinstance(raw[key], bool)):
+                raise problem("must be a whole number" if kind is int else "must be a name", key, value=raw[key])
+        if not 1 <= raw.get("degree", 5) <= 11:
+            raise problem("the degree of a spline is from 1 to 11", "degree", value=raw["degree"])
+        return Samples(**raw)
+
+    described = " and of t, the time in s"
+    law = _scalar_schema(quantity, described)
+    formula = {"type": "object", "properties": {"expression": law}, "required": ["expression"]}
+    spline = Samples.model_json_schema()
+    for entry in (spline["properties"]["time"], spline["properties"]["value"]):
+        entry.pop("anyOf")
+        entry |= {"type": "string", "description": "name of a column; by default time, and the only other one"}
+        entry.pop("default")
+    schema = {
+        "description": law["description"],
+        "anyOf": [*law["anyOf"], formula | {"additionalProperties": False}, spline],
+    }
+    return Annotated[Any, Checked(check, schema)]
+
+
+def _orientation(raw: Any, info: Any) -> dict[str, Any]:
+    """Read one of the three forms of an orientation; the values stay numbers or expressions."""
+    forms: dict[str, tuple[str, ...]] = {
+        "quaternion": ("quaternion",),
+        "euler": ("euler", "angles"),
+        "axis": ("axis", "angle"),
+    }
+    if not isinstance(raw, dict):
+        raise problem("must be {quaternion: [e0, e1, e2, e3]}, {axis, angle} or {euler: zxz, angles}")
+    form = next((form for form in forms if form in raw), None)
+    valid = forms[form] if form else [key for keys in forms.values() for key in keys]
+    for key in raw:
+        if key not in valid:
+            raise problem(f"unknown key {show_value(key)}; {did_you_mean(key, valid)}", key, value=UNSET)
+    for key in valid if form else ("quaternion",):
+        if key not in raw:
+            raise problem("is missing", key, value=UNSET)
+    if form == "quaternion":
+        return {"quaternion": _vector_value(raw["quaternion"], 4, "ratio", info, "quaternion")}
+    if form == "euler":
+        if not isinstance(raw["euler"], str):
+            raise problem("must be three letters, such as zxz", "euler", value=raw["euler"])
+        return {"euler": raw["euler"], "angles": _vector_value(raw["angles"], 3, "angle", info, "angles")}
+    try:
+        angle = _parse(raw["angle"], "angle", info).value
+    except PydanticCustomError as error:
+        raise _below(error, "angle") from None
+    return {"axis": _vector_value(raw["axis"], 3, "direction", info, "axis"), "angle": angle}
+
+
+def orientation() -> Any:
+    """Return the annotation of an orientation in space."""
+    forms = [
+        {"quaternion": _vector_schema(4, "ratio")},
+        {"axis": _vector_schema(3, "direction"), "angle": _scalar_schema("angle")},
+        {
+            "euler": {"type": "string", "pattern": "^([xyz]{3}|[XYZ]{3})$"},
+            "angles": _vector_schema(3, "angle"),
+        },
+    ]
+    closed = {"type": "object", "additionalProperties": False}
+    text = "lower-case Euler letters turn about fixed axes, upper-case ones about the moving axes of the body"
+    schema = {"description": text, "oneOf": [closed | {"properties": f, "required": list(f)} for f in forms]}
+    return Annotated[Any, Checked(_orientation, schema)]
+
+
+def inertia() -> Any:
+    """Return the annotation of a spatial inertia: three principal moments, or the full symmetric matrix."""
+
+    def check(raw: Any, info: Any) -> Any:
+        if not isinstance(raw, (list, tuple)) or len(raw) != 3:
+            raise problem("must be a list of 3 principal moments, or 3 rows of 3")
+        if not all(isinstance(row, (list, tuple)) for row in raw):
+            return _vector_value(raw, 3, "inertia", info)
+        rows = tuple(_vector_value(row, 3, "inertia", info, index) for index, row in enumerate(raw))
+        if any(rows[i][j] != rows[j][i] for i in range(3) for j in range(i)):
+            raise problem("a matrix of inertia must be symmetric")
+        return rows
+
+    schema = {
+        "type": "array",
+        "description": "a list of 3 principal moments, or 3 rows of 3, such as 0.1 kg*m^2",
+        "anyOf": [_vector_schema(3, "inertia"), {"items": _vector_schema(3, "inertia"), "minItems": 3, "maxItems": 3}],
+    }
+    return Annotated[Any, Checked(check, schema)]

@@ -1,0 +1,47 @@
+"""Central finite differences, what jerk and jounce were taken from before (Sommer 2024, 57-58)."""
+
+import numpy as np
+
+WEIGHTS = {  # by order of accuracy and order of derivative, from the sample two steps before to that two steps after
+    (2, 1): (0, -1 / 2, 0, 1 / 2, 0),
+    (2, 2): (0, 1, -2, 1, 0),
+    (4, 1): (1 / 12, -8 / 12, 0, 8 / 12, -1 / 12),  # printed with -8/12 twice, see the errata
+    (4, 2): (-1 / 12, 16 / 12, -30 / 12, 16 / 12, -1 / 12),
+}
+REACH = 2  # samples needed on either side
+
+
+def central_difference(
+    samples: np.ndarray, step: float, *, derivative: int, accuracy: int, at: np.ndarray | None = None
+) -> np.ndarray:
+    """Return the first or second derivative of evenly spaced samples (Sommer 2024, equations 57 and 58 corrected).
+
+    Parameters
+    ----------
+    samples : array of shape (time,)
+        Values `step` apart (near each of the instants asked for).
+    step : float
+        Time step, s.
+    derivative : int
+        1 or 2.
+    accuracy : int
+        2 or 4: the error falls with this power of the step.
+    at : array of int, optional
+        Indices of the instants asked for; all that have two samples on either side unless given.
+
+    Returns
+    -------
+    numpy.ndarray
+        Derivatives at those instants.
+
+    Examples
+    --------
+    >>> t = np.arange(5) * 0.1
+    >>> central_difference(t**4, 0.1, derivative=2, accuracy=4)
+    array([0.48])
+    """
+    samples = np.asarray(samples, float)
+    centres = np.arange(REACH, len(samples) - REACH) if at is None else np.asarray(at)
+    weights = WEIGHTS[accuracy, derivative]
+    terms = [weight * samples[centres + k - REACH] for k, weight in enumerate(weights) if weight]
+    return np.sum(terms, axis=0) / step**derivative

@@ -1,0 +1,217 @@
+"""The seven simulations: their mechanisms, their explicit solutions, and the errors between the two."""
+
+import dataclasses
+from collections.abc import Callable
+from importlib.resources import as_file, files
+from typing import Any
+
+import numpy as np
+
+from jounce.io import load
+from jounce.kinematics import solve
+from jounce.mechanism import Mechanism
+from jounce.papers.sommer_2024 import geometry
+from jounce.papers.sommer_2024.differences import REACH, central_difference
+
+MECHANISMS = files("jounce.papers.sommer_2024") / "mechanisms"
+QUANTITIES = ("velocity", "acceleration", "jerk", "jounce")  # derivatives 1 to 4 of the output angle
+CYCLE = 2.0  # s
+STEP = 0.01  # s
+TOLERANCE = 1e-12
+TOLERANCES = tuple(float(f"1e{k}") for k in range(-14, -3))
+STEPS = (1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, 1e-1)  # s, each a whole part of the cycle
+RUNS = 1 + len(TOLERANCES) + len(STEPS)  # of each simulation
+
+
+@dataclasses.dataclass(frozen=True)
+class Simulation:
+    """One driven mechanism with an explicit solution of one of its angles.
+
+    Parameters
+    ----------
+    name : str
+        As in `errors.csv`; also the name of the mechanism file.
+    title : str
+        As in figures.
+    output : str
+        The output angle, as named in the mechanism file.
+    form : callable
+        Its explicit solution, from `geometry`.
+    """
+
+    name: str
+    title: str
+    output: str
+    form: geometry.Form
+
+    def load(self) -> Mechanism:
+        """Return the mechanism, from the file that is part of the package."""
+        with as_file(MECHANISMS / f"{self.name}.yaml") as path:
+            return load(path)
+
+    def simulated(self, mechanism: Mechanism, time: np.ndarray, **settings: Any) -> np.ndarray:
+        """Return the output angle and its derivatives to jounce by `jounce.solve`, shape (time, 5), rad."""
+        return solve(mechanism, time, order=len(QUANTITIES), **settings).outputs[self.output]
+
+    def explicit(self, mechanism: Mechanism, time: np.ndarray) -> np.ndarray:
+        """Return the same from the explicit solution, which does not use the solver."""
+        return geometry.evaluate(self.form, time, mechanism.parameter_values, order=len(QUANTITIES))
+
+
+SIMULATIONS = {
+    simulation.name: simulation
+    for simulation in (
+        Simulation("four_bar", "Four-bar", "psi", geometry.four_bar),
+        Simulation(
+            "inverted_slider_crank_slide", "Inverted slider-crank, slide driver", "psi", geometry.inverted_slider_crank
+        ),
+        Simulation(
+            "inverted_slider_crank_distance",
+            "Inverted slider-crank, distance driver",
+            "psi",
+            geometry.inverted_slider_crank,
+        ),
+        Simulation("rsur", "RSUR", "psi", geometry.rsur),
+        Simulation("rssr", "RSSR", "psi", geometry.rsur),
+        Simulation("rspu_distance", "RSPU, distance driver", "theta", geometry.rspu),
+        Simulation("rspu_slide", "RSPU, slide driver", "theta", geometry.rspu),
+    )
+}
+
+
+@dataclasses.dataclass(frozen=True)
+class Cycle:
+    """A simulation beside its explicit solution, over one cycle at nominal settings.
+
+    Attributes
+    ----------
+    time : array of shape (time,)
+        Instants, s.
+    simulated, explicit : array of shape (time, 5)
+        The output angle and its derivatives to jounce, rad to rad/s^4.
+    """
+
+    time: np.ndarray
+    simulated: np.ndarray
+    explicit: np.ndarray
+
+    @property
+    def rmse(self) -> np.ndarray:
+        """Root-mean-square errors of velocity to jounce, rad/s to rad/s^4, shape (4,)."""
+        return rmse(self.simulated, self.explicit)[1:]
+
+    @property
+    def peak(self) -> np.ndarray:
+        """Largest absolute values of velocity to jounce, rad/s to rad/s^4, shape (4,)."""
+        return np.max(np.abs(self.explicit), axis=0)[1:]
+
+    @property
+    def normalised_rmse(self) -> np.ndarray:
+        """The errors divided by the largest absolute values, shape (4,)."""
+        return normalised_rmse(self.simulated, self.explicit)[1:]
+
+
+@dataclasses.dataclass(frozen=True)
+class Results:
+    """All that is measured of one simulation.
+
+    Attributes
+    ----------
+    cycle : Cycle
+        At nominal settings.
+    by_tolerance : array of shape (tolerances, 4)
+        Normalised RMSE of velocity to jounce for each of `TOLERANCES`.
+    by_step : dict of str to array of shape (steps, 2)
+        Normalised RMSE of jerk and jounce for each of `STEPS`: of the simulation, and of the differences of second
+        and fourth order of its acceleration.
+    """
+
+    cycle: Cycle
+    by_tolerance: np.ndarray
+    by_step: dict[str, np.ndarray]
+
+
+def rmse(found: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Return the root-mean-square error over time, the first axis."""
+    return np.sqrt(np.mean((found - right) ** 2, axis=0))
+
+
+def normalised_rmse(found: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Return the root-mean-square error over time divided by the largest absolute value (Sommer 2024, section 4)."""
+    return rmse(found, right) / np.max(np.abs(right), axis=0)
+
+
+def nominal_time() -> np.ndarray:
+    """Return one cycle of 2 s in steps of 0.01 s, both ends included: shape (201,)."""
+    return STEP * np.arange(round(CYCLE / STEP) + 1)
+
+
+def nominal_cycle(simulation: Simulation, mechanism: Mechanism) -> Cycle:
+    """Return one cycle at an assembly tolerance of 1e-12, simulated and explicit."""
+    time = nominal_time()
+    simulated = simulation.simulated(mechanism, time, tolerance=TOLERANCE)
+    return Cycle(time, simulated, simulation.explicit(mechanism, time))
+
+
+def tolerance_error(simulation: Simulation, mechanism: Mechanism, tolerance: float) -> np.ndarray:
+    """Return the normalised RMSE of velocity to jounce, with positions no better than an assembly tolerance."""
+    time = nominal_time()
+    found = simulation.simulated(mechanism, time, tolerance=tolerance, refine=False)
+    return normalised_rmse(found, simulation.explicit(mechanism, time))[1:]
+
+
+def step_errors(simulation: Simulation, mechanism: Mechanism, step: float) -> dict[str, np.ndarray]:
+    """Return the normalised RMSE of jerk and jounce at one time step: simulated, and by differences of order 2 and 4.
+
+    All three stand at the same instants, one whole cycle of them.
+    """
+    time, centres = stencil_instants(step)
+    found = simulation.simulated(mechanism, time)
+    right = simulation.explicit(mechanism, time[centres])[:, 3:]
+    errors = {"simulation": normalised_rmse(found[centres, 3:], right)}
+    for name, accuracy in (("second order", 2), ("fourth order", 4)):
+        estimates = [
+            central_difference(found[:, 2], step, derivative=derivative, accuracy=accuracy, at=centres)
+            for derivative in (1, 2)
+        ]
+        errors[name] = normalised_rmse(np.stack(estimates, axis=1), right)
+    return errors
+
+
+def stencil_instants(step: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return increasing instants, and the indices of those around which two more stand on either side, `step` apart.
+
+    A grid of that step over one cycle. Where it would have more than some thousand instants, only the surroundings of
+    the nominal 201 instants are kept: the mean square of an error over the cycle is the same.
+    """
+    if 2 * REACH * step < STEP:
+        centres = REACH * step + nominal_time()
+        time = (centres[:, None] + step * np.arange(-REACH, REACH + 1)).ravel()
+        return time, np.arange(REACH, len(time), 2 * REACH + 1)
+    count = round(CYCLE / step) + 1
+    return step * np.arange(count + 2 * REACH), np.arange(REACH, REACH + count)
+
+
+def measure(simulation: Simulation, advanced: Callable[[], None] = lambda: None) -> Results:
+    """Run a simulation at nominal settings, over all tolerances and over all time steps.
+
+    Parameters
+    ----------
+    simulation : Simulation
+        What to run.
+    advanced : callable, optional
+        Called after each of the `RUNS` runs.
+    """
+    mechanism = simulation.load()
+    cycle = nominal_cycle(simulation, mechanism)
+    advanced()
+    by_tolerance = []
+    for tolerance in TOLERANCES:
+        by_tolerance.append(tolerance_error(simulation, mechanism, tolerance))
+        advanced()
+    by_step = []
+    for step in STEPS:
+        by_step.append(step_errors(simulation, mechanism, step))
+        advanced()
+    methods = {name: np.stack([errors[name] for errors in by_step]) for name in by_step[0]}
+    return Results(cycle, np.stack(by_tolerance), methods)

@@ -1,0 +1,89 @@
+"""Every way a mechanism file can be wrong ends in one message with file, line, name and value, never in a traceback."""
+
+import pathlib
+
+import pytest
+from ruamel.yaml import YAML
+
+from jounce.errors import MechanismFileError
+from jounce.io import load
+
+PLANAR = """\
+title: Planar four-bar
+space: planar
+gravity: [0, -9.81]
+parameters: {AD: 13.21 cm, AB: 4.00 cm, BC: 14.23 cm, CD: 20.31 cm, tau: 2 s}
+bodies:
+  crank:  {position: [0, 0], angle: 30 deg}
+  rocker: {position: [AD, 0], angle: 100 deg}
+joints:
+  A:  {type: revolute, bodies: [ground, crank], points: [[0, 0], [0, 0]]}
+  D:  {type: revolute, bodies: [ground, rocker], points: [[AD, 0], [0, 0]]}
+  BC: {type: double_revolute, bodies: [crank, rocker], points: [[AB, 0], [CD, 0]], length: BC}
+drivers:
+  theta: {type: coordinate, bodies: [ground, crank], coordinate: angle, motion: 30*deg + 60*deg*sin(2*pi*t/tau)}
+outputs:
+  psi: {body: rocker, quantity: angle}
+  C: {body: rocker, point: [CD, 0]}
+time: {start: 0, stop: 2, step: 0.01}
+"""
+SPATIAL = """\
+space: spatial
+parameters: {L: 10 cm}
+bodies:
+  crank:
+    position: [0, 0, 0]
+    orientation: {axis: [0, 0, 1], angle: 30 deg}
+joints:
+  O: {type: revolute, bodies: [ground, crank], points: [[0, 0, 0], [0, 0, 0]], axes: [[0, 0, 1], [0, 0, 1]]}
+drivers:
+  theta: {type: rotation, bodies: [ground, crank], axis: [0, 0, 1], motion: 2*pi*t}
+outputs:
+  tip: {body: crank, point: [L, 0, 0]}
+  turn: {bodies: [ground, crank], quantity: angle, axis: [0, 0, 1], vectors: [[1, 0, 0], [1, 0, 0]]}
+"""
+FILES = {"planar": PLANAR, "spatial": SPATIAL}
+CASES = YAML(typ="safe").load(pathlib.Path(__file__).with_name("bad_input.yaml"))
+
+
+@pytest.mark.parametrize(
+    "space, what", [pytest.param(space, what, id=f"{space}-{what}") for space in CASES for what in CASES[space]]
+)
+def test_file_with_one_mistake(tmp_path, space, what):
+    case, text = CASES[space][what], FILES[space]
+    assert case["instead_of"] in text
+    path = tmp_path / "file.yaml"
+    path.write_text(text.replace(case["instead_of"], case["text"], 1))
+    with pytest.raises(MechanismFileError) as caught:
+        load(path)
+    message = str(caught.value)
+    assert message.startswith(f"{path}, line {case['line']}, {case['name']}: ")
+    assert case["says"] in message
+    assert message.isprintable()
+
+
+@pytest.mark.parametrize("text", [PLANAR, SPATIAL], ids=["planar", "spatial"])
+def test_the_files_without_mistakes_are_read(tmp_path, text):
+    path = tmp_path / "good.yaml"
+    path.write_text(text)
+    assert load(path).bodies
+
+
+@pytest.mark.parametrize(
+    "text, words", [("- a\n", "got ['a']"), ("hello", "got 'hello'"), ("# nothing", "got nothing")]
+)
+def test_a_file_that_is_no_mapping(tmp_path, text, words):
+    path = tmp_path / "list.yaml"
+    path.write_text(text)
+    with pytest.raises(
+        MechanismFileError, match="a mechanism file is a mapping with the keys space, bodies, joints"
+    ) as caught:
+        load(path)
+    assert words in str(caught.value)
+
+
+def test_a_misspelt_key_is_named_rather_than_the_key_that_misses(tmp_path):
+    path = tmp_path / "two.yaml"
+    path.write_text("space: planar\nbodies:\n  a: {}\njoints:\n  A:\n    type: double_revolute\n    lenght: 1\n")
+    with pytest.raises(MechanismFileError, match=r"line 7, joints.A.lenght: unknown key 'lenght'"):
+        load(path)

@@ -1,0 +1,255 @@
+"""The seven simulations of Sommer 2024: explicit solutions, errors, sweeps, files written."""
+
+import csv
+import importlib
+import pathlib
+import subprocess
+import sys
+
+import mpmath as mp
+import numpy as np
+import pytest
+
+from jounce.errors import OutputError
+from jounce.papers import sommer_2024
+from jounce.papers.sommer_2024 import QUANTITIES, SIMULATIONS, central_difference, geometry, simulations
+from jounce.papers.sommer_2024.simulations import STEPS, TOLERANCES, stencil_instants
+
+reproduction = importlib.import_module("jounce.papers.sommer_2024.reproduce")
+ROOT = pathlib.Path(__file__).parents[2]
+FLOOR = 1e-14  # normalised RMSE that every quantity of every simulation must reach
+
+
+# The same angles from other, textbook formulas, at any precision.
+
+
+def swing(t, p):
+    return mp.sin(2 * mp.pi * t / p["tau"])
+
+
+def crank_angle(t, p):
+    return mp.radians(30) + mp.radians(60) * swing(t, p)
+
+
+def driven_distance(t, p):
+    return p["d_start"] + p["d_delta"] * swing(t, p)
+
+
+def angle_opposite(opposite, one, other):
+    """Law of cosines."""
+    return mp.acos((one**2 + other**2 - opposite**2) / (2 * one * other))
+
+
+def four_bar(t, p):
+    diagonal = p["AB"] * mp.expj(crank_angle(t, p)) - p["AD"]
+    return mp.arg(diagonal) - angle_opposite(p["BC"], abs(diagonal), p["CD"])
+
+
+def inverted_slider_crank(t, p):
+    return mp.pi - angle_opposite(driven_distance(t, p), p["EF"], p["FG"])
+
+
+def rsur(t, p):
+    """Tangent of the half angle, from the quadratic equation of the closed loop."""
+    theta = crank_angle(t, p)
+    b = mp.matrix([p["OA"], p["AB"] * mp.cos(theta) - p["OD"], p["AB"] * mp.sin(theta)])  # from D to B
+    k = (mp.fdot(b, b) + p["CD"] ** 2 - p["BC"] ** 2) / (2 * p["CD"])
+    return 2 * mp.atan((b[0] - mp.sqrt(b[0] ** 2 + b[2] ** 2 - k**2)) / (k + b[2]))
+
+
+def rspu(t, p):
+    """B and D, seen along the axis of the crank, stand AB and OD from it; along the axis they are OA apart."""
+    return angle_opposite(mp.sqrt(driven_distance(t, p) ** 2 - p["OA"] ** 2), p["AB"], p["OD"])
+
+
+TEXTBOOK = {geometry.four_bar: four_bar, geometry.inverted_slider_crank: inverted_slider_crank}
+TEXTBOOK |= {geometry.rsur: rsur, geometry.rspu: rspu}
+
+
+def precise(form, time, parameters, order=4):
+    """The derivatives of a textbook formula at 40 digits, rounded at the end."""
+    with mp.workdps(40):
+        exact = {name: mp.mpf(float(value)) for name, value in parameters.items()}
+        series = [mp.taylor(lambda t: form(t, exact), mp.mpf(float(instant)), order) for instant in time]
+        return np.array([[float(mp.re(c) * mp.factorial(k)) for k, c in enumerate(row)] for row in series])
+
+
+def largest_error(found, right):
+    """Of any derivative, by its largest value; angles may differ by whole turns."""
+    error = found - right
+    error[:, 0] -= 2 * np.pi * np.round(error[:, 0] / (2 * np.pi))
+    return (np.abs(error).max(axis=0) / np.abs(right).max(axis=0)).max()
+
+
+@pytest.mark.parametrize("name", ["four_bar", "inverted_slider_crank_slide", "rsur", "rspu_slide"])
+def test_explicit_solution_has_the_digits_of_the_textbook_formula(name):
+    simulation = SIMULATIONS[name]
+    mechanism = simulation.load()
+    time = np.array([0.0, 0.17, 0.43, 0.5, 0.87, 1.06, 1.31, 1.5, 1.93])
+    found = simulation.explicit(mechanism, time)
+    right = precise(TEXTBOOK[simulation.form], time, mechanism.parameter_values)
+    assert largest_error(found, right) <= 1e-14
+
+
+def test_explicit_solutions_reach_higher_orders():
+    simulation = SIMULATIONS["four_bar"]
+    parameters = simulation.load().parameter_values
+    time = np.array([0.1, 0.9, 1.4])
+    found = geometry.evaluate(simulation.form, time, parameters, order=8)
+    right = precise(four_bar, time, parameters, order=8)
+    assert largest_error(found, right) <= 1e-13
+
+
+def test_explicit_solutions_use_neither_solver_nor_constraints():
+    text = pathlib.Path(geometry.__file__).read_text()
+    assert not any(room in text for room in ("jounce.kinematics", "jounce.constraints", "jounce.mechanism", "solve("))
+
+
+@pytest.mark.parametrize("name", SIMULATIONS)
+def test_simulation_reaches_rounding_from_velocity_to_jounce(name):
+    simulation = SIMULATIONS[name]
+    cycle = simulations.nominal_cycle(simulation, simulation.load())
+    assert cycle.time[-1] == 2.0
+    assert cycle.time.shape == (201,)
+    assert np.abs(cycle.simulated[:, 0] - cycle.explicit[:, 0]).max() <= 1e-14
+    assert (cycle.normalised_rmse <= FLOOR).all(), dict(zip(QUANTITIES, cycle.normalised_rmse, strict=True))
+    assert (cycle.peak > 0.1).all(), "the motion is worth measuring"
+    for (printed_name, quantity), printed in reproduction.PRINTED.items():
+        if printed_name == name:
+            assert cycle.rmse[QUANTITIES.index(quantity)] < printed
+
+
+@pytest.mark.parametrize("name", SIMULATIONS)
+def test_files_in_the_package_are_those_in_examples(name):
+    inside = simulations.MECHANISMS / f"{name}.yaml"
+    assert inside.read_bytes() == (ROOT / "examples" / f"{name}.yaml").read_bytes()
+
+
+@pytest.fixture(scope="module")
+def small_run(tmp_path_factory):
+    """A whole reproduction, of the four-bar alone."""
+    directory = tmp_path_factory.mktemp("small") / "made" / "here"
+    figures = importlib.import_module("jounce.papers.sommer_2024.figures")
+    calls, kept = [], {}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(reproduction, "SIMULATIONS", {"four_bar": SIMULATIONS["four_bar"]})
+        patch.setattr(figures, "FIGURES", {k: figures.FIGURES[k] for k in (2, 4, 5)})
+        measure = reproduction.measure
+        patch.setattr(reproduction, "measure", lambda s, advanced: kept.setdefault(s.name, measure(s, advanced)))
+        paths = reproduction.reproduce(directory, lambda done, total: calls.append((done, total)))
+    return directory, paths, calls, kept["four_bar"]
+
+
+def check_errors(path, names):
+    lines = path.read_text().splitlines()
+    assert lines[0] == "simulation,quantity,rmse,normalised_rmse"
+    rows = list(csv.DictReader(lines))
+    assert [(row["simulation"], row["quantity"]) for row in rows] == [(n, q) for n in names for q in QUANTITIES]
+    for row in rows:
+        assert 0 < float(row["normalised_rmse"]) <= FLOOR, row
+        assert 0 < float(row["rmse"]) <= 1e-12, row
+
+
+def test_reproduction_writes_its_files(small_run):
+    directory, paths, calls, _ = small_run
+    names = ["comparison.md", "errors.csv"]
+    names += [f"figure_0{k}.{kind}" for k in (2, 4, 5) for kind in ("png", "svg")]
+    assert [path.name for path in paths] == names
+    assert sorted(path.name for path in directory.iterdir()) == sorted(names), "nothing else is left behind"
+    check_errors(directory / "errors.csv", ["four_bar"])
+    for path in paths:
+        content = path.read_bytes()
+        if path.suffix == ".png":
+            assert content.startswith(b"\x89PNG")
+            assert len(content) > 20_000
+        if path.suffix == ".svg":
+            assert b"</svg>" in content
+    assert [done for done, _ in calls] == list(range(1, calls[-1][1] + 1))
+
+
+def test_comparison_puts_printed_errors_beside_ours(small_run):
+    text = (small_run[0] / "comparison.md").read_text()
+    row = next(line for line in text.splitlines() if line.startswith("| four_bar | jerk |"))
+    assert "| 1.07e-13 |" in row
+    assert "1.07e-13" not in text.replace(row, "")
+
+
+def test_errors_fall_with_the_tolerance_until_the_floor(small_run):
+    errors = small_run[3].by_tolerance
+    assert errors.shape == (len(TOLERANCES), 4)
+    assert (errors <= np.array(TOLERANCES)[:, None]).all()
+    assert (errors[0] <= FLOOR).all()
+    assert (errors[2:] > 10 * errors[:-2]).all(), "two decades of tolerance are worth more than one of error"
+    assert (errors[-1] > 1e-7).all()
+
+
+def test_jerk_and_jounce_are_as_precise_as_velocity_and_acceleration(small_run):
+    errors = small_run[3].by_tolerance
+    assert (errors.max(axis=1) < 10 * errors.min(axis=1)).all()
+
+
+@pytest.mark.parametrize("method, order", [("second order", 2), ("fourth order", 4)])
+def test_differences_converge_at_their_order(small_run, method, order):
+    steps, errors = np.array(STEPS), small_run[3].by_step[method]
+    between = (steps > 1.5e-3) & (steps < 3e-2)
+    slopes = np.diff(np.log(errors[between]), axis=0) / np.diff(np.log(steps[between]))[:, None]
+    np.testing.assert_allclose(slopes, order, atol=0.05)
+
+
+def test_the_simulation_does_not_depend_on_the_time_step(small_run):
+    by_step = small_run[3].by_step
+    assert (by_step["simulation"] <= FLOOR).all()
+    assert all((by_step["simulation"] < 1e-3 * by_step[method]).all() for method in ("second order", "fourth order"))
+
+
+def test_differences_are_exact_for_polynomials_of_their_order():
+    t = 0.5 * np.arange(9) - 2
+    for accuracy, derivative in ((2, 1), (2, 2), (4, 1), (4, 2)):
+        degree = accuracy + derivative - 1
+        polynomial = np.polynomial.Polynomial(np.arange(1, degree + 2))
+        found = central_difference(polynomial(t), 0.5, derivative=derivative, accuracy=accuracy)
+        np.testing.assert_allclose(found, polynomial.deriv(derivative)(t[2:-2]), rtol=1e-13, atol=1e-12)
+
+
+@pytest.mark.parametrize("step", STEPS)
+def test_every_instant_has_its_neighbours_and_all_make_one_cycle(step):
+    time, centres = stencil_instants(step)
+    assert time[0] == 0.0
+    assert (np.diff(time) > 0).all()
+    assert len(time) <= 1010
+    for k in (-2, -1, 1, 2):
+        np.testing.assert_allclose(time[centres + k] - time[centres], k * step, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(time[centres[-1]] - time[centres[0]], 2.0, rtol=1e-15)
+
+
+def test_a_directory_that_cannot_be_made_is_refused_before_any_computing(tmp_path, monkeypatch):
+    monkeypatch.setattr(reproduction, "measure", lambda *_: pytest.fail("computed"))
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OutputError, match=r"file/out: files cannot be written there: Not a directory"):
+        reproduction.reproduce(tmp_path / "file" / "out")
+    with pytest.raises(OutputError, match="files cannot be written there"):
+        reproduction.reproduce(tmp_path / "file")
+
+
+def test_a_file_that_cannot_be_written_leaves_nothing_behind(tmp_path):
+    (tmp_path / "errors.csv" / "inside").mkdir(parents=True)
+    with pytest.raises(OutputError, match=r"errors\.csv: cannot be written"):
+        reproduction.write(tmp_path / "errors.csv", b"text")
+    assert [path.name for path in tmp_path.iterdir()] == ["errors.csv"]
+
+
+def test_drawing_is_imported_late_and_leaves_pyplot_alone():
+    code = (
+        "import sys, jounce.papers.sommer_2024 as s; assert 'matplotlib' not in sys.modules\n"
+        "import jounce.papers.sommer_2024.figures; assert 'matplotlib.pyplot' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+@pytest.mark.slow
+def test_the_whole_reproduction(tmp_path):
+    paths = sommer_2024.reproduce(tmp_path)
+    check_errors(tmp_path / "errors.csv", SIMULATIONS)
+    figures = {path.name for path in paths if path.suffix == ".png"}
+    assert figures == {f"figure_{k:02d}.png" for k in (2, 3, 4, 5, 6, 7, 10, 11, 12, 13)}
+    assert all(path.stat().st_size > 1000 for path in paths)
