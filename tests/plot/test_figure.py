@@ -108,7 +108,7 @@ def test_one_instant_and_order_zero_can_be_drawn(four_bar):
 def test_dollars_in_a_title_are_not_mathematics(four_bar, tmp_path):
     import dataclasses
 
-    mechanism = dataclasses.replace(four_bar.mechanism, title="costs $5, or $6_{")
+    mechanism = dataclasses.replace(four_bar.mechanism, title="costs $5, or $6_{ \u4e2d")
     save(draw(jn.solve(mechanism, [0.0, 0.1], order=0)), tmp_path / "figure.png")
 
 

@@ -12,7 +12,7 @@ import time
 from mpmath import mp
 
 from tests.oracles.mpmath_kinematics import solve_file
-from tests.problems.bank import EXAMPLES, REFERENCES
+from tests.problems.mechanisms import EXAMPLES, REFERENCES
 
 ORDER, DIGITS, STORED = 10, 50, 30
 

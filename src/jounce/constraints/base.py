@@ -88,17 +88,20 @@ def rows(*parts: Any) -> Jet:
     return concatenate(whole)
 
 
-def value_fields(kind: type[AbstractConstraint]) -> dict[str, dataclasses.Field]:
+def value_fields(kind: type[Any]) -> dict[str, dataclasses.Field]:
     """Return the fields of a joint or driver that hold values, by name; `bodies` is not among them."""
     return {field.name: field for field in dataclasses.fields(kind) if field.name != "bodies"}
 
 
 def field_kind(field: dataclasses.Field) -> str:
     """Return ``scalar``, ``vector``, ``motion`` or ``text``, by the annotation of the field."""
+    if isinstance(field.type, str):  # under ``from __future__ import annotations``
+        word = field.type.rpartition(".")[2].strip()
+        return {"Scalar": "scalar", "Vector": "vector", "Motion": "motion"}.get(word, "text")
     return next(iter(getattr(field.type, "__metadata__", ())), "text")
 
 
-def check_text(kind: type[AbstractConstraint], field: str, value: Any, valid: tuple[str, ...]) -> None:
+def check_text(field: str, value: Any, valid: tuple[str, ...]) -> None:
     """Raise MechanismError unless a word, such as a coordinate, is one of those valid."""
     if value not in valid:
         raise MechanismError(f"unknown {field}; {did_you_mean(value, valid)}", name=field, value=value)

@@ -24,7 +24,7 @@ class CoordinateDriver(AbstractConstraint, type="coordinate", space="planar", ro
     offset: Scalar = 0.0  # rad or m
 
     def __check_init__(self):
-        check_text(type(self), "coordinate", self.coordinate, COORDINATES)
+        check_text("coordinate", self.coordinate, COORDINATES)
 
     def residual(self, body_i, body_j, time):
         ratio = 1.0 if self.ratio is None else self.ratio

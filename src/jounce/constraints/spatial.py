@@ -9,8 +9,7 @@ import jax.numpy as jnp
 
 from jounce.constraints.base import AbstractConstraint, Scalar, Vector, rows
 from jounce.constraints.planar import length_of, slide
-from jounce.jet import Jet, atan2, cross, wrap
-from jounce.jet.algebra import total
+from jounce.jet import Jet, cross, dot, stack, wrap
 
 
 def perpendiculars(axis: Any) -> tuple[Any, Any]:
@@ -31,13 +30,34 @@ def relative_angle(body_i: Any, body_j: Any, axis_i: Any, vector_i: Any = None, 
     the sign that Sommer 2024, equation 101, loses; with vectors, the signed angle from the first, on body i, to the
     second, on body j.
     """
+    # The rate of the angle is the angular velocity along the axis, but for terms that vanish while the bodies turn about
+    # the axis only: jets of the arctangent would subtract products that are larger by 2^k at order k.
     axis = axis_i / length_of(axis_i)[None]
     if vector_i is None:
-        q = body_j.quaternion
-        e = [spin.dot(q) for spin in body_i.spins]
-        return 2.0 * atan2(total(u * x for u, x in zip(axis, e, strict=True)), body_i.quaternion.dot(q))
-    u, a, b = body_i.direction(axis), body_i.direction(vector_i), body_j.direction(vector_j)
-    return atan2(u.dot(a.cross(b)), a.dot(b) - u.dot(a) * u.dot(b))
+        e0 = body_i.quaternion.dot(body_j.quaternion)
+        e = stack([spin.dot(body_j.quaternion) for spin in body_i.spins])
+        along = dot(axis, e)
+        value = 2.0 * jnp.arctan2(along.coefficients[0], e0.coefficients[0])
+        w = body_j.angular_velocity  # in the frame of body j
+        if body_i.angular_velocity is not None:
+            turning = body_j.to_body(body_i.global_angular_velocity())
+            w = -turning if w is None else w - turning
+        if w is None:
+            return Jet.constant(value, body_i.order)
+        across = e - along * axis
+        excess = e0 * dot(axis, cross(across, w)) + along * dot(across, w)
+        rate = dot(axis, w) + excess / (e0.square() + along.square())
+    else:
+        u, a, b = body_i.direction(axis), body_i.direction(vector_i), body_j.direction(vector_j)
+        along = u.dot(b)
+        across = b - along * u
+        first = [x.coefficients[0] for x in (u, a, across)]
+        value = jnp.arctan2(dot(cross(first[0], first[1]), first[2]), dot(first[1], first[2]))
+        if body_i.order == 0:
+            return Jet([value])
+        w = body_j.global_angular_velocity() - body_i.global_angular_velocity()
+        rate = u.dot(w) - along * w.dot(across) / across.dot(across)
+    return rate.integrate(value)
 
 
 class Spherical(AbstractConstraint, type="spherical", space="spatial"):

@@ -22,7 +22,8 @@ SAFE_FRACTION = 0.4  # of the time in which some Taylor term would move a body b
 LARGEST_DEPARTURE = 0.05  # from a prediction, rad or sizes of the mechanism
 SMALLEST_DEPARTURE = 1e-6  # below this no prediction is called wrong
 SINGULAR_PIVOT = 1e-9
-ROUNDING = 2e-15  # a correction this small (in rad, or in sizes of the mechanism) leaves the Jacobian as good as new
+FIRST_REFINED_ORDER = 5  # derivatives of some bodies may be 10^10 times those of others, and would lend them their errors
+ROUNDING = 4e-15  # a correction this small (in rad, or in sizes of the mechanism) leaves the Jacobian as good as new
 
 
 class Arrival(NamedTuple):
@@ -50,13 +51,12 @@ def newton_raphson(system: System, pose: Any, time: Jet, tolerance: Any, refine:
         factor = DenseFactor.of(system.jacobian(pose, time))
         step = factor.solve(-system.residual(pose, time).coefficients[0])
         size = _size(step)
-        if not refine:
-            step = jnp.where(size <= tolerance, 0.0, step)
+        step = jnp.where(refine | ~(size <= tolerance), step, 0.0)
         return pose.displaced(*system.coordinates(step, pose.shifts)), factor, size
 
     def unfinished(state: Any) -> Any:
         _, _, size, accepted_before, count = state
-        done = (size <= ROUNDING) | accepted_before if refine else size <= tolerance
+        done = jnp.where(refine, (size <= ROUNDING) | accepted_before, size <= tolerance)
         hopeful = jnp.isfinite(size) | (count == 0)  # what is not finite never will be
         return jnp.any(~done & hopeful) & (count < MAX_ITERATIONS)
 
@@ -76,10 +76,14 @@ def differentiated(system: System, pose: Any, factor: DenseFactor, time: Jet) ->
     The coefficient of order k of the residual is affine in the unknown (r[k], w'[k-1] / k) with the Jacobian as its
     slope, so that it is found from the coefficient with the unknown set to zero.
     """
+    jacobian = system.jacobian(pose, time) if time.order >= FIRST_REFINED_ORDER else None
     for k in range(1, time.order + 1):
         trial = pose.extended(None, None)
         right = -system.residual(trial, time.truncate(k)).dense().coefficients[k]
-        pose = pose.extended(*system.coordinates(factor.solve(right), pose.shifts))
+        solution = factor.solve(right)
+        if k >= FIRST_REFINED_ORDER:
+            solution += factor.solve(right - jnp.sum(jacobian * solution[None], axis=1))
+        pose = pose.extended(*system.coordinates(solution, pose.shifts))
         pose = jax.lax.optimization_barrier(pose)  # or XLA computes it again in everything that uses it
     return pose
 
@@ -135,7 +139,7 @@ def _status(correction: Any, departure: Any, travel: Any, pivot_ratio: Any, admi
     return status
 
 
-@compiled("pose_type", "order", "refine")
+@compiled("pose_type", "order")
 def advance(
     system: System,
     coordinates: dict[str, Any],
@@ -143,10 +147,10 @@ def advance(
     step: Any,
     instant: Any,
     tolerance: Any,
+    refine: Any,
     *,
     pose_type: type,
     order: int,
-    refine: bool = True,
 ) -> Arrival:
     """Solve a batch of instants, each from a neighbour solved before.
 
@@ -161,8 +165,10 @@ def advance(
         Time from the neighbour, and the time arrived at, s.
     tolerance : float
         Largest correction of an accepted pose, rad or sizes of the mechanism.
-    pose_type, order, refine
-        PlanarPose or SpatialPose; derivatives wanted; whether to correct to rounding.
+    refine : bool
+        Whether to correct accepted poses to rounding.
+    pose_type, order
+        PlanarPose or SpatialPose; derivatives wanted.
     """
     moving = {name: Jet(tuple(c)) for name, c in coordinates.items()}
     predicted = pose_type.predicted_from(moving, step)

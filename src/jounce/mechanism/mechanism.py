@@ -137,7 +137,10 @@ class Mechanism:
         while waiting:
             ready = [k for k, v in waiting.items() if v.names <= values.keys()]
             for name in ready:
-                values[name] = waiting.pop(name).evaluate(values)
+                try:
+                    values[name] = waiting.pop(name).evaluate(values)
+                except ExpressionError as error:
+                    raise error.located(name=f"parameters.{name}") from None
             if not ready:
                 name, expression = next(iter(waiting.items()))
                 try:

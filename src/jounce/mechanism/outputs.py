@@ -98,7 +98,7 @@ class AngularVelocityOutput(AbstractOutput):
     lost_orders = 1
 
     def __check_init__(self):
-        check_text(type(self), "frame", self.frame, FRAMES)
+        check_text("frame", self.frame, FRAMES)
 
     def evaluate(self, body):
         if hasattr(body, "angle"):

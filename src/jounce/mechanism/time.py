@@ -79,7 +79,7 @@ def _spaced(grid: TimeGrid, parameters: Mapping[str, Any]) -> np.ndarray:
     else:
         count = np.floor((stop - start) / values["step"] * (1 + 1e-12) + 1e-9) + 1
     if count > MAX_INSTANTS:
-        raise MechanismError(f"a time grid holds at most {MAX_INSTANTS} instants", name="time", value=int(count))
+        raise MechanismError(f"a time grid holds at most {MAX_INSTANTS} instants", name="time", value=count)
     if "count" in values:
         return np.linspace(start, stop, int(count))
     return start + values["step"] * np.arange(int(count))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Sequence
 from os import PathLike, fspath
 from pathlib import Path
@@ -221,7 +222,8 @@ def save(figure: Any, path: str | PathLike[str]) -> None:
     name = fspath(path)
     metadata = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(Path(name).suffix.lower())
     try:
-        with mpl.rc_context(STYLE):
+        with mpl.rc_context(STYLE), warnings.catch_warnings():
+            warnings.filterwarnings("ignore", message="Glyph .* missing")  # names in other scripts get boxes
             figure.savefig(name, dpi=RESOLUTION, metadata=metadata)
     except (OSError, ValueError) as error:
         raise OutputError(f"cannot be written: {getattr(error, 'strerror', None) or error}", path=name) from error

@@ -62,7 +62,8 @@ class SpatialPose:
     axes : tuple of 3 Jet
         Axes of the body in the global frame, the columns of the attitude matrix A, each of shape (3, ...).
     angular_velocity : Jet or None
-        Body-fixed angular velocity w', shape (3, ...), rad/s, one order shorter; None at order zero.
+        Body-fixed angular velocity w', shape (3, ...), rad/s, one order shorter; None at order zero, and where it is
+        zero for certain.
     """
 
     position: Jet
@@ -106,13 +107,16 @@ class SpatialPose:
 
     def global_angular_velocity(self) -> Jet:
         """Return the angular velocity in the global frame, to any order: Sommer 2024, equations 73-76."""
-        if self.angular_velocity is None:
+        if self.order == 0:
             raise ValueError("a pose of order 0 has no angular velocity; ask for order 1 or more")
+        if self.angular_velocity is None:
+            return Jet.constant(jnp.zeros_like(self.position.coefficients[0]), self.order - 1)
         return self.direction(self.angular_velocity)
 
     def take(self, bodies: tuple[int, ...]) -> "SpatialPose":
         """Return the poses of the given bodies, by index; body 0 is the ground, which never moves."""
-        return jax.tree.map(lambda jet: take_bodies(jet, bodies), self, is_leaf=lambda x: isinstance(x, Jet))
+        taken = jax.tree.map(lambda jet: take_bodies(jet, bodies), self, is_leaf=lambda x: isinstance(x, Jet))
+        return taken if any(bodies) else dataclasses.replace(taken, angular_velocity=None)
 
     def displaced(self, shift: Any, turn: Any) -> "SpatialPose":
         """Return the pose of order zero moved by a shift, (3, ...) in m, and a turn in body axes, (3, ...) in rad."""
@@ -128,13 +132,13 @@ class SpatialPose:
         What is None is zero.
         """
         k = self.order + 1
-        newest = None if turn is None else k * turn
-        if self.angular_velocity is not None:
-            velocity = self.angular_velocity.append(newest)
-        else:
-            velocity = Jet([jnp.zeros_like(self.position.coefficients[0]) if newest is None else newest])
+        velocity = self.angular_velocity
+        if velocity is not None:
+            velocity = velocity.append(None if turn is None else k * turn)
+        elif turn is not None:
+            velocity = Jet((k * turn,)) if k == 1 else Jet((jnp.zeros_like(turn), *[None] * (k - 2), k * turn))
         # the term with the newest w' stands last: the others are then shared between a trial and the solution
-        rates = velocity.coefficients if newest is not None or k > 1 else (None,)
+        rates = [None] * k if velocity is None else velocity.coefficients
         w = list(zip(*(components(rate) if rate is not None else [None] * 3 for rate in rates), strict=True))
 
         def sum_along(jet: Jet, rate: Any) -> Any:

@@ -73,9 +73,9 @@ class FunctionMotion(AbstractMotion):
     --------
     >>> import jax.numpy as jnp
     >>> import jounce as jn
-    >>> law = jn.FunctionMotion(lambda t: jnp.tanh(t))
+    >>> law = jn.FunctionMotion(lambda t: jnp.exp(-2 * t))
     >>> [float(x) for x in law(jn.Jet.variable(0.0, order=3)).derivatives()]
-    [0.0, 1.0, 0.0, -2.0]
+    [1.0, -2.0, 4.0, -8.0]
     """
 
     function: Callable[[Any], Any] = eqx.field(static=True)
