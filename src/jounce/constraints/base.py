@@ -66,8 +66,11 @@ class AbstractConstraint(eqx.Module):
         """
 
     def admissible(self, time: Jet) -> Any:
-        """Tell at which instants the driver's law has a permitted value; true everywhere unless a class says more."""
-        return jnp.ones_like(time.coefficients[0], dtype=bool)
+        """Tell at which instants the motion law, if there is one, has a permitted value: a finite one, unless more."""
+        motion = getattr(self, "motion", None)
+        if motion is None:
+            return jnp.ones_like(time.coefficients[0], dtype=bool)
+        return jnp.isfinite(motion(time.truncate(0)).coefficients[0])
 
 
 def catalogue(space: str, role: str) -> dict[str, type[AbstractConstraint]]:

@@ -1,7 +1,5 @@
 """Drivers: constraints with a motion law ``f(t)``. Sommer 2024, equations 39-40, 44-49, 53-55 and 101-111."""
 
-from typing import Any
-
 import equinox as eqx
 import jax.numpy as jnp
 
@@ -56,7 +54,8 @@ class DistanceDriver(AbstractConstraint, type="distance", space="planar", role="
         return d.dot(d) - self.motion(time).square()
 
     def admissible(self, time):
-        return self.motion(time.truncate(0)).coefficients[0] > 0
+        distance = self.motion(time.truncate(0)).coefficients[0]
+        return (distance > 0) & jnp.isfinite(distance)
 
 
 class SpatialSlideDriver(SlideDriver, type="slide", space="spatial", role="driver"):
@@ -86,8 +85,3 @@ class RotationDriver(AbstractConstraint, type="rotation", space="spatial", role=
     def residual(self, body_i, body_j, time):
         angle = relative_angle(body_i, body_j, self.axis_i, self.vector_i, self.vector_j)
         return wrap(angle - self.motion(time), 2 * jnp.pi)
-
-
-def driven(constraint: Any) -> bool:
-    """Tell whether a constraint prescribes motion."""
-    return constraint.role == "driver"

@@ -30,8 +30,8 @@ def relative_angle(body_i: Any, body_j: Any, axis_i: Any, vector_i: Any = None, 
     the sign that Sommer 2024, equation 101, loses; with vectors, the signed angle from the first, on body i, to the
     second, on body j.
     """
-    # The rate of the angle is the angular velocity along the axis, but for terms that vanish while the bodies turn about
-    # the axis only: jets of the arctangent would subtract products that are larger by 2^k at order k.
+    # The rate of the angle is the angular velocity along the axis, but for terms that vanish while the bodies turn
+    # about the axis only: jets of the arctangent would subtract products that are larger by 2^k at order k.
     axis = axis_i / length_of(axis_i)[None]
     if vector_i is None:
         e0 = body_i.quaternion.dot(body_j.quaternion)

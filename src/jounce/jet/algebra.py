@@ -82,11 +82,13 @@ class Jet:
         """Shape of one coefficient."""
         return jnp.shape(self.coefficients[0])
 
-    def tree_flatten(self):
+    def tree_flatten(self) -> tuple[Any, None]:
+        """Tell JAX that the coefficients are what it transforms."""
         return self.coefficients, None
 
     @classmethod
-    def tree_unflatten(cls, _, leaves):
+    def tree_unflatten(cls, _: None, leaves: Any) -> "Jet":
+        """Build the jet again from its transformed coefficients."""
         jet = object.__new__(cls)  # transformations pass placeholders that are not arrays
         jet.coefficients = tuple(leaves)
         return jet

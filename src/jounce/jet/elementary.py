@@ -44,7 +44,7 @@ def sqrt(x: Any) -> Any:
     """Return the square root."""
     if not isinstance(x, Jet):
         return jnp.sqrt(x)
-    y = [jnp.sqrt(x.coefficients[0])]
+    y: list[Any] = [jnp.sqrt(x.coefficients[0])]
     for k in range(1, x.order + 1):
         rest = minus(x.coefficients[k], sum_of_products(jnp.multiply, y[1:k], y[k - 1 : 0 : -1]))
         y.append(None if rest is None else rest / (2 * y[0]))
@@ -76,7 +76,7 @@ def _real_power(x: Jet, exponent: Any) -> Jet:
     """
     at_zero = x.coefficients[0] == 0
     c = (jnp.where(at_zero, 1.0, x.coefficients[0]), *x.coefficients[1:])
-    y = [jnp.power(c[0], exponent)]
+    y: list[Any] = [jnp.power(c[0], exponent)]
     for k in range(1, x.order + 1):
         weighted = [None if c[j] is None else (exponent * j - (k - j)) * c[j] for j in range(1, k + 1)]
         value = sum_of_products(jnp.multiply, weighted, y[k - 1 :: -1])
@@ -135,7 +135,7 @@ def cos(x: Any) -> Any:
 def _riccati(x: Jet, value: Any, slope: Any, sign: int) -> Jet:
     """Solve ``y' = s x'``, ``s = constant + sign y^2``, from the value of y and of its slope s."""
     y, s = [value], [slope]
-    for k in range(1, x.order + 1):
+    for _ in range(x.order):
         y.append(_chain(y, x, s))
         square = sum_of_products(jnp.multiply, y, y[::-1])
         s.append(None if square is None else sign * square)

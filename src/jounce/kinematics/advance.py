@@ -21,8 +21,8 @@ CONVERGED = 1e-9  # a last correction above this is no convergence, however smal
 SAFE_FRACTION = 0.4  # of the time in which some Taylor term would move a body by a radian, or by the mechanism's size
 LARGEST_DEPARTURE = 0.05  # from a prediction, rad or sizes of the mechanism
 SMALLEST_DEPARTURE = 1e-6  # below this no prediction is called wrong
-SINGULAR_PIVOT = 1e-9
-FIRST_REFINED_ORDER = 5  # derivatives of some bodies may be 10^10 times those of others, and would lend them their errors
+SINGULAR_PIVOT = 1e-8
+FIRST_REFINED_ORDER = 5  # above, derivatives of some bodies are 10^10 times those of others, and lend them their errors
 ROUNDING = 4e-15  # a correction this small (in rad, or in sizes of the mechanism) leaves the Jacobian as good as new
 
 
@@ -34,13 +34,15 @@ class Arrival(NamedTuple):
     status: Any  # see Status
     body: Any  # index of the moving body that is farthest from its prediction
     safe_step: Any  # s, over which the motion from here can be predicted
+    pivot_ratio: Any  # smallest pivot of the Jacobian over the largest
+    admissible: Any  # whether each driver has a permitted value, shape (drivers, batch)
 
 
 def _size(increment: Any) -> Any:
     return jnp.max(jnp.abs(increment), axis=0)
 
 
-def newton_raphson(system: System, pose: Any, time: Jet, tolerance: Any, refine: bool) -> tuple[Any, DenseFactor, Any]:
+def newton_raphson(system: System, pose: Any, time: Jet, tolerance: Any, refine: Any) -> tuple[Any, DenseFactor, Any]:
     """Return the assembled pose, the factored Jacobian there, and the size of the last correction.
 
     An instant is accepted when its correction is at most the tolerance. With `refine` that correction is still made,
@@ -131,7 +133,7 @@ def _status(correction: Any, departure: Any, travel: Any, pivot_ratio: Any, admi
         (~(correction <= jnp.maximum(tolerance, CONVERGED)), Status.NOT_CONVERGED),
         (pivot_ratio <= SINGULAR_PIVOT, Status.SINGULAR),
         (~jnp.isfinite(correction), Status.NOT_CONVERGED),
-        (~admissible, Status.NOT_ASSEMBLED),
+        (~admissible, Status.INADMISSIBLE),
     )
     status = jnp.full(correction.shape, int(Status.OK))
     for happened, outcome in outcomes:
@@ -185,10 +187,10 @@ def advance(
         results.append(jnp.stack(result.dense().coefficients))
     departures = _departures(system, pose, predicted)
     travel = total(term * jnp.abs(step) ** k for k, term in enumerate(_terms(system, moving, pose_type.predictor), 1))
-    permitted = [g.element.admissible(time) for g in system.groups]
-    admissible = jnp.stack([jnp.broadcast_to(jnp.all(p, axis=0), step.shape) for p in permitted])
+    admissible = system.admissible(time)
+    pivot_ratio = factor.pivot_ratio()
     status = _status(
-        correction, jnp.max(departures, axis=0), travel, factor.pivot_ratio(), jnp.all(admissible, axis=0), tolerance
+        correction, jnp.max(departures, axis=0), travel, pivot_ratio, jnp.all(admissible, axis=0), tolerance
     )
     reached = pose.coordinates()
     return Arrival(
@@ -197,4 +199,6 @@ def advance(
         status,
         jnp.argmax(departures, axis=0),
         _safe_step(_terms(system, reached, pose_type.predictor)),
+        pivot_ratio,
+        admissible,
     )

@@ -45,6 +45,9 @@ def assemble(model: Model, instant: float, tolerance: float) -> tuple[Model, dic
         If joints and drivers leave degrees of freedom, or there are too many of them.
     """
     columns = model.system.cells.shape[1]
+    if not model.rows:
+        noun = "degree of freedom" if columns == 1 else "degrees of freedom"
+        raise MobilityError(f"the mechanism has no joints and no drivers: {columns} {noun} are left")
     still, instant = np.zeros(columns), np.float64(instant)
 
     def moved(coordinates: dict[str, Any], increment: np.ndarray) -> Any:
@@ -83,7 +86,12 @@ def _row_scale(jacobian: np.ndarray) -> np.ndarray:
 
 
 def _check_assembled(model: Model, gaps: np.ndarray, instant: float, tolerance: float) -> None:
-    gaps = np.where(np.isfinite(gaps), np.abs(gaps), np.inf)
+    unknown = list(dict.fromkeys(name for name, gap in zip(model.rows, gaps, strict=True) if not np.isfinite(gap)))
+    if unknown:
+        named = ", ".join(unknown)
+        message = f"no finite value at t = {instant:g} s: {named}; check motion laws and the starting guess"
+        raise AssemblyError(message, status=Status.INADMISSIBLE)
+    gaps = np.abs(gaps)
     worst = np.argsort(-gaps)
     if gaps[worst[0]] <= max(1e3 * tolerance, 1e-9):
         return

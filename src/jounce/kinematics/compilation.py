@@ -1,7 +1,7 @@
 """How the solver's functions are compiled."""
 
 from collections.abc import Callable
-from functools import lru_cache, wraps
+from functools import cached_property, lru_cache, update_wrapper
 from typing import Any
 
 import jax
@@ -18,24 +18,28 @@ def compiler_options() -> dict[str, Any] | None:
         return None
     try:
         jax.jit(lambda: 0.0, compiler_options=options).lower().compile()
-    except Exception:  # whatever the release of XLA raises
+    except (RuntimeError, ValueError):  # jax.errors.JaxRuntimeError is a RuntimeError
         return None
     return options
 
 
-def compiled(*static: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Compile a function at its first call, as `jax.jit` with these static arguments and the solver's options."""
+class Compiled:
+    """A function compiled at its first call, as by `jax.jit` with the solver's options."""
 
-    def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
-        @lru_cache(maxsize=1)
-        def jitted() -> Any:
-            return jax.jit(function, static_argnames=static, compiler_options=compiler_options())
+    def __init__(self, function: Callable[..., Any], static: tuple[str, ...]):
+        self.function, self.static = function, static
+        update_wrapper(self, function)
 
-        @wraps(function)
-        def call(*arguments: Any, **keywords: Any) -> Any:
-            return jitted()(*arguments, **keywords)
+    @cached_property
+    def jitted(self) -> Any:
+        """The function as `jax.jit` returns it."""
+        return jax.jit(self.function, static_argnames=self.static, compiler_options=compiler_options())
 
-        call.jitted = jitted  # pyright: ignore[reportFunctionMemberAccess] - for tests that count compilations
-        return call
+    def __call__(self, *arguments: Any, **keywords: Any) -> Any:
+        """Call the compiled function."""
+        return self.jitted(*arguments, **keywords)
 
-    return decorate
+
+def compiled(*static: str) -> Callable[[Callable[..., Any]], Compiled]:
+    """Compile the decorated function at its first call, with these static arguments."""
+    return lambda function: Compiled(function, static)

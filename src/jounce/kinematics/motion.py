@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -39,8 +38,8 @@ class Motion:
         Highest derivative of the outputs.
     status : numpy.ndarray of int, shape (time,)
         Outcome at each instant, see `Status`; where it is not 0, all results are NaN.
-    failed_bodies : dict of int to str
-        For the instants that failed, by index, the body that is farthest from its prediction.
+    culprits : dict of int to str
+        For the instants that failed, by index: the body farthest from its prediction, or the driver at fault.
     """
 
     def __init__(
@@ -51,10 +50,10 @@ class Motion:
         order: int,
         state: tuple[dict[str, Any], tuple[Any, ...]],
         status: np.ndarray,
-        failed_bodies: dict[int, str],
+        culprits: dict[int, str],
     ):
         self.mechanism, self.time, self.order, self.status = mechanism, time, order, status
-        self.failed_bodies = failed_bodies
+        self.culprits = culprits
         self._model = model
         self._coordinates, groups = state
         self._groups = dict(zip(model.outputs, groups, strict=True))

@@ -17,6 +17,7 @@ from jounce.kinematics.status import Status
 from jounce.mechanism import Model
 
 SMALLEST_STEP = 1e-10  # of the span
+NEARLY_SINGULAR_PIVOT = 1e-3  # where the steps had to become smallest
 SMALL_BATCH, LARGE_BATCH, LONG_GRID = 64, 512, 1024  # lanes; a batch width compiles once, so a short grid uses one
 
 
@@ -44,6 +45,13 @@ class Solver:
         )
         return jax.tree.map(lambda x: np.asarray(x)[..., :lanes], arrival)
 
+    def culprit(self, arrival: Arrival, lane: int) -> str:
+        """Return where to look for the fault: a driver without a permitted value, or the body farthest astray."""
+        refused = np.flatnonzero(~arrival.admissible[:, lane])
+        if refused.size:
+            return ", ".join(self.model.drivers[k] for k in refused)
+        return f"body {self.model.bodies[int(arrival.body[lane])]}"
+
     def _predictor(self, known: Any) -> tuple[dict[str, Any], tuple[Any, ...]]:
         """Return what a prediction needs of solved instants: the jets of the pose and of turning angles."""
         coordinates, outputs = known
@@ -64,9 +72,10 @@ class Track:
     instants: list[float]
     states: list[Any]
     safe_step: float
+    pivot_ratio: float = 1.0
     status: Status = Status.OK
     ended_at: float = np.inf
-    body: str = ""
+    culprit: str = ""
 
 
 def follow(solver: Solver, start: Track, stop: float, span: float) -> Track:
@@ -80,20 +89,26 @@ def follow(solver: Solver, start: Track, stop: float, span: float) -> Track:
         step = min(track.safe_step, largest, stop - now)
         if stop - now - step < 0.1 * step:
             step = stop - now  # no sliver of a step at the end
+        refused = None
         while True:
             target = stop if step == stop - now else now + step
             arrival = solver(track.states[-1], np.array([target - now]), np.array([target]))
             if arrival.status[0] == Status.OK:
                 break
+            if arrival.status[0] == Status.INADMISSIBLE:
+                refused = refused or (arrival, target)
             if step < SMALLEST_STEP * span or target <= now:
+                arrival, target = refused or (arrival, target)
                 track.status, track.ended_at = Status(int(arrival.status[0])), target
-                track.body = solver.model.bodies[int(arrival.body[0])]
+                track.culprit = solver.culprit(arrival, 0)
+                if refused is None and track.pivot_ratio < NEARLY_SINGULAR_PIVOT:
+                    track.status = Status.SINGULAR  # the range of the motion ends at a dead point
                 return track
             step *= 0.5
         largest, now = 4 * step, target
         track.instants.append(now)
         track.states.append((arrival.coordinates, arrival.outputs))
-        track.safe_step = float(arrival.safe_step[0])
+        track.safe_step, track.pivot_ratio = float(arrival.safe_step[0]), float(arrival.pivot_ratio[0])
     return track
 
 
@@ -107,8 +122,8 @@ def solve_grid(
     state
         Jets of all instants, time last.
     status : array of shape (time,)
-    bodies : dict of int to str
-        For instants that failed, the body farthest from its prediction.
+    culprits : dict of int to str
+        For instants that failed, the body farthest from its prediction, or the driver without a permitted value.
     """
     count, anchors = len(time), np.array(track.instants)
     store = jax.tree.map(
@@ -116,7 +131,7 @@ def solve_grid(
     )
     instants = np.concatenate([time, anchors])
     status = np.full(count, int(Status.NOT_REACHED))
-    bodies: dict[int, str] = {}
+    culprits: dict[int, str] = {}
     nearest = count + _nearest(anchors, time)
     reached = time < track.ended_at
     width = LARGE_BATCH if count > LONG_GRID else SMALL_BATCH
@@ -129,24 +144,28 @@ def solve_grid(
             source = np.where(status[level - sources] == Status.OK, level - sources, nearest[level])
         for first in range(0, len(level), width):
             lanes, known_at = level[first : first + width], source[first : first + width]
-            known = jax.tree.map(lambda x, at=_slice_of(known_at): x[..., at], store)
+            chosen = _slice_of(known_at)
+            known = jax.tree.map(lambda x, at=chosen: x[..., at], store)
             arrival = solver(known, time[lanes] - instants[known_at], time[lanes])
             status[lanes] = arrival.status
             _keep(store, _slice_of(lanes), arrival)
-            for k in np.flatnonzero(arrival.status != Status.OK):
-                bodies[int(lanes[k])] = solver.model.bodies[int(arrival.body[k])]
-                _rescue(solver, track, store, status, bodies, int(lanes[k]), time)
+            for k in np.flatnonzero(arrival.status != Status.OK).tolist():
+                culprits[int(lanes[k])] = solver.culprit(arrival, k)
+                _rescue(solver, track, store, status, culprits, int(lanes[k]), time)
             done += len(lanes)
             if progress is not None:
                 progress(done, count)
     first_lost = int(np.argmin(reached)) if not reached.all() else count
     if first_lost < count:
-        status[first_lost] = track.status
-        bodies[first_lost] = track.body
+        status[first_lost], culprits[first_lost] = track.status, track.culprit
+        lost = time[first_lost : first_lost + 1]
+        arrival = solver(track.states[-1], lost - track.instants[-1], lost)
+        if arrival.status[0] == Status.INADMISSIBLE:  # the fault is the law's, not that of the position before
+            status[first_lost], culprits[first_lost] = Status.INADMISSIBLE, solver.culprit(arrival, 0)
         if progress is not None:
             progress(count, count)
     state = jax.tree.map(lambda x: x[..., :count], store)
-    return state, status, bodies
+    return state, status, culprits
 
 
 def _keep(store: Any, lanes: Any, arrival: Arrival) -> None:
@@ -157,17 +176,17 @@ def _keep(store: Any, lanes: Any, arrival: Arrival) -> None:
 
 
 def _rescue(
-    solver: Solver, track: Track, store: Any, status: np.ndarray, bodies: dict[int, str], lane: int, time: np.ndarray
+    solver: Solver, track: Track, store: Any, status: np.ndarray, culprits: dict[int, str], lane: int, time: np.ndarray
 ) -> None:
     """Follow the motion to one instant that its neighbour could not predict, from the anchor before it."""
     anchor = int(np.searchsorted(track.instants, time[lane], side="right")) - 1
     start = Track([track.instants[anchor]], [track.states[anchor]], (time[lane] - track.instants[anchor]) / 2)
     local = follow(solver, start, float(time[lane]), track.instants[-1] - time[0])
     if local.status != Status.OK:
-        status[lane], bodies[lane] = local.status, local.body
+        status[lane], culprits[lane] = local.status, local.culprit
     elif len(local.states) > 1:
         status[lane] = Status.OK
-        bodies.pop(lane)
+        culprits.pop(lane)
         jax.tree.map(lambda whole, part: whole.__setitem__((..., lane), part[..., 0]), store, local.states[-1])
 
 

@@ -15,6 +15,7 @@ from jounce.mechanism import Mechanism, build, time_grid
 
 LOWEST_ORDER = 4  # of the jets inside: predictions need some, also where the user wants positions only
 HIGHEST_ORDER = 30
+LARGEST_TOLERANCE = 1e-2
 
 
 def solve(
@@ -73,15 +74,16 @@ def solve(
     ('time', 'derivative')
     """
     order = _checked_order(order)
-    if not (isinstance(tolerance, numbers.Real) and np.isfinite(tolerance) and tolerance > 0):
-        raise MechanismError("the tolerance must be a number above zero", name="tolerance", value=tolerance)
+    if not (isinstance(tolerance, numbers.Real) and 0 < tolerance <= LARGEST_TOLERANCE):
+        message = f"the tolerance must be a number above zero and at most {LARGEST_TOLERANCE:g}"
+        raise MechanismError(message, name="tolerance", value=tolerance)
     instants = time_grid(mechanism.time if time is None else time, mechanism.parameter_values)
     lost = max((output.lost_orders for output in mechanism.outputs.values()), default=0)
     model, coordinates = assemble(build(mechanism), instants[0], tolerance)
     solver = Solver(model, max(order + lost, LOWEST_ORDER), float(tolerance), refine)
     track = follow(solver, _first(solver, coordinates, instants[:1]), instants[-1], instants[-1] - instants[0])
-    state, statuses, bodies = solve_grid(solver, track, instants, progress)
-    motion = Motion(mechanism, model, instants, order, state, statuses, bodies)
+    state, statuses, culprits = solve_grid(solver, track, instants, progress)
+    motion = Motion(mechanism, model, instants, order, state, statuses, culprits)
     if strict:
         raise_for_status(motion)
     return motion
@@ -94,8 +96,8 @@ def raise_for_status(motion: Motion) -> None:
         return
     first = int(failed[0])
     status = Status(int(motion.status[first]))
-    body = motion.failed_bodies.get(first, "")
-    where = f"t = {motion.time[first]:g} s" + (f", body {body}" if body else "")
+    culprit = motion.culprits.get(first, "")
+    where = f"t = {motion.time[first]:g} s" + (f", {culprit}" if culprit else "")
     total = len(motion.time)
     message = f"{where}: {_words(status)}: {status.advice}"
     solved = f"{total - failed.size} of {total} instants were solved"
@@ -104,7 +106,7 @@ def raise_for_status(motion: Motion) -> None:
 
 def _checked_order(order: Any) -> int:
     whole = isinstance(order, numbers.Integral) and not isinstance(order, bool)
-    if not whole or not 0 <= order <= HIGHEST_ORDER:
+    if not whole or not 0 <= int(order) <= HIGHEST_ORDER:
         message = f"the order of derivatives must be a whole number from 0 to {HIGHEST_ORDER}"
         raise MechanismError(message, name="order", value=order)
     return int(order)
@@ -118,8 +120,8 @@ def _first(solver: Solver, coordinates: dict[str, np.ndarray], instant: np.ndarr
     arrival = solver((still, angles), np.zeros(1), instant)
     status = Status(int(arrival.status[0]))
     if status != Status.OK:
-        body = solver.model.bodies[int(arrival.body[0])]
-        raise SolveError(f"t = {instant[0]:g} s, body {body}: {_words(status)}: {status.advice}", status=status)
+        where = f"t = {instant[0]:g} s, {solver.culprit(arrival, 0)}"
+        raise SolveError(f"{where}: {_words(status)}: {status.advice}", status=status)
     return Track([float(instant[0])], [(arrival.coordinates, arrival.outputs)], float(arrival.safe_step[0]))
 
 

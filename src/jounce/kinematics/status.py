@@ -12,6 +12,7 @@ class Status(enum.IntEnum):
     BRANCH_JUMP = 3
     NOT_CONVERGED = 4
     NOT_REACHED = 5
+    INADMISSIBLE = 6
 
     @property
     def advice(self) -> str:
@@ -28,5 +29,7 @@ _ADVICE = {
     "check that the motion laws are continuous and that the mechanism does not pass a dead point",
     Status.NOT_CONVERGED: "Newton-Raphson did not reach the tolerance; the bodies may not reach each other here, or "
     "the tolerance is too small",
+    Status.INADMISSIBLE: "the motion law has no permitted value here: a law must be finite, and the distance of a "
+    "distance driver above zero",
     Status.NOT_REACHED: "not computed, because the motion could not be followed up to here",
 }

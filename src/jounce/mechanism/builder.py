@@ -8,6 +8,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 
 from jounce.constraints.base import field_kind, value_fields
 from jounce.errors import JounceError, MechanismError
@@ -38,6 +39,8 @@ class Model:
         Coordinates of the starting guess of all bodies, the ground first, shape (..., bodies, 1).
     rows : tuple of str
         Name of the joint or driver of each row of the residual.
+    drivers : tuple of str
+        Names of the drivers, in the order of `System.admissible`.
     bodies : tuple of str
         Names of the moving bodies, in the order of the pose.
     outputs : tuple of tuple of str
@@ -50,6 +53,7 @@ class Model:
     pose_type: type
     guess: dict[str, Any]
     rows: tuple[str, ...]
+    drivers: tuple[str, ...]
     bodies: tuple[str, ...]
     outputs: tuple[tuple[str, ...], ...]
     length: float
@@ -80,6 +84,7 @@ def build(mechanism: Mechanism) -> Model:
 
     row_counts = [_row_count(group, pose_type, guess) for group in groups]
     row_names = [n for members, count in zip(names, row_counts, strict=True) for _ in range(count) for n in members]
+    drivers = tuple(n for group, members in zip(groups, names, strict=True) if group.is_driver for n in members)
     length = _size(groups, guess)
     system = System(
         groups,
@@ -90,7 +95,7 @@ def build(mechanism: Mechanism) -> Model:
         len(mechanism.bodies),
     )
     plain = tuple(tuple(n.removeprefix("outputs.") for n in members) for members in output_names)
-    return Model(system, pose_type, guess, tuple(row_names), tuple(mechanism.bodies), plain, length)
+    return Model(system, pose_type, guess, tuple(row_names), drivers, tuple(mechanism.bodies), plain, length)
 
 
 def starting_guess(mechanism: Mechanism, parameters: dict[str, Any], components: int) -> dict[str, Any]:
@@ -166,8 +171,8 @@ def _size(groups: tuple[Group, ...], guess: dict[str, Any]) -> float:
     for group in groups:
         for name, field in value_fields(type(group.element)).items():
             value = getattr(group.element, name)
-            if field_kind(field) == "vector" and name.startswith("point") and not isinstance(value, jax.core.Tracer):
+            if field_kind(field) == "vector" and name.startswith("point") and not isinstance(value, Tracer):
                 sizes.append(np.max(np.linalg.norm(value, axis=0)))
-            elif name in ("length", "radius") and not isinstance(value, jax.core.Tracer):
+            elif name in ("length", "radius") and not isinstance(value, Tracer):
                 sizes.append(np.max(value))
     return float(max(sizes)) or 1.0

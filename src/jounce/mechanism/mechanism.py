@@ -8,6 +8,7 @@ from typing import Any
 from jounce.constraints import AbstractConstraint
 from jounce.errors import ExpressionError, MechanismError, did_you_mean
 from jounce.mechanism.outputs import AbstractOutput
+from jounce.mechanism.resolve import check_parameter
 from jounce.trajectory import Expression
 
 GROUND = "ground"
@@ -129,10 +130,12 @@ class Mechanism:
         Raises
         ------
         MechanismError
-            If expressions form a circle.
+            If a value is not one finite number, or expressions form a circle.
         """
         expressions = {k: Expression(v) if isinstance(v, str) else v for k, v in self.parameters.items()}
         values = {k: v for k, v in expressions.items() if not isinstance(v, Expression)}
+        for name, value in values.items():
+            check_parameter(name, value)
         waiting = {k: v for k, v in expressions.items() if isinstance(v, Expression)}
         while waiting:
             ready = [k for k, v in waiting.items() if v.names <= values.keys()]

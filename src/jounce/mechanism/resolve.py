@@ -8,9 +8,11 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 
 from jounce.constraints.base import field_kind, value_fields
 from jounce.errors import JounceError, MechanismError
+from jounce.jet import Jet
 from jounce.trajectory import AbstractMotion, Expression, ExpressionMotion, FunctionMotion
 
 POSITIVE = ("length", "radius")
@@ -35,7 +37,7 @@ def resolve(value: Any, parameters: Mapping[str, Any]) -> Any:
 def resolve_motion(motion: Any, parameters: Mapping[str, Any]) -> AbstractMotion:
     """Return the motion law that a number, an expression, a Python function or a law stands for."""
     if isinstance(motion, AbstractMotion):
-        return motion
+        return _traceable(motion)
     if isinstance(motion, numbers.Real):
         motion = Expression(repr(float(motion)))
     if isinstance(motion, str):
@@ -44,13 +46,38 @@ def resolve_motion(motion: Any, parameters: Mapping[str, Any]) -> AbstractMotion
         motion.check({*parameters, "t"})
         return ExpressionMotion(motion, {name: parameters[name] for name in sorted(motion.names - {"t"})})
     if callable(motion):
-        return FunctionMotion(motion)
+        return _traceable(FunctionMotion(motion))
     raise MechanismError("a motion is an expression, a function of time or a motion law", value=motion)
+
+
+def _traceable(motion: AbstractMotion) -> AbstractMotion:
+    """Return a law after trying it once, on shapes only: Python functions can fail in ways that need words."""
+    try:
+        jax.eval_shape(lambda t: motion(Jet([t])).coefficients[0], np.zeros((1, 1)))
+    except JounceError:
+        raise
+    except (TypeError, ValueError, AttributeError) as error:
+        reason = str(error).strip().splitlines()[0]
+        advice = "it must map a scalar time to a scalar with functions of jax.numpy"
+        raise MechanismError(f"the motion law cannot be used: {reason}; {advice}") from error
+    return motion
+
+
+def check_parameter(name: str, value: Any) -> None:
+    """Raise MechanismError unless the value of a parameter is one finite number."""
+    if isinstance(value, Tracer):
+        return
+    try:
+        plain = np.asarray(value, float)
+    except (TypeError, ValueError):
+        plain = np.empty(2)
+    if plain.shape != () or not np.isfinite(plain):
+        raise MechanismError("a parameter must be one finite number", name=f"parameters.{name}", value=_plain(value))
 
 
 def check_value(field: str, kind: str, value: Any, components: int) -> None:
     """Raise MechanismError unless a value fits its field: shape, finite, not a zero axis, not a negative length."""
-    if isinstance(value, jax.core.Tracer):
+    if isinstance(value, Tracer):
         return
     shape = (components,) if kind == "vector" else ()
     if np.shape(value) != shape or np.asarray(value).dtype.kind != "f":
@@ -85,7 +112,21 @@ def resolve_element(element: Any, parameters: Mapping[str, Any], components: int
         except JounceError as error:
             raise error.located(name=f"{name}.{field_name}") from None
         values[field_name] = value
+    _check_sideways(values, name)
     return values
+
+
+def _check_sideways(values: Mapping[str, Any], name: str) -> None:
+    """Raise MechanismError where a normal, or a vector of an angle, is parallel to the axis it must stand off from."""
+    for axis_name, others in (("axis_i", ("normal_i", "vector_i")), ("axis_j", ("normal_j",)), ("axis", ("vector_i",))):
+        axis = values.get(axis_name)
+        for other in others:
+            vector = values.get(other)
+            if isinstance(axis, np.ndarray) and isinstance(vector, np.ndarray):
+                sine = np.linalg.norm(np.cross(axis, vector)) / (np.linalg.norm(axis) * np.linalg.norm(vector))
+                if sine < 1e-9:
+                    message = "must not be parallel to the axis"
+                    raise MechanismError(message, name=f"{name}.{other}", value=_plain(vector))
 
 
 def static_fields(element: Any) -> tuple[str, ...]:
@@ -121,6 +162,6 @@ def stack_elements(elements: Sequence[Any], values: Sequence[Mapping[str, Any]])
 
 
 def _along_instances(*leaves: Any) -> Any:
-    traced = any(isinstance(leaf, jax.core.Tracer) for leaf in leaves)
+    traced = any(isinstance(leaf, Tracer) for leaf in leaves)
     namespace = jnp if traced else np
     return namespace.stack([namespace.asarray(leaf) for leaf in leaves], axis=-1)[..., None]

@@ -33,6 +33,11 @@ class Group(eqx.Module):
         """Number of joints, drivers or outputs in the group."""
         return len(self.bodies[0])
 
+    @property
+    def is_driver(self) -> bool:
+        """Whether the group prescribes motion."""
+        return self.element.role == "driver"
+
     def residual(self, pose: Any, time: Jet) -> Jet:
         """Return the residuals, shape (rows, instances, batch)."""
         return _with_rows(self.element.residual(*self._poses(pose), time))
@@ -124,6 +129,13 @@ class System(eqx.Module):
         blocks = [b for group in self.groups for b in group.derivative_blocks(pose, frozen, self.column_scale)]
         entries = jnp.concatenate([*map(_flat, blocks), jnp.zeros_like(time.coefficients[0])])
         return entries[self.cells] * self.row_scale[:, :, None]
+
+    def admissible(self, time: Jet) -> Any:
+        """Tell at which instants each driver has a permitted value, shape (drivers, batch)."""
+        lanes = time.coefficients[0].shape[-1]
+        drivers = [group for group in self.groups if group.is_driver]
+        parts = [jnp.broadcast_to(g.element.admissible(time), (g.instances, lanes)) for g in drivers]
+        return jnp.concatenate([*parts, jnp.ones((0, lanes), bool)])
 
     def coordinates(self, solution: Any, shifts: int) -> tuple[Any, Any]:
         """Turn a scaled solution, shape (columns, batch), into shifts and turns of all bodies, (c, bodies, batch)."""

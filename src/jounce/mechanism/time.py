@@ -73,13 +73,13 @@ def _spaced(grid: TimeGrid, parameters: Mapping[str, Any]) -> np.ndarray:
         count = values["count"]
         if count < 1 or count != int(count) or (count == 1) != (stop == start):
             message = "count must be a whole number of instants, at least 2 unless start and stop are the same"
-            raise MechanismError(message, name="time.count", value=count)
+            raise MechanismError(message, name="time.count", value=float(count))
     elif values["step"] <= 0:
         raise MechanismError("the step must be greater than zero", name="time.step", value=values["step"])
     else:
         count = np.floor((stop - start) / values["step"] * (1 + 1e-12) + 1e-9) + 1
     if count > MAX_INSTANTS:
-        raise MechanismError(f"a time grid holds at most {MAX_INSTANTS} instants", name="time", value=count)
+        raise MechanismError(f"a time grid holds at most {MAX_INSTANTS} instants", name="time", value=float(count))
     if "count" in values:
         return np.linspace(start, stop, int(count))
     return start + values["step"] * np.arange(int(count))

@@ -68,8 +68,8 @@ class SpatialPose:
 
     position: Jet
     quaternion: Jet
-    spins: tuple[Jet, Jet, Jet]
-    axes: tuple[Jet, Jet, Jet]
+    spins: tuple[Jet, ...]
+    axes: tuple[Jet, ...]
     angular_velocity: Jet | None
 
     shifts, turns = 3, 3  # coordinates of each kind: x, y, z; rotation about the three body axes

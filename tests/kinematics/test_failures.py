@@ -1,0 +1,190 @@
+"""What cannot be solved: said by name and time, never silently wrong."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jounce as jn
+from jounce import Status
+from tests.problems.small import crank, distance_slider, four_bar, four_hinges, slider_crank
+
+GRID = np.linspace(0, 2, 21)
+
+
+def failure(mechanism, time, **keywords):
+    with pytest.raises(jn.SolveError) as caught:
+        jn.solve(mechanism, time, **keywords)
+    return caught.value
+
+
+def test_jump_of_a_motion_law_is_reported_with_time_and_body():
+    error = failure(crank(lambda t: jnp.where(t < 1, t, t + 1.0)), GRID)
+    assert error.status == Status.BRANCH_JUMP
+    assert "t = 1 s" in str(error)
+    assert "crank" in str(error)
+    assert "10 of 21" in str(error)
+    assert isinstance(error.motion, jn.Motion)
+    np.testing.assert_allclose(error.motion.outputs["angle"][:10, 0], GRID[:10], atol=1e-14)
+
+
+@pytest.mark.parametrize("jump", [2 * np.pi, -1.0, 0.5])
+def test_jumps_of_other_sizes(jump):
+    assert failure(crank(lambda t: jnp.where(t < 1, t, t + jump)), GRID).status == Status.BRANCH_JUMP
+
+
+def test_without_strict_good_instants_are_kept_and_the_rest_is_nan():
+    motion = jn.solve(crank(lambda t: jnp.where(t < 1, t, t + 1.0)), GRID, strict=False)
+    assert motion.status[:10].tolist() == [Status.OK] * 10
+    assert motion.status[10] == Status.BRANCH_JUMP
+    assert motion.status[11:].tolist() == [Status.NOT_REACHED] * 10
+    assert motion.failed_bodies[10] == "crank"
+    np.testing.assert_allclose(motion.outputs["angle"][:10, 0], GRID[:10], atol=1e-14)
+    assert np.isnan(motion.outputs["angle"][10:]).all()
+    assert np.isnan(motion.dataset["tip"].values[10:]).all()
+    assert np.isnan(motion.point("crank", [1, 2]).values[10:]).all()
+    assert "10 of 21" in repr(motion)
+
+
+def test_kink_of_a_motion_law_is_no_jump():
+    motion = jn.solve(crank(lambda t: jnp.where(t < 1, t, 2 * t - 1)), GRID, order=1)
+    np.testing.assert_allclose(motion.outputs["angle"][:, 0], np.where(GRID < 1, GRID, 2 * GRID - 1), atol=1e-13)
+
+
+def test_slider_driven_to_its_dead_centre_is_singular():
+    error = failure(slider_crank("3.5 + 0.5*t"), np.linspace(0, 1, 5))
+    assert error.status == Status.SINGULAR
+    assert "t = 1 s" in str(error)
+    assert "dead point" in str(error)
+    assert not error.motion.status[:4].any()
+
+
+def test_slider_driven_beyond_its_reach():
+    time = np.linspace(0, 4, 9)
+    motion = jn.solve(slider_crank("3.52 + 0.2*t"), time, strict=False)
+    reached = 3.52 + 0.2 * time < 4
+    assert not motion.status[reached].any()
+    assert motion.status[~reached].all()
+    x = 3.52 + 0.2 * time[reached]
+    np.testing.assert_allclose(motion.outputs["angle"][reached, 0], np.arccos((x**2 + 1 - 9) / (2 * x)), rtol=1e-12)
+    assert "t = 2.5 s" in str(failure(slider_crank("3.52 + 0.2*t"), time))
+
+
+def test_crank_that_leaves_the_region_of_assembly():
+    mechanism = four_bar(0.0, 2.0, "t", AB=0.2, AD=0.3, BC=0.1, CD=0.15)
+    time = np.linspace(0, 3, 31)
+    motion = jn.solve(mechanism, time, strict=False)
+    reached = np.sqrt(0.2**2 + 0.3**2 - 2 * 0.2 * 0.3 * np.cos(time)) < 0.25  # B within reach of the coupler and rocker
+    assert (motion.status[reached] == Status.OK).all()
+    assert (motion.status[~reached] != Status.OK).all()
+    assert failure(mechanism, time).motion.status[~reached].all()
+
+
+def test_dead_centre_passed_smoothly_keeps_to_the_motion():
+    """The law touches the dead centre and returns; the crank goes on through it, in one smooth motion."""
+    time = np.linspace(0, 3, 31)
+    angle = jn.solve(slider_crank("4 - 0.5*cos(t)**2"), time, order=0).outputs["angle"][:, 0]
+    assert (np.diff(angle) < 0).all()
+
+
+def test_change_point_of_a_parallelogram_is_passed_on_the_same_branch():
+    time = np.linspace(0.5, 4, 15)
+    mechanism = four_bar("0.5", "0.5", "t", AB=0.1, CD=0.1, AD=0.2, BC=0.2)
+    motion = jn.solve(mechanism, time, order=1)
+    np.testing.assert_allclose(motion.outputs["psi"], np.stack([time, np.ones(15)], axis=1), rtol=1e-11)
+
+
+@pytest.mark.parametrize("time", [[0.0, 0.5, 1.0, 1.5], [0.0, 0.3, 0.7, 1.1]])
+def test_distance_driver_that_reaches_zero(time):
+    error = failure(distance_slider("0.5 - 0.5*t"), time)
+    assert error.status == Status.NOT_ASSEMBLED
+    assert "reach" in str(error)
+    good = np.array(time) < 1
+    assert not error.motion.status[good].any()
+    assert error.motion.status[~good].all()
+
+
+@pytest.mark.parametrize("motion", ["-0.5", "0", "0.5*t"])
+def test_distance_driver_that_is_not_positive_at_the_start(motion):
+    error = failure(distance_slider(motion), [0.0, 1.0])
+    assert error.status == Status.NOT_ASSEMBLED
+    assert "t = 0 s" in str(error)
+    assert "reach" in str(error)
+
+
+@pytest.mark.parametrize("motion", ["1/t", "log(t-1)"])
+def test_motion_law_without_a_value_at_the_start(motion):
+    with pytest.raises(jn.JounceError, match=r"drivers\.turn"):
+        jn.solve(crank(motion), [0.0, 1.0])
+
+
+def test_motion_law_without_a_value_later():
+    error = failure(crank("sqrt(1-t)"), np.linspace(0, 2, 5))
+    assert "t = 1" in str(error)
+
+
+def test_mechanism_that_cannot_be_assembled():
+    with pytest.raises(jn.AssemblyError, match=r"t = 0 s.*joints\.BC") as caught:
+        jn.solve(four_bar(BC=0.9), [0.0, 1.0])
+    assert caught.value.status == Status.NOT_ASSEMBLED
+
+
+def test_drivers_that_contradict_each_other():
+    again = crank("t")
+    mechanism = jn.Mechanism(
+        space="planar",
+        bodies=again.bodies,
+        joints=again.joints,
+        drivers={
+            "one": jn.drivers.CoordinateDriver(("ground", "crank"), "angle", "t"),
+            "two": jn.drivers.CoordinateDriver(("ground", "crank"), "angle", "t + 1"),
+        },
+    )
+    with pytest.raises(jn.AssemblyError, match=r"drivers\.(one|two), drivers\.(one|two)"):
+        jn.solve(mechanism, [0.0])
+
+
+PIN = jn.planar.Revolute(("ground", "crank"), [0, 0], [0, 0])
+TURN = jn.drivers.CoordinateDriver(("ground", "crank"), "angle", "t")
+
+
+@pytest.mark.parametrize(
+    "bodies, joints, drivers, message",
+    [
+        (["crank"], {"O": PIN}, {}, r"1 degree of freedom is left, with which crank can move: add 1 driver"),
+        (["crank", "loose"], {"O": PIN}, {"turn": TURN}, r"3 degrees of freedom are left, with which loose can move"),
+        (["crank"], {"O": PIN, "twin": PIN}, {"turn": TURN}, r"2 equations too many among joints\.O, joints\.twin"),
+        (["crank"], {"O": PIN}, {"turn": TURN, "more": TURN}, r"1 equation too many among drivers\.\w+, drivers\.\w+"),
+        (["crank"], {}, {}, r"3 degrees of freedom are left"),
+    ],
+    ids=["driver_missing", "loose_body", "joint_twice", "driver_twice", "nothing_at_all"],
+)
+def test_degrees_of_freedom_are_explained(bodies, joints, drivers, message):
+    mechanism = jn.Mechanism(
+        space="planar", bodies={name: jn.Body([0, 0]) for name in bodies}, joints=joints, drivers=drivers
+    )
+    with pytest.raises(jn.MobilityError, match=message):
+        jn.solve(mechanism, [0.0])
+
+
+def test_redundant_hinges_are_refused_by_name():
+    with pytest.raises(jn.MobilityError, match="3 equations too many") as caught:
+        jn.solve(four_hinges(), [0.0, 0.1])
+    assert all(f"joints.{name}" in str(caught.value) for name in "ABCD")
+
+
+@pytest.mark.parametrize("order", [-1, 1.5, "4", None, True, 31])
+def test_order_that_is_none(order):
+    with pytest.raises((jn.MechanismError, TypeError), match="order"):  # TypeError by the checker of the tests
+        jn.solve(crank("t"), [0.0], order=order)
+
+
+@pytest.mark.parametrize("tolerance", [0, -1.0, np.nan, np.inf, "1e-3", None])
+def test_tolerance_that_is_none(tolerance):
+    with pytest.raises((jn.MechanismError, TypeError), match="tolerance"):
+        jn.solve(crank("t"), [0.0], tolerance=tolerance)
+
+
+@pytest.mark.parametrize("law", [lambda t: jnp.stack([t, t]), lambda t: None, lambda t: float(t)], ids=["vector", "none", "float"])
+def test_python_function_that_is_no_motion_law(law):
+    with pytest.raises(jn.MechanismError, match=r"drivers\.turn"):
+        jn.solve(crank(law), [0.0])
