@@ -101,7 +101,7 @@ def test_long_grid_is_the_short_one_and_progress_is_told():
 
 
 def compilations():
-    return advance.jitted()._cache_size()
+    return advance.jitted._cache_size()
 
 
 def test_parameters_and_number_of_instants_compile_nothing_again():

@@ -13,6 +13,7 @@ from jounce.trajectory import Expression
 
 GROUND = "ground"
 RESERVED = ("t", "pi", "deg")
+RESERVED_OUTPUTS = ("time", "derivative", "component")  # the axes of a result
 
 
 @dataclasses.dataclass(frozen=True)
@@ -103,6 +104,9 @@ class Mechanism:
         for name in self.parameters:
             if name in RESERVED:
                 raise MechanismError(f"the name '{name}' is reserved", name=f"parameters.{name}")
+        for name in RESERVED_OUTPUTS:
+            if name in self.outputs:
+                raise MechanismError(f"the name '{name}' is reserved for an axis of results", name=f"outputs.{name}")
         for name in self.joints.keys() & self.drivers.keys():
             raise MechanismError("a joint and a driver have the same name", name=f"drivers.{name}")
         for kind, elements in self.elements.items():
