@@ -4,11 +4,7 @@ from __future__ import annotations
 
 import csv
 import itertools
-import os
 import re
-import secrets
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
 from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
@@ -16,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from jounce.errors import OutputError
+from jounce.io.files import check_target, reason_of, replacing
 
 __all__ = ["check_writable", "columns", "read", "write"]
 
@@ -36,51 +33,7 @@ def check_writable(path: str | PathLike[str]) -> None:
     OutputError
         The ending is another, the folder does not exist, or nothing may be written there.
     """
-    name = fspath(path)
-    if Path(name).suffix.lower() not in SUFFIXES:
-        raise OutputError(f"the kind of an output is told by its ending; valid: {', '.join(SUFFIXES)}", path=name)
-    try:
-        target = Path(os.path.realpath(name))
-        if target.is_dir():
-            raise OutputError("is a directory, the name of a file is needed", path=name)
-        if not target.parent.is_dir():
-            raise OutputError(f"the folder {target.parent} does not exist", path=name)
-        if target.exists() and not (target.is_file() and os.access(target, os.W_OK)):
-            raise OutputError("the file there may not be replaced", path=name)
-        _new_file(target).unlink()
-    except (OSError, ValueError) as error:
-        raise OutputError(f"cannot be written: {_reason(error)}", path=name) from None
-
-
-def _reason(error: Exception) -> str:
-    return getattr(error, "strerror", None) or str(error)
-
-
-def _new_file(target: Path) -> Path:
-    """Create an empty file of a name of its own beside the target."""
-    path = target.with_name(f".jounce-{secrets.token_hex(6)}{target.suffix}")
-    path.touch(exist_ok=False)
-    return path
-
-
-@contextmanager
-def _replacing(path: str | PathLike[str]) -> Iterator[Path]:
-    """Give a file beside the target to write to, and put it in the place of the target only when that went well."""
-    check_writable(path)
-    target = Path(os.path.realpath(path))
-    scratch: Path | None = None
-    try:
-        scratch = _new_file(target)
-        yield scratch
-        scratch.replace(target)
-    except OutputError as error:
-        raise error.located(path=fspath(path)) from None
-    except (OSError, ValueError) as error:
-        raise OutputError(f"cannot be written: {_reason(error)}", path=fspath(path)) from error
-    finally:
-        if scratch is not None:
-            with suppress(OSError):
-                scratch.unlink()
+    check_target(path, SUFFIXES, "an output")
 
 
 def write(dataset: Any, path: str | PathLike[str]) -> None:
@@ -113,7 +66,8 @@ def write(dataset: Any, path: str | PathLike[str]) -> None:
     ...     print(pathlib.Path(folder, "motion.csv").read_text().splitlines()[0])
     time,psi,psi_d1,C_x,C_x_d1,C_y,C_y_d1
     """
-    with _replacing(path) as scratch:
+    check_writable(path)
+    with replacing(path) as scratch:
         if Path(fspath(path)).suffix.lower() == ".csv":
             _write_csv(dataset, scratch)
         else:
@@ -216,7 +170,7 @@ def read(path: str | PathLike[str]) -> Any:
     except FileNotFoundError:
         raise OutputError("file not found", path=name) from None
     except (OSError, ValueError, csv.Error) as error:
-        raise OutputError(f"cannot be read: {_reason(error)}", path=name) from None
+        raise OutputError(f"cannot be read: {reason_of(error)}", path=name) from None
     if header[:1] != ["time"] or not rows:
         raise OutputError("is not a table of results, whose first column is time", path=name)
     for line, row in enumerate(rows, start=2):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import warnings
 from collections.abc import Sequence
 from os import PathLike, fspath
@@ -11,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from jounce.errors import MechanismError, OutputError, did_you_mean
+from jounce.errors import MechanismError, did_you_mean
+from jounce.io.files import check_target, replacing
 from jounce.io.peaks import COMPONENTS, derivative_name
 from jounce.plot.labels import scale_of, symbol, unit_label
 
@@ -193,19 +193,7 @@ def check_figure(path: str | PathLike[str]) -> None:
     OutputError
         The ending is not .png, .svg or .pdf, the folder does not exist, or nothing may be written there.
     """
-    name = fspath(path)
-    if Path(name).suffix.lower() not in SUFFIXES:
-        raise OutputError(f"the kind of a figure is told by its ending; valid: {', '.join(SUFFIXES)}", path=name)
-    try:
-        target = Path(os.path.realpath(name))
-        if target.is_dir():
-            raise OutputError("is a directory, the name of a file is needed", path=name)
-        if not target.parent.is_dir():
-            raise OutputError(f"the folder {target.parent} does not exist", path=name)
-        if not os.access(target if target.exists() else target.parent, os.W_OK):
-            raise OutputError("nothing may be written there", path=name)
-    except (OSError, ValueError) as error:
-        raise OutputError(f"cannot be written: {getattr(error, 'strerror', None) or error}", path=name) from None
+    check_target(path, SUFFIXES, "a figure")
 
 
 def save(figure: Any, path: str | PathLike[str]) -> None:
@@ -219,11 +207,7 @@ def save(figure: Any, path: str | PathLike[str]) -> None:
     import matplotlib as mpl
 
     check_figure(path)
-    name = fspath(path)
-    metadata = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(Path(name).suffix.lower())
-    try:
-        with mpl.rc_context(STYLE), warnings.catch_warnings():
-            warnings.filterwarnings("ignore", message="Glyph .* missing")  # names in other scripts get boxes
-            figure.savefig(name, dpi=RESOLUTION, metadata=metadata)
-    except (OSError, ValueError) as error:
-        raise OutputError(f"cannot be written: {getattr(error, 'strerror', None) or error}", path=name) from error
+    metadata = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(Path(fspath(path)).suffix.lower())
+    with replacing(path) as beside, mpl.rc_context(STYLE), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Glyph .* missing")  # names in other scripts get boxes
+        figure.savefig(beside, dpi=RESOLUTION, metadata=metadata)

@@ -2,14 +2,13 @@
 
 import io
 import os
-import secrets
 import tempfile
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from jounce.errors import OutputError
+from jounce.io.files import replacing
 from jounce.papers.sommer_2024.simulations import QUANTITIES, RUNS, SIMULATIONS, STEP, TOLERANCE, Cycle, measure
 
 PRINTED = {  # root-mean-square errors in the text of the paper, sections 4 and 6
@@ -104,22 +103,15 @@ def comparison(cycles: Mapping[str, Cycle]) -> str:
 
 
 def write(path: Path, content: bytes) -> Path:
-    """Write a whole file or nothing: into a file beside it, which then takes its name.
+    """Write a whole file or nothing.
 
     Raises
     ------
     OutputError
         If it cannot be written.
     """
-    beside = path.with_name(f".{path.name}-{secrets.token_hex(6)}")
-    try:
+    with replacing(path) as beside:
         beside.write_bytes(content)
-        beside.replace(path)
-    except OSError as error:
-        raise OutputError(f"cannot be written: {error.strerror or error}", path=path) from None
-    finally:
-        with suppress(OSError):
-            beside.unlink()
     return path
 
 
