@@ -11,9 +11,34 @@ from tests.problems.bank import BODIES, cases, group_of, pose_of, random_motion
 
 ORDER = 5
 RANKS = {
-    "planar": {"revolute": 2, "double_revolute": 1, "parallel1": 1, "parallel2": 1, "prismatic": 2, "coordinate": 1, "gear": 1, "rolling": 1, "slide": 1, "distance": 1, "point_on_parabola": 1},
-    "spatial": {"spherical": 3, "double_spherical": 1, "dot1": 1, "dot2": 1, "universal": 4, "revolute": 5, "cylindrical": 4, "prismatic": 5, "screw": 5, "rotation": 1, "slide": 1, "distance": 1},
-}  # fmt: skip
+    "planar": {
+        "revolute": 2,
+        "double_revolute": 1,
+        "parallel1": 1,
+        "parallel2": 1,
+        "prismatic": 2,
+        "coordinate": 1,
+        "gear": 1,
+        "rolling": 1,
+        "slide": 1,
+        "distance": 1,
+        "point_on_parabola": 1,
+    },
+    "spatial": {
+        "spherical": 3,
+        "double_spherical": 1,
+        "dot1": 1,
+        "dot2": 1,
+        "universal": 4,
+        "revolute": 5,
+        "cylindrical": 4,
+        "prismatic": 5,
+        "screw": 5,
+        "rotation": 1,
+        "slide": 1,
+        "distance": 1,
+    },
+}
 
 
 def test_table_of_ranks_names_the_whole_catalogue():
@@ -88,14 +113,15 @@ class SpatialCouple:
     def residual(self, kind, values, shift, turn):
         i = BODIES.index("one")
         q = [Jet(jnp.asarray(c[k, i, 0]) for c in self.motion["quaternion"]) for k in range(4)]
-        back = [self.q_j[0], *(-self.q_j[1:])]
-        q = product(product(product(q, list(self.q_i)), turn), back)
+        q = product(product(product(q, list(self.q_i)), turn), self.back)
         motion = {name: series.copy() for name, series in self.motion.items()}
         motion["quaternion"][:, :, 2, 0] = coefficients(q)
         motion["position"][:, :, 2] = 0
         pose = pose_of(motion)
         body_i, body_j = pose.take((1,)), pose.take((2,))
-        local = jet.stack([sum((float(self.C_i[r, c]) * shift[c] for c in range(3)), STILL) + self.p_i[r] for r in range(3)])
+        local = jet.stack(
+            [sum((float(self.C_i[r, c]) * shift[c] for c in range(3)), STILL) + self.p_i[r] for r in range(3)]
+        )
         at = body_i.position + jet.matvec(body_i.attitude, local.map(lambda c: c[:, None, None]))
         position = (at - body_j.direction(self.p_j[:, None, None])).dense()
         motion["position"][:, :, 2] = np.array(position.coefficients)[:, :, 0]
@@ -104,13 +130,26 @@ class SpatialCouple:
         return np.array(group.residual(pose_of(motion), time).dense().coefficients)[:, :, 0, 0]
 
     @property
+    def twist(self):
+        """Angle of ``A_i^T A_j`` about the joint axis where the frames of the joint coincide."""
+        q = product(self.back, list(self.q_i))
+        return 2 * np.arctan2(q[3], q[0])
+
+    @property
+    def back(self):
+        return [self.q_j[0], *(-self.q_j[1:])]
+
+    @property
     def points(self):
         return {"point_i": self.p_i.tolist(), "point_j": self.p_j.tolist()}
 
     def pair(self, name, first="z", second=None):
         """Values of a joint that are axes of the joint frame, one in each body."""
         columns = ["xyz".index(axis) for axis in (first, second or first)]
-        return {f"{name}_i": (1.3 * self.C_i[:, columns[0]]).tolist(), f"{name}_j": (0.7 * self.C_j[:, columns[1]]).tolist()}
+        return {
+            f"{name}_i": (1.3 * self.C_i[:, columns[0]]).tolist(),
+            f"{name}_j": (0.7 * self.C_j[:, columns[1]]).tolist(),
+        }
 
 
 def spatial_joints(c):
@@ -124,13 +163,43 @@ def spatial_joints(c):
         "spherical": (spatial.Spherical, c.points, [(none, ball)], [(aside, ball), (up, still)]),
         "double_spherical": (spatial.DoubleSpherical, c.points | {"length": LENGTH}, [(far, ball)], [(up, ball)]),
         "dot1": (spatial.Dot1, c.pair("vector", "x", "y"), [(aside, spin_of("x", "y"))], [(none, spin)]),
-        "dot2": (spatial.Dot2, c.points | {"vector_i": c.C_i[:, 2].tolist()}, [([TRAVEL, OTHER, STILL], ball)], [(up, ball)]),
-        "universal": (spatial.Universal, c.points | c.pair("vector", "x", "y"), [(none, spin_of("x", "y"))], [(none, spin), (up, still)]),
-        "revolute": (spatial.Revolute, c.points | c.pair("axis"), [(none, spin)], [(up, spin), (aside, spin), (none, tilt)]),
-        "cylindrical": (spatial.Cylindrical, c.points | c.pair("axis"), [(up, spin), (up, still)], [(aside, spin), (none, tilt)]),
-        "prismatic": (spatial.Prismatic, c.points | c.pair("axis") | c.pair("normal", "x"), [(up, still)], [(none, spin), (aside, still), (none, tilt)]),
-        "screw": (spatial.Screw, c.points | c.pair("axis") | {"lead": LEAD, "offset": 0.0}, [([STILL, STILL, screwed], spin)], [(up, still), (none, spin), (none, tilt)]),
-    }  # fmt: skip
+        "dot2": (
+            spatial.Dot2,
+            c.points | {"vector_i": c.C_i[:, 2].tolist()},
+            [([TRAVEL, OTHER, STILL], ball)],
+            [(up, ball)],
+        ),
+        "universal": (
+            spatial.Universal,
+            c.points | c.pair("vector", "x", "y"),
+            [(none, spin_of("x", "y"))],
+            [(none, spin), (up, still)],
+        ),
+        "revolute": (
+            spatial.Revolute,
+            c.points | c.pair("axis"),
+            [(none, spin)],
+            [(up, spin), (aside, spin), (none, tilt)],
+        ),
+        "cylindrical": (
+            spatial.Cylindrical,
+            c.points | c.pair("axis"),
+            [(up, spin), (up, still)],
+            [(aside, spin), (none, tilt)],
+        ),
+        "prismatic": (
+            spatial.Prismatic,
+            c.points | c.pair("axis") | c.pair("normal", "x"),
+            [(up, still)],
+            [(none, spin), (aside, still), (none, tilt)],
+        ),
+        "screw": (
+            spatial.Screw,
+            c.points | c.pair("axis") | {"lead": LEAD, "offset": -LEAD / (2 * np.pi) * c.twist},
+            [([STILL, STILL, screwed], spin)],
+            [(up, still), (none, spin), (none, tilt)],
+        ),
+    }
 
 
 def spin_of(first, second):
@@ -170,7 +239,9 @@ class PlanarCouple:
         c, s = np.cos(self.a_i), np.sin(self.a_i)
         x, y = c * shift[0] - s * shift[1] + self.p_i[0], s * shift[0] + c * shift[1] + self.p_i[1]
         local = [w.map(lambda v: v[None, None]) for w in (x, y)]
-        seen = jet.stack([body_i.cosine * local[0] - body_i.sine * local[1], body_i.sine * local[0] + body_i.cosine * local[1]])
+        seen = jet.stack(
+            [body_i.cosine * local[0] - body_i.sine * local[1], body_i.sine * local[0] + body_i.cosine * local[1]]
+        )
         position = (body_i.position + seen - body_j.direction(self.p_j[:, None, None])).dense()
         motion["position"][:, :, 2] = np.array(position.coefficients)[:, :, 0]
         group = group_of([kind(("one", "two"), **values)], "planar")
@@ -196,7 +267,12 @@ def planar_joints(c):
         "double_revolute": (planar.DoubleRevolute, c.points | {"length": LENGTH}, [(circle, TURN)], [(along, TURN)]),
         "parallel1": (planar.Parallel1, c.along("i", "j"), [([TRAVEL, OTHER], STILL)], [(none, TURN)]),
         "parallel2": (planar.Parallel2, c.points | c.along("i"), [(along, TURN)], [(across, TURN)]),
-        "prismatic": (planar.Prismatic, c.points | c.along("i", "j"), [(along, STILL)], [(across, STILL), (along, TURN)]),
+        "prismatic": (
+            planar.Prismatic,
+            c.points | c.along("i", "j"),
+            [(along, STILL)],
+            [(across, STILL), (along, TURN)],
+        ),
         "rolling": (planar.Rolling, c.points | c.along("i") | offset, [(rolled, TURN)], [(along, STILL), (none, TURN)]),
     }
 

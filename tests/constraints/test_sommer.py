@@ -268,11 +268,15 @@ def test_equations_101_to_103_rotation_driver(seed, half_turns):
     turning = np.outer(random.normal(size=4), u)
     state_i = spatial_state(random, p=random.normal(size=4), w=np.zeros((4, 3)))
     base = state_i[1]
-    product = np.array([base[0] * p[0] - base[1:] @ p[1:], *(base[0] * p[1:] + p[0] * base[1:] + np.cross(base[1:], p[1:]))])
+    product = np.array(
+        [base[0] * p[0] - base[1:] @ p[1:], *(base[0] * p[1:] + p[0] * base[1:] + np.cross(base[1:], p[1:]))]
+    )
     state_j = spatial_state(random, p=product, w=turning)
     np.testing.assert_allclose(state_i[0].A.T @ state_j[0].A, attitude(p), atol=1e-14)
     for axis in (u, 3 * u):
-        reading = Reading(lambda names, a=axis: jn.drivers.RotationDriver(names, a.tolist(), LAW), [state_i, state_j], f)
+        reading = Reading(
+            lambda names, a=axis: jn.drivers.RotationDriver(names, a.tolist(), LAW), [state_i, state_j], f
+        )
         residual = spatial.equation_101(p, u, f)
         residual -= 2 * np.pi * np.round(residual / (2 * np.pi))
         block = np.concatenate(spatial.equation_102(u))

@@ -47,7 +47,7 @@ def repeated(motion, order, batch):
 
 
 def extended(motion, unknown):
-    """Coordinates of a motion with one order more: (r[k], phi[k]) or (r[k], w'[k-1] / k), of shape (c, bodies, batch)."""
+    """Coordinates of one order more: (r[k], phi[k]) or (r[k], w'[k-1] / k), of shape (c, bodies, batch)."""
     c = pose_of(motion).coordinates()
     order, shifts = len(motion["position"]), motion["position"].shape[1]
     c["position"] = c["position"].append(jnp.asarray(unknown[:shifts]))
@@ -77,7 +77,7 @@ def read_off_jacobian(group, motion):
 
 
 def displaced(motion, steps):
-    """Coefficients of order zero with coordinates changed: shifts, angles, turns about body axes, (c, bodies, batch)."""
+    """Coefficients of order zero with coordinates changed: shifts, turns about body axes, (c, bodies, batch)."""
     moved = repeated(motion, 0, steps.shape[-1])
     shifts = moved["position"].shape[1]
     moved["position"][0] += steps[:shifts]
@@ -176,12 +176,14 @@ def moved_together(motion, random, order):
     frame = pose_of(common)
     turned["position"] = np.array(frame.point(Jet(map(jnp.asarray, motion["position"]))).dense().coefficients)
     a, b = ([Jet(jnp.asarray(level[k]) for level in s["quaternion"]) for k in range(4)] for s in (common, motion))
-    product = jet.stack([
-        a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
-        a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
-        a[0] * b[2] + a[2] * b[0] + a[3] * b[1] - a[1] * b[3],
-        a[0] * b[3] + a[3] * b[0] + a[1] * b[2] - a[2] * b[1],
-    ])  # fmt: skip
+    product = jet.stack(
+        [
+            a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
+            a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
+            a[0] * b[2] + a[2] * b[0] + a[3] * b[1] - a[1] * b[3],
+            a[0] * b[3] + a[3] * b[0] + a[1] * b[2] - a[2] * b[1],
+        ]
+    )
     turned["quaternion"] = np.array(product.dense().coefficients)
     return turned
 

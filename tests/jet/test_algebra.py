@@ -29,7 +29,7 @@ POSITIVE = st.floats(0.8, 3)
 
 
 def magnitude(*operands):
-    """Coefficients of the product of the operands with all numbers replaced by their magnitudes: what rounding scales with."""
+    """Coefficients of the product of the operands, all taken by magnitude: what rounding scales with."""
     size = np.eye(1, ORDER + 1)[0]
     for x in operands:
         size = np.convolve(size, np.abs(np.array(x.dense().coefficients)))[: ORDER + 1]
@@ -142,7 +142,9 @@ def test_atan2_undoes_polar_coordinates(angle, radius):
 
 @given(jets(), st.floats(-0.3, 0.3))
 def test_evaluation_is_the_taylor_polynomial(x, step):
-    assert float(x.evaluate(step)) == pytest.approx(float(np.polyval(np.array(x.dense().coefficients)[::-1], step)), abs=1e-14)
+    assert float(x.evaluate(step)) == pytest.approx(
+        float(np.polyval(np.array(x.dense().coefficients)[::-1], step)), abs=1e-14
+    )
 
 
 def test_evaluation_predicts_a_function():

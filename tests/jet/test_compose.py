@@ -31,15 +31,33 @@ def own_reverse(t):
 own_reverse.defvjp(lambda t: (jnp.sin(t), t), lambda t, g: (jnp.cos(t) * g,))
 
 SMOOTH = {
-    "elementary": (lambda t: jnp.exp(-t) * jnp.sin(3 * t) + jnp.cosh(t) / jnp.sqrt(t), lambda t: mp.exp(-t) * mp.sin(3 * t) + mp.cosh(t) / mp.sqrt(t)),
-    "inverse_functions": (lambda t: jnp.arcsin(t) + jnp.arccos(t / 2) * jnp.arctan(t), lambda t: mp.asin(t) + mp.acos(t / 2) * mp.atan(t)),
+    "elementary": (
+        lambda t: jnp.exp(-t) * jnp.sin(3 * t) + jnp.cosh(t) / jnp.sqrt(t),
+        lambda t: mp.exp(-t) * mp.sin(3 * t) + mp.cosh(t) / mp.sqrt(t),
+    ),
+    "inverse_functions": (
+        lambda t: jnp.arcsin(t) + jnp.arccos(t / 2) * jnp.arctan(t),
+        lambda t: mp.asin(t) + mp.acos(t / 2) * mp.atan(t),
+    ),
     "atan2": (lambda t: jnp.arctan2(jnp.sin(t), 1 + t * t), lambda t: mp.atan2(mp.sin(t), 1 + t * t)),
-    "powers": (lambda t: t**3 + t**-2 + t**2.5 + 2.0**t + t**t, lambda t: t**3 + t**-2 + t ** mp.mpf(2.5) + mp.mpf(2) ** t + t**t),
+    "powers": (
+        lambda t: t**3 + t**-2 + t**2.5 + 2.0**t + t**t,
+        lambda t: t**3 + t**-2 + t ** mp.mpf(2.5) + mp.mpf(2) ** t + t**t,
+    ),
     "hypot": (lambda t: jnp.hypot(t, 2.0), lambda t: mp.sqrt(t * t + 4)),
-    "dot": (lambda t: jnp.dot(jnp.array([1.0, 2.0, 3.0]), jnp.stack([t, t**2, jnp.sin(t)])), lambda t: t + 2 * t**2 + 3 * mp.sin(t)),
-    "matrix": (lambda t: (M @ jnp.stack([t, jnp.cos(t)])) @ jnp.stack([t, t * t]), lambda t: (t + 2 * mp.cos(t)) * t + (3 * t + 4 * mp.cos(t)) * t * t),
+    "dot": (
+        lambda t: jnp.dot(jnp.array([1.0, 2.0, 3.0]), jnp.stack([t, t**2, jnp.sin(t)])),
+        lambda t: t + 2 * t**2 + 3 * mp.sin(t),
+    ),
+    "matrix": (
+        lambda t: (M @ jnp.stack([t, jnp.cos(t)])) @ jnp.stack([t, t * t]),
+        lambda t: (t + 2 * mp.cos(t)) * t + (3 * t + 4 * mp.cos(t)) * t * t,
+    ),
     "jitted_inside": (lambda t: jax.jit(lambda u: jnp.exp(u) * u)(t), lambda t: mp.exp(t) * t),
-    "vmapped_inside": (lambda t: jnp.sum(jax.vmap(lambda a: jnp.sin(a * t))(jnp.array([1.0, 2.0]))), lambda t: mp.sin(t) + mp.sin(2 * t)),
+    "vmapped_inside": (
+        lambda t: jnp.sum(jax.vmap(lambda a: jnp.sin(a * t))(jnp.array([1.0, 2.0]))),
+        lambda t: mp.sin(t) + mp.sin(2 * t),
+    ),
     "gradient_inside": (jax.grad(lambda t: jnp.sin(t) ** 2), lambda t: mp.sin(2 * t)),
     "custom_jvp": (own_derivative, mp.sin),
     "custom_vjp": (own_reverse, mp.sin),
@@ -50,15 +68,21 @@ SMOOTH = {
     "erf": (jax.scipy.special.erf, mp.erf),
     "expm1_log1p": (lambda t: jnp.expm1(t) * jnp.log1p(t), lambda t: mp.expm1(t) * mp.log(1 + t)),
     "polyval": (lambda t: jnp.polyval(jnp.array([1.0, -2.0, 3.0]), t), lambda t: t**2 - 2 * t + 3),
-    "scan": (lambda t: jax.lax.scan(lambda c, x: (c * t + x, None), jnp.zeros_like(t), jnp.array([1.0, 2.0, 3.0]))[0], lambda t: t * t + 2 * t + 3),
+    "scan": (
+        lambda t: jax.lax.scan(lambda c, x: (c * t + x, None), jnp.zeros_like(t), jnp.array([1.0, 2.0, 3.0]))[0],
+        lambda t: t * t + 2 * t + 3,
+    ),
     "fori_loop": (lambda t: jax.lax.fori_loop(0, 3, lambda _, c: jnp.sin(c), t), lambda t: mp.sin(mp.sin(mp.sin(t)))),
     "cond": (lambda t: jax.lax.cond(t < 1, jnp.sin, jnp.cos, t), mp.sin),
     "switch": (lambda t: jax.lax.switch(1, [jnp.sin, jnp.cos], t), mp.cos),
     "product": (lambda t: jnp.prod(jnp.stack([t, t * t, jnp.sin(t)])), lambda t: t**3 * mp.sin(t)),
-    "sums": (lambda t: jnp.cumsum(jnp.stack([t, t * t, jnp.sin(t)]))[2] + jnp.mean(jnp.stack([t, t * t])), lambda t: t + t * t + mp.sin(t) + (t + t * t) / 2),
+    "sums": (
+        lambda t: jnp.cumsum(jnp.stack([t, t * t, jnp.sin(t)]))[2] + jnp.mean(jnp.stack([t, t * t])),
+        lambda t: t + t * t + mp.sin(t) + (t + t * t) / 2,
+    ),
     "updated_array": (lambda t: jnp.sum(jnp.zeros(3).at[1].set(t * t) * jnp.arange(3.0)), lambda t: t * t),
     "smooth_step": (lambda t: jnp.where(t > 0, jnp.exp(-1 / jnp.where(t > 0, t, 1.0)), 0.0), lambda t: mp.exp(-1 / t)),
-}  # fmt: skip
+}
 PIECEWISE = {
     "where": (lambda t: jnp.where(t < 1, t**3, jnp.exp(-t)), lambda t: t**3),
     "select": (lambda t: jnp.select([t < 0.5, t < 1], [t, t * t], t**3), lambda t: t * t),
@@ -73,7 +97,7 @@ PIECEWISE = {
     "max_and_min": (lambda t: jnp.maximum(t, t * t) * jnp.minimum(jnp.sin(t), 0.5), lambda t: t * mp.mpf(0.5)),
     "rounding": (lambda t: t * jnp.floor(3 * t) + jnp.sign(t) * jnp.ceil(t) * jnp.round(t), lambda t: 2 * t + 1),
     "largest": (lambda t: jnp.max(jnp.stack([t, t * t])) * t, lambda t: t * t),
-}  # fmt: skip
+}
 
 
 def derivatives(function, t, order):
@@ -124,11 +148,15 @@ def test_every_instant_takes_its_own_branch():
 
 @pytest.mark.parametrize("function", [lambda t: 3.0, lambda t: 3, lambda t: jnp.asarray(3.0)])
 def test_constant_law(function):
-    np.testing.assert_array_equal(jn.compose(function, jn.Jet.variable(jnp.zeros(2), 2)).derivatives(), [[3, 3], [0, 0], [0, 0]])
+    np.testing.assert_array_equal(
+        jn.compose(function, jn.Jet.variable(jnp.zeros(2), 2)).derivatives(), [[3, 3], [0, 0], [0, 0]]
+    )
 
 
 def test_order_zero_is_the_function():
-    assert float(jn.compose(slider, jn.Jet.variable(AT, 0)).coefficients[0]) == pytest.approx(float(slider(AT)), rel=1e-15)
+    assert float(jn.compose(slider, jn.Jet.variable(AT, 0)).coefficients[0]) == pytest.approx(
+        float(slider(AT)), rel=1e-15
+    )
 
 
 @pytest.mark.parametrize(

@@ -74,9 +74,7 @@ def test_products_are_cauchy_convolutions_of_numpy_products(random):
     a, v, b = some(random, 2, 3), some(random, 3), some(random, 3, 4)
     for product, left, right, subscripts in [(jet.matvec, a, v, "ijn,jn->in"), (jet.matmul, a, b, "ijn,jkn->ikn")]:
         x, y = values(left), values(right)
-        expected = [
-            sum(np.einsum(subscripts, x[j], y[k - j]) for j in range(k + 1)) for k in range(ORDER + 1)
-        ]
+        expected = [sum(np.einsum(subscripts, x[j], y[k - j]) for j in range(k + 1)) for k in range(ORDER + 1)]
         np.testing.assert_allclose(values(product(left, right)), expected, atol=1e-14)
 
 

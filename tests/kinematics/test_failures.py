@@ -184,7 +184,9 @@ def test_tolerance_that_is_none(tolerance):
         jn.solve(crank("t"), [0.0], tolerance=tolerance)
 
 
-@pytest.mark.parametrize("law", [lambda t: jnp.stack([t, t]), lambda t: None, lambda t: float(t)], ids=["vector", "none", "float"])
+@pytest.mark.parametrize(
+    "law", [lambda t: jnp.stack([t, t]), lambda t: None, lambda t: float(t)], ids=["vector", "none", "float"]
+)
 def test_python_function_that_is_no_motion_law(law):
     with pytest.raises(jn.MechanismError, match=r"drivers\.turn"):
         jn.solve(crank(law), [0.0])

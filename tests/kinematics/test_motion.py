@@ -44,7 +44,9 @@ def test_points_and_angles_asked_for_later_are_the_outputs(planar):
     np.testing.assert_allclose(planar.point("rocker", [0.2031, 0.0]).values, planar.outputs["C"], rtol=1e-13)
     np.testing.assert_allclose(planar.angle("rocker").values, planar.outputs["psi"], rtol=1e-13)
     np.testing.assert_allclose(planar.outputs["rate"][:, :4], planar.outputs["psi"][:, 1:], rtol=1e-12)
-    np.testing.assert_allclose(planar.angular_velocity("rocker").values[:, :4], planar.outputs["psi"][:, 1:], rtol=1e-12)
+    np.testing.assert_allclose(
+        planar.angular_velocity("rocker").values[:, :4], planar.outputs["psi"][:, 1:], rtol=1e-12
+    )
     difference = planar.angle("rocker") - planar.angle("crank")
     np.testing.assert_allclose(planar.outputs["between"], difference, rtol=1e-12)
     assert planar.point("rocker", [0.0, 0.0]).dims == ("time", "derivative", "component")

@@ -7,9 +7,9 @@ import jounce as jn
 from tests.problems.mechanisms import MECHANISMS, example, reference
 
 JOUNCE, HIGH = 1e-14, 1e-12
-# Every kind of joint that the issue names, and one spatial chain, in the quick suite; all files to order 10 in the slow one.
+# Gears, rolling, screw, universal and prismatic joints are in the quick suite; all files to order 10 in the slow one.
 QUICK = ("four_bar", "gear_pair", "rolling_disc", "screw_press", "slider_crank", "hooke_joint")
-# A driven distance of which the high derivatives are 10^4 times smaller than those of the points it is measured between,
+# A driven distance whose high derivatives are 10^4 times smaller than those of the points that it is measured between,
 # so that their rounding shows: no double-precision evaluation of the distance from the points does better.
 CANCELLING = {("rspu_distance", "d"): 1e-11, ("rspu_slide", "d"): 1e-11}
 
@@ -22,7 +22,9 @@ def errors(name, order):
     found = {}
     for output, truth in outputs.items():
         values = np.moveaxis(motion.outputs[output], 1, 0)
-        assert values.shape[0] == order + 1 - motion.mechanism.outputs[output].lost_orders or values.shape[0] == order + 1
+        assert (
+            values.shape[0] == order + 1 - motion.mechanism.outputs[output].lost_orders or values.shape[0] == order + 1
+        )
         for k, value in enumerate(values):
             scale = np.abs(truth[k]).max()
             found[output, k] = np.sqrt(np.mean((value - truth[k]) ** 2)) / (scale or 1.0)

@@ -27,7 +27,10 @@ def users_own_joint():
 
         def residual(self, body_i, body_j, time):
             d = body_j.point(self.point_j) - body_i.position
-            x, y = body_i.direction(np.array([1.0, 0.0])[:, None, None]), body_i.direction(np.array([0.0, 1.0])[:, None, None])
+            x, y = (
+                body_i.direction(np.array([1.0, 0.0])[:, None, None]),
+                body_i.direction(np.array([0.0, 1.0])[:, None, None]),
+            )
             return y.dot(d) - self.curvature * x.dot(d) ** 2
 
     registered = base.catalogue("planar", "joint")["point_on_parabola"]
@@ -80,7 +83,9 @@ def cases():
             fields = value_fields(kind)
             words = COORDINATES if "coordinate" in fields else ("",)
             extras = {n for n, f in fields.items() if f.default is None and n != "offset"}
-            found += [Case(kind, space, more, word) for word in words for more in ([False, True] if extras else [False])]
+            found += [
+                Case(kind, space, more, word) for word in words for more in ([False, True] if extras else [False])
+            ]
     return found
 
 
@@ -103,7 +108,9 @@ def random_motion(random, space, order, batch=1, degree=None):
         shapes["quaternion"] = (4, count, batch)
     motion = {}
     for name, shape in shapes.items():
-        series = random.uniform(-1, 1, (degree + 1, *shape)) * 0.5 ** np.arange(degree + 1).reshape(-1, *[1] * len(shape))
+        series = random.uniform(-1, 1, (degree + 1, *shape)) * 0.5 ** np.arange(degree + 1).reshape(
+            -1, *[1] * len(shape)
+        )
         series = np.concatenate([series, np.zeros((max(order - degree, 0), *shape))])[: order + 1]
         series[..., 0, :] = 0
         if name == "quaternion":
@@ -119,7 +126,11 @@ def pose_of(motion):
     if "angle" in motion:
         return PlanarPose.from_jets(position, jn.Jet(map(jnp.asarray, motion["angle"])))
     p, rate = unit_quaternion_and_rate([list(c) for c in motion["quaternion"]])
-    return SpatialPose.from_coordinates({"position": position, "quaternion": p, "angular_velocity": rate} if rate else {"position": position, "quaternion": p})
+    return SpatialPose.from_coordinates(
+        {"position": position, "quaternion": p, "angular_velocity": rate}
+        if rate
+        else {"position": position, "quaternion": p}
+    )
 
 
 def unit_quaternion_and_rate(series):

@@ -13,7 +13,9 @@ def crank(motion, outputs=None, **keywords):
         bodies={"crank": jn.Body([0, 0])},
         joints={"O": planar.Revolute(("ground", "crank"), [0, 0], [0, 0])},
         drivers={"turn": drivers.CoordinateDriver(("ground", "crank"), "angle", motion)},
-        outputs={"angle": jn.AngleOutput("crank"), "tip": jn.PointOutput("crank", [1, 0])} if outputs is None else outputs,
+        outputs={"angle": jn.AngleOutput("crank"), "tip": jn.PointOutput("crank", [1, 0])}
+        if outputs is None
+        else outputs,
         **keywords,
     )
 

@@ -38,7 +38,13 @@ def test_equation_009_attitude(seed):
 def test_equations_010_to_014_point(seed):
     (i, _), (s, _) = bodies(seed)
     found = derivatives(planar_pose(i).point(s[:, None, None]))[..., 0, 0]
-    equations = (planar.equation_010, planar.equation_011, planar.equation_012, planar.equation_013, planar.equation_014)
+    equations = (
+        planar.equation_010,
+        planar.equation_011,
+        planar.equation_012,
+        planar.equation_013,
+        planar.equation_014,
+    )
     for value, equation in zip(found, equations, strict=True):
         expected = equation(i, s)
         np.testing.assert_allclose(value, expected, rtol=0, atol=1e-14 * (1 + np.abs(expected).max()) * 10)
@@ -86,7 +92,9 @@ def test_extension_order_by_order_is_the_whole(seed):
     pose = PlanarPose.from_jets(whole.position.truncate(0), whole.angle.truncate(0))
     for k in range(1, whole.order + 1):
         pose = pose.extended(whole.position.coefficients[k], whole.angle.coefficients[k][None])
-    np.testing.assert_allclose(derivatives(pose.point(s[0][:, None, None])), derivatives(whole.point(s[0][:, None, None])))
+    np.testing.assert_allclose(
+        derivatives(pose.point(s[0][:, None, None])), derivatives(whole.point(s[0][:, None, None]))
+    )
 
 
 @SEEDS

@@ -41,7 +41,13 @@ def close(found, expected):
 def test_equations_059_to_066_point(seed):
     case = Case(seed)
     found = derivatives(case.pose_i.point(column(case.s_i)))
-    equations = (spatial.equation_059, spatial.equation_061, spatial.equation_062, spatial.equation_064, spatial.equation_066)
+    equations = (
+        spatial.equation_059,
+        spatial.equation_061,
+        spatial.equation_062,
+        spatial.equation_064,
+        spatial.equation_066,
+    )
     for value, equation in zip(found, equations, strict=True):
         close(value, equation(case.i, case.s_i))
 
@@ -62,7 +68,9 @@ def test_equations_060_063_065_products_of_angular_velocity(seed):
 def test_equations_067_to_070_relative_vector(seed):
     case = Case(seed)
     found = derivatives(case.pose_j.point(column(case.s_j)) - case.pose_i.point(column(case.s_i)))
-    for k, equation in enumerate((spatial.equation_067, spatial.equation_068, spatial.equation_069, spatial.equation_070)):
+    for k, equation in enumerate(
+        (spatial.equation_067, spatial.equation_068, spatial.equation_069, spatial.equation_070)
+    ):
         close(found[k], equation(case.i, case.j, case.s_i, case.s_j))
     printed = spatial.equation_069_printed(case.i, case.j, case.s_i, case.s_j)
     assert np.abs(found[2] - printed).max() > 1e-3  # as printed, body i has a wrong sign
@@ -187,7 +195,9 @@ def test_take_selects_bodies_by_index(bodies):
     taken = whole.take(bodies)
     for name in ("position", "quaternion"):
         found, expected = (np.array(getattr(p, name).dense().coefficients) for p in (taken, whole))
-        np.testing.assert_array_equal(np.broadcast_to(found, (*found.shape[:2], len(bodies), 1)), expected[:, :, list(bodies)])
+        np.testing.assert_array_equal(
+            np.broadcast_to(found, (*found.shape[:2], len(bodies), 1)), expected[:, :, list(bodies)]
+        )
     s = random.normal(size=3)
     found, expected = (np.array(p.point(column(s)).dense().coefficients) for p in (taken, whole))
     np.testing.assert_allclose(np.broadcast_to(found, (5, 3, len(bodies), 1)), expected[:, :, list(bodies)], atol=1e-14)

@@ -112,82 +112,89 @@ def follow(solver: Solver, start: Track, stop: float, span: float) -> Track:
     return track
 
 
-def solve_grid(
-    solver: Solver, track: Track, time: np.ndarray, progress: Callable[[int, int], None] | None
-) -> tuple[Any, np.ndarray, dict[int, str]]:
-    """Solve all instants of a grid from the anchors of a track.
+class Grid:
+    """All instants of a time grid, solved from the anchors of a track.
 
-    Returns
-    -------
-    state
-        Jets of all instants, time last.
-    status : array of shape (time,)
+    Attributes
+    ----------
+    status : array of int, shape (time,)
     culprits : dict of int to str
         For instants that failed, the body farthest from its prediction, or the driver without a permitted value.
     """
-    count, anchors = len(time), np.array(track.instants)
-    store = jax.tree.map(
-        lambda *xs: np.concatenate([np.zeros((*xs[0].shape[:-1], count)), *xs], axis=-1), *track.states
-    )
-    instants = np.concatenate([time, anchors])
-    status = np.full(count, int(Status.NOT_REACHED))
-    culprits: dict[int, str] = {}
-    nearest = count + _nearest(anchors, time)
-    reached = time < track.ended_at
-    width = LARGE_BATCH if count > LONG_GRID else SMALL_BATCH
-    done = 0
-    for level, sources in _levels(count, len(anchors), width):
-        level = level[reached[level]]
-        if sources is None:
-            source = nearest[level]
-        else:
-            source = np.where(status[level - sources] == Status.OK, level - sources, nearest[level])
-        for first in range(0, len(level), width):
-            lanes, known_at = level[first : first + width], source[first : first + width]
-            chosen = _slice_of(known_at)
-            known = jax.tree.map(lambda x, at=chosen: x[..., at], store)
-            arrival = solver(known, time[lanes] - instants[known_at], time[lanes])
-            status[lanes] = arrival.status
-            _keep(store, _slice_of(lanes), arrival)
-            for k in np.flatnonzero(arrival.status != Status.OK).tolist():
-                culprits[int(lanes[k])] = solver.culprit(arrival, k)
-                _rescue(solver, track, store, status, culprits, int(lanes[k]), time)
-            done += len(lanes)
-            if progress is not None:
-                progress(done, count)
-    first_lost = int(np.argmin(reached)) if not reached.all() else count
-    if first_lost < count:
-        status[first_lost], culprits[first_lost] = track.status, track.culprit
-        lost = time[first_lost : first_lost + 1]
-        arrival = solver(track.states[-1], lost - track.instants[-1], lost)
-        if arrival.status[0] == Status.INADMISSIBLE:  # the fault is the law's, not that of the position before
-            status[first_lost], culprits[first_lost] = Status.INADMISSIBLE, solver.culprit(arrival, 0)
-        if progress is not None:
+
+    def __init__(self, solver: Solver, track: Track, time: np.ndarray):
+        self.solver, self.track, self.time = solver, track, time
+        self.status = np.full(len(time), int(Status.NOT_REACHED))
+        self.culprits: dict[int, str] = {}
+        anchors = np.array(track.instants)
+        self._instants = np.concatenate([time, anchors])
+        self._nearest = len(time) + _nearest(anchors, time)
+        self._store = jax.tree.map(
+            lambda *xs: np.concatenate([np.zeros((*xs[0].shape[:-1], len(time))), *xs], axis=-1), *track.states
+        )
+
+    @property
+    def state(self) -> tuple[dict[str, Any], tuple[Any, ...]]:
+        """Jets of the coordinates and of the outputs, time last."""
+        return jax.tree.map(lambda x: x[..., : len(self.time)], self._store)
+
+    def solve(self, progress: Callable[[int, int], None] | None) -> None:
+        """Solve level after level; an instant that its neighbour cannot predict is followed to from an anchor."""
+        count = len(self.time)
+        reached = self.time < self.track.ended_at
+        width = LARGE_BATCH if count > LONG_GRID else SMALL_BATCH
+        done = 0
+        for level, distance in _levels(count, len(self.track.instants), width):
+            lanes = level[reached[level]]
+            source = self._nearest[lanes]
+            if distance is not None:
+                source = np.where(self.status[lanes - distance] == Status.OK, lanes - distance, source)
+            for first in range(0, len(lanes), width):
+                self._solve_batch(lanes[first : first + width], source[first : first + width])
+                done += min(width, len(lanes) - first)
+                if progress is not None:
+                    progress(done, count)
+        if not reached.all():
+            self._explain_end(int(np.argmin(reached)))
+        if progress is not None and done < count:
             progress(count, count)
-    state = jax.tree.map(lambda x: x[..., :count], store)
-    return state, status, culprits
 
+    def _solve_batch(self, lanes: np.ndarray, source: np.ndarray) -> None:
+        chosen = _slice_of(source)
+        known = jax.tree.map(lambda x: x[..., chosen], self._store)
+        arrival = self.solver(known, self.time[lanes] - self._instants[source], self.time[lanes])
+        self.status[lanes] = arrival.status
+        self._keep(_slice_of(lanes), (arrival.coordinates, arrival.outputs))
+        for k in np.flatnonzero(arrival.status != Status.OK).tolist():
+            self.culprits[int(lanes[k])] = self.solver.culprit(arrival, k)
+            self._rescue(int(lanes[k]))
 
-def _keep(store: Any, lanes: Any, arrival: Arrival) -> None:
-    def put(whole: np.ndarray, part: np.ndarray) -> None:
-        whole[..., lanes] = part
+    def _keep(self, lanes: Any, state: Any) -> None:
+        def put(whole: np.ndarray, part: np.ndarray) -> None:
+            whole[..., lanes] = part
 
-    jax.tree.map(put, store, (arrival.coordinates, arrival.outputs))
+        jax.tree.map(put, self._store, state)
 
+    def _rescue(self, lane: int) -> None:
+        """Follow the motion to one instant from the anchor before it."""
+        track, instant = self.track, float(self.time[lane])
+        anchor = int(np.searchsorted(track.instants, instant, side="right")) - 1
+        start = Track([track.instants[anchor]], [track.states[anchor]], (instant - track.instants[anchor]) / 2)
+        local = follow(self.solver, start, instant, track.instants[-1] - self.time[0])
+        if local.status != Status.OK:
+            self.status[lane], self.culprits[lane] = local.status, local.culprit
+        elif len(local.states) > 1:
+            self.status[lane] = Status.OK
+            self.culprits.pop(lane)
+            self._keep(slice(lane, lane + 1), local.states[-1])
 
-def _rescue(
-    solver: Solver, track: Track, store: Any, status: np.ndarray, culprits: dict[int, str], lane: int, time: np.ndarray
-) -> None:
-    """Follow the motion to one instant that its neighbour could not predict, from the anchor before it."""
-    anchor = int(np.searchsorted(track.instants, time[lane], side="right")) - 1
-    start = Track([track.instants[anchor]], [track.states[anchor]], (time[lane] - track.instants[anchor]) / 2)
-    local = follow(solver, start, float(time[lane]), track.instants[-1] - time[0])
-    if local.status != Status.OK:
-        status[lane], culprits[lane] = local.status, local.culprit
-    elif len(local.states) > 1:
-        status[lane] = Status.OK
-        culprits.pop(lane)
-        jax.tree.map(lambda whole, part: whole.__setitem__((..., lane), part[..., 0]), store, local.states[-1])
+    def _explain_end(self, lost: int) -> None:
+        """Say at the first instant that was not reached why the motion could not be followed to it."""
+        track, instant = self.track, self.time[lost : lost + 1]
+        self.status[lost], self.culprits[lost] = track.status, track.culprit
+        arrival = self.solver(track.states[-1], instant - track.instants[-1], instant)
+        if arrival.status[0] == Status.INADMISSIBLE:  # the fault is the law's, not that of the position before
+            self.status[lost], self.culprits[lost] = Status.INADMISSIBLE, self.solver.culprit(arrival, 0)
 
 
 def _slice_of(indices: np.ndarray) -> Any:

@@ -9,7 +9,7 @@ import numpy as np
 from jounce.errors import MechanismError, SolveError
 from jounce.kinematics.assembly import assemble
 from jounce.kinematics.motion import Motion
-from jounce.kinematics.path import Solver, Track, follow, solve_grid
+from jounce.kinematics.path import Grid, Solver, Track, follow
 from jounce.kinematics.status import Status
 from jounce.mechanism import Mechanism, build, time_grid
 
@@ -82,8 +82,9 @@ def solve(
     model, coordinates = assemble(build(mechanism), instants[0], tolerance)
     solver = Solver(model, max(order + lost, LOWEST_ORDER), float(tolerance), refine)
     track = follow(solver, _first(solver, coordinates, instants[:1]), instants[-1], instants[-1] - instants[0])
-    state, statuses, culprits = solve_grid(solver, track, instants, progress)
-    motion = Motion(mechanism, model, instants, order, state, statuses, culprits)
+    grid = Grid(solver, track, instants)
+    grid.solve(progress)
+    motion = Motion(mechanism, model, instants, order, grid.state, grid.status, grid.culprits)
     if strict:
         raise_for_status(motion)
     return motion

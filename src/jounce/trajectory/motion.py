@@ -148,15 +148,16 @@ class SplineMotion(AbstractMotion):
     def __call__(self, time: Jet) -> Jet:
         """Return the jet of the law at the instants of the time jet; outside the samples the end pieces go on."""
         instants = time.coefficients[0]
-        if jnp.ndim(self.breakpoints) == 1:
-            piece = jnp.searchsorted(self.breakpoints, instants, side="right") - 1
+        breakpoints, coefficients = jnp.asarray(self.breakpoints), jnp.asarray(self.coefficients)
+        if breakpoints.ndim == 1:
+            piece = jnp.searchsorted(breakpoints, instants, side="right") - 1
             piece = jnp.clip(piece, 0, None)
-            start, powers = self.breakpoints[piece], self.coefficients[:, piece]
+            start, powers = breakpoints[piece], coefficients[:, piece]
         else:  # several drivers of one kind, stacked along an axis before the batch: (samples, drivers, 1)
             search = jax.vmap(lambda x: jnp.searchsorted(x, instants[0], side="right") - 1, in_axes=1)
-            piece = jnp.clip(search(self.breakpoints[..., 0]), 0, None)
-            start = jnp.take_along_axis(self.breakpoints[..., 0], piece.T, axis=0).T
-            powers = jnp.take_along_axis(self.coefficients[..., 0], piece.T[None], axis=1)
+            piece = jnp.clip(search(breakpoints[..., 0]), 0, None)
+            start = jnp.take_along_axis(breakpoints[..., 0], piece.T, axis=0).T
+            powers = jnp.take_along_axis(coefficients[..., 0], piece.T[None], axis=1)
             powers = jnp.swapaxes(powers, 1, 2)
         local = time - start
         value = Jet.constant(powers[-1], time.order)

@@ -1,0 +1,216 @@
+"""Mechanisms written in Python: names, parameters, values and time grids are checked, and errors say where."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import jounce as jn
+from jounce import planar, spatial
+from jounce.mechanism import build, time_grid
+from tests.problems.small import crank, four_bar
+
+PIN = planar.Revolute(("ground", "crank"), [0, 0], [0, 0])
+
+
+def mechanism(**changes):
+    given = {"space": "planar", "bodies": {"crank": jn.Body([0, 0])}, "joints": {"O": PIN}}
+    return jn.Mechanism(**(given | changes))
+
+
+@pytest.mark.parametrize(
+    "changes, message",
+    [
+        ({"space": "plane"}, r"space.*planar or spatial.*'plane'"),
+        ({"bodies": {}}, "at least one moving body"),
+        ({"bodies": {"ground": jn.Body([0, 0])}}, r"bodies\.ground"),
+        (
+            {"joints": {"O": planar.Revolute(("ground", "cranc"), [0, 0], [0, 0])}},
+            r"joints\.O\.bodies.*did you mean 'crank'",
+        ),
+        ({"joints": {"O": spatial.Spherical(("ground", "crank"), [0, 0, 0], [0, 0, 0])}}, r"joints\.O.*spatial"),
+        ({"parameters": {"t": 1.0}}, r"parameters\.t.*reserved"),
+        ({"parameters": {"pi": 3.0}}, r"parameters\.pi.*reserved"),
+        ({"outputs": {"a": jn.AngleOutput("crunk")}}, r"outputs\.a\.bodies.*did you mean 'crank'"),
+        ({"outputs": {"a": jn.RelativeAngleOutput(("ground", "crank"), [0, 0, 1])}}, r"outputs\.a.*spatial"),
+        ({"drivers": {"O": jn.drivers.CoordinateDriver(("ground", "crank"), "angle", "t")}}, r"drivers\.O.*same name"),
+    ],
+    ids=[
+        "space",
+        "no_body",
+        "ground",
+        "missing_body",
+        "joint_space",
+        "reserved_t",
+        "reserved_pi",
+        "output_body",
+        "output_space",
+        "same_name",
+    ],
+)
+def test_structure(changes, message):
+    with pytest.raises(jn.MechanismError, match=message):
+        mechanism(**changes)
+
+
+@pytest.mark.parametrize("name", ["time", "derivative", "component"])
+def test_output_named_like_an_axis_of_the_dataset(name):
+    with pytest.raises(jn.MechanismError, match=rf"outputs\.{name}"):
+        mechanism(outputs={name: jn.AngleOutput("crank")})
+
+
+def joint(kind, *values, space="planar", bodies=("ground", "crank")):
+    position = [0, 0] if space == "planar" else [0, 0, 0]
+    return mechanism(space=space, bodies={"crank": jn.Body(position)}, joints={"J": kind(bodies, *values)})
+
+
+ORIGIN = [0, 0, 0]
+
+
+@pytest.mark.parametrize(
+    "wrong, message",
+    [
+        (lambda: joint(planar.Revolute, [0, 0, 0], [0, 0]), r"joints\.J\.point_i.*vector of 2 numbers"),
+        (lambda: joint(planar.Revolute, [0, 0], 1.0), r"joints\.J\.point_j.*vector of 2 numbers"),
+        (lambda: joint(planar.Revolute, [0, np.nan], [0, 0]), r"joints\.J\.point_i.*finite"),
+        (lambda: joint(planar.Revolute, [0, "1e308*10"], [0, 0]), r"joints\.J\.point_i"),
+        (lambda: joint(planar.DoubleRevolute, [0, 0], [0, 0], 0.0), r"joints\.J\.length.*greater than zero"),
+        (
+            lambda: joint(planar.DoubleRevolute, [0, 0], [0, 0], -0.1423),
+            r"joints\.J\.length.*greater than zero, got -0.1423",
+        ),
+        (lambda: joint(planar.DoubleRevolute, [0, 0], [0, 0], [1.0]), r"joints\.J\.length.*one number"),
+        (lambda: joint(planar.DoubleRevolute, [0, 0], [0, 0], "BC"), r"joints\.J\.length.*'?BC"),
+        (lambda: joint(planar.DoubleRevolute, [0, 0], [0, 0], None), r"joints\.J\.length"),
+        (lambda: joint(planar.Parallel1, [0, 0], [1, 0]), r"joints\.J\.vector_i.*zero length"),
+        (lambda: joint(planar.Rolling, [0, 0], [0, 0], [1, 0], -1.0), r"joints\.J\.radius.*greater than zero"),
+        (lambda: joint(spatial.Revolute, ORIGIN, ORIGIN, ORIGIN, [0, 0, 1], space="spatial"), r"axis_i.*zero length"),
+        (lambda: joint(spatial.Screw, ORIGIN, ORIGIN, [0, 0, 1], [0, 0, 1], 0.0, space="spatial"), r"lead.*zero"),
+        (
+            lambda: joint(
+                spatial.Prismatic, ORIGIN, ORIGIN, [0, 0, 1], [0, 0, 1], [0, 0, 2], [1, 0, 0], space="spatial"
+            ),
+            r"joints\.J.*parallel",
+        ),
+        (lambda: mechanism(bodies={"crank": jn.Body([0, 0, 0])}), r"bodies\.crank\.position.*vector of 2"),
+        (lambda: mechanism(bodies={"crank": jn.Body([0, 0], angle="x")}), r"bodies\.crank\.angle"),
+        (lambda: joint(spatial.Dot1, [0, 0, 1], [1, 0, 0], space="planar"), "spatial"),
+    ],
+)
+def test_values_are_checked_with_their_place(wrong, message):
+    with pytest.raises(jn.JounceError, match=message):
+        build(wrong())
+
+
+def test_euler_parameters_that_are_all_zero():
+    body = jn.Body(ORIGIN, orientation=[0, 0, 0, 0])
+    ball = spatial.Spherical(("ground", "crank"), ORIGIN, ORIGIN)
+    with pytest.raises(jn.MechanismError, match=r"bodies\.crank\.orientation"):
+        build(mechanism(space="spatial", bodies={"crank": body}, joints={"J": ball}))
+
+
+class TestParameters:
+    def test_given_by_each_other_in_any_order(self):
+        found = mechanism(parameters={"c": "a + b", "b": "2*a", "a": 3.0, "n": 2}).parameter_values
+        assert found == {"a": 3.0, "b": 6.0, "c": 9.0, "n": 2}
+
+    def test_in_a_circle(self):
+        with pytest.raises(jn.MechanismError, match="circle: a, b"):
+            _ = mechanism(parameters={"a": "b", "b": "a"}).parameter_values
+
+    def test_unknown_name(self):
+        with pytest.raises(jn.JounceError, match=r"parameters\.a.*bb"):
+            _ = mechanism(parameters={"a": "bb", "b": 1.0}).parameter_values
+
+    @pytest.mark.parametrize("value", [np.nan, np.inf, np.ones(2)], ids=["nan", "inf", "array"])
+    def test_not_one_finite_number(self, value):
+        with pytest.raises(jn.MechanismError, match=r"parameters\.a"):
+            jn.solve(crank("a*t", parameters={"a": value}), [0.0])
+
+    def test_with_other_values(self):
+        first = four_bar()
+        second = first.with_parameters(AB=0.05)
+        assert second.parameters["AB"] == 0.05
+        assert first.parameters["AB"] == 0.04
+        assert second.joints is first.joints
+
+    def test_other_value_of_a_parameter_that_others_follow(self):
+        changed = mechanism(parameters={"a": 1.0, "b": "2*a"}).with_parameters(a=5.0)
+        assert changed.parameter_values["b"] == 10.0
+
+    def test_that_does_not_exist(self):
+        with pytest.raises(jn.MechanismError, match="did you mean 'AB'"):
+            four_bar().with_parameters(ab=0.05)
+
+
+def test_offset_that_is_not_given_follows_from_the_starting_guess():
+    def pair(offset):
+        return jn.Mechanism(
+            space="planar",
+            bodies={"a": jn.Body([0, 0], 0.2), "b": jn.Body([3, 0], 0.7)},
+            joints={
+                "A": planar.Revolute(("ground", "a"), [0, 0], [0, 0]),
+                "B": planar.Revolute(("ground", "b"), [3, 0], [0, 0]),
+                "mesh": planar.Coordinate(("a", "b"), "angle", ratio=-0.5, offset=offset),
+            },
+            drivers={"turn": jn.drivers.CoordinateDriver(("ground", "a"), "angle", "0.2 + t")},
+            outputs={"b": jn.AngleOutput("b")},
+        )
+
+    for offset in (None, 0.8):
+        np.testing.assert_allclose(jn.solve(pair(offset), [0.0, 1.0], order=1).outputs["b"], [[0.7, -0.5], [0.2, -0.5]])
+
+
+class TestTimeGrid:
+    @pytest.mark.parametrize(
+        "grid, expected",
+        [
+            (jn.TimeGrid(0, 1, 0.25), [0, 0.25, 0.5, 0.75, 1]),
+            (jn.TimeGrid(0, 1, count=3), [0, 0.5, 1]),
+            (jn.TimeGrid(0, 0, count=1), [0]),
+            (jn.TimeGrid(-1, 0.99, 0.5), [-1, -0.5, 0, 0.5]),
+            (jn.TimeGrid("tau", "2*tau", "tau/2"), [2, 3, 4]),
+            ([0, 1, 4], [0, 1, 4]),
+            (np.array([5.0]), [5]),
+        ],
+    )
+    def test_instants(self, grid, expected):
+        np.testing.assert_allclose(time_grid(grid, {"tau": 2.0}), expected, atol=1e-15)
+
+    @pytest.mark.parametrize("step", [0.1, 0.01, 1e-3, 1 / 3, 0.7 / 7])
+    def test_stop_is_reached_though_the_step_is_rounded(self, step):
+        instants = time_grid(jn.TimeGrid(0, 1, step), {})
+        assert len(instants) == round(1 / step) + 1
+        assert instants[-1] == pytest.approx(1, abs=1e-12)
+
+    @pytest.mark.parametrize(
+        "grid, message",
+        [
+            (None, "no time grid"),
+            ([], "at least one instant"),
+            ([[0.0, 1.0]], "list of at least one"),
+            (5.0, "list of at least one"),
+            ("abc", "must be numbers"),
+            ([0, 0], r"time\[1\].*increase strictly"),
+            ([0, 2, 1], r"time\[2\].*increase strictly"),
+            ([0, np.nan], r"time\[1\].*finite"),
+            ([0, np.inf], r"time\[1\].*finite"),
+            (jn.TimeGrid(0, 1), "either step or count"),
+            (jn.TimeGrid(0, 1, 0.1, 3), "either step or count"),
+            (jn.TimeGrid(0, 1, -0.1), r"time\.step.*greater than zero"),
+            (jn.TimeGrid(0, 1, 0), r"time\.step.*greater than zero"),
+            (jn.TimeGrid(1, 0, 0.1), r"time\.stop.*before start"),
+            (jn.TimeGrid(0, np.inf, 0.1), r"time\.stop.*finite"),
+            (jn.TimeGrid(0, 1, 1e-12), "at most 10000000 instants.*got 10000000000"),
+            (jn.TimeGrid(0, 1, count=0), r"time\.count"),
+            (jn.TimeGrid(0, 1, count=2.5), r"time\.count"),
+            (jn.TimeGrid(0, "tau", 0.1), "tau"),
+        ],
+    )
+    def test_wrong_grids(self, grid, message):
+        with pytest.raises(jn.JounceError, match=message):
+            time_grid(grid, {})
+
+    def test_of_the_mechanism_is_used_when_none_is_given(self):
+        timed = dataclasses.replace(crank("t"), time=jn.TimeGrid(0, 1, count=3))
+        np.testing.assert_allclose(jn.solve(timed).time, [0, 0.5, 1])
