@@ -152,3 +152,11 @@ def test_unrefined_positions_are_as_far_off_as_the_tolerance_lets_them():
 def test_a_tolerance_below_rounding_still_ends(tolerance):
     motion = jn.solve(four_bar(), np.linspace(0, 2, 5), tolerance=tolerance, strict=False)
     assert not motion.status.any()
+
+
+@pytest.mark.parametrize("time", [[0.0, 1.0], np.linspace(0, 1, 11)], ids=["ends", "grid"])
+def test_a_quick_whole_turn_between_rests_is_counted(time):
+    """Before and after it the nut rests in the same attitude: only the law tells that it has turned."""
+    motion = jn.solve(screw(0.01, "2*pi*0.5*(1 + tanh((t - 0.5)/0.01))"), time, order=1)
+    assert motion.outputs["p"][-1, 0, 2] == pytest.approx(0.01, rel=1e-12)
+    assert motion.outputs["angle"][-1, 0] == pytest.approx(TURN, rel=1e-12)
