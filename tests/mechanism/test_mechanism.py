@@ -1,7 +1,9 @@
 """Mechanisms written in Python: names, parameters, values and time grids are checked, and errors say where."""
 
 import dataclasses
+from fractions import Fraction
 
+import jax
 import numpy as np
 import pytest
 
@@ -102,6 +104,22 @@ def test_values_are_checked_with_their_place(wrong, message):
         build(wrong())
 
 
+@pytest.mark.parametrize(
+    "zeros", [np.zeros(2, int), np.zeros(2), np.zeros(2, np.float32), (0, 0), [np.int32(0), "0*2"]]
+)
+def test_vectors_of_any_kind_of_numbers(zeros):
+    """Integers and single precision become doubles, and compile nothing of their own."""
+    given = jax.tree.leaves(build(joint(planar.Revolute, zeros, zeros)).system.groups)
+    plain = jax.tree.leaves(build(joint(planar.Revolute, [0.0, 0.0], [0.0, 0.0])).system.groups)
+    assert [(x.shape, x.dtype) for x in given] == [(x.shape, x.dtype) for x in plain]
+
+
+@pytest.mark.parametrize("vector", [[None, 0], [0j, 0], [[0], [0]], "0", {"x": 0}, [0], []], ids=str)
+def test_what_is_no_vector_of_numbers(vector):
+    with pytest.raises(jn.JounceError, match=r"joints\.J\.point_i"):
+        build(joint(planar.Revolute, vector, [0, 0]))
+
+
 def test_euler_parameters_that_are_all_zero():
     body = jn.Body(ORIGIN, orientation=[0, 0, 0, 0])
     ball = spatial.Spherical(("ground", "crank"), ORIGIN, ORIGIN)
@@ -113,6 +131,12 @@ class TestParameters:
     def test_given_by_each_other_in_any_order(self):
         found = mechanism(parameters={"c": "a + b", "b": "2*a", "a": 3.0, "n": 2}).parameter_values
         assert found == {"a": 3.0, "b": 6.0, "c": 9.0, "n": 2}
+
+    @pytest.mark.parametrize("value", [2, np.int64(2), np.float32(2), Fraction(2), np.asarray(2.0)], ids=repr)
+    def test_of_any_real_kind_become_floats(self, value):
+        found = mechanism(parameters={"a": value}).parameter_values["a"]
+        assert found == 2.0
+        assert np.asarray(jn.solve(crank("a*t", parameters={"a": value}), [1.0]).outputs["angle"])[0, 1] == 2.0
 
     def test_in_a_circle(self):
         with pytest.raises(jn.MechanismError, match="circle: a, b"):

@@ -14,7 +14,6 @@ from jounce.rigid import PlanarPose, SpatialPose
 BODIES = ("ground", "one", "two", "three", "four")
 INDEX = {name: k for k, name in enumerate(BODIES)}
 LAW = "0.9 + 0.4*sin(1.3*t + 0.2) + 0.1*t**2"
-COORDINATES = ("angle", "x", "y")
 
 
 def users_own_joint():
@@ -81,11 +80,11 @@ def cases():
         kinds = [k for role in ("joint", "driver") for k in base.catalogue(space, role).values()]
         for kind in [*kinds, *([OWN] if space == "planar" else [])]:
             fields = value_fields(kind)
-            words = COORDINATES if "coordinate" in fields else ("",)
             extras = {n for n, f in fields.items() if f.default is None and n != "offset"}
-            found += [
-                Case(kind, space, more, word) for word in words for more in ([False, True] if extras else [False])
-            ]
+            variants = [(False, ""), (True, "")] if extras else [(False, "")]
+            if "coordinate" in fields:
+                variants = [(False, "angle"), (True, "angle"), (False, "x"), (True, "y")]
+            found += [Case(kind, space, *variant) for variant in variants]
     return found
 
 

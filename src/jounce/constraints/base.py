@@ -42,6 +42,7 @@ class AbstractConstraint(eqx.Module):
     role: ClassVar[str] = ""
     type_name: ClassVar[str] = ""
     body_count: ClassVar[int] = 2
+    periodic: ClassVar[bool] = False  # whether its residual forgets whole turns, which the law must not skip then
 
     def __init_subclass__(cls, type: str = "", space: str = "", role: str = "joint", **keywords: Any):  # noqa: A002
         super().__init_subclass__(**keywords)

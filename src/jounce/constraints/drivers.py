@@ -78,6 +78,8 @@ class RotationDriver(AbstractConstraint, type="rotation", space="spatial", role=
     vector_i: Vector = None
     vector_j: Vector = None
 
+    periodic = True
+
     def __check_init__(self):
         if (self.vector_i is None) != (self.vector_j is None):
             raise MechanismError("a rotation driver takes two vectors, one on each body, or none", name="vectors")

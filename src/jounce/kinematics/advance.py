@@ -125,11 +125,30 @@ def _safe_step(terms: list[Any]) -> Any:
     return SAFE_FRACTION * jnp.min(jnp.stack(steps), axis=0)
 
 
-def _status(correction: Any, departure: Any, travel: Any, pivot_ratio: Any, admissible: Any, tolerance: Any) -> Any:
+def _predictable(departure: Any, travel: Any) -> Any:
+    """Tell whether a departure from a prediction is small enough, for how far the prediction moves."""
+    return departure <= jnp.minimum(LARGEST_DEPARTURE, jnp.maximum(0.2 * travel, SMALLEST_DEPARTURE))
+
+
+def _travel(terms: list[Any], step: Any) -> Any:
+    return total(term * jnp.abs(step) ** k for k, term in enumerate(terms, 1))
+
+
+def _laws_predictable(system: System, instant: Any, step: Any, order: int) -> Any:
+    """Tell whether the laws that may skip whole turns unseen keep to their own Taylor series over the step."""
+    start, end = Jet.variable((instant - step)[None], order), Jet([instant[None]])
+    result = jnp.ones(step.shape, bool)
+    for before, after in zip(system.laws(start), system.laws(end), strict=True):
+        away = jnp.abs(after.coefficients[0] - before.evaluate(step[None]))
+        travel = _travel([jnp.abs(c) for c in before.dense().coefficients[1:]], step[None])
+        result &= jnp.all(_predictable(away, travel), axis=0)
+    return result
+
+
+def _status(correction: Any, predictable: Any, pivot_ratio: Any, admissible: Any, tolerance: Any) -> Any:
     """Return the outcome at each instant, the gravest last."""
-    limit = jnp.minimum(LARGEST_DEPARTURE, jnp.maximum(0.2 * travel, SMALLEST_DEPARTURE))
     outcomes = (
-        (~(departure <= limit), Status.BRANCH_JUMP),
+        (~predictable, Status.BRANCH_JUMP),
         (~(correction <= jnp.maximum(tolerance, CONVERGED)), Status.NOT_CONVERGED),
         (pivot_ratio <= SINGULAR_PIVOT, Status.SINGULAR),
         (~jnp.isfinite(correction), Status.NOT_CONVERGED),
@@ -186,12 +205,11 @@ def advance(
             result = _continued(result, Jet(tuple(next(known))).evaluate(step))
         results.append(jnp.stack(result.dense().coefficients))
     departures = _departures(system, pose, predicted)
-    travel = total(term * jnp.abs(step) ** k for k, term in enumerate(_terms(system, moving, pose_type.predictor), 1))
+    travel = _travel(_terms(system, moving, pose_type.predictor), step)
+    predictable = _predictable(jnp.max(departures, axis=0), travel) & _laws_predictable(system, instant, step, order)
     admissible = system.admissible(time)
     pivot_ratio = factor.pivot_ratio()
-    status = _status(
-        correction, jnp.max(departures, axis=0), travel, pivot_ratio, jnp.all(admissible, axis=0), tolerance
-    )
+    status = _status(correction, predictable, pivot_ratio, jnp.all(admissible, axis=0), tolerance)
     reached = pose.coordinates()
     return Arrival(
         {name: jnp.stack(jet.dense().coefficients) for name, jet in reached.items()},

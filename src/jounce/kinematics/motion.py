@@ -90,7 +90,7 @@ class Motion:
         dataset["derivative"].attrs = {"long_name": "order of the time derivative"}
         return dataset
 
-    def point(self, body: str, point: Sequence[float]) -> Any:
+    def point(self, body: str, point: Sequence[Any]) -> Any:
         """Return the position of any point of a body in the global frame and its derivatives.
 
         Parameters

@@ -8,7 +8,7 @@ from typing import Any
 from jounce.constraints import AbstractConstraint
 from jounce.errors import ExpressionError, MechanismError, did_you_mean
 from jounce.mechanism.outputs import AbstractOutput
-from jounce.mechanism.resolve import check_parameter
+from jounce.mechanism.resolve import parameter_value
 from jounce.trajectory import Expression
 
 GROUND = "ground"
@@ -101,6 +101,15 @@ class Mechanism:
             raise MechanismError("a mechanism needs at least one moving body", name="bodies", value=dict(self.bodies))
         if GROUND in self.bodies:
             raise MechanismError("the body 'ground' always exists and never moves", name="bodies.ground")
+        self._check_names()
+        for kind, elements in self.elements.items():
+            for name, element in elements.items():
+                self._check_element(kind, name, element)
+
+    def _check_names(self) -> None:
+        for name, body in self.bodies.items():
+            if not isinstance(body, Body):
+                raise MechanismError("must be a Body", name=f"bodies.{name}", value=body)
         for name in self.parameters:
             if name in RESERVED:
                 raise MechanismError(f"the name '{name}' is reserved", name=f"parameters.{name}")
@@ -109,12 +118,12 @@ class Mechanism:
                 raise MechanismError(f"the name '{name}' is reserved for an axis of results", name=f"outputs.{name}")
         for name in self.joints.keys() & self.drivers.keys():
             raise MechanismError("a joint and a driver have the same name", name=f"drivers.{name}")
-        for kind, elements in self.elements.items():
-            for name, element in elements.items():
-                self._check_element(kind, name, element)
 
     def _check_element(self, kind: str, name: str, element: Any) -> None:
         place = f"{kind}.{name}"
+        wanted = AbstractOutput if kind == "outputs" else AbstractConstraint
+        if not isinstance(element, wanted):
+            raise MechanismError(f"must be one of the classes of {kind}", name=place, value=element)
         if element.space and element.space != self.space:
             raise MechanismError(f"is {element.space}, in a {self.space} mechanism", name=place)
         for body in element.bodies:
@@ -137,9 +146,7 @@ class Mechanism:
             If a value is not one finite number, or expressions form a circle.
         """
         expressions = {k: Expression(v) if isinstance(v, str) else v for k, v in self.parameters.items()}
-        values = {k: v for k, v in expressions.items() if not isinstance(v, Expression)}
-        for name, value in values.items():
-            check_parameter(name, value)
+        values = {k: parameter_value(k, v) for k, v in expressions.items() if not isinstance(v, Expression)}
         waiting = {k: v for k, v in expressions.items() if isinstance(v, Expression)}
         while waiting:
             ready = [k for k, v in waiting.items() if v.names <= values.keys()]

@@ -27,11 +27,18 @@ def resolve(value: Any, parameters: Mapping[str, Any]) -> Any:
         return value.evaluate(parameters)
     if isinstance(value, numbers.Real):
         return float(value)
-    if isinstance(value, Sequence) and not isinstance(value, str):
+    if isinstance(value, np.ndarray | jax.Array) and not isinstance(value, Tracer):
+        return np.asarray(value, float) if value.dtype.kind in "fiu" else value
+    if isinstance(value, Sequence):
         entries = [resolve(entry, parameters) for entry in value]
-        plain = all(isinstance(entry, float | np.ndarray) for entry in entries)
-        return np.array(entries) if plain else jnp.stack([jnp.asarray(entry, float) for entry in entries])
+        if any(isinstance(entry, Tracer) for entry in entries):
+            return jnp.stack([jnp.asarray(entry, float) for entry in entries])
+        return np.array(entries, float) if all(map(_is_number, entries)) else list(value)
     return value
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, float) or (isinstance(value, np.ndarray) and value.shape == () and value.dtype.kind == "f")
 
 
 def resolve_motion(motion: Any, parameters: Mapping[str, Any]) -> AbstractMotion:
@@ -63,16 +70,23 @@ def _traceable(motion: AbstractMotion) -> AbstractMotion:
     return motion
 
 
-def check_parameter(name: str, value: Any) -> None:
-    """Raise MechanismError unless the value of a parameter is one finite number."""
+def parameter_value(name: str, value: Any) -> Any:
+    """Return the value of a parameter as a float; what JAX traces stays as it is.
+
+    Raises
+    ------
+    MechanismError
+        If it is not one finite number.
+    """
     if isinstance(value, Tracer):
-        return
+        return value
     try:
-        plain = np.asarray(value, float)
+        number = float(value) if np.shape(value) == () else np.nan
     except (TypeError, ValueError):
-        plain = np.empty(2)
-    if plain.shape != () or not np.isfinite(plain):
+        number = np.nan
+    if not np.isfinite(number):
         raise MechanismError("a parameter must be one finite number", name=f"parameters.{name}", value=_plain(value))
+    return number
 
 
 def check_value(field: str, kind: str, value: Any, components: int) -> None:
@@ -80,7 +94,7 @@ def check_value(field: str, kind: str, value: Any, components: int) -> None:
     if isinstance(value, Tracer):
         return
     shape = (components,) if kind == "vector" else ()
-    if np.shape(value) != shape or np.asarray(value).dtype.kind != "f":
+    if not isinstance(value, float | np.ndarray) or np.shape(value) != shape or np.asarray(value).dtype.kind != "f":
         wanted = f"a vector of {components} numbers" if kind == "vector" else "one number"
         raise MechanismError(f"must be {wanted}", value=_plain(value))
     if not np.isfinite(value).all():
@@ -106,7 +120,7 @@ def resolve_element(element: Any, parameters: Mapping[str, Any], components: int
         try:
             if kind == "motion":
                 value = resolve_motion(value, parameters)
-            elif kind in ("scalar", "vector") and value is not None:
+            elif kind in ("scalar", "vector") and (value is not None or field.default is not None):
                 value = resolve(value, parameters)
                 check_value(field_name, kind, value, components)
         except JounceError as error:

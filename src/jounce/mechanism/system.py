@@ -137,6 +137,10 @@ class System(eqx.Module):
         parts = [jnp.broadcast_to(g.element.admissible(time), (g.instances, lanes)) for g in drivers]
         return jnp.concatenate([*parts, jnp.ones((0, lanes), bool)])
 
+    def laws(self, time: Jet) -> list[Jet]:
+        """Return the jets of the motion laws, in rad, whose drivers forget whole turns."""
+        return [group.element.motion(time) for group in self.groups if group.element.periodic]
+
     def coordinates(self, solution: Any, shifts: int) -> tuple[Any, Any]:
         """Turn a scaled solution, shape (columns, batch), into shifts and turns of all bodies, (c, bodies, batch)."""
         count = self.column_scale.shape[0]
