@@ -8,7 +8,7 @@ from jounce.constraints import base  # importing jounce switches on double preci
 
 jax.config.update("jax_numpy_dtype_promotion", "strict")
 jax.config.update("jax_numpy_rank_promotion", "raise")
-hypothesis.settings.register_profile("jounce", deadline=None, max_examples=25, derandomize=True)
+hypothesis.settings.register_profile("jounce", deadline=None, max_examples=15, derandomize=True)
 hypothesis.settings.load_profile("jounce")
 
 

@@ -27,7 +27,7 @@ def test_jump_of_a_motion_law_is_reported_with_time_and_body():
     np.testing.assert_allclose(error.motion.outputs["angle"][:10, 0], GRID[:10], atol=1e-14)
 
 
-@pytest.mark.parametrize("jump", [2 * np.pi, -1.0, 0.5])
+@pytest.mark.parametrize("jump", [2 * np.pi])
 def test_jumps_of_other_sizes(jump):
     assert failure(crank(lambda t: jnp.where(t < 1, t, t + jump)), GRID).status == Status.BRANCH_JUMP
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from tests.problems.small import crank, four_bar, spindle
+from tests.problems.small import crank, four_bar, law, spindle
 
 TIME = np.linspace(0.0, 1.0, 4)
 
@@ -25,7 +25,7 @@ def planar():
 
 @pytest.fixture(scope="module")
 def spatial():
-    return jn.solve(spindle("0.4 + sin(2*t)", axis=(1.0, 2.0, 2.0)), TIME)
+    return jn.solve(spindle(law(0.4, wave=1.0), axis=(1.0, 2.0, 2.0)), TIME)
 
 
 def test_dataset_has_names_dimensions_and_units(planar):
@@ -64,12 +64,14 @@ def test_a_point_of_the_ground_stands_still(planar):
 
 def test_spatial_angular_velocity_in_both_frames(spatial):
     axis = np.array([1.0, 2.0, 2.0]) / 3
-    rate = 2 * np.cos(2 * TIME)
+    rate = np.pi * np.cos(np.pi * TIME)
     for name, frame in (("spin", "global"), ("body_spin", "body")):
         np.testing.assert_allclose(spatial.outputs[name][:, 0], rate[:, None] * axis, atol=1e-13)
         asked = spatial.angular_velocity("spindle", frame).values
         np.testing.assert_allclose(asked[:, :4], spatial.outputs[name][:, :4], atol=1e-13)
-    np.testing.assert_allclose(spatial.outputs["spin"][:, 1], -4 * np.sin(2 * TIME)[:, None] * axis, atol=1e-12)
+    np.testing.assert_allclose(
+        spatial.outputs["spin"][:, 1], -(np.pi**2) * np.sin(np.pi * TIME)[:, None] * axis, atol=1e-12
+    )
 
 
 def test_relative_angle_asked_for_later(spatial):

@@ -8,7 +8,7 @@ import jounce as jn
 from jounce.jet import Jet
 from jounce.kinematics.advance import advance
 from jounce.mechanism import build
-from tests.problems.small import crank, four_bar, screw, slider_crank, spindle
+from tests.problems.small import crank, four_bar, law, screw, slider_crank, spindle
 
 TURN = 2 * np.pi
 
@@ -26,7 +26,7 @@ def test_coarse_grid_follows_the_motion_over_turns():
 
 def test_fifty_turns_with_three_instants_after_the_first():
     time = np.array([0.0, 1 / 3, 2 / 3, 1.0])
-    motion = jn.solve(crank("2*pi*50*t"), time, order=2)
+    motion = jn.solve(crank(law(rate=50 * TURN)), time, order=2)
     np.testing.assert_allclose(motion.outputs["angle"][:, 0] / TURN, 50 * time, rtol=1e-15)
     np.testing.assert_allclose(motion.outputs["tip"][:, 0, 0], np.cos(TURN * 50 * time), atol=1e-12)
 
@@ -34,7 +34,7 @@ def test_fifty_turns_with_three_instants_after_the_first():
 @pytest.mark.parametrize("vectors", [None, ([1.0, 0.0, 0.2], [1.0, 0.0, 0.0])], ids=["euler", "vectors"])
 def test_rotation_driver_over_turns_and_back(vectors):
     time = np.array([0.0, 0.5, 1.0])
-    mechanism = spindle("0.3 + 2*pi*5*sin(pi*t)", vectors=vectors)
+    mechanism = spindle(law(0.3, wave=5 * TURN), vectors=vectors)
     motion = jn.solve(mechanism, time, order=2)
     expected = 0.3 + TURN * 5 * np.sin(np.pi * time)
     np.testing.assert_allclose(motion.outputs["angle"][:, 0], expected, atol=1e-12)
@@ -45,7 +45,7 @@ def test_rotation_driver_over_turns_and_back(vectors):
 
 def test_rotation_about_an_oblique_axis():
     axis = np.array([1.0, 2.0, -3.0])
-    motion = jn.solve(spindle("2*pi*3*t", axis=axis), [0.0, 0.5, 1.0], order=2)
+    motion = jn.solve(spindle(law(rate=3 * TURN), axis=axis), [0.0, 0.5, 1.0], order=2)
     expected = 3 * TURN * axis / np.linalg.norm(axis)
     np.testing.assert_allclose(motion.outputs["spin"][:, 0], np.tile(expected, (3, 1)), rtol=1e-13)
     np.testing.assert_allclose(motion.outputs["body_spin"][:, 0], np.tile(expected, (3, 1)), rtol=1e-13)
@@ -55,19 +55,19 @@ def test_rotation_about_an_oblique_axis():
 @pytest.mark.parametrize("lead", [0.01, -0.01])
 def test_screw_keeps_count_of_its_turns(lead):
     time = np.array([0.0, 0.4, 1.0])
-    motion = jn.solve(screw(lead, "2*pi*30*t"), time, order=1)
+    motion = jn.solve(screw(lead, law(rate=30 * TURN)), time, order=1)
     np.testing.assert_allclose(motion.outputs["p"][:, 0, 2], 30 * lead * time, atol=1e-14)
     np.testing.assert_allclose(motion.outputs["p"][:, 1, 2], 30 * lead, rtol=1e-13)
 
 
 def test_screw_driven_by_its_slide_turns():
     time = np.array([0.0, 0.4, 1.0])
-    motion = jn.solve(screw(0.01, "0.2*t", driven="slide"), time, order=1)
+    motion = jn.solve(screw(0.01, law(rate=0.2), driven="slide"), time, order=1)
     np.testing.assert_allclose(motion.outputs["angle"][:, 0], TURN * 20 * time, atol=1e-11)
 
 
 def test_one_instant():
-    motion = jn.solve(crank("t"), [0.5])
+    motion = jn.solve(crank(law(rate=1.0)), [0.5])
     np.testing.assert_allclose(motion.outputs["angle"], [[0.5, 1, 0, 0, 0]], atol=1e-15)
 
 
@@ -157,6 +157,6 @@ def test_a_tolerance_below_rounding_still_ends(tolerance):
 @pytest.mark.parametrize("time", [[0.0, 1.0], np.linspace(0, 1, 11)], ids=["ends", "grid"])
 def test_a_quick_whole_turn_between_rests_is_counted(time):
     """Before and after it the nut rests in the same attitude: only the law tells that it has turned."""
-    motion = jn.solve(screw(0.01, "2*pi*0.5*(1 + tanh((t - 0.5)/0.01))"), time, order=1)
+    motion = jn.solve(screw(0.01, law(rise=TURN)), time, order=1)
     assert motion.outputs["p"][-1, 0, 2] == pytest.approx(0.01, rel=1e-12)
     assert motion.outputs["angle"][-1, 0] == pytest.approx(TURN, rel=1e-12)

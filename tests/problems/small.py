@@ -3,7 +3,14 @@
 import jounce as jn
 from jounce import drivers, planar, spatial
 
-DEGREE = 0.017453292519943295
+
+def law(start=0.0, rate=0.0, wave=0.0, rise=0.0):
+    """A motion law of which the values are data, so that all laws of this form are compiled once.
+
+    ``start + rate t + wave sin(pi t)``, and a rise by `rise` at t = 0.5 within a few hundredths of a second.
+    """
+    values = {"start": start, "rate": rate, "wave": wave, "rise": rise}
+    return jn.ExpressionMotion("start + rate*t + wave*sin(pi*t) + rise/2*(1 + tanh((t - 0.5)/0.01))", values)
 
 
 def crank(motion, outputs=None, **keywords):

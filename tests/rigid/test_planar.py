@@ -11,7 +11,7 @@ from jounce.rigid import PlanarPose, perpendicular
 from tests.oracles import sommer_planar as planar
 from tests.problems.states import planar_pose, planar_state
 
-SEEDS = pytest.mark.parametrize("seed", range(3))
+SEEDS = pytest.mark.parametrize("seed", range(2))
 
 
 def bodies(seed, count=2):
