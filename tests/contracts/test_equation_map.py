@@ -23,7 +23,7 @@ def table_rows():
 
 
 @functools.cache
-def test_functions(path):
+def functions_of_tests(path):
     """Names of the test functions of a file, those in classes as Class::name."""
     if not (ROOT / path).is_file():
         return set()
@@ -35,9 +35,6 @@ def test_functions(path):
         elif isinstance(node, ast.ClassDef):
             found |= {f"{node.name}::{inner.name}" for inner in node.body if isinstance(inner, ast.FunctionDef)}
     return {name for name in found if name.rpartition("::")[2].startswith("test_")}
-
-
-test_functions.__test__ = False
 
 
 def find_name(dotted):
@@ -67,7 +64,7 @@ def test_every_name_exists_and_is_public():
 
 def test_every_test_exists():
     named = sorted({row["test"].partition("::")[::2] for row in table_rows()})
-    assert not [f"{path}::{name}" for path, name in named if name not in test_functions(path)]
+    assert not [f"{path}::{name}" for path, name in named if name not in functions_of_tests(path)]
 
 
 def test_a_row_that_points_at_nothing_is_found():
@@ -75,12 +72,12 @@ def test_a_row_that_points_at_nothing_is_found():
         find_name("jounce.constraints.planar.Revolver")
     with pytest.raises(ModuleNotFoundError):
         find_name("jounced.planar")
-    assert "test_no_such_test" not in test_functions("tests/contracts/test_equation_map.py")
-    assert "test_every_test_exists" in test_functions("tests/contracts/test_equation_map.py")
+    assert "test_no_such_test" not in functions_of_tests("tests/contracts/test_equation_map.py")
+    assert "test_every_test_exists" in functions_of_tests("tests/contracts/test_equation_map.py")
 
 
 def test_errata_name_tests_that_exist():
     named = re.findall(r"`(tests/[\w/]+\.py)::([\w:]+)`", (ROOT / "docs" / "errata.md").read_text())
     assert named
-    missing = [f"{path}::{name}" for path, name in named if name not in test_functions(path)]
+    missing = [f"{path}::{name}" for path, name in named if name not in functions_of_tests(path)]
     assert not missing

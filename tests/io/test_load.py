@@ -5,7 +5,6 @@ import math
 import pathlib
 import subprocess
 import sys
-import time
 
 import numpy as np
 import pytest
@@ -322,20 +321,6 @@ def test_a_class_may_state_its_units(tmp_path):
     assert joint(tmp_path, "spatial", "{type: test_spring, bodies: [a, b], gain: 180 deg, rest: 1 s}").gain == math.pi
     with pytest.raises(MechanismFileError, match="expected an angle"):
         joint(tmp_path, "spatial", "{type: test_spring, bodies: [a, b], gain: 1 cm, rest: 1 s}")
-
-
-def test_a_four_bar_is_read_in_little_time():
-    load(EXAMPLES[0])
-    path = ROOT / "examples" / "four_bar.yaml"
-    load(path)
-    best = min(timed(lambda: load(path)) for _ in range(3))
-    assert best < 0.2  # 7 ms without the checks of types that the tests switch on
-
-
-def timed(call):
-    started = time.perf_counter()
-    call()
-    return time.perf_counter() - started
 
 
 @pytest.mark.parametrize("module", ["pydantic", "ruamel", "pint", "scipy", "h5netcdf", "h5py"])

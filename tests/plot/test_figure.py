@@ -110,6 +110,7 @@ def test_dollars_in_a_title_are_not_mathematics(four_bar, tmp_path):
 
     mechanism = dataclasses.replace(four_bar.mechanism, title="costs $5, or $6_{ \u4e2d")
     save(draw(jn.solve(mechanism, [0.0, 0.1], order=0)), tmp_path / "figure.png")
+    assert (tmp_path / "figure.png").stat().st_size > 1000
 
 
 @pytest.mark.parametrize("example, outputs", [("four_bar", ["psi"]), ("rsur", ["psi", "B", "C", "coupler_spin"])])
