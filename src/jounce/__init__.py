@@ -25,7 +25,12 @@ from jounce.errors import (  # noqa: E402
     MechanismFileError as MechanismFileError,
     MobilityError as MobilityError,
     OutputError as OutputError,
+    RobotError as RobotError,
+    RobotFileError as RobotFileError,
+    SampleWarning as SampleWarning,
+    SingularityError as SingularityError,
     SolveError as SolveError,
+    TrajectoryError as TrajectoryError,
     UnitError as UnitError,
 )
 from jounce.io import load as load  # noqa: E402
@@ -42,6 +47,20 @@ from jounce.mechanism import (  # noqa: E402
     PointOutput as PointOutput,
     RelativeAngleOutput as RelativeAngleOutput,
     TimeGrid as TimeGrid,
+)
+from jounce.robot import (  # noqa: E402
+    FrameMotion as FrameMotion,
+    Inertia as Inertia,
+    Joint as Joint,
+    Limits as Limits,
+    Link as Link,
+    Mimic as Mimic,
+    Robot as Robot,
+    Wrench as Wrench,
+    center_of_mass as center_of_mass,
+    forward_kinematics as forward_kinematics,
+    inverse_dynamics as inverse_dynamics,
+    joint_wrenches as joint_wrenches,
 )
 from jounce.trajectory import (  # noqa: E402
     Expression as Expression,

@@ -19,7 +19,12 @@ __all__ = [
     "MechanismFileError",
     "MobilityError",
     "OutputError",
+    "RobotError",
+    "RobotFileError",
+    "SampleWarning",
+    "SingularityError",
     "SolveError",
+    "TrajectoryError",
     "UnitError",
     "did_you_mean",
     "show_value",
@@ -196,6 +201,26 @@ class MechanismFileError(MechanismError):
 
 class MobilityError(MechanismError):
     """The drivers and joints do not leave exactly zero degrees of freedom."""
+
+
+class RobotError(JounceError):
+    """A robot cannot be what was described: a loop, a link without mass, an unknown joint, values of the wrong shape."""
+
+
+class RobotFileError(RobotError):
+    """A URDF or MJCF file cannot be read, or describes no possible robot."""
+
+
+class TrajectoryError(JounceError):
+    """A trajectory cannot be built or does not fit its robot: times that do not increase, too few samples."""
+
+
+class SingularityError(JounceError):
+    """An orientation or a configuration is singular: what was asked for does not exist or is not unique there."""
+
+
+class SampleWarning(UserWarning):
+    """Samples do not determine the derivatives asked for to a useful accuracy."""
 
 
 class OutputError(JounceError):

@@ -1,0 +1,124 @@
+"""Mass, centre of mass and inertia of a rigid body, and their sums. Negrean 2025, equations 72 and 108."""
+
+import dataclasses
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from jounce.errors import RobotError
+
+ROUNDING = 1e-5  # of the largest principal moment: what files with six digits may break the triangle inequality by
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Inertia:
+    """How mass is distributed in a rigid body, in the frame of that body.
+
+    Parameters
+    ----------
+    mass : float
+        kg, greater than zero.
+    center_of_mass : array_like of shape (3,), default zero
+        m, in the frame of the body.
+    tensor : array_like of shape (3, 3) or (3,), default zero
+        Inertia about the centre of mass, in axes parallel to those of the body, kg m^2; three numbers are its
+        diagonal. Zero is a point mass.
+
+    Raises
+    ------
+    RobotError
+        If the mass is not greater than zero, a value is not finite, or the tensor is not symmetric, has a negative
+        principal moment, or one that exceeds the sum of the other two: no real body has such moments.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> rod = jn.Inertia(2.0, center_of_mass=[0.5, 0, 0], tensor=[0, 1 / 6, 1 / 6])
+    >>> float(rod.about_origin[2, 2])
+    0.6666666666666666
+    """
+
+    mass: float
+    center_of_mass: Any = (0.0, 0.0, 0.0)
+    tensor: Any = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        for name, shapes in (("mass", ((),)), ("center_of_mass", ((3,),)), ("tensor", ((3, 3), (3,)))):
+            object.__setattr__(self, name, _numbers(name, getattr(self, name), shapes))
+        object.__setattr__(self, "mass", float(self.mass))
+        if self.tensor.shape == (3,):
+            object.__setattr__(self, "tensor", np.diag(self.tensor))
+        if self.mass <= 0:
+            raise RobotError("must be greater than zero", name="mass", value=self.mass)
+        scale = float(np.abs(self.tensor).max())
+        if not np.allclose(self.tensor, self.tensor.T, rtol=0, atol=1e-9 * scale):
+            raise RobotError("must be symmetric", name="inertia", value=self.tensor.tolist())
+        small, middle, large = (float(x) for x in np.linalg.eigvalsh(self.tensor))
+        if small < -1e-9 * scale:
+            raise RobotError("has a negative principal moment", name="inertia", value=small)
+        if large - small - middle > ROUNDING * large:
+            message = (
+                "breaks the triangle inequality: the largest principal moment exceeds the sum of the others; check the "
+                "units, the signs of the products of inertia and the axes"
+            )
+            raise RobotError(message, name="inertia", value=[small, middle, large])
+
+    @property
+    def about_origin(self) -> np.ndarray:
+        """Inertia tensor about the origin of the frame of the body, (3, 3), kg m^2."""
+        c = self.center_of_mass
+        return self.tensor + self.mass * (c @ c * np.eye(3) - np.outer(c, c))
+
+    @property
+    def second_moments(self) -> np.ndarray:
+        """Integral of rho rho^T dm about the centre of mass, (3, 3), kg m^2: Negrean 2025, equation 108."""
+        return np.trace(self.tensor) / 2 * np.eye(3) - self.tensor
+
+    @property
+    def pseudo_inertia(self) -> np.ndarray:
+        """Second moments about the origin of the frame, first moments and mass, (4, 4): what `trace(T' J T'^T)` needs."""
+        c = np.append(self.center_of_mass, 1.0)
+        moments = np.zeros((4, 4))
+        moments[:3, :3] = self.second_moments
+        return moments + self.mass * np.outer(c, c)
+
+    def moved(self, position: Any, rotation: Any) -> "Inertia":
+        """Return the inertia of the same body in another frame.
+
+        Parameters
+        ----------
+        position : array_like of shape (3,)
+            Origin of the body's frame in the other frame, m.
+        rotation : array_like of shape (3, 3)
+            Takes components in the body's frame to the other frame.
+        """
+        position, rotation = np.asarray(position, float), np.asarray(rotation, float)
+        tensor = rotation @ self.tensor @ rotation.T
+        return Inertia(self.mass, position + rotation @ self.center_of_mass, (tensor + tensor.T) / 2)
+
+    @classmethod
+    def total(cls, parts: Iterable["Inertia"]) -> "Inertia":
+        """Return the inertia of several bodies fixed together, all given in one frame."""
+        parts = list(parts)
+        mass = sum(part.mass for part in parts)
+        center = sum(part.mass * part.center_of_mass for part in parts) / mass
+        tensor = np.zeros((3, 3))
+        for part in parts:
+            d = part.center_of_mass - center
+            tensor += part.tensor + part.mass * (d @ d * np.eye(3) - np.outer(d, d))
+        return cls(mass, center, tensor)
+
+
+def _numbers(name: str, value: Any, shapes: tuple[tuple[int, ...], ...]) -> np.ndarray:
+    """Return an array of finite numbers of one of the shapes."""
+    try:
+        array = np.asarray(value, float)
+    except (TypeError, ValueError):
+        raise RobotError("must be made of numbers", name=name, value=value) from None
+    if array.shape not in shapes:
+        wanted = " or ".join(map(str, shapes))
+        raise RobotError(f"must have the shape {wanted}", name=name, value=array.shape)
+    if not np.isfinite(array).all():
+        raise RobotError("must be finite", name=name, value=value)
+    return array

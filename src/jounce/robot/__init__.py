@@ -1,0 +1,18 @@
+"""Serial and tree robots in joint coordinates: kinematics, Jacobians, torques and reactions, with rates of any order."""
+
+from jounce.rigid.inertia import Inertia as Inertia
+from jounce.robot.construct import (
+    DenavitHartenberg as DenavitHartenberg,
+    Screw as Screw,
+    from_denavit_hartenberg as from_denavit_hartenberg,
+    from_screws as from_screws,
+)
+from jounce.robot.inverse_dynamics import inverse_dynamics as inverse_dynamics, joint_wrenches as joint_wrenches
+from jounce.robot.kinematics import (
+    FrameMotion as FrameMotion,
+    center_of_mass as center_of_mass,
+    forward_kinematics as forward_kinematics,
+)
+from jounce.robot.model import Joint as Joint, Limits as Limits, Link as Link, Mimic as Mimic
+from jounce.robot.robot import Robot as Robot
+from jounce.robot.wrenches import Wrench as Wrench

@@ -1,0 +1,115 @@
+"""How batches of samples go through the algorithms: in blocks of few sizes, batch last, in chunks that fit the cache."""
+
+import math
+from collections.abc import Callable
+from functools import cached_property, update_wrapper
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jounce.errors import RobotError
+from jounce.kinematics.compilation import compiler_options
+from jounce.robot.robot import Robot
+
+CHUNK = 128  # samples that are computed side by side
+WIDTHS = (8, CHUNK, 16 * CHUNK)  # sizes of blocks: each compiles once for a kind of robot
+
+
+def coefficients(derivatives: Any) -> Any:
+    """Return Taylor coefficients, order first, from plain derivatives along the leading axis."""
+    scale = np.array([1 / math.factorial(k) for k in range(derivatives.shape[0])])
+    return derivatives * scale.reshape(-1, *[1] * (derivatives.ndim - 1))
+
+
+def derivatives(coefficients: Any) -> Any:
+    """Return plain derivatives, order first, from Taylor coefficients along the leading axis."""
+    scale = np.array([float(math.factorial(k)) for k in range(coefficients.shape[0])])
+    return coefficients * scale.reshape(-1, *[1] * (coefficients.ndim - 1))
+
+
+def checked(robot: Robot, q: Any, least: int) -> Any:
+    """Return q as an array of shape (..., order + 1, n) with at least so many derivatives.
+
+    Raises
+    ------
+    RobotError
+        If its shape does not fit the robot or the derivatives are too few.
+    """
+    if not isinstance(q, jax.Array):
+        try:
+            q = np.asarray(q, float)
+        except (TypeError, ValueError):
+            raise RobotError("must be an array of numbers", name="q", value=type(q).__name__) from None
+    n = len(robot.joint_names)
+    if q.ndim < 2 or q.shape[-1] != n:
+        joints = f"{robot.name} has {n} {'joint' if n == 1 else 'joints'}"
+        raise RobotError(f"must have the shape (..., order + 1, n); {joints}: n = {n}", name="q", value=q.shape)
+    if q.shape[-2] < least + 1:
+        names = ["q", "q'", "q''"][: least + 1]
+        message = f"must hold {', '.join(names)} along its last axis but one; the shape is (..., order + 1, n)"
+        raise RobotError(message, name="q", value=q.shape)
+    return q
+
+
+class Batched:
+    """A function on Taylor coefficients, batch last, made to work on plain derivatives, batch first.
+
+    The function gets the tree, a tuple of arrays of shape (order + 1, ..., batch), a pytree of constants and static
+    arguments, and returns a pytree of arrays of the shape (order + 1, ..., batch). Results are NumPy arrays, or JAX
+    arrays under a transformation of JAX.
+    """
+
+    def __init__(self, function: Callable[..., Any]):
+        self.function = function
+        update_wrapper(self, function)
+
+    @cached_property
+    def jitted(self) -> Any:
+        """The function on a block of samples, compiled; made at the first call, since the options start the backend."""
+        return jax.jit(self._chunks, static_argnums=3, compiler_options=compiler_options())
+
+    def __call__(self, robot: Robot, arrays: tuple[Any, ...], constants: Any = (), static: tuple[Any, ...] = ()) -> Any:
+        """Return results for arrays of derivatives, the first one of shape (batch..., order + 1, n)."""
+        lead = arrays[0].shape[:-2]
+        axes, count = len(lead), math.prod(lead)
+        if any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves((arrays, constants))):
+            flat = tuple(jnp.reshape(x, (count, *x.shape[axes:])) for x in arrays)
+            found = self._block(robot.tree, flat, constants, static)
+            return jax.tree.map(lambda x: jnp.reshape(x, (*lead, *x.shape[1:])), found)
+        flat = tuple(np.reshape(np.asarray(x), (count, *x.shape[axes:])) for x in arrays)
+        found = [self.jitted(robot.tree, block, constants, static) for block in _blocks(flat)]
+
+        def joined(*parts: Any) -> Any:
+            whole = np.concatenate(parts) if len(parts) > 1 else np.asarray(parts[0])
+            return np.reshape(whole[:count], (*lead, *whole.shape[1:]))
+
+        return jax.tree.map(joined, *found)
+
+    def _chunks(self, tree: Any, arrays: tuple[Any, ...], constants: Any, static: tuple[Any, ...]) -> Any:
+        width = arrays[0].shape[0]
+        if width <= CHUNK:
+            return self._block(tree, arrays, constants, static)
+        parts = tuple(jnp.reshape(x, (width // CHUNK, CHUNK, *x.shape[1:])) for x in arrays)
+        found = jax.lax.map(lambda part: self._block(tree, part, constants, static), parts)
+        return jax.tree.map(lambda x: jnp.reshape(x, (width, *x.shape[2:])), found)
+
+    def _block(self, tree: Any, arrays: tuple[Any, ...], constants: Any, static: tuple[Any, ...]) -> Any:
+        last = tuple(coefficients(jnp.moveaxis(jnp.asarray(x), 0, -1)) for x in arrays)
+        found = self.function(tree, last, constants, *static)
+        return jax.tree.map(lambda x: jnp.moveaxis(derivatives(x), -1, 0), found)
+
+
+def _blocks(arrays: tuple[np.ndarray, ...]) -> list[tuple[np.ndarray, ...]]:
+    """Cut arrays of samples into blocks of the known widths; the last one is filled up with zeros."""
+    count, start, blocks = len(arrays[0]), 0, []
+    while start < count or not blocks:
+        left = count - start
+        width = next((w for w in WIDTHS if w >= left), WIDTHS[-1])
+        taken = tuple(x[start : start + width] for x in arrays)
+        if left < width:
+            taken = tuple(np.concatenate([x, np.zeros((width - left, *x.shape[1:]))]) for x in taken)
+        blocks.append(taken)
+        start += width
+    return blocks

@@ -1,0 +1,210 @@
+"""Robots from tables: Denavit-Hartenberg parameters, screw axes, and the joints of a floating base."""
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from jounce.errors import RobotError, did_you_mean
+from jounce.rigid.inertia import Inertia
+from jounce.robot.model import Joint, Limits, Link
+from jounce.robot.robot import Robot
+from jounce.robot.tree import turn_about
+
+CONVENTIONS = ("standard", "modified")
+X, Y, Z = np.eye(3)
+
+
+@dataclasses.dataclass(frozen=True)
+class DenavitHartenberg:
+    """One row of a Denavit-Hartenberg table; the moving parameter is at its value for coordinate zero.
+
+    Parameters
+    ----------
+    a : float, default 0
+        Length of the link along x, m.
+    alpha : float, default 0
+        Twist of the link about x, rad.
+    d : float, default 0
+        Offset along z, m.
+    theta : float, default 0
+        Angle about z, rad.
+    type : {"revolute", "continuous", "prismatic"}, default "revolute"
+        The coordinate is added to theta, or to d of a prismatic joint.
+    inertia : Inertia, optional
+        Of the link that the joint moves, in its Denavit-Hartenberg frame.
+    limits : Limits, optional
+        What the joint may do.
+    """
+
+    a: float = 0.0
+    alpha: float = 0.0
+    d: float = 0.0
+    theta: float = 0.0
+    type: str = "revolute"
+    inertia: Inertia | None = None
+    limits: Limits = Limits()
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Screw:
+    """A joint by its screw axis in the frame of the base, at coordinates zero. Negrean 2025, equations 31-34.
+
+    Parameters
+    ----------
+    axis : array_like of shape (3,)
+        Direction of the axis.
+    point : array_like of shape (3,), default zero
+        A point of the axis, m.
+    type : {"revolute", "continuous", "prismatic"}, default "revolute"
+        Whether the joint turns about the axis or slides along it.
+    inertia : Inertia, optional
+        Of the link that the joint moves, in the frame of the base at coordinates zero.
+    limits : Limits, optional
+        What the joint may do.
+    """
+
+    axis: Any
+    point: Any = (0.0, 0.0, 0.0)
+    type: str = "revolute"
+    inertia: Inertia | None = None
+    limits: Limits = Limits()
+
+
+def from_denavit_hartenberg(rows: Sequence[DenavitHartenberg], convention: str = "standard", name: str = "robot") -> Robot:
+    """Return a serial robot from a table of Denavit-Hartenberg parameters.
+
+    Links are named link_1 to link_n, with their Denavit-Hartenberg frames, joints joint_1 to joint_n, the base base.
+
+    Parameters
+    ----------
+    rows : sequence of DenavitHartenberg
+        One for each joint, from the base outwards.
+    convention : {"standard", "modified"}, default "standard"
+        Standard: ``Rz(theta) Tz(d) Tx(a) Rx(alpha)``, frames at the far end of links. Modified (Craig): ``Rx(alpha)
+        Tx(a) Rz(theta) Tz(d)``, frames at the near end.
+    name : str, default "robot"
+        Name of the robot.
+
+    Returns
+    -------
+    Robot
+        On a fixed base, z up.
+
+    Raises
+    ------
+    RobotError
+        If the convention is not known, or a row gives no possible joint.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> rod = jn.Inertia(1.0, center_of_mass=[-0.5, 0, 0])
+    >>> arm = jn.robot.from_denavit_hartenberg([jn.robot.DenavitHartenberg(a=1.0, inertia=rod)] * 2)
+    >>> arm.joint_names
+    ('joint_1', 'joint_2')
+    """
+    if convention not in CONVENTIONS:
+        raise RobotError(f"no such convention; {did_you_mean(convention, CONVENTIONS)}", name="convention", value=convention)
+    links, joints = [Link("base")], []
+    for k, row in enumerate(rows, 1):
+        for field in ("a", "alpha", "d", "theta"):
+            if not np.isfinite(getattr(row, field)):
+                raise RobotError("must be a finite number", name=f"row {k}.{field}", value=getattr(row, field))
+        parent, about_z, about_x = links[-1].name, turn_about(Z, row.theta), turn_about(X, row.alpha)
+        moved = {"type": row.type, "limits": row.limits}
+        if convention == "modified":
+            place = about_x @ (row.a * X + row.d * Z)
+            joints.append(Joint(f"joint_{k}", parent, f"link_{k}", position=place, rotation=about_x @ about_z, **moved))
+        else:  # the axis of the joint does not pass through the frame of its link: a frame on the axis stands between
+            joints.append(Joint(f"joint_{k}", parent, f"axis_{k}", **moved))
+            links.append(Link(f"axis_{k}"))
+            place = about_z @ (row.a * X) + row.d * Z
+            joints.append(Joint(f"fixed_{k}", f"axis_{k}", f"link_{k}", "fixed", place, about_z @ about_x))
+        links.append(Link(f"link_{k}", row.inertia))
+    return Robot(name, links, joints)
+
+
+def from_screws(screws: Sequence[Screw], tool: Any = None, name: str = "robot") -> Robot:
+    """Return a serial robot from the screw axes of its joints, as a product of exponentials has them.
+
+    Links are named link_1 to link_n; at coordinates zero their frames coincide with that of the base. The frame tool is
+    fixed to the last one.
+
+    Parameters
+    ----------
+    screws : sequence of Screw
+        One for each joint, from the base outwards.
+    tool : array_like of shape (4, 4), optional
+        Pose of the tool in the frame of the base at coordinates zero.
+    name : str, default "robot"
+        Name of the robot.
+
+    Returns
+    -------
+    Robot
+        On a fixed base, z up.
+
+    Raises
+    ------
+    RobotError
+        If an axis has no direction, a value is not finite, or the tool has no rigid pose.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> load = jn.Inertia(2.0, center_of_mass=[1.0, 0, 0])
+    >>> slide = jn.robot.Screw([0, 0, 1], type="prismatic", inertia=jn.Inertia(1.0))
+    >>> arm = jn.robot.from_screws([slide, jn.robot.Screw([0, 0, 1], inertia=load)])
+    >>> jn.inverse_dynamics(arm, [[0.0, 0.0], [0.0, 0.0], [0.0, 3.0]]).round(12).tolist()
+    [[29.43, 6.0]]
+    """
+    links, joints, parent = [Link("base")], [], "base"
+    for k, screw in enumerate(screws, 1):
+        point = np.array(screw.point, float)
+        moved = {"type": screw.type, "axis": screw.axis, "limits": screw.limits}
+        joints.append(Joint(f"joint_{k}", parent, f"axis_{k}", position=point, **moved))
+        joints.append(Joint(f"fixed_{k}", f"axis_{k}", f"link_{k}", "fixed", position=-point))
+        links += [Link(f"axis_{k}"), Link(f"link_{k}", screw.inertia)]
+        parent = f"link_{k}"
+    if tool is not None:
+        pose = np.array(tool, float)
+        if pose.shape != (4, 4) or not np.array_equal(pose[3], [0, 0, 0, 1]):
+            raise RobotError("must be a homogeneous transform of shape (4, 4)", name="tool", value=pose.tolist())
+        joints.append(Joint("tool", parent, "tool", "fixed", pose[:3, 3], pose[:3, :3]))
+        links.append(Link("tool"))
+    return Robot(name, links, joints)
+
+
+def floating_joints(base: str, sequence: str = "ZYX", prefix: str = "base") -> tuple[list[Link], list[Joint]]:
+    """Return the links and joints that let a link move freely: slides along x, y, z, then turns about moving axes.
+
+    Parameters
+    ----------
+    base : str
+        The link that is set free; `world` is the new base.
+    sequence : str, default "ZYX"
+        Axes of the three turns.
+    prefix : str, default "base"
+        What the names begin with.
+
+    Raises
+    ------
+    RobotError
+        If the sequence is not made of three letters X, Y, Z of which neighbours differ.
+    """
+    letters = sequence.upper()
+    if len(letters) != 3 or set(letters) - set("XYZ") or letters[0] == letters[1] or letters[1] == letters[2]:
+        message = "must be three letters X, Y, Z of which neighbours differ"
+        raise RobotError(message, name="sequence", value=sequence)
+    axes = dict(zip("XYZ", (X, Y, Z), strict=True))
+    kinds = [("prismatic", axes[letter], letter.lower()) for letter in "XYZ"]
+    kinds += [("continuous", axes[letter], f"angle_{k}") for k, letter in enumerate(letters, 1)]
+    links, joints = [Link("world")], []
+    for k, (kind, axis, suffix) in enumerate(kinds):
+        child = base if k == 5 else f"{prefix}_frame_{k + 1}"
+        joints.append(Joint(f"{prefix}_{suffix}", links[-1].name, child, kind, axis=axis))
+        if k < 5:
+            links.append(Link(child))
+    return links, joints

@@ -1,0 +1,177 @@
+"""Torques of a prescribed motion and the wrenches that its joints carry, with their rates, to any order."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+
+from jounce.errors import RobotError, did_you_mean
+from jounce.jet import Jet, concatenate, cross
+from jounce.rigid.frames import Frames
+from jounce.robot.batches import Batched, checked
+from jounce.robot.kinematics import body_frames
+from jounce.robot.newton_euler import newton_euler
+from jounce.robot.robot import Robot
+from jounce.robot.scan import stacked, to_coordinates
+from jounce.robot.tree import Tree
+from jounce.robot.wrenches import FRAMES, Wrench, wrench_arrays
+
+
+def inverse_dynamics(
+    robot: Robot,
+    q: Any,
+    *,
+    wrenches: Sequence[Wrench] = (),
+    time: Any = None,
+    drives: bool = False,
+) -> Any:
+    """Return the joint torques or forces that a motion needs, and their rates, exact to rounding.
+
+    Recursive Newton-Euler on jets: Negrean 2025, equations 123-125 and 144-146, to any order.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot, with what it holds (`Robot.with_payload`) and the gravity that it feels.
+    q : array_like of shape (..., order + 1, n)
+        Coordinates and their derivatives ``q, q', q'', ...`` in the order of `robot.joint_names`, rad or m; order 2 or
+        more. Every derivative beyond the second gives one rate of the torques.
+    wrenches : sequence of Wrench, optional
+        Forces and torques from outside.
+    time : array_like of shape (...), optional
+        Instants of the samples, s; needed where a wrench is a function of time.
+    drives : bool, default False
+        Add what the drives need: armature inertia, viscous damping and Coulomb friction of the joints. Friction has the
+        sign of the velocity and is zero at rest; its jumps are not in the rates.
+
+    Returns
+    -------
+    array of shape (..., order - 1, n)
+        ``tau, tau', tau'', ...`` in N m, or N for prismatic joints, by s. A joint that others follow bears their part.
+
+    Raises
+    ------
+    RobotError
+        If q or a wrench does not fit the robot.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> rod = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0], tensor=[0, 1 / 12, 1 / 12])
+    >>> pin = jn.Joint("pin", "base", "rod", axis=[0, -1, 0])
+    >>> pendulum = jn.Robot("pendulum", [jn.Link("base"), jn.Link("rod", rod)], [pin])
+    >>> jn.inverse_dynamics(pendulum, [[0.0], [1.0], [3.0], [6.0]]).round(12).tolist()  # torque and torque rate
+    [[5.905], [2.0]]
+    """
+    q = checked(robot, q, 2)
+    arrays, static = _applied(robot, q, wrenches, time)
+    return _generalised_forces(robot, arrays[0], arrays[1], (*static, drives))
+
+
+def joint_wrenches(
+    robot: Robot, q: Any, *, wrenches: Sequence[Wrench] = (), time: Any = None, frame: str = "link"
+) -> Any:
+    """Return the forces and moments that the joints carry, and their rates: what bearings and flanges feel.
+
+    Parameters
+    ----------
+    robot, q, wrenches, time
+        As for `inverse_dynamics`.
+    frame : {"link", "base"}, default "link"
+        Axes of the components: those of the moved link, of which the rates are then the rates of the components, or
+        those of the base.
+
+    Returns
+    -------
+    array of shape (..., order - 1, bodies, 6)
+        Force, N, and moment about the origin of the link, N m, that each of `robot.moving_links` gets through its joint
+        from its parent, by s.
+
+    Raises
+    ------
+    RobotError
+        If q or a wrench does not fit the robot.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> rod = jn.Inertia(2.0, center_of_mass=[0.5, 0, 0])
+    >>> links, pin = [jn.Link("base"), jn.Link("rod", rod)], jn.Joint("pin", "base", "rod", axis=[0, -1, 0])
+    >>> jn.joint_wrenches(jn.Robot("pendulum", links, [pin]), [[0.0], [0.0], [0.0]])[0, 0].round(12).tolist()
+    [0.0, 0.0, 19.62, 0.0, -9.81, 0.0]
+    """
+    if frame not in FRAMES:
+        raise RobotError(f"no such frame; {did_you_mean(frame, FRAMES)}", name="frame", value=frame)
+    q = checked(robot, q, 2)
+    arrays, static = _applied(robot, q, wrenches, time)
+    aligned = np.stack([robot.frames[link].rotation for link in robot.moving_links], axis=-1)
+    return _carried(robot, arrays[0], (arrays[1], aligned), (*static, frame == "base"))
+
+
+def _applied(robot: Robot, q: Any, wrenches: Sequence[Wrench], time: Any) -> tuple[Any, Any]:
+    """Return the arrays, the constants and what is static of the wrenches."""
+    given = wrench_arrays(robot, wrenches, q.shape[:-2], q.shape[-2] - 2, time)
+    frames = [robot.frames[wrench.link] for wrench in wrenches]
+    constants = tuple(
+        (np.int64(frame.body), frame.position + frame.rotation @ np.asarray(wrench.point, float), frame.rotation)
+        for frame, wrench in zip(frames, wrenches, strict=True)
+    )
+    return ((q, *given), constants), (tuple(wrench.frame == "base" for wrench in wrenches),)
+
+
+def _on_bodies(tree: Tree, arrays: Any, constants: Any, global_axes: tuple[bool, ...]) -> tuple[Any, Any]:
+    """Return external wrenches about the origins of bodies, in their frames, (levels, bodies, 6, batch); and frames."""
+    q, *wrenches = arrays
+    if not wrenches:
+        return None, None
+    levels = q.shape[0] - 2
+    frames = body_frames(tree, q[:levels]) if any(global_axes) else None
+    whole = jnp.zeros((levels, tree.shape.bodies, 6, q.shape[-1]))
+    for values, (body, point, rotation), in_base in zip(wrenches, constants, global_axes, strict=True):
+        force, torque = Jet(tuple(values[:, :3])), Jet(tuple(values[:, 3:]))
+        if in_base:
+            frame = _frame(frames, body)
+            force, torque = frame.to_body(force), frame.to_body(torque)
+        else:
+            force, torque = (part.map(lambda c: jnp.einsum("ij,js->is", rotation, c)) for part in (force, torque))
+        moment = torque + cross(point[:, None], force)
+        whole = whole.at[:, body].add(stacked(concatenate([force, moment])))
+    return whole, frames
+
+
+def _frame(frames: Frames | None, body: Any) -> Frames:
+    assert frames is not None
+    return frames.take(body)
+
+
+@Batched
+def _generalised_forces(tree: Tree, arrays: Any, constants: Any, global_axes: tuple[bool, ...], drives: bool) -> Any:
+    q = arrays[0]
+    applied, _ = _on_bodies(tree, arrays, constants, global_axes)
+    forces = to_coordinates(tree, newton_euler(tree, q, applied)[0])
+    if drives:
+        levels = q.shape[0] - 2
+        armature, damping, friction = (jnp.asarray(x)[:, None] for x in (tree.armature, tree.damping, tree.friction))
+        motion = Jet(tuple(q))
+        velocity = motion.differentiate()
+        acceleration = velocity.differentiate()
+        forces = forces + stacked(acceleration * armature) + stacked((velocity * damping).truncate(levels - 1))
+        forces = forces.at[0].add(friction * jnp.sign(q[1]))
+    return forces
+
+
+@Batched
+def _carried(tree: Tree, arrays: Any, constants: Any, global_axes: tuple[bool, ...], in_base: bool) -> Any:
+    q = arrays[0]
+    given, aligned = constants
+    applied, _ = _on_bodies(tree, arrays, given, global_axes)
+    _, force, moment = newton_euler(tree, q, applied)
+    parts = [Jet(tuple(jnp.swapaxes(x, 1, 2))) for x in (force, moment)]  # components, bodies, batch
+    if in_base:
+        frames = body_frames(tree, q[:-2])
+        found = [frames.without_base().direction(part) for part in parts]
+    else:
+        found = [part.map(lambda c: jnp.einsum("ijb,ibs->jbs", aligned, c)) for part in parts]
+    return jnp.swapaxes(stacked(concatenate(found)), 1, 2)
+

@@ -1,0 +1,196 @@
+"""Kinematics of any order: frames, points, centre of mass. Negrean 2025, equations 39, 44-48 and 55-58."""
+
+import dataclasses
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jounce.jet import Jet, components, concatenate, cross, matvec, sine_cosine
+from jounce.jet.algebra import total
+from jounce.rigid.frames import Frames
+from jounce.robot.batches import Batched, checked
+from jounce.robot.robot import Robot
+from jounce.robot.scan import entries, joint_coordinates, places, read, stacked, write
+from jounce.robot.tree import Tree
+
+
+def body_frames(tree: Tree, q: Any) -> Frames:
+    """Return the frames of all bodies, of the shape (3, bodies + 1, batch); the last one is the base.
+
+    Parameters
+    ----------
+    tree : Tree
+        Arrays of the robot.
+    q : array of shape (order + 1, coordinates, batch)
+        Taylor coefficients of the coordinates.
+    """
+    levels, _, samples = q.shape
+    zero = jnp.zeros((levels, 3, samples))
+    units = tuple(zero.at[0, i].set(1.0) for i in range(3))
+    base = (zero, *units, zero[1:])
+
+    def outward(state: Any, entry: Any) -> tuple[Any, Any]:
+        body, coordinate = entry
+        coordinate = Jet(tuple(coordinate[:, None]))
+        position, *axes, spin = (Jet(tuple(c)) if c.shape[0] else None for c in read(tree, state, body.parent_slot))
+        position = position + _combined(axes, body.position)
+        x, y, z = (_combined(axes, body.rotation[:, i]) for i in range(3))
+        if tree.shape.turning:
+            angle = coordinate * body.turning if tree.shape.sliding else coordinate
+            sine, cosine = sine_cosine(angle)
+            x, y = x * cosine + y * sine, y * cosine - x * sine
+            if spin is not None:
+                spin = spin + z * angle.differentiate()
+        if tree.shape.sliding:
+            position = position + z * (coordinate * (1 - body.turning))
+        found = (*(stacked(jet) for jet in (position, x, y, z)), zero[1:] if spin is None else stacked(spin))
+        return write(tree, state, body.slot, found), found
+
+    _, found = jax.lax.scan(outward, places(tree, base), (entries(tree), jnp.moveaxis(joint_coordinates(tree, q), 1, 0)))
+    position, *axes, spin = (
+        Jet(tuple(jnp.moveaxis(jnp.concatenate([each, fixed[None]]), 0, 2))) if fixed.shape[0] else None
+        for each, fixed in zip(found, base, strict=True)
+    )
+    return Frames(position, tuple(axes), spin)
+
+
+def _combined(axes: Any, local: Any) -> Jet:
+    return total(axis * part for axis, part in zip(axes, local, strict=True))
+
+
+def link_frame(tree: Tree, q: Any, constants: Any) -> Frames:
+    """Return the frame at a point of a link: constants are the index of its body, position and rotation there."""
+    body, position, rotation = constants
+    frame = body_frames(tree, q).take(body)
+    axes = tuple(frame.direction(rotation[:, i]) for i in range(3))
+    return Frames(frame.point(position), axes, frame.angular_velocity)
+
+
+def frame_constants(robot: Robot, link: str, point: Any) -> tuple[Any, Any, Any]:
+    """Return the index of the body of a link, and the pose there of its frame at a point.
+
+    Raises
+    ------
+    RobotError
+        If there is no such link, or the point is not made of three finite numbers.
+    """
+    from jounce.errors import RobotError, did_you_mean
+
+    if link not in robot.frames:
+        raise RobotError(f"no link has this name; {did_you_mean(link, robot.frames)}", name="link", value=link)
+    point = np.asarray(point, float)
+    if point.shape != (3,) or not np.isfinite(point).all():
+        raise RobotError("must be three finite numbers", name="point", value=point.tolist())
+    frame = robot.frames[link]
+    body = frame.body if frame.body >= 0 else len(robot.moving_links)
+    return np.int64(body), frame.position + frame.rotation @ point, frame.rotation
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class FrameMotion:
+    """Where a frame is and how it moves, in components of the base, with derivatives of any order.
+
+    Parameters
+    ----------
+    position : array of shape (..., order + 1, 3)
+        Position of the origin and its derivatives: velocity, acceleration, jerk, ...; m by s.
+    rotation : array of shape (..., order + 1, 3, 3)
+        Rotation matrix from the frame to the base, and its derivatives.
+    angular_velocity : array of shape (..., order, 3)
+        Angular velocity, acceleration, jerk, ...; rad/s by s.
+    """
+
+    position: Any
+    rotation: Any
+    angular_velocity: Any
+
+
+@Batched
+def _frame_motion(tree: Tree, arrays: Any, constants: Any) -> Any:
+    frame = link_frame(tree, arrays[0], constants)
+    spin = stacked(frame.angular_velocity) if frame.angular_velocity is not None else jnp.zeros((0, *frame.position.shape))
+    return stacked(frame.position), stacked(frame.attitude), spin
+
+
+def forward_kinematics(robot: Robot, q: Any, link: str, point: Any = (0.0, 0.0, 0.0)) -> FrameMotion:
+    """Return the motion of the frame of a link, or of the same frame moved to a point, to any order.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    q : array_like of shape (..., order + 1, n)
+        Coordinates and their derivatives, rad or m; the order may be 0.
+    link : str
+        Name of the link.
+    point : array_like of shape (3,), default the origin
+        Origin of the frame that is looked at, in the frame of the link, m.
+
+    Returns
+    -------
+    FrameMotion
+        Position (..., order + 1, 3), rotation (..., order + 1, 3, 3), angular velocity (..., order, 3), in the frame of
+        the base.
+
+    Raises
+    ------
+    RobotError
+        If there is no such link, or q does not fit the robot.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> rod = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0])
+    >>> links, pin = [jn.Link("base"), jn.Link("rod", rod)], jn.Joint("pin", "base", "rod")
+    >>> motion = jn.forward_kinematics(jn.Robot("one", links, [pin]), [[0.0], [2.0], [0.0]], "rod", [1, 0, 0])
+    >>> motion.position.tolist()
+    [[1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [-4.0, 0.0, 0.0]]
+    """
+    q = checked(robot, q, 0)
+    return FrameMotion(*_frame_motion(robot, (q,), frame_constants(robot, link, point)))
+
+
+@Batched
+def _center_of_mass(tree: Tree, arrays: Any, constants: Any) -> Any:
+    frames = body_frames(tree, arrays[0])
+    mass, center = constants
+    centers = frames.point(jnp.swapaxes(center, 0, 1)[:, :, None])
+    share = mass / mass.sum()
+    return stacked(centers.map(lambda c: jnp.einsum("cbs,b->cs", c, share)))
+
+
+def center_of_mass(robot: Robot, q: Any) -> Any:
+    """Return the centre of mass of the whole robot and its derivatives: Negrean 2025, equations 44-48 and 55.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot; the mass of its base counts too.
+    q : array_like of shape (..., order + 1, n)
+        Coordinates and their derivatives, rad or m.
+
+    Returns
+    -------
+    array of shape (..., order + 1, 3)
+        In the frame of the base, m by s.
+
+    Raises
+    ------
+    RobotError
+        If q does not fit the robot.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> rod = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0])
+    >>> links, pin = [jn.Link("base"), jn.Link("rod", rod)], jn.Joint("pin", "base", "rod")
+    >>> jn.center_of_mass(jn.Robot("one", links, [pin]), [[0.0], [2.0]]).tolist()
+    [[0.5, 0.0, 0.0], [0.0, 1.0, 0.0]]
+    """
+    q = checked(robot, q, 0)
+    base = robot.base_inertia
+    mass = np.append(robot.tree.mass, 0.0 if base is None else base.mass)
+    center = np.concatenate([robot.tree.center, [np.zeros(3) if base is None else base.center_of_mass]])
+    return _center_of_mass(robot, (q,), (mass, center))

@@ -1,0 +1,155 @@
+"""What a robot is made of: links, joints and limits, as a file or a script gives them; frozen and checked."""
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+
+from jounce.errors import RobotError, did_you_mean
+from jounce.rigid.inertia import Inertia
+
+MOVING = ("revolute", "continuous", "prismatic")
+TYPES = (*MOVING, "fixed")
+
+
+@dataclasses.dataclass(frozen=True)
+class Limits:
+    """What a joint may do; None is no limit. Angles in rad, lengths in m, torques in N m, forces in N.
+
+    Parameters
+    ----------
+    lower, upper : float or None
+        Range of the coordinate, rad or m.
+    velocity, acceleration, jerk : float or None
+        Largest absolute values of its derivatives.
+    effort : float or None
+        Largest torque or force.
+    effort_rate : float or None
+        Largest rate of the torque or force.
+    """
+
+    lower: float | None = None
+    upper: float | None = None
+    velocity: float | None = None
+    acceleration: float | None = None
+    jerk: float | None = None
+    effort: float | None = None
+    effort_rate: float | None = None
+
+    def __post_init__(self) -> None:
+        for field in dataclasses.fields(self):
+            value = getattr(self, field.name)
+            if value is None:
+                continue
+            if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
+                raise RobotError("must be a finite number", name=field.name, value=value)
+            if field.name not in ("lower", "upper") and value <= 0:
+                raise RobotError("must be greater than zero", name=field.name, value=value)
+        if self.lower is not None and self.upper is not None and self.lower > self.upper:
+            raise RobotError("the lower limit must not exceed the upper one", value=[self.lower, self.upper])
+
+
+@dataclasses.dataclass(frozen=True)
+class Mimic:
+    """A joint that follows another one: its coordinate is ``multiplier * q + offset``."""
+
+    joint: str
+    multiplier: float = 1.0
+    offset: float = 0.0
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Link:
+    """A rigid link; without inertia it is a frame, or a massless piece between two joints.
+
+    Parameters
+    ----------
+    name : str
+        Name of the link, and of its frame.
+    inertia : Inertia or None
+        In the frame of the link.
+    """
+
+    name: str
+    inertia: Inertia | None = None
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Joint:
+    """A joint between two links; the frame of the child link is that of the joint.
+
+    Parameters
+    ----------
+    name : str
+        Name of the joint.
+    parent, child : str
+        Names of the links that it joins.
+    type : {"revolute", "continuous", "prismatic", "fixed"}, default "revolute"
+        A revolute or continuous joint turns about its axis, a prismatic one slides along it.
+    position : array_like of shape (3,), default zero
+        Origin of the child link at coordinate zero, in the frame of the parent link, m.
+    rotation : array_like of shape (3, 3), default identity
+        Takes components in the frame of the child link, at coordinate zero, to that of the parent.
+    axis : array_like of shape (3,), default z
+        Axis in the frame of the child link; it is normalised.
+    limits : Limits, optional
+        What the joint may do.
+    mimic : Mimic, optional
+        The joint that this one follows.
+    armature : float, default 0
+        Inertia of the drive, seen at the joint, kg m^2 or kg.
+    damping : float, default 0
+        Viscous friction, N m s/rad or N s/m.
+    friction : float, default 0
+        Coulomb friction, N m or N.
+
+    Raises
+    ------
+    RobotError
+        If the type is not known, the axis has no length, or the rotation is none.
+    """
+
+    name: str
+    parent: str
+    child: str
+    type: str = "revolute"
+    position: Any = (0.0, 0.0, 0.0)
+    rotation: Any = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    axis: Any = (0.0, 0.0, 1.0)
+    limits: Limits = Limits()
+    mimic: Mimic | None = None
+    armature: float = 0.0
+    damping: float = 0.0
+    friction: float = 0.0
+
+    def __post_init__(self) -> None:
+        where = f"joints.{self.name}"
+        if self.type not in TYPES:
+            message = f"no joint has this type; {did_you_mean(self.type, TYPES)}"
+            raise RobotError(message, name=f"{where}.type", value=self.type)
+        for field, shape in (("position", (3,)), ("rotation", (3, 3)), ("axis", (3,))):
+            value = np.array(getattr(self, field), float)
+            if value.shape != shape or not np.isfinite(value).all():
+                raise RobotError(f"must be finite numbers of shape {shape}", name=f"{where}.{field}", value=value.tolist())
+            object.__setattr__(self, field, value)
+        if not np.allclose(self.rotation @ self.rotation.T, np.eye(3), rtol=0, atol=1e-6) or np.linalg.det(self.rotation) < 0:
+            raise RobotError("must be a rotation matrix", name=f"{where}.rotation", value=self.rotation.tolist())
+        length = float(np.linalg.norm(self.axis))
+        if self.type != "fixed":
+            if length < 1e-9:
+                raise RobotError("must have a direction", name=f"{where}.axis", value=self.axis.tolist())
+            object.__setattr__(self, "axis", self.axis if abs(length - 1) < 1e-15 else self.axis / length)
+        for field in ("armature", "damping", "friction"):
+            value = getattr(self, field)
+            if not (np.isfinite(value) and value >= 0):
+                raise RobotError("must be zero or greater", name=f"{where}.{field}", value=value)
+
+    @property
+    def moving(self) -> bool:
+        """Whether the joint lets its links move."""
+        return self.type != "fixed"
+
+    @property
+    def turning(self) -> bool:
+        """Whether the coordinate is an angle."""
+        return self.type in ("revolute", "continuous")

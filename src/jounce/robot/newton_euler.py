@@ -1,0 +1,147 @@
+"""Recursive Newton-Euler on jets: forces and torques of a tree of bodies, with rates of any order, written once.
+
+Everything is in the frame of each body, whose z is the axis of its joint. The state that goes outwards is the jet of
+the angular velocity w and of the velocity v of the origin. A force is the rate of a momentum seen from the turning
+frame, ``f = p' + w x p``; these two products and the turns from frame to frame are all that is not linear. Gravity is
+a base that accelerates the other way.
+"""
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+
+from jounce.jet import Jet, components, concatenate, cross, matvec, next_sine_cosine
+from jounce.jet.algebra import bilinear
+from jounce.robot.scan import entries, joint_coordinates, places, read, stacked, write
+from jounce.robot.tree import Tree
+
+
+class Turn:
+    """The rotation from a body to its parent, ``M Rz(d)``: a matrix for each sample, and a jet of the turn since then.
+
+    The jet starts at zero, so that sine and ``cosine - 1`` have no first coefficients, and most products vanish.
+    """
+
+    def __init__(self, tree: Tree, body: Tree, coordinate: Jet):
+        placement = body.rotation[:, :, None]
+        self.sine = self.versine = None
+        if not tree.shape.turning:
+            self.matrix = placement
+            return
+        angle = coordinate * body.turning if tree.shape.sliding else coordinate
+        sine, cosine = jnp.sin(angle.coefficients[0])[None], jnp.cos(angle.coefficients[0])[None]
+        x, y, z = placement[:, 0:1], placement[:, 1:2], placement[:, 2:3]
+        along = jnp.broadcast_to(z, (3, *sine.shape[1:]))
+        self.matrix = jnp.concatenate([x * cosine + y * sine, y * cosine - x * sine, along], axis=1)
+        s, c = [None], [1.0]
+        for _ in range(angle.order):
+            following = next_sine_cosine(s, c, angle)
+            s.append(following[0])
+            c.append(following[1])
+        self.sine, self.versine = Jet(s), Jet([None, *c[1:]])
+
+    def outward(self, vector: Jet) -> Jet:
+        """Take a vector from the parent's frame to that of the body."""
+        return self._turned(matvec(jnp.swapaxes(self.matrix, 0, 1), vector), 1)
+
+    def inward(self, vector: Jet) -> Jet:
+        """Take a vector from the frame of the body to the parent's."""
+        return matvec(self.matrix, self._turned(vector, -1))
+
+    def _turned(self, vector: Jet, sign: int) -> Jet:
+        if self.sine is None:
+            return vector
+        x, y, z = components(vector)
+        across = [bilinear(jnp.multiply, self.sine, part) for part in (y, x)]
+        first, second = across if sign > 0 else (-across[0], -across[1])
+        x, y = (part + bilinear(jnp.multiply, self.versine, part) for part in (x, y))
+        return concatenate([x + first, y - second, z])
+
+
+def _constant(value: Any) -> Any:
+    return value[:, None]
+
+
+def newton_euler(tree: Tree, q: Any, wrenches: Any = None) -> tuple[Any, Any, Any]:
+    """Return generalised forces at the joints and the wrenches that they carry.
+
+    Parameters
+    ----------
+    tree : Tree
+        Arrays of the robot.
+    q : array of shape (order + 1, coordinates, batch)
+        Taylor coefficients of the coordinates, order 2 or more.
+    wrenches : array of shape (order - 1, bodies, 6, batch), optional
+        Taylor coefficients of external forces and of their moments about the origin, in the frame of each body.
+
+    Returns
+    -------
+    force : array of shape (order - 1, bodies, batch)
+        Taylor coefficients of the force or torque along the axis of each joint.
+    carried : tuple of array of shape (order - 1, bodies, 3, batch)
+        Force and moment about the origin of the body that it gets through its joint, in its own frame.
+    """
+    order = q.shape[0] - 1
+    coordinates = joint_coordinates(tree, q)
+    samples = q.shape[-1]
+    zero = jnp.zeros((3, samples))
+    falling = jnp.broadcast_to(-jnp.asarray(tree.gravity)[:, None], (3, samples))
+    base = tuple(jnp.stack(c) for c in ([zero] * order, [zero, falling, *[zero] * (order - 2)]))
+    bodies = (entries(tree), jnp.moveaxis(coordinates, 1, 0), wrenches if wrenches is None else jnp.moveaxis(wrenches, 1, 0))
+
+    def outward(state: Any, entry: Any) -> tuple[Any, Any]:
+        body, coordinate, applied = entry
+        coordinate = Jet(tuple(coordinate[:, None]))
+        turn = Turn(tree, body, coordinate)
+        w, v = (Jet(tuple(c)) for c in read(tree, state, body.parent_slot))
+        w, v = turn.outward(w), turn.outward(v + cross(w, _constant(body.position)))
+        slide = None
+        rate = coordinate.differentiate()
+        if tree.shape.turning:
+            turning = rate * body.turning if tree.shape.sliding else rate
+            x, y, z = components(w)
+            w = concatenate([x, y, z + turning])
+        if tree.shape.sliding:
+            slide = coordinate * (1 - body.turning)
+            x, y, z = components(w)
+            v = v + concatenate([y * slide, -(x * slide), rate * (1 - body.turning)])
+        momentum = (v + cross(w, _constant(body.center))) * body.mass
+        spin = matvec(body.inertia[:, :, None], w)
+        force = momentum.differentiate() + cross(w, momentum)
+        moment = spin.differentiate() + cross(w, spin) + cross(_constant(body.center), force)
+        if applied is not None:
+            force = Jet(f - a[:3] for f, a in zip(force.coefficients, applied, strict=True))
+            moment = Jet(m - a[3:] for m, a in zip(moment.coefficients, applied, strict=True))
+        state = write(tree, state, body.slot, (stacked(w), stacked(v)))
+        return state, (force.dense(), moment.dense(), turn.matrix, turn.sine, turn.versine, slide)
+
+    def inward(state: Any, entry: Any) -> tuple[Any, Any]:
+        body, (force, moment, matrix, sine, versine, slide) = entry
+        turn = object.__new__(Turn)
+        turn.matrix, turn.sine, turn.versine = matrix, sine, versine
+        from_children = read(tree, state, body.slot)
+        force, moment = (own + Jet(tuple(c)) for own, c in zip((force, moment), from_children, strict=True))
+        along = Jet(c[2] for c in moment.coefficients)
+        if tree.shape.sliding:
+            along = along * body.turning + Jet(c[2] for c in force.coefficients) * (1 - body.turning)
+        at_joint = moment
+        if slide is not None:
+            x, y, _ = components(force)
+            at_joint = moment + concatenate([-(slide * y), slide * x, 0 * x])
+        parent = turn.inward(force)
+        about = turn.inward(at_joint) + cross(_constant(body.position), parent)
+        if tree.shape.slots > 1:
+            state = write(tree, state, body.slot, jax.tree.map(jnp.zeros_like, from_children))
+            before = read(tree, state, body.parent_slot)
+            sent = tuple(a + stacked(b) for a, b in zip(before, (parent, about), strict=True))
+            state = write(tree, state, body.parent_slot, sent)
+        else:
+            state = (stacked(parent), stacked(about))
+        return state, (stacked(along), stacked(force), stacked(moment))
+
+    _, kept = jax.lax.scan(outward, places(tree, base), bodies)
+    nothing = jnp.zeros((order - 1, 3, samples))
+    _, results = jax.lax.scan(inward, places(tree, (nothing, nothing)), (bodies[0], kept), reverse=True)
+    along, force, moment = (jnp.moveaxis(x, 0, 1) for x in results)
+    return along, force, moment

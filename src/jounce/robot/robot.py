@@ -1,0 +1,211 @@
+"""The robot as its user sees it: links and joints by name, moving joints in the order of q; frozen."""
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from jounce.errors import RobotError, did_you_mean
+from jounce.rigid.inertia import Inertia
+from jounce.robot.model import Joint, Limits, Link
+from jounce.robot.tree import arrange, ordered
+
+STANDARD_GRAVITY = 9.81  # m/s^2, as in Pinocchio and MuJoCo
+
+
+class Robot:
+    """A serial or tree-shaped robot of rigid links, on a fixed base unless given a floating one.
+
+    Parameters
+    ----------
+    name : str
+        What it is called.
+    links : sequence of Link
+        One of them, the base, is no joint's child.
+    joints : sequence of Joint
+        Every link but the base is the child of exactly one.
+    gravity : array_like of shape (3,), default (0, 0, -9.81)
+        Acceleration of free fall in the frame of the base, m/s^2.
+
+    Attributes
+    ----------
+    joint_names : tuple of str
+        Moving joints that follow no other, parents before children, branches in the order given: the order of q.
+    base : str
+        The link that does not move.
+    tree : Tree
+        The arrays that the algorithms work with.
+    frames : dict of str to Frame
+        Where each link is in the bodies of the tree.
+
+    Raises
+    ------
+    RobotError
+        If names repeat or lead nowhere, the joints form a loop or several trees, a moving link that ends a branch has
+        no mass, or a joint follows one that cannot be followed.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> rod = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0], tensor=[0, 1 / 12, 1 / 12])
+    >>> pendulum = jn.Robot(
+    ...     "pendulum", [jn.Link("base"), jn.Link("rod", rod)], [jn.Joint("pin", "base", "rod", axis=[0, 1, 0])]
+    ... )
+    >>> pendulum.joint_names
+    ('pin',)
+    """
+
+    def __init__(
+        self, name: str, links: Sequence[Link], joints: Sequence[Joint], gravity: Any = (0.0, 0.0, -STANDARD_GRAVITY)
+    ):
+        self.name = name
+        self.gravity = np.array(gravity, float)
+        if self.gravity.shape != (3,) or not np.isfinite(self.gravity).all():
+            raise RobotError("must be three finite numbers", name="gravity", value=self.gravity.tolist())
+        self.links = _by_name("links", links)
+        self.joints = {joint.name: joint for joint in ordered(self.links, _by_name("joints", joints))}
+        self.base = ({*self.links} - {joint.child for joint in self.joints.values()}).pop()
+        moving = [joint for joint in self.joints.values() if joint.moving]
+        self.joint_names = tuple(joint.name for joint in moving if joint.mimic is None)
+        for joint in moving:
+            self._check_mimic(joint)
+        self.tree, self.frames = arrange(self)
+
+    def __repr__(self) -> str:
+        count = len(self.joint_names)
+        return f"<Robot {self.name}: {count} {'joint' if count == 1 else 'joints'}, {len(self.links)} links>"
+
+    @property
+    def link_names(self) -> tuple[str, ...]:
+        """Names of the links; each is also the name of a frame."""
+        return tuple(self.links)
+
+    @property
+    def moving_links(self) -> tuple[str, ...]:
+        """Names of the links that joints move, one for each, in the order of results for each body.
+
+        Links fixed to one of them move with it, and their mass is counted there.
+        """
+        return tuple(joint.child for joint in self.joints.values() if joint.moving)
+
+    @property
+    def limits(self) -> dict[str, Limits]:
+        """Limits of the joints in `joint_names`."""
+        return {name: self.joints[name].limits for name in self.joint_names}
+
+    @property
+    def base_inertia(self) -> Inertia | None:
+        """Inertia of the base and of all links fixed to it, in the frame of the base; None if it has none."""
+        fixed = {name: frame for name, frame in self.frames.items() if frame.body < 0}
+        parts = [
+            inertia.moved(frame.position, frame.rotation)
+            for name, frame in fixed.items()
+            if (inertia := self.links[name].inertia) is not None
+        ]
+        return Inertia.total(parts) if parts else None
+
+    @property
+    def mass(self) -> float:
+        """Mass of all links, the base included, kg."""
+        return float(sum(link.inertia.mass for link in self.links.values() if link.inertia is not None))
+
+    def with_gravity(self, gravity: Any) -> "Robot":
+        """Return the same robot under another acceleration of free fall, m/s^2 in the frame of the base."""
+        return Robot(self.name, list(self.links.values()), list(self.joints.values()), gravity)
+
+    def with_payload(self, link: str, payload: Inertia) -> "Robot":
+        """Return the robot with a load fixed to a link, given in the frame of that link: Q_SU of Negrean 2025, 125.
+
+        Raises
+        ------
+        RobotError
+            If there is no such link.
+        """
+        self._checked_link(link)
+        held = self.links[link].inertia
+        whole = payload if held is None else Inertia.total([held, payload])
+        links = {**self.links, link: Link(link, whole)}
+        return Robot(self.name, list(links.values()), list(self.joints.values()), self.gravity)
+
+    def locked(self, positions: Mapping[str, float]) -> "Robot":
+        """Return the robot with joints held at given coordinates, rad or m; joints that follow them are held too.
+
+        Raises
+        ------
+        RobotError
+            If there is no such moving joint, or it follows another.
+        """
+        for name, value in positions.items():
+            if name not in self.joint_names:
+                message = f"no moving joint has this name; {did_you_mean(name, self.joint_names)}"
+                raise RobotError(message, name="locked", value=name)
+            if not np.isfinite(value):
+                raise RobotError("must be a finite number", name=f"locked.{name}", value=value)
+        joints = []
+        for joint in self.joints.values():
+            held = positions.get(joint.name)
+            if joint.mimic is not None and joint.mimic.joint in positions:
+                held = joint.mimic.multiplier * positions[joint.mimic.joint] + joint.mimic.offset
+            joints.append(joint if held is None else _held(joint, float(held)))
+        return Robot(self.name, list(self.links.values()), joints, self.gravity)
+
+    def with_floating_base(self, sequence: str = "ZYX") -> "Robot":
+        """Return the robot on a base that moves freely: three slides along x, y, z, then three turns.
+
+        The coordinates base_x, base_y, base_z (m) and base_angle_1 to 3 (rad) come first in q. Their generalised forces
+        are those that would have to hold the base; for one that is free, prescribe its motion and read how far from zero
+        they are. The angles have a singular orientation (the second at a right angle for ``ZYX``): choose a sequence that
+        stays away from it.
+
+        Parameters
+        ----------
+        sequence : str, default "ZYX"
+            Axes of the turns, three letters, each about the axes as moved by those before.
+        """
+        from jounce.robot.construct import floating_joints
+
+        links, joints = floating_joints(self.base, sequence)
+        every = [*links, *self.links.values()], [*joints, *self.joints.values()]
+        return Robot(self.name, *every, self.gravity)
+
+    def coordinates(self, **values: float) -> np.ndarray:
+        """Return an array for q, shape (n,), with the named joints at the given values and the others at zero."""
+        for name in values:
+            if name not in self.joint_names:
+                message = f"no moving joint has this name; {did_you_mean(name, self.joint_names)}"
+                raise RobotError(message, name="joint", value=name)
+        return np.array([values.get(name, 0.0) for name in self.joint_names], float)
+
+    def _checked_link(self, link: str) -> str:
+        if link not in self.links:
+            raise RobotError(f"no link has this name; {did_you_mean(link, self.links)}", name="link", value=link)
+        return link
+
+    def _check_mimic(self, joint: Joint) -> None:
+        if joint.mimic is not None and joint.mimic.joint not in self.joint_names:
+            message = f"must follow a moving joint that follows no other; {did_you_mean(joint.mimic.joint, self.joint_names)}"
+            raise RobotError(message, name=f"joints.{joint.name}.mimic", value=joint.mimic.joint)
+
+
+def _by_name(kind: str, parts: Sequence[Any]) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for part in parts:
+        if part.name in found:
+            raise RobotError("this name is given twice", name=kind, value=part.name)
+        found[part.name] = part
+    if not found and kind == "links":
+        raise RobotError("a robot needs at least one link", name=kind)
+    return found
+
+
+def _held(joint: Joint, coordinate: float) -> Joint:
+    """Return the fixed joint that holds a moving one at a coordinate."""
+    from jounce.robot.tree import turn_about
+
+    position, rotation = joint.position, joint.rotation
+    if joint.turning:
+        rotation = rotation @ turn_about(joint.axis, coordinate)
+    else:
+        position = position + rotation @ joint.axis * coordinate
+    return dataclasses.replace(joint, type="fixed", position=position, rotation=rotation, mimic=None)

@@ -1,0 +1,59 @@
+"""How a tree of bodies is scanned: what is carried from parents to children, and from coordinates to joints."""
+
+import dataclasses
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+
+from jounce.jet import Jet
+from jounce.robot.tree import Tree
+
+
+def joint_coordinates(tree: Tree, q: Any) -> Any:
+    """Return the coordinates of the bodies, (order + 1, bodies, batch), from those of q; both as Taylor coefficients."""
+    if tree.shape.direct:
+        return q
+    q = jnp.take(q, jnp.asarray(tree.coordinate), axis=1) * jnp.asarray(tree.multiplier)[:, None]
+    return jnp.concatenate([q[:1] + jnp.asarray(tree.offset)[:, None], q[1:]])
+
+
+def to_coordinates(tree: Tree, forces: Any) -> Any:
+    """Return generalised forces (order + 1, coordinates, batch) from those at the joints of the bodies."""
+    if tree.shape.direct:
+        return forces
+    shape = (forces.shape[0], tree.shape.coordinates, forces.shape[2])
+    weighted = forces * jnp.asarray(tree.multiplier)[:, None]
+    return jnp.zeros(shape).at[:, jnp.asarray(tree.coordinate)].add(weighted)
+
+
+def entries(tree: Tree) -> Tree:
+    """Return the arrays that have one entry for each body, which a scan takes apart."""
+    fields = ("armature", "damping", "friction", "gravity", "ancestors")
+    return dataclasses.replace(jax.tree.map(jnp.asarray, tree), **dict.fromkeys(fields))
+
+
+def places(tree: Tree, state: Any) -> Any:
+    """Return the places where states of parents are kept, all holding the given one."""
+    if tree.shape.slots == 1:
+        return state
+    return jax.tree.map(lambda x: jnp.broadcast_to(x, (tree.shape.slots, *x.shape)), state)
+
+
+def read(tree: Tree, state: Any, slot: Any) -> Any:
+    """Return the state kept in a place; a chain has one place only."""
+    if tree.shape.slots == 1:
+        return state
+    return jax.tree.map(lambda x: jax.lax.dynamic_index_in_dim(x, slot, keepdims=False), state)
+
+
+def write(tree: Tree, state: Any, slot: Any, value: Any) -> Any:
+    """Return the places with a new state in one of them."""
+    if tree.shape.slots == 1:
+        return value
+    return jax.tree.map(lambda x, y: jax.lax.dynamic_update_index_in_dim(x, y, slot, 0), state, value)
+
+
+def stacked(jet: Jet) -> Any:
+    """Return the coefficients of a jet as one array, order first."""
+    return jnp.stack(jet.dense().coefficients)

@@ -1,0 +1,101 @@
+"""External wrenches: forces and torques that act on links, as functions of time."""
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jounce.errors import RobotError, did_you_mean
+from jounce.jet import Jet, compose
+from jounce.robot.robot import Robot
+
+FRAMES = ("base", "link")
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Wrench:
+    """A force and a torque from outside on a link, for example of a contact or a tool.
+
+    Parameters
+    ----------
+    link : str
+        Name of the link that it acts on.
+    force, torque : array_like or callable, default zero
+        N and N m. Shape (3,): constant. Shape (..., order - 1, 3): values and derivatives in time for each sample, as
+        the torques that are asked for. A callable maps the time, a scalar in s, to three components, with JAX functions.
+    point : array_like of shape (3,), default zero
+        Where the force acts, in the frame of the link, m.
+    frame : {"base", "link"}, default "base"
+        Whose axes the components refer to; those of the link turn with it.
+
+    Raises
+    ------
+    RobotError
+        If the frame is not known or the point is not made of three finite numbers.
+    """
+
+    link: str
+    force: Any = (0.0, 0.0, 0.0)
+    torque: Any = (0.0, 0.0, 0.0)
+    point: Any = (0.0, 0.0, 0.0)
+    frame: str = "base"
+
+    def __post_init__(self) -> None:
+        if self.frame not in FRAMES:
+            message = f"no such frame; {did_you_mean(self.frame, FRAMES)}"
+            raise RobotError(message, name="wrench.frame", value=self.frame)
+        point = np.asarray(self.point, float)
+        if point.shape != (3,) or not np.isfinite(point).all():
+            raise RobotError("must be three finite numbers", name="wrench.point", value=point.tolist())
+
+
+def wrench_arrays(robot: Robot, wrenches: Sequence[Wrench], lead: tuple[int, ...], levels: int, time: Any) -> tuple[Any, ...]:
+    """Return the wrenches as arrays of plain derivatives, of shape (..., levels, 6): force, then torque.
+
+    Raises
+    ------
+    RobotError
+        If a link does not exist, the base is pushed, a shape does not fit the samples, or a function has no time.
+    """
+    arrays = []
+    for k, wrench in enumerate(wrenches):
+        where = f"wrenches[{k}]"
+        if wrench.link not in robot.frames:
+            message = f"no link has this name; {did_you_mean(wrench.link, robot.frames)}"
+            raise RobotError(message, name=f"{where}.link", value=wrench.link)
+        if robot.frames[wrench.link].body < 0:
+            raise RobotError("this link is fixed to the base: nothing moves it", name=f"{where}.link", value=wrench.link)
+        parts = [_derivatives(f"{where}.{name}", getattr(wrench, name), lead, levels, time) for name in ("force", "torque")]
+        arrays.append(jnp.concatenate(parts, axis=-1) if _traced(parts) else np.concatenate(parts, axis=-1))
+    return tuple(arrays)
+
+
+def _derivatives(where: str, value: Any, lead: tuple[int, ...], levels: int, time: Any) -> Any:
+    shape = (*lead, levels, 3)
+    if callable(value):
+        if time is None:
+            raise RobotError("is a function of time: give the instants of the samples as `time`", name=where)
+        instants = jnp.asarray(time, float)
+        if instants.shape != lead:
+            raise RobotError(f"must have one instant for each sample, shape {lead}", name="time", value=instants.shape)
+        jet = compose(lambda t: jnp.stack([jnp.asarray(x, float) for x in value(t)]), Jet.variable(instants, levels - 1))
+        return jnp.moveaxis(jet.derivatives(), (0, 1), (-2, -1))
+    array = value if isinstance(value, jax.Array) else np.asarray(value, float)
+    if array.shape == (3,):
+        constant = jnp.zeros(shape) if _traced([array]) else np.zeros(shape)
+        return constant.at[..., 0, :].set(array) if isinstance(constant, jax.Array) else _with_value(constant, array)
+    if array.shape != shape:
+        raise RobotError(f"must have the shape (3,) or {shape}", name=where, value=array.shape)
+    return array
+
+
+def _with_value(zeros: np.ndarray, value: np.ndarray) -> np.ndarray:
+    zeros[..., 0, :] = value
+    return zeros
+
+
+def _traced(arrays: Sequence[Any]) -> bool:
+    return any(isinstance(x, jax.core.Tracer) for x in arrays)
