@@ -7,7 +7,7 @@ import jax as _jax
 
 _jax.config.update("jax_enable_x64", True)
 
-from jounce import jet as jet  # noqa: E402 - after the switch to double precision
+from jounce import dynamics as dynamics, jet as jet, rigid as rigid, robot as robot  # noqa: E402 - after the switch
 from jounce.constraints import (  # noqa: E402
     AbstractConstraint as AbstractConstraint,
     Scalar as Scalar,
@@ -16,6 +16,11 @@ from jounce.constraints import (  # noqa: E402
     planar as planar,
     rows as rows,
     spatial as spatial,
+)
+from jounce.dynamics import (  # noqa: E402
+    Energy as Energy,
+    acceleration_energy as acceleration_energy,
+    kinetic_energy as kinetic_energy,
 )
 from jounce.errors import (  # noqa: E402
     AssemblyError as AssemblyError,
@@ -60,7 +65,10 @@ from jounce.robot import (  # noqa: E402
     center_of_mass as center_of_mass,
     forward_kinematics as forward_kinematics,
     inverse_dynamics as inverse_dynamics,
+    jacobian as jacobian,
+    joint_motion as joint_motion,
     joint_wrenches as joint_wrenches,
+    operational_accelerations as operational_accelerations,
 )
 from jounce.trajectory import (  # noqa: E402
     Expression as Expression,

@@ -58,6 +58,11 @@ class Motion:
         self._coordinates, groups = state
         self._groups = dict(zip(model.outputs, groups, strict=True))
 
+    @property
+    def poses(self) -> tuple[type, dict[str, Any]]:
+        """Type of the poses of all bodies, the ground first, and Taylor coefficients of their coordinates by name."""
+        return self._model.pose_type, self._coordinates
+
     def __repr__(self) -> str:
         solved = int(np.sum(self.status == Status.OK))
         title = f"{self.mechanism.title}: " if self.mechanism.title else ""

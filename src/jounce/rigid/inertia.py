@@ -77,7 +77,7 @@ class Inertia:
 
     @property
     def pseudo_inertia(self) -> np.ndarray:
-        """Second moments about the origin of the frame, first moments and mass, (4, 4): what `trace(T' J T'^T)` needs."""
+        """Second moments about the origin of the frame, first moments and mass, (4, 4), as `trace(T' J T'^T)` needs."""
         c = np.append(self.center_of_mass, 1.0)
         moments = np.zeros((4, 4))
         moments[:3, :3] = self.second_moments

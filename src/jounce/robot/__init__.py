@@ -1,4 +1,4 @@
-"""Serial and tree robots in joint coordinates: kinematics, Jacobians, torques and reactions, with rates of any order."""
+"""Serial and tree robots in joint coordinates: kinematics, Jacobians, torques, reactions, with rates of any order."""
 
 from jounce.rigid.inertia import Inertia as Inertia
 from jounce.robot.construct import (
@@ -8,6 +8,11 @@ from jounce.robot.construct import (
     from_screws as from_screws,
 )
 from jounce.robot.inverse_dynamics import inverse_dynamics as inverse_dynamics, joint_wrenches as joint_wrenches
+from jounce.robot.jacobian import (
+    jacobian as jacobian,
+    operational_accelerations as operational_accelerations,
+)
+from jounce.robot.joint_motion import JointMotion as JointMotion, joint_motion as joint_motion
 from jounce.robot.kinematics import (
     FrameMotion as FrameMotion,
     center_of_mass as center_of_mass,

@@ -1,4 +1,4 @@
-"""How batches of samples go through the algorithms: in blocks of few sizes, batch last, in chunks that fit the cache."""
+"""How batches of samples go through the algorithms: in blocks of few sizes, batch last, in chunks for the cache."""
 
 import math
 from collections.abc import Callable
@@ -8,6 +8,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 
 from jounce.errors import RobotError
 from jounce.kinematics.compilation import compiler_options
@@ -74,15 +75,15 @@ class Batched:
         """Return results for arrays of derivatives, the first one of shape (batch..., order + 1, n)."""
         lead = arrays[0].shape[:-2]
         axes, count = len(lead), math.prod(lead)
-        if any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves((arrays, constants))):
+        if any(isinstance(x, Tracer) for x in jax.tree.leaves((arrays, constants))):
             flat = tuple(jnp.reshape(x, (count, *x.shape[axes:])) for x in arrays)
             found = self._block(robot.tree, flat, constants, static)
             return jax.tree.map(lambda x: jnp.reshape(x, (*lead, *x.shape[1:])), found)
         flat = tuple(np.reshape(np.asarray(x), (count, *x.shape[axes:])) for x in arrays)
         found = [self.jitted(robot.tree, block, constants, static) for block in _blocks(flat)]
 
-        def joined(*parts: Any) -> Any:
-            whole = np.concatenate(parts) if len(parts) > 1 else np.asarray(parts[0])
+        def joined(first: Any, *others: Any) -> Any:
+            whole = np.concatenate([first, *others]) if others else np.asarray(first)
             return np.reshape(whole[:count], (*lead, *whole.shape[1:]))
 
         return jax.tree.map(joined, *found)

@@ -8,7 +8,7 @@ import numpy as np
 
 from jounce.errors import RobotError, did_you_mean
 from jounce.rigid.inertia import Inertia
-from jounce.robot.model import Joint, Limits, Link
+from jounce.robot.model import UNLIMITED, Joint, Limits, Link
 from jounce.robot.robot import Robot
 from jounce.robot.tree import turn_about
 
@@ -44,7 +44,7 @@ class DenavitHartenberg:
     theta: float = 0.0
     type: str = "revolute"
     inertia: Inertia | None = None
-    limits: Limits = Limits()
+    limits: Limits = UNLIMITED
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -69,10 +69,12 @@ class Screw:
     point: Any = (0.0, 0.0, 0.0)
     type: str = "revolute"
     inertia: Inertia | None = None
-    limits: Limits = Limits()
+    limits: Limits = UNLIMITED
 
 
-def from_denavit_hartenberg(rows: Sequence[DenavitHartenberg], convention: str = "standard", name: str = "robot") -> Robot:
+def from_denavit_hartenberg(
+    rows: Sequence[DenavitHartenberg], convention: str = "standard", name: str = "robot"
+) -> Robot:
     """Return a serial robot from a table of Denavit-Hartenberg parameters.
 
     Links are named link_1 to link_n, with their Denavit-Hartenberg frames, joints joint_1 to joint_n, the base base.
@@ -106,7 +108,9 @@ def from_denavit_hartenberg(rows: Sequence[DenavitHartenberg], convention: str =
     ('joint_1', 'joint_2')
     """
     if convention not in CONVENTIONS:
-        raise RobotError(f"no such convention; {did_you_mean(convention, CONVENTIONS)}", name="convention", value=convention)
+        raise RobotError(
+            f"no such convention; {did_you_mean(convention, CONVENTIONS)}", name="convention", value=convention
+        )
     links, joints = [Link("base")], []
     for k, row in enumerate(rows, 1):
         for field in ("a", "alpha", "d", "theta"):

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jounce.errors import RobotError, did_you_mean
-from jounce.jet import Jet, concatenate, cross
+from jounce.jet import Jet, concatenate, cross, matvec
 from jounce.rigid.frames import Frames
 from jounce.robot.batches import Batched, checked
 from jounce.robot.kinematics import body_frames
@@ -134,7 +134,7 @@ def _on_bodies(tree: Tree, arrays: Any, constants: Any, global_axes: tuple[bool,
             frame = _frame(frames, body)
             force, torque = frame.to_body(force), frame.to_body(torque)
         else:
-            force, torque = (part.map(lambda c: jnp.einsum("ij,js->is", rotation, c)) for part in (force, torque))
+            force, torque = (matvec(rotation[:, :, None], part) for part in (force, torque))
         moment = torque + cross(point[:, None], force)
         whole = whole.at[:, body].add(stacked(concatenate([force, moment])))
     return whole, frames
@@ -174,4 +174,3 @@ def _carried(tree: Tree, arrays: Any, constants: Any, global_axes: tuple[bool, .
     else:
         found = [part.map(lambda c: jnp.einsum("ijb,ibs->jbs", aligned, c)) for part in parts]
     return jnp.swapaxes(stacked(concatenate(found)), 1, 2)
-

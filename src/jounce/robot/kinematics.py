@@ -7,7 +7,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jounce.jet import Jet, components, concatenate, cross, matvec, sine_cosine
+from jounce.errors import RobotError, did_you_mean
+from jounce.jet import Jet, sine_cosine
 from jounce.jet.algebra import total
 from jounce.rigid.frames import Frames
 from jounce.robot.batches import Batched, checked
@@ -34,26 +35,27 @@ def body_frames(tree: Tree, q: Any) -> Frames:
     def outward(state: Any, entry: Any) -> tuple[Any, Any]:
         body, coordinate = entry
         coordinate = Jet(tuple(coordinate[:, None]))
-        position, *axes, spin = (Jet(tuple(c)) if c.shape[0] else None for c in read(tree, state, body.parent_slot))
+        *placed, spin = read(tree, state, body.parent_slot)
+        position, *axes = (Jet(tuple(c)) for c in placed)
         position = position + _combined(axes, body.position)
         x, y, z = (_combined(axes, body.rotation[:, i]) for i in range(3))
         if tree.shape.turning:
             angle = coordinate * body.turning if tree.shape.sliding else coordinate
             sine, cosine = sine_cosine(angle)
             x, y = x * cosine + y * sine, y * cosine - x * sine
-            if spin is not None:
-                spin = spin + z * angle.differentiate()
+            if levels > 1:
+                spin = spin + stacked(z * angle.differentiate())
         if tree.shape.sliding:
             position = position + z * (coordinate * (1 - body.turning))
-        found = (*(stacked(jet) for jet in (position, x, y, z)), zero[1:] if spin is None else stacked(spin))
+        found = (*(stacked(jet) for jet in (position, x, y, z)), spin)
         return write(tree, state, body.slot, found), found
 
-    _, found = jax.lax.scan(outward, places(tree, base), (entries(tree), jnp.moveaxis(joint_coordinates(tree, q), 1, 0)))
-    position, *axes, spin = (
-        Jet(tuple(jnp.moveaxis(jnp.concatenate([each, fixed[None]]), 0, 2))) if fixed.shape[0] else None
-        for each, fixed in zip(found, base, strict=True)
+    _, found = jax.lax.scan(
+        outward, places(tree, base), (entries(tree), jnp.moveaxis(joint_coordinates(tree, q), 1, 0))
     )
-    return Frames(position, tuple(axes), spin)
+    arrays = [jnp.moveaxis(jnp.concatenate([x, fixed[None]]), 0, 2) for x, fixed in zip(found, base, strict=True)]
+    position, *axes = (Jet(tuple(x)) for x in arrays[:4])
+    return Frames(position, tuple(axes), Jet(tuple(arrays[4])) if levels > 1 else None)
 
 
 def _combined(axes: Any, local: Any) -> Jet:
@@ -76,8 +78,6 @@ def frame_constants(robot: Robot, link: str, point: Any) -> tuple[Any, Any, Any]
     RobotError
         If there is no such link, or the point is not made of three finite numbers.
     """
-    from jounce.errors import RobotError, did_you_mean
-
     if link not in robot.frames:
         raise RobotError(f"no link has this name; {did_you_mean(link, robot.frames)}", name="link", value=link)
     point = np.asarray(point, float)
@@ -110,7 +110,9 @@ class FrameMotion:
 @Batched
 def _frame_motion(tree: Tree, arrays: Any, constants: Any) -> Any:
     frame = link_frame(tree, arrays[0], constants)
-    spin = stacked(frame.angular_velocity) if frame.angular_velocity is not None else jnp.zeros((0, *frame.position.shape))
+    spin = (
+        stacked(frame.angular_velocity) if frame.angular_velocity is not None else jnp.zeros((0, *frame.position.shape))
+    )
     return stacked(frame.position), stacked(frame.attitude), spin
 
 

@@ -49,6 +49,9 @@ class Limits:
             raise RobotError("the lower limit must not exceed the upper one", value=[self.lower, self.upper])
 
 
+UNLIMITED = Limits()
+
+
 @dataclasses.dataclass(frozen=True)
 class Mimic:
     """A joint that follows another one: its coordinate is ``multiplier * q + offset``."""
@@ -116,7 +119,7 @@ class Joint:
     position: Any = (0.0, 0.0, 0.0)
     rotation: Any = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     axis: Any = (0.0, 0.0, 1.0)
-    limits: Limits = Limits()
+    limits: Limits = UNLIMITED
     mimic: Mimic | None = None
     armature: float = 0.0
     damping: float = 0.0
@@ -130,9 +133,14 @@ class Joint:
         for field, shape in (("position", (3,)), ("rotation", (3, 3)), ("axis", (3,))):
             value = np.array(getattr(self, field), float)
             if value.shape != shape or not np.isfinite(value).all():
-                raise RobotError(f"must be finite numbers of shape {shape}", name=f"{where}.{field}", value=value.tolist())
+                raise RobotError(
+                    f"must be finite numbers of shape {shape}", name=f"{where}.{field}", value=value.tolist()
+                )
             object.__setattr__(self, field, value)
-        if not np.allclose(self.rotation @ self.rotation.T, np.eye(3), rtol=0, atol=1e-6) or np.linalg.det(self.rotation) < 0:
+        if (
+            not np.allclose(self.rotation @ self.rotation.T, np.eye(3), rtol=0, atol=1e-6)
+            or np.linalg.det(self.rotation) < 0
+        ):
             raise RobotError("must be a rotation matrix", name=f"{where}.rotation", value=self.rotation.tolist())
         length = float(np.linalg.norm(self.axis))
         if self.type != "fixed":

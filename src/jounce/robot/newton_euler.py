@@ -88,7 +88,11 @@ def newton_euler(tree: Tree, q: Any, wrenches: Any = None) -> tuple[Any, Any, An
     zero = jnp.zeros((3, samples))
     falling = jnp.broadcast_to(-jnp.asarray(tree.gravity)[:, None], (3, samples))
     base = tuple(jnp.stack(c) for c in ([zero] * order, [zero, falling, *[zero] * (order - 2)]))
-    bodies = (entries(tree), jnp.moveaxis(coordinates, 1, 0), wrenches if wrenches is None else jnp.moveaxis(wrenches, 1, 0))
+    bodies = (
+        entries(tree),
+        jnp.moveaxis(coordinates, 1, 0),
+        wrenches if wrenches is None else jnp.moveaxis(wrenches, 1, 0),
+    )
 
     def outward(state: Any, entry: Any) -> tuple[Any, Any]:
         body, coordinate, applied = entry

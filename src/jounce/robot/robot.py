@@ -154,9 +154,9 @@ class Robot:
         """Return the robot on a base that moves freely: three slides along x, y, z, then three turns.
 
         The coordinates base_x, base_y, base_z (m) and base_angle_1 to 3 (rad) come first in q. Their generalised forces
-        are those that would have to hold the base; for one that is free, prescribe its motion and read how far from zero
-        they are. The angles have a singular orientation (the second at a right angle for ``ZYX``): choose a sequence that
-        stays away from it.
+        are those that would have to hold the base: for one that is free, they tell how far a motion is from what
+        physics allows. The angles have a singular orientation (for ``ZYX`` the second at a right angle): choose a
+        sequence that stays away from it.
 
         Parameters
         ----------
@@ -184,7 +184,9 @@ class Robot:
 
     def _check_mimic(self, joint: Joint) -> None:
         if joint.mimic is not None and joint.mimic.joint not in self.joint_names:
-            message = f"must follow a moving joint that follows no other; {did_you_mean(joint.mimic.joint, self.joint_names)}"
+            message = (
+                f"must follow a moving joint that follows no other; {did_you_mean(joint.mimic.joint, self.joint_names)}"
+            )
             raise RobotError(message, name=f"joints.{joint.name}.mimic", value=joint.mimic.joint)
 
 

@@ -11,7 +11,7 @@ from jounce.robot.tree import Tree
 
 
 def joint_coordinates(tree: Tree, q: Any) -> Any:
-    """Return the coordinates of the bodies, (order + 1, bodies, batch), from those of q; both as Taylor coefficients."""
+    """Return the coordinates of the bodies, (order + 1, bodies, batch), from q; both as Taylor coefficients."""
     if tree.shape.direct:
         return q
     q = jnp.take(q, jnp.asarray(tree.coordinate), axis=1) * jnp.asarray(tree.multiplier)[:, None]

@@ -104,15 +104,17 @@ def ordered(links: Mapping[str, Link], joints: Mapping[str, Joint]) -> list[Join
         if joint.child in parents:
             first = parents[joint.child].name
             message = (
-                f"link {joint.child} is the child of two joints, {first} and {joint.name}: a loop, which a tree cannot have; "
-                "leave one of them out"
+                f"link {joint.child} is the child of two joints, {first} and {joint.name}: a loop, which a tree cannot "
+                "have; leave one of them out"
             )
             raise RobotError(message, name=f"joints.{joint.name}.child", value=joint.child)
         parents[joint.child] = joint
         children[joint.parent].append(joint)
     roots = [name for name in links if name not in parents]
     if not roots:
-        raise RobotError("the joints form a loop: every link is the child of a joint, and none can be the base", name="joints")
+        raise RobotError(
+            "the joints form a loop: every link is the child of a joint, and none can be the base", name="joints"
+        )
     if len(roots) > 1:
         message = "exactly one link must be no joint's child, the base; join the others to it"
         raise RobotError(message, name="links", value=roots)

@@ -2,11 +2,13 @@
 
 import dataclasses
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 
 from jounce.errors import RobotError, did_you_mean
 from jounce.jet import Jet, compose
@@ -25,7 +27,7 @@ class Wrench:
         Name of the link that it acts on.
     force, torque : array_like or callable, default zero
         N and N m. Shape (3,): constant. Shape (..., order - 1, 3): values and derivatives in time for each sample, as
-        the torques that are asked for. A callable maps the time, a scalar in s, to three components, with JAX functions.
+        many as torques are asked for. A callable maps the time, a scalar in s, to three components, by JAX functions.
     point : array_like of shape (3,), default zero
         Where the force acts, in the frame of the link, m.
     frame : {"base", "link"}, default "base"
@@ -52,7 +54,9 @@ class Wrench:
             raise RobotError("must be three finite numbers", name="wrench.point", value=point.tolist())
 
 
-def wrench_arrays(robot: Robot, wrenches: Sequence[Wrench], lead: tuple[int, ...], levels: int, time: Any) -> tuple[Any, ...]:
+def wrench_arrays(
+    robot: Robot, wrenches: Sequence[Wrench], lead: tuple[int, ...], levels: int, time: Any
+) -> tuple[Any, ...]:
     """Return the wrenches as arrays of plain derivatives, of shape (..., levels, 6): force, then torque.
 
     Raises
@@ -67,8 +71,12 @@ def wrench_arrays(robot: Robot, wrenches: Sequence[Wrench], lead: tuple[int, ...
             message = f"no link has this name; {did_you_mean(wrench.link, robot.frames)}"
             raise RobotError(message, name=f"{where}.link", value=wrench.link)
         if robot.frames[wrench.link].body < 0:
-            raise RobotError("this link is fixed to the base: nothing moves it", name=f"{where}.link", value=wrench.link)
-        parts = [_derivatives(f"{where}.{name}", getattr(wrench, name), lead, levels, time) for name in ("force", "torque")]
+            raise RobotError(
+                "this link is fixed to the base: nothing moves it", name=f"{where}.link", value=wrench.link
+            )
+        parts = [
+            _derivatives(f"{where}.{name}", getattr(wrench, name), lead, levels, time) for name in ("force", "torque")
+        ]
         arrays.append(jnp.concatenate(parts, axis=-1) if _traced(parts) else np.concatenate(parts, axis=-1))
     return tuple(arrays)
 
@@ -81,21 +89,22 @@ def _derivatives(where: str, value: Any, lead: tuple[int, ...], levels: int, tim
         instants = jnp.asarray(time, float)
         if instants.shape != lead:
             raise RobotError(f"must have one instant for each sample, shape {lead}", name="time", value=instants.shape)
-        jet = compose(lambda t: jnp.stack([jnp.asarray(x, float) for x in value(t)]), Jet.variable(instants, levels - 1))
-        return jnp.moveaxis(jet.derivatives(), (0, 1), (-2, -1))
+        jet = Jet.variable(instants, levels - 1)
+        parts = [compose(partial(_component, value, i), jet).derivatives() for i in range(3)]
+        return jnp.moveaxis(jnp.stack(parts, axis=1), (0, 1), (-2, -1))
     array = value if isinstance(value, jax.Array) else np.asarray(value, float)
     if array.shape == (3,):
-        constant = jnp.zeros(shape) if _traced([array]) else np.zeros(shape)
-        return constant.at[..., 0, :].set(array) if isinstance(constant, jax.Array) else _with_value(constant, array)
+        level = np.zeros((levels, 1))
+        level[0] = 1.0
+        return level * array * np.ones(shape)
     if array.shape != shape:
         raise RobotError(f"must have the shape (3,) or {shape}", name=where, value=array.shape)
     return array
 
 
-def _with_value(zeros: np.ndarray, value: np.ndarray) -> np.ndarray:
-    zeros[..., 0, :] = value
-    return zeros
+def _component(function: Any, index: int, time: Any) -> Any:
+    return jnp.asarray(function(time)[index], float)
 
 
 def _traced(arrays: Sequence[Any]) -> bool:
-    return any(isinstance(x, jax.core.Tracer) for x in arrays)
+    return any(isinstance(x, Tracer) for x in arrays)

@@ -1,0 +1,245 @@
+"""Kinetic energy and acceleration energies of any order, with their rates. Negrean 2025, equations 65-120.
+
+The acceleration energy of order p is the kinetic energy with derivatives of order p + 1 in the place of velocities,
+``E_p = 1/2 integral |r^(p+1)|^2 dm``; order 0 is the kinetic energy. With the second moments S of a body about its
+centre of mass C and its axes a this is ``m/2 |r_C^(p+1)|^2 + 1/2 sum S_jk a_j^(p+1) . a_k^(p+1)`` (equation 107), exact
+for any motion. On jets the same two products give the rates.
+"""
+
+import dataclasses
+import math
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+
+from jounce.errors import MechanismError, RobotError
+from jounce.jet import Jet, dot
+from jounce.jet.algebra import total
+from jounce.kinematics import Motion, Status
+from jounce.kinematics.compilation import compiled
+from jounce.mechanism.resolve import resolve
+from jounce.rigid.frames import Frames
+from jounce.robot.batches import Batched, checked
+from jounce.robot.kinematics import body_frames
+from jounce.robot.robot import Robot
+from jounce.robot.scan import stacked
+from jounce.robot.tree import Tree
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Energy:
+    """An energy of several bodies, translation and rotation apart, with its rates.
+
+    Parameters
+    ----------
+    translation, rotation : array of shape (..., rates + 1, bodies)
+        The parts of each body, kg m^2 / s^(2 p + 2) for order p, and their derivatives.
+    bodies : tuple of str
+        Names along the last axis.
+    order : int
+        The order p of the energy; 0 is the kinetic energy.
+    """
+
+    translation: Any
+    rotation: Any
+    bodies: tuple[str, ...]
+    order: int
+
+    @property
+    def total(self) -> Any:
+        """Energy of all bodies and its rates, shape (..., rates + 1)."""
+        return (self.translation + self.rotation).sum(axis=-1)
+
+
+def body_energy(pose: Any, mass: Any, center_of_mass: Any, second_moments: Any, order: int = 1) -> tuple[Jet, Jet]:
+    """Return the acceleration energy of rigid bodies as jets: Negrean 2025, equations 82-113.
+
+    Parameters
+    ----------
+    pose : SpatialPose, PlanarPose or Frames
+        Where the bodies are, as jets of order `order` + 1 or more.
+    mass : array_like
+        kg; its shape is that of the batch axes of the pose.
+    center_of_mass : array of shape (3, ...) or (2, ...)
+        In the frames of the bodies, m.
+    second_moments : array of shape (3, 3, ...) or (2, 2, ...)
+        Integral of rho rho^T dm about the centre of mass, in the frames of the bodies, kg m^2.
+    order : int, default 1
+        Order p of the energy; 0 is the kinetic energy.
+
+    Returns
+    -------
+    translation, rotation : Jet
+        Shorter than the pose by `order` + 1.
+
+    Raises
+    ------
+    ValueError
+        If the pose has too few derivatives.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> angle = jn.Jet([0.0, 2.0, 1.5])  # a disc of 1 kg m^2 that turns in the plane, at 2 rad/s and 3 rad/s^2
+    >>> pose = jn.rigid.PlanarPose.from_jets(jn.Jet.constant([0.0, 0.0], 2), angle)
+    >>> _, rotation = jn.dynamics.body_energy(pose, 1.0, [0.0, 0.0], [[0.5, 0.0], [0.0, 0.5]])
+    >>> float(rotation.coefficients[0])  # (3^2 + 2^4) / 2
+    12.5
+    """
+    velocity = _differentiated(pose.point(center_of_mass), order + 1)
+    rates = [_differentiated(axis, order + 1) for axis in _axes(pose)]
+    translation = dot(velocity, velocity) * (0.5 * mass)
+    size = range(len(rates))
+    rotation = total(
+        dot(rates[i], rates[k]) * ((0.5 if i == k else 1.0) * second_moments[i][k])
+        for i in size
+        for k in size
+        if i <= k
+    )
+    return translation, rotation
+
+
+def _axes(pose: Any) -> tuple[Jet, ...]:
+    if hasattr(pose, "axes"):
+        return pose.axes
+    return tuple(pose.direction(unit) for unit in np.eye(2))  # a planar body
+
+
+def _differentiated(jet: Jet, times: int) -> Jet:
+    if jet.order < times:
+        raise ValueError(f"the pose has derivatives to order {jet.order}, this energy needs order {times}")
+    for _ in range(times):
+        jet = jet.differentiate()
+    return jet
+
+
+def acceleration_energy(system: Robot | Motion, q: Any = None, *, order: int = 1) -> Energy:
+    """Return the acceleration energy of order p of a robot or of a moving mechanism, and its rates.
+
+    Negrean 2025, equations 73-78 for order 0, 82-113 for order 1, 107 for any order.
+
+    Parameters
+    ----------
+    system : Robot or Motion
+        A robot, or the motion of a mechanism whose bodies have masses.
+    q : array_like of shape (..., K + 1, n), optional
+        Coordinates of a robot and their derivatives, K at least p + 1.
+    order : int, default 1
+        The order p; 0 is the kinetic energy.
+
+    Returns
+    -------
+    Energy
+        With K - p - 1 rates; for a motion of derivatives to order K, one for each instant.
+
+    Raises
+    ------
+    RobotError, MechanismError
+        If derivatives are missing, q does not fit the robot, or no body of the mechanism has a mass.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> rod = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0], tensor=[0, 1 / 12, 1 / 12])
+    >>> links, pin = [jn.Link("base"), jn.Link("rod", rod)], jn.Joint("pin", "base", "rod")
+    >>> robot = jn.Robot("one", links, [pin])
+    >>> float(jn.acceleration_energy(robot, [[0.0], [2.0], [3.0]]).total[0].round(12))  # (3^2 + 2^4) / 3 / 2
+    4.166666666667
+    """
+    if isinstance(order, bool) or not isinstance(order, int | np.integer) or order < 0:
+        raise RobotError("must be a whole number, 0 or greater", name="order", value=order)
+    order = int(order)
+    if isinstance(system, Motion):
+        return _of_motion(system, order)
+    q = checked(system, q, 0)
+    if q.shape[-2] < order + 2:
+        message = f"an energy of order {order} needs derivatives of q to order {order + 1}"
+        raise RobotError(message, name="q", value=q.shape)
+    translation, rotation = _of_robot(system, (q,), (), (order,))
+    return Energy(translation, rotation, system.moving_links, order)
+
+
+def kinetic_energy(system: Robot | Motion, q: Any = None) -> Energy:
+    """Return the kinetic energy of a robot or of a moving mechanism, and its rates: `acceleration_energy` of order 0.
+
+    Negrean 2025, equations 65-78 (Koenig's theorem).
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> slide = jn.robot.Screw([1, 0, 0], type="prismatic", inertia=jn.Inertia(2.0))
+    >>> jn.kinetic_energy(jn.robot.from_screws([slide]), [[0.0], [3.0], [1.0]]).total.tolist()  # energy and power
+    [9.0, 6.0]
+    """
+    return acceleration_energy(system, q, order=0)
+
+
+def robot_energy(tree: Tree, frames: Frames, order: int) -> tuple[Jet, Jet]:
+    """Return the energy of the bodies of a robot as jets of shape (bodies, batch), from the frames of the bodies."""
+    tensor = jnp.moveaxis(jnp.asarray(tree.inertia), 0, -1)[..., None]
+    spread = 0.5 * (tensor[0, 0] + tensor[1, 1] + tensor[2, 2])
+    moments = [[(spread if i == k else 0.0) - tensor[i, k] for k in range(3)] for i in range(3)]
+    center = jnp.swapaxes(jnp.asarray(tree.center), 0, 1)[:, :, None]
+    return body_energy(frames, jnp.asarray(tree.mass)[:, None], center, moments, order)
+
+
+@Batched
+def _of_robot(tree: Tree, arrays: Any, _: Any, order: int) -> Any:
+    frames = body_frames(tree, arrays[0]).without_base()
+    return tuple(stacked(part) for part in robot_energy(tree, frames, order))
+
+
+def _of_motion(motion: Motion, order: int) -> Energy:
+    if motion.order < order + 1:
+        message = f"an energy of order {order} needs a motion solved to order {order + 1}"
+        raise MechanismError(message, name="order", value=motion.order)
+    pose_type, coordinates = motion.poses
+    parts = _evaluated(coordinates, *mechanism_masses(motion), pose_type, order)
+    bad = (motion.status != Status.OK)[:, None, None]
+
+    def derivatives(coefficients: Any) -> np.ndarray:
+        factorials = np.array([float(math.factorial(k)) for k in range(len(coefficients))])
+        values = np.asarray(coefficients) * factorials[:, None, None]  # order, body, time
+        return np.where(bad, np.nan, np.moveaxis(values[:, 1:], -1, 0))  # without the ground
+
+    translation, rotation = (derivatives(part[: motion.order - order]) for part in parts)
+    return Energy(translation, rotation, tuple(motion.mechanism.bodies), order)
+
+
+@compiled("pose_type", "order")
+def _evaluated(coordinates: Any, mass: Any, center: Any, moments: Any, pose_type: Any, order: int) -> Any:
+    pose = pose_type.from_coordinates({name: Jet(tuple(c)) for name, c in coordinates.items()})
+    return tuple(stacked(part) for part in body_energy(pose, mass, center, moments, order))
+
+
+def mechanism_masses(motion: Motion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return masses (bodies, 1), centres of mass (k, bodies, 1) and second moments (k, k, bodies, 1), the ground first.
+
+    Raises
+    ------
+    MechanismError
+        If no body has a mass, or a body has an inertia without a mass.
+    """
+    mechanism = motion.mechanism
+    planar = mechanism.space == "planar"
+    size = 2 if planar else 3
+    parameters = mechanism.parameter_values
+    masses, centers, moments = [0.0], [np.zeros(size)], [np.zeros((size, size))]
+    for name, body in mechanism.bodies.items():
+        if body.mass is None and body.inertia is not None:
+            raise MechanismError("an inertia needs a mass beside it", name=f"bodies.{name}.mass")
+        center = resolve([0.0] * size if body.center_of_mass is None else body.center_of_mass, parameters)
+        inertia = resolve(0.0 if body.inertia is None else body.inertia, parameters)
+        masses.append(float(resolve(0.0 if body.mass is None else body.mass, parameters)))
+        centers.append(np.asarray(center, float))
+        if planar:  # the second moments of a plane body about its axes are not known apart, and only their sum counts
+            moments.append(np.eye(2) * np.asarray(inertia, float) / 2)
+        else:
+            tensor = np.asarray(inertia, float)
+            tensor = np.diag(tensor) if tensor.ndim == 1 else tensor * np.ones((3, 3))
+            moments.append(np.trace(tensor) / 2 * np.eye(3) - tensor)
+    if not any(masses):
+        raise MechanismError("no body has a mass; energies need some", name="bodies")
+    center, second = (np.moveaxis(np.stack(x), 0, -1)[..., None] for x in (centers, moments))
+    return np.array(masses)[:, None], center, second

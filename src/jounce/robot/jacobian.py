@@ -1,0 +1,112 @@
+"""Jacobians with their rates, and operational accelerations of any order. Negrean 2025, equations 55-59."""
+
+from typing import Any
+
+import jax.numpy as jnp
+
+from jounce.jet import Jet, concatenate, cross
+from jounce.robot.batches import Batched, checked
+from jounce.robot.kinematics import body_frames, frame_constants, link_frame
+from jounce.robot.robot import Robot
+from jounce.robot.scan import stacked
+from jounce.robot.tree import Tree
+
+
+def jacobian_jet(tree: Tree, q: Any, constants: Any) -> Jet:
+    """Return the Jacobian of a frame as a jet of shape (6, coordinates, batch), linear rows first."""
+    body, position, _ = constants
+    frames = body_frames(tree, q)
+    target = frames.take(body).point(position)[:, None]
+    bodies = frames.without_base()
+    axis = bodies.axes[2]
+    turning = jnp.asarray(tree.turning)[:, None]
+    moved = jnp.asarray(tree.ancestors)[body][:, None] * jnp.asarray(tree.multiplier)[:, None]
+    linear = cross(axis, target - bodies.position) * turning + axis * (1 - turning)
+    columns = concatenate([linear, axis * turning]) * moved
+    if tree.shape.direct:
+        return columns
+    shape = (6, tree.shape.coordinates, q.shape[-1])
+    return columns.map(lambda c: jnp.zeros(shape).at[:, jnp.asarray(tree.coordinate)].add(c))
+
+
+@Batched
+def _jacobian(tree: Tree, arrays: Any, constants: Any) -> Any:
+    return stacked(jacobian_jet(tree, arrays[0], constants))
+
+
+def jacobian(robot: Robot, q: Any, link: str, point: Any = (0.0, 0.0, 0.0)) -> Any:
+    """Return the Jacobian of a point of a link and its time derivatives, to any order.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    q : array_like of shape (..., order + 1, n)
+        Coordinates and their derivatives, rad or m; the order may be 0.
+    link : str
+        Name of the link.
+    point : array_like of shape (3,), default the origin
+        Point in the frame of the link, m.
+
+    Returns
+    -------
+    array of shape (..., order + 1, 6, n)
+        ``J, J', J'', ...``: three rows for the velocity of the point, three for the angular velocity, in the frame of
+        the base.
+
+    Raises
+    ------
+    RobotError
+        If there is no such link, or q does not fit the robot.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> rod = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0])
+    >>> links, pin = [jn.Link("base"), jn.Link("rod", rod)], jn.Joint("pin", "base", "rod")
+    >>> jn.jacobian(jn.Robot("one", links, [pin]), [[0.0]], "rod", [2, 0, 0])[0, :, 0].tolist()
+    [0.0, 2.0, 0.0, 0.0, 0.0, 1.0]
+    """
+    return _jacobian(robot, (checked(robot, q, 0),), frame_constants(robot, link, point))
+
+
+def twist(tree: Tree, q: Any, constants: Any) -> Jet:
+    """Return the velocity of a point and the angular velocity of its link, (6, batch), one order shorter than q."""
+    frame = link_frame(tree, q, constants)
+    return concatenate([frame.position.differentiate(), frame.angular_velocity])
+
+
+@Batched
+def _operational(tree: Tree, arrays: Any, constants: Any) -> Any:
+    return stacked(twist(tree, arrays[0], constants))
+
+
+def operational_accelerations(robot: Robot, q: Any, link: str, point: Any = (0.0, 0.0, 0.0)) -> Any:
+    """Return the operational velocity and accelerations of all orders of a point of a link: Negrean 2025, equation 59.
+
+    Parameters
+    ----------
+    robot, q, link, point
+        As for `jacobian`, with q of order 1 or more.
+
+    Returns
+    -------
+    array of shape (..., order, 6)
+        ``X', X'', ..., X^(order)``: the velocity of the point and the angular velocity, then their derivatives, in the
+        frame of the base. Equal to the sum of ``C(m - 1, k) J^(k) q^(m - k)``.
+
+    Raises
+    ------
+    RobotError
+        If there is no such link, or q does not fit the robot.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> rod = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0])
+    >>> links, pin = [jn.Link("base"), jn.Link("rod", rod)], jn.Joint("pin", "base", "rod")
+    >>> robot = jn.Robot("one", links, [pin])
+    >>> jn.operational_accelerations(robot, [[0.0], [2.0], [0.0]], "rod", [1, 0, 0]).tolist()
+    [[0.0, 2.0, 0.0, 0.0, 0.0, 2.0], [-4.0, 0.0, 0.0, 0.0, 0.0, 0.0]]
+    """
+    return _operational(robot, (checked(robot, q, 1),), frame_constants(robot, link, point))
