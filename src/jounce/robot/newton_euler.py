@@ -6,6 +6,7 @@ frame, ``f = p' + w x p``; these two products and the turns from frame to frame 
 a base that accelerates the other way.
 """
 
+import dataclasses
 from typing import Any
 
 import jax
@@ -17,40 +18,51 @@ from jounce.robot.scan import entries, joint_coordinates, places, read, stacked,
 from jounce.robot.tree import Tree
 
 
+def once(value: Any) -> Any:
+    """Return a value as it is, kept by XLA, which otherwise computes it again for every use: this halves the time."""
+    return jax.lax.optimization_barrier(value)
+
+
+@jax.tree_util.register_dataclass
+@dataclasses.dataclass(frozen=True)
 class Turn:
     """The rotation from a body to its parent, ``M Rz(d)``: a matrix for each sample, and a jet of the turn since then.
 
     The jet starts at zero, so that sine and ``cosine - 1`` have no first coefficients, and most products vanish.
     """
 
-    def __init__(self, tree: Tree, body: Tree, coordinate: Jet):
+    matrix: Any
+    sine: Jet | None = None
+    versine: Jet | None = None
+
+    @classmethod
+    def of(cls, tree: Tree, body: Tree, coordinate: Jet) -> "Turn":
+        """Return the rotation of a body whose joint has this coordinate, shape (1, batch)."""
         placement = body.rotation[:, :, None]
-        self.sine = self.versine = None
         if not tree.shape.turning:
-            self.matrix = placement
-            return
+            return cls(placement)
         angle = coordinate * body.turning if tree.shape.sliding else coordinate
         sine, cosine = jnp.sin(angle.coefficients[0])[None], jnp.cos(angle.coefficients[0])[None]
         x, y, z = placement[:, 0:1], placement[:, 1:2], placement[:, 2:3]
         along = jnp.broadcast_to(z, (3, *sine.shape[1:]))
-        self.matrix = jnp.concatenate([x * cosine + y * sine, y * cosine - x * sine, along], axis=1)
+        matrix = jnp.concatenate([x * cosine + y * sine, y * cosine - x * sine, along], axis=1)
         s, c = [None], [1.0]
         for _ in range(angle.order):
             following = next_sine_cosine(s, c, angle)
             s.append(following[0])
             c.append(following[1])
-        self.sine, self.versine = Jet(s), Jet([None, *c[1:]])
+        return cls(matrix, Jet(s), Jet([None, *c[1:]]))
 
     def outward(self, vector: Jet) -> Jet:
         """Take a vector from the parent's frame to that of the body."""
-        return self._turned(matvec(jnp.swapaxes(self.matrix, 0, 1), vector), 1)
+        return self._turned(once(matvec(jnp.swapaxes(self.matrix, 0, 1), vector)), 1)
 
     def inward(self, vector: Jet) -> Jet:
         """Take a vector from the frame of the body to the parent's."""
-        return matvec(self.matrix, self._turned(vector, -1))
+        return matvec(self.matrix, once(self._turned(vector, -1)))
 
     def _turned(self, vector: Jet, sign: int) -> Jet:
-        if self.sine is None:
+        if self.sine is None or self.versine is None:
             return vector
         x, y, z = components(vector)
         across = [bilinear(jnp.multiply, self.sine, part) for part in (y, x)]
@@ -97,7 +109,7 @@ def newton_euler(tree: Tree, q: Any, wrenches: Any = None) -> tuple[Any, Any, An
     def outward(state: Any, entry: Any) -> tuple[Any, Any]:
         body, coordinate, applied = entry
         coordinate = Jet(tuple(coordinate[:, None]))
-        turn = Turn(tree, body, coordinate)
+        turn = Turn.of(tree, body, coordinate)
         w, v = (Jet(tuple(c)) for c in read(tree, state, body.parent_slot))
         w, v = turn.outward(w), turn.outward(v + cross(w, _constant(body.position)))
         slide = None
@@ -110,20 +122,20 @@ def newton_euler(tree: Tree, q: Any, wrenches: Any = None) -> tuple[Any, Any, An
             slide = coordinate * (1 - body.turning)
             x, y, z = components(w)
             v = v + concatenate([y * slide, -(x * slide), rate * (1 - body.turning)])
+        w, v = once((w, v))
         momentum = (v + cross(w, _constant(body.center))) * body.mass
         spin = matvec(body.inertia[:, :, None], w)
+        momentum, spin = once((momentum, spin))
         force = momentum.differentiate() + cross(w, momentum)
         moment = spin.differentiate() + cross(w, spin) + cross(_constant(body.center), force)
         if applied is not None:
             force = Jet(f - a[:3] for f, a in zip(force.coefficients, applied, strict=True))
             moment = Jet(m - a[3:] for m, a in zip(moment.coefficients, applied, strict=True))
         state = write(tree, state, body.slot, (stacked(w), stacked(v)))
-        return state, (force.dense(), moment.dense(), turn.matrix, turn.sine, turn.versine, slide)
+        return state, (force.dense(), moment.dense(), turn, slide)
 
     def inward(state: Any, entry: Any) -> tuple[Any, Any]:
-        body, (force, moment, matrix, sine, versine, slide) = entry
-        turn = object.__new__(Turn)
-        turn.matrix, turn.sine, turn.versine = matrix, sine, versine
+        body, (force, moment, turn, slide) = entry
         from_children = read(tree, state, body.slot)
         force, moment = (own + Jet(tuple(c)) for own, c in zip((force, moment), from_children, strict=True))
         along = Jet(c[2] for c in moment.coefficients)
