@@ -77,4 +77,4 @@ from jounce.trajectory import (  # noqa: E402
     SplineMotion as SplineMotion,
 )
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"

@@ -13,7 +13,7 @@ from jounce.jet.algebra import total
 from jounce.rigid.frames import Frames
 from jounce.robot.batches import Batched, checked
 from jounce.robot.robot import Robot
-from jounce.robot.scan import entries, joint_coordinates, places, read, stacked, write
+from jounce.robot.scan import entries, joint_coordinates, once, places, read, stacked, write
 from jounce.robot.tree import Tree
 
 
@@ -42,6 +42,7 @@ def body_frames(tree: Tree, q: Any) -> Frames:
         if tree.shape.turning:
             angle = coordinate * body.turning if tree.shape.sliding else coordinate
             sine, cosine = sine_cosine(angle)
+            sine, cosine, x, y, z = once((sine, cosine, x, y, z))
             x, y = x * cosine + y * sine, y * cosine - x * sine
             if levels > 1:
                 spin = spin + stacked(z * angle.differentiate())

@@ -14,13 +14,8 @@ import jax.numpy as jnp
 
 from jounce.jet import Jet, components, concatenate, cross, matvec, next_sine_cosine
 from jounce.jet.algebra import bilinear
-from jounce.robot.scan import entries, joint_coordinates, places, read, stacked, write
+from jounce.robot.scan import entries, joint_coordinates, once, places, read, stacked, write
 from jounce.robot.tree import Tree
-
-
-def once(value: Any) -> Any:
-    """Return a value as it is, kept by XLA, which otherwise computes it again for every use: this halves the time."""
-    return jax.lax.optimization_barrier(value)
 
 
 @jax.tree_util.register_dataclass
