@@ -1,4 +1,4 @@
-"""Exact time derivatives of any order of mechanisms: velocity, acceleration, jerk, jounce and beyond.
+"""Exact time derivatives of any order of mechanisms and robots: velocity to jounce and beyond, torques and their rates.
 
 Importing this package switches JAX to double precision (``jax_enable_x64``); it has no other side effect.
 """
@@ -38,7 +38,7 @@ from jounce.errors import (  # noqa: E402
     TrajectoryError as TrajectoryError,
     UnitError as UnitError,
 )
-from jounce.io import load as load  # noqa: E402
+from jounce.io import load as load, load_robot as load_robot, load_trajectory as load_trajectory  # noqa: E402
 from jounce.jet import Jet as Jet, compose as compose  # noqa: E402
 from jounce.kinematics import Motion as Motion, Status as Status, solve as solve  # noqa: E402
 from jounce.mechanism import (  # noqa: E402
@@ -71,10 +71,16 @@ from jounce.robot import (  # noqa: E402
     operational_accelerations as operational_accelerations,
 )
 from jounce.trajectory import (  # noqa: E402
+    CycloidalMotion as CycloidalMotion,
     Expression as Expression,
     ExpressionMotion as ExpressionMotion,
     FunctionMotion as FunctionMotion,
+    JointTrajectory as JointTrajectory,
+    PolynomialMotion as PolynomialMotion,
+    RestToRestMotion as RestToRestMotion,
     SplineMotion as SplineMotion,
+    TrapezoidalMotion as TrapezoidalMotion,
+    motion_profile as motion_profile,
 )
 
 __version__ = "0.2.0"

@@ -1,0 +1,106 @@
+"""Robots from files."""
+
+from __future__ import annotations
+
+from os import PathLike, fspath
+from pathlib import Path
+
+from jounce.errors import RobotFileError
+from jounce.io.markup import Element, read_markup
+from jounce.io.mjcf import read_mjcf
+from jounce.io.urdf import read_urdf
+from jounce.robot.robot import Robot
+
+__all__ = ["load_robot"]
+
+ENDINGS = (".urdf", ".xml")
+XACRO = "is a xacro file, from which a URDF has yet to be made; run: xacro FILE.urdf.xacro > FILE.urdf"
+
+
+def load_robot(path: str | PathLike[str], *, floating_base: bool | str = False, massless: bool = False) -> Robot:
+    """Read a robot from a URDF or MJCF file.
+
+    Which of the two it is, the root element says. Only what moves is read: links, joints and their limits, masses and
+    inertias, from MJCF also gravity and the forces of actuators; shapes and meshes need not be there. URDF needs the
+    extra ``robots``, MJCF the extra ``mjcf``.
+
+    Parameters
+    ----------
+    path
+        A file ending in .urdf or .xml.
+    floating_base : bool or str, default False
+        Set the base free, by three slides and three turns, as `Robot.with_floating_base` does; three letters give the
+        sequence of the turns. A base that is only a massless frame with one link fixed to it is left out.
+    massless : bool, default False
+        Take URDF links that move and have no mass as massless pieces between joints, as long as they carry some mass.
+
+    Returns
+    -------
+    Robot
+        Its frames, links and joints have the names of the file.
+
+    Raises
+    ------
+    RobotFileError
+        The file cannot be read or describes no possible robot: the message names the file, the line, the entry and the
+        value.
+
+    Examples
+    --------
+    >>> from jounce.io.robots import load_robot
+    >>> robot = load_robot("examples/robots/scara.urdf")
+    >>> robot.joint_names
+    ('shoulder', 'elbow', 'quill', 'wrist')
+    >>> robot.limits["quill"].effort
+    220.0
+    """
+    name = fspath(path)
+    name = name if isinstance(name, str) else str(name)
+    if not name:
+        raise RobotFileError("the name of a file is needed", value=name)
+    suffix = Path(name).suffix.lower()
+    if suffix == ".xacro":
+        raise RobotFileError(XACRO, path=name)
+    if suffix not in ENDINGS and not Path(name).is_dir():
+        message = f"the kind of a robot file is told by its ending; valid: {', '.join(ENDINGS)}"
+        raise RobotFileError(message, path=name)
+    root = read_markup(name)
+    if root.tag == "robot":
+        _check_expanded(root)
+        robot = read_urdf(root, massless)
+    elif root.tag == "mujoco":
+        if suffix != ".xml":
+            raise RobotFileError("MuJoCo reads MJCF only from files whose names end in .xml; rename it", path=name)
+        robot = read_mjcf(root)
+    else:
+        message = "is no robot file; the root element of a URDF is <robot>, that of an MJCF file is <mujoco>"
+        raise root.error(message, value=f"<{root.tag}>")
+    if floating_base is False:
+        return robot
+    return _released(robot, "ZYX" if floating_base is True else floating_base, name)
+
+
+def _check_expanded(root: Element) -> None:
+    """Refuse what xacro has yet to work out."""
+    for element in root.walk():
+        if element.tag.startswith("xacro:"):
+            raise element.error(XACRO, value=f"<{element.tag}>")
+        for value in element.attributes.values():
+            if "${" in value or "$(" in value:
+                raise element.error(XACRO, value=value)
+
+
+def _released(robot: Robot, sequence: str, path: str) -> Robot:
+    """Return the robot on a floating base, which takes the name world."""
+    joints = list(robot.joints.values())
+    attached = [joint for joint in joints if joint.parent == robot.base]
+    if len(attached) == 1 and not attached[0].moving and robot.links[robot.base].inertia is None:
+        links = [link for name, link in robot.links.items() if name != robot.base]
+        robot = Robot(robot.name, links, [joint for joint in joints if joint is not attached[0]], robot.gravity)
+    if "world" in robot.links:
+        message = (
+            "the robot cannot have a floating base: a link named world carries it; rename that link, or set the robot "
+            "free in the file, by a joint of type floating in a URDF or a <freejoint/> in MJCF"
+        )
+        raise RobotFileError(message, path=path, name="links.world")
+    return robot.with_floating_base(sequence)
