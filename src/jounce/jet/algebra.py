@@ -59,7 +59,7 @@ class Jet:
     @classmethod
     def from_derivatives(cls, derivatives: Any) -> "Jet":
         """Return the jet whose plain derivatives ``x, x', x'', ...`` stand along the leading axis."""
-        return cls(x * (1 / math.factorial(k)) for k, x in enumerate(derivatives))
+        return cls(jnp.asarray(x, float) * (1 / math.factorial(k)) for k, x in enumerate(derivatives))
 
     def derivatives(self) -> jax.Array:
         """Return the plain derivatives ``x, x', x'', ...`` along a new leading axis."""

@@ -1,0 +1,253 @@
+"""Angular velocity of any order from samples of the attitude: a spline of unit quaternions, evaluated on jets."""
+
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+
+from jounce.errors import JounceError, TrajectoryError
+from jounce.jet import Jet, cross, dot, sqrt, stack, transpose
+from jounce.rigid.orientation import angular_velocity, check_rotation
+from jounce.rigid.rotations import is_traced, rotation_matrix
+
+HIGHEST_DEGREE = 11
+UNIT = 1e-6  # how far the length of a sampled quaternion may be from one: printed digits, single precision
+
+
+class AttitudeSamples:
+    """Attitude of a body interpolated through samples in time.
+
+    A spline runs through the unit quaternions of the samples, their signs chosen so that neighbours are near; at any
+    instant it is scaled to unit length as a jet, so that attitude and angular velocity are exact derivatives of the
+    interpolated motion. How near this comes to the true motion depends on the spacing of the samples: the error of the
+    n-th derivative of the attitude falls as spacing^(degree + 1 - n).
+
+    Parameters
+    ----------
+    times : array_like of shape (samples,)
+        Strictly increasing instants, s.
+    quaternions : array_like of shape (samples, 4)
+        Unit quaternions (e0, e1, e2, e3), the scalar first, from the body to the global frame; of either sign.
+    degree : int, default 5
+        Degree of the spline, from 2 to 11; derivatives of the attitude up to ``degree - 1`` are continuous. At least
+        ``degree + 1`` samples are needed.
+
+    Raises
+    ------
+    TrajectoryError
+        If the samples are too few for the degree, not finite, not increasing in time, of unequal number, not of unit
+        length, or so far apart that the turn between neighbours is half a turn, of unknown sense.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import jounce as jn
+    >>> t = np.linspace(0.0, 1.0, 41)
+    >>> angles = np.stack([0.5 * t**2, 0 * t, 0 * t], axis=1)
+    >>> samples = jn.rigid.AttitudeSamples.from_euler_angles(t, angles, "ZYX")
+    >>> found = samples.angular_velocity(jn.Jet.variable(0.5, order=3))
+    >>> (abs(found.derivatives()[:, 2]) + 0).round(4).tolist()
+    [0.5, 1.0, 0.0]
+    """
+
+    def __init__(self, times: Any, quaternions: Any, degree: int = 5):
+        times, quaternions = np.asarray(times, float), np.asarray(quaternions, float)
+        _check_times(times, quaternions, "quaternions", (4,), degree)
+        length = np.linalg.norm(quaternions, axis=1)
+        bad = np.abs(length - 1) > UNIT
+        if bad.any():
+            first = int(np.flatnonzero(bad)[0])
+            message = (
+                f"a rotation needs a quaternion of unit length; that of sample {first} is of length {length[first]:.9g}"
+            )
+            raise TrajectoryError(message, name="quaternions", value=quaternions[first].tolist())
+        quaternions = _continuous(times, quaternions / length[:, None])
+        from scipy.interpolate import PPoly, make_interp_spline  # here, since importing SciPy takes half a second
+
+        each = [PPoly.from_spline(make_interp_spline(times, component, k=degree)) for component in quaternions.T]
+        inside = np.diff(each[0].x) > 0
+        self.start, self.stop = float(times[0]), float(times[-1])
+        self.degree = degree
+        self._breakpoints = each[0].x[:-1][inside]
+        # (power, component, piece), lowest power first
+        self._coefficients = np.stack([pieces.c[::-1, inside] for pieces in each], axis=1)
+
+    @classmethod
+    def from_rotation_matrices(cls, times: Any, matrices: Any, degree: int = 5) -> "AttitudeSamples":
+        """Build the interpolation from rotation matrices from the body to the global frame, (samples, 3, 3).
+
+        Raises
+        ------
+        TrajectoryError
+            As in the class, and if a matrix is not a rotation.
+        """
+        times, matrices = np.asarray(times, float), np.asarray(matrices, float)
+        _check_times(times, matrices, "matrices", (3, 3), degree)
+        try:
+            check_rotation(np.moveaxis(matrices, 0, -1), "matrices")
+        except JounceError as error:
+            raise TrajectoryError(error.message, name=error.name, value=error.value) from None
+        return cls(times, _quaternions(matrices), degree)
+
+    @classmethod
+    def from_euler_angles(cls, times: Any, angles: Any, sequence: str, degree: int = 5) -> "AttitudeSamples":
+        """Build the interpolation from Euler angles, (samples, 3) in rad, of one of `SEQUENCES`.
+
+        Raises
+        ------
+        TrajectoryError
+            As in the class.
+        JounceError
+            If the sequence is not known.
+        """
+        times, angles = np.asarray(times, float), np.asarray(angles, float)
+        _check_times(times, angles, "angles", (3,), degree)
+        return cls(times, _quaternions(np.moveaxis(np.asarray(rotation_matrix(sequence, angles.T)), -1, 0)), degree)
+
+    def quaternion(self, time: Jet) -> Jet:
+        """Return the unit quaternion (e0, e1, e2, e3) at the instants of a time jet.
+
+        Parameters
+        ----------
+        time : Jet of shape (...)
+            Instants, s, between the first and the last sample, of an order below the degree.
+
+        Returns
+        -------
+        Jet of shape (4, ...)
+            Unit quaternion from the body to the global frame, of the order of `time`.
+
+        Raises
+        ------
+        TrajectoryError
+            If an instant is outside the samples, or the order asked is not below the degree.
+        """
+        instants = time.coefficients[0]
+        if time.order >= self.degree:
+            message = (
+                f"a spline of degree {self.degree} has continuous derivatives up to order {self.degree - 1} only; "
+                f"give degree={time.order + 1} or more (an angular velocity takes one order more of the attitude)"
+            )
+            raise TrajectoryError(message, name="order", value=time.order)
+        self._check_range(instants)
+        piece = jnp.searchsorted(jnp.asarray(self._breakpoints), instants, side="right") - 1
+        piece = jnp.clip(piece, 0, len(self._breakpoints) - 1)
+        local = time - jnp.asarray(self._breakpoints)[piece]
+        powers = jnp.asarray(self._coefficients)[..., piece]  # (power, component, ...)
+        value = Jet.constant(powers[-1], time.order)
+        for c in powers[-2::-1]:
+            value = value * local + c
+        return value / sqrt(dot(value, value))
+
+    def attitude(self, time: Jet) -> Jet:
+        """Return the rotation matrix at the instants of a time jet.
+
+        Parameters
+        ----------
+        time : Jet of shape (...)
+            Instants, s, between the first and the last sample, of an order below the degree.
+
+        Returns
+        -------
+        Jet of shape (3, 3, ...)
+            Rotation matrix from the body to the global frame, of the order of `time`.
+
+        Raises
+        ------
+        TrajectoryError
+            If an instant is outside the samples, or the order asked is not below the degree.
+        """
+        quaternion = self.quaternion(time)
+        scalar, vector = quaternion[0], quaternion[1:]
+        batch = (1,) * (len(quaternion.shape) - 1)
+
+        def turned(axis: Any) -> Jet:
+            return 2.0 * cross(vector, cross(vector, axis) + scalar * axis) + axis
+
+        return transpose(stack([turned(jnp.reshape(axis, (3, *batch))) for axis in jnp.eye(3)]))
+
+    def angular_velocity(self, time: Jet, frame: str = "global") -> Jet:
+        """Return the angular velocity and its derivatives at the instants of a time jet.
+
+        Parameters
+        ----------
+        time : Jet of shape (...)
+            Instants, s, between the first and the last sample: of order 1 for the angular velocity, 2 for the angular
+            acceleration too, and so on, below the degree.
+        frame : {"global", "body"}, default "global"
+            Frame of the components.
+
+        Returns
+        -------
+        Jet of shape (3, ...)
+            Angular velocity, rad/s, one order shorter than `time`.
+
+        Raises
+        ------
+        TrajectoryError
+            If an instant is outside the samples, or the order asked is not below the degree.
+        """
+        return angular_velocity(self.attitude(time), frame)
+
+    def _check_range(self, instants: Any) -> None:
+        if is_traced(instants):
+            return
+        outside = ~((np.asarray(instants) >= self.start) & (np.asarray(instants) <= self.stop))
+        if outside.any():
+            message = f"the samples reach from {self.start:g} to {self.stop:g} s; there is no attitude outside of them"
+            raise TrajectoryError(message, name="time", value=float(np.asarray(instants)[outside].flat[0]))
+
+
+def _check_times(times: np.ndarray, samples: np.ndarray, name: str, shape: tuple[int, ...], degree: int) -> None:
+    if times.ndim != 1 or samples.shape != (*times.shape, *shape):
+        wanted = ", ".join(map(str, ("samples", *shape)))
+        message = f"samples need one entry for each time: times of shape (samples,) and {name} of shape ({wanted})"
+        raise TrajectoryError(message, name=name, value=f"shapes {times.shape} and {samples.shape}")
+    for what, values in (("times", times), (name, samples)):
+        finite = np.isfinite(values).reshape(len(values), -1).all(axis=1)
+        if not finite.all():
+            first = int(np.flatnonzero(~finite)[0])
+            message = f"samples must be finite numbers; sample {first} is not"
+            raise TrajectoryError(message, name=what, value=values[first].tolist())
+    if (np.diff(times) <= 0).any():
+        first = int(np.flatnonzero(np.diff(times) <= 0)[0])
+        message = f"times of samples must increase; sample {first + 1} does not come after sample {first}"
+        raise TrajectoryError(message, name="times", value=float(times[first + 1]))
+    if isinstance(degree, bool) or not isinstance(degree, int) or not 2 <= degree <= HIGHEST_DEGREE:
+        message = f"the degree of the spline must be a whole number from 2 to {HIGHEST_DEGREE}"
+        raise TrajectoryError(message, name="degree", value=degree)
+    if len(times) <= degree:
+        raise TrajectoryError(
+            f"a spline of degree {degree} needs at least {degree + 1} samples", name="times", value=len(times)
+        )
+
+
+def _continuous(times: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
+    """Choose the sign of each quaternion so that it is the nearer one to its neighbour: both are the same rotation."""
+    along = np.sum(quaternions[1:] * quaternions[:-1], axis=1)
+    unknown = np.abs(along) < UNIT
+    if unknown.any():
+        first = int(np.flatnonzero(unknown)[0])
+        message = (
+            f"between samples {first} and {first + 1} the body makes half a turn, to one side or to the other; "
+            "give samples closer in time"
+        )
+        raise TrajectoryError(message, name="times", value=times[first : first + 2].tolist())
+    signs = np.concatenate([[1.0], np.cumprod(np.sign(along))])
+    return quaternions * signs[:, None]
+
+
+def _quaternions(matrices: np.ndarray) -> np.ndarray:
+    """Return unit quaternions of rotation matrices, (samples, 3, 3), each from its largest component."""
+    R, trace = matrices, np.trace(matrices, axis1=1, axis2=2)
+    # row k is 4 e_k times the whole quaternion
+    table = np.empty((len(R), 4, 4))
+    table[:, 0, 0] = 1 + trace
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        table[:, i + 1, i + 1] = 1 + 2 * R[:, i, i] - trace
+        table[:, 0, i + 1] = table[:, i + 1, 0] = R[:, k, j] - R[:, j, k]
+        table[:, i + 1, j + 1] = table[:, j + 1, i + 1] = R[:, i, j] + R[:, j, i]
+    largest = np.argmax(np.diagonal(table, axis1=1, axis2=2), axis=1)
+    rows = table[np.arange(len(R)), largest]
+    return rows / np.linalg.norm(rows, axis=1, keepdims=True)

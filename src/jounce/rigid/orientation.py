@@ -1,0 +1,390 @@
+"""Euler angles, their rates and angular velocity, of any order on jets. Negrean 2025, equations 29-30, 36 and 41-42."""
+
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+
+from jounce.errors import JounceError, SingularityError, did_you_mean
+from jounce.jet import Jet, atan2, cos, cross, dot, matvec, sin, sqrt, stack, transpose
+from jounce.jet.algebra import total
+from jounce.rigid.rotations import (
+    AXES,
+    check_sequence,
+    checked_angles,
+    is_moving,
+    is_traced,
+    simple_rotations,
+    uniform,
+)
+from jounce.rigid.selection import body_vector
+
+FRAMES = ("global", "body")
+
+SINGULAR = 1e-8
+"""Below this distance from a singular orientation more than half the digits of angles and rates are lost."""
+
+ORTHONORMAL = 1e-6
+"""Largest entry of ``R^T R - I`` that a rotation matrix may have, to forgive single precision and printed digits."""
+
+
+def transfer_matrix(sequence: str, angles: Any, frame: str = "global") -> Any:
+    """Return the angular transfer matrix, which takes rates of Euler angles to the angular velocity.
+
+    ``J_psi = [u, R(u; a) v, R(u; a) R(v; b) w]`` for moving axes u, v, w. Negrean 2025, equation 30.
+
+    Parameters
+    ----------
+    sequence : str
+        One of `SEQUENCES`.
+    angles : Jet, array_like of shape (3, ...), or three of either
+        Angles in the order of the letters, rad.
+    frame : {"global", "body"}, default "global"
+        Frame of the components of the angular velocity.
+
+    Returns
+    -------
+    Jet or array of shape (3, 3, ...)
+        Columns in the order of the angles: the axis about which each of them turns.
+
+    Raises
+    ------
+    JounceError
+        If the sequence or the frame is not known, or there are not three angles.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> jn.rigid.transfer_matrix("ZYX", [0.0, 0.0, 0.5]).tolist()
+    [[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]
+    """
+    _check_frame(frame)
+    turns, finish = simple_rotations(sequence, angles)
+    axes = [Jet.constant(_basis(letter, turns[0]), turns[0].order) for letter in sequence]
+    # seen from the global frame an axis is moved by the turns before it about moving axes, after it about fixed ones;
+    # from the body by the inverse of the others
+    before = is_moving(sequence) == (frame == "global")
+    if frame == "body":
+        turns = [transpose(turn) for turn in turns]
+    columns = []
+    for k, axis in enumerate(axes):
+        for turn in turns[:k][::-1] if before else turns[k + 1 :]:
+            axis = matvec(turn, axis)
+        columns.append(axis)
+    return finish(transpose(stack(columns)))
+
+
+def angular_velocity_from_angles(sequence: str, angles: Any, frame: str = "global") -> Jet:
+    """Return the angular velocity of Euler angles that move, with its derivatives. Negrean 2025, equations 41-42.
+
+    Parameters
+    ----------
+    sequence : str
+        One of `SEQUENCES`.
+    angles : Jet of shape (3, ...), or three Jet
+        Angles in the order of the letters, rad, of order 1 or more.
+    frame : {"global", "body"}, default "global"
+        Frame of the components.
+
+    Returns
+    -------
+    Jet of shape (3, ...)
+        Angular velocity, rad/s, and its derivatives, one order shorter than the angles.
+
+    Raises
+    ------
+    JounceError
+        If the sequence or the frame is not known, or the angles carry no derivative.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> t = jn.Jet.variable(0.0, order=2)
+    >>> jn.rigid.angular_velocity_from_angles("ZYX", [3.0 * t, 2.0 * t, t]).derivatives().tolist()
+    [[1.0, 2.0, 3.0], [-6.0, 3.0, -2.0]]
+    """
+    angles = _moving_jet(checked_angles(angles), "angles")
+    return matvec(transfer_matrix(sequence, angles.truncate(angles.order - 1), frame), angles.differentiate())
+
+
+def angular_velocity(attitude: Any, frame: str = "global") -> Jet:
+    """Return the angular velocity of a rotation matrix that moves, ``[w]x = R' R^T``. Negrean 2025, equation 36.
+
+    Parameters
+    ----------
+    attitude : Jet of shape (3, 3, ...)
+        Rotation matrix from the body to the global frame, orthonormal at every order; of order 1 or more.
+    frame : {"global", "body"}, default "global"
+        Frame of the components; in that of the body, ``[w]x = R^T R'``.
+
+    Returns
+    -------
+    Jet of shape (3, ...)
+        Angular velocity, rad/s, and its derivatives, one order shorter than the attitude.
+
+    Raises
+    ------
+    JounceError
+        If the frame is not known, or the attitude carries no derivative.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> angle = 2.0 * jn.Jet.variable(0.3, order=2)
+    >>> jn.rigid.angular_velocity(jn.rigid.simple_rotation("y", angle)).derivatives().round(12).tolist()
+    [[0.0, 2.0, 0.0], [0.0, 0.0, 0.0]]
+    """
+    _check_frame(frame)
+    attitude = _moving_jet(attitude, "attitude")
+    # every axis of a triad moves as a' = w x a, and the sum of a x (w x a) over the three of them is 2 w
+    triad = transpose(attitude) if frame == "global" else attitude
+    half = 0.5 if frame == "global" else -0.5
+    rates = triad.differentiate()
+    return half * total(cross(triad[k], rates[k]) for k in range(3))
+
+
+def angle_rates(sequence: str, angles: Any, angular_velocity: Any, frame: str = "global") -> Any:
+    """Return the rates of Euler angles from the angular velocity: the inverse of the transfer matrix.
+
+    Parameters
+    ----------
+    sequence : str
+        One of `SEQUENCES`.
+    angles : Jet, array_like of shape (3, ...), or three of either
+        Angles in the order of the letters, rad. Values are enough where the angular velocity is a jet: the angles'
+        derivatives then follow from it, order after order.
+    angular_velocity : Jet or array_like of shape (3, ...)
+        Angular velocity, rad/s.
+    frame : {"global", "body"}, default "global"
+        Frame of its components.
+
+    Returns
+    -------
+    Jet or array of shape (3, ...)
+        Rates of the angles, rad/s, with their derivatives where the angular velocity has them. Of a batch, the samples
+        at a singular orientation are NaN, and `is_singular_orientation` tells which they are.
+
+    Raises
+    ------
+    JounceError
+        If the sequence or the frame is not known, or there are not three angles.
+    SingularityError
+        If a single orientation is singular: two of the three axes are parallel there.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> jn.rigid.angle_rates("ZYX", [0.0, 0.0, 0.0], [1.0, 2.0, 3.0]).tolist()
+    [3.0, 2.0, 1.0]
+    >>> jn.rigid.angle_rates("ZYX", [0.0, 1.5707963267948966, 0.0], [1.0, 2.0, 3.0])
+    Traceback (most recent call last):
+    ...
+    jounce.errors.SingularityError: ZYX: its first and last axes are parallel where the second angle is ...
+    """
+    _check_frame(frame)
+    angles = checked_angles(angles)
+    value = angles.coefficients[0] if isinstance(angles, Jet) else jnp.asarray(angles, float)
+    regular = _regular(sequence, value, singularity_distance(sequence, value))
+    # one state for all of a batch of the other: batch axes of length one
+    given = angular_velocity.coefficients[0] if isinstance(angular_velocity, Jet) else angular_velocity
+    rank = max(np.ndim(value), np.ndim(given))
+    angular_velocity, value = body_vector(angular_velocity, rank - 1), body_vector(value, rank - 1)
+    if isinstance(angles, Jet):
+        (angles, velocity), finish = uniform(angles, angular_velocity)
+        return finish(_marked(_solved(transfer_matrix(sequence, angles, frame), velocity), regular))
+    (velocity,), finish = uniform(angular_velocity)
+    known = Jet([value])
+    while True:
+        rates = _solved(transfer_matrix(sequence, known, frame), velocity.truncate(known.order)).dense()
+        if rates.order == velocity.order:
+            return finish(_marked(rates, regular))
+        known = rates.integrate(value)
+
+
+def singularity_distance(sequence: str, angles: Any) -> Any:
+    """Return how far an orientation is from a singular one: the volume that the three axes of rotation span.
+
+    Parameters
+    ----------
+    sequence : str
+        One of `SEQUENCES`.
+    angles : Jet, array_like of shape (3, ...), or three of either
+        Angles in the order of the letters, rad.
+
+    Returns
+    -------
+    array of shape (...)
+        Absolute determinant of the transfer matrix: 0 at a singular orientation, 1 at the farthest from it; the cosine
+        of the second angle, or its sine where the first and last letters are the same.
+
+    Raises
+    ------
+    JounceError
+        If the sequence is not known, or there are not three angles.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> float(jn.rigid.singularity_distance("ZYX", [0.3, 0.0, 0.2]))
+    1.0
+    """
+    check_sequence(sequence)
+    angles = checked_angles(angles)
+    second = (angles.coefficients[0] if isinstance(angles, Jet) else jnp.asarray(angles, float))[1]
+    return jnp.abs((sin if sequence[0] == sequence[2] else cos)(second))
+
+
+def is_singular_orientation(sequence: str, angles: Any, tolerance: float = SINGULAR) -> Any:
+    """Tell where Euler angles are at a singular orientation (gimbal lock).
+
+    Parameters
+    ----------
+    sequence : str
+        One of `SEQUENCES`.
+    angles : Jet, array_like of shape (3, ...), or three of either
+        Angles in the order of the letters, rad.
+    tolerance : float, default 1e-8
+        Largest `singularity_distance` that counts as singular.
+
+    Returns
+    -------
+    array of bool of shape (...)
+        True where the first and last axes are parallel.
+
+    Raises
+    ------
+    JounceError
+        If the sequence is not known, or there are not three angles.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> jn.rigid.is_singular_orientation("ZXZ", [[0.1, 0.1], [0.0, 0.5], [0.2, 0.2]]).tolist()
+    [True, False]
+    """
+    return singularity_distance(sequence, angles) <= tolerance
+
+
+def euler_angles(sequence: str, attitude: Any) -> Any:
+    """Return the Euler angles of a rotation matrix, with their derivatives where it is a jet.
+
+    Parameters
+    ----------
+    sequence : str
+        One of `SEQUENCES`.
+    attitude : Jet or array_like of shape (3, 3, ...)
+        Rotation matrix from the body to the global frame.
+
+    Returns
+    -------
+    Jet or array of shape (3, ...)
+        Angles in the order of the letters, rad: the second one in [0, pi] where the first and last letters are the
+        same and in [-pi/2, pi/2] elsewhere, the others in [-pi, pi]. Of a batch, the samples at a singular
+        orientation are NaN.
+
+    Raises
+    ------
+    JounceError
+        If the sequence is not known, or the matrix is not a rotation.
+    SingularityError
+        If a single orientation is singular: only the sum or the difference of two angles is determined there.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> angles = jn.rigid.euler_angles("ZYX", jn.rigid.rotation_matrix("ZYX", [0.3, 0.2, 0.1]))
+    >>> [round(float(angle), 12) for angle in angles]
+    [0.3, 0.2, 0.1]
+    """
+    check_sequence(sequence)
+    (matrix,), finish = uniform(attitude)
+    check_rotation(matrix.coefficients[0])
+    letters = sequence.lower() if is_moving(sequence) else sequence[::-1]
+    i, j, k = (AXES.index(letter) for letter in letters)
+    last = 3 - i - j
+    sign = 1.0 if (j - i) % 3 == 1 else -1.0  # whether i, j and the third axis stand in cyclic order
+    if i == k:
+        side = [matrix[j, i], -sign * matrix[last, i]]
+        end = [matrix[i, j], sign * matrix[i, last]]
+    else:
+        side = [-sign * matrix[j, k], matrix[k, k]]
+        end = [-sign * matrix[i, j], matrix[i, i]]
+    regular = _regular(sequence, None, jnp.hypot(*(part.coefficients[0] for part in side)))
+    distance = sqrt(side[0].square() + side[1].square())
+    middle = atan2(distance, matrix[i, i]) if i == k else atan2(sign * matrix[i, k], distance)
+    found = [atan2(*side), middle, atan2(*end)]
+    angles = stack(found if is_moving(sequence) else found[::-1])
+    return finish(_marked(angles, regular))
+
+
+def check_rotation(matrix: Any, name: str = "attitude", tolerance: float = ORTHONORMAL) -> None:
+    """Raise a JounceError unless matrices of shape (3, 3, ...) are rotations; those that JAX traces are not seen."""
+    if tuple(np.shape(matrix)[:2]) != (3, 3):
+        message = "a rotation matrix needs 3 rows and 3 columns on the first axes; batch axes come last"
+        raise JounceError(message, name=name, value=f"shape {tuple(np.shape(matrix))}")
+    if is_traced(matrix):
+        return
+    found = np.moveaxis(np.asarray(matrix).reshape(3, 3, -1), -1, 0)
+    with np.errstate(invalid="ignore"):  # what is not finite shows in the result
+        off = np.abs(np.swapaxes(found, 1, 2) @ found - np.eye(3)).max(axis=(1, 2))
+        bad = ~(off <= tolerance) | ~(np.linalg.det(found) > 0)
+    if bad.any():
+        first = int(np.flatnonzero(bad)[0])
+        which = f" (number {first} of the batch)" if len(found) > 1 else ""
+        if not np.isfinite(off[first]):
+            what = "has entries that are not finite"
+        elif off[first] > tolerance:
+            what = f"is not orthonormal: an entry of R^T R is {off[first]:.3g} off, more than {tolerance:g}"
+        else:
+            what = "is a reflection: its determinant is negative"
+        raise JounceError(f"the matrix{which} {what}", name=name, value=found[first].tolist())
+
+
+def _regular(sequence: str, angles: Any, distance: Any) -> Any:
+    """Return the mask of regular orientations; a single one that is singular raises."""
+    regular = distance > SINGULAR
+    if np.ndim(distance) == 0 and not is_traced(regular) and not bool(regular) and not bool(jnp.isnan(distance)):
+        where = "a multiple of pi" if sequence[0] == sequence[2] else "pi/2 and a multiple of pi"
+        message = (
+            f"its first and last axes are parallel where the second angle is {where}, and this orientation is only "
+            f"{float(distance):.3g} away; choose a sequence that is "
+            f"{'of three different letters' if sequence[0] == sequence[2] else 'of equal first and last letters'} here"
+        )
+        if angles is None:
+            raise SingularityError(message, name=sequence)
+        raise SingularityError(message, name=sequence, value=[float(angle) for angle in angles])
+    return regular
+
+
+def _marked(vector: Jet, regular: Any) -> Jet:
+    """Return a vector with NaN at every order where the orientation is singular."""
+    if not is_traced(regular) and bool(jnp.all(regular)):
+        return vector
+    mask = jnp.reshape(regular, (1,) * (len(vector.shape) - jnp.ndim(regular)) + jnp.shape(regular))
+    return vector.dense().map(lambda c: jnp.where(mask, c, jnp.nan))
+
+
+def _solved(matrix: Jet, vector: Jet) -> Jet:
+    """Return ``matrix^-1 vector`` by Cramer's rule: three columns, whose determinant is the singularity distance."""
+    a, b, c = transpose(matrix)
+    normals = cross(b, c), cross(c, a), cross(a, b)
+    volume = dot(a, normals[0])
+    return stack([dot(normal, vector) / volume for normal in normals])
+
+
+def _basis(letter: str, turn: Jet) -> Any:
+    """Return a coordinate axis with the batch axes of a turn."""
+    one = jnp.ones_like(turn.coefficients[0][0, 0])
+    return jnp.stack([one if u == letter.lower() else 0 * one for u in AXES])
+
+
+def _check_frame(frame: str) -> None:
+    if frame not in FRAMES:
+        raise JounceError(f"no such frame; {did_you_mean(frame, FRAMES)}", name="frame", value=frame)
+
+
+def _moving_jet(value: Any, name: str) -> Jet:
+    if not isinstance(value, Jet) or value.order == 0:
+        message = "carries no derivative, so there is no angular velocity; give a Jet of order 1 or more"
+        raise JounceError(message, name=name)
+    return value

@@ -1,0 +1,234 @@
+"""Simple rotations and Euler sequences on jets, products of exponentials. Negrean 2025, equations 11-22."""
+
+from collections.abc import Sequence
+from functools import reduce
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
+
+from jounce.errors import JounceError, did_you_mean
+from jounce.jet import Jet, components, cos, matmul, sin, sqrt, stack
+from jounce.jet.algebra import total
+
+AXES = "xyz"
+
+MOVING_SEQUENCES = tuple(u + v + w for u in "XYZ" for v in "XYZ" for w in "XYZ" if v not in (u, w))
+"""The twelve Euler sequences about axes that move with the body."""
+
+FIXED_SEQUENCES = tuple(sequence.lower() for sequence in MOVING_SEQUENCES)
+"""The twelve Euler sequences about axes that stay."""
+
+SEQUENCES = MOVING_SEQUENCES + FIXED_SEQUENCES
+"""All Euler sequences: upper-case letters for moving axes, lower-case for fixed ones, as SciPy writes them."""
+
+
+def simple_rotation(axis: str, angle: Any) -> Any:
+    """Return the matrix of a rotation about a coordinate axis. Negrean 2025, equations 11-18.
+
+    One formula serves the three axes: a diagonal of cosines, and the skew-symmetric matrix of a vector of sines, in
+    which operators Delta, one or zero by the axis, switch the angle on or off.
+
+    Parameters
+    ----------
+    axis : {"x", "y", "z"}
+        Axis of rotation; capitals mean the same.
+    angle : Jet or array_like of shape (...)
+        Angle, rad, counted by the right-hand rule.
+
+    Returns
+    -------
+    Jet or array of shape (3, 3, ...)
+        Matrix that takes components in the turned frame to those in the frame before; a jet where the angle is one.
+
+    Raises
+    ------
+    JounceError
+        If there is no such axis.
+
+    Examples
+    --------
+    >>> from math import pi
+    >>> import jounce as jn
+    >>> jn.rigid.simple_rotation("z", pi / 2).round().astype(int).tolist()
+    [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
+    >>> angle = jn.Jet.variable(0.0, order=1)
+    >>> jn.rigid.simple_rotation("z", angle)[1, 0].derivatives().tolist()
+    [0.0, 1.0]
+    """
+    letter = str(axis).lower()
+    if letter not in tuple(AXES):
+        raise JounceError(f"no such coordinate axis; {did_you_mean(axis, AXES)}", name="axis", value=axis)
+    (turn,), finish = uniform(angle)
+    delta = [int(letter == u) for u in AXES]  # Delta_u of equation 14; Delta_vw of equation 13 is 1 - Delta_u
+    one = Jet.constant(jnp.ones_like(turn.coefficients[0]), turn.order)
+    zero = one.map(jnp.zeros_like)
+    cosine, sine = cos(turn), sin(turn)
+    c = [one if on else cosine for on in delta]  # cos(angle Delta_vw)
+    s = [sine if on else zero for on in delta]  # sin(angle Delta_u)
+    return finish(_rows([[c[0], -s[2], s[1]], [s[2], c[1], -s[0]], [-s[1], s[0], c[2]]]))
+
+
+def rotation_about(axis: Any, angle: Any) -> Any:
+    """Return the matrix of a rotation about any axis: the exponential of its skew-symmetric matrix times the angle.
+
+    ``R = chi chi^T (1 - cos) + I cos + [chi]x sin`` with the unit vector chi of the axis. Negrean 2025, equations
+    19 and 21.
+
+    Parameters
+    ----------
+    axis : Jet or array_like of shape (3,) or (3, ...)
+        Direction of the axis, of any length but zero; it may move.
+    angle : Jet or array_like of shape (...)
+        Angle, rad, counted by the right-hand rule.
+
+    Returns
+    -------
+    Jet or array of shape (3, 3, ...)
+        Matrix of the rotation; a jet where the axis or the angle is one.
+
+    Raises
+    ------
+    JounceError
+        If the axis is not three finite numbers, or is of zero length.
+
+    Examples
+    --------
+    >>> from math import pi
+    >>> import jounce as jn
+    >>> jn.rigid.rotation_about([1, 1, 1], 2 * pi / 3).round().astype(int).tolist()
+    [[0, 0, 1], [1, 0, 0], [0, 1, 0]]
+    """
+    (chi, turn), finish = uniform(checked_direction(axis), angle)
+    x, y, z = unit(chi)
+    c, s = cos(turn), sin(turn)
+    versine = 2.0 * sin(0.5 * turn).square()  # 1 - cos, without cancellation at small angles
+    return finish(
+        _rows(
+            [
+                [x * x * versine + c, x * y * versine - z * s, x * z * versine + y * s],
+                [x * y * versine + z * s, y * y * versine + c, y * z * versine - x * s],
+                [x * z * versine - y * s, y * z * versine + x * s, z * z * versine + c],
+            ]
+        )
+    )
+
+
+def rotation_matrix(sequence: str, angles: Any) -> Any:
+    """Return the rotation matrix of Euler angles, a product of three exponentials. Negrean 2025, equations 20-22.
+
+    Parameters
+    ----------
+    sequence : str
+        Three letters, neighbours different. Upper case ("ZXZ"): each turn is about an axis that the turns before have
+        moved. Lower case ("zxz"): about axes that stay.
+    angles : Jet, array_like of shape (3, ...), or three of either
+        Angles in the order of the letters, rad.
+
+    Returns
+    -------
+    Jet or array of shape (3, 3, ...)
+        Matrix that takes body components to global ones; a jet where an angle is one, with all its derivatives.
+
+    Raises
+    ------
+    JounceError
+        If the sequence is not one of `SEQUENCES`, or there are not three angles.
+
+    See Also
+    --------
+    euler_angles : The way back.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> t = jn.Jet.variable(0.0, order=1)
+    >>> jn.rigid.rotation_matrix("ZYX", [3.0 * t, 2.0 * t, t]).derivatives()[1].tolist()
+    [[0.0, -3.0, 2.0], [3.0, 0.0, -1.0], [-2.0, 1.0, 0.0]]
+    """
+    turns, finish = simple_rotations(sequence, angles)
+    return finish(reduce(matmul, turns if is_moving(sequence) else turns[::-1]))
+
+
+def simple_rotations(sequence: str, angles: Any) -> tuple[list[Jet], Any]:
+    """Return the three turns of a sequence as jets, in the order of its letters, and what `uniform` returns."""
+    check_sequence(sequence)
+    (angles,), finish = uniform(checked_angles(angles))
+    return [simple_rotation(axis, angle) for axis, angle in zip(sequence, angles, strict=True)], finish
+
+
+def is_moving(sequence: str) -> bool:
+    """Tell whether a sequence turns about moving axes."""
+    return sequence.isupper()
+
+
+def check_sequence(sequence: str) -> None:
+    """Raise a JounceError unless the sequence is one of the 24."""
+    if sequence not in SEQUENCES:
+        message = (
+            "not an Euler sequence; write three letters with neighbours different, such as ZXZ (moving axes) or zxz "
+            "(fixed axes)"
+        )
+        raise JounceError(message, name="sequence", value=sequence)
+
+
+def checked_angles(angles: Any) -> Any:
+    """Return three angles as one jet or array of shape (3, ...)."""
+    if isinstance(angles, Sequence) and any(isinstance(angle, Jet) for angle in angles):
+        angles = stack([angle if isinstance(angle, Jet) else jnp.asarray(angle, float) for angle in angles])
+    shape = angles.shape if isinstance(angles, Jet) else np.shape(angles)
+    if shape[:1] != (3,):
+        message = "needs three angles along the first axis; batch axes come last"
+        raise JounceError(message, name="angles", value=f"shape {tuple(shape)}")
+    return angles
+
+
+def checked_direction(axis: Any, name: str = "axis") -> Any:
+    """Return the direction of an axis, after a check of its size and, where it is known, of its length."""
+    shape = axis.shape if isinstance(axis, Jet) else np.shape(axis)
+    if shape[:1] != (3,):
+        message = "an axis needs three components along the first axis"
+        raise JounceError(message, name=name, value=f"shape {tuple(shape)}")
+    value = axis.coefficients[0] if isinstance(axis, Jet) else axis
+    if not is_traced(value):
+        length = np.linalg.norm(np.asarray(value, float), axis=0)
+        if not (np.isfinite(length) & (length > 0)).all():
+            message = "the direction of an axis must be finite and not of zero length"
+            raise JounceError(message, name=name, value=np.asarray(value).tolist())
+    return axis
+
+
+def is_traced(value: Any) -> bool:
+    """Tell whether a value is not known yet, because JAX is tracing a function of it."""
+    return any(isinstance(leaf, Tracer) for leaf in (value if isinstance(value, list | tuple) else [value]))
+
+
+def unit(vector: Jet) -> list[Jet]:
+    """Return the components, each of the batch's shape, of a vector scaled to unit length."""
+    parts = [part[0] for part in components(vector)]
+    length = sqrt(total(part.square() for part in parts))
+    return [part / length for part in parts]
+
+
+def uniform(*arguments: Any) -> tuple[list[Jet], Any]:
+    """Return arguments as jets of one order, and the function that turns the result into what the caller expects.
+
+    Where no argument is a jet, the result is the array of its values. Batch axes of all arguments must agree, or be
+    missing, and stand last.
+    """
+    orders = [argument.order for argument in arguments if isinstance(argument, Jet)]
+    order = min(orders, default=0)
+    jets = [
+        argument.truncate(order) if isinstance(argument, Jet) else Jet.constant(_real(argument), order)
+        for argument in arguments
+    ]
+    return jets, (lambda jet: jet) if orders else (lambda jet: jet.coefficients[0])
+
+
+def _real(value: Any) -> Any:
+    return jnp.asarray(value, float)
+
+
+def _rows(rows: list[list[Jet]]) -> Jet:
+    return stack([stack(row) for row in rows])
