@@ -1,9 +1,18 @@
-"""Motion laws: expressions, Python functions and splines through samples."""
+"""Motion laws: expressions, Python functions, splines, profiles; and trajectories, one law for each joint."""
 
 from jounce.trajectory.expression import Expression as Expression
+from jounce.trajectory.joint_trajectory import JointTrajectory as JointTrajectory
 from jounce.trajectory.motion import (
     AbstractMotion as AbstractMotion,
     ExpressionMotion as ExpressionMotion,
     FunctionMotion as FunctionMotion,
     SplineMotion as SplineMotion,
 )
+from jounce.trajectory.polynomial import PolynomialMotion as PolynomialMotion
+from jounce.trajectory.profiles import (
+    AbstractProfile as AbstractProfile,
+    CycloidalMotion as CycloidalMotion,
+    RestToRestMotion as RestToRestMotion,
+    motion_profile as motion_profile,
+)
+from jounce.trajectory.trapezoid import TrapezoidalMotion as TrapezoidalMotion

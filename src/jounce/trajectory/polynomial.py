@@ -1,0 +1,326 @@
+"""Polynomial motion functions of any degree: splines through knots that carry positions, accelerations or others."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from jounce.errors import TrajectoryError, did_you_mean
+from jounce.trajectory.motion import SplineMotion
+from jounce.trajectory.sampling import check_samples
+
+MAX_CONTINUITY = 10
+ENDS = ("not-a-knot", "natural", "clamped")
+
+_Conditions = Mapping[int, float]
+
+
+class PolynomialMotion(SplineMotion):
+    """A motion law of polynomials of degree ``m + 1`` on the segments between knots, continuous to order m.
+
+    The knots carry values of the law or of one of its derivatives: positions, measured accelerations, or values of the
+    m-th derivative, which is linear on each segment. Solved for by SciPy's B-splines in a scaled time.
+
+    A law of s segments has ``s + 1 + m`` free numbers, and the knots fix ``s + 1`` of them. The other m are fixed by
+    conditions at the first and the last knot. Those on derivatives lower than what the knots carry are the constants
+    of its integration; as many are needed as integrations. Those on higher derivatives are either named by `ends`, or
+    given: as many as are left. With m odd they cannot be shared evenly, and an error at one end then does not fade
+    along the knots; prefer m even, which is a spline of odd degree.
+
+    Parameters
+    ----------
+    times : array_like of shape (knots,)
+        Strictly increasing instants, s.
+    values : array_like of shape (knots,)
+        What the knots carry: m or rad, per s to the power of `derivative`.
+    continuity : int, default 4
+        Order m of the highest continuous derivative, from 1 to 10; 2 is the cubic spline.
+    derivative : int, default 0
+        Order of the derivative that the knots carry, from 0 (positions) to m.
+    start, end : dict of int to float, optional
+        Conditions at the first and the last knot: the value of the derivative of each order named, 0 for the position.
+        Without any on the derivatives below `derivative`, these are zero at the start.
+    ends : {"not-a-knot", "natural", "clamped"}, default "not-a-knot"
+        Conditions on the derivatives above `derivative`, when `start` and `end` give none. With c of them needed, the
+        start takes ``ceil(c / 2)`` and the end ``floor(c / 2)``: not-a-knot has the polynomials next to the ends go on
+        over as many knots, natural has the highest of the continuous derivatives vanish, and clamped the lowest (rest).
+
+    Raises
+    ------
+    TrajectoryError
+        If the knots are too few, not finite or do not increase, or the conditions do not close the system.
+
+    Notes
+    -----
+    Outside the knots the polynomials of the end segments go on. The formulas are Negrean 2025, equations 61-64; the
+    conditions at the ends are not fixed there.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> law = jn.PolynomialMotion([0.0, 1.0, 2.0], [0.0, 1.0, 0.0], continuity=2, ends="natural")
+    >>> [float(x) for x in law(jn.Jet.variable(1.0, order=2)).derivatives()]
+    [1.0, 0.0, -3.0]
+
+    From rest, with both ends at rest to the second derivative:
+
+    >>> rest = {1: 0.0, 2: 0.0}
+    >>> law = jn.PolynomialMotion([0.0, 1.0], [0.0, 1.0], continuity=4, start=rest, end=rest)
+    >>> round(float(law(jn.Jet.variable(0.5, order=1)).coefficients[1]), 12)
+    1.875
+    """
+
+    stop: Any
+
+    def __init__(
+        self,
+        times: Any,
+        values: Any,
+        continuity: int = 4,
+        derivative: int = 0,
+        start: _Conditions | None = None,
+        end: _Conditions | None = None,
+        ends: str = "not-a-knot",
+    ):
+        times, values = check_samples(times, values)
+        _check_orders(continuity, derivative)
+        if ends not in ENDS:
+            raise TrajectoryError(f"no conditions have this name; {did_you_mean(ends, ENDS)}", name="ends", value=ends)
+        conditions = _checked(start, continuity, "start"), _checked(end, continuity, "end")
+        constants = _constants(conditions, derivative)
+        step = (times[-1] - times[0]) / (len(times) - 1)
+        knots = (times - times[0]) / step
+        pieces = _spline(knots, values, continuity + 1 - derivative, _above(conditions, derivative, step), ends)
+        pieces = pieces * step**derivative
+        for _ in range(derivative):
+            pieces = _integrated(pieces, np.diff(knots))
+        if derivative:
+            pieces = pieces + _closing(pieces, knots, constants, times[-1] - times[0])
+        self.breakpoints = times[:-1]
+        self.stop = times[-1]
+        self.coefficients = pieces / step ** np.arange(continuity + 2)[:, None]
+        self.degree = continuity + 1
+
+    @classmethod
+    def from_accelerations(
+        cls,
+        times: Any,
+        accelerations: Any,
+        continuity: int = 4,
+        start: _Conditions | None = None,
+        end: _Conditions | None = None,
+        ends: str = "not-a-knot",
+    ) -> "PolynomialMotion":
+        """Return the law whose acceleration goes through samples, integrated twice (Negrean 2025, section 4).
+
+        Parameters
+        ----------
+        times : array_like of shape (knots,)
+            Strictly increasing instants, s.
+        accelerations : array_like of shape (knots,)
+            Samples of the acceleration, m/s^2 or rad/s^2.
+        continuity : int, default 4
+            Order m of the highest continuous derivative of the position, at least 2; 4 gives quintic segments.
+        start, end : dict of int to float, optional
+            Two conditions on the position (0) and the velocity (1), one at least on the position: by default
+            ``start={0: 0.0, 1: 0.0}``. And either none or ``m - 2`` on the derivatives from the third on.
+        ends : {"not-a-knot", "natural", "clamped"}, default "not-a-knot"
+            Conditions on the derivatives from the third on, when none are given.
+
+        Returns
+        -------
+        PolynomialMotion
+            The law of the position.
+
+        Raises
+        ------
+        TrajectoryError
+            As for the class.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import jounce as jn
+        >>> t = np.linspace(0.0, 1.0, 11)
+        >>> law = jn.PolynomialMotion.from_accelerations(t, 6 * t, start={0: 2.0}, end={0: 3.0})
+        >>> [round(float(x), 9) for x in law(jn.Jet.variable(0.5, order=3)).derivatives()]
+        [2.125, 0.75, 3.0, 6.0]
+        """
+        if continuity < 2:
+            message = "accelerations at the knots are continuous; the order of continuity is at least 2"
+            raise TrajectoryError(message, name="continuity", value=continuity)
+        return cls(times, accelerations, continuity, 2, start, end, ends)
+
+    @property
+    def continuity(self) -> int:
+        """Order m of the highest continuous derivative."""
+        return self.degree - 1
+
+    @property
+    def knots(self) -> np.ndarray:
+        """Instants of the knots, shape (knots,), s."""
+        return np.append(self.breakpoints, self.stop)
+
+    @property
+    def knot_values(self) -> np.ndarray:
+        """Values of the m-th derivative at the knots, shape (knots,): ``q^(m)_i`` of Negrean 2025, equation 61."""
+        m = self.continuity
+        first, slope = math.factorial(m) * self.coefficients[m], math.factorial(m + 1) * self.coefficients[m + 1]
+        last = first[-1] + slope[-1] * (self.stop - self.breakpoints[-1])
+        return np.append(first, last)
+
+    def integration_constants(self, origin: float = 0.0) -> np.ndarray:
+        """Return the integration constants ``a_k`` of the segments (Negrean 2025, equations 61-63).
+
+        On segment i of length ``T_i``, with ``tau`` the time since `origin`, the derivative of order ``m - p`` is
+        ``(-1)^p (tau_i - tau)^(p+1) / (T_i (p+1)!) q^(m)_{i-1} + (tau - tau_{i-1})^(p+1) / (T_i (p+1)!) q^(m)_i
+        + sum_{k=1}^p a_k tau^(p-k) / (p-k)!``.
+
+        Parameters
+        ----------
+        origin : float, default 0
+            The instant from which ``tau`` counts, s. Far from the segments the terms cancel, and digits are lost.
+
+        Returns
+        -------
+        ndarray of shape (m, segments)
+            ``a_1, ..., a_m``, m or rad per s to the power of ``m - k``.
+
+        Examples
+        --------
+        >>> import jounce as jn
+        >>> law = jn.PolynomialMotion([0.0, 1.0], [2.0, 2.0], continuity=2, derivative=2, start={0: 5.0, 1: 0.0})
+        >>> law.integration_constants().round(12).tolist()  # q = (1 - t)^3 / 3 + t^3 / 3 + a_1 t + a_2
+        [[1.0], [4.666666666667]]
+        """
+        m, knots, highest = self.continuity, self.knots, self.knot_values
+        length, beginning = np.diff(knots), knots[:-1] - origin
+        rest = []
+        for k in range(m):  # what the term of the left knot value does not hold of each power of the local time
+            known = (-1) ** (m + k) * math.comb(m + 1, k) / math.factorial(m + 1) * length ** (m - k) * highest[:-1]
+            rest.append(self.coefficients[k] - known)
+        constants = []
+        for power in range(m - 1, -1, -1):  # the local time is tau - beginning: the powers of tau by the binomial sum
+            shifted = [rest[k] * math.comb(k, power) * (-beginning) ** (k - power) for k in range(power, m)]
+            constants.append(math.factorial(power) * sum(shifted[1:], shifted[0]))
+        return np.stack(constants)
+
+
+def _check_orders(continuity: Any, derivative: Any) -> None:
+    """Refuse orders that no such law has."""
+    for name, order, least, most in (
+        ("continuity", continuity, 1, MAX_CONTINUITY),
+        ("derivative", derivative, 0, continuity),
+    ):
+        if isinstance(order, bool) or not isinstance(order, int | np.integer) or not least <= order <= most:
+            raise TrajectoryError(f"must be a whole number from {least} to {most}", name=name, value=order)
+
+
+def _checked(conditions: _Conditions | None, continuity: int, name: str) -> dict[int, float]:
+    """Return the conditions at one end, refusing orders that are not continuous and values that are no numbers."""
+    if conditions is None:
+        return {}
+    if not isinstance(conditions, Mapping):
+        raise TrajectoryError("must map orders of derivatives to values, as {1: 0.0}", name=name, value=conditions)
+    for order, value in conditions.items():
+        if isinstance(order, bool) or not isinstance(order, int | np.integer) or not 0 <= order <= continuity:
+            message = f"the order of a condition is a whole number from 0 to the continuity, {continuity}"
+            raise TrajectoryError(message, name=name, value=order)
+        if not np.isscalar(value) or isinstance(value, str | bytes) or not np.isfinite(value):
+            raise TrajectoryError(
+                "the value of a condition must be a finite number", name=f"{name}[{order}]", value=value
+            )
+    return {int(order): float(value) for order, value in conditions.items()}
+
+
+_Ends = tuple[dict[int, float], dict[int, float]]
+
+
+def _constants(conditions: _Ends, derivative: int) -> _Ends:
+    """Return the conditions on the derivatives below that of the knots; by default all zero at the start."""
+    for name, end in zip(("start", "end"), conditions, strict=True):
+        if derivative in end:
+            message = f"the knots carry the derivative of order {derivative}, it takes no condition"
+            raise TrajectoryError(message, name=name, value=end)
+    low: _Ends = ({k: v for k, v in conditions[0].items() if k < derivative}, {})
+    low[1].update({k: v for k, v in conditions[1].items() if k < derivative})
+    count = len(low[0]) + len(low[1])
+    if count == 0:
+        return dict.fromkeys(range(derivative), 0.0), {}
+    if count != derivative:
+        message = f"{derivative} conditions on the derivatives below order {derivative} close the system"
+        raise TrajectoryError(f"{message}; give as many in start and end together", value=count)
+    return low
+
+
+def _above(conditions: _Ends, derivative: int, step: float) -> _Ends:
+    """Return the conditions on the derivatives above that of the knots, by order above it and in scaled time."""
+    first, last = (
+        {k - derivative: v * step ** (k - derivative) for k, v in end.items() if k > derivative} for end in conditions
+    )
+    return first, last
+
+
+def _spline(knots: np.ndarray, values: np.ndarray, degree: int, conditions: _Ends, ends: str) -> np.ndarray:
+    """Return the local Taylor coefficients, shape (degree + 1, segments), of a spline through values at knots."""
+    from scipy.interpolate import make_interp_spline  # here, since importing SciPy takes half a second
+
+    needed, given = degree - 1, len(conditions[0]) + len(conditions[1])
+    if given not in (0, needed):
+        message = f"{needed} conditions on the derivatives above that of the knots close the system, or none"
+        raise TrajectoryError(f"{message}; give as many in start and end together", value=given)
+    first, last = (needed + 1) // 2, needed // 2
+    if not given and ends == "not-a-knot":
+        if len(knots) <= degree:
+            message = f"not-a-knot ends of a law of this degree need at least {degree + 1} knots"
+            raise TrajectoryError(f"{message}; give more, or conditions at the start and the end", value=len(knots))
+        inside = knots[1 + first : len(knots) - 1 - last]
+        bounds = [np.full(degree + 1, knot) for knot in (knots[0], knots[-1])]
+        spline = make_interp_spline(knots, values, k=degree, t=np.concatenate([bounds[0], inside, bounds[1]]))
+    else:
+        if not given:
+            top = degree if ends == "natural" else 0
+            start, end = (dict.fromkeys((abs(top - k) for k in range(1, n + 1)), 0.0) for n in (first, last))
+            conditions = start, end
+        both = [sorted(end.items()) or None for end in conditions] if needed else [None, None]
+        try:
+            spline = make_interp_spline(knots, values, k=degree, bc_type=tuple(both))
+        except (np.linalg.LinAlgError, ValueError):
+            orders = [sorted(end) for end in conditions]
+            message = "the conditions at the start and the end do not determine the law; choose others"
+            raise TrajectoryError(message, value=orders) from None
+    powers = [spline(knots[:-1], nu=k) / math.factorial(k) for k in range(degree + 1)]
+    return np.stack(powers)
+
+
+def _integrated(pieces: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+    """Return the local Taylor coefficients of the integral from the first knot."""
+    raised = pieces / np.arange(1, len(pieces) + 1)[:, None]
+    gains = sum(c * lengths ** (k + 1) for k, c in enumerate(raised))
+    constants = np.concatenate([[0.0], np.cumsum(gains)[:-1]])
+    return np.concatenate([constants[None], raised])
+
+
+def _closing(pieces: np.ndarray, knots: np.ndarray, constants: _Ends, duration: float) -> np.ndarray:
+    """Return the polynomial of the integration constants, as local Taylor coefficients of the shape of the pieces."""
+    count, span, last = len(constants[0]) + len(constants[1]), knots[-1], knots[-1] - knots[-2]
+    rows, values = [], []
+    for place, conditions in enumerate(constants):
+        for order, value in conditions.items():
+            reached = pieces[order, 0] * math.factorial(order)
+            if place:
+                reached = sum(
+                    c * math.perm(k, order) * last ** (k - order) for k, c in enumerate(pieces[:, -1]) if k >= order
+                )
+            rows.append([float(math.perm(j, order) * (place or j == order)) for j in range(count)])
+            values.append(value * duration**order - reached * span**order)
+    if np.linalg.matrix_rank(np.array(rows)) < count:
+        message = "these conditions do not fix the constants of integration; one at least must be on the position"
+        raise TrajectoryError(message, value=[sorted(end) for end in constants])
+    powers = np.linalg.solve(np.array(rows), np.array(values))
+    at = knots[:-1] / span
+    closing = np.zeros_like(pieces)
+    for k in range(count):
+        closing[k] = sum(powers[j] * math.comb(j, k) * at ** (j - k) for j in range(k, count)) / span**k
+    return closing
