@@ -1,4 +1,4 @@
-"""The map of the paper's equations leads to code that exists and tests that exist."""
+"""The map of the papers' equations leads to code that exists and tests that exist."""
 
 import ast
 import functools
@@ -10,15 +10,16 @@ import pytest
 
 ROOT = pathlib.Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "equations.md"
-ROW = re.compile(r"^\| S (?P<number>A?\d+) \| `(?P<name>[\w.]+)` \| `(?P<test>[^`]+)` \|$")
-EXPECTED = [str(k) for k in range(1, 112)] + [f"A{k}" for k in range(1, 35)]
+ROW = re.compile(r"^\| (?P<number>[SN] A?\d+) \| `(?P<name>[\w.]+)` \| `(?P<test>[^`]+)` \|$")
+SOMMER = [f"S {k}" for k in range(1, 112)] + [f"S A{k}" for k in range(1, 35)]
+NEGREAN = [f"N {k}" for k in range(1, 147)]
 
 
 def table_rows():
-    lines = [line for line in PAGE.read_text().splitlines() if line.startswith("| S ")]
+    lines = [line for line in PAGE.read_text().splitlines() if line.startswith(("| S ", "| N "))]
     matches = [(line, ROW.match(line)) for line in lines]
     malformed = [line for line, match in matches if match is None]
-    assert not malformed, f"rows that are not '| S number | `name` | `file::test` |': {malformed}"
+    assert not malformed, f"rows that are not '| S or N number | `name` | `file::test` |': {malformed}"
     return [match.groupdict() for _, match in matches if match]
 
 
@@ -52,7 +53,7 @@ def find_name(dotted):
 
 
 def test_every_equation_has_exactly_one_row():
-    assert [row["number"] for row in table_rows()] == EXPECTED
+    assert [row["number"] for row in table_rows()] == SOMMER + NEGREAN
 
 
 def test_every_name_exists_and_is_public():

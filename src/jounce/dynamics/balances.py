@@ -28,7 +28,7 @@ def _virtual_work(tree: Tree, arrays: Any, _: Any, inertial: bool) -> Any:
         momentum = total(tensor[:, i] * part for i, part in enumerate(components(spin)))
         moment = frames.direction(momentum).differentiate()
     else:
-        force = Jet.constant(-jnp.asarray(tree.gravity)[:, None, None] * mass, center.order)
+        force = Jet.constant(-jnp.asarray(tree.gravity)[:, None, None] * mass[None], center.order)
         moment = None
     # axes and origins of joints stand along a new axis before the bodies
     axis, origin = (jet.map(lambda c: c[:, :, None]) for jet in (frames.axes[2], frames.position))
