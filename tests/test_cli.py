@@ -265,7 +265,7 @@ def test_there_are_broken_files():
         (["plot", FOUR_BAR, "--out", "no/such/folder/figure.png"], "does not exist"),
         (["plot", FOUR_BAR, "--output", "phi"], "did you mean 'psi'"),
         (["plot", "none.yaml", "--out", "figure.png"], "file not found"),
-        (["reproduce", "negrean-2025", "--out", "x"], "not available in this version"),
+        (["reproduce", "negrean", "--out", "x"], "did you mean 'negrean-2025'"),
         (["reproduce", "sommer", "--out", "x"], "sommer-2024"),
         (["reproduce", "sommer-2024"], "--out"),
     ],

@@ -1,4 +1,4 @@
-"""Exact time derivatives of any order of mechanisms and robots: velocity to jounce and beyond, torques and their rates.
+"""Exact time derivatives of any order of mechanisms and robots: jerk, jounce and beyond, torques and their rates.
 
 Importing this package switches JAX to double precision (``jax_enable_x64``); it has no other side effect.
 """
@@ -19,7 +19,9 @@ from jounce.constraints import (  # noqa: E402
 )
 from jounce.dynamics import (  # noqa: E402
     Energy as Energy,
+    LimitReport as LimitReport,
     acceleration_energy as acceleration_energy,
+    check_limits as check_limits,
     kinetic_energy as kinetic_energy,
 )
 from jounce.errors import (  # noqa: E402
@@ -38,7 +40,12 @@ from jounce.errors import (  # noqa: E402
     TrajectoryError as TrajectoryError,
     UnitError as UnitError,
 )
-from jounce.io import load as load, load_robot as load_robot, load_trajectory as load_trajectory  # noqa: E402
+from jounce.io import (  # noqa: E402
+    load as load,
+    load_limits as load_limits,
+    load_robot as load_robot,
+    load_trajectory as load_trajectory,
+)
 from jounce.jet import Jet as Jet, compose as compose  # noqa: E402
 from jounce.kinematics import Motion as Motion, Status as Status, solve as solve  # noqa: E402
 from jounce.mechanism import (  # noqa: E402

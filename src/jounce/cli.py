@@ -2,7 +2,7 @@
 
 Everything that a command needs is imported when it runs, so that none waits for the libraries of another. Results go to
 standard output, messages to standard error; the exit status is 0 for success, 2 for bad input, and 1 where a solve
-failed at some instants (the others are still printed and written) or a result could not be written.
+failed at some instants (the others are still printed and written), a limit is broken, or a result could not be written.
 """
 
 from __future__ import annotations
@@ -15,8 +15,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from jounce.errors import JounceError, OutputError, SolveError
-from jounce.io.terminal import Bar, complain, say, show_peaks, unexpected
+from jounce.errors import JounceError, OutputError, RobotError, SampleWarning, SolveError
+from jounce.io.summaries import count, limits_summary, summary, verdict
+from jounce.io.terminal import Bar, caution, complain, say, show_limits, show_peaks, unexpected
 
 if TYPE_CHECKING:
     from jounce.kinematics import Motion
@@ -56,7 +57,7 @@ def run(
     if out is not None:
         io.check_writable(out)
     motion = _solved(_loaded(file, set_, import_), file, order, tolerance)
-    say(_summary(motion, file))
+    say(summary(motion, file))
     show_peaks(peaks(motion))
     if out is not None:
         _written(lambda: io.write(motion.dataset, out))
@@ -103,28 +104,97 @@ def plot(
     return _outcome(motion, file)
 
 
+def check(
+    robot: Path,
+    trajectory: Path,
+    /,
+    *,
+    limits: Path | None = None,
+    out: Path | None = None,
+    payload: list[str] | None = None,
+    degree: int = 5,
+) -> int:
+    """Compare a trajectory with the limits of a robot, from position to torque rate.
+
+    The exit status is 0 where all limits are kept, 1 where one is broken.
+
+    Parameters
+    ----------
+    robot
+        Robot file: URDF (.urdf) or MJCF (.xml).
+    trajectory
+        Samples (.csv), or laws or a motion (.yaml, .yml, .toml or .json).
+    limits
+        File of limits, which go before those of the robot file.
+    out
+        Draw the joints' shares of their limits: .png, .svg or .pdf.
+    payload
+        LINK=MASS held in the origin of a link, with a unit; repeatable.
+    degree
+        Of the splines through samples, odd from 3 to 11.
+    """
+    import warnings
+
+    from jounce.dynamics.limits import check_limits
+    from jounce.io.limits import load_limits
+    from jounce.io.robots import load_robot
+    from jounce.io.trajectories import load_trajectory
+
+    if out is not None:
+        from jounce.plot import check_figure
+
+        check_figure(out)
+    model = load_robot(robot)
+    laid = load_limits(limits, model) if limits is not None else None
+    if payload:
+        from jounce.io.payloads import with_payloads
+
+        model = with_payloads(model, payload)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", SampleWarning)
+        motion = load_trajectory(trajectory, degree)
+        try:
+            report = check_limits(model, motion, laid)
+        except RobotError as error:
+            raise error.located(path=robot) from None
+        except JounceError as error:
+            raise error.located(path=trajectory) from None
+    if report.worst is None:
+        raise JounceError("there are no limits to compare with; give a file of limits with --limits", path=robot)
+    say(limits_summary(report, motion, robot, trajectory))
+    show_limits(report)
+    for warning in caught:
+        caution(warning.message)
+    say(f"\n{verdict(report)}")
+    if out is not None:
+        from jounce.plot import draw_limits, save
+
+        _written(lambda: save(draw_limits(report, f"{report.robot}: {trajectory.name}"), out))
+        say(f"\nWritten to {out}")
+    return 0 if report.kept else 1
+
+
 def reproduce(paper: str, /, *, out: Path) -> int:
     """Make the figures and tables of a paper again.
 
     Parameters
     ----------
     paper
-        sommer-2024.
+        sommer-2024 or negrean-2025.
     out
         Folder for figures and tables; made if it does not exist.
     """
-    if paper == "negrean-2025":
-        raise JounceError("negrean-2025 is not available in this version, which does kinematics only; sommer-2024 is")
-    if paper != "sommer-2024":
+    import importlib
+
+    if paper not in PAPERS:
         from jounce.errors import did_you_mean
 
-        raise JounceError(f"no paper has this name; {did_you_mean(paper, ['sommer-2024'])}", value=paper)
-    from jounce.papers.sommer_2024 import reproduce as make
-
+        raise JounceError(f"no paper has this name; {did_you_mean(paper, PAPERS)}", value=paper)
+    make = importlib.import_module(PAPERS[paper]).reproduce
     with Bar("reproducing") as bar:
         paths = make(out, progress=bar)
     say(paths[0].read_text(encoding="utf-8"))
-    say(f"Written to {out}: {_count(len(paths), 'file')}")
+    say(f"Written to {out}: {count(len(paths), 'file')}")
     return 0
 
 
@@ -138,6 +208,8 @@ def schema() -> int:
     return 0
 
 
+PAPERS = {"sommer-2024": "jounce.papers.sommer_2024", "negrean-2025": "jounce.papers.negrean_2025"}
+
 EXAMPLES = {
     run: """\
   jounce run examples/four_bar.yaml
@@ -146,7 +218,15 @@ EXAMPLES = {
     plot: """\
   jounce plot examples/four_bar.yaml --out four_bar.png
   jounce plot examples/rsur.yaml --order 6 --output psi --output C""",
-    reproduce: "  jounce reproduce sommer-2024 --out out",
+    check: """\
+  jounce check examples/robots/panda.urdf examples/trajectories/panda_good.csv
+  jounce check examples/robots/panda.urdf examples/trajectories/panda_pick.yaml \\
+    --limits examples/limits/franka_panda.yaml --out pick.png
+  jounce check examples/robots/panda.urdf examples/trajectories/panda_wave.yaml \\
+    --payload "panda_hand=3 kg\"""",
+    reproduce: """\
+  jounce reproduce sommer-2024 --out out
+  jounce reproduce negrean-2025 --out out""",
     schema: "  jounce schema > mechanism.schema.json",
 }
 
@@ -162,7 +242,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0 success, 2 bad input, 1 a solve or a writing that failed, 130 interrupted.
+        0 success, 2 bad input, 1 a solve or a writing that failed or a limit that is broken, 130 interrupted.
     """
     if arguments is None:
         gc.freeze()  # the collector need not look at the libraries again: 0.15 s of a short run
@@ -170,7 +250,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with suppress(AttributeError, ValueError):
             stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
     try:
-        _use_compilation_cache()
+        from jounce.io.cache import use_compilation_cache
+
+        use_compilation_cache()
         return _dispatch(list(sys.argv[1:] if arguments is None else arguments))
     except KeyboardInterrupt:
         return 130
@@ -279,69 +361,3 @@ def _written(write: Any) -> None:
         write()
     except OutputError as error:
         raise _WritingError(error) from None
-
-
-def _summary(motion: Motion, file: Path) -> str:
-    """Word what was solved: bodies, degrees of freedom, instants."""
-    import numpy as np
-
-    from jounce.mechanism import build
-
-    mechanism, time_ = motion.mechanism, motion.time
-    rows = build(mechanism).rows
-    drives = sum(name.startswith("drivers.") for name in rows)
-    bodies = _count(len(mechanism.bodies), "moving body", "moving bodies")
-    joints = f"{_count(len(mechanism.joints), 'joint')} ({_count(len(rows) - drives, 'equation')})"
-    freedom = _count(drives, "degree of freedom", "degrees of freedom")
-    driven = f", driven by {', '.join(mechanism.drivers)}" if mechanism.drivers else ""
-    solved = int(np.sum(motion.status == 0))
-    instants = _count(len(time_), "instant") if solved == len(time_) else f"{solved} of {len(time_)} instants"
-    span = f"t = {time_[0]:g} s" if len(time_) == 1 else f"from t = {time_[0]:g} s to {time_[-1]:g} s"
-    return "\n".join([
-        mechanism.title or file.name,
-        f"{mechanism.space}: {bodies} ({len(rows)} coordinates), {joints}",
-        f"{freedom}{driven}",
-        f"{instants} {span}, derivatives to order {motion.order}",
-    ])  # fmt: skip
-
-
-def _count(number: int, noun: str, plural: str = "") -> str:
-    return f"{number} {noun if number == 1 else plural or f'{noun}s'}"
-
-
-def _cache_directory() -> Path | None:
-    """Return where compiled programs are kept: JOUNCE_CACHE_DIR, or the user's cache folder; None where nowhere."""
-    given = os.environ.get("JOUNCE_CACHE_DIR")
-    if given is not None:
-        return Path(given) if given.strip() else None
-    home = Path.home()
-    if sys.platform == "win32":
-        return Path(os.environ.get("LOCALAPPDATA", home / "AppData" / "Local")) / "jounce" / "cache"
-    if sys.platform == "darwin":
-        return home / "Library" / "Caches" / "jounce"
-    base = Path(os.environ.get("XDG_CACHE_HOME", ""))
-    return (base if base.is_absolute() else home / ".cache") / "jounce"
-
-
-def _use_compilation_cache() -> None:
-    """Keep compiled programs between calls of the command, unless JAX was told where or the folder is out of reach."""
-    import warnings
-
-    import jax
-
-    if getattr(jax.config, "jax_compilation_cache_dir", None) is not None:
-        return
-    try:
-        directory = _cache_directory()
-        if directory is None:
-            return
-        directory.mkdir(parents=True, exist_ok=True)
-    except (OSError, RuntimeError, ValueError):  # RuntimeError: there is no home
-        return
-    if not os.access(directory, os.W_OK | os.X_OK):
-        return
-    jax.config.update("jax_compilation_cache_dir", str(directory))
-    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.05)
-    jax.config.update("jax_persistent_cache_min_entry_size_bytes", 0)
-    jax.config.update("jax_persistent_cache_enable_xla_caches", "none")  # those are for GPUs
-    warnings.filterwarnings("ignore", message="Error (reading|writing) persistent compilation cache")

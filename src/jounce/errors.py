@@ -204,7 +204,7 @@ class MobilityError(MechanismError):
 
 
 class RobotError(JounceError):
-    """A robot cannot be what was described: a loop, a link without mass, an unknown joint, values of the wrong shape."""
+    """A robot cannot be what was described, or values do not fit it: a loop, a link without mass, an unknown joint."""
 
 
 class RobotFileError(RobotError):

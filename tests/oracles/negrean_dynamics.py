@@ -132,7 +132,7 @@ def translation_factor(delta):
 
 
 def energy(robot, q, p, n=0):
-    """Return the n-th rate of the acceleration energy of order p, of all bodies; q holds plain derivatives, by joint."""
+    """Return the n-th rate of the acceleration energy of order p of all bodies; q holds plain derivatives by joint."""
     length = p + n + 2
     rows = [[*list(row)[:length], *[mpf(0)] * (length - len(row))] for row in q]
     state = State(robot, [Series([mpf(d) / mp.factorial(k) for k, d in enumerate(row)]) for row in rows])

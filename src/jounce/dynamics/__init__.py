@@ -19,3 +19,4 @@ from jounce.dynamics.equations import (
     mangeron_nielsen as mangeron_nielsen,
     printed_coefficient as printed_coefficient,
 )
+from jounce.dynamics.limits import LimitReport as LimitReport, LimitRow as LimitRow, check_limits as check_limits

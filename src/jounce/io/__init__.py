@@ -1,4 +1,4 @@
-"""Files of mechanisms, robots, trajectories and results; the libraries that they need are imported when a file is, not before."""
+"""Files of mechanisms, robots, trajectories and results; libraries are imported when a file is read, not before."""
 
 from __future__ import annotations
 
@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from jounce.io.export import json_schema as json_schema
+    from jounce.io.limits import load_limits as load_limits
     from jounce.io.loader import load as load
     from jounce.io.results import check_writable as check_writable, read as read, write as write
     from jounce.io.robots import load_robot as load_robot
     from jounce.io.trajectories import load_trajectory as load_trajectory
 
-__all__ = ["check_writable", "json_schema", "load", "load_robot", "load_trajectory", "read", "write"]
+__all__ = ["check_writable", "json_schema", "load", "load_limits", "load_robot", "load_trajectory", "read", "write"]
 
 _HOMES = {
     "load": "loader",
@@ -19,6 +20,7 @@ _HOMES = {
     "check_writable": "results",
     "read": "results",
     "write": "results",
+    "load_limits": "limits",
     "load_robot": "robots",
     "load_trajectory": "trajectories",
 }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 from collections.abc import Iterable, Mapping
 from os import PathLike
 from typing import Any
@@ -118,7 +119,7 @@ class _LimitsFile:
         if dimension and dimension not in _dimensions(key, joint.turning):
             unit = EXAMPLES[joint.turning][KEYS.index(key)]
             kind = "turns" if joint.turning else "slides"
-            message = f"the unit is that of {describe_dimension(dimension)}; a joint that {kind} has {key} in {unit}"
+            message = f"{_wrong_unit(raw, dimension)}; a joint that {kind} has {key} in {unit}"
             raise self._error(message, at, value=raw)
         self._check_size(number, raw, key, at)
         return number
@@ -128,10 +129,7 @@ class _LimitsFile:
             found = parse_value(raw)
         except JounceError as error:
             quoted = getattr(error, "column", None) is not None  # the text is in the message
-            message = error.message
-            if message.startswith("unknown unit 'Nm'"):
-                message = "unknown unit 'Nm'; write N*m"
-            raise self._error(message, at, **({} if quoted else {"value": raw})) from None
+            raise self._error(error.message, at, **({} if quoted else {"value": raw})) from None
         assert isinstance(found.value, float)  # no names are allowed, so that expressions are worked out
         return found.value, found.dimension
 
@@ -150,7 +148,7 @@ class _LimitsFile:
         number, dimension = self._parsed(raw, at)
         if dimension and dimension not in (*_dimensions(key, True), *_dimensions(key, False)):
             turning, sliding = (EXAMPLES[kind][KEYS.index(key)] for kind in (True, False))
-            message = f"the unit is that of {describe_dimension(dimension)}; {key} is in {turning} or {sliding}"
+            message = f"{_wrong_unit(raw, dimension)}; {key} is in {turning} or {sliding}"
             raise self._error(message, at, value=raw)
         self._check_size(number, raw, key, at)
 
@@ -182,6 +180,13 @@ class _LimitsFile:
     def _error(self, message: str, at: Location = (), **value: Any) -> RobotError:
         place = self.source.error(message, at)
         return RobotError(message, path=place.path, line=place.line, name=place.name, **value)
+
+
+def _wrong_unit(raw: Any, dimension: Dimension) -> str:
+    if re.search(r"(?<![A-Za-z])Nm(?![A-Za-z])", str(raw)):  # to pint a measure of yarns, number metric
+        return "newton metres are written N*m"
+    words = {_dimensions("effort", turning)[0]: word for turning, word in ((True, "a torque"), (False, "a force"))}
+    return f"the unit is that of {words.get(dimension) or describe_dimension(dimension)}"
 
 
 def _dimensions(key: str, turning: bool) -> tuple[Dimension, ...]:

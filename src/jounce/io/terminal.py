@@ -1,4 +1,4 @@
-"""What a command shows: the table of peaks, a progress bar, messages; in colour on a terminal, plain text elsewhere."""
+"""What a command shows: tables, a progress bar, messages; in colour on a terminal, plain text elsewhere."""
 
 from __future__ import annotations
 
@@ -7,44 +7,74 @@ import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from jounce.io.peaks import Peak
 
-__all__ = ["Bar", "complain", "say", "show_peaks", "unexpected"]
+if TYPE_CHECKING:
+    from jounce.dynamics.limits import LimitReport
+
+__all__ = ["Bar", "caution", "complain", "say", "show_limits", "show_peaks", "unexpected"]
 
 WIDTH = 80  # of tables that do not go to a terminal
 PATIENCE = 1.0  # s, before a progress bar is shown
 ROUNDING = 1e-15  # of the other components; what is smaller is shown as 0
 HEADINGS = ("output", "derivative", "unit", "minimum", "at t/s", "maximum", "at t/s")
+LIMIT_HEADINGS = ("joint", "quantity", "unit", "worst", "limit", "ratio", "at t/s")
 
 
 def show_peaks(found: list[Peak]) -> None:
     """Print a table of peaks."""
     if not found:
         say("\nNo outputs are defined, so there is nothing to tabulate.")
-    elif sys.stdout.isatty():
-        _print_table(found)
-    else:
-        say("\n" + "\n".join(_plain_table(found)))
+        return
+    table = [_cells(peak) for peak in found]
+    marks = [[k for k, largest in zip((3, 5), peak.largest, strict=True) if largest] for peak in found]
+    _show_table(HEADINGS, table, marks, "largest magnitude", (3, 5))
+
+
+def show_limits(report: LimitReport) -> None:
+    """Print a table of the worst instant of each joint and quantity that has a limit."""
+    table, marks = [], []
+    for row in report.limited:
+        numbers = (_shown(x) for x in (row.value, row.limit or 0.0))
+        table.append([row.joint, row.quantity, row.unit, *numbers, f"{row.ratio or 0.0:.4f}", f"{row.time:.5g}"])
+        marks.append([5] if row.broken else [])
+    _show_table(LIMIT_HEADINGS, table, marks, "broken" if any(marks) else "", (5,), "bold red")
+
+
+def _shown(number: float) -> str:
+    return "-" if math.isnan(number) else f"{number:.6g}"
 
 
 def _cells(peak: Peak) -> list[str]:
-    def shown(number: float) -> str:
-        return "-" if math.isnan(number) else f"{number:.6g}"
-
     low, high = (0.0 if abs(x) < ROUNDING * peak.size else x for x in (peak.minimum, peak.maximum))
-    extremes = (shown(x) for x in (low, peak.minimum_at, high, peak.maximum_at))
+    extremes = (_shown(x) for x in (low, peak.minimum_at, high, peak.maximum_at))
     return [peak.output, peak.derivative, peak.unit, *extremes]
 
 
-def _plain_table(found: list[Peak]) -> list[str]:
+def _show_table(
+    headings: Sequence[str],
+    table: list[list[str]],
+    marks: list[list[int]],
+    meaning: str,
+    markable: Sequence[int],
+    style: str = "bold",
+) -> None:
+    """Print rows grouped by their first cell; the next two are text, the rest numbers, of which some are marked."""
+    if sys.stdout.isatty():
+        _print_table(headings, table, marks, meaning, style)
+        return
+    starred = [
+        [cell + ("*" if k in marked else " ") if k in markable else cell for k, cell in enumerate(cells)]
+        for cells, marked in zip(table, marks, strict=True)
+    ]
+    say("\n" + "\n".join([*_plain_table(headings, starred), *(["", f"* {meaning}"] if meaning else [])]))
+
+
+def _plain_table(headings: Sequence[str], table: list[list[str]]) -> list[str]:
     """Return the lines of a table in plain text; where names are too long for it, they stand on lines of their own."""
-    table = [_cells(peak) for peak in found]
-    for peak, cells in zip(found, table, strict=True):
-        for column, largest in zip((3, 5), peak.largest, strict=True):
-            cells[column] += "*" if largest else " "
-    columns = list(zip(HEADINGS, *table, strict=True))
+    columns = list(zip(headings, *table, strict=True))
     widths = [max(map(len, column)) for column in columns]
     first = 0 if sum(widths) + 2 * (len(widths) - 1) <= WIDTH else 1
 
@@ -52,36 +82,39 @@ def _plain_table(found: list[Peak]) -> list[str]:
         parts = [c.ljust(w) if k < 3 else c.rjust(w) for k, (c, w) in enumerate(zip(cells, widths, strict=True))]
         return "  ".join(parts[first:]).rstrip()
 
-    lines = [line(HEADINGS), line(["-" * w for w in widths])]
+    lines = [line(headings), line(["-" * w for w in widths])]
     before = ""
     for cells in table:
         if cells[0] != before:
             lines += [""] * bool(before) + [cells[0]] * first
         before = cells[0]
         lines.append(line(cells))
-    return [*lines, "", "* largest magnitude"]
+    return lines
 
 
-def _print_table(found: list[Peak]) -> None:
+def _print_table(
+    headings: Sequence[str], found: list[list[str]], marks: list[list[int]], meaning: str, style: str
+) -> None:
     from rich import box
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
 
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, header_style="bold")
-    for k, heading in enumerate(HEADINGS):
+    for k, heading in enumerate(headings):
         table.add_column(heading, justify="left" if k < 3 else "right", no_wrap=k > 0, style="cyan" if k == 0 else "")
     before = ""
-    for peak in found:
-        cells = [Text(cell) for cell in _cells(peak)]
-        for column, largest in zip((3, 5), peak.largest, strict=True):
-            cells[column].stylize("bold" if largest else "")
-        cells[0] = Text("" if peak.output == before else _clean(peak.output))
-        if before not in ("", peak.output):
+    for row, marked in zip(found, marks, strict=True):
+        cells = [Text(cell) for cell in row]
+        for column in marked:
+            cells[column].stylize(style)
+        cells[0] = Text("" if row[0] == before else _clean(row[0]))
+        if before not in ("", row[0]):
             table.add_section()
-        before = peak.output
+        before = row[0]
         table.add_row(*cells)
-    Console().print(table, "bold: largest magnitude", sep="\n")
+    notes = [f"{style}: {meaning}"] if meaning else []
+    Console().print(table, *notes, sep="\n")
 
 
 class Bar:
@@ -128,14 +161,23 @@ def say(text: str) -> None:
 
 def complain(error: object) -> None:
     """Print an error on standard error, in one line."""
-    text = _clean(" ".join(str(error).split()))
+    _tell("error", "bold red", error)
+
+
+def caution(warning: object) -> None:
+    """Print a warning on standard error, in one line."""
+    _tell("warning", "bold yellow", warning)
+
+
+def _tell(kind: str, style: str, message: object) -> None:
+    text = _clean(" ".join(str(message).split()))
     if sys.stderr.isatty():
         from rich.console import Console
         from rich.text import Text
 
-        Console(stderr=True, soft_wrap=True).print(Text.assemble(("error: ", "bold red"), text))
+        Console(stderr=True, soft_wrap=True).print(Text.assemble((f"{kind}: ", style), text))
     else:
-        sys.stderr.write(f"error: {text}\n")
+        sys.stderr.write(f"{kind}: {text}\n")
 
 
 def unexpected(error: Exception) -> str:

@@ -45,10 +45,10 @@ class Inertia:
 
     def __post_init__(self) -> None:
         for name, shapes in (("mass", ((),)), ("center_of_mass", ((3,),)), ("tensor", ((3, 3), (3,)))):
-            object.__setattr__(self, name, _numbers(name, getattr(self, name), shapes))
+            object.__setattr__(self, name, finite_numbers(name, getattr(self, name), *shapes))
         object.__setattr__(self, "mass", float(self.mass))
         if self.tensor.shape == (3,):
-            object.__setattr__(self, "tensor", np.diag(self.tensor))
+            object.__setattr__(self, "tensor", unchanging(np.diag(self.tensor)))
         if self.mass <= 0:
             raise RobotError("must be greater than zero", name="mass", value=self.mass)
         scale = float(np.abs(self.tensor).max())
@@ -99,8 +99,16 @@ class Inertia:
 
     @classmethod
     def total(cls, parts: Iterable["Inertia"]) -> "Inertia":
-        """Return the inertia of several bodies fixed together, all given in one frame."""
+        """Return the inertia of several bodies fixed together, all given in one frame.
+
+        Raises
+        ------
+        RobotError
+            If there are none.
+        """
         parts = list(parts)
+        if not parts:
+            raise RobotError("the sum of inertias needs at least one", name="parts", value=parts)
         mass = sum(part.mass for part in parts)
         center = sum(part.mass * part.center_of_mass for part in parts) / mass
         tensor = np.zeros((3, 3))
@@ -110,15 +118,27 @@ class Inertia:
         return cls(mass, center, tensor)
 
 
-def _numbers(name: str, value: Any, shapes: tuple[tuple[int, ...], ...]) -> np.ndarray:
-    """Return an array of finite numbers of one of the shapes."""
+def finite_numbers(name: str, value: Any, *shapes: tuple[int, ...]) -> np.ndarray:
+    """Return a copy of finite numbers of one of the shapes, of any shape if none is given; it cannot be written to.
+
+    Raises
+    ------
+    RobotError
+        If the value is not made of numbers, its shape is another one, or a number is not finite.
+    """
     try:
-        array = np.asarray(value, float)
+        array = np.array(value, float)
     except (TypeError, ValueError):
         raise RobotError("must be made of numbers", name=name, value=value) from None
-    if array.shape not in shapes:
+    if shapes and array.shape not in shapes:
         wanted = " or ".join(map(str, shapes))
-        raise RobotError(f"must have the shape {wanted}", name=name, value=array.shape)
+        raise RobotError(f"must have the shape {wanted}, not {array.shape}", name=name)
     if not np.isfinite(array).all():
-        raise RobotError("must be finite", name=name, value=value)
+        raise RobotError("must be finite", name=name, value=array.tolist())
+    return unchanging(array)
+
+
+def unchanging(array: np.ndarray) -> np.ndarray:
+    """Return an array that cannot be written to: what was computed from it would not follow."""
+    array.setflags(write=False)
     return array

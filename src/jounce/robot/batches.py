@@ -30,6 +30,26 @@ def derivatives(coefficients: Any) -> Any:
     return coefficients * scale.reshape(-1, *[1] * (coefficients.ndim - 1))
 
 
+def floats(name: str, values: Any) -> Any:
+    """Return values as an array of double precision, of NumPy unless it is one of JAX.
+
+    Raises
+    ------
+    RobotError
+        If they are not real numbers in one rectangular array.
+    """
+    array = values if isinstance(values, jax.Array) else None
+    try:
+        array = np.asarray(values) if array is None else array
+        if array.dtype.kind not in "OUSc":
+            return array.astype(float, copy=False)
+        if array.dtype.kind == "O":
+            return np.asarray(array, float)
+    except (TypeError, ValueError):
+        pass
+    raise RobotError("must be an array of real numbers", name=name, value=type(values).__name__)
+
+
 def checked(robot: Robot, q: Any, least: int) -> Any:
     """Return q as an array of shape (..., order + 1, n) with at least so many derivatives.
 
@@ -38,19 +58,17 @@ def checked(robot: Robot, q: Any, least: int) -> Any:
     RobotError
         If its shape does not fit the robot or the derivatives are too few.
     """
-    if not isinstance(q, jax.Array):
-        try:
-            q = np.asarray(q, float)
-        except (TypeError, ValueError):
-            raise RobotError("must be an array of numbers", name="q", value=type(q).__name__) from None
+    q = floats("q", q)
     n = len(robot.joint_names)
     if q.ndim < 2 or q.shape[-1] != n:
         joints = f"{robot.name} has {n} {'joint' if n == 1 else 'joints'}"
-        raise RobotError(f"must have the shape (..., order + 1, n); {joints}: n = {n}", name="q", value=q.shape)
+        raise RobotError(f"must have the shape (..., order + 1, n), not {q.shape}; {joints}: n = {n}", name="q")
     if q.shape[-2] < least + 1:
         names = ["q", "q'", "q''"][: least + 1]
-        message = f"must hold {', '.join(names)} along its last axis but one; the shape is (..., order + 1, n)"
-        raise RobotError(message, name="q", value=q.shape)
+        message = (
+            f"must hold {', '.join(names)} along its last axis but one: the shape (..., order + 1, n), not {q.shape}"
+        )
+        raise RobotError(message, name="q")
     return q
 
 
@@ -71,19 +89,24 @@ class Batched:
         """The function on a block of samples, compiled; made at the first call, since the options start the backend."""
         return jax.jit(self._chunks, static_argnums=3, compiler_options=compiler_options())
 
+    @cached_property
+    def nested(self) -> Any:
+        """The function compiled on its own within transformations of JAX, which take no options of the compiler."""
+        return jax.jit(self._block, static_argnums=3)
+
     def __call__(self, robot: Robot, arrays: tuple[Any, ...], constants: Any = (), static: tuple[Any, ...] = ()) -> Any:
         """Return results for arrays of derivatives, the first one of shape (batch..., order + 1, n)."""
         lead = arrays[0].shape[:-2]
         axes, count = len(lead), math.prod(lead)
         if any(isinstance(x, Tracer) for x in jax.tree.leaves((arrays, constants))):
             flat = tuple(jnp.reshape(x, (count, *x.shape[axes:])) for x in arrays)
-            found = self._block(robot.tree, flat, constants, static)
+            found = self.nested(robot.tree, flat, constants, static)
             return jax.tree.map(lambda x: jnp.reshape(x, (*lead, *x.shape[1:])), found)
         flat = tuple(np.reshape(np.asarray(x), (count, *x.shape[axes:])) for x in arrays)
         found = [self.jitted(robot.tree, block, constants, static) for block in _blocks(flat)]
 
-        def joined(first: Any, *others: Any) -> Any:
-            whole = np.concatenate([first, *others]) if others else np.asarray(first)
+        def joined(*parts: Any) -> Any:
+            whole = np.concatenate(parts)  # a copy that its user may write to
             return np.reshape(whole[:count], (*lead, *whole.shape[1:]))
 
         return jax.tree.map(joined, *found)
@@ -103,11 +126,12 @@ class Batched:
 
 
 def _blocks(arrays: tuple[np.ndarray, ...]) -> list[tuple[np.ndarray, ...]]:
-    """Cut arrays of samples into blocks of the known widths; the last one is filled up with zeros."""
+    """Cut arrays of samples into blocks of one of the known widths; the last one is filled up with zeros."""
     count, start, blocks = len(arrays[0]), 0, []
+    small, middle, large = WIDTHS  # half of a large block at least is in use, so that no more than twice is computed
+    width = small if count <= small else middle if count <= large // 2 else large
     while start < count or not blocks:
         left = count - start
-        width = next((w for w in WIDTHS if w >= left), WIDTHS[-1])
         taken = tuple(x[start : start + width] for x in arrays)
         if left < width:
             taken = tuple(np.concatenate([x, np.zeros((width - left, *x.shape[1:]))]) for x in taken)

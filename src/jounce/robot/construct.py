@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from jounce.errors import RobotError, did_you_mean
-from jounce.rigid.inertia import Inertia
+from jounce.rigid.inertia import Inertia, finite_numbers
 from jounce.robot.model import UNLIMITED, Joint, Limits, Link
 from jounce.robot.robot import Robot
 from jounce.robot.tree import turn_about
@@ -114,8 +114,7 @@ def from_denavit_hartenberg(
     links, joints = [Link("base")], []
     for k, row in enumerate(rows, 1):
         for field in ("a", "alpha", "d", "theta"):
-            if not np.isfinite(getattr(row, field)):
-                raise RobotError("must be a finite number", name=f"row {k}.{field}", value=getattr(row, field))
+            finite_numbers(f"row {k}.{field}", getattr(row, field), ())
         parent, about_z, about_x = links[-1].name, turn_about(Z, row.theta), turn_about(X, row.alpha)
         moved = {"type": row.type, "limits": row.limits}
         if convention == "modified":
@@ -166,32 +165,36 @@ def from_screws(screws: Sequence[Screw], tool: Any = None, name: str = "robot") 
     """
     links, joints, parent = [Link("base")], [], "base"
     for k, screw in enumerate(screws, 1):
-        point = np.array(screw.point, float)
+        point = finite_numbers(f"screw {k}.point", screw.point, (3,))
         moved = {"type": screw.type, "axis": screw.axis, "limits": screw.limits}
         joints.append(Joint(f"joint_{k}", parent, f"axis_{k}", position=point, **moved))
         joints.append(Joint(f"fixed_{k}", f"axis_{k}", f"link_{k}", "fixed", position=-point))
         links += [Link(f"axis_{k}"), Link(f"link_{k}", screw.inertia)]
         parent = f"link_{k}"
     if tool is not None:
-        pose = np.array(tool, float)
-        if pose.shape != (4, 4) or not np.array_equal(pose[3], [0, 0, 0, 1]):
-            raise RobotError("must be a homogeneous transform of shape (4, 4)", name="tool", value=pose.tolist())
+        pose = finite_numbers("tool", tool, (4, 4))
+        if not np.array_equal(pose[3], [0, 0, 0, 1]):
+            raise RobotError("must have the last row 0, 0, 0, 1", name="tool", value=pose[3].tolist())
         joints.append(Joint("tool", parent, "tool", "fixed", pose[:3, 3], pose[:3, :3]))
         links.append(Link("tool"))
     return Robot(name, links, joints)
 
 
-def floating_joints(base: str, sequence: str = "ZYX", prefix: str = "base") -> tuple[list[Link], list[Joint]]:
+def floating_joints(
+    base: str, sequence: str = "ZYX", prefix: str = "base", world: str = "world"
+) -> tuple[list[Link], list[Joint]]:
     """Return the links and joints that let a link move freely: slides along x, y, z, then turns about moving axes.
 
     Parameters
     ----------
     base : str
-        The link that is set free; `world` is the new base.
+        The link that is set free.
     sequence : str, default "ZYX"
         Axes of the three turns.
     prefix : str, default "base"
         What the names begin with.
+    world : str, default "world"
+        Name of the new base.
 
     Raises
     ------
@@ -205,7 +208,7 @@ def floating_joints(base: str, sequence: str = "ZYX", prefix: str = "base") -> t
     axes = dict(zip("XYZ", (X, Y, Z), strict=True))
     kinds = [("prismatic", axes[letter], letter.lower()) for letter in "XYZ"]
     kinds += [("continuous", axes[letter], f"angle_{k}") for k, letter in enumerate(letters, 1)]
-    links, joints = [Link("world")], []
+    links, joints = [Link(world)], []
     for k, (kind, axis, suffix) in enumerate(kinds):
         child = base if k == 5 else f"{prefix}_frame_{k + 1}"
         joints.append(Joint(f"{prefix}_{suffix}", links[-1].name, child, kind, axis=axis))

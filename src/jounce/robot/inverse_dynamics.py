@@ -105,7 +105,8 @@ def joint_wrenches(
         raise RobotError(f"no such frame; {did_you_mean(frame, FRAMES)}", name="frame", value=frame)
     q = checked(robot, q, 2)
     arrays, static = _applied(robot, q, wrenches, time)
-    aligned = np.stack([robot.frames[link].rotation for link in robot.moving_links], axis=-1)
+    turned = [robot.frames[link].rotation for link in robot.moving_links]
+    aligned = np.moveaxis(np.array(turned).reshape(-1, 3, 3), 0, -1)
     return _carried(robot, arrays[0], (arrays[1], aligned), (*static, frame == "base"))
 
 
@@ -114,7 +115,7 @@ def _applied(robot: Robot, q: Any, wrenches: Sequence[Wrench], time: Any) -> tup
     given = wrench_arrays(robot, wrenches, q.shape[:-2], q.shape[-2] - 2, time)
     frames = [robot.frames[wrench.link] for wrench in wrenches]
     constants = tuple(
-        (np.int64(frame.body), frame.position + frame.rotation @ np.asarray(wrench.point, float), frame.rotation)
+        (np.int64(frame.body), frame.position + frame.rotation @ wrench.point, frame.rotation)
         for frame, wrench in zip(frames, wrenches, strict=True)
     )
     return ((q, *given), constants), (tuple(wrench.frame == "base" for wrench in wrenches),)

@@ -1,6 +1,7 @@
 """Joint motion from the motion of a link, order by order, by one pseudo-inverse. Negrean 2025, equation 60."""
 
 import dataclasses
+from collections.abc import Sequence
 from typing import Any
 
 import jax
@@ -9,7 +10,8 @@ import numpy as np
 from jax.core import Tracer
 
 from jounce.errors import RobotError, SingularityError, did_you_mean
-from jounce.robot.batches import Batched, checked
+from jounce.rigid.inertia import finite_numbers
+from jounce.robot.batches import Batched, floats
 from jounce.robot.jacobian import jacobian_jet, twist
 from jounce.robot.kinematics import frame_constants
 from jounce.robot.robot import Robot
@@ -19,6 +21,7 @@ from jounce.robot.tree import Tree
 TASKS = {"pose": (0, 1, 2, 3, 4, 5), "position": (0, 1, 2), "orientation": (3, 4, 5)}
 
 
+@jax.tree_util.register_dataclass
 @dataclasses.dataclass(frozen=True, eq=False)
 class JointMotion:
     """Joint coordinates of a prescribed motion of a link.
@@ -52,8 +55,9 @@ def _solved(tree: Tree, arrays: Any, constants: Any, rows: tuple[int, ...]) -> A
 
     matrix = jnp.moveaxis(jacobian_jet(tree, position, frame).coefficients[0][rows_], -1, 0)
     u, s, v = jnp.linalg.svd(matrix, full_matrices=False)
-    near = s < threshold * s[:, :1]
-    squares = jnp.where(near, damping**2 * (1 - (s / (threshold * s[:, :1])) ** 2), 0.0)
+    limit = threshold * s[:, :1]
+    near = s <= limit  # also where all are zero, and no motion is possible
+    squares = jnp.where(near, damping**2 * (1 - (s / jnp.where(limit == 0, 1.0, limit)) ** 2), 0.0)
     inverse = jnp.where(near & (damping == 0), jnp.nan, s / jnp.where(squares + s == 0, 1.0, s**2 + squares))
     # the pseudo-inverse is made once, and serves all orders
     pseudo = jnp.einsum("bji,bj,bkj->bik", v, inverse, u)
@@ -63,7 +67,7 @@ def _solved(tree: Tree, arrays: Any, constants: Any, rows: tuple[int, ...]) -> A
         missing = wanted[k] - task_twist(trial)[k]
         q = jnp.concatenate([q, jnp.einsum("bik,kb->ib", pseudo, missing)[None] / (k + 1)])
     residual = wanted - task_twist(q)
-    return q, jnp.swapaxes(s, 0, 1)[None], jnp.swapaxes(near.any(axis=1)[:, None], 0, 1)[None] * 1.0, residual
+    return q, jnp.swapaxes(s, 0, 1)[None], near.any(axis=1).astype(float)[None, None], residual
 
 
 def joint_motion(
@@ -73,7 +77,7 @@ def joint_motion(
     link: str,
     point: Any = (0.0, 0.0, 0.0),
     *,
-    task: str = "pose",
+    task: str | Sequence[int] = "pose",
     damping: float = 0.0,
     threshold: float = 1e-3,
     strict: bool = True,
@@ -89,17 +93,17 @@ def joint_motion(
         The robot.
     position : array_like of shape (..., n)
         Coordinates, rad or m.
-    operational : array_like of shape (..., order, 6) or (..., order, 3)
-        ``X', X'', ...`` as `operational_accelerations` gives them; three components where the task has three.
+    operational : array_like of shape (..., order, 6) or (..., order, rows)
+        ``X', X'', ...`` as `operational_accelerations` gives them, or the rows of the task alone.
     link, point
         As for `jacobian`.
-    task : {"pose", "position", "orientation"}, default "pose"
-        Which rows count.
+    task : {"pose", "position", "orientation"} or sequence of int, default "pose"
+        Which rows count; numbers from 0 to 5 choose them freely, as ``(0, 1)`` for a place in the x-y plane.
     damping : float, default 0
         Damped least squares: how strongly directions near singularity are held back, in the units of the Jacobian; it
         fades in below the threshold. Zero is no damping: singular configurations are errors.
     threshold : float, default 1e-3
-        A configuration is singular where the smallest singular value is below this part of the largest.
+        A configuration is singular where the smallest singular value does not exceed this part of the largest.
     strict : bool, default True
         Raise at singular configurations without damping; otherwise they are NaN.
 
@@ -124,18 +128,18 @@ def joint_motion(
     >>> jn.joint_motion(robot, [0.0], [[0.0, 2.0, 0.0], [-4.0, 0.0, 0.0]], "rod", [1, 0, 0], task="position").q.tolist()
     [[0.0], [2.0], [0.0]]
     """
-    if task not in TASKS:
-        raise RobotError(f"no such task; {did_you_mean(task, TASKS)}", name="task", value=task)
-    rows = TASKS[task]
+    rows = _rows(task)
     for name, value, least in (("damping", damping, 0.0), ("threshold", threshold, 1e-15)):
-        if not (np.isfinite(value) and value >= least):
-            raise RobotError(f"must be a finite number, {least:g} or greater", name=name, value=value)
-    start = checked(robot, jnp.asarray(position, float)[..., None, :], 0)
-    wanted = operational if isinstance(operational, jax.Array) else np.asarray(operational, float)
+        if finite_numbers(name, value, ()) < least:
+            raise RobotError(f"must be {least:g} or greater", name=name, value=value)
+    start, n = floats("position", position), len(robot.joint_names)
+    if start.ndim < 1 or start.shape[-1] != n:
+        raise RobotError(f"must have the shape (..., n) with n = {n}, not {start.shape}", name="position")
+    start, wanted = start[..., None, :], floats("operational", operational)
     lead = start.shape[:-2]
     if wanted.ndim < 2 or wanted.shape[:-2] != lead or wanted.shape[-1] not in (6, len(rows)) or wanted.shape[-2] < 1:
         shape = f"{(*lead, 'order', len(rows))}".replace("'", "")
-        raise RobotError(f"must have the shape {shape}, order 1 or more", name="operational", value=wanted.shape)
+        raise RobotError(f"must have the shape {shape}, order 1 or more, not {wanted.shape}", name="operational")
     if wanted.shape[-1] == 6:
         wanted = wanted[..., np.array(rows)]
     constants = (frame_constants(robot, link, point), np.float64(damping), np.float64(threshold))
@@ -143,11 +147,24 @@ def joint_motion(
     values, singular = values[..., 0, :], singular[..., 0, 0] > 0
     if strict and damping == 0 and not isinstance(singular, Tracer) and np.any(singular):
         first = tuple(int(i) for i in np.argwhere(np.atleast_1d(singular))[0])
-        ratio = float(np.min(np.reshape(values, (-1, values.shape[-1])).min(axis=1)))
+        smallest, largest = (float(values[first if lead else ()][k]) for k in (-1, 0))
         where = "" if not lead else f" at sample {first[0] if len(first) == 1 else first}"
         message = (
-            f"the configuration is singular for this task{where}: the smallest singular value of the Jacobian is "
-            f"{ratio:.2g}; give a damping, or take another task or path"
+            f"the configuration is singular for this task{where}: the singular values of the Jacobian reach from "
+            f"{largest:.2g} down to {smallest:.2g}; give a damping, or take another task or path"
         )
         raise SingularityError(message, name=link)
     return JointMotion(q, values, singular, residual)
+
+
+def _rows(task: str | Sequence[int]) -> tuple[int, ...]:
+    """Return the rows of the Jacobian that a task has."""
+    if isinstance(task, str):
+        if task not in TASKS:
+            raise RobotError(f"no such task; {did_you_mean(task, TASKS)}", name="task", value=task)
+        return TASKS[task]
+    rows = tuple(task)
+    whole = all(isinstance(row, int | np.integer) and 0 <= row <= 5 for row in rows)
+    if not whole or not rows or len(set(rows)) < len(rows):
+        raise RobotError("must be a name or different rows from 0 to 5", name="task", value=list(rows))
+    return tuple(int(row) for row in rows)

@@ -11,6 +11,7 @@ from jounce.errors import RobotError, did_you_mean
 from jounce.jet import Jet, sine_cosine
 from jounce.jet.algebra import total
 from jounce.rigid.frames import Frames
+from jounce.rigid.inertia import finite_numbers
 from jounce.robot.batches import Batched, checked
 from jounce.robot.robot import Robot
 from jounce.robot.scan import entries, joint_coordinates, once, places, read, stacked, write
@@ -33,16 +34,14 @@ def body_frames(tree: Tree, q: Any) -> Frames:
     base = (zero, *units, zero[1:])
 
     def outward(state: Any, entry: Any) -> tuple[Any, Any]:
-        body, coordinate = entry
-        coordinate = Jet(tuple(coordinate[:, None]))
+        body, coordinate, turn = entry
         *placed, spin = read(tree, state, body.parent_slot)
         position, *axes = (Jet(tuple(c)) for c in placed)
         position = position + _combined(axes, body.position)
         x, y, z = (_combined(axes, body.rotation[:, i]) for i in range(3))
         if tree.shape.turning:
-            angle = coordinate * body.turning if tree.shape.sliding else coordinate
-            sine, cosine = sine_cosine(angle)
-            sine, cosine, x, y, z = once((sine, cosine, x, y, z))
+            angle, sine, cosine = turn
+            x, y, z = once((x, y, z))
             x, y = x * cosine + y * sine, y * cosine - x * sine
             if levels > 1:
                 spin = spin + stacked(z * angle.differentiate())
@@ -51,9 +50,11 @@ def body_frames(tree: Tree, q: Any) -> Frames:
         found = (*(stacked(jet) for jet in (position, x, y, z)), spin)
         return write(tree, state, body.slot, found), found
 
-    _, found = jax.lax.scan(
-        outward, places(tree, base), (entries(tree), jnp.moveaxis(joint_coordinates(tree, q), 1, 0))
-    )
+    coordinates = Jet(tuple(joint_coordinates(tree, q)[:, :, None]))
+    angles = coordinates * jnp.asarray(tree.turning)[:, None, None] if tree.shape.sliding else coordinates
+    # made before the scan, in which XLA would take sine and cosine again for each use of them
+    turns = (angles, *sine_cosine(angles)) if tree.shape.turning else None
+    _, found = jax.lax.scan(outward, places(tree, base), (entries(tree), coordinates, turns))
     arrays = [jnp.moveaxis(jnp.concatenate([x, fixed[None]]), 0, 2) for x, fixed in zip(found, base, strict=True)]
     position, *axes = (Jet(tuple(x)) for x in arrays[:4])
     return Frames(position, tuple(axes), Jet(tuple(arrays[4])) if levels > 1 else None)
@@ -81,14 +82,13 @@ def frame_constants(robot: Robot, link: str, point: Any) -> tuple[Any, Any, Any]
     """
     if link not in robot.frames:
         raise RobotError(f"no link has this name; {did_you_mean(link, robot.frames)}", name="link", value=link)
-    point = np.asarray(point, float)
-    if point.shape != (3,) or not np.isfinite(point).all():
-        raise RobotError("must be three finite numbers", name="point", value=point.tolist())
+    point = finite_numbers("point", point, (3,))
     frame = robot.frames[link]
     body = frame.body if frame.body >= 0 else len(robot.moving_links)
     return np.int64(body), frame.position + frame.rotation @ point, frame.rotation
 
 
+@jax.tree_util.register_dataclass
 @dataclasses.dataclass(frozen=True, eq=False)
 class FrameMotion:
     """Where a frame is and how it moves, in components of the base, with derivatives of any order.
@@ -182,7 +182,7 @@ def center_of_mass(robot: Robot, q: Any) -> Any:
     Raises
     ------
     RobotError
-        If q does not fit the robot.
+        If q does not fit the robot, or nothing has a mass.
 
     Examples
     --------
@@ -194,6 +194,8 @@ def center_of_mass(robot: Robot, q: Any) -> Any:
     """
     q = checked(robot, q, 0)
     base = robot.base_inertia
+    if base is None and not robot.moving_links:
+        raise RobotError("no link has a mass", name="robot", value=robot.name)
     mass = np.append(robot.tree.mass, 0.0 if base is None else base.mass)
     center = np.concatenate([robot.tree.center, [np.zeros(3) if base is None else base.center_of_mass]])
     return _center_of_mass(robot, (q,), (mass, center))

@@ -1,12 +1,13 @@
 """What a robot is made of: links, joints and limits, as a file or a script gives them; frozen and checked."""
 
 import dataclasses
+import numbers
 from typing import Any
 
 import numpy as np
 
 from jounce.errors import RobotError, did_you_mean
-from jounce.rigid.inertia import Inertia
+from jounce.rigid.inertia import Inertia, finite_numbers, unchanging
 
 MOVING = ("revolute", "continuous", "prismatic")
 TYPES = (*MOVING, "fixed")
@@ -41,7 +42,7 @@ class Limits:
             value = getattr(self, field.name)
             if value is None:
                 continue
-            if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
+            if isinstance(value, bool) or not isinstance(value, numbers.Real) or not np.isfinite(float(value)):
                 raise RobotError("must be a finite number", name=field.name, value=value)
             if field.name not in ("lower", "upper") and value <= 0:
                 raise RobotError("must be greater than zero", name=field.name, value=value)
@@ -54,11 +55,30 @@ UNLIMITED = Limits()
 
 @dataclasses.dataclass(frozen=True)
 class Mimic:
-    """A joint that follows another one: its coordinate is ``multiplier * q + offset``."""
+    """A joint that follows another one: its coordinate is ``multiplier * q + offset``.
+
+    Parameters
+    ----------
+    joint : str
+        Name of the joint that is followed; it follows no other.
+    multiplier : float, default 1
+        By how much faster this one moves.
+    offset : float, default 0
+        Its coordinate where that of the other is zero, rad or m.
+
+    Raises
+    ------
+    RobotError
+        If a number is not finite.
+    """
 
     joint: str
     multiplier: float = 1.0
     offset: float = 0.0
+
+    def __post_init__(self) -> None:
+        for field in ("multiplier", "offset"):
+            object.__setattr__(self, field, float(finite_numbers(f"mimic.{field}", getattr(self, field), ())))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -71,10 +91,19 @@ class Link:
         Name of the link, and of its frame.
     inertia : Inertia or None
         In the frame of the link.
+
+    Raises
+    ------
+    RobotError
+        If the inertia is none.
     """
 
     name: str
     inertia: Inertia | None = None
+
+    def __post_init__(self) -> None:
+        if self.inertia is not None and not isinstance(self.inertia, Inertia):
+            raise RobotError("must be an Inertia or None", name=f"links.{self.name}.inertia", value=self.inertia)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -100,7 +129,8 @@ class Joint:
     mimic : Mimic, optional
         The joint that this one follows.
     armature : float, default 0
-        Inertia of the drive, seen at the joint, kg m^2 or kg.
+        Inertia of the drive, seen at the joint, kg m^2 or kg. Of a joint that follows another, this and the next two
+        count through the multiplier.
     damping : float, default 0
         Viscous friction, N m s/rad or N s/m.
     friction : float, default 0
@@ -109,7 +139,8 @@ class Joint:
     Raises
     ------
     RobotError
-        If the type is not known, the axis has no length, or the rotation is none.
+        If the type is not known, a value is not finite or has another shape, the axis has no length, the rotation is
+        none, or armature, damping or friction is negative.
     """
 
     name: str
@@ -131,12 +162,7 @@ class Joint:
             message = f"no joint has this type; {did_you_mean(self.type, TYPES)}"
             raise RobotError(message, name=f"{where}.type", value=self.type)
         for field, shape in (("position", (3,)), ("rotation", (3, 3)), ("axis", (3,))):
-            value = np.array(getattr(self, field), float)
-            if value.shape != shape or not np.isfinite(value).all():
-                raise RobotError(
-                    f"must be finite numbers of shape {shape}", name=f"{where}.{field}", value=value.tolist()
-                )
-            object.__setattr__(self, field, value)
+            object.__setattr__(self, field, finite_numbers(f"{where}.{field}", getattr(self, field), shape))
         if (
             not np.allclose(self.rotation @ self.rotation.T, np.eye(3), rtol=0, atol=1e-6)
             or np.linalg.det(self.rotation) < 0
@@ -146,11 +172,12 @@ class Joint:
         if self.type != "fixed":
             if length < 1e-9:
                 raise RobotError("must have a direction", name=f"{where}.axis", value=self.axis.tolist())
-            object.__setattr__(self, "axis", self.axis if abs(length - 1) < 1e-15 else self.axis / length)
+            object.__setattr__(self, "axis", self.axis if abs(length - 1) < 1e-15 else unchanging(self.axis / length))
         for field in ("armature", "damping", "friction"):
-            value = getattr(self, field)
-            if not (np.isfinite(value) and value >= 0):
+            value = float(finite_numbers(f"{where}.{field}", getattr(self, field), ()))
+            if value < 0:
                 raise RobotError("must be zero or greater", name=f"{where}.{field}", value=value)
+            object.__setattr__(self, field, value)
 
     @property
     def moving(self) -> bool:

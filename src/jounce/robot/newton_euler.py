@@ -11,11 +11,14 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from jounce.jet import Jet, components, concatenate, cross, matvec, next_sine_cosine
-from jounce.jet.algebra import bilinear
+from jounce.jet.algebra import bilinear, total
 from jounce.robot.scan import entries, joint_coordinates, once, places, read, stacked, write
 from jounce.robot.tree import Tree
+
+QUARTER = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])  # a quarter turn about z, of x and y
 
 
 @jax.tree_util.register_dataclass
@@ -23,38 +26,52 @@ from jounce.robot.tree import Tree
 class Turn:
     """The rotation from a body to its parent, ``M Rz(d)``: a matrix for each sample, and a jet of the turn since then.
 
-    The jet starts at zero, so that sine and ``cosine - 1`` have no first coefficients, and most products vanish.
+    The jet starts at zero, so that sine and ``versine = cosine - 1`` have no first coefficients, and most products
+    vanish. They are made for all joints at once outside of the scans, inside which XLA would take them again for each
+    use. The matrix is cheaper made than kept.
     """
 
-    matrix: Any
+    still: Any  # the matrix is still + across cosine + quarter sine
+    across: Any = None
+    quarter: Any = None
+    start: tuple[Any, Any] | None = None  # cosine and sine of the value
     sine: Jet | None = None
     versine: Jet | None = None
 
     @classmethod
-    def of(cls, tree: Tree, body: Tree, coordinate: Jet) -> "Turn":
-        """Return the rotation of a body whose joint has this coordinate, shape (1, batch)."""
-        placement = body.rotation[:, :, None]
+    def of(cls, tree: Tree, coordinates: Jet) -> "Turn":
+        """Return the rotations of all bodies, for coordinates of shape (bodies, 1, batch)."""
+        placement = jnp.asarray(tree.rotation)
         if not tree.shape.turning:
-            return cls(placement)
-        angle = coordinate * body.turning if tree.shape.sliding else coordinate
-        sine, cosine = jnp.sin(angle.coefficients[0])[None], jnp.cos(angle.coefficients[0])[None]
-        x, y, z = placement[:, 0:1], placement[:, 1:2], placement[:, 2:3]
-        along = jnp.broadcast_to(z, (3, *sine.shape[1:]))
-        matrix = jnp.concatenate([x * cosine + y * sine, y * cosine - x * sine, along], axis=1)
+            return cls(placement[..., None])
+        along_z = np.array([0.0, 0.0, 1.0])[None, None, :]
+        still, across, quarter = placement * along_z, placement * (1 - along_z), placement @ QUARTER
+        angle = coordinates * jnp.asarray(tree.turning)[:, None, None] if tree.shape.sliding else coordinates
         s, c = [None], [1.0]
         for _ in range(angle.order):
             following = next_sine_cosine(s, c, angle)
             s.append(following[0])
             c.append(following[1])
-        return cls(matrix, Jet(s), Jet([None, *c[1:]]))
+        value = angle.coefficients[0][:, None]
+        start = (jnp.cos(value), jnp.sin(value))
+        return cls(still[..., None], across[..., None], quarter[..., None], start, Jet(s), Jet([None, *c[1:]]))
+
+    @property
+    def matrix(self) -> Any:
+        """The matrix for the value, shape (3, 3, batch)."""
+        if self.start is None:
+            return self.still
+        cosine, sine = self.start
+        return self.still + self.across * cosine + self.quarter * sine
 
     def outward(self, vector: Jet) -> Jet:
         """Take a vector from the parent's frame to that of the body."""
-        return self._turned(once(matvec(jnp.swapaxes(self.matrix, 0, 1), vector)), 1)
+        rows = zip(self.matrix, components(vector), strict=True)
+        return self._turned(total(bilinear(jnp.multiply, row, part) for row, part in rows), 1)
 
     def inward(self, vector: Jet) -> Jet:
         """Take a vector from the frame of the body to the parent's."""
-        return matvec(self.matrix, once(self._turned(vector, -1)))
+        return matvec(self.matrix, self._turned(vector, -1))
 
     def _turned(self, vector: Jet, sign: int) -> Jet:
         if self.sine is None or self.versine is None:
@@ -95,19 +112,19 @@ def newton_euler(tree: Tree, q: Any, wrenches: Any = None) -> tuple[Any, Any, An
     zero = jnp.zeros((3, samples))
     falling = jnp.broadcast_to(-jnp.asarray(tree.gravity)[:, None], (3, samples))
     base = tuple(jnp.stack(c) for c in ([zero] * order, [zero, falling, *[zero] * (order - 2)]))
+    along_joints = Jet(tuple(coordinates[:, :, None]))
+    # turns are made before the scan, all at once: inside, XLA would take sine and cosine again for each use of them
     bodies = (
         entries(tree),
-        jnp.moveaxis(coordinates, 1, 0),
+        along_joints,
+        Turn.of(tree, along_joints),
         wrenches if wrenches is None else jnp.moveaxis(wrenches, 1, 0),
     )
 
     def outward(state: Any, entry: Any) -> tuple[Any, Any]:
-        body, coordinate, applied = entry
-        coordinate = Jet(tuple(coordinate[:, None]))
-        turn = Turn.of(tree, body, coordinate)
+        body, coordinate, turn, applied = entry
         w, v = (Jet(tuple(c)) for c in read(tree, state, body.parent_slot))
         w, v = turn.outward(w), turn.outward(v + cross(w, _constant(body.position)))
-        slide = None
         rate = coordinate.differentiate()
         if tree.shape.turning:
             turning = rate * body.turning if tree.shape.sliding else rate
@@ -127,17 +144,18 @@ def newton_euler(tree: Tree, q: Any, wrenches: Any = None) -> tuple[Any, Any, An
             force = Jet(f - a[:3] for f, a in zip(force.coefficients, applied, strict=True))
             moment = Jet(m - a[3:] for m, a in zip(moment.coefficients, applied, strict=True))
         state = write(tree, state, body.slot, (stacked(w), stacked(v)))
-        return state, (force.dense(), moment.dense(), turn, slide)
+        return state, (force.dense(), moment.dense())
 
     def inward(state: Any, entry: Any) -> tuple[Any, Any]:
-        body, (force, moment, turn, slide) = entry
+        body, coordinate, turn, (force, moment) = entry
         from_children = read(tree, state, body.slot)
         force, moment = (own + Jet(tuple(c)) for own, c in zip((force, moment), from_children, strict=True))
         along = Jet(c[2] for c in moment.coefficients)
         if tree.shape.sliding:
             along = along * body.turning + Jet(c[2] for c in force.coefficients) * (1 - body.turning)
         at_joint = moment
-        if slide is not None:
+        if tree.shape.sliding:
+            slide = coordinate * (1 - body.turning)
             x, y, _ = components(force)
             at_joint = moment + concatenate([-(slide * y), slide * x, 0 * x])
         parent = turn.inward(force)
@@ -153,6 +171,6 @@ def newton_euler(tree: Tree, q: Any, wrenches: Any = None) -> tuple[Any, Any, An
 
     _, kept = jax.lax.scan(outward, places(tree, base), bodies)
     nothing = jnp.zeros((order - 1, 3, samples))
-    _, results = jax.lax.scan(inward, places(tree, (nothing, nothing)), (bodies[0], kept), reverse=True)
+    _, results = jax.lax.scan(inward, places(tree, (nothing, nothing)), (*bodies[:3], kept), reverse=True)
     along, force, moment = (jnp.moveaxis(x, 0, 1) for x in results)
     return along, force, moment

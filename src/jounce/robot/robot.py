@@ -2,12 +2,13 @@
 
 import dataclasses
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from jounce.errors import RobotError, did_you_mean
-from jounce.rigid.inertia import Inertia
+from jounce.rigid.inertia import Inertia, finite_numbers
 from jounce.robot.model import Joint, Limits, Link
 from jounce.robot.tree import arrange, ordered
 
@@ -60,17 +61,26 @@ class Robot:
         self, name: str, links: Sequence[Link], joints: Sequence[Joint], gravity: Any = (0.0, 0.0, -STANDARD_GRAVITY)
     ):
         self.name = name
-        self.gravity = np.array(gravity, float)
-        if self.gravity.shape != (3,) or not np.isfinite(self.gravity).all():
-            raise RobotError("must be three finite numbers", name="gravity", value=self.gravity.tolist())
-        self.links = _by_name("links", links)
-        self.joints = {joint.name: joint for joint in ordered(self.links, _by_name("joints", joints))}
+        self.gravity = finite_numbers("gravity", gravity, (3,))
+        self.links: Mapping[str, Link] = MappingProxyType(_by_name("links", links, Link))
+        in_order = ordered(self.links, _by_name("joints", joints, Joint))
+        self.joints: Mapping[str, Joint] = MappingProxyType({joint.name: joint for joint in in_order})
         self.base = ({*self.links} - {joint.child for joint in self.joints.values()}).pop()
         moving = [joint for joint in self.joints.values() if joint.moving]
         self.joint_names = tuple(joint.name for joint in moving if joint.mimic is None)
         for joint in moving:
             self._check_mimic(joint)
         self.tree, self.frames = arrange(self)
+        self._made = True
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if "_made" in self.__dict__:  # the tree would not follow
+            message = "a robot does not change; make another, as with_gravity, with_payload and locked do"
+            raise AttributeError(f"{name}: {message}")
+        object.__setattr__(self, name, value)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Robot, (self.name, list(self.links.values()), list(self.joints.values()), self.gravity)
 
     def __repr__(self) -> str:
         count = len(self.joint_names)
@@ -140,12 +150,11 @@ class Robot:
             if name not in self.joint_names:
                 message = f"no moving joint has this name; {did_you_mean(name, self.joint_names)}"
                 raise RobotError(message, name="locked", value=name)
-            if not np.isfinite(value):
-                raise RobotError("must be a finite number", name=f"locked.{name}", value=value)
+            finite_numbers(f"locked.{name}", value, ())
         joints = []
         for joint in self.joints.values():
             held = positions.get(joint.name)
-            if joint.mimic is not None and joint.mimic.joint in positions:
+            if joint.moving and joint.mimic is not None and joint.mimic.joint in positions:
                 held = joint.mimic.multiplier * positions[joint.mimic.joint] + joint.mimic.offset
             joints.append(joint if held is None else _held(joint, float(held)))
         return Robot(self.name, list(self.links.values()), joints, self.gravity)
@@ -153,10 +162,11 @@ class Robot:
     def with_floating_base(self, sequence: str = "ZYX") -> "Robot":
         """Return the robot on a base that moves freely: three slides along x, y, z, then three turns.
 
-        The coordinates base_x, base_y, base_z (m) and base_angle_1 to 3 (rad) come first in q. Their generalised forces
-        are those that would have to hold the base: for one that is free, they tell how far a motion is from what
-        physics allows. The angles have a singular orientation (for ``ZYX`` the second at a right angle): choose a
-        sequence that stays away from it.
+        The new base is the link world, or world_ where the robot has a link of that name. The coordinates base_x,
+        base_y, base_z (m) and base_angle_1 to 3 (rad) come first in q. Their generalised forces are those that would
+        have to hold the base: for one that is free, they tell how far a motion is from what physics allows. The angles
+        have a singular orientation (for ``ZYX`` the second at a right angle): choose a sequence that stays away from
+        it.
 
         Parameters
         ----------
@@ -165,7 +175,10 @@ class Robot:
         """
         from jounce.robot.construct import floating_joints
 
-        links, joints = floating_joints(self.base, sequence)
+        world = "world"
+        while world in self.links:
+            world += "_"
+        links, joints = floating_joints(self.base, sequence, world=world)
         every = [*links, *self.links.values()], [*joints, *self.joints.values()]
         return Robot(self.name, *every, self.gravity)
 
@@ -190,9 +203,11 @@ class Robot:
             raise RobotError(message, name=f"joints.{joint.name}.mimic", value=joint.mimic.joint)
 
 
-def _by_name(kind: str, parts: Sequence[Any]) -> dict[str, Any]:
+def _by_name(kind: str, parts: Sequence[Any], wanted: type) -> dict[str, Any]:
     found: dict[str, Any] = {}
-    for part in parts:
+    for k, part in enumerate(parts):
+        if not isinstance(part, wanted):
+            raise RobotError(f"must be a {wanted.__name__}", name=f"{kind}[{k}]", value=part)
         if part.name in found:
             raise RobotError("this name is given twice", name=kind, value=part.name)
         found[part.name] = part

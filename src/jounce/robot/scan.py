@@ -14,8 +14,8 @@ def joint_coordinates(tree: Tree, q: Any) -> Any:
     """Return the coordinates of the bodies, (order + 1, bodies, batch), from q; both as Taylor coefficients."""
     if tree.shape.direct:
         return q
-    q = jnp.take(q, jnp.asarray(tree.coordinate), axis=1) * jnp.asarray(tree.multiplier)[:, None]
-    return jnp.concatenate([q[:1] + jnp.asarray(tree.offset)[:, None], q[1:]])
+    q = jnp.take(q, jnp.asarray(tree.coordinate), axis=1) * jnp.asarray(tree.multiplier)[None, :, None]
+    return jnp.concatenate([q[:1] + jnp.asarray(tree.offset)[None, :, None], q[1:]])
 
 
 def to_coordinates(tree: Tree, forces: Any) -> Any:
@@ -23,7 +23,7 @@ def to_coordinates(tree: Tree, forces: Any) -> Any:
     if tree.shape.direct:
         return forces
     shape = (forces.shape[0], tree.shape.coordinates, forces.shape[2])
-    weighted = forces * jnp.asarray(tree.multiplier)[:, None]
+    weighted = forces * jnp.asarray(tree.multiplier)[None, :, None]
     return jnp.zeros(shape).at[:, jnp.asarray(tree.coordinate)].add(weighted)
 
 

@@ -59,7 +59,7 @@ class Tree:
     ancestors : array of shape (bodies + 1, bodies)
         1 where joint j moves body i; the last row is the base.
     armature, damping, friction : array of shape (coordinates,)
-        Of the drives.
+        Of the drives, those of joints that follow included.
     gravity : array of shape (3,)
         m/s^2.
     """
@@ -155,7 +155,8 @@ def arrange(robot: "Robot") -> tuple[Tree, dict[str, Frame]]:
     slots, parent_slots, count = _slots(parents)
     bodies, order = len(moving), list(robot.joint_names)
     follows = [joint.name if joint.mimic is None else joint.mimic.joint for joint in moving]
-    drives = [robot.joints[name] for name in order]
+    coordinate = np.array([order.index(name) for name in follows], int)
+    multiplier = np.array([1.0 if joint.mimic is None else joint.mimic.multiplier for joint in moving], float)
     turning = np.array([joint.turning for joint in moving], float)
     tree = Tree(
         rotation=np.array([rotation for _, rotation in places]).reshape(bodies, 3, 3),
@@ -164,15 +165,15 @@ def arrange(robot: "Robot") -> tuple[Tree, dict[str, Frame]]:
         center=np.array([zero if one is None else one.center_of_mass for one in whole]).reshape(bodies, 3),
         inertia=np.array([0 * identity if one is None else one.tensor for one in whole]).reshape(bodies, 3, 3),
         turning=turning,
-        coordinate=np.array([order.index(name) for name in follows], int),
-        multiplier=np.array([1.0 if joint.mimic is None else joint.mimic.multiplier for joint in moving], float),
+        coordinate=coordinate,
+        multiplier=multiplier,
         offset=np.array([0.0 if joint.mimic is None else joint.mimic.offset for joint in moving], float),
         slot=np.array(slots, int),
         parent_slot=np.array(parent_slots, int),
         ancestors=_ancestors(parents),
-        armature=np.array([joint.armature for joint in drives], float),
-        damping=np.array([joint.damping for joint in drives], float),
-        friction=np.array([joint.friction for joint in drives], float),
+        armature=_at_coordinates([joint.armature for joint in moving], multiplier**2, coordinate, len(order)),
+        damping=_at_coordinates([joint.damping for joint in moving], multiplier**2, coordinate, len(order)),
+        friction=_at_coordinates([joint.friction for joint in moving], np.abs(multiplier), coordinate, len(order)),
         gravity=robot.gravity,
         shape=Shape(
             bodies=bodies,
@@ -200,6 +201,11 @@ def turn_about(axis: np.ndarray, angle: float) -> np.ndarray:
     x, y, z = axis
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+
+
+def _at_coordinates(values: list[float], weights: np.ndarray, coordinate: np.ndarray, count: int) -> np.ndarray:
+    """Return what the drives of joints make together at each coordinate, by virtual work."""
+    return np.bincount(coordinate, weights * values, count) if values else np.zeros(count)
 
 
 def _check_masses(moving: list[Joint], parents: list[int], masses: list[list[Inertia]]) -> None:

@@ -12,6 +12,8 @@ from jax.core import Tracer
 
 from jounce.errors import RobotError, did_you_mean
 from jounce.jet import Jet, compose
+from jounce.rigid.inertia import finite_numbers
+from jounce.robot.batches import floats
 from jounce.robot.robot import Robot
 
 FRAMES = ("base", "link")
@@ -49,9 +51,7 @@ class Wrench:
         if self.frame not in FRAMES:
             message = f"no such frame; {did_you_mean(self.frame, FRAMES)}"
             raise RobotError(message, name="wrench.frame", value=self.frame)
-        point = np.asarray(self.point, float)
-        if point.shape != (3,) or not np.isfinite(point).all():
-            raise RobotError("must be three finite numbers", name="wrench.point", value=point.tolist())
+        object.__setattr__(self, "point", finite_numbers("wrench.point", self.point, (3,)))
 
 
 def wrench_arrays(
@@ -86,19 +86,25 @@ def _derivatives(where: str, value: Any, lead: tuple[int, ...], levels: int, tim
     if callable(value):
         if time is None:
             raise RobotError("is a function of time: give the instants of the samples as `time`", name=where)
-        instants = jnp.asarray(time, float)
+        instants = jnp.asarray(floats("time", time))
         if instants.shape != lead:
-            raise RobotError(f"must have one instant for each sample, shape {lead}", name="time", value=instants.shape)
+            raise RobotError(
+                f"must have one instant for each sample, the shape {lead}, not {instants.shape}", name="time"
+            )
+        given = jax.eval_shape(lambda t: jnp.asarray(value(t), float), jnp.zeros(())).shape
+        if given != (3,):
+            raise RobotError(f"the function must return three components, not the shape {given}", name=where)
         jet = Jet.variable(instants, levels - 1)
         parts = [compose(partial(_component, value, i), jet).derivatives() for i in range(3)]
         return jnp.moveaxis(jnp.stack(parts, axis=1), (0, 1), (-2, -1))
-    array = value if isinstance(value, jax.Array) else np.asarray(value, float)
+    array = floats(where, value)
     if array.shape == (3,):
         level = np.zeros((levels, 1))
         level[0] = 1.0
-        return level * array * np.ones(shape)
+        library = jnp if isinstance(array, jax.Array) else np
+        return library.broadcast_to(level * array[None], shape)
     if array.shape != shape:
-        raise RobotError(f"must have the shape (3,) or {shape}", name=where, value=array.shape)
+        raise RobotError(f"must have the shape (3,) or {shape}, not {array.shape}", name=where)
     return array
 
 

@@ -1,0 +1,381 @@
+"""Whether a trajectory keeps the limits of a robot: position to jerk, torque and torque rate of every joint."""
+
+import dataclasses
+import warnings
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from jounce.errors import RobotError, SampleWarning, TrajectoryError, did_you_mean
+from jounce.robot.inverse_dynamics import inverse_dynamics
+from jounce.robot.model import Limits
+from jounce.robot.robot import Robot
+from jounce.trajectory.joint_trajectory import JointTrajectory
+
+FIELDS = ("position", "velocity", "acceleration", "jerk", "effort", "effort_rate")
+TURNING = dict(zip(FIELDS, ("rad", "rad/s", "rad/s^2", "rad/s^3", "N m", "N m/s"), strict=True))
+SLIDING = dict(zip(FIELDS, ("m", "m/s", "m/s^2", "m/s^3", "N", "N/s"), strict=True))
+EFFORTS = (4, 5)  # which of them the dynamics give
+ORDER = 3  # of the motion: jerk, and with it the rate of the torque
+
+ROUNDING = 1e-9  # by which a ratio may exceed 1
+INSTANTS = 2000  # at least, over the trajectory
+BETWEEN = 4  # intervals at least, from one instant of the trajectory to the next
+BLOCK = 2048  # instants evaluated at once, always as many, so that all is compiled once
+PEAKS = 3  # of each curve that are searched
+POINTS = 9  # instants around each
+ROUNDS = 8  # times the step is divided
+
+
+@dataclasses.dataclass(frozen=True)
+class LimitRow:
+    """The worst instant of one quantity of one joint.
+
+    Parameters
+    ----------
+    joint : str
+        Name of the joint.
+    quantity : str
+        position, velocity, acceleration, jerk, torque, torque rate; force and force rate of a prismatic joint.
+    unit : str
+        Of the value and the limit.
+    value : float
+        What the trajectory has there.
+    time : float
+        The instant, s.
+    limit : float or None
+        The bound to which the value comes nearest, with its sign; None where there is no limit: the value is then the
+        one of largest magnitude.
+    ratio : float or None
+        How far from the middle of what is allowed, relative to half of it: the magnitude over the limit, and for a
+        range of positions 0 in its middle, 1 at its ends. Where only one end is given, 1 at that end, growing by one
+        for each time the size of the bound (1 rad or m if it is zero) beyond.
+    """
+
+    joint: str
+    quantity: str
+    unit: str
+    value: float
+    time: float
+    limit: float | None = None
+    ratio: float | None = None
+
+    @property
+    def broken(self) -> bool:
+        """Whether the limit is broken, by more than rounding."""
+        return self.ratio is not None and self.ratio > 1 + ROUNDING
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class LimitReport:
+    """What `check_limits` found.
+
+    Parameters
+    ----------
+    robot : str
+        Name of the robot.
+    joint_names : tuple of str
+        Its moving joints.
+    rows : tuple of LimitRow
+        Joint by joint, position to torque rate.
+    held : dict of str to float
+        Joints that the trajectory does not name, and the coordinates at which they stand still, rad or m.
+    times : ndarray of shape (time,)
+        Instants that were looked at; the worst ones were then searched between them.
+    values : ndarray of shape (time, 6, joints)
+        Position, velocity, acceleration, jerk, torque and torque rate there.
+    shares : ndarray of shape (time, 6, joints)
+        The same as shares of their limits: from -1 at the lower to 1 at the upper one, NaN where there is no limit.
+    """
+
+    robot: str
+    joint_names: tuple[str, ...]
+    rows: tuple[LimitRow, ...]
+    held: Mapping[str, float]
+    times: np.ndarray
+    values: np.ndarray
+    shares: np.ndarray
+
+    @property
+    def limited(self) -> tuple[LimitRow, ...]:
+        """Rows that have a limit."""
+        return tuple(row for row in self.rows if row.ratio is not None)
+
+    @property
+    def broken(self) -> tuple[LimitRow, ...]:
+        """Rows whose limit is broken, the worst first."""
+        return tuple(sorted((row for row in self.rows if row.broken), key=_ratio, reverse=True))
+
+    @property
+    def kept(self) -> bool:
+        """Whether no limit is broken."""
+        return not self.broken
+
+    @property
+    def worst(self) -> LimitRow | None:
+        """The row of the largest ratio; None if nothing has a limit."""
+        return max(self.limited, key=_ratio, default=None)
+
+
+def check_limits(
+    robot: Robot,
+    trajectory: JointTrajectory,
+    limits: Mapping[str, Limits] | None = None,
+    *,
+    times: Any = None,
+    drives: bool = True,
+) -> LimitReport:
+    """Compare a trajectory, and the torques and torque rates that it needs, with the limits of the joints.
+
+    All values are exact derivatives of the trajectory, at its own instants and at least three between each two of them,
+    2000 in all or more. Around the highest peaks of each curve the step is then refined to less than a millionth of
+    the duration: what is reported are true values of the curves.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot, with what it holds.
+    trajectory : JointTrajectory
+        Joints that it does not name stand still at zero, or at the end of their range that is nearest to it; of them
+        only torques are compared.
+    limits : dict of str to Limits, optional
+        Limits of some joints, in place of those that the robot has.
+    times : array_like of shape (time,), optional
+        Increasing instants to look at, s, instead of those above.
+    drives : bool, default True
+        Whether torques contain armature inertia, damping and friction of the drives.
+
+    Returns
+    -------
+    LimitReport
+        One row for each joint and quantity, also where there is no limit.
+
+    Raises
+    ------
+    TrajectoryError
+        If the robot does not have a joint of the trajectory, or a value is not finite.
+    RobotError
+        If the robot has no joints, or `limits` names one that it does not have.
+
+    Warns
+    -----
+    SampleWarning
+        If the samples of the trajectory do not support its jerk, or a lower derivative.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> from jounce.dynamics.limits import check_limits
+    >>> rod = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0])
+    >>> pin = jn.Joint("pin", "base", "rod", axis=[0, -1, 0], limits=jn.Limits(velocity=2.0, effort=4.0))
+    >>> pendulum = jn.Robot("pendulum", [jn.Link("base"), jn.Link("rod", rod)], [pin])
+    >>> report = check_limits(pendulum, jn.JointTrajectory({"pin": "sin(t)"}, start=0.0, stop=3.0))
+    >>> report.kept, [(row.quantity, round(row.ratio, 4), round(row.time, 4)) for row in report.limited]
+    (False, [('velocity', 0.5, 0.0), ('torque', 1.2263, 0.0)])
+    """
+    curves = _Curves(robot, trajectory, drives)
+    bounds = _Bounds(robot, _merged(robot, limits))
+    grid = _grid(trajectory) if times is None else _checked_times(times)
+    values = curves(grid)
+    wanted = [
+        (quantity, joint)
+        for joint, name in enumerate(robot.joint_names)
+        for quantity in range(len(FIELDS))
+        if quantity in EFFORTS or name not in curves.held
+    ]
+    at, found = _worst(curves, bounds, grid, values, np.array(wanted))
+    rows = tuple(
+        _row(robot, bounds, quantity, joint, time, value)
+        for (quantity, joint), time, value in zip(wanted, at.tolist(), found.tolist(), strict=True)
+    )
+    for message in curves.doubts:
+        warnings.warn(SampleWarning(message), stacklevel=2)
+    return LimitReport(robot.name, robot.joint_names, rows, curves.held, grid, values, bounds.shares(values))
+
+
+class _Curves:
+    """All quantities of all joints as functions of time."""
+
+    def __init__(self, robot: Robot, trajectory: JointTrajectory, drives: bool):
+        if not robot.joint_names:
+            raise RobotError("the robot has no moving joint; there is nothing to check", name="joints")
+        for name in trajectory.names:
+            if name not in robot.joint_names:
+                raise TrajectoryError(_why_not(robot, name), name="joint", value=name)
+        self.robot, self.trajectory, self.drives = robot, trajectory, drives
+        self.columns = [robot.joint_names.index(name) for name in trajectory.names]
+        self.held = {name: _rest(robot.limits[name]) for name in robot.joint_names if name not in trajectory.names}
+        self.doubts: list[str] = []
+
+    def __call__(self, times: np.ndarray) -> np.ndarray:
+        """Return values of shape (time, 6, joints)."""
+        found = []
+        for start in range(0, len(times), BLOCK):
+            block = times[start : start + BLOCK]
+            whole = np.concatenate([block, np.full(BLOCK - len(block), block[-1])])
+            found.append(self._block(whole)[: len(block)])
+        return np.concatenate(found)
+
+    def _block(self, times: np.ndarray) -> np.ndarray:
+        q = np.zeros((len(times), ORDER + 1, len(self.robot.joint_names)))
+        for name, value in self.held.items():
+            q[:, 0, self.robot.joint_names.index(name)] = value
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always", SampleWarning)
+            q[:, :, self.columns] = self.trajectory.derivatives(times, ORDER)
+        for warning in caught:
+            if str(warning.message) not in self.doubts:
+                self.doubts.append(str(warning.message))
+        self._check_finite(q, times)
+        found = np.concatenate([q, inverse_dynamics(self.robot, q, drives=self.drives)], axis=1)
+        self._check_finite(found, times)
+        return found
+
+    def _check_finite(self, values: np.ndarray, times: np.ndarray) -> None:
+        bad = np.argwhere(~np.isfinite(values))
+        if len(bad):
+            instant, quantity, joint = bad[0]
+            message = (
+                f"the {FIELDS[quantity].replace('_', ' ')} of this joint is not finite at t = {times[instant]:g} s"
+            )
+            raise TrajectoryError(f"{message}; choose another law there", name=self.robot.joint_names[joint])
+
+
+class _Bounds:
+    """What is allowed, in arrays of shape (6, joints), infinite where there is no bound."""
+
+    def __init__(self, robot: Robot, limits: Mapping[str, Limits]):
+        every = [limits[name] for name in robot.joint_names]
+        largest = np.array([[_or_infinite(getattr(x, field)) for x in every] for field in FIELDS[1:]])
+        self.upper = np.concatenate([[[_or_infinite(x.upper) for x in every]], largest])
+        self.lower = np.concatenate([[[-_or_infinite(x.lower, -1.0) for x in every]], -largest])
+        self.limited = np.isfinite(self.upper) | np.isfinite(self.lower)
+        with np.errstate(invalid="ignore"):
+            half = (self.upper - self.lower) / 2
+        size = np.where(np.isfinite(self.upper), np.abs(self.upper), np.abs(self.lower))
+        unit = np.where(np.isfinite(size) & (size > 0), size, 1.0)
+        self.scale = np.where(np.isfinite(half) & (half > 0), half, unit)
+
+    def sides(self, values: Any, at: Any = ...) -> tuple[Any, Any]:
+        """Return the ratios to the upper and to the lower bound, -inf where there is none."""
+        upper, lower, scale = self.upper[at], self.lower[at], self.scale[at]
+        return (values - upper + scale) / scale, (lower - values + scale) / scale
+
+    def measure(self, values: np.ndarray, at: Any = ...) -> np.ndarray:
+        """Return what is worst where it is largest: the ratio, or the magnitude where there is no limit."""
+        return np.where(self.limited[at], np.maximum(*self.sides(values, at)), np.abs(values))
+
+    def shares(self, values: np.ndarray) -> np.ndarray:
+        """Return the ratios with the sign of the bound that is nearer, NaN where there is no limit."""
+        above, below = self.sides(values)
+        return np.where(self.limited, np.where(above >= below, np.maximum(above, 0), -np.maximum(below, 0)), np.nan)
+
+
+def _worst(
+    curves: _Curves, bounds: _Bounds, grid: np.ndarray, values: np.ndarray, wanted: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the worst instant of each wanted curve and its value there.
+
+    Around the highest peaks on the grid, the best of a few instants becomes the middle of a shorter interval, again and
+    again. A jump between two instants is found from the side on which the curve is worse.
+    """
+    at = tuple(wanted.T)
+    measures = bounds.measure(values)[:, *at]
+    every = np.arange(len(wanted))
+    best = np.argmax(measures, axis=0)
+    times, sizes, found = grid[best], measures[best, every], values[best, *at]
+    peaks = _peaks(measures)
+    low, high = grid[np.maximum(peaks - 1, 0)], grid[np.minimum(peaks + 1, len(grid) - 1)]
+    share = np.linspace(0.0, 1.0, POINTS)
+    peak, curve = np.indices(low.shape)
+    for _ in range(ROUNDS):
+        around = low + share[:, None, None] * (high - low)
+        there = curves(around.reshape(-1)).reshape(*around.shape, *values.shape[1:])
+        own = there[:, peak, curve, *at]
+        measured = bounds.measure(own, at)
+        top = np.argmax(measured, axis=0)
+        chosen = np.argmax(np.max(measured, axis=0), axis=0)  # of the peaks of each curve
+        new = (top[chosen, every], chosen, every)
+        better = measured[new] > sizes + 1e-12 * np.abs(sizes)  # else the instant on the grid, which has a round number
+        sizes, times, found = (
+            np.where(better, x[new], y) for x, y in ((measured, sizes), (around, times), (own, found))
+        )
+        low = np.take_along_axis(around, np.maximum(top - 1, 0)[None], axis=0)[0]
+        high = np.take_along_axis(around, np.minimum(top + 1, POINTS - 1)[None], axis=0)[0]
+    return times, found
+
+
+def _peaks(measures: np.ndarray) -> np.ndarray:
+    """Return the indices of the highest local maxima of each curve, shape (PEAKS, curves); the best fills up."""
+    edge = np.full((1, measures.shape[1]), -np.inf)
+    before, after = np.concatenate([edge, measures[:-1]]), np.concatenate([measures[1:], edge])
+    height = np.where((measures > before) & (measures >= after), measures, -np.inf)
+    order = np.argsort(-height, axis=0, kind="stable")[:PEAKS]
+    order = np.concatenate([order, np.repeat(order[:1], PEAKS - len(order), axis=0)])
+    usable = np.isfinite(np.take_along_axis(height, order, axis=0))
+    return np.where(usable, order, np.argmax(measures, axis=0))
+
+
+def _row(robot: Robot, bounds: _Bounds, quantity: int, joint: int, time: float, value: float) -> LimitRow:
+    name = robot.joint_names[joint]
+    turning = robot.joints[name].turning
+    field, units = FIELDS[quantity], TURNING if turning else SLIDING
+    word = field.replace("effort", "torque" if turning else "force").replace("_", " ")
+    if not bounds.limited[quantity, joint]:
+        return LimitRow(name, word, units[field], value, time)
+    above, below = (float(x) for x in bounds.sides(np.array(value), (quantity, joint)))
+    limit = (bounds.upper if above >= below else bounds.lower)[quantity, joint]
+    return LimitRow(name, word, units[field], value, time, float(limit), max(above, below, 0.0))
+
+
+def _merged(robot: Robot, limits: Mapping[str, Limits] | None) -> dict[str, Limits]:
+    given = dict(limits or {})
+    for name, entry in given.items():
+        if name not in robot.joint_names:
+            raise RobotError(_why_not(robot, name), name="limits", value=name)
+        if not isinstance(entry, Limits):
+            raise RobotError("must be Limits", name=f"limits.{name}", value=entry)
+    return robot.limits | given
+
+
+def _why_not(robot: Robot, name: str) -> str:
+    """Say why a name is not that of a joint that can be moved."""
+    joint = robot.joints.get(name)
+    if joint is None:
+        return f"{robot.name} has no moving joint of this name; {did_you_mean(name, robot.joint_names)}"
+    if joint.mimic is not None:
+        return f"this joint follows {joint.mimic.joint}; leave it out"
+    return "this joint is fixed; leave it out"
+
+
+def _rest(limits: Limits) -> float:
+    """Return zero, or what is nearest to it in the range of a joint."""
+    low = 0.0 if limits.lower is None else max(limits.lower, 0.0)
+    return low if limits.upper is None else min(limits.upper, low)
+
+
+def _or_infinite(bound: float | None, sign: float = 1.0) -> float:
+    return np.inf if bound is None else sign * float(bound)
+
+
+def _grid(trajectory: JointTrajectory) -> np.ndarray:
+    """Return the instants of a trajectory, its ends, and more between each two."""
+    own = np.unique(np.concatenate([[trajectory.start], trajectory.times, [trajectory.stop]]))
+    steps = max(BETWEEN, -(-INSTANTS // (len(own) - 1)))
+    between = own[:-1, None] + np.diff(own)[:, None] * (np.arange(steps) / steps)
+    return np.append(between.reshape(-1), own[-1])
+
+
+def _checked_times(times: Any) -> np.ndarray:
+    try:
+        found = np.array(times, float)
+    except (TypeError, ValueError):
+        raise TrajectoryError("must be numbers", name="times", value=times) from None
+    if found.ndim != 1 or not found.size or not np.isfinite(found).all() or (np.diff(found) <= 0).any():
+        raise TrajectoryError("must be finite instants that increase, at least one", name="times", value=found.tolist())
+    return found
+
+
+def _ratio(row: LimitRow) -> float:
+    return -np.inf if row.ratio is None else row.ratio

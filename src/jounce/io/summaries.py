@@ -1,0 +1,84 @@
+"""What the command says about a motion, and about a trajectory and the limits of a robot."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from jounce.dynamics.limits import LimitReport
+    from jounce.kinematics import Motion
+    from jounce.trajectory import JointTrajectory
+
+__all__ = ["count", "limits_summary", "summary", "verdict"]
+
+
+def summary(motion: Motion, file: Path) -> str:
+    """Word what was solved: bodies, degrees of freedom, instants."""
+    import numpy as np
+
+    from jounce.mechanism import build
+
+    mechanism, time_ = motion.mechanism, motion.time
+    rows = build(mechanism).rows
+    drives = sum(name.startswith("drivers.") for name in rows)
+    bodies = count(len(mechanism.bodies), "moving body", "moving bodies")
+    joints = f"{count(len(mechanism.joints), 'joint')} ({count(len(rows) - drives, 'equation')})"
+    freedom = count(drives, "degree of freedom", "degrees of freedom")
+    driven = f", driven by {', '.join(mechanism.drivers)}" if mechanism.drivers else ""
+    solved = int(np.sum(motion.status == 0))
+    instants = count(len(time_), "instant") if solved == len(time_) else f"{solved} of {len(time_)} instants"
+    span = f"t = {time_[0]:g} s" if len(time_) == 1 else f"from t = {time_[0]:g} s to {time_[-1]:g} s"
+    return "\n".join([
+        mechanism.title or file.name,
+        f"{mechanism.space}: {bodies} ({len(rows)} coordinates), {joints}",
+        f"{freedom}{driven}",
+        f"{instants} {span}, derivatives to order {motion.order}",
+    ])  # fmt: skip
+
+
+def limits_summary(report: LimitReport, motion: JointTrajectory, robot: Path, trajectory: Path) -> str:
+    """Word what was compared, which joints stand still, and what has no limits."""
+    moved = count(len(motion.names), "moving joint")
+    lines = [
+        f"{report.robot}: {moved} ({robot.name}, {trajectory.name})",
+        f"t = {motion.start:g} s to {motion.stop:g} s, {len(report.times)} instants and the peaks between them",
+    ]
+    if report.held:
+        units = {row.joint: "m" if row.unit == "N" else "rad" for row in report.rows if row.unit in ("N", "N m")}
+        held = [f"{name} at {value:.6g} {units[name]}" for name, value in report.held.items()]
+        lines.append(f"not in the trajectory, held still: {', '.join(held)}")
+    free: dict[str, list[str]] = {}
+    for row in report.rows:
+        if row.ratio is None:
+            free.setdefault(row.quantity, []).append(row.joint)
+    if free:
+        limited = {row.quantity for row in report.limited}
+        told = [f"{word} of {', '.join(names)}" if word in limited else word for word, names in free.items()]
+        lines.append(f"without a limit: {', '.join(told)}")
+    return "\n".join(_wrapped(line) for line in lines)
+
+
+def verdict(report: LimitReport) -> str:
+    """Word whether the limits are kept, and the place that is nearest to breaking one or breaks one most."""
+    number, worst = len(report.limited), report.worst
+    assert worst is not None
+    place = f"{worst.joint} {worst.quantity}, {worst.ratio:.4g} of its limit at t = {worst.time:.5g} s"
+    if report.kept:
+        return f"All limits kept ({number}).\nClosest: {place}"
+    return f"{len(report.broken)} of {count(number, 'limit')} broken.\nWorst: {place}"
+
+
+def _wrapped(line: str) -> str:
+    """Break a long line after commas and colons only."""
+    import textwrap
+
+    glued = re.sub("(?<![,:]) ", "\0", line)
+    broken = textwrap.fill(glued, 80, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
+    return broken.replace("\0", " ")
+
+
+def count(number: int, noun: str, plural: str = "") -> str:
+    """Word a number of things."""
+    return f"{number} {noun if number == 1 else plural or f'{noun}s'}"

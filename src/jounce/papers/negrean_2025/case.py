@@ -1,0 +1,147 @@
+"""The measured motions and the arm of section 4, with stand-ins for what the text of the paper does not hold.
+
+The third link of a Fanuc LR Mate 100 iB turns from 0 to pi in 1.7 s. An accelerometer on it gives the tangential
+acceleration every 0.033 s, once in a motion at high speed, once with a sudden stop. The samples stand in figures 4 and
+5 only, and the masses in figure 6 only, so both are chosen here.
+"""
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+
+from jounce.rigid.inertia import Inertia
+from jounce.robot import Robot, Screw, from_screws
+from jounce.trajectory import PolynomialMotion
+
+ANGLE = np.pi  # rad, section 4
+DURATION = 1.7  # s, section 4
+SEGMENTS = 51  # section 4; the spacing of the samples is then 0.0333 s
+CONTINUITY = 4  # m of equations 61 and 62: segments of degree 5
+KNOTS = np.linspace(0.0, DURATION, SEGMENTS + 1)
+
+MASS = 6.5  # kg; these six are stand-ins for figure 6
+CENTER_X = 0.12  # m
+CENTER_Z = 0.03  # m
+INERTIA_X = 0.020  # kg m^2, as the next two about the centre of mass
+INERTIA_Y = 0.060
+INERTIA_Z = 0.055
+RADIUS = 0.25  # m from the axis to the accelerometer, a stand-in
+
+RIPPLE = ((0.08, 29.0, 0.7), (0.05, 41.0, 2.1))  # rad/s^2, rad/s, rad: what the accelerometer adds
+STOP = 0.9  # s, when braking begins
+BRAKING = 0.2  # s, how long it lasts
+RINGING = (6.0, 32.0, 8.0)  # rad/s^2, rad/s, 1/s: how the arm rings after it
+
+
+def arm() -> Robot:
+    """Return the robot of one joint: the third link on its axis, y, horizontal; x and z are those of the link."""
+    link = Inertia(MASS, (CENTER_X, 0.0, CENTER_Z), (INERTIA_X, INERTIA_Y, INERTIA_Z))
+    return from_screws([Screw((0.0, 1.0, 0.0), inertia=link)], name="arm")
+
+
+def inertia_about_axis() -> float:
+    """Return ``M (x_C^2 + z_C^2) + I_y`` of equations 141-146, kg m^2."""
+    return MASS * (CENTER_X**2 + CENTER_Z**2) + INERTIA_Y
+
+
+def rest_to_rest(time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return speed and acceleration of the polynomial of degree 7 from 0 to pi, with rest to the third derivative."""
+    s = time / DURATION
+    speed = 140 * s**3 * (1 - s) ** 3
+    acceleration = 420 * s**2 * (1 - s) ** 2 * (1 - 2 * s)
+    return speed * ANGLE / DURATION, acceleration * ANGLE / DURATION**2
+
+
+def high_speed() -> np.ndarray:
+    """Return samples of the angular acceleration in the motion at high speed, rad/s^2, one for each knot."""
+    return rest_to_rest(KNOTS)[1] + ripple(KNOTS)
+
+
+def sudden_stop() -> np.ndarray:
+    """Return samples of the angular acceleration where the motion is stopped at 0.9 s, rad/s^2, one for each knot."""
+    turned = KNOTS - STOP
+    phase = np.clip(turned / BRAKING, 0.0, 1.0)
+    braking = -rest_to_rest(np.array(STOP))[0] / BRAKING * (1 - np.cos(2 * np.pi * phase))
+    size, frequency, decay = RINGING
+    after = np.clip(turned - BRAKING, 0.0, None)
+    ringing = size * np.exp(-decay * after) * np.sin(frequency * after)
+    return np.where(turned < 0, rest_to_rest(KNOTS)[1], braking + ringing) + ripple(KNOTS)
+
+
+def ripple(time: np.ndarray) -> np.ndarray:
+    """Return what the accelerometer adds to the motion, rad/s^2."""
+    parts = (size * np.sin(frequency * time + phase) for size, frequency, phase in RIPPLE)
+    return np.sum(list(parts), axis=0)
+
+
+def law(accelerations: np.ndarray) -> PolynomialMotion:
+    """Return the quintic segments through samples of the acceleration, from rest at zero, without jerk at the ends."""
+    start = {0: 0.0, 1: 0.0}
+    return PolynomialMotion.from_accelerations(KNOTS, accelerations, CONTINUITY, start=start, ends="clamped")
+
+
+def end_of(motion: PolynomialMotion) -> np.ndarray:
+    """Return angle and speed at the last knot, rad and rad/s."""
+    local = float(motion.stop - motion.breakpoints[-1])
+    piece = np.polynomial.Polynomial(motion.coefficients[:, -1])
+    return np.array([piece(local), piece.deriv()(local)])
+
+
+def at_rest(accelerations: np.ndarray, angle: float | None) -> np.ndarray:
+    """Return samples less the bias, and with an angle less the drift, that keep the motion from its end.
+
+    Parameters
+    ----------
+    accelerations : array of shape (knots,)
+        Samples, rad/s^2.
+    angle : float or None
+        Where the motion ends at rest, rad; None if only the rest is known.
+    """
+    shapes = [np.ones(len(KNOTS)), KNOTS] if angle is not None else [np.ones(len(KNOTS))]
+    known = slice(None) if angle is not None else slice(1, 2)
+    wanted = np.array([angle or 0.0, 0.0])[known]
+    effect = np.stack([end_of(law(shape))[known] for shape in shapes], axis=1)
+    amounts = np.linalg.solve(effect, wanted - end_of(law(accelerations))[known])
+    return accelerations + amounts @ np.stack(shapes)
+
+
+@dataclasses.dataclass(frozen=True)
+class Case:
+    """One of the two measured motions.
+
+    Parameters
+    ----------
+    name : str
+        As in the files.
+    title : str
+        As in figures.
+    samples : callable
+        Returns the samples of the angular acceleration, rad/s^2, one for each of `KNOTS`.
+    angle : float or None
+        Where the motion ends, rad, if that is known.
+    """
+
+    name: str
+    title: str
+    samples: Callable[[], np.ndarray]
+    angle: float | None
+
+    @property
+    def accelerations(self) -> np.ndarray:
+        """Samples less bias and drift, rad/s^2: what the law goes through."""
+        return at_rest(self.samples(), self.angle)
+
+    @property
+    def motion(self) -> PolynomialMotion:
+        """The law of the angle."""
+        return law(self.accelerations)
+
+
+CASES = {
+    case.name: case
+    for case in (
+        Case("high_speed", "High-speed motion", high_speed, ANGLE),
+        Case("sudden_stop", "Sudden stop", sudden_stop, None),
+    )
+}

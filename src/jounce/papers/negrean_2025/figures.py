@@ -1,0 +1,127 @@
+"""Figures 4, 5 and 7-9 of the paper, and one of the acceleration energies, drawn from computed histories.
+
+This module imports matplotlib, and is imported only when figures are drawn. Figures are objects of their own with the
+Agg canvas; the state of `matplotlib.pyplot` is not touched.
+"""
+
+from collections.abc import Mapping
+from contextlib import AbstractContextManager
+from functools import partial
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from jounce.papers.negrean_2025.case import DURATION, KNOTS, RADIUS
+from jounce.papers.negrean_2025.history import STEPS, History
+
+BLUE, ORANGE, GREEN = "#0072B2", "#D55E00", "#009E73"  # told apart by colour-blind readers
+GREY = "#606060"
+TORQUES = (
+    ("torque", "Driving torque", "N m"),
+    ("torque rate", "First rate of the driving torque", "N m/s"),
+    ("second rate", "Second rate of the driving torque", r"N m/s$^2$"),
+)
+ENERGY_COLOURS = (BLUE, ORANGE, GREEN)
+
+
+def style() -> AbstractContextManager[None]:
+    """Return the settings under which the figures are drawn and written, as a context."""
+    return mpl.rc_context(
+        {
+            "font.size": 9,
+            "axes.grid": True,
+            "axes.axisbelow": True,
+            "axes.spines.right": False,
+            "axes.spines.top": False,
+            "grid.color": "#DDDDDD",
+            "grid.linewidth": 0.6,
+            "legend.frameon": False,
+            "lines.linewidth": 1.4,
+            "lines.markersize": 3.5,
+            "svg.hashsalt": "negrean-2025",
+        }
+    )
+
+
+def _figure(rows: int, columns: int, size: tuple[float, float], title: str) -> tuple[Figure, np.ndarray]:
+    figure = Figure(figsize=size, layout="constrained")
+    FigureCanvasAgg(figure)
+    figure.suptitle(title, fontsize=10)
+    panels = figure.subplots(rows, columns, squeeze=False, sharex=True)
+    for panel in panels.flat:
+        panel.axhline(0.0, color="#999999", linewidth=0.7, zorder=1)
+        panel.set_xlim(0.0, DURATION)
+    for panel in panels[-1]:
+        panel.set_xlabel("time / s")
+    return figure, panels
+
+
+def accelerations(histories: Mapping[str, History], *, radius: float | None, number: int) -> Figure:
+    """Draw the samples and the law through them, one panel for each motion (figures 4 and 5)."""
+    what = "Generalised angular acceleration" if radius is None else "Tangential acceleration"
+    unit = r"rad/s$^2$" if radius is None else r"m/s$^2$"
+    factor = 1.0 if radius is None else radius
+    figure, panels = _figure(len(histories), 1, (6.0, 4.8), f"{what} (figure {number} of Negrean 2025)")
+    for panel, history in zip(panels[:, 0], histories.values(), strict=True):
+        panel.plot(history.time, factor * history.motion[:, 2], color=BLUE, label="quintic segments")
+        samples = factor * history.case.accelerations
+        panel.plot(KNOTS, samples, color=ORANGE, marker="o", linestyle="", label="synthetic samples, every 0.033 s")
+        panel.set_title(history.case.title, fontsize=9)
+        panel.set_ylabel(f"acceleration / ({unit})")
+    panels[0, 0].legend(loc="upper right")
+    figure.align_ylabels()
+    return figure
+
+
+def torque(histories: Mapping[str, History], *, rate: int, number: int) -> Figure:
+    """Draw the driving torque or one of its rates, and the part of inertia in it (figures 7 to 9)."""
+    name, title, unit = TORQUES[rate]
+    figure, panels = _figure(len(histories), 1, (6.0, 4.8), f"{title} (figure {number} of Negrean 2025)")
+    for panel, history in zip(panels[:, 0], histories.values(), strict=True):
+        whole = history.torques[:, rate]
+        panel.plot(history.time, whole, color=BLUE, label="driving torque", zorder=3)
+        inertial = whole - history.gravity[:, rate]
+        panel.plot(history.time, inertial, color=ORANGE, linestyle="--", linewidth=1.1, label="of that, inertia")
+        panel.plot(
+            history.time, history.gravity[:, rate], color=GREEN, linestyle=":", linewidth=1.3, label="of that, gravity"
+        )
+        panel.set_title(history.case.title, fontsize=9)
+        panel.set_ylabel(f"{name} / ({unit})")
+    figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    figure.align_ylabels()
+    return figure
+
+
+def energies(histories: Mapping[str, History]) -> Figure:
+    """Draw the acceleration energies of orders 1 to 3, by the library and by the closed forms (equations 141-143)."""
+    title = "Acceleration energies of orders 1 to 3 (equations 141-143 of Negrean 2025)"
+    figure, panels = _figure(3, len(histories), (7.2, 6.0), title)
+    for column, history in enumerate(histories.values()):
+        for p, panel in enumerate(panels[:, column], 1):
+            found, closed = history.energies[:, p - 1], history.closed_energies[:, p - 1]
+            panel.plot(history.time, found, color=ENERGY_COLOURS[p - 1], label="library")
+            every = slice(None, None, STEPS)  # the knots
+            panel.plot(
+                history.time[every], closed[every], color=GREY, marker="x", linestyle="", label="closed form", zorder=3
+            )
+            panel.ticklabel_format(axis="y", style="sci", scilimits=(-2, 4), useMathText=True)
+            if column == 0:
+                panel.set_ylabel(rf"$E_{p}$ / (kg m$^2$ s$^{{-{2 * p + 2}}}$)")
+            if p == 1:
+                panel.set_title(history.case.title, fontsize=9)
+    panels[0, -1].legend(loc="upper left")
+    figure.align_ylabels()
+    return figure
+
+
+FIGURES: dict[str, Any] = {
+    "figure_04": partial(accelerations, radius=RADIUS, number=4),
+    "figure_05": partial(accelerations, radius=None, number=5),
+    "figure_07": partial(torque, rate=0, number=7),
+    "figure_08": partial(torque, rate=1, number=8),
+    "figure_09": partial(torque, rate=2, number=9),
+    "energies": energies,
+}

@@ -1,0 +1,87 @@
+"""What the library computes for a motion of the arm, beside the closed forms of the paper."""
+
+import dataclasses
+
+import jax.numpy as jnp
+import numpy as np
+
+from jounce.dynamics import acceleration_energy, gravity_forces, higher_order
+from jounce.jet import Jet
+from jounce.papers.negrean_2025 import closed_forms
+from jounce.papers.negrean_2025.case import CENTER_X, CENTER_Z, DURATION, MASS, SEGMENTS, Case, arm, inertia_about_axis
+from jounce.robot import inverse_dynamics
+
+ORDER = 6  # of the derivatives of the angle: equation 131 with m = 4 needs as many
+STEPS = 20  # instants in each segment
+
+
+@dataclasses.dataclass(frozen=True)
+class History:
+    """A motion of the arm over time.
+
+    Attributes
+    ----------
+    case : Case
+        The motion.
+    time : array of shape (time,)
+        s.
+    motion : array of shape (time, 7)
+        Angle and its derivatives, rad by s.
+    energies, closed_energies : array of shape (time, 3)
+        Acceleration energies of orders 1 to 3, of the library and by equations 141-143, kg m^2 / s^(2 p + 2).
+    torques, closed_torques, equation_torques : array of shape (time, 3)
+        Torque and its two rates: of the library by Newton-Euler, by equations 144-146, and by the higher-order
+        equations 129-131 with the part of gravity, N m by s.
+    gravity : array of shape (time, 3)
+        The part of gravity in them, N m by s.
+    """
+
+    case: Case
+    time: np.ndarray
+    motion: np.ndarray
+    energies: np.ndarray
+    closed_energies: np.ndarray
+    torques: np.ndarray
+    closed_torques: np.ndarray
+    equation_torques: np.ndarray
+    gravity: np.ndarray
+
+
+def history(case: Case) -> History:
+    """Return all that is computed of a motion, at 20 instants in each segment and at the end.
+
+    Parameters
+    ----------
+    case : Case
+        The motion.
+
+    Returns
+    -------
+    History
+        Where a knot stands, derivatives above the fourth are those of the segment that begins there.
+    """
+    robot, inertia = arm(), inertia_about_axis()
+    time = np.linspace(0.0, DURATION, SEGMENTS * STEPS + 1)
+    motion = np.asarray(case.motion(Jet.variable(jnp.asarray(time), ORDER)).derivatives()).T
+    q = motion[:, :, None]
+    energies = [acceleration_energy(robot, q[:, : p + 2], order=p).total[..., 0] for p in (1, 2, 3)]
+    against = np.asarray(gravity_forces(robot, q, rates=2))[..., 0]
+    inertial = [np.asarray(higher_order(robot, q, k))[..., 0] for k in (1, 2, 3)]
+    weight = -float(robot.gravity[2])
+    closed_gravity = closed_forms.gravity_torques(MASS, (CENTER_X, CENTER_Z), weight, motion)
+    return History(
+        case,
+        time,
+        motion,
+        np.stack([np.asarray(energy) for energy in energies], axis=-1),
+        closed_forms.energies(inertia, motion),
+        np.asarray(inverse_dynamics(robot, q[:, :5]))[..., 0],
+        closed_forms.torques(inertia, motion, closed_gravity),
+        np.stack(inertial, axis=-1) + against,
+        closed_gravity,
+    )
+
+
+def difference(found: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Return the largest differences over time, divided by the largest values, one for each column."""
+    return np.max(np.abs(found - right), axis=0) / np.max(np.abs(right), axis=0)

@@ -1,0 +1,123 @@
+"""The figures and comparisons of section 4, made again into one directory."""
+
+import io
+import os
+import tempfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from jounce.errors import OutputError
+from jounce.io.files import replacing
+from jounce.papers.negrean_2025.case import CASES
+from jounce.papers.negrean_2025.comparison import comparison
+from jounce.papers.negrean_2025.history import History, history
+
+FORMATS = ("png", "svg")
+
+
+def reproduce(out_directory: str | os.PathLike[str], progress: Callable[[int, int], None] | None = None) -> list[Path]:
+    """Compute the motions of section 4 of Negrean 2025 and write figures, `comparison.md`, energies and torques.
+
+    Parameters
+    ----------
+    out_directory : path
+        Where to write; made if it does not exist. Files of the same names are replaced.
+    progress : callable, optional
+        Called with the number of motions and figures done and their total.
+
+    Returns
+    -------
+    list of pathlib.Path
+        The files written: `comparison.md`, `energies.csv` and `torques.csv` first, then the figures as PNG and SVG.
+
+    Raises
+    ------
+    OutputError
+        If the directory cannot be made or written to; raised before any computing.
+
+    Examples
+    --------
+    >>> from jounce.papers.negrean_2025 import reproduce
+    >>> paths = reproduce("out")  # doctest: +SKIP
+    """
+    directory = _writable(Path(out_directory))
+    from jounce.papers.negrean_2025 import figures  # imports matplotlib
+
+    total = len(CASES) + len(figures.FIGURES)
+    done = 0
+
+    def advanced() -> None:
+        nonlocal done
+        done += 1
+        if progress is not None:
+            progress(done, total)
+
+    histories: dict[str, History] = {}
+    for name, case in CASES.items():
+        histories[name] = history(case)
+        advanced()
+    paths = [
+        write(directory / "comparison.md", comparison(histories).encode("ascii")),
+        write(directory / "energies.csv", energies_csv(histories).encode("ascii")),
+        write(directory / "torques.csv", torques_csv(histories).encode("ascii")),
+    ]
+    for name, draw in figures.FIGURES.items():
+        with figures.style():
+            figure = draw(histories)
+            paths += [write(directory / f"{name}.{kind}", _rendered(figure, kind)) for kind in FORMATS]
+        advanced()
+    return paths
+
+
+def energies_csv(histories: Mapping[str, History]) -> str:
+    """Return the angle with its derivatives to jounce and the energies E_1 to E_3 as CSV, 17 significant digits."""
+    columns = ("q", "q_d1", "q_d2", "q_d3", "q_d4", "E_1", "E_2", "E_3")
+    return _csv(columns, {name: np.hstack([h.motion[:, :5], h.energies]) for name, h in histories.items()}, histories)
+
+
+def torques_csv(histories: Mapping[str, History]) -> str:
+    """Return the driving torque and its two rates, and the part of gravity in them, as CSV, 17 significant digits."""
+    columns = ("torque", "torque_d1", "torque_d2", "gravity", "gravity_d1", "gravity_d2")
+    return _csv(columns, {name: np.hstack([h.torques, h.gravity]) for name, h in histories.items()}, histories)
+
+
+def _csv(columns: tuple[str, ...], tables: Mapping[str, np.ndarray], histories: Mapping[str, History]) -> str:
+    rows = [",".join(("motion", "time", *columns))]
+    for name, table in tables.items():
+        for instant, values in zip(histories[name].time, table, strict=True):
+            rows.append(",".join([name, *(f"{value:.16e}" for value in (instant, *values))]))
+    return "\n".join(rows) + "\n"
+
+
+def write(path: Path, content: bytes) -> Path:
+    """Write a whole file or nothing.
+
+    Raises
+    ------
+    OutputError
+        If it cannot be written.
+    """
+    with replacing(path) as beside:
+        beside.write_bytes(content)
+    return path
+
+
+def _writable(directory: Path) -> Path:
+    """Make the directory, and try a file in it."""
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=directory):
+            pass
+    except (OSError, ValueError) as error:  # ValueError: a null character in the name
+        reason = getattr(error, "strerror", None) or error
+        raise OutputError(f"files cannot be written there: {reason}", path=directory) from None
+    return directory
+
+
+def _rendered(figure: Any, kind: str) -> bytes:
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format=kind, dpi=200, metadata={"Date": None} if kind == "svg" else None)
+    return buffer.getvalue()

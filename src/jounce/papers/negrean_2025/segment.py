@@ -1,0 +1,82 @@
+"""The one segment that section 4 prints, on [0.565, 0.605] s: do its five polynomials belong together?
+
+The text that we read has lost minus signs. Those of the angle are + - + - + - from the highest power down, and those of
+each derivative follow.
+"""
+
+import dataclasses
+from decimal import Decimal
+
+import numpy as np
+
+INTERVAL = (0.565, 0.605)  # s
+POLYNOMIALS = (  # highest power first, as printed: angle to jounce, rad by s
+    ("3792.503", "-11239.525", "13301.344", "-7864.321", "2331.436", "-277.457"),
+    ("18962.519", "-44958.1", "39904.034", "-15728.643", "2331.436"),
+    ("75850.076", "-134874.302", "79808.069", "-15728.643"),
+    ("227550.23", "-269748.605", "79808.069"),
+    ("455100.461", "-269748.605"),
+)
+HALF_UNIT = Decimal("0.0005")  # three decimals are printed; a final zero is not
+
+
+@dataclasses.dataclass(frozen=True)
+class Check:
+    """One coefficient beside what the derivative of the polynomial before makes it.
+
+    Parameters
+    ----------
+    order : int
+        Of the derivative that the coefficient belongs to.
+    power : int
+        Of the time.
+    printed, derived : Decimal
+        The coefficient, and the power times the coefficient of the polynomial before.
+    rounding : Decimal
+        How far the two may differ if both are rounded to three decimals.
+    """
+
+    order: int
+    power: int
+    printed: Decimal
+    derived: Decimal
+    rounding: Decimal
+
+    @property
+    def residual(self) -> Decimal:
+        """Printed less derived."""
+        return self.printed - self.derived
+
+    @property
+    def rounded(self) -> bool:
+        """Whether rounding to three decimals explains the difference; if not, digits were cut off."""
+        return abs(self.residual) <= self.rounding
+
+
+def check() -> list[Check]:
+    """Return all fourteen coefficients of the four derivatives beside those that follow from the one before.
+
+    Examples
+    --------
+    >>> worst = max(check(), key=lambda c: abs(c.residual))
+    >>> worst.order, worst.power, str(worst.residual)
+    (1, 4, '0.004')
+    """
+    found = []
+    for order in range(1, len(POLYNOMIALS)):
+        before, printed = POLYNOMIALS[order - 1], POLYNOMIALS[order]
+        for power, coefficient in zip(range(len(printed) - 1, -1, -1), printed, strict=True):
+            factor = power + 1
+            derived = factor * Decimal(before[len(before) - 1 - factor])
+            found.append(Check(order, power, Decimal(coefficient), derived, (factor + 1) * HALF_UNIT))
+    return found
+
+
+def evaluated(time: np.ndarray) -> np.ndarray:
+    """Return angle, speed, acceleration, jerk and jounce of the printed segment, shape (5, time), rad by s."""
+    return np.array([np.polyval([float(c) for c in printed], time) for printed in POLYNOMIALS])
+
+
+def uncertainty(order: int) -> float:
+    """Return how far a value of the segment may be off through the rounding of its coefficients, rad by s."""
+    return sum(float(HALF_UNIT) * INTERVAL[1] ** k for k in range(len(POLYNOMIALS[order])))

@@ -1,0 +1,326 @@
+"""The equations of motion in every form against virtual work in fifty digits: Negrean 2025, 121-135 and 144-146."""
+
+import functools
+import math
+
+import numpy as np
+import pytest
+from mpmath import mp, mpf
+
+import jounce as jn
+from jounce.dynamics import (
+    catalan,
+    gibbs_appell,
+    gravity_forces,
+    higher_order,
+    lagrange,
+    mangeron_nielsen,
+    newton_euler,
+    printed_coefficient,
+    virtual_work,
+)
+from tests.oracles import mp_robot, negrean_dynamics, negrean_energies
+from tests.problems.robots import random_robot
+
+RATES = 2  # of the forces in the quick tests: k = 1, 2, 3
+ROUNDING = 1e-13  # of the largest force; some 500 roundings, through factorials and sums of k derivatives
+
+
+def numbers_of(robot):
+    """Return a robot without mimics as bodies of the oracle, and its coordinates in their order."""
+    index, bodies = {robot.base: -1}, []
+    for joint in robot.joints.values():
+        index[joint.child] = len(bodies)
+        body = {"parent": index[joint.parent], "type": joint.type, "position": joint.position, "axis": joint.axis}
+        body |= {"rotation": joint.rotation, "name": joint.child, "joint": joint.name}
+        inertia = robot.links[joint.child].inertia
+        if inertia is not None:
+            body |= {"mass": inertia.mass, "center": inertia.center_of_mass, "inertia": inertia.tensor}
+        bodies.append(body)
+    return mp_robot.from_numbers(bodies)
+
+
+@functools.cache
+def tree():
+    """Return a robot of three joints in two branches, with a slide and a link fixed to another."""
+    return random_robot(7, 3, prismatic=0.4, fixed=0.4)
+
+
+@functools.cache
+def following():
+    """Return a robot of four moving links, of which one or more follow another joint."""
+    return random_robot(12, 4, tree=False, prismatic=0.4, mimic=0.5, fixed=0.0)
+
+
+@functools.cache
+def case(make, order=7, samples=2):
+    """Return a robot, derivatives of its coordinates, and its inertia forces and rates in fifty digits."""
+    robot = make()
+    q = np.random.default_rng(len(robot.joint_names)).uniform(-1, 1, (samples, order + 1, len(robot.joint_names)))
+    with mp.workdps(50):
+        found = [negrean_dynamics.inertia_forces(*in_digits(robot, sample), order - 2) for sample in q]
+    return robot, q, np.array(found)
+
+
+def in_digits(robot, sample):
+    """Return the robot of the oracle, and the coordinates of one sample by joint."""
+    made = numbers_of(robot)
+    names = [made.bodies[k].joint for k in made.moving]
+    assert names == list(robot.joint_names), "the oracle has them in the same order"
+    return made, [[mpf(float(x)) for x in sample[:, j]] for j in range(len(names))]
+
+
+def agree(found, right, tolerance=ROUNDING):
+    """Assert agreement of every rate, by its largest value."""
+    found, right = np.asarray(found), np.asarray(right)[:, : np.shape(found)[1]]
+    scale = np.abs(right).max(axis=(0, 2), keepdims=True)
+    assert found.shape == right.shape
+    assert (np.abs(found - right) <= tolerance * scale).all(), np.abs((found - right) / scale).max(axis=(0, 2))
+
+
+def test_the_robots_have_what_they_should():
+    kinds = {joint.type for joint in tree().joints.values()}
+    assert kinds == {"revolute", "prismatic", "fixed"}
+    parents = [joint.parent for joint in tree().joints.values() if joint.moving]
+    assert len(set(parents)) < len(parents), "branches"
+    assert len(following().joint_names) < len(following().moving_links)
+
+
+FORMS = {
+    "newton_euler": lambda robot, q: newton_euler(robot, q, RATES),
+    "virtual_work": lambda robot, q: virtual_work(robot, q, RATES),
+    "lagrange": lambda robot, q: lagrange(robot, q, RATES),
+    "mangeron_1": lambda robot, q: mangeron_nielsen(robot, q, RATES),
+    "mangeron_2": lambda robot, q: mangeron_nielsen(robot, q, 1, m=2),
+    "mangeron_3": lambda robot, q: mangeron_nielsen(robot, q, 0, m=3),
+    "gibbs_appell_2": lambda robot, q: gibbs_appell(robot, q, RATES),
+    "gibbs_appell_3": lambda robot, q: gibbs_appell(robot, q, 1, m=3),
+    "gibbs_appell_4": lambda robot, q: gibbs_appell(robot, q, 0, m=4),
+    "higher_order_1": lambda robot, q: higher_order(robot, q, 1)[:, None],
+}
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_equations_124_to_128_agree_with_virtual_work_in_fifty_digits(form):
+    robot, q, right = case(tree)
+    agree(FORMS[form](robot, q), right)
+
+
+@pytest.mark.parametrize("k", [2, 3])
+def test_equations_129_to_131_and_134_agree_with_virtual_work_in_fifty_digits(k):
+    robot, q, right = case(tree)
+    agree(higher_order(robot, q, k)[:, None], right[:, k - 1 : k])
+
+
+@pytest.mark.parametrize("k, m", [(1, 3), (2, 4)])
+def test_the_order_of_the_derivatives_does_not_matter(k, m):
+    robot, q, right = case(tree)
+    agree(higher_order(robot, q, k, m)[:, None], right[:, k - 1 : k])
+
+
+def test_joints_that_follow_others():
+    robot = following()
+    q = np.random.default_rng(3).uniform(-1, 1, (2, 5, len(robot.joint_names)))
+    right = newton_euler(robot, q, 1)
+    agree(virtual_work(robot, q, 1), right)
+    agree(lagrange(robot, q, 1), right)
+    agree(mangeron_nielsen(robot, q, 1), right)
+    agree(gibbs_appell(robot, q, 1), right)
+    agree(higher_order(robot, q, 2)[:, None], right[:, 1:])
+    leader = {joint.name for joint in robot.joints.values() if joint.moving and joint.mimic is None}
+    assert set(robot.joint_names) == leader
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2])
+def test_all_forms_to_the_fifth_rate(seed):
+    robot, q, right = case(functools.partial(random_robot, seed, 4, prismatic=0.3), order=12, samples=1)
+    loose = 1e-10  # k = 6 divides sums of terms that are some hundred times greater than the force, at the 12th order
+    agree(newton_euler(robot, q, 5), right, 1e-12)
+    agree(virtual_work(robot, q, 5), right, 1e-12)
+    agree(lagrange(robot, q, 5), right, 1e-12)
+    for m in (1, 2, 3):
+        agree(mangeron_nielsen(robot, q, 5, m), right, loose)
+    for m in (2, 3, 4):
+        agree(gibbs_appell(robot, q, 5, m), right, loose)
+    for k in range(1, 7):
+        agree(higher_order(robot, q, k)[:, None], right[:, k - 1 : k], loose)
+    agree(higher_order(robot, q, 4, 6)[:, None], right[:, 3:4], loose)
+
+
+# what the paper prints, in fifty digits
+
+
+@functools.cache
+def digits():
+    """Return a chain of two revolute joints, its coordinates and its inertia forces in fifty digits."""
+    robot = random_robot(5, 2, tree=False, prismatic=0.0, fixed=0.0)
+    q = np.random.default_rng(0).uniform(-1, 1, (10, 2))
+    with mp.workdps(50):
+        made, rows = in_digits(robot, q)
+        return made, rows, negrean_dynamics.inertia_forces(made, rows, 4)
+
+
+def off(found, right):
+    return np.abs(found - right).max() / np.abs(right).max()
+
+
+def test_equation_130_first_rate_by_energies_of_two_orders():
+    with mp.workdps(50):
+        robot, q, right = digits()
+        found = negrean_dynamics.slope(robot, q, 2, 0, 3) + negrean_dynamics.slope(robot, q, 1, 0, 1) / 2
+        assert off(found, right[1]) <= 1e-14
+        assert off(negrean_dynamics.higher_order(robot, q, 2, 3, [1, 2]), right[1]) <= 1e-14
+
+
+def test_equation_131_middle_form_has_two_thirds_where_a_third_is_printed():
+    with mp.workdps(50):
+        robot, q, right = digits()
+        third, second, first = (negrean_dynamics.slope(robot, q, p, 0, m) for p, m in ((3, 4), (2, 2), (1, 0)))
+        assert off(third + 2 * second / 3 + first, right[2]) <= 1e-14
+        assert off(third + second / 3 + first, right[2]) == pytest.approx(MIDDLE_131, rel=0.05)
+        assert off(negrean_dynamics.higher_order(robot, q, 3, 4, [1, 2, 5]), right[2]) <= 1e-14
+    w, a, s = 1.5, -1.0, 2.0  # one axis, by N 142 and 143: I s needs 2/3
+    assert s - 6 * w**2 * a + 2 / 3 * 9 * w**2 * a == pytest.approx(s)
+
+
+def test_equations_132_and_134_need_catalan_numbers():
+    with mp.workdps(50):
+        robot, q, right = digits()
+        assert off(negrean_dynamics.higher_order(robot, q, 4, 5, [1, 2, 5, 14]), right[3]) <= 1e-14
+        printed = negrean_dynamics.higher_order(robot, q, 4, 5, [1, 2, 5, 9])
+        assert off(printed, right[3]) == pytest.approx(PRINTED_132, rel=0.05)
+
+
+MIDDLE_131 = 1.0
+PRINTED_132 = 1.0
+
+
+def test_coefficients():
+    assert [catalan(p) for p in range(1, 7)] == [1, 2, 5, 14, 42, 132]
+    assert [printed_coefficient(p) for p in range(1, 7)] == [1, 2, 5, 9, 14, 20]
+    recursion = [1]  # C_0; C_{n+1} = sum C_i C_{n-i}
+    for n in range(8):
+        recursion.append(sum(recursion[i] * recursion[n - i] for i in range(n + 1)))
+    assert [catalan(p) for p in range(9)] == recursion
+
+
+@pytest.mark.slow
+def test_printed_coefficients_fail_from_the_fourth_on():
+    robot, q, right = case(tree, order=10, samples=1)
+    for k in (1, 2, 3):
+        agree(higher_order(robot, q, k, coefficients=printed_coefficient)[:, None], right[:, k - 1 : k])
+    for k in (4, 5):
+        agree(higher_order(robot, q, k)[:, None], right[:, k - 1 : k], 1e-11)
+        printed = higher_order(robot, q, k, coefficients=printed_coefficient)
+        assert off(printed, right[:, k - 1]) > 0.05
+
+
+def test_leading_term_with_printed_coefficients():
+    weights = [1, 2, 5, 14]  # of the highest derivative of q in d E_p^(k + m - 2 p - 1) / d q^(m)
+    k, m = 4, 5
+    shares = [math.comb(m + k - 2 * p - 1, m - p - 1) + math.comb(m + k - 2 * p - 1, k - p) for p in range(1, k + 1)]
+    shares = [s / 2 for s in shares]
+    scale = math.factorial(k - 1) * math.factorial(m) / math.factorial(m + k - 1)
+    assert scale * sum(c * s for c, s in zip(weights, shares, strict=True)) == pytest.approx(1.0)
+    weights[3] = 9
+    assert scale * sum(c * s for c, s in zip(weights, shares, strict=True)) == pytest.approx(51 / 56)
+
+
+# driving forces
+
+
+def test_equation_123_rates_by_the_rates_of_the_jacobian():
+    robot = tree()
+    q = np.random.default_rng(1).uniform(-1, 1, (6, 3))
+    found = np.zeros((4, 3))
+    for name, link in robot.links.items():
+        if link.inertia is None:
+            continue
+        motion = jn.forward_kinematics(robot, q, name, link.inertia.center_of_mass)
+        J = jn.jacobian(robot, q, name, link.inertia.center_of_mass)
+        w, R = motion.angular_velocity, motion.rotation
+        tensor = [leibniz(lambda i, j: R[i] @ link.inertia.tensor @ R[j].T, n) for n in range(5)]
+        momentum = [leibniz(lambda i, j: tensor[i] @ w[j], n) for n in range(5)]
+        force = [np.concatenate([link.inertia.mass * motion.position[n + 2], momentum[n + 1]]) for n in range(4)]
+        for n in range(4):
+            found[n] += leibniz(lambda i, j: J[i].T @ force[j], n)
+    right = virtual_work(robot, q, 3)
+    np.testing.assert_allclose(found, right, rtol=0, atol=1e-12 * np.abs(right).max())
+
+
+def leibniz(product, n):
+    return sum(math.comb(n, i) * product(i, n - i) for i in range(n + 1))
+
+
+def test_equation_125_driving_forces_are_of_inertia_weight_and_load():
+    robot, q, _ = case(tree)
+    load = jn.Inertia(1.5, [0.1, 0.2, -0.1], [0.02, 0.03, 0.04])
+    loaded = robot.with_payload("link_2", load)
+    parts = newton_euler(robot, q, RATES) + gravity_forces(robot, q, RATES)
+    agree(jn.inverse_dynamics(robot, q[:, : RATES + 3]), parts, 1e-12)
+    alone = jn.Robot(
+        "load",
+        [jn.Link(name, load if name == "link_2" else None) for name in robot.links],
+        list(robot.joints.values()),
+    )
+    carried = newton_euler(alone, q, RATES) + gravity_forces(alone, q, RATES)
+    agree(jn.inverse_dynamics(loaded, q[:, : RATES + 3]), parts + carried, 1e-12)
+
+
+def test_gravity_forces_are_the_slope_of_the_potential_energy():
+    robot, q, _ = case(tree)
+    found = gravity_forces(robot, q, 1)
+    with mp.workdps(50):
+        for sample, forces in zip(q, found, strict=True):
+            made, rows = in_digits(robot, sample)
+            for j in range(3):
+                sides = []
+                for sign in (1, -1):
+                    moved = [list(row[:3]) for row in rows]
+                    moved[j][0] += sign * mpf("1e-20")
+                    sides.append(
+                        mp_robot.State(made, [mp_robot.motion(row) for row in moved]).potential_energy().derivatives()
+                    )
+                for n in range(2):
+                    slope = float((sides[0][n] - sides[1][n]) / mpf("2e-20"))
+                    assert abs(slope - forces[n, j]) <= 1e-13 * np.abs(found).max()
+
+
+def test_equations_144_to_146_torques_about_one_axis():
+    tensor, q = (0.02, 0.06, 0.055), np.random.default_rng(2).normal(size=(3, 7, 1))
+    arm = jn.robot.from_screws([jn.robot.Screw([0, 1, 0], inertia=jn.Inertia(2.0, [0.3, 0.4, 0.1], tensor))])
+    about_axis = 2.0 * (0.3**2 + 0.1**2) + 0.06
+    right = np.stack(negrean_energies.one_axis_torques(about_axis, *(q[:, k, 0] for k in (2, 3, 4))), axis=1)
+    for k in (1, 2, 3):
+        np.testing.assert_allclose(higher_order(arm, q, k)[:, 0], right[:, k - 1], rtol=0, atol=1e-13)
+    weight = np.asarray(gravity_forces(arm, q, 2))[..., 0]
+    whole = jn.inverse_dynamics(arm, q[:, :5])[..., 0]
+    np.testing.assert_allclose(whole, right + weight, rtol=0, atol=1e-12)
+    assert np.abs(weight).max() > 0.1 * np.abs(whole).max(), "the last members of 144-146 leave out the part of gravity"
+
+
+# errors
+
+
+@pytest.mark.parametrize("form", [lagrange, mangeron_nielsen, gibbs_appell, newton_euler, virtual_work])
+def test_too_few_derivatives_or_no_number_of_rates(form):
+    robot, q, _ = case(tree)
+    with pytest.raises(jn.RobotError, match="2 rates in this form need derivatives of q to order"):
+        form(robot, q[:, :4], 2)
+    with pytest.raises(jn.RobotError, match="rates.*must be a whole number, 0 or greater"):
+        form(robot, q, -1)
+
+
+def test_an_order_of_derivatives_that_is_too_small():
+    robot, q, _ = case(tree)
+    with pytest.raises(jn.RobotError, match="m.*must be a whole number, 1 or greater"):
+        mangeron_nielsen(robot, q, m=0)
+    with pytest.raises(jn.RobotError, match="m.*must be a whole number, 2 or greater"):
+        gibbs_appell(robot, q, m=1)
+    with pytest.raises(jn.RobotError, match="m.*must be a whole number, 4 or greater"):
+        higher_order(robot, q, 3, 3)
+    with pytest.raises(jn.RobotError, match="k.*must be a whole number, 1 or greater"):
+        higher_order(robot, q, 0)
+    with pytest.raises(jn.RobotError, match="need derivatives of q to order 8"):
+        higher_order(robot, q, 4)
