@@ -206,17 +206,15 @@ def test_jit_vmap_and_two_ways_of_differentiation_agree(torque):
     def call(q):
         return jn.inverse_dynamics(ROBOT, q)
 
-    found = jax.jit(jax.vmap(call))(Q)
+    found = jax.jit(jax.vmap(call))(Q[:, :4])
     assert isinstance(found, jax.Array)
-    near(found, torque)
-    forward, reverse = (way(call)(jnp.asarray(Q[0])) for way in (jax.jacfwd, jax.jacrev))
-    assert forward.shape == (ORDER - 1, 7, ORDER + 1, 7)
+    near(found, torque[:, :2])
+    forward, reverse = (way(call)(jnp.asarray(Q[0, :4])) for way in (jax.jacfwd, jax.jacrev))
+    assert forward.shape == (2, 7, 4, 7)
     near(forward, reverse)
-    mass = forward[0, :, 2]
-    near(mass, mass.T)
-    for level in range(1, ORDER - 1):  # the rate of torque is the slope of torque along the motion
-        rate = sum(np.einsum("ij,j->i", forward[level - 1, :, k], Q[0, k + 1]) for k in range(ORDER))
-        near(torque[0, level], rate)
+    near(forward[0, :, 2], forward[0, :, 2].T)  # the mass matrix
+    rate = sum(np.einsum("ij,j->i", forward[0, :, k], Q[0, k + 1]) for k in range(3))
+    near(torque[0, 1], rate)  # the rate of torque is the slope of torque along the motion
 
 
 def test_slopes_in_masses_and_centers():

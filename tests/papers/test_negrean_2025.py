@@ -1,0 +1,147 @@
+"""The arm of Negrean 2025, section 4: stand-ins, closed forms beside the library, the printed segment, the files."""
+
+import csv
+import itertools
+import math
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from jounce.errors import OutputError
+from jounce.papers import negrean_2025
+from jounce.papers.negrean_2025 import CASES, case, closed_forms, comparison, reproduce, segment
+from jounce.papers.negrean_2025.history import difference, history
+from tests.oracles import negrean_energies
+
+ROUNDING = 1e-14  # of the largest value over time
+
+
+@pytest.fixture(scope="module")
+def histories():
+    return {name: history(motion) for name, motion in CASES.items()}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_equations_141_to_146_beside_the_library(histories, name):
+    found = histories[name]
+    assert (difference(found.energies, found.closed_energies) <= ROUNDING).all()
+    assert (difference(found.torques, found.closed_torques) <= ROUNDING).all()
+    assert (difference(found.equation_torques, found.closed_torques) <= ROUNDING).all()
+    right = negrean_energies.one_axis(case.inertia_about_axis(), *found.motion.T[1:5])
+    np.testing.assert_allclose(found.closed_energies, np.stack(right, axis=1), rtol=1e-12, atol=1e-9)
+
+
+def test_gravity_and_torques_in_closed_form():
+    q, w, a = 0.7, 1.3, -2.1
+    found = closed_forms.gravity_torques(2.0, (0.3, 0.1), 9.81, [q, w, a])
+    slope = -0.3 * math.cos(q) - 0.1 * math.sin(q)
+    change = 0.3 * math.sin(q) - 0.1 * math.cos(q)
+    right = 2.0 * 9.81 * np.array([slope, change * w, change * a - slope * w**2])
+    np.testing.assert_allclose(found, right, rtol=1e-14)
+    torques = negrean_2025.torques(0.5, [q, w, a, 4.0, 5.0], found)
+    np.testing.assert_allclose(torques, right + 0.5 * np.array([a, 4.0, 5.0]), rtol=1e-14)
+
+
+def test_equations_061_to_064_the_motions_keep_what_the_text_says(histories):
+    assert (case.DURATION, case.SEGMENTS, case.CONTINUITY) == (1.7, 51, 4)
+    assert np.diff(case.KNOTS) == pytest.approx(0.033, abs=5e-4)
+    for name, found in histories.items():
+        law = CASES[name].motion
+        assert law.degree == 5
+        assert len(law.knots) == 52
+        at_knots = found.motion[:: found.time.size // 51]
+        np.testing.assert_allclose(at_knots[:, 2], CASES[name].accelerations, rtol=0, atol=1e-12)
+        jumps = comparison.jumps(found)
+        assert (jumps[:5] <= 1e-12 * np.abs(found.motion[:, :5]).max(axis=0)).all()
+        assert jumps[5] > 1.0
+        np.testing.assert_allclose(found.motion[0, [0, 1, 3]], 0.0, atol=1e-12)
+        np.testing.assert_allclose(found.motion[-1, [1, 3]], 0.0, atol=1e-11)
+    assert histories["high_speed"].motion[-1, 0] == pytest.approx(np.pi, rel=1e-14)
+    assert histories["sudden_stop"].motion[-1, 0] < np.pi
+
+
+def test_samples_are_the_stated_ones():
+    speed, acceleration = case.rest_to_rest(np.linspace(0, 1.7, 2001))
+    turned = np.concatenate([[0.0], np.cumsum((speed[1:] + speed[:-1]) / 2)]) * 1.7 / 2000
+    assert turned[-1] == pytest.approx(np.pi, rel=1e-6)
+    np.testing.assert_allclose(np.gradient(speed, 1.7 / 2000)[5:-5], acceleration[5:-5], atol=1e-4)
+    assert np.abs(case.high_speed() - case.rest_to_rest(case.KNOTS)[1]).max() < 0.13
+    stop = case.sudden_stop()
+    np.testing.assert_array_equal(stop[case.KNOTS < 0.9], case.high_speed()[case.KNOTS < 0.9])
+    assert stop.min() < -30
+    for motion in CASES.values():
+        assert np.abs(motion.accelerations - motion.samples()).max() < 0.2
+
+
+def test_equations_136_to_140_the_printed_segment():
+    checks = segment.check()
+    assert len(checks) == 14
+    cut = [c for c in checks if not c.rounded]
+    assert [(c.order, c.power, str(c.residual)) for c in cut] == [(1, 4, "0.004")]
+    assert all(abs(float(c.residual)) <= 0.001 * (c.power + 2) for c in checks), "or digits are cut off"
+    ends = segment.evaluated(np.array(segment.INTERVAL))
+    np.testing.assert_allclose(ends[:3], [[1.3734, 1.6332], [6.7474, 6.2192], [-11.852, -15.498]], rtol=1e-4)
+    for k in range(4):  # each is the derivative of the one before, to the rounding of the coefficients
+        t, h = 0.585, 1e-3
+        values = segment.evaluated(np.array([t - h, t + h]))[k]
+        slope = float(np.diff(values)[0]) / (2 * h)
+        assert slope == pytest.approx(float(segment.evaluated(np.array([t]))[k + 1][0]), abs=0.2)
+
+
+def test_the_signs_of_the_printed_segment_are_the_only_ones_that_keep_the_arm_between_0_and_pi():
+    sizes = [abs(float(c)) for c in segment.POLYNOMIALS[0]]
+    fitting = []
+    for signs in itertools.product((1, -1), repeat=6):
+        values = [
+            np.polyval([s * c for s, c in zip(signs, sizes, strict=True)], t) for t in np.linspace(0.565, 0.605, 9)
+        ]
+        if min(values) >= 0 and max(values) <= np.pi:
+            fitting.append(signs)
+    assert fitting == [(1, -1, 1, -1, 1, -1)]
+
+
+def test_reproduction_writes_its_files(histories, tmp_path, monkeypatch):
+    module = sys.modules["jounce.papers.negrean_2025.reproduce"]
+    monkeypatch.setattr(module, "history", lambda motion: histories[motion.name])
+    calls = []
+    paths = reproduce(tmp_path / "made" / "here", lambda done, total: calls.append((done, total)))
+    figures = [f"{name}.{kind}" for name in (*FIGURES, "energies") for kind in ("png", "svg")]
+    names = ["comparison.md", "energies.csv", "torques.csv", *figures]
+    assert [path.name for path in paths] == names
+    assert sorted(path.name for path in (tmp_path / "made" / "here").iterdir()) == sorted(names)
+    assert calls == [(k, 8) for k in range(1, 9)]
+    for path in paths:
+        content = path.read_bytes()
+        assert path.suffix != ".png" or (content.startswith(b"\x89PNG") and len(content) > 20_000)
+        assert path.suffix != ".svg" or b"</svg>" in content
+    text = paths[0].read_text()
+    assert "not those of the" in text
+    assert "M_3 = 6.5 kg" in text
+    rows = list(csv.DictReader(paths[1].read_text().splitlines()))
+    assert len(rows) == 2 * 1021
+    energies = np.array([[float(row[f"E_{p}"]) for p in (1, 2, 3)] for row in rows])
+    np.testing.assert_array_equal(energies, np.concatenate([h.energies for h in histories.values()]))
+    rows = list(csv.DictReader(paths[2].read_text().splitlines()))
+    torques = np.array([[float(row[c]) for c in ("torque", "torque_d1", "torque_d2")] for row in rows])
+    np.testing.assert_array_equal(torques, np.concatenate([h.torques for h in histories.values()]))
+
+
+FIGURES = tuple(f"figure_{k:02d}" for k in (4, 5, 7, 8, 9))
+
+
+def test_a_directory_that_cannot_be_made_is_refused_before_any_computing(tmp_path, monkeypatch):
+    module = sys.modules["jounce.papers.negrean_2025.reproduce"]
+    monkeypatch.setattr(module, "history", lambda *_: pytest.fail("computed"))
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OutputError, match="files cannot be written there"):
+        reproduce(tmp_path / "file" / "out")
+
+
+def test_drawing_is_imported_late_and_leaves_pyplot_alone():
+    code = (
+        "import sys, jounce.papers.negrean_2025 as n; assert 'matplotlib' not in sys.modules\n"
+        "import jounce.papers.negrean_2025.figures; assert 'matplotlib.pyplot' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
