@@ -62,7 +62,7 @@ def sudden_stop() -> np.ndarray:
     """Return samples of the angular acceleration where the motion is stopped at 0.9 s, rad/s^2, one for each knot."""
     turned = KNOTS - STOP
     phase = np.clip(turned / BRAKING, 0.0, 1.0)
-    braking = -rest_to_rest(np.array(STOP))[0] / BRAKING * (1 - np.cos(2 * np.pi * phase))
+    braking = -rest_to_rest(np.array([STOP]))[0] / BRAKING * (1 - np.cos(2 * np.pi * phase))
     size, frequency, decay = RINGING
     after = np.clip(turned - BRAKING, 0.0, None)
     ringing = size * np.exp(-decay * after) * np.sin(frequency * after)

@@ -27,7 +27,7 @@ def energies(inertia: float, motion: Any) -> np.ndarray:
     Examples
     --------
     >>> energies(2.0, [0.0, 1.0, 3.0, 2.0, 0.0]).tolist()
-    [10.0, 82.0, 1496.0]
+    [10.0, 82.0, 1480.0]
     """
     w, a, j, s = np.moveaxis(np.asarray(motion, float), -1, 0)[1:5]
     first = a**2 + w**4
