@@ -1,21 +1,15 @@
 """The figures and comparisons of section 4, made again into one directory."""
 
-import io
 import os
-import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from jounce.errors import OutputError
-from jounce.io.files import replacing
+from jounce.papers.files import FORMATS, rendered, writable, write
 from jounce.papers.negrean_2025.case import CASES
 from jounce.papers.negrean_2025.comparison import comparison
 from jounce.papers.negrean_2025.history import History, history
-
-FORMATS = ("png", "svg")
 
 
 def reproduce(out_directory: str | os.PathLike[str], progress: Callable[[int, int], None] | None = None) -> list[Path]:
@@ -43,7 +37,7 @@ def reproduce(out_directory: str | os.PathLike[str], progress: Callable[[int, in
     >>> from jounce.papers.negrean_2025 import reproduce
     >>> paths = reproduce("out")  # doctest: +SKIP
     """
-    directory = _writable(Path(out_directory))
+    directory = writable(Path(out_directory))
     from jounce.papers.negrean_2025 import figures  # imports matplotlib
 
     total = len(CASES) + len(figures.FIGURES)
@@ -67,7 +61,7 @@ def reproduce(out_directory: str | os.PathLike[str], progress: Callable[[int, in
     for name, draw in figures.FIGURES.items():
         with figures.style():
             figure = draw(histories)
-            paths += [write(directory / f"{name}.{kind}", _rendered(figure, kind)) for kind in FORMATS]
+            paths += [write(directory / f"{name}.{kind}", rendered(figure, kind)) for kind in FORMATS]
         advanced()
     return paths
 
@@ -90,34 +84,3 @@ def _csv(columns: tuple[str, ...], tables: Mapping[str, np.ndarray], histories: 
         for instant, values in zip(histories[name].time, table, strict=True):
             rows.append(",".join([name, *(f"{value:.16e}" for value in (instant, *values))]))
     return "\n".join(rows) + "\n"
-
-
-def write(path: Path, content: bytes) -> Path:
-    """Write a whole file or nothing.
-
-    Raises
-    ------
-    OutputError
-        If it cannot be written.
-    """
-    with replacing(path) as beside:
-        beside.write_bytes(content)
-    return path
-
-
-def _writable(directory: Path) -> Path:
-    """Make the directory, and try a file in it."""
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=directory):
-            pass
-    except (OSError, ValueError) as error:  # ValueError: a null character in the name
-        reason = getattr(error, "strerror", None) or error
-        raise OutputError(f"files cannot be written there: {reason}", path=directory) from None
-    return directory
-
-
-def _rendered(figure: Any, kind: str) -> bytes:
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format=kind, dpi=200, metadata={"Date": None} if kind == "svg" else None)
-    return buffer.getvalue()

@@ -1,14 +1,10 @@
 """All figures and errors of the paper, made again into one directory."""
 
-import io
 import os
-import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
 
-from jounce.errors import OutputError
-from jounce.io.files import replacing
+from jounce.papers.files import FORMATS, rendered, writable, write
 from jounce.papers.sommer_2024.simulations import QUANTITIES, RUNS, SIMULATIONS, STEP, TOLERANCE, Cycle, measure
 
 PRINTED = {  # root-mean-square errors in the text of the paper, sections 4 and 6
@@ -18,7 +14,6 @@ PRINTED = {  # root-mean-square errors in the text of the paper, sections 4 and 
     ("rsur", "jounce"): 3.81e-13,
 }
 UNITS = ("rad/s", "rad/s^2", "rad/s^3", "rad/s^4")
-FORMATS = ("png", "svg")
 
 
 def reproduce(out_directory: str | os.PathLike[str], progress: Callable[[int, int], None] | None = None) -> list[Path]:
@@ -46,7 +41,7 @@ def reproduce(out_directory: str | os.PathLike[str], progress: Callable[[int, in
     >>> from jounce.papers.sommer_2024 import reproduce
     >>> paths = reproduce("out")  # doctest: +SKIP
     """
-    directory = _writable(Path(out_directory))
+    directory = writable(Path(out_directory))
     from jounce.papers.sommer_2024 import figures  # imports matplotlib
 
     total = RUNS * len(SIMULATIONS) + len(figures.FIGURES)
@@ -67,7 +62,7 @@ def reproduce(out_directory: str | os.PathLike[str], progress: Callable[[int, in
     for number, draw in figures.FIGURES.items():
         with figures.style():
             figure = draw(results)
-            paths += [write(directory / f"figure_{number:02d}.{kind}", _rendered(figure, kind)) for kind in FORMATS]
+            paths += [write(directory / f"figure_{number:02d}.{kind}", rendered(figure, kind)) for kind in FORMATS]
         advanced()
     return paths
 
@@ -100,34 +95,3 @@ def comparison(cycles: Mapping[str, Cycle]) -> str:
             beside = "" if printed is None else f"{printed:.3g}"
             lines.append(f"| {name} | {quantity} | {unit} | {peak:.4g} | {error:.2e} | {beside} | {normalised:.1e} |")
     return "\n".join(lines) + "\n"
-
-
-def write(path: Path, content: bytes) -> Path:
-    """Write a whole file or nothing.
-
-    Raises
-    ------
-    OutputError
-        If it cannot be written.
-    """
-    with replacing(path) as beside:
-        beside.write_bytes(content)
-    return path
-
-
-def _writable(directory: Path) -> Path:
-    """Make the directory, and try a file in it."""
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=directory):
-            pass
-    except (OSError, ValueError) as error:  # ValueError: a null character in the name
-        reason = getattr(error, "strerror", None) or error
-        raise OutputError(f"files cannot be written there: {reason}", path=directory) from None
-    return directory
-
-
-def _rendered(figure: Any, kind: str) -> bytes:
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format=kind, dpi=200, metadata={"Date": None} if kind == "svg" else None)
-    return buffer.getvalue()
