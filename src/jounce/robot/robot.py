@@ -163,10 +163,10 @@ class Robot:
         """Return the robot on a base that moves freely: three slides along x, y, z, then three turns.
 
         The new base is the link ``world``, or ``world_`` where the robot has a link of that name. The coordinates
-        base_x, base_y, base_z (m) and base_angle_1 to 3 (rad) come first in q. Their generalised forces are those that would
-        have to hold the base: for one that is free, they tell how far a motion is from what physics allows. The angles
-        have a singular orientation (for ``ZYX`` the second at a right angle): choose a sequence that stays away from
-        it.
+        base_x, base_y, base_z (m) and base_angle_1 to 3 (rad) come first in q. Their generalised forces are those that
+        would have to hold the base: for one that is free, they tell how far a motion is from what physics allows. The
+        angles have a singular orientation (for ``ZYX`` the second at a right angle): choose a sequence that stays away
+        from it.
 
         Parameters
         ----------
