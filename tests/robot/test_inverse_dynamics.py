@@ -202,6 +202,7 @@ def test_rates_of_high_order_follow_each_other(order, torque):
         assert np.abs(series - then[:, k]).max() <= bound
 
 
+@pytest.mark.slow
 def test_jit_vmap_and_two_ways_of_differentiation_agree(torque):
     def call(q):
         return jn.inverse_dynamics(ROBOT, q)
