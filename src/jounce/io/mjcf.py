@@ -39,7 +39,7 @@ def read_mjcf(root: Element) -> Robot:
     Bodies and joints without a name are called ``body_1``, ``joint_0`` and so on, by their number in MuJoCo. Armature,
     damping and friction of joints are kept, with the armature and damping of actuators on them; ranges become limits,
     and symmetric ranges of force limits of effort. A joint tied to another by a linear equality follows it. Contacts,
-    springs, tendons and all else that is no body, joint or actuator of a joint are left out.
+    springs, tendons, gravity compensation and all else that is no body, joint or actuator of a joint are left out.
 
     Parameters
     ----------
