@@ -75,6 +75,11 @@ class PlanarPose:
         sine, cosine = next_sine_cosine(list(self.sine.coefficients), list(self.cosine.coefficients), angle)
         return PlanarPose(self.position.append(shift), angle, self.sine.append(sine), self.cosine.append(cosine))
 
+    def varied(self, shift: Jet, turn: Jet) -> "PlanarPose":
+        """Return how the jets change, to first order, as bodies shift, (2, ...) in m, and turn, (1, ...) in rad."""
+        turn = turn[0]
+        return PlanarPose(shift, turn, self.cosine * turn, -(self.sine * turn))
+
     @classmethod
     def predicted_from(cls, coordinates: dict[str, Jet], step: Any) -> "PlanarPose":
         """Return the pose of order zero that the Taylor series of coordinates give a time `step` away, in s."""

@@ -162,6 +162,21 @@ class SpatialPose:
             velocity,
         )
 
+    def varied(self, shift: Jet, turn: Jet) -> "SpatialPose":
+        """Return how the jets change, to first order, as bodies shift, (3, ...) in m, and turn, (3, ...) in rad.
+
+        The turn is about the body's axes; it need not be small, as the change is linear in it.
+        """
+        x, y, z = self.axes
+        p, q, r = components(turn)
+        axes = (y * r - z * q, z * p - x * r, x * q - y * p)
+        quaternion = total(spin * part for spin, part in zip(self.spins, (p, q, r), strict=True)) * 0.5
+        spins = zip(*map(quaternion_spins, quaternion.dense().coefficients), strict=True)
+        velocity = None
+        if self.angular_velocity is not None:
+            velocity = turn.differentiate() + self.angular_velocity.cross(turn)
+        return SpatialPose(shift, quaternion, tuple(map(Jet, spins)), axes, velocity)
+
     @classmethod
     def predicted_from(cls, coordinates: dict[str, Jet], step: Any) -> "SpatialPose":
         """Return the pose of order zero that the Taylor series of coordinates give a time `step` away, in s."""
