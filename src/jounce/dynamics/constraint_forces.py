@@ -113,3 +113,66 @@ def multipliers(system: System, pose: Any, time: Jet, load: Any, levels: int) ->
         right = jnp.swapaxes(missing, 0, 1).reshape(-1, missing.shape[-1]) * scale
         found = found.at[k].set(factor.solve_transposed(right))
     return found
+
+
+def exerted(group: Group, pose: Any, time: Jet, found: Jet) -> Jet:
+    """Return the forces that drivers exert along what they prescribe, (instances, batch), with rates.
+
+    Conjugate to the law f: ``lambda^T dPhi/df``, whose product with f' is the power that goes into the mechanism.
+
+    Parameters
+    ----------
+    group : Group
+        Drivers of one type.
+    pose, time
+        Jets of at least the order of the multipliers.
+    found : Jet
+        Multipliers of the rows, not scaled, shape (rows, instances, batch).
+    """
+    pose, time = _truncated(pose, found.order), time.truncate(found.order)
+
+    def residual(shift: Any) -> Any:
+        element = eqx.tree_at(lambda e: e.motion, group.element, _Shifted(group.element.motion, shift))
+        return stacked(Group(element, group.bodies).residual(pose, time))
+
+    shift = jnp.zeros((group.instances, time.coefficients[0].shape[-1]))
+    _, slope = jax.jvp(residual, (shift,), (jnp.ones_like(shift),))
+    return total(components(found * Jet(tuple(slope))))[0]
+
+
+def _moving(pose: Any) -> Any:
+    """Return a pose with no certain zeros: also the ground may be moved in thought."""
+    pose = jax.tree.map(lambda jet: jet.dense(), pose, is_leaf=_is_jet)
+    if pose.turns == 3 and pose.order and pose.angular_velocity is None:
+        rest = Jet.constant(jnp.zeros_like(pose.position.coefficients[0]), pose.order - 1).dense()
+        return dataclasses.replace(pose, angular_velocity=rest)
+    return pose
+
+
+def joint_wrenches(group: Group, pose: Any, time: Jet, found: Jet) -> list[tuple[Jet, Jet]]:
+    """Return what the joints of one type do to the bodies in each slot: force, global, and moment about the origin.
+
+    The force has the shape (c, instances, batch), the moment, in the axes of the body, (turns, instances, batch).
+    """
+    order = found.order
+    pose, time = _truncated(pose, order), time.truncate(order)
+    poses = [pose.take(indices) for indices in group.bodies]
+    results = []
+    for slot, body in enumerate(map(_moving, poses)):
+        shape = jnp.shape(body.position.coefficients[0])
+
+        def residual(change: Any, slot: int = slot, body: Any = body) -> Any:
+            moved = list(poses)
+            moved[slot] = change
+            jet = group.element.residual(*moved, time)
+            return stacked(jet.map(lambda c: c[None]) if len(jet.shape) == 2 else jet)
+
+        def rates(velocity: Any, body: Any = body, residual: Any = residual) -> Any:
+            shift, turn = (Jet(tuple(part)) for part in (velocity[:, : body.shifts], velocity[:, body.shifts :]))
+            change = _truncated(body.varied(shift, turn), order)
+            return jax.jvp(residual, (body,), (change,))[1]
+
+        example = jax.ShapeDtypeStruct((order + 1, pose.shifts + pose.turns, *shape[1:]), jnp.float64)
+        work = -jax.linear_transpose(rates, example)(stacked(found)[::-1])[0][::-1]
+        results.append((Jet(tuple(work[:, : pose.shifts])), Jet(tuple(work[:, pose.shifts :]))))
+    return results
