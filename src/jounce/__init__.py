@@ -7,7 +7,13 @@ import jax as _jax
 
 _jax.config.update("jax_enable_x64", True)
 
-from jounce import dynamics as dynamics, jet as jet, rigid as rigid, robot as robot  # noqa: E402 - after the switch
+from jounce import (  # noqa: E402 - after the switch
+    dynamics as dynamics,
+    forces as forces,
+    jet as jet,
+    rigid as rigid,
+    robot as robot,
+)
 from jounce.constraints import (  # noqa: E402
     AbstractConstraint as AbstractConstraint,
     Scalar as Scalar,
@@ -40,6 +46,7 @@ from jounce.errors import (  # noqa: E402
     TrajectoryError as TrajectoryError,
     UnitError as UnitError,
 )
+from jounce.forces import AbstractForce as AbstractForce, Law as Law, Laws as Laws  # noqa: E402
 from jounce.io import (  # noqa: E402
     load as load,
     load_limits as load_limits,
@@ -61,6 +68,7 @@ from jounce.mechanism import (  # noqa: E402
     TimeGrid as TimeGrid,
 )
 from jounce.robot import (  # noqa: E402
+    Closure as Closure,
     FrameMotion as FrameMotion,
     Inertia as Inertia,
     Joint as Joint,

@@ -14,7 +14,14 @@ Scalar = Annotated[Any, "scalar"]
 Vector = Annotated[Any, "vector"]
 Motion = Annotated[Any, "motion"]
 
-_REGISTRY: dict[tuple[str, str], dict[str, type["AbstractConstraint"]]] = {}
+_REGISTRY: dict[tuple[str, str], dict[str, type[Any]]] = {}
+
+
+def register(kind: type[Any], type: str, space: str, role: str) -> None:  # noqa: A002
+    """Let files name a class by its type; one of no particular space is of both."""
+    kind.type_name, kind.space, kind.role = type, space, role
+    for each in (space,) if space else ("planar", "spatial"):
+        _REGISTRY.setdefault((each, role), {})[type] = kind
 
 
 class AbstractConstraint(eqx.Module):
@@ -47,8 +54,7 @@ class AbstractConstraint(eqx.Module):
     def __init_subclass__(cls, type: str = "", space: str = "", role: str = "joint", **keywords: Any):  # noqa: A002
         super().__init_subclass__(**keywords)
         if type:
-            cls.type_name, cls.space, cls.role = type, space, role
-            _REGISTRY.setdefault((space, role), {})[type] = cls
+            register(cls, type, space, role)
 
     def __check_init__(self):
         name = self.type_name or type(self).__name__
@@ -74,8 +80,8 @@ class AbstractConstraint(eqx.Module):
         return jnp.isfinite(motion(time.truncate(0)).coefficients[0])
 
 
-def catalogue(space: str, role: str) -> dict[str, type[AbstractConstraint]]:
-    """Return the classes that files may name, by their type: `space` planar or spatial, `role` joint or driver.
+def catalogue(space: str, role: str) -> dict[str, type[Any]]:
+    """Return the classes that files may name, by their type: `space` planar or spatial, `role` joint, driver or force.
 
     Examples
     --------
@@ -93,15 +99,15 @@ def rows(*parts: Any) -> Jet:
 
 
 def value_fields(kind: type[Any]) -> dict[str, dataclasses.Field]:
-    """Return the fields of a joint or driver that hold values, by name; `bodies` is not among them."""
+    """Return the fields of a joint, driver or force that hold values, by name; `bodies` is not among them."""
     return {field.name: field for field in dataclasses.fields(kind) if field.name != "bodies"}
 
 
 def field_kind(field: dataclasses.Field) -> str:
-    """Return ``scalar``, ``vector``, ``motion`` or ``text``, by the annotation of the field."""
+    """Return ``scalar``, ``vector``, ``motion``, ``law``, ``laws`` or ``text``, by the annotation of the field."""
     if isinstance(field.type, str):  # under ``from __future__ import annotations``
         word = field.type.rpartition(".")[2].strip()
-        return {"Scalar": "scalar", "Vector": "vector", "Motion": "motion"}.get(word, "text")
+        return word.lower() if word in ("Scalar", "Vector", "Motion", "Law", "Laws") else "text"
     return next(iter(getattr(field.type, "__metadata__", ())), "text")
 
 

@@ -41,6 +41,8 @@ class Model:
         Name of the joint or driver of each row of the residual.
     drivers : tuple of str
         Names of the drivers, in the order of `System.admissible`.
+    forces : tuple of tuple of str
+        Names of the applied forces in each group of the system, in the order of `System.finite_forces`.
     bodies : tuple of str
         Names of the moving bodies, in the order of the pose.
     outputs : tuple of tuple of str
@@ -54,6 +56,7 @@ class Model:
     guess: dict[str, Any]
     rows: tuple[str, ...]
     drivers: tuple[str, ...]
+    forces: tuple[tuple[str, ...], ...]
     bodies: tuple[str, ...]
     outputs: tuple[tuple[str, ...], ...]
     length: float
@@ -79,6 +82,8 @@ def build(mechanism: Mechanism) -> Model:
     elements |= {f"drivers.{k}": v for k, v in mechanism.drivers.items()}
     groups, names = group_elements(elements, parameters, body_index, components)
     groups = tuple(_with_offsets(group, pose_type, guess) for group in groups)
+    applied = {f"forces.{k}": v for k, v in mechanism.forces.items()}
+    forces, force_names = group_elements(applied, parameters, body_index, components)
     wanted = {f"outputs.{k}": v for k, v in mechanism.outputs.items()}
     outputs, output_names = group_elements(wanted, parameters, body_index, components)
 
@@ -93,9 +98,24 @@ def build(mechanism: Mechanism) -> Model:
         np.ones((len(row_names), 1)),
         np.array([length] * components + [1.0] * pose_type.turns),
         len(mechanism.bodies),
+        forces,
     )
-    plain = tuple(tuple(n.removeprefix("outputs.") for n in members) for members in output_names)
-    return Model(system, pose_type, guess, tuple(row_names), drivers, tuple(mechanism.bodies), plain, length)
+    return Model(
+        system,
+        pose_type,
+        guess,
+        tuple(row_names),
+        drivers,
+        _plain(force_names),
+        tuple(mechanism.bodies),
+        _plain(output_names),
+        length,
+    )
+
+
+def _plain(names: tuple[tuple[str, ...], ...]) -> tuple[tuple[str, ...], ...]:
+    """Return names in groups without the kind before them."""
+    return tuple(tuple(name.partition(".")[2] for name in members) for members in names)
 
 
 def starting_guess(mechanism: Mechanism, parameters: dict[str, Any], components: int) -> dict[str, Any]:

@@ -7,12 +7,14 @@ from typing import Any
 
 from jounce.constraints import AbstractConstraint
 from jounce.errors import ExpressionError, MechanismError, did_you_mean
+from jounce.forces import AbstractForce
 from jounce.mechanism.outputs import AbstractOutput
 from jounce.mechanism.resolve import parameter_value
 from jounce.trajectory import Expression
 
 GROUND = "ground"
 RESERVED = ("t", "pi", "deg")
+CLASSES = {"outputs": AbstractOutput, "forces": AbstractForce}  # constraints otherwise
 RESERVED_OUTPUTS = ("time", "derivative", "component")  # the axes of a result
 
 
@@ -28,8 +30,13 @@ class Body:
         Starting guess of the angle of a planar body, rad.
     orientation : sequence of 4 numbers, optional
         Starting guess of the Euler parameters [e0, e1, e2, e3] of a spatial body; normalised when used.
-    mass, inertia, center_of_mass : optional
-        Kept for the dynamics; kinematics does not use them. kg, kg m^2, m.
+    mass : number or expression, optional
+        For the dynamics; kinematics does not use it. kg.
+    inertia : number, sequence or expression, optional
+        Moment of inertia about the centre of mass, kg m^2: one number in the plane; in space three principal moments
+        along the axes of the body, or a symmetric matrix in these axes.
+    center_of_mass : sequence, optional
+        In the frame of the body, m; its origin unless given.
     """
 
     position: Any
@@ -52,12 +59,17 @@ class Mechanism:
         The moving bodies; the body ``"ground"`` always exists besides.
     joints, drivers : dict of str to AbstractConstraint
         By name; their values may be numbers (SI), or expressions of the parameters.
+    forces : dict of str to AbstractForce, optional
+        Applied forces and torques, by name; they do not bear on motion that is prescribed.
+    initial : dict of str to AbstractConstraint, optional
+        Drivers that hold at the start of a simulation only: they give the position and the velocity there, by value and
+        first derivative of their law, and are then released.
     outputs : dict of str to AbstractOutput, optional
         Quantities wanted, by name.
     parameters : dict of str to number or expression, optional
         Named values, SI.
     gravity : sequence, optional
-        Kept for the dynamics, m/s^2.
+        Acceleration of free fall in the global frame, (2,) or (3,), m/s^2; zero unless given.
     time : array_like, optional
         The instants that `jounce.solve` takes when it is given none, s.
     title : str, optional
@@ -88,6 +100,8 @@ class Mechanism:
     bodies: Mapping[str, Body]
     joints: Mapping[str, AbstractConstraint]
     drivers: Mapping[str, AbstractConstraint] = dataclasses.field(default_factory=dict)
+    forces: Mapping[str, AbstractForce] = dataclasses.field(default_factory=dict)
+    initial: Mapping[str, AbstractConstraint] = dataclasses.field(default_factory=dict)
     outputs: Mapping[str, AbstractOutput] = dataclasses.field(default_factory=dict)
     parameters: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     gravity: Any = None
@@ -118,12 +132,21 @@ class Mechanism:
                 raise MechanismError(f"the name '{name}' is reserved for an axis of results", name=f"outputs.{name}")
         for name in self.joints.keys() & self.drivers.keys():
             raise MechanismError("a joint and a driver have the same name", name=f"drivers.{name}")
+        for kind in ("joints", "drivers"):
+            for name in self.initial.keys() & getattr(self, kind).keys():
+                message = f"a {kind[:-1]} and an initial condition have the same name"
+                raise MechanismError(message, name=f"initial.{name}")
 
     def _check_element(self, kind: str, name: str, element: Any) -> None:
         place = f"{kind}.{name}"
-        wanted = AbstractOutput if kind == "outputs" else AbstractConstraint
+        wanted = CLASSES.get(kind, AbstractConstraint)
         if not isinstance(element, wanted):
             raise MechanismError(f"must be one of the classes of {kind}", name=place, value=element)
+        if kind == "initial" and element.role != "driver":
+            message = "an initial condition is given by a driver"
+            raise MechanismError(message, name=place, value=element.type_name or type(element).__name__)
+        if kind == "forces" and not set(element.bodies) - {GROUND}:
+            raise MechanismError("acts on the ground alone, which never moves", name=f"{place}.bodies")
         if element.space and element.space != self.space:
             raise MechanismError(f"is {element.space}, in a {self.space} mechanism", name=place)
         for body in element.bodies:
@@ -133,8 +156,9 @@ class Mechanism:
 
     @property
     def elements(self) -> dict[str, Mapping[str, Any]]:
-        """Joints, drivers and outputs, by kind."""
-        return {"joints": self.joints, "drivers": self.drivers, "outputs": self.outputs}
+        """Joints, drivers, forces, initial conditions and outputs, by kind."""
+        kinds = ("joints", "drivers", "forces", "initial", "outputs")
+        return {kind: getattr(self, kind) for kind in kinds}
 
     @cached_property
     def parameter_values(self) -> dict[str, Any]:

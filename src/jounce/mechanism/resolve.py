@@ -12,6 +12,7 @@ from jax.core import Tracer
 
 from jounce.constraints.base import field_kind, value_fields
 from jounce.errors import JounceError, MechanismError
+from jounce.forces import AbstractForce, AbstractLaw, ExpressionLaw, FunctionLaw, TimeLaw, VectorLaw
 from jounce.jet import Jet
 from jounce.trajectory import AbstractMotion, Expression, ExpressionMotion, FunctionMotion
 
@@ -59,15 +60,77 @@ def resolve_motion(motion: Any, parameters: Mapping[str, Any]) -> AbstractMotion
 
 def _traceable(motion: AbstractMotion) -> AbstractMotion:
     """Return a law after trying it once, on shapes only: Python functions can fail in ways that need words."""
+    advice = "it must map a scalar time to a scalar with functions of jax.numpy"
+    _tried("motion law", advice, lambda t: motion(Jet([t])), np.zeros((1, 1)))
+    return motion
+
+
+def _tried(what: str, advice: str, function: Any, *arguments: Any) -> tuple[int, ...]:
+    """Return the shape of the jet that a function of arrays returns; raise MechanismError where it cannot be used."""
     try:
-        jax.eval_shape(lambda t: motion(Jet([t])).coefficients[0], np.zeros((1, 1)))
+        return jax.eval_shape(lambda *xs: function(*xs).coefficients[0], *arguments).shape
     except JounceError:
         raise
-    except (TypeError, ValueError, AttributeError) as error:
-        reason = str(error).strip().splitlines()[0]
-        advice = "it must map a scalar time to a scalar with functions of jax.numpy"
-        raise MechanismError(f"the motion law cannot be used: {reason}; {advice}") from error
-    return motion
+    except (TypeError, ValueError, AttributeError, IndexError) as error:
+        reason = (str(error).strip() or type(error).__name__).splitlines()[0]
+        raise MechanismError(f"the {what} cannot be used: {reason}; {advice}") from error
+
+
+def resolve_law(law: Any, force: AbstractForce, parameters: Mapping[str, Any], components: int | None) -> AbstractLaw:
+    """Return the law of a force that a number, an expression, a Python function or a motion law stands for.
+
+    Parameters
+    ----------
+    law : object
+        As a user gives it; a list of them for a force with components.
+    force : AbstractForce
+        Says what expressions call displacement and velocity.
+    parameters : mapping
+        Values of other names in expressions.
+    components : int or None
+        Size of a vector, None for a scalar.
+    """
+    if components is None or isinstance(law, AbstractLaw) or (callable(law) and not isinstance(law, AbstractMotion)):
+        found = _scalar_law(law, force, parameters)
+    else:
+        entries = law.tolist() if isinstance(law, np.ndarray) else law
+        if isinstance(entries, str) or not isinstance(entries, Sequence) or len(entries) != components:
+            raise MechanismError(f"must be a list of {components} laws or numbers", value=_plain(law))
+        found = VectorLaw(_scalar_law(entry, force, parameters) for entry in entries)
+    shape = (1, 1) if components is None else (components, 1, 1)
+    advice = "it must map the jets of displacement, velocity and time to the jet of the force"
+    got = _tried(
+        "law", advice, lambda x, v, t: found(Jet([x, v, v]), Jet([v, v]), Jet.variable(t, 2)), *[np.zeros(shape)] * 2,
+        np.zeros((1, 1)),
+    )  # fmt: skip
+    if got != shape:
+        raise MechanismError(f"the law cannot be used: its value has the shape {got}, not {shape}; {advice}")
+    return found
+
+
+def _scalar_law(law: Any, force: AbstractForce, parameters: Mapping[str, Any]) -> AbstractLaw:
+    names = force.displacement_names, force.velocity_names
+    if isinstance(law, AbstractLaw):
+        return law
+    if isinstance(law, AbstractMotion):
+        return TimeLaw(law)
+    if isinstance(law, numbers.Real) and not isinstance(law, bool):
+        size = float(law)
+        if not np.isfinite(size):
+            raise MechanismError("must be finite", value=size)
+        return ExpressionLaw("size", {"size": size}, *names)  # a leaf: laws that differ in it are stacked
+    if isinstance(law, str):
+        law = Expression(law)
+    if isinstance(law, Expression):
+        own = {"t", *names[0], *names[1]}
+        law.check({*parameters, *own})
+        for name in sorted(law.names & own & parameters.keys()):
+            message = f"the parameter '{name}' has the name of a variable of this law; give it another name"
+            raise MechanismError(message, value=law.text)
+        return ExpressionLaw(law, {name: parameters[name] for name in sorted(law.names - own)}, *names)
+    if callable(law):
+        return FunctionLaw(law)
+    raise MechanismError("a law is a number, an expression, a motion law or a function of jets", value=law)
 
 
 def parameter_value(name: str, value: Any) -> Any:
@@ -89,8 +152,11 @@ def parameter_value(name: str, value: Any) -> Any:
     return number
 
 
-def check_value(field: str, kind: str, value: Any, components: int) -> None:
-    """Raise MechanismError unless a value fits its field: shape, finite, not a zero axis, not a negative length."""
+def check_value(field: str, kind: str, value: Any, components: int, sign: str = "") -> None:
+    """Raise MechanismError unless a value fits its field: shape, finite, not a zero axis, not a negative length.
+
+    A `sign` of "not negative" or "any" lets a length be zero, or negative too.
+    """
     if isinstance(value, Tracer):
         return
     shape = (components,) if kind == "vector" else ()
@@ -100,7 +166,9 @@ def check_value(field: str, kind: str, value: Any, components: int) -> None:
     if not np.isfinite(value).all():
         raise MechanismError("must be finite", value=_plain(value))
     word = field.removesuffix("_i").removesuffix("_j")
-    if word in POSITIVE and value <= 0:
+    if sign == "not negative" and value < 0:
+        raise MechanismError("must not be negative", value=_plain(value))
+    if word in POSITIVE and not sign and value <= 0:
         raise MechanismError("must be greater than zero", value=_plain(value))
     if word == "lead" and value == 0:
         raise MechanismError("must not be zero", value=_plain(value))
@@ -113,16 +181,18 @@ def _plain(value: Any) -> Any:
 
 
 def resolve_element(element: Any, parameters: Mapping[str, Any], components: int, name: str) -> dict[str, Any]:
-    """Return the values of a joint, driver or output as arrays, by field, checked."""
-    values = {}
+    """Return the values of a joint, driver, force or output as arrays, by field, checked."""
+    values, signs = {}, getattr(element, "signs", {})
     for field_name, field in value_fields(type(element)).items():
         kind, value = field_kind(field), getattr(element, field_name)
         try:
             if kind == "motion":
                 value = resolve_motion(value, parameters)
+            elif kind in ("law", "laws"):
+                value = resolve_law(value, element, parameters, None if kind == "law" else components)
             elif kind in ("scalar", "vector") and (value is not None or field.default is not None):
                 value = resolve(value, parameters)
-                check_value(field_name, kind, value, components)
+                check_value(field_name, kind, value, components, signs.get(field_name, ""))
         except JounceError as error:
             raise error.located(name=f"{name}.{field_name}") from None
         values[field_name] = value

@@ -1,5 +1,6 @@
 """A mechanism in numbers: instances of a type stacked, bodies by index, residual and Jacobian of the whole."""
 
+import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
@@ -15,11 +16,11 @@ POSITION_COMPONENTS = {"planar": 2, "spatial": 3}
 
 
 class Group(eqx.Module):
-    """All joints, drivers or outputs of one type, evaluated together.
+    """All joints, drivers, forces or outputs of one type, evaluated together.
 
     Parameters
     ----------
-    element : AbstractConstraint or AbstractOutput
+    element : AbstractConstraint, AbstractForce or AbstractOutput
         Its values have shape (..., instances, 1).
     bodies : tuple of tuple of int
         For each body slot, the indices of the bodies of the instances; 0 is the ground.
@@ -30,7 +31,7 @@ class Group(eqx.Module):
 
     @property
     def instances(self) -> int:
-        """Number of joints, drivers or outputs in the group."""
+        """Number of joints, drivers, forces or outputs in the group."""
         return len(self.bodies[0])
 
     @property
@@ -45,6 +46,33 @@ class Group(eqx.Module):
     def evaluate(self, pose: Any) -> Jet:
         """Return the outputs, shape (components, instances, batch)."""
         return _with_rows(self.element.evaluate(*self._poses(pose)))
+
+    def displacement(self, pose: Any, time: Jet) -> Jet:
+        """Return the displacements of forces, shape (components, instances, batch)."""
+        return _with_rows(self.element.displacement(*self._poses(pose), time))
+
+    def force(self, pose: Any, time: Jet) -> Jet:
+        """Return the forces, shape (components, instances, batch), one order shorter than the pose."""
+        displacement, velocity = self._motion(pose, time)
+        return _with_rows(self.element.force(displacement, velocity, time)).truncate(pose.order - 1)
+
+    def power(self, pose: Any, time: Jet) -> Jet:
+        """Return the power that forces put into the mechanism, shape (instances, batch), W."""
+        displacement, velocity = self._motion(pose, time)
+        force = self.element.force(displacement, velocity, time)
+        return force.dot(velocity) if len(force.shape) == 3 else force * velocity
+
+    def energy(self, pose: Any, time: Jet) -> Jet:
+        """Return the energy that forces have stored, shape (instances, batch), J."""
+        return self.element.energy(self.element.displacement(*self._poses(pose), time))
+
+    def variation(self, pose: Any, change: Any, time: Jet) -> Jet:
+        """Return how far forces act along as all bodies move by a change, shape (components, instances, batch)."""
+        return _with_rows(self.element.variation(tuple(self._poses(pose)), tuple(self._poses(change)), time))
+
+    def _motion(self, pose: Any, time: Jet) -> tuple[Jet, Jet]:
+        poses = self._poses(pose)
+        return self.element.displacement(*poses, time), self.element.velocity(*poses, time)
 
     def derivative_blocks(self, pose: Any, time: Jet, scale: Any) -> list[Any]:
         """Return the derivatives of the residuals by the coordinates of the bodies in each slot that may move.
@@ -105,7 +133,7 @@ def group_elements(
 
 
 class System(eqx.Module):
-    """All constraints of a mechanism as functions on one pose of all its bodies, the ground first.
+    """All constraints and forces of a mechanism as functions on one pose of all its bodies, the ground first.
 
     Coordinates of positions are scaled by a length of the mechanism, and rows by the size of their derivatives, so
     that steps and pivots mean the same for a watch and a crane.
@@ -117,6 +145,7 @@ class System(eqx.Module):
     row_scale: Any  # shape (rows, 1)
     column_scale: Any  # one for each coordinate of a body
     body_count: int = eqx.field(static=True)
+    forces: tuple[Group, ...] = ()
 
     def residual(self, pose: Any, time: Jet) -> Jet:
         """Return the residuals of all constraints, shape (rows, batch), scaled."""
@@ -141,12 +170,51 @@ class System(eqx.Module):
         """Return the jets of the motion laws, in rad, whose drivers forget whole turns."""
         return [group.element.motion(time) for group in self.groups if group.element.periodic]
 
+    def applied_forces(self, pose: Any, time: Jet) -> Jet:
+        """Return what the applied forces do to all bodies, shape (coordinates, bodies, batch), the ground first.
+
+        Forces are in global axes, moments about the origin of each body and in its axes. They are conjugate to the
+        virtual velocities of ``pose.varied``, from which they follow by transposing how far each force acts along: no
+        Jacobian is written. The order is one less than that of the pose; gravity is not among them.
+        """
+        order, count = pose.order - 1, pose.shifts + pose.turns
+        shape = (count, *pose.position.shape[1:])
+        if not self.forces:
+            return Jet.constant(jnp.zeros(shape), order)
+        sizes = [jnp.stack(group.force(pose, time).dense().coefficients) for group in self.forces]
+        still, now = _movable(pose.truncate(order)), time.truncate(order)
+
+        def along(velocity: Any) -> list[Any]:
+            shift, turn = (Jet(tuple(part)) for part in (velocity[:, : pose.shifts], velocity[:, pose.shifts :]))
+            change = _movable(still.varied(shift, turn).truncate(order))
+            return [jnp.stack(group.variation(still, change, now).dense().coefficients) for group in self.forces]
+
+        transposed = jax.linear_transpose(along, jax.ShapeDtypeStruct((order + 1, *shape), jnp.float64))
+        # the transpose of a convolution runs backwards in the orders
+        return Jet(tuple(transposed([size[::-1] for size in sizes])[0][::-1]))
+
+    def finite_forces(self, pose: Any, time: Jet) -> Any:
+        """Tell where each applied force is a finite number, shape (forces, batch); the pose has velocities."""
+        lanes = time.coefficients[0].shape[-1]
+        sizes = [group.force(pose.truncate(1), time.truncate(1)).coefficients[0] for group in self.forces]
+        parts = [jnp.broadcast_to(jnp.isfinite(x).all(axis=0), (x.shape[1], lanes)) for x in sizes]
+        return jnp.concatenate([*parts, jnp.ones((0, lanes), bool)])
+
     def coordinates(self, solution: Any, shifts: int) -> tuple[Any, Any]:
         """Turn a scaled solution, shape (columns, batch), into shifts and turns of all bodies, (c, bodies, batch)."""
         count = self.column_scale.shape[0]
         parts = jnp.swapaxes(solution.reshape(self.body_count, count, -1), 0, 1)
         parts = jnp.pad(parts * self.column_scale[:, None, None], ((0, 0), (1, 0), (0, 0)))
         return parts[:shifts], parts[shifts:]
+
+
+def _movable(pose: Any) -> Any:
+    """Return a pose without certain zeros, which may be moved in thought."""
+    pose = jax.tree.map(lambda jet: jet.dense(), pose, is_leaf=lambda x: isinstance(x, Jet))
+    if pose.turns == 3 and pose.order and pose.angular_velocity is None:
+        rest = Jet.constant(jnp.zeros_like(pose.position.coefficients[0]), pose.order - 1).dense()
+        return dataclasses.replace(pose, angular_velocity=rest)
+    return pose
 
 
 def _flat(block: Any) -> Any:

@@ -57,6 +57,10 @@ class PlanarPose:
         local = body_vector(local, len(self.angle.shape))
         return self.cosine * local + self.sine * perpendicular(local)
 
+    def to_body(self, vector: Jet) -> Jet:
+        """Return the body components, shape (2, ...), of a vector given in the global frame."""
+        return self.cosine * vector - self.sine * perpendicular(vector)
+
     def take(self, bodies: tuple[int, ...]) -> "PlanarPose":
         """Return the poses of the given bodies, by index; body 0 is the ground, which never moves."""
         return jax.tree.map(lambda jet: take_bodies(jet, bodies), self, is_leaf=lambda x: isinstance(x, Jet))
@@ -79,6 +83,11 @@ class PlanarPose:
         """Return how the jets change, to first order, as bodies shift, (2, ...) in m, and turn, (1, ...) in rad."""
         turn = turn[0]
         return PlanarPose(shift, turn, self.cosine * turn, -(self.sine * turn))
+
+    def truncate(self, order: int) -> "PlanarPose":
+        """Return the pose cut to at most `order`."""
+        jets = (self.position, self.angle, self.sine, self.cosine)
+        return PlanarPose(*(jet.truncate(order) for jet in jets))
 
     @classmethod
     def predicted_from(cls, coordinates: dict[str, Jet], step: Any) -> "PlanarPose":

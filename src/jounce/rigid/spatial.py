@@ -177,6 +177,22 @@ class SpatialPose:
             velocity = turn.differentiate() + self.angular_velocity.cross(turn)
         return SpatialPose(shift, quaternion, tuple(map(Jet, spins)), axes, velocity)
 
+    def turning(self, change: "SpatialPose") -> Jet:
+        """Return the turn, (3, ...) in rad about the axes of the body, of a change that `varied` gave."""
+        (x, y, z), (dx, dy, dz) = self.axes, change.axes
+        return stack([dot(dy, z), dot(dz, x), dot(dx, y)])
+
+    def truncate(self, order: int) -> "SpatialPose":
+        """Return the pose cut to at most `order`."""
+        spin = self.angular_velocity
+        return SpatialPose(
+            self.position.truncate(order),
+            self.quaternion.truncate(order),
+            tuple(jet.truncate(order) for jet in self.spins),
+            tuple(jet.truncate(order) for jet in self.axes),
+            None if spin is None or order == 0 else spin.truncate(order - 1),
+        )
+
     @classmethod
     def predicted_from(cls, coordinates: dict[str, Jet], step: Any) -> "SpatialPose":
         """Return the pose of order zero that the Taylor series of coordinates give a time `step` away, in s."""

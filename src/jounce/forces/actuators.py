@@ -1,0 +1,98 @@
+"""Forces and torques between two bodies by a law of their displacement, its rate and time: actuators, bumpers."""
+
+from typing import Any
+
+import jax.numpy as jnp
+
+from jounce.constraints.base import Vector
+from jounce.constraints.planar import slide
+from jounce.constraints.spatial import relative_angle
+from jounce.errors import MechanismError
+from jounce.forces.base import AbstractForce, Law
+from jounce.jet import Jet, sqrt, wrap
+
+
+def distance(body_i: Any, body_j: Any, point_i: Any, point_j: Any) -> Jet:
+    """Return the distance of two points, m."""
+    d = body_j.point(point_j) - body_i.point(point_i)
+    return sqrt(d.dot(d))
+
+
+def turn(body_i: Any, body_j: Any, axis_i: Any, vector_i: Any, vector_j: Any) -> Jet:
+    """Return the angle in rad, from -pi to pi, by which body j is turned about an axis of body i, in space."""
+    return wrap(relative_angle(body_i, body_j, axis_i, vector_i, vector_j), 2 * jnp.pi)
+
+
+def check_vectors(force: Any) -> None:
+    """Raise MechanismError unless an angle in space is measured with a vector on each body, or with none."""
+    if (force.vector_i is None) != (force.vector_j is None):
+        raise MechanismError(f"{force.type_name} takes two vectors, one on each body, or none", name="vectors")
+
+
+class DistanceForce(AbstractForce, type="distance_force"):
+    """Force along the line of two points by a law of their distance x, its rate v and t; positive, it pushes apart."""
+
+    point_i: Vector  # m, in the frame of body i
+    point_j: Vector
+    law: Law  # N
+
+    def displacement(self, body_i, body_j, time):
+        return distance(body_i, body_j, self.point_i, self.point_j)
+
+    def force(self, displacement, velocity, time):
+        return self.law(displacement, velocity, time)
+
+
+class SlideForce(AbstractForce, type="slide_force"):
+    """Force on body j along a direction of body i, by a law of the slide x, its rate v and t; body i takes the counter.
+
+    The slide is that of a slide driver: from the point on body i to that on body j, along the direction.
+    """
+
+    point_i: Vector  # m, in the frame of body i
+    point_j: Vector
+    vector_i: Vector  # direction of a positive force on body j
+    law: Law  # N
+
+    def displacement(self, body_i, body_j, time):
+        return slide(body_i, body_j, self.point_i, self.point_j, self.vector_i)
+
+    def force(self, displacement, velocity, time):
+        return self.law(displacement, velocity, time)
+
+
+class Torque(AbstractForce, type="torque", space="planar"):
+    """Torque on body j from body i, by a law of the relative angle x, its rate v and t."""
+
+    law: Law  # N m
+
+    unit = "N*m"
+
+    def displacement(self, body_i, body_j, time):
+        return body_j.angle - body_i.angle
+
+    def force(self, displacement, velocity, time):
+        return self.law(displacement, velocity, time)
+
+
+class SpatialTorque(AbstractForce, type="torque", space="spatial"):
+    """Torque on body j from body i about an axis of body i, by a law of the angle x, its rate v and t.
+
+    The angle is that of a rotation driver, from -pi to pi: with vectors, from `vector_i` to `vector_j`.
+    """
+
+    axis_i: Vector
+    law: Law  # N m
+    vector_i: Vector = None
+    vector_j: Vector = None
+
+    unit = "N*m"
+
+    def __check_init__(self):
+        check_vectors(self)
+
+    def displacement(self, body_i, body_j, time):
+        return turn(body_i, body_j, self.axis_i, self.vector_i, self.vector_j)
+
+    def force(self, displacement, velocity, time):
+        return self.law(displacement, velocity, time)

@@ -1,0 +1,135 @@
+"""What an applied force is: named values on one or more bodies, where it acts, and how large it is, on jets."""
+
+import abc
+from typing import Annotated, Any, ClassVar
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jounce.constraints.base import catalogue, register
+from jounce.errors import MechanismError
+from jounce.jet import Jet
+
+Law = Annotated[Any, "law"]
+Laws = Annotated[Any, "laws"]
+
+FRAMES = ("global", "body")
+
+
+class AbstractForce(eqx.Module):
+    """An applied force or torque: a displacement on which it does work, and its size.
+
+    A subclass lists its values as fields and defines `displacement` and `force`; nothing else. What it does to its
+    bodies follows from how the displacement changes as they move, and the rates of that, to any order, follow too.
+    Fields are annotated `Scalar`, `Vector`, `Law`, `Laws` or ``str``. Given a `type`, the subclass can be used in
+    mechanism files by that name; the keys are those of joints: ``point_i`` and ``point_j`` are the key ``points``.
+
+    Parameters
+    ----------
+    bodies : tuple of str
+        Names of the bodies, ``"ground"`` among them if one is fixed; one name alone is enough for a force on one body.
+
+    Raises
+    ------
+    MechanismError
+        If the number of bodies is wrong or one stands there twice.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> class Rubber(jn.AbstractForce, space="planar"):
+    ...     point_j: jn.Vector  # m, in the frame of body j
+    ...     stiffness: jn.Scalar  # N/m^3
+    ...
+    ...     def displacement(self, body_i, body_j, time):
+    ...         return body_j.point(self.point_j)[0] - body_i.position[0]
+    ...
+    ...     def force(self, displacement, velocity, time):
+    ...         return -self.stiffness * displacement**3
+    >>> Rubber(("ground", "slider"), point_j=[0, 0], stiffness=5.0).stiffness
+    5.0
+    """
+
+    bodies: tuple[str, ...] = eqx.field(static=True, converter=lambda b: (b,) if isinstance(b, str) else tuple(b))
+
+    space: ClassVar[str] = ""  # planar or spatial where only one makes sense
+    role: ClassVar[str] = "force"
+    type_name: ClassVar[str] = ""
+    body_count: ClassVar[int] = 2
+    unit: ClassVar[str] = "N"
+    displacement_names: ClassVar[tuple[str, ...]] = ("x",)  # what expressions of the law call the displacement
+    velocity_names: ClassVar[tuple[str, ...]] = ("v",)
+    signs: ClassVar[dict[str, str]] = {}  # for lengths that need not be above zero: "not negative" or "any"
+
+    def __init_subclass__(cls, type: str = "", space: str = "", **keywords: Any):  # noqa: A002
+        super().__init_subclass__(**keywords)
+        if space:
+            cls.space = space
+        if type:
+            register(cls, type, space, "force")
+
+    def __check_init__(self):
+        name = self.type_name or type(self).__name__
+        if len(self.bodies) != self.body_count:
+            noun = "body" if self.body_count == 1 else "bodies"
+            message = f"{name} acts on {self.body_count} {noun}"
+            raise MechanismError(message, name="bodies", value=list(self.bodies))
+        if len(set(self.bodies)) != len(self.bodies):
+            message = f"{name} must act between different bodies, not on a body from itself"
+            raise MechanismError(message, name="bodies", value=list(self.bodies))
+
+    @abc.abstractmethod
+    def displacement(self, *bodies_and_time: Any) -> Jet:
+        """Return the jet of the displacement: ``displacement(self, body_i, body_j, time)``.
+
+        Bodies are poses (`PlanarPose` or `SpatialPose`), `time` is a jet in s. The result is a scalar, of shape (...),
+        or a vector, (components, ...), in m or rad.
+        """
+
+    @abc.abstractmethod
+    def force(self, displacement: Jet, velocity: Jet, time: Jet) -> Jet:
+        """Return the jet of the force, of the shape of the displacement.
+
+        Its product with the velocity is the power that goes into the mechanism: a positive force drives a growing
+        displacement. It may be as short as the velocity, which has one order less than the displacement.
+        """
+
+    def velocity(self, *bodies_and_time: Any) -> Jet:
+        """Return the jet of the velocity on which the force works: the rate of the displacement, unless told."""
+        return self.displacement(*bodies_and_time).differentiate()
+
+    def variation(self, bodies: tuple[Any, ...], changes: tuple[Any, ...], time: Jet) -> Jet:
+        """Return how far the force acts along as the bodies move by changes; linear in them.
+
+        It follows from the displacement, unless the force works on what is no change of any displacement, as a moment
+        in space does; `velocity` and this are then told together.
+
+        Parameters
+        ----------
+        bodies : tuple of PlanarPose or SpatialPose
+            Where the bodies are.
+        changes : tuple of PlanarPose or SpatialPose
+            What ``varied`` of them gives.
+        time : Jet
+            In s.
+        """
+        return jax.jvp(lambda *poses: self.displacement(*poses, time), tuple(bodies), tuple(changes))[1]
+
+    def energy(self, displacement: Jet) -> Jet:
+        """Return the energy that the force has stored and gives back, in J; none, unless told."""
+        first = displacement.coefficients[0]
+        zero = jnp.zeros_like(first if len(self.velocity_names) == 1 else first[0])
+        return Jet.constant(zero, displacement.order)
+
+
+def force_catalogue(space: str) -> dict[str, type[AbstractForce]]:
+    """Return the classes of forces that files may name, by their type, for planar or spatial mechanisms.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> jn.forces.force_catalogue("planar")["spring"].__name__
+    'Spring'
+    """
+    return catalogue(space, "force")

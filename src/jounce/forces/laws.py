@@ -1,0 +1,148 @@
+"""Laws of forces: what a force depends on, as functions that act on jets."""
+
+import abc
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+
+from jounce.jet import Jet, stack
+from jounce.trajectory import AbstractMotion, Expression
+
+
+class AbstractLaw(eqx.Module):
+    """A law of a force: maps displacement, velocity and time, all jets, to the jet of the force, in SI units."""
+
+    @abc.abstractmethod
+    def __call__(self, displacement: Jet, velocity: Jet, time: Jet) -> Jet:
+        """Return the jet of the force; its batch axes are those of `velocity`."""
+
+
+class ExpressionLaw(AbstractLaw):
+    """A law given by an expression of displacement, velocity, time and parameters; one component of a force.
+
+    Parameters
+    ----------
+    expression : Expression
+        For example ``-k*x**3 - c*v``.
+    parameters : dict of str to float or array
+        Values of the other names in the expression.
+    displacements, velocities : tuple of str
+        What the expression calls the displacement and the velocity, or their components where there are several names.
+        The time is always ``t``.
+
+    Raises
+    ------
+    ExpressionError
+        If a name in the expression has no value.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> law = jn.forces.ExpressionLaw("-k*x**3", {"k": 2.0})
+    >>> x = jn.Jet([1.0, 3.0])  # at 1 m, 3 m/s
+    >>> [float(rate) for rate in law(x, x.differentiate(), jn.Jet.variable(0.0, 1)).derivatives()]
+    [-2.0, -18.0]
+    """
+
+    expression: Expression = eqx.field(static=True)
+    parameters: dict[str, Any]
+    displacements: tuple[str, ...] = eqx.field(static=True)
+    velocities: tuple[str, ...] = eqx.field(static=True)
+
+    def __init__(
+        self,
+        expression: Expression | str,
+        parameters: Mapping[str, Any] | None = None,
+        displacements: tuple[str, ...] = ("x",),
+        velocities: tuple[str, ...] = ("v",),
+    ):
+        self.expression = Expression(expression) if isinstance(expression, str) else expression
+        self.parameters = {} if parameters is None else dict(parameters)
+        self.displacements, self.velocities = tuple(displacements), tuple(velocities)
+        self.expression.check({*self.parameters, "t", *self.displacements, *self.velocities})
+
+    def __call__(self, displacement: Jet, velocity: Jet, time: Jet) -> Jet:
+        """Return the jet of the force."""
+        moving = _named(self.displacements, displacement) | _named(self.velocities, velocity)
+        value = self.expression.evaluate({**self.parameters, "t": time, **moving})
+        return _spread(value, displacement if len(self.velocities) == 1 else displacement[0], time)
+
+
+class TimeLaw(AbstractLaw):
+    """A law of time alone, from a motion law such as a spline through samples.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> law = jn.forces.TimeLaw(jn.ExpressionMotion("10*t**2"))
+    >>> at_rest, time = jn.Jet([0.0, 0.0, 0.0]), jn.Jet.variable(1.0, 2)
+    >>> [float(rate) for rate in law(at_rest, at_rest, time).derivatives()]
+    [10.0, 20.0, 20.0]
+    """
+
+    motion: AbstractMotion
+
+    def __call__(self, displacement: Jet, velocity: Jet, time: Jet) -> Jet:
+        """Return the jet of the force."""
+        return _spread(self.motion(time), displacement, time)
+
+
+class FunctionLaw(AbstractLaw):
+    """A law given by a Python function of the jets of displacement, velocity and time.
+
+    Parameters
+    ----------
+    function : callable
+        Maps three jets to the jet of the force, of the shape of the displacement, by operators and the functions of
+        `jounce.jet`.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> law = jn.forces.FunctionLaw(lambda x, v, t: -5.0 * jn.jet.sin(x) - 0.1 * v)
+    >>> x = jn.Jet([0.0, 2.0])
+    >>> float(law(x, x.differentiate(), jn.Jet.variable(0.0, 1)).coefficients[0])
+    -0.2
+    """
+
+    function: Callable[[Jet, Jet, Jet], Any] = eqx.field(static=True)
+
+    def __call__(self, displacement: Jet, velocity: Jet, time: Jet) -> Jet:
+        """Return the jet of the force."""
+        return _spread(self.function(displacement, velocity, time), displacement, time)
+
+
+class VectorLaw(AbstractLaw):
+    """A law for each component of a force.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> names = ("x", "y"), ("vx", "vy")
+    >>> law = jn.forces.VectorLaw([jn.forces.ExpressionLaw(text, {}, *names) for text in ("-vx", "-2*y")])
+    >>> place, velocity = jn.Jet([[1.0, 2.0]]), jn.Jet([[3.0, 0.0]])
+    >>> law(place, velocity, jn.Jet([0.0])).coefficients[0].tolist()
+    [-3.0, -4.0]
+    """
+
+    parts: tuple[AbstractLaw, ...] = eqx.field(converter=tuple)
+
+    def __call__(self, displacement: Jet, velocity: Jet, time: Jet) -> Jet:
+        """Return the jet of the force, a vector."""
+        return stack([part(displacement, velocity, time) for part in self.parts])
+
+
+def _named(names: tuple[str, ...], jet: Jet) -> dict[str, Jet]:
+    if len(names) == 1:
+        return {names[0]: jet}
+    return {name: jet[k] for k, name in enumerate(names)}
+
+
+def _spread(value: Any, like: Jet, time: Jet) -> Jet:
+    """Return a value as a jet of the shape of another: a law of time alone is the same for all instances."""
+    shape = jnp.shape(like.coefficients[0])
+    if not isinstance(value, Jet):
+        return Jet.constant(jnp.broadcast_to(jnp.asarray(value, float), shape), time.order)
+    return value + jnp.zeros(shape)

@@ -1,0 +1,104 @@
+"""Loads on one body: a force at a point and a moment, by laws of place, velocity and time, global or in the body."""
+
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+
+from jounce.constraints.base import Vector, check_text
+from jounce.forces.base import FRAMES, AbstractForce, Law, Laws
+from jounce.jet import Jet
+
+
+class PointForce(AbstractForce, type="point_force", space="planar"):
+    """Force at a point of a body: one law for each component, of t, x, y, vx and vy.
+
+    x and y are where the point is, in the global frame. The components, and those of the velocity, are global, or along
+    the axes of the body (`frame`), as for a thruster.
+    """
+
+    point: Vector  # m, in the frame of the body
+    law: Laws  # N
+    frame: str = eqx.field(static=True, default="global")
+
+    body_count = 1
+    displacement_names = ("x", "y")
+    velocity_names = ("vx", "vy")
+
+    def __check_init__(self):
+        check_text("frame", self.frame, FRAMES)
+
+    def displacement(self, body, time):
+        return body.point(self.point)
+
+    def velocity(self, body, time):
+        return self._components(body, body.point(self.point).differentiate())
+
+    def variation(self, bodies, changes, time):
+        return self._components(bodies[0], super().variation(bodies, changes, time))
+
+    def _components(self, body: Any, vector: Jet) -> Jet:
+        return vector if self.frame == "global" else body.to_body(vector)
+
+    def force(self, displacement, velocity, time):
+        return self.law(displacement, velocity, time)
+
+
+class SpatialPointForce(PointForce, type="point_force", space="spatial"):
+    """Force at a point of a body: one law for each component, of t, x, y, z, vx, vy and vz.
+
+    x, y and z are where the point is, in the global frame. The components, and those of the velocity, are global, or
+    along the axes of the body (`frame`), as for a thruster.
+    """
+
+    displacement_names = ("x", "y", "z")
+    velocity_names = ("vx", "vy", "vz")
+
+
+class Moment(AbstractForce, type="moment", space="planar"):
+    """Moment on a body, by a law of its angle x, its rate v and t."""
+
+    law: Law  # N m
+
+    body_count = 1
+    unit = "N*m"
+
+    def displacement(self, body, time):
+        return body.angle
+
+    def force(self, displacement, velocity, time):
+        return self.law(displacement, velocity, time)
+
+
+class SpatialMoment(AbstractForce, type="moment", space="spatial"):
+    """Moment on a body: one law for each component, of t and of the angular velocity wx, wy, wz.
+
+    All components are global, or along the axes of the body (`frame`).
+    """
+
+    law: Laws  # N m
+    frame: str = eqx.field(static=True, default="global")
+
+    body_count = 1
+    unit = "N*m"
+    displacement_names = ()
+    velocity_names = ("wx", "wy", "wz")
+
+    def __check_init__(self):
+        check_text("frame", self.frame, FRAMES)
+
+    def displacement(self, body, time):
+        # no vector changes at the rate of the angular velocity: what the moment works on is told by the rates below
+        return Jet.constant(jnp.zeros_like(body.position.coefficients[0]), body.order)
+
+    def velocity(self, body, time):
+        if self.frame == "body" and body.angular_velocity is not None:
+            return body.angular_velocity
+        return body.global_angular_velocity()
+
+    def variation(self, bodies, changes, time):
+        turn = bodies[0].turning(changes[0])
+        return turn if self.frame == "body" else bodies[0].direction(turn)
+
+    def force(self, displacement, velocity, time):
+        return self.law(displacement, velocity, time)
