@@ -14,7 +14,7 @@ from jounce.errors import RobotError, RobotFileError
 from jounce.io.markup import Element
 from jounce.rigid.inertia import Inertia
 from jounce.robot.construct import floating_joints
-from jounce.robot.model import Joint, Limits, Link, Mimic
+from jounce.robot.model import Closure, Joint, Limits, Link, Mimic
 from jounce.robot.robot import Robot
 from jounce.robot.tree import turn_about
 
@@ -38,7 +38,8 @@ def read_mjcf(root: Element) -> Robot:
     turns, zero where its axes are those of the world. Several joints on one body have massless links between them.
     Bodies and joints without a name are called ``body_1``, ``joint_0`` and so on, by their number in MuJoCo. Armature,
     damping and friction of joints are kept, with the armature and damping of actuators on them; ranges become limits,
-    and symmetric ranges of force limits of effort. A joint tied to another by a linear equality follows it. Contacts,
+    and symmetric ranges of force limits of effort. A joint tied to another by a linear equality follows it; active
+    equalities of type connect and weld become closures, named closure_0 and so on where they have no name. Contacts,
     springs, tendons, gravity compensation and all else that is no body, joint or actuator of a joint are left out.
 
     Parameters
@@ -151,6 +152,7 @@ class _Reader:
         self.joints: list[Joint] = []
         self.held: dict[str, float] = {}
         self.mimics: dict[str, Mimic] = {}
+        self.closures: list[Closure] = []
         self.efforts = _efforts(model, mujoco)
 
     def error(self, message: str, name: str, **value: Any) -> RobotFileError:
@@ -173,7 +175,8 @@ class _Reader:
             for k in range(model.nbody):
                 self._body(k)
             gravity = (0.0, 0.0, 0.0) if weightless else model.opt.gravity
-            robot = Robot(self.root.attributes.get("model") or "robot", self.links, self.joints, gravity)
+            name = self.root.attributes.get("model") or "robot"
+            robot = Robot(name, self.links, self.joints, gravity, self.closures)
             return robot.locked(self.held) if self.held else robot
         except RobotFileError:
             raise
@@ -181,17 +184,22 @@ class _Reader:
             raise self.error(error.message, error.name or "", value=error.value) from None
 
     def _tie(self) -> None:
-        """Read what joints have to do with one another, and refuse what closes a loop."""
+        """Read what joints have to do with one another, and what closes loops."""
         model, kinds = self.model, self.mujoco.mjtEq
         lines = [_line(equality.info) for equality in self.spec.equalities]
+        names = _names([model.equality(k).name for k in range(model.neq)], "closure")
         for k in np.flatnonzero(model.eq_active0):
             kind, name = model.eq_type[k], model.equality(int(k)).name
             place = {"path": self.root.path, "line": lines[k], "name": f"equality.{name}" if name else "equality"}
+            self.lines[f"closures.{names[k]}"] = lines[k]
+            if kind in (int(kinds.mjEQ_CONNECT), int(kinds.mjEQ_WELD)):
+                self.closures.append(self._closure(k, names[k]))
+                continue
             if kind != int(kinds.mjEQ_JOINT):
                 word = kinds(int(kind)).name.removeprefix("mjEQ_").lower()
                 message = (
-                    f"an active equality of type {word} closes a loop or ties parts together, which a tree of bodies "
-                    "cannot have; remove it, or set active='false', to read the tree alone"
+                    f"an active equality of type {word} ties parts together as no joint or closure can; remove it, or "
+                    "set active='false'"
                 )
                 raise RobotFileError(message, **place)
             first, second = int(model.eq_obj1id[k]), int(model.eq_obj2id[k])
@@ -213,6 +221,23 @@ class _Reader:
                 slope = float(coefficients[1])
                 offset = float(start - slope * self._reference(second))
                 self.mimics[name] = Mimic(self.joint_names[second], slope, offset)
+
+    def _closure(self, k: Any, name: str) -> Closure:
+        """Return a connect or weld: its anchors and its relative pose as MuJoCo holds them."""
+        model, data = self.model, self.model.eq_data[k]
+        weld = model.eq_type[k] == int(self.mujoco.mjtEq.mjEQ_WELD)
+        numbers = (int(model.eq_obj1id[k]), int(model.eq_obj2id[k]))
+        if model.eq_objtype[k] == int(self.mujoco.mjtObj.mjOBJ_SITE):
+            ends = [(int(model.site_bodyid[i]), model.site_pos[i], _matrix(model.site_quat[i])) for i in numbers]
+            points, rotation = [position for _, position, _ in ends], ends[0][2] @ ends[1][2].T
+            numbers = tuple(body for body, _, _ in ends)
+        elif weld:  # the anchor is kept in the frame of the second body, and where it has to be in that of the first
+            points, rotation = [data[3:6], data[0:3]], _matrix(data[6:10])
+        else:
+            points, rotation = [data[0:3], data[3:6]], None
+        turning = weld and data[10] != 0  # a weld without torque holds a point only
+        links = (self.bodies[numbers[0]], self.bodies[numbers[1]])
+        return Closure(name, links, "weld" if turning else "connect", points, rotation=rotation if turning else None)
 
     def _reference(self, joint: int) -> float:
         return float(self.model.qpos0[self.model.jnt_qposadr[joint]])

@@ -1,12 +1,15 @@
 """Serial and tree robots in joint coordinates: kinematics, Jacobians, torques, reactions, with rates of any order."""
 
 from jounce.rigid.inertia import Inertia as Inertia
+from jounce.robot.closed_loop import body_point as body_point
+from jounce.robot.closures import LinkClosure as LinkClosure, closure_wrenches as closure_wrenches
 from jounce.robot.construct import (
     DenavitHartenberg as DenavitHartenberg,
     Screw as Screw,
     from_denavit_hartenberg as from_denavit_hartenberg,
     from_screws as from_screws,
 )
+from jounce.robot.coupling import CoupledJoints as CoupledJoints, SlideOutput as SlideOutput
 from jounce.robot.inverse_dynamics import inverse_dynamics as inverse_dynamics, joint_wrenches as joint_wrenches
 from jounce.robot.jacobian import (
     jacobian as jacobian,
@@ -18,6 +21,6 @@ from jounce.robot.kinematics import (
     center_of_mass as center_of_mass,
     forward_kinematics as forward_kinematics,
 )
-from jounce.robot.model import Joint as Joint, Limits as Limits, Link as Link, Mimic as Mimic
+from jounce.robot.model import Closure as Closure, Joint as Joint, Limits as Limits, Link as Link, Mimic as Mimic
 from jounce.robot.robot import Robot as Robot
 from jounce.robot.wrenches import Wrench as Wrench

@@ -163,11 +163,7 @@ class Joint:
             raise RobotError(message, name=f"{where}.type", value=self.type)
         for field, shape in (("position", (3,)), ("rotation", (3, 3)), ("axis", (3,))):
             object.__setattr__(self, field, finite_numbers(f"{where}.{field}", getattr(self, field), shape))
-        if (
-            not np.allclose(self.rotation @ self.rotation.T, np.eye(3), rtol=0, atol=1e-6)
-            or np.linalg.det(self.rotation) < 0
-        ):
-            raise RobotError("must be a rotation matrix", name=f"{where}.rotation", value=self.rotation.tolist())
+        rotation_matrix(f"{where}.rotation", self.rotation)
         length = float(np.linalg.norm(self.axis))
         if self.type != "fixed":
             if length < 1e-9:
@@ -188,3 +184,83 @@ class Joint:
     def turning(self) -> bool:
         """Whether the coordinate is an angle."""
         return self.type in ("revolute", "continuous")
+
+
+CLOSURES = ("connect", "weld", "pin", "slider")
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Closure:
+    """What closes a loop: two links that are held together besides the joints of the tree.
+
+    Parameters
+    ----------
+    name : str
+        Name of the closure, which no joint has.
+    links : tuple of str
+        Names of the two links.
+    type : {"connect", "weld", "pin", "slider"}, default "connect"
+        What stays as it is: a point of each link in one place (3 equations), or the whole pose (6); a pin leaves a turn
+        about an axis (5), a slider a travel along it (5).
+    points : array_like of shape (3,) or (2, 3), default zero
+        The point in the frame of the first link, m, and the one in that of the second; without this, it is where the
+        first one is at coordinates zero.
+    axis : array_like of shape (3,), optional
+        Of a pin or a slider, in the frame of the first link.
+    rotation : array_like of shape (3, 3), optional
+        Takes components in the frame of the second link to that of the first where the loop is closed; for a pin but
+        for turns about its axis. Without it, as at coordinates zero.
+
+    Raises
+    ------
+    RobotError
+        If the type is not known, the links are not two, a value is not finite or has another shape, or the axis of a
+        pin or a slider is missing.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> closure = jn.Closure("tip", ("left", "right"), points=[0.2, 0, 0])
+    """
+
+    name: str
+    links: tuple[str, str]
+    type: str = "connect"
+    points: Any = (0.0, 0.0, 0.0)
+    axis: Any = None
+    rotation: Any = None
+
+    def __post_init__(self) -> None:
+        where = f"closures.{self.name}"
+        if self.type not in CLOSURES:
+            message = f"no closure has this type; {did_you_mean(self.type, CLOSURES)}"
+            raise RobotError(message, name=f"{where}.type", value=self.type)
+        links = () if isinstance(self.links, str) else tuple(self.links)
+        if len(links) != 2 or links[0] == links[1]:
+            raise RobotError("must be two different links", name=f"{where}.links", value=self.links)
+        object.__setattr__(self, "links", links)
+        object.__setattr__(self, "points", finite_numbers(f"{where}.points", self.points, (3,), (2, 3)))
+        if self.type in ("pin", "slider"):
+            axis = finite_numbers(f"{where}.axis", self.axis, (3,)) if self.axis is not None else np.zeros(3)
+            length = float(np.linalg.norm(axis))
+            if length < 1e-9:
+                raise RobotError(
+                    f"a {self.type} needs the direction of its axis", name=f"{where}.axis", value=self.axis
+                )
+            object.__setattr__(self, "axis", unchanging(axis / length))
+        if self.rotation is not None:
+            object.__setattr__(self, "rotation", rotation_matrix(f"{where}.rotation", self.rotation))
+
+
+def rotation_matrix(name: str, value: Any) -> np.ndarray:
+    """Return a rotation matrix, checked.
+
+    Raises
+    ------
+    RobotError
+        If it is none.
+    """
+    matrix = finite_numbers(name, value, (3, 3))
+    if not np.allclose(matrix @ matrix.T, np.eye(3), rtol=0, atol=1e-6) or np.linalg.det(matrix) < 0:
+        raise RobotError("must be a rotation matrix", name=name, value=matrix.tolist())
+    return matrix

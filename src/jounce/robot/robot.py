@@ -9,8 +9,8 @@ import numpy as np
 
 from jounce.errors import RobotError, did_you_mean
 from jounce.rigid.inertia import Inertia, finite_numbers
-from jounce.robot.model import Joint, Limits, Link
-from jounce.robot.tree import arrange, ordered
+from jounce.robot.model import Closure, Joint, Limits, Link
+from jounce.robot.tree import Tree, arrange, ordered
 
 STANDARD_GRAVITY = 9.81  # m/s^2, as in Pinocchio and MuJoCo
 
@@ -28,6 +28,9 @@ class Robot:
         Every link but the base is the child of exactly one.
     gravity : array_like of shape (3,), default (0, 0, -9.81)
         Acceleration of free fall in the frame of the base, m/s^2.
+    closures : sequence of Closure, default none
+        What closes loops of the tree. A robot that has some moves as a mechanism does (`mechanism`); the functions on
+        coordinates refuse it, as its coordinates depend on one another, and take `opened` instead.
 
     Attributes
     ----------
@@ -35,8 +38,6 @@ class Robot:
         Moving joints that follow no other, parents before children, branches in the order given: the order of q.
     base : str
         The link that does not move.
-    tree : Tree
-        The arrays that the algorithms work with.
     frames : dict of str to Frame
         Where each link is in the bodies of the tree.
 
@@ -44,7 +45,7 @@ class Robot:
     ------
     RobotError
         If names repeat or lead nowhere, the joints form a loop or several trees, a moving link that ends a branch has
-        no mass, or a joint follows one that cannot be followed.
+        no mass, a joint follows one that cannot be followed, or a closure joins links that move as one.
 
     Examples
     --------
@@ -58,7 +59,12 @@ class Robot:
     """
 
     def __init__(
-        self, name: str, links: Sequence[Link], joints: Sequence[Joint], gravity: Any = (0.0, 0.0, -STANDARD_GRAVITY)
+        self,
+        name: str,
+        links: Sequence[Link],
+        joints: Sequence[Joint],
+        gravity: Any = (0.0, 0.0, -STANDARD_GRAVITY),
+        closures: Sequence[Closure] = (),
     ):
         self.name = name
         self.gravity = finite_numbers("gravity", gravity, (3,))
@@ -70,7 +76,10 @@ class Robot:
         self.joint_names = tuple(joint.name for joint in moving if joint.mimic is None)
         for joint in moving:
             self._check_mimic(joint)
-        self.tree, self.frames = arrange(self)
+        self._tree, self.frames = arrange(self)
+        given = _by_name("closures", closures, Closure)
+        placed = {name: self._checked_closure(closure) for name, closure in given.items()}
+        self.closures: Mapping[str, Closure] = MappingProxyType(placed)
         self._made = True
 
     def __setattr__(self, name: str, value: Any) -> None:
@@ -80,11 +89,25 @@ class Robot:
         object.__setattr__(self, name, value)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Robot, (self.name, list(self.links.values()), list(self.joints.values()), self.gravity)
+        closures = list(self.closures.values())
+        return Robot, (self.name, list(self.links.values()), list(self.joints.values()), self.gravity, closures)
 
     def __repr__(self) -> str:
         count = len(self.joint_names)
-        return f"<Robot {self.name}: {count} {'joint' if count == 1 else 'joints'}, {len(self.links)} links>"
+        closed = f", closed by {', '.join(self.closures)}" if self.closures else ""
+        joints = "joint" if count == 1 else "joints"
+        return f"<Robot {self.name}: {count} {joints}, {len(self.links)} links{closed}>"
+
+    @property
+    def tree(self) -> Tree:
+        """The arrays that the algorithms on coordinates work with; a robot with closures has none."""
+        if self.closures:
+            message = (
+                "the loops of this robot make its coordinates depend on one another; jn.solve(robot.mechanism(...)) "
+                "gives its motion and forces, robot.opened() the tree without closures"
+            )
+            raise RobotError(message, name=self.name, value=list(self.closures))
+        return self._tree
 
     @property
     def link_names(self) -> tuple[str, ...]:
@@ -122,7 +145,15 @@ class Robot:
 
     def with_gravity(self, gravity: Any) -> "Robot":
         """Return the same robot under another acceleration of free fall, m/s^2 in the frame of the base."""
-        return Robot(self.name, list(self.links.values()), list(self.joints.values()), gravity)
+        return self._changed(gravity=gravity)
+
+    def with_closures(self, closures: Sequence[Closure]) -> "Robot":
+        """Return the robot with more closures."""
+        return self._changed(closures=[*self.closures.values(), *closures])
+
+    def opened(self) -> "Robot":
+        """Return the tree without closures; its coordinates do not depend on one another."""
+        return self._changed(closures=())
 
     def with_payload(self, link: str, payload: Inertia) -> "Robot":
         """Return the robot with a load fixed to a link, given in the frame of that link: Q_SU of Negrean 2025, 125.
@@ -136,7 +167,7 @@ class Robot:
         held = self.links[link].inertia
         whole = payload if held is None else Inertia.total([held, payload])
         links = {**self.links, link: Link(link, whole)}
-        return Robot(self.name, list(links.values()), list(self.joints.values()), self.gravity)
+        return self._changed(links=list(links.values()))
 
     def locked(self, positions: Mapping[str, float]) -> "Robot":
         """Return the robot with joints held at given coordinates, rad or m; joints that follow them are held too.
@@ -157,7 +188,7 @@ class Robot:
             if joint.moving and joint.mimic is not None and joint.mimic.joint in positions:
                 held = joint.mimic.multiplier * positions[joint.mimic.joint] + joint.mimic.offset
             joints.append(joint if held is None else _held(joint, float(held)))
-        return Robot(self.name, list(self.links.values()), joints, self.gravity)
+        return self._changed(joints=joints)
 
     def with_floating_base(self, sequence: str = "ZYX") -> "Robot":
         """Return the robot on a base that moves freely: three slides along x, y, z, then three turns.
@@ -179,8 +210,18 @@ class Robot:
         while world in self.links:
             world += "_"
         links, joints = floating_joints(self.base, sequence, world=world)
-        every = [*links, *self.links.values()], [*joints, *self.joints.values()]
-        return Robot(self.name, *every, self.gravity)
+        return self._changed(links=[*links, *self.links.values()], joints=[*joints, *self.joints.values()])
+
+    def mechanism(self, q: Any = None, **settings: Any) -> Any:
+        """Return the `jounce.Mechanism` that the robot is, with its masses, for `jounce.solve`; loops may be closed.
+
+        See Also
+        --------
+        jounce.robot.closed_loop.mechanism : What there is to set: drivers, outputs, time, and so on.
+        """
+        from jounce.robot.closed_loop import mechanism
+
+        return mechanism(self, q, **settings)
 
     def coordinates(self, **values: float) -> np.ndarray:
         """Return an array for q, shape (n,), with the named joints at the given values and the others at zero."""
@@ -189,6 +230,31 @@ class Robot:
                 message = f"no moving joint has this name; {did_you_mean(name, self.joint_names)}"
                 raise RobotError(message, name="joint", value=name)
         return np.array([values.get(name, 0.0) for name in self.joint_names], float)
+
+    def _changed(self, **parts: Any) -> "Robot":
+        """Return the robot with other links, joints, gravity or closures."""
+        held = {name: list(getattr(self, name).values()) for name in ("links", "joints", "closures")}
+        return Robot(**{"name": self.name, "gravity": self.gravity, **held, **parts})
+
+    def _checked_closure(self, closure: Closure) -> Closure:
+        """Return a closure with what it leaves to the pose at coordinates zero."""
+        where = f"closures.{closure.name}"
+        if closure.name in self.joints:
+            raise RobotError("a joint and a closure have the same name", name=where)
+        for link in closure.links:
+            if link not in self.links:
+                raise RobotError(f"no link has this name; {did_you_mean(link, self.links)}", name=where, value=link)
+        if len({self.frames[link].body for link in closure.links}) == 1:
+            message = "these links are fixed to one another already; a closure joins links that move"
+            raise RobotError(message, name=f"{where}.links", value=list(closure.links))
+        poses = _poses_at_zero(self.joints)
+        (origin, turned), (other, other_turned) = (poses[link] for link in closure.links)
+        points, rotation = closure.points, closure.rotation
+        if points.shape == (3,):
+            points = np.array([points, other_turned.T @ (origin + turned @ points - other)])
+        if rotation is None:
+            rotation = turned.T @ other_turned
+        return dataclasses.replace(closure, points=points, rotation=rotation)
 
     def _checked_link(self, link: str) -> str:
         if link not in self.links:
@@ -213,6 +279,17 @@ def _by_name(kind: str, parts: Sequence[Any], wanted: type) -> dict[str, Any]:
         found[part.name] = part
     if not found and kind == "links":
         raise RobotError("a robot needs at least one link", name=kind)
+    return found
+
+
+def _poses_at_zero(joints: Mapping[str, Joint]) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Return position and rotation of all links at coordinates zero, in the frame of the base."""
+    found: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+    for joint in joints.values():
+        follows = joint.moving and joint.mimic is not None
+        still = _held(joint, joint.mimic.offset if follows and joint.mimic is not None else 0.0)
+        position, rotation = found.setdefault(joint.parent, (np.zeros(3), np.eye(3)))
+        found[joint.child] = (position + rotation @ still.position, rotation @ still.rotation)
     return found
 
 

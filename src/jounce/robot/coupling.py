@@ -1,0 +1,134 @@
+"""The coordinate of a joint between two bodies, seen from their poses: driven, followed by another joint, or wanted."""
+
+import dataclasses
+from fractions import Fraction
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+
+from jounce.constraints import AbstractConstraint, Scalar, Vector
+from jounce.constraints.planar import slide
+from jounce.constraints.spatial import relative_angle
+from jounce.jet import Jet, wrap
+from jounce.mechanism import AbstractOutput
+
+LARGEST_DENOMINATOR = 1000  # of ratios that are taken for those of whole numbers
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Placed:
+    """A moving joint between two bodies of a mechanism, in the frames of these bodies.
+
+    Parameters
+    ----------
+    bodies : tuple of str
+        Names of the two bodies.
+    turning : bool
+        Whether the coordinate is an angle.
+    point : array of shape (3,)
+        Origin of the joint on the first body; on the second it is the origin of the frame.
+    axis_i, axis_j : array of shape (3,)
+        Axis on each body.
+    vector_i, vector_j : array of shape (3,)
+        Perpendiculars to the axis that coincide at coordinate zero.
+    """
+
+    bodies: tuple[str, str]
+    turning: bool
+    point: Any
+    axis_i: Any
+    axis_j: Any
+    vector_i: Any
+    vector_j: Any
+
+
+def coordinate(body_i: Any, body_j: Any, turning: bool, parts: Any) -> Jet:
+    """Return the coordinate of a joint, rad up to whole turns, or m."""
+    point, axis, vector_i, vector_j = parts
+    if turning:
+        return relative_angle(body_i, body_j, axis, vector_i, vector_j)
+    return slide(body_i, body_j, point, jnp.zeros_like(point), axis)
+
+
+class CoupledJoints(AbstractConstraint, space="spatial"):
+    """A joint follows another one: ``weight_2 q_2 - weight_1 q_1 = offset``, up to whole periods.
+
+    The angles of turning joints are known up to whole turns. The weights are whole numbers where the ratio of the
+    joints is one of whole numbers, so that the joints never lose count over many turns.
+    """
+
+    roles: tuple[int, ...] = eqx.field(static=True)  # places among the bodies of parent and child of each joint
+    turning: tuple[bool, ...] = eqx.field(static=True)
+    point_1: Vector
+    axis_1: Vector
+    vector_1: Vector
+    opposite_1: Vector
+    point_2: Vector
+    axis_2: Vector
+    vector_2: Vector
+    opposite_2: Vector
+    weight_1: Scalar
+    weight_2: Scalar
+    offset: Scalar
+    period: Scalar = None
+
+    @property
+    def body_count(self) -> int:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """Number of different bodies, which two joints may share."""
+        return max(self.roles) + 1
+
+    def residual(self, *bodies_and_time):
+        """Return what the second joint lacks of following the first."""
+        bodies = [bodies_and_time[place] for place in self.roles]
+        first = (self.point_1, self.axis_1, self.vector_1, self.opposite_1)
+        second = (self.point_2, self.axis_2, self.vector_2, self.opposite_2)
+        leader = coordinate(bodies[0], bodies[1], self.turning[0], first)
+        follower = coordinate(bodies[2], bodies[3], self.turning[1], second)
+        excess = self.weight_2 * follower - self.weight_1 * leader - self.offset
+        return excess if self.period is None else wrap(excess, self.period)
+
+
+def coupled(leader: Placed, follower: Placed, multiplier: float, offset: float) -> CoupledJoints:
+    """Return the constraint that makes a joint follow another: ``q_2 = multiplier q_1 + offset``.
+
+    A turning joint whose multiplier is no ratio of whole numbers below a thousand is followed for half a turn either
+    side of zero only; beyond it the motion cannot be followed.
+    """
+    bodies = list(dict.fromkeys([*leader.bodies, *follower.bodies]))
+    weights, period = (multiplier, 1.0), None
+    if leader.turning and follower.turning:
+        ratio = Fraction(multiplier).limit_denominator(LARGEST_DENOMINATOR)
+        if abs(ratio - Fraction(multiplier)) <= 1e-15 * abs(Fraction(multiplier)):
+            weights = (float(ratio.numerator), float(ratio.denominator))
+        period = 2 * np.pi
+    elif leader.turning:
+        period = 2 * np.pi * abs(multiplier) or None
+    elif follower.turning:
+        period = 2 * np.pi
+    return CoupledJoints(
+        tuple(bodies),
+        tuple(bodies.index(body) for body in (*leader.bodies, *follower.bodies)),
+        (leader.turning, follower.turning),
+        *(leader.point, leader.axis_i, leader.vector_i, leader.vector_j),
+        *(follower.point, follower.axis_i, follower.vector_i, follower.vector_j),
+        weight_1=weights[0],
+        weight_2=weights[1],
+        offset=offset * weights[1],
+        period=period,
+    )
+
+
+class SlideOutput(AbstractOutput):
+    """Distance, along a direction of body i, from a point of it to a point of body j, m; it may be negative."""
+
+    point_i: Vector  # m, in the frame of each body
+    point_j: Vector
+    vector_i: Vector
+
+    body_count = 2
+
+    def evaluate(self, body_i, body_j):
+        """Return the distance."""
+        return slide(body_i, body_j, self.point_i, self.point_j, self.vector_i)
