@@ -41,6 +41,17 @@ class DenseFactor(eqx.Module):
         inverse = jnp.argsort(self.permutation, axis=1)
         return jnp.take_along_axis(y, inverse, axis=1).T
 
+    def inverse(self) -> Any:
+        """Return the inverse matrices, shape (rows, rows, batch), for many right-hand sides that come one by one.
+
+        A product with it is one operation on the whole batch, where LAPACK is called for each matrix.
+        """
+        size = self.lu.shape[-1]
+        unit = jnp.broadcast_to(jnp.eye(size)[:, :, None], (size, size, self.lu.shape[0]))
+        columns = jnp.take_along_axis(jnp.moveaxis(unit, -1, 0), self.permutation[:, :, None], axis=1)
+        y = jax.lax.linalg.triangular_solve(self.lu, columns, left_side=True, lower=True, unit_diagonal=True)
+        return jnp.moveaxis(jax.lax.linalg.triangular_solve(self.lu, y, left_side=True, lower=False), 0, -1)
+
     def pivot_ratio(self) -> Any:
         """Return the smallest pivot over the largest, shape (batch,): near zero at a singular position."""
         pivots = jnp.abs(jnp.diagonal(self.lu, axis1=-2, axis2=-1))

@@ -1,0 +1,268 @@
+"""Forward dynamics of constrained mechanisms: accelerations and multipliers with all their rates, from one matrix.
+
+The equations of motion ``M q'' + Phi_q^T lambda = Q`` and ``Phi'' = 0`` are written once, on plain values. On series
+their coefficient k is affine in the unknowns ``(q''[k], lambda[k])``, with the same matrix
+``[[M, Phi_q^T], [Phi_q, 0]]`` at every order: the "hyper-dynamic" equations that Sommer 2024, section 7, announces.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jounce.dynamics.constraint_forces import inertia_forces
+from jounce.jet import Jet
+from jounce.jet.series import Recursion
+from jounce.kinematics.linear import DenseFactor
+from jounce.mechanism.system import System
+from jounce.rigid import PlanarPose, SpatialPose
+from jounce.rigid.spatial import body_axes, quaternion_spins
+
+
+
+class State(NamedTuple):
+    """Where the moving bodies are and how they move; shapes (components, bodies, batch).
+
+    Attributes
+    ----------
+    position, velocity : array
+        Of the origins of the body frames, in the global frame, m and m/s.
+    attitude : array
+        Angles, (1, bodies, batch) in rad, or Euler parameters, (4, bodies, batch).
+    spin : array
+        Rate of the angle, or angular velocity in the axes of the body, rad/s.
+    """
+
+    position: Any
+    attitude: Any
+    velocity: Any
+    spin: Any
+
+    def map(self, function: Any) -> "State":
+        """Apply a function to each array."""
+        return State(*map(function, self))
+
+
+class Expansion(NamedTuple):
+    """Taylor coefficients of a motion about an instant: what a step of an integrator needs, and leaves behind."""
+
+    state: State  # arrays of shape (order + 1, components, bodies, batch)
+    acceleration: Any  # (order, coordinates of a body, bodies, batch)
+    multipliers: Any  # (order, rows, batch), of the scaled rows, over the scale of the masses
+
+
+class Equations(eqx.Module):
+    """The equations of motion of a mechanism.
+
+    Parameters
+    ----------
+    system : System
+        Its joints, drivers and forces.
+    mass, center, moments : array
+        As `mechanism_masses` gives them, without the ground.
+    gravity : array of shape (components, 1, 1)
+        m/s^2.
+    scale : float
+        Of the masses, by which the equations are divided, kg.
+    pose_type : type
+        PlanarPose or SpatialPose.
+    """
+
+    system: System
+    mass: Any
+    center: Any
+    moments: Any
+    gravity: Any
+    scale: Any
+    pose_type: type = eqx.field(static=True)
+
+    @property
+    def coordinates(self) -> int:
+        """Number of coordinates of a body."""
+        return self.pose_type.shifts + self.pose_type.turns
+
+    def pose(self, state: State, *higher: tuple[Any, Any]) -> Any:
+        """Return the pose of all bodies, the ground first, with velocities and with accelerations where given."""
+        pose = self.still(state.position, state.attitude)
+        for k, (shift, turn) in enumerate([(state.velocity, state.spin), *higher], 1):
+            pose = pose.extended(grounded(shift) / math.factorial(k), grounded(turn) / math.factorial(k))
+        return pose
+
+    def still(self, position: Any, attitude: Any) -> Any:
+        """Return the pose of order zero of all bodies, the ground first."""
+        position = Jet([grounded(position)])
+        if self.pose_type is PlanarPose:
+            return PlanarPose.from_jets(position, Jet([grounded(attitude)[0]]))
+        fixed = jnp.zeros_like(attitude[:, :1]).at[0].set(1.0)
+        quaternion = jnp.concatenate([fixed, attitude], axis=1)  # of unit length already: it is kept so
+        spins, axes = (tuple(Jet([x]) for x in f(quaternion)) for f in (quaternion_spins, body_axes))
+        return SpatialPose(position, Jet([quaternion]), spins, axes, None)
+
+    def attitude_of(self, pose: Any) -> Any:
+        """Return the attitude of the moving bodies, as a state has it, from a pose of order zero."""
+        if self.pose_type is PlanarPose:
+            return pose.angle.coefficients[0][None, 1:]
+        return pose.quaternion.coefficients[0][:, 1:]
+
+    def balance(self, state: State, acceleration: Any, multipliers: Any, time: Any) -> tuple[Any, Any, Any]:
+        """Return what must vanish, and how the attitude moves.
+
+        Returns
+        -------
+        forces : array of shape (coordinates, bodies, batch)
+            ``M q'' - Q + Phi_q^T lambda``, over the scale of the masses.
+        second : array of shape (rows, batch)
+            ``Phi''``, of the scaled rows.
+        attitude_rate : array
+            Of the shape of the attitude.
+        """
+        shifts = self.pose_type.shifts
+        pose = self.pose(state, (acceleration[:shifts], acceleration[shifts:]))
+        clock = Jet.variable(time, 2)
+        second = 2.0 * self.system.residual(pose, clock).dense().coefficients[2]
+        force, moment = inertia_forces(pose, self.mass, self.center, self.moments, self.gravity)
+        inertia = jnp.concatenate([force.coefficients[0], moment.coefficients[0]])[:, 1:]
+        still, now = self.still(state.position, state.attitude), clock.truncate(0)
+
+        def loosened(change: Any) -> Any:
+            return jax.jvp(lambda p: self.system.residual(p, now).coefficients[0], (still,), (change,))[1]
+
+        forces = inertia / self.scale + conjugate(loosened, still, multipliers)[:, 1:]
+        moving = self.pose(state)
+        for group in self.system.forces:
+            force = group.force(moving, clock.truncate(1)).coefficients[0]
+            along = conjugate(lambda c, g=group: g.variation(still, c, now).coefficients[0], still, force)
+            forces = forces - along[:, 1:] / self.scale
+        return forces, second, self._attitude_rate(state)
+
+    def _attitude_rate(self, state: State) -> Any:
+        if self.pose_type is PlanarPose:
+            return state.spin
+        spins = quaternion_spins(state.attitude)
+        return 0.5 * sum(spin * part for spin, part in zip(spins, jnp.split(state.spin, 3), strict=True))
+
+    def matrix(self, state: State, time: Any) -> Any:
+        """Return the matrix of the unknown accelerations and multipliers, (size, size, batch), scaled."""
+        jacobian = self.system.jacobian(self.still(state.position, state.attitude), Jet([time]))
+        mass = self.mass_matrix(state)
+        rows = jacobian.shape[0]
+        above = jnp.concatenate([mass, jnp.swapaxes(jacobian, 0, 1)], axis=1)
+        below = jnp.concatenate([jacobian, jnp.zeros((rows, rows, jacobian.shape[-1]))], axis=1)
+        return jnp.concatenate([above, below])
+
+    def mass_matrix(self, state: State) -> Any:
+        """Return the mass matrix over the scale of the masses, scaled, shape (columns, columns, batch)."""
+        shifts, count = self.pose_type.shifts, self.coordinates
+        pose = self.pose(state.map(jnp.asarray))
+        bodies, lanes = state.position.shape[1:]
+
+        def inertia(direction: Any) -> Any:
+            whole = jnp.broadcast_to(direction[:, None, None], (count, bodies, lanes))
+            accelerated = pose.extended(0.5 * grounded(whole[:shifts]), 0.5 * grounded(whole[shifts:]))
+            parts = inertia_forces(accelerated, self.mass, self.center, self.moments, self.gravity)
+            return jnp.concatenate([part.coefficients[0] for part in parts])[:, 1:]
+
+        zero = inertia(jnp.zeros(count))
+        scale = jnp.asarray(self.system.column_scale)
+        blocks = jax.vmap(inertia, out_axes=1)(jnp.diag(scale)) - zero[:, None]  # out, in, bodies, batch
+        blocks = blocks * (scale / self.scale)[:, None, None, None]
+        whole = jnp.eye(bodies)[:, None, :, None, None] * jnp.moveaxis(blocks, 2, 0)[:, :, None]
+        return whole.reshape(bodies * count, bodies * count, lanes)
+
+    def flat(self, forces: Any) -> Any:
+        """Return generalised forces of bodies, (coordinates, bodies, batch), as a scaled column."""
+        scaled = forces * jnp.asarray(self.system.column_scale)[:, None, None]
+        return jnp.swapaxes(scaled, 0, 1).reshape(-1, forces.shape[-1])
+
+    def bodies(self, column: Any) -> Any:
+        """Return a scaled column of the unknown coordinates by body, (coordinates, bodies, batch)."""
+        scale = jnp.asarray(self.system.column_scale)
+        return jnp.swapaxes(column.reshape(-1, self.coordinates, column.shape[-1]), 0, 1) * scale[:, None, None]
+
+
+def grounded(moving: Any) -> Any:
+    """Put the ground, which has none of a quantity, before the moving bodies."""
+    return jnp.concatenate([jnp.zeros_like(moving[:, :1]), moving], axis=1)
+
+
+def conjugate(variation: Any, pose: Any, weights: Any) -> Any:
+    """Return the forces by which weights act on the bodies, (coordinates, bodies, batch).
+
+    Parameters
+    ----------
+    variation : callable
+        How what the weights are conjugate to varies with a change of the pose; linear.
+    pose : SpatialPose or PlanarPose
+        Of order zero.
+    weights : array
+        Of the shape of the variation.
+    """
+    shifts = pose.shifts
+    example = jax.ShapeDtypeStruct((shifts + pose.turns, *pose.position.shape[1:]), jnp.float64)
+    transposed = jax.linear_transpose(lambda v: variation(pose.varied(Jet([v[:shifts]]), Jet([v[shifts:]]))), example)
+    return transposed(weights)[0]
+
+
+def expand(equations: Equations, state: State, time: Any, order: int) -> Expansion:
+    """Return the Taylor coefficients of the motion through a state, to an order.
+
+    Parameters
+    ----------
+    equations : Equations
+        Of the mechanism.
+    state : State
+        That fulfils the constraints and their rates.
+    time : array of shape (1, batch)
+        The instant, s.
+    order : int
+        Highest coefficient of positions and velocities, at least 1.
+    """
+    inverse = DenseFactor.of(equations.matrix(state, time)).inverse()
+    count, bodies, lanes = equations.coordinates, *state.position.shape[1:]
+    columns, rows = count * bodies, equations.system.row_scale.shape[0]
+
+    def program(*leaves: Any) -> Any:
+        position, attitude, velocity, spin, acceleration, multipliers, clock = leaves
+        return equations.balance(State(position, attitude, velocity, spin), acceleration, multipliers, clock)
+
+    def solved(forces: Any, second: Any) -> tuple[Any, Any]:
+        right = jnp.concatenate([equations.flat(forces), second])
+        solution = -jnp.sum(inverse * right[None], axis=1)
+        return equations.bodies(solution[:columns]), solution[columns:]
+
+    trial = (jnp.zeros((count, bodies, lanes)), jnp.zeros((rows, lanes)))
+    forces, second, _ = program(*state, *trial, time)
+    acceleration, multipliers = solved(forces, second)
+    recursion = Recursion(program, (*state, acceleration, multipliers, time), order - 1)
+    first = (*state, acceleration, multipliers)
+    shifts = equations.pose_type.shifts
+
+    def raised(before: Any, rate: Any, k: Any) -> State:
+        """Return the state of order k from the coefficients of order k - 1 of its rates."""
+        last, accelerated = before, rate[0]
+        return State(last.velocity / k, rate[1] / k, accelerated[:shifts] / k, accelerated[shifts:] / k)
+
+    def level(k: Any, history: Any, before: State, rates: Any) -> Any:
+        now = raised(before, rates, k)
+        ticking = jnp.where(k == 1, jnp.ones_like(time), jnp.zeros_like(time))
+        (forces, second, attitude_rate), history = recursion.advanced(history, k, (*now, *trial, ticking))
+        found = solved(forces, second)
+        history = recursion.corrected(history, k, (None,) * 4 + found + (None,))
+        return history, now, (found[0], attitude_rate), found
+
+    store = jax.tree.map(lambda x: jnp.zeros((order, *x.shape)).at[0].set(x), first)
+
+    def body(k: Any, carry: Any) -> Any:
+        history, now, rates, store = carry
+        history, now, rates, found = level(k, history, now, rates)
+        store = jax.tree.map(lambda s, x: jax.lax.dynamic_update_index_in_dim(s, x, k, 0), store, (*now, *found))
+        return history, now, rates, store
+
+    carry = (recursion.history, state, (acceleration, recursion.outputs[2]), store)
+    _, now, rates, store = jax.lax.fori_loop(1, order, body, carry)
+    *states, accelerations, forces = store
+    last = raised(now, rates, order)
+    whole = State(*(jnp.concatenate([s, x[None]]) for s, x in zip(states, last, strict=True)))
+    return Expansion(whole, accelerations, forces)

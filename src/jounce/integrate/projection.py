@@ -1,0 +1,86 @@
+"""Back onto the constraints: positions and velocities corrected by the least amount, measured by the masses."""
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+
+from jounce.dynamics.forward import Equations, State, grounded
+from jounce.jet import Jet
+from jounce.kinematics.linear import DenseFactor
+
+MOST_ITERATIONS = 10
+ROUNDING = 1e-15  # a correction this small, in rad or sizes of the mechanism, leaves nothing to correct
+
+
+def projected(equations: Equations, state: State, time: Any) -> tuple[State, Any]:
+    """Return the nearest state that fulfils the constraints and their rates, and how far positions moved.
+
+    The correction of positions is that of least kinetic energy, were it a velocity; that of velocities likewise.
+
+    Parameters
+    ----------
+    equations : Equations
+        Of the mechanism.
+    state : State
+        Near the constraints.
+    time : array of shape (1, batch)
+        Its instant, s.
+
+    Returns
+    -------
+    State
+        With Euler parameters of unit length.
+    distance : array of shape (batch,)
+        Size of the first correction of positions, rad or sizes of the mechanism; not finite where it failed.
+    """
+    clock = Jet([time])
+    position, attitude = state.position, normalised(state.attitude)
+
+    def correction(position: Any, attitude: Any) -> tuple[Any, Any]:
+        factor = DenseFactor.of(equations.matrix(state._replace(position=position, attitude=attitude), time))
+        gap = equations.system.residual(equations.still(position, attitude), clock).coefficients[0]
+        return factor, gap
+
+    def moved(position: Any, attitude: Any, column: Any) -> tuple[Any, Any]:
+        change = equations.bodies(column)
+        shifts = equations.pose_type.shifts
+        pose = equations.still(position, attitude).displaced(grounded(change[:shifts]), grounded(change[shifts:]))
+        return pose.position.coefficients[0][:, 1:], equations.attitude_of(pose)
+
+    def iterate(carry: Any) -> Any:
+        position, attitude, _, _, first, count = carry
+        factor, gap = correction(position, attitude)
+        column = solved(factor, equations, gap)
+        size = jnp.max(jnp.abs(column), axis=0)
+        position, attitude = moved(position, attitude, column)
+        return position, attitude, factor, size, jnp.where(count == 0, size, first), count + 1
+
+    def unfinished(carry: Any) -> Any:
+        *_, size, _, count = carry
+        return jnp.any((size > 1e-9) & jnp.isfinite(size)) & (count < MOST_ITERATIONS) | (count == 0)
+
+    size = equations.system.cells.shape
+    lanes = time.shape[-1]
+    blank = DenseFactor.blank((sum(size), sum(size)), lanes)
+    start = (position, attitude, blank, jnp.full(lanes, jnp.inf), jnp.zeros(lanes), 0)
+    position, attitude, factor, last, first, _ = jax.lax.while_loop(unfinished, iterate, start)
+    moving = state._replace(position=position, attitude=attitude)
+    rate = equations.system.residual(equations.pose(moving), Jet.variable(time, 1)).dense().coefficients[1]
+    change = equations.bodies(solved(factor, equations, rate))
+    shifts = equations.pose_type.shifts
+    moving = moving._replace(velocity=state.velocity + change[:shifts], spin=state.spin + change[shifts:])
+    return moving, jnp.where(last <= 1e-9, first, jnp.inf)
+
+
+def solved(factor: DenseFactor, equations: Equations, gap: Any) -> Any:
+    """Return the least change of coordinates that closes a gap of the rows, as a scaled column."""
+    columns = equations.system.cells.shape[1]
+    return factor.solve(-jnp.concatenate([jnp.zeros((columns, gap.shape[-1])), gap]))[:columns]
+
+
+def normalised(attitude: Any) -> Any:
+    """Return Euler parameters of unit length; angles as they are."""
+    if attitude.shape[0] == 1:
+        return attitude
+    return attitude / jnp.sqrt(jnp.sum(attitude * attitude, axis=0))[None]
