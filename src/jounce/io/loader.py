@@ -11,12 +11,14 @@ from jounce.errors import JounceError, MechanismFileError, did_you_mean
 from jounce.io.fields import FileKey, file_keys, location_of, output_types
 from jounce.io.source import Location, Source, read_source
 from jounce.mechanism import Body, Mechanism, TimeGrid, time_grid
+from jounce.mechanism.masses import body_mass
 from jounce.mechanism.resolve import resolve, resolve_element
 from jounce.trajectory import SplineMotion
 
 __all__ = ["load"]
 
 SPACES = {"planar": 2, "spatial": 3}
+ROLES = {"joints": "joint", "drivers": "driver", "forces": "force", "initial": "driver"}
 
 
 def load(path: str | PathLike[str]) -> Mechanism:
@@ -127,9 +129,11 @@ def _build(source: Source, space: str, model: dict[str, Any], places: dict[str, 
         raise error.located(name="parameters") from None
     mechanism = Mechanism(
         space=space,
-        bodies={name: _body(source, name, _plain(body), values) for name, body in model["bodies"].items()},
-        joints=_constraints(source, space, "joint", model["joints"], places),
-        drivers=_constraints(source, space, "driver", model["drivers"], places),
+        bodies={name: _body(source, space, name, _plain(body), values) for name, body in model["bodies"].items()},
+        joints=_constraints(source, space, "joints", model["joints"], places),
+        drivers=_constraints(source, space, "drivers", model["drivers"], places),
+        forces=_constraints(source, space, "forces", model["forces"], places),
+        initial=_constraints(source, space, "initial", model["initial"], places),
         outputs=_outputs(space, model["outputs"], places),
         parameters=parameters,
         gravity=model["gravity"],
@@ -140,8 +144,16 @@ def _build(source: Source, space: str, model: dict[str, Any], places: dict[str, 
     return mechanism
 
 
-def _body(source: Source, name: str, given: dict[str, Any], parameters: dict[str, Any]) -> Body:
+def _body(source: Source, space: str, name: str, given: dict[str, Any], parameters: dict[str, Any]) -> Body:
     """Build a body; its orientation, a starting guess, is turned into Euler parameters with the values of now."""
+    if isinstance(given["inertia"], dict):
+        from jounce.io.masses import expanded
+
+        try:
+            given |= expanded(given, parameters, planar=space == "planar")
+        except JounceError as error:
+            key = ("mass",) if error.name == "mass" else ("inertia", *([error.name] if error.name else []))
+            raise source.error(error.message, ("bodies", name, *key), value=error.value) from None
     form = given.pop("orientation", None)
     if form is None:
         return Body(**given)
@@ -174,22 +186,21 @@ def _arguments(keys: tuple[FileKey, ...], given: dict[str, Any]) -> dict[str, An
 
 
 def _constraints(
-    source: Source, space: str, role: str, models: dict[str, Any], places: dict[str, Any]
+    source: Source, space: str, section: str, models: dict[str, Any], places: dict[str, Any]
 ) -> dict[str, Any]:
-    """Build the joints or drivers, and note where their fields stand in the file."""
+    """Build the joints, drivers or forces, and note where their fields stand in the file."""
     found = {}
     for name, model in models.items():
         given = _plain(model)
-        kind = catalogue(space, role)[given["type"]]
+        kind = catalogue(space, ROLES[section])[given["type"]]
         keys = file_keys(kind)
-        place = f"{role}s.{name}"
-        places[place] = ((f"{role}s", name), keys)
+        place = f"{section}.{name}"
+        places[place] = ((section, name), keys)
         arguments = _arguments(keys, given)
         for field, value in arguments.items():
-            if hasattr(value, "samples"):
-                arguments[field] = _spline(source, (f"{role}s", name, field), value)
+            arguments[field] = _splines(source, (section, name, field), value)
         try:
-            found[name] = kind(bodies=given["bodies"], **arguments)
+            found[name] = kind(bodies=given["bodies"] if "bodies" in given else given["body"], **arguments)
         except JounceError as error:
             raise error if isinstance(error, MechanismFileError) else _placed(error, place) from None
     return found
@@ -199,6 +210,13 @@ def _placed(error: JounceError, place: str) -> JounceError:
     """Return an error of a constructor, which knows its fields only, with its full dotted name."""
     error.name = f"{place}.{error.name}" if error.name else place
     return error
+
+
+def _splines(source: Source, location: Location, value: Any) -> Any:
+    """Return a value with samples turned into motion laws, also where it is a list of laws."""
+    if isinstance(value, tuple) and any(hasattr(entry, "samples") for entry in value):
+        return tuple(_splines(source, (*location, index), entry) for index, entry in enumerate(value))
+    return _spline(source, location, value) if hasattr(value, "samples") else value
 
 
 def _spline(source: Source, location: Location, samples: Any) -> SplineMotion:
@@ -242,29 +260,19 @@ def _check_values(mechanism: Mechanism) -> None:
         for name, element in elements.items():
             resolve_element(element, parameters, components, f"{kind}.{name}")
     for name, body in mechanism.bodies.items():
-        for field in ("position", "angle", "mass", "inertia", "center_of_mass"):
-            _check_body_value(f"bodies.{name}.{field}", getattr(body, field), parameters)
-    if mechanism.gravity is not None:
-        _check_body_value("gravity", mechanism.gravity, parameters)
+        for field in ("position", "angle"):
+            _check_expressions(f"bodies.{name}.{field}", getattr(body, field), parameters)
+        body_mass(name, body, parameters, components)
+    _check_expressions("gravity", mechanism.gravity, parameters)
     if mechanism.time is not None:
         time_grid(mechanism.time, parameters)
 
 
-def _check_body_value(name: str, value: Any, parameters: dict[str, Any]) -> None:
-    from jounce.errors import MechanismError
-
-    if value is None:
-        return
+def _check_expressions(name: str, value: Any, parameters: dict[str, Any]) -> None:
     try:
-        number = resolve(value, parameters)
+        resolve(value, parameters)
     except JounceError as error:
         raise error.located(name=name) from None
-    if name.endswith((".mass", ".inertia")) and min(_flat(number)) < 0:
-        raise MechanismError("must not be negative", name=name, value=number)
-
-
-def _flat(value: Any) -> list[float]:
-    return [value] if isinstance(value, float) else [float(entry) for entry in value.reshape(-1)]
 
 
 def _find(name: str | None, places: dict[str, tuple[Location, tuple[FileKey, ...]]]) -> Location:

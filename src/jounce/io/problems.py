@@ -12,7 +12,7 @@ from jounce.io.source import Location, Source
 
 __all__ = ["first_problem"]
 
-_TAGGED = {"joints": "joint", "drivers": "driver", "outputs": "output"}
+_TAGGED = {"joints": "joint", "drivers": "driver", "forces": "force", "initial": "driver", "outputs": "output"}
 _HINTS = {
     ("planar", "orientation"): "a planar body has an angle",
     ("spatial", "angle"): "a spatial body has an orientation",
@@ -95,7 +95,7 @@ def _valid_keys(source: Source, space: str, parent: Location) -> list[str]:
         keys = ["body" if output.body_count == 1 else "bodies", *(["quantity"] if quantity else [])]
         return [*keys, *(key.key for key in file_keys(output))]
     constraint = catalogue(space, _TAGGED[str(kind)])[entry["type"]]
-    return ["type", "bodies", *(key.key for key in file_keys(constraint))]
+    return ["type", "body" if constraint.body_count == 1 else "bodies", *(key.key for key in file_keys(constraint))]
 
 
 def _aliases(model: Any) -> list[str]:
@@ -103,7 +103,7 @@ def _aliases(model: Any) -> list[str]:
 
 
 def _unknown_type(source: Source, space: str, at: Location, entry: dict[str, Any]) -> MechanismFileError:
-    """Word a joint, driver or output of a kind that does not exist."""
+    """Word a joint, driver, force or output of a kind that does not exist."""
     if at[0] == "outputs":
         return _unknown_output(source, space, at, entry)
     role = _TAGGED[str(at[0])]
@@ -114,7 +114,7 @@ def _unknown_type(source: Source, space: str, at: Location, entry: dict[str, Any
     elsewhere = [
         f"a {other_space} {other_role}"
         for other_space in ("planar", "spatial")
-        for other_role in ("joint", "driver")
+        for other_role in ("joint", "driver", "force")
         if isinstance(name, str) and name in catalogue(other_space, other_role)
     ]
     note = f"it is the type of {' and '.join(elsewhere)}; " if elsewhere else ""

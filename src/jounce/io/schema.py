@@ -17,7 +17,8 @@ from jounce.constraints import catalogue
 from jounce.constraints.planar import COORDINATES
 from jounce.errors import did_you_mean
 from jounce.io.fields import FileKey, file_keys, output_tag, output_types
-from jounce.io.values import Checked, inertia, motion, orientation, problem, scalar, vector, vectors
+from jounce.io.masses import inertia
+from jounce.io.values import Checked, laws, motion, orientation, problem, scalar, vector, vectors
 from jounce.mechanism.outputs import FRAMES
 from jounce.trajectory.expression import CONSTANTS, FUNCTIONS
 
@@ -106,7 +107,10 @@ def _model(name: str, doc: str | None, fields: dict[str, tuple[Any, Any]]) -> ty
     return create_model(name, __config__=config, __doc__=" ".join(summary.split()), **aliased)  # type: ignore[call-overload]
 
 
-def _annotation(key: FileKey, size: int, choices: dict[str, tuple[str, ...]]) -> Any:
+def _annotation(kind: type[Any], key: FileKey, size: int, choices: dict[str, tuple[str, ...]]) -> Any:
+    if key.kind in ("law", "laws"):
+        variables = (*kind.displacement_names, *kind.velocity_names)
+        return motion(key.quantity, variables) if key.kind == "law" else laws(size, key.quantity, variables)
     if key.kind == "motion":
         return motion(key.quantity)
     if key.kind == "scalar":
@@ -120,14 +124,21 @@ def _annotation(key: FileKey, size: int, choices: dict[str, tuple[str, ...]]) ->
 def _values(kind: type[Any], size: int) -> dict[str, tuple[Any, Any]]:
     """Return the keys of a class besides its bodies, as fields of a model."""
     choices = _CHOICES if kind.__module__.startswith("jounce.") else {}
-    return {key.key: (_annotation(key, size, choices), ... if key.required else None) for key in file_keys(kind)}
+    return {key.key: (_annotation(kind, key, size, choices), ... if key.required else None) for key in file_keys(kind)}
+
+
+def _bodies(kind: type[Any]) -> dict[str, tuple[Any, Any]]:
+    """Return the key of the bodies of a class: ``body`` for one alone."""
+    if kind.body_count > 1:
+        return {"bodies": (_names(kind.body_count), ...)}
+    return {"body": (Annotated[Any, Checked(_check_body, {"type": "string"})], ...)}
 
 
 def _constraint_union(space: str, role: str, types: _Types) -> Any:
-    """Return the union of all joints or drivers of a space, told apart by ``type``."""
+    """Return the union of all joints, drivers or forces of a space, told apart by ``type``."""
     models = []
     for name, kind in types:
-        fields = {"type": (Literal[name], ...), "bodies": (_names(kind.body_count), ...)}
+        fields = {"type": (Literal[name], ...)} | _bodies(kind)
         title = f"{space}_{name}_{role}"
         models.append(_model(title, kind.__doc__, fields | _values(kind, COMPONENTS[space])))
     return Annotated[Union[tuple(models)], Discriminator("type")]  # noqa: UP007
@@ -159,15 +170,16 @@ def _body_model(space: str) -> type[BaseModel]:
     size = COMPONENTS[space]
     fields: dict[str, tuple[Any, Any]] = {"position": (vector(size, "length"), (0.0,) * size)}
     if space == "planar":
-        fields |= {"angle": (scalar("angle"), 0.0), "inertia": (scalar("inertia"), None)}
+        fields |= {"angle": (scalar("angle"), 0.0)}
     else:
-        fields |= {"orientation": (orientation(), None), "inertia": (inertia(), None)}
-    fields |= {"mass": (scalar("mass"), None), "center_of_mass": (vector(size, "length"), None)}
+        fields |= {"orientation": (orientation(), None)}
+    fields |= {"mass": (scalar("mass"), None), "inertia": (inertia(space), None)}
+    fields |= {"center_of_mass": (vector(size, "length"), None)}
     return _model(f"{space}_body", "A moving body; its pose is the starting guess for assembly.", fields)
 
 
 @lru_cache(maxsize=8)
-def _file_model(space: str, joints: _Types, drivers: _Types) -> type[BaseModel]:
+def _file_model(space: str, joints: _Types, drivers: _Types, forces: _Types) -> type[BaseModel]:
     time = {"start": (scalar("time"), 0.0), "stop": (scalar("time"), ...)}
     time |= {"step": (scalar("time"), None), "count": (scalar("ratio"), None)}
     optional = {
@@ -176,6 +188,8 @@ def _file_model(space: str, joints: _Types, drivers: _Types) -> type[BaseModel]:
         "parameters": (_named(scalar("any"), _PARAMETER, _parameter_name), {}),
         "joints": (_named(_constraint_union(space, "joint", joints), _NAME), {}),
         "drivers": (_named(_constraint_union(space, "driver", drivers), _NAME), {}),
+        "forces": (_named(_constraint_union(space, "force", forces), _NAME), {}),
+        "initial": (_named(_constraint_union(space, "driver", drivers), _NAME), {}),
         "outputs": (_named(_output_union(space), _NAME, _output_name), {}),
         "time": (_model(f"{space}_time", "Instants from start to stop, by step or by count.", time), None),
     }
@@ -188,12 +202,12 @@ def _file_model(space: str, joints: _Types, drivers: _Types) -> type[BaseModel]:
 
 
 def file_model(space: str, *, own_types: bool = True) -> type[BaseModel]:
-    """Return the model of a whole file of a space, with every joint and driver registered by now.
+    """Return the model of a whole file of a space, with every joint, driver and force registered by now.
 
     Without ``own_types``, with those of this package only.
     """
     types = []
-    for role in ("joint", "driver"):
+    for role in ("joint", "driver", "force"):
         found = catalogue(space, role).items()
         types.append(tuple((n, kind) for n, kind in found if own_types or kind.__module__.startswith("jounce.")))
     return _file_model(space, *types)

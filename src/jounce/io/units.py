@@ -28,9 +28,15 @@ def _dimension(**powers: int) -> Dimension:
     return tuple(sorted((name, power) for name, power in powers.items() if power))
 
 
+def _per_angle(dimension: Dimension) -> Dimension:
+    return _dimension(**dict(dimension), angle=-1)
+
+
 NUMBER = _dimension()
 _LENGTH, _ANGLE, _TIME, _MASS = (_dimension(**{name: 1}) for name in ("length", "angle", "time", "mass"))
 _FORCE = _dimension(mass=1, length=1, time=-2)
+_TORQUE = _dimension(mass=1, length=2, time=-2)
+_TORSIONAL_DAMPING = _dimension(mass=1, length=2, time=-1)
 _TURN = 2 * math.pi
 
 _COMMON: dict[str, tuple[Decimal | float, Dimension]] = {
@@ -62,6 +68,17 @@ KINDS: dict[str, tuple[str, tuple[Dimension, ...]]] = {
     "ratio": ("a pure number", (NUMBER,)),
     "length per angle": ("a length (per radian), such as 5 cm", (_LENGTH, _dimension(length=1, angle=-1))),
     "mass": ("a mass, such as 2 kg", (_MASS,)),
+    "density": ("a density, such as 7850 kg/m^3", (_dimension(mass=1, length=-3),)),
+    "first moment": ("a first moment of mass, such as 0.2 kg*m", (_dimension(mass=1, length=1),)),
+    "force": ("a force, such as 10 N", (_FORCE,)),
+    "torque": ("a torque, such as 2 N*m", (_TORQUE,)),
+    "stiffness": ("a stiffness, such as 500 N/m", (_dimension(mass=1, time=-2),)),
+    "damping": ("a damping, such as 3 N*s/m", (_dimension(mass=1, time=-1),)),
+    "torsional stiffness": ("a torsional stiffness, such as 2 N*m/rad", (_TORQUE, _per_angle(_TORQUE))),
+    "torsional damping": (
+        "a torsional damping, such as 0.1 N*m*s/rad",
+        (_TORSIONAL_DAMPING, _per_angle(_TORSIONAL_DAMPING)),
+    ),
     "inertia": ("a moment of inertia, such as 0.1 kg*m^2", (_dimension(mass=1, length=2),)),
     "acceleration": ("an acceleration, such as 9.81 m/s^2", (_dimension(length=1, time=-2),)),
     "any": ("a value", ()),

@@ -15,7 +15,7 @@ from pydantic_core import PydanticCustomError, core_schema
 from jounce.errors import UNSET, ExpressionError, JounceError, did_you_mean, show_value
 from jounce.io.units import KINDS, Value, parse_value
 
-__all__ = ["Checked", "Samples", "inertia", "motion", "orientation", "problem", "scalar", "vector", "vectors"]
+__all__ = ["Checked", "Samples", "below", "laws", "motion", "orientation", "problem", "scalar", "vector", "vectors"]
 
 
 def problem(message: str, *at: str | int, value: object = ...) -> PydanticCustomError:
@@ -26,10 +26,11 @@ def problem(message: str, *at: str | int, value: object = ...) -> PydanticCustom
     return PydanticCustomError("jounce", "{message}", {"message": message, "at": at, "value": value})
 
 
-def _below(error: PydanticCustomError, *at: str | int) -> PydanticCustomError:
-    """Return the same error one or more steps further down."""
+def below(error: PydanticCustomError, *at: str | int, value: object = ...) -> PydanticCustomError:
+    """Return the same error one or more steps further down, with the value there unless it has one already."""
     context = error.context or {}
-    return problem(context["message"], *at, *context["at"], value=context["value"])
+    shown = value if context["value"] is ... else context["value"]
+    return problem(context["message"], *at, *context["at"], value=shown)
 
 
 class Checked:
@@ -46,7 +47,7 @@ class Checked:
         return self.schema
 
 
-def _parse(raw: Any, quantity: str, info: Any, extra_names: tuple[str, ...] = ()) -> Value:
+def parse(raw: Any, quantity: str, info: Any, extra_names: tuple[str, ...] = ()) -> Value:
     if quantity in ("of coordinate", "per angle"):
         turning = info.data.get("coordinate") == "angle"
         by_coordinate = {"of coordinate": ("length", "angle"), "per angle": ("length per angle", "ratio")}
@@ -66,25 +67,25 @@ def _words(quantity: str) -> str:
     return {"of coordinate": "a length or an angle", "per angle": "a pure number or a length"}.get(quantity, "a value")
 
 
-def _scalar_schema(quantity: str, described: str = "") -> dict[str, Any]:
+def scalar_schema(quantity: str, described: str = "") -> dict[str, Any]:
     text = f"{_words(quantity)}: a number (SI), a number with a unit, or an expression of parameters{described}"
     return {"description": text, "anyOf": [{"type": "number"}, {"type": "string", "minLength": 1}]}
 
 
 def scalar(quantity: str) -> Any:
     """Return the annotation of one value of a kind of ``units.KINDS``."""
-    return Annotated[Any, Checked(lambda raw, info: _parse(raw, quantity, info).value, _scalar_schema(quantity))]
+    return Annotated[Any, Checked(lambda raw, info: parse(raw, quantity, info).value, scalar_schema(quantity))]
 
 
-def _vector_value(raw: Any, size: int, quantity: str, info: Any, *at: str | int) -> tuple[Any, ...]:
+def vector_value(raw: Any, size: int, quantity: str, info: Any, *at: str | int) -> tuple[Any, ...]:
     if not isinstance(raw, (list, tuple)) or len(raw) != size:
         raise problem(f"must be a list of {size} values", *at, value=raw)
     parsed = []
     for index, item in enumerate(raw):
         try:
-            parsed.append(_parse(item, "any" if quantity == "direction" else quantity, info))
+            parsed.append(parse(item, "any" if quantity == "direction" else quantity, info))
         except PydanticCustomError as error:
-            raise _below(error, *at, index) from None
+            raise below(error, *at, index) from None
     if quantity == "direction":
         used = {item.dimension for item in parsed if item.value != 0 and isinstance(item.value, float)}
         if len(used) > 1:
@@ -92,7 +93,7 @@ def _vector_value(raw: Any, size: int, quantity: str, info: Any, *at: str | int)
     return tuple(item.value for item in parsed)
 
 
-def _vector_schema(size: int, quantity: str) -> dict[str, Any]:
+def vector_schema(size: int, quantity: str) -> dict[str, Any]:
     words = "a direction, of any length but zero" if quantity == "direction" else _words(quantity)
     items = {"anyOf": [{"type": "number"}, {"type": "string", "minLength": 1}]}
     return {"type": "array", "description": words, "items": items, "minItems": size, "maxItems": size}
@@ -101,7 +102,7 @@ def _vector_schema(size: int, quantity: str) -> dict[str, Any]:
 def vector(size: int, quantity: str) -> Any:
     """Return the annotation of a list of values of one kind."""
     return Annotated[
-        Any, Checked(lambda raw, info: _vector_value(raw, size, quantity, info), _vector_schema(size, quantity))
+        Any, Checked(lambda raw, info: vector_value(raw, size, quantity, info), vector_schema(size, quantity))
     ]
 
 
@@ -111,9 +112,9 @@ def vectors(count: int, size: int, quantity: str) -> Any:
     def check(raw: Any, info: Any) -> tuple[Any, ...]:
         if not isinstance(raw, (list, tuple)) or len(raw) != count:
             raise problem(f"must be a list of {count} vectors, one on each body")
-        return tuple(_vector_value(item, size, quantity, info, index) for index, item in enumerate(raw))
+        return tuple(vector_value(item, size, quantity, info, index) for index, item in enumerate(raw))
 
-    schema = {"type": "array", "items": _vector_schema(size, quantity), "minItems": count, "maxItems": count}
+    schema = {"type": "array", "items": vector_schema(size, quantity), "minItems": count, "maxItems": count}
     return Annotated[Any, Checked(check, schema)]
 
 
@@ -127,17 +128,17 @@ class Samples(BaseModel):
     value: str | None = None
 
 
-def motion(quantity: str) -> Any:
-    """Return the annotation of a motion law."""
+def motion(quantity: str, variables: tuple[str, ...] = ()) -> Any:
+    """Return the annotation of a law of time, and of other variables where there are some: of motion, or of a force."""
 
     def check(raw: Any, info: Any) -> Any:
         if not isinstance(raw, dict):
-            return _parse(raw, quantity, info, ("t",)).value
+            return parse(raw, quantity, info, ("t", *variables)).value
         if raw.keys() == {"expression"}:
             try:
-                return _parse(raw["expression"], quantity, info, ("t",)).value
+                return parse(raw["expression"], quantity, info, ("t", *variables)).value
             except PydanticCustomError as error:
-                raise _below(error, "expression") from None
+                raise below(error, "expression") from None
         valid = ["expression"] if "expression" in raw else list(Samples.model_fields)
         valid += [] if {"expression", "samples"} & raw.keys() else ["expression"]
         for key in raw.keys() - set(valid):
@@ -151,8 +152,9 @@ def motion(quantity: str) -> Any:
             raise problem("the degree of a spline is from 1 to 11", "degree", value=raw["degree"])
         return Samples(**raw)
 
-    described = " and of t, the time in s"
-    law = _scalar_schema(quantity, described)
+    named = f", {', '.join(variables[:-1])} and {variables[-1]}" if len(variables) > 1 else ""
+    described = f" and of t, the time in s{named}"
+    law = scalar_schema(quantity, described)
     formula = {"type": "object", "properties": {"expression": law}, "required": ["expression"]}
     spline = Samples.model_json_schema()
     for entry in (spline["properties"]["time"], spline["properties"]["value"]):
@@ -164,6 +166,25 @@ def motion(quantity: str) -> Any:
         "anyOf": [*law["anyOf"], formula | {"additionalProperties": False}, spline],
     }
     return Annotated[Any, Checked(check, schema)]
+
+
+def laws(size: int, quantity: str, variables: tuple[str, ...]) -> Any:
+    """Return the annotation of a list of laws, one for each component of a force."""
+    one = motion(quantity, variables)
+    single: Checked = one.__metadata__[0]
+
+    def check(raw: Any, info: Any) -> tuple[Any, ...]:
+        if not isinstance(raw, (list, tuple)) or len(raw) != size:
+            raise problem(f"must be a list of {size} laws, one for each component")
+        found = []
+        for index, entry in enumerate(raw):
+            try:
+                found.append(single.function(entry, info))
+            except PydanticCustomError as error:
+                raise below(error, index, value=entry) from None
+        return tuple(found)
+
+    return Annotated[Any, Checked(check, {"type": "array", "items": single.schema, "minItems": size, "maxItems": size})]
 
 
 def _orientation(raw: Any, info: Any) -> dict[str, Any]:
@@ -184,50 +205,29 @@ def _orientation(raw: Any, info: Any) -> dict[str, Any]:
         if key not in raw:
             raise problem("is missing", key, value=UNSET)
     if form == "quaternion":
-        return {"quaternion": _vector_value(raw["quaternion"], 4, "ratio", info, "quaternion")}
+        return {"quaternion": vector_value(raw["quaternion"], 4, "ratio", info, "quaternion")}
     if form == "euler":
         if not isinstance(raw["euler"], str):
             raise problem("must be three letters, such as zxz", "euler", value=raw["euler"])
-        return {"euler": raw["euler"], "angles": _vector_value(raw["angles"], 3, "angle", info, "angles")}
+        return {"euler": raw["euler"], "angles": vector_value(raw["angles"], 3, "angle", info, "angles")}
     try:
-        angle = _parse(raw["angle"], "angle", info).value
+        angle = parse(raw["angle"], "angle", info).value
     except PydanticCustomError as error:
-        raise _below(error, "angle") from None
-    return {"axis": _vector_value(raw["axis"], 3, "direction", info, "axis"), "angle": angle}
+        raise below(error, "angle") from None
+    return {"axis": vector_value(raw["axis"], 3, "direction", info, "axis"), "angle": angle}
 
 
 def orientation() -> Any:
     """Return the annotation of an orientation in space."""
     forms = [
-        {"quaternion": _vector_schema(4, "ratio")},
-        {"axis": _vector_schema(3, "direction"), "angle": _scalar_schema("angle")},
+        {"quaternion": vector_schema(4, "ratio")},
+        {"axis": vector_schema(3, "direction"), "angle": scalar_schema("angle")},
         {
             "euler": {"type": "string", "pattern": "^([xyz]{3}|[XYZ]{3})$"},
-            "angles": _vector_schema(3, "angle"),
+            "angles": vector_schema(3, "angle"),
         },
     ]
     closed = {"type": "object", "additionalProperties": False}
     text = "lower-case Euler letters turn about fixed axes, upper-case ones about the moving axes of the body"
     schema = {"description": text, "oneOf": [closed | {"properties": f, "required": list(f)} for f in forms]}
     return Annotated[Any, Checked(_orientation, schema)]
-
-
-def inertia() -> Any:
-    """Return the annotation of a spatial inertia: three principal moments, or the full symmetric matrix."""
-
-    def check(raw: Any, info: Any) -> Any:
-        if not isinstance(raw, (list, tuple)) or len(raw) != 3:
-            raise problem("must be a list of 3 principal moments, or 3 rows of 3")
-        if not all(isinstance(row, (list, tuple)) for row in raw):
-            return _vector_value(raw, 3, "inertia", info)
-        rows = tuple(_vector_value(row, 3, "inertia", info, index) for index, row in enumerate(raw))
-        if any(rows[i][j] != rows[j][i] for i in range(3) for j in range(i)):
-            raise problem("a matrix of inertia must be symmetric")
-        return rows
-
-    schema = {
-        "type": "array",
-        "description": "a list of 3 principal moments, or 3 rows of 3, such as 0.1 kg*m^2",
-        "anyOf": [_vector_schema(3, "inertia"), {"items": _vector_schema(3, "inertia"), "minItems": 3, "maxItems": 3}],
-    }
-    return Annotated[Any, Checked(check, schema)]

@@ -34,12 +34,14 @@ def resolve(value: Any, parameters: Mapping[str, Any]) -> Any:
         entries = [resolve(entry, parameters) for entry in value]
         if any(isinstance(entry, Tracer) for entry in entries):
             return jnp.stack([jnp.asarray(entry, float) for entry in entries])
-        return np.array(entries, float) if all(map(_is_number, entries)) else list(value)
+        return np.array(entries, float) if _are_numbers(entries) else list(value)
     return value
 
 
-def _is_number(value: Any) -> bool:
-    return isinstance(value, float) or (isinstance(value, np.ndarray) and value.shape == () and value.dtype.kind == "f")
+def _are_numbers(entries: list[Any]) -> bool:
+    """Tell whether entries are numbers, or rows of numbers of one length."""
+    numeric = all(isinstance(x, float) or (isinstance(x, np.ndarray) and x.dtype.kind == "f") for x in entries)
+    return numeric and len({np.shape(x) for x in entries}) <= 1
 
 
 def resolve_motion(motion: Any, parameters: Mapping[str, Any]) -> AbstractMotion:

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from jounce.errors import RobotError
+from jounce.errors import RobotError, did_you_mean
+from jounce.rigid.solids import SOLIDS, pseudo_parts, solid_moments
 
 ROUNDING = 1e-5  # of the largest principal moment: what files with six digits may break the triangle inequality by
 
@@ -98,6 +99,81 @@ class Inertia:
         return Inertia(self.mass, position + rotation @ self.center_of_mass, (tensor + tensor.T) / 2)
 
     @classmethod
+    def solid(
+        cls,
+        kind: str,
+        *,
+        mass: Any = None,
+        density: Any = None,
+        axis: str = "",
+        center_of_mass: Any = (0.0, 0.0, 0.0),
+        **sizes: Any,
+    ) -> "Inertia":
+        """Return the inertia of a homogeneous solid.
+
+        Parameters
+        ----------
+        kind : str
+            ``"box"`` (size: three edges along x, y and z), ``"sphere"`` (radius), ``"cylinder"`` (radius, length),
+            ``"tube"`` (radius, inner_radius, length), or thin: ``"rod"`` (length), ``"disc"`` (radius).
+        mass, density : float
+            kg, or kg/m^3: one of them; thin solids take a mass.
+        axis : str, optional
+            ``"x"``, ``"y"`` or ``"z"`` of the body, along which a rod (x unless told), cylinder, tube, or the normal of
+            a disc (z unless told) stands.
+        center_of_mass : array_like of shape (3,), default zero
+            In the frame of the body, m.
+        **sizes
+            m.
+
+        Raises
+        ------
+        RobotError
+            If the kind, the axis or a size does not exist or is missing, or a value is not greater than zero.
+
+        Examples
+        --------
+        >>> import jounce as jn
+        >>> shaft = jn.Inertia.solid("cylinder", radius=0.02, length=0.3, density=7850)
+        >>> round(shaft.mass, 6)
+        2.95938
+        """
+        axis = check_solid(kind, axis, {**sizes, "mass": mass, "density": density})
+        volume, moments = solid_moments(kind, axis, sizes)
+        mass = float(density * volume if mass is None else mass)
+        return cls(mass, center_of_mass, np.array(moments, float) * mass)
+
+    @classmethod
+    def from_pseudo(cls, pseudo: Any) -> "Inertia":
+        """Return the inertia that a matrix of pseudo-inertia describes: the inverse of `pseudo_inertia`.
+
+        Parameters
+        ----------
+        pseudo : array_like of shape (4, 4)
+            Second moments about the origin of the frame, kg m^2, first moments, kg m, and mass, kg.
+
+        Raises
+        ------
+        RobotError
+            If it is not symmetric, the mass is not greater than zero, or no real body has such moments.
+
+        Examples
+        --------
+        >>> import jounce as jn
+        >>> ball = jn.Inertia(2.0, center_of_mass=[0.5, 0, 0], tensor=[0.1, 0.1, 0.1])
+        >>> jn.Inertia.from_pseudo(ball.pseudo_inertia).tensor.diagonal().round(12).tolist()
+        [0.1, 0.1, 0.1]
+        """
+        pseudo = finite_numbers("pseudo", pseudo, (4, 4))
+        if not np.allclose(pseudo, pseudo.T, rtol=0, atol=1e-9 * float(np.abs(pseudo).max())):
+            raise RobotError("must be symmetric", name="pseudo", value=pseudo.tolist())
+        if pseudo[3, 3] <= 0:
+            raise RobotError("must be greater than zero", name="mass", value=float(pseudo[3, 3]))
+        mass, center, second = pseudo_parts(pseudo)
+        moments = np.array(second)
+        return cls(float(mass), center, np.trace(moments) * np.eye(3) - (moments + moments.T) / 2)
+
+    @classmethod
     def total(cls, parts: Iterable["Inertia"]) -> "Inertia":
         """Return the inertia of several bodies fixed together, all given in one frame.
 
@@ -116,6 +192,46 @@ class Inertia:
             d = part.center_of_mass - center
             tensor += part.tensor + part.mass * (d @ d * np.eye(3) - np.outer(d, d))
         return cls(mass, center, tensor)
+
+
+def check_solid(kind: str, axis: str, given: dict[str, Any]) -> str:
+    """Return the axis of a solid, its own unless one is given, once kind, axis, sizes and mass or density fit.
+
+    Raises
+    ------
+    RobotError
+        What does not fit.
+    """
+    if kind not in SOLIDS:
+        raise RobotError(f"unknown solid; {did_you_mean(kind, SOLIDS)}", name="solid", value=kind)
+    solid = SOLIDS[kind]
+    valid = (*solid.sizes, "mass", "density")
+    for name in given:
+        if name not in valid:
+            raise RobotError(f"a {kind} has no such size; {did_you_mean(name, valid)}", name=name)
+    for name in solid.sizes:
+        if given.get(name) is None:
+            raise RobotError("is missing", name=name)
+    mass, density = given.get("mass"), given.get("density")
+    if (mass is None) == (density is None):
+        raise RobotError("a solid takes a mass or a density", name="density", value=density)
+    if density is not None and kind in ("rod", "disc"):
+        raise RobotError(f"a {kind} is thin and has no volume; give its mass", name="density", value=density)
+    if axis and (not solid.axis or axis not in ("x", "y", "z")):
+        words = "the axis is x, y or z" if solid.axis else f"a {kind} has no axis"
+        raise RobotError(words, name="axis", value=axis)
+    _check_sizes({name: value for name, value in given.items() if value is not None})
+    return axis or solid.axis
+
+
+def _check_sizes(given: dict[str, Any]) -> None:
+    for name, value in given.items():
+        numbers = finite_numbers(name, value, (3,) if name == "size" else ())
+        if not (numbers > 0).all() and name != "inner_radius":
+            raise RobotError("must be greater than zero", name=name, value=numbers.tolist())
+    if "inner_radius" in given and not 0 <= given["inner_radius"] < given["radius"]:
+        message = "the inner radius of a tube is at least zero and less than its radius"
+        raise RobotError(message, name="inner_radius", value=float(given["inner_radius"]))
 
 
 def finite_numbers(name: str, value: Any, *shapes: tuple[int, ...]) -> np.ndarray:

@@ -1,0 +1,71 @@
+"""Masses of bodies in numbers, checked: what no real body can have is refused."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from jax.core import Tracer
+
+from jounce.errors import JounceError, MechanismError, RobotError
+from jounce.mechanism.mechanism import Body
+from jounce.mechanism.resolve import check_value, resolve
+from jounce.rigid.inertia import Inertia
+
+
+def body_mass(name: str, body: Body, parameters: Mapping[str, Any], components: int) -> tuple[Any, Any, Any]:
+    """Return mass, centre of mass, (2,) or (3,), and inertia about it, () or (3, 3), of a body; zero where not given.
+
+    Parameters
+    ----------
+    name : str
+        Of the body, for messages.
+    body : Body
+        Its values may be expressions.
+    parameters : mapping of str to float
+        Values of the names in expressions.
+    components : int
+        2 in the plane, 3 in space.
+
+    Raises
+    ------
+    MechanismError
+        If a value has a wrong shape or is not finite, mass or inertia is negative, or no real body has such moments.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> plate = jn.Body([0, 0], mass="m", inertia="m*a**2/6", center_of_mass=[0.1, 0])
+    >>> mass, center, inertia = body_mass("plate", plate, {"m": 3.0, "a": 2.0}, 2)
+    >>> mass, center.tolist(), inertia
+    (3.0, [0.1, 0.0], 2.0)
+    """
+    place = f"bodies.{name}"
+    mass = _resolved(f"{place}.mass", 0.0 if body.mass is None else body.mass, parameters, ())
+    center = [0.0] * components if body.center_of_mass is None else body.center_of_mass
+    center = _resolved(f"{place}.center_of_mass", center, parameters, (components,))
+    shapes = ((),) if components == 2 else ((3,), (3, 3))
+    zero = 0.0 if components == 2 else [0.0] * 3
+    inertia = _resolved(f"{place}.inertia", zero if body.inertia is None else body.inertia, parameters, *shapes)
+    for field, value in (("mass", mass), ("inertia", inertia)):
+        if np.shape(value) == () and not isinstance(value, Tracer) and value < 0:
+            raise MechanismError("must not be negative", name=f"{place}.{field}", value=float(value))
+    if components == 3 and not isinstance(inertia, Tracer):
+        try:
+            inertia = Inertia(1.0, tensor=inertia).tensor
+        except RobotError as error:
+            raise MechanismError(error.message, name=f"{place}.inertia", value=error.value) from None
+    return mass, center, inertia
+
+
+def _resolved(name: str, value: Any, parameters: Mapping[str, Any], *shapes: tuple[int, ...]) -> Any:
+    try:
+        found = resolve(value, parameters)
+        if isinstance(found, Tracer) or (np.shape(found) in shapes and np.shape(found) != ()):
+            if not isinstance(found, Tracer) and not np.isfinite(found).all():
+                raise MechanismError("must be finite", value=np.asarray(found).tolist())
+            return found
+        kind, size = ("vector", shapes[0][0]) if shapes[0] else ("scalar", 0)
+        check_value(name.rpartition(".")[2], kind, found, size)
+    except JounceError as error:
+        raise error.located(name=name) from None
+    return found

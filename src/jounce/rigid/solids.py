@@ -1,0 +1,95 @@
+"""Homogeneous solids: volume, and moments of inertia over the mass, from their sizes.
+
+Plain arithmetic, so that sizes may be numbers or anything else that can be added and multiplied.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+
+class Solid(NamedTuple):
+    """A kind of solid: its sizes, the axis it stands along unless told, and how volume and moments follow.
+
+    Attributes
+    ----------
+    sizes : tuple of str
+        Names of its sizes, m.
+    axis : str
+        ``"x"``, ``"y"`` or ``"z"``; empty where no axis is special.
+    measure : callable
+        Maps the sizes to the volume, m^3 (None where a size is taken for zero), and to the moments of inertia over
+        the mass, m^2, about the axis and across it; or about x, y and z.
+    """
+
+    sizes: tuple[str, ...]
+    axis: str
+    measure: Callable[..., tuple[Any, tuple[Any, ...]]]
+
+
+def _box(size: Any) -> tuple[Any, tuple[Any, ...]]:
+    x, y, z = size
+    return x * y * z, ((y * y + z * z) / 12.0, (z * z + x * x) / 12.0, (x * x + y * y) / 12.0)
+
+
+def _sphere(radius: Any) -> tuple[Any, tuple[Any, ...]]:
+    moment = radius * radius * 0.4
+    return radius * radius * radius * (4 * math.pi / 3), (moment, moment, moment)
+
+
+def _tube(radius: Any, inner_radius: Any, length: Any) -> tuple[Any, tuple[Any, ...]]:
+    outer, inner = radius * radius, inner_radius * inner_radius
+    along = (outer + inner) / 2.0
+    return (outer - inner) * length * math.pi, (along, along / 2.0 + length * length / 12.0)
+
+
+def _cylinder(radius: Any, length: Any) -> tuple[Any, tuple[Any, ...]]:
+    return _tube(radius, 0.0, length)
+
+
+def _rod(length: Any) -> tuple[Any, tuple[Any, ...]]:
+    return None, (0.0, length * length / 12.0)
+
+
+def _disc(radius: Any) -> tuple[Any, tuple[Any, ...]]:
+    return None, (radius * radius / 2.0, radius * radius / 4.0)
+
+
+SOLIDS = {
+    "box": Solid(("size",), "", _box),
+    "sphere": Solid(("radius",), "", _sphere),
+    "cylinder": Solid(("radius", "length"), "z", _cylinder),
+    "tube": Solid(("radius", "inner_radius", "length"), "z", _tube),
+    "rod": Solid(("length",), "x", _rod),
+    "disc": Solid(("radius",), "z", _disc),
+}
+
+
+def solid_moments(kind: str, axis: str, sizes: dict[str, Any]) -> tuple[Any, tuple[Any, Any, Any]]:
+    """Return the volume of a solid, None for a thin one, and its moments over the mass about x, y and z.
+
+    Examples
+    --------
+    >>> solid_moments("rod", "x", {"length": 6.0})
+    (None, (0.0, 3.0, 3.0))
+    """
+    volume, moments = SOLIDS[kind].measure(**sizes)
+    if len(moments) == 3:
+        return volume, (moments[0], moments[1], moments[2])
+    along, across = moments
+    x, y, z = (along if letter == axis else across for letter in "xyz")
+    return volume, (x, y, z)
+
+
+def pseudo_parts(pseudo: Any) -> tuple[Any, list[Any], list[list[Any]]]:
+    """Return the mass, the centre of mass and the second moments about it from a matrix of pseudo-inertia.
+
+    Parameters
+    ----------
+    pseudo : sequence of sequences
+        ``[[S, m c], [m c^T, m]]`` with S the integral of rho rho^T dm about the origin; (4, 4), or (3, 3) in the plane.
+    """
+    size = range(len(pseudo) - 1)
+    mass, first = pseudo[-1][-1], [row[-1] for row in pseudo[:-1]]
+    second = [[pseudo[i][k] - first[i] * first[k] / mass for k in size] for i in size]
+    return mass, [part / mass for part in first], second
