@@ -1,0 +1,141 @@
+"""Marching through time: steps chosen, taken, projected, checked, and kept as polynomials."""
+
+import enum
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from jounce.dynamics.forward import Equations, Expansion, State, expand
+from jounce.integrate.methods import AbstractMethod, coefficient_sizes
+from jounce.integrate.projection import projected
+from jounce.kinematics.compilation import compiled
+
+SMALLEST_STEP = 1e-13  # of the span, or of the time itself
+MARGIN = 10.0  # an estimate of the error that is so many times the tolerance is still accepted: estimates are rough
+
+
+class Outcome(enum.IntEnum):
+    """What became of a run."""
+
+    RUNNING = 0
+    ARRIVED = 1
+    COLLAPSED = 2  # steps became too small to move on
+    LOST = 3  # the motion is not finite from the start
+
+
+class Front(NamedTuple):
+    """How far a batch of runs has come."""
+
+    time: Any  # s, shape (batch,)
+    expansion: Expansion
+    limit: Any  # largest next step after one that was refused, s
+    outcome: Any  # see Outcome
+    drift: Any  # largest distance from the constraints before a projection, rad or sizes of the mechanism
+
+
+class Steps(NamedTuple):
+    """Steps tried, in the order of trial, first axis; the batch last."""
+
+    start: Any  # s
+    length: Any  # s, negative backward in time
+    taken: Any  # whether it was accepted
+    polynomial: State  # coefficients in the time from the start, (steps, order + 1, components, bodies, batch)
+
+
+@compiled("order")
+def departed(equations: Equations, state: State, time: Any, *, order: int) -> Front:
+    """Return the start of runs from states on the constraints; `time` has the shape (batch,)."""
+    expansion = expand(equations, state, time[None], order)
+    finite = _finite(expansion)
+    outcome = jnp.where(finite, int(Outcome.RUNNING), int(Outcome.LOST))
+    return Front(time, expansion, jnp.full(time.shape, jnp.inf), outcome, jnp.zeros(time.shape))
+
+
+@compiled("method", "count", "keep")
+def march(
+    equations: Equations,
+    front: Front,
+    stop: Any,
+    tolerance: Any,
+    longest: Any,
+    *,
+    method: AbstractMethod,
+    count: int,
+    keep: bool = True,
+) -> tuple[Front, Steps | None, Any]:
+    """Take up to `count` steps towards a time, all runs of a batch side by side.
+
+    Parameters
+    ----------
+    equations : Equations
+        Of the mechanism.
+    front : Front
+        Where to go on from.
+    stop : float
+        Where to go, s; steps end there exactly.
+    tolerance : float
+        Of the error of a step, rad or sizes of the mechanism.
+    longest : float
+        Largest step, s.
+    method : AbstractMethod
+        How steps are taken.
+    count : int
+        Steps to try at most.
+    keep : bool, default True
+        Whether to return the steps, for dense output.
+
+    Returns
+    -------
+    front : Front
+    steps : Steps or None
+    tried : int
+        How many of them there are.
+    """
+    length = equations.system.column_scale[0]
+    order = len(front.expansion.acceleration)
+
+    def attempt(front: Front) -> tuple[Front, Steps]:
+        left = stop - front.time
+        sizes = coefficient_sizes(front.expansion, length)
+        step = jnp.minimum(jnp.minimum(method.step(sizes, tolerance), front.limit), longest)
+        last = step >= 0.999 * jnp.abs(left)  # no sliver of a step at the end
+        step = jnp.where(last, left, jnp.sign(left) * step)
+        time = jnp.where(last, stop, front.time + step)
+        running = front.outcome == Outcome.RUNNING
+        step = jnp.where(running, step, 0.0)
+        time = jnp.where(running, time, front.time)
+
+        state = method.arrive(equations, front.expansion, front.time, step)
+        state, distance = projected(equations, state, time[None])
+        expansion = expand(equations, state, time[None], order)
+        error = method.error(front.expansion, expansion, step, length)
+        good = _finite(expansion) & jnp.isfinite(distance) & (error <= MARGIN * tolerance) & running
+        tiny = jnp.abs(step) < SMALLEST_STEP * jnp.maximum(jnp.abs(front.time), jnp.abs(stop - front.time))
+        polynomial = method.polynomial(front.expansion, expansion, step)
+        steps = Steps(front.time, step, good, polynomial)
+        outcome = jnp.where(good & last, int(Outcome.ARRIVED), front.outcome)
+        outcome = jnp.where(running & ~good & tiny, int(Outcome.COLLAPSED), outcome)
+        onwards = Front(time, expansion, jnp.full(step.shape, jnp.inf), outcome, jnp.maximum(front.drift, distance))
+        refused = front._replace(limit=jnp.where(running, 0.5 * jnp.abs(step), front.limit), outcome=outcome)
+        return jax.tree.map(lambda a, b: jnp.where(good, a, b), onwards, refused), steps
+
+    def unfinished(carry: Any) -> Any:
+        front, _, tried = carry
+        return jnp.any(front.outcome == Outcome.RUNNING) & (tried < count)
+
+    def iterate(carry: Any) -> Any:
+        front, kept, tried = carry
+        front, steps = attempt(front)
+        if keep:
+            kept = jax.tree.map(lambda k, s: jax.lax.dynamic_update_index_in_dim(k, s, tried, 0), kept, steps)
+        return front, kept, tried + 1
+
+    shapes = jax.eval_shape(lambda f: attempt(f)[1], front)
+    kept = jax.tree.map(lambda s: jnp.zeros((count, *s.shape), s.dtype), shapes) if keep else None
+    return jax.lax.while_loop(unfinished, iterate, (front, kept, 0))
+
+
+def _finite(expansion: Expansion) -> Any:
+    parts = [jnp.all(jnp.isfinite(x.reshape(-1, x.shape[-1])), axis=0) for x in jax.tree.leaves(expansion)]
+    return jnp.all(jnp.stack(parts), axis=0)

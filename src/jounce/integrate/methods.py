@@ -1,0 +1,136 @@
+"""Integration methods: how far a step may go, where it arrives, how well, and its polynomial in between."""
+
+import abc
+import math
+from functools import cached_property
+from typing import Any, ClassVar
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jounce.dynamics.forward import Equations, Expansion, State, expand
+from jounce.errors import JounceError
+
+HIGHEST_ORDER = 40
+ROUNDING = 1e-14  # relative error of an acceleration that is no sign of a step too long
+
+
+class AbstractMethod(eqx.Module):
+    """A one-step method on Taylor expansions of the constrained motion.
+
+    Every step starts from the expansion of the motion at its beginning, ends on the constraints, and is accepted where
+    the accelerations of the equations there agree with those of its polynomial.
+    """
+
+    @abc.abstractmethod
+    def expansion_order(self, tolerance: float) -> int:
+        """Return the order of the expansions that the method needs."""
+
+    @abc.abstractmethod
+    def step(self, sizes: Any, tolerance: Any) -> Any:
+        """Return how far a step may go, s, shape (batch,).
+
+        Parameters
+        ----------
+        sizes : array of shape (order + 1, batch)
+            Sizes of the Taylor coefficients 1 to order + 1 of the positions, rad or sizes of the mechanism.
+        tolerance : float
+            Of the error of a step, in the same measure.
+        """
+
+    @abc.abstractmethod
+    def arrive(self, equations: Equations, expansion: Expansion, time: Any, step: Any) -> State:
+        """Return the state at the end of a step, not yet on the constraints; `time` is that of its beginning."""
+
+    @abc.abstractmethod
+    def polynomial(self, start: Expansion, end: Expansion, step: Any) -> State:
+        """Return the coefficients of the step's polynomial in the time from its beginning, order first."""
+
+    @abc.abstractmethod
+    def error(self, start: Expansion, end: Expansion, step: Any, length: Any) -> Any:
+        """Return an estimate of the error of a step, rad or sizes of the mechanism, shape (batch,)."""
+
+
+def evaluated(polynomial: State, step: Any) -> State:
+    """Return the values of the polynomials of a state a time `step` away, shape (batch,)."""
+    return State(*(_horner(c, step) for c in polynomial))
+
+
+def _horner(coefficients: Any, step: Any) -> Any:
+    def add(value: Any, c: Any) -> tuple[Any, None]:
+        return value * step[None, None] + c, None
+
+    return jax.lax.scan(add, coefficients[-1], coefficients[:-1], reverse=True)[0]
+
+
+def coefficient_sizes(expansion: Expansion, length: Any) -> Any:
+    """Return the sizes of the Taylor coefficients 1 to order + 1 of positions, shape (order + 1, batch)."""
+    velocity, spin = (jnp.max(jnp.abs(c), axis=(1, 2)) for c in expansion.state[2:])
+    return jnp.maximum(velocity / length, spin) / jnp.arange(1.0, len(velocity) + 1)[:, None]
+
+
+def _reach(sizes: Any, first: int) -> Any:
+    """Return the time in which no Taylor term from the order `first` on exceeds one, shape (batch,).
+
+    All of them count: the last two may vanish together, as those of a body at rest or at a turning point do.
+    """
+    orders = jnp.arange(1.0, len(sizes) + 1)[first - 1 :]
+    roots = jnp.power(jnp.maximum(sizes[first - 1 :], 1e-300), -1.0 / orders[:, None])
+    return jnp.min(roots, axis=0)
+
+
+class Taylor(AbstractMethod):
+    """Taylor series of the constrained motion, of a chosen order or one that suits the tolerance.
+
+    Parameters
+    ----------
+    order : int, optional
+        From 4 to 40; from the tolerance unless given.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> jn.Taylor().expansion_order(1e-12)
+    21
+    """
+
+    order: int | None = eqx.field(static=True, default=None)
+
+    def __check_init__(self):
+        if self.order is not None and not (isinstance(self.order, int) and 4 <= self.order <= HIGHEST_ORDER):
+            message = f"the order of Taylor series is a whole number from 4 to {HIGHEST_ORDER}"
+            raise JounceError(message, name="order", value=self.order)
+
+    def expansion_order(self, tolerance: float) -> int:
+        """Return the order: of all, the one that takes the fewest terms for a unit of time, at this tolerance."""
+        return self.order or min(max(round(-0.75 * math.log(tolerance)), 6), 28)
+
+    def step(self, sizes: Any, tolerance: Any) -> Any:
+        """Return the step at which the terms of the upper half of the orders point to an error within tolerance."""
+        count = len(sizes)
+        return _reach(sizes, count // 2) * tolerance ** (1.0 / count)
+
+    def arrive(self, equations: Equations, expansion: Expansion, time: Any, step: Any) -> State:
+        """Return the value of the series."""
+        return evaluated(expansion.state, step)
+
+    def polynomial(self, start: Expansion, end: Expansion, step: Any) -> State:
+        """Return the series."""
+        return start.state
+
+    def error(self, start: Expansion, end: Expansion, step: Any, length: Any) -> Any:
+        """Return what accelerations at the end depart by from the series, as the displacement that is left out."""
+        order = len(start.acceleration)
+        series = jnp.concatenate([c for c in start.state[2:]], axis=1)
+        rates = series[1:] * jnp.arange(1.0, order + 1)[:, None, None, None]
+        found = end.acceleration[0]
+        departure = jnp.abs(_horner(rates, step) - found) - ROUNDING * jnp.max(jnp.abs(found), axis=(0, 1))[None, None]
+        shifts = start.state.velocity.shape[1]
+        size = jnp.maximum(_largest(departure[:shifts]) / length, _largest(departure[shifts:]))
+        return jnp.maximum(size, 0.0) * step**2 / (order * (order + 1))
+
+
+def _largest(x: Any) -> Any:
+    return jnp.max(x, axis=(0, 1))
