@@ -24,11 +24,23 @@ from jounce.constraints import (  # noqa: E402
     spatial as spatial,
 )
 from jounce.dynamics import (  # noqa: E402
+    AppliedForceOutput as AppliedForceOutput,
+    AppliedTorqueOutput as AppliedTorqueOutput,
+    DriverForceOutput as DriverForceOutput,
+    DriverTorqueOutput as DriverTorqueOutput,
     Energy as Energy,
+    JointForceOutput as JointForceOutput,
+    JointTorqueOutput as JointTorqueOutput,
     LimitReport as LimitReport,
+    Reaction as Reaction,
     acceleration_energy as acceleration_energy,
+    applied_force as applied_force,
     check_limits as check_limits,
+    driver_force as driver_force,
+    joint_reaction as joint_reaction,
     kinetic_energy as kinetic_energy,
+    potential_energy as potential_energy,
+    power_balance as power_balance,
 )
 from jounce.errors import (  # noqa: E402
     AssemblyError as AssemblyError,

@@ -1,4 +1,4 @@
-"""Energies and equations of motion: kinetic and acceleration energies of any order, generalised forces and rates."""
+"""Energies, equations of motion, and forces with rates: of drivers, joints and everything that is applied."""
 
 from jounce.dynamics.balances import (
     gravity_forces as gravity_forces,
@@ -10,6 +10,7 @@ from jounce.dynamics.energies import (
     acceleration_energy as acceleration_energy,
     body_energy as body_energy,
     kinetic_energy as kinetic_energy,
+    potential_energy as potential_energy,
 )
 from jounce.dynamics.equations import (
     catalan as catalan,
@@ -20,3 +21,18 @@ from jounce.dynamics.equations import (
     printed_coefficient as printed_coefficient,
 )
 from jounce.dynamics.limits import LimitReport as LimitReport, LimitRow as LimitRow, check_limits as check_limits
+from jounce.dynamics.outputs import (
+    AppliedForceOutput as AppliedForceOutput,
+    AppliedTorqueOutput as AppliedTorqueOutput,
+    DriverForceOutput as DriverForceOutput,
+    DriverTorqueOutput as DriverTorqueOutput,
+    JointForceOutput as JointForceOutput,
+    JointTorqueOutput as JointTorqueOutput,
+)
+from jounce.dynamics.power import power_balance as power_balance
+from jounce.dynamics.reactions import (
+    Reaction as Reaction,
+    applied_force as applied_force,
+    driver_force as driver_force,
+    joint_reaction as joint_reaction,
+)

@@ -1,14 +1,13 @@
-"""Forces of a driven mechanism and their rates: Lagrange multipliers from the transposed factor, to any order.
+"""Forces of constraints and their rates: Lagrange multipliers from the transposed factor, to any order.
 
 The equations of motion ``M q'' + Phi_q^T lambda = Q`` are a balance of jets. With the motion known, each coefficient of
-the multipliers follows from the factored Jacobian of the positions, transposed. The product ``Phi_q^T lambda`` of jets is
-the transpose of ``Phi_q v``, and that is how the residuals change as bodies move with the virtual velocity v: no Jacobian
-is written anywhere, and a joint of one's own has its reactions.
+the multipliers follows from the factored Jacobian of the positions, transposed; where the motion is free in some
+directions, from the matrix of masses and Jacobian together. The jets of the Jacobian are how the residuals change with
+virtual displacements of the bodies: none is written anywhere, and a joint of one's own has its reactions.
 """
 
 import dataclasses
-import math
-from collections.abc import Callable
+from collections.abc import Sequence
 from typing import Any
 
 import equinox as eqx
@@ -16,20 +15,168 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jounce.dynamics.energies import mechanism_masses
-from jounce.errors import MechanismError, did_you_mean
-from jounce.jet import Jet, components, concatenate, cross
-from jounce.jet.algebra import total
-from jounce.kinematics import Motion, Status
-from jounce.kinematics.compilation import compiled
+from jounce.dynamics.loads import inertia_forces as inertia_forces
+from jounce.jet import Jet
 from jounce.kinematics.linear import DenseFactor
-from jounce.mechanism.system import Group, System
+from jounce.mechanism.system import System
 from jounce.robot.scan import stacked
 from jounce.trajectory import AbstractMotion
 
 
+def truncated(pose: Any, order: int) -> Any:
+    """Return a pose with the jets cut to an order, and none of them a certain zero, so that it may be displaced."""
+    pose = jax.tree.map(lambda jet: jet.dense(), pose.truncate(order), is_leaf=lambda x: isinstance(x, Jet))
+    if pose.turns == 3 and order and pose.angular_velocity is None:
+        rest = Jet.constant(jnp.zeros_like(pose.position.coefficients[0]), order - 1).dense()
+        return dataclasses.replace(pose, angular_velocity=rest)
+    return pose
+
+
+def slopes(element: Any, poses: Sequence[Any], time: Jet, slot: int) -> Any:
+    """Return how the residual of a joint or driver changes as the body in a slot is displaced: Jacobian, as jets.
+
+    Parameters
+    ----------
+    element : AbstractConstraint
+        Its values have shape (..., instances, 1).
+    poses : sequence of SpatialPose or PlanarPose
+        Of the bodies in each slot, shape (..., instances, batch), of the order of the time.
+    time : Jet
+        Of shape (1, batch).
+    slot : int
+        Which of the bodies is displaced; it may be the ground.
+
+    Returns
+    -------
+    array of shape (order + 1, coordinates, rows, instances, batch)
+        Taylor coefficients of the derivatives by a shift in global axes, m, and by a turn in axes of the body, rad.
+    """
+    body = truncated(poses[slot], time.order)
+    shape, size = body.position.shape[1:], body.shifts + body.turns
+
+    def residual(pose: Any) -> Any:
+        return stacked(with_rows(element.residual(*poses[:slot], pose, *poses[slot + 1 :], time)))
+
+    def along(direction: Any) -> Any:
+        unit = jnp.broadcast_to(direction[:, None, None], (size, *shape))
+        shift, turn = (Jet.constant(part, time.order).dense() for part in (unit[: body.shifts], unit[body.shifts :]))
+        change = truncated(body.varied(shift, turn), time.order)
+        return jax.jvp(residual, (body,), (jax.lax.optimization_barrier(change),))[1]
+
+    return jnp.moveaxis(jax.vmap(along)(jnp.eye(size)), 0, 1)
+
+
+def with_rows(jet: Jet) -> Jet:
+    """Return a jet of shape (instances, batch) as one of shape (1, instances, batch)."""
+    return jet.map(lambda c: c[None]) if len(jet.shape) == 2 else jet
+
+
+def work_along(slope: Any, forces: Any, level: int, lowest: int = 0) -> Any:
+    """Return the Taylor coefficient of what multipliers do along the coordinates of the bodies: slope times them.
+
+    Parameters
+    ----------
+    slope : array of shape (levels, coordinates, rows, instances, batch)
+        As `slopes` gives it.
+    forces : array of shape (levels, rows, instances, batch)
+        Coefficients of the multipliers.
+    level : int
+        Which coefficient of the product.
+    lowest : int
+        The coefficients of the slope below this one are left out.
+
+    Returns
+    -------
+    array of shape (coordinates, instances, batch)
+    """
+    return sum(jnp.sum(slope[j] * forces[level - j][None], axis=1) for j in range(lowest, level + 1))
+
+
+class FreeFactor(eqx.Module):
+    """The factored matrix ``[[M, J^T], [J, 0]]`` of a mechanism that has degrees of freedom left."""
+
+    factor: DenseFactor
+    rows: int = eqx.field(static=True)
+
+    @classmethod
+    def of(cls, mass: Any, jacobian: Any) -> "FreeFactor":
+        """Factor from mass matrices, (columns, columns, batch), and Jacobians, (rows, columns, batch)."""
+        rows = jacobian.shape[0]
+        above = jnp.concatenate([mass, jnp.swapaxes(jacobian, 0, 1)], axis=1)
+        below = jnp.concatenate([jacobian, jnp.zeros((rows, rows, jacobian.shape[-1]))], axis=1)
+        return cls(DenseFactor.of(jnp.concatenate([above, below])), rows)
+
+    def solve_transposed(self, right: Any) -> Any:
+        """Return the multipliers that balance loads, (columns, batch), but for what accelerates the bodies freely."""
+        whole = jnp.concatenate([right, jnp.zeros((self.rows, right.shape[-1]))])
+        return self.factor.solve(whole)[-self.rows :]
+
+
+def multipliers(system: System, blocks: Sequence[Sequence[Any]], load: Any, mass: Any = None) -> Any:
+    """Return the multipliers of all rows, not scaled, as Taylor coefficients, (levels, rows, batch).
+
+    Parameters
+    ----------
+    system : System
+        The mechanism.
+    blocks : sequence of sequence of array
+        For each group, `slopes` for each of its moving slots.
+    load : array of shape (levels, coordinates of a body, bodies, batch)
+        What the constraints have to balance, without the ground.
+    mass : array of shape (coordinates, coordinates, bodies, batch), optional
+        As `mass_matrices` gives them, without the ground; for mechanisms that are not driven in all directions.
+    """
+    if not blocks:
+        return jnp.zeros((load.shape[0], 0, load.shape[-1]))
+    scale = jnp.asarray(system.column_scale)
+    factor = _factor(system, blocks, mass)
+    found: list[Any] = []
+    for k in range(len(load)):
+        missing = load[k]
+        for group, parts, forces in _by_group(system, blocks, found):
+            for slot, slope in zip(group.moving_slots, parts, strict=True):
+                missing -= _onto_bodies(work_along(slope, forces, k, 1), group.bodies[slot], system.body_count)
+        right = jnp.swapaxes(missing * scale[:, None, None], 0, 1).reshape(-1, missing.shape[-1])
+        found.append(factor.solve_transposed(right) * system.row_scale)
+    return jnp.stack(found)
+
+
+def _factor(system: System, blocks: Sequence[Sequence[Any]], mass: Any) -> Any:
+    """Return the factor that solves for multipliers: of the Jacobian alone where it is square."""
+    scale = jnp.asarray(system.column_scale)
+    flat = [(slope[0] * scale[:, None, None, None]).reshape(-1, slope.shape[-1]) for parts in blocks for slope in parts]
+    lanes = flat[0].shape[-1]
+    jacobian = jnp.concatenate([*flat, jnp.zeros((1, lanes))])[system.cells] * system.row_scale[:, :, None]
+    rows, columns, _ = jacobian.shape
+    if rows == columns:
+        return DenseFactor.of(jacobian)
+    scaled = mass * (scale[:, None] * scale)[:, :, None, None]
+    scaled = scaled / jnp.max(jnp.abs(scaled))  # their size does not matter to the multipliers
+    whole = jnp.eye(system.body_count)[:, None, :, None, None] * jnp.moveaxis(scaled, 2, 0)[:, :, None]
+    return FreeFactor.of(whole.reshape(columns, columns, lanes), jacobian)
+
+
+def _by_group(system: System, blocks: Sequence[Sequence[Any]], found: list[Any]) -> list[Any]:
+    """Return groups with their blocks and those of the multipliers found so far, each (rows, instances, batch)."""
+    if not found:
+        return []
+    results, first = [], 0
+    for group, parts in zip(system.groups, blocks, strict=True):
+        _, _, rows, instances, lanes = parts[0].shape
+        last = first + rows * instances
+        # the coefficient that is wanted next counts with those of the slope that are left out
+        results.append((group, parts, [level[first:last].reshape(rows, instances, lanes) for level in found]))
+        first = last
+    return results
+
+
+def _onto_bodies(work: Any, bodies: tuple[int, ...], count: int) -> Any:
+    """Return what acts on each moving body from what acts on the bodies of the instances."""
+    return jnp.zeros((work.shape[0], count + 1, work.shape[-1])).at[:, np.array(bodies)].add(work)[:, 1:]
+
+
 class _Shifted(AbstractMotion):
-    """A law moved by a constant: how the residual of a driver changes with it tells the force that the driver exerts."""
+    """A law moved by a constant: how the residual of a driver changes with it tells what the driver exerts."""
 
     law: AbstractMotion
     shift: Any
@@ -38,141 +185,42 @@ class _Shifted(AbstractMotion):
         return self.law(time) + self.shift
 
 
-def _truncated(pose: Any, order: int) -> Any:
-    """Return a pose with the jets cut to an order; its angular velocity is one shorter."""
-    cut = jax.tree.map(lambda jet: jet.truncate(order).dense(), pose, is_leaf=_is_jet)
-    spin = getattr(cut, "angular_velocity", None)
-    if spin is None:
-        return cut
-    return dataclasses.replace(cut, angular_velocity=spin.truncate(order - 1) if order else None)
-
-
-def _is_jet(value: Any) -> bool:
-    return isinstance(value, Jet)
-
-
-def inertia_forces(pose: Any, mass: Any, center: Any, moments: Any, gravity: Any) -> tuple[Jet, Jet]:
-    """Return inertia less weight of all bodies: force, global, and moment about the origin, in axes of the body.
-
-    Both are two orders shorter than the pose; shapes (c, bodies, batch) and (turns, bodies, batch).
-    """
-    acceleration = pose.point(center).differentiate().differentiate()
-    force = (acceleration - gravity) * mass
-    if pose.turns == 1:
-        about = moments[0][0] + moments[1][1]
-        moment = pose.angle.differentiate().differentiate() * about + cross(pose.direction(center), force)
-        return force, moment[None]
-    spread = moments[0][0] + moments[1][1] + moments[2][2]
-    spin = pose.angular_velocity
-    momentum = spin * spread - total(moments[:, i] * part for i, part in enumerate(components(spin)))
-    local = pose.to_body(force)
-    return force, momentum.differentiate() + cross(spin, momentum) + cross(center, local)
-
-
-def _balance(system: System, pose: Any, time: Jet, levels: int) -> Callable[[Any], Any]:
-    """Return the map from multipliers, (levels, rows, batch), to ``Phi_q^T lambda``, (levels, c, bodies, batch)."""
-    order = levels - 1
-    pose, time = _truncated(pose, order), time.truncate(order)
-
-    def rates(velocity: Any) -> Any:
-        still = jnp.zeros_like(velocity[:, :, :1])  # the ground does not move
-        velocity = jnp.concatenate([still, velocity], axis=2)
-        shift, turn = (Jet(tuple(part)) for part in (velocity[:, : pose.shifts], velocity[:, pose.shifts :]))
-        change = _truncated(pose.varied(shift, turn), order)
-        return jax.jvp(lambda p: stacked(system.residual(p, time)), (pose,), (change,))[1]
-
-    batch = time.coefficients[0].shape[-1]
-    example = jax.ShapeDtypeStruct((levels, pose.shifts + pose.turns, system.body_count, batch), jnp.float64)
-    transposed = jax.linear_transpose(rates, example)
-    # the transpose of a convolution runs backwards in the orders
-    return lambda multipliers: transposed(multipliers[::-1])[0][::-1]
-
-
-def multipliers(system: System, pose: Any, time: Jet, load: Any, levels: int) -> Any:
-    """Return the multipliers of all rows as Taylor coefficients, (levels, rows, batch).
-
-    Parameters
-    ----------
-    system : System
-        The mechanism; its rows are scaled, and so are the multipliers.
-    pose : SpatialPose or PlanarPose
-        Jets of all bodies, the ground first.
-    time : Jet
-        Of shape (1, batch).
-    load : array of shape (levels, coordinates of a body, bodies, batch)
-        What the constraints have to balance: applied forces less those of inertia.
-    levels : int
-        One more than the rates that are wanted.
-    """
-    product = _balance(system, pose, time, levels)
-    factor = DenseFactor.of(system.jacobian(_truncated(pose, 0), time.truncate(0)))
-    scale = jnp.tile(jnp.asarray(system.column_scale), system.body_count)[:, None]
-    found = jnp.zeros((levels, system.row_scale.shape[0], load.shape[-1]))
-    for k in range(levels):
-        missing = load[k] - product(found)[k]
-        right = jnp.swapaxes(missing, 0, 1).reshape(-1, missing.shape[-1]) * scale
-        found = found.at[k].set(factor.solve_transposed(right))
-    return found
-
-
-def exerted(group: Group, pose: Any, time: Jet, found: Jet) -> Jet:
-    """Return the forces that drivers exert along what they prescribe, (instances, batch), with rates.
+def exerted(driver: Any, poses: Sequence[Any], time: Jet, forces: Any) -> Any:
+    """Return the forces that drivers exert along what they prescribe, with rates, (levels, instances, batch).
 
     Conjugate to the law f: ``lambda^T dPhi/df``, whose product with f' is the power that goes into the mechanism.
 
     Parameters
     ----------
-    group : Group
-        Drivers of one type.
-    pose, time
-        Jets of at least the order of the multipliers.
-    found : Jet
-        Multipliers of the rows, not scaled, shape (rows, instances, batch).
+    driver : AbstractConstraint
+        Its values have shape (..., instances, 1).
+    poses, time
+        As `slopes` takes them.
+    forces : array of shape (levels, rows, instances, batch)
+        Coefficients of the multipliers; the order of the poses is one less than the levels.
     """
-    pose, time = _truncated(pose, found.order), time.truncate(found.order)
 
     def residual(shift: Any) -> Any:
-        element = eqx.tree_at(lambda e: e.motion, group.element, _Shifted(group.element.motion, shift))
-        return stacked(Group(element, group.bodies).residual(pose, time))
+        element = eqx.tree_at(lambda e: e.motion, driver, _Shifted(driver.motion, shift))
+        return stacked(with_rows(element.residual(*poses, time)))
 
-    shift = jnp.zeros((group.instances, time.coefficients[0].shape[-1]))
+    shift = jnp.zeros(forces.shape[2:])
     _, slope = jax.jvp(residual, (shift,), (jnp.ones_like(shift),))
-    return total(components(found * Jet(tuple(slope))))[0]
+    return jnp.stack([work_along(slope[:, None], forces, k)[0] for k in range(len(forces))])
 
 
-def _moving(pose: Any) -> Any:
-    """Return a pose with no certain zeros: also the ground may be moved in thought."""
-    pose = jax.tree.map(lambda jet: jet.dense(), pose, is_leaf=_is_jet)
-    if pose.turns == 3 and pose.order and pose.angular_velocity is None:
-        rest = Jet.constant(jnp.zeros_like(pose.position.coefficients[0]), pose.order - 1).dense()
-        return dataclasses.replace(pose, angular_velocity=rest)
-    return pose
+def wrench(slope: Any, forces: Any) -> Any:
+    """Return what joints do to the bodies of one slot: force, global, and moment about the origin, in axes of the body.
 
+    Parameters
+    ----------
+    slope : array of shape (levels, coordinates, rows, instances, batch)
+        As `slopes` gives it.
+    forces : array of shape (levels, rows, instances, batch)
+        Coefficients of the multipliers.
 
-def joint_wrenches(group: Group, pose: Any, time: Jet, found: Jet) -> list[tuple[Jet, Jet]]:
-    """Return what the joints of one type do to the bodies in each slot: force, global, and moment about the origin.
-
-    The force has the shape (c, instances, batch), the moment, in the axes of the body, (turns, instances, batch).
+    Returns
+    -------
+    array of shape (levels, coordinates, instances, batch)
     """
-    order = found.order
-    pose, time = _truncated(pose, order), time.truncate(order)
-    poses = [pose.take(indices) for indices in group.bodies]
-    results = []
-    for slot, body in enumerate(map(_moving, poses)):
-        shape = jnp.shape(body.position.coefficients[0])
-
-        def residual(change: Any, slot: int = slot, body: Any = body) -> Any:
-            moved = list(poses)
-            moved[slot] = change
-            jet = group.element.residual(*moved, time)
-            return stacked(jet.map(lambda c: c[None]) if len(jet.shape) == 2 else jet)
-
-        def rates(velocity: Any, body: Any = body, residual: Any = residual) -> Any:
-            shift, turn = (Jet(tuple(part)) for part in (velocity[:, : body.shifts], velocity[:, body.shifts :]))
-            change = _truncated(body.varied(shift, turn), order)
-            return jax.jvp(residual, (body,), (change,))[1]
-
-        example = jax.ShapeDtypeStruct((order + 1, pose.shifts + pose.turns, *shape[1:]), jnp.float64)
-        work = -jax.linear_transpose(rates, example)(stacked(found)[::-1])[0][::-1]
-        results.append((Jet(tuple(work[:, : pose.shifts])), Jet(tuple(work[:, pose.shifts :]))))
-    return results
+    return jnp.stack([-work_along(slope, forces, k) for k in range(len(forces))])

@@ -18,6 +18,7 @@ from jounce.jet import Jet, dot
 from jounce.jet.algebra import total
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.compilation import compiled
+from jounce.mechanism import Mechanism
 from jounce.mechanism.resolve import resolve
 from jounce.rigid.frames import Frames
 from jounce.robot.batches import Batched, checked
@@ -213,6 +214,57 @@ def _evaluated(coordinates: Any, mass: Any, center: Any, moments: Any, pose_type
     return tuple(stacked(part) for part in body_energy(pose, mass, center, moments, order))
 
 
+def potential_energy(motion: Motion) -> Any:
+    """Return the potential energy of all bodies of a mechanism in its gravity, and its rates; zero at the origin.
+
+    Parameters
+    ----------
+    motion : Motion
+        Of a mechanism whose bodies have masses.
+
+    Returns
+    -------
+    array of shape (time, order + 1)
+        J, J/s, ...; NaN at instants that were not solved.
+
+    Raises
+    ------
+    MechanismError
+        If no body has a mass.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> lift = jn.Mechanism(
+    ...     space="planar",
+    ...     gravity=[0, -10.0],
+    ...     bodies={"cage": jn.Body([0, 0], mass=3.0)},
+    ...     joints={"rail": jn.planar.Prismatic(("ground", "cage"), [0, 0], [0, 0], [0, 1], [0, 1])},
+    ...     drivers={"height": jn.drivers.SlideDriver(("ground", "cage"), [0, 0], [0, 0], [0, 1], "2*t")},
+    ... )
+    >>> jn.dynamics.potential_energy(jn.solve(lift, [0.0, 1.0], order=1))[1].round(9).tolist()  # energy and power
+    [60.0, 60.0]
+    """
+    mass, center, _ = mechanism_masses(motion)
+    pose_type, coordinates = motion.poses
+    heights = _heights(coordinates, center, gravity_of(motion.mechanism), pose_type)[: motion.order + 1]
+    factorials = np.array([float(math.factorial(k)) for k in range(len(heights))])
+    values = -np.sum(np.asarray(heights) * mass, axis=1) * factorials[:, None]
+    return np.where((motion.status == Status.OK)[:, None], values.T, np.nan)
+
+
+@compiled("pose_type")
+def _heights(coordinates: Any, center: Any, gravity: Any, pose_type: Any) -> Any:
+    pose = pose_type.from_coordinates({name: Jet(tuple(c)) for name, c in coordinates.items()})
+    return stacked(dot(pose.point(center), gravity))
+
+
+def gravity_of(mechanism: Mechanism) -> np.ndarray:
+    """Return the acceleration of free fall in a mechanism, shape (k, 1, 1), m/s^2."""
+    given = [0.0] * (2 if mechanism.space == "planar" else 3) if mechanism.gravity is None else mechanism.gravity
+    return np.asarray(resolve(given, mechanism.parameter_values), float)[:, None, None]
+
+
 def mechanism_masses(motion: Motion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return masses (bodies, 1), centres of mass (k, bodies, 1) and second moments (k, k, bodies, 1), the ground first.
 
@@ -221,7 +273,14 @@ def mechanism_masses(motion: Motion) -> tuple[np.ndarray, np.ndarray, np.ndarray
     MechanismError
         If no body has a mass, or a body has an inertia without a mass.
     """
-    mechanism = motion.mechanism
+    found = masses_of(motion.mechanism)
+    if not found[0].any():
+        raise MechanismError("no body has a mass; energies need some", name="bodies")
+    return found
+
+
+def masses_of(mechanism: Mechanism) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return what `mechanism_masses` does, also where no body has a mass."""
     planar = mechanism.space == "planar"
     size = 2 if planar else 3
     parameters = mechanism.parameter_values
@@ -239,7 +298,5 @@ def mechanism_masses(motion: Motion) -> tuple[np.ndarray, np.ndarray, np.ndarray
             tensor = np.asarray(inertia, float)
             tensor = np.diag(tensor) if tensor.ndim == 1 else tensor * np.ones((3, 3))
             moments.append(np.trace(tensor) / 2 * np.eye(3) - tensor)
-    if not any(masses):
-        raise MechanismError("no body has a mass; energies need some", name="bodies")
     center, second = (np.moveaxis(np.stack(x), 0, -1)[..., None] for x in (centers, moments))
     return np.array(masses)[:, None], center, second

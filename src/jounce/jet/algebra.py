@@ -67,7 +67,7 @@ class Jet:
 
     def dense(self) -> "Jet":
         """Return the same jet with arrays of zeros where coefficients are None."""
-        if None not in self.coefficients[1:]:
+        if all(c is not None for c in self.coefficients):  # `in` would compare arrays
             return self
         zero = jnp.zeros_like(self.coefficients[0])
         return Jet(zero if c is None else c for c in self.coefficients)

@@ -12,7 +12,14 @@ from jounce.errors import MechanismError, did_you_mean
 from jounce.jet import Jet
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.status import Status
-from jounce.mechanism import AngleOutput, AngularVelocityOutput, Mechanism, Model, PointOutput
+from jounce.mechanism import (
+    AbstractMotionOutput,
+    AngleOutput,
+    AngularVelocityOutput,
+    Mechanism,
+    Model,
+    PointOutput,
+)
 from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.system import POSITION_COMPONENTS, Group, group_elements
 
@@ -40,6 +47,8 @@ class Motion:
         Outcome at each instant, see `Status`; where it is not 0, all results are NaN.
     culprits : dict of int to str
         For the instants that failed, by index: the body farthest from its prediction, or the driver at fault.
+    derived : dict
+        What was computed of the motion and may be wanted again, by name: the forces, for one.
     """
 
     def __init__(
@@ -54,9 +63,15 @@ class Motion:
     ):
         self.mechanism, self.time, self.order, self.status = mechanism, time, order, status
         self.culprits = culprits
+        self.derived: dict[str, Any] = {}
         self._model = model
         self._coordinates, groups = state
         self._groups = dict(zip(model.outputs, groups, strict=True))
+
+    @property
+    def model(self) -> Model:
+        """The numeric model that was solved."""
+        return self._model
 
     @property
     def poses(self) -> tuple[type, dict[str, Any]]:
@@ -75,6 +90,9 @@ class Motion:
         for names, coefficients in self._groups.items():
             for k, name in enumerate(names):
                 found[name] = self._derivatives(coefficients[:, :, k])
+        for name, output in self.mechanism.outputs.items():
+            if isinstance(output, AbstractMotionOutput):
+                found[name] = self._derivatives(output.coefficients(self))
         return {name: found[name] for name in self.mechanism.outputs}
 
     @cached_property
@@ -129,7 +147,7 @@ class Motion:
         Raises
         ------
         MechanismError
-            If the output names a body that does not exist or does not fit the space.
+            If the output names a body, joint, driver or force that does not exist, or does not fit the mechanism.
         """
         names = (GROUND, *self._model.bodies)
         for body in output.bodies:
@@ -138,6 +156,9 @@ class Motion:
                 raise MechanismError(message, name="body", value=body)
         if output.space and output.space != self.mechanism.space:
             raise MechanismError(f"this output is {output.space}, the mechanism is {self.mechanism.space}", name=name)
+        if isinstance(output, AbstractMotionOutput):
+            output.check(self.mechanism)
+            return self._labelled(name, self._derivatives(output.coefficients(self)), output.unit)
         components = POSITION_COMPONENTS[self.mechanism.space]
         index = {body: k for k, body in enumerate(names)}
         (group,), _ = group_elements({name: output}, self.mechanism.parameter_values, index, components)

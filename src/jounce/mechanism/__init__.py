@@ -3,7 +3,9 @@
 from jounce.mechanism.builder import Model as Model, build as build
 from jounce.mechanism.mechanism import Body as Body, Mechanism as Mechanism
 from jounce.mechanism.outputs import (
+    AbstractMotionOutput as AbstractMotionOutput,
     AbstractOutput as AbstractOutput,
+    AbstractQuantity as AbstractQuantity,
     AngleOutput as AngleOutput,
     AngularVelocityOutput as AngularVelocityOutput,
     DistanceOutput as DistanceOutput,

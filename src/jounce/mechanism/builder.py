@@ -14,6 +14,7 @@ from jounce.constraints.base import field_kind, value_fields
 from jounce.errors import JounceError, MechanismError
 from jounce.jet import Jet
 from jounce.mechanism.mechanism import GROUND, Mechanism
+from jounce.mechanism.outputs import AbstractOutput
 from jounce.mechanism.resolve import check_value, resolve
 from jounce.mechanism.system import (
     POSITION_COMPONENTS,
@@ -84,7 +85,7 @@ def build(mechanism: Mechanism) -> Model:
     groups = tuple(_with_offsets(group, pose_type, guess) for group in groups)
     applied = {f"forces.{k}": v for k, v in mechanism.forces.items()}
     forces, force_names = group_elements(applied, parameters, body_index, components)
-    wanted = {f"outputs.{k}": v for k, v in mechanism.outputs.items()}
+    wanted = {f"outputs.{k}": v for k, v in mechanism.outputs.items() if isinstance(v, AbstractOutput)}
     outputs, output_names = group_elements(wanted, parameters, body_index, components)
 
     row_counts = [_row_count(group, pose_type, guess) for group in groups]

@@ -8,13 +8,14 @@ from typing import Any
 from jounce.constraints import AbstractConstraint
 from jounce.errors import ExpressionError, MechanismError, did_you_mean
 from jounce.forces import AbstractForce
-from jounce.mechanism.outputs import AbstractOutput
+from jounce.mechanism.outputs import AbstractQuantity
 from jounce.mechanism.resolve import parameter_value
+from jounce.rigid.inertia import Inertia
 from jounce.trajectory import Expression
 
 GROUND = "ground"
 RESERVED = ("t", "pi", "deg")
-CLASSES = {"outputs": AbstractOutput, "forces": AbstractForce}  # constraints otherwise
+CLASSES = {"outputs": AbstractQuantity, "forces": AbstractForce}  # constraints otherwise
 RESERVED_OUTPUTS = ("time", "derivative", "component")  # the axes of a result
 
 
@@ -32,11 +33,23 @@ class Body:
         Starting guess of the Euler parameters [e0, e1, e2, e3] of a spatial body; normalised when used.
     mass : number or expression, optional
         For the dynamics; kinematics does not use it. kg.
-    inertia : number, sequence or expression, optional
+    inertia : number, sequence, expression or Inertia, optional
         Moment of inertia about the centre of mass, kg m^2: one number in the plane; in space three principal moments
-        along the axes of the body, or a symmetric matrix in these axes.
+        along the axes of the body, or a symmetric matrix in these axes. An `Inertia` gives the mass and the centre of
+        mass too.
     center_of_mass : sequence, optional
         In the frame of the body, m; its origin unless given.
+
+    Raises
+    ------
+    MechanismError
+        If a mass or a centre of mass is given beside an `Inertia`.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> jn.Body([0, 0], inertia=jn.Inertia.solid("rod", length=0.6, mass=2.0)).inertia  # about z in the plane
+    0.06
     """
 
     position: Any
@@ -45,6 +58,17 @@ class Body:
     mass: Any = None
     inertia: Any = None
     center_of_mass: Any = None
+
+    def __post_init__(self):
+        if isinstance(self.inertia, Inertia):
+            if self.mass is not None or self.center_of_mass is not None:
+                message = "an Inertia tells the mass and the centre of mass; give neither beside it"
+                raise MechanismError(message, name="inertia")
+            whole, planar = self.inertia, len(self.position) == 2
+            tensor = float(whole.tensor[2, 2]) if planar else whole.tensor
+            found = {"mass": whole.mass, "center_of_mass": whole.center_of_mass[: 2 if planar else 3]}
+            for name, value in {**found, "inertia": tensor}.items():
+                object.__setattr__(self, name, value)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -64,7 +88,7 @@ class Mechanism:
     initial : dict of str to AbstractConstraint, optional
         Drivers that hold at the start of a simulation only: they give the position and the velocity there, by value and
         first derivative of their law, and are then released.
-    outputs : dict of str to AbstractOutput, optional
+    outputs : dict of str to AbstractQuantity, optional
         Quantities wanted, by name.
     parameters : dict of str to number or expression, optional
         Named values, SI.
@@ -102,7 +126,7 @@ class Mechanism:
     drivers: Mapping[str, AbstractConstraint] = dataclasses.field(default_factory=dict)
     forces: Mapping[str, AbstractForce] = dataclasses.field(default_factory=dict)
     initial: Mapping[str, AbstractConstraint] = dataclasses.field(default_factory=dict)
-    outputs: Mapping[str, AbstractOutput] = dataclasses.field(default_factory=dict)
+    outputs: Mapping[str, AbstractQuantity] = dataclasses.field(default_factory=dict)
     parameters: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     gravity: Any = None
     time: Any = None
@@ -153,6 +177,12 @@ class Mechanism:
             if body != GROUND and body not in self.bodies:
                 message = f"no body has this name; {did_you_mean(body, [GROUND, *self.bodies])}"
                 raise MechanismError(message, name=f"{place}.bodies", value=body)
+        if kind == "outputs":
+            try:
+                element.check(self)
+            except MechanismError as error:
+                error.name = f"{place}.{error.name}"  # it knows its fields only
+                raise
 
     @property
     def elements(self) -> dict[str, Mapping[str, Any]]:

@@ -13,7 +13,30 @@ from jounce.jet import Jet, sqrt
 FRAMES = ("global", "body")
 
 
-class AbstractOutput(eqx.Module):
+class AbstractQuantity(eqx.Module):
+    """What may be asked of a motion: a quantity with its unit, of the poses of some bodies or of the whole motion."""
+
+    unit: ClassVar[str] = "m"
+    space: ClassVar[str] = ""  # planar or spatial where only one makes sense
+    lost_orders: ClassVar[int] = 0  # derivatives by which it is shorter than the motion
+    rate_names: ClassVar[tuple[str, ...]] = ()  # of the quantity and its rates, where they are no velocities
+    body_count: ClassVar[int] = 0
+
+    def check(self, mechanism: Any) -> None:
+        """Raise MechanismError unless the quantity exists in a mechanism; names of bodies are checked elsewhere."""
+
+
+class AbstractMotionOutput(AbstractQuantity):
+    """A quantity that follows from the whole motion and the mechanism, such as a force."""
+
+    bodies: ClassVar[tuple[str, ...]] = ()
+
+    @abc.abstractmethod
+    def coefficients(self, motion: Any) -> Any:
+        """Return the Taylor coefficients of the quantity at all instants, shape (order + 1, components, time)."""
+
+
+class AbstractOutput(AbstractQuantity):
     """A quantity of a motion: one function on jets, as a joint is, with the unit of its value.
 
     Parameters
@@ -24,10 +47,7 @@ class AbstractOutput(eqx.Module):
 
     bodies: tuple[str, ...] = eqx.field(static=True, converter=lambda b: (b,) if isinstance(b, str) else tuple(b))
 
-    unit: ClassVar[str] = "m"
-    space: ClassVar[str] = ""  # planar or spatial where only one makes sense
     turning: ClassVar[bool] = False  # an angle known up to whole turns, made continuous along the motion
-    lost_orders: ClassVar[int] = 0  # derivatives by which it is shorter than the motion
     body_count: ClassVar[int] = 1
 
     def __check_init__(self):

@@ -1,0 +1,267 @@
+"""Inverse dynamics of mechanisms: multipliers, forces of drivers and wrenches of joints over a whole motion.
+
+Long motions go through in chunks of instants. What differs between mechanisms, the residuals, is compiled type by type
+on the poses of the bodies that it joins, so that all mechanisms share it.
+"""
+
+import dataclasses
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any
+
+import jax
+import numpy as np
+
+from jounce.dynamics import constraint_forces
+from jounce.dynamics.energies import gravity_of, masses_of
+from jounce.dynamics.loads import loads, mass_matrices
+from jounce.errors import MechanismError
+from jounce.jet import Jet, cross
+from jounce.kinematics import Motion
+from jounce.kinematics.compilation import compiled
+from jounce.mechanism import Model
+from jounce.mechanism.system import System
+from jounce.robot.scan import stacked
+
+SMALL_BATCH, LARGE_BATCH = 64, 512  # instants; a short motion compiles for one width only, and fills less of it
+
+
+@dataclasses.dataclass(frozen=True)
+class Place:
+    """Where a joint or driver is among the groups of a system, and its group among the rows."""
+
+    group: int
+    instance: int
+    rows: slice
+
+
+def places(model: Model) -> dict[str, Place]:
+    """Return the places of all joints and drivers, by name."""
+    found, first = {}, 0
+    for index, group in enumerate(model.system.groups):
+        names = model.rows[first : first + group.instances]
+        last = first
+        while model.rows[last : last + group.instances] == names:
+            last += group.instances
+        for instance, name in enumerate(names):
+            found[name.partition(".")[2]] = Place(index, instance, slice(first, last))
+        first = last
+    return found
+
+
+class MotionForces:
+    """The forces in a motion, computed when they are asked for and kept. Sommer 2024, section 7.
+
+    Parameters
+    ----------
+    motion : Motion
+        Of a mechanism with masses or applied forces.
+
+    Raises
+    ------
+    MechanismError
+        If the motion has no accelerations, or the masses are not valid.
+    """
+
+    def __init__(self, motion: Motion):
+        self.motion, self.model = motion, motion.model
+        self.pose_type, self.coordinates = motion.poses
+        self.levels = len(self.coordinates["position"]) - 2  # of the forces: accelerations use up two
+        if self.levels < 1:
+            raise MechanismError("forces need a motion solved to order 2 or higher", name="order", value=motion.order)
+        mechanism = motion.mechanism
+        self.masses = masses_of(mechanism)
+        self.gravity = gravity_of(mechanism)
+        self.places = places(self.model)
+        self._exerted: dict[int, np.ndarray] = {}
+        self._applied: dict[int, np.ndarray] = {}
+        self._wrenches: dict[tuple[int, int], np.ndarray] = {}
+
+    @classmethod
+    def of(cls, motion: Motion) -> "MotionForces":
+        """Return the forces of a motion, those computed before among them."""
+        if "forces" not in motion.derived:
+            motion.derived["forces"] = cls(motion)
+        return motion.derived["forces"]
+
+    @cached_property
+    def multipliers(self) -> np.ndarray:
+        """Multipliers of the rows of all residuals, as Taylor coefficients, (levels, rows, time)."""
+        system = dataclasses.replace(self.model.system, outputs=())
+        forces = dataclasses.replace(system, groups=(), cells=None, row_scale=None)
+        square = system.cells.shape[0] == system.cells.shape[1]
+
+        def chunk(lanes: np.ndarray) -> Any:
+            blocks = [
+                [self._slopes(index, slot, lanes) for slot in group.moving_slots]
+                for index, group in enumerate(system.groups)
+            ]
+            bodies, instants = self.taken(None, lanes, self.levels + 2), self.motion.time[lanes]
+            load = _loads(forces, bodies, instants, self.masses, self.gravity, self.pose_type)
+            still = None if square else self.taken(None, lanes, 1)
+            return _multipliers(system, blocks, load, still, self.masses, self.pose_type)
+
+        return self.in_chunks(chunk)
+
+    def driver_force(self, name: str) -> np.ndarray:
+        """Return what a driver exerts along what it prescribes, as Taylor coefficients, (levels, 1, time)."""
+        place = self.places[name]
+        if place.group not in self._exerted:
+            group = self.model.system.groups[place.group]
+            found = self._by_instance(place)
+
+            def chunk(lanes: np.ndarray) -> Any:
+                poses, instants = self._poses(place.group, lanes), self.motion.time[lanes]
+                return _exerted(group.element, poses, instants, found[..., lanes], self.pose_type)
+
+            self._exerted[place.group] = self.in_chunks(chunk)
+        return self._exerted[place.group][:, place.instance : place.instance + 1]
+
+    def wrench(self, name: str, slot: int) -> np.ndarray:
+        """Return what a joint or driver does to the body in a slot: coefficients of shape (levels, coordinates, time).
+
+        Force, global, and moment about the origin of the body, in its axes.
+        """
+        place = self.places[name]
+        if (place.group, slot) not in self._wrenches:
+            found = self._by_instance(place)
+
+            def chunk(lanes: np.ndarray) -> Any:
+                return _wrenches(self._slopes(place.group, slot, lanes), found[..., lanes])
+
+            self._wrenches[place.group, slot] = self.in_chunks(chunk)
+        return self._wrenches[place.group, slot][:, :, place.instance]
+
+    def applied_force(self, name: str) -> np.ndarray:
+        """Return an applied force, as Taylor coefficients, (levels, components, time)."""
+        index = next(k for k, names in enumerate(self.model.forces) if name in names)
+        instance = self.model.forces[index].index(name)
+        if index not in self._applied:
+            group = self.model.system.forces[index]
+
+            def chunk(lanes: np.ndarray) -> Any:
+                poses = tuple(self.taken(slot, lanes, self.levels + 1) for slot in group.bodies)
+                return _applied(group.element, poses, self.motion.time[lanes], self.pose_type, self.levels)
+
+            self._applied[index] = self.in_chunks(chunk)
+        return self._applied[index][:, :, instance]
+
+    def expressed(self, work: np.ndarray, body: int, frame: int | None, point: np.ndarray) -> tuple[Any, Any]:
+        """Return a wrench on a body as force and moment about a point of it, (levels, components, time).
+
+        Parameters
+        ----------
+        work : array of shape (levels, coordinates, time)
+            Force, global, and moment about the origin of the body, in its axes.
+        body, frame : int
+            Indices of the body and of the one in whose axes the wrench is wanted: 0 is the ground, None global.
+        point : array of shape (c,)
+            In the frame of the body, m.
+        """
+
+        def chunk(lanes: np.ndarray) -> Any:
+            taken = [self.taken((b,), lanes, self.levels) for b in ((body,) if frame is None else (body, frame))]
+            return _expressed(work[:, :, lanes], taken, point[:, None, None], self.pose_type)
+
+        return self.in_chunks(chunk)
+
+    def in_chunks(self, function: Callable[[np.ndarray], Any]) -> Any:
+        """Return what a function of indices of instants gives, for all of them: arrays with the time last."""
+        count = len(self.motion.time)
+        width = SMALL_BATCH if count <= SMALL_BATCH else LARGE_BATCH
+        parts = []
+        for first in range(0, count, width):
+            lanes = np.minimum(np.arange(first, first + width), count - 1)
+            parts.append(jax.tree.map(np.asarray, function(lanes)))
+        return jax.tree.map(lambda *xs: np.concatenate(xs, axis=-1)[..., :count], *parts)
+
+    def taken(self, bodies: tuple[int, ...] | None, lanes: np.ndarray, levels: int) -> dict[str, Any]:
+        """Return coordinates at some instants; of the ground alone it is the place only, as it never moves."""
+        if bodies is not None and not any(bodies):
+            levels = 1
+        found = {}
+        for name, values in self.coordinates.items():
+            count = levels - (name == "angular_velocity")
+            if count:
+                chosen = values[:count][..., lanes]
+                found[name] = chosen if bodies is None else chosen[..., np.array(bodies), :]
+        return found
+
+    def _poses(self, index: int, lanes: np.ndarray) -> tuple[dict[str, Any], ...]:
+        bodies = self.model.system.groups[index].bodies
+        return tuple(self.taken(slot, lanes, self.levels) for slot in bodies)
+
+    def _slopes(self, index: int, slot: int, lanes: np.ndarray) -> Any:
+        element = self.model.system.groups[index].element
+        poses, instants = self._poses(index, lanes), self.motion.time[lanes]
+        return _slopes(element, poses, instants, self.pose_type, slot, self.levels)
+
+    def _by_instance(self, place: Place) -> np.ndarray:
+        """Return the multipliers of a group, (levels, rows, instances, time)."""
+        found = self.multipliers[:, place.rows]
+        instances = self.model.system.groups[place.group].instances
+        return found.reshape(len(found), -1, instances, found.shape[-1])
+
+
+def pose_of(coordinates: dict[str, Any], pose_type: Any, order: int) -> Any:
+    """Return the pose of bodies from Taylor coefficients of their coordinates; a place alone is one at rest."""
+    pose = pose_type.from_coordinates({name: Jet(tuple(c)) for name, c in coordinates.items()})
+    if pose.order < order:
+        return jax.tree.map(
+            lambda j: Jet.constant(j.coefficients[0], order), pose, is_leaf=lambda x: isinstance(x, Jet)
+        )
+    return jax.lax.optimization_barrier(pose)  # or XLA computes it again in everything that uses it
+
+
+@compiled("pose_type", "slot", "levels")
+def _slopes(element: Any, poses: Any, instants: Any, pose_type: Any, slot: int, levels: int) -> Any:
+    time = Jet.variable(instants[None], levels - 1)
+    return constraint_forces.slopes(element, [pose_of(pose, pose_type, levels - 1) for pose in poses], time, slot)
+
+
+@compiled("pose_type")
+def _loads(system: System, bodies: Any, instants: Any, masses: Any, gravity: Any, pose_type: Any) -> Any:
+    order = len(bodies["position"]) - 1
+    pose = pose_of(bodies, pose_type, order)
+    return loads(system, pose, Jet.variable(instants[None], order), masses, gravity)
+
+
+@compiled("pose_type")
+def _multipliers(system: System, blocks: Any, load: Any, still: Any, masses: Any, pose_type: Any) -> Any:
+    mass = None if still is None else mass_matrices(pose_of(still, pose_type, 0), *masses)[:, :, 1:]
+    return constraint_forces.multipliers(system, blocks, load, mass)
+
+
+@compiled("pose_type")
+def _exerted(driver: Any, poses: Any, instants: Any, forces: Any, pose_type: Any) -> Any:
+    order = len(forces) - 1
+    built = [pose_of(pose, pose_type, order) for pose in poses]
+    return constraint_forces.exerted(driver, built, Jet.variable(instants[None], order), forces)
+
+
+@compiled("pose_type", "levels")
+def _applied(force: Any, poses: Any, instants: Any, pose_type: Any, levels: int) -> Any:
+    built = [pose_of(pose, pose_type, levels) for pose in poses]
+    time = Jet.variable(instants[None], levels)
+    found = force.force(force.displacement(*built, time), force.velocity(*built, time), time).truncate(levels - 1)
+    return stacked(constraint_forces.with_rows(found))
+
+
+@compiled()
+def _wrenches(slope: Any, forces: Any) -> Any:
+    return constraint_forces.wrench(slope, forces)
+
+
+@compiled("pose_type")
+def _expressed(work: Any, bodies: Any, point: Any, pose_type: Any) -> tuple[Any, Any]:
+    order = len(work) - 1
+    pose, *frame = (pose_of(body, pose_type, order) for body in bodies)
+    force, moment = (Jet(tuple(part[:, :, None])) for part in (work[:, : pose.shifts], work[:, pose.shifts :]))
+    if pose.turns == 1:
+        moment = moment - cross(pose.direction(point), force)[None]
+    else:
+        moment = pose.direction(moment - cross(point, pose.to_body(force)))
+    for other in frame:
+        force = other.to_body(force)
+        moment = moment if pose.turns == 1 else other.to_body(moment)
+    return tuple(stacked(jet)[:, :, 0] for jet in (force, moment))

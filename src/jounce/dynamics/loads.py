@@ -1,0 +1,92 @@
+"""What the constraints of a mechanism have to balance: inertia, weight and applied forces of all bodies, on jets.
+
+Forces act in the coordinates of virtual displacements: a shift of the origin of a body along the global axes, and a
+turn about the axes of the body.
+"""
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+
+from jounce.jet import Jet, components, cross
+from jounce.jet.algebra import total
+from jounce.mechanism.system import System
+from jounce.robot.scan import stacked
+
+
+def inertia_forces(pose: Any, mass: Any, center: Any, moments: Any, gravity: Any) -> tuple[Jet, Jet]:
+    """Return inertia less weight of all bodies: force, global, and moment about the origin, in axes of the body.
+
+    Both are two orders shorter than the pose; shapes (c, bodies, batch) and (turns, bodies, batch).
+
+    Parameters
+    ----------
+    pose : SpatialPose or PlanarPose
+        Jets of all bodies, of shape (..., bodies, batch).
+    mass, center, moments
+        As `mechanism_masses` gives them.
+    gravity : array of shape (c, 1, 1)
+        m/s^2.
+    """
+    acceleration = pose.point(center).differentiate().differentiate()
+    force = (acceleration - gravity) * mass
+    if pose.turns == 1:
+        about = moments[0][0] + moments[1][1]
+        moment = pose.angle.differentiate().differentiate() * about + cross(pose.direction(center), force)
+        return force, moment[None]
+    spread = moments[0][0] + moments[1][1] + moments[2][2]
+    spin = pose.angular_velocity
+    momentum = spin * spread - total(moments[:, i] * part for i, part in enumerate(components(spin)))
+    local = pose.to_body(force)
+    return force, momentum.differentiate() + cross(spin, momentum) + cross(center, local)
+
+
+def mass_matrices(pose: Any, mass: Any, center: Any, moments: Any) -> Any:
+    """Return the mass matrix of each body, (coordinates, coordinates, bodies, batch), at a pose of order zero.
+
+    It is the map from accelerations to the forces of inertia of bodies that do not move yet.
+    """
+    split, shape = pose.shifts, pose.position.shape[1:]
+
+    def wide(direction: Any) -> tuple[Any, Any]:
+        whole = jnp.broadcast_to(direction[:, None, None], (len(direction), *shape))
+        return whole[:split], whole[split:]
+
+    size = split + pose.turns
+    still = pose.extended(*wide(jnp.zeros(size)))
+
+    def along(direction: Any) -> Any:
+        accelerated = still.extended(*wide(0.5 * direction))
+        force, moment = inertia_forces(accelerated, mass, center, moments, 0.0)
+        return jnp.concatenate([force.coefficients[0], moment.coefficients[0]])
+
+    return jax.vmap(along, out_axes=1)(jnp.eye(size))
+
+
+def loads(system: System, pose: Any, time: Jet, masses: Any, gravity: Any) -> Any:
+    """Return applied forces and weight less inertia of all moving bodies, as Taylor coefficients.
+
+    Parameters
+    ----------
+    system : System
+        Its applied forces count.
+    pose : SpatialPose or PlanarPose
+        Jets of all bodies, the ground first.
+    time : Jet
+        Of shape (1, batch).
+    masses : tuple of array
+        As `mechanism_masses` gives them.
+    gravity : array of shape (c, 1, 1)
+        m/s^2.
+
+    Returns
+    -------
+    array of shape (order - 1, coordinates, bodies, batch)
+        The order is that of the pose; force, global, and moment about the origin, in axes of the body.
+    """
+    mass, center, moments = masses
+    load = -jnp.concatenate([stacked(x) for x in inertia_forces(pose, mass, center, moments, gravity)], axis=1)
+    if system.forces:
+        load = load + stacked(system.applied_forces(pose, time))[: len(load)]
+    return load[:, :, 1:]

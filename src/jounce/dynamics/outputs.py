@@ -1,0 +1,186 @@
+"""Forces as outputs: of drivers along what they prescribe, of joints on their bodies, and applied ones, with rates."""
+
+from typing import Any, ClassVar
+
+import equinox as eqx
+import numpy as np
+
+from jounce.constraints.base import Vector, value_fields
+from jounce.dynamics.inverse import MotionForces
+from jounce.errors import MechanismError, did_you_mean
+from jounce.mechanism import AbstractMotionOutput, Mechanism
+from jounce.mechanism.mechanism import GROUND
+from jounce.mechanism.resolve import resolve_element
+
+RATES = ("yank", "second rate", "third rate", "fourth rate")
+
+
+def is_turning(driver: Any) -> bool:
+    """Tell whether the law of a driver is an angle, so that what it exerts is a torque."""
+    fields = value_fields(type(driver))
+    stated = getattr(driver, "dimensions", {}).get("motion")
+    if stated is not None:
+        return stated == "angle"
+    if "coordinate" in fields:
+        return driver.coordinate == "angle"
+    return "point_i" not in fields and "point_j" not in fields
+
+
+class AbstractForceOutput(AbstractMotionOutput):
+    """A force or torque in a mechanism: two derivatives shorter than the motion, as accelerations are."""
+
+    lost_orders = 2
+    source: ClassVar[str] = ""  # the field that names what exerts it: driver, joint or force
+
+    def check(self, mechanism: Mechanism) -> None:
+        """Raise MechanismError unless the mechanism has what is named, and masses or applied forces."""
+        kinds = {"driver": ("drivers",), "joint": ("joints", "drivers"), "force": ("forces",)}[self.source]
+        known = {name: element for kind in kinds for name, element in getattr(mechanism, kind).items()}
+        name = getattr(self, self.source)
+        if name not in known:
+            message = f"no {self.source} has this name; {did_you_mean(name, known)}"
+            raise MechanismError(message, name=self.source, value=name)
+        if not mechanism.forces and all(body.mass is None for body in mechanism.bodies.values()):
+            message = "forces need masses, and no body has one; give the bodies mass and inertia"
+            raise MechanismError(message, name=self.source, value=name)
+        self._check_named(known[name])
+
+    def _check_named(self, element: Any) -> None:
+        """Raise MechanismError unless the quantity is one of what is named."""
+
+
+class _DriverOutput(AbstractForceOutput):
+    driver: str = eqx.field(static=True)
+
+    source = "driver"
+
+    def coefficients(self, motion: Any) -> np.ndarray:
+        """Return the Taylor coefficients of what the driver exerts, (levels, 1, time)."""
+        return MotionForces.of(motion).driver_force(self.driver)
+
+
+class DriverForceOutput(_DriverOutput):
+    """Force of a driver along the length that it prescribes, N; its product with the rate of the law is the power."""
+
+    unit = "N"
+    rate_names = ("force", *RATES)
+
+    def _check_named(self, element):
+        if is_turning(element):
+            raise MechanismError("this driver prescribes an angle, so that it exerts a torque", name="quantity")
+
+
+class DriverTorqueOutput(_DriverOutput):
+    """Torque of a driver about the angle that it prescribes, N m; its product with the rate of the law is the power."""
+
+    unit = "N*m"
+    rate_names = ("torque", *RATES)
+
+    def _check_named(self, element):
+        if not is_turning(element):
+            raise MechanismError("this driver prescribes a length, so that it exerts a force", name="quantity")
+
+
+class _JointOutput(AbstractForceOutput):
+    joint: str = eqx.field(static=True)
+    body: str | None = eqx.field(
+        static=True, default=None
+    )  # on which it acts; the second one of the joint unless given
+    frame: str = eqx.field(static=True, default="global")  # global, body, or the name of a body of the joint
+
+    source = "joint"
+
+    def _check_named(self, element):
+        if self.body is not None and self.body not in element.bodies:
+            message = f"is not joined by '{self.joint}'; {did_you_mean(self.body, element.bodies)}"
+            raise MechanismError(message, name="body", value=self.body)
+        if self.frame not in ("global", "body", *element.bodies):
+            message = f"unknown frame; {did_you_mean(self.frame, ['global', 'body', *element.bodies])}"
+            raise MechanismError(message, name="frame", value=self.frame)
+
+    def _wrench(self, motion: Any, point: Any) -> tuple[np.ndarray, np.ndarray]:
+        """Return force and moment about a point of the body, with rates; about that of the joint unless given."""
+        forces, mechanism = MotionForces.of(motion), motion.mechanism
+        element = {**mechanism.joints, **mechanism.drivers}[self.joint]
+        body = element.bodies[1] if self.body is None else self.body
+        slot = element.bodies.index(body)
+        index = [GROUND, *mechanism.bodies].index
+        frame = {"global": None, "body": body}.get(self.frame, self.frame)
+        if point is None:
+            place = forces.places[self.joint]
+            fixed = getattr(forces.model.system.groups[place.group].element, f"point_{'ijm'[slot]}", None)
+            size = forces.pose_type.shifts
+            point = np.zeros(size) if fixed is None else np.asarray(fixed).reshape(size, -1)[:, place.instance]
+        work = forces.wrench(self.joint, slot)
+        return forces.expressed(work, index(body), None if frame is None else index(frame), point)
+
+
+class JointForceOutput(_JointOutput):
+    """Reaction force of a joint, or of a driver, on one of its bodies, N."""
+
+    unit = "N"
+    rate_names = ("force", *RATES)
+
+    def coefficients(self, motion: Any) -> np.ndarray:
+        """Return the Taylor coefficients of the force, (levels, components, time)."""
+        return self._wrench(motion, None)[0]
+
+
+class JointTorqueOutput(_JointOutput):
+    """Reaction torque of a joint, or of a driver, on one of its bodies, about a point of that body, N m.
+
+    The point is that of the joint unless given, or the origin of the body where the joint has none there.
+    """
+
+    point: Vector = None  # m, in the frame of the body
+
+    unit = "N*m"
+    rate_names = ("torque", *RATES)
+
+    def coefficients(self, motion: Any) -> np.ndarray:
+        """Return the Taylor coefficients of the torque, (levels, components, time)."""
+        mechanism = motion.mechanism
+        components = 2 if mechanism.space == "planar" else 3
+        values = resolve_element(self, mechanism.parameter_values, components, f"outputs.{self.joint}")
+        return self._wrench(motion, values["point"])[1]
+
+
+class _AppliedOutput(AbstractForceOutput):
+    force: str = eqx.field(static=True)
+
+    source = "force"
+
+    def coefficients(self, motion: Any) -> np.ndarray:
+        """Return the Taylor coefficients of the force, (levels, components, time)."""
+        return MotionForces.of(motion).applied_force(self.force)
+
+    def _check_named(self, element):
+        if element.unit != self.unit:
+            kind, other = ("force", "torque") if element.unit == "N" else ("torque", "force")
+            raise MechanismError(f"this is a {kind}, no {other}", name="quantity")
+
+
+class AppliedForceOutput(_AppliedOutput):
+    """Applied force along its displacement, or with its components, N; it drives a growing displacement if positive."""
+
+    unit = "N"
+    rate_names = ("force", *RATES)
+
+
+class AppliedTorqueOutput(_AppliedOutput):
+    """Applied torque about its angle, or with its components, N m; it drives a growing angle if positive."""
+
+    unit = "N*m"
+    rate_names = ("torque", *RATES)
+
+
+FORCE_OUTPUTS: tuple[tuple[str, type[AbstractForceOutput]], ...] = (
+    ("force", DriverForceOutput),
+    ("torque", DriverTorqueOutput),
+    ("force", JointForceOutput),
+    ("reaction", JointForceOutput),
+    ("torque", JointTorqueOutput),
+    ("force", AppliedForceOutput),
+    ("torque", AppliedTorqueOutput),
+)
+"""The word for ``quantity`` in a file and the class of each force as an output."""
