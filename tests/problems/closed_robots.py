@@ -18,17 +18,19 @@ def random_inertia(random):
     return jn.Inertia(random.uniform(0.5, 2.0), random.uniform(-0.2, 0.2, 3), moments)
 
 
-def random_loop(count=7, seed=4):
-    """Return a loop of hinges in any directions, welded where it is closed: of seven, one degree of freedom is left."""
+def random_loop(seed=4, count=7):
+    """Return a chain of hinges in any directions, welded to its base: seven have one degree of freedom left."""
     random = np.random.default_rng(seed)
     links, joints = [jn.Link("link_0")], []
-    for k in range(1, count):
+    for k in range(1, count + 1):
         links.append(jn.Link(f"link_{k}", random_inertia(random)))
         rotation = Rotation.random(random_state=random).as_matrix()
         place, axis = random.uniform(-0.4, 0.4, 3), random.normal(size=3)
-        joints.append(jn.Joint(f"joint_{k}", f"link_{k - 1}", f"link_{k}", position=place, rotation=rotation, axis=axis))
-    pin = jn.Closure("pin", (links[-1].name, "link_0"), "pin", [0.2, -0.1, 0.3], axis=random.normal(size=3))
-    return jn.Robot("loop", links, joints, gravity=[0.5, -1.0, -9.0], closures=[pin])
+        joints.append(
+            jn.Joint(f"joint_{k}", f"link_{k - 1}", f"link_{k}", position=place, rotation=rotation, axis=axis)
+        )
+    weld = jn.Closure("weld", (links[-1].name, "link_0"), "weld", [0.2, -0.1, 0.3])
+    return jn.Robot("loop", links, joints, gravity=[0.5, -1.0, -9.0], closures=[weld])
 
 
 def in_pinocchio(robot):
@@ -41,7 +43,8 @@ def in_pinocchio(robot):
         here = at * pinocchio.SE3(np.array(joint.rotation), np.array(joint.position))
         if joint.moving:
             kind = pinocchio.JointModelRevoluteUnaligned if joint.turning else pinocchio.JointModelPrismaticUnaligned
-            parent, here = model.addJoint(parent, kind(np.array(joint.axis)), here, joint.name), pinocchio.SE3.Identity()
+            parent = model.addJoint(parent, kind(np.array(joint.axis)), here, joint.name)
+            here = pinocchio.SE3.Identity()
         places[joint.child] = (parent, here)
         inertia = robot.links[joint.child].inertia
         if inertia is not None:
@@ -50,12 +53,32 @@ def in_pinocchio(robot):
     return model, places
 
 
-def constraint_model(robot, model, places, closure, kind):
-    """Return a closure as Pinocchio has it: of the points of both links, or of their whole frames."""
-    frames = []
+def in_contact(model, places, closure):
+    """Return a connect or weld as Pinocchio holds it: the points of both links in one place, or their whole frames."""
+    kind = pinocchio.ContactType.CONTACT_6D if closure.type == "weld" else pinocchio.ContactType.CONTACT_3D
+    ends = []
     for link, point, turned in zip(closure.links, closure.points, (np.eye(3), closure.rotation.T), strict=True):
         joint, here = places[link]
-        frames.append((joint, here * pinocchio.SE3(turned, np.array(point))))
-    (first, here), (second, there) = frames
-    constraint = pinocchio.RigidConstraintModel(kind, model, first, here, second, there, pinocchio.ReferenceFrame.LOCAL)
-    return constraint
+        ends += [joint, here * pinocchio.SE3(np.array(turned), np.array(point))]
+    return pinocchio.RigidConstraintModel(kind, model, *ends, pinocchio.ReferenceFrame.LOCAL)
+
+
+def forward(model, constraint, state, torque):
+    """Return Pinocchio's accelerations under joint torques, and the force on the first link, in its axes."""
+    constraints, kept = pinocchio.StdVec_RigidConstraintModel(), pinocchio.StdVec_RigidConstraintData()
+    constraints.append(constraint)
+    kept.append(constraint.createData())
+    data = model.createData()
+    pinocchio.initConstraintDynamics(model, data, constraints, kept)
+    settings = pinocchio.ProximalSettings(1e-14, 1e-12, 30)  # directions that are redundant bear nothing
+    found = pinocchio.constraintDynamics(model, data, state[0], state[1], torque, constraints, kept, settings)
+    return np.array(found), np.array(kept[0].contact_force.vector)
+
+
+def inverse(model, q):
+    """Return the generalised forces of the tree and their rates, (2, n), from derivatives to the third, (4, n)."""
+    data = model.createData()
+    force = np.array(pinocchio.rnea(model, data, *q[:3]))
+    pinocchio.computeRNEADerivatives(model, data, *q[:3])
+    mass = np.triu(data.M) + np.triu(data.M, 1).T
+    return np.array([force, data.dtau_dq @ q[1] + data.dtau_dv @ q[2] + mass @ q[3]])

@@ -271,7 +271,7 @@ class _Parts:
             return True
         axes = [np.eye(3)[2], tree.rotation[slides[1]] @ np.eye(3)[2]]
         axes.append(tree.rotation[slides[1]] @ tree.rotation[slides[2]] @ np.eye(3)[2])
-        return abs(np.linalg.det(np.array(axes))) > 1e-3
+        return bool(abs(np.linalg.det(np.array(axes))) > 1e-3)
 
     def placed(self, index: int) -> Placed:
         """Return a moving joint in the frames of the two bodies."""

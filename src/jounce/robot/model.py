@@ -2,6 +2,7 @@
 
 import dataclasses
 import numbers
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -197,7 +198,7 @@ class Closure:
     ----------
     name : str
         Name of the closure, which no joint has.
-    links : tuple of str
+    links : sequence of str
         Names of the two links.
     type : {"connect", "weld", "pin", "slider"}, default "connect"
         What stays as it is: a point of each link in one place (3 equations), or the whole pose (6); a pin leaves a turn
@@ -224,7 +225,7 @@ class Closure:
     """
 
     name: str
-    links: tuple[str, str]
+    links: Sequence[str]
     type: str = "connect"
     points: Any = (0.0, 0.0, 0.0)
     axis: Any = None

@@ -1,0 +1,384 @@
+"""Robots as mechanisms: open chains against recursive Newton-Euler, loops against Pinocchio, MuJoCo, closed forms."""
+
+import math
+import pickle
+
+import mujoco
+import numpy as np
+import pytest
+from mpmath import mp
+
+import jounce as jn
+from jounce.dynamics.inverse import MotionForces
+from tests.problems.closed_robots import FIVE_BAR, forward, in_contact, in_pinocchio, inverse, random_loop
+
+ROBOTS = FIVE_BAR.parent
+TIME = np.linspace(0.1, 0.7, 4)
+ROD = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0], tensor=[0.01, 1 / 12, 1 / 12])
+
+
+def coordinates(motion, robot):
+    """Return the coordinates of the tree and their derivatives, (time, order + 1, n)."""
+    return np.stack([motion.outputs[name] for name in robot.joint_names], axis=-1)
+
+
+def torques(motion, robot):
+    """Return forces of the drives with rates, (time, rates + 1, n), zero where there is no drive."""
+    forces = MotionForces.of(motion)
+    levels = motion.order - 1
+    found = np.zeros((len(motion.time), levels, len(robot.joint_names)))
+    for k, name in enumerate(robot.joint_names):
+        if f"{name}_drive" in motion.mechanism.drivers:
+            found[:, :, k] = forces.driver_force(f"{name}_drive")[:levels, 0].T
+    return found * np.array([math.factorial(k) for k in range(levels)])[:, None]
+
+
+def error(found, expected):
+    """Return the largest error of each order, by the peak."""
+    return np.abs(found - expected).max(axis=(0, 2)) / np.abs(expected).max(axis=(0, 2))
+
+
+def waves(robot, seed=3):
+    """Return laws for all joints of a robot, sums of sines."""
+    random = np.random.default_rng(seed)
+    laws = {}
+    for name in robot.joint_names:
+        size = 1.0 if robot.joints[name].turning else 0.05
+        a, b, c = size * random.uniform(0.1, 0.4, 3)
+        v, w, phase = random.uniform(0.5, 3.0, 3)
+        laws[name] = f"{a} + {b}*sin({v}*t + {phase}) + {c}*sin({w}*t)"
+    return jn.JointTrajectory(laws, 0.0, 1.0, times=TIME)
+
+
+def agrees_with_newton_euler(robot, order=5, **settings):
+    """Check coordinates, torques and all their rates of an open chain that is driven at every joint."""
+    laws = waves(robot)
+    motion = jn.solve(robot.mechanism(drivers=laws, **settings), order=order)
+    q = laws.derivatives(TIME, order=order, names=robot.joint_names)
+    np.testing.assert_allclose(coordinates(motion, robot), q, rtol=0, atol=1e-12 * np.abs(q).max())
+    expected = jn.inverse_dynamics(robot, q, **settings)
+    assert (error(torques(motion, robot), expected) <= 1e-13).all()  # 2e-15 measured
+
+
+def test_open_chain_has_the_torques_of_newton_euler():
+    agrees_with_newton_euler(jn.load_robot(ROBOTS / "planar_arm.xml"), order=3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["panda", "ur5", "scara", "solo12"])
+def test_open_robots_have_the_torques_of_newton_euler(name):
+    agrees_with_newton_euler(jn.load_robot(ROBOTS / f"{name}.urdf"))
+
+
+def branched(**changes):
+    """Return a robot with a fixed link, a slide, a branch, and joints that follow others in every way."""
+    links = [jn.Link("base"), *(jn.Link(name, ROD) for name in "abcde"), jn.Link("plate", ROD)]
+    tilt = [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
+    joints = [
+        jn.Joint("A", "base", "a", axis=[0, 1, 2], position=[0.1, 0, 0.2], **changes),
+        jn.Joint("flange", "a", "plate", "fixed", [0.3, 0.1, 0], tilt),
+        jn.Joint("B", "plate", "b", position=[0, 0.2, 0], axis=[1, 0, 0], mimic=jn.Mimic("A", -1.5, 0.4)),
+        jn.Joint("C", "a", "c", "prismatic", [0.2, 0, 0], axis=[1, 1, 0], mimic=jn.Mimic("A", 0.3, 0.1)),
+        jn.Joint("D", "base", "d", "prismatic", rotation=tilt, axis=[0, 0, 1]),
+        jn.Joint("E", "d", "e", axis=[0, 1, 0], mimic=jn.Mimic("D", 2.0, -0.3)),
+    ]
+    return jn.Robot("branched", links, joints, gravity=[1.0, 2.0, -9.0])
+
+
+@pytest.mark.slow
+def test_joints_that_follow_others_load_the_ones_they_follow():
+    agrees_with_newton_euler(branched())
+
+
+@pytest.mark.slow
+def test_joints_follow_over_many_turns():
+    robot = branched()
+    outputs = {"A": "A", "B": "B", "C": "C"}
+    time = np.linspace(0.0, 3.0, 61)
+    motion = jn.solve(robot.mechanism(drivers={"A": "9*t", "D": 0.0}, outputs=outputs), time, order=1)
+    np.testing.assert_allclose(motion.outputs["A"][:, 0], 9 * time, atol=1e-11)
+    np.testing.assert_allclose(motion.outputs["B"][:, 0], 0.4 - 13.5 * time, atol=1e-11)
+    np.testing.assert_allclose(motion.outputs["C"][:, 0], 0.1 + 2.7 * time, atol=1e-11)
+
+
+@pytest.mark.slow
+def test_damping_of_joints():
+    agrees_with_newton_euler(branched(damping=0.7), order=3, drives=True)
+
+
+@pytest.fixture(scope="module")
+def five_bar():
+    robot = jn.load_robot(FIVE_BAR)
+    laws = {"left_motor": "0.3*sin(4*t)", "right_motor": "0.2*sin(6*t) - 0.1"}
+    return robot, jn.solve(robot.mechanism(drivers=laws), TIME, order=3)
+
+
+def five_bar_tip(angles):
+    """Return the absolute angles of the four links and the tip, by the intersection of two circles."""
+    left, right = angles[0] + mp.radians(120), angles[1] + mp.radians(60)
+    elbows = [mp.mpc(x, 0) + mp.mpf("0.16") * mp.expj(a) for x, a in (("-0.06", left), ("0.06", right))]
+    across = elbows[1] - elbows[0]
+    height = mp.sqrt(mp.mpf("0.22") ** 2 - abs(across) ** 2 / 4)
+    tip = (elbows[0] + elbows[1]) / 2 + mp.mpc(0, 1) * across / abs(across) * height
+    return (left, mp.arg(tip - elbows[0]), right, mp.arg(tip - elbows[1])), elbows, tip
+
+
+@pytest.mark.slow
+def test_five_bar_against_its_closed_form(five_bar):
+    robot, motion = five_bar
+    found = torques(motion, robot)[:, :2, [0, 2]]
+    centers = [("-0.06", 0, 0.075, 0.0), (None, 1, 0.115, 0.004), ("0.06", 2, 0.075, 0.0), (None, 3, 0.118, 0.0)]
+    masses, moments = [0.21, 0.26, 0.21, 0.34], [4.1e-4, 1.12e-3, 4.1e-4, 1.31e-3]
+
+    def placed(*angles):
+        """Return centres of mass and angles of the links."""
+        turned, elbows, _ = five_bar_tip(angles)
+        starts = [mp.mpc("-0.06"), elbows[0], mp.mpc("0.06"), elbows[1]]
+        ends = [s + mp.mpc(x, z) * mp.expj(a) for s, a, (_, _, x, z) in zip(starts, turned, centers, strict=True)]
+        return [*ends, *turned]
+
+    def angles(t):
+        return mp.mpf("0.3") * mp.sin(4 * t), mp.mpf("0.2") * mp.sin(6 * t) - mp.mpf("0.1")
+
+    def torque(t, k):
+        """Return the virtual work of inertia and weight per angle of a motor."""
+        here, step = angles(t), mp.mpf(10) ** -15
+        series = [mp.diff(lambda s, i=i: placed(*angles(s))[i], t, 2) for i in range(8)]
+        moved = [[h + sign * step * (j == k) for j, h in enumerate(here)] for sign in (1, -1)]
+        slopes = [(a - b) / (2 * step) for a, b in zip(*(placed(*m) for m in moved), strict=True)]
+        work = mp.mpf(0)
+        for i in range(4):
+            force = masses[i] * (series[i] + mp.mpc(0, "9.80665"))
+            work += mp.re(force * mp.conj(slopes[i])) + moments[i] * mp.re(series[4 + i] * slopes[4 + i])
+        return work
+
+    with mp.workdps(40):
+        tip = motion.point("right_forearm", [0.22, 0, 0]).values[:, 0]
+        expected = [complex(five_bar_tip(angles(mp.mpf(t)))[2]) for t in TIME]
+        np.testing.assert_allclose(tip[:, 0] + 1j * tip[:, 2], expected, rtol=0, atol=1e-15)
+        at = mp.mpf(TIME[2])
+        for k in range(2):
+            assert abs(found[2, 0, k] - torque(at, k)) <= 1e-13  # N m, of at most 0.5
+            step = mp.mpf(10) ** -4
+            weights = {1: mp.mpf(3) / 4, 2: mp.mpf(-3) / 20, 3: mp.mpf(1) / 60}
+            rate = sum(w * (torque(at + j * step, k) - torque(at - j * step, k)) for j, w in weights.items()) / step
+            assert abs(found[2, 1, k] - rate) <= 1e-12
+
+
+def test_five_bar_is_closed_where_mujoco_closes_it(five_bar):
+    robot, motion = five_bar
+    model = mujoco.MjModel.from_xml_path(str(FIVE_BAR))
+    data = mujoco.MjData(model)
+    for k, q in enumerate(coordinates(motion, robot)[:, 0]):
+        data.qpos[:] = [q[robot.joint_names.index(model.joint(j).name)] for j in range(model.njnt)]
+        mujoco.mj_forward(model, data)
+        assert np.abs(data.efc_pos[:3]).max() <= 1e-15
+        for body in robot.moving_links:
+            here = motion.point(body, [0, 0, 0]).values[k, 0]
+            np.testing.assert_allclose(here, data.body(body).xpos, rtol=0, atol=1e-15)
+
+
+def agrees_with_pinocchio(robot, motion):
+    """Check that the torques found make Pinocchio's constrained model accelerate as the motion does."""
+    model, places = in_pinocchio(robot)
+    (closure,) = robot.closures.values()
+    q, torque = coordinates(motion, robot), torques(motion, robot)
+    wrenches = MotionForces.of(motion).wrench(closure.name, 0)[0]
+    for k in range(len(TIME)):
+        acceleration, force = forward(model, in_contact(model, places, closure), q[k], torque[k, 0])
+        np.testing.assert_allclose(acceleration, q[k, 2], rtol=0, atol=1e-12 * np.abs(q[k, 2]).max())
+        ours = np.linalg.norm(wrenches[:3, k])
+        assert abs(ours - np.linalg.norm(force[:3])) <= 1e-11 * ours
+    return model, q, torque
+
+
+def test_five_bar_against_pinocchio(five_bar):
+    agrees_with_pinocchio(*five_bar)
+
+
+@pytest.mark.slow
+def test_spatial_loop_against_pinocchio():
+    robot = random_loop()
+    borne, redundant = jn.robot.closure_wrenches(robot)["weld"]
+    assert (borne.shape, redundant.shape) == ((6, 6), (0, 6))
+    motion = jn.solve(robot.mechanism(drivers={"joint_1": "0.2*sin(3*t)"}), TIME)
+    model, q, torque = agrees_with_pinocchio(robot, motion)
+    for k in range(len(TIME)):  # with one degree of freedom, the power of the tree is that of the drive
+        share = q[k, 1] / q[k, 1, 0]
+        change = (q[k, 2] - share * q[k, 2, 0]) / q[k, 1, 0]
+        force, rate = inverse(model, q[k])
+        assert abs(share @ force - torque[k, 0, 0]) <= 1e-13 * np.abs(force).max()
+        assert abs(share @ rate + change @ force - torque[k, 1, 0]) <= 1e-12 * np.abs(rate).max()
+
+
+JOINTS = {
+    "revolute": ([jn.Joint("J", "arm", "load", axis=[1, 2, 2])], 1),
+    "prismatic": ([jn.Joint("J", "arm", "load", "prismatic", axis=[1, 2, 2])], 1),
+    "ball": (jn.robot.construct.floating_joints("load", prefix="J", world="arm")[1][3:], 3),
+    "free": (jn.robot.construct.floating_joints("load", "XYZ", prefix="J", world="arm")[1], 6),
+}
+
+
+def carrier(kind):
+    """Return an arm that a load is joined to and welded to besides, so that it is a payload."""
+    joints, count = JOINTS[kind]
+    names = [joint.child for joint in joints[:-1]]
+    load = jn.Inertia(0.7, [0.1, 0.2, -0.1], [0.02, 0.03, 0.04])
+    links = [jn.Link("base"), jn.Link("arm", ROD), *map(jn.Link, names), jn.Link("load", load)]
+    first = jn.Joint(joints[0].name, "arm", joints[0].child, joints[0].type, [0.3, 0.1, 0.2], axis=joints[0].axis)
+    joints = [jn.Joint("hinge", "base", "arm", axis=[0, 1, 0]), first, *joints[1:]]
+    weld = jn.Closure("weld", ("arm", "load"), "weld", [0.4, -0.3, 0.1])
+    return jn.Robot("carrier", links, joints, closures=[weld]), load, count
+
+
+@pytest.mark.parametrize("kind", [k if k == "free" else pytest.param(k, marks=pytest.mark.slow) for k in JOINTS])
+def test_what_is_welded_is_a_payload(kind):
+    robot, load, count = carrier(kind)
+    borne, redundant = jn.robot.closure_wrenches(robot)["weld"]
+    assert (len(borne), len(redundant)) == (count, 6 - count)
+    mechanism = robot.mechanism(drivers={"hinge": "0.5 + sin(2*t)"})
+    assert (*mechanism.bodies,) == ("arm", "load")
+    assert ("J" in mechanism.joints or "J_angle_1" in mechanism.joints) == (kind != "free")
+    motion = jn.solve(mechanism, TIME)
+    plain = jn.Robot("arm", [jn.Link("base"), jn.Link("arm", ROD)], [robot.joints["hinge"]])
+    plain = plain.with_payload("arm", load.moved([0.3, 0.1, 0.2], np.eye(3)))
+    expected = jn.inverse_dynamics(plain, motion.outputs["hinge"][:, :, None])
+    assert (error(torques(motion, robot)[:, :, :1], expected) <= 1e-13).all()
+
+
+@pytest.mark.slow
+def test_a_floating_base_driven_along_its_coordinates_keeps_its_joints():
+    robot = jn.Robot("rod", [jn.Link("rod", ROD)], []).with_floating_base()
+    agrees_with_newton_euler(robot, order=3)
+
+
+def bennett(a=0.3, b=0.4, alpha=0.7):
+    """Return a closed loop of four skew hinges, which moves although it has equations enough not to; and its ratio."""
+    beta = math.asin(b * math.sin(alpha) / a)
+    row, other = (
+        jn.robot.DenavitHartenberg(a=length, alpha=twist, inertia=ROD) for length, twist in ((a, alpha), (b, beta))
+    )
+    chain = jn.robot.from_denavit_hartenberg([row, other, row, other])
+    fixed = chain.joints["fixed_4"]  # the base stands for the fourth link, behind the fourth hinge
+    links = [link for link in chain.links.values() if link.name not in ("axis_4", "link_4")]
+    joints = [joint for joint in chain.joints.values() if joint.child not in ("axis_4", "link_4")]
+    points = [[0, 0, 0], -fixed.rotation.T @ fixed.position]
+    pin = jn.Closure("D", ("link_3", "base"), "pin", points, axis=[0, 0, 1], rotation=fixed.rotation)
+    ratio = math.sin((beta + alpha) / 2) / math.sin((beta - alpha) / 2)
+    return jn.Robot("bennett", links, joints, closures=[pin]), ratio
+
+
+@pytest.mark.slow
+def test_linkage_with_more_equations_than_its_mobility_allows():
+    robot, ratio = bennett()
+    start = {"joint_1": 0.9, "joint_2": 3.0, "joint_3": -0.8}
+    borne, redundant = jn.robot.closure_wrenches(robot, start)["D"]
+    assert (len(borne), len(redundant)) == (2, 3)
+    motion = jn.solve(robot.mechanism(start, drivers={"joint_1": "0.9 + 0.5*sin(t)"}), TIME, order=2)
+    q = coordinates(motion, robot)
+    np.testing.assert_allclose(np.tan(q[:, 0, 0] / 2) * np.tan(q[:, 0, 1] / 2), ratio, rtol=1e-12)  # Bennett's equation
+    np.testing.assert_allclose(q[:, :, 0], -q[:, :, 2], rtol=0, atol=1e-13)
+
+
+def test_a_dead_point_does_not_make_equations_redundant():
+    links = [jn.Link("base"), *(jn.Link(name, ROD) for name in "abc")]
+    joints = [jn.Joint("A", "base", "a"), jn.Joint("B", "a", "b", position=[1, 0, 0])]
+    joints.append(jn.Joint("C", "base", "c", position=[1, 0, 0]))
+    tip = jn.Closure("tip", ("b", "c"), points=[[1, 0, 0], [1, 0, 0]])
+    robot = jn.Robot("flat", links, joints, closures=[tip])
+    borne, redundant = jn.robot.closure_wrenches(robot)["tip"]
+    assert np.abs(borne[:, 2]).max() == 0
+    assert redundant.tolist() == [[0.0, 0.0, 1.0, 0.0, 0.0, 0.0]]
+
+
+def four_bar(**changes):
+    links = [jn.Link("base"), *(jn.Link(name, ROD) for name in ("crank", "rod", "rocker"))]
+    joints = [jn.Joint("A", "base", "crank"), jn.Joint("B", "crank", "rod", position=[1, 0, 0])]
+    joints.append(jn.Joint("D", "base", "rocker", position=[1, 1, 0], **changes))
+    tip = jn.Closure("C", ("rod", "rocker"), points=[[1, 0, 0], [1, 0, 0]])
+    return jn.Robot("four-bar", links, joints, closures=[tip])
+
+
+def test_closures_are_kept():
+    robot = four_bar()
+    copy = pickle.loads(pickle.dumps(robot))
+    assert copy.closures["C"].points.tolist() == robot.closures["C"].points.tolist()
+    for changed in (
+        robot.with_gravity([0, 0, -1]),
+        robot.with_payload("rod", ROD),
+        robot.locked({"D": 0.2}),
+        robot.with_floating_base(),
+        robot.opened().with_closures([*robot.closures.values()]),
+    ):
+        assert (*changed.closures,) == ("C",)
+        assert changed.closures["C"].rotation.tolist() == robot.closures["C"].rotation.tolist()
+    assert repr(robot) == "<Robot four-bar: 3 joints, 4 links, closed by C>"
+    assert robot.opened().tree.shape.bodies == 3
+
+
+def test_the_second_point_follows_from_coordinates_zero():
+    links = [jn.Link("base"), jn.Link("a", ROD), jn.Link("b", ROD)]
+    joints = [jn.Joint("A", "base", "a", axis=[0, 1, 0]), jn.Joint("S", "base", "b", "prismatic", [1, 2, 3])]
+    closure = jn.Robot("two", links, joints, closures=[jn.Closure("c", ("a", "b"), points=[0.5, 0, 0])]).closures["c"]
+    assert closure.points.tolist() == [[0.5, 0, 0], [-0.5, -2, -3]]
+
+
+@pytest.mark.parametrize(
+    "settings, says",
+    [
+        ({"type": "pinn"}, "closures.c.type: no closure has this type, got 'pinn'; did you mean 'pin'?"),
+        ({"links": ("rod",)}, "closures.c.links: must be two different links, got ('rod',)"),
+        ({"links": ("rod", "rod")}, "closures.c.links: must be two different links"),
+        ({"points": [1, 2]}, "closures.c.points: must have the shape (3,) or (2, 3), not (2,)"),
+        ({"points": [1, 2, np.nan]}, "closures.c.points: must be finite"),
+        ({"type": "pin"}, "closures.c.axis: a pin needs the direction of its axis, got nothing"),
+        ({"type": "slider", "axis": [0, 0, 0]}, "closures.c.axis: a slider needs the direction of its axis"),
+        ({"rotation": np.ones((3, 3))}, "closures.c.rotation: must be a rotation matrix"),
+        ({"links": ("rod", "rocket")}, "closures.c: no link has this name, got 'rocket'; did you mean 'rocker'?"),
+        ({"name": "D"}, "closures.D: a joint and a closure have the same name"),
+        ({"name": "C"}, "closures: this name is given twice, got 'C'"),
+    ],
+)
+def test_bad_closures(settings, says):
+    with pytest.raises(jn.RobotError) as caught:
+        four_bar().with_closures([jn.Closure(**{"name": "c", "links": ("rod", "rocker"), **settings})])
+    assert str(caught.value).startswith(says)
+
+
+@pytest.mark.parametrize(
+    "ask, says",
+    [
+        (lambda r: jn.inverse_dynamics(r, np.zeros((3, 3))), "four-bar: the loops of this robot make its coordinates"),
+        (lambda r: jn.forward_kinematics(r, np.zeros((1, 3)), "rod"), "four-bar: the loops of this robot make"),
+        (lambda r: r.mechanism(drivers={"E": "t"}), "drivers: no moving joint that follows no other has this name"),
+        (lambda r: r.mechanism(initial={"E": "t"}), "initial: no moving joint that follows no other has this name"),
+        (lambda r: r.mechanism([0, 0]), "q: must have the shape (3,), not (2,)"),
+        (lambda r: r.mechanism({"E": 1.0}), "joint: no moving joint has this name"),
+        (lambda r: r.mechanism(outputs={"x": "E"}), "outputs.x: no moving joint has this name"),
+        (lambda r: r.mechanism(drivers={"A": "1/t"}), "drivers.A: the law has no finite value at t = 0 s"),
+        (lambda r: r.mechanism(drivers={"A": "2*pi*f*t"}), "drivers.A: "),
+        (
+            lambda r: r.mechanism(drivers={"A": 0.0, "D": np.pi}),
+            "closures.C: the loops cannot be closed from the coord",
+        ),
+        (lambda r: jn.robot.body_point(r, "rot"), "link: no link has this name, got 'rot'; did you mean 'rod'?"),
+    ],
+)
+def test_bad_requests(ask, says):
+    with pytest.raises(jn.JounceError) as caught:
+        ask(four_bar())
+    assert str(caught.value).startswith(says)
+
+
+@pytest.mark.parametrize("field", ["armature", "friction"])
+def test_drives_that_a_mechanism_cannot_have(field):
+    robot = four_bar(**{field: 0.5})
+    assert robot.mechanism({"A": 0.1}).joints
+    with pytest.raises(jn.RobotError, match=rf"joints\.D\.{field}: {field} of a drive has no counterpart"):
+        robot.mechanism({"A": 0.1}, drives=True)
+
+
+def test_a_moving_link_named_ground():
+    robot = jn.Robot("odd", [jn.Link("base"), jn.Link("ground", ROD)], [jn.Joint("A", "base", "ground")])
+    with pytest.raises(jn.RobotError, match="a link of this name moves"):
+        robot.mechanism()
