@@ -298,3 +298,52 @@ def test_nothing_is_written_beside_the_user(tmp_path, monkeypatch, inside):
 def test_a_part_may_be_called_nan(tmp_path):
     robot = load_robot(written(tmp_path, "<joint name='nan'/>", "<actuator><motor joint='nan'/></actuator>"))
     assert robot.joint_names == ("nan",)
+
+
+CLOSURES = """\
+<mujoco model="loops"><compiler angle="radian"/>
+  <worldbody>
+    <site name="sw" pos="0.3 0.4 0.1" quat="0.9 0.1 0.2 0.3"/>
+    <body name="a" quat="0.9 0.1 0.2 0.3"><joint axis="0 0 1"/><geom size="0.1"/>
+      <body name="b" pos="0.3 0 0" euler="0 0 1"><joint axis="0 0.1 1" ref="0.2"/><geom size="0.1"/>
+        <site name="sb" pos="0.11 0.12 0.13" quat="0.5 -0.1 0.7 0.3"/>
+      </body>
+    </body>
+    <body name="c" pos="0.2 0.1 0"><joint axis="1 0 1"/><geom size="0.1"/>
+      <site name="sc" pos="0.1 0.5 0.3" quat="0.5 0.2 0.7 0.3"/>
+    </body>
+  </worldbody>
+  <equality>
+    <connect body1="b" body2="c" anchor="0.3 0.02 0.05"/>
+    <connect name="sites" site1="sb" site2="sc"/>
+    <connect name="to the world" body1="b" anchor="0.3 0.02 0.05"/>
+    <weld name="weld" body1="b" body2="c" anchor="0.3 0.02 0.05"/>
+    <weld name="posed" body1="b" body2="c" anchor="0.3 0.02 0.05" relpose="0.1 0.2 0.3 0.9 0.1 0.3 0.2"/>
+    <weld name="frames" site1="sb" site2="sc"/>
+    <weld name="frame of the world" site1="sb" site2="sw"/>
+    <weld name="whole body" body1="b"/>
+    <weld name="without torque" body1="b" body2="c" torquescale="0"/>
+    <connect name="not active" body1="b" anchor="0 0 0" active="false"/>
+  </equality>
+</mujoco>
+"""
+
+
+def test_connects_and_welds_are_closures_that_miss_what_mujoco_says(tmp_path):
+    path = tmp_path / "loops.xml"
+    path.write_text(CLOSURES)
+    robot, model = load_robot(path), mujoco.MjModel.from_xml_string(CLOSURES)
+    assert (*robot.closures,)[:3] == ("closure_0", "sites", "to the world")
+    assert [c.type for c in robot.closures.values()] == [*["connect"] * 3, *["weld"] * 5, "connect"]
+    data = mujoco.MjData(model)
+    data.qpos[:] = [0.7, -0.4, 1.1]
+    mujoco.mj_forward(model, data)
+    ours = poses(robot, dict(zip(robot.joint_names, data.qpos, strict=True)))
+    for k, closure in enumerate(robot.closures.values()):
+        gap = data.efc_pos[[row for row in range(data.nefc) if data.efc_id[row] == k]]
+        first, second = (ours[link] for link in closure.links)
+        ends = [pose[:3, :3] @ p + pose[:3, 3] for pose, p in zip((first, second), closure.points, strict=True)]
+        np.testing.assert_allclose(ends[0] - ends[1], gap[:3], rtol=0, atol=1e-14)
+        if closure.type == "weld":
+            turn = Rotation.from_matrix(second[:3, :3].T @ first[:3, :3] @ closure.rotation).magnitude()
+            assert np.sin(turn / 2) == pytest.approx(np.linalg.norm(gap[3:]), rel=1e-13)
