@@ -266,3 +266,22 @@ def expand(equations: Equations, state: State, time: Any, order: int) -> Expansi
     last = raised(now, rates, order)
     whole = State(*(jnp.concatenate([s, x[None]]) for s, x in zip(states, last, strict=True)))
     return Expansion(whole, accelerations, forces)
+
+
+def least_change(equations: Equations, state: State, time: Any, gap: Any) -> Any:
+    """Return the change of coordinates, (coordinates, bodies, batch), of least kinetic energy that closes a gap.
+
+    Parameters
+    ----------
+    equations : Equations
+        Of the mechanism.
+    state : State
+        Where it is.
+    time : array of shape (1, batch)
+        The instant, s.
+    gap : array of shape (rows, batch)
+        Of the scaled rows, to first order.
+    """
+    columns = equations.system.cells.shape[1]
+    factor = DenseFactor.of(equations.matrix(state, time))
+    return equations.bodies(factor.solve(-jnp.concatenate([jnp.zeros((columns, gap.shape[-1])), gap]))[:columns])

@@ -27,8 +27,21 @@ def _moved(system: Any, coordinates: dict[str, Any], increment: Any, instant: An
     return moved, system.residual(pose, time).coefficients[0][:, 0], system.jacobian(pose, time)[:, :, 0]
 
 
-def assemble(model: Model, instant: float, tolerance: float) -> tuple[Model, dict[str, np.ndarray]]:
+def assemble(
+    model: Model, instant: float, tolerance: float, *, free: bool = False
+) -> tuple[Model, dict[str, np.ndarray]]:
     """Put the bodies together at one instant, from the starting guess, by damped Gauss-Newton.
+
+    Parameters
+    ----------
+    model : Model
+        The mechanism.
+    instant : float
+        s.
+    tolerance : float
+        Of the last correction, rad or sizes of the mechanism.
+    free : bool, default False
+        Whether degrees of freedom may be left: then the position is the nearest to the guess that fulfils all joints.
 
     Returns
     -------
@@ -45,9 +58,11 @@ def assemble(model: Model, instant: float, tolerance: float) -> tuple[Model, dic
         If joints and drivers leave degrees of freedom, or there are too many of them.
     """
     columns = model.system.cells.shape[1]
-    if not model.rows:
+    if not model.rows and not free:
         noun = "degree of freedom" if columns == 1 else "degrees of freedom"
         raise MobilityError(f"the mechanism has no joints and no drivers: {columns} {noun} are left")
+    if not model.rows:  # bodies that fly freely are together as they are
+        return dataclasses.replace(model, system=jax.device_put(model.system)), model.guess
     still, instant = np.zeros(columns), np.float64(instant)
 
     def moved(coordinates: dict[str, Any], increment: np.ndarray) -> Any:
@@ -75,7 +90,7 @@ def assemble(model: Model, instant: float, tolerance: float) -> tuple[Model, dic
         if size <= tolerance:
             break
     _check_assembled(model, scale * residual, float(instant), tolerance)
-    check_mobility(model, scale[:, None] * jacobian)
+    check_mobility(model, scale[:, None] * jacobian, free=free)
     system = jax.device_put(dataclasses.replace(model.system, row_scale=scale[:, None]))
     return dataclasses.replace(model, system=system), coordinates
 
@@ -105,23 +120,26 @@ def _check_assembled(model: Model, gaps: np.ndarray, instant: float, tolerance: 
     raise AssemblyError(message, status=Status.NOT_ASSEMBLED)
 
 
-def check_mobility(model: Model, jacobian: np.ndarray) -> None:
-    """Raise MobilityError, with the bodies and joints concerned, unless the Jacobian is square and regular."""
+def check_mobility(model: Model, jacobian: np.ndarray, *, free: bool = False) -> None:
+    """Raise MobilityError, with the bodies and joints concerned, unless the Jacobian is square and regular.
+
+    Where degrees of freedom may be left, it is enough that no constraint is redundant.
+    """
     rows, columns = jacobian.shape
     left, sizes, right = np.linalg.svd(jacobian)
     rank = int(np.sum(sizes > RANK_TOLERANCE * sizes.max(initial=0.0)))
-    if rows == columns == rank:
+    if rows == rank and (free or rank == columns):
         return
-    free, redundant = columns - rank, rows - rank
+    left_over, redundant = columns - rank, rows - rank
     bodies = len(model.bodies)
     parts = [
         f"{bodies} moving {'body has' if bodies == 1 else 'bodies have'} {columns} coordinates; joints and drivers "
         f"give {rows} equations, {rank} of them independent"
     ]
-    if free:
-        noun = "degree of freedom is" if free == 1 else "degrees of freedom are"
-        moving = _concerned(np.linalg.norm(right[rank:].reshape(free, bodies, -1), axis=(0, 2)), model.bodies)
-        parts.append(f"{free} {noun} left, with which {moving} can move: add {_count(free, 'driver')}")
+    if left_over and not free:
+        noun = "degree of freedom is" if left_over == 1 else "degrees of freedom are"
+        moving = freely_moving(model, right[rank:])
+        parts.append(f"{left_over} {noun} left, with which {moving} can move: add {_count(left_over, 'driver')}")
     if redundant:
         names = tuple(dict.fromkeys(model.rows))
         weights = np.linalg.norm(left[:, rank:], axis=1)
@@ -130,9 +148,15 @@ def check_mobility(model: Model, jacobian: np.ndarray) -> None:
             f"{_count(redundant, 'equation')} too many among {_concerned(by_name, names)}: free a direction there "
             "(a spherical or cylindrical joint for a revolute, say), or remove a driver"
         )
-    if free and redundant and rows == columns:
+    if left_over and redundant and rows == columns and not free:
         parts.append("or the start is a singular position: start at another instant")
     raise MobilityError("; ".join(parts))
+
+
+def freely_moving(model: Model, directions: np.ndarray) -> str:
+    """Name the bodies that move along directions of the coordinates, shape (directions, columns)."""
+    sizes = np.linalg.norm(directions.reshape(len(directions), len(model.bodies), -1), axis=(0, 2))
+    return _concerned(sizes, model.bodies)
 
 
 def _concerned(weights: np.ndarray, names: tuple[str, ...]) -> str:

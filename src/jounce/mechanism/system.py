@@ -56,6 +56,13 @@ class Group(eqx.Module):
         displacement, velocity = self._motion(pose, time)
         return _with_rows(self.element.force(displacement, velocity, time)).truncate(pose.order - 1)
 
+    def finite(self, pose: Any, time: Jet) -> Any:
+        """Tell where forces and the velocities they work on are finite numbers, shape (instances, batch)."""
+        displacement, velocity = self._motion(pose, time)
+        force = self.element.force(displacement, velocity, time)
+        parts = [_with_rows(jet).coefficients[0] for jet in (velocity, force)]
+        return jnp.isfinite(parts[0]).all(axis=0) & jnp.isfinite(parts[1]).all(axis=0)
+
     def power(self, pose: Any, time: Jet) -> Jet:
         """Return the power that forces put into the mechanism, shape (instances, batch), W."""
         displacement, velocity = self._motion(pose, time)
@@ -149,6 +156,8 @@ class System(eqx.Module):
 
     def residual(self, pose: Any, time: Jet) -> Jet:
         """Return the residuals of all constraints, shape (rows, batch), scaled."""
+        if not self.groups:  # bodies that fly freely
+            return Jet.constant(jnp.zeros((0, time.coefficients[0].shape[-1])), pose.order)
         parts = [group.residual(pose, time).map(_flat) for group in self.groups]
         return concatenate(parts) * self.row_scale
 
@@ -194,10 +203,13 @@ class System(eqx.Module):
         return Jet(tuple(transposed([size[::-1] for size in sizes])[0][::-1]))
 
     def finite_forces(self, pose: Any, time: Jet) -> Any:
-        """Tell where each applied force is a finite number, shape (forces, batch); the pose has velocities."""
+        """Tell where each applied force is a finite number, shape (forces, batch); the pose has velocities.
+
+        Where the velocity is not, as for the distance of two points that meet, the force has no direction.
+        """
         lanes = time.coefficients[0].shape[-1]
-        sizes = [group.force(pose.truncate(1), time.truncate(1)).coefficients[0] for group in self.forces]
-        parts = [jnp.broadcast_to(jnp.isfinite(x).all(axis=0), (x.shape[1], lanes)) for x in sizes]
+        moving = [group.finite(_movable(pose.truncate(1)), time.truncate(1)) for group in self.forces]
+        parts = [jnp.broadcast_to(x, (x.shape[0], lanes)) for x in moving]
         return jnp.concatenate([*parts, jnp.ones((0, lanes), bool)])
 
     def coordinates(self, solution: Any, shifts: int) -> tuple[Any, Any]:

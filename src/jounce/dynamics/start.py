@@ -1,0 +1,165 @@
+"""The state a simulation starts from: consistent positions and velocities from partial ones, and what can move."""
+
+import dataclasses
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jounce.dynamics.energies import gravity_of, masses_of
+from jounce.dynamics.forward import Equations, State, least_change
+from jounce.errors import AssemblyError, MechanismError, MobilityError
+from jounce.jet import Jet
+from jounce.kinematics.assembly import RANK_TOLERANCE, assemble, freely_moving
+from jounce.kinematics.compilation import compiled
+from jounce.mechanism import Mechanism, Model, build
+from jounce.mechanism.builder import pose_at
+
+TOLERANCE = 1e-12  # of the assembled positions, rad or sizes of the mechanism
+
+
+class Start(NamedTuple):
+    """A mechanism ready to move.
+
+    Attributes
+    ----------
+    model : Model
+        The numeric model, its rows scaled.
+    equations : Equations
+        Its equations of motion.
+    state : State
+        That fulfils joints, drivers and initial conditions with their rates; a batch of one.
+    mobility : str
+        Degrees of freedom and the bodies that have them, in words.
+    """
+
+    model: Model
+    equations: Equations
+    state: State
+    mobility: str
+
+
+def start(mechanism: Mechanism, instant: float) -> Start:
+    """Return a consistent state at an instant, from the starting guess and the initial conditions.
+
+    Initial conditions are drivers: each fixes one coordinate and its rate, as its law gives them at the instant. What
+    they leave open is chosen: positions nearest to the guess of the bodies, velocities of least kinetic energy.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        Its bodies need masses; joints and drivers may leave degrees of freedom.
+    instant : float
+        s.
+
+    Raises
+    ------
+    MechanismError
+        If a value is not valid, no body has a mass, or one that can move has none.
+    AssemblyError
+        If joints, drivers and initial conditions cannot all be fulfilled.
+    MobilityError
+        If constraints or initial conditions are redundant.
+    """
+    masses = masses_of(mechanism)
+    if not masses[0].any():
+        raise MechanismError("no body has a mass; the equations of motion need masses", name="bodies")
+    model = build(mechanism)
+    coordinates = model.guess
+    if mechanism.initial:
+        model, coordinates = _assembled(mechanism, instant)
+        whole = equations_of(mechanism, model)
+        state = _at_rest(model, coordinates)
+        state = jax.tree.map(np.asarray, _with_rates(whole, state, np.array([[instant]])))
+        model = dataclasses.replace(build(mechanism), guess=coordinates)
+    model, coordinates = assemble(model, instant, TOLERANCE, free=True)
+    equations = equations_of(mechanism, model)
+    if not mechanism.initial:
+        state = _at_rest(model, coordinates)
+    state = jax.tree.map(np.asarray, _with_rates(equations, state, np.array([[instant]])))
+    if not all(np.isfinite(part).all() for part in state):
+        _explain(equations, model, state, instant, masses)
+    return Start(model, equations, state, _explain(equations, model, state, instant, masses))
+
+
+def equations_of(mechanism: Mechanism, model: Model) -> Equations:
+    """Return the equations of motion of a mechanism."""
+    mass, center, moments = masses_of(mechanism)
+    system = dataclasses.replace(model.system, outputs=())
+    values = (system, mass, center, moments, gravity_of(mechanism), np.float64(np.max(mass)))
+    return Equations(*jax.device_put(values), model.pose_type)
+
+
+def _assembled(mechanism: Mechanism, instant: float) -> tuple[Model, dict[str, np.ndarray]]:
+    """Return the mechanism with its initial conditions as drivers, assembled."""
+    driven = dataclasses.replace(mechanism, drivers={**mechanism.drivers, **mechanism.initial}, initial={})
+    model = build(driven)
+    rows = tuple(_renamed(name, mechanism) for name in model.rows)
+    try:
+        return assemble(dataclasses.replace(model, rows=rows), instant, TOLERANCE, free=True)
+    except AssemblyError as error:
+        message = f"{error.message}; joints, drivers and initial conditions contradict each other there"
+        raise AssemblyError(message, status=error.status) from None
+    except MobilityError as error:
+        message = f"joints, drivers and initial conditions together: {error.message}"
+        raise MobilityError(message) from None
+
+
+def _renamed(row: str, mechanism: Mechanism) -> str:
+    kind, _, name = row.partition(".")
+    return f"initial.{name}" if kind == "drivers" and name in mechanism.initial else row
+
+
+def _at_rest(model: Model, coordinates: dict[str, np.ndarray]) -> State:
+    pose = pose_at(coordinates, model.pose_type)
+    position = np.asarray(pose.position.coefficients[0])[:, 1:]
+    if pose.turns == 1:
+        attitude, spin = np.asarray(pose.angle.coefficients[0])[None, 1:], np.zeros((1, *position.shape[1:]))
+    else:
+        attitude, spin = np.asarray(pose.quaternion.coefficients[0])[:, 1:], np.zeros_like(position)
+    return State(position, attitude, np.zeros_like(position), spin)
+
+
+@compiled()
+def _with_rates(equations: Equations, state: State, time: Any) -> State:
+    """Return the state with the least change of its velocities that fulfils the rates of all constraints."""
+    rate = equations.system.residual(equations.pose(state), Jet.variable(time, 1)).dense().coefficients[1]
+    change = least_change(equations, state, time, rate)
+    shifts = equations.pose_type.shifts
+    return state._replace(velocity=state.velocity + change[:shifts], spin=state.spin + change[shifts:])
+
+
+@compiled()
+def _matrices(equations: Equations, state: State, time: Any) -> tuple[Any, Any]:
+    pose = equations.still(state.position, state.attitude)
+    return equations.matrix(state, time)[..., 0], equations.system.jacobian(pose, Jet([time]))[..., 0]
+
+
+def _explain(equations: Equations, model: Model, state: State, instant: float, masses: Any) -> str:
+    """Return the mobility in words, or raise for a body whose acceleration nothing determines."""
+    state = state._replace(velocity=np.zeros_like(state.velocity), spin=np.zeros_like(state.spin))
+    whole, jacobian = (np.asarray(x) for x in _matrices(equations, state, np.array([[instant]])))
+    columns = jacobian.shape[1]
+    _, sizes, right = np.linalg.svd(whole)
+    loose = right[sizes <= RANK_TOLERANCE * 1e-3 * sizes.max()]
+    if len(loose):
+        mass, _, moments = masses
+        by_body = np.linalg.norm(loose[:, :columns].reshape(len(loose), len(model.bodies), -1), axis=(0, 2))
+        for name, size, m, s in zip(
+            model.bodies, by_body, mass[1:, 0], np.abs(moments[..., 1:, 0]).sum((0, 1)), strict=True
+        ):
+            if size > 0.05 * by_body.max() and (m == 0 or s == 0):
+                lacks = "mass" if m == 0 else "inertia"
+                message = f"the body can move but has no {lacks}, so that nothing determines its acceleration"
+                advice = f"give it one, or join it to a body that has {'mass' if m == 0 else 'inertia'}"
+                raise MechanismError(f"{message}; {advice}", name=f"bodies.{name}.{lacks}")
+        names = freely_moving(model, loose[:, :columns])
+        raise MobilityError(f"the equations of motion are singular at t = {instant:g} s: {names}")
+    _, sizes, right = np.linalg.svd(jacobian)
+    rank = int(np.sum(sizes > RANK_TOLERANCE * sizes.max(initial=0.0)))
+    free = columns - rank
+    if not free:
+        return "no degree of freedom: all motion is prescribed"
+    noun = "degree of freedom" if free == 1 else "degrees of freedom"
+    return f"{free} {noun}: {freely_moving(model, right[rank:])}"
