@@ -12,8 +12,16 @@ from dataclasses import MISSING, dataclass
 from typing import Any
 
 from jounce.constraints.base import field_kind, value_fields
+from jounce.dynamics import (
+    AppliedForceOutput,
+    AppliedTorqueOutput,
+    DriverForceOutput,
+    DriverTorqueOutput,
+    JointForceOutput,
+    JointTorqueOutput,
+)
 from jounce.mechanism import (
-    AbstractOutput,
+    AbstractQuantity,
     AngleOutput,
     AngularVelocityOutput,
     DistanceOutput,
@@ -22,7 +30,16 @@ from jounce.mechanism import (
     RelativeAngleOutput,
 )
 
-__all__ = ["OUTPUTS", "FileKey", "file_keys", "location_of", "output_tag", "output_types"]
+__all__ = [
+    "HOLDERS",
+    "OUTPUTS",
+    "FileKey",
+    "file_keys",
+    "location_of",
+    "output_holder",
+    "output_tag",
+    "output_types",
+]
 
 _PLURALS = {"point": "points", "vector": "vectors", "axis": "axes", "normal": "normals"}
 
@@ -97,26 +114,41 @@ def _quantity(kind: type[Any], stem: str, fields: set[str]) -> str:
     return "length" if "point_i" in fields else "angle"
 
 
-OUTPUTS: tuple[tuple[str | None, type[AbstractOutput]], ...] = (
+OUTPUTS: tuple[tuple[str | None, type[AbstractQuantity]], ...] = (
     (None, PointOutput),
     ("angle", AngleOutput),
     ("angle", PlanarRelativeAngleOutput),
     ("angle", RelativeAngleOutput),
     ("angular_velocity", AngularVelocityOutput),
     ("distance", DistanceOutput),
+    ("force", DriverForceOutput),
+    ("torque", DriverTorqueOutput),
+    ("force", JointForceOutput),
+    ("reaction", JointForceOutput),
+    ("torque", JointTorqueOutput),
+    ("force", AppliedForceOutput),
+    ("torque", AppliedTorqueOutput),
 )
 """The word for ``quantity`` in a file (None when there is none) and the class of each output."""
 
-
-def output_tag(quantity: object, body_count: int) -> str:
-    """Return the name of a form of output, by its quantity and whether it has ``body`` or ``bodies``."""
-    return f"{quantity or 'point'} of {'a body' if body_count == 1 else 'bodies'}"
+HOLDERS = {"driver": "a driver", "joint": "a joint", "force": "a force", "bodies": "bodies", "body": "a body"}
+"""The keys that say what an output is of, and their words; the first that is there counts."""
 
 
-def output_types(space: str) -> dict[str, tuple[str | None, type[AbstractOutput]]]:
+def output_holder(kind: type[AbstractQuantity]) -> str:
+    """Return the key that says what an output of a class is of, one of ``HOLDERS``."""
+    return getattr(kind, "source", "body" if kind.body_count == 1 else "bodies")
+
+
+def output_tag(quantity: object, holder: str) -> str:
+    """Return the name of a form of output, by its quantity and the key that says what it is of."""
+    return f"{quantity or 'point'} of {HOLDERS[holder]}"
+
+
+def output_types(space: str) -> dict[str, tuple[str | None, type[AbstractQuantity]]]:
     """Return the forms of output that exist in a space, by tag: the word for ``quantity``, and the class."""
     return {
-        output_tag(quantity, kind.body_count): (quantity, kind)
+        output_tag(quantity, output_holder(kind)): (quantity, kind)
         for quantity, kind in OUTPUTS
         if kind.space in ("", space)
     }

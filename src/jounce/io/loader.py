@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from jounce.constraints import catalogue
+from jounce.dynamics import AppliedForceOutput, AppliedTorqueOutput, JointForceOutput, JointTorqueOutput
 from jounce.errors import JounceError, MechanismFileError, did_you_mean
 from jounce.io.fields import FileKey, file_keys, location_of, output_types
 from jounce.io.source import Location, Source, read_source
-from jounce.mechanism import Body, Mechanism, TimeGrid, time_grid
+from jounce.mechanism import AngularVelocityOutput, Body, Mechanism, PointOutput, TimeGrid, time_grid
 from jounce.mechanism.masses import body_mass
 from jounce.mechanism.resolve import resolve, resolve_element
 from jounce.trajectory import SplineMotion
@@ -237,9 +238,11 @@ def _outputs(space: str, models: dict[str, Any], places: dict[str, Any]) -> dict
         kind = tags[type(model).__name__]
         keys, given = file_keys(kind), _plain(model)
         places[f"outputs.{name}"] = (("outputs", name), keys)
-        bodies = given["bodies"] if kind.body_count > 1 else (given["body"],)
+        arguments = _arguments(keys, given)
+        if kind.body_count:
+            arguments["bodies"] = given["bodies"] if kind.body_count > 1 else (given["body"],)
         try:
-            found[name] = kind(bodies=bodies, **_arguments(keys, given))
+            found[name] = kind(**arguments)
         except JounceError as error:
             raise _placed(error, f"outputs.{name}") from None
     return found
@@ -249,8 +252,16 @@ def _check_columns(source: Source, mechanism: Mechanism) -> None:
     """Refuse outputs whose columns in a table would have the same name: a point C and an angle C_x."""
     for name in mechanism.outputs:
         stem, _, component = name.rpartition("_")
-        if component in ("x", "y", "z") and getattr(mechanism.outputs.get(stem), "point", None) is not None:
+        if component in ("x", "y", "z") and _has_components(mechanism, mechanism.outputs.get(stem)):
             raise source.error(f"this name is taken by a component of the output '{stem}'", ("outputs", name))
+
+
+def _has_components(mechanism: Mechanism, output: Any) -> bool:
+    """Tell whether an output is a vector."""
+    if isinstance(output, AppliedForceOutput | AppliedTorqueOutput):
+        return len(mechanism.forces[output.force].velocity_names) > 1
+    turning = isinstance(output, AngularVelocityOutput | JointTorqueOutput) and mechanism.space == "spatial"
+    return turning or isinstance(output, PointOutput | JointForceOutput)
 
 
 def _check_values(mechanism: Mechanism) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["Peak", "derivative_name", "derivative_unit", "peaks", "scalar_outputs"]
+__all__ = ["Peak", "derivative_name", "derivative_unit", "peaks", "rate_name", "scalar_outputs"]
 
 NAMES = ("position", "velocity", "acceleration", "jerk", "jounce")
 COMPONENTS = ("x", "y", "z")
@@ -24,7 +24,7 @@ class Peak:
     output : str
         Name of the output, with its component where it has some: ``C_x``.
     derivative : str
-        ``position``, ``velocity``, ..., see `derivative_name`.
+        ``position``, ``velocity``, ..., or ``torque``, ``yank``, ..., see `rate_name`.
     unit : str
     minimum, maximum : float
         In the unit; NaN where no instant was solved.
@@ -64,6 +64,23 @@ def derivative_name(order: int) -> str:
         return NAMES[order]
     last = order % 10 if order // 10 % 10 != 1 else 0
     return str(order) + {1: "st", 2: "nd", 3: "rd"}.get(last, "th")
+
+
+def rate_name(output: Any, order: int) -> str:
+    """Name a time derivative of an output: velocity, jerk, ..., or for a force yank, second rate, ...
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> [rate_name(jn.AngleOutput("crank"), k) for k in (0, 1, 4)]
+    ['position', 'velocity', 'jounce']
+    >>> [rate_name(jn.DriverTorqueOutput("theta"), k) for k in (0, 1, 2, 6)]
+    ['torque', 'yank', 'second rate', '6th rate']
+    """
+    names = output.rate_names
+    if not names:
+        return derivative_name(order + output.lost_orders)
+    return names[order] if order < len(names) else f"{derivative_name(order)} rate"
 
 
 def derivative_unit(unit: str, order: int) -> str:
@@ -125,7 +142,7 @@ def peaks(motion: Any) -> list[Peak]:
             magnitudes = np.abs(motion.outputs[name][:, order])
             size = float(np.max(magnitudes, initial=0.0, where=np.isfinite(magnitudes)))
             unit = derivative_unit(output.unit, order)
-            found.append(Peak(column, derivative_name(order + output.lost_orders), unit, *extremes, size))
+            found.append(Peak(column, rate_name(output, order), unit, *extremes, size))
     return found
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from jounce.constraints import catalogue
 from jounce.errors import UNSET, MechanismFileError, did_you_mean, show_value
-from jounce.io.fields import file_keys, output_types
+from jounce.io.fields import file_keys, output_holder, output_types
 from jounce.io.schema import file_model, output_form
 from jounce.io.source import Location, Source
 
@@ -55,8 +55,6 @@ def _word(source: Source, space: str, problem: Any) -> MechanismFileError:
         case "jounce":
             stated = context["value"]
             return source.error(context["message"], at, value=value if stated is ... else stated)
-        case "extra_forbidden" if at[0] == "outputs" and at[-1] in ("joint", "driver"):
-            return _unknown_output(source, space, at[:2], source.data["outputs"][at[1]])
         case "extra_forbidden":
             return source.error(_unknown_key(source, space, at), at)
         case "missing":
@@ -92,8 +90,8 @@ def _valid_keys(source: Source, space: str, parent: Location) -> list[str]:
     entry = source.data[parent[0]][parent[1]]
     if kind == "outputs":
         quantity, output = output_types(space)[output_form(entry)]
-        keys = ["body" if output.body_count == 1 else "bodies", *(["quantity"] if quantity else [])]
-        return [*keys, *(key.key for key in file_keys(output))]
+        keys = dict.fromkeys([output_holder(output), *(["quantity"] if quantity else [])])
+        return list(keys | dict.fromkeys(key.key for key in file_keys(output)))
     constraint = catalogue(space, _TAGGED[str(kind)])[entry["type"]]
     return ["type", "body" if constraint.body_count == 1 else "bodies", *(key.key for key in file_keys(constraint))]
 
@@ -123,18 +121,23 @@ def _unknown_type(source: Source, space: str, at: Location, entry: dict[str, Any
 
 
 def _unknown_output(source: Source, space: str, at: Location, entry: dict[str, Any]) -> MechanismFileError:
-    quantity = entry.get("quantity")
-    if "joint" in entry or "driver" in entry or quantity in ("force", "torque", "reaction"):
-        message = "forces, torques and reactions need masses, they come with a later version"
-        return source.error(message, (*at, "quantity"), value=UNSET if quantity is None else quantity)
-    forms = output_types(space)
+    quantity, forms = entry.get("quantity"), output_types(space)
     quantities = {word for word, _ in forms.values() if word}
+    place = (*at, "quantity")
+    for holder in ("driver", "joint", "force"):
+        if holder in entry:
+            valid = [word for word, kind in forms.values() if word and output_holder(kind) == holder]
+            if quantity is None:
+                return source.error(f"is missing; valid: {', '.join(sorted(set(valid)))}", place)
+            message = f"a {holder} has no such quantity; {did_you_mean(quantity, valid)}"
+            return source.error(message, place, value=quantity)
+    if quantity in ("force", "torque", "reaction"):
+        message = "of what? name a driver, joint or force, as in {driver: theta, quantity: torque}"
+        return source.error(message, place, value=quantity)
     if isinstance(quantity, str) and quantity in quantities:
         body = "bodies: [i, j]" if "bodies" not in entry else "body"
         return source.error(f"in {space} space the quantity '{quantity}' takes {body}", at, value=entry)
     if quantity is None:
         message = "give a point of one body, or a quantity"
         return source.error(f"{message}; {did_you_mean('', quantities)}", at, value=entry)
-    return source.error(
-        f"no output has this quantity; {did_you_mean(quantity, quantities)}", (*at, "quantity"), value=quantity
-    )
+    return source.error(f"no output has this quantity; {did_you_mean(quantity, quantities)}", place, value=quantity)

@@ -16,7 +16,7 @@ from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, create_mo
 from jounce.constraints import catalogue
 from jounce.constraints.planar import COORDINATES
 from jounce.errors import did_you_mean
-from jounce.io.fields import FileKey, file_keys, output_tag, output_types
+from jounce.io.fields import HOLDERS, FileKey, file_keys, output_holder, output_tag, output_types
 from jounce.io.masses import inertia
 from jounce.io.values import Checked, laws, motion, orientation, problem, scalar, vector, vectors
 from jounce.mechanism.outputs import FRAMES
@@ -123,7 +123,8 @@ def _annotation(kind: type[Any], key: FileKey, size: int, choices: dict[str, tup
 
 def _values(kind: type[Any], size: int) -> dict[str, tuple[Any, Any]]:
     """Return the keys of a class besides its bodies, as fields of a model."""
-    choices = _CHOICES if kind.__module__.startswith("jounce.") else {}
+    own_frames = not kind.body_count  # the frame of a force may also be a body by its name
+    choices = _CHOICES if kind.__module__.startswith("jounce.") and not own_frames else {}
     return {key.key: (_annotation(kind, key, size, choices), ... if key.required else None) for key in file_keys(kind)}
 
 
@@ -148,17 +149,14 @@ def output_form(raw: Any) -> Any:
     """Return the tag of the form that an output of a file has, None when it is not a mapping."""
     if not isinstance(raw, dict):
         return None
-    return output_tag(raw.get("quantity"), 2 if "bodies" in raw else 1)
+    return output_tag(raw.get("quantity"), next((key for key in HOLDERS if key in raw), "body"))
 
 
 def _output_union(space: str) -> Any:
     """Return the union of all outputs of a space."""
     models = []
-    body = Annotated[Any, Checked(_check_body, {"type": "string"})]
     for tag, (quantity, kind) in output_types(space).items():
-        fields: dict[str, tuple[Any, Any]] = {"body": (body, ...)}
-        if kind.body_count > 1:
-            fields = {"bodies": (_names(kind.body_count), ...)}
+        fields: dict[str, tuple[Any, Any]] = _bodies(kind) if output_holder(kind) in ("body", "bodies") else {}
         if quantity is not None:
             fields["quantity"] = (Literal[quantity], ...)
         fields |= _values(kind, COMPONENTS[space])

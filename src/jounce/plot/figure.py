@@ -12,7 +12,7 @@ import numpy as np
 
 from jounce.errors import MechanismError, did_you_mean
 from jounce.io.files import check_target, replacing
-from jounce.io.peaks import COMPONENTS, derivative_name
+from jounce.io.peaks import COMPONENTS, rate_name
 from jounce.plot.labels import scale_of, symbol, unit_label
 
 __all__ = ["check_figure", "draw", "save"]
@@ -71,7 +71,8 @@ def draw(motion: Any, outputs: Sequence[str] | None = None) -> Any:
     Returns
     -------
     matplotlib.figure.Figure
-        Rows are position, velocity, ... as far as the order of the motion; an angular velocity starts in the second.
+        Rows are position, velocity, ... as far as the order of the motion; an angular velocity starts in the second, a
+        force in the third, beside the acceleration.
 
     Raises
     ------
@@ -142,8 +143,8 @@ def _draw_column(motion: Any, name: str, panels: Any, first: int) -> None:
             )
         _shade_unsolved(axes, motion)
         _finish(axes, motion.time, scaled)
-        word = derivative_name(row + first)
-        word = f"{word} derivative" if row + first > 4 else word
+        word = rate_name(output, order)
+        word = f"{word} derivative" if row + first > 4 and not output.rate_names else word
         word = "angle" if row + first == 0 and output.unit == "rad" else word
         mark = "" if vector else symbol(name, order)
         axes.set_ylabel(f"{word}\n{mark}{'  ' if mark else ''}({unit_label(output.unit, order, exponent)})")

@@ -47,11 +47,13 @@ def unit_label(unit: str, order: int, exponent: int = 0) -> str:
 
     Examples
     --------
-    >>> unit_label("m", 2), unit_label("m", 1, -3), unit_label("rad", 4, 3)
-    ('m/s$^2$', 'mm/s', '$10^{3}$ rad/s$^4$')
+    >>> unit_label("m", 2), unit_label("m", 1, -3), unit_label("rad", 4, 3), unit_label("N*m", 1)
+    ('m/s$^2$', 'mm/s', '$10^{3}$ rad/s$^4$', 'N m/s')
     """
     text = re.sub(
-        r"\^(-?\d+)", lambda m: f"$^{m[1]}$" if len(m[1]) == 1 else f"$^{{{m[1]}}}$", derivative_unit(unit, order)
+        r"\^(-?\d+)",
+        lambda m: f"$^{m[1]}$" if len(m[1]) == 1 else f"$^{{{m[1]}}}$",
+        derivative_unit(unit.replace("*", " "), order),
     )
     if exponent == 0:
         return text
