@@ -52,7 +52,7 @@ def departed(equations: Equations, state: State, time: Any, *, order: int) -> Fr
     return Front(time, expansion, jnp.full(time.shape, jnp.inf), outcome, jnp.zeros(time.shape))
 
 
-@compiled("method", "count", "keep")
+@compiled("count", "keep")
 def march(
     equations: Equations,
     front: Front,
@@ -98,7 +98,7 @@ def march(
     def attempt(front: Front) -> tuple[Front, Steps]:
         left = stop - front.time
         sizes = coefficient_sizes(front.expansion, length)
-        step = jnp.minimum(jnp.minimum(method.step(sizes, tolerance), front.limit), longest)
+        step = jnp.minimum(jnp.minimum(method.longest_step(sizes, tolerance), front.limit), longest)
         last = step >= 0.999 * jnp.abs(left)  # no sliver of a step at the end
         step = jnp.where(last, left, jnp.sign(left) * step)
         time = jnp.where(last, stop, front.time + step)

@@ -2,15 +2,13 @@
 
 import abc
 import math
-from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-import numpy as np
 
-from jounce.dynamics.forward import Equations, Expansion, State, expand
+from jounce.dynamics.forward import Equations, Expansion, State
 from jounce.errors import JounceError
 
 HIGHEST_ORDER = 40
@@ -29,7 +27,7 @@ class AbstractMethod(eqx.Module):
         """Return the order of the expansions that the method needs."""
 
     @abc.abstractmethod
-    def step(self, sizes: Any, tolerance: Any) -> Any:
+    def longest_step(self, sizes: Any, tolerance: Any) -> Any:
         """Return how far a step may go, s, shape (batch,).
 
         Parameters
@@ -71,7 +69,7 @@ def coefficient_sizes(expansion: Expansion, length: Any) -> Any:
     return jnp.maximum(velocity / length, spin) / jnp.arange(1.0, len(velocity) + 1)[:, None]
 
 
-def _reach(sizes: Any, first: int) -> Any:
+def reach(sizes: Any, first: int) -> Any:
     """Return the time in which no Taylor term from the order `first` on exceeds one, shape (batch,).
 
     All of them count: the last two may vanish together, as those of a body at rest or at a turning point do.
@@ -88,6 +86,8 @@ class Taylor(AbstractMethod):
     ----------
     order : int, optional
         From 4 to 40; from the tolerance unless given.
+    step : float, optional
+        The length of all steps, s; by a control of the error unless given.
 
     Examples
     --------
@@ -97,20 +97,24 @@ class Taylor(AbstractMethod):
     """
 
     order: int | None = eqx.field(static=True, default=None)
+    step: float | int | None = None
 
     def __check_init__(self):
         if self.order is not None and not (isinstance(self.order, int) and 4 <= self.order <= HIGHEST_ORDER):
             message = f"the order of Taylor series is a whole number from 4 to {HIGHEST_ORDER}"
             raise JounceError(message, name="order", value=self.order)
+        check_step(self.step)
 
     def expansion_order(self, tolerance: float) -> int:
         """Return the order: of all, the one that takes the fewest terms for a unit of time, at this tolerance."""
         return self.order or min(max(round(-0.75 * math.log(tolerance)), 6), 28)
 
-    def step(self, sizes: Any, tolerance: Any) -> Any:
+    def longest_step(self, sizes: Any, tolerance: Any) -> Any:
         """Return the step at which the terms of the upper half of the orders point to an error within tolerance."""
+        if self.step is not None:
+            return jnp.full(sizes.shape[1], self.step, float)
         count = len(sizes)
-        return _reach(sizes, count // 2) * tolerance ** (1.0 / count)
+        return reach(sizes, count // 2) * tolerance ** (1.0 / count)
 
     def arrive(self, equations: Equations, expansion: Expansion, time: Any, step: Any) -> State:
         """Return the value of the series."""
@@ -122,8 +126,10 @@ class Taylor(AbstractMethod):
 
     def error(self, start: Expansion, end: Expansion, step: Any, length: Any) -> Any:
         """Return what accelerations at the end depart by from the series, as the displacement that is left out."""
+        if self.step is not None:
+            return jnp.zeros_like(step)
         order = len(start.acceleration)
-        series = jnp.concatenate([c for c in start.state[2:]], axis=1)
+        series = jnp.concatenate(list(start.state[2:]), axis=1)
         rates = series[1:] * jnp.arange(1.0, order + 1)[:, None, None, None]
         found = end.acceleration[0]
         departure = jnp.abs(_horner(rates, step) - found) - ROUNDING * jnp.max(jnp.abs(found), axis=(0, 1))[None, None]
@@ -134,3 +140,11 @@ class Taylor(AbstractMethod):
 
 def _largest(x: Any) -> Any:
     return jnp.max(x, axis=(0, 1))
+
+
+def check_step(step: Any) -> None:
+    """Refuse a length of steps that is no positive number; None leaves it to the control of the error."""
+    if step is None or isinstance(step, jax.Array):
+        return
+    if isinstance(step, bool) or not isinstance(step, (int, float)) or not (step > 0 and math.isfinite(step)):
+        raise JounceError("the length of steps must be a positive number of seconds", name="step", value=step)
