@@ -59,6 +59,12 @@ from jounce.errors import (  # noqa: E402
     UnitError as UnitError,
 )
 from jounce.forces import AbstractForce as AbstractForce, Law as Law, Laws as Laws  # noqa: E402
+from jounce.integrate import (  # noqa: E402
+    Event as Event,
+    Simulation as Simulation,
+    Taylor as Taylor,
+    simulate as simulate,
+)
 from jounce.io import (  # noqa: E402
     load as load,
     load_limits as load_limits,

@@ -32,6 +32,26 @@ def _evaluated(group: Group, coordinates: dict[str, Any], pose_type: type) -> An
     return jnp.stack(group.evaluate(pose).dense().coefficients)
 
 
+def check_output(output: Any, mechanism: Mechanism, name: str = "output") -> None:
+    """Raise MechanismError unless an output names what the mechanism has, and exists in its space."""
+    names = (GROUND, *mechanism.bodies)
+    for body in output.bodies:
+        if body not in names:
+            message = f"no body has this name; {did_you_mean(body, names)}"
+            raise MechanismError(message, name="body", value=body)
+    if output.space and output.space != mechanism.space:
+        raise MechanismError(f"this output is {output.space}, the mechanism is {mechanism.space}", name=name)
+    output.check(mechanism)
+
+
+def output_group(output: Any, mechanism: Mechanism, name: str = "output") -> Group:
+    """Return an output of poses as a group of one, which acts on the pose of all bodies."""
+    index = {body: k for k, body in enumerate((GROUND, *mechanism.bodies))}
+    components = POSITION_COMPONENTS[mechanism.space]
+    (group,), _ = group_elements({name: output}, mechanism.parameter_values, index, components)
+    return group
+
+
 class Motion:
     """The motion of a mechanism at the instants of a time grid.
 
@@ -149,19 +169,10 @@ class Motion:
         MechanismError
             If the output names a body, joint, driver or force that does not exist, or does not fit the mechanism.
         """
-        names = (GROUND, *self._model.bodies)
-        for body in output.bodies:
-            if body not in names:
-                message = f"no body has this name; {did_you_mean(body, names)}"
-                raise MechanismError(message, name="body", value=body)
-        if output.space and output.space != self.mechanism.space:
-            raise MechanismError(f"this output is {output.space}, the mechanism is {self.mechanism.space}", name=name)
+        check_output(output, self.mechanism, name)
         if isinstance(output, AbstractMotionOutput):
-            output.check(self.mechanism)
             return self._labelled(name, self._derivatives(output.coefficients(self)), output.unit)
-        components = POSITION_COMPONENTS[self.mechanism.space]
-        index = {body: k for k, body in enumerate(names)}
-        (group,), _ = group_elements({name: output}, self.mechanism.parameter_values, index, components)
+        group = output_group(output, self.mechanism, name)
         values = np.asarray(_evaluated(group, self._coordinates, self._model.pose_type))[:, :, 0]
         return self._labelled(name, self._derivatives(values), output.unit)
 

@@ -73,7 +73,7 @@ def solve(
     >>> motion.dataset["psi"].dims
     ('time', 'derivative')
     """
-    order = _checked_order(order)
+    order = checked_order(order)
     if not (isinstance(tolerance, numbers.Real) and 0 < tolerance <= LARGEST_TOLERANCE):
         message = f"the tolerance must be a number above zero and at most {LARGEST_TOLERANCE:g}"
         raise MechanismError(message, name="tolerance", value=tolerance)
@@ -105,7 +105,8 @@ def raise_for_status(motion: Motion) -> None:
     raise SolveError(f"{message} ({solved})", motion=motion, status=status)
 
 
-def _checked_order(order: Any) -> int:
+def checked_order(order: Any) -> int:
+    """Return the order of derivatives, or raise MechanismError."""
     whole = isinstance(order, numbers.Integral) and not isinstance(order, bool)
     if not whole or not 0 <= int(order) <= HIGHEST_ORDER:
         message = f"the order of derivatives must be a whole number from 0 to {HIGHEST_ORDER}"

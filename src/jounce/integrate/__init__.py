@@ -1,0 +1,6 @@
+"""Integration of the equations of motion: Taylor series of any order, Obreshkov, step control, events, dense output."""
+
+from jounce.integrate.events import Event as Event
+from jounce.integrate.methods import AbstractMethod as AbstractMethod, Taylor as Taylor
+from jounce.integrate.simulate import simulate as simulate
+from jounce.integrate.simulation import Simulation as Simulation

@@ -1,0 +1,234 @@
+"""From a mechanism with masses and forces to its motion."""
+
+import dataclasses
+import numbers
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import jax
+import numpy as np
+
+from jounce.dynamics.forward import State
+from jounce.dynamics.start import Start, start as consistent_start
+from jounce.errors import MechanismError, SolveError
+from jounce.integrate.events import Event, crossings, output_series
+from jounce.integrate.marching import Front, Outcome, departed, march
+from jounce.integrate.methods import AbstractMethod, Taylor
+from jounce.integrate.simulation import Simulation, Track
+from jounce.jet import Jet
+from jounce.kinematics import Status, raise_for_status
+from jounce.kinematics.solve import checked_order
+from jounce.kinematics.motion import check_output, output_group
+from jounce.mechanism import Mechanism, time_grid
+
+STEPS = 64  # tried between two looks at progress and events
+TOLERANCES = (1e-15, 1e-2)
+
+
+def simulate(
+    mechanism: Mechanism,
+    time: Any = None,
+    order: int = 4,
+    *,
+    method: AbstractMethod | None = None,
+    tolerance: float = 1e-13,
+    initial: Mapping[str, Any] | None = None,
+    events: Sequence[Event] = (),
+    longest_step: float = np.inf,
+    strict: bool = True,
+    progress: Callable[[int, int], None] | None = None,
+) -> Simulation:
+    """Return the motion of a mechanism under its forces, with time derivatives of any order.
+
+    Accelerations, multipliers and all their rates follow from one factored matrix at each step; positions and
+    velocities are projected onto the constraints (Sommer 2024, section 7).
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        With masses. Joints and drivers may leave degrees of freedom; drivers go on prescribing what they drive.
+    time : array_like of shape (time,), optional
+        Instants, s, increasing, or decreasing to go backward; those of the mechanism unless given. The first is the
+        start.
+    order : int, default 4
+        Highest derivative of the outputs, up to 30.
+    method : AbstractMethod, optional
+        `Taylor` unless given.
+    tolerance : float, default 1e-13
+        Of the error of a step, rad or sizes of the mechanism.
+    initial : dict of str to driver, optional
+        In the place of ``mechanism.initial``: each fixes one coordinate and its rate at the start.
+    events : sequence of Event, optional
+        Crossings to look for.
+    longest_step : float, optional
+        s.
+    strict : bool, default True
+        Raise if an instant is not reached. Otherwise it is NaN and `Motion.status` says why.
+    progress : callable, optional
+        Called with the number of instants passed and their total.
+
+    Returns
+    -------
+    Simulation
+        Also a `Motion`.
+
+    Raises
+    ------
+    MechanismError
+        If the mechanism, the instants or an option is not valid, or a body that can move has no mass.
+    AssemblyError
+        If joints, drivers and initial conditions contradict each other.
+    MobilityError
+        If constraints are redundant.
+    SolveError
+        If the motion cannot be followed to an instant (with `strict`); it holds the motion up to there.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> pendulum = jn.Mechanism(
+    ...     space="planar",
+    ...     gravity=[0, -9.81],
+    ...     bodies={"rod": jn.Body([0, 0], mass=2.0, inertia=0.5, center_of_mass=[1, 0])},
+    ...     joints={"O": jn.planar.Revolute(("ground", "rod"), [0, 0], [0, 0])},
+    ...     outputs={"angle": jn.AngleOutput("rod")},
+    ... )
+    >>> fall = jn.simulate(pendulum, [0.0, 0.5, 1.0], order=3)
+    >>> bool(abs(fall.energy - fall.energy[0]).max() < 1e-12)
+    True
+    """
+    order = checked_order(order)
+    method = Taylor() if method is None else method
+    if not isinstance(method, AbstractMethod):
+        raise MechanismError("must be a method, such as jn.Taylor()", name="method", value=method)
+    low, high = TOLERANCES
+    if not (isinstance(tolerance, numbers.Real) and low <= tolerance <= high):
+        message = f"the tolerance must be a number from {low:g} to {high:g}"
+        raise MechanismError(message, name="tolerance", value=tolerance)
+    if not (isinstance(longest_step, numbers.Real) and longest_step > 0):
+        raise MechanismError("must be greater than zero", name="longest_step", value=longest_step)
+    if initial is not None:
+        mechanism = dataclasses.replace(mechanism, initial=dict(initial))
+    instants = _instants(mechanism.time if time is None else time, mechanism.parameter_values)
+    watched = [_watched(event, mechanism) for event in events]
+    start = consistent_start(mechanism, float(instants[0]))
+    _check_forces(start, float(instants[0]))
+    run = _Run(start, method, float(tolerance), float(longest_step), events, watched)
+    run.go(instants, progress)
+    simulation = Simulation(mechanism, start, run.track, instants, order, run.ending, run.happened)
+    if strict and run.stopped_at is None:
+        raise_for_status(simulation)
+    return simulation
+
+
+def _instants(time: Any, parameters: Mapping[str, Any]) -> np.ndarray:
+    """Return the instants of a run, which may go backward."""
+    if not isinstance(time, (list, tuple, np.ndarray)) or np.ndim(time) != 1 or len(time) < 2:
+        return time_grid(time, parameters)
+    backward = time[-1] < time[0]
+    instants = time_grid(list(time)[::-1] if backward else time, parameters)
+    return instants[::-1] if backward else instants
+
+
+def _watched(event: Any, mechanism: Mechanism) -> Any:
+    """Return the output of an event as a group of one."""
+    if not isinstance(event, Event):
+        raise MechanismError("must be a jn.Event", name="events", value=event)
+    check_output(event.output, mechanism, "events")
+    return output_group(event.output, mechanism)
+
+
+def _check_forces(start: Start, instant: float) -> None:
+    """Raise SolveError where an applied force has no finite value at the start."""
+    names = _unfit(start, jax.tree.map(np.asarray, start.state), instant)
+    if names:
+        status = Status.INADMISSIBLE
+        message = f"t = {instant:g} s, {names}: the force is not finite: check its law and its parameters"
+        raise SolveError(message, status=status)
+
+
+def _unfit(start: Start, state: State, instant: float) -> str:
+    """Name the applied forces that are not finite in a state."""
+    system = start.equations.system
+    if not system.forces:
+        return ""
+    pose = start.equations.pose(state)
+    fit = np.asarray(system.finite_forces(pose, Jet.variable(np.array([[instant]]), 1)))[:, 0]
+    names = [name for members in start.model.forces for name in members]
+    return ", ".join(f"forces.{name}" for name, good in zip(names, fit, strict=True) if not good)
+
+
+class _Run:
+    """One run: its steps so far, the events in them, and how it ended."""
+
+    def __init__(self, start: Start, method: AbstractMethod, tolerance: float, longest: float, events: Any, watched: Any):
+        self.start, self.method, self.tolerance, self.longest = start, method, tolerance, longest
+        self.events, self.watched = events, watched
+        self.happened: list[list[float]] = [[] for _ in events]
+        self.parts: list[Track] = []
+        self.ending = (Status.OK, "")
+        self.stopped_at: float | None = None  # by a terminal event
+
+    @property
+    def track(self) -> Track:
+        """All steps taken."""
+        whole = self.parts
+        polynomial = State(*(np.concatenate(part) for part in zip(*(p.polynomial for p in whole), strict=True)))
+        joined = (np.concatenate([getattr(p, name) for p in whole]) for name in ("start", "length"))
+        return Track(*joined, polynomial)
+
+    def go(self, instants: np.ndarray, progress: Callable[[int, int], None] | None) -> None:
+        """March from the first to the last instant."""
+        equations, stop, sense = self.start.equations, instants[-1], np.sign(instants[-1] - instants[0])
+        order = self.method.expansion_order(self.tolerance)
+        front = departed(equations, self.start.state, instants[:1], order=order)
+        if len(instants) == 1 or int(front.outcome[0]) != Outcome.RUNNING:
+            self._stand(front)
+        while int(front.outcome[0]) == Outcome.RUNNING and self.stopped_at is None and len(instants) > 1:
+            front, steps, tried = march(
+                equations, front, stop, self.tolerance, self.longest, method=self.method, count=STEPS
+            )
+            taken = np.flatnonzero(np.asarray(steps.taken)[: int(tried), 0])
+            if len(taken):
+                part = jax.tree.map(lambda x: np.asarray(x)[taken][..., 0], steps)
+                self.parts.append(self._watch(Track(part.start, part.length, part.polynomial)))
+            if progress is not None:
+                progress(int(np.sum(sense * instants <= sense * float(front.time[0]))), len(instants))
+        if not self.parts:
+            self._stand(front)
+        if int(front.outcome[0]) in (Outcome.COLLAPSED, Outcome.LOST):
+            self.ending = self._explained(front)
+
+    def _stand(self, front: Front) -> None:
+        """Keep the start as a step of no length."""
+        polynomial = State(*(np.asarray(part)[None, ..., 0] for part in front.expansion.state))
+        self.parts.append(Track(np.asarray(front.time), np.zeros(1), polynomial))
+
+    def _watch(self, part: Track) -> Track:
+        """Note the events in some steps; cut the steps at the first that is terminal."""
+        found = []
+        if self.events:
+            pose_type = self.start.model.pose_type
+            coordinates = part.coordinates(pose_type)
+            for which, (event, group) in enumerate(zip(self.events, self.watched, strict=True)):
+                series = np.asarray(output_series(group, coordinates, pose_type))[:, event.component, 0]
+                found += [(step, after, which) for step, after in crossings(event, series, part.length)]
+        for step, after, which in sorted(found, key=lambda x: (x[0], abs(x[1]))):
+            instant = float(part.start[step] + after)
+            self.happened[which].append(instant)
+            if self.events[which].terminal:
+                self.stopped_at = instant
+                length = np.append(part.length[:step], after)
+                polynomial = State(*(x[: step + 1] for x in part.polynomial))
+                return Track(part.start[: step + 1], length, polynomial)
+        return part
+
+    def _explained(self, front: Front) -> tuple[Status, str]:
+        """Return why steps did not go on, and where to look: a force that is not finite, or the most urgent body."""
+        state = State(*(part[0] for part in front.expansion.state))
+        if names := _unfit(self.start, state, float(front.time[0])):
+            return Status.INADMISSIBLE, names
+        acceleration = np.abs(np.asarray(front.expansion.acceleration[0])[..., 0])
+        scale = np.asarray(self.start.equations.system.column_scale)[:, None]
+        sizes = np.nan_to_num(acceleration / scale, nan=np.inf).max(axis=0)
+        return Status.COLLAPSED, f"body {self.start.model.bodies[int(np.argmax(sizes))]}"

@@ -1,0 +1,210 @@
+"""The result of a simulation: a motion with dense output, energy, drift and events."""
+
+import dataclasses
+from functools import cached_property
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jounce.dynamics.energies import body_energy
+from jounce.dynamics.forward import Equations, State, expand
+from jounce.dynamics.start import Start
+from jounce.integrate.events import output_series
+from jounce.integrate.methods import evaluated
+from jounce.integrate.projection import projected
+from jounce.jet import Jet, dot
+from jounce.kinematics import Motion, Status
+from jounce.kinematics.compilation import compiled
+from jounce.mechanism import Mechanism
+
+SMALL_BATCH, LARGE_BATCH = 16, 64  # instants expanded together
+
+
+@dataclasses.dataclass(frozen=True)
+class Track:
+    """Steps taken, in order.
+
+    Parameters
+    ----------
+    start, length : array of shape (steps,)
+        s; lengths are negative backward in time.
+    polynomial : State
+        Coefficients in the time from the start, (steps, order + 1, components, bodies).
+    """
+
+    start: np.ndarray
+    length: np.ndarray
+    polynomial: State
+
+    @property
+    def end(self) -> float:
+        """Where the last step ends, s."""
+        return float(self.start[-1] + self.length[-1])
+
+    def coordinates(self, pose_type: type) -> dict[str, np.ndarray]:
+        """Return the coefficients of all steps as coordinates of a pose, the batch last."""
+        moved = State(*(np.moveaxis(part, 0, -1) for part in self.polynomial))
+        return pose_coordinates(moved, pose_type)
+
+
+def pose_coordinates(state: State, pose_type: type) -> dict[str, np.ndarray]:
+    """Return Taylor coefficients of states, order first, as those of the pose of all bodies, the ground first."""
+    position, attitude, _, spin = (np.asarray(part) for part in state)
+
+    def grounded(part: np.ndarray) -> np.ndarray:
+        return np.concatenate([np.zeros_like(part[:, :, :1]), part], axis=2)
+
+    if attitude.shape[1] == 1:
+        return {"position": grounded(position), "angle": grounded(attitude)[:, 0]}
+    quaternion = grounded(attitude)
+    quaternion[0, 0, 0] = 1.0
+    return {"position": grounded(position), "quaternion": quaternion, "angular_velocity": grounded(spin)[:-1]}
+
+
+class Simulation(Motion):
+    """The motion of a mechanism under its forces, at the instants asked for and at any other.
+
+    All that `Motion` offers is there: outputs, points and angles with their derivatives, forces of joints. At each
+    instant the derivatives of every order follow from the equations of motion, not from the steps.
+
+    Attributes
+    ----------
+    energy : numpy.ndarray of shape (time,)
+        Kinetic energy, potential energy in gravity, and what springs have stored, J.
+    drift : numpy.ndarray of shape (time,)
+        Largest residual of all joints and drivers, rad or sizes of the mechanism, on the positions.
+    mobility : str
+        Degrees of freedom and the bodies that have them.
+    events : list of list of float
+        For each event asked for, the times at which it happened, s.
+    track : Track
+        The steps, as polynomials.
+    """
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        start: Start,
+        track: Track,
+        instants: np.ndarray,
+        order: int,
+        ending: tuple[Status, str] = (Status.OK, ""),
+        events: list[list[float]] | None = None,
+    ):
+        self.track, self._start = track, start
+        self.events = [] if events is None else events
+        self._ending = ending
+        lost = max((output.lost_orders for output in mechanism.outputs.values()), default=0)
+        reached, chosen = _steps_of(track, instants)
+        state = _at(start.equations, track, instants, chosen, order + max(lost, 1))
+        pose_type = start.model.pose_type
+        coordinates = pose_coordinates(state, pose_type)
+        groups = tuple(
+            _continuous(group, np.asarray(output_series(group, coordinates, pose_type)), instants)
+            for group in start.model.system.outputs
+        )
+        status = np.where(reached, int(Status.OK), int(Status.NOT_REACHED))
+        culprits = {}
+        if not reached.all():
+            first = int(np.flatnonzero(~reached)[0])
+            status[first], culprits[first] = int(ending[0]), ending[1]
+        super().__init__(mechanism, start.model, instants, order, (coordinates, groups), status, culprits)
+
+    def __repr__(self) -> str:
+        return f"<Simulation{super().__repr__()[7:-1]}, {len(self.track.start)} steps>"
+
+    @property
+    def mobility(self) -> str:
+        """Degrees of freedom and the bodies that have them, in words."""
+        return self._start.mobility
+
+    @property
+    def ended_at(self) -> float:
+        """Time to which the motion was followed, s."""
+        return self.track.end
+
+    def at(self, time: Any, order: int | None = None) -> "Simulation":
+        """Return the same simulation at other instants, without integrating again.
+
+        Parameters
+        ----------
+        time : array_like of shape (time,)
+            s; those outside of what was simulated are NaN.
+        order : int, optional
+            Highest derivative; that of this simulation unless given.
+        """
+        instants = np.atleast_1d(np.asarray(time, float))
+        order = self.order if order is None else order
+        return Simulation(self.mechanism, self._start, self.track, instants, order, self._ending, self.events)
+
+    @cached_property
+    def energy(self) -> np.ndarray:
+        """Kinetic energy, potential energy in gravity, and what springs have stored, J, shape (time,)."""
+        return self._checked(0)
+
+    @cached_property
+    def drift(self) -> np.ndarray:
+        """Largest residual of joints and drivers, rad or sizes of the mechanism, shape (time,)."""
+        return self._checked(1)
+
+    def _checked(self, which: int) -> np.ndarray:
+        pose_type, coordinates = self.poses
+        low = {name: values[: 2 - (name == "angular_velocity")] for name, values in coordinates.items()}
+        found = np.asarray(_checks(self._start.equations, low, self.time[None], pose_type)[which])
+        return np.where(self.status == Status.OK, found, np.nan)
+
+
+def _steps_of(track: Track, instants: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return which instants the steps reach, and the step in which each of them is."""
+    sense = 1.0 if track.length[0] >= 0 else -1.0
+    rounding = 1e-14 * max(abs(track.start[0]), abs(track.end))
+    reached = (sense * (instants - track.start[0]) >= -rounding) & (sense * (instants - track.end) <= rounding)
+    chosen = np.searchsorted(sense * track.start, sense * instants, side="right") - 1
+    return reached, np.clip(chosen, 0, len(track.start) - 1)
+
+
+def _at(equations: Equations, track: Track, instants: np.ndarray, chosen: np.ndarray, order: int) -> State:
+    """Return the Taylor coefficients of the motion at instants, order first and the instants last."""
+    count = len(instants)
+    width = SMALL_BATCH if count <= SMALL_BATCH else LARGE_BATCH
+    parts = []
+    for first in range(0, count, width):
+        lanes = np.minimum(np.arange(first, first + width), count - 1)
+        steps = chosen[lanes]
+        polynomial = State(*(np.moveaxis(part[steps], 0, -1) for part in track.polynomial))
+        state = _expanded(equations, polynomial, instants[lanes] - track.start[steps], instants[lanes], order=order)
+        parts.append(jax.tree.map(np.asarray, state))
+    return jax.tree.map(lambda *xs: np.concatenate(xs, axis=-1)[..., :count], *parts)
+
+
+@compiled("order")
+def _expanded(equations: Equations, polynomial: State, step: Any, instants: Any, *, order: int) -> State:
+    state, _ = projected(equations, evaluated(polynomial, step), instants[None])
+    return expand(equations, state, instants[None], order).state
+
+
+def _continuous(group: Any, series: np.ndarray, instants: np.ndarray) -> np.ndarray:
+    """Take the whole turns out of angles that are known up to them, from one instant to the next by their rates."""
+    if not group.element.turning or len(instants) < 2:
+        return series
+    expected = np.diff(instants) * 0.5 * (series[1, ..., 1:] + series[1, ..., :-1])
+    jumps = np.round((np.diff(series[0], axis=-1) - expected) / (2 * np.pi))
+    series[0, ..., 1:] -= 2 * np.pi * np.cumsum(jumps, axis=-1)
+    return series
+
+
+@compiled("pose_type")
+def _checks(equations: Equations, coordinates: dict[str, Any], time: Any, pose_type: type) -> tuple[Any, Any]:
+    """Return the energy and the largest residual, both of shape (batch,)."""
+    pose = pose_type.from_coordinates({name: Jet(tuple(c)) for name, c in coordinates.items()})
+    clock = Jet.variable(time, 1)
+    translation, rotation = body_energy(pose, equations.mass, equations.center, equations.moments, 0)
+    height = dot(pose.point(equations.center), equations.gravity).coefficients[0]
+    energy = jnp.sum(translation.coefficients[0] + rotation.coefficients[0] - equations.mass * height, axis=0)
+    for group in equations.system.forces:
+        stored = jnp.broadcast_to(group.energy(pose, clock).coefficients[0], (group.instances, time.shape[-1]))
+        energy = energy + jnp.sum(stored, axis=0)
+    gaps = equations.system.residual(pose, clock).coefficients[0]
+    return energy, jnp.max(jnp.abs(gaps), axis=0, initial=0.0)
