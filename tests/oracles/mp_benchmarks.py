@@ -1,97 +1,20 @@
 """Published benchmarks of multibody dynamics in the judge's own formulation: each function returns a closed `Problem`.
 
-Every number is taken in decimals as published. Planar bodies in absolute coordinates are (x, y, angle) of the centre of
-mass, spatial ones are (x, y, z) of the centre of mass and four Euler parameters with their normalisation as a constraint.
+Every number is taken in decimals as published. Planar bodies in absolute coordinates are (x, y, angle) of the centre
+of mass, spatial ones (x, y, z) and four Euler parameters, with their normalisation as a constraint.
 """
 
 from mpmath import mp
 
 from tests.oracles.mp_dynamics import Problem, Rate, cos, node, sin, sqrt
 
-ANDREWS = {
-    **{"m1": "0.04325", "m2": "0.00365", "m3": "0.02373", "m4": "0.00706", "m5": "0.07050", "m6": "0.00706"},
-    **{"m7": "0.05498", "i1": "2.194e-6", "i2": "4.410e-7", "i3": "5.255e-6", "i4": "5.667e-7", "i5": "1.169e-5"},
-    **{"i6": "5.667e-7", "i7": "1.912e-5", "xa": "-0.06934", "ya": "-0.00227", "xb": "-0.03635", "yb": "0.03273"},
-    **{"xc": "0.014", "yc": "0.072", "c0": "4530", "l0": "0.07785", "mom": "0.033", "d": "0.028", "da": "0.0115"},
-    **{"e": "0.02", "ea": "0.01421", "rr": "0.007", "ra": "0.00092", "ss": "0.035", "sa": "0.01874"},
-    **{"sb": "0.01043", "sc": "0.018", "sd": "0.02", "ta": "0.02308", "tb": "0.00916", "u": "0.04", "ua": "0.01228"},
-    **{"ub": "0.00449", "zf": "0.02", "zt": "0.04", "fa": "0.01421"},
-}
-ANDREWS_NAMES = ("beta", "Theta", "gamma", "Phi", "delta", "Omega", "epsilon")
-ANDREWS_START = (  # of the test set, to about 28 digits
-    "-0.0617138900142764496358948458001",
-    "0",
-    "0.455279819163070380255912382449",
-    "0.222668390165885884674473185609",
-    "0.487364979543842550225598953530",
-    "-0.222668390165885884674473185609",
-    "1.23054744454982119249735015568",
-)
 
-
-def andrews():
-    """Andrews' squeezing mechanism in seven angles with six constraints: the formulation of the IVP test set."""
-    n = {name: mp.mpf(value) for name, value in ANDREWS.items()}
-    problem = Problem()
-    beta, theta, gamma, phi, delta, omega, epsilon = q = problem.coordinates(7)
-    second, fourth, sixth = beta + theta, phi + delta, omega + epsilon
-    links = (beta, second, gamma, fourth, delta, sixth, epsilon)
-    crank = [n["rr"] * cos(beta), n["rr"] * sin(beta)]
-    centres = [
-        (n["ra"] * cos(beta), n["ra"] * sin(beta)),
-        (crank[0] - n["da"] * cos(second), crank[1] - n["da"] * sin(second)),
-        (n["xb"] + n["sa"] * sin(gamma) + n["sb"] * cos(gamma), n["yb"] - n["sa"] * cos(gamma) + n["sb"] * sin(gamma)),
-        (
-            n["xa"] + n["zt"] * cos(delta) + (n["e"] - n["ea"]) * sin(fourth),
-            n["ya"] + n["zt"] * sin(delta) - (n["e"] - n["ea"]) * cos(fourth),
-        ),
-        (n["xa"] + n["ta"] * cos(delta) - n["tb"] * sin(delta), n["ya"] + n["ta"] * sin(delta) + n["tb"] * cos(delta)),
-        (
-            n["xa"] + n["u"] * sin(epsilon) + (n["zf"] - n["fa"]) * cos(sixth),
-            n["ya"] - n["u"] * cos(epsilon) + (n["zf"] - n["fa"]) * sin(sixth),
-        ),
-        (
-            n["xa"] + n["ua"] * sin(epsilon) - n["ub"] * cos(epsilon),
-            n["ya"] - n["ua"] * cos(epsilon) - n["ub"] * sin(epsilon),
-        ),
-    ]
-    for k, (centre, angle) in enumerate(zip(centres, links, strict=True), 1):
-        for coordinate in centre:
-            problem.inertia(n[f"m{k}"], coordinate)
-        problem.inertia(n[f"i{k}"], angle)
-    problem.force(n["mom"], beta)
-    spring = sqrt(
-        _squared(
-            n["xb"] + n["sd"] * cos(gamma) + n["sc"] * sin(gamma) - n["xc"],
-            n["yb"] + n["sd"] * sin(gamma) - n["sc"] * cos(gamma) - n["yc"],
-        )
-    )
-    problem.force((spring - n["l0"]) * -n["c0"], spring)
-    tip = [crank[0] - n["d"] * cos(second), crank[1] - n["d"] * sin(second)]
-    ends = [
-        (n["xb"] + n["ss"] * sin(gamma), n["yb"] - n["ss"] * cos(gamma)),
-        (
-            n["xa"] + n["e"] * sin(fourth) + n["zt"] * cos(delta),
-            n["ya"] - n["e"] * cos(fourth) + n["zt"] * sin(delta),
-        ),
-        (
-            n["xa"] + n["zf"] * cos(sixth) + n["u"] * sin(epsilon),
-            n["ya"] + n["zf"] * sin(sixth) - n["u"] * cos(epsilon),
-        ),
-    ]
-    for end in ends:
-        for a, b in zip(tip, end, strict=True):
-            problem.constraint(a - b)
-    assert len(q) == 7
-    return problem.close()
-
-
-def _squared(x, y):
+def squared(x, y):
     return x * x + y * y
 
 
 class Planar:
-    """Rigid body of the plane in absolute coordinates; points are given in its own frame, of which the origin is free."""
+    """Rigid body of the plane in absolute coordinates; points are given in a frame of its own, anywhere on it."""
 
     def __init__(self, problem, mass, inertia, center=("0", "0")):
         self.x, self.y, self.angle = self.coordinates = problem.coordinates(3)
@@ -113,7 +36,7 @@ class Planar:
 
 
 class Spatial:
-    """Rigid body of space in absolute coordinates: centre of mass and Euler parameters; inertia principal, in its axes."""
+    """Rigid body of space in absolute coordinates, centre of mass and Euler parameters; inertia in principal axes."""
 
     def __init__(self, problem, mass, inertia, center=("0", "0", "0")):
         self.coordinates = problem.coordinates(7)
@@ -147,78 +70,6 @@ def join(problem, a, b):
     """Let two points coincide, the second on the body that is acted upon; its reaction is minus the multipliers."""
     for x, y in zip(a, b, strict=True):
         problem.constraint(y - x)
-
-
-def andrews_absolute():
-    """Andrews' squeezing mechanism in absolute coordinates: ten pins, of which all reactions follow.
-
-    Returns the problem, the seven bodies and the names of the pins in the order of the multipliers (x and y of each).
-    """
-    n = {name: mp.mpf(value) for name, value in ANDREWS.items()}
-    problem = Problem()
-    centers = [
-        (n["ra"], 0),
-        (-n["da"], 0),
-        (n["sb"], -n["sa"]),
-        (0, n["ea"] - n["e"]),
-        (n["ta"], n["tb"]),
-        (n["zf"] - n["fa"], 0),
-        (-n["ub"], -n["ua"]),
-    ]
-    bodies = [Planar(problem, n[f"m{k}"], n[f"i{k}"], c) for k, c in enumerate(centers, 1)]
-    k1, k2, k3, k4, k5, k6, k7 = bodies
-    ground = {name: [node(n[f"x{name}"]), node(n[f"y{name}"])] for name in "abc"}
-    pins = {
-        "O": ([node(0), node(0)], k1.point(0, 0)),
-        "crank": (k1.point(n["rr"], 0), k2.point(0, 0)),
-        "B": (ground["b"], k3.point(0, 0)),
-        "A5": (ground["a"], k5.point(0, 0)),
-        "A7": (ground["a"], k7.point(0, 0)),
-        "E": (k5.point(n["zt"], 0), k4.point(0, 0)),
-        "H": (k7.point(0, -n["u"]), k6.point(0, 0)),
-        "P3": (k2.point(-n["d"], 0), k3.point(0, -n["ss"])),
-        "P4": (k2.point(-n["d"], 0), k4.point(0, -n["e"])),
-        "P6": (k2.point(-n["d"], 0), k6.point(n["zf"], 0)),
-    }
-    for first, second in pins.values():
-        join(problem, first, second)
-    problem.force(n["mom"], k1.angle)
-    end = k3.point(n["sd"], -n["sc"])
-    spring = sqrt(_squared(end[0] - n["xc"], end[1] - n["yc"]))
-    problem.force((spring - n["l0"]) * -n["c0"], spring)
-    return problem.close(), bodies, list(pins)
-
-
-def andrews_poses(bodies, q, v):
-    """Return absolute coordinates and their rates from the seven angles and their rates, by finite closed forms."""
-    n = {name: mp.mpf(value) for name, value in ANDREWS.items()}
-    beta, theta, gamma, phi, delta, omega, epsilon = q
-    db, dt, dg, dp, dd, do, de = v
-    angles = [beta, beta + theta, gamma, phi + delta, delta, omega + epsilon, epsilon]
-    rates = [db, db + dt, dg, dp + dd, dd, do + de, de]
-    a, b = (n["xa"], n["ya"]), (n["xb"], n["yb"])
-    unit = [(mp.cos(x), mp.sin(x)) for x in (beta, delta, epsilon)]
-    origins = [
-        ((0, 0), (0, 0)),
-        ((n["rr"] * unit[0][0], n["rr"] * unit[0][1]), (-n["rr"] * db * unit[0][1], n["rr"] * db * unit[0][0])),
-        (b, (0, 0)),
-        (
-            (a[0] + n["zt"] * unit[1][0], a[1] + n["zt"] * unit[1][1]),
-            (-n["zt"] * dd * unit[1][1], n["zt"] * dd * unit[1][0]),
-        ),
-        (a, (0, 0)),
-        (
-            (a[0] + n["u"] * unit[2][1], a[1] - n["u"] * unit[2][0]),
-            (n["u"] * de * unit[2][0], n["u"] * de * unit[2][1]),
-        ),
-        (a, (0, 0)),
-    ]
-    position, velocity = [], []
-    for body, (origin, moving), angle, rate in zip(bodies, origins, angles, rates, strict=True):
-        pose = body.at(*origin, angle)
-        position += pose
-        velocity += [moving[0] - rate * (pose[1] - origin[1]), moving[1] + rate * (pose[0] - origin[0]), rate]
-    return position, velocity
 
 
 def double_four_bar():
@@ -284,7 +135,7 @@ GOVERNOR = {"stiffness": "8e5", "damping": "4e4"}
 
 
 def flyball_governor(stiffness=GOVERNOR["stiffness"], damping=GOVERNOR["damping"]):
-    """IFToMM benchmark A05, the stiff governor: coordinates are the angle of the shaft, the falls of both rods, the slider.
+    """IFToMM benchmark A05, the stiff governor, in the angle of the shaft, the falls of both rods and the slider.
 
     A rod hangs at 0.05 m from the axis at the top of the shaft (1 m), by `fall` below the horizontal, with a ball of
     5 kg at its end; spring and damper lead from its middle to the slider, 0.05 m from the axis, at height `s`.
@@ -312,7 +163,7 @@ def flyball_governor(stiffness=GOVERNOR["stiffness"], damping=GOVERNOR["damping"
                 problem.inertia(weight, x)
         height = 1 - mp.mpf("0.5") * sin(fall) - s
         reach = mp.mpf("0.5") * cos(fall)
-        length = sqrt(_squared(reach, height))
+        length = sqrt(squared(reach, height))
         force = (length - mp.mpf("0.5")) * -mp.mpf(stiffness) - Rate(length) * mp.mpf(damping)
         problem.force(force, length)
     return problem.close()
@@ -323,17 +174,19 @@ def governor_start():
     return [0, mp.pi / 6, mp.pi / 6, mp.mpf("0.5")], [2 * mp.pi, 0, 0, 0]
 
 
-def spatial_slider_crank():
-    """IFToMM benchmark, spatial rigid slider-crank: returns the problem and its bodies (crank, rod, slider).
+def spatial_slider_crank(stiffness=0, damping=0):
+    """IFToMM benchmark, spatial rigid slider-crank: returns the problem and crank angle, slide and rod.
 
-    The crank (0.08 m, about x through (0, 0.1, 0.12), its centre of mass on the axis) starts upright; the rod (0.3 m) hangs on a ball
-    at the crank and a universal joint at the slider, which moves along x; weight acts along -z on crank and rod.
+    The crank (0.08 m, about x through (0, 0.1, 0.12), its centre of mass on the axis) starts upright; the rod (0.3 m)
+    hangs on a ball at the crank and on a universal joint at the slider, which moves along x; weight acts along -z.
+    Unlike in the benchmark, a spring with a damper may hold the slider to x = 0.2 m.
     """
     problem = Problem()
     angle, x = problem.coordinates(2)
     rod = Spatial(problem, "0.5", ("0.0004", "0.004", "0.004"))
     problem.inertia("0.0001", angle)
     problem.inertia(2, x)
+    problem.force((x - mp.mpf("0.2")) * -mp.mpf(stiffness) - Rate(x) * mp.mpf(damping), x)
     problem.force(mp.mpf("-0.5") * mp.mpf("9.81"), rod.position[2])
     tip = [node(0), mp.mpf("0.1") - mp.mpf("0.08") * sin(angle), mp.mpf("0.12") + mp.mpf("0.08") * cos(angle)]
     join(problem, tip, rod.point("-0.15", 0, 0))
@@ -374,3 +227,51 @@ def stewart():
         law = n["L"] + n["a"] * sin(problem.time * (2 * mp.pi / n["tau"]) + phase)
         problem.constraint(sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) - law)
     return problem.close(), plate
+
+
+def free_four_bar():
+    """Four-bar of uniform rods (0.3, 0.7 and 0.5 m; 1, 2 and 1.5 kg) on a base of 0.6 m, in the angles of the rods."""
+    problem = Problem()
+    crank, coupler, rocker = problem.coordinates(3)
+    a, b, c, base = (mp.mpf(x) for x in ("0.3", "0.7", "0.5", "0.6"))
+    end = (a * cos(crank), a * sin(crank))
+    rod(problem, a / 2 * cos(crank), a / 2 * sin(crank), crank, a**2 / 12)
+    place = (end[0] + b / 2 * cos(coupler), end[1] + b / 2 * sin(coupler))
+    rod(problem, *place, coupler, 2 * b**2 / 12, mass=2)
+    mass = mp.mpf("1.5")
+    rod(problem, base + c / 2 * cos(rocker), c / 2 * sin(rocker), rocker, mass * c**2 / 12, mass=mass)
+    tip = (end[0] + b * cos(coupler), end[1] + b * sin(coupler))
+    join(problem, tip, (base + c * cos(rocker), c * sin(rocker)))
+    return problem.close()
+
+
+def spatial_double_pendulum():
+    """Two bodies on crossed hinges: the first turns about the global y axis, the second about the x axis of the first.
+
+    Their frames lie in the hinges; at rest both hang down along -z. Returns the problem and the tip of the second.
+    """
+    problem = Problem()
+    first, second = problem.coordinates(2)
+    c, s, d, e = cos(first), sin(first), cos(second), sin(second)
+    zero, one = node(0), node(1)
+    a = [[c, zero, -s], [zero, one, zero], [s, zero, c]]  # columns: the axes of the first body
+    b = [a[0], _mix(a[1], d, a[2], e), _mix(a[1], -e, a[2], d)]
+    hinge = [x * mp.mpf("-0.5") for x in a[2]]
+    for axes, origin, mass, moments in (
+        (a, [zero] * 3, "2", ("0.03", "0.04", "0.02")),
+        (b, hinge, "1.5", ("0.05", "0.02", "0.06")),
+    ):
+        centre = [o + x * mp.mpf("-0.3") for o, x in zip(origin, axes[2], strict=True)]
+        for x in centre:
+            problem.inertia(mass, x)
+        problem.force(mp.mpf(mass) * mp.mpf("-9.81"), centre[2])
+        moments = [mp.mpf(x) for x in moments]
+        for moment, axis in zip(moments, axes, strict=True):
+            for x in axis:
+                problem.inertia(sum(moments) / 2 - moment, x)
+    tip = [problem.watch(h + x * mp.mpf("-0.6")) for h, x in zip(hinge, b[2], strict=True)]
+    return problem.close(), tip
+
+
+def _mix(a, c, b, s):
+    return [x * c + y * s for x, y in zip(a, b, strict=True)]

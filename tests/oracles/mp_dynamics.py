@@ -1,14 +1,14 @@
 """Independent judge: equations of motion with constraints in many digits, to any order, from T, Q and g alone.
 
 A mechanism is a list of coordinates q, and scalar functions of them: the kinetic energy is a sum of weighted squares
-of rates, ``T = 1/2 sum w x(q)'^2`` (with the coordinates of centres of mass, angles, columns of the attitude matrix), each
+of rates, ``T = 1/2 sum w x(q)'^2`` (of coordinates of centres of mass, angles, columns of the attitude matrix), each
 force F does work on one displacement ``s(q)``, and each constraint is ``g(q, t) = 0``. Then, by d'Alembert,
 
     sum w x'' dx/dq + sum lambda dg/dq = sum F ds/dq,
 
 solved for one Taylor coefficient of q and lambda after another. The functions are a graph of nodes that remember their
-coefficients, so that a new order costs one more row of every product; gradients are graphs as well. Nothing here imports
-the library: any coordinates will do, so that angles of a loop, absolute coordinates and quaternions judge each other.
+coefficients, so that a new order costs one more row of every product; gradients are graphs as well. Nothing here
+imports the library, and any coordinates will do: angles of a loop, absolute coordinates, quaternions judge each other.
 """
 
 from mpmath import mp
@@ -263,7 +263,8 @@ class Problem:
             (w, [(i, s) for i, s in enumerate(slope) if not is_zero(s)])
             for (w, _), (_, slope) in zip(self.inertias, terms, strict=False)
         ]
-        wanted = [*self.q, *self.watched, *self.multipliers, *self.constraints, *self.balance, *sum(self.slopes, [])]
+        wanted = [*self.q, *self.watched, *self.multipliers, *self.constraints, *self.balance]
+        wanted += [s for slope in self.slopes for s in slope]
         wanted += [s for _, slope in self.mass for _, s in slope]
         self._order(wanted)
         return self
