@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from jounce.constraints import catalogue
-from jounce.errors import UNSET, MechanismFileError, did_you_mean, show_value
+from jounce.errors import MechanismFileError, did_you_mean, show_value
 from jounce.io.fields import file_keys, output_holder, output_types
 from jounce.io.schema import file_model, output_form
 from jounce.io.source import Location, Source
