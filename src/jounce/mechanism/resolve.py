@@ -98,7 +98,7 @@ def resolve_law(law: Any, force: AbstractForce, parameters: Mapping[str, Any], c
         entries = law.tolist() if isinstance(law, np.ndarray) else law
         if isinstance(entries, str) or not isinstance(entries, Sequence) or len(entries) != components:
             raise MechanismError(f"must be a list of {components} laws or numbers", value=_plain(law))
-        found = VectorLaw(_scalar_law(entry, force, parameters) for entry in entries)
+        found = VectorLaw(tuple(_scalar_law(entry, force, parameters) for entry in entries))
     shape = (1, 1) if components is None else (components, 1, 1)
     advice = "it must map the jets of displacement, velocity and time to the jet of the force"
     got = _tried(
