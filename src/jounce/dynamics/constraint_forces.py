@@ -150,7 +150,7 @@ def _factor(system: System, blocks: Sequence[Sequence[Any]], mass: Any) -> Any:
     rows, columns, _ = jacobian.shape
     if rows == columns:
         return DenseFactor.of(jacobian)
-    scaled = mass * (scale[:, None] * scale)[:, :, None, None]
+    scaled = mass * (scale[:, None] * scale[None])[:, :, None, None]
     scaled = scaled / jnp.max(jnp.abs(scaled))  # their size does not matter to the multipliers
     whole = jnp.eye(system.body_count)[:, None, :, None, None] * jnp.moveaxis(scaled, 2, 0)[:, :, None]
     return FreeFactor.of(whole.reshape(columns, columns, lanes), jacobian)
