@@ -227,7 +227,7 @@ class _Parts:
     """
 
     def __init__(self, robot: Robot, kept: set[str], forces: Any, outputs: Any):
-        self.robot = robot
+        self.robot, self.tree = robot, robot.opened().tree
         self.moving = [joint for joint in robot.joints.values() if joint.moving]
         if GROUND in robot.moving_links:
             raise RobotError("a link of this name moves; rename it, it stands for the base", name="links", value=GROUND)
@@ -253,7 +253,7 @@ class _Parts:
 
     def _is_free(self, first: int, count: int, kept: set[str], links: set[str]) -> bool:
         """Whether joints in a row let a body move freely (6), or turn freely (3), and nobody asks for one of them."""
-        robot, tree, chain = self.robot, self.robot.opened().tree, self.moving[first : first + count]
+        robot, tree, chain = self.robot, self.tree, self.moving[first : first + count]
         following = {joint.mimic.joint for joint in self.moving if joint.mimic is not None}
         if any(joint.mimic is not None or joint.name in kept | following for joint in chain):
             return False
