@@ -27,6 +27,17 @@ outputs:
   C: {body: rocker, point: [CD, 0]}
 time: {start: 0, stop: 2, step: 0.01}
 """
+PLANAR_FORCES = (
+    PLANAR
+    + """\
+forces:
+  pull: {type: spring, bodies: [ground, rocker], points: [[0, 0], [CD, 0]], stiffness: 500 N/m, length: 5 cm}
+  push: {type: point_force, body: crank, point: [AB, 0], law: [-2*vx, 3 N]}
+  brake: {type: torque, bodies: [ground, crank], law: -0.1*v}
+initial:
+  start: {type: coordinate, bodies: [ground, rocker], coordinate: angle, motion: 2*t}
+"""
+)
 SPATIAL = """\
 space: spatial
 parameters: {L: 10 cm}
@@ -42,7 +53,15 @@ outputs:
   tip: {body: crank, point: [L, 0, 0]}
   turn: {bodies: [ground, crank], quantity: angle, axis: [0, 0, 1], vectors: [[1, 0, 0], [1, 0, 0]]}
 """
-FILES = {"planar": PLANAR, "spatial": SPATIAL}
+SPATIAL_FORCES = (
+    SPATIAL
+    + """\
+forces:
+  twist: {type: torsional_spring, bodies: [ground, crank], axis: [0, 0, 1], stiffness: 2 N*m/rad, angle: 10 deg}
+  spin: {type: moment, body: crank, law: [-wx, 0, 1 N*m], frame: body}
+"""
+)
+FILES = {"planar": PLANAR, "planar forces": PLANAR_FORCES, "spatial": SPATIAL, "spatial forces": SPATIAL_FORCES}
 CASES = YAML(typ="safe").load(pathlib.Path(__file__).with_name("bad_input.yaml"))
 
 
@@ -62,7 +81,7 @@ def test_file_with_one_mistake(tmp_path, space, what):
     assert message.isprintable()
 
 
-@pytest.mark.parametrize("text", [PLANAR, SPATIAL], ids=["planar", "spatial"])
+@pytest.mark.parametrize("text", FILES.values(), ids=FILES)
 def test_the_files_without_mistakes_are_read(tmp_path, text):
     path = tmp_path / "good.yaml"
     path.write_text(text)

@@ -36,6 +36,8 @@ class DistanceForce(AbstractForce, type="distance_force"):
     point_j: Vector
     law: Law  # N
 
+    dimensions = {"law": "force"}
+
     def displacement(self, body_i, body_j, time):
         return distance(body_i, body_j, self.point_i, self.point_j)
 
@@ -54,6 +56,8 @@ class SlideForce(AbstractForce, type="slide_force"):
     vector_i: Vector  # direction of a positive force on body j
     law: Law  # N
 
+    dimensions = {"law": "force"}
+
     def displacement(self, body_i, body_j, time):
         return slide(body_i, body_j, self.point_i, self.point_j, self.vector_i)
 
@@ -67,6 +71,7 @@ class Torque(AbstractForce, type="torque", space="planar"):
     law: Law  # N m
 
     unit = "N*m"
+    dimensions = {"law": "torque"}
 
     def displacement(self, body_i, body_j, time):
         return body_j.angle - body_i.angle
@@ -87,6 +92,7 @@ class SpatialTorque(AbstractForce, type="torque", space="spatial"):
     vector_j: Vector = None
 
     unit = "N*m"
+    dimensions = {"law": "torque"}
 
     def __check_init__(self):
         check_vectors(self)

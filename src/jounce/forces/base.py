@@ -119,7 +119,7 @@ class AbstractForce(eqx.Module):
     def energy(self, displacement: Jet) -> Jet:
         """Return the energy that the force has stored and gives back, in J; none, unless told."""
         first = displacement.coefficients[0]
-        zero = jnp.zeros_like(first if len(self.velocity_names) == 1 else first[0])
+        zero = jnp.zeros_like(first if jnp.ndim(first) < 3 else first[0])  # instances and batch stand last
         return Jet.constant(zero, displacement.order)
 
 

@@ -22,6 +22,7 @@ class PointForce(AbstractForce, type="point_force", space="planar"):
     frame: str = eqx.field(static=True, default="global")
 
     body_count = 1
+    dimensions = {"law": "force"}
     displacement_names = ("x", "y")
     velocity_names = ("vx", "vy")
 
@@ -62,6 +63,7 @@ class Moment(AbstractForce, type="moment", space="planar"):
 
     body_count = 1
     unit = "N*m"
+    dimensions = {"law": "torque"}
 
     def displacement(self, body, time):
         return body.angle
@@ -81,6 +83,7 @@ class SpatialMoment(AbstractForce, type="moment", space="spatial"):
 
     body_count = 1
     unit = "N*m"
+    dimensions = {"law": "torque"}
     displacement_names = ()
     velocity_names = ("wx", "wy", "wz")
 

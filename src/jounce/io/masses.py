@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 from pydantic_core import PydanticCustomError
 
-from jounce.errors import UNSET, MechanismError, did_you_mean, show_value
+from jounce.errors import UNSET, MechanismError, RobotError, did_you_mean, show_value
 from jounce.io.values import Checked, below, parse, problem, scalar_schema, vector_schema, vector_value
 from jounce.mechanism.resolve import resolve
 from jounce.rigid.inertia import Inertia, check_solid
@@ -224,7 +224,11 @@ def _from_pseudo(matrix: Any, parameters: dict[str, Any], *, planar: bool) -> di
     numbers = [[float(resolve(x, parameters)) for x in row] for row in matrix]
     if planar:  # a lamina
         numbers = [[*row[:2], 0.0, row[2]] for row in (*numbers[:2], [0.0] * 3, numbers[2])]
-    Inertia.from_pseudo(numbers)
+    try:
+        Inertia.from_pseudo(numbers)
+    except RobotError as error:
+        message = f"its mass {error.message}" if error.name == "mass" else error.message
+        raise MechanismError(message, name="pseudo", value=error.value) from None
     mass, center, second = pseudo_parts(_open(matrix))
     trace = second[0][0] + second[1][1] if planar else second[0][0] + second[1][1] + second[2][2]
     tensor = trace if planar else [[(trace if i == k else 0.0) - second[i][k] for k in range(3)] for i in range(3)]
