@@ -92,8 +92,9 @@ def draw(motion: Any, outputs: Sequence[str] | None = None) -> Any:
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
     names = _chosen(motion, outputs)
-    first = min(motion.mechanism.outputs[name].lost_orders for name in names)
-    rows = motion.order + 1 - first if motion.order >= first else 1
+    lost = [motion.mechanism.outputs[name].lost_orders for name in names]
+    first = min(lost)
+    rows = max(motion.order, max(lost)) + 1 - first
     with mpl.rc_context(STYLE):
         width, height = PANEL if len(names) > 1 else SINGLE_PANEL
         size = (width * len(names) + 0.3, height * rows + 0.9)
@@ -148,10 +149,11 @@ def _draw_column(motion: Any, name: str, panels: Any, first: int) -> None:
         word = "angle" if row + first == 0 and output.unit == "rad" else word
         mark = "" if vector else symbol(name, order)
         axes.set_ylabel(f"{word}\n{mark}{'  ' if mark else ''}({unit_label(output.unit, order, exponent)})")
-    panels[0].set_title(name.replace("$", r"\$"), loc="left", pad=6)
+    top = panels[max(output.lost_orders - first, 0)]  # a force starts beside the acceleration
+    top.set_title(name.replace("$", r"\$"), loc="left", pad=6)
     if vector:
         lines = panels[-1].get_lines()[: values.shape[2]]
-        panels[0].legend(handles=lines, ncols=len(lines), loc="lower right", bbox_to_anchor=(1.0, 1.0), **LEGEND)
+        top.legend(handles=lines, ncols=len(lines), loc="lower right", bbox_to_anchor=(1.0, 1.0), **LEGEND)
     panels[-1].set_xlabel("time  $t$  (s)")
 
 
