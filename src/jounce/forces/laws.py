@@ -1,7 +1,7 @@
 """Laws of forces: what a force depends on, as functions that act on jets."""
 
 import abc
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import equinox as eqx
@@ -15,8 +15,12 @@ class AbstractLaw(eqx.Module):
     """A law of a force: maps displacement, velocity and time, all jets, to the jet of the force, in SI units."""
 
     @abc.abstractmethod
+    def value(self, displacement: Jet, velocity: Jet, time: Jet) -> Any:
+        """Return the force: a jet, or what does not change in time; its axes need not be all there."""
+
     def __call__(self, displacement: Jet, velocity: Jet, time: Jet) -> Jet:
-        """Return the jet of the force; its batch axes are those of `velocity`."""
+        """Return the jet of the force, of the shape of the displacement."""
+        return _spread(self.value(displacement, velocity, time), displacement, time)
 
 
 class ExpressionLaw(AbstractLaw):
@@ -63,11 +67,10 @@ class ExpressionLaw(AbstractLaw):
         self.displacements, self.velocities = tuple(displacements), tuple(velocities)
         self.expression.check({*self.parameters, "t", *self.displacements, *self.velocities})
 
-    def __call__(self, displacement: Jet, velocity: Jet, time: Jet) -> Jet:
-        """Return the jet of the force."""
+    def value(self, displacement: Jet, velocity: Jet, time: Jet) -> Any:
+        """Return what the expression evaluates to."""
         moving = _named(self.displacements, displacement) | _named(self.velocities, velocity)
-        value = self.expression.evaluate({**self.parameters, "t": time, **moving})
-        return _spread(value, displacement if len(self.velocities) == 1 else displacement[0], time)
+        return self.expression.evaluate({**self.parameters, "t": time, **moving})
 
 
 class TimeLaw(AbstractLaw):
@@ -84,9 +87,9 @@ class TimeLaw(AbstractLaw):
 
     motion: AbstractMotion
 
-    def __call__(self, displacement: Jet, velocity: Jet, time: Jet) -> Jet:
-        """Return the jet of the force."""
-        return _spread(self.motion(time), displacement, time)
+    def value(self, displacement: Jet, velocity: Jet, time: Jet) -> Any:
+        """Return the jet of the law of time."""
+        return self.motion(time)
 
 
 class FunctionLaw(AbstractLaw):
@@ -109,9 +112,9 @@ class FunctionLaw(AbstractLaw):
 
     function: Callable[[Jet, Jet, Jet], Any] = eqx.field(static=True)
 
-    def __call__(self, displacement: Jet, velocity: Jet, time: Jet) -> Jet:
-        """Return the jet of the force."""
-        return _spread(self.function(displacement, velocity, time), displacement, time)
+    def value(self, displacement: Jet, velocity: Jet, time: Jet) -> Any:
+        """Return what the function returns."""
+        return self.function(displacement, velocity, time)
 
 
 class VectorLaw(AbstractLaw):
@@ -122,16 +125,17 @@ class VectorLaw(AbstractLaw):
     >>> import jounce as jn
     >>> names = ("x", "y"), ("vx", "vy")
     >>> law = jn.forces.VectorLaw([jn.forces.ExpressionLaw(text, {}, *names) for text in ("-vx", "-2*y")])
-    >>> place, velocity = jn.Jet([[1.0, 2.0]]), jn.Jet([[3.0, 0.0]])
-    >>> law(place, velocity, jn.Jet([0.0])).coefficients[0].tolist()
+    >>> place, velocity = (jn.Jet.constant([*pair], 1) for pair in ((1.0, 2.0), (3.0, 0.0)))
+    >>> law(place, velocity, jn.Jet.variable(0.0, 1)).coefficients[0].tolist()
     [-3.0, -4.0]
     """
 
-    parts: tuple[AbstractLaw, ...] = eqx.field(converter=tuple)
+    parts: Sequence[AbstractLaw] = eqx.field(converter=tuple)
 
-    def __call__(self, displacement: Jet, velocity: Jet, time: Jet) -> Jet:
+    def value(self, displacement: Jet, velocity: Jet, time: Jet) -> Any:
         """Return the jet of the force, a vector."""
-        return stack([part(displacement, velocity, time) for part in self.parts])
+        parts = [part.value(displacement, velocity, time) for part in self.parts]
+        return stack([_spread(part, displacement[0], time) for part in parts])
 
 
 def _named(names: tuple[str, ...], jet: Jet) -> dict[str, Jet]:
