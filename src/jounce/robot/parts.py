@@ -1,0 +1,234 @@
+"""The bodies, joints, closures and drives that a robot becomes as a mechanism, in the frames of its moving links."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from jounce.constraints import AbstractConstraint, spatial
+from jounce.constraints.drivers import RotationDriver, SpatialSlideDriver
+from jounce.errors import RobotError, did_you_mean
+from jounce.forces import AbstractForce
+from jounce.forces.springs import SlideSpring, SpatialTorsionalSpring
+from jounce.mechanism import Body, RelativeAngleOutput
+from jounce.mechanism.mechanism import GROUND
+from jounce.rigid.inertia import Inertia
+from jounce.robot.closures import LinkClosure
+from jounce.robot.coupling import Placed, SlideOutput, coupled
+from jounce.robot.kinematics import forward_kinematics
+from jounce.robot.model import Closure
+from jounce.robot.robot import Robot
+from jounce.robot.tree import axes_with_z_along
+
+DAMPING = "_damping"
+
+
+def on_body(robot: Robot, link: str) -> tuple[str, np.ndarray, np.ndarray]:
+    """Return the body that a link is part of, and the pose of the link in its frame."""
+    index, position, rotation = robot.frames[link]
+    if index < 0:
+        return GROUND, position, rotation
+    name = robot.moving_links[index]
+    if name == link:
+        return name, np.zeros(3), np.eye(3)
+    turned = robot.frames[name].rotation.T
+    return name, turned @ position, turned @ rotation
+
+
+class Parts:
+    """The bodies, joints and drives of a robot, in the frames of its moving links.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    kept : set of str
+        Joints whose coordinates are wanted, so that they are not merged into a free body or a ball.
+    forces, outputs
+        What may name links that are otherwise merged.
+    """
+
+    def __init__(self, robot: Robot, kept: set[str], forces: Any, outputs: Any):
+        self.robot, self.tree = robot, robot.opened().tree
+        self.moving = [joint for joint in robot.joints.values() if joint.moving]
+        if GROUND in robot.moving_links:
+            raise RobotError("a link of this name moves; rename it, it stands for the base", name="links", value=GROUND)
+        elements = [*(forces or {}).values(), *(x for x in (outputs or {}).values() if not isinstance(x, str))]
+        links = {body for element in elements for body in element.bodies}
+        links |= {on_body(robot, link)[0] for closure in robot.closures.values() for link in closure.links}
+        self.merged: dict[int, int] = {}  # by index of the last joint of a chain, how many joints are one
+        for k in range(len(self.moving)):
+            for count in (6, 3):
+                first = k - count + 1
+                if first >= 0 and self._is_free(first, count, kept, links) and first not in self._inner():
+                    self.merged[k] = count
+                    break
+        inner = self._inner()
+        self.coordinates = tuple(
+            name for name in robot.joint_names if name not in inner_names(self.moving, self.merged)
+        )
+        self.links = [joint.child for k, joint in enumerate(self.moving) if k not in inner]
+
+    def _inner(self) -> set[int]:
+        """Return the indices of the massless bodies within merged chains."""
+        return {k for last, count in self.merged.items() for k in range(last - count + 1, last)}
+
+    def _is_free(self, first: int, count: int, kept: set[str], links: set[str]) -> bool:
+        """Whether joints in a row let a body move freely (6), or turn freely (3), and nobody asks for one of them."""
+        robot, tree, chain = self.robot, self.tree, self.moving[first : first + count]
+        following = {joint.mimic.joint for joint in self.moving if joint.mimic is not None}
+        if any(joint.mimic is not None or joint.name in kept | following for joint in chain):
+            return False
+        for k, joint in enumerate(chain[:-1], first):
+            children = [other for other in self.moving if robot.frames[other.parent].body == k]
+            if tree.mass[k] or children != [chain[k - first + 1]] or joint.child in links:
+                return False
+        turns = np.arange(first + count - 3, first + count)
+        slides = np.arange(first, first + count - 3)
+        if not all(tree.turning[turns]) or any(tree.turning[slides]) or np.abs(tree.position[turns[1:]]).max() > 1e-12:
+            return False
+        if any(abs(tree.rotation[k][2, 2]) > 1e-9 for k in turns[1:]):
+            return False  # neighbours not at right angles cannot turn a body every way
+        if count == 3:
+            return True
+        axes = [np.eye(3)[2], tree.rotation[slides[1]] @ np.eye(3)[2]]
+        axes.append(tree.rotation[slides[1]] @ tree.rotation[slides[2]] @ np.eye(3)[2])
+        return bool(abs(np.linalg.det(np.array(axes))) > 1e-3)
+
+    def placed(self, index: int) -> Placed:
+        """Return a moving joint in the frames of the two bodies."""
+        joint = self.moving[index]
+        parent, position, rotation = on_body(self.robot, joint.parent)
+        point, rotation = position + rotation @ joint.position, rotation @ joint.rotation
+        side = axes_with_z_along(joint.axis)[:, 0]
+        return Placed(
+            (parent, joint.child), joint.turning, point, rotation @ joint.axis, joint.axis, rotation @ side, side
+        )
+
+    def _named(self, name: str) -> Placed:
+        return self.placed([joint.name for joint in self.moving].index(name))
+
+    def joints(self) -> dict[str, AbstractConstraint]:
+        """Return the joints of the tree, and what couples joints that follow others."""
+        found: dict[str, AbstractConstraint] = {}
+        inner = self._inner()
+        for k, joint in enumerate(self.moving):
+            if k in inner or self.merged.get(k) == 6:
+                continue
+            if self.merged.get(k) == 3:
+                first = self.placed(k - 2)
+                bodies = (first.bodies[0], joint.child)
+                found[self.moving[k - 2].name] = spatial.Spherical(bodies, first.point, np.zeros(3))
+                continue
+            at = self.placed(k)
+            ends = (at.point, np.zeros(3), at.axis_i, at.axis_j)
+            if at.turning:
+                found[joint.name] = spatial.Revolute(at.bodies, *ends)
+            else:
+                found[joint.name] = spatial.Prismatic(at.bodies, *ends, at.vector_i, at.vector_j)
+        for joint in self.moving:
+            if joint.mimic is not None:
+                pair = (self._named(joint.mimic.joint), self._named(joint.name))
+                found[self._unused(f"{joint.name}_mimic", found)] = coupled(
+                    *pair, joint.mimic.multiplier, joint.mimic.offset
+                )
+        return found
+
+    def _unused(self, name: str, taken: Any) -> str:
+        while name in taken or name in self.robot.joints or name in self.robot.closures:
+            name += "_"
+        return name
+
+    def closure(self, closure: Closure, wrenches: np.ndarray) -> LinkClosure:
+        """Return what closes a loop, in the directions of the wrenches given in the frame of the first link."""
+        ends = [on_body(self.robot, link) for link in closure.links]
+        points = [at + turned @ p for (_, at, turned), p in zip(ends, closure.points, strict=True)]
+        (first, _, turned), (second, _, other) = ends
+        axes = np.kron(np.eye(2), turned.T)
+        attitude = {}
+        if np.any(wrenches[:, 3:]):
+            quaternion = _quaternion(turned @ closure.rotation @ other.T)
+            attitude = {"vector_part": quaternion[1:], "scalar_part": float(quaternion[0])}
+        return LinkClosure((first, second), points[0], points[1], wrenches @ axes, **attitude)
+
+    def driver(self, name: str, law: Any) -> AbstractConstraint:
+        """Return the driver of a coordinate."""
+        at = self._named(name)
+        if at.turning:
+            return RotationDriver(at.bodies, at.axis_i, law, at.vector_i, at.vector_j)
+        return SpatialSlideDriver(at.bodies, at.point, np.zeros(3), at.axis_i, law)
+
+    def output(self, name: str, joint: str) -> Any:
+        """Return the coordinate of a joint as an output."""
+        if joint not in [other.name for other in self.moving]:
+            message = f"no moving joint has this name; {did_you_mean(joint, [j.name for j in self.moving])}"
+            raise RobotError(message, name=f"outputs.{name}", value=joint)
+        at = self._named(joint)
+        if at.turning:
+            return RelativeAngleOutput(at.bodies, at.axis_i, at.vector_i, at.vector_j)
+        return SlideOutput(at.bodies, at.point, np.zeros(3), at.axis_i)
+
+    def damping(self) -> dict[str, AbstractForce]:
+        """Return the dampers of the joints; refuse what a mechanism cannot have."""
+        found: dict[str, AbstractForce] = {}
+        for k, joint in enumerate(self.moving):
+            for field in ("armature", "friction"):
+                on_base = joint.turning and self.robot.frames[joint.parent].body < 0
+                if getattr(joint, field) and not (field == "armature" and on_base):
+                    message = (
+                        f"{field} of this drive has no counterpart in a mechanism; leave drives=False and add its part "
+                        "to the force of the driver, or set it to zero"
+                    )
+                    raise RobotError(message, name=f"joints.{joint.name}.{field}", value=getattr(joint, field))
+            if not joint.damping:
+                continue
+            at, damper = self.placed(k), {"stiffness": 0.0, "damping": joint.damping}
+            if at.turning:
+                turn = {"axis_i": at.axis_i, "vector_i": at.vector_i, "vector_j": at.vector_j}
+                found[joint.name + DAMPING] = SpatialTorsionalSpring(at.bodies, **turn, **damper)
+            else:
+                ends = {"point_i": at.point, "point_j": np.zeros(3), "vector_i": at.axis_i}
+                found[joint.name + DAMPING] = SlideSpring(at.bodies, **ends, **damper)
+        return found
+
+    def bodies(self, q: np.ndarray, drives: bool) -> dict[str, Body]:
+        """Return the moving bodies with their masses, at the pose that the coordinates give.
+
+        A drive on the base turns as fast as its link does about an axis that is fixed in it: its armature is inertia of
+        the link.
+        """
+        armature = {joint.child: joint.armature * np.outer(joint.axis, joint.axis) for joint in self.moving if drives}
+        robot, tree = self.robot, self.robot.opened()
+        masses: dict[str, list[Inertia]] = {name: [] for name in self.links}
+        for name, link in robot.links.items():
+            body, position, rotation = on_body(robot, name)
+            if link.inertia is not None and body != GROUND:
+                masses[body].append(link.inertia.moved(position, rotation))
+        found = {}
+        for name, parts in masses.items():
+            at = forward_kinematics(tree, q[None], name)
+            whole = Inertia.total(parts) if parts else None
+            found[name] = Body(
+                at.position[0].tolist(),
+                orientation=_quaternion(at.rotation[0]).tolist(),
+                mass=None if whole is None else whole.mass,
+                inertia=None if whole is None else whole.tensor + armature.get(name, 0.0),
+                center_of_mass=None if whole is None else whole.center_of_mass,
+            )
+        return found
+
+
+def inner_names(moving: Sequence[Any], merged: Mapping[int, int]) -> set[str]:
+    """Return the names of joints that are merged with their neighbours."""
+    return {moving[k].name for last, count in merged.items() for k in range(last - count + 1, last + 1)}
+
+
+def _quaternion(rotation: np.ndarray) -> np.ndarray:
+    """Return the Euler parameters of a rotation matrix, from the largest of their squares, which never vanishes."""
+    r = np.asarray(rotation, float)
+    cross = np.array([r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]])
+    products = np.empty((4, 4))  # 4 p p^T
+    products[0, 0], products[0, 1:], products[1:, 0] = 1 + np.trace(r), cross, cross
+    products[1:, 1:] = r + r.T + (1 - np.trace(r)) * np.eye(3)
+    row = products[int(np.argmax(np.diag(products)))]
+    return row / np.linalg.norm(row)
