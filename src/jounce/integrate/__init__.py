@@ -1,6 +1,8 @@
 """Integration of the equations of motion: Taylor series of any order, Obreshkov, step control, events, dense output."""
 
+from jounce.integrate.diffrax_term import OrdinaryEquation as OrdinaryEquation, ode_term as ode_term
 from jounce.integrate.events import Event as Event
 from jounce.integrate.methods import AbstractMethod as AbstractMethod, Taylor as Taylor
+from jounce.integrate.obreshkov import Obreshkov as Obreshkov
 from jounce.integrate.simulate import simulate as simulate
 from jounce.integrate.simulation import Simulation as Simulation

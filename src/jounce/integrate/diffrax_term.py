@@ -1,0 +1,139 @@
+"""The equations of motion as an ordinary differential equation, for the solvers of diffrax."""
+
+import dataclasses
+import importlib
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jounce.dynamics.forward import Equations, State
+from jounce.dynamics.start import Start, start as consistent_start
+from jounce.errors import MechanismError
+from jounce.integrate.projection import normalised
+from jounce.integrate.simulation import Simulation, Track
+from jounce.kinematics.linear import DenseFactor
+from jounce.mechanism import Mechanism
+
+
+def ode_term(mechanism: Mechanism, time: float = 0.0) -> "OrdinaryEquation":
+    """Return the equations of motion of a mechanism as ``y' = f(t, y, args)``, for the solvers of diffrax.
+
+    Accelerations come from the same matrix as in `simulate`, but nothing puts the bodies back onto the constraints:
+    they drift off as far as the tolerance of the solver lets them. The extra ``jounce[integrators]`` has diffrax.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        With masses; its `initial` conditions give the start.
+    time : float, default 0
+        The start, s.
+
+    Returns
+    -------
+    OrdinaryEquation
+        The term, the state to start from, and how to read what a solver gives.
+
+    Raises
+    ------
+    MechanismError
+        If diffrax is not installed, or the mechanism is not valid.
+    AssemblyError, MobilityError
+        As `simulate` does.
+
+    Examples
+    --------
+    >>> import diffrax
+    >>> import jounce as jn
+    >>> pendulum = jn.Mechanism(
+    ...     space="planar",
+    ...     gravity=[0, -9.81],
+    ...     bodies={"rod": jn.Body([0, 0], mass=2.0, inertia=0.5, center_of_mass=[1, 0])},
+    ...     joints={"O": jn.planar.Revolute(("ground", "rod"), [0, 0], [0, 0])},
+    ...     outputs={"angle": jn.AngleOutput("rod")},
+    ... )
+    >>> equation = jn.ode_term(pendulum)
+    >>> solution = diffrax.diffeqsolve(
+    ...     equation.term, diffrax.Dopri8(), 0.0, 1.0, None, equation.state, args=equation.equations,
+    ...     stepsize_controller=diffrax.PIDController(rtol=1e-10, atol=1e-10),
+    ... )
+    >>> motion = equation.motion(solution.ts, solution.ys, order=3)
+    >>> fall = jn.simulate(pendulum, [0.0, 1.0], order=3)
+    >>> bool(abs(motion.outputs["angle"] - fall.outputs["angle"][1:]).max() < 1e-7)
+    True
+    """
+    try:
+        diffrax: Any = importlib.import_module("diffrax")
+    except ImportError:
+        message = 'ode_term needs the package diffrax, which is not installed: pip install "jounce[integrators]"'
+        raise MechanismError(message) from None
+    start = consistent_start(mechanism, float(time))
+    state = State(*(jnp.asarray(part[..., 0]) for part in start.state))
+    return OrdinaryEquation(diffrax.ODETerm(state_rates), state, start.equations, mechanism, start)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class OrdinaryEquation:
+    """The equations of motion as an ordinary differential equation.
+
+    Parameters
+    ----------
+    term : diffrax.ODETerm
+        Its `args` are the equations of motion.
+    state : State
+        To start from: arrays of shape (components, bodies).
+    equations : Equations
+        To pass as ``args``: a pytree of masses, lengths and the rest, to differentiate by or to change.
+    mechanism : Mechanism
+        What was given.
+    """
+
+    term: Any
+    state: State
+    equations: Equations
+    mechanism: Mechanism
+    start: Start
+
+    def motion(self, time: Any, states: State, order: int = 4) -> Simulation:
+        """Return what a solver gives at instants as a motion, with derivatives of any order.
+
+        They follow from the equations of motion at the states, which are put back onto the constraints.
+
+        Parameters
+        ----------
+        time : array of shape (time,)
+            ``solution.ts``, s.
+        states : State
+            ``solution.ys``: arrays of shape (time, components, bodies).
+        order : int, default 4
+            Highest derivative of the outputs.
+        """
+        instants = np.asarray(time, float)
+        track = Track(instants, np.zeros_like(instants), State(*(np.asarray(part)[:, None] for part in states)))
+        return Simulation(self.mechanism, self.start, track, instants, order)
+
+
+def state_rates(time: Any, state: State, equations: Equations) -> State:
+    """Return the rate of a state, arrays of shape (components, bodies): ``f(t, y, args)``.
+
+    Parameters
+    ----------
+    time : float
+        s.
+    state : State
+        Positions and velocities.
+    equations : Equations
+        Of the mechanism.
+    """
+    state = state.map(lambda part: part[..., None])
+    state = state._replace(attitude=normalised(state.attitude))
+    clock = jnp.reshape(jnp.asarray(time, float), (1, 1))
+    columns, rows = equations.system.cells.shape[1], equations.system.cells.shape[0]
+    trial = jnp.zeros((equations.coordinates, *state.position.shape[1:])), jnp.zeros((rows, 1))
+    forces, second, attitude_rate = equations.balance(state, *trial, clock)
+    factor = DenseFactor.of(equations.matrix(state, clock))
+    column = -factor.solve(jnp.concatenate([equations.flat(forces), second]))[:columns]
+    acceleration, shifts = equations.bodies(column), equations.pose_type.shifts
+    rate = State(state.velocity, attitude_rate, acceleration[:shifts], acceleration[shifts:])
+    return jax.tree.map(lambda part: part[..., 0], rate)
