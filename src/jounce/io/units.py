@@ -181,6 +181,7 @@ def describe_dimension(dimension: Dimension) -> str:
     'length/time^3'
     """
     named = {powers[0]: words.partition(",")[0] for words, powers in KINDS.values() if len(powers) == 1}
+    named |= {KINDS[kind][1][1]: f"a {kind}" for kind in ("torsional stiffness", "torsional damping")}
     if dimension in named:
         return named[dimension]
     if dimension == _ANGLE:

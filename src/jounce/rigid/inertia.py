@@ -213,10 +213,13 @@ def check_solid(kind: str, axis: str, given: dict[str, Any]) -> str:
         if given.get(name) is None:
             raise RobotError("is missing", name=name)
     mass, density = given.get("mass"), given.get("density")
-    if (mass is None) == (density is None):
-        raise RobotError("a solid takes a mass or a density", name="density", value=density)
-    if density is not None and kind in ("rod", "disc"):
+    thin = kind in ("rod", "disc")
+    if mass is None and density is None:
+        raise RobotError(f"a {kind} needs a mass{'' if thin else ' or a density'}", name="mass")
+    if density is not None and thin:
         raise RobotError(f"a {kind} is thin and has no volume; give its mass", name="density", value=density)
+    if mass is not None and density is not None:
+        raise RobotError(f"a {kind} takes a mass or a density, not both", name="density", value=density)
     if axis and (not solid.axis or axis not in ("x", "y", "z")):
         words = "the axis is x, y or z" if solid.axis else f"a {kind} has no axis"
         raise RobotError(words, name="axis", value=axis)
