@@ -44,11 +44,11 @@ def arm(**body):
     "name", [pytest.param(n, marks=() if n == "slider_crank" else pytest.mark.slow) for n in MECHANISMS]
 )
 def test_power_balance_of_the_bank(name):
-    # the two sides share no code but the motion; screws and gimbals lose three digits at the second rate of their power
+    # the two sides share no code but the motion; 2e-15 measured, but for screw and swash plate at higher rates
     balance = jn.power_balance(jn.solve(massed_example(name), TIME, order=4))
-    left = np.abs(balance["residual"]) / balance["scale"].max("time")
+    left = (np.abs(balance["residual"]) / balance["scale"].max("time")).max("time")
     assert float(balance["scale"].min()) > 0
-    assert (left.max("time") <= [1e-13, 1e-12, 1e-11]).all(), left.max("time").values
+    assert (left <= 1e-13).all(), left.values
 
 
 @pytest.mark.parametrize("name", ["slider_crank", pytest.param("hooke_joint", marks=pytest.mark.slow)])
@@ -353,3 +353,28 @@ def test_a_mechanism_without_masses_and_forces_says_so():
         jn.driver_force(motion, "turn")
     with pytest.raises(MechanismError, match=r"outputs\.T\.driver: forces need masses"):
         dataclasses.replace(arm(), outputs={"T": jn.DriverTorqueOutput("turn")})
+
+
+@pytest.mark.slow
+def test_reactions_of_a_chain_against_recursive_newton_euler():
+    rod = jn.Inertia(1.3, center_of_mass=[0.4, 0.05, -0.1], tensor=[0.02, 0.11, 0.12])
+    links = [jn.Link("base"), jn.Link("a", rod), jn.Link("b", rod), jn.Link("c", rod)]
+    joints = [
+        jn.Joint("A", "base", "a", axis=[0.0, 1.0, 2.0], position=[0.1, 0.0, 0.2]),
+        jn.Joint("B", "a", "b", axis=[1.0, 0.0, 0.3], position=[0.5, 0.1, 0.0]),
+        jn.Joint("C", "b", "c", axis=[0.0, 1.0, 0.0], position=[0.3, 0.0, 0.1]),
+    ]
+    robot = jn.Robot("chain", links, joints)
+    laws = {"A": "0.4*sin(2*t)", "B": "0.3 + 0.5*t", "C": "cos(1.5*t)"}
+    motion = jn.solve(robot.mechanism(drivers=laws), TIME, order=5)
+    q = np.stack([motion.outputs[name] for name in "ABC"], axis=-1)
+    for frame, axes in (("body", "link"), ("global", "base")):
+        expected = jn.joint_wrenches(robot, q, frame=axes)
+        for k, (name, link) in enumerate(zip("ABC", "abc", strict=True)):
+            parts = [jn.joint_reaction(motion, j, link, frame, [0.0, 0.0, 0.0]) for j in (name, f"{name}_drive")]
+            force = sum(part.force.values for part in parts)
+            torque = sum(part.torque.values for part in parts)
+            found = np.concatenate([force, torque], axis=-1)[:, : expected.shape[1]]
+            sizes = np.abs(expected[:, :, k]).max(axis=(0, 2))
+            error = np.abs(found - expected[:, : found.shape[1], k]).max(axis=(0, 2)) / sizes[: found.shape[1]]
+            assert (error <= 1e-13).all(), (name, frame, error)
