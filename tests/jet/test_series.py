@@ -262,7 +262,7 @@ def test_coefficients_that_come_late_make_the_same_history():
         recursion = Recursion(program, (x[0], y[0]), ORDER)
         found, at_once = recursion.advanced(at_once, k, now)
         without, late = recursion.advanced(late, k, (now[0], None))
-        late = recursion.corrected(late, k, (None, now[1]))
+        late = recursion.corrected(late, (None, now[1]))
         slope = jax.jvp(lambda y: program(x[0], y), (y[0],), (now[1],))[1]
         gaps = jax.tree.map(lambda a, b, c: jnp.max(jnp.abs(a - b - c)), found, without, slope)
         return at_once, late, (gaps, jax.tree.map(lambda a, b: jnp.max(jnp.abs(a - b)), at_once, late))

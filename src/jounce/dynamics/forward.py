@@ -14,12 +14,13 @@ import jax.numpy as jnp
 
 from jounce.dynamics.constraint_forces import inertia_forces
 from jounce.jet import Jet
+from jounce.jet.algebra import total
+from jounce.jet.loops import tight_loop
 from jounce.jet.series import Recursion
 from jounce.kinematics.linear import DenseFactor
 from jounce.mechanism.system import System
 from jounce.rigid import PlanarPose, SpatialPose
 from jounce.rigid.spatial import body_axes, quaternion_spins
-
 
 
 class State(NamedTuple):
@@ -205,6 +206,25 @@ def conjugate(variation: Any, pose: Any, weights: Any) -> Any:
     return transposed(weights)[0]
 
 
+def multiplied(matrix: Any, column: Any) -> Any:
+    """Return the product of matrices, (rows, size, batch), and columns, (size, batch), in a loop over the size.
+
+    XLA would otherwise compute the column anew for every row: a loop has its arguments made before it starts.
+    """
+    rows, size, lanes = matrix.shape
+    block = min(8, (size + 1) // 2)
+    count = -(-size // block)
+    matrix = jnp.pad(matrix, ((0, 0), (0, count * block - size), (0, 0)))
+    column = jnp.pad(column, ((0, count * block - size), (0, 0)))
+
+    def added(i: Any, found: Any) -> Any:
+        a = jax.lax.dynamic_slice_in_dim(matrix, i * block, block, 1)
+        b = jax.lax.dynamic_slice_in_dim(column, i * block, block)
+        return found + total(a[:, j] * b[j][None] for j in range(block))
+
+    return jax.lax.fori_loop(0, count, added, jnp.zeros((rows, lanes)))
+
+
 def expand(equations: Equations, state: State, time: Any, order: int) -> Expansion:
     """Return the Taylor coefficients of the motion through a state, to an order.
 
@@ -228,11 +248,10 @@ def expand(equations: Equations, state: State, time: Any, order: int) -> Expansi
         return equations.balance(State(position, attitude, velocity, spin), acceleration, multipliers, clock)
 
     def solved(forces: Any, second: Any) -> tuple[Any, Any]:
-        right = jnp.concatenate([equations.flat(forces), second])
-        solution = -jnp.sum(inverse * right[None], axis=1)
+        solution = -multiplied(inverse, jnp.concatenate([equations.flat(forces), second]))
         return equations.bodies(solution[:columns]), solution[columns:]
 
-    trial = (jnp.zeros((count, bodies, lanes)), jnp.zeros((rows, lanes)))
+    trial = jnp.zeros((count, bodies, lanes)), jnp.zeros((rows, lanes))
     forces, second, _ = program(*state, *trial, time)
     acceleration, multipliers = solved(forces, second)
     recursion = Recursion(program, (*state, acceleration, multipliers, time), order - 1)
@@ -247,9 +266,9 @@ def expand(equations: Equations, state: State, time: Any, order: int) -> Expansi
     def level(k: Any, history: Any, before: State, rates: Any) -> Any:
         now = raised(before, rates, k)
         ticking = jnp.where(k == 1, jnp.ones_like(time), jnp.zeros_like(time))
-        (forces, second, attitude_rate), history = recursion.advanced(history, k, (*now, *trial, ticking))
+        (forces, second, attitude_rate), history = recursion.advanced(history, k, (*now, None, None, ticking))
         found = solved(forces, second)
-        history = recursion.corrected(history, k, (None,) * 4 + found + (None,))
+        history = recursion.corrected(history, (None,) * 4 + found + (None,))
         return history, now, (found[0], attitude_rate), found
 
     store = jax.tree.map(lambda x: jnp.zeros((order, *x.shape)).at[0].set(x), first)
@@ -261,7 +280,7 @@ def expand(equations: Equations, state: State, time: Any, order: int) -> Expansi
         return history, now, rates, store
 
     carry = (recursion.history, state, (acceleration, recursion.outputs[2]), store)
-    _, now, rates, store = jax.lax.fori_loop(1, order, body, carry)
+    _, now, rates, store = tight_loop(1, order, body, carry)
     *states, accelerations, forces = store
     last = raised(now, rates, order)
     whole = State(*(jnp.concatenate([s, x[None]]) for s, x in zip(states, last, strict=True)))

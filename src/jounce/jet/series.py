@@ -2,30 +2,45 @@
 
 Jets evaluate an expression at all orders at once, from inputs that are known. The solution of a differential equation
 is not: its coefficient k follows from the equation at order k, so that the equation is needed order after order, each
-once. `Recursion` reads the program of any JAX-traceable function, keeps the coefficients of what is multiplied, and
-gives the next coefficients of the outputs from the next ones of the inputs. The order may be the counter of a loop, so
-that what is compiled does not grow with it.
+once. `Recursion` reads the program of a JAX-traceable function, keeps the coefficients of what is multiplied, and gives
+the next coefficients of the outputs from the next ones of the inputs, in a loop over the orders.
 
 In ``y = f(x)`` the newest coefficient of x enters the newest of y as in ``f'(x_0) x_k`` only. A solver may so advance
-with zero for the unknown, solve its linear equations, and add what the unknown changes with `Recursion.corrected`.
+with zero for the unknown, solve its linear equations, and add what the unknown changes with `Recursion.corrected`. All
+other products are of coefficients known before: one sum over the orders for all of them side by side.
 """
 
+import math
 from collections.abc import Callable, Sequence
+from functools import reduce
+from itertools import accumulate
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax.extend.core import Literal
 
-from jounce.jet.algebra import total
+from jounce.jet.algebra import minus, plus, total
+from jounce.jet.operations import ADDITIVE, BROADCASTING, COMPOSED, LINEAR, PAIRS, PLAIN, SLOPES, STEPWISE, times
+
+_BLOCK = 8  # terms of a sum taken at once
+
+
+class _Pair(NamedTuple):
+    """Two variables whose coefficients are multiplied: ``sum_j left[j] right[k-j]``, or with the weight j."""
+
+    left: int
+    right: int
+    weighted: bool
 
 
 class _Node(NamedTuple):
     """One operation on series: the rule for its next coefficient, what it reads and what it makes."""
 
-    rule: Callable[..., Any]
-    slope: Callable[..., Any]  # the operation at order zero, for its derivative
+    rule: Callable[..., Any]  # of the coefficients of the operands, and of the sum over its pairs
     operands: tuple[Any, ...]  # numbers of variables, or arrays that do not change in time
+    pairs: list[_Pair]
     result: int
 
 
@@ -59,14 +74,19 @@ class Recursion:
         self.order = order
         self._nodes: list[_Node] = []
         self._values: dict[int, Any] = {}  # of order zero, by number of the variable
-        self._stored: dict[int, None] = {}  # variables whose history is needed, in order
+        self._known: dict[Any, Any] = {}  # results of operations already read, which programs often repeat
         self._pairs: dict[Any, Any] = {}  # sine and cosine, or their hyperbolic likes, of the same angle
         self._inputs = [self._variable(value) for value in values]
         program, shape = jax.make_jaxpr(function, return_shape=True)(*values)
         self._structure = jax.tree.structure(shape)
         self._outputs = self._read(program.jaxpr, program.consts, self._inputs)
         self.outputs = self._collected([self._value(x) for x in self._outputs])
-        self.history = tuple(self._first(self._values[number]) for number in self._stored)
+        self._nodes = self._needed()
+        self._products = list(dict.fromkeys(pair for node in self._nodes for pair in node.pairs))
+        self._stored = list(dict.fromkeys(x for pair in self._products for x in pair[:2]))
+        width = sum(jnp.size(self._values[pair.left]) for pair in self._products)
+        left, right = (jnp.zeros((order + size * _BLOCK, width)) for size in (1, 2))
+        self.history = (left, right, tuple(self._values[x] for x in self._stored))
 
     def advanced(self, history: Any, k: Any, coefficients: Sequence[Any]) -> tuple[Any, Any]:
         """Return the coefficients of order k of the outputs, and the history with them.
@@ -77,50 +97,41 @@ class Recursion:
             To order k - 1.
         k : int
             At least 1.
-        coefficients : sequence of array
-            Of order k, of the arguments.
+        coefficients : sequence of array or None
+            Of order k, of the arguments; None is zero.
         """
-        step = _Step(self, dict(zip(self._stored, history, strict=True)), {}, k)
-        for number, coefficient in zip(self._inputs, coefficients, strict=True):
-            step.set(number, coefficient)
-        for node in self._nodes:
-            step.set(node.result, node.rule(step, *node.operands))
-        return self._collected([self._next(x, step.now) for x in self._outputs]), tuple(step.known.values())
+        left, right, newest = history
+        left, right = self._written(left, right, dict(zip(self._stored, newest, strict=True)), k - 1)
+        now = self._swept(coefficients, self._sums(left, right, k))
 
-    def corrected(self, history: Any, k: Any, changes: Sequence[Any]) -> Any:
-        """Return the history of order k after a change of the coefficients of order k of the arguments.
+        def found(x: Any) -> Any:
+            c = now[x] if isinstance(x, int) else None
+            return jnp.zeros_like(self._value(x)) if c is None else c
+
+        return self._collected([found(x) for x in self._outputs]), (left, right, tuple(map(found, self._stored)))
+
+    def corrected(self, history: Any, changes: Sequence[Any]) -> Any:
+        """Return the history after a change of the newest coefficients of the arguments.
 
         Parameters
         ----------
         history
-            To order k.
-        k : int
-            The order.
+            As `advanced` returned it.
         changes : sequence of array or None
-            To add to the coefficients of order k of the arguments; None where there is no change.
+            To add to the coefficients of the order reached; None where there is no change.
         """
-        change: dict[int, Any] = {n: c for n, c in zip(self._inputs, changes, strict=True) if c is not None}
+        left, right, newest = history
+        change = self._swept(changes, None)
+        return left, right, tuple(plus(c, change.get(x)) for x, c in zip(self._stored, newest, strict=True))
+
+    def _swept(self, coefficients: Sequence[Any], sums: dict[_Pair, Any] | None) -> dict[int, Any]:
+        """Return coefficients of order k of all variables, from those of the arguments; None is zero."""
+        now: dict[int, Any] = dict(zip(self._inputs, coefficients, strict=True))
         for node in self._nodes:
-            moved = [i for i, x in enumerate(node.operands) if isinstance(x, int) and x in change]
-            if moved:
-                values = [self._value(x) for x in node.operands]
-
-                def along(*parts: Any, node: _Node = node, moved: list[int] = moved, values: list[Any] = values) -> Any:
-                    whole = list(values)
-                    for i, part in zip(moved, parts, strict=True):
-                        whole[i] = part
-                    return node.slope(*whole)
-
-                directions = tuple(change[node.operands[i]] for i in moved)
-                _, change[node.result] = jax.jvp(along, tuple(values[i] for i in moved), directions)
-        place = self.order - k
-
-        def added(before: Any, c: Any) -> Any:
-            c = c + jax.lax.dynamic_index_in_dim(before, place, 0, keepdims=False)
-            return jax.lax.dynamic_update_index_in_dim(before, c, place, 0)
-
-        places = zip(self._stored, history, strict=True)
-        return tuple(added(h, change[n]) if n in change else h for n, h in places)
+            parts = [now[x] if isinstance(x, int) else None for x in node.operands]
+            found = None if sums is None or not node.pairs else total(sums[pair] for pair in node.pairs)
+            now[node.result] = node.rule(parts, found)
+        return now
 
     # what is known of variables
 
@@ -132,18 +143,53 @@ class Recursion:
     def _value(self, x: Any) -> Any:
         return self._values[x] if isinstance(x, int) else x.array
 
-    def _next(self, x: Any, now: dict[int, Any]) -> Any:
-        return now[x] if isinstance(x, int) else jnp.zeros_like(x.array)
-
     def _collected(self, leaves: list[Any]) -> Any:
         return jax.tree.unflatten(self._structure, leaves)
 
-    # histories: arrays that hold the coefficients backwards and then zeros, so that a sum over products of
-    # coefficients whose orders add up to k is the sum over one array and a slice of another
+    def _needed(self) -> list[_Node]:
+        """Return the nodes on which the outputs depend."""
+        makers = {node.result: node for node in self._nodes}
+        found: set[int] = set()
+        waiting = [x for x in self._outputs if isinstance(x, int)]
+        while waiting:
+            number = waiting.pop()
+            if number in makers and number not in found:
+                found.add(number)
+                node = makers[number]
+                waiting += [x for x in node.operands if isinstance(x, int)]
+                waiting += [x for pair in node.pairs for x in pair[:2]]
+        return [node for node in self._nodes if node.result in found]
 
-    def _first(self, value: Any) -> Any:
-        size = 2 * self.order + 1
-        return jnp.zeros((size, *jnp.shape(value))).at[self.order].set(value)
+    # histories: the factors of all products side by side, one row an order, so that one loop sums all products
+
+    def _written(self, left: Any, right: Any, newest: dict[int, Any], k: Any) -> tuple[Any, Any]:
+        """Write the coefficients of order k."""
+        place = 0
+        for pair in self._products:
+            a, b = (jnp.ravel(newest[x])[None] for x in pair[:2])
+            left = jax.lax.dynamic_update_slice(left, a * k if pair.weighted else a, (k, place))
+            right = jax.lax.dynamic_update_slice(right, b, (k + _BLOCK, place))
+            place += a.size
+        return left, right
+
+    def _sums(self, left: Any, right: Any, k: Any) -> dict[_Pair, Any]:
+        """Return the sums over the products of coefficients of orders 1 to k - 1, those of order k left out."""
+
+        def block(i: Any, found: Any) -> Any:
+            first = 1 + i * _BLOCK
+            a = jax.lax.dynamic_slice_in_dim(left, first, _BLOCK)
+            b = jax.lax.dynamic_slice_in_dim(right, k - first + 1, _BLOCK)
+            return found + total(a[j] * b[_BLOCK - 1 - j] for j in range(_BLOCK))
+
+        found = jax.lax.fori_loop(0, (k + _BLOCK - 2) // _BLOCK, block, jnp.zeros(left.shape[1]))
+        sums, place = {}, 0
+        for pair in self._products:
+            shape = jnp.shape(self._values[pair.left])
+            size = math.prod(shape)
+            part = found[place : place + size].reshape(shape)
+            sums[pair] = part / k if pair.weighted else part
+            place += size
+        return sums
 
     # reading the program
 
@@ -161,6 +207,26 @@ class Recursion:
         return [look(v) for v in jaxpr.outvars]
 
     def _equation(self, primitive: Any, parameters: dict, operands: list[Any], made: Sequence[Any]) -> list[Any]:
+        key = self._key(primitive, parameters, operands)
+        if key is None:
+            return self._results(primitive, parameters, operands, made)
+        if key not in self._known:  # the operands stay alive with it, so that no other takes their place in memory
+            self._known[key] = self._results(primitive, parameters, operands, made), operands
+        return self._known[key][0]
+
+    def _key(self, primitive: Any, parameters: dict, operands: list[Any]) -> Any:
+        """Return what tells an operation from others; None where that is not known."""
+        names = [x if isinstance(x, int) else x.key() for x in operands]
+        if primitive.name in ("mul", "add", "add_any"):
+            names.sort(key=str)
+        key = (primitive.name, *sorted(parameters.items()), *names)
+        try:
+            hash(key)
+        except TypeError:
+            return None
+        return key
+
+    def _results(self, primitive: Any, parameters: dict, operands: list[Any], made: Sequence[Any]) -> list[Any]:
         name = primitive.name
         still = not any(isinstance(x, int) for x in operands)
         if still or not any(jnp.issubdtype(v.aval.dtype, jnp.floating) for v in made):  # decisions keep for a step
@@ -168,25 +234,35 @@ class Recursion:
             return list(map(_Constant, results if primitive.multiple_results else [results]))
         inner = parameters.get("jaxpr", parameters.get("call_jaxpr"))
         if name == "cond":
-            return self._branches(operands, parameters["branches"], made)
+            return self._branches(operands, parameters["branches"])
         if name == "scan":
             return self._unrolled(operands, parameters)
         if name != "while" and inner is not None:
             closed = hasattr(inner, "jaxpr")
             return self._read(inner.jaxpr if closed else inner, inner.consts if closed else (), operands)
-        if name in _STEPWISE:
+        return self._elementary(primitive, parameters, operands, made)
+
+    def _elementary(self, primitive: Any, parameters: dict, operands: list[Any], made: Sequence[Any]) -> list[Any]:
+        name = primitive.name
+        if name == "optimization_barrier":
+            return operands
+        if name in BROADCASTING:  # numbers and axes of length one, which JAX lets through
+            operands = [self._widened(x, made[0].aval.shape) for x in operands]
+        if name in STEPWISE:
             return [_Constant(primitive.bind(*map(self._value, operands), **parameters))]
-        if name in _COMPOSED:
-            return [self._composed(lambda *xs: _COMPOSED[name](*xs, **parameters), operands)]
-        if name in _SLOPES:
+        if name in COMPOSED:
+            return [self._composed(lambda *xs: COMPOSED[name](*xs, **parameters), operands)]
+        if name in SLOPES:
             return [self._by_slope(name, operands)]
-        if name in _PAIRS:
+        if name in PAIRS:
             return [self._pair(name, operands[0])]
-        if name in ("mul", "dot_general") and all(isinstance(x, int) for x in operands):
-            return [self._product(lambda a, b: primitive.bind(a, b, **parameters), operands)]
+        if name == "mul" and all(isinstance(x, int) for x in operands):
+            return [self._product(*operands)]
         if name == "div" and isinstance(operands[1], int):
-            return [self._quotient(operands)]
-        if name in _LINEAR:
+            return [self._quotient(*operands)]
+        if name in ("split", "unstack"):
+            return self._separated(name, parameters, operands)
+        if name in LINEAR:
             return [self._linear(primitive, parameters, operands)]
         raise TypeError(f"the operation '{name}' of JAX has no rule for Taylor series")
 
@@ -195,7 +271,7 @@ class Recursion:
         program = jax.make_jaxpr(function)(*map(self._value, operands))
         return self._read(program.jaxpr, program.consts, operands)[0]
 
-    def _branches(self, operands: list[Any], branches: Any, made: Sequence[Any]) -> list[Any]:
+    def _branches(self, operands: list[Any], branches: Any) -> list[Any]:
         which, arguments = operands[0], operands[1:]
         outcomes = [self._read(b.jaxpr, b.consts, arguments) for b in branches]
         index = jnp.clip(self._value(which), 0, len(branches) - 1)
@@ -221,71 +297,93 @@ class Recursion:
         stacked = [self._composed(lambda *xs: jnp.stack(xs), list(parts)) for parts in zip(*collected, strict=True)]
         return [*carry, *stacked]
 
+    def _widened(self, x: Any, shape: tuple[int, ...]) -> Any:
+        if not isinstance(x, int) or jnp.shape(self._values[x]) == shape:
+            return x
+        return self._composed(lambda value: jnp.broadcast_to(value, shape), [x])
+
+    def _separated(self, name: str, parameters: dict, operands: list[Any]) -> list[Any]:
+        axis = parameters["axis"]
+        sizes = parameters["sizes"] if name == "split" else [1] * jnp.shape(self._value(operands[0]))[axis]
+        ends = list(accumulate(map(int, sizes)))
+
+        def part(x: Any, start: int, stop: int) -> Any:
+            cut = jax.lax.slice_in_dim(x, start, stop, axis=axis)
+            return cut if name == "split" else jnp.squeeze(cut, axis)
+
+        bounds = zip([0, *ends], ends, strict=False)
+        return [self._composed(lambda x, a=start, b=stop: part(x, a, b), operands) for start, stop in bounds]
+
     # nodes
 
-    def _node(self, rule: Callable[..., Any], slope: Callable[..., Any], operands: Sequence[Any]) -> int:
-        result = self._variable(slope(*map(self._value, operands)))
-        self._nodes.append(_Node(rule, slope, tuple(operands), result))
+    def _node(self, rule: Callable[..., Any], value: Any, operands: Sequence[Any], pairs: Sequence[_Pair] = ()) -> int:
+        result = self._variable(value)
+        self._nodes.append(_Node(rule, tuple(operands), list(pairs), result))
         return result
 
-    def _keep(self, *variables: Any) -> None:
-        self._stored.update({x: None for x in variables if isinstance(x, int)})
-
     def _linear(self, primitive: Any, parameters: dict, operands: list[Any]) -> int:
-        additive = primitive.name in _ADDITIVE
-        zeros = {
-            i
-            for i, x in enumerate(operands)
-            if not isinstance(x, int) and additive and jnp.issubdtype(x.array.dtype, jnp.floating)
-        }
+        additive = primitive.name in ADDITIVE
 
-        def rule(step: _Step, *xs: Any) -> Any:
-            parts = [step.now[x] if isinstance(x, int) else x.array for x in xs]
-            parts = [jnp.zeros_like(p) if i in zeros else p for i, p in enumerate(parts)]
-            return primitive.bind(*parts, **parameters)
+        def rule(parts: list[Any], _: Any) -> Any:
+            if all(part is None for part in parts):
+                return None
+            whole = []
+            for x, part in zip(operands, parts, strict=True):
+                fixed = self._value(x)
+                adds = isinstance(x, int) or (additive and jnp.issubdtype(jnp.result_type(fixed), jnp.floating))
+                whole.append(part if part is not None else jnp.zeros_like(fixed) if adds else fixed)
+            return primitive.bind(*whole, **parameters)
 
-        return self._node(rule, lambda *xs: primitive.bind(*xs, **parameters), operands)
+        return self._node(rule, primitive.bind(*map(self._value, operands), **parameters), operands)
 
-    def _product(self, product: Callable[[Any, Any], Any], operands: list[Any]) -> int:
-        self._keep(*operands)
-        return self._node(lambda step, a, b: step.convolution(product, a, b), product, operands)
+    def _product(self, a: int, b: int) -> int:
+        first, second = self._value(a), self._value(b)
 
-    def _quotient(self, operands: list[Any]) -> int:
-        a, b = operands
+        def rule(parts: list[Any], sums: Any) -> Any:
+            return plus(sums, plus(times(parts[0], second), times(first, parts[1])))
+
+        return self._node(rule, first * second, [a, b], [_Pair(a, b, False)])
+
+    def _quotient(self, a: Any, b: int) -> int:
+        below, value = self._value(b), self._value(a) / self._value(b)
         result = len(self._values)  # the node made next
 
-        def rule(step: _Step, a: Any, b: int) -> Any:
-            known = step.convolution(jnp.multiply, result, b)
-            return (step.now[a] - known if isinstance(a, int) else -known) / self._value(b)
+        def rule(parts: list[Any], sums: Any) -> Any:
+            above = minus(minus(parts[0], sums), times(value, parts[1]))
+            return None if above is None else above / below
 
-        self._keep(b, result)
-        return self._node(rule, jnp.divide, [a, b])
+        return self._node(rule, value, [a, b], [_Pair(result, b, False)])
 
     def _by_slope(self, name: str, operands: list[Any]) -> int:
         """Make the nodes of a function known by its derivatives: ``y' = sum g_i(x, y) x_i'``."""
-        function, slopes = _SLOPES[name]
-        moving = [i for i, x in enumerate(operands) if isinstance(x, int)]
-        result, places = len(self._values), {}
+        function, slopes = SLOPES[name]
+        values: list[Any] = [None] * len(operands)
 
-        def rule(step: _Step, *xs: Any) -> Any:
-            return total(step.chain(places[i], xs[i]) for i in moving)
+        def rule(parts: list[Any], sums: Any) -> Any:
+            return reduce(plus, map(times, values, parts), sums)
 
-        self._keep(result, *operands)
-        self._node(rule, function, operands)
-        for i in moving:  # read at each order after the function itself, and used at the next
-            slope = self._composed(slopes[i], [*operands, result])
-            places[i] = slope
-            self._keep(slope)
+        result = self._node(rule, function(*map(self._value, operands)), operands)
+        node = self._nodes[-1]
+        for i, x in enumerate(operands):  # read at each order after the function itself, and used at the next
+            if isinstance(x, int):
+                slope = self._composed(slopes[i], [*operands, result])
+                values[i] = self._value(slope)
+                if isinstance(slope, int):
+                    node.pairs.append(_Pair(x, slope, True))
         return result
 
     def _pair(self, name: str, x: int) -> int:
         """Make the nodes of two functions that are each other's derivative, up to a sign."""
-        first, second, sign = _PAIRS[name]
+        first, second, sign = PAIRS[name]
         if (x, first) not in self._pairs:
             a, b = len(self._values), len(self._values) + 1
-            self._keep(x, a, b)
-            self._node(lambda step, x: step.chain(b, x), _PLAIN[first], [x])
-            self._node(lambda step, x: sign * step.chain(a, x), _PLAIN[second], [x])
+            values = PLAIN[first](self._value(x)), PLAIN[second](self._value(x))
+
+            def rule(parts: list[Any], sums: Any, slope: Any) -> Any:
+                return plus(sums, times(slope, parts[0]))
+
+            self._node(lambda p, s: rule(p, s, values[1]), values[0], [x], [_Pair(x, b, True)])
+            self._node(lambda p, s: times(sign, rule(p, s, values[0])), values[1], [x], [_Pair(x, a, True)])
             self._pairs[x, first], self._pairs[x, second] = a, b
         return self._pairs[x, name]
 
@@ -295,110 +393,8 @@ class _Constant(NamedTuple):
 
     array: Any
 
-
-class _Step(NamedTuple):
-    """The sums over products of coefficients at one order."""
-
-    recursion: Recursion
-    known: dict[int, Any]
-    now: dict[int, Any]
-    k: Any
-
-    def set(self, number: int, coefficient: Any) -> None:
-        """Note the coefficient of order k of a variable."""
-        self.now[number] = coefficient
-        if number in self.known:
-            place = self.recursion.order - self.k
-            self.known[number] = jax.lax.dynamic_update_index_in_dim(self.known[number], coefficient, place, 0)
-
-    def convolution(self, product: Callable[[Any, Any], Any], a: int, b: int) -> Any:
-        """Return ``sum_j a[j] b[k-j]``; a coefficient of order k that is not known yet counts as zero."""
-        return self._summed(product, self._forward(a), b)
-
-    def chain(self, slope: Any, x: int) -> Any:
-        """Return the coefficient k of y from ``y' = slope x'``."""
-        if not isinstance(slope, int):
-            return slope.array * self.now[x]
-        forward = self._forward(x)
-        weights = jnp.arange(self.recursion.order + 1.0).reshape((-1,) + (1,) * (forward.ndim - 1))
-        return self._summed(jnp.multiply, forward * weights, slope) / self.k
-
-    def _forward(self, a: int) -> Any:
-        return self.known[a][self.recursion.order :: -1]
-
-    def _summed(self, product: Callable[[Any, Any], Any], forward: Any, b: int) -> Any:
-        order = self.recursion.order
-        backward = jax.lax.dynamic_slice_in_dim(self.known[b], order - self.k, order + 1)
-        return jnp.sum(jax.vmap(product)(forward, backward), axis=0)
-
-
-def _whole_power(x: Any, *, y: int) -> Any:
-    if y < 0:
-        return 1.0 / _whole_power(x, y=-y)
-    result, square = None, x
-    while y:
-        if y & 1:
-            result = square if result is None else result * square
-        y >>= 1
-        if y:
-            square = square * square
-    return jnp.ones_like(x) if result is None else result
-
-
-def _select_larger(a: Any, b: Any) -> Any:
-    return jnp.where(a >= b, a, b)
-
-
-def _square_root(x: Any) -> Any:
-    return jnp.sqrt(x)
-
-
-_PLAIN = {"sin": jnp.sin, "cos": jnp.cos, "sinh": jnp.sinh, "cosh": jnp.cosh}
-_PAIRS = {
-    "sin": ("sin", "cos", -1.0),
-    "cos": ("sin", "cos", -1.0),
-    "sinh": ("sinh", "cosh", 1.0),
-    "cosh": ("sinh", "cosh", 1.0),
-}
-_ROOT_OF_PI = 1.7724538509055160273
-# a function and its partial derivatives, which may use its value, the last argument
-_SLOPES: dict[str, tuple[Callable[..., Any], tuple[Callable[..., Any], ...]]] = {
-    "exp": (jnp.exp, (lambda x, y: y,)),
-    "expm1": (jnp.expm1, (lambda x, y: y + 1.0,)),
-    "log": (jnp.log, (lambda x, y: 1.0 / x,)),
-    "log1p": (jnp.log1p, (lambda x, y: 1.0 / (1.0 + x),)),
-    "sqrt": (_square_root, (lambda x, y: 0.5 / y,)),
-    "cbrt": (jnp.cbrt, (lambda x, y: y / (3.0 * x),)),
-    "pow": (jnp.power, (lambda x, p, y: p * y / x, lambda x, p, y: y * jnp.log(x))),
-    "tan": (jnp.tan, (lambda x, y: 1.0 + y * y,)),
-    "tanh": (jnp.tanh, (lambda x, y: 1.0 - y * y,)),
-    "atan": (jnp.arctan, (lambda x, y: 1.0 / (1.0 + x * x),)),
-    "asin": (jnp.arcsin, (lambda x, y: 1.0 / jnp.sqrt((1.0 - x) * (1.0 + x)),)),
-    "acos": (jnp.arccos, (lambda x, y: -1.0 / jnp.sqrt((1.0 - x) * (1.0 + x)),)),
-    "asinh": (jnp.arcsinh, (lambda x, y: 1.0 / jnp.sqrt(1.0 + x * x),)),
-    "acosh": (jnp.arccosh, (lambda x, y: 1.0 / jnp.sqrt((x - 1.0) * (x + 1.0)),)),
-    "atanh": (jnp.arctanh, (lambda x, y: 1.0 / ((1.0 - x) * (1.0 + x)),)),
-    "atan2": (jnp.arctan2, (lambda y, x, z: x / (x * x + y * y), lambda y, x, z: -y / (x * x + y * y))),
-    "erf": (jax.lax.erf, (lambda x, y: 2.0 / _ROOT_OF_PI * jnp.exp(-x * x),)),
-    "logistic": (jax.lax.logistic, (lambda x, y: y * (1.0 - y),)),
-}
-_COMPOSED: dict[str, Callable[..., Any]] = {
-    "square": lambda x: x * x,
-    "integer_pow": _whole_power,
-    "rsqrt": lambda x, **_: 1.0 / jnp.sqrt(x),
-    "exp2": lambda x, **_: jnp.exp(x * 0.69314718055994530942),
-    "erfc": lambda x: 1.0 - jax.lax.erf(x),
-    "abs": lambda x: jnp.where(x < 0, -x, x),
-    "max": _select_larger,
-    "min": lambda a, b: jnp.where(a <= b, a, b),
-    "clamp": lambda low, x, high: jnp.where(x < low, low, jnp.where(x > high, high, x)),
-    "rem": lambda x, y: x - y * jnp.trunc(x / y),
-}
-_ADDITIVE = frozenset(
-    "add add_any sub concatenate dynamic_update_slice pad scatter-add select_n stack".split()
-)
-_LINEAR = _ADDITIVE | frozenset(
-    "broadcast_in_dim convert_element_type copy cumsum div dot_general dynamic_slice expand_dims gather mul neg "
-    "optimization_barrier reduce_sum reshape rev scatter slice squeeze transpose unstack".split()
-)
-_STEPWISE = frozenset("ceil floor round sign stop_gradient".split())  # piecewise constant in time
+    def key(self) -> Any:
+        """Return what tells it from others: small numbers of a program by value, results by identity."""
+        if isinstance(self.array, bool | int | float | np.generic):
+            return str(jnp.result_type(self.array)), np.asarray(self.array).tobytes()
+        return "array", id(self.array)

@@ -1,0 +1,102 @@
+"""How the operations of JAX programs act on Taylor series: tables that `jounce.jet.series` reads."""
+
+from collections.abc import Callable
+from functools import reduce
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+
+from jounce.jet.loops import halved_sum
+
+
+def times(a: Any, b: Any) -> Any:
+    """Multiply coefficients; None is zero."""
+    return None if a is None or b is None else a * b
+
+
+def _whole_power(x: Any, *, y: int) -> Any:
+    if y < 0:
+        return 1.0 / _whole_power(x, y=-y)
+    result, square = None, x
+    while y:
+        if y & 1:
+            result = square if result is None else result * square
+        y >>= 1
+        if y:
+            square = square * square
+    return jnp.ones_like(x) if result is None else result
+
+
+def _select_larger(a: Any, b: Any) -> Any:
+    return jnp.where(a >= b, a, b)
+
+
+def _contracted(a: Any, b: Any, *, dimension_numbers: Any, **_: Any) -> Any:
+    (first, second), (shared_a, shared_b) = dimension_numbers
+    free_a, free_b = (
+        [i for i in range(x.ndim) if i not in (*c, *s)] for x, c, s in ((a, first, shared_a), (b, second, shared_b))
+    )
+    a = jnp.transpose(a, (*shared_a, *free_a, *first)).reshape(
+        *(a.shape[i] for i in (*shared_a, *free_a)), *(1,) * len(free_b), -1
+    )
+    b = jnp.transpose(b, (*shared_b, *free_b, *second)).reshape(
+        *(b.shape[i] for i in shared_b), *(1,) * len(free_a), *(b.shape[i] for i in free_b), -1
+    )
+    return halved_sum(a * b, -1)
+
+
+def _square_root(x: Any) -> Any:
+    return jnp.sqrt(x)
+
+
+PLAIN = {"sin": jnp.sin, "cos": jnp.cos, "sinh": jnp.sinh, "cosh": jnp.cosh}
+PAIRS = {
+    "sin": ("sin", "cos", -1.0),
+    "cos": ("sin", "cos", -1.0),
+    "sinh": ("sinh", "cosh", 1.0),
+    "cosh": ("sinh", "cosh", 1.0),
+}
+_ROOT_OF_PI = 1.7724538509055160273
+# a function and its partial derivatives, which may use its value, the last argument
+SLOPES: dict[str, tuple[Callable[..., Any], tuple[Callable[..., Any], ...]]] = {
+    "exp": (jnp.exp, (lambda _x, y: y,)),
+    "expm1": (jnp.expm1, (lambda _x, y: y + 1.0,)),
+    "log": (jnp.log, (lambda x, _y: 1.0 / x,)),
+    "log1p": (jnp.log1p, (lambda x, _y: 1.0 / (1.0 + x),)),
+    "sqrt": (_square_root, (lambda _x, y: 0.5 / y,)),
+    "cbrt": (jnp.cbrt, (lambda x, y: y / (3.0 * x),)),
+    "pow": (jnp.power, (lambda x, p, y: p * y / x, lambda x, _p, y: y * jnp.log(x))),
+    "tan": (jnp.tan, (lambda _x, y: 1.0 + y * y,)),
+    "tanh": (jnp.tanh, (lambda _x, y: 1.0 - y * y,)),
+    "atan": (jnp.arctan, (lambda x, _y: 1.0 / (1.0 + x * x),)),
+    "asin": (jnp.arcsin, (lambda x, _y: 1.0 / jnp.sqrt((1.0 - x) * (1.0 + x)),)),
+    "acos": (jnp.arccos, (lambda x, _y: -1.0 / jnp.sqrt((1.0 - x) * (1.0 + x)),)),
+    "asinh": (jnp.arcsinh, (lambda x, _y: 1.0 / jnp.sqrt(1.0 + x * x),)),
+    "acosh": (jnp.arccosh, (lambda x, _y: 1.0 / jnp.sqrt((x - 1.0) * (x + 1.0)),)),
+    "atanh": (jnp.arctanh, (lambda x, _y: 1.0 / ((1.0 - x) * (1.0 + x)),)),
+    "atan2": (jnp.arctan2, (lambda y, x, _z: x / (x * x + y * y), lambda y, x, _z: -y / (x * x + y * y))),
+    "erf": (jax.lax.erf, (lambda x, _y: 2.0 / _ROOT_OF_PI * jnp.exp(-x * x),)),
+    "erfc": (jax.lax.erfc, (lambda x, _y: -2.0 / _ROOT_OF_PI * jnp.exp(-x * x),)),
+    "logistic": (jax.lax.logistic, (lambda _x, y: y * (1.0 - y),)),
+}
+COMPOSED: dict[str, Callable[..., Any]] = {
+    "dot_general": _contracted,
+    "reduce_sum": lambda x, *, axes, **_: reduce(halved_sum, sorted(axes, reverse=True), x),
+    "square": lambda x: x * x,
+    "integer_pow": _whole_power,
+    "rsqrt": lambda x, **_: 1.0 / jnp.sqrt(x),
+    "exp2": lambda x, **_: jnp.exp(x * 0.69314718055994530942),
+    "abs": lambda x: jnp.where(x < 0, -x, x),
+    "max": _select_larger,
+    "min": lambda a, b: jnp.where(a <= b, a, b),
+    "clamp": lambda low, x, high: jnp.where(x < low, low, jnp.where(x > high, high, x)),
+    "rem": lambda x, y: x - y * jnp.trunc(x / y),
+}
+BROADCASTING = frozenset("mul div pow atan2".split())
+ADDITIVE = frozenset("add add_any sub concatenate dynamic_update_slice pad scatter scatter-add select_n stack".split())
+LINEAR = ADDITIVE | frozenset(
+    "broadcast_in_dim convert_element_type copy cumsum div dynamic_slice expand_dims gather mul neg "
+    "reshape rev slice squeeze transpose".split()
+)
+STEPWISE = frozenset("ceil floor round sign stop_gradient".split())  # piecewise constant in time
