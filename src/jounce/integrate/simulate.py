@@ -31,7 +31,7 @@ def simulate(
     order: int = 4,
     *,
     method: AbstractMethod | None = None,
-    tolerance: float = 1e-13,
+    tolerance: float = 1e-15,
     initial: Mapping[str, Any] | None = None,
     events: Sequence[Event] = (),
     longest_step: float = np.inf,
@@ -54,7 +54,7 @@ def simulate(
         Highest derivative of the outputs, up to 30.
     method : AbstractMethod, optional
         `Taylor` unless given.
-    tolerance : float, default 1e-13
+    tolerance : float, default 1e-15
         Of the error of a step, rad or sizes of the mechanism.
     initial : dict of str to driver, optional
         In the place of ``mechanism.initial``: each fixes one coordinate and its rate at the start.

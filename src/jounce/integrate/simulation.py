@@ -102,7 +102,7 @@ class Simulation(Motion):
         pose_type = start.model.pose_type
         coordinates = pose_coordinates(state, pose_type)
         groups = tuple(
-            _continuous(group, np.asarray(output_series(group, coordinates, pose_type)), instants)
+            _continuous(group, np.array(output_series(group, coordinates, pose_type)), instants)
             for group in start.model.system.outputs
         )
         status = np.where(reached, int(Status.OK), int(Status.NOT_REACHED))
