@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 
 from jounce.dynamics.forward import Equations, Expansion, State, expand
-from jounce.integrate.methods import AbstractMethod, coefficient_sizes
+from jounce.integrate.methods import AbstractMethod
 from jounce.integrate.projection import projected
 from jounce.kinematics.compilation import compiled
 
@@ -97,8 +97,8 @@ def march(
 
     def attempt(front: Front) -> tuple[Front, Steps]:
         left = stop - front.time
-        sizes = coefficient_sizes(front.expansion, length)
-        step = jnp.minimum(jnp.minimum(method.longest_step(sizes, tolerance), front.limit), longest)
+        start, reach = method.prepared(front.expansion, length, tolerance)
+        step = jnp.minimum(jnp.minimum(reach, front.limit), longest)
         last = step >= 0.999 * jnp.abs(left)  # no sliver of a step at the end
         step = jnp.where(last, left, jnp.sign(left) * step)
         time = jnp.where(last, stop, front.time + step)
@@ -106,13 +106,13 @@ def march(
         step = jnp.where(running, step, 0.0)
         time = jnp.where(running, time, front.time)
 
-        state = method.arrive(equations, front.expansion, front.time, step)
+        state = method.arrive(equations, start, front.time, step)
         state, distance = projected(equations, state, time[None])
         expansion = expand(equations, state, time[None], order)
-        error = method.error(front.expansion, expansion, step, length)
+        error = method.error(start, expansion, step, length)
         good = _finite(expansion) & jnp.isfinite(distance) & (error <= MARGIN * tolerance) & running
         tiny = jnp.abs(step) < SMALLEST_STEP * jnp.maximum(jnp.abs(front.time), jnp.abs(stop - front.time))
-        polynomial = method.polynomial(front.expansion, expansion, step)
+        polynomial = method.polynomial(start, expansion, step)
         steps = Steps(front.time, step, good, polynomial)
         outcome = jnp.where(good & last, int(Outcome.ARRIVED), front.outcome)
         outcome = jnp.where(running & ~good & tiny, int(Outcome.COLLAPSED), outcome)

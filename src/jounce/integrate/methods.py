@@ -7,11 +7,13 @@ from typing import Any
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from jounce.dynamics.forward import Equations, Expansion, State
 from jounce.errors import JounceError
 
 HIGHEST_ORDER = 40
+LOWEST_ORDER = 4
 ROUNDING = 1e-14  # relative error of an acceleration that is no sign of a step too long
 
 
@@ -38,6 +40,20 @@ class AbstractMethod(eqx.Module):
             Of the error of a step, in the same measure.
         """
 
+    def prepared(self, expansion: Expansion, length: Any, tolerance: Any) -> tuple[Expansion, Any]:
+        """Return the expansion as the step shall use it, and how far that may go, s, shape (batch,).
+
+        Parameters
+        ----------
+        expansion : Expansion
+            At the beginning of the step.
+        length : float
+            Size of the mechanism, m.
+        tolerance : float
+            Of the error of the step, rad or sizes of the mechanism.
+        """
+        return expansion, self.longest_step(coefficient_sizes(expansion, length), tolerance)
+
     @abc.abstractmethod
     def arrive(self, equations: Equations, expansion: Expansion, time: Any, step: Any) -> State:
         """Return the state at the end of a step, not yet on the constraints; `time` is that of its beginning."""
@@ -57,10 +73,10 @@ def evaluated(polynomial: State, step: Any) -> State:
 
 
 def _horner(coefficients: Any, step: Any) -> Any:
-    def add(value: Any, c: Any) -> tuple[Any, None]:
-        return value * step[None, None] + c, None
-
-    return jax.lax.scan(add, coefficients[-1], coefficients[:-1], reverse=True)[0]
+    value = coefficients[-1]
+    for k in range(len(coefficients) - 2, -1, -1):
+        value = value * step[None, None] + coefficients[k]
+    return value
 
 
 def coefficient_sizes(expansion: Expansion, length: Any) -> Any:
@@ -115,6 +131,28 @@ class Taylor(AbstractMethod):
             return jnp.full(sizes.shape[1], self.step, float)
         count = len(sizes)
         return reach(sizes, count // 2) * tolerance ** (1.0 / count)
+
+    def prepared(self, expansion: Expansion, length: Any, tolerance: Any) -> tuple[Expansion, Any]:
+        """Return the series cut where it carries furthest, and how far that is.
+
+        Near a singular position the higher coefficients drown in rounding: the cut series is then much the better one.
+        """
+        if self.step is not None:
+            return super().prepared(expansion, length, tolerance)
+        sizes = coefficient_sizes(expansion, length)
+        orders = np.arange(1, len(sizes) + 1)
+        roots = jnp.power(jnp.maximum(sizes, 1e-300), -1.0 / orders[:, None])
+        cuts = np.arange(LOWEST_ORDER, len(sizes))[:, None]
+        counted = (orders >= (cuts + 1) // 2) & (orders <= cuts + 1)  # the upper half of what is kept, and the next
+        reaches = jnp.min(jnp.where(counted[:, :, None], roots[None], jnp.inf), axis=1)
+        steps = reaches * jnp.power(tolerance, 1.0 / (cuts + 1.0))
+        best = jnp.argmax(steps, axis=0)
+        kept = np.arange(len(sizes))[:, None] <= best + LOWEST_ORDER  # of the coefficients from zero on
+
+        def cut(part: Any) -> Any:
+            return jnp.where(kept[:, None, None], part, 0.0)
+
+        return expansion._replace(state=expansion.state.map(cut)), jnp.max(steps, axis=0)
 
     def arrive(self, equations: Equations, expansion: Expansion, time: Any, step: Any) -> State:
         """Return the value of the series."""
