@@ -117,7 +117,7 @@ def free_four_bar():
         space="planar",
         gravity=[0, -GRAVITY],
         bodies={
-            name: jn.Body(places[name], angles[name], mass, mass * length**2 / 12, [length / 2, 0])
+            name: jn.Body(places[name], angles[name], None, mass, mass * length**2 / 12, [length / 2, 0])
             for name, (mass, length) in rods.items()
         },
         joints={
