@@ -11,7 +11,7 @@ from jounce.kinematics import Motion
 from jounce.mechanism import build
 from tests.problems import small
 from tests.problems.massed import massed, massed_example
-from tests.problems.mechanisms import MECHANISMS
+from tests.problems.mechanisms import MECHANISMS, example
 
 TIME = np.array([0.1, 0.35, 0.6, 0.85])
 ZERO, X = [0.0, 0.0], [1.0, 0.0]
@@ -351,6 +351,8 @@ def test_a_mechanism_without_masses_and_forces_says_so():
     motion = jn.solve(arm(), TIME, order=4)
     with pytest.raises(MechanismError, match="forces need masses, and no body has one"):
         jn.driver_force(motion, "turn")
+    with pytest.raises(MechanismError, match="forces need masses"):
+        jn.power_balance(motion)
     with pytest.raises(MechanismError, match=r"outputs\.T\.driver: forces need masses"):
         dataclasses.replace(arm(), outputs={"T": jn.DriverTorqueOutput("turn")})
 
@@ -378,3 +380,25 @@ def test_reactions_of_a_chain_against_recursive_newton_euler():
             sizes = np.abs(expected[:, :, k]).max(axis=(0, 2))
             error = np.abs(found - expected[:, : found.shape[1], k]).max(axis=(0, 2)) / sizes[: found.shape[1]]
             assert (error <= 1e-13).all(), (name, frame, error)
+
+
+def test_a_force_that_is_not_finite_is_named_with_its_time():
+    law = "2/(t - 0.6)"
+    mechanism = dataclasses.replace(arm(mass=2.0), forces={"brake": jn.forces.Torque(("ground", "arm"), law)})
+    motion = jn.solve(mechanism, TIME, order=4)
+    with pytest.raises(MechanismError, match=r"forces\.brake: has no finite value at t = 0\.6 s; check its law"):
+        jn.driver_force(motion, "turn")
+
+
+@pytest.mark.slow
+def test_reactions_in_a_simulation():
+    # a double pendulum: what holds the lower mass is m (a - g), with rates, from derivatives of its place alone
+    mechanism = jn.load(example("double_pendulum"))
+    simulation = jn.simulate(mechanism, np.linspace(0.0, 1.0, 5), order=3)
+    tip = simulation.point("lower", mechanism.bodies["lower"].center_of_mass).values
+    expected = tip[:, 2:].copy()
+    expected[:, 0] += [0.0, 9.81]
+    force = jn.joint_reaction(simulation, "B").force.values[:, : expected.shape[1]]
+    np.testing.assert_allclose(force, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+    balance = jn.power_balance(simulation)
+    assert (np.abs(balance["residual"]) <= 1e-12 * balance["scale"].max("time")).all()

@@ -17,13 +17,19 @@ from jounce.dynamics.energies import gravity_of, masses_of
 from jounce.dynamics.loads import loads, mass_matrices
 from jounce.errors import MechanismError
 from jounce.jet import Jet, cross
-from jounce.kinematics import Motion
+from jounce.kinematics import Motion, Status
 from jounce.kinematics.compilation import compiled
-from jounce.mechanism import Model
+from jounce.mechanism import Mechanism, Model
 from jounce.mechanism.system import System
 from jounce.robot.scan import stacked
 
 SMALL_BATCH, LARGE_BATCH = 64, 512  # instants; a short motion compiles for one width only, and fills less of it
+
+
+def check_loads(mechanism: Mechanism, name: str = "bodies") -> None:
+    """Raise MechanismError unless a body has a mass or a force is applied."""
+    if not mechanism.forces and all(body.mass is None for body in mechanism.bodies.values()):
+        raise MechanismError("forces need masses, and no body has one; give the bodies mass and inertia", name=name)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -60,10 +66,11 @@ class MotionForces:
     Raises
     ------
     MechanismError
-        If the motion has no accelerations, or the masses are not valid.
+        If nothing has a mass and no force is applied, the motion has no accelerations, or the masses are not valid.
     """
 
     def __init__(self, motion: Motion):
+        check_loads(motion.mechanism)
         self.motion, self.model = motion, motion.model
         self.pose_type, self.coordinates = motion.poses
         self.levels = len(self.coordinates["position"]) - 2  # of the forces: accelerations use up two
@@ -97,7 +104,8 @@ class MotionForces:
                 for index, group in enumerate(system.groups)
             ]
             bodies, instants = self.taken(None, lanes, self.levels + 2), self.motion.time[lanes]
-            load = _loads(forces, bodies, instants, self.masses, self.gravity, self.pose_type)
+            load, finite = _loads(forces, bodies, instants, self.masses, self.gravity, self.pose_type)
+            self._check_finite(np.asarray(finite), lanes)
             still = None if square else self.taken(None, lanes, 1)
             return _multipliers(system, blocks, load, still, self.masses, self.pose_type)
 
@@ -187,6 +195,15 @@ class MotionForces:
                 found[name] = chosen if bodies is None else chosen[..., np.array(bodies), :]
         return found
 
+    def _check_finite(self, finite: np.ndarray, lanes: np.ndarray) -> None:
+        """Raise MechanismError for the first instant that was solved and at which an applied force is not finite."""
+        bad = np.argwhere((~finite & (self.motion.status[lanes] == Status.OK)).T)
+        if len(bad):
+            lane, force = bad[0]
+            name = [name for names in self.model.forces for name in names][force]
+            message = f"has no finite value at t = {self.motion.time[lanes[lane]]:g} s; check its law there"
+            raise MechanismError(message, name=f"forces.{name}")
+
     def _poses(self, index: int, lanes: np.ndarray) -> tuple[dict[str, Any], ...]:
         bodies = self.model.system.groups[index].bodies
         return tuple(self.taken(slot, lanes, self.levels) for slot in bodies)
@@ -220,10 +237,11 @@ def _slopes(element: Any, poses: Any, instants: Any, pose_type: Any, slot: int, 
 
 
 @compiled("pose_type")
-def _loads(system: System, bodies: Any, instants: Any, masses: Any, gravity: Any, pose_type: Any) -> Any:
+def _loads(system: System, bodies: Any, instants: Any, masses: Any, gravity: Any, pose_type: Any) -> tuple[Any, Any]:
     order = len(bodies["position"]) - 1
     pose = pose_of(bodies, pose_type, order)
-    return loads(system, pose, Jet.variable(instants[None], order), masses, gravity)
+    time = Jet.variable(instants[None], order)
+    return loads(system, pose, time, masses, gravity), system.finite_forces(pose, time)
 
 
 @compiled("pose_type")

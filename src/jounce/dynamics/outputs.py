@@ -6,7 +6,7 @@ import equinox as eqx
 import numpy as np
 
 from jounce.constraints.base import Vector, value_fields
-from jounce.dynamics.inverse import MotionForces
+from jounce.dynamics.inverse import MotionForces, check_loads
 from jounce.errors import MechanismError, did_you_mean
 from jounce.mechanism import AbstractMotionOutput, Mechanism
 from jounce.mechanism.mechanism import GROUND
@@ -40,9 +40,7 @@ class AbstractForceOutput(AbstractMotionOutput):
         if name not in known:
             message = f"no {self.source} has this name; {did_you_mean(name, known)}"
             raise MechanismError(message, name=self.source, value=name)
-        if not mechanism.forces and all(body.mass is None for body in mechanism.bodies.values()):
-            message = "forces need masses, and no body has one; give the bodies mass and inertia"
-            raise MechanismError(message, name=self.source, value=name)
+        check_loads(mechanism, self.source)
         self._check_named(known[name])
 
     def _check_named(self, element: Any) -> None:

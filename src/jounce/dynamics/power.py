@@ -35,7 +35,7 @@ def power_balance(motion: Motion) -> Any:
     Raises
     ------
     MechanismError
-        If the motion has no accelerations, or the masses are not valid.
+        If nothing has a mass and no force is applied, the motion has no accelerations, or the masses are not valid.
 
     Examples
     --------
