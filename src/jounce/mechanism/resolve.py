@@ -209,7 +209,8 @@ def _check_sideways(values: Mapping[str, Any], name: str) -> None:
         for other in others:
             vector = values.get(other)
             if isinstance(axis, np.ndarray) and isinstance(vector, np.ndarray):
-                sine = np.linalg.norm(np.cross(axis, vector)) / (np.linalg.norm(axis) * np.linalg.norm(vector))
+                first, second = (v / np.max(np.abs(v)) for v in (axis, vector))  # no overflow in the squares
+                sine = np.linalg.norm(np.cross(first, second)) / (np.linalg.norm(first) * np.linalg.norm(second))
                 if sine < 1e-9:
                     message = "must not be parallel to the axis"
                     raise MechanismError(message, name=f"{name}.{other}", value=_plain(vector))

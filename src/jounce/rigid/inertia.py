@@ -169,9 +169,11 @@ class Inertia:
             raise RobotError("must be symmetric", name="pseudo", value=pseudo.tolist())
         if pseudo[3, 3] <= 0:
             raise RobotError("must be greater than zero", name="mass", value=float(pseudo[3, 3]))
-        mass, center, second = pseudo_parts(pseudo)
-        moments = np.array(second)
-        return cls(float(mass), center, np.trace(moments) * np.eye(3) - (moments + moments.T) / 2)
+        with np.errstate(all="ignore"):  # what overflows is refused below
+            mass, center, second = pseudo_parts(pseudo)
+            moments = np.array(second)
+            tensor = np.trace(moments) * np.eye(3) - (moments / 2 + moments.T / 2)
+        return cls(float(mass), center, tensor)
 
     @classmethod
     def total(cls, parts: Iterable["Inertia"]) -> "Inertia":
