@@ -12,6 +12,7 @@ from jounce.integrate.projection import projected
 from jounce.kinematics.compilation import compiled
 
 SMALLEST_STEP = 1e-13  # of the span, or of the time itself
+BEYOND = 1.7  # times the reach of a step that was refused near a singular position
 MARGIN = 10.0  # an estimate of the error that is so many times the tolerance is still accepted: estimates are rough
 
 
@@ -29,7 +30,7 @@ class Front(NamedTuple):
 
     time: Any  # s, shape (batch,)
     expansion: Expansion
-    limit: Any  # largest next step after one that was refused, s
+    refused: Any  # number of steps refused from here, one after the other
     outcome: Any  # see Outcome
     drift: Any  # largest distance from the constraints before a projection, rad or sizes of the mechanism
 
@@ -49,7 +50,7 @@ def departed(equations: Equations, state: State, time: Any, *, order: int) -> Fr
     expansion = expand(equations, state, time[None], order)
     finite = _finite(expansion)
     outcome = jnp.where(finite, int(Outcome.RUNNING), int(Outcome.LOST))
-    return Front(time, expansion, jnp.full(time.shape, jnp.inf), outcome, jnp.zeros(time.shape))
+    return Front(time, expansion, jnp.zeros(time.shape, int), outcome, jnp.zeros(time.shape))
 
 
 @compiled("count", "keep")
@@ -97,8 +98,10 @@ def march(
 
     def attempt(front: Front) -> tuple[Front, Steps]:
         left = stop - front.time
-        start, reach = method.prepared(front.expansion, length, tolerance)
-        step = jnp.minimum(jnp.minimum(reach, front.limit), longest)
+        start, reach, allowed = method.prepared(front.expansion, length, tolerance)
+        # a step that ended in a singular position is tried longer: shorter ones would only come nearer, and nearer
+        beyond = (front.refused == 1) & (allowed > tolerance)
+        step = jnp.minimum(reach * jnp.where(beyond, BEYOND, 0.5**front.refused), longest)
         last = step >= 0.999 * jnp.abs(left)  # no sliver of a step at the end
         step = jnp.where(last, left, jnp.sign(left) * step)
         time = jnp.where(last, stop, front.time + step)
@@ -110,14 +113,14 @@ def march(
         state, distance = projected(equations, state, time[None])
         expansion = expand(equations, state, time[None], order)
         error = method.error(start, expansion, step, length)
-        good = _finite(expansion) & jnp.isfinite(distance) & (error <= MARGIN * tolerance) & running
+        good = _finite(expansion) & jnp.isfinite(distance) & (error <= MARGIN * allowed) & running
         tiny = jnp.abs(step) < SMALLEST_STEP * jnp.maximum(jnp.abs(front.time), jnp.abs(stop - front.time))
         polynomial = method.polynomial(start, expansion, step)
         steps = Steps(front.time, step, good, polynomial)
         outcome = jnp.where(good & last, int(Outcome.ARRIVED), front.outcome)
         outcome = jnp.where(running & ~good & tiny, int(Outcome.COLLAPSED), outcome)
-        onwards = Front(time, expansion, jnp.full(step.shape, jnp.inf), outcome, jnp.maximum(front.drift, distance))
-        refused = front._replace(limit=jnp.where(running, 0.5 * jnp.abs(step), front.limit), outcome=outcome)
+        onwards = Front(time, expansion, jnp.zeros_like(front.refused), outcome, jnp.maximum(front.drift, distance))
+        refused = front._replace(refused=front.refused + 1, outcome=outcome)
         return jax.tree.map(lambda a, b: jnp.where(good, a, b), onwards, refused), steps
 
     def unfinished(carry: Any) -> Any:

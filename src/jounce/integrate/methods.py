@@ -14,6 +14,8 @@ from jounce.errors import JounceError
 
 HIGHEST_ORDER = 40
 LOWEST_ORDER = 4
+DROWNED = 0.6  # of the coefficients kept, or fewer, tell that rounding has drowned the others
+RELAXED = 1e4  # times larger errors are accepted where that is so
 ROUNDING = 1e-14  # relative error of an acceleration that is no sign of a step too long
 
 
@@ -40,8 +42,10 @@ class AbstractMethod(eqx.Module):
             Of the error of a step, in the same measure.
         """
 
-    def prepared(self, expansion: Expansion, length: Any, tolerance: Any) -> tuple[Expansion, Any]:
-        """Return the expansion as the step shall use it, and how far that may go, s, shape (batch,).
+    def prepared(self, expansion: Expansion, length: Any, tolerance: Any) -> tuple[Expansion, Any, Any]:
+        """Return the expansion as the step shall use it, how far that may go, s, and by which tolerance to judge it.
+
+        The last two have the shape (batch,).
 
         Parameters
         ----------
@@ -52,7 +56,8 @@ class AbstractMethod(eqx.Module):
         tolerance : float
             Of the error of the step, rad or sizes of the mechanism.
         """
-        return expansion, self.longest_step(coefficient_sizes(expansion, length), tolerance)
+        step = self.longest_step(coefficient_sizes(expansion, length), tolerance)
+        return expansion, step, jnp.full(step.shape, tolerance)
 
     @abc.abstractmethod
     def arrive(self, equations: Equations, expansion: Expansion, time: Any, step: Any) -> State:
@@ -132,10 +137,12 @@ class Taylor(AbstractMethod):
         count = len(sizes)
         return reach(sizes, count // 2) * tolerance ** (1.0 / count)
 
-    def prepared(self, expansion: Expansion, length: Any, tolerance: Any) -> tuple[Expansion, Any]:
+    def prepared(self, expansion: Expansion, length: Any, tolerance: Any) -> tuple[Expansion, Any, Any]:
         """Return the series cut where it carries furthest, and how far that is.
 
         Near a singular position the higher coefficients drown in rounding: the cut series is then much the better one.
+        Its error may be larger, so that the step passes over the singular position: rounding grows with the inverse of
+        the distance from there, and steps that keep it small would come near, and nearer.
         """
         if self.step is not None:
             return super().prepared(expansion, length, tolerance)
@@ -152,7 +159,9 @@ class Taylor(AbstractMethod):
         def cut(part: Any) -> Any:
             return jnp.where(kept[:, None, None], part, 0.0)
 
-        return expansion._replace(state=expansion.state.map(cut)), jnp.max(steps, axis=0)
+        drowned = best + LOWEST_ORDER < DROWNED * len(sizes)
+        allowed = jnp.where(drowned, RELAXED * tolerance, tolerance)
+        return expansion._replace(state=expansion.state.map(cut)), jnp.max(steps, axis=0), allowed
 
     def arrive(self, equations: Equations, expansion: Expansion, time: Any, step: Any) -> State:
         """Return the value of the series."""
