@@ -244,14 +244,14 @@ def draw(found: dict[str, list[Point]], path: Path) -> None:
     """Write the figure: error at the end against time spent."""
     import matplotlib.pyplot as plt
 
-    figure, axes = plt.subplots(figsize=(7, 4.5), layout="constrained")
+    figure, axes = plt.subplots(figsize=(7.5, 4), layout="constrained")
     for (name, points), marker in zip(found.items(), "os^Dv", strict=False):
         axes.loglog([s * 1e3 for _, s, _ in points], [e for _, _, e in points], marker=marker, label=name)
     axes.set_xlabel("time for 10 s of motion, one core (ms)")
     axes.set_ylabel("error of the angles at 10 s (rad)")
     axes.set_title("Double pendulum from horizontal rest")
     axes.grid(which="major", alpha=0.4)
-    axes.legend()
+    figure.legend(loc="outside right upper")
     figure.savefig(path, dpi=130)
     print(f"wrote {path}")
 
