@@ -230,3 +230,61 @@ def test_a_force_of_ones_own_in_a_file(tmp_path):
     assert isinstance(force, Wind)
     with pytest.raises(jn.MechanismFileError, match=r"line 4, forces\.F\.strength: expected a force, such as 10 N"):
         written(tmp_path, "planar", "{F: {type: wind, body: a, strength: 3 m, law: 1 - v**2}}")
+
+
+WHOLE = {
+    "planar": """\
+space: planar
+parameters: {k: 3 N/m}
+bodies:
+  a: {}
+  b: {mass: 1, inertia: {solid: tube, radius: 1, inner_radius: 0.5, length: 2, axis: x}}
+  c: {inertia: {pseudo: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}}
+forces:
+  s: {type: spring, bodies: [a, b], points: [[0, 0], [0, 0]], stiffness: 1, length: 1, damping: 1}
+  p: {type: point_force, body: a, point: [0, 0], law: [x, 1], frame: body}
+  t: {type: torque, bodies: [a, b], law: x}
+initial:
+  i: {type: coordinate, bodies: [ground, a], coordinate: angle, motion: t}
+""",
+    "spatial": """\
+space: spatial
+bodies:
+  a: {}
+  b: {mass: 1, inertia: {solid: box, size: [1, 1, 1]}}
+forces:
+  s: {type: slide_spring, bodies: [a, b], points: [[0, 0, 0], [0, 0, 0]], vector: [1, 0, 0], stiffness: 1}
+  m: {type: moment, body: a, law: [wx, 1, 0], frame: global}
+  t: {type: torque, bodies: [a, b], axis: [0, 0, 1], vectors: [[1, 0, 0], [1, 0, 0]], law: x}
+""",
+}
+ODD = [None, True, [], {}, "", "nan", 1e308, -1, 0, "a b", "x/0", [[]], [None], {"x": 1}, {"samples": "no.csv"}]
+ODD += [{"expression": 3}, ["x"], "k", "1 furlong", "'", "__import__('os')", [1, 2, 3, 4], "sqrt(-1)"]
+
+
+def places(data, at=()):
+    """Return the paths of all entries below a mapping or list."""
+    items = data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
+    return [path for key, value in items for path in ((*at, key), *places(value, (*at, key)))]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("space", WHOLE)
+def test_any_value_anywhere_loads_or_ends_in_one_message_with_its_line(tmp_path, space):
+    path = tmp_path / "file.yaml"
+    path.write_text(WHOLE[space])
+    original, refused = json.dumps(read_source(path).data), []
+    path = tmp_path / "file.json"
+    for at in places(json.loads(original)):
+        for value in ODD if at[0] in ("bodies", "forces", "initial") else ():
+            entry = data = json.loads(original)
+            for key in at[:-1]:
+                entry = entry[key]
+            entry[at[-1]] = value
+            path.write_text(json.dumps(data))
+            try:
+                assert load(path).bodies
+            except jn.MechanismFileError as error:
+                refused.append(error)
+    assert len(refused) > 500
+    assert all(error.line is not None and str(error).isprintable() for error in refused)
