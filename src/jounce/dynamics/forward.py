@@ -255,36 +255,33 @@ def expand(equations: Equations, state: State, time: Any, order: int) -> Expansi
     forces, second, _ = program(*state, *trial, time)
     acceleration, multipliers = solved(forces, second)
     recursion = Recursion(program, (*state, acceleration, multipliers, time), order - 1)
-    first = (*state, acceleration, multipliers)
     shifts = equations.pose_type.shifts
 
-    def raised(before: Any, rate: Any, k: Any) -> State:
+    def raised(before: State, acceleration: Any, attitude_rate: Any, k: Any) -> State:
         """Return the state of order k from the coefficients of order k - 1 of its rates."""
-        last, accelerated = before, rate[0]
-        return State(last.velocity / k, rate[1] / k, accelerated[:shifts] / k, accelerated[shifts:] / k)
+        rates = State(before.velocity, attitude_rate, acceleration[:shifts], acceleration[shifts:])
+        return rates.map(lambda c: c / k)
 
-    def level(k: Any, history: Any, before: State, rates: Any) -> Any:
-        now = raised(before, rates, k)
+    def level(k: Any, carry: Any) -> Any:
+        history, now, series, rates = carry
         ticking = jnp.where(k == 1, jnp.ones_like(time), jnp.zeros_like(time))
         (forces, second, attitude_rate), history = recursion.advanced(history, k, (*now, None, None, ticking))
-        found = solved(forces, second)
-        history = recursion.corrected(history, (None,) * 4 + found + (None,))
-        return history, now, (found[0], attitude_rate), found
+        acceleration, multipliers = solved(forces, second)
+        history = recursion.corrected(history, (None,) * 4 + (acceleration, multipliers, None))
+        now = raised(now, acceleration, attitude_rate, k + 1)
+        put = jax.lax.dynamic_update_index_in_dim
+        series = State(*(put(s, c, k + 1, 0) for s, c in zip(series, now, strict=True)))
+        return history, now, series, put(rates, multipliers, k, 0)
 
-    store = jax.tree.map(lambda x: jnp.zeros((order, *x.shape)).at[0].set(x), first)
-
-    def body(k: Any, carry: Any) -> Any:
-        history, now, rates, store = carry
-        history, now, rates, found = level(k, history, now, rates)
-        store = jax.tree.map(lambda s, x: jax.lax.dynamic_update_index_in_dim(s, x, k, 0), store, (*now, *found))
-        return history, now, rates, store
-
-    carry = (recursion.history, state, (acceleration, recursion.outputs[2]), store)
-    _, now, rates, store = tight_loop(1, order, body, carry)
-    *states, accelerations, forces = store
-    last = raised(now, rates, order)
-    whole = State(*(jnp.concatenate([s, x[None]]) for s, x in zip(states, last, strict=True)))
-    return Expansion(whole, accelerations, forces)
+    now = raised(state, acceleration, recursion.outputs[2], 1)
+    series = State(
+        *(jnp.zeros((order + 1, *c.shape)).at[0].set(c).at[1].set(d) for c, d in zip(state, now, strict=True))
+    )
+    rates = jnp.zeros((order, rows, lanes)).at[0].set(multipliers)
+    _, _, series, rates = tight_loop(1, order, level, (recursion.history, now, series, rates))
+    numbers = jnp.arange(1.0, order + 1)[:, None, None, None]
+    accelerations = numbers * jnp.concatenate([series.velocity[1:], series.spin[1:]], axis=1)
+    return Expansion(series, accelerations, rates)
 
 
 def least_change(equations: Equations, state: State, time: Any, gap: Any) -> Any:

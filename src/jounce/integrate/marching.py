@@ -12,7 +12,6 @@ from jounce.integrate.projection import projected
 from jounce.kinematics.compilation import compiled
 
 SMALLEST_STEP = 1e-13  # of the span, or of the time itself
-BEYOND = 1.7  # times the reach of a step that was refused near a singular position
 MARGIN = 10.0  # an estimate of the error that is so many times the tolerance is still accepted: estimates are rough
 
 
@@ -47,7 +46,7 @@ class Steps(NamedTuple):
 @compiled("order")
 def departed(equations: Equations, state: State, time: Any, *, order: int) -> Front:
     """Return the start of runs from states on the constraints; `time` has the shape (batch,)."""
-    expansion = expand(equations, state, time[None], order)
+    expansion = _kept(expand(equations, state, time[None], order))
     finite = _finite(expansion)
     outcome = jnp.where(finite, int(Outcome.RUNNING), int(Outcome.LOST))
     return Front(time, expansion, jnp.zeros(time.shape, int), outcome, jnp.zeros(time.shape))
@@ -94,14 +93,12 @@ def march(
         How many of them there are.
     """
     length = equations.system.column_scale[0]
-    order = len(front.expansion.acceleration)
+    order = len(front.expansion.state.position) - 1
 
     def attempt(front: Front) -> tuple[Front, Steps]:
         left = stop - front.time
         start, reach, allowed = method.prepared(front.expansion, length, tolerance)
-        # a step that ended in a singular position is tried longer: shorter ones would only come nearer, and nearer
-        beyond = (front.refused == 1) & (allowed > tolerance)
-        step = jnp.minimum(reach * jnp.where(beyond, BEYOND, 0.5**front.refused), longest)
+        step = jnp.minimum(reach * 0.5**front.refused, longest)
         last = step >= 0.999 * jnp.abs(left)  # no sliver of a step at the end
         step = jnp.where(last, left, jnp.sign(left) * step)
         time = jnp.where(last, stop, front.time + step)
@@ -111,7 +108,7 @@ def march(
 
         state = method.arrive(equations, start, front.time, step)
         state, distance = projected(equations, state, time[None])
-        expansion = expand(equations, state, time[None], order)
+        expansion = _kept(expand(equations, state, time[None], order))
         error = method.error(start, expansion, step, length)
         good = _finite(expansion) & jnp.isfinite(distance) & (error <= MARGIN * allowed) & running
         tiny = jnp.abs(step) < SMALLEST_STEP * jnp.maximum(jnp.abs(front.time), jnp.abs(stop - front.time))
@@ -137,6 +134,11 @@ def march(
     shapes = jax.eval_shape(lambda f: attempt(f)[1], front)
     kept = jax.tree.map(lambda s: jnp.zeros((count, *s.shape), s.dtype), shapes) if keep else None
     return jax.lax.while_loop(unfinished, iterate, (front, kept, 0))
+
+
+def _kept(expansion: Expansion) -> Expansion:
+    """Return an expansion without what steps do not need."""
+    return expansion._replace(acceleration=expansion.acceleration[:1], multipliers=expansion.multipliers[:1])
 
 
 def _finite(expansion: Expansion) -> Any:

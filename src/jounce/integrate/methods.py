@@ -14,8 +14,8 @@ from jounce.errors import JounceError
 
 HIGHEST_ORDER = 40
 LOWEST_ORDER = 4
-DROWNED = 0.6  # of the coefficients kept, or fewer, tell that rounding has drowned the others
-RELAXED = 1e4  # times larger errors are accepted where that is so
+FAINT = 1e-10  # what grows in the upper coefficients from an amplitude below is rounding, near a singular position
+ROUGH = 1e-11  # tolerance of a step there, rad or sizes of the mechanism
 ROUNDING = 1e-14  # relative error of an acceleration that is no sign of a step too long
 
 
@@ -82,6 +82,14 @@ def _horner(coefficients: Any, step: Any) -> Any:
     for k in range(len(coefficients) - 2, -1, -1):
         value = value * step[None, None] + coefficients[k]
     return value
+
+
+def _drowned(sizes: Any) -> Any:
+    """Tell where the upper coefficients are rounding that grows geometrically, shape (batch,)."""
+    count = len(sizes)
+    middle, top = (jnp.log(jnp.maximum(jnp.max(sizes[k - 4 : k], axis=0), 1e-300)) for k in (count // 2, count))
+    growth = (top - middle) / (count - count // 2)
+    return (growth > 0) & (middle - (count // 2) * growth < math.log(FAINT))
 
 
 def coefficient_sizes(expansion: Expansion, length: Any) -> Any:
@@ -152,15 +160,14 @@ class Taylor(AbstractMethod):
         cuts = np.arange(LOWEST_ORDER, len(sizes))[:, None]
         counted = (orders >= (cuts + 1) // 2) & (orders <= cuts + 1)  # the upper half of what is kept, and the next
         reaches = jnp.min(jnp.where(counted[:, :, None], roots[None], jnp.inf), axis=1)
-        steps = reaches * jnp.power(tolerance, 1.0 / (cuts + 1.0))
+        allowed = jnp.where(_drowned(sizes), jnp.maximum(tolerance, ROUGH), tolerance)
+        steps = reaches * jnp.power(allowed[None], 1.0 / (cuts + 1.0))
         best = jnp.argmax(steps, axis=0)
         kept = np.arange(len(sizes))[:, None] <= best + LOWEST_ORDER  # of the coefficients from zero on
 
         def cut(part: Any) -> Any:
             return jnp.where(kept[:, None, None], part, 0.0)
 
-        drowned = best + LOWEST_ORDER < DROWNED * len(sizes)
-        allowed = jnp.where(drowned, RELAXED * tolerance, tolerance)
         return expansion._replace(state=expansion.state.map(cut)), jnp.max(steps, axis=0), allowed
 
     def arrive(self, equations: Equations, expansion: Expansion, time: Any, step: Any) -> State:
@@ -175,7 +182,7 @@ class Taylor(AbstractMethod):
         """Return what accelerations at the end depart by from the series, as the displacement that is left out."""
         if self.step is not None:
             return jnp.zeros_like(step)
-        order = len(start.acceleration)
+        order = len(start.state.position) - 1
         series = jnp.concatenate(list(start.state[2:]), axis=1)
         rates = series[1:] * jnp.arange(1.0, order + 1)[:, None, None, None]
         found = end.acceleration[0]
