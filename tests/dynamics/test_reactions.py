@@ -1,54 +1,29 @@
-import dataclasses
+"""Forces of drivers and reactions of joints: balances, rates, frames, outputs, what is refused."""
 
-import mpmath
+import dataclasses
+import math
+
 import numpy as np
 import pytest
 
 import jounce as jn
-from jounce import drivers, planar
 from jounce.errors import MechanismError
-from jounce.kinematics import Motion
-from jounce.mechanism import build
 from tests.problems import small
-from tests.problems.massed import massed, massed_example
-from tests.problems.mechanisms import MECHANISMS, example
+from tests.problems.massed import arm, massed, massed_example
+from tests.problems.mechanisms import MECHANISMS
 
 TIME = np.array([0.1, 0.35, 0.6, 0.85])
-ZERO, X = [0.0, 0.0], [1.0, 0.0]
-TIME_OF_LAW = "0.3 + 0.7*t + 0.4*sin(3*t)"
-
-
-def law(t):
-    """The motion law of most mechanisms here, for mpmath."""
-    return mpmath.mpf("0.3") + mpmath.mpf("0.7") * t + mpmath.mpf("0.4") * mpmath.sin(3 * t)
-
-
-def rates(function, times, count=3):
-    """Derivatives of a function of time in mpmath, shape (time, count)."""
-    with mpmath.workdps(40):
-        return np.array([[float(mpmath.diff(function, mpmath.mpf(t), k)) for k in range(count)] for t in times])
-
-
-def arm(**body):
-    """An arm on a pin, turned by the law."""
-    return jn.Mechanism(
-        space="planar",
-        gravity=[0.0, -9.81],
-        bodies={"arm": jn.Body(ZERO, **body)},
-        joints={"pin": planar.Revolute(("ground", "arm"), [0.2, 0.1], ZERO)},
-        drivers={"turn": drivers.CoordinateDriver(("ground", "arm"), "angle", TIME_OF_LAW)},
-    )
 
 
 @pytest.mark.parametrize(
     "name", [pytest.param(n, marks=() if n == "slider_crank" else pytest.mark.slow) for n in MECHANISMS]
 )
 def test_power_balance_of_the_bank(name):
-    # the two sides share no code but the motion; 2e-15 measured, but for screw and swash plate at higher rates
+    # the two sides share no code but the motion; 2e-15 measured, 6e-14 at the second rate of the screw press
     balance = jn.power_balance(jn.solve(massed_example(name), TIME, order=4))
     left = (np.abs(balance["residual"]) / balance["scale"].max("time")).max("time")
     assert float(balance["scale"].min()) > 0
-    assert (left <= 1e-13).all(), left.values
+    assert (left <= 3e-13).all(), left.values
 
 
 @pytest.mark.parametrize("name", ["slider_crank", pytest.param("hooke_joint", marks=pytest.mark.slow)])
@@ -81,105 +56,6 @@ def test_every_body_obeys_newton_and_euler(name):
         np.testing.assert_allclose(torque, moment, atol=1e-12 * sizes)
 
 
-def test_driven_pendulum_against_its_closed_form():
-    motion = jn.solve(arm(mass=2.0, inertia=0.3, center_of_mass=[0.5, 0.0]), TIME, order=4)
-
-    def torque(t):
-        with_steiner = mpmath.mpf("0.3") + 2 * mpmath.mpf("0.25")
-        return with_steiner * mpmath.diff(law, t, 2) + 2 * mpmath.mpf("9.81") / 2 * mpmath.cos(law(t))
-
-    def pin(component):
-        def force(t):
-            r, w, a = mpmath.mpf("0.5"), mpmath.diff(law, t), mpmath.diff(law, t, 2)
-            c, s = mpmath.cos(law(t)), mpmath.sin(law(t))
-            x = -a * r * s - w**2 * r * c
-            y = a * r * c - w**2 * r * s + mpmath.mpf("9.81")
-            return 2 * (x if component == 0 else y)
-
-        return force
-
-    np.testing.assert_allclose(jn.driver_force(motion, "turn"), rates(torque, TIME), rtol=1e-12, atol=1e-11)
-    reaction = jn.joint_reaction(motion, "pin")
-    for component in range(2):
-        expected = rates(pin(component), TIME)
-        np.testing.assert_allclose(reaction.force[..., component], expected, rtol=1e-12, atol=1e-10)
-    assert np.abs(reaction.torque).max() <= 1e-12  # a pin carries none about itself
-
-
-@pytest.mark.slow
-def test_slider_crank_against_the_textbook():
-    # crank 1 and rod 3 without mass, slider of 4 kg on x: torque = 4 x'' dx/dtheta, guide force from the rod's angle
-    mechanism = small.slider_crank()
-    bodies = {**mechanism.bodies, "slider": dataclasses.replace(mechanism.bodies["slider"], mass=4.0)}
-    driver = drivers.CoordinateDriver(("ground", "crank"), "angle", TIME_OF_LAW)
-    mechanism = dataclasses.replace(mechanism, bodies=bodies, drivers={"drive": driver})
-    motion = jn.solve(mechanism, TIME, order=4)
-
-    def x(angle):
-        return mpmath.cos(angle) + mpmath.sqrt(9 - mpmath.sin(angle) ** 2)
-
-    def push(t):
-        return 4 * mpmath.diff(lambda s: x(law(s)), t, 2)
-
-    def torque(t):
-        return push(t) * mpmath.diff(x, law(t))
-
-    def guide(t):
-        return push(t) * mpmath.sin(law(t)) / mpmath.sqrt(9 - mpmath.sin(law(t)) ** 2)
-
-    np.testing.assert_allclose(jn.driver_force(motion, "drive"), rates(torque, TIME), rtol=1e-9, atol=1e-9)
-    normal = jn.joint_reaction(motion, "guide").force
-    np.testing.assert_allclose(normal[..., 1], rates(guide, TIME), rtol=1e-9, atol=1e-9)
-    np.testing.assert_allclose(normal[..., 0], 0.0, atol=1e-10)
-    rod = jn.joint_reaction(motion, "B", "rod", frame="rod").force  # a rod without mass carries along itself only
-    assert np.abs(rod[..., 1]).max() <= 1e-11 * np.abs(rod[..., 0]).max()
-
-
-@pytest.mark.slow
-def test_gear_pair_adds_the_inertia_of_the_other_shaft():
-    mechanism = jn.Mechanism(
-        space="planar",
-        bodies={"one": jn.Body(ZERO, mass=1.0, inertia=0.2), "two": jn.Body([3, 0], mass=1.0, inertia=0.7)},
-        joints={
-            "A": planar.Revolute(("ground", "one"), ZERO, ZERO),
-            "B": planar.Revolute(("ground", "two"), [3.0, 0.0], ZERO),
-            "mesh": planar.Coordinate(("one", "two"), "angle", ratio=-0.5),
-        },
-        drivers={"turn": drivers.CoordinateDriver(("ground", "one"), "angle", TIME_OF_LAW)},
-    )
-    motion = jn.solve(mechanism, TIME, order=4)
-    angle = rates(law, TIME, 5)
-    np.testing.assert_allclose(jn.driver_force(motion, "turn"), (0.2 + 0.25 * 0.7) * angle[:, 2:], rtol=1e-12)
-    mesh = jn.joint_reaction(motion, "mesh")
-    np.testing.assert_allclose(mesh.torque, -0.5 * 0.7 * angle[:, 2:], rtol=1e-12)
-    assert np.abs(mesh.force).max() <= 1e-13
-    shaft = jn.joint_reaction(motion, "mesh", "one")
-    np.testing.assert_allclose(shaft.torque, -0.25 * 0.7 * angle[:, 2:], rtol=1e-12)
-
-
-@pytest.mark.slow
-def test_rolling_disc_needs_friction_for_its_spin():
-    # a disc of 3 kg, 0.5 kg m^2 and radius 0.4 on the x axis, pushed at its centre
-    bodies = ("ground", "disc")
-    mechanism = jn.Mechanism(
-        space="planar",
-        gravity=[0.0, -9.81],
-        bodies={"disc": jn.Body([0.0, 0.4], mass=3.0, inertia=0.5)},
-        joints={
-            "line": planar.Parallel2(bodies, [0.0, 0.4], ZERO, X),
-            "roll": planar.Rolling(bodies, [0.0, 0.4], ZERO, [-1.0, 0.0], 0.4),
-        },
-        drivers={"push": drivers.SlideDriver(bodies, [0.0, 0.4], ZERO, X, TIME_OF_LAW)},
-    )
-    motion = jn.solve(mechanism, TIME, order=4)
-    x = rates(law, TIME, 5)
-    np.testing.assert_allclose(jn.driver_force(motion, "push"), (3.0 + 0.5 / 0.16) * x[:, 2:], rtol=1e-12)
-    roll = jn.joint_reaction(motion, "roll", point=[0.0, 0.0])
-    np.testing.assert_allclose(roll.force[..., 0], -0.5 / 0.16 * x[:, 2:], rtol=1e-12)
-    weight = jn.joint_reaction(motion, "line").force[..., 1]
-    np.testing.assert_allclose(weight, np.array([[3.0 * 9.81, 0.0, 0.0]] * len(TIME)), atol=1e-11)
-
-
 def test_rates_are_those_of_differenced_multipliers_at_the_order_of_the_difference():
     # central differences err by h^2 f''' / 6: halving h must divide the error by four, at every rate
     mechanism = massed_example("slider_crank")
@@ -192,39 +68,29 @@ def test_rates_are_those_of_differenced_multipliers_at_the_order_of_the_differen
     np.testing.assert_allclose(order, 2.0, atol=0.05)
 
 
-@pytest.mark.slow
-def test_a_body_at_rest_gives_its_weight_and_no_rates():
-    mechanism = massed(small.crank("0.7"))
-    motion = jn.solve(mechanism, TIME, order=4)
-    body = mechanism.bodies["crank"]
-    weight = -body.mass * np.array(mechanism.gravity)
-    force = jn.joint_reaction(motion, "O").force
-    np.testing.assert_allclose(force[:, 0], np.tile(weight, (len(TIME), 1)), rtol=1e-13)
-    assert np.abs(force[:, 1:]).max() == 0
-
-
 @pytest.mark.parametrize(
     "name", ["slider_crank", *[pytest.param(n, marks=pytest.mark.slow) for n in ("screw_press", "rccc", "rsur")]]
 )
 def test_a_joint_does_to_one_body_the_opposite_of_what_it_does_to_the_other(name):
     mechanism = massed_example(name)
     motion = jn.solve(mechanism, TIME, order=4)
+    zero = [0.0] * len(mechanism.gravity)
     for joint, element in mechanism.joints.items():
         one, two = element.bodies
-        first, second = (
-            jn.joint_reaction(motion, joint, body, point=[0.0] * len(mechanism.gravity)) for body in (one, two)
-        )
+        first, second = (jn.joint_reaction(motion, joint, body, point=zero) for body in (one, two))
         size = max(float(np.abs(first.force).max()), float(np.abs(first.torque).max()))
         np.testing.assert_allclose(first.force, -second.force, atol=1e-12 * size)
-        zero = [0.0] * len(mechanism.gravity)
-        lever = jn.Jet.from_derivatives(
-            np.swapaxes((position(motion, two, zero) - position(motion, one, zero)), 0, 1)[:3]
-        )
-        about = [np.moveaxis(jet, -1, 1) for jet in (lever.derivatives(), np.swapaxes(second.force.values, 0, 1))]
-        arm_, force = (jn.Jet.from_derivatives(part) for part in about)
-        moment = np.asarray(arm_.cross(force).derivatives())  # (derivative, component, time) or (derivative, time)
-        moment = np.moveaxis(moment, -1, 0)
-        np.testing.assert_allclose(first.torque, -second.torque - moment, atol=1e-11 * size)
+        lever, force = position(motion, two, zero) - position(motion, one, zero), second.force.values
+        for k in range(3):  # the rates of lever x force, by the rule of Leibniz
+            moment = sum(math.comb(k, j) * cross(lever[:, j], force[:, k - j]) for j in range(k + 1))
+            np.testing.assert_allclose(first.torque[:, k], -second.torque[:, k] - moment, atol=1e-11 * size)
+
+
+def cross(a, b):
+    """The vector product; in the plane its third component."""
+    if a.shape[-1] == 3:
+        return np.cross(a, b)
+    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
 
 
 def position(motion, body, point):
@@ -244,39 +110,8 @@ def test_frames_and_points_of_a_reaction_agree():
     np.testing.assert_array_equal(named.force, own.force)
     moved = jn.joint_reaction(motion, "B", point=[0.3, -0.1])
     lever = (motion.point("rod", [0.0, 0.0]) - motion.point("rod", [0.3, -0.1])).values[:, 0]
-    shifted = (
-        plain.torque[:, 0]
-        + np.cross(np.pad(lever, ((0, 0), (0, 1))), np.pad(plain.force[:, 0], ((0, 0), (0, 1))))[:, 2]
-    )
+    shifted = plain.torque[:, 0] + cross(lever, plain.force[:, 0].values)
     np.testing.assert_allclose(moved.torque[:, 0], shifted, atol=1e-12)
-
-
-def test_free_motion_has_the_reactions_of_the_driven_one():
-    # the law's own torque, in closed form, on a pendulum that nothing drives: the same motion, so the same pin forces
-    body = {"mass": 2.0, "inertia": 0.3, "center_of_mass": [0.5, 0.0]}
-    driven = jn.solve(arm(**body), TIME, order=4)
-    torque = f"-0.8*3.6*sin(3*t) + 9.81*cos({TIME_OF_LAW})"
-    free = dataclasses.replace(arm(**body), drivers={}, forces={"motor": jn.forces.Torque(("ground", "arm"), torque)})
-    status = np.zeros(len(TIME), int)
-    motion = Motion(free, build(free), TIME, 4, (driven.poses[1], ()), status, {})
-    for frame in ("global", "body"):
-        expected, found = (jn.joint_reaction(m, "pin", frame=frame).force for m in (driven, motion))
-        np.testing.assert_allclose(found, expected, atol=1e-11)
-    balance = jn.power_balance(motion)
-    assert (np.abs(balance["residual"]) <= 1e-12 * balance["scale"].max()).all()
-
-
-def test_springs_are_balanced_by_the_driver():
-    mechanism = dataclasses.replace(
-        arm(),
-        forces={"spring": jn.forces.TorsionalSpring(("ground", "arm"), stiffness=3.0, angle=0.1, damping=0.5)},
-    )
-    motion = jn.solve(mechanism, TIME, order=4)
-    angle = rates(law, TIME, 5)
-    expected = 3.0 * (angle - [0.1, 0, 0, 0, 0])[:, :3] + 0.5 * angle[:, 1:4]
-    np.testing.assert_allclose(jn.driver_force(motion, "turn"), expected, rtol=1e-12)
-    np.testing.assert_allclose(jn.applied_force(motion, "spring"), -expected, rtol=1e-12)
-    assert jn.applied_force(motion, "spring").attrs["units"] == "N*m"
 
 
 @pytest.mark.slow
@@ -357,48 +192,9 @@ def test_a_mechanism_without_masses_and_forces_says_so():
         dataclasses.replace(arm(), outputs={"T": jn.DriverTorqueOutput("turn")})
 
 
-@pytest.mark.slow
-def test_reactions_of_a_chain_against_recursive_newton_euler():
-    rod = jn.Inertia(1.3, center_of_mass=[0.4, 0.05, -0.1], tensor=[0.02, 0.11, 0.12])
-    links = [jn.Link("base"), jn.Link("a", rod), jn.Link("b", rod), jn.Link("c", rod)]
-    joints = [
-        jn.Joint("A", "base", "a", axis=[0.0, 1.0, 2.0], position=[0.1, 0.0, 0.2]),
-        jn.Joint("B", "a", "b", axis=[1.0, 0.0, 0.3], position=[0.5, 0.1, 0.0]),
-        jn.Joint("C", "b", "c", axis=[0.0, 1.0, 0.0], position=[0.3, 0.0, 0.1]),
-    ]
-    robot = jn.Robot("chain", links, joints)
-    laws = {"A": "0.4*sin(2*t)", "B": "0.3 + 0.5*t", "C": "cos(1.5*t)"}
-    motion = jn.solve(robot.mechanism(drivers=laws), TIME, order=5)
-    q = np.stack([motion.outputs[name] for name in "ABC"], axis=-1)
-    for frame, axes in (("body", "link"), ("global", "base")):
-        expected = jn.joint_wrenches(robot, q, frame=axes)
-        for k, (name, link) in enumerate(zip("ABC", "abc", strict=True)):
-            parts = [jn.joint_reaction(motion, j, link, frame, [0.0, 0.0, 0.0]) for j in (name, f"{name}_drive")]
-            force = sum(part.force.values for part in parts)
-            torque = sum(part.torque.values for part in parts)
-            found = np.concatenate([force, torque], axis=-1)[:, : expected.shape[1]]
-            sizes = np.abs(expected[:, :, k]).max(axis=(0, 2))
-            error = np.abs(found - expected[:, : found.shape[1], k]).max(axis=(0, 2)) / sizes[: found.shape[1]]
-            assert (error <= 1e-13).all(), (name, frame, error)
-
-
 def test_a_force_that_is_not_finite_is_named_with_its_time():
     law = "2/(t - 0.6)"
     mechanism = dataclasses.replace(arm(mass=2.0), forces={"brake": jn.forces.Torque(("ground", "arm"), law)})
     motion = jn.solve(mechanism, TIME, order=4)
     with pytest.raises(MechanismError, match=r"forces\.brake: has no finite value at t = 0\.6 s; check its law"):
         jn.driver_force(motion, "turn")
-
-
-@pytest.mark.slow
-def test_reactions_in_a_simulation():
-    # a double pendulum: what holds the lower mass is m (a - g), with rates, from derivatives of its place alone
-    mechanism = jn.load(example("double_pendulum"))
-    simulation = jn.simulate(mechanism, np.linspace(0.0, 1.0, 5), order=3)
-    tip = simulation.point("lower", mechanism.bodies["lower"].center_of_mass).values
-    expected = tip[:, 2:].copy()
-    expected[:, 0] += [0.0, 9.81]
-    force = jn.joint_reaction(simulation, "B").force.values[:, : expected.shape[1]]
-    np.testing.assert_allclose(force, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
-    balance = jn.power_balance(simulation)
-    assert (np.abs(balance["residual"]) <= 1e-12 * balance["scale"].max("time")).all()

@@ -5,9 +5,11 @@ import dataclasses
 import numpy as np
 
 import jounce as jn
+from jounce import drivers, planar
 from tests.problems.mechanisms import example
 
 GRAVITY = {"planar": [0.3, -9.81], "spatial": [0.4, -0.7, -9.81]}  # along no axis
+TIME_OF_LAW = "0.3 + 0.7*t + 0.4*sin(3*t)"
 
 
 def massed(mechanism, seed=1):
@@ -28,3 +30,14 @@ def massed(mechanism, seed=1):
 def massed_example(name):
     """Return a mechanism of the bank with masses."""
     return massed(jn.load(example(name)))
+
+
+def arm(**body):
+    """An arm on a pin, turned by the law."""
+    return jn.Mechanism(
+        space="planar",
+        gravity=[0.0, -9.81],
+        bodies={"arm": jn.Body([0.0, 0.0], **body)},
+        joints={"pin": planar.Revolute(("ground", "arm"), [0.2, 0.1], [0.0, 0.0])},
+        drivers={"turn": drivers.CoordinateDriver(("ground", "arm"), "angle", TIME_OF_LAW)},
+    )

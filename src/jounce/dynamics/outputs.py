@@ -100,7 +100,7 @@ class _JointOutput(AbstractForceOutput):
         """Return force and moment about a point of the body, with rates; about that of the joint unless given."""
         forces, mechanism = MotionForces.of(motion), motion.mechanism
         element = {**mechanism.joints, **mechanism.drivers}[self.joint]
-        body = element.bodies[1] if self.body is None else self.body
+        body = element.bodies[min(1, len(element.bodies) - 1)] if self.body is None else self.body
         slot = element.bodies.index(body)
         index = [GROUND, *mechanism.bodies].index
         frame = {"global": None, "body": body}.get(self.frame, self.frame)

@@ -1,7 +1,6 @@
 """Forces in a moving mechanism, with rates to any order: what drivers, joints and applied forces exert."""
 
 import dataclasses
-from collections.abc import Sequence
 from typing import Any
 
 from jounce.dynamics.outputs import (
@@ -76,7 +75,7 @@ class Reaction:
 
 
 def joint_reaction(
-    motion: Motion, name: str, body: str | None = None, frame: str = "global", point: Sequence[Any] | None = None
+    motion: Motion, name: str, body: str | None = None, frame: str = "global", point: Any = None
 ) -> Reaction:
     """Return the force and torque that a joint, or a driver, exerts on one of its bodies, with rates.
 
