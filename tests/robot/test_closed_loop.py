@@ -195,6 +195,20 @@ def test_five_bar_against_pinocchio(five_bar):
 
 
 @pytest.mark.slow
+def test_free_motion_of_a_loop_accelerates_as_in_pinocchio():
+    robot = jn.load_robot(FIVE_BAR)
+    initial = {"left_motor": "0.1 + 0.5*t", "right_motor": "-0.2 + 0.3*t"}
+    motion = jn.simulate(robot.mechanism(initial=initial, time=[0.0, 0.1, 0.2]), order=3)
+    q = coordinates(motion, robot)
+    np.testing.assert_allclose(q[0, :2, [0, 2]], [[0.1, 0.5], [-0.2, 0.3]], rtol=0, atol=1e-13)
+    model, places = in_pinocchio(robot)
+    contact = in_contact(model, places, robot.closures["tip"])
+    for state in q:
+        acceleration, _ = forward(model, contact, state, np.zeros(4))
+        np.testing.assert_allclose(acceleration, state[2], rtol=0, atol=1e-12 * np.abs(state[2]).max())
+
+
+@pytest.mark.slow
 def test_spatial_loop_against_pinocchio():
     robot = random_loop()
     borne, redundant = jn.robot.closure_wrenches(robot)["weld"]
