@@ -163,7 +163,7 @@ class Taylor(AbstractMethod):
         allowed = jnp.where(_drowned(sizes), jnp.maximum(tolerance, ROUGH), tolerance)
         steps = reaches * jnp.power(allowed[None], 1.0 / (cuts + 1.0))
         best = jnp.argmax(steps, axis=0)
-        kept = np.arange(len(sizes))[:, None] <= best + LOWEST_ORDER  # of the coefficients from zero on
+        kept = np.arange(len(sizes))[:, None] <= best[None] + LOWEST_ORDER  # of the coefficients from zero on
 
         def cut(part: Any) -> Any:
             return jnp.where(kept[:, None, None], part, 0.0)

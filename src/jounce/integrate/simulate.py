@@ -17,8 +17,8 @@ from jounce.integrate.methods import AbstractMethod, Taylor
 from jounce.integrate.simulation import Simulation, Track
 from jounce.jet import Jet
 from jounce.kinematics import Status, raise_for_status
-from jounce.kinematics.solve import checked_order
 from jounce.kinematics.motion import check_output, output_group
+from jounce.kinematics.solve import checked_order
 from jounce.mechanism import Mechanism, time_grid
 
 STEPS = 64  # tried between two looks at progress and events
@@ -161,7 +161,9 @@ def _unfit(start: Start, state: State, instant: float) -> str:
 class _Run:
     """One run: its steps so far, the events in them, and how it ended."""
 
-    def __init__(self, start: Start, method: AbstractMethod, tolerance: float, longest: float, events: Any, watched: Any):
+    def __init__(
+        self, start: Start, method: AbstractMethod, tolerance: float, longest: float, events: Any, watched: Any
+    ):
         self.start, self.method, self.tolerance, self.longest = start, method, tolerance, longest
         self.events, self.watched = events, watched
         self.happened: list[list[float]] = [[] for _ in events]

@@ -113,12 +113,17 @@ class Simulation(Motion):
         super().__init__(mechanism, start.model, instants, order, (coordinates, groups), status, culprits)
 
     def __repr__(self) -> str:
-        return f"<Simulation{super().__repr__()[7:-1]}, {len(self.track.start)} steps>"
+        return f"<Simulation{super().__repr__()[7:-1]}, {self.steps} steps>"
 
     @property
     def mobility(self) -> str:
         """Degrees of freedom and the bodies that have them, in words."""
         return self._start.mobility
+
+    @property
+    def steps(self) -> int:
+        """Number of steps taken."""
+        return len(self.track.start)
 
     @property
     def ended_at(self) -> float:

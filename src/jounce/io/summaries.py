@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from jounce.dynamics.limits import LimitReport
+    from jounce.integrate import Simulation
     from jounce.kinematics import Motion
     from jounce.trajectory import JointTrajectory
 
-__all__ = ["count", "limits_summary", "summary", "verdict"]
+__all__ = ["count", "limits_summary", "simulation_summary", "summary", "verdict"]
 
 
 def summary(motion: Motion, file: Path) -> str:
@@ -36,6 +37,35 @@ def summary(motion: Motion, file: Path) -> str:
         f"{freedom}{driven}",
         f"{instants} {span}, derivatives to order {motion.order}",
     ])  # fmt: skip
+
+
+def simulation_summary(motion: Simulation, file: Path) -> str:
+    """Word what was simulated: mobility, instants, steps, and how well energy and constraints were kept."""
+    import numpy as np
+
+    from jounce.kinematics import Status
+
+    mechanism, time_ = motion.mechanism, motion.time
+    bodies = count(len(mechanism.bodies), "moving body", "moving bodies")
+    joints, forces = count(len(mechanism.joints), "joint"), count(len(mechanism.forces), "force")
+    reached = motion.status == Status.OK
+    instants = count(len(time_), "instant") if reached.all() else f"{int(reached.sum())} of {len(time_)} instants"
+    lines = [
+        mechanism.title or file.name,
+        f"{mechanism.space}: {bodies}, {joints}, {forces}",
+        motion.mobility,
+        f"{instants} from t = {time_[0]:g} s to {time_[-1]:g} s in {count(motion.steps, 'step')}, "
+        f"derivatives to order {motion.order}",
+    ]
+    if reached.any():
+        energy = motion.energy[reached]
+        change, size = float(np.max(np.abs(energy - energy[0]))), float(np.max(np.abs(energy)))
+        share = f", {change / size:.1e} of the largest" if size else ""
+        lines.append(f"energy: {energy[0]:.9g} J at the start; it changes by {change:.2g} J{share}")
+        if mechanism.drivers or mechanism.forces:
+            lines.append("(drivers, actuators and dampers change it)")
+        lines.append(f"constraint drift: {np.max(motion.drift[reached]):.1e} (rad, or sizes of the mechanism)")
+    return "\n".join(_wrapped(line) for line in lines)
 
 
 def limits_summary(report: LimitReport, motion: JointTrajectory, robot: Path, trajectory: Path) -> str:

@@ -32,7 +32,7 @@ _ADVICE = {
     "the tolerance is too small",
     Status.INADMISSIBLE: "the motion law has no permitted value here: a law must be finite, and the distance of a "
     "distance driver above zero",
-    Status.COLLAPSED: "the steps of the integration became too small to move on: the motion runs into a singular position, "
-    "or a force grows beyond all bounds or jumps; check the mechanism and its forces here",
+    Status.COLLAPSED: "the steps of the integration became too small to move on: the motion runs into a singular "
+    "position, or a force grows beyond all bounds or jumps; check the mechanism and its forces here",
     Status.NOT_REACHED: "not computed, because the motion could not be followed up to here",
 }

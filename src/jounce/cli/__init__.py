@@ -1,0 +1,114 @@
+"""The command ``jounce``: one thin function per command; the work is done by the rooms below.
+
+Everything that a command needs is imported when it runs, so that none waits for the libraries of another. Results go to
+standard output, messages to standard error; the exit status is 0 for success, 2 for bad input, and 1 where a solve
+failed at some instants (the others are still printed and written), a limit is broken, or a result could not be written.
+"""
+
+from __future__ import annotations
+
+import gc
+import os
+import sys
+from collections.abc import Sequence
+from contextlib import suppress
+
+from jounce.cli.mechanisms import plot, run, schema, simulate
+from jounce.cli.papers import reproduce
+from jounce.cli.robots import check
+from jounce.cli.writing import WritingError
+from jounce.errors import JounceError, SolveError
+from jounce.io.terminal import complain, unexpected
+
+EXAMPLES = {
+    run: """\
+  jounce run examples/four_bar.yaml
+  jounce run examples/rsur.yaml --order 8 --out motion.nc
+  jounce run examples/four_bar.yaml --set "BC=15 cm" --set tau=3""",
+    simulate: """\
+  jounce simulate examples/andrews.yaml
+  jounce simulate examples/double_pendulum.yaml --order 2 --out pendulum.nc
+  jounce simulate examples/flyball_governor.yaml --method obreshkov-6 --tolerance 1e-9""",
+    plot: """\
+  jounce plot examples/four_bar.yaml --out four_bar.png
+  jounce plot examples/rsur.yaml --order 6 --output psi --output C""",
+    check: """\
+  jounce check examples/robots/panda.urdf examples/trajectories/panda_good.csv
+  jounce check examples/robots/panda.urdf examples/trajectories/panda_pick.yaml \\
+    --limits examples/limits/franka_panda.yaml --out pick.png
+  jounce check examples/robots/panda.urdf examples/trajectories/panda_wave.yaml \\
+    --payload "panda_hand=3 kg\"""",
+    reproduce: """\
+  jounce reproduce sommer-2024 --out out
+  jounce reproduce negrean-2025 --out out""",
+    schema: "  jounce schema > mechanism.schema.json",
+}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit status.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        Those of the process unless given.
+
+    Returns
+    -------
+    int
+        0 success, 2 bad input, 1 a solve or a writing that failed or a limit that is broken, 130 interrupted.
+    """
+    if arguments is None:
+        gc.freeze()  # the collector need not look at the libraries again: 0.15 s of a short run
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(AttributeError, ValueError):
+            stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
+    try:
+        from jounce.io.cache import use_compilation_cache
+
+        use_compilation_cache()
+        return _dispatch(list(sys.argv[1:] if arguments is None else arguments))
+    except KeyboardInterrupt:
+        return 130
+    except BrokenPipeError:  # who reads us has read enough
+        with suppress(OSError, ValueError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except SolveError as error:
+        complain(error)
+        return 2 if error.motion is None else 1
+    except JounceError as error:
+        complain(error)
+        return 2
+    except WritingError as error:
+        complain(error)
+        return 1
+    except Exception as error:  # the last resort: a message, not a traceback
+        if os.environ.get("JOUNCE_DEBUG"):
+            raise
+        complain(f"{unexpected(error)}; set JOUNCE_DEBUG=1 for the traceback")
+        return 1
+
+
+def _dispatch(arguments: list[str]) -> int:
+    import cyclopts
+
+    from jounce import __version__
+
+    app = cyclopts.App(
+        name="jounce",
+        help="Exact time derivatives of any order of mechanisms: velocity, acceleration, jerk, jounce and beyond.",
+        help_format="plaintext",
+        help_formatter="default" if sys.stdout.isatty() else "plain",
+        help_epilogue="Examples:\n" + "\n".join(EXAMPLES.values()),
+        version=__version__,
+        default_parameter=cyclopts.Parameter(negative=()),
+        result_action="return_value",
+        suppress_keyboard_interrupt=False,
+    )
+    for place, (command, examples) in enumerate(EXAMPLES.items()):
+        app.command(command, help_epilogue=f"Examples:\n{examples}", sort_key=place)
+    try:
+        return app(arguments, exit_on_error=False, print_error=False) or 0
+    except cyclopts.CycloptsError as error:
+        raise JounceError(f"{' '.join(str(error).split())} (see jounce --help)") from None

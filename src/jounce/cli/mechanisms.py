@@ -1,0 +1,233 @@
+"""The commands for mechanism files: solved, simulated, drawn; and their schema."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from jounce.cli.writing import written
+from jounce.errors import JounceError, SolveError
+from jounce.io.summaries import simulation_summary, summary
+from jounce.io.terminal import Bar, say, show_peaks
+
+if TYPE_CHECKING:
+    from jounce.kinematics import Motion
+    from jounce.mechanism import Mechanism
+
+
+def run(
+    file: Path,
+    /,
+    *,
+    order: int = 4,
+    out: Path | None = None,
+    tolerance: float = 1e-12,
+    set_: list[str] | None = None,
+    import_: list[Path] | None = None,
+) -> int:
+    """Solve a mechanism file and print peak values, position to jounce.
+
+    Parameters
+    ----------
+    file
+        Mechanism file: .yaml, .yml, .toml or .json.
+    order
+        Highest derivative, 0 to 30; 3 is jerk, 4 jounce.
+    out
+        Write all values to this .csv or .nc (NetCDF) file.
+    tolerance
+        Of positions, rad or sizes of the mechanism.
+    set_
+        NAME=VALUE of a parameter, with a unit; repeatable.
+    import_
+        Python file with your own joints; repeatable.
+    """
+    from jounce import io
+    from jounce.io.peaks import peaks
+
+    if out is not None:
+        io.check_writable(out)
+    motion = _solved(_loaded(file, set_, import_), file, order, tolerance)
+    say(summary(motion, file))
+    show_peaks(peaks(motion))
+    if out is not None:
+        written(lambda: io.write(motion.dataset, out))
+        say(f"\nWritten to {out}")
+    return _outcome(motion, file)
+
+
+def simulate(
+    file: Path,
+    /,
+    *,
+    order: int = 4,
+    out: Path | None = None,
+    method: str = "taylor",
+    tolerance: float = 1e-15,
+    step: float | None = None,
+    set_: list[str] | None = None,
+    import_: list[Path] | None = None,
+) -> int:
+    """Move a mechanism by its forces, from its initial conditions, and print peak values, energy and drift.
+
+    Parameters
+    ----------
+    file
+        Mechanism file with masses: .yaml, .yml, .toml or .json.
+    order
+        Highest derivative, 0 to 30; 3 is jerk, 4 jounce.
+    out
+        Write all values to this .csv or .nc (NetCDF) file.
+    method
+        taylor, obreshkov-4, obreshkov-6 or obreshkov-8.
+    tolerance
+        Of the error of a step, rad or sizes of the mechanism.
+    step
+        Length of all steps in s, in the place of a control of the error.
+    set_
+        NAME=VALUE of a parameter, with a unit; repeatable.
+    import_
+        Python file with your own joints and forces; repeatable.
+    """
+    from jounce import io
+    from jounce.integrate import simulate as integrate
+    from jounce.io.peaks import peaks
+
+    if out is not None:
+        io.check_writable(out)
+    chosen = _method(method, step)
+    mechanism = _loaded(file, set_, import_)
+    try:
+        with Bar("simulating") as bar:
+            motion = integrate(mechanism, order=order, method=chosen, tolerance=tolerance, strict=False, progress=bar)
+    except JounceError as error:
+        raise _of_option(error, file) from None
+    say(simulation_summary(motion, file))
+    show_peaks(peaks(motion))
+    if out is not None:
+        written(lambda: io.write(motion.dataset, out))
+        say(f"\nWritten to {out}")
+    return _outcome(motion, file)
+
+
+def _method(name: str, step: float | None) -> Any:
+    """Return the integration method of a name."""
+    from jounce.errors import did_you_mean
+    from jounce.integrate import Obreshkov, Taylor
+
+    kinds: dict[str, Any] = {"taylor": lambda: Taylor(step=step)}
+    kinds |= {f"obreshkov-{n}": (lambda n=n: Obreshkov(n, step)) for n in (4, 6, 8)}
+    if name not in kinds:
+        raise JounceError(f"no method has this name; {did_you_mean(name, kinds)}", name="--method", value=name)
+    try:
+        return kinds[name]()
+    except JounceError as error:
+        error.name = "--step"
+        raise
+
+
+def plot(
+    file: Path,
+    /,
+    *,
+    order: int = 4,
+    out: Path | None = None,
+    output: list[str] | None = None,
+    set_: list[str] | None = None,
+    import_: list[Path] | None = None,
+) -> int:
+    """Solve a mechanism file and draw its outputs, position to jounce.
+
+    Parameters
+    ----------
+    file
+        Mechanism file: .yaml, .yml, .toml or .json.
+    order
+        Highest derivative, 0 to 30; 3 is jerk, 4 jounce.
+    out
+        Figure, .png, .svg or .pdf [default: FILE's name.png].
+    output
+        Name of an output to draw; repeatable; all unless given.
+    set_
+        NAME=VALUE of a parameter, with a unit; repeatable.
+    import_
+        Python file with your own joints; repeatable.
+    """
+    from jounce.plot import check_figure, draw, save
+
+    out = Path(f"{file.stem}.png") if out is None else out
+    check_figure(out)
+    mechanism = _loaded(file, set_, import_)
+    _check_outputs(mechanism, output or (), file)
+    motion = _solved(mechanism, file, order)
+    written(lambda: save(draw(motion, output), out))
+    say(f"Written to {out}")
+    return _outcome(motion, file)
+
+
+def schema() -> int:
+    """Print the JSON Schema of mechanism files, for editors that complete and check."""
+    import json
+
+    from jounce.io import json_schema
+
+    say(json.dumps(json_schema(), indent=1))
+    return 0
+
+
+def _loaded(file: Path, assignments: Sequence[str] | None, imports: Sequence[Path] | None) -> Mechanism:
+    from jounce.io import load
+
+    if imports:
+        from jounce.io.own import import_file
+
+        for path in imports:
+            import_file(path)
+    mechanism = load(file)
+    if assignments:
+        from jounce.io.overrides import override
+
+        mechanism = override(mechanism, file, assignments)
+    return mechanism
+
+
+def _check_outputs(mechanism: Mechanism, wanted: Sequence[str], file: Path) -> None:
+    from jounce.errors import MechanismError, did_you_mean
+
+    if not mechanism.outputs:
+        raise MechanismError("there is nothing to draw; name some outputs", path=file, name="outputs")
+    for name in wanted:
+        if name not in mechanism.outputs:
+            message = f"no output has this name; {did_you_mean(name, mechanism.outputs)}"
+            raise MechanismError(message, path=file, name="outputs", value=name)
+
+
+def _solved(mechanism: Mechanism, file: Path, order: int, tolerance: float = 1e-12) -> Motion:
+    """Solve at all instants of the file; those that fail are NaN."""
+    from jounce.kinematics import solve
+
+    try:
+        with Bar("solving") as bar:
+            return solve(mechanism, order=order, tolerance=tolerance, strict=False, progress=bar)
+    except JounceError as error:
+        raise _of_option(error, file) from None
+
+
+def _of_option(error: JounceError, file: Path) -> JounceError:
+    """Return an error with the option, or the file, that it is about."""
+    if error.name in ("order", "tolerance"):
+        error.name = f"--{error.name}"
+        return error
+    return error.located(path=file)
+
+
+def _outcome(motion: Motion, file: Path) -> int:
+    """Return 0, or raise for the first instant that failed."""
+    from jounce.kinematics import raise_for_status
+
+    try:
+        raise_for_status(motion)
+    except SolveError as error:
+        raise error.located(path=file) from None
+    return 0

@@ -1,0 +1,35 @@
+"""The command that makes the figures and tables of papers again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from jounce.errors import JounceError
+from jounce.io.summaries import count
+from jounce.io.terminal import Bar, say
+
+PAPERS = {"sommer-2024": "jounce.papers.sommer_2024", "negrean-2025": "jounce.papers.negrean_2025"}
+
+
+def reproduce(paper: str, /, *, out: Path) -> int:
+    """Make the figures and tables of a paper again.
+
+    Parameters
+    ----------
+    paper
+        sommer-2024 or negrean-2025.
+    out
+        Folder for figures and tables; made if it does not exist.
+    """
+    import importlib
+
+    if paper not in PAPERS:
+        from jounce.errors import did_you_mean
+
+        raise JounceError(f"no paper has this name; {did_you_mean(paper, PAPERS)}", value=paper)
+    make = importlib.import_module(PAPERS[paper]).reproduce
+    with Bar("reproducing") as bar:
+        paths = make(out, progress=bar)
+    say(paths[0].read_text(encoding="utf-8"))
+    say(f"Written to {out}: {count(len(paths), 'file')}")
+    return 0

@@ -1,0 +1,80 @@
+"""The command for robots: a trajectory compared with limits."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from jounce.cli.writing import written
+from jounce.errors import JounceError, RobotError, SampleWarning
+from jounce.io.summaries import limits_summary, verdict
+from jounce.io.terminal import caution, say, show_limits
+
+
+def check(
+    robot: Path,
+    trajectory: Path,
+    /,
+    *,
+    limits: Path | None = None,
+    out: Path | None = None,
+    payload: list[str] | None = None,
+    degree: int = 5,
+) -> int:
+    """Compare a trajectory with the limits of a robot, from position to torque rate.
+
+    The exit status is 0 where all limits are kept, 1 where one is broken.
+
+    Parameters
+    ----------
+    robot
+        Robot file: URDF (.urdf) or MJCF (.xml).
+    trajectory
+        Samples (.csv), or laws or a motion (.yaml, .yml, .toml or .json).
+    limits
+        File of limits, which go before those of the robot file.
+    out
+        Draw the joints' shares of their limits: .png, .svg or .pdf.
+    payload
+        LINK=MASS held in the origin of a link, with a unit; repeatable.
+    degree
+        Of the splines through samples, odd from 3 to 11.
+    """
+    import warnings
+
+    from jounce.dynamics.limits import check_limits
+    from jounce.io.limits import load_limits
+    from jounce.io.robots import load_robot
+    from jounce.io.trajectories import load_trajectory
+
+    if out is not None:
+        from jounce.plot import check_figure
+
+        check_figure(out)
+    model = load_robot(robot)
+    laid = load_limits(limits, model) if limits is not None else None
+    if payload:
+        from jounce.io.payloads import with_payloads
+
+        model = with_payloads(model, payload)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", SampleWarning)
+        motion = load_trajectory(trajectory, degree)
+        try:
+            report = check_limits(model, motion, laid)
+        except RobotError as error:
+            raise error.located(path=robot) from None
+        except JounceError as error:
+            raise error.located(path=trajectory) from None
+    if report.worst is None:
+        raise JounceError("there are no limits to compare with; give a file of limits with --limits", path=robot)
+    say(limits_summary(report, motion, robot, trajectory))
+    show_limits(report)
+    for warning in caught:
+        caution(warning.message)
+    say(f"\n{verdict(report)}")
+    if out is not None:
+        from jounce.plot import draw_limits, save
+
+        written(lambda: save(draw_limits(report, f"{report.robot}: {trajectory.name}"), out))
+        say(f"\nWritten to {out}")
+    return 0 if report.kept else 1
