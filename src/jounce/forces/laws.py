@@ -130,7 +130,7 @@ class VectorLaw(AbstractLaw):
     [-3.0, -4.0]
     """
 
-    parts: Sequence[AbstractLaw] = eqx.field(converter=tuple)
+    parts: Sequence[AbstractLaw] = eqx.field(converter=lambda parts: tuple(parts))
 
     def value(self, displacement: Jet, velocity: Jet, time: Jet) -> Any:
         """Return the jet of the force, a vector."""
