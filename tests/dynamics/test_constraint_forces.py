@@ -1,0 +1,110 @@
+"""Jacobians as jets, and the factors that solve for multipliers, beside differences and plain linear algebra."""
+
+import jax
+import numpy as np
+import pytest
+
+import jounce as jn
+from jounce.dynamics.constraint_forces import FreeFactor, slopes
+from jounce.dynamics.loads import inertia_forces, mass_matrices
+from jounce.jet import Jet
+from tests.problems.bank import cases, group_of, pose_of, random_motion
+
+QUICK = ("planar-joint-gear", "spatial-joint-dot1")
+STEP = 1e-3
+
+
+def moved(motion, step):
+    """The same motion of polynomials seen from an instant a step later."""
+    found = {}
+    for name, series in motion.items():
+        degree = len(series) - 1
+        shifted = [
+            sum(np.array(binomial(j, k)) * series[j] * step ** (j - k) for j in range(k, degree + 1))
+            for k in range(degree + 1)
+        ]
+        found[name] = np.stack(shifted)
+    return found
+
+
+def binomial(n, k):
+    return float(np.prod([(n - i) / (i + 1) for i in range(k)])) if k else 1.0
+
+
+@pytest.mark.parametrize(
+    "case", [pytest.param(c, id=str(c), marks=() if str(c) in QUICK else pytest.mark.slow) for c in cases()]
+)
+def test_slopes_are_the_jacobian_and_its_rates(case):
+    random = np.random.default_rng(7)
+    group = group_of([case.element(random)], case.space)
+    motion = random_motion(random, case.space, 4)
+    scale = np.ones(3 if case.space == "planar" else 6)
+
+    @jax.jit
+    def jets(motion):
+        pose = pose_of(motion)
+        poses = [pose.take(bodies) for bodies in group.bodies]
+        return [slopes(group.element, poses, Jet.variable(np.zeros((1, 1)), 4), slot) for slot in range(len(poses))]
+
+    @jax.jit
+    def plain(motion, now):
+        still = pose_of({name: series[:1] for name, series in motion.items()})
+        return group.derivative_blocks(still, Jet.constant(now, 1), scale)
+
+    found = jets(motion)
+    at = [plain(moved(motion, k * STEP), np.full((1, 1), k * STEP)) for k in (-2, -1, 0, 1, 2)]
+    for slot, slope in enumerate(found):
+        far, near, here, after, further = (blocks[slot] for blocks in at)
+        size = float(np.abs(slope).max())
+        np.testing.assert_allclose(slope[0], here, atol=1e-14 * size)
+        first = (far - 8 * near + 8 * after - further) / (12 * STEP)
+        second = (-far + 16 * near - 30 * here + 16 * after - further) / (12 * STEP**2)
+        # differences of fourth order err by h^4 times a fifth derivative, and by rounding over the step
+        np.testing.assert_allclose(slope[1], first, atol=1e-9 * size)
+        np.testing.assert_allclose(2 * slope[2], second, atol=1e-6 * size)
+
+
+@pytest.mark.parametrize("space", ["planar", "spatial"])
+def test_mass_matrices_give_the_kinetic_energy(space):
+    random = np.random.default_rng(3)
+    motion = random_motion(random, space, 2)
+    pose = pose_of(motion)
+    size, count = (2, 3) if space == "planar" else (3, 6)
+    bodies = pose.position.shape[1]
+    mass, center = random.uniform(1, 2, (bodies, 1)), random.normal(size=(size, bodies, 1))
+    root = random.normal(size=(size, size, bodies))
+    moments = np.einsum("ikb,jkb->ijb", root, root)[..., None]
+    matrices = np.asarray(mass_matrices(pose.truncate(0), mass, center, moments))
+    spin = pose.angle.differentiate()[None] if space == "planar" else pose.angular_velocity
+    velocity = np.concatenate([pose.position.coefficients[1], spin.coefficients[0]])
+    energy = 0.5 * np.einsum("ibt,ijbt,jbt->bt", velocity, matrices, velocity)
+    translation, rotation = jn.dynamics.body_energy(pose, mass, center, moments, 0)
+    np.testing.assert_allclose(energy, translation.coefficients[0] + rotation.coefficients[0], rtol=1e-13, atol=1e-14)
+    np.testing.assert_allclose(matrices, np.swapaxes(matrices, 0, 1), atol=1e-14 * np.abs(matrices).max())
+    assert matrices.shape == (count, count, bodies, 1)
+
+
+def test_bodies_at_rest_have_their_weight_for_a_load():
+    still = pose_of(
+        {
+            name: np.concatenate([s[:1], 0 * s[:1], 0 * s[:1]])
+            for name, s in random_motion(np.random.default_rng(1), "spatial", 1).items()
+        }
+    )
+    bodies = still.position.shape[1]
+    gravity = np.array([0.0, 0.0, -9.81])[:, None, None]
+    mass, center = np.full((bodies, 1), 2.0), np.zeros((3, bodies, 1))
+    force, moment = inertia_forces(still, mass, center, np.zeros((3, 3, bodies, 1)), gravity)
+    np.testing.assert_allclose(force.coefficients[0][2], 2.0 * 9.81, rtol=1e-15)
+    assert np.abs(moment.coefficients[0]).max() <= 1e-15
+
+
+def test_free_factor_solves_the_equations_of_motion():
+    random = np.random.default_rng(5)
+    root, jacobian, load = random.normal(size=(7, 7, 3)), random.normal(size=(4, 7, 3)), random.normal(size=(7, 3))
+    mass = np.einsum("ikb,jkb->ijb", root, root)
+    found = np.asarray(FreeFactor.of(mass, jacobian).solve_transposed(load))
+    for k in range(3):
+        m, j = np.linalg.inv(mass[..., k]), jacobian[..., k]
+        expected = np.linalg.solve(j @ m @ j.T, j @ m @ load[:, k])
+        np.testing.assert_allclose(found[:, k], expected, rtol=1e-9)
