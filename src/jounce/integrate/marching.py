@@ -98,7 +98,7 @@ def march(
     def attempt(front: Front) -> tuple[Front, Steps]:
         left = stop - front.time
         start, reach, allowed = method.prepared(front.expansion, length, tolerance)
-        step = jnp.minimum(reach * 0.5**front.refused, longest)
+        step = jnp.minimum(reach * 0.5 ** front.refused.astype(float), longest)
         last = step >= 0.999 * jnp.abs(left)  # no sliver of a step at the end
         step = jnp.where(last, left, jnp.sign(left) * step)
         time = jnp.where(last, stop, front.time + step)

@@ -20,7 +20,7 @@ from jounce.dynamics.forward import Equations, Expansion, State, expand
 from jounce.errors import JounceError
 from jounce.integrate.methods import ROUNDING, AbstractMethod, check_step, evaluated, reach
 
-MOST_ITERATIONS = 40
+MOST_ITERATIONS = 80
 CONVERGED = 1e-15  # change in an iteration, rad or sizes of the mechanism
 STALLED = 1e-13  # a change below this that no longer shrinks is rounding
 HIGHER_COEFFICIENTS = 4  # beyond the first in the error: some vanish at rest and at turning points
@@ -108,7 +108,7 @@ class Obreshkov(AbstractMethod):
 
         def joined(c0: Any, c1: Any) -> Any:
             count = self.highest + 1
-            power = length ** jnp.arange(2.0 * count).reshape(-1, 1, 1, 1)
+            power = length[None, None, None] ** jnp.arange(2.0 * count)[:, None, None, None]
             low, high = c0[:count] * power[:count], c1[:count] * power[:count]
             ends = jnp.concatenate([(high - low)[:1], low[1:], high[1:]])
             rest = jnp.sum(upper.reshape(*upper.shape, 1, 1, 1) * ends[None], axis=1)

@@ -1,0 +1,51 @@
+"""Runs of an integration method, step by step, for tests of its order: many fixed steps side by side."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jounce.dynamics.forward import State
+from jounce.integrate.marching import Outcome, departed, march
+
+COUNT = 4096  # steps tried at most
+LENIENT = 1e-6  # tolerance where the steps are given
+
+
+def widened(state, lanes):
+    """Return the state of one run as that of many."""
+    return State(*(jnp.broadcast_to(jnp.asarray(part), (*part.shape[:-1], lanes)) for part in state))
+
+
+def marched(ready, method, stop, tolerance, longest=np.inf, *, lanes=1, instant=0.0):
+    """Run from the start of a mechanism to a time; `longest` holds the largest steps of the runs side by side."""
+    order = method.expansion_order(tolerance)
+    front = departed(ready.equations, widened(ready.state, lanes), jnp.full(lanes, instant), order=order)
+    return onwards(ready, method, front, stop, tolerance, longest)
+
+
+def onwards(ready, method, front, stop, tolerance, longest=np.inf):
+    """Go on from the front of other runs to a time; return the front and the number of steps tried."""
+    running = jnp.full(front.time.shape, int(Outcome.RUNNING))
+    front, _, tried = march(
+        ready.equations,
+        front._replace(outcome=running),
+        stop,
+        tolerance,
+        jnp.broadcast_to(jnp.asarray(longest, float), front.time.shape),
+        method=method,
+        count=COUNT,
+        keep=False,
+    )
+    assert np.all(np.asarray(front.outcome) == Outcome.ARRIVED)
+    return front, int(tried)
+
+
+def ends(front):
+    """Return the states at which runs have arrived, (components of all, runs)."""
+    parts = [np.asarray(part[0]) for part in jax.tree.leaves(front.expansion.state)]
+    return np.concatenate([part.reshape(-1, part.shape[-1]) for part in parts])
+
+
+def orders(errors, steps):
+    """Return the orders at which errors shrink from step to step."""
+    return np.diff(np.log(errors)) / np.diff(np.log(steps))
