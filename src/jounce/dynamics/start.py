@@ -64,18 +64,14 @@ def start(mechanism: Mechanism, instant: float) -> Start:
     masses = masses_of(mechanism)
     if not masses[0].any():
         raise MechanismError("no body has a mass; the equations of motion need masses", name="bodies")
-    model = build(mechanism)
-    coordinates = model.guess
+    model, state = build(mechanism), None
     if mechanism.initial:
-        model, coordinates = _assembled(mechanism, instant)
-        whole = equations_of(mechanism, model)
-        state = _at_rest(model, coordinates)
-        state = jax.tree.map(np.asarray, _with_rates(whole, state, np.array([[instant]])))
-        model = dataclasses.replace(build(mechanism), guess=coordinates)
+        whole, coordinates = _assembled(mechanism, instant)
+        state = _with_rates(equations_of(mechanism, whole), _at_rest(whole, coordinates), np.array([[instant]]))
+        model = dataclasses.replace(model, guess=coordinates)
     model, coordinates = assemble(model, instant, TOLERANCE, free=True)
     equations = equations_of(mechanism, model)
-    if not mechanism.initial:
-        state = _at_rest(model, coordinates)
+    state = _at_rest(model, coordinates) if state is None else state
     state = jax.tree.map(np.asarray, _with_rates(equations, state, np.array([[instant]])))
     if not all(np.isfinite(part).all() for part in state):
         _explain(equations, model, state, instant, masses)
@@ -84,10 +80,10 @@ def start(mechanism: Mechanism, instant: float) -> Start:
 
 def equations_of(mechanism: Mechanism, model: Model) -> Equations:
     """Return the equations of motion of a mechanism."""
-    mass, center, moments = masses_of(mechanism)
+    masses = masses_of(mechanism)
     system = dataclasses.replace(model.system, outputs=())
-    values = (system, mass, center, moments, gravity_of(mechanism), np.float64(np.max(mass)))
-    return Equations(*jax.device_put(values), model.pose_type)
+    equations = Equations(system, *masses, gravity_of(mechanism), np.float64(np.max(masses[0])), model.pose_type)
+    return jax.device_put(equations)
 
 
 def _assembled(mechanism: Mechanism, instant: float) -> tuple[Model, dict[str, np.ndarray]]:

@@ -176,8 +176,8 @@ class _Run:
         """All steps taken."""
         whole = self.parts
         polynomial = State(*(np.concatenate(part) for part in zip(*(p.polynomial for p in whole), strict=True)))
-        joined = (np.concatenate([getattr(p, name) for p in whole]) for name in ("start", "length"))
-        return Track(*joined, polynomial)
+        start, length = (np.concatenate(part) for part in ([p.start for p in whole], [p.length for p in whole]))
+        return Track(start, length, polynomial)
 
     def go(self, instants: np.ndarray, progress: Callable[[int, int], None] | None) -> None:
         """March from the first to the last instant."""
@@ -192,8 +192,8 @@ class _Run:
             )
             taken = np.flatnonzero(np.asarray(steps.taken)[: int(tried), 0])
             if len(taken):
-                part = jax.tree.map(lambda x: np.asarray(x)[taken][..., 0], steps)
-                self.parts.append(self._watch(Track(part.start, part.length, part.polynomial)))
+                start, length, _, polynomial = jax.tree.map(lambda x, k=taken: np.asarray(x)[k][..., 0], steps)
+                self.parts.append(self._watch(Track(start, length, polynomial)))
             if progress is not None:
                 progress(int(np.sum(sense * instants <= sense * float(front.time[0]))), len(instants))
         if not self.parts:
@@ -211,7 +211,7 @@ class _Run:
         found = []
         if self.events:
             pose_type = self.start.model.pose_type
-            coordinates = part.coordinates(pose_type)
+            coordinates = part.coordinates()
             for which, (event, group) in enumerate(zip(self.events, self.watched, strict=True)):
                 series = np.asarray(output_series(group, coordinates, pose_type))[:, event.component, 0]
                 found += [(step, after, which) for step, after in crossings(event, series, part.length)]

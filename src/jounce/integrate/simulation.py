@@ -43,13 +43,13 @@ class Track:
         """Where the last step ends, s."""
         return float(self.start[-1] + self.length[-1])
 
-    def coordinates(self, pose_type: type) -> dict[str, np.ndarray]:
+    def coordinates(self) -> dict[str, np.ndarray]:
         """Return the coefficients of all steps as coordinates of a pose, the batch last."""
         moved = State(*(np.moveaxis(part, 0, -1) for part in self.polynomial))
-        return pose_coordinates(moved, pose_type)
+        return pose_coordinates(moved)
 
 
-def pose_coordinates(state: State, pose_type: type) -> dict[str, np.ndarray]:
+def pose_coordinates(state: State) -> dict[str, np.ndarray]:
     """Return Taylor coefficients of states, order first, as those of the pose of all bodies, the ground first."""
     position, attitude, _, spin = (np.asarray(part) for part in state)
 
@@ -100,7 +100,7 @@ class Simulation(Motion):
         reached, chosen = _steps_of(track, instants)
         state = _at(start.equations, track, instants, chosen, order + max(lost, 1))
         pose_type = start.model.pose_type
-        coordinates = pose_coordinates(state, pose_type)
+        coordinates = pose_coordinates(state)
         groups = tuple(
             _continuous(group, np.array(output_series(group, coordinates, pose_type)), instants)
             for group in start.model.system.outputs
