@@ -36,12 +36,12 @@ def check(found, expected, tolerance):
     assert (errors < tolerance).all(), errors
 
 
-def energy_kept(motion, tolerance):
-    """Check the energy of a conservative motion, by the largest kinetic energy or so."""
-    scale = max(np.ptp(motion.energy), np.max(np.abs(motion.energy)))
+def energy_kept(motion, tolerance, scale):
+    """Check the energy of a conservative motion, by a typical kinetic energy, J."""
     assert np.max(np.abs(motion.energy - motion.energy[0])) < tolerance * scale
 
 
+@pytest.mark.slow
 def test_simple_pendulum_is_the_elliptic_function():
     """IFToMM A01, released from the horizontal: angle and velocity in closed form over 10 s, about five periods."""
     time = np.linspace(0, 10, 101)
@@ -52,7 +52,7 @@ def test_simple_pendulum_is_the_elliptic_function():
     assert np.max(np.abs(motion.outputs["angle"][:, 0] - (1.5 * np.pi - from_vertical))) < 1e-11
     acceleration = motion.outputs["angle"][:, 2]
     assert np.max(np.abs(acceleration - GRAVITY * np.sin(from_vertical))) < 1e-10
-    energy_kept(motion, 1e-12)
+    energy_kept(motion, 1e-12, GRAVITY)
     assert np.max(motion.drift) < 1e-13
 
 
@@ -144,7 +144,7 @@ def test_double_pendulum_from_horizontal_rest():
         expected = tables["angles"][name][:, :4]
         check(found[:2], expected[:2], early)
         check(found, expected, late)
-    energy_kept(motion, 1e-12)
+    energy_kept(motion, 1e-12, 2 * GRAVITY)
     assert np.max(motion.drift) < 1e-13
 
 
@@ -156,7 +156,7 @@ def test_double_four_bar_up_to_its_singular_position():
     expected = jn.simulate(one, time, 3).outputs["angle"]
     motion = jn.simulate(jn.load(example("double_four_bar")), time, 3)
     check(motion.outputs["angle"], expected, 1e-10)
-    energy_kept(motion, 1e-12)
+    energy_kept(motion, 1e-12, 3.5 * GRAVITY)
 
 
 @pytest.mark.slow
@@ -167,7 +167,7 @@ def test_double_four_bar():
     check(motion.outputs["angle"][index], tables["angles"]["a"][:, :3], 1e-7)
     for k, axis in enumerate("xy"):
         check(motion.outputs["tip"][index][..., k], tables["tip"][axis][:, :3], 1e-6)
-    energy_kept(motion, 1e-8)
+    energy_kept(motion, 1e-8, 3.5 * GRAVITY)
     assert np.max(motion.drift) < 1e-13
 
 
@@ -206,7 +206,7 @@ def test_spatial_slider_crank(reference, stiffness, damping):
     for k, axis in enumerate("xyz"):
         check(motion.outputs["centre"][index][..., k], tables["rod"][axis][:, :4], 1e-9)
     if not damping:
-        energy_kept(motion, 1e-12)
+        energy_kept(motion, 1e-12, 0.1)
 
 
 @pytest.mark.slow
@@ -217,7 +217,7 @@ def test_spatial_double_pendulum():
         check(motion.outputs[name][index], tables["angles"][name][:, :4], 1e-11)
     for k, axis in enumerate("xyz"):
         check(motion.outputs["tip"][index][..., k], tables["tip"][axis][:, :4], 1e-11)
-    energy_kept(motion, 1e-12)
+    energy_kept(motion, 1e-12, GRAVITY)
 
 
 @pytest.mark.slow
@@ -230,7 +230,7 @@ def test_free_four_bar():
     force = jn.joint_reaction(motion, "C").force.to_numpy()[index]
     for k, axis in enumerate("xy"):
         check(force[..., :3, k], -tables["multipliers"][axis][:, :3], 1e-8)
-    energy_kept(motion, 1e-12)
+    energy_kept(motion, 1e-12, GRAVITY)
 
 
 @pytest.mark.slow
@@ -239,7 +239,7 @@ def test_rolling_disc_swings_on_its_spring():
     motion = jn.simulate(dynamics.rolling_disc(), time, 4)
     check(motion.outputs["place"][..., 0], dynamics.rolling_motion(time, 4), 1e-11)
     check(motion.outputs["angle"][:, 1:], dynamics.rolling_motion(time, 4)[:, 1:] / 0.3, 1e-11)
-    energy_kept(motion, 1e-12)
+    energy_kept(motion, 1e-12, 5.0)
 
 
 @pytest.mark.slow
