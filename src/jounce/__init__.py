@@ -118,4 +118,4 @@ from jounce.trajectory import (  # noqa: E402
     motion_profile as motion_profile,
 )
 
-__version__ = "0.2.0"
+__version__ = "0.3.0"
