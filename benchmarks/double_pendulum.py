@@ -233,7 +233,7 @@ def report(found: dict[str, list[Point]]) -> None:
             print(f"  {name:<38} tolerance {tolerance:7.1e} {seconds * 1e3:10.3f} ms   error {error:8.1e}")
     for error in (1e-4, 1e-6, 1e-8):
         needed = {name: cheapest(points, error) for name, points in found.items()}
-        ratios = ", ".join(f"{name} {value / needed[BASE]:.3f}" for name, value in needed.items())
+        ratios = ", ".join(f"{name} {value / needed[BASE]:.3f}" for name, value in needed.items() if value > 0)
         print(f"time for an error of {error:g}, by that of {BASE}: {ratios}")
     at_target = {name: [s for t, s, _ in points if t == TARGET] for name, points in found.items()}
     if at_target.get(BASE) and at_target.get(OURS):
