@@ -1,4 +1,4 @@
-"""The two-point formulas of Obreshkov: a closed form of one step, dense output, estimates, steps that do not converge."""
+"""The two-point formulas of Obreshkov: a closed form of one step, dense output, estimates, lack of convergence."""
 
 from math import comb, factorial
 
