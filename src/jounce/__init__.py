@@ -60,12 +60,14 @@ from jounce.errors import (  # noqa: E402
 )
 from jounce.forces import AbstractForce as AbstractForce, Law as Law, Laws as Laws  # noqa: E402
 from jounce.integrate import (  # noqa: E402
+    Batch as Batch,
     Event as Event,
     Obreshkov as Obreshkov,
     Simulation as Simulation,
     Taylor as Taylor,
     ode_term as ode_term,
     simulate as simulate,
+    simulate_batch as simulate_batch,
 )
 from jounce.io import (  # noqa: E402
     load as load,

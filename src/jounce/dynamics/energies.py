@@ -12,6 +12,7 @@ from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 
 from jounce.errors import MechanismError, RobotError
 from jounce.jet import Jet, dot
@@ -19,6 +20,7 @@ from jounce.jet.algebra import total
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.compilation import compiled
 from jounce.mechanism import Mechanism
+from jounce.mechanism.masses import body_mass
 from jounce.mechanism.resolve import resolve
 from jounce.rigid.frames import Frames
 from jounce.robot.batches import Batched, checked
@@ -259,10 +261,10 @@ def _heights(coordinates: Any, center: Any, gravity: Any, pose_type: Any) -> Any
     return stacked(dot(pose.point(center), gravity))
 
 
-def gravity_of(mechanism: Mechanism) -> np.ndarray:
+def gravity_of(mechanism: Mechanism) -> Any:
     """Return the acceleration of free fall in a mechanism, shape (k, 1, 1), m/s^2."""
     given = [0.0] * (2 if mechanism.space == "planar" else 3) if mechanism.gravity is None else mechanism.gravity
-    return np.asarray(resolve(given, mechanism.parameter_values), float)[:, None, None]
+    return resolve(given, mechanism.parameter_values)[:, None, None]
 
 
 def mechanism_masses(motion: Motion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -279,24 +281,24 @@ def mechanism_masses(motion: Motion) -> tuple[np.ndarray, np.ndarray, np.ndarray
     return found
 
 
-def masses_of(mechanism: Mechanism) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return what `mechanism_masses` does, also where no body has a mass."""
-    planar = mechanism.space == "planar"
-    size = 2 if planar else 3
-    parameters = mechanism.parameter_values
+def masses_of(mechanism: Mechanism) -> tuple[Any, Any, Any]:
+    """Return what `mechanism_masses` does, also where no body has a mass; parameters may be traced by JAX."""
+    size = 2 if mechanism.space == "planar" else 3
     masses, centers, moments = [0.0], [np.zeros(size)], [np.zeros((size, size))]
     for name, body in mechanism.bodies.items():
         if body.mass is None and body.inertia is not None:
             raise MechanismError("an inertia needs a mass beside it", name=f"bodies.{name}.mass")
-        center = resolve([0.0] * size if body.center_of_mass is None else body.center_of_mass, parameters)
-        inertia = resolve(0.0 if body.inertia is None else body.inertia, parameters)
-        masses.append(float(resolve(0.0 if body.mass is None else body.mass, parameters)))
-        centers.append(np.asarray(center, float))
-        if planar:  # the second moments of a plane body about its axes are not known apart, and only their sum counts
-            moments.append(np.eye(2) * np.asarray(inertia, float) / 2)
+        mass, center, inertia = body_mass(name, body, mechanism.parameter_values, size)
+        masses.append(mass)
+        centers.append(center)
+        if size == 2:  # the second moments of a plane body about its axes are not known apart; only their sum counts
+            moments.append(np.eye(2) * 0.5 * inertia)
         else:
-            tensor = np.asarray(inertia, float)
-            tensor = np.diag(tensor) if tensor.ndim == 1 else tensor * np.ones((3, 3))
-            moments.append(np.trace(tensor) / 2 * np.eye(3) - tensor)
-    center, second = (np.moveaxis(np.stack(x), 0, -1)[..., None] for x in (centers, moments))
-    return np.array(masses)[:, None], center, second
+            tensor = inertia * np.eye(3) if np.ndim(inertia) < 2 else inertia
+            moments.append((tensor[0, 0] + tensor[1, 1] + tensor[2, 2]) / 2 * np.eye(3) - tensor)
+    traced = any(isinstance(x, Tracer) for x in (*masses, *centers, *moments))
+    stack = jnp.stack if traced else np.stack
+    mass, center, second = (
+        stack([*map(jnp.asarray if traced else np.asarray, x)], -1) for x in (masses, centers, moments)
+    )
+    return mass[:, None], center[..., None], second[..., None]

@@ -67,12 +67,12 @@ def start(mechanism: Mechanism, instant: float) -> Start:
     model, state = build(mechanism), None
     if mechanism.initial:
         whole, coordinates = _assembled(mechanism, instant)
-        state = _with_rates(equations_of(mechanism, whole), _at_rest(whole, coordinates), np.array([[instant]]))
+        state = with_rates(equations_of(mechanism, whole), at_rest(whole, coordinates), np.array([[instant]]))
         model = dataclasses.replace(model, guess=coordinates)
     model, coordinates = assemble(model, instant, TOLERANCE, free=True)
     equations = equations_of(mechanism, model)
-    state = _at_rest(model, coordinates) if state is None else state
-    state = jax.tree.map(np.asarray, _with_rates(equations, state, np.array([[instant]])))
+    state = at_rest(model, coordinates) if state is None else state
+    state = jax.tree.map(np.asarray, with_rates(equations, state, np.array([[instant]])))
     if not all(np.isfinite(part).all() for part in state):
         _explain(equations, model, state, instant, masses)
     return Start(model, equations, state, _explain(equations, model, state, instant, masses))
@@ -88,8 +88,7 @@ def equations_of(mechanism: Mechanism, model: Model) -> Equations:
 
 def _assembled(mechanism: Mechanism, instant: float) -> tuple[Model, dict[str, np.ndarray]]:
     """Return the mechanism with its initial conditions as drivers, assembled."""
-    driven = dataclasses.replace(mechanism, drivers={**mechanism.drivers, **mechanism.initial}, initial={})
-    model = build(driven)
+    model = build(driven(mechanism))
     rows = tuple(_renamed(name, mechanism) for name in model.rows)
     try:
         return assemble(dataclasses.replace(model, rows=rows), instant, TOLERANCE, free=True)
@@ -101,12 +100,18 @@ def _assembled(mechanism: Mechanism, instant: float) -> tuple[Model, dict[str, n
         raise MobilityError(message) from None
 
 
+def driven(mechanism: Mechanism) -> Mechanism:
+    """Return the mechanism with its initial conditions as drivers."""
+    return dataclasses.replace(mechanism, drivers={**mechanism.drivers, **mechanism.initial}, initial={})
+
+
 def _renamed(row: str, mechanism: Mechanism) -> str:
     kind, _, name = row.partition(".")
     return f"initial.{name}" if kind == "drivers" and name in mechanism.initial else row
 
 
-def _at_rest(model: Model, coordinates: dict[str, np.ndarray]) -> State:
+def at_rest(model: Model, coordinates: dict[str, np.ndarray]) -> State:
+    """Return the state of bodies at rest, from the coordinates of their assembled pose."""
     pose = pose_at(coordinates, model.pose_type)
     position = np.asarray(pose.position.coefficients[0])[:, 1:]
     if pose.turns == 1:
@@ -117,7 +122,7 @@ def _at_rest(model: Model, coordinates: dict[str, np.ndarray]) -> State:
 
 
 @compiled()
-def _with_rates(equations: Equations, state: State, time: Any) -> State:
+def with_rates(equations: Equations, state: State, time: Any) -> State:
     """Return the state with the least change of its velocities that fulfils the rates of all constraints."""
     rate = equations.system.residual(equations.pose(state), Jet.variable(time, 1)).dense().coefficients[1]
     change = least_change(equations, state, time, rate)

@@ -1,5 +1,6 @@
 """Integration of the equations of motion: Taylor series of any order, Obreshkov, step control, events, dense output."""
 
+from jounce.integrate.batch import Batch as Batch, simulate_batch as simulate_batch
 from jounce.integrate.diffrax_term import OrdinaryEquation as OrdinaryEquation, ode_term as ode_term
 from jounce.integrate.events import Event as Event
 from jounce.integrate.methods import AbstractMethod as AbstractMethod, Taylor as Taylor

@@ -1,7 +1,6 @@
 """From a mechanism with masses and forces to its motion."""
 
 import dataclasses
-import numbers
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -11,7 +10,7 @@ import numpy as np
 from jounce.dynamics.forward import State
 from jounce.dynamics.start import Start, start as consistent_start
 from jounce.errors import MechanismError, SolveError
-from jounce.integrate.events import Event, crossings, output_series
+from jounce.integrate.events import Event, Watch, series_of
 from jounce.integrate.marching import Front, Outcome, departed, march
 from jounce.integrate.methods import AbstractMethod, Taylor
 from jounce.integrate.simulation import Simulation, Track
@@ -97,23 +96,19 @@ def simulate(
     >>> bool(abs(fall.energy - fall.energy[0]).max() < 1e-12)
     True
     """
-    order = checked_order(order)
-    method = Taylor() if method is None else method
-    if not isinstance(method, AbstractMethod):
-        raise MechanismError("must be a method, such as jn.Taylor()", name="method", value=method)
-    low, high = TOLERANCES
-    if not (isinstance(tolerance, numbers.Real) and low <= tolerance <= high):
-        message = f"the tolerance must be a number from {low:g} to {high:g}"
-        raise MechanismError(message, name="tolerance", value=tolerance)
-    if not (isinstance(longest_step, numbers.Real) and longest_step > 0):
-        raise MechanismError("must be greater than zero", name="longest_step", value=longest_step)
+    order, method = checked(order, method, tolerance, longest_step)
+    if not isinstance(events, Sequence):
+        raise MechanismError("must be a list of jn.Event", name="events", value=events)
     if initial is not None:
+        if not isinstance(initial, Mapping):
+            raise MechanismError("must be a mapping of names to drivers", name="initial", value=initial)
         mechanism = dataclasses.replace(mechanism, initial=dict(initial))
-    instants = _instants(mechanism.time if time is None else time, mechanism.parameter_values)
+    instants = instants_of(mechanism.time if time is None else time, mechanism.parameter_values)
     watched = [_watched(event, mechanism) for event in events]
     start = consistent_start(mechanism, float(instants[0]))
     _check_forces(start, float(instants[0]))
-    run = _Run(start, method, float(tolerance), float(longest_step), events, watched)
+    watches = [_watch_of(event, group, start) for event, group in zip(events, watched, strict=True)]
+    run = _Run(start, method, float(tolerance), float(longest_step), watches)
     run.go(instants, progress)
     simulation = Simulation(mechanism, start, run.track, instants, order, run.ending, run.happened)
     if strict and run.stopped_at is None:
@@ -121,11 +116,29 @@ def simulate(
     return simulation
 
 
-def _instants(time: Any, parameters: Mapping[str, Any]) -> np.ndarray:
+def checked(order: Any, method: Any, tolerance: Any, longest_step: Any) -> tuple[int, AbstractMethod]:
+    """Return order and method of a simulation, or raise MechanismError for an option that is not valid."""
+    order = checked_order(order)
+    method = Taylor() if method is None else method
+    if not isinstance(method, AbstractMethod):
+        raise MechanismError("must be a method, such as jn.Taylor()", name="method", value=method)
+    low, high = TOLERANCES
+    if not (isinstance(tolerance, int | float) and low <= tolerance <= high):
+        message = f"the tolerance must be a number from {low:g} to {high:g}"
+        raise MechanismError(message, name="tolerance", value=tolerance)
+    if not (isinstance(longest_step, int | float) and longest_step > 0):
+        raise MechanismError("must be greater than zero", name="longest_step", value=longest_step)
+    return order, method
+
+
+def instants_of(time: Any, parameters: Mapping[str, Any]) -> np.ndarray:
     """Return the instants of a run, which may go backward."""
     if not isinstance(time, (list, tuple, np.ndarray)) or np.ndim(time) != 1 or len(time) < 2:
         return time_grid(time, parameters)
-    backward = time[-1] < time[0]
+    try:
+        backward = bool(time[-1] < time[0])
+    except TypeError:
+        backward = False  # no numbers: told below
     instants = time_grid(list(time)[::-1] if backward else time, parameters)
     return instants[::-1] if backward else instants
 
@@ -136,6 +149,16 @@ def _watched(event: Any, mechanism: Mechanism) -> Any:
         raise MechanismError("must be a jn.Event", name="events", value=event)
     check_output(event.output, mechanism, "events")
     return output_group(event.output, mechanism)
+
+
+def _watch_of(event: Event, group: Any, start: Start) -> Watch:
+    """Return what looks for an event, or raise if its output has no such component."""
+    coordinates = jax.tree.map(lambda x: np.stack([x] * 3), start.model.guess)  # the shape of it is all that matters
+    components = series_of(group, coordinates, start.model.pose_type).shape[1]
+    if event.component >= components:
+        message = f"the output has {components} component{'s' if components > 1 else ''}, counted from 0"
+        raise MechanismError(message, name="events.component", value=event.component)
+    return Watch(event, group, start.model.pose_type)
 
 
 def _check_forces(start: Start, instant: float) -> None:
@@ -162,11 +185,11 @@ class _Run:
     """One run: its steps so far, the events in them, and how it ended."""
 
     def __init__(
-        self, start: Start, method: AbstractMethod, tolerance: float, longest: float, events: Any, watched: Any
+        self, start: Start, method: AbstractMethod, tolerance: float, longest: float, watches: Sequence[Watch]
     ):
         self.start, self.method, self.tolerance, self.longest = start, method, tolerance, longest
-        self.events, self.watched = events, watched
-        self.happened: list[list[float]] = [[] for _ in events]
+        self.watches = watches
+        self.happened: list[list[float]] = [[] for _ in watches]
         self.parts: list[Track] = []
         self.ending = (Status.OK, "")
         self.stopped_at: float | None = None  # by a terminal event
@@ -208,17 +231,15 @@ class _Run:
 
     def _watch(self, part: Track) -> Track:
         """Note the events in some steps; cut the steps at the first that is terminal."""
-        found = []
-        if self.events:
-            pose_type = self.start.model.pose_type
-            coordinates = part.coordinates()
-            for which, (event, group) in enumerate(zip(self.events, self.watched, strict=True)):
-                series = np.asarray(output_series(group, coordinates, pose_type))[:, event.component, 0]
-                found += [(step, after, which) for step, after in crossings(event, series, part.length)]
+        if not self.watches:
+            return part
+        coordinates, found = part.coordinates(), []
+        for which, watch in enumerate(self.watches):
+            found += [(step, after, which) for step, after in watch.look(part.start, part.length, coordinates)]
         for step, after, which in sorted(found, key=lambda x: (x[0], abs(x[1]))):
             instant = float(part.start[step] + after)
             self.happened[which].append(instant)
-            if self.events[which].terminal:
+            if self.watches[which].event.terminal:
                 self.stopped_at = instant
                 length = np.append(part.length[:step], after)
                 polynomial = State(*(x[: step + 1] for x in part.polynomial))

@@ -11,7 +11,7 @@ import numpy as np
 from jounce.dynamics.energies import body_energy
 from jounce.dynamics.forward import Equations, State, expand
 from jounce.dynamics.start import Start
-from jounce.integrate.events import output_series
+from jounce.integrate.events import series_of, whole_turns
 from jounce.integrate.methods import evaluated
 from jounce.integrate.projection import projected
 from jounce.jet import Jet, dot
@@ -102,14 +102,14 @@ class Simulation(Motion):
         pose_type = start.model.pose_type
         coordinates = pose_coordinates(state)
         groups = tuple(
-            _continuous(group, np.array(output_series(group, coordinates, pose_type)), instants)
+            continuous(group, np.array(output_series(group, coordinates, pose_type)), instants)
             for group in start.model.system.outputs
         )
         status = np.where(reached, int(Status.OK), int(Status.NOT_REACHED))
         culprits = {}
-        if not reached.all():
-            first = int(np.flatnonzero(~reached)[0])
-            status[first], culprits[first] = int(ending[0]), ending[1]
+        beyond = np.flatnonzero(~reached & (np.abs(instants - track.start[0]) > abs(track.end - track.start[0])))
+        if ending[0] != Status.OK and beyond.size:
+            status[beyond[0]], culprits[int(beyond[0])] = int(ending[0]), ending[1]
         super().__init__(mechanism, start.model, instants, order, (coordinates, groups), status, culprits)
 
     def __repr__(self) -> str:
@@ -179,18 +179,19 @@ def _at(equations: Equations, track: Track, instants: np.ndarray, chosen: np.nda
         lanes = np.minimum(np.arange(first, first + width), count - 1)
         steps = chosen[lanes]
         polynomial = State(*(np.moveaxis(part[steps], 0, -1) for part in track.polynomial))
-        state = _expanded(equations, polynomial, instants[lanes] - track.start[steps], instants[lanes], order=order)
+        state = expanded(equations, polynomial, instants[lanes] - track.start[steps], instants[lanes], order=order)
         parts.append(jax.tree.map(np.asarray, state))
     return jax.tree.map(lambda *xs: np.concatenate(xs, axis=-1)[..., :count], *parts)
 
 
 @compiled("order")
-def _expanded(equations: Equations, polynomial: State, step: Any, instants: Any, *, order: int) -> State:
+def expanded(equations: Equations, polynomial: State, step: Any, instants: Any, *, order: int) -> State:
+    """Return the Taylor coefficients of the motion at instants a time `step` into steps, from the equations there."""
     state, _ = projected(equations, evaluated(polynomial, step), instants[None])
     return expand(equations, state, instants[None], order).state
 
 
-def _continuous(group: Any, series: np.ndarray, instants: np.ndarray) -> np.ndarray:
+def continuous(group: Any, series: np.ndarray, instants: np.ndarray) -> np.ndarray:
     """Take the whole turns out of angles that are known up to them, from one instant to the next by their rates."""
     if not group.element.turning or len(instants) < 2:
         return series

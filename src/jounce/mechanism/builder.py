@@ -63,8 +63,16 @@ class Model:
     length: float
 
 
-def build(mechanism: Mechanism) -> Model:
+def build(mechanism: Mechanism, like: Model | None = None) -> Model:
     """Return the numeric model of a mechanism.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        To be solved.
+    like : Model, optional
+        Of the same mechanism with other values of its parameters, which may be traced by JAX here: its starting guess,
+        its size, and the offsets that follow from them, are taken over.
 
     Raises
     ------
@@ -77,12 +85,15 @@ def build(mechanism: Mechanism) -> Model:
     components = POSITION_COMPONENTS[mechanism.space]
     body_index = {name: k for k, name in enumerate((GROUND, *mechanism.bodies))}
     pose_type = PlanarPose if components == 2 else SpatialPose
-    guess = starting_guess(mechanism, parameters, components)
+    guess = starting_guess(mechanism, parameters, components) if like is None else like.guess
 
     elements = {f"joints.{k}": v for k, v in mechanism.joints.items()}
     elements |= {f"drivers.{k}": v for k, v in mechanism.drivers.items()}
     groups, names = group_elements(elements, parameters, body_index, components)
-    groups = tuple(_with_offsets(group, pose_type, guess) for group in groups)
+    if like is None:
+        groups = tuple(_with_offsets(group, pose_type, guess) for group in groups)
+    else:
+        groups = tuple(map(_with_offsets_of, groups, like.system.groups))
     applied = {f"forces.{k}": v for k, v in mechanism.forces.items()}
     forces, force_names = group_elements(applied, parameters, body_index, components)
     wanted = {f"outputs.{k}": v for k, v in mechanism.outputs.items() if isinstance(v, AbstractOutput)}
@@ -91,12 +102,12 @@ def build(mechanism: Mechanism) -> Model:
     row_counts = [_row_count(group, pose_type, guess) for group in groups]
     row_names = [n for members, count in zip(names, row_counts, strict=True) for _ in range(count) for n in members]
     drivers = tuple(n for group, members in zip(groups, names, strict=True) if group.is_driver for n in members)
-    length = _size(groups, guess)
+    length = _size(groups, guess) if like is None else like.length
     system = System(
         groups,
         outputs,
         jacobian_cells(groups, row_counts, components + pose_type.turns, len(mechanism.bodies)),
-        np.ones((len(row_names), 1)),
+        np.ones((len(row_names), 1)) if like is None else like.system.row_scale,
         np.array([length] * components + [1.0] * pose_type.turns),
         len(mechanism.bodies),
         forces,
@@ -184,6 +195,13 @@ def _with_offsets(group: Group, pose_type: type, guess: dict[str, Any]) -> Group
 
     offset = np.asarray(jax.jit(fulfilling)())
     return eqx.tree_at(lambda g: g.element.offset, group, offset, is_leaf=lambda x: x is None)
+
+
+def _with_offsets_of(group: Group, known: Group) -> Group:
+    """Take over the offsets that were not given from a group that has them."""
+    if "offset" not in value_fields(type(group.element)) or group.element.offset is not None:
+        return group
+    return eqx.tree_at(lambda g: g.element.offset, group, known.element.offset, is_leaf=lambda x: x is None)
 
 
 def _size(groups: tuple[Group, ...], guess: dict[str, Any]) -> float:
