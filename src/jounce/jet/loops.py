@@ -1,6 +1,8 @@
 """Loops over small arrays, compiled to one piece of machine code, and what such loops need."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import Any
 
 import jax
@@ -8,15 +10,35 @@ import jax.numpy as jnp
 from jax.experimental.xla_metadata import set_xla_metadata
 from jax.extend.core import jaxpr_as_fun
 
+LARGEST = 2**20  # bytes carried by a loop that is worth it: of larger arrays the calls are a small part
+
+_allowed: ContextVar[bool] = ContextVar("tight loops allowed", default=False)
+
+
+@contextmanager
+def tight_loops() -> Iterator[None]:
+    """Allow loops in one piece in what is traced here.
+
+    It must be compiled with the solver's options: with XLA's own, such loops may end the process.
+    """
+    token = _allowed.set(True)
+    try:
+        yield
+    finally:
+        _allowed.reset(token)
+
 
 def tight_loop(lower: Any, upper: Any, body: Callable[[Any, Any], Any], carry: Any) -> Any:
-    """Run `jax.lax.fori_loop`, in one piece.
+    """Run `jax.lax.fori_loop`, in one piece where that is allowed and worth it.
 
     XLA calls each operation of a loop on a CPU as a function of its own, which costs more than small arrays do. The
     marks, which a release that does not know them passes over, ask for the whole loop as one function. Its body must
     be made of elementwise operations, slices and updates: XLA has libraries for products of matrices and sums.
     """
     leaves, structure = jax.tree.flatten(carry)
+    size = sum(x.size * x.dtype.itemsize for x in map(jnp.asarray, leaves))
+    if not _allowed.get() or size > LARGEST:
+        return jax.lax.fori_loop(lower, upper, body, carry)
     loop = jax.make_jaxpr(
         lambda *xs: jax.tree.leaves(jax.lax.fori_loop(lower, upper, body, jax.tree.unflatten(structure, xs)))
     )(*leaves)

@@ -101,7 +101,7 @@ class Recursion:
             Of order k, of the arguments; None is zero.
         """
         left, right, newest = history
-        left, right = self._written(left, right, dict(zip(self._stored, newest, strict=True)), k - 1)
+        left, right = self._written(left, right, newest, k - 1)
         now = self._swept(coefficients, self._sums(left, right, k))
 
         def found(x: Any) -> Any:
@@ -162,15 +162,15 @@ class Recursion:
 
     # histories: the factors of all products side by side, one row an order, so that one loop sums all products
 
-    def _written(self, left: Any, right: Any, newest: dict[int, Any], k: Any) -> tuple[Any, Any]:
-        """Write the coefficients of order k."""
-        place = 0
-        for pair in self._products:
-            a, b = (jnp.ravel(newest[x])[None] for x in pair[:2])
-            left = jax.lax.dynamic_update_slice(left, a * k if pair.weighted else a, (k, place))
-            right = jax.lax.dynamic_update_slice(right, b, (k + _BLOCK, place))
-            place += a.size
-        return left, right
+    def _written(self, left: Any, right: Any, newest: Sequence[Any], k: Any) -> tuple[Any, Any]:
+        """Write the coefficients of order k, in one piece a side: what is compiled is to stay small."""
+        if not self._products:
+            return left, right
+        rows = {x: jnp.ravel(c) for x, c in zip(self._stored, newest, strict=True)}
+        a, b = (jnp.concatenate([rows[pair[i]] for pair in self._products])[None] for i in (0, 1))
+        weighted = [pair.weighted for pair in self._products for _ in range(rows[pair.left].size)]
+        left = jax.lax.dynamic_update_slice_in_dim(left, a * jnp.where(np.array(weighted), k, 1.0)[None], k, 0)
+        return left, jax.lax.dynamic_update_slice_in_dim(right, b, k + _BLOCK, 0)
 
     def _sums(self, left: Any, right: Any, k: Any) -> dict[_Pair, Any]:
         """Return the sums over the products of coefficients of orders 1 to k - 1, those of order k left out."""
@@ -186,9 +186,8 @@ class Recursion:
         for pair in self._products:
             shape = jnp.shape(self._values[pair.left])
             size = math.prod(shape)
-            part = found[place : place + size].reshape(shape)
+            part, place = found[place : place + size].reshape(shape), place + size
             sums[pair] = part / k if pair.weighted else part
-            place += size
         return sums
 
     # reading the program
