@@ -1,18 +1,23 @@
 """Events: instants at which a quantity of the motion crosses a value, found on the polynomials of the steps."""
 
 import dataclasses
+import itertools
 import math
 from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
 
+from jounce.dynamics.forward import State
 from jounce.errors import MechanismError
 from jounce.jet import Jet
 from jounce.kinematics.compilation import compiled
 from jounce.mechanism import AbstractOutput
 from jounce.mechanism.system import Group
 
+_ANGLES = np.pi * (np.arange(20)[::-1] + 0.5) / 20
+NODES = 0.5 + 0.5 * np.cos(_ANGLES)  # of Chebyshev, in a step: steps reach a small part of where their series converge
+INTERPOLATION = np.cos(np.arange(20)[:, None] * _ANGLES) * np.where(np.arange(20) == 0, 0.05, 0.1)[:, None]
 SMALL_BATCH, LARGE_BATCH = 16, 64  # evaluated together
 REAL = 1e-4  # of a step: an imaginary part below may be that of a real root of several, blurred by rounding
 FAINT = 1e-14  # of a polynomial's coefficients: values below are rounding
@@ -81,6 +86,20 @@ def output_series(group: Group, coordinates: dict[str, Any], pose_type: type) ->
     return jnp.stack(group.evaluate(pose).dense().coefficients)
 
 
+def pose_coordinates(state: State) -> dict[str, np.ndarray]:
+    """Return Taylor coefficients of states, order first, as those of the pose of all bodies, the ground first."""
+    position, attitude, _, spin = (np.asarray(part) for part in state)
+
+    def grounded(part: np.ndarray) -> np.ndarray:
+        return np.concatenate([np.zeros_like(part[:, :, :1]), part], axis=2)
+
+    if attitude.shape[1] == 1:
+        return {"position": grounded(position), "angle": grounded(attitude)[:, 0]}
+    quaternion = grounded(attitude)
+    quaternion[0, 0, 0] = 1.0
+    return {"position": grounded(position), "quaternion": quaternion, "angular_velocity": grounded(spin)[:-1]}
+
+
 def series_of(group: Group, coordinates: dict[str, Any], pose_type: type) -> np.ndarray:
     """Return `output_series` of a batch of any size, (order + 1, components, batch), compiled for two sizes only."""
     count = coordinates["position"].shape[-1]
@@ -89,26 +108,47 @@ def series_of(group: Group, coordinates: dict[str, Any], pose_type: type) -> np.
     for first in range(0, count, width):
         lanes = np.minimum(np.arange(first, first + width), count - 1)
         taken = {name: part[..., lanes] for name, part in coordinates.items()}
-        parts.append(np.asarray(output_series(group, taken, pose_type))[:, :, 0])
+        parts.append(np.asarray(output_series(group, taken, pose_type)))
     return np.concatenate(parts, axis=-1)[..., :count]
 
 
-def whole_turns(values: np.ndarray, rises: np.ndarray, before: float | None = None) -> np.ndarray:
-    """Return what to add to angles known up to whole turns, one per step, to make them continuous.
+def at_nodes(group: Group, polynomial: Any, length: np.ndarray, order: int, pose_type: type) -> np.ndarray:
+    """Return outputs at the nodes of steps, (order + 1, components, instances, steps, nodes): Taylor coefficients.
+
+    A few at many places cost less than many at one: the program for high orders of an angle takes minutes to compile.
 
     Parameters
     ----------
-    values : array of shape (steps,)
-        Angles at the beginnings of steps, rad.
-    rises : array of shape (steps,)
-        By how much they grow in the steps, rad.
-    before : float, optional
-        The continuous angle at the beginning of the first step, where steps went before.
+    group : Group
+        Outputs.
+    polynomial : State
+        Coefficients in the time from the beginnings of steps, (steps, coefficients, components, bodies).
+    length : array of shape (steps,)
+        Of the steps, s.
+    order : int
+        Highest coefficient; what is shorter by nature is as long as it can be.
+    pose_type : type
+        PlanarPose or SpatialPose.
     """
-    arrived = values[:-1] + rises[:-1]
-    arrived = np.append(values[0] if before is None else before, arrived)
-    jumps = np.round((arrived - values) / (2 * np.pi))
-    return 2 * np.pi * np.cumsum(jumps)
+    since = length[:, None] * NODES
+    count = polynomial.position.shape[1]
+    j, k = np.arange(order + 1)[:, None], np.arange(count)
+    powers = since ** np.maximum(k - j, 0)[:, :, None, None]
+    binomials = np.array([[math.comb(b, a) for b in range(count)] for a in range(order + 1)], float)
+    weights = binomials[:, :, None, None] * powers
+    shifted = (np.einsum("jksn,skcb->jcbsn", weights, part) for part in polynomial)
+    coordinates = pose_coordinates(State(*(part.reshape(*part.shape[:3], -1) for part in shifted)))
+    series = series_of(group, coordinates, pose_type)
+    return series.reshape(*series.shape[:3], *since.shape)
+
+
+def counted_on(values: np.ndarray, rates: np.ndarray, time: np.ndarray) -> np.ndarray:
+    """Return angles known up to whole turns, (..., time), counted on from the first by their rates."""
+    rises = 0.5 * np.diff(time) * (rates[..., 1:] + rates[..., :-1])
+    jumps = np.round((np.diff(values, axis=-1) - rises) / (2 * np.pi))
+    found = values.copy()
+    found[..., 1:] -= 2 * np.pi * np.cumsum(jumps, axis=-1)
+    return found
 
 
 class Watch:
@@ -126,41 +166,40 @@ class Watch:
 
     def __init__(self, event: Event, group: Group, pose_type: type):
         self.event, self._group, self._pose_type = event, group, pose_type
-        self._angle: float | None = None  # at the end of the steps so far, turns counted
+        self._angle = np.zeros((3, 0))  # time, angle with its turns, and rate, at the last node so far
         self._last = math.nan, 0.0  # time and sense of the last crossing in either direction
         self._begun = False
 
-    def look(self, start: np.ndarray, length: np.ndarray, coordinates: dict[str, Any]) -> list[tuple[int, float]]:
+    def look(self, start: np.ndarray, length: np.ndarray, polynomial: Any) -> list[tuple[int, float]]:
         """Return the crossings in the next steps, each as the number of the step and the time from its beginning.
 
         Parameters
         ----------
         start, length : array of shape (steps,)
             s; lengths are negative backward in time.
-        coordinates : dict of str to array
-            Taylor coefficients of the poses, order first and steps last.
+        polynomial : State
+            Coefficients in the time from the start, (steps, order + 1, components, bodies).
         """
-        series = series_of(self._group, coordinates, self._pose_type)[:, self.event.component]
-        powers = length ** np.arange(len(series))[:, None]
-        if self._group.element.turning:
-            rises = (series * powers)[1:].sum(axis=0)
-            series[0] += whole_turns(series[0], rises, self._angle)
-            self._angle = float(series[0, -1] + rises[-1])
-        for _ in range(self.event.derivative):
-            series = series[1:] * np.arange(1.0, len(series))[:, None]
-        if len(series) < 2:
-            message = "the polynomials of this method's steps have no such derivative that varies"
-            raise MechanismError(message, name="events.derivative", value=self.event.derivative)
-        scaled = series * powers[: len(series)]  # a step goes from 0 to 1
-        scaled[0] -= self.event.value
+        derivative, element = self.event.derivative, self._group.element
+        order = derivative + element.lost_orders + 1
+        series = at_nodes(self._group, polynomial, length, order, self._pose_type)[:, self.event.component, 0]
+        if len(series) <= derivative:
+            raise MechanismError("the output has no such derivative", name="events.derivative", value=derivative)
+        if element.turning:
+            time = (start[:, None] + length[:, None] * NODES).ravel()
+            history = np.concatenate([self._angle, [time, series[0].ravel(), series[1].ravel()]], axis=1)
+            history[1] = counted_on(history[1], history[2], history[0])
+            series[0] = history[1, -len(time) :].reshape(series[0].shape)
+            self._angle = history[:, -1:]
+        values = series[derivative] * math.factorial(derivative) - self.event.value
         found = []
-        for k in np.flatnonzero(np.abs(scaled[0]) <= 1.001 * np.abs(scaled[1:]).sum(axis=0)):
-            for root, sense in crossings(scaled[:, k], first=k == 0 and not self._begun):
+        for k, coefficients in enumerate(values @ INTERPOLATION.T):
+            for root, sense in crossings(coefficients, first=k == 0 and not self._begun):
                 after, rising = float(root * length[k]), float(sense * np.sign(length[k]))
                 again = self._last[1] == rising and abs(start[k] + after - self._last[0]) < 2 * EDGE * abs(length[k])
                 self._last = float(start[k] + after), rising
                 if not again and self.event.direction * rising >= 0:
-                    found.append((int(k), after))
+                    found.append((k, after))
         self._begun = True
         return found
 
@@ -173,23 +212,23 @@ def crossings(coefficients: np.ndarray, *, first: bool = False) -> list[tuple[fl
     Parameters
     ----------
     coefficients : array of shape (order + 1,)
-        Lowest first.
+        Of Chebyshev polynomials on [0, 1], lowest first.
     first : bool, default False
         Whether a sign change at 0 itself does not count: there the polynomial begins.
 
     Examples
     --------
-    >>> crossings(np.array([-0.25, 1.0]))
+    >>> crossings(np.array([0.25, 0.5]))
     [(0.25, 1.0)]
-    >>> crossings(np.array([0.25, -1.0, 1.0]))
+    >>> crossings(np.array([0.125, 0.0, 0.125]))  # touches zero in the middle
     []
     """
     size = np.abs(coefficients).max()
-    if not size or not np.isfinite(size):
+    if not size or not np.isfinite(size) or abs(coefficients[0]) > 1.001 * np.abs(coefficients[1:]).sum():
         return []
-    polynomial, faint = np.polynomial.Polynomial(coefficients), FAINT * size
-    places = _real_roots(coefficients, size)
-    if first and abs(coefficients[0]) <= faint:
+    polynomial, faint = np.polynomial.Chebyshev(coefficients, [0, 1]), FAINT * size
+    places = _real_roots(polynomial)
+    if first and abs(polynomial(0.0)) <= faint:
         places = np.append(places, 0.0)
     clusters: list[list[float]] = []
     for place in np.sort(places):
@@ -198,21 +237,21 @@ def crossings(coefficients: np.ndarray, *, first: bool = False) -> list[tuple[fl
             clusters[-1].append(float(place))
         else:
             clusters.append([float(place)])
-    edges = [(a[-1] + b[0]) / 2 for a, b in zip(clusters, clusters[1:], strict=False)]
+    edges = [-np.inf, *((a[-1] + b[0]) / 2 for a, b in itertools.pairwise(clusters)), np.inf]
     found = []
-    for cluster, before, after in zip(clusters, [None, *edges], [*edges, None], strict=True):
+    for cluster, before, after in zip(clusters, edges, edges[1:], strict=False):
         place = cluster[len(cluster) // 2]
-        low = polynomial(cluster[0] - BESIDE if before is None else max(before, cluster[0] - BESIDE))
-        high = polynomial(cluster[-1] + BESIDE if after is None else min(after, cluster[-1] + BESIDE))
+        low, high = polynomial(max(before, cluster[0] - BESIDE)), polynomial(min(after, cluster[-1] + BESIDE))
         if low * high < 0 and -EDGE <= place <= 1 + EDGE and not (first and 0.0 in cluster):
             found.append((min(max(place, 0.0), 1.0), float(np.sign(high))))
     return found
 
 
-def _real_roots(coefficients: np.ndarray, size: float) -> np.ndarray:
+def _real_roots(polynomial: Any) -> np.ndarray:
     """Return the roots of a polynomial that may be real, in and about [0, 1], each corrected by Newton's method."""
-    last = np.flatnonzero(np.abs(coefficients) > 1e-17 * size)[-1]  # what is below rounding has no root near
-    polynomial = np.polynomial.Polynomial(coefficients[: last + 1])
+    sizes = np.abs(polynomial.coef)
+    last = np.flatnonzero(sizes > 1e-17 * sizes.max())[-1]  # what is below rounding has no root near
+    polynomial = polynomial.truncate(last + 1)
     roots = polynomial.roots() if last else np.zeros(0)
     real = np.real(roots[(np.abs(np.imag(roots)) <= REAL) & (np.abs(np.real(roots) - 0.5) < 0.5 + 10 * BESIDE)])
     slope = polynomial.deriv()

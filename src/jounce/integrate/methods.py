@@ -95,7 +95,13 @@ def _drowned(sizes: Any) -> Any:
 def coefficient_sizes(expansion: Expansion, length: Any) -> Any:
     """Return the sizes of the Taylor coefficients 1 to order + 1 of positions, shape (order + 1, batch)."""
     velocity, spin = (jnp.max(jnp.abs(c), axis=(1, 2)) for c in expansion.state[2:])
-    return jnp.maximum(velocity / length, spin) / jnp.arange(1.0, len(velocity) + 1)[:, None]
+    sizes = jnp.maximum(velocity / length, spin) / jnp.arange(1.0, len(velocity) + 1)[:, None]
+    attitude = expansion.state.attitude
+    if attitude.shape[1] == 1:
+        return sizes
+    # Euler parameters of a body that spins evenly go on where its angular velocity has no more terms
+    turned = 2.0 * jnp.max(jnp.abs(attitude[1:]), axis=(1, 2))
+    return sizes.at[:-1].max(turned)
 
 
 def reach(sizes: Any, first: int) -> Any:

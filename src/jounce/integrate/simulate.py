@@ -10,7 +10,7 @@ import numpy as np
 from jounce.dynamics.forward import State
 from jounce.dynamics.start import Start, start as consistent_start
 from jounce.errors import MechanismError, SolveError
-from jounce.integrate.events import Event, Watch, series_of
+from jounce.integrate.events import Event, Watch
 from jounce.integrate.marching import Front, Outcome, departed, march
 from jounce.integrate.methods import AbstractMethod, Taylor
 from jounce.integrate.simulation import Simulation, Track
@@ -153,8 +153,8 @@ def _watched(event: Any, mechanism: Mechanism) -> Any:
 
 def _watch_of(event: Event, group: Any, start: Start) -> Watch:
     """Return what looks for an event, or raise if its output has no such component."""
-    coordinates = jax.tree.map(lambda x: np.stack([x] * 3), start.model.guess)  # the shape of it is all that matters
-    components = series_of(group, coordinates, start.model.pose_type).shape[1]
+    pose = start.equations.pose(start.state)
+    components = jax.eval_shape(lambda: group.evaluate(pose).coefficients[0]).shape[0]
     if event.component >= components:
         message = f"the output has {components} component{'s' if components > 1 else ''}, counted from 0"
         raise MechanismError(message, name="events.component", value=event.component)
@@ -233,9 +233,9 @@ class _Run:
         """Note the events in some steps; cut the steps at the first that is terminal."""
         if not self.watches:
             return part
-        coordinates, found = part.coordinates(), []
+        found = []
         for which, watch in enumerate(self.watches):
-            found += [(step, after, which) for step, after in watch.look(part.start, part.length, coordinates)]
+            found += [(step, after, which) for step, after in watch.look(part.start, part.length, part.polynomial)]
         for step, after, which in sorted(found, key=lambda x: (x[0], abs(x[1]))):
             instant = float(part.start[step] + after)
             self.happened[which].append(instant)

@@ -11,7 +11,7 @@ import numpy as np
 from jounce.dynamics.energies import body_energy
 from jounce.dynamics.forward import Equations, State, expand
 from jounce.dynamics.start import Start
-from jounce.integrate.events import series_of, whole_turns
+from jounce.integrate.events import NODES, at_nodes, counted_on, pose_coordinates, series_of
 from jounce.integrate.methods import evaluated
 from jounce.integrate.projection import projected
 from jounce.jet import Jet, dot
@@ -42,25 +42,6 @@ class Track:
     def end(self) -> float:
         """Where the last step ends, s."""
         return float(self.start[-1] + self.length[-1])
-
-    def coordinates(self) -> dict[str, np.ndarray]:
-        """Return the coefficients of all steps as coordinates of a pose, the batch last."""
-        moved = State(*(np.moveaxis(part, 0, -1) for part in self.polynomial))
-        return pose_coordinates(moved)
-
-
-def pose_coordinates(state: State) -> dict[str, np.ndarray]:
-    """Return Taylor coefficients of states, order first, as those of the pose of all bodies, the ground first."""
-    position, attitude, _, spin = (np.asarray(part) for part in state)
-
-    def grounded(part: np.ndarray) -> np.ndarray:
-        return np.concatenate([np.zeros_like(part[:, :, :1]), part], axis=2)
-
-    if attitude.shape[1] == 1:
-        return {"position": grounded(position), "angle": grounded(attitude)[:, 0]}
-    quaternion = grounded(attitude)
-    quaternion[0, 0, 0] = 1.0
-    return {"position": grounded(position), "quaternion": quaternion, "angular_velocity": grounded(spin)[:-1]}
 
 
 class Simulation(Motion):
@@ -102,7 +83,7 @@ class Simulation(Motion):
         pose_type = start.model.pose_type
         coordinates = pose_coordinates(state)
         groups = tuple(
-            continuous(group, np.array(output_series(group, coordinates, pose_type)), instants)
+            self._continued(group, series_of(group, coordinates, pose_type), instants, chosen)
             for group in start.model.system.outputs
         )
         status = np.where(reached, int(Status.OK), int(Status.NOT_REACHED))
@@ -153,6 +134,20 @@ class Simulation(Motion):
     def drift(self) -> np.ndarray:
         """Largest residual of joints and drivers, rad or sizes of the mechanism, shape (time,)."""
         return self._checked(1)
+
+    def _continued(self, group: Any, series: np.ndarray, instants: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+        """Return the series of outputs at instants; angles known up to whole turns go on from step to step."""
+        track = self.track
+        if not group.element.turning or not track.length.any():  # no steps: states that another solver gave
+            return continuous(group, series, instants)
+        nodes = (track.start[:, None] + track.length[:, None] * NODES).ravel()
+        known = at_nodes(group, track.polynomial, track.length, 1, self._start.model.pose_type)[:2]
+        known = known.reshape(*known.shape[:3], -1)
+        counted = counted_on(known[0], known[1], nodes)
+        near = np.abs(nodes[None] - instants[:, None]).argmin(axis=1)
+        expected = counted[..., near] + (instants - nodes[near]) * 0.5 * (known[1][..., near] + series[1])
+        series[0] += 2 * np.pi * np.round((expected - series[0]) / (2 * np.pi))
+        return series
 
     def _checked(self, which: int) -> np.ndarray:
         pose_type, coordinates = self.poses
