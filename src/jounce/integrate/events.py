@@ -58,7 +58,7 @@ class Event:
     False
     """
 
-    output: AbstractOutput
+    output: Any
     value: float = 0.0
     derivative: int = 0
     component: int = 0

@@ -32,7 +32,7 @@ def simulate(
     method: AbstractMethod | None = None,
     tolerance: float = 1e-15,
     initial: Mapping[str, Any] | None = None,
-    events: Sequence[Event] = (),
+    events: Any = (),
     longest_step: float = np.inf,
     strict: bool = True,
     progress: Callable[[int, int], None] | None = None,
