@@ -15,7 +15,6 @@ import jax.numpy as jnp
 from jounce.dynamics.constraint_forces import inertia_forces
 from jounce.jet import Jet
 from jounce.jet.algebra import total
-from jounce.jet.loops import tight_loop
 from jounce.jet.series import Recursion
 from jounce.kinematics.linear import DenseFactor
 from jounce.mechanism.system import System
@@ -278,8 +277,7 @@ def expand(equations: Equations, state: State, time: Any, order: int) -> Expansi
         *(jnp.zeros((order + 1, *c.shape)).at[0].set(c).at[1].set(d) for c, d in zip(state, now, strict=True))
     )
     rates = jnp.zeros((order, rows, lanes)).at[0].set(multipliers)
-    if order > 1:  # XLA breaks off at a loop that is never run
-        _, _, series, rates = tight_loop(1, order, level, (recursion.history, now, series, rates))
+    _, _, series, rates = jax.lax.fori_loop(1, order, level, (recursion.history, now, series, rates))
     numbers = jnp.arange(1.0, order + 1)[:, None, None, None]
     accelerations = numbers * jnp.concatenate([series.velocity[1:], series.spin[1:]], axis=1)
     return Expansion(series, accelerations, rates)

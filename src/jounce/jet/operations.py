@@ -1,13 +1,10 @@
 """How the operations of JAX programs act on Taylor series: tables that `jounce.jet.series` reads."""
 
 from collections.abc import Callable
-from functools import reduce
 from typing import Any
 
 import jax
 import jax.numpy as jnp
-
-from jounce.jet.loops import halved_sum
 
 
 def times(a: Any, b: Any) -> Any:
@@ -43,7 +40,7 @@ def _contracted(a: Any, b: Any, *, dimension_numbers: Any, **_: Any) -> Any:
     b = jnp.transpose(b, (*shared_b, *free_b, *second)).reshape(
         *(b.shape[i] for i in shared_b), *(1,) * len(free_a), *(b.shape[i] for i in free_b), -1
     )
-    return halved_sum(a * b, -1)
+    return jnp.sum(a * b, axis=-1)
 
 
 def _square_root(x: Any) -> Any:
@@ -82,7 +79,6 @@ SLOPES: dict[str, tuple[Callable[..., Any], tuple[Callable[..., Any], ...]]] = {
 }
 COMPOSED: dict[str, Callable[..., Any]] = {
     "dot_general": _contracted,
-    "reduce_sum": lambda x, *, axes, **_: reduce(halved_sum, sorted(axes, reverse=True), x),
     "square": lambda x: x * x,
     "integer_pow": _whole_power,
     "rsqrt": lambda x, **_: 1.0 / jnp.sqrt(x),
@@ -97,6 +93,6 @@ BROADCASTING = frozenset("mul div pow atan2".split())
 ADDITIVE = frozenset("add add_any sub concatenate dynamic_update_slice pad scatter scatter-add select_n stack".split())
 LINEAR = ADDITIVE | frozenset(
     "broadcast_in_dim convert_element_type copy cumsum div dynamic_slice expand_dims gather mul neg "
-    "reshape rev slice squeeze transpose".split()
+    "reduce_sum reshape rev slice squeeze transpose".split()
 )
 STEPWISE = frozenset("ceil floor round sign stop_gradient".split())  # piecewise constant in time

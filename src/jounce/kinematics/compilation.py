@@ -1,13 +1,10 @@
 """How the solver's functions are compiled."""
 
 from collections.abc import Callable
-from contextlib import nullcontext
-from functools import cached_property, lru_cache, update_wrapper, wraps
+from functools import cached_property, lru_cache, update_wrapper
 from typing import Any
 
 import jax
-
-from jounce.jet.loops import tight_loops
 
 
 @lru_cache(maxsize=1)
@@ -36,14 +33,7 @@ class Compiled:
     @cached_property
     def jitted(self) -> Any:
         """The function as `jax.jit` returns it."""
-        options = compiler_options()
-
-        @wraps(self.function)
-        def traced(*arguments: Any, **keywords: Any) -> Any:
-            with tight_loops() if options else nullcontext():
-                return self.function(*arguments, **keywords)
-
-        return jax.jit(traced, static_argnames=self.static, compiler_options=options)
+        return jax.jit(self.function, static_argnames=self.static, compiler_options=compiler_options())
 
     def __call__(self, *arguments: Any, **keywords: Any) -> Any:
         """Call the compiled function."""

@@ -1,0 +1,103 @@
+"""Batches: every run is what it is alone; a run that fails leaves the others as they are."""
+
+import numpy as np
+import pytest
+
+import jounce as jn
+
+TIME = [0.0, 0.4, 1.0]
+
+
+def pendulum(**changes):
+    """Two rods; angle and rate at the start, a mass, a length and a spring follow from parameters."""
+    values = {"rise": 0.3, "rate": 0.0, "mass": 1.0, "length": 1.0, "stiffness": 5.0} | changes
+    return jn.Mechanism(
+        space="planar",
+        gravity=[0, -9.81],
+        parameters=values,
+        bodies={
+            "upper": jn.Body([0, 0], mass=1.0, inertia="length**2/12", center_of_mass=["length/2", 0]),
+            "lower": jn.Body(["length", 0], mass="mass", inertia=0.1, center_of_mass=[0.5, 0]),
+        },
+        joints={
+            "A": jn.planar.Revolute(("ground", "upper"), [0, 0], [0, 0]),
+            "B": jn.planar.Revolute(("upper", "lower"), ["length", 0], [0, 0]),
+        },
+        forces={"spring": jn.forces.TorsionalSpring(("upper", "lower"), stiffness="stiffness", angle=0.2)},
+        initial={
+            "rise": jn.drivers.CoordinateDriver(("ground", "upper"), "angle", motion="rise + rate*t"),
+            "hang": jn.drivers.CoordinateDriver(("ground", "lower"), "angle", motion="0.1"),
+        },
+        outputs={"tip": jn.PointOutput("lower", ["length", 0]), "angle": jn.AngleOutput("upper")},
+    )
+
+
+def spread(count):
+    generator = np.random.default_rng(4)
+    return {
+        "rise": generator.uniform(-2, 2, count),
+        "rate": generator.normal(size=count),
+        "mass": generator.uniform(0.5, 2, count),
+        "length": generator.uniform(0.8, 1.2, count),
+        "stiffness": generator.uniform(0, 10, count),
+    }
+
+
+def test_every_run_is_what_it_is_alone():
+    values = spread(5)
+    batch = jn.simulate_batch(pendulum(), values, TIME, order=3)
+    assert batch.outputs["tip"].shape == (5, 3, 4, 2)
+    assert batch.outputs["angle"].shape == (5, 3, 4)
+    assert (batch.status == jn.Status.OK).all()
+    for run in range(5):
+        alone = jn.simulate(pendulum(**{name: float(v[run]) for name, v in values.items()}), TIME, order=3)
+        assert alone.steps == batch.steps[run]
+        for name, expected in alone.outputs.items():
+            scale = np.abs(expected).max(axis=0)
+            # the runs meet the same numbers in another order; a double pendulum multiplies what rounding differs by
+            assert np.all(np.abs(batch.outputs[name][run] - expected) <= 1e-10 * scale)
+
+
+@pytest.mark.slow
+def test_runs_in_several_chunks():
+    values = spread(70)
+    batch = jn.simulate_batch(pendulum(), values, TIME, order=1)
+    again = jn.simulate_batch(pendulum(), {name: v[::-1] for name, v in values.items()}, TIME, order=1)
+    np.testing.assert_allclose(again.outputs["tip"][::-1], batch.outputs["tip"], rtol=0, atol=1e-10)
+
+
+@pytest.mark.slow
+def test_a_run_that_fails_leaves_the_others():
+    """A law that has no finite value for one of the runs, from a time on."""
+    block = jn.Mechanism(
+        space="planar",
+        parameters={"end": 2.0},
+        bodies={"block": jn.Body([0, 0], mass=1.0, inertia=1.0)},
+        joints={"rail": jn.planar.Prismatic(("ground", "block"), [0, 0], [0, 0], [1, 0], [1, 0])},
+        forces={"push": jn.forces.SlideForce(("ground", "block"), [0, 0], [0, 0], [1, 0], law="1/(end - t)**2")},
+        outputs={"place": jn.PointOutput("block", [0, 0])},
+    )
+    batch = jn.simulate_batch(block, {"end": [3.0, 0.7, 2.0]}, TIME, order=1)
+    assert (batch.status[[0, 2]] == jn.Status.OK).all()
+    assert batch.status[1].tolist() == [jn.Status.OK, jn.Status.OK, jn.Status.COLLAPSED]
+    assert np.isfinite(batch.outputs["place"][1, :2]).all()
+    assert np.isnan(batch.outputs["place"][1, 2]).all()
+    # x'' = (end - t)^-2 from rest: x' = 1/(end - t) - 1/end
+    for run, end in ((0, 3.0), (2, 2.0)):
+        expected = 1 / (end - np.array(TIME)) - 1 / end
+        np.testing.assert_allclose(batch.outputs["place"][run, :, 1, 0], expected, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "values, words",
+    [
+        ({}, "at least one parameter"),
+        ({"raise": [1.0]}, "did you mean 'rise'"),
+        ({"rise": [1.0, np.nan]}, "finite"),
+        ({"rise": 1.0}, "one for each run"),
+        ({"rise": [1.0, 2.0], "rate": [1.0]}, "2 as those before"),
+    ],
+)
+def test_bad_parameters(values, words):
+    with pytest.raises(jn.MechanismError, match=words):
+        jn.simulate_batch(pendulum(), values, TIME)
