@@ -142,7 +142,7 @@ def spatial_slider_crank(stiffness=0.0, damping=0.0):
         bodies={
             "crank": jn.Body([0, 0.1, 0.12], mass=0.12, inertia=[0.0001, 0.00001, 0.0001]),
             "rod": jn.Body([0, 0.1, 0.2], None, turned, 0.5, [0.0004, 0.004, 0.004], [0.15, 0, 0]),
-            "slider": jn.Body([0.2, 0, 0], mass=2.0, inertia=0.0001),
+            "slider": jn.Body([0.2, 0, 0], mass=2.0, inertia=[0.0001, 0.0001, 0.0001]),
         },
         joints={
             "A": spatial.Revolute(("ground", "crank"), [0, 0.1, 0.12], origin, x, x),
