@@ -226,7 +226,7 @@ def test_spatial_slider_crank(reference, stiffness, damping):
     for k, axis in enumerate("xyz"):
         check(motion.outputs["centre"][index][..., k], tables["rod"][axis][:, :4], 1e-9)
     if not damping:
-        # measured 2.3e-12 of the largest kinetic energy, 0.468 J, after four turns, a little more with each turn: this is
+        # measured 2.3e-12 of the largest kinetic energy, 0.468 J, after four turns, and more with each turn: this is
         # short of the aim of 1e-12 over 100 periods, and the bound only keeps it from growing worse
         energy_kept(motion, 4e-12, 0.468)
 
