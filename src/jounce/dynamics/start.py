@@ -8,7 +8,7 @@ import numpy as np
 
 from jounce.dynamics.energies import gravity_of, masses_of
 from jounce.dynamics.forward import Equations, State, least_change
-from jounce.errors import AssemblyError, MechanismError, MobilityError
+from jounce.errors import AssemblyError, JounceError, MechanismError, MobilityError
 from jounce.jet import Jet
 from jounce.kinematics.assembly import RANK_TOLERANCE, assemble, freely_moving
 from jounce.kinematics.compilation import compiled
@@ -88,7 +88,11 @@ def equations_of(mechanism: Mechanism, model: Model) -> Equations:
 
 def _assembled(mechanism: Mechanism, instant: float) -> tuple[Model, dict[str, np.ndarray]]:
     """Return the mechanism with its initial conditions as drivers, assembled."""
-    model = build(driven(mechanism))
+    try:
+        model = build(driven(mechanism))
+    except JounceError as error:
+        error.name = _renamed(error.name or "", mechanism) or None
+        raise
     rows = tuple(_renamed(name, mechanism) for name in model.rows)
     try:
         return assemble(dataclasses.replace(model, rows=rows), instant, TOLERANCE, free=True)
@@ -107,7 +111,7 @@ def driven(mechanism: Mechanism) -> Mechanism:
 
 def _renamed(row: str, mechanism: Mechanism) -> str:
     kind, _, name = row.partition(".")
-    return f"initial.{name}" if kind == "drivers" and name in mechanism.initial else row
+    return f"initial.{name}" if kind == "drivers" and name.partition(".")[0] in mechanism.initial else row
 
 
 def at_rest(model: Model, coordinates: dict[str, np.ndarray]) -> State:

@@ -88,6 +88,9 @@ class Simulation(Motion):
         )
         status = np.where(reached, int(Status.OK), int(Status.NOT_REACHED))
         culprits = {}
+        lost = reached & ~np.all([np.isfinite(p).all(axis=tuple(range(p.ndim - 1))) for p in state], axis=0)
+        if lost.any():  # the state is known there, but not its derivatives
+            status[lost], culprits[int(np.argmax(lost))] = int(Status.INADMISSIBLE), ending[1]
         beyond = np.flatnonzero(~reached & (np.abs(instants - track.start[0]) > abs(track.end - track.start[0])))
         if ending[0] != Status.OK and beyond.size:
             status[beyond[0]], culprits[int(beyond[0])] = int(ending[0]), ending[1]
@@ -134,6 +137,11 @@ class Simulation(Motion):
     def drift(self) -> np.ndarray:
         """Largest residual of joints and drivers, rad or sizes of the mechanism, shape (time,)."""
         return self._checked(1)
+
+    @property
+    def kinetic_energy(self) -> np.ndarray:
+        """Kinetic energy, J, shape (time,)."""
+        return self._checked(2)
 
     def _continued(self, group: Any, series: np.ndarray, instants: np.ndarray, chosen: np.ndarray) -> np.ndarray:
         """Return the series of outputs at instants; angles known up to whole turns go on from step to step."""
@@ -197,15 +205,16 @@ def continuous(group: Any, series: np.ndarray, instants: np.ndarray) -> np.ndarr
 
 
 @compiled("pose_type")
-def _checks(equations: Equations, coordinates: dict[str, Any], time: Any, pose_type: type) -> tuple[Any, Any]:
-    """Return the energy and the largest residual, both of shape (batch,)."""
+def _checks(equations: Equations, coordinates: dict[str, Any], time: Any, pose_type: type) -> tuple[Any, Any, Any]:
+    """Return the energy, the largest residual and the kinetic energy, all of shape (batch,)."""
     pose = pose_type.from_coordinates({name: Jet(tuple(c)) for name, c in coordinates.items()})
     clock = Jet.variable(time, 1)
     translation, rotation = body_energy(pose, equations.mass, equations.center, equations.moments, 0)
     height = dot(pose.point(equations.center), equations.gravity).coefficients[0]
-    energy = jnp.sum(translation.coefficients[0] + rotation.coefficients[0] - equations.mass * height, axis=0)
+    kinetic = jnp.sum(translation.coefficients[0] + rotation.coefficients[0], axis=0)
+    energy = kinetic - jnp.sum(equations.mass * height, axis=0)
     for group in equations.system.forces:
         stored = jnp.broadcast_to(group.energy(pose, clock).coefficients[0], (group.instances, time.shape[-1]))
         energy = energy + jnp.sum(stored, axis=0)
     gaps = equations.system.residual(pose, clock).coefficients[0]
-    return energy, jnp.max(jnp.abs(gaps), axis=0, initial=0.0)
+    return energy, jnp.max(jnp.abs(gaps), axis=0, initial=0.0), kinetic

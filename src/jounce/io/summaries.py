@@ -59,8 +59,8 @@ def simulation_summary(motion: Simulation, file: Path) -> str:
     ]
     if reached.any():
         energy = motion.energy[reached]
-        change, size = float(np.max(np.abs(energy - energy[0]))), float(np.max(np.abs(energy)))
-        share = f", {change / size:.1e} of the largest" if size else ""
+        change, size = float(np.max(np.abs(energy - energy[0]))), float(np.max(motion.kinetic_energy[reached]))
+        share = f", {change / size:.1e} of the largest kinetic energy" if size else ""
         lines.append(f"energy: {energy[0]:.9g} J at the start; it changes by {change:.2g} J{share}")
         if mechanism.drivers or mechanism.forces:
             lines.append("(drivers, actuators and dampers change it)")
