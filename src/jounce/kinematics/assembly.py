@@ -72,6 +72,8 @@ def assemble(
     coordinates, residual, jacobian = moved(model.guess, still)
     scale = _row_scale(jacobian)
     for _ in range(MAX_STEPS):
+        if not np.isfinite(residual).all():
+            break  # told below, by name
         step = np.linalg.lstsq(scale[:, None] * jacobian, -scale * residual, rcond=1e-10)[0]
         size = np.max(np.abs(step), initial=0.0)
         if not np.isfinite(size):

@@ -1,0 +1,119 @@
+"""Where a simulation starts: consistent states from partial conditions, mobility in words, and what is refused."""
+
+import dataclasses
+import sys
+
+import numpy as np
+import pytest
+
+import jounce as jn
+from jounce import drivers, planar
+from jounce.dynamics.start import start
+from tests.problems.dynamics import simple_pendulum
+
+
+def turn(body, law, of="ground"):
+    return drivers.CoordinateDriver((of, body), "angle", law)
+
+
+def with_initial(**initial):
+    return dataclasses.replace(simple_pendulum(0.3, 1.0), initial=initial)
+
+
+def test_a_condition_fixes_the_position_and_the_rate():
+    state = start(simple_pendulum(0.3, 1.5), 0.0)
+    assert state.state.attitude[0, 0, 0] == pytest.approx(0.3, abs=1e-14)
+    assert state.state.spin[0, 0, 0] == pytest.approx(1.5, abs=1e-14)
+    assert np.allclose(state.state.velocity, 0.0, atol=1e-14)
+    assert state.mobility == "1 degree of freedom: bob"
+
+
+def test_without_a_condition_the_guess_is_kept_and_the_body_rests():
+    state = start(with_initial(), 0.0).state
+    assert state.attitude[0, 0, 0] == pytest.approx(0.3, abs=1e-14)
+    assert np.allclose([*state.spin.ravel(), *state.velocity.ravel()], 0.0, atol=1e-14)
+
+
+def test_velocities_left_open_are_those_of_least_kinetic_energy():
+    # a double rod: only the tip's vertical speed is told; minimise 1/2 v^T M v by hand over the two rates
+    rods = jn.Mechanism(
+        space="planar",
+        bodies={
+            "upper": jn.Body([0, 0], mass=2.0, inertia=0.5, center_of_mass=[0.5, 0]),
+            "lower": jn.Body([1, 0], mass=1.0, inertia=0.2, center_of_mass=[0.5, 0]),
+        },
+        joints={
+            "A": planar.Revolute(("ground", "upper"), [0, 0], [0, 0]),
+            "B": planar.Revolute(("upper", "lower"), [1, 0], [0, 0]),
+        },
+        initial={"lift": drivers.SlideDriver(("ground", "lower"), [0, 0], [1, 0], [0, 1], "3*t")},
+    )
+    spin = start(rods, 0.0).state.spin[0, :, 0]
+    mass = np.array([[0.5 + 2 * 0.25 + 1.0, 0.5], [0.5, 0.2 + 0.25]])
+    wanted = np.linalg.solve(mass, [1.0, 1.0])
+    assert np.allclose(spin, 3.0 * wanted / wanted.sum(), rtol=1e-13)
+
+
+def refused(kind, words, mechanism):
+    with pytest.raises(kind, match=words):
+        start(mechanism, 0.0)
+
+
+def body(**changes):
+    mechanism = simple_pendulum(0.3, 1.0)
+    return dataclasses.replace(mechanism, bodies={"bob": dataclasses.replace(mechanism.bodies["bob"], **changes)})
+
+
+def test_masses_that_determine_no_motion():
+    refused(jn.MechanismError, "bodies: no body has a mass; the equations", body(mass=None))
+    refused(jn.MechanismError, "bodies.bob.inertia: the body can move but has no inertia", body(center_of_mass=None))
+
+
+def test_a_massless_body_that_can_move_is_named():
+    mechanism = body()
+    bodies = {**mechanism.bodies, "dust": jn.Body([0, 0])}
+    pin = planar.Revolute(("ground", "dust"), [0, 0], [0, 0])
+    loose = dataclasses.replace(mechanism, bodies=bodies, joints={**mechanism.joints, "pin": pin})
+    refused(jn.MechanismError, "bodies.dust.(mass|inertia): the body can move but has no", loose)
+
+
+def test_conditions_that_contradict_each_other_or_the_joints():
+    refused(jn.AssemblyError, "initial.a, initial.b stay open", with_initial(a=turn("bob", 0.3), b=turn("bob", 1.0)))
+    shifted = drivers.CoordinateDriver(("ground", "bob"), "x", 1.0)
+    refused(jn.AssemblyError, "joints, drivers and initial conditions contradict", with_initial(a=shifted))
+
+
+def test_conditions_and_drivers_that_are_too_many():
+    refused(jn.MobilityError, "initial.b, initial.a", with_initial(a=turn("bob", 0.3), b=turn("bob", "0.3")))
+    driven = dataclasses.replace(simple_pendulum(0.3, 1.0), drivers={"a": turn("bob", 0.3)})
+    refused(jn.MobilityError, "joints, drivers and initial conditions together", driven)
+    both = dataclasses.replace(driven, drivers={"a": turn("bob", 0.3), "b": turn("bob", 0.3)}, initial={})
+    refused(jn.MobilityError, "drivers.b, drivers.a", both)
+    fixed = planar.Revolute(("ground", "bob"), [0, 0], [0, 0])
+    twice = dataclasses.replace(both, joints={"pivot": fixed, "again": fixed}, drivers={}, initial={})
+    refused(jn.MobilityError, "joints.pivot, joints.again", twice)
+
+
+def test_a_joint_is_no_initial_condition():
+    with pytest.raises(jn.MechanismError, match=r"initial.pin: an initial condition is given by a driver"):
+        with_initial(pin=planar.Revolute(("ground", "bob"), [0, 0], [0, 0]))
+
+
+@pytest.mark.parametrize(
+    "keywords, words",
+    [
+        ({"tolerance": 0.0}, "tolerance: the tolerance must be a number from 1e-15 to 0.01, got 0"),
+        ({"tolerance": np.nan}, "tolerance"),
+        ({"longest_step": 0.0}, "longest_step: must be greater than zero"),
+        ({"order": 31}, "order: the order of derivatives"),
+        ({"time": [0.0, 0.0]}, r"time\[1\]: instants must increase strictly"),
+        ({"time": [0.0, np.nan]}, r"time\[1\]: instants must be finite"),
+        ({"time": [0.0, "1 s"]}, "time: the instants must be numbers"),
+        ({"time": []}, "at least one instant"),
+        ({"time": None}, "no time grid is given"),
+    ],
+)
+def test_options_are_checked_before_any_computing(keywords, words, monkeypatch):
+    monkeypatch.setattr(sys.modules[jn.simulate.__module__], "consistent_start", None)
+    with pytest.raises(jn.MechanismError, match=words):
+        jn.simulate(simple_pendulum(), **{"time": [0.0, 1.0], **keywords})
