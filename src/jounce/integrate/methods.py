@@ -15,6 +15,7 @@ from jounce.errors import JounceError
 HIGHEST_ORDER = 40
 LOWEST_ORDER = 4
 FAINT = 1e-10  # what grows in the upper coefficients from an amplitude below is rounding, near a singular position
+NEAR = 1e-6  # rad or sizes of the mechanism: what a body moves within the radius of a series near a pole
 ROUGH = 1e-11  # tolerance of a step there, rad or sizes of the mechanism
 ROUNDING = 1e-14  # relative error of an acceleration that is no sign of a step too long
 
@@ -85,11 +86,16 @@ def _horner(coefficients: Any, step: Any) -> Any:
 
 
 def _drowned(sizes: Any) -> Any:
-    """Tell where the upper coefficients are rounding that grows geometrically, shape (batch,)."""
+    """Tell where the upper coefficients are rounding that grows geometrically, shape (batch,).
+
+    Where the motion itself would hardly get on within the radius that they show, there is a pole in the way, whose
+    series grow faintly too: it must not be passed.
+    """
     count = len(sizes)
     middle, top = (jnp.log(jnp.maximum(jnp.max(sizes[k - 4 : k], axis=0), 1e-300)) for k in (count // 2, count))
     growth = (top - middle) / (count - count // 2)
-    return (growth > 0) & (middle - (count // 2) * growth < math.log(FAINT))
+    faint = middle - (count // 2) * growth < math.log(FAINT)
+    return (growth > 0) & faint & (sizes[0] * jnp.exp(-growth) > NEAR)
 
 
 def coefficient_sizes(expansion: Expansion, length: Any) -> Any:
