@@ -18,10 +18,13 @@ MECHANISMS = {
     "spatial double pendulum": dynamics.spatial_double_pendulum,
 }
 QUICK = {("Taylor", "free four-bar")}
+APART = {("Obreshkov 4", "double pendulum"), ("Obreshkov 6", "double pendulum")}  # each compiles for half a minute
+APART |= {("Obreshkov 4", "spatial double pendulum"), ("Obreshkov 8", "spatial double pendulum")}
 CASES = [
     pytest.param(method, name, marks=() if (method, name) in QUICK else pytest.mark.slow)
     for name in MECHANISMS
     for method in METHODS
+    if (method, name) not in APART
 ]
 GRID = np.linspace(0.0, 1.0, 9)
 

@@ -9,6 +9,7 @@ import jounce as jn
 
 ROOT = pathlib.Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+SLOW = ("closed_loop_robots.md", "integrators.md", "simulation.md")  # they compile for half a minute
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
@@ -21,7 +22,8 @@ def blocks(page, language):
 
 def pages_with(language, needle=""):
     found = [page for page in PAGES if any(needle in code for _, code in blocks(page, language))]
-    return pytest.mark.parametrize("page", found, ids=lambda page: str(page.relative_to(ROOT)))
+    cases = [pytest.param(page, marks=pytest.mark.slow if page.name in SLOW else ()) for page in found]
+    return pytest.mark.parametrize("page", cases, ids=[str(page.relative_to(ROOT)) for page in found])
 
 
 @pages_with("python")

@@ -93,6 +93,7 @@ def test_an_output_of_ones_own_and_many_crossings_in_one_step():
     assert motion.events[0] == pytest.approx([np.pi / 6 / 7, (np.pi / 6 + 2 * np.pi) / 7], abs=1e-12)
 
 
+@pytest.mark.slow
 def test_turns_of_an_angle_in_space_count():
     z, x, origin, bodies = [0, 0, 1], [1, 0, 0], [0, 0, 0], ("ground", "rotor")
     angle = jn.RelativeAngleOutput(bodies, z, x, x)

@@ -80,7 +80,10 @@ def test_pseudo_inertia_there_and_back():
         (lambda: jn.Inertia.solid("rod", mass=1, radius=2), "radius: a rod has no such size; valid: density, length"),
         (lambda: jn.Inertia.solid("rod", length=1), "mass: a rod needs a mass"),
         (lambda: jn.Inertia.solid("rod", length=1, density=1), "density: a rod is thin and has no volume, got 1"),
-        (lambda: jn.Inertia.solid("sphere", radius=1, mass=1, density=1), "density: a sphere takes a mass or a density, not both, got 1"),
+        (
+            lambda: jn.Inertia.solid("sphere", radius=1, mass=1, density=1),
+            "density: a sphere takes a mass or a density, not both, got 1",
+        ),
         (lambda: jn.Inertia.solid("sphere", radius=1), "mass: a sphere needs a mass or a density"),
         (lambda: jn.Inertia.solid("sphere", radius=-1, mass=1), "radius: must be greater than zero, got -1"),
         (lambda: jn.Inertia.solid("sphere", radius=np.nan, mass=1), "radius: must be finite"),
