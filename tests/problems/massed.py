@@ -21,7 +21,8 @@ def massed(mechanism, seed=1):
         inertia = float(random.uniform(0.01, 0.05))
         if mechanism.space == "spatial":
             root = random.normal(size=(3, 3))
-            inertia = (0.01 * root @ root.T + 0.02 * np.eye(3)).tolist()
+            spread = 0.01 * root @ root.T + 0.01 * np.eye(3)  # second moments: so that a body can have them
+            inertia = (np.trace(spread) * np.eye(3) - spread).tolist()
         mass = float(random.uniform(0.5, 3.0))
         bodies[name] = dataclasses.replace(body, mass=mass, inertia=inertia, center_of_mass=center.tolist())
     return dataclasses.replace(mechanism, bodies=bodies, gravity=GRAVITY[mechanism.space])
