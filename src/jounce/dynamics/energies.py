@@ -288,7 +288,7 @@ def masses_of(mechanism: Mechanism) -> tuple[Any, Any, Any]:
     for name, body in mechanism.bodies.items():
         if body.mass is None and body.inertia is not None:
             raise MechanismError("an inertia needs a mass beside it", name=f"bodies.{name}.mass")
-        mass, center, inertia = body_mass(name, body, mechanism.parameter_values, size)
+        mass, center, inertia = body_mass(name, body, mechanism.parameter_values, size, solid=False)
         masses.append(mass)
         centers.append(center)
         if size == 2:  # the second moments of a plane body about its axes are not known apart; only their sum counts

@@ -12,7 +12,9 @@ from jounce.mechanism.resolve import check_value, resolve
 from jounce.rigid.inertia import Inertia
 
 
-def body_mass(name: str, body: Body, parameters: Mapping[str, Any], components: int) -> tuple[Any, Any, Any]:
+def body_mass(
+    name: str, body: Body, parameters: Mapping[str, Any], components: int, *, solid: bool = True
+) -> tuple[Any, Any, Any]:
     """Return mass, centre of mass, (2,) or (3,), and inertia about it, () or (3, 3), of a body; zero where not given.
 
     Parameters
@@ -25,6 +27,8 @@ def body_mass(name: str, body: Body, parameters: Mapping[str, Any], components: 
         Values of the names in expressions.
     components : int
         2 in the plane, 3 in space.
+    solid : bool, default True
+        Whether to refuse moments that no solid body has; the rotor of a drive may be counted in those of a link.
 
     Raises
     ------
@@ -49,7 +53,7 @@ def body_mass(name: str, body: Body, parameters: Mapping[str, Any], components: 
     for field, value in (("mass", mass), ("inertia", inertia)):
         if np.shape(value) == () and not isinstance(value, Tracer) and value < 0:
             raise MechanismError("must not be negative", name=f"{place}.{field}", value=float(value))
-    if components == 3 and not isinstance(inertia, Tracer):
+    if solid and components == 3 and not isinstance(inertia, Tracer):
         try:
             inertia = Inertia(1.0, tensor=inertia).tensor
         except RobotError as error:
