@@ -95,7 +95,7 @@ def test_other_values_of_parameters_reach_the_laws():
     assert laws[0].expression is laws[1].expression or laws[0].expression == laws[1].expression
 
 
-def refused(force, space="planar", parameters=()):
+def built(force, space="planar", parameters=()):
     size = 2 if space == "planar" else 3
     mechanism = jn.Mechanism(
         space=space,
@@ -104,7 +104,8 @@ def refused(force, space="planar", parameters=()):
         forces={"F": force},
         parameters=dict(parameters),
     )
-    build(mechanism)
+    (group,) = build(mechanism).system.forces
+    return group.element
 
 
 BOTH, LINE = ("a", "b"), ([0, 0], [0, 0])
@@ -141,22 +142,29 @@ BOTH, LINE = ("a", "b"), ([0, 0], [0, 0])
 )
 def test_what_no_law_or_value_is(wrong, message):
     with pytest.raises(jn.JounceError, match=message):
-        refused(wrong())
+        built(wrong())
 
 
 def test_values_that_are_allowed():
     """A stiffness may be negative, a free length zero, that of a slide of any sign; a vector of laws an array."""
-    refused(forces.Spring(BOTH, *LINE, stiffness=-3.0, length=0.0, damping=-1.0))
-    refused(forces.SlideSpring(BOTH, *LINE, [1, 0], stiffness=0.0, length=-2.0))
-    refused(forces.PointForce("a", [0, 0], np.array([1.0, 2.0])))
-    refused(forces.PointForce("a", [0, 0], lambda x, v, t: -v))
-    refused(forces.PointForce("a", [0, 0], [jn.FunctionMotion(jnp.sin), "t"]))
+    spring = built(forces.Spring(BOTH, *LINE, stiffness=-3.0, length=0.0, damping=-1.0))
+    assert [float(x.item()) for x in (spring.stiffness, spring.length, spring.damping)] == [-3.0, 0.0, -1.0]
+    slide = built(forces.SlideSpring(BOTH, *LINE, [1, 0], stiffness=0.0, length=-2.0))
+    assert [float(x.item()) for x in (slide.stiffness, slide.length)] == [0.0, -2.0]
+    x, v, t = (jn.Jet([jnp.array([[[a]], [[b]]])]) for a, b in ((0.3, 0.4), (1.5, -2.5), (0.7, 0.7)))
+    for law, wanted in (
+        (np.array([1.0, 2.0]), [1.0, 2.0]),
+        (lambda x, v, t: -v, [-1.5, 2.5]),
+        ([jn.FunctionMotion(jnp.sin), "t"], [np.sin(0.7), 0.7]),
+    ):
+        force = built(forces.PointForce("a", [0, 0], law)).force(x, v, t[0])
+        np.testing.assert_allclose(np.ravel(force.coefficients[0]), wanted, rtol=1e-15)
 
 
 def test_a_parameter_may_not_hide_a_variable_of_a_law():
     with pytest.raises(jn.MechanismError, match=r"forces\.F\.law: the parameter 'x' has the name of a variable"):
-        refused(forces.Torque(BOTH, "-x"), parameters={"x": 1.0})
-    refused(forces.Torque(BOTH, "-v"), parameters={"x": 1.0})
+        built(forces.Torque(BOTH, "-x"), parameters={"x": 1.0})
+    built(forces.Torque(BOTH, "-v"), parameters={"x": 1.0})
 
 
 @pytest.mark.parametrize(
@@ -173,10 +181,10 @@ def test_a_parameter_may_not_hide_a_variable_of_a_law():
             lambda: forces.SpatialTorque(("a", "b"), [0, 0, 1], 1.0, vector_i=[1, 0, 0]),
             r"vectors: torque takes two vectors, one on each body, or none",
         ),
-        (lambda: refused(forces.Torque(BOTH, 1.0), "spatial"), r"forces\.F: is planar, in a spatial mechanism"),
-        (lambda: refused(forces.Moment("ground", 1.0)), r"forces\.F\.bodies: acts on the ground alone, which never"),
+        (lambda: built(forces.Torque(BOTH, 1.0), "spatial"), r"forces\.F: is planar, in a spatial mechanism"),
+        (lambda: built(forces.Moment("ground", 1.0)), r"forces\.F\.bodies: acts on the ground alone, which never"),
         (
-            lambda: refused(forces.Moment("c", 1.0)),
+            lambda: built(forces.Moment("c", 1.0)),
             r"forces\.F\.bodies: no body has this name, got 'c'; valid: a, b, gr",
         ),
     ],
@@ -205,5 +213,5 @@ def test_a_force_of_ones_own_joins_the_catalogue():
         assert forces.force_catalogue(space)["magnet"] is Magnet
     for kind in (jn.Scalar, jn.Law, jn.Laws):
         assert kind.__metadata__
-    refused(Magnet(BOTH, *LINE, strength="2*s"), parameters={"s": 1.0})
+    built(Magnet(BOTH, *LINE, strength="2*s"), parameters={"s": 1.0})
     assert "magnet" not in forces.force_catalogue("neither")

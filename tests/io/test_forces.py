@@ -146,27 +146,26 @@ def test_toml_and_json_say_the_same(tmp_path):
     assert list(found[0].forces) == ["twist", "push"]
 
 
+SOLIDS = [
+    ("spatial", "{solid: box, size: [L, 2 cm, 3 cm]}", ("box", {"size": [0.1, 0.02, 0.03]})),
+    ("spatial", "{solid: tube, radius: L, inner_radius: L/2, length: 1}", ("tube", {"axis": "z"})),
+    ("spatial", "{solid: sphere, radius: L}", ("sphere", {"radius": 0.1})),
+    ("planar", "{solid: cylinder, radius: L, length: 5}", ("cylinder", {"radius": 0.1, "length": 5.0})),
+]
+THIN = [
+    ("spatial", "{solid: rod, length: L, axis: y}", ("rod", {"length": 0.1, "axis": "y"})),
+    ("planar", "{solid: disc, radius: L}", ("disc", {"radius": 0.1})),
+    ("planar", "{solid: rod, length: 20 cm}", ("rod", {"length": 0.2})),
+]
+
+
 @pytest.mark.parametrize(
-    "space, form, solid",
-    [
-        ("spatial", "{solid: box, size: [L, 2 cm, 3 cm]}", ("box", {"size": [0.1, 0.02, 0.03]})),
-        ("spatial", "{solid: tube, radius: L, inner_radius: L/2, length: 1}", ("tube", {"axis": "z"})),
-        ("spatial", "{solid: rod, length: L, axis: y}", ("rod", {"length": 0.1, "axis": "y"})),
-        ("spatial", "{solid: sphere, radius: L}", ("sphere", {"radius": 0.1})),
-        ("planar", "{solid: disc, radius: L}", ("disc", {"radius": 0.1})),
-        ("planar", "{solid: rod, length: 20 cm}", ("rod", {"length": 0.2})),
-        ("planar", "{solid: cylinder, radius: L, length: 5}", ("cylinder", {"radius": 0.1, "length": 5.0})),
-    ],
+    "space, form, solid, density", [(*s, d) for d in (False, True) for s in SOLIDS + THIN * (not d)]
 )
-@pytest.mark.parametrize("density", [False, True])
 def test_solids_have_the_moments_of_the_same_in_python(tmp_path, space, form, solid, density):
     kind, sizes = solid
     if kind == "tube":
         sizes = {"radius": 0.1, "inner_radius": 0.05, "length": 1.0}
-    if density and kind in ("rod", "disc"):
-        with pytest.raises(jn.MechanismFileError, match=r"bodies\.a\.inertia\.density: unknown key"):
-            written(tmp_path, space, "{}", bodies=f"{{a: {{inertia: {form[:-1]}, density: 7 g/cm^3}}}}}}")
-        return
     text = f"inertia: {form[:-1]}, density: 7 g/cm^3}}" if density else f"mass: m, inertia: {form}"
     mechanism = written(tmp_path, space, "{}", bodies=f"{{a: {{{text}}}}}")
     expected = jn.Inertia.solid(kind, **sizes, **({"density": 7000.0} if density else {"mass": 2.0}))
@@ -176,6 +175,12 @@ def test_solids_have_the_moments_of_the_same_in_python(tmp_path, space, form, so
     assert not center.any()
     tensor = expected.tensor[2, 2] if space == "planar" else expected.tensor
     np.testing.assert_allclose(inertia, tensor, rtol=1e-15)
+
+
+@pytest.mark.parametrize("form", ["solid: disc, radius: L", "solid: rod, length: 20 cm"])
+def test_solids_without_a_volume_have_no_density(tmp_path, form):
+    with pytest.raises(jn.MechanismFileError, match=r"bodies\.a\.inertia\.density: unknown key"):
+        written(tmp_path, "planar", "{}", bodies=f"{{a: {{inertia: {{{form}, density: 7 g/cm^3}}}}}}")
 
 
 def test_solids_follow_the_parameters(tmp_path):

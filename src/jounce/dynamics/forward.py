@@ -5,18 +5,17 @@ their coefficient k is affine in the unknowns ``(q''[k], lambda[k])``, with the 
 ``[[M, Phi_q^T], [Phi_q, 0]]`` at every order: the "hyper-dynamic" equations that Sommer 2024, section 7, announces.
 """
 
-import math
 from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from jounce.dynamics.constraint_forces import inertia_forces
+from jounce.dynamics.loads import inertia_forces, mass_matrices
 from jounce.jet import Jet
 from jounce.jet.algebra import total
 from jounce.jet.series import Recursion
-from jounce.kinematics.linear import DenseFactor
+from jounce.kinematics.linear import factor_type
 from jounce.mechanism.system import System
 from jounce.rigid import PlanarPose, SpatialPose
 from jounce.rigid.spatial import body_axes, quaternion_spins
@@ -83,12 +82,13 @@ class Equations(eqx.Module):
         """Number of coordinates of a body."""
         return self.pose_type.shifts + self.pose_type.turns
 
-    def pose(self, state: State, *higher: tuple[Any, Any]) -> Any:
-        """Return the pose of all bodies, the ground first, with velocities and with accelerations where given."""
-        pose = self.still(state.position, state.attitude)
-        for k, (shift, turn) in enumerate([(state.velocity, state.spin), *higher], 1):
-            pose = pose.extended(grounded(shift) / math.factorial(k), grounded(turn) / math.factorial(k))
-        return pose
+    def pose(self, state: State) -> Any:
+        """Return the pose of all bodies, the ground first, with velocities."""
+        return self.extended(self.still(state.position, state.attitude), state.velocity, state.spin)
+
+    def extended(self, pose: Any, shift: Any, turn: Any) -> Any:
+        """Return a pose with one more Taylor coefficient of the moving bodies."""
+        return pose.extended(grounded(shift), grounded(turn))
 
     def still(self, position: Any, attitude: Any) -> Any:
         """Return the pose of order zero of all bodies, the ground first."""
@@ -119,22 +119,21 @@ class Equations(eqx.Module):
             Of the shape of the attitude.
         """
         shifts = self.pose_type.shifts
-        pose = self.pose(state, (acceleration[:shifts], acceleration[shifts:]))
+        still = self.still(state.position, state.attitude)  # made once: what repeats is summed once, if it is the same
+        moving = self.extended(still, state.velocity, state.spin)
+        pose = self.extended(moving, acceleration[:shifts] / 2.0, acceleration[shifts:] / 2.0)
         clock = Jet.variable(time, 2)
         second = 2.0 * self.system.residual(pose, clock).dense().coefficients[2]
         force, moment = inertia_forces(pose, self.mass, self.center, self.moments, self.gravity)
         inertia = jnp.concatenate([force.coefficients[0], moment.coefficients[0]])[:, 1:]
-        still, now = self.still(state.position, state.attitude), clock.truncate(0)
+        now = clock.truncate(0)
 
         def loosened(change: Any) -> Any:
             return jax.jvp(lambda p: self.system.residual(p, now).coefficients[0], (still,), (change,))[1]
 
         forces = inertia / self.scale + conjugate(loosened, still, multipliers)[:, 1:]
-        moving = self.pose(state)
-        for group in self.system.forces:
-            force = group.force(moving, clock.truncate(1)).coefficients[0]
-            along = conjugate(lambda c, g=group: g.variation(still, c, now).coefficients[0], still, force)
-            forces = forces - along[:, 1:] / self.scale
+        applied = self.system.applied_forces(moving, clock.truncate(1)).coefficients[0]
+        forces = forces - applied[:, 1:] / self.scale
         return forces, second, self._attitude_rate(state)
 
     def _attitude_rate(self, state: State) -> Any:
@@ -154,20 +153,11 @@ class Equations(eqx.Module):
 
     def mass_matrix(self, state: State) -> Any:
         """Return the mass matrix over the scale of the masses, scaled, shape (columns, columns, batch)."""
-        shifts, count = self.pose_type.shifts, self.coordinates
-        pose = self.pose(state.map(jnp.asarray))
-        bodies, lanes = state.position.shape[1:]
-
-        def inertia(direction: Any) -> Any:
-            whole = jnp.broadcast_to(direction[:, None, None], (count, bodies, lanes))
-            accelerated = pose.extended(0.5 * grounded(whole[:shifts]), 0.5 * grounded(whole[shifts:]))
-            parts = inertia_forces(accelerated, self.mass, self.center, self.moments, self.gravity)
-            return jnp.concatenate([part.coefficients[0] for part in parts])[:, 1:]
-
-        zero = inertia(jnp.zeros(count))
+        count, bodies, lanes = self.coordinates, *state.position.shape[1:]
+        pose = self.still(state.position, state.attitude)
+        blocks = mass_matrices(pose, self.mass, self.center, self.moments)[:, :, 1:]
         scale = jnp.asarray(self.system.column_scale)
-        blocks = jax.vmap(inertia, out_axes=1)(jnp.diag(scale)) - zero[:, None]  # out, in, bodies, batch
-        blocks = blocks * (scale / self.scale)[:, None, None, None]
+        blocks = blocks * (scale[:, None] * scale[None] / self.scale)[:, :, None, None]
         whole = jnp.eye(bodies)[:, None, :, None, None] * jnp.moveaxis(blocks, 2, 0)[:, :, None]
         return whole.reshape(bodies * count, bodies * count, lanes)
 
@@ -238,8 +228,8 @@ def expand(equations: Equations, state: State, time: Any, order: int) -> Expansi
     order : int
         Highest coefficient of positions and velocities, at least 1.
     """
-    inverse = DenseFactor.of(equations.matrix(state, time)).inverse()
     count, bodies, lanes = equations.coordinates, *state.position.shape[1:]
+    inverse = factor_type(lanes).of(equations.matrix(state, time)).inverse()
     columns, rows = count * bodies, equations.system.row_scale.shape[0]
 
     def program(*leaves: Any) -> Any:
@@ -298,5 +288,5 @@ def least_change(equations: Equations, state: State, time: Any, gap: Any) -> Any
         Of the scaled rows, to first order.
     """
     columns = equations.system.cells.shape[1]
-    factor = DenseFactor.of(equations.matrix(state, time))
+    factor = factor_type(time.shape[-1]).of(equations.matrix(state, time))
     return equations.bodies(factor.solve(-jnp.concatenate([jnp.zeros((columns, gap.shape[-1])), gap]))[:columns])

@@ -8,24 +8,21 @@ from typing import Any
 
 import jax
 import numpy as np
-from jax.core import Tracer
 
-from jounce.dynamics.energies import gravity_of, masses_of
-from jounce.dynamics.forward import Equations, State
-from jounce.dynamics.start import driven, start, with_rates
+from jounce.dynamics.forward import State
+from jounce.dynamics.start import driven, start
 from jounce.errors import MechanismError, did_you_mean
-from jounce.integrate.events import output_series
-from jounce.integrate.marching import Outcome, departed, march
+from jounce.integrate.events import output_series, pose_coordinates
+from jounce.integrate.family import Family, Starts
+from jounce.integrate.marching import Front, Outcome, Steps, departed, march
 from jounce.integrate.methods import AbstractMethod
-from jounce.integrate.projection import projected
-from jounce.integrate.simulate import STEPS, checked, instants_of
-from jounce.integrate.simulation import continuous, expanded, pose_coordinates
+from jounce.integrate.simulate import checked, instants_of
+from jounce.integrate.simulation import expanded
 from jounce.kinematics import Status
-from jounce.kinematics.compilation import compiled
-from jounce.mechanism import Mechanism, Model, build
+from jounce.mechanism import Mechanism, build
 
 LANES = 64  # runs marched together: more fall out of the cache
-STAGES = 8  # in which parameters go from those of the first run to their own, so that positions follow
+STEPS = 16  # tried before runs that have ended make room for others
 
 
 @dataclasses.dataclass(frozen=True)
@@ -108,23 +105,24 @@ def simulate_batch(
     order, method = checked(order, method, tolerance, longest_step)
     instants = instants_of(mechanism.time if time is None else time, first.parameter_values)
     nominal = start(first, float(instants[0]))
-    family = _Family(first, nominal.model, names)
-    begun = _Family(driven(first), build(driven(first)), names) if first.initial else family
+    family = Family(first, nominal.model, names)
+    begun = Family(driven(first), build(driven(first)), names) if first.initial else family
+    runs = _Runs(family, rows, instants, order, (float(tolerance), float(longest_step), method))
 
-    def run(lanes: np.ndarray) -> Any:
-        state = _started(begun, nominal.state, rows[0], rows[lanes], float(instants[0]))
-        return _marched(family, rows[lanes], state, instants, order, method, float(tolerance), float(longest_step))
+    starts = Starts(begun, nominal.state, rows, float(instants[0]))
 
-    count = len(rows)
-    width = min(LANES, 1 << (count - 1).bit_length())
-    chunks = [np.minimum(np.arange(k, k + width), count - 1) for k in range(0, count, width)]
-    with ThreadPoolExecutor(min(len(chunks), os.cpu_count() or 1)) as pool:  # XLA works outside of Python's lock
-        parts = [run(chunks[0]), *pool.map(run, chunks[1:])]
-    outputs, status, steps = (
-        jax.tree.map(lambda *xs: np.concatenate(xs)[:count], *p) for p in zip(*parts, strict=True)
-    )
-    ordered = {name: outputs[name] for name in mechanism.outputs if name in outputs}
-    return Batch(instants, values, ordered, status, steps)
+    def depart(some: np.ndarray) -> None:
+        runs.depart(some, starts.of(some))
+
+    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:  # XLA works outside of Python's lock
+        lots = runs.lots(np.arange(len(rows)))
+        depart(lots[0])  # compiles, once for all threads; so does the first advance
+        list(pool.map(depart, lots[1:]))
+        if len(runs.moving):
+            runs.advance(runs.lots(runs.moving)[0])
+        while len(runs.moving):
+            list(pool.map(runs.advance, runs.lots(runs.moving)))
+    return Batch(instants, values, runs.outputs, runs.status, runs.steps)
 
 
 def _checked_parameters(mechanism: Mechanism, parameters: Mapping[str, Any]) -> dict[str, np.ndarray]:
@@ -150,127 +148,151 @@ def _checked_parameters(mechanism: Mechanism, parameters: Mapping[str, Any]) -> 
     return values
 
 
-class _Family:
-    """A mechanism whose values follow from parameters: those that do have one entry for each run, last."""
+class _Runs:
+    """The runs of a batch on their way; those that still move are marched side by side, however far they are.
 
-    def __init__(self, mechanism: Mechanism, model: Model, names: tuple[str, ...]):
-        self.mechanism, self.model, self.names = mechanism, model, names
-        self.scale = np.float64(np.max(masses_of(mechanism)[0]))
-        self._moved: list[bool] = []
-        self._leaves, self._structure = jax.tree.flatten(self._made(mechanism, model))
+    What is asked for is kept, not the steps: derivatives at the instants follow from the equations of motion there.
+    """
 
-    def _made(self, mechanism: Mechanism, model: Model) -> tuple[Equations, Any]:
-        system = dataclasses.replace(model.system, outputs=())
-        masses, gravity = masses_of(mechanism), gravity_of(mechanism)
-        return Equations(system, *masses, gravity, self.scale, model.pose_type), model.system.outputs
+    def __init__(
+        self,
+        family: Family,
+        rows: np.ndarray,
+        instants: np.ndarray,
+        order: int,
+        settings: tuple[float, float, AbstractMethod],
+    ):
+        self.family, self.instants, self.order, self.settings = family, instants, order, settings
+        self.width = min(LANES, 1 << (len(rows) - 1).bit_length())
+        self.steps = np.zeros(len(rows), int)
+        self._made = family.of(rows)
+        self._reached = np.zeros((len(rows), len(instants)), bool)
+        self._sense = 1.0 if instants[-1] >= instants[0] else -1.0
+        lost = max((output.lost_orders for output in family.mechanism.outputs.values()), default=0)
+        self._expansion = max(order + max(lost, 1), 2)  # turns of angles are counted by two derivatives
+        self._front: Any = None
+        self._values: dict[int, np.ndarray] = {}  # of each group, (runs, time, order + 1, components, outputs)
+        self._begun = np.full(len(rows), instants[0])  # the time at which the last step began
+        self._angles: dict[int, np.ndarray] = {}  # the series of turning outputs there
 
-    def of(self, rows: np.ndarray) -> tuple[Equations, Any]:
-        """Return equations of motion and outputs for values of the parameters, (runs, parameters)."""
+    @property
+    def moving(self) -> np.ndarray:
+        """The runs that are still on their way."""
+        return np.flatnonzero((self._front.outcome == Outcome.RUNNING) & (len(self.instants) > 1))
 
-        def one(row: Any) -> list[Any]:
-            varied = self.mechanism.with_parameters(**dict(zip(self.names, row, strict=True)))
-            leaves = jax.tree.leaves(self._made(varied, build(varied, like=self.model)))
-            self._moved = [isinstance(leaf, Tracer) for leaf in leaves]
-            return [leaf for leaf in leaves if isinstance(leaf, Tracer)]
+    @property
+    def status(self) -> np.ndarray:
+        """See `Batch`."""
+        status = np.where(self._reached, int(Status.OK), int(Status.NOT_REACHED))
+        stuck = np.flatnonzero(~self._reached.all(axis=1))
+        status[stuck, np.argmin(self._reached[stuck], axis=1)] = int(Status.COLLAPSED)
+        return status
 
-        varied = iter(jax.vmap(one, out_axes=-1)(rows))
-        pairs = zip(self._leaves, self._moved, strict=True)
-        leaves = [np.asarray(next(varied))[..., 0, :] if moved else leaf for leaf, moved in pairs]
-        return jax.tree.unflatten(self._structure, leaves)
+    @property
+    def outputs(self) -> dict[str, np.ndarray]:
+        """See `Batch`."""
+        factorials = np.cumprod([1.0, *range(1, self.order + 1)])[:, None]
+        found = {}
+        for which, values in self._values.items():
+            for k, name in enumerate(self.family.model.outputs[which]):
+                derivatives = values[..., k] * factorials[: values.shape[2]]
+                found[name] = derivatives[..., 0] if derivatives.shape[-1] == 1 else derivatives
+        return {name: found[name] for name in self.family.mechanism.outputs if name in found}
+
+    def lots(self, runs: np.ndarray) -> list[np.ndarray]:
+        """Return runs in lots of one size; the last repeats its last run."""
+        return [runs[np.minimum(np.arange(k, k + self.width), len(runs) - 1)] for k in range(0, len(runs), self.width)]
+
+    def depart(self, runs: np.ndarray, state: State) -> None:
+        """Set runs off from states on the constraints."""
+        equations, _ = self.family.picked(self._made, runs)
+        tolerance, _, method = self.settings
+        time = np.full(len(runs), self.instants[0])
+        front = departed(equations, state, time, order=method.expansion_order(tolerance))
+        front = jax.tree.map(np.asarray, front)
+        if self._front is None:
+            self._front = jax.tree.map(lambda x: np.zeros((*x.shape[:-1], len(self.steps)), x.dtype), front)
+        self._put(runs, front)
+        self._note(runs, np.zeros(len(runs), int), front.expansion.state, time, {})
+        lost = runs[front.outcome == Outcome.LOST]
+        self._reached[lost] = False
+        for values in self._values.values():
+            values[lost] = np.nan
+
+    def advance(self, runs: np.ndarray) -> None:
+        """March runs by some steps, and note what they pass."""
+        equations, _ = self.family.picked(self._made, runs)
+        tolerance, longest, method = self.settings
+        front = jax.tree.map(lambda x: x[..., runs], self._front)
+        found = march(equations, front, self.instants[-1], tolerance, longest, method=method, count=STEPS)
+        front, steps, tried = jax.tree.map(np.asarray, found)
+        self._put(runs, front)
+        self.steps[runs] += steps.taken.sum(axis=0)
+        angles = self._counted(runs, steps, int(tried))
+        begin, now = self._sense * steps.start, self._sense * self.instants
+        end = self._sense * front.time + 1e-14 * np.abs(front.time)
+        near = np.flatnonzero((now >= begin[0].min()) & (now <= end.max()))
+        passed = steps.taken & (begin <= now[near, None, None])  # instants, steps, runs
+        step = passed.shape[1] - 1 - np.argmax(passed[:, ::-1], axis=1)
+        instant, lane = np.nonzero(passed.any(axis=1) & (now[near, None] <= end))
+        step = step[instant, lane]
+        polynomial = State(*(np.moveaxis(part[step, ..., lane], 0, -1) for part in steps.polynomial))
+        before = {which: series[..., step, lane] for which, series in angles.items()}
+        self._note(runs[lane], near[instant], polynomial, steps.start[step, lane], before)
+
+    def _put(self, runs: np.ndarray, front: Front) -> None:
+        for whole, part in zip(jax.tree.leaves(self._front), jax.tree.leaves(front), strict=True):
+            whole[..., runs] = part
+
+    def _counted(self, runs: np.ndarray, steps: Steps, tried: int) -> dict[int, np.ndarray]:
+        """Return the series of turning outputs where steps begin, turns counted on, steps and runs last."""
+        found = {}
+        time = np.concatenate([self._begun[runs][None], steps.start[:tried]])
+        self._begun[runs] = time[-1]
+        _, outputs = self.family.picked(self._made, np.tile(runs, len(steps.start)))
+        for which, group in enumerate(outputs):
+            if group.element.turning:
+                parts = (np.moveaxis(part[:, :3], 0, -2) for part in steps.polynomial)
+                state = State(*(part.reshape(*part.shape[:-2], -1) for part in parts))
+                series = np.array(output_series(group, pose_coordinates(state), self.family.model.pose_type))
+                series = series.reshape(*series.shape[:-1], *steps.start.shape)[..., :tried, :]
+                last = self._angles.setdefault(which, np.full((*series.shape[:-2], len(self.steps)), np.nan))
+                whole = np.concatenate([last[..., runs][..., None, :], series], axis=-2)
+                series[0] -= np.cumsum(turned(whole[..., :-1, :], whole[..., 1:, :], np.diff(time, axis=0)), axis=-2)
+                last[..., runs] = series[..., -1, :]
+                found[which] = series
+        return found
+
+    def _note(
+        self, runs: np.ndarray, at: np.ndarray, polynomial: State, begin: np.ndarray, before: dict[int, np.ndarray]
+    ) -> None:
+        """Keep the outputs of runs at instants, given by number, a time into steps that began at others."""
+        for lanes in self.lots(np.arange(len(runs))):
+            equations, outputs = self.family.picked(self._made, runs[lanes])
+            time = self.instants[at[lanes]]
+            since = time - begin[lanes]
+            started = State(*(part[..., lanes] for part in polynomial))
+            coordinates = pose_coordinates(expanded(equations, started, since, time, order=self._expansion))
+            for which, group in enumerate(outputs):
+                series = np.array(output_series(group, coordinates, self.family.model.pose_type))
+                if which in before:
+                    series[0] -= turned(before[which][..., lanes], series, since)
+                values = np.moveaxis(series[: self.order + 1], -1, 0)
+                if which not in self._values:
+                    self._values[which] = np.full((*self._reached.shape, *values.shape[1:]), np.nan)
+                self._values[which][runs[lanes], at[lanes]] = values
+            self._reached[runs[lanes], at[lanes]] = True
 
 
-def _started(begun: _Family, state: State, first: Any, rows: np.ndarray, instant: float) -> State:
-    """Return consistent states of runs: positions followed from those of the first run, least velocities."""
-    lanes, clock = len(rows), np.full((1, len(rows)), instant)
-    state = State(*(np.repeat(np.asarray(part), lanes, axis=-1) for part in state))
-    state = state._replace(velocity=np.zeros_like(state.velocity), spin=np.zeros_like(state.spin))
-    equations, _ = begun.of(rows)
-    for stage in range(1, STAGES + 1):
-        nearer, _ = begun.of(first + (rows - first) * (stage / STAGES))
-        state = _followed(nearer, state, clock)
-        state = state._replace(velocity=np.zeros_like(state.velocity), spin=np.zeros_like(state.spin))
-    return jax.tree.map(np.asarray, with_rates(equations, state, clock))
+def turned(before: np.ndarray, after: np.ndarray, since: np.ndarray) -> np.ndarray:
+    """Return the whole turns, in rad, by which an angle is too far ahead of an earlier one and of its derivatives.
 
-
-@compiled()
-def _followed(equations: Equations, state: State, clock: Any) -> State:
-    return projected(equations, state, clock)[0]
-
-
-def _marched(
-    family: _Family,
-    rows: np.ndarray,
-    state: State,
-    instants: np.ndarray,
-    order: int,
-    method: AbstractMethod,
-    tolerance: float,
-    longest: float,
-) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray]:
-    """Return outputs, status and numbers of steps of some runs."""
-    equations, outputs = family.of(rows)
-    lanes, stop = len(rows), instants[-1]
-    lost = max((o.lost_orders for o in family.mechanism.outputs.values()), default=0)
-    front = departed(equations, state, np.full(lanes, instants[0]), order=method.expansion_order(tolerance))
-    sense = 1.0 if stop >= instants[0] else -1.0
-    shape = (len(instants), lanes)
-    found: Any = None
-    step, reached = np.zeros(shape), np.zeros(shape, bool)
-    count = np.zeros(lanes, int)
-    if len(instants) == 1:
-        found = jax.tree.map(lambda x: np.asarray(x)[None], front.expansion.state)
-        reached[:] = np.asarray(front.outcome) != Outcome.LOST
-    while (np.asarray(front.outcome) == Outcome.RUNNING).any() and len(instants) > 1:
-        front, steps, tried = march(equations, front, stop, tolerance, longest, method=method, count=STEPS)
-        start, length, taken, polynomial = jax.tree.map(lambda x, n=int(tried): np.asarray(x)[:n], steps)
-        if found is None:
-            found = jax.tree.map(lambda x: np.zeros((len(instants), *x.shape[1:])), polynomial)
-        count += taken.sum(axis=0)
-        for lane in range(lanes):
-            mine = np.flatnonzero(taken[:, lane])
-            if not len(mine):
-                continue
-            begin, end = start[mine, lane], start[mine[-1], lane] + length[mine[-1], lane]
-            inside = (sense * instants >= sense * begin[0]) & (sense * instants <= sense * end + 1e-14 * abs(end))
-            which = np.flatnonzero(inside)
-            chosen = mine[np.searchsorted(sense * begin, sense * instants[which], side="right") - 1]
-            step[which, lane], reached[which, lane] = instants[which] - start[chosen, lane], True
-            for whole, part in zip(found, polynomial, strict=True):
-                whole[which, ..., lane] = part[chosen, ..., lane]
-    states = [
-        expanded(
-            equations,
-            State(*(part[k] for part in found)),
-            step[k],
-            np.full(lanes, instants[k]),
-            order=order + max(lost, 1),
-        )
-        for k in range(len(instants))
-    ]
-    whole = jax.tree.map(lambda *xs: np.stack([np.asarray(x) for x in xs], axis=-2), *states)
-    results = _outputs(family, outputs, whole, instants, order, reached)
-    status = np.where(reached, int(Status.OK), int(Status.NOT_REACHED)).T
-    stuck = ~reached.all(axis=0)
-    status[stuck, np.argmin(reached[:, stuck], axis=0)] = int(Status.COLLAPSED)
-    return results, status, count
-
-
-def _outputs(
-    family: _Family, outputs: Any, state: State, instants: np.ndarray, order: int, reached: np.ndarray
-) -> dict[str, np.ndarray]:
-    """Return the outputs with derivatives, (runs, time, order + 1[, component])."""
-    times, lanes = reached.shape
-    flat = State(*(part.reshape(*part.shape[:-2], times * lanes) for part in state))
-    coordinates = pose_coordinates(flat)
-    results = {}
-    for group, names in zip(outputs, family.model.outputs, strict=True):
-        wide = jax.tree.map(lambda x: np.tile(x, times) if np.shape(x)[-1:] == (lanes,) and lanes > 1 else x, group)
-        series = np.array(output_series(wide, coordinates, family.model.pose_type))[: order + 1]
-        series = np.moveaxis(series.reshape(*series.shape[:-1], times, lanes), -1, -2)  # the time last
-        series = continuous(group, series, instants)
-        factorials = np.cumprod([1.0, *range(1, len(series))])
-        for k, name in enumerate(names):
-            values = np.moveaxis(series[:, :, k] * factorials[:, None, None, None], (2, 3, 0, 1), (0, 1, 2, 3))
-            values = np.where(reached.T[:, :, None, None], values, np.nan)
-            results[name] = values[..., 0] if values.shape[-1] == 1 else values
-    return results
+    Parameters
+    ----------
+    before, after : array of shape (order + 1, ...)
+        Taylor coefficients of the angle, to the second at least; where `before` is NaN, no turns are counted.
+    since : array
+        Time from the one to the other, s.
+    """
+    rise = since / 2 * (before[1] + after[1]) + since**2 / 6 * (before[2] - after[2])
+    return 2 * np.pi * np.nan_to_num(np.round((after[0] - before[0] - rise) / (2 * np.pi)))

@@ -168,19 +168,19 @@ class Taylor(AbstractMethod):
             return super().prepared(expansion, length, tolerance)
         sizes = coefficient_sizes(expansion, length)
         orders = np.arange(1, len(sizes) + 1)
-        roots = jnp.power(jnp.maximum(sizes, 1e-300), -1.0 / orders[:, None])
+        roots = -jnp.log(jnp.maximum(sizes, 1e-300)) / orders[:, None]  # logarithms: powers would cost far more
         cuts = np.arange(LOWEST_ORDER, len(sizes))[:, None]
         counted = (orders >= (cuts + 1) // 2) & (orders <= cuts + 1)  # the upper half of what is kept, and the next
         reaches = jnp.min(jnp.where(counted[:, :, None], roots[None], jnp.inf), axis=1)
         allowed = jnp.where(_drowned(sizes), jnp.maximum(tolerance, ROUGH), tolerance)
-        steps = reaches * jnp.power(allowed[None], 1.0 / (cuts + 1.0))
+        steps = reaches + jnp.log(allowed)[None] / (cuts + 1.0)
         best = jnp.argmax(steps, axis=0)
         kept = np.arange(len(sizes))[:, None] <= best[None] + LOWEST_ORDER  # of the coefficients from zero on
 
         def cut(part: Any) -> Any:
             return jnp.where(kept[:, None, None], part, 0.0)
 
-        return expansion._replace(state=expansion.state.map(cut)), jnp.max(steps, axis=0), allowed
+        return expansion._replace(state=expansion.state.map(cut)), jnp.exp(jnp.max(steps, axis=0)), allowed
 
     def arrive(self, equations: Equations, expansion: Expansion, time: Any, step: Any) -> State:
         """Return the value of the series."""

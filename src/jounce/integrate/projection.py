@@ -7,7 +7,7 @@ import jax.numpy as jnp
 
 from jounce.dynamics.forward import Equations, State, grounded
 from jounce.jet import Jet
-from jounce.kinematics.linear import DenseFactor
+from jounce.kinematics.linear import factor_type
 
 MOST_ITERATIONS = 10
 ROUNDING = 1e-15  # a correction this small, in rad or sizes of the mechanism, leaves nothing to correct
@@ -34,11 +34,12 @@ def projected(equations: Equations, state: State, time: Any) -> tuple[State, Any
     distance : array of shape (batch,)
         Size of the first correction of positions, rad or sizes of the mechanism; not finite where it failed.
     """
-    clock = Jet([time])
+    clock, lanes = Jet([time]), time.shape[-1]
+    linear = factor_type(lanes)
     position, attitude = state.position, normalised(state.attitude)
 
     def correction(position: Any, attitude: Any) -> tuple[Any, Any]:
-        factor = DenseFactor.of(equations.matrix(state._replace(position=position, attitude=attitude), time))
+        factor = linear.of(equations.matrix(state._replace(position=position, attitude=attitude), time))
         gap = equations.system.residual(equations.still(position, attitude), clock).coefficients[0]
         return factor, gap
 
@@ -61,8 +62,7 @@ def projected(equations: Equations, state: State, time: Any) -> tuple[State, Any
         return jnp.any((size > 1e-9) & jnp.isfinite(size)) & (count < MOST_ITERATIONS) | (count == 0)
 
     size = equations.system.cells.shape
-    lanes = time.shape[-1]
-    blank = DenseFactor.blank((sum(size), sum(size)), lanes)
+    blank = linear.blank((sum(size), sum(size)), lanes)
     start = (position, attitude, blank, jnp.full(lanes, jnp.inf), jnp.zeros(lanes), 0)
     position, attitude, factor, last, first, _ = jax.lax.while_loop(unfinished, iterate, start)
     moving = state._replace(position=position, attitude=attitude)
@@ -73,7 +73,7 @@ def projected(equations: Equations, state: State, time: Any) -> tuple[State, Any
     return moving, jnp.where(last <= 1e-9, first, jnp.inf)
 
 
-def solved(factor: DenseFactor, equations: Equations, gap: Any) -> Any:
+def solved(factor: Any, equations: Equations, gap: Any) -> Any:
     """Return the least change of coordinates that closes a gap of the rows, as a scaled column."""
     columns = equations.system.cells.shape[1]
     return factor.solve(-jnp.concatenate([jnp.zeros((columns, gap.shape[-1])), gap]))[:columns]

@@ -1,0 +1,99 @@
+"""One mechanism with many values of its parameters: the equations of motion and the starts of all runs of a batch."""
+
+import dataclasses
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
+
+from jounce.dynamics.energies import gravity_of, masses_of
+from jounce.dynamics.forward import Equations, State
+from jounce.dynamics.start import with_rates
+from jounce.integrate.projection import projected
+from jounce.kinematics.compilation import compiled
+from jounce.mechanism import Mechanism, Model, build
+
+STAGES = 8  # in which parameters go from those of the first run to their own, so that positions follow
+
+
+class Family:
+    """A mechanism whose values follow from parameters: those that do have one entry for each run, last.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        With the values of one run.
+    model : Model
+        Built from it.
+    names : tuple of str
+        Parameters in which the runs differ.
+    """
+
+    def __init__(self, mechanism: Mechanism, model: Model, names: tuple[str, ...]):
+        self.mechanism, self.model, self.names = mechanism, model, names
+        self.scale = np.float64(np.max(masses_of(mechanism)[0]))
+        self._moved: list[bool] = []
+        self._leaves, self._structure = jax.tree.flatten(self._made(mechanism, model))
+
+    def _made(self, mechanism: Mechanism, model: Model) -> tuple[Equations, Any]:
+        system = dataclasses.replace(model.system, outputs=())
+        masses, gravity = masses_of(mechanism), gravity_of(mechanism)
+        return Equations(system, *masses, gravity, self.scale, model.pose_type), model.system.outputs
+
+    def of(self, rows: np.ndarray) -> tuple[Equations, Any]:
+        """Return equations of motion and outputs for values of the parameters, (runs, parameters)."""
+
+        def one(row: Any) -> list[Any]:
+            varied = self.mechanism.with_parameters(**dict(zip(self.names, row, strict=True)))
+            leaves = jax.tree.leaves(self._made(varied, build(varied, like=self.model)))
+            self._moved = [isinstance(leaf, Tracer) for leaf in leaves]
+            return [leaf for leaf in leaves if isinstance(leaf, Tracer)]
+
+        varied = iter(jax.vmap(one, out_axes=-1)(rows))
+        pairs = zip(self._leaves, self._moved, strict=True)
+        leaves = [np.asarray(next(varied))[..., 0, :] if moved else leaf for leaf, moved in pairs]
+        return jax.tree.unflatten(self._structure, leaves)
+
+    def picked(self, made: tuple[Equations, Any], runs: np.ndarray) -> tuple[Equations, Any]:
+        """Return what `of` returned for all runs, for some of them."""
+        pairs = zip(jax.tree.leaves(made), self._moved, strict=True)
+        return jax.tree.unflatten(self._structure, [leaf[..., runs] if moved else leaf for leaf, moved in pairs])
+
+
+class Starts:
+    """Consistent states of runs at the start: positions followed from those of the first run, least velocities.
+
+    Parameters
+    ----------
+    begun : Family
+        With the initial conditions as drivers.
+    state : State
+        Of the first run.
+    rows : array of shape (runs, parameters)
+        The parameters of all.
+    instant : float
+        s.
+    """
+
+    def __init__(self, begun: Family, state: State, rows: np.ndarray, instant: float):
+        self._begun, self._state, self._instant = begun, state, instant
+        change = (rows - rows[0]) / STAGES
+        self._stages = [begun.of(rows[0] + stage * change) for stage in range(1, STAGES)] + [begun.of(rows)]
+
+    def of(self, runs: np.ndarray) -> State:
+        """Return the states of some runs."""
+        clock = np.full((1, len(runs)), self._instant)
+        still = self._state._replace(velocity=np.zeros_like(self._state.velocity), spin=np.zeros_like(self._state.spin))
+        state = State(*(np.repeat(np.asarray(part), len(runs), axis=-1) for part in still))
+        for made in self._stages:
+            equations, _ = self._begun.picked(made, runs)
+            state = _followed(equations, state, clock)
+        return jax.tree.map(np.asarray, with_rates(equations, state, clock))
+
+
+@compiled()
+def _followed(equations: Equations, state: State, clock: Any) -> State:
+    followed = projected(equations, state, clock)[0]
+    return followed._replace(velocity=jnp.zeros_like(state.velocity), spin=jnp.zeros_like(state.spin))
