@@ -214,7 +214,7 @@ def multiplied(matrix: Any, column: Any) -> Any:
     return jax.lax.fori_loop(0, count, added, jnp.zeros((rows, lanes)))
 
 
-def expand(equations: Equations, state: State, time: Any, order: int) -> Expansion:
+def expand(equations: Equations, state: State, time: Any, order: int, inverse: Any = None) -> Expansion:
     """Return the Taylor coefficients of the motion through a state, to an order.
 
     Parameters
@@ -227,9 +227,12 @@ def expand(equations: Equations, state: State, time: Any, order: int) -> Expansi
         The instant, s.
     order : int
         Highest coefficient of positions and velocities, at least 1.
+    inverse : array of shape (rows, rows, batch), optional
+        Of the equations' matrix at this state, where it is known.
     """
     count, bodies, lanes = equations.coordinates, *state.position.shape[1:]
-    inverse = factor_type(lanes).of(equations.matrix(state, time)).inverse()
+    if inverse is None:
+        inverse = factor_type(lanes).of(equations.matrix(state, time)).inverse()
     columns, rows = count * bodies, equations.system.row_scale.shape[0]
 
     def program(*leaves: Any) -> Any:

@@ -107,8 +107,8 @@ def march(
         time = jnp.where(running, time, front.time)
 
         state = method.arrive(equations, start, front.time, step)
-        state, distance = projected(equations, state, time[None])
-        expansion = _kept(expand(equations, state, time[None], order))
+        state, distance, inverse = projected(equations, state, time[None])
+        expansion = _kept(expand(equations, state, time[None], order, inverse))
         error = method.error(start, expansion, step, length)
         good = _finite(expansion) & jnp.isfinite(distance) & (error <= MARGIN * allowed) & running
         tiny = jnp.abs(step) < SMALLEST_STEP * jnp.maximum(jnp.abs(front.time), jnp.abs(stop - front.time))

@@ -167,7 +167,7 @@ class Taylor(AbstractMethod):
         if self.step is not None:
             return super().prepared(expansion, length, tolerance)
         sizes = coefficient_sizes(expansion, length)
-        orders = np.arange(1, len(sizes) + 1)
+        orders = np.arange(1.0, len(sizes) + 1)
         roots = -jnp.log(jnp.maximum(sizes, 1e-300)) / orders[:, None]  # logarithms: powers would cost far more
         cuts = np.arange(LOWEST_ORDER, len(sizes))[:, None]
         counted = (orders >= (cuts + 1) // 2) & (orders <= cuts + 1)  # the upper half of what is kept, and the next

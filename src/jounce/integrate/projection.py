@@ -10,10 +10,11 @@ from jounce.jet import Jet
 from jounce.kinematics.linear import factor_type
 
 MOST_ITERATIONS = 10
+CLOSE = 4e-15  # so near to where the matrix was inverted, in the same unit, the inverse is the same but for rounding
 ROUNDING = 1e-15  # a correction this small, in rad or sizes of the mechanism, leaves nothing to correct
 
 
-def projected(equations: Equations, state: State, time: Any) -> tuple[State, Any]:
+def projected(equations: Equations, state: State, time: Any) -> tuple[State, Any, Any]:
     """Return the nearest state that fulfils the constraints and their rates, and how far positions moved.
 
     The correction of positions is that of least kinetic energy, were it a velocity; that of velocities likewise.
@@ -33,6 +34,8 @@ def projected(equations: Equations, state: State, time: Any) -> tuple[State, Any
         With Euler parameters of unit length.
     distance : array of shape (batch,)
         Size of the first correction of positions, rad or sizes of the mechanism; not finite where it failed.
+    inverse : array of shape (rows, rows, batch)
+        Of the equations' matrix at this state, which `expand` takes.
     """
     clock, lanes = Jet([time]), time.shape[-1]
     linear = factor_type(lanes)
@@ -70,7 +73,12 @@ def projected(equations: Equations, state: State, time: Any) -> tuple[State, Any
     change = equations.bodies(solved(factor, equations, rate))
     shifts = equations.pose_type.shifts
     moving = moving._replace(velocity=state.velocity + change[:shifts], spin=state.spin + change[shifts:])
-    return moving, jnp.where(last <= 1e-9, first, jnp.inf)
+    inverse = jax.lax.cond(
+        jnp.all(last <= CLOSE),
+        lambda: factor.inverse(),
+        lambda: linear.of(equations.matrix(moving, time)).inverse(),
+    )
+    return moving, jnp.where(last <= 1e-9, first, jnp.inf), inverse
 
 
 def solved(factor: Any, equations: Equations, gap: Any) -> Any:

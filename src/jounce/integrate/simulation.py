@@ -190,8 +190,8 @@ def _at(equations: Equations, track: Track, instants: np.ndarray, chosen: np.nda
 @compiled("order")
 def expanded(equations: Equations, polynomial: State, step: Any, instants: Any, *, order: int) -> State:
     """Return the Taylor coefficients of the motion at instants a time `step` into steps, from the equations there."""
-    state, _ = projected(equations, evaluated(polynomial, step), instants[None])
-    return expand(equations, state, instants[None], order).state
+    state, _, inverse = projected(equations, evaluated(polynomial, step), instants[None])
+    return expand(equations, state, instants[None], order, inverse).state
 
 
 def continuous(group: Any, series: np.ndarray, instants: np.ndarray) -> np.ndarray:
