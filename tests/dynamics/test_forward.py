@@ -284,18 +284,7 @@ def test_lanes_of_a_batch_are_runs_of_their_own():
 
 
 def test_free_fall_has_no_higher_coefficients():
-    stone = jn.Mechanism(
-        space="planar",
-        gravity=[0.0, -9.81],
-        bodies={"stone": jn.Body([1.0, 2.0], 0.5, mass=3.0, inertia=0.4)},
-        joints={},
-        initial={
-            "x": drivers.CoordinateDriver(("ground", "stone"), "x", "1 + 2*t"),
-            "y": drivers.CoordinateDriver(("ground", "stone"), "y", "2 + 5*t"),
-            "turn": drivers.CoordinateDriver(("ground", "stone"), "angle", "0.5 - 3*t"),
-        },
-    )
-    _, found = expansion(stone, 8)
+    _, found = expansion(dynamics.thrown_stone(), 8)
     place = np.zeros((9, 2))
     place[:3] = [[1, 2], [2, 5], [0, -9.81 / 2]]
     assert np.allclose(found.state.position[..., 0, 0], place, rtol=1e-15, atol=1e-15)

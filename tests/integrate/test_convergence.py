@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce import drivers
 from jounce.dynamics.start import start
 from tests.problems import dynamics
 from tests.problems.marches import LENIENT, ends, marched, onwards, orders
@@ -15,7 +14,7 @@ METHODS = {  # steps in s, between those that are too long for the leading term 
     "Taylor 4": (jn.Taylor(4, step=BIG), [1 / 64, 1 / 96, 1 / 128]),
     "Taylor 5": (jn.Taylor(5, step=BIG), [1 / 64, 1 / 96, 1 / 128]),
     "Taylor 6": (jn.Taylor(6, step=BIG), [1 / 64, 1 / 96, 1 / 128]),
-    "Taylor 8": (jn.Taylor(8, step=BIG), [1 / 48, 1 / 64, 1 / 96]),
+    "Taylor 8": (jn.Taylor(8, step=BIG), [1 / 64, 1 / 80, 1 / 96]),
     "Taylor 10": (jn.Taylor(10, step=BIG), [1 / 32, 1 / 40, 1 / 48]),
     "Taylor 12": (jn.Taylor(12, step=BIG), [1 / 24, 1 / 32]),
     "Obreshkov 2": (jn.Obreshkov(2, step=BIG), [1 / 64, 1 / 96, 1 / 128]),
@@ -24,10 +23,12 @@ METHODS = {  # steps in s, between those that are too long for the leading term 
     "Obreshkov 8": (jn.Obreshkov(8, step=BIG), [1 / 24, 1 / 32, 1 / 40]),
 }
 QUICK = {("Taylor 8", "plane"), ("Obreshkov 4", "plane")}
+SPATIAL = ("Taylor 8", "Obreshkov 4", "Obreshkov 8")  # these stand for the others: programs in space compile for long
 CASES = [
     pytest.param(method, space, marks=() if (method, space) in QUICK else pytest.mark.slow)
     for method in METHODS
     for space in BODIES
+    if space == "plane" or method in SPATIAL
 ]
 STARTS: dict = {}
 
@@ -110,18 +111,7 @@ def test_the_trap_of_a_double_pendulum_at_horizontal_rest():
 
 
 def test_a_polynomial_motion_is_exact_in_one_step():
-    stone = jn.Mechanism(
-        space="planar",
-        gravity=[0.0, -9.81],
-        bodies={"stone": jn.Body([1.0, 2.0], 0.5, mass=3.0, inertia=0.4)},
-        joints={},
-        initial={
-            "x": drivers.CoordinateDriver(("ground", "stone"), "x", "1 + 2*t"),
-            "y": drivers.CoordinateDriver(("ground", "stone"), "y", "2 + 5*t"),
-            "turn": drivers.CoordinateDriver(("ground", "stone"), "angle", "0.5 - 3*t"),
-        },
-    )
-    falling = start(stone, 0.0)
+    falling = start(dynamics.thrown_stone(), 0.0)
     wanted = [1 + 2 * 3, 2 + 5 * 3 - 9.81 * 9 / 2, 0.5 - 9, 2, 5 - 9.81 * 3, -3]
     for method in (jn.Taylor(), jn.Obreshkov(4)):
         front, tried = marched(falling, method, 3.0, 1e-12)

@@ -6,6 +6,7 @@ import pytest
 
 import jounce as jn
 from jounce import Status
+from jounce.mechanism import check_mechanism
 from tests.problems.small import crank, distance_slider, four_bar, four_hinges, slider_crank
 
 GRID = np.linspace(0, 2, 21)
@@ -190,3 +191,9 @@ def test_tolerance_that_is_none(tolerance):
 def test_python_function_that_is_no_motion_law(law):
     with pytest.raises(jn.MechanismError, match=r"drivers\.turn"):
         jn.solve(crank(law), [0.0])
+
+
+def test_what_is_no_mechanism():
+    # of the public functions, the checks of types in the tests would say so first
+    with pytest.raises(jn.MechanismError, match=r"must be a jn\.Mechanism, got 'a\.yaml'; jn\.load reads one"):
+        check_mechanism("a.yaml")

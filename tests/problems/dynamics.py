@@ -162,6 +162,21 @@ def spatial_slider_crank(stiffness=0.0, damping=0.0):
     )
 
 
+def thrown_stone():
+    """A stone that falls and turns evenly: x = 1 + 2 t, y = 2 + 5 t - g t^2 / 2, angle = 0.5 - 3 t."""
+    return jn.Mechanism(
+        space="planar",
+        gravity=[0.0, -GRAVITY],
+        bodies={"stone": jn.Body([1.0, 2.0], 0.5, mass=3.0, inertia=0.4)},
+        joints={},
+        initial={
+            "x": drivers.CoordinateDriver(("ground", "stone"), "x", "1 + 2*t"),
+            "y": drivers.CoordinateDriver(("ground", "stone"), "y", "2 + 5*t"),
+            "turn": drivers.CoordinateDriver(("ground", "stone"), "angle", "0.5 - 3*t"),
+        },
+    )
+
+
 def rolling_disc():
     """A disc of 2 kg and radius 0.3 m that rolls on a line, on a spring of 50 N/m: see `rolling_motion`."""
     return jn.Mechanism(

@@ -19,7 +19,7 @@ from jounce.integrate.methods import AbstractMethod
 from jounce.integrate.simulate import checked, instants_of
 from jounce.integrate.simulation import expanded
 from jounce.kinematics import Status
-from jounce.mechanism import Mechanism, build
+from jounce.mechanism import Mechanism, build, check_mechanism
 
 LANES = 64  # runs marched together: more fall out of the cache
 STEPS = 16  # tried before runs that have ended make room for others
@@ -99,6 +99,7 @@ def simulate_batch(
     >>> jn.simulate_batch(pendulum, {"lift": [0.1, 0.2, 0.3]}, [0.0, 0.5]).outputs["angle"].shape
     (3, 2, 3)
     """
+    check_mechanism(mechanism)
     values = _checked_parameters(mechanism, parameters)
     names, rows = tuple(values), np.stack(list(values.values()), axis=-1)
     first = mechanism.with_parameters(**dict(zip(names, rows[0].tolist(), strict=True)))

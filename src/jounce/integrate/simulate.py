@@ -18,7 +18,7 @@ from jounce.jet import Jet
 from jounce.kinematics import Status, raise_for_status
 from jounce.kinematics.motion import check_output, output_group
 from jounce.kinematics.solve import checked_order
-from jounce.mechanism import Mechanism, time_grid
+from jounce.mechanism import Mechanism, check_mechanism, time_grid
 
 STEPS = 64  # tried between two looks at progress and events
 TOLERANCES = (1e-15, 1e-2)
@@ -96,7 +96,10 @@ def simulate(
     >>> bool(abs(fall.energy - fall.energy[0]).max() < 1e-12)
     True
     """
+    check_mechanism(mechanism)
     order, method = checked(order, method, tolerance, longest_step)
+    if progress is not None and not callable(progress):
+        raise MechanismError("must be a function of two numbers", name="progress", value=progress)
     if not isinstance(events, Sequence):
         raise MechanismError("must be a list of jn.Event", name="events", value=events)
     if initial is not None:
@@ -126,7 +129,7 @@ def checked(order: Any, method: Any, tolerance: Any, longest_step: Any) -> tuple
     if not (isinstance(tolerance, int | float) and low <= tolerance <= high):
         message = f"the tolerance must be a number from {low:g} to {high:g}"
         raise MechanismError(message, name="tolerance", value=tolerance)
-    if not (isinstance(longest_step, int | float) and longest_step > 0):
+    if isinstance(longest_step, bool) or not (isinstance(longest_step, int | float) and longest_step > 0):
         raise MechanismError("must be greater than zero", name="longest_step", value=longest_step)
     return order, method
 

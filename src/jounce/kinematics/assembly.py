@@ -141,7 +141,8 @@ def check_mobility(model: Model, jacobian: np.ndarray, *, free: bool = False) ->
     if left_over and not free:
         noun = "degree of freedom is" if left_over == 1 else "degrees of freedom are"
         moving = freely_moving(model, right[rank:])
-        parts.append(f"{left_over} {noun} left, with which {moving} can move: add {_count(left_over, 'driver')}")
+        remedy = f"add {_count(left_over, 'driver')}, or simulate it under its forces"
+        parts.append(f"{left_over} {noun} left, with which {moving} can move: {remedy}")
     if redundant:
         names = tuple(dict.fromkeys(model.rows))
         weights = np.linalg.norm(left[:, rank:], axis=1)

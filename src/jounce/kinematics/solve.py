@@ -11,7 +11,7 @@ from jounce.kinematics.assembly import assemble
 from jounce.kinematics.motion import Motion
 from jounce.kinematics.path import Grid, Solver, Track, follow
 from jounce.kinematics.status import Status
-from jounce.mechanism import Mechanism, build, time_grid
+from jounce.mechanism import Mechanism, build, check_mechanism, time_grid
 
 LOWEST_ORDER = 4  # of the jets inside: predictions need some, also where the user wants positions only
 HIGHEST_ORDER = 30
@@ -73,6 +73,7 @@ def solve(
     >>> motion.dataset["psi"].dims
     ('time', 'derivative')
     """
+    check_mechanism(mechanism)
     order = checked_order(order)
     if not (isinstance(tolerance, numbers.Real) and 0 < tolerance <= LARGEST_TOLERANCE):
         message = f"the tolerance must be a number above zero and at most {LARGEST_TOLERANCE:g}"

@@ -1,7 +1,7 @@
 """Mechanisms: named bodies, joints, drivers, outputs and parameters, and their numeric model."""
 
 from jounce.mechanism.builder import Model as Model, build as build
-from jounce.mechanism.mechanism import Body as Body, Mechanism as Mechanism
+from jounce.mechanism.mechanism import Body as Body, Mechanism as Mechanism, check_mechanism as check_mechanism
 from jounce.mechanism.outputs import (
     AbstractMotionOutput as AbstractMotionOutput,
     AbstractOutput as AbstractOutput,

@@ -236,3 +236,9 @@ class Mechanism:
                 message = f"no parameter has this name; {did_you_mean(name, self.parameters)}"
                 raise MechanismError(message, name="parameters", value=name)
         return dataclasses.replace(self, parameters={**self.parameters, **values})
+
+
+def check_mechanism(given: Any) -> None:
+    """Raise MechanismError for what is no mechanism, such as the name of a file."""
+    if not isinstance(given, Mechanism):
+        raise MechanismError("must be a jn.Mechanism; jn.load reads one from a file", name="mechanism", value=given)
