@@ -131,18 +131,15 @@ def test_joints_that_follow_others():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [1, 2])
-def test_all_forms_to_the_fifth_rate(seed):
-    robot, q, right = case(functools.partial(random_robot, seed, 4, prismatic=0.3), order=12, samples=1)
+def test_all_forms_to_the_fifth_rate():
+    robot, q, right = case(functools.partial(random_robot, 1, 4, prismatic=0.3), order=12, samples=1)
     bound = 1e-12  # 1.1e-13 was measured, of Gibbs-Appell with m = 4; most are a few roundings
     agree(newton_euler(robot, q, 5), right, bound)
     agree(virtual_work(robot, q, 5), right, bound)
     agree(lagrange(robot, q, 5), right, bound)
-    for m in (1, 2, 3):
-        agree(mangeron_nielsen(robot, q, 5, m), right, bound)
-    for m in (2, 3, 4):
-        agree(gibbs_appell(robot, q, 5, m), right, bound)
-    for k in range(1, 7):
+    agree(mangeron_nielsen(robot, q, 5, 2), right, bound)
+    agree(gibbs_appell(robot, q, 5, 4), right, bound)
+    for k in (4, 6):
         agree(higher_order(robot, q, k)[:, None], right[:, k - 1 : k], bound)
     agree(higher_order(robot, q, 4, 6)[:, None], right[:, 3:4], bound)
 
