@@ -87,10 +87,10 @@ class Starts:
         clock = np.full((1, len(runs)), self._instant)
         still = self._state._replace(velocity=np.zeros_like(self._state.velocity), spin=np.zeros_like(self._state.spin))
         state = State(*(np.repeat(np.asarray(part), len(runs), axis=-1) for part in still))
-        for made in self._stages:
-            equations, _ = self._begun.picked(made, runs)
+        stages = [self._begun.picked(made, runs)[0] for made in self._stages]
+        for equations in stages:
             state = _followed(equations, state, clock)
-        return jax.tree.map(np.asarray, with_rates(equations, state, clock))
+        return jax.tree.map(np.asarray, with_rates(stages[-1], state, clock))
 
 
 @compiled()
