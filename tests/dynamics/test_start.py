@@ -102,7 +102,7 @@ def test_a_joint_is_no_initial_condition():
 @pytest.mark.parametrize(
     "keywords, words",
     [
-        ({"tolerance": 0.0}, "tolerance: the tolerance must be a number from 1e-15 to 0.01, got 0"),
+        ({"tolerance": 0.0}, "tolerance: the tolerance must be a number from 1e-17 to 0.01, got 0"),
         ({"tolerance": np.nan}, "tolerance"),
         ({"longest_step": 0.0}, "longest_step: must be greater than zero"),
         ({"order": 31}, "order: the order of derivatives"),
