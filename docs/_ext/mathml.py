@@ -21,8 +21,11 @@ def visit_math(writer, node):
 
 
 def visit_math_block(writer, node):
-    """Write a displayed formula."""
-    writer.body.append(f'<div style="overflow-x: auto; padding: 0.5em 0">{_render(node, as_block=True)}</div>\n')
+    """Write a displayed formula, with its number where it has one."""
+    number = f'<span class="eqno">({node["number"]})</span>' if node.get("number") else ""
+    for name in node["ids"]:  # where references to the number lead
+        writer.body.append(f'<span id="{name}"></span>')
+    writer.body.append(f'<div class="formula">{_render(node, as_block=True)}{number}</div>\n')
     raise nodes.SkipNode
 
 
