@@ -74,6 +74,7 @@ from jounce.io import (  # noqa: E402
     load_limits as load_limits,
     load_robot as load_robot,
     load_trajectory as load_trajectory,
+    write_mechanism as write_mechanism,
 )
 from jounce.jet import Jet as Jet, compose as compose  # noqa: E402
 from jounce.kinematics import Motion as Motion, Status as Status, solve as solve  # noqa: E402
