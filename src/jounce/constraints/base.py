@@ -108,7 +108,7 @@ def value_fields(kind: type[Any]) -> dict[str, dataclasses.Field]:
 
 
 def field_kind(field: dataclasses.Field) -> str:
-    """Return ``scalar``, ``vector``, ``motion``, ``law``, ``laws``, ``wrenches`` or ``text``, by the annotation of the field."""
+    """Return ``scalar``, ``vector``, ``motion``, ``law``, ``laws``, ``wrenches`` or ``text``, by the annotation."""
     if isinstance(field.type, str):  # under ``from __future__ import annotations``
         word = field.type.rpartition(".")[2].strip()
         return word.lower() if word in ("Scalar", "Vector", "Motion", "Law", "Laws", "Wrenches") else "text"

@@ -1,4 +1,4 @@
-"""What ``jounce inspect`` says: tables of bodies, joints, degrees of freedom and the start, for mechanisms and robots."""
+"""What ``jounce inspect`` says: tables of bodies, joints and robots, and what was counted."""
 
 from __future__ import annotations
 
@@ -95,9 +95,9 @@ def brief_robot(facts: dict[str, Any]) -> None:
     headings = ("joint", "type", "links", "lower", "upper", "velocity", "effort", "follows")
     show_rows("Joints (rad, m, N m, N)", headings, rows, (3, 4, 5, 6))
     rows = [
-        [x["name"], _maybe(x["mass"]), _vector(x["center_of_mass"]), "" if x["moves_with"] == x["name"] else x["moves_with"]]
+        [x["name"], _maybe(x["mass"]), _vector(x["center_of_mass"]), _other(x["moves_with"], x["name"])]
         for x in facts["links"]
-    ]  # fmt: skip
+    ]
     show_rows("Links", ("link", "mass/kg", "centre of mass/m", "fixed to"), rows, (1,))
     if facts["closures"]:
         rows = [
@@ -117,6 +117,10 @@ def brief_robot(facts: dict[str, Any]) -> None:
 
 def _maybe(number: float | None) -> str:
     return "-" if number is None else f"{number:.6g}"
+
+
+def _other(name: str, own: str) -> str:
+    return "" if name == own else name
 
 
 def _whole(number: int | None) -> str:

@@ -93,7 +93,9 @@ def assigned(robot: Robot, assignments: Iterable[str], option: str, *, law: bool
     for text in assignments:
         name, equals, value = (part.strip() for part in text.partition("="))
         if not equals or not name or not value:
-            raise JounceError("a joint is given a value by JOINT=VALUE, such as 'elbow=30 deg'", name=option, value=text)
+            raise JounceError(
+                "a joint is given a value by JOINT=VALUE, such as 'elbow=30 deg'", name=option, value=text
+            )
         if name not in robot.joint_names:
             message = f"no moving joint has this name; {did_you_mean(name, robot.joint_names)}"
             raise JounceError(message, name=option, value=name)

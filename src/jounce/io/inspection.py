@@ -15,8 +15,15 @@ from jounce.io.fields import OUTPUTS, output_holder
 from jounce.io.source import read_source
 from jounce.io.summaries import count
 from jounce.io.units import parse_value
-from jounce.kinematics.assembly import Trial, check_assembled, check_mobility, freely_moving, put_together
-from jounce.kinematics.assembly import redundant_rows, split
+from jounce.kinematics.assembly import (
+    Trial,
+    check_assembled,
+    check_mobility,
+    freely_moving,
+    put_together,
+    redundant_rows,
+    split,
+)
 from jounce.mechanism import Mechanism, Model, build, time_grid
 from jounce.mechanism.masses import body_mass
 from jounce.mechanism.system import POSITION_COMPONENTS

@@ -20,7 +20,8 @@ STYLE = (
     "<style scoped>.jounce{font-size:90%}.jounce table{border-collapse:collapse;margin:.3em 0 .6em}"
     ".jounce th,.jounce td{text-align:left;padding:.15em .8em .15em 0;border-bottom:1px solid rgba(128,128,128,.3);"
     "background:transparent;color:inherit}.jounce td.n,.jounce th.n{text-align:right;"
-    "font-variant-numeric:tabular-nums}.jounce caption{text-align:left;font-weight:bold;color:inherit;white-space:nowrap}"
+    "font-variant-numeric:tabular-nums}"
+    ".jounce caption{text-align:left;font-weight:bold;color:inherit;white-space:nowrap}"
     ".jounce .bad{font-weight:bold;text-decoration:underline}.jounce p{margin:.2em 0}</style>"
 )
 
@@ -83,8 +84,10 @@ def _number(value: Any) -> str:
 
     if value is None:
         return "-"
-    if isinstance(value, Expression | str):
-        return getattr(value, "text", value)
+    if isinstance(value, Expression):
+        return value.text
+    if isinstance(value, str):
+        return value
     if np.shape(value):
         return "[" + ", ".join(map(_number, value)) + "]"
     number = float(value)
@@ -151,8 +154,8 @@ def _peaks(motion: Any) -> str:
         return "<p>No outputs are defined.</p>"
     found = peaks(motion)
     rows = [
-        [p.output, p.derivative, p.unit, *(_rounded(x, p.size) for x in (p.minimum, p.minimum_at, p.maximum))]
-        + [_rounded(p.maximum_at, p.size)]
+        [p.output, p.derivative, p.unit, _rounded(p.minimum, p.size), _rounded(p.minimum_at, 0.0)]
+        + [_rounded(p.maximum, p.size), _rounded(p.maximum_at, 0.0)]  # noqa: RUF005
         for p in found
     ]
     headings = ("output", "derivative", "unit", "minimum", "at t/s", "maximum", "at t/s")

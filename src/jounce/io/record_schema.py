@@ -66,7 +66,12 @@ def _mechanism() -> dict[str, Any]:
         ("coordinates", "equations", "of_drivers", "independent", "of_joints", "left", "redundant"), WHOLE
     )
     freedom |= {"redundant_among": NAMES, "moving": NAMES, "words": TEXT, "message": _maybe(TEXT)}
-    assembly = {"status": {"enum": ["assembled", "open"]}, "message": _maybe(TEXT), "at": NUMBER, "open": _maybe(NUMBER)}
+    assembly = {
+        "status": {"enum": ["assembled", "open"]},
+        "message": _maybe(TEXT),
+        "at": NUMBER,
+        "open": _maybe(NUMBER),
+    }
     parameter = {"name": TEXT, "value": NUMBER, "unit": _maybe(TEXT), "written": _maybe(TEXT)}
     return {
         "kind": {"const": "mechanism"},

@@ -89,7 +89,7 @@ def motion_record(motion: Motion, file: Any, written: Any) -> dict[str, Any]:
             {"index": k, "time": times[k], "status": Status(motion.status[k]).name, "culprit": motion.culprits.get(k)}
             for k in failed.tolist()
         ],
-        "peaks": [_peak(peak, times) for peak in peaks(motion)],
+        "peaks": [_peak(peak) for peak in peaks(motion)],
         "written": written,
     }
     if hasattr(motion, "energy"):
@@ -109,7 +109,7 @@ def motion_record(motion: Motion, file: Any, written: Any) -> dict[str, Any]:
     return found
 
 
-def _peak(peak: Any, times: Any) -> dict[str, Any]:
+def _peak(peak: Any) -> dict[str, Any]:
     return {
         "output": peak.output,
         "derivative": peak.derivative,

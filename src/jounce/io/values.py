@@ -15,7 +15,19 @@ from pydantic_core import PydanticCustomError, core_schema
 from jounce.errors import UNSET, ExpressionError, JounceError, did_you_mean, show_value
 from jounce.io.units import KINDS, Value, parse_value
 
-__all__ = ["Checked", "Samples", "below", "laws", "motion", "orientation", "problem", "scalar", "vector", "vectors", "wrenches"]
+__all__ = [
+    "Checked",
+    "Samples",
+    "below",
+    "laws",
+    "motion",
+    "orientation",
+    "problem",
+    "scalar",
+    "vector",
+    "vectors",
+    "wrenches",
+]
 
 
 def problem(message: str, *at: str | int, value: object = ...) -> PydanticCustomError:

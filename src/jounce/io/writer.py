@@ -210,8 +210,8 @@ class _Writer:
             raise MechanismError(message, name=place)
         ends = np.asarray(law.breakpoints, float)
         pieces = np.asarray(law.coefficients, float)
-        last = ends[-1] + (ends[-1] - ends[-2] if len(ends) > 1 else 1.0)
         between = (law.degree - 1) // 2  # samples near each end, which are no breakpoints
+        last = ends[-1] + ((between + 1) * (ends[-1] - ends[0]) / (len(ends) + between) if len(ends) > 1 else 1.0)
         times = np.unique(np.concatenate([
             np.linspace(ends[0], ends[1] if len(ends) > 1 else last, between + 2),
             ends, np.linspace(ends[-1], last, between + 2),
@@ -238,7 +238,7 @@ def _plain(value: Any, place: str) -> Any:
         return value.text
     if isinstance(value, str):
         return value
-    if isinstance(value, numbers.Real) or np.shape(value) == () and hasattr(value, "dtype"):
+    if isinstance(value, numbers.Real) or (np.shape(value) == () and hasattr(value, "dtype")):
         return _number(float(value), place)
     if isinstance(value, Mapping):
         return {key: _plain(entry, place) for key, entry in value.items()}

@@ -182,8 +182,8 @@ def check_mobility(model: Model, jacobian: np.ndarray, *, free: bool = False) ->
         parts.append(f"{left_over} {noun} left, with which {moving} can move: {remedy}")
     if redundant:
         parts.append(
-            f"{_count(redundant, 'equation')} too many among {redundant_rows(model, left[:, rank:])}: free a direction there "
-            "(a spherical or cylindrical joint for a revolute, say), or remove a driver"
+            f"{_count(redundant, 'equation')} too many among {redundant_rows(model, left[:, rank:])}: free a direction "
+            "there (a spherical or cylindrical joint for a revolute, say), or remove a driver"
         )
     if left_over and redundant and rows == columns and not free:
         parts.append("or the start is a singular position: start at another instant")
