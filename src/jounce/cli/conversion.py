@@ -33,13 +33,13 @@ def convert(
     Parameters
     ----------
     source
-        Mechanism file (.yaml, .yml, .toml, .json) or robot file (.urdf, .xml).
+        Mechanism file, or robot file: .urdf or .xml.
     target
         Mechanism file to write: .yaml, .yml, .toml or .json.
     drive
-        JOINT=LAW of a robot's joint: a value with a unit, or an expression of t; repeatable.
+        JOINT=LAW: a value with a unit or an expression of t; repeatable.
     start
-        JOINT=VALUE where a robot's joint starts, with a unit; repeatable.
+        JOINT=VALUE with a unit, where a joint starts; repeatable.
     hold
         Hold the joints of a robot that are not driven.
     drives

@@ -28,7 +28,7 @@ def inspect(
     Parameters
     ----------
     file
-        Mechanism file (.yaml, .yml, .toml, .json) or robot file (.urdf, .xml).
+        Mechanism file, or robot file: .urdf or .xml.
     set_
         NAME=VALUE of a parameter, with a unit; repeatable.
     import_

@@ -153,11 +153,11 @@ def _peaks(motion: Any) -> str:
     if not motion.mechanism.outputs:
         return "<p>No outputs are defined.</p>"
     found = peaks(motion)
-    rows = [
-        [p.output, p.derivative, p.unit, _rounded(p.minimum, p.size), _rounded(p.minimum_at, 0.0)]
-        + [_rounded(p.maximum, p.size), _rounded(p.maximum_at, 0.0)]  # noqa: RUF005
-        for p in found
-    ]
+    rows = []
+    for peak in found:
+        low, high = (_rounded(x, peak.size) for x in (peak.minimum, peak.maximum))
+        low_at, high_at = (_rounded(x, 0.0) for x in (peak.minimum_at, peak.maximum_at))
+        rows.append([peak.output, peak.derivative, peak.unit, low, low_at, high, high_at])
     headings = ("output", "derivative", "unit", "minimum", "at t/s", "maximum", "at t/s")
     return _table("Peaks", headings, rows, (3, 4, 5, 6))
 
