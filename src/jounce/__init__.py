@@ -74,6 +74,7 @@ from jounce.io import (  # noqa: E402
     load_limits as load_limits,
     load_robot as load_robot,
     load_trajectory as load_trajectory,
+    write_mechanism as write_mechanism,
 )
 from jounce.jet import Jet as Jet, compose as compose  # noqa: E402
 from jounce.kinematics import Motion as Motion, Status as Status, solve as solve  # noqa: E402
@@ -121,3 +122,14 @@ from jounce.trajectory import (  # noqa: E402
 )
 
 __version__ = "0.3.0"
+
+
+def _repr_html_(self: object) -> str:
+    """Return what a notebook shows."""
+    from jounce.io.notebook import shown
+
+    return shown(self)
+
+
+for _kind in (Mechanism, Motion, Robot, JointTrajectory, Batch):  # here, as the files know all of these
+    setattr(_kind, "_repr_html_", _repr_html_)  # noqa: B010 - no attribute that a type checker knows

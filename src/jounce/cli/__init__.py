@@ -2,7 +2,8 @@
 
 Everything that a command needs is imported when it runs, so that none waits for the libraries of another. Results go to
 standard output, messages to standard error; the exit status is 0 for success, 2 for bad input, and 1 where a solve
-failed at some instants (the others are still printed and written), a limit is broken, or a result could not be written.
+failed at some instants (the others are still printed and written), a limit is broken, what is inspected cannot start to
+move, or a result could not be written.
 """
 
 from __future__ import annotations
@@ -12,15 +13,27 @@ import os
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
+from typing import Any
 
+from jounce.cli.completing import completion
+from jounce.cli.conversion import convert
+from jounce.cli.inspection import inspect
 from jounce.cli.mechanisms import plot, run, schema, simulate
 from jounce.cli.papers import reproduce
 from jounce.cli.robots import check
+from jounce.cli.starters import new
 from jounce.cli.writing import WritingError
 from jounce.errors import JounceError, SolveError
 from jounce.io.terminal import complain, unexpected
 
 EXAMPLES = {
+    new: """\
+  jounce new
+  jounce new four-bar
+  jounce new slider-crank engine.yaml""",
+    inspect: """\
+  jounce inspect examples/six_bar_watt.yaml
+  jounce inspect examples/robots/panda.urdf --json""",
     run: """\
   jounce run examples/four_bar.yaml
   jounce run examples/rsur.yaml --order 8 --out motion.nc
@@ -28,21 +41,48 @@ EXAMPLES = {
     simulate: """\
   jounce simulate examples/andrews.yaml
   jounce simulate examples/double_pendulum.yaml --order 2 --out pendulum.nc
-  jounce simulate examples/flyball_governor.yaml --method obreshkov-6 --tolerance 1e-9""",
+  jounce simulate examples/flyball_governor.yaml \\
+    --method obreshkov-6 --tolerance 1e-9""",
     plot: """\
   jounce plot examples/four_bar.yaml --out four_bar.png
   jounce plot examples/rsur.yaml --order 6 --output psi --output C""",
     check: """\
   jounce check examples/robots/panda.urdf examples/trajectories/panda_good.csv
-  jounce check examples/robots/panda.urdf examples/trajectories/panda_pick.yaml \\
-    --limits examples/limits/franka_panda.yaml --out pick.png
-  jounce check examples/robots/panda.urdf examples/trajectories/panda_wave.yaml \\
-    --payload "panda_hand=3 kg\"""",
+  jounce check examples/robots/panda.urdf \\
+    examples/trajectories/panda_pick.yaml --out pick.png \\
+    --limits examples/limits/franka_panda.yaml
+  jounce check examples/robots/panda.urdf \\
+    examples/trajectories/panda_wave.yaml --payload "panda_hand=3 kg\"""",
+    convert: """\
+  jounce convert examples/four_bar.yaml four_bar.toml
+  jounce convert examples/robots/ur5.urdf ur5.yaml --hold \\
+    --drive "elbow_joint=45*deg*sin(t)"
+  jounce convert examples/robots/panda.urdf panda.yaml \\
+    --start "panda_joint4=-90 deg\"""",
     reproduce: """\
   jounce reproduce sommer-2024 --out out
   jounce reproduce negrean-2025 --out out""",
-    schema: "  jounce schema > mechanism.schema.json",
+    schema: """\
+  jounce schema > mechanism.schema.json
+  jounce schema results""",
+    completion: """\
+  jounce completion bash --install
+  jounce completion fish""",
 }
+FIRST = """\
+  jounce new four-bar                          # a commented starter file
+  jounce inspect four-bar.yaml                 # what is in it, can it move?
+  jounce run four-bar.yaml                     # peaks, position to jounce
+  jounce plot four-bar.yaml --out four-bar.png
+  jounce convert robot.urdf robot.yaml         # a robot as a mechanism
+
+jounce COMMAND --help explains a command, with examples."""
+STATUS = """\
+Exit status:
+  0  success
+  1  a failed instant, a broken limit, no possible start, nothing written
+  2  bad input
+  130  interrupted"""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -58,6 +98,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     int
         0 success, 2 bad input, 1 a solve or a writing that failed or a limit that is broken, 130 interrupted.
     """
+    as_json = False
     if arguments is None:
         gc.freeze()  # the collector need not look at the libraries again: 0.15 s of a short run
     for stream in (sys.stdout, sys.stderr):
@@ -67,7 +108,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         from jounce.io.cache import use_compilation_cache
 
         use_compilation_cache()
-        return _dispatch(list(sys.argv[1:] if arguments is None else arguments))
+        given = list(sys.argv[1:] if arguments is None else arguments)
+        as_json = "--json" in given
+        return _dispatch(given)
     except KeyboardInterrupt:
         return 130
     except BrokenPipeError:  # who reads us has read enough
@@ -75,32 +118,42 @@ def main(arguments: Sequence[str] | None = None) -> int:
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except SolveError as error:
-        complain(error)
+        complain(error, json=as_json)
         return 2 if error.motion is None else 1
     except JounceError as error:
-        complain(error)
+        complain(error, json=as_json)
         return 2
     except WritingError as error:
-        complain(error)
+        complain(error, json=as_json)
         return 1
     except Exception as error:  # the last resort: a message, not a traceback
         if os.environ.get("JOUNCE_DEBUG"):
             raise
-        complain(f"{unexpected(error)}; set JOUNCE_DEBUG=1 for the traceback")
+        complain(f"{unexpected(error)}; set JOUNCE_DEBUG=1 for the traceback", json=as_json)
         return 1
 
 
 def _dispatch(arguments: list[str]) -> int:
     import cyclopts
 
+    try:
+        return application()(arguments, exit_on_error=False, print_error=False) or 0
+    except cyclopts.CycloptsError as error:
+        raise JounceError(f"{' '.join(str(error).split())} (see jounce --help)") from None
+
+
+def application() -> Any:
+    """Return the command line as a `cyclopts.App`."""
+    import cyclopts
+
     from jounce import __version__
 
     app = cyclopts.App(
         name="jounce",
-        help="Exact time derivatives of any order of mechanisms: velocity, acceleration, jerk, jounce and beyond.",
+        help="Exact time derivatives of mechanisms and robots, to jounce and beyond.",
         help_format="plaintext",
         help_formatter="default" if sys.stdout.isatty() else "plain",
-        help_epilogue="Examples:\n" + "\n".join(EXAMPLES.values()),
+        help_epilogue=f"Examples:\n{FIRST}\n\n{STATUS}",
         version=__version__,
         default_parameter=cyclopts.Parameter(negative=()),
         result_action="return_value",
@@ -108,7 +161,4 @@ def _dispatch(arguments: list[str]) -> int:
     )
     for place, (command, examples) in enumerate(EXAMPLES.items()):
         app.command(command, help_epilogue=f"Examples:\n{examples}", sort_key=place)
-    try:
-        return app(arguments, exit_on_error=False, print_error=False) or 0
-    except cyclopts.CycloptsError as error:
-        raise JounceError(f"{' '.join(str(error).split())} (see jounce --help)") from None
+    return app

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from jounce.cli.writing import written
 from jounce.errors import JounceError, SolveError
 from jounce.io.summaries import simulation_summary, summary
-from jounce.io.terminal import Bar, say, show_peaks
+from jounce.io.terminal import Bar, say, say_json, show_peaks
 
 if TYPE_CHECKING:
     from jounce.kinematics import Motion
@@ -25,6 +25,7 @@ def run(
     tolerance: float = 1e-12,
     set_: list[str] | None = None,
     import_: list[Path] | None = None,
+    json: bool = False,
 ) -> int:
     """Solve a mechanism file and print peak values, position to jounce.
 
@@ -42,6 +43,8 @@ def run(
         NAME=VALUE of a parameter, with a unit; repeatable.
     import_
         Python file with your own joints; repeatable.
+    json
+        Print the result as JSON.
     """
     from jounce import io
     from jounce.io.peaks import peaks
@@ -49,12 +52,10 @@ def run(
     if out is not None:
         io.check_writable(out)
     motion = _solved(_loaded(file, set_, import_), file, order, tolerance)
-    say(summary(motion, file))
-    show_peaks(peaks(motion))
-    if out is not None:
-        written(lambda: io.write(motion.dataset, out))
-        say(f"\nWritten to {out}")
-    return _outcome(motion, file)
+    if not json:
+        say(summary(motion, file))
+        show_peaks(peaks(motion))
+    return _finished("run", motion, file, out, json)
 
 
 def simulate(
@@ -68,8 +69,9 @@ def simulate(
     step: float | None = None,
     set_: list[str] | None = None,
     import_: list[Path] | None = None,
+    json: bool = False,
 ) -> int:
-    """Move a mechanism by its forces, from its initial conditions, and print peak values, energy and drift.
+    """Move a mechanism by its forces and print peak values, energy, drift.
 
     Parameters
     ----------
@@ -89,6 +91,8 @@ def simulate(
         NAME=VALUE of a parameter, with a unit; repeatable.
     import_
         Python file with your own joints and forces; repeatable.
+    json
+        Print the result as JSON.
     """
     from jounce import io
     from jounce.integrate import simulate as integrate
@@ -103,10 +107,23 @@ def simulate(
             motion = integrate(mechanism, order=order, method=chosen, tolerance=tolerance, strict=False, progress=bar)
     except JounceError as error:
         raise _of_option(error, file) from None
-    say(simulation_summary(motion, file))
-    show_peaks(peaks(motion))
+    if not json:
+        say(simulation_summary(motion, file))
+        show_peaks(peaks(motion))
+    return _finished("simulate", motion, file, out, json)
+
+
+def _finished(command: str, motion: Motion, file: Path, out: Path | None, json: bool) -> int:
+    """Write the results of a motion where they are wanted, and return the exit status."""
+    from jounce import io
+
     if out is not None:
         written(lambda: io.write(motion.dataset, out))
+    if json:
+        from jounce.io.records import motion_record
+
+        say_json(command, motion_record(motion, file, out))
+    elif out is not None:
         say(f"\nWritten to {out}")
     return _outcome(motion, file)
 
@@ -166,13 +183,24 @@ def plot(
     return _outcome(motion, file)
 
 
-def schema() -> int:
-    """Print the JSON Schema of mechanism files, for editors that complete and check."""
+def schema(of: Literal["mechanism", "results"] = "mechanism", /) -> int:
+    """Print the JSON Schema of mechanism files, or of results.
+
+    Editors complete and check files by it.
+
+    Parameters
+    ----------
+    of
+        mechanism: files; results: what the commands print with --json.
+    """
     import json
 
-    from jounce.io import json_schema
+    if of == "results":
+        from jounce.io.record_schema import record_schema as made
+    else:
+        from jounce.io import json_schema as made
 
-    say(json.dumps(json_schema(), indent=1))
+    say(json.dumps(made(), indent=1))
     return 0
 
 

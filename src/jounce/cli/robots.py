@@ -7,7 +7,7 @@ from pathlib import Path
 from jounce.cli.writing import written
 from jounce.errors import JounceError, RobotError, SampleWarning
 from jounce.io.summaries import limits_summary, verdict
-from jounce.io.terminal import caution, say, show_limits
+from jounce.io.terminal import caution, say, say_json, show_limits
 
 
 def check(
@@ -19,8 +19,9 @@ def check(
     out: Path | None = None,
     payload: list[str] | None = None,
     degree: int = 5,
+    json: bool = False,
 ) -> int:
-    """Compare a trajectory with the limits of a robot, from position to torque rate.
+    """Compare a trajectory with the limits of a robot, to torque rate.
 
     The exit status is 0 where all limits are kept, 1 where one is broken.
 
@@ -38,6 +39,8 @@ def check(
         LINK=MASS held in the origin of a link, with a unit; repeatable.
     degree
         Of the splines through samples, odd from 3 to 11.
+    json
+        Print the result as JSON.
     """
     import warnings
 
@@ -67,14 +70,21 @@ def check(
             raise error.located(path=trajectory) from None
     if report.worst is None:
         raise JounceError("there are no limits to compare with; give a file of limits with --limits", path=robot)
-    say(limits_summary(report, motion, robot, trajectory))
-    show_limits(report)
+    if not json:
+        say(limits_summary(report, motion, robot, trajectory))
+        show_limits(report)
     for warning in caught:
-        caution(warning.message)
-    say(f"\n{verdict(report)}")
+        caution(warning.message, json=json)
+    if not json:
+        say(f"\n{verdict(report)}")
     if out is not None:
         from jounce.plot import draw_limits, save
 
         written(lambda: save(draw_limits(report, f"{report.robot}: {trajectory.name}"), out))
+    if json:
+        from jounce.io.records import limits_record
+
+        say_json("check", limits_record(report, robot, trajectory, out))
+    elif out is not None:
         say(f"\nWritten to {out}")
     return 0 if report.kept else 1

@@ -13,6 +13,7 @@ from jounce.jet import Jet, concatenate
 Scalar = Annotated[Any, "scalar"]
 Vector = Annotated[Any, "vector"]
 Motion = Annotated[Any, "motion"]
+Wrenches = Annotated[Any, "wrenches"]
 
 _REGISTRY: dict[tuple[str, str], dict[str, type[Any]]] = {}
 
@@ -49,6 +50,7 @@ class AbstractConstraint(eqx.Module):
     role: ClassVar[str] = ""
     type_name: ClassVar[str] = ""
     body_count: ClassVar[int] = 2
+    body_counts: ClassVar[tuple[int, ...]] = ()  # where more than one number is right
     periodic: ClassVar[bool] = False  # whether its residual forgets whole turns, which the law must not skip then
 
     def __init_subclass__(cls, type: str = "", space: str = "", role: str = "joint", **keywords: Any):  # noqa: A002
@@ -58,8 +60,10 @@ class AbstractConstraint(eqx.Module):
 
     def __check_init__(self):
         name = self.type_name or type(self).__name__
-        if len(self.bodies) != self.body_count:
-            raise MechanismError(f"{name} joins {self.body_count} bodies", name="bodies", value=list(self.bodies))
+        counts = self.body_counts or (self.body_count,)
+        if len(self.bodies) not in counts:
+            message = f"{name} joins {' or '.join(map(str, counts))} bodies"
+            raise MechanismError(message, name="bodies", value=list(self.bodies))
         if len(set(self.bodies)) != len(self.bodies):
             message = f"{name} must join different bodies, not a body with itself"
             raise MechanismError(message, name="bodies", value=list(self.bodies))
@@ -104,10 +108,10 @@ def value_fields(kind: type[Any]) -> dict[str, dataclasses.Field]:
 
 
 def field_kind(field: dataclasses.Field) -> str:
-    """Return ``scalar``, ``vector``, ``motion``, ``law``, ``laws`` or ``text``, by the annotation of the field."""
+    """Return ``scalar``, ``vector``, ``motion``, ``law``, ``laws``, ``wrenches`` or ``text``, by the annotation."""
     if isinstance(field.type, str):  # under ``from __future__ import annotations``
         word = field.type.rpartition(".")[2].strip()
-        return word.lower() if word in ("Scalar", "Vector", "Motion", "Law", "Laws") else "text"
+        return word.lower() if word in ("Scalar", "Vector", "Motion", "Law", "Laws", "Wrenches") else "text"
     return next(iter(getattr(field.type, "__metadata__", ())), "text")
 
 

@@ -11,8 +11,19 @@ if TYPE_CHECKING:
     from jounce.io.results import check_writable as check_writable, read as read, write as write
     from jounce.io.robots import load_robot as load_robot
     from jounce.io.trajectories import load_trajectory as load_trajectory
+    from jounce.io.writer import write_mechanism as write_mechanism
 
-__all__ = ["check_writable", "json_schema", "load", "load_limits", "load_robot", "load_trajectory", "read", "write"]
+__all__ = [
+    "check_writable",
+    "json_schema",
+    "load",
+    "load_limits",
+    "load_robot",
+    "load_trajectory",
+    "read",
+    "write",
+    "write_mechanism",
+]
 
 _HOMES = {
     "load": "loader",
@@ -23,6 +34,7 @@ _HOMES = {
     "load_limits": "limits",
     "load_robot": "robots",
     "load_trajectory": "trajectories",
+    "write_mechanism": "writer",
 }
 
 

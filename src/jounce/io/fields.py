@@ -29,6 +29,7 @@ from jounce.mechanism import (
     PointOutput,
     RelativeAngleOutput,
 )
+from jounce.robot.coupling import SlideOutput
 
 __all__ = [
     "HOLDERS",
@@ -55,7 +56,7 @@ class FileKey:
     fields : tuple of str
         Fields of the class that it fills; more than one when the key holds a list with an entry for each body.
     kind : str
-        ``scalar``, ``vector``, ``motion`` or ``text``.
+        ``scalar``, ``vector``, ``motion``, ``law``, ``laws``, ``wrenches`` or ``text``.
     quantity : str
         Kind of unit, one of ``units.KINDS``; or ``direction`` (any unit, the same in all components), or ``of
         coordinate`` and ``per angle``, which follow the key ``coordinate`` beside it.
@@ -121,6 +122,7 @@ OUTPUTS: tuple[tuple[str | None, type[AbstractQuantity]], ...] = (
     ("angle", RelativeAngleOutput),
     ("angular_velocity", AngularVelocityOutput),
     ("distance", DistanceOutput),
+    ("slide", SlideOutput),
     ("force", DriverForceOutput),
     ("torque", DriverTorqueOutput),
     ("force", JointForceOutput),

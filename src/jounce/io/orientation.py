@@ -42,7 +42,9 @@ def from_quaternion(quaternion: Sequence[float]) -> Quaternion:
     >>> from_quaternion([2.0, 0.0, 0.0, 0.0])
     (1.0, 0.0, 0.0, 0.0)
     """
-    e0, e1, e2, e3 = _unit(quaternion, "the Euler parameters")
+    unit = _unit(quaternion, "the Euler parameters")
+    near = abs(math.hypot(*quaternion) - 1) < 1e-15  # what was written in full is read as it was
+    e0, e1, e2, e3 = map(float, quaternion) if near else unit
     return (e0, e1, e2, e3)
 
 

@@ -13,7 +13,7 @@ from typing import Any
 from jounce.errors import MechanismFileError
 from jounce.io.source import MAX_DEPTH, Builder, Location, Source
 
-__all__ = ["read_json", "read_toml", "read_yaml"]
+__all__ = ["plain_scalar", "read_json", "read_toml", "read_yaml"]
 
 # The core schema of YAML 1.2 (section 10.3.2 of its specification).
 _NULL = {"", "~", "null", "Null", "NULL"}
@@ -24,7 +24,7 @@ _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 _SPECIAL = re.compile(r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
 
 
-def _yaml_scalar(text: str) -> Any:
+def plain_scalar(text: str) -> Any:
     """Resolve a plain scalar by the core schema of YAML 1.2: 1e-3 is a number, yes is text."""
     if text in _NULL:
         return None
@@ -57,7 +57,7 @@ def read_yaml(path: str, text: str) -> Source:
             line = event.start_mark.line + 1
             if isinstance(event, kinds.ScalarEvent):
                 _refuse_tag(builder, event, line)
-                value = _yaml_scalar(event.value) if event.implicit[0] else event.value
+                value = plain_scalar(event.value) if event.implicit[0] else event.value
                 if builder.wants_key:
                     builder.key(value, line)
                 else:

@@ -18,7 +18,7 @@ from jounce.constraints.planar import COORDINATES
 from jounce.errors import did_you_mean
 from jounce.io.fields import HOLDERS, FileKey, file_keys, output_holder, output_tag, output_types
 from jounce.io.masses import inertia
-from jounce.io.values import Checked, laws, motion, orientation, problem, scalar, vector, vectors
+from jounce.io.values import Checked, laws, motion, orientation, problem, scalar, vector, vectors, wrenches
 from jounce.mechanism.outputs import FRAMES
 from jounce.trajectory.expression import CONSTANTS, FUNCTIONS
 
@@ -37,19 +37,19 @@ def _text(raw: Any, _info: Any) -> str:
     return raw
 
 
-def _names(count: int) -> Any:
-    """Return the annotation of a list of names of bodies."""
+def _names(*counts: int) -> Any:
+    """Return the annotation of a list of names of bodies, as many as one of the counts."""
 
     def check(raw: Any, info: Any) -> tuple[str, ...]:
-        if not isinstance(raw, (list, tuple)) or len(raw) != count:
-            raise problem(f"must be a list of {count} names of bodies")
+        if not isinstance(raw, (list, tuple)) or len(raw) not in counts:
+            raise problem(f"must be a list of {' or '.join(map(str, counts))} names of bodies")
         for index, name in enumerate(raw):
             _check_body(name, info, index)
         if len(set(raw)) != len(raw):
             raise problem("the bodies must differ, a body cannot be joined with itself")
         return tuple(raw)
 
-    schema = {"type": "array", "items": {"type": "string"}, "minItems": count, "maxItems": count}
+    schema = {"type": "array", "items": {"type": "string"}, "minItems": min(counts), "maxItems": max(counts)}
     return Annotated[Any, Checked(check, schema)]
 
 
@@ -117,6 +117,8 @@ def _annotation(kind: type[Any], key: FileKey, size: int, choices: dict[str, tup
         return scalar(key.quantity)
     if key.kind == "vector":
         return vector(size, key.quantity) if len(key.fields) == 1 else vectors(len(key.fields), size, key.quantity)
+    if key.kind == "wrenches":
+        return wrenches()
     words = {"enum": list(choices[key.key])} if key.key in choices else {"type": "string"}
     return Annotated[Any, Checked(_text, words)]
 
@@ -131,7 +133,7 @@ def _values(kind: type[Any], size: int) -> dict[str, tuple[Any, Any]]:
 def _bodies(kind: type[Any]) -> dict[str, tuple[Any, Any]]:
     """Return the key of the bodies of a class: ``body`` for one alone."""
     if kind.body_count > 1:
-        return {"bodies": (_names(kind.body_count), ...)}
+        return {"bodies": (_names(*(getattr(kind, "body_counts", ()) or (kind.body_count,))), ...)}
     return {"body": (Annotated[Any, Checked(_check_body, {"type": "string"})], ...)}
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +14,18 @@ from jounce.io.peaks import Peak
 if TYPE_CHECKING:
     from jounce.dynamics.limits import LimitReport
 
-__all__ = ["Bar", "caution", "complain", "say", "show_limits", "show_peaks", "unexpected"]
+__all__ = [
+    "Bar",
+    "caution",
+    "complain",
+    "say",
+    "say_json",
+    "show_columns",
+    "show_limits",
+    "show_peaks",
+    "show_rows",
+    "unexpected",
+]
 
 WIDTH = 80  # of tables that do not go to a terminal
 PATIENCE = 1.0  # s, before a progress bar is shown
@@ -117,6 +128,46 @@ def _print_table(
     Console().print(table, *notes, sep="\n")
 
 
+def show_columns(pairs: Sequence[tuple[str, str]]) -> None:
+    """Print names and what they mean, in two columns."""
+    width = max(len(name) for name, _ in pairs)
+    coloured = sys.stdout.isatty()
+    if coloured:
+        from rich.console import Console
+        from rich.text import Text
+
+        for name, meaning in pairs:
+            Console(soft_wrap=True).print(Text.assemble((name.ljust(width), "cyan"), f"  {meaning}"))
+        return
+    say("\n".join(f"{name:{width}}  {meaning}" for name, meaning in pairs))
+
+
+def show_rows(title: str, headings: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[int] = ()) -> None:
+    """Print a table below a title; columns that are empty throughout are left out, the last one may be long."""
+    kept = [k for k in range(len(headings)) if any(row[k] for row in rows)] or [0]
+    if sys.stdout.isatty():
+        from rich import box
+        from rich.console import Console
+        from rich.table import Table
+        from rich.text import Text
+
+        table = Table(box=box.SIMPLE_HEAD, pad_edge=False, header_style="bold", title=title, title_justify="left")
+        table.title_style = "bold"
+        for k in kept:
+            justify, style = ("right" if k in numbers else "left"), ("cyan" if k == 0 else "")
+            table.add_column(headings[k], justify=justify, style=style, overflow="fold")
+        for row in rows:
+            table.add_row(*(Text(_clean(row[k])) for k in kept))
+        Console().print("", table)
+        return
+    widths = {k: max(len(row[k]) for row in [headings, *rows]) for k in kept}
+    lines = ["", title]
+    for row in [headings, ["-" * len(heading) for heading in headings], *rows]:
+        cells = [row[k].rjust(widths[k]) if k in numbers else row[k].ljust(widths[k]) for k in kept]
+        lines.append("  " + "  ".join(cells).rstrip())
+    say("\n".join(lines))
+
+
 class Bar:
     """A progress bar on the terminal's standard error, shown only when work goes on for more than a moment."""
 
@@ -159,17 +210,30 @@ def say(text: str) -> None:
     sys.stdout.flush()
 
 
-def complain(error: object) -> None:
-    """Print an error on standard error, in one line."""
-    _tell("error", "bold red", error)
+def say_json(command: str, data: Mapping[str, Any]) -> None:
+    """Print the result of a command as JSON on standard output."""
+    from jounce.io.records import record
+
+    sys.stdout.write(record(command, data) + "\n")
+    sys.stdout.flush()
 
 
-def caution(warning: object) -> None:
-    """Print a warning on standard error, in one line."""
-    _tell("warning", "bold yellow", warning)
+def complain(error: object, *, json: bool = False) -> None:
+    """Print an error on standard error, in one line: of words, or of JSON."""
+    _tell("error", "bold red", error, json)
 
 
-def _tell(kind: str, style: str, message: object) -> None:
+def caution(warning: object, *, json: bool = False) -> None:
+    """Print a warning on standard error, in one line: of words, or of JSON."""
+    _tell("warning", "bold yellow", warning, json)
+
+
+def _tell(kind: str, style: str, message: object, json: bool) -> None:
+    if json:
+        from jounce.io.records import complaint
+
+        sys.stderr.write(complaint(kind, message) + "\n")
+        return
     text = _clean(" ".join(str(message).split()))
     if sys.stderr.isatty():
         from rich.console import Console

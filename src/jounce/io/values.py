@@ -15,7 +15,19 @@ from pydantic_core import PydanticCustomError, core_schema
 from jounce.errors import UNSET, ExpressionError, JounceError, did_you_mean, show_value
 from jounce.io.units import KINDS, Value, parse_value
 
-__all__ = ["Checked", "Samples", "below", "laws", "motion", "orientation", "problem", "scalar", "vector", "vectors"]
+__all__ = [
+    "Checked",
+    "Samples",
+    "below",
+    "laws",
+    "motion",
+    "orientation",
+    "problem",
+    "scalar",
+    "vector",
+    "vectors",
+    "wrenches",
+]
 
 
 def problem(message: str, *at: str | int, value: object = ...) -> PydanticCustomError:
@@ -116,6 +128,17 @@ def vectors(count: int, size: int, quantity: str) -> Any:
 
     schema = {"type": "array", "items": vector_schema(size, quantity), "minItems": count, "maxItems": count}
     return Annotated[Any, Checked(check, schema)]
+
+
+def wrenches() -> Any:
+    """Return the annotation of rows of six values: a force and a moment."""
+
+    def check(raw: Any, info: Any) -> tuple[Any, ...]:
+        if not isinstance(raw, (list, tuple)) or not raw:
+            raise problem("must be rows of six values, a force and a moment")
+        return tuple(vector_value(row, 6, "any", info, index) for index, row in enumerate(raw))
+
+    return Annotated[Any, Checked(check, {"type": "array", "items": vector_schema(6, "any"), "minItems": 1})]
 
 
 class Samples(BaseModel):

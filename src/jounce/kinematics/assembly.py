@@ -1,7 +1,7 @@
 """The first assembly: bodies put together from the starting guess, and degrees of freedom counted and explained."""
 
 import dataclasses
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
@@ -25,6 +25,27 @@ def _moved(system: Any, coordinates: dict[str, Any], increment: Any, instant: An
     time = Jet([instant[None, None]])
     moved = {name: jet.coefficients[0] for name, jet in pose.coordinates().items()}
     return moved, system.residual(pose, time).coefficients[0][:, 0], system.jacobian(pose, time)[:, :, 0]
+
+
+class Trial(NamedTuple):
+    """How far bodies could be put together.
+
+    Attributes
+    ----------
+    coordinates : dict of str to array
+        Of all bodies, the ground first: assembled, or as near to it as they came.
+    scale : array of shape (rows,)
+        By which the rows are multiplied.
+    gaps : array of shape (rows,)
+        By how much each row is open, rad or sizes of the mechanism.
+    jacobian : array of shape (rows, columns)
+        Scaled, there.
+    """
+
+    coordinates: dict[str, np.ndarray]
+    scale: np.ndarray
+    gaps: np.ndarray
+    jacobian: np.ndarray
 
 
 def assemble(
@@ -63,7 +84,26 @@ def assemble(
         raise MobilityError(f"the mechanism has no joints and no drivers: {columns} {noun} are left")
     if not model.rows:  # bodies that fly freely are together as they are
         return dataclasses.replace(model, system=jax.device_put(model.system)), model.guess
-    still, instant = np.zeros(columns), np.float64(instant)
+    found = put_together(model, instant, tolerance)
+    check_assembled(model, found.gaps, instant, tolerance)
+    check_mobility(model, found.jacobian, free=free)
+    system = jax.device_put(dataclasses.replace(model.system, row_scale=found.scale[:, None]))
+    return dataclasses.replace(model, system=system), found.coordinates
+
+
+def put_together(model: Model, instant: float, tolerance: float) -> Trial:
+    """Return how far the bodies can be put together at one instant; nothing is refused.
+
+    Parameters
+    ----------
+    model : Model
+        The mechanism, with at least one row.
+    instant : float
+        s.
+    tolerance : float
+        Of the last correction, rad or sizes of the mechanism.
+    """
+    still, instant = np.zeros(model.system.cells.shape[1]), np.float64(instant)
 
     def moved(coordinates: dict[str, Any], increment: np.ndarray) -> Any:
         result = _moved(model.system, coordinates, increment, instant, model.pose_type)
@@ -91,10 +131,7 @@ def assemble(
         scale = _row_scale(jacobian)
         if size <= tolerance:
             break
-    _check_assembled(model, scale * residual, float(instant), tolerance)
-    check_mobility(model, scale[:, None] * jacobian, free=free)
-    system = jax.device_put(dataclasses.replace(model.system, row_scale=scale[:, None]))
-    return dataclasses.replace(model, system=system), coordinates
+    return Trial(coordinates, scale, scale * residual, scale[:, None] * jacobian)
 
 
 def _row_scale(jacobian: np.ndarray) -> np.ndarray:
@@ -102,7 +139,8 @@ def _row_scale(jacobian: np.ndarray) -> np.ndarray:
     return 1 / np.where((largest > 0) & np.isfinite(largest), largest, 1.0)
 
 
-def _check_assembled(model: Model, gaps: np.ndarray, instant: float, tolerance: float) -> None:
+def check_assembled(model: Model, gaps: np.ndarray, instant: float, tolerance: float) -> None:
+    """Raise AssemblyError, with the joints concerned, where gaps stay open."""
     unknown = list(dict.fromkeys(name for name, gap in zip(model.rows, gaps, strict=True) if not np.isfinite(gap)))
     if unknown:
         named = ", ".join(unknown)
@@ -128,8 +166,7 @@ def check_mobility(model: Model, jacobian: np.ndarray, *, free: bool = False) ->
     Where degrees of freedom may be left, it is enough that no constraint is redundant.
     """
     rows, columns = jacobian.shape
-    left, sizes, right = np.linalg.svd(jacobian)
-    rank = int(np.sum(sizes > RANK_TOLERANCE * sizes.max(initial=0.0)))
+    left, rank, right = split(jacobian)
     if rows == rank and (free or rank == columns):
         return
     left_over, redundant = columns - rank, rows - rank
@@ -144,16 +181,27 @@ def check_mobility(model: Model, jacobian: np.ndarray, *, free: bool = False) ->
         remedy = f"add {_count(left_over, 'driver')}, or simulate it under its forces"
         parts.append(f"{left_over} {noun} left, with which {moving} can move: {remedy}")
     if redundant:
-        names = tuple(dict.fromkeys(model.rows))
-        weights = np.linalg.norm(left[:, rank:], axis=1)
-        by_name = np.array([max(w for w, n in zip(weights, model.rows, strict=True) if n == name) for name in names])
         parts.append(
-            f"{_count(redundant, 'equation')} too many among {_concerned(by_name, names)}: free a direction there "
-            "(a spherical or cylindrical joint for a revolute, say), or remove a driver"
+            f"{_count(redundant, 'equation')} too many among {redundant_rows(model, left[:, rank:])}: free a direction "
+            "there (a spherical or cylindrical joint for a revolute, say), or remove a driver"
         )
     if left_over and redundant and rows == columns and not free:
         parts.append("or the start is a singular position: start at another instant")
     raise MobilityError("; ".join(parts))
+
+
+def split(jacobian: np.ndarray) -> tuple[np.ndarray, int, np.ndarray]:
+    """Return the left vectors, the rank and the right vectors of a scaled Jacobian."""
+    left, sizes, right = np.linalg.svd(jacobian)
+    return left, int(np.sum(sizes > RANK_TOLERANCE * sizes.max(initial=0.0))), right
+
+
+def redundant_rows(model: Model, combinations: np.ndarray) -> str:
+    """Name the joints and drivers in combinations of rows that vanish, shape (rows, combinations)."""
+    names = tuple(dict.fromkeys(model.rows))
+    weights = np.linalg.norm(combinations, axis=1)
+    by_name = np.array([max(w for w, n in zip(weights, model.rows, strict=True) if n == name) for name in names])
+    return _concerned(by_name, names)
 
 
 def freely_moving(model: Model, directions: np.ndarray) -> str:

@@ -195,11 +195,26 @@ def resolve_element(element: Any, parameters: Mapping[str, Any], components: int
             elif kind in ("scalar", "vector") and (value is not None or field.default is not None):
                 value = resolve(value, parameters)
                 check_value(field_name, kind, value, components, signs.get(field_name, ""))
+            elif kind == "wrenches":
+                value = _wrenches(resolve(value, parameters))
         except JounceError as error:
             raise error.located(name=f"{name}.{field_name}") from None
         values[field_name] = value
     _check_sideways(values, name)
     return values
+
+
+def _wrenches(value: Any) -> Any:
+    """Return rows of six numbers, checked."""
+    if not isinstance(value, Tracer):
+        rows = isinstance(value, np.ndarray) and value.dtype.kind == "f" and value.ndim == 2 and value.shape[1] == 6
+        if not rows or not len(value):
+            raise MechanismError("must be rows of six numbers, a force and a moment", value=_plain(value))
+        if not np.isfinite(value).all():
+            raise MechanismError("must be finite", value=_plain(value))
+        if not np.abs(value).max(axis=1).all():
+            raise MechanismError("a row must not vanish", value=_plain(value))
+    return value
 
 
 def _check_sideways(values: Mapping[str, Any], name: str) -> None:

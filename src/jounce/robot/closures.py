@@ -13,7 +13,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from jounce.constraints import AbstractConstraint, Scalar, Vector
-from jounce.errors import RobotError
+from jounce.constraints.base import Wrenches
+from jounce.errors import MechanismError, RobotError
 from jounce.jet import cross, stack
 from jounce.jet.algebra import total
 from jounce.robot.batches import Batched
@@ -28,7 +29,7 @@ MAX_STEPS = 100
 SWAY = 0.05  # rad, or sizes of the robot: how far a position in general is from the one given
 
 
-class LinkClosure(AbstractConstraint, space="spatial"):
+class LinkClosure(AbstractConstraint, type="closure", space="spatial"):
     """Two links held together in some directions, each a wrench that the closure can bear.
 
     With the offset d of the points and the turn e that is missing, both in axes of body i, the rows are
@@ -37,9 +38,18 @@ class LinkClosure(AbstractConstraint, space="spatial"):
 
     point_i: Vector  # m, in the frame of body i
     point_j: Vector
-    wrenches: Any  # (rows, 6): force and moment, in axes of body i
+    wrenches: Wrenches  # (rows, 6): force and moment, in axes of body i
     vector_part: Vector = None  # of the Euler parameters of the frame of body j in that of body i, when closed
     scalar_part: Scalar = None
+
+    dimensions = {"vector_part": "ratio", "scalar_part": "ratio"}
+
+    def __check_init__(self):
+        if (self.vector_part is None) != (self.scalar_part is None):
+            raise MechanismError("Euler parameters have a vector_part and a scalar_part", name="vector_part")
+        if self.vector_part is None and np.any(np.asarray([row[3:] for row in self.wrenches]) != 0):
+            message = "a closure that bears moments needs vector_part and scalar_part, the attitude when closed"
+            raise MechanismError(message, name="vector_part")
 
     def residual(self, body_i, body_j, _time):
         """Return the rows, shape (rows, ...)."""

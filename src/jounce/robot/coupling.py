@@ -9,11 +9,15 @@ import jax.numpy as jnp
 import numpy as np
 
 from jounce.constraints import AbstractConstraint, Scalar, Vector
+from jounce.constraints.base import check_text
 from jounce.constraints.planar import slide
 from jounce.constraints.spatial import relative_angle
+from jounce.errors import MechanismError
 from jounce.jet import Jet, wrap
 from jounce.mechanism import AbstractOutput
 
+KINDS = ("turn-turn", "turn-slide", "slide-turn", "slide-slide")
+PLACES = "ijmn"
 LARGEST_DENOMINATOR = 1000  # of ratios that are taken for those of whole numbers
 
 
@@ -52,15 +56,15 @@ def coordinate(body_i: Any, body_j: Any, turning: bool, parts: Any) -> Jet:
     return slide(body_i, body_j, point, jnp.zeros_like(point), axis)
 
 
-class CoupledJoints(AbstractConstraint, space="spatial"):
+class CoupledJoints(AbstractConstraint, type="coupled", space="spatial"):
     """A joint follows another one: ``weight_2 q_2 - weight_1 q_1 = offset``, up to whole periods.
 
     The angles of turning joints are known up to whole turns. The weights are whole numbers where the ratio of the
     joints is one of whole numbers, so that the joints never lose count over many turns.
     """
 
-    roles: tuple[int, ...] = eqx.field(static=True)  # places among the bodies of parent and child of each joint
-    turning: tuple[bool, ...] = eqx.field(static=True)
+    roles: str = eqx.field(static=True)  # parent and child of each joint among the bodies i, j, m, n, such as ijim
+    kinds: str = eqx.field(static=True)  # of each joint, turn or slide, such as turn-slide
     point_1: Vector
     axis_1: Vector
     vector_1: Vector
@@ -74,18 +78,30 @@ class CoupledJoints(AbstractConstraint, space="spatial"):
     offset: Scalar
     period: Scalar = None
 
-    @property
-    def body_count(self) -> int:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """Number of different bodies, which two joints may share."""
-        return max(self.roles) + 1
+    body_count = 3
+    body_counts = (3, 4)  # two joints may share one
+    dimensions = {
+        **dict.fromkeys(("point_1", "point_2"), "length"),
+        **dict.fromkeys((f"{word}_{k}" for word in ("axis", "vector", "opposite") for k in (1, 2)), "direction"),
+        **dict.fromkeys(("weight_1", "weight_2", "offset", "period"), "any"),
+    }
+
+    def __check_init__(self):
+        check_text("kinds", self.kinds, KINDS)
+        places = PLACES[: len(self.bodies)]
+        pairs = {self.roles[:2], self.roles[2:]}
+        if len(self.roles) != 4 or set(self.roles) != set(places) or any(len({*pair}) != 2 for pair in pairs):
+            message = f"must name two bodies of each joint by {', '.join(places)}, such as ijim"
+            raise MechanismError(message, name="roles", value=self.roles)
 
     def residual(self, *bodies_and_time):
         """Return what the second joint lacks of following the first."""
-        bodies = [bodies_and_time[place] for place in self.roles]
+        bodies = [bodies_and_time[PLACES.index(place)] for place in self.roles]
+        turning = [kind == "turn" for kind in self.kinds.split("-")]
         first = (self.point_1, self.axis_1, self.vector_1, self.opposite_1)
         second = (self.point_2, self.axis_2, self.vector_2, self.opposite_2)
-        leader = coordinate(bodies[0], bodies[1], self.turning[0], first)
-        follower = coordinate(bodies[2], bodies[3], self.turning[1], second)
+        leader = coordinate(bodies[0], bodies[1], turning[0], first)
+        follower = coordinate(bodies[2], bodies[3], turning[1], second)
         excess = self.weight_2 * follower - self.weight_1 * leader - self.offset
         return excess if self.period is None else wrap(excess, self.period)
 
@@ -109,8 +125,8 @@ def coupled(leader: Placed, follower: Placed, multiplier: float, offset: float) 
         period = 2 * np.pi
     return CoupledJoints(
         tuple(bodies),
-        tuple(bodies.index(body) for body in (*leader.bodies, *follower.bodies)),
-        (leader.turning, follower.turning),
+        "".join(PLACES[bodies.index(body)] for body in (*leader.bodies, *follower.bodies)),
+        "-".join("turn" if joint.turning else "slide" for joint in (leader, follower)),
         *(leader.point, leader.axis_i, leader.vector_i, leader.vector_j),
         *(follower.point, follower.axis_i, follower.vector_i, follower.vector_j),
         weight_1=weights[0],

@@ -1,0 +1,51 @@
+"""The command that writes starter files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from jounce.io.terminal import say, say_json, show_columns
+
+
+def new(name: str | None = None, file: Path | None = None, /, *, force: bool = False, json: bool = False) -> int:
+    """Write a commented starter file; without a name, list them.
+
+    Parameters
+    ----------
+    name
+        Of the starter, such as four-bar.
+    file
+        File to write: .yaml, .yml, .toml or .json [default: NAME.yaml].
+    force
+        Replace a file that is there.
+    json
+        Print the result as JSON.
+    """
+    from jounce.io.templates import STARTERS, write_starter
+
+    if name is None:
+        if json:
+            listed = [{"name": s.name, "about": s.about, "command": s.command} for s in STARTERS.values()]
+            say_json("new", {"starters": listed})
+            return 0
+        show_columns([(starter.name, starter.about) for starter in STARTERS.values()])
+        say("\nWrite one with: jounce new NAME [FILE]")
+        return 0
+    target = Path(f"{name}.yaml") if file is None else file
+    starter = write_starter(name, target, force=force)
+    following = [f"jounce {starter.command} {_quoted(target)}"]
+    if starter.command == "run":
+        following.append(f"jounce plot {_quoted(target)} --out {_quoted(target.with_suffix('.png'))}")
+    else:
+        following.append(f"jounce simulate {_quoted(target)} --out {_quoted(target.with_suffix('.csv'))}")
+    if json:
+        say_json("new", {"name": starter.name, "written": str(target), "next": following})
+        return 0
+    say(f"{starter.about}\nWritten to {target}\n\nTry now:\n  " + "\n  ".join(following))
+    return 0
+
+
+def _quoted(path: Path) -> str:
+    import shlex
+
+    return shlex.quote(str(path))
