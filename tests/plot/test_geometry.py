@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.plot.geometry import guessed, placed, skeleton
+from jounce.plot.frames import assembled, frames, guessed
+from jounce.plot.geometry import placed, skeleton
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 FILES = sorted((ROOT / "examples").glob("*.yaml"))
@@ -118,6 +119,9 @@ def test_placed_agrees_with_points_of_the_motion(name):
         placed(motion, body, points, order=3)
     with pytest.raises(jn.MechanismError, match="no body has this name"):
         placed(motion, "bodyy", points)
+    whole = frames(motion)
+    np.testing.assert_allclose(whole[body][:, :, 0] + whole[body][:, :, 1:] @ points[-1], found[:, 0, -1], atol=1e-15)
+    np.testing.assert_allclose(assembled(mechanism)[body][0], whole[body][0], rtol=0, atol=1e-8)
     start = guessed(mechanism)[body](points)
     assert np.linalg.norm(start - found[0, 0]) < 0.5 * skeleton(mechanism).size
 

@@ -6,7 +6,7 @@ outputs, whatever their types, one's own included.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
@@ -14,17 +14,14 @@ from typing import Any
 import numpy as np
 
 from jounce.constraints.base import field_kind, value_fields
-from jounce.errors import JounceError, MechanismError, did_you_mean
-from jounce.jet import Jet
-from jounce.kinematics.compilation import compiled
-from jounce.mechanism.builder import starting_guess
+from jounce.errors import JounceError
 from jounce.mechanism.mechanism import GROUND, check_mechanism
 from jounce.mechanism.resolve import check_value, resolve
 from jounce.mechanism.system import POSITION_COMPONENTS
+from jounce.plot.frames import guessed, placed as placed
 from jounce.plot.gears import pitch_radii
-from jounce.rigid import PlanarPose, SpatialPose
 
-__all__ = ["Link", "Skeleton", "Symbol", "guessed", "placed", "skeleton"]
+__all__ = ["Link", "Skeleton", "Symbol", "placed", "skeleton"]
 
 SLOTS = {"_i": 0, "_j": 1, "_m": 2}  # endings of fields, and the body that each is fixed to
 DIRECTIONS = ("axis", "vector")  # of joints; the first that there is counts
@@ -67,7 +64,9 @@ class Symbol:
     points : tuple of numpy.ndarray
         One on each body, in its frame, m; the centre of a gear.
     axes : tuple of numpy.ndarray or None
-        Axis, direction of travel or normal on each body, in its frame, of any length.
+        Axis, direction of travel or normal on each body, in its frame, of any length. Of a rack, the first leads from
+        the centre of the wheel to where they touch; the first of a coordinate is its direction, both in the global
+        frame.
     radii : tuple of float or None
         Pitch radii of gears, the radius of a wheel, of each body, m.
     """
@@ -221,26 +220,6 @@ def _complete(body: str, points: _Points, mechanism: Any, components: int, near:
         points.add(np.zeros(components), "", near)
 
 
-def guessed(mechanism: Any) -> dict[str, Any]:
-    """Return for each body the function that takes points of its frame, (n, components), to the starting guess, m.
-
-    Examples
-    --------
-    >>> import jounce as jn
-    >>> from jounce.plot.geometry import guessed
-    >>> guessed(jn.load("examples/four_bar.yaml"))["rocker"]([[0.0, 0.0]]).round(6).tolist()
-    [[0.1321, 0.0]]
-    """
-    components = POSITION_COMPONENTS[mechanism.space]
-    guess = starting_guess(mechanism, mechanism.parameter_values, components)
-    frames = np.asarray(_frames(PlanarPose if components == 2 else SpatialPose, {k: (v,) for k, v in guess.items()}))
-
-    def function(frame: np.ndarray) -> Any:
-        return lambda points: frame[:, 0] + np.asarray(points, float).reshape(-1, components) @ frame[:, 1:].T
-
-    return {body: function(frames[0, :, :, k, 0]) for k, body in enumerate((GROUND, *mechanism.bodies))}
-
-
 def _extent(points: np.ndarray) -> float:
     return float(np.linalg.norm(np.ptp(np.asarray(points, float), axis=0)))
 
@@ -299,6 +278,8 @@ def _symbol(mechanism: Any, name: str, element: Any, values: Mapping[str, Any], 
             axes[slot] = value
     if "radius" in values and len(bodies) > 1:
         radii[1] = float(values["radius"])
+    if getattr(element, "coordinate", "angle") != "angle":
+        axes[0] = np.array([1.0, 0.0]) if element.coordinate == "x" else np.array([0.0, 1.0])
     if element.role == "joint" and kind in ("gear", "coordinate") and mechanism.space == "planar":
         return _geared(mechanism, Symbol(name, kind, bodies, tuple(points), tuple(axes), tuple(radii)), element, values)
     return Symbol(name, kind, bodies, tuple(points), tuple(axes), tuple(radii))
@@ -311,83 +292,12 @@ def _geared(mechanism: Any, symbol: Symbol, element: Any, values: Mapping[str, A
     if ratio == 0 or symbol.bodies[0] == GROUND:
         return symbol
     if coordinate != "angle":
-        along = np.array([1.0, 0.0]) if coordinate == "x" else np.array([0.0, 1.0])
         center, _ = pitch_radii(mechanism, symbol.bodies, -1.0)
+        side = np.array([0.0, -ratio]) if coordinate == "x" else np.array([ratio, 0.0])
         points = center[0], symbol.points[1]
-        return Symbol(symbol.name, "rack", symbol.bodies, points, (None, along), (abs(ratio), None))
+        return Symbol(symbol.name, "rack", symbol.bodies, points, (side, symbol.axes[0]), (abs(ratio), None))
     centers, radii = pitch_radii(mechanism, symbol.bodies, ratio)
     if radii is None:
         return symbol
     points = (*centers, *symbol.points[2:])
     return Symbol(symbol.name, "gear", symbol.bodies, points, symbol.axes, (*radii, *symbol.radii[2:]))
-
-
-@compiled("pose_type")
-def _frames(pose_type: Any, coordinates: Mapping[str, Any]) -> Any:
-    """Return origin and axes of all bodies, shape (order + 1, components, 1 + components, bodies, time)."""
-    import jax.numpy as jnp
-
-    pose = pose_type.from_coordinates({name: Jet(tuple(c)) for name, c in coordinates.items()})
-    columns = [pose.position, *(pose.direction(unit) for unit in np.eye(pose_type.shifts))]
-    return jnp.stack([jnp.stack(column.dense().coefficients) for column in columns], axis=2)
-
-
-def placed(motion: Any, body: str, points: Any, order: int = 0) -> np.ndarray:
-    """Return where points of a body are in the global frame, and their derivatives, at all instants.
-
-    Parameters
-    ----------
-    motion : Motion
-        At instants that were not solved the result is NaN.
-    body : str
-        Name of the body, ``"ground"`` included.
-    points : array_like of shape (n, components)
-        In the frame of the body, m.
-    order : int, default 0
-        Highest derivative.
-
-    Returns
-    -------
-    numpy.ndarray of shape (time, order + 1, n, components)
-        m, m/s, ...
-
-    Raises
-    ------
-    MechanismError
-        No body has the name, the points are no vectors, or the order is above that of the motion.
-
-    Examples
-    --------
-    >>> import jounce as jn
-    >>> from jounce.plot.geometry import placed
-    >>> motion = jn.solve(jn.load("examples/four_bar.yaml"), [0.0], order=1)
-    >>> placed(motion, "crank", [[0.0, 0.0], [0.04, 0.0]], order=1)[0, 0].round(5).tolist()
-    [[0.0, 0.0], [0.03464, 0.02]]
-    """
-    names, components = (GROUND, *motion.mechanism.bodies), POSITION_COMPONENTS[motion.mechanism.space]
-    if body not in names:
-        raise MechanismError(f"no body has this name; {did_you_mean(body, names)}", name="body", value=body)
-    local = np.asarray(points, float)
-    if local.ndim != 2 or local.shape[1] != components:
-        raise MechanismError(f"must be a list of vectors of {components} numbers", name="points", value=local.tolist())
-    if not 0 <= order <= motion.order:
-        message = f"the motion has derivatives up to order {motion.order}; solve it with a higher order"
-        raise MechanismError(message, name="order", value=order)
-    frame = _all_frames(motion, order)[..., names.index(body), :]
-    found = frame[:, :, 0, None, :] + np.einsum("kcdt,nd->kcnt", frame[:, :, 1:], local)
-    found = np.moveaxis(found, (3, 0, 2, 1), (0, 1, 2, 3))
-    found[:, 1:] += 0.0  # no negative zeros
-    return np.where((np.asarray(motion.status) == 0)[:, None, None, None], found, np.nan)
-
-
-def _all_frames(motion: Any, order: int) -> np.ndarray:
-    """Return derivatives of the frames of all bodies; kept with the motion."""
-    known = motion.derived.get("frames")
-    if known is None or len(known) <= order:
-        pose_type, coordinates = motion.poses
-        cut = {name: tuple(c[: order + 1]) for name, c in coordinates.items()}
-        known = np.array(_frames(pose_type, cut))
-        sizes: Sequence[float] = np.cumprod([1.0, *range(1, order + 1)]).tolist()
-        known *= np.array(sizes).reshape(-1, *[1] * (known.ndim - 1))
-        motion.derived["frames"] = known
-    return known[: order + 1]
