@@ -42,8 +42,8 @@ def assembled(mechanism: Any) -> dict[str, np.ndarray]:
     --------
     >>> import jounce as jn
     >>> from jounce.plot.frames import assembled
-    >>> assembled(jn.load("examples/four_bar.yaml"))["rocker"][0, :, 0].round(6).tolist()
-    [0.1321, 0.0]
+    >>> assembled(jn.load("examples/four_bar.yaml"))["crank"][0, :, 1].round(6).tolist()  # x axis
+    [0.866025, 0.5]
     """
     started = dataclasses.replace(mechanism, drivers={**mechanism.drivers, **mechanism.initial}, initial={})
     first = 0.0
