@@ -16,9 +16,10 @@ from jounce.io.peaks import COMPONENTS, rate_name
 from jounce.plot.labels import scale_of, symbol, unit_label
 from jounce.plot.style import COLOURS, PALE_GREY, RESOLUTION, blank_figure, shown_name, style
 
-__all__ = ["check_figure", "draw", "save"]
+__all__ = ["check_figure", "draw", "finish", "save", "shade_unsolved"]
 
 SUFFIXES = (".png", ".svg", ".pdf")
+COLUMNS = 5  # of outputs beside each other, at most
 PANEL, SINGLE_PANEL = (3.5, 1.25), (4.8, 1.25)  # inches
 LEGEND = {"borderaxespad": 0.1, "handlelength": 1.2, "handletextpad": 0.5, "columnspacing": 1.2}
 
@@ -31,7 +32,7 @@ def draw(motion: Any, outputs: Sequence[str] | None = None) -> Any:
     motion : Motion
         Instants that were not solved are left out and shaded.
     outputs : sequence of str, optional
-        Names of the outputs, one column each; all unless given.
+        Names of the outputs, one column each, in blocks of five below each other; all unless given.
 
     Returns
     -------
@@ -58,10 +59,19 @@ def draw(motion: Any, outputs: Sequence[str] | None = None) -> Any:
     rows = max(motion.order, max(lost)) + 1 - first
     with style():
         width, height = PANEL if len(names) > 1 else SINGLE_PANEL
-        figure = blank_figure(width * len(names) + 0.3, height * rows + 0.9, motion.mechanism.title)
-        panels = figure.subplots(rows, len(names), sharex=True, squeeze=False)
-        for column, name in zip(panels.T, names, strict=True):
-            _draw_column(motion, name, column, first)
+        blocks = -(-len(names) // COLUMNS)
+        columns = -(-len(names) // blocks)
+        tall = height * rows * blocks + 0.9 + 0.45 * (blocks - 1)
+        figure = blank_figure(width * columns + 0.3, tall, motion.mechanism.title)
+        panels = figure.subplots(rows * blocks, columns, sharex=True, squeeze=False)
+        for place in range(blocks * columns):
+            block, column = divmod(place, columns)
+            chosen = panels[block * rows : (block + 1) * rows, column]
+            if place < len(names):
+                _draw_column(motion, names[place], chosen, first)
+                continue
+            for axes in chosen:
+                axes.set_axis_off()
         figure.align_ylabels()
     return figure
 
@@ -98,8 +108,8 @@ def _draw_column(motion: Any, name: str, panels: Any, first: int) -> None:
                 markersize=3,
                 label=symbol(name, component=COMPONENTS[c]) if vector else None,
             )
-        _shade_unsolved(axes, motion)
-        _finish(axes, motion.time, scaled)
+        shade_unsolved(axes, motion)
+        finish(axes, motion.time, scaled)
         word = rate_name(output, order)
         word = f"{word} derivative" if row + first > 4 and not output.rate_names else word
         word = "angle" if row + first == 0 and output.unit == "rad" else word
@@ -111,9 +121,10 @@ def _draw_column(motion: Any, name: str, panels: Any, first: int) -> None:
         lines = panels[-1].get_lines()[: values.shape[2]]
         top.legend(handles=lines, ncols=len(lines), loc="lower right", bbox_to_anchor=(1.0, 1.0), **LEGEND)
     panels[-1].set_xlabel("time  $t$  (s)")
+    panels[-1].tick_params(labelbottom=True)
 
 
-def _finish(axes: Any, time: np.ndarray, scaled: np.ndarray) -> None:
+def finish(axes: Any, time: np.ndarray, scaled: np.ndarray) -> None:
     """Set limits, ticks and grid; a constant is drawn as one, not magnified to its rounding."""
     from matplotlib.ticker import MaxNLocator
 
@@ -135,7 +146,7 @@ def _finish(axes: Any, time: np.ndarray, scaled: np.ndarray) -> None:
         axes.set_xlim(time[0], time[-1])
 
 
-def _shade_unsolved(axes: Any, motion: Any) -> None:
+def shade_unsolved(axes: Any, motion: Any) -> None:
     """Shade the time that no solved instant borders."""
     failed = np.flatnonzero(motion.status != 0)
     for run in np.split(failed, np.flatnonzero(np.diff(failed) > 1) + 1) if failed.size else ():

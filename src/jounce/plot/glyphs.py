@@ -52,10 +52,13 @@ def support(canvas: Canvas, place: np.ndarray, owner: str) -> None:
     hatching(canvas, left - wide, right + wide, DOWN, 6, owner)
 
 
-def rail(canvas: Canvas, body: str, places: np.ndarray, axis: Any, owner: str, *, beyond: float = 2.6) -> None:
+def rail(
+    canvas: Canvas, body: str, places: np.ndarray, axis: Any, owner: str, *, beyond: float = 2.6, start: Any = None
+) -> None:
     """Draw the line of a body along which global places, (time, components), move, hatched where it is the ground.
 
-    The places stand on the line, at least about; `beyond` is how far it goes on, in units.
+    The places stand on the line, at least about; `beyond` is how far it goes on, in units. A moving body has its line
+    from where it is held, `start` in its frame.
     """
     u = canvas.unit
     local = canvas.within(body, places)
@@ -65,23 +68,25 @@ def rail(canvas: Canvas, body: str, places: np.ndarray, axis: Any, owner: str, *
     if not np.isfinite(travel).any():
         return
     low, high = float(np.nanmin(travel)) - beyond * u, float(np.nanmax(travel)) + beyond * u
+    if start is not None and body != GROUND:
+        low, high = min(low, float(start @ along)), max(high, float(start @ along))
     middle = np.nanmean(foot, axis=0)
-    start, stop = (canvas.flat(canvas.at(body, middle + end * along)) for end in (low, high))
+    first, last = (canvas.flat(canvas.at(body, middle + end * along)) for end in (low, high))
     if body != GROUND:
-        canvas.line(start, stop, stroke=canvas.colours[body], width=2.2, layer=GUIDES, owner=owner)
+        canvas.line(first, last, stroke=canvas.colours[body], width=2.2, layer=GUIDES, owner=owner)
         return
-    direction = unit_vector(stop - start)
+    direction = unit_vector(last - first)
     side = normal_of(direction)
     side = np.where(side[:, 1:] > 1e-9, -side, side)  # strokes below the line, or to its left where it stands
     side = np.where((np.abs(side[:, 1:]) <= 1e-9) & (side[:, :1] > 0), -side, side)
     shift = side * (0.9 * u if canvas.planar else 0.0)
     if not canvas.planar:
-        canvas.line(start, stop, width=1.0, layer=GUIDES, owner=owner)
-        for end in (start, stop):
+        canvas.line(first, last, width=1.0, layer=GUIDES, owner=owner)
+        for end in (first, last):
             hatching(canvas, end - side * 0.9 * u, end + side * 0.9 * u, direction * 0.5, 3, owner)
         return
     count = int(np.clip((high - low) / (0.8 * u), 4, 40))
-    hatching(canvas, start + shift, stop + shift, side, count, owner)
+    hatching(canvas, first + shift, last + shift, side, count, owner)
 
 
 def spring(canvas: Canvas, first: np.ndarray, second: np.ndarray, owner: str, *, turns: int = 6) -> None:

@@ -20,7 +20,7 @@ SIDE = 3.4  # inches
 
 
 def hodograph(motion: Any, output: str, order: int = 1) -> Any:
-    """Draw the curve that the tip of a vector runs through: the hodograph of a point's velocity, acceleration, ...
+    r"""Draw the curve that the tip of a vector runs through: the hodograph of a point's velocity, acceleration, ...
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ def hodograph(motion: Any, output: str, order: int = 1) -> Any:
     >>> from jounce.plot import hodograph
     >>> figure = hodograph(jn.solve(jn.load("examples/four_bar.yaml"), order=2), "C", order=2)
     >>> figure.axes[0].get_xlabel()
-    '$\\\\ddot{C}_{x}$  (m/s$^2$)'
+    '$\\ddot{C}_{x}$  (m/s$^2$)'
     """
     values = _values(motion, output, (order,))[0]
     if values.ndim != 2:
@@ -75,7 +75,7 @@ def hodograph(motion: Any, output: str, order: int = 1) -> Any:
 
 
 def phase_portrait(motion: Any, output: str, orders: tuple[int, int] = (0, 1)) -> Any:
-    """Draw one derivative of an output against another, by default velocity against position.
+    r"""Draw one derivative of an output against another, by default velocity against position.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def phase_portrait(motion: Any, output: str, orders: tuple[int, int] = (0, 1)) -
     >>> from jounce.plot import phase_portrait
     >>> figure = phase_portrait(jn.solve(jn.load("examples/four_bar.yaml"), order=1), "psi")
     >>> figure.axes[0].get_xlabel(), len(figure.axes)
-    ('$\\\\psi$  (rad)', 1)
+    ('$\\psi$  (rad)', 1)
     """
     pair = tuple(orders)
     if len(pair) != 2:
@@ -122,7 +122,18 @@ def phase_portrait(motion: Any, output: str, orders: tuple[int, int] = (0, 1)) -
                 mark = symbol(output, order, component) or rate_name(its_output, order)
                 label(f"{mark}  ({unit_label(its_output.unit, order, exponent)})")
             _few_ticks(axes)
+            _set_limits(axes, (x, first, exponents[0]), (y, second, exponents[1]))
     return figure
+
+
+def _set_limits(axes: Any, *shown: tuple[np.ndarray, np.ndarray, int]) -> None:
+    """Keep an axis on which nothing changes but rounding from being magnified to it."""
+    for limits, (values, all_components, exponent) in zip((axes.set_xlim, axes.set_ylim), shown, strict=True):
+        known, whole = values[np.isfinite(values)], all_components[np.isfinite(all_components)]
+        size = float(np.max(np.abs(whole), initial=0.0)) * 10.0**-exponent
+        if (known.size and np.ptp(known) <= 1e-9 * size) or not size:
+            middle = float(known.mean()) if known.size else 0.0
+            limits(middle - (0.5 * size or 1.0), middle + (0.5 * size or 1.0))
 
 
 def _values(motion: Any, output: str, orders: tuple[int, ...]) -> list[np.ndarray]:

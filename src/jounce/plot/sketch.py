@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from jounce.errors import MechanismError, did_you_mean
-from jounce.io.peaks import derivative_unit, rate_name
+from jounce.io.peaks import rate_name
 from jounce.mechanism import PointOutput
 from jounce.mechanism.mechanism import Mechanism, check_mechanism
 from jounce.plot.labels import scale_of, unit_label
@@ -48,8 +48,8 @@ class Paths:
         if names and order:
             output = motion.mechanism.outputs[names[0]]
             self.exponent = scale_of(np.concatenate(list(self.sizes.values())))
-            self.label = f"{rate_name(output, order)}  ({unit_label(output.unit, order, self.exponent)})"
-            self.unit = derivative_unit(output.unit, order)
+            whose = f" of {shown_name(names[0])}" if len(names) == 1 else ""
+            self.label = f"{rate_name(output, order)}{whose}  ({unit_label(output.unit, order, self.exponent)})"
 
 
 def paths_of(motion: Any, wanted: Sequence[str] | None, order: int, view: tuple[float, float]) -> Paths | None:
@@ -267,7 +267,7 @@ def _draw_paths(figure: Any, axes: Any, paths: Paths) -> None:
         drawn.set_array(size)
         axes.add_collection(drawn)
     bar = figure.colorbar(drawn, ax=axes, shrink=0.75, aspect=25, pad=0.02)
-    bar.set_label(paths.label if len(paths.names) > 1 else f"{paths.label} of {shown_name(paths.names[0])}")
+    bar.set_label(paths.label)
     bar.outline.set_visible(False)
 
 

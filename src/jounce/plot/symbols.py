@@ -112,7 +112,14 @@ def _axis(symbol: Symbol, slot: int) -> np.ndarray:
 
 def _prismatic(canvas: Canvas, symbol: Symbol, owner: str) -> None:
     block, guide = _block_and_rail(symbol)
-    rail(canvas, symbol.bodies[guide], _global(canvas, symbol, block), _axis(symbol, guide), owner)
+    rail(
+        canvas,
+        symbol.bodies[guide],
+        _global(canvas, symbol, block),
+        _axis(symbol, guide),
+        owner,
+        start=symbol.points[guide],
+    )
     along = unit_vector(canvas.toward(symbol.bodies[block], _axis(symbol, block)))
     _block(canvas, symbol.bodies[block], _place(canvas, symbol, block), along, owner)
 
@@ -126,7 +133,7 @@ def _block(canvas: Canvas, body: str, place: np.ndarray, along: np.ndarray, owne
 
 def _pin_in_slot(canvas: Canvas, symbol: Symbol, owner: str) -> None:
     pin = _global(canvas, symbol, 1)
-    rail(canvas, symbol.bodies[0], pin, _axis(symbol, 0), owner)
+    rail(canvas, symbol.bodies[0], pin, _axis(symbol, 0), owner, start=symbol.points[0])
     _pin(canvas, canvas.flat(pin), owner)
 
 
@@ -188,7 +195,8 @@ def _rolling(canvas: Canvas, symbol: Symbol, owner: str) -> None:
     along = axis / np.linalg.norm(axis)
     on_line = symbol.points[0] + (local @ along)[:, None] * along
     frame = canvas.frames[symbol.bodies[0]]
-    rail(canvas, symbol.bodies[0], frame[:, :, 0] + np.einsum("tck,tk->tc", frame[:, :, 1:], on_line), axis, owner)
+    touch = frame[:, :, 0] + np.einsum("tck,tk->tc", frame[:, :, 1:], on_line)
+    rail(canvas, symbol.bodies[0], touch, axis, owner, start=symbol.points[0])
 
 
 def _sphere(canvas: Canvas, place: np.ndarray, owner: str) -> None:
@@ -221,7 +229,7 @@ def _sleeve(canvas: Canvas, symbol: Symbol, owner: str) -> None:
     block, guide = _block_and_rail(symbol)
     body, shaft = symbol.bodies[block], symbol.bodies[guide]
     place = _global(canvas, symbol, block)
-    rail(canvas, shaft, place, _axis(symbol, guide), owner, beyond=3.5)
+    rail(canvas, shaft, place, _axis(symbol, guide), owner, beyond=3.5, start=symbol.points[guide])
     if symbol.kind == "screw":
         frame = canvas.frame_of(shaft, _axis(symbol, guide))
         flat, u = canvas.flat(frame), canvas.unit
@@ -238,7 +246,7 @@ def _slider(canvas: Canvas, symbol: Symbol, owner: str) -> None:
     block, guide = _block_and_rail(symbol)
     body = symbol.bodies[block]
     place = _global(canvas, symbol, block)
-    rail(canvas, symbol.bodies[guide], place, _axis(symbol, guide), owner, beyond=3.0)
+    rail(canvas, symbol.bodies[guide], place, _axis(symbol, guide), owner, beyond=3.0, start=symbol.points[guide])
     axes, colour = canvas.frame_of(body, _axis(symbol, block)), canvas.colours.get(body, INK)
     look = {"stroke": colour, "fill": tinted(colour, 0.35), "width": 1.2, "layer": SYMBOLS, "owner": owner}
     box(canvas, canvas.flat(place), axes, (1.7, 0.9, 0.9), **look)
