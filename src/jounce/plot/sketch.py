@@ -16,7 +16,7 @@ from jounce.plot.naming import place_names
 from jounce.plot.scene import AZIMUTH, ELEVATION, WHEELS, Canvas, Scene, outline, scene_of
 from jounce.plot.style import GREY, blank_figure, shown_name, style
 
-__all__ = ["Drawing", "Paths", "paths_of", "sketch"]
+__all__ = ["Drawing", "Paths", "length_text", "paths_of", "round_length", "sketch"]
 
 NAMES = ("all", "bodies", "joints", "none")
 WIDEST, TALLEST, LEAST = 6.4, 5.2, 2.6  # inches
@@ -274,12 +274,10 @@ def _draw_paths(figure: Any, axes: Any, paths: Paths) -> None:
 def _draw_scale(axes: Any, limits: tuple[float, ...], view: tuple[float, float] | None) -> None:
     """Draw a bar of a round length, and the axes of a view in space."""
     left, right, lower, upper = limits
-    length = 0.22 * (right - left)
-    power = 10.0 ** np.floor(np.log10(length))
-    length = float(power * max(k for k in (1.0, 2.0, 5.0) if k * power <= length * (1 + 1e-9)))
+    length = round_length(0.22 * (right - left))
     start, foot = left + 0.03 * (right - left), lower + 0.25 * (upper - lower) * 0.12
     axes.plot([start, start + length], [foot, foot], color=GREY, linewidth=1.6, solid_capstyle="butt", zorder=8)
-    axes.text(start, foot + 0.008 * (upper - lower), _length_text(length), color=GREY, fontsize=7.5, va="bottom")
+    axes.text(start, foot + 0.008 * (upper - lower), length_text(length), color=GREY, fontsize=7.5, va="bottom")
     if view is None:
         return
     screen = Canvas(None, {"ground": np.zeros((1, 3, 4))}, view).screen  # type: ignore[arg-type]
@@ -293,7 +291,26 @@ def _draw_scale(axes: Any, limits: tuple[float, ...], view: tuple[float, float] 
         axes.text(*far, name, color=GREY, fontsize=7.5, ha="center", va="center")
 
 
-def _length_text(length: float) -> str:
+def round_length(length: float) -> float:
+    """Return the largest of 1, 2, 5, 10, 20, ... that is not above a length.
+
+    Examples
+    --------
+    >>> round_length(0.07), round_length(3.0)
+    (0.05, 2.0)
+    """
+    power = 10.0 ** np.floor(np.log10(length))
+    return float(f"{power * max(k for k in (1.0, 2.0, 5.0) if k * power <= length * (1 + 1e-9)):.3g}")
+
+
+def length_text(length: float) -> str:
+    """Word a length.
+
+    Examples
+    --------
+    >>> length_text(0.05), length_text(2.0)
+    ('50 mm', '2 m')
+    """
     if length >= 1:
         return f"{length:g} m"
     for factor, unit in ((1e3, "mm"), (1e6, "\u00b5m")):
