@@ -85,25 +85,25 @@ def plot(
     import_
         Python file with your own joints; repeatable.
     """
-    kind = _kind(kind, out)
-    out = Path(f"{file.stem}{'.gif' if kind == 'animation' else '.png'}") if out is None else out
-    _check_target(kind, out)
+    chosen = _kind(kind, out)
+    out = Path(f"{file.stem}{'.gif' if chosen == 'animation' else '.png'}") if out is None else out
+    _check_target(chosen, out)
     mechanism = loaded(file, set_, import_)
-    _check_names(mechanism, kind, output or (), file)
-    least = max(derivative or 0, ORDERS[kind] if order is None or kind in PORTRAITS else 0)
+    _check_names(mechanism, chosen, output or (), file)
+    least = max(derivative or 0, ORDERS[chosen] if order is None or chosen in PORTRAITS else 0)
     motion = _moved(mechanism, file, least if order is None else max(order, derivative or 0))
     view = (azimuth, elevation)
     look: dict[str, Any] = {"paths": output, "order": derivative or 0, "view": view}
     if names is not None:
         look["names"] = names
     try:
-        if kind == "animation":
+        if chosen == "animation":
             from jounce.plot import animate
 
             with Bar("drawing") as bar:
                 written(lambda: animate(motion, out, speed=speed, fps=fps, progress=bar, **look))
         else:
-            _draw(motion, kind, out, output, derivative, {"instant": instant, **look})
+            _draw(motion, chosen, out, output, derivative, {"instant": instant, **look})
     except JounceError as error:
         raise of_option(error, file) from None
     say(f"Written to {out}")

@@ -138,6 +138,7 @@ def schema() -> int:
 
 
 def loaded(file: Path, assignments: Sequence[str] | None, imports: Sequence[Path] | None) -> Mechanism:
+    """Return the mechanism of a file, with parameters changed, after files of one's own joints were run."""
     from jounce.io import load
 
     if imports:

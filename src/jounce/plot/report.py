@@ -29,6 +29,8 @@ MOST_INSTANTS = 2001  # of the plots
 MOST_FRAMES = 240  # of the sketch, which goes on evenly between them
 STEPS = 20000  # of places across the sketch
 DIGITS = 9  # of plotted values; peaks are taken of all instants in full
+ROUNDING = 1e-15  # of the other components; what is smaller is 0
+KINDS = {"joints": "joint", "drivers": "driver", "forces": "force", "initial": "at the start"}
 SPEEDS = (0.001, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 100.0)
 
 
@@ -129,12 +131,12 @@ def _data(motion: Any, view: tuple[float, float], source: str) -> dict[str, Any]
         "outputs": outputs,
         "scene": _scene(motion, rising, shown, view, [output["name"] for output in outputs]),
         "peaks": [_peak(peak) for peak in peaks(motion)],
-        "parameters": _parameters(mechanism),
+        "parameters": [[name, _number(value)] for name, value in mechanism.parameter_values.items()],
         "bodies": _bodies(mechanism),
         "elements": [
-            [name, f"{element.type_name or type(element).__name__} ({kind})", ", ".join(element.bodies)]
-            for kind in ("joints", "drivers", "forces", "initial")
-            for name, element in getattr(mechanism, kind).items()
+            [name, f"{element.type_name or type(element).__name__} {kind}", ", ".join(element.bodies)]
+            for kinds, kind in KINDS.items()
+            for name, element in mechanism.elements[kinds].items()
         ],
     }
 
@@ -168,8 +170,11 @@ def _output(name: str, output: Any, values: np.ndarray) -> dict[str, Any]:
 
 def _peak(peak: Any) -> dict[str, Any]:
     found = {name: getattr(peak, name) for name in ("output", "derivative", "unit")}
-    numbers = ("minimum", "minimum_at", "maximum", "maximum_at")
-    return found | {name: _number(getattr(peak, name)) for name in numbers} | {"largest": list(peak.largest)}
+    times = {name: _number(getattr(peak, name)) for name in ("minimum_at", "maximum_at")}
+    extremes = {name: getattr(peak, name) for name in ("minimum", "maximum")}
+    small = ROUNDING * peak.size
+    shown = {name: _number(0.0 if abs(value) < small else value) for name, value in extremes.items()}
+    return found | times | shown | {"largest": list(peak.largest)}
 
 
 def _messages(motion: Any) -> list[str]:
@@ -184,14 +189,6 @@ def _messages(motion: Any) -> list[str]:
         culprit = motion.culprits.get(int(run[0]), "")
         lines.append(f"Not solved at {when}{f' ({culprit})' if culprit else ''}: {known.advice}.")
     return lines
-
-
-def _parameters(mechanism: Any) -> list[list[Any]]:
-    values = mechanism.parameter_values
-    return [
-        [name, _number(values[name]), given if isinstance(given, str) else getattr(given, "text", "")]
-        for name, given in mechanism.parameters.items()
-    ]
 
 
 def _bodies(mechanism: Any) -> list[dict[str, Any]]:

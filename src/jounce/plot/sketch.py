@@ -13,7 +13,7 @@ from jounce.mechanism import PointOutput
 from jounce.mechanism.mechanism import Mechanism, check_mechanism
 from jounce.plot.labels import scale_of, unit_label
 from jounce.plot.naming import place_names
-from jounce.plot.scene import AZIMUTH, ELEVATION, WHEELS, Canvas, Scene, outline, scene_of
+from jounce.plot.scene import AZIMUTH, ELEVATION, WHEELS, Scene, outline, scene_of, screen_of
 from jounce.plot.style import GREY, blank_figure, shown_name, style
 
 __all__ = ["Drawing", "Paths", "length_text", "paths_of", "round_length", "sketch"]
@@ -40,9 +40,9 @@ class Paths:
     """
 
     def __init__(self, motion: Any, names: Sequence[str], order: int, view: tuple[float, float]):
-        canvas = Canvas(None, {"ground": np.zeros((1, 2 if motion.mechanism.space == "planar" else 3, 1))}, view)  # type: ignore[arg-type]
+        screen = np.eye(2) if motion.mechanism.space == "planar" else screen_of(view)[:2]
         self.names, self.order = list(names), order
-        self.flat = {name: canvas.flat(motion.outputs[name][:, 0]) for name in names}
+        self.flat = {name: motion.outputs[name][:, 0] @ screen.T for name in names}
         self.sizes = {name: np.linalg.norm(motion.outputs[name][:, order], axis=-1) for name in names}
         self.label = ""
         if names and order:
@@ -225,26 +225,12 @@ def sketch(
         chosen = np.unique([*np.linspace(0, len(solved) - 1, min(MOST, len(solved))).round().astype(int)])
         chosen = np.unique([*solved[chosen], at])
         whole = scene_of(moving, view=view, instants=chosen)
-        at = int(np.searchsorted(chosen, at))
-        scene = Scene([_at_instant(shape, at) for shape in whole.shapes], _labels_at(whole, at), whole.unit)
-        at = 0
+        scene, at = whole.only(int(np.searchsorted(chosen, at))), 0
     with style():
         drawing = Drawing(scene, found, mechanism.title, None if mechanism.space == "planar" else view)
         drawing.show(at)
         drawing.write_names(at, names)
     return drawing.figure
-
-
-def _at_instant(shape: Any, at: int) -> Any:
-    from dataclasses import replace
-
-    return replace(shape, points=shape.points[[min(at, len(shape.points) - 1)]])
-
-
-def _labels_at(scene: Scene, at: int) -> list[Any]:
-    from dataclasses import replace
-
-    return [replace(label, anchor=label.anchor[[at]]) for label in scene.labels]
 
 
 def _draw_paths(figure: Any, axes: Any, paths: Paths) -> None:
@@ -280,7 +266,7 @@ def _draw_scale(axes: Any, limits: tuple[float, ...], view: tuple[float, float] 
     axes.text(start, foot + 0.008 * (upper - lower), length_text(length), color=GREY, fontsize=7.5, va="bottom")
     if view is None:
         return
-    screen = Canvas(None, {"ground": np.zeros((1, 3, 4))}, view).screen  # type: ignore[arg-type]
+    screen = screen_of(view)
     arm = 0.055 * max(right - left, upper - lower)
     origin = np.array([right - 1.5 * arm, lower + 1.2 * arm])
     for name, direction in zip("xyz", screen[:2].T, strict=True):

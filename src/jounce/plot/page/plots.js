@@ -209,7 +209,7 @@ if (data.messages.length) { byId("status").hidden = false; byId("status").textCo
 fill("peaks", ["output", "derivative", "unit", "minimum", "at t / s", "maximum", "at t / s"], data.peaks.map((peak) => [
   peak.output, peak.derivative, unitText(peak.unit, 0), { text: shown(peak.minimum), largest: peak.largest[0] }, peak.minimum_at,
   { text: shown(peak.maximum), largest: peak.largest[1] }, peak.maximum_at]), [3, 4, 5, 6]);
-fill("parameters", ["name", "value, SI", "given as"], data.parameters, [1]);
+fill("parameters", ["name", "value, SI"], data.parameters, [1]);
 fill("bodies", ["name", "mass, kg", "starting position, m"], data.bodies.map((body) => [
   { text: body.name, colour: body.colour }, body.mass, body.position]), [1]);
 fill("elements", ["name", "kind", "bodies"], data.elements, []);
