@@ -277,23 +277,30 @@ def _draw_link(canvas: Canvas, link: Link) -> None:
     """Draw the bars of a body, or its plate, and write its name."""
     colour, owner = canvas.colours[link.body], f"bodies.{link.body}"
     places = canvas.flat(canvas.at(link.body, link.points))  # time, n, 2
-    closed = len(link.edges) > 1 and link.edges[-1][1] == link.edges[0][0] and len(link.edges) > 2
-    if closed:
-        outline = [first for first, _ in link.edges]
-        canvas.curve(
-            places[:, outline], closed=True, stroke=colour, fill=tinted(colour), width=2.0, layer=PLATES, owner=owner
-        )
-    else:
-        for first, second in link.edges:
-            canvas.curve(places[:, [first, second]], stroke=colour, width=4.0, layer=BARS, owner=owner)
-    if closed:
-        anchor = places[:, [first for first, _ in link.edges]].mean(axis=1)
+    ring = _ring(link)
+    if ring:
+        look = {"stroke": colour, "fill": tinted(colour), "width": 2.0, "layer": PLATES, "owner": owner}
+        canvas.curve(places[:, ring], closed=True, **look)
+    for first, second in link.edges[len(ring) :]:
+        width = 2.0 if ring else 4.0
+        canvas.curve(places[:, [first, second]], stroke=colour, width=width, layer=BARS, owner=owner)
+    anchor = places[:, 0]
+    if ring:
+        anchor = places[:, ring].mean(axis=1)
     elif link.edges:
         lengths = [np.linalg.norm(link.points[i] - link.points[j]) for i, j in link.edges]
         anchor = places[:, link.edges[int(np.argmax(lengths))]].mean(axis=1)
-    else:
-        anchor = places[:, 0]
     canvas.name(link.body, anchor, colour, owner)
+
+
+def _ring(link: Link) -> list[int]:
+    """Return the corners of the plate with which the bars of a link begin; none where it has no plate."""
+    corners: list[int] = []
+    for first, second in link.edges:
+        corners.append(first)
+        if second == corners[0]:
+            return corners if len(corners) > 2 else []
+    return []
 
 
 def outline(shape: Shape, instant: int) -> np.ndarray:

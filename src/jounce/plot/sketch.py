@@ -20,6 +20,7 @@ __all__ = ["Drawing", "Paths", "length_text", "paths_of", "round_length", "sketc
 
 NAMES = ("all", "bodies", "joints", "none")
 WIDEST, TALLEST, LEAST = 6.4, 5.2, 2.6  # inches
+LETTER = 0.095  # inches of a title
 MOST = 400  # instants that a drawing is made for; more would not be seen
 PATH_MAP = "cividis"  # rises evenly in lightness, for the colour-blind too
 
@@ -97,7 +98,8 @@ class Drawing:
         wide, tall = right - left, upper - lower
         scale = min((WIDEST - 0.3) / wide, (TALLEST - 0.3) / tall)
         bar = 0.9 if paths is not None and paths.order and paths.names else 0.0
-        size = max(LEAST, wide * scale + 0.3 + bar), max(LEAST, tall * scale + 0.3 + 0.35 * bool(title))
+        least = max(LEAST, LETTER * len(title))
+        size = max(least, wide * scale + 0.3 + bar), max(LEAST, tall * scale + 0.3 + 0.35 * bool(title))
         self.figure = blank_figure(*size, title)
         self.axes = axes = self.figure.add_subplot()
         axes.set_aspect("equal")
