@@ -58,12 +58,12 @@ def test_forces_are_drawn_of_a_simulation(run, tmp_path, kind):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "part"),
+    "arguments, part",
     [
         (["plot", FOUR_BAR, "--kind", "skech"], "sketch"),
         (["plot", FOUR_BAR, "--kind", "sketch", "--out", "a.gif"], "does not move"),
         (["plot", FOUR_BAR, "--kind", "animation", "--out", "a.png"], ".gif, .mp4"),
-        (["plot", FOUR_BAR, "--kind", "reactions", "--output", "BD"], "did you mean 'BC'"),
+        (["plot", FOUR_BAR, "--kind", "reactions", "--output", "BCD"], "did you mean 'BC'"),
         (["plot", FOUR_BAR, "--kind", "energy", "--out", "a.png"], "mass"),
         (["plot", FOUR_BAR, "--kind", "hodograph", "--output", "psi", "--out", "a.png"], "with components"),
         (["plot", FOUR_BAR, "--kind", "phase", "--output", "psi", "--output", "C"], "one output"),
