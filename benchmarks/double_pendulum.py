@@ -242,17 +242,18 @@ def report(found: dict[str, list[Point]]) -> None:
 
 def draw(found: dict[str, list[Point]], path: Path) -> None:
     """Write the figure: error at the end against time spent."""
-    import matplotlib.pyplot as plt
+    from jounce.plot.style import LINE_COLOURS, RESOLUTION, blank_figure, style
 
-    figure, axes = plt.subplots(figsize=(7.5, 4), layout="constrained")
-    for (name, points), marker in zip(found.items(), "os^Dv", strict=False):
-        axes.loglog([s * 1e3 for _, s, _ in points], [e for _, _, e in points], marker=marker, label=name)
-    axes.set_xlabel("time for 10 s of motion, one core (ms)")
-    axes.set_ylabel("error of the angles at 10 s (rad)")
-    axes.set_title("Double pendulum from horizontal rest")
-    axes.grid(which="major", alpha=0.4)
-    figure.legend(loc="outside right upper")
-    figure.savefig(path, dpi=130)
+    with style():
+        figure = blank_figure(7.5, 4.0, "Double pendulum from horizontal rest")
+        axes = figure.subplots()
+        for (name, points), marker, colour in zip(found.items(), "os^Dv", LINE_COLOURS, strict=False):
+            times, errors = [s * 1e3 for _, s, _ in points], [e for _, _, e in points]
+            axes.loglog(times, errors, color=colour, marker=marker, label=name)
+        axes.set_xlabel("time for 10 s of motion, one core  (ms)")
+        axes.set_ylabel("error of the angles at 10 s  (rad)")
+        figure.legend(loc="outside right upper")
+        figure.savefig(path, dpi=RESOLUTION)
     print(f"wrote {path}")
 
 

@@ -143,33 +143,29 @@ def main():
 
 def draw(results):
     """Draw errors, and how many times smaller they are with jerk, against the step."""
-    import matplotlib as mpl
+    from jounce.plot.style import COLOURS, GREY, RESOLUTION, blank_figure, style
 
-    mpl.use("Agg")
-    import matplotlib.pyplot as plt
-
-    figure, panels = plt.subplots(2, 2, figsize=(8.0, 6.0), sharex=True, sharey="row", layout="constrained")
-    styles = [("#0072B2", "o"), ("#D55E00", "s"), ("#009E73", "D")]
-    steps = np.array(STEPS) * 1e3
-    for (above, below), (title, errors) in zip(panels.T, results.items(), strict=True):
-        jerk = list(errors.values())[-1]
-        for (name, values), (colour, marker) in zip(errors.items(), styles, strict=True):
-            above.loglog(steps, values, color=colour, marker=marker, markersize=4, label=name)
-            if values is not jerk:
-                below.loglog(steps, values / jerk, color=colour, marker=marker, markersize=4, label=name)
-        above.set_title(f"Free {title} under gravity")
-        below.axhline(10, color="#444444", linewidth=0.8, linestyle="--")
-        below.text(steps[-1], 10, "ten, as claimed", color="#444444", fontsize=8, va="bottom")
-        below.set_xlabel("step, ms")
-        below.set_xticks(steps, [f"{step:.3g}" for step in steps])
-        below.minorticks_off()
-        for panel in (above, below):
-            panel.grid(color="#DDDDDD", linewidth=0.6)
-            panel.spines[["top", "right"]].set_visible(False)
-    panels[0, 0].set_ylabel("largest error of an angle in 1 s, rad")
-    panels[1, 0].set_ylabel("times the error with jerk")
-    panels[0, 0].legend(fontsize=8, frameon=False)
-    figure.savefig(FIGURE, dpi=130)
+    with style():
+        figure = blank_figure(8.0, 6.0)
+        panels = figure.subplots(2, 2, sharex=True, sharey="row")
+        looks = list(zip(COLOURS, "osD", strict=True))
+        steps = np.array(STEPS) * 1e3
+        for (above, below), (title, errors) in zip(panels.T, results.items(), strict=True):
+            jerk = list(errors.values())[-1]
+            for (name, values), (colour, marker) in zip(errors.items(), looks, strict=True):
+                above.loglog(steps, values, color=colour, marker=marker, label=name)
+                if values is not jerk:
+                    below.loglog(steps, values / jerk, color=colour, marker=marker, label=name)
+            above.set_title(f"Free {title} under gravity")
+            below.axhline(10, color=GREY, linewidth=0.8, linestyle="--")
+            below.text(steps[-1], 10, "ten, as claimed", color=GREY, va="bottom")
+            below.set_xlabel("step  (ms)")
+            below.set_xticks(steps, [f"{step:.3g}" for step in steps])
+            below.minorticks_off()
+        panels[0, 0].set_ylabel("largest error of an angle in 1 s  (rad)")
+        panels[1, 0].set_ylabel("times the error with jerk")
+        panels[0, 0].legend()
+        figure.savefig(FIGURE, dpi=RESOLUTION)
     print(f"drawn: {FIGURE}")
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from jounce.cli.conversion import MECHANISMS, ROBOTS
-from jounce.cli.mechanisms import _loaded
+from jounce.cli.mechanisms import loaded
 from jounce.errors import JounceError, did_you_mean
 from jounce.io.terminal import say_json
 
@@ -52,7 +52,7 @@ def inspect(
         from jounce.io.briefing import brief as tell
         from jounce.io.inspection import inspected
 
-        mechanism = _loaded(file, set_, import_)
+        mechanism = loaded(file, set_, import_)
         try:
             facts = inspected(mechanism, file)
         except JounceError as error:

@@ -11,6 +11,7 @@ from jounce.dynamics.energies import (
     body_energy as body_energy,
     kinetic_energy as kinetic_energy,
     potential_energy as potential_energy,
+    stored_energy as stored_energy,
 )
 from jounce.dynamics.equations import (
     catalan as catalan,

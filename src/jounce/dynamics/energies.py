@@ -261,6 +261,51 @@ def _heights(coordinates: Any, center: Any, gravity: Any, pose_type: Any) -> Any
     return stacked(dot(pose.point(center), gravity))
 
 
+def stored_energy(motion: Motion) -> np.ndarray:
+    """Return the energy that springs, and other forces that give back what they take, have stored.
+
+    Parameters
+    ----------
+    motion : Motion
+        Of any mechanism; without such forces it is zero.
+
+    Returns
+    -------
+    array of shape (time,)
+        J; NaN at instants that were not solved.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> sled = jn.Mechanism(
+    ...     space="planar",
+    ...     bodies={"sled": jn.Body([1, 0])},
+    ...     joints={"rail": jn.planar.Prismatic(("ground", "sled"), [0, 0], [0, 0], [1, 0], [1, 0])},
+    ...     drivers={"push": jn.drivers.SlideDriver(("ground", "sled"), [0, 0], [0, 0], [1, 0], "1 + t**2")},
+    ...     forces={"spring": jn.forces.Spring(("ground", "sled"), [0, 0], [0, 0], stiffness=5.0, length=1.0)},
+    ... )
+    >>> jn.dynamics.stored_energy(jn.solve(sled, [0.0, 2.0], order=1)).round(12).tolist()  # 5/2 t^4
+    [0.0, 40.0]
+    """
+    pose_type, coordinates = motion.poses
+    low = {name: values[: 2 - (name == "angular_velocity")] for name, values in coordinates.items()}
+    stored = np.asarray(_stored(motion.model.system.forces, low, motion.time[None], pose_type))
+    return np.where(motion.status == Status.OK, stored, np.nan)
+
+
+@compiled("pose_type")
+def _stored(groups: Any, coordinates: Any, time: Any, pose_type: Any) -> Any:
+    pose, clock = (
+        pose_type.from_coordinates({name: Jet(tuple(c)) for name, c in coordinates.items()}),
+        Jet.variable(time, 1),
+    )
+    total_energy = jnp.zeros(time.shape[-1])
+    for group in groups:
+        stored = jnp.broadcast_to(group.energy(pose, clock).coefficients[0], (group.instances, time.shape[-1]))
+        total_energy = total_energy + jnp.sum(stored, axis=0)
+    return total_energy
+
+
 def gravity_of(mechanism: Mechanism) -> Any:
     """Return the acceleration of free fall in a mechanism, shape (k, 1, 1), m/s^2."""
     given = [0.0] * (2 if mechanism.space == "planar" else 3) if mechanism.gravity is None else mechanism.gravity

@@ -1,4 +1,13 @@
 """Figures of publication quality; matplotlib is imported when one is drawn, not before."""
 
+from jounce.plot.animation import animate as animate, check_animation as check_animation
 from jounce.plot.figure import check_figure as check_figure, draw as draw, save as save
+from jounce.plot.forces import (
+    draw_energy as draw_energy,
+    draw_power as draw_power,
+    draw_reactions as draw_reactions,
+)
 from jounce.plot.limits import draw_limits as draw_limits
+from jounce.plot.portraits import hodograph as hodograph, phase_portrait as phase_portrait
+from jounce.plot.report import check_report as check_report, report as report
+from jounce.plot.sketch import sketch as sketch

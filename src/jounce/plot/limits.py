@@ -8,13 +8,11 @@ import numpy as np
 
 from jounce.dynamics.limits import FIELDS, LimitReport, LimitRow
 from jounce.errors import RobotError
-from jounce.plot.figure import GREY, RESOLUTION, STYLE
 from jounce.plot.labels import unit_label
+from jounce.plot.style import GREY, LINE_COLOURS, PALE_GREY, blank_figure, shown_name, style
 
 __all__ = ["draw_limits"]
 
-JOINT_COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#000000")
-"""Of Okabe and Ito, told apart by the colour-blind; their yellow is too pale for lines."""
 DASHES = ("-", (0, (4, 1.5)), (0, (1, 1.2)), (0, (5, 1.2, 1, 1.2)), (0, (8, 2)), (0, (2, 2)))
 BROKEN, FORBIDDEN = "#B22222", "#EDEDED"
 WIDTH, ROW = 7.0, 1.75  # inches
@@ -53,10 +51,6 @@ def draw_limits(report: LimitReport, title: str = "") -> Any:
     >>> [axes.get_title(loc="left") for axes in draw_limits(report).axes]
     ['worst: pin, 1 rad/s (limit 2)', 'worst: pin, 4.905 N m (limit 8)']
     """
-    import matplotlib as mpl
-    from matplotlib.figure import Figure
-    from matplotlib.layout_engine import ConstrainedLayoutEngine
-
     limited = np.array(np.isfinite(report.shares).any(axis=0))  # quantities, joints
     for name in report.held:
         limited[: FIELDS.index("effort"), report.joint_names.index(name)] = False
@@ -65,11 +59,11 @@ def draw_limits(report: LimitReport, title: str = "") -> Any:
         raise RobotError("there are no limits to draw; give some", name="limits")
     columns = 2 if len(rows) > 3 else 1
     lines = -(-len(rows) // columns)
-    with mpl.rc_context(STYLE):
+    with style():
         joints = np.flatnonzero(limited.any(axis=0))
         legend = 0.22 * -(-len(joints) // _per_line(report, joints))
-        layout = ConstrainedLayoutEngine(w_pad=0.06, h_pad=0.06, hspace=0.02, wspace=0.03)
-        figure = Figure(figsize=(WIDTH, ROW * lines + 0.75 + legend), dpi=RESOLUTION, layout=layout)
+        tall = ROW * lines + 0.75 + legend
+        figure = blank_figure(WIDTH, tall, title or report.robot, h_pad=0.06, hspace=0.02, wspace=0.03)
         grid = figure.subplots(lines, columns, sharex=True, squeeze=False)
         places = [*grid.T.reshape(-1)]  # the derivatives of the position below each other
         for axes in places[len(rows) :]:
@@ -80,7 +74,6 @@ def draw_limits(report: LimitReport, title: str = "") -> Any:
         for axes in (*grid[-1], places[len(rows) - 1]):
             axes.set_xlabel("time  $t$  (s)")
             axes.tick_params(labelbottom=True)
-        figure.suptitle((title or report.robot).replace("$", r"\$"), fontsize=11, fontweight="bold")
         _draw_legend(report, joints.tolist(), figure)
     return figure
 
@@ -92,8 +85,8 @@ def _per_line(report: LimitReport, joints: Any) -> int:
 
 
 def _line_style(joint: int) -> dict[str, Any]:
-    rounds, place = divmod(joint, len(JOINT_COLOURS))
-    return {"color": JOINT_COLOURS[place], "linestyle": DASHES[rounds % len(DASHES)]}
+    rounds, place = divmod(joint, len(LINE_COLOURS))
+    return {"color": LINE_COLOURS[place], "linestyle": DASHES[rounds % len(DASHES)]}
 
 
 def _draw_panel(report: LimitReport, quantity: int, joints: list[int], axes: Any) -> None:
@@ -114,14 +107,13 @@ def _draw_panel(report: LimitReport, quantity: int, joints: list[int], axes: Any
     for sign in (-1, 1):
         axes.axhline(sign, color=GREY, linewidth=1.1, zorder=1.5)
         axes.axhspan(sign, sign * (abs(low) + abs(high) + margin), color=FORBIDDEN, linewidth=0, zorder=0)
-    axes.axhline(0.0, color="#999999", linewidth=0.7, zorder=1)
+    axes.axhline(0.0, color=PALE_GREY, linewidth=0.7, zorder=1)
     axes.plot([worst.time], [at], marker="o", markersize=4, color="black", fillstyle="none", zorder=5, clip_on=False)
-    axes.grid(visible=True)
     axes.yaxis.set_major_locator(MaxNLocator(nbins=5, steps=[1, 2, 2.5, 5, 10], min_n_ticks=3))
     axes.xaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 2.5, 5, 10]))
     words = " / ".join(dict.fromkeys(row.quantity for row in _rows_of(report, quantity)))
     axes.set_ylabel(f"{words}\n(share of limit)")
-    name = worst.joint.replace("$", r"\$")
+    name = shown_name(worst.joint)
     told = f"worst: {name}, {worst.value:.5g} {unit_label(worst.unit, 0)} (limit {worst.limit:.5g})"
     axes.set_title(told, loc="left", pad=4, fontsize=7.5, color=BROKEN if worst.broken else GREY)
 
@@ -144,7 +136,7 @@ def _is_upper(report: LimitReport, row: LimitRow) -> bool:
 def _draw_legend(report: LimitReport, joints: list[int], figure: Any) -> None:
     from matplotlib.lines import Line2D
 
-    names = [report.joint_names[joint].replace("$", r"\$") for joint in joints]
+    names = [shown_name(report.joint_names[joint]) for joint in joints]
     handles = [
         Line2D([], [], linewidth=1.6, label=name, **_line_style(joint))
         for joint, name in zip(joints, names, strict=True)

@@ -5,54 +5,29 @@ Agg canvas; the state of `matplotlib.pyplot` is not touched.
 """
 
 from collections.abc import Mapping
-from contextlib import AbstractContextManager
 from functools import partial
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from jounce.papers.negrean_2025.case import DURATION, KNOTS, RADIUS
 from jounce.papers.negrean_2025.history import STEPS, History
+from jounce.plot.style import BLUE, GREEN, GREY, PALE_GREY, VERMILION, blank_figure, style as style
 
-BLUE, ORANGE, GREEN = "#0072B2", "#D55E00", "#009E73"  # told apart by colour-blind readers
-GREY = "#606060"
 TORQUES = (
     ("torque", "Driving torque", "N m"),
     ("torque rate", "First rate of the driving torque", "N m/s"),
     ("second rate", "Second rate of the driving torque", r"N m/s$^2$"),
 )
-ENERGY_COLOURS = (BLUE, ORANGE, GREEN)
-
-
-def style() -> AbstractContextManager[None]:
-    """Return the settings under which the figures are drawn and written, as a context."""
-    return mpl.rc_context(
-        {
-            "font.size": 9,
-            "axes.grid": True,
-            "axes.axisbelow": True,
-            "axes.spines.right": False,
-            "axes.spines.top": False,
-            "grid.color": "#DDDDDD",
-            "grid.linewidth": 0.6,
-            "legend.frameon": False,
-            "lines.linewidth": 1.4,
-            "lines.markersize": 3.5,
-            "svg.hashsalt": "negrean-2025",
-        }
-    )
+ENERGY_COLOURS = (BLUE, VERMILION, GREEN)
 
 
 def _figure(rows: int, columns: int, size: tuple[float, float], title: str) -> tuple[Figure, np.ndarray]:
-    figure = Figure(figsize=size, layout="constrained")
-    FigureCanvasAgg(figure)
-    figure.suptitle(title, fontsize=10)
+    figure = blank_figure(*size, title)
     panels = figure.subplots(rows, columns, squeeze=False, sharex=True)
     for panel in panels.flat:
-        panel.axhline(0.0, color="#999999", linewidth=0.7, zorder=1)
+        panel.axhline(0.0, color=PALE_GREY, linewidth=0.7, zorder=1)
         panel.set_xlim(0.0, DURATION)
     for panel in panels[-1]:
         panel.set_xlabel("time / s")
@@ -68,8 +43,8 @@ def accelerations(histories: Mapping[str, History], *, radius: float | None, num
     for panel, history in zip(panels[:, 0], histories.values(), strict=True):
         panel.plot(history.time, factor * history.motion[:, 2], color=BLUE, label="quintic segments")
         samples = factor * history.case.accelerations
-        panel.plot(KNOTS, samples, color=ORANGE, marker="o", linestyle="", label="synthetic samples, every 0.033 s")
-        panel.set_title(history.case.title, fontsize=9)
+        panel.plot(KNOTS, samples, color=VERMILION, marker="o", linestyle="", label="synthetic samples, every 0.033 s")
+        panel.set_title(history.case.title)
         panel.set_ylabel(f"acceleration / ({unit})")
     panels[0, 0].legend(loc="upper right")
     figure.align_ylabels()
@@ -84,11 +59,11 @@ def torque(histories: Mapping[str, History], *, rate: int, number: int) -> Figur
         whole = history.torques[:, rate]
         panel.plot(history.time, whole, color=BLUE, label="driving torque", zorder=3)
         inertial = whole - history.gravity[:, rate]
-        panel.plot(history.time, inertial, color=ORANGE, linestyle="--", linewidth=1.1, label="of that, inertia")
+        panel.plot(history.time, inertial, color=VERMILION, linestyle="--", linewidth=1.1, label="of that, inertia")
         panel.plot(
             history.time, history.gravity[:, rate], color=GREEN, linestyle=":", linewidth=1.3, label="of that, gravity"
         )
-        panel.set_title(history.case.title, fontsize=9)
+        panel.set_title(history.case.title)
         panel.set_ylabel(f"{name} / ({unit})")
     figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
     figure.align_ylabels()
@@ -111,7 +86,7 @@ def energies(histories: Mapping[str, History]) -> Figure:
             if column == 0:
                 panel.set_ylabel(rf"$E_{p}$ / (kg m$^2$ s$^{{-{2 * p + 2}}}$)")
             if p == 1:
-                panel.set_title(history.case.title, fontsize=9)
+                panel.set_title(history.case.title)
     panels[0, -1].legend(loc="upper left")
     figure.align_ylabels()
     return figure

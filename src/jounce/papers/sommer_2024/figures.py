@@ -5,27 +5,23 @@ Agg canvas; the state of `matplotlib.pyplot` is not touched.
 """
 
 from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager
 from functools import partial
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from jounce.papers.sommer_2024.simulations import QUANTITIES, SIMULATIONS, STEPS, TOLERANCES, Results
+from jounce.plot.style import BLUE, GREEN, GREY, PURPLE, VERMILION, blank_figure, style as style
 
-BLUE, ORANGE, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#CC79A7"  # told apart by colour-blind readers
-GREY = "#606060"
 LOOKS = {
     "velocity": {"color": BLUE, "marker": "o", "linestyle": "-"},
-    "acceleration": {"color": ORANGE, "marker": "s", "linestyle": "--"},
+    "acceleration": {"color": VERMILION, "marker": "s", "linestyle": "--"},
     "jerk": {"color": GREEN, "marker": "^", "linestyle": "-."},
     "jounce": {"color": PURPLE, "marker": "D", "linestyle": ":"},
-    "second order": {"color": ORANGE, "marker": "s", "linestyle": "--"},
+    "second order": {"color": VERMILION, "marker": "s", "linestyle": "--"},
     "fourth order": {"color": GREEN, "marker": "^", "linestyle": "-."},
     "simulation": {"color": BLUE, "marker": "o", "linestyle": "-"},
 }
@@ -37,28 +33,8 @@ METHODS = {
 RATE_UNITS = {"jerk": r"rad/s$^3$", "jounce": r"rad/s$^4$"}
 
 
-def style() -> AbstractContextManager[None]:
-    """Return the settings under which the figures are drawn and written, as a context."""
-    return mpl.rc_context(
-        {
-            "font.size": 9,
-            "axes.grid": True,
-            "axes.spines.right": False,
-            "axes.spines.top": False,
-            "grid.color": "#DDDDDD",
-            "grid.linewidth": 0.6,
-            "legend.frameon": False,
-            "lines.linewidth": 1.4,
-            "lines.markersize": 4,
-            "svg.hashsalt": "sommer-2024",
-        }
-    )
-
-
 def _figure(rows: int, columns: int, size: tuple[float, float], title: str, **shared: Any) -> tuple[Figure, np.ndarray]:
-    figure = Figure(figsize=size, layout="constrained")
-    FigureCanvasAgg(figure)
-    figure.suptitle(title, fontsize=10)
+    figure = blank_figure(*size, title)
     return figure, figure.subplots(rows, columns, squeeze=False, **shared)
 
 
@@ -72,13 +48,12 @@ def time_history(results: Mapping[str, Results], *, name: str, quantity: str, nu
     above, below = axes[:, 0]
     above.plot(cycle.time, found, color=BLUE)
     above.set_ylabel(f"{quantity} / ({unit})")
-    below.plot(cycle.time, found - right, color=ORANGE, linewidth=0.9)
+    below.plot(cycle.time, found - right, color=VERMILION, linewidth=0.9)
     index = derivative - 1
     below.set_ylabel(f"error / ({unit})")
     below.set_title(
         f"simulation minus explicit solution, RMSE {cycle.rmse[index]:.2g} {unit}"
         f" ({cycle.normalised_rmse[index]:.1g} of the largest value)",
-        fontsize=9,
     )
     below.set_xlabel("time / s")
     below.set_xlim(cycle.time[0], cycle.time[-1])
@@ -95,7 +70,7 @@ def tolerance_sweep(results: Mapping[str, Results], *, names: Sequence[str], num
         for k, quantity in enumerate(QUANTITIES):
             panel.loglog(TOLERANCES, results[name].by_tolerance[:, k], label=quantity, **LOOKS[quantity])
         panel.loglog(TOLERANCES, TOLERANCES, color=GREY, linewidth=0.8, zorder=1, label="the tolerance itself")
-        panel.set_title(SIMULATIONS[name].title, fontsize=9)
+        panel.set_title(SIMULATIONS[name].title)
         panel.set_xlabel("assembly tolerance (rad, or mechanism sizes)")
         _decades(panel.xaxis, 2)
         _decades(panel.yaxis, 2)
@@ -114,7 +89,7 @@ def step_sweep(results: Mapping[str, Results], *, names: Sequence[str], number: 
             panel: Axes = axes[row, column]
             for method, label in METHODS.items():
                 panel.loglog(STEPS, results[name].by_step[method][:, row], label=label, **LOOKS[method])
-            panel.set_title(f"{SIMULATIONS[name].title}: {quantity}", fontsize=9)
+            panel.set_title(f"{SIMULATIONS[name].title}: {quantity}")
             _decades(panel.yaxis, 2)
     for panel in axes[-1]:
         panel.set_xlabel("time step h / s")

@@ -1,0 +1,204 @@
+"""Animations of a motion: the sketch, moved, as GIF or MP4."""
+
+from __future__ import annotations
+
+import numbers
+from collections.abc import Callable, Sequence
+from os import PathLike, fspath
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from jounce.errors import MechanismError, OutputError, did_you_mean
+from jounce.io.files import check_target, replacing
+from jounce.plot.scene import AZIMUTH, ELEVATION, scene_of
+from jounce.plot.sketch import NAMES, Drawing, paths_of
+from jounce.plot.style import GREY, style
+
+__all__ = ["ANIMATION_SUFFIXES", "animate", "check_animation", "frame_instants"]
+
+ANIMATION_SUFFIXES = (".gif", ".mp4")
+FRAMES_PER_SECOND = 25  # a GIF counts in hundredths of a second
+LONGEST, SHORTEST = 20.0, 2.0  # s, of a film whose speed is not told
+MOST_FRAMES = 3000
+RESOLUTION = 110  # dots per inch
+
+
+def check_animation(path: str | PathLike[str]) -> None:
+    """Raise OutputError unless an animation can be written to a path; meant to be asked before a long computation.
+
+    Raises
+    ------
+    OutputError
+        The ending is not .gif or .mp4, the folder does not exist, or there is no ffmpeg, which .mp4 needs.
+    """
+    check_target(path, ANIMATION_SUFFIXES, "an animation")
+    if Path(fspath(path)).suffix.lower() == ".mp4":
+        from matplotlib.animation import FFMpegWriter
+
+        if not FFMpegWriter.isAvailable():
+            message = "an .mp4 needs the program ffmpeg, which is not there; install it, or write a .gif"
+            raise OutputError(message, path=fspath(path))
+
+
+def frame_instants(time: Any, *, speed: float | None = None, fps: int = FRAMES_PER_SECOND) -> np.ndarray:
+    """Return the times that the frames of a film show.
+
+    Parameters
+    ----------
+    time : array_like of shape (time,)
+        Instants of a motion, s.
+    speed : float, optional
+        Seconds of motion in a second of film. Real time unless given, or where that would be very short or long, such
+        that the film takes 2 s or 20 s.
+    fps : int, default 25
+        Frames in a second.
+
+    Returns
+    -------
+    numpy.ndarray of shape (frames,)
+        s, evenly spaced.
+
+    Raises
+    ------
+    MechanismError
+        The speed or the rate is not above zero, or the film would have more than 3000 frames.
+
+    Examples
+    --------
+    >>> from jounce.plot.animation import frame_instants
+    >>> len(frame_instants([0.0, 2.0])), len(frame_instants([0.0, 2.0], speed=0.5)), len(frame_instants([0.0, 0.03]))
+    (51, 101, 51)
+    """
+    time = np.asarray(time, float)
+    span = abs(float(time[-1] - time[0]))
+    rate, given = _above_zero("fps", fps), 1.0 if speed is None else _above_zero("speed", speed)
+    length = span / given
+    if speed is None and span:
+        length = float(np.clip(length, SHORTEST, LONGEST))
+    count = round(length * rate) + 1
+    if count > MOST_FRAMES:
+        message = f"the film would have {count} frames, of at most {MOST_FRAMES}; choose a higher speed or fewer fps"
+        raise MechanismError(message, name="speed", value=speed)
+    return np.linspace(time[0], time[-1], count)
+
+
+def _above_zero(name: str, value: Any) -> float:
+    if not (isinstance(value, numbers.Real) and not isinstance(value, bool) and 0 < float(value) < np.inf):
+        raise MechanismError("must be greater than zero", name=name, value=value)
+    return float(value)
+
+
+def animate(
+    motion: Any,
+    path: str | PathLike[str],
+    *,
+    speed: float | None = None,
+    fps: int = FRAMES_PER_SECOND,
+    names: str = "bodies",
+    paths: Sequence[str] | None = None,
+    order: int = 0,
+    view: tuple[float, float] = (AZIMUTH, ELEVATION),
+    progress: Callable[[int, int], None] | None = None,
+) -> None:
+    """Write the moving sketch of a motion to a .gif or .mp4 file.
+
+    Parameters
+    ----------
+    motion : Motion
+        Each frame shows its nearest instant; those that were not solved are left out.
+    path : str or path
+        The ending tells the kind; .mp4 needs ffmpeg.
+    speed : float, optional
+        Seconds of motion in a second of film; see `frame_instants`.
+    fps : int, default 25
+        Frames in a second; a GIF rounds their time to hundredths of a second.
+    names : str, default "bodies"
+        Which names are written: ``"all"``, ``"bodies"``, ``"joints"`` or ``"none"``.
+    paths, order, view
+        As for `sketch`.
+    progress : callable, optional
+        Called with the number of frames done and their total.
+
+    Raises
+    ------
+    MechanismError
+        An option is not valid, or no instant was solved.
+    OutputError
+        The file cannot be written.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> from jounce.plot import animate
+    >>> motion = jn.solve(jn.load("examples/four_bar.yaml"), order=0)
+    >>> animate(motion, "four_bar.gif", fps=10)  # doctest: +SKIP
+    """
+    import matplotlib.animation as films
+
+    if names not in NAMES:
+        raise MechanismError(f"unknown choice; {did_you_mean(names, NAMES)}", name="names", value=names)
+    check_animation(path)
+    found = paths_of(motion, paths, order, view)
+    solved = np.flatnonzero(np.asarray(motion.status) == 0)
+    if not solved.size:
+        raise MechanismError("no instant was solved, so that there is nothing to draw", name="motion")
+    wanted = frame_instants(motion.time, speed=speed, fps=fps)
+    nearest = _nearest(motion.time, wanted)
+    shown = nearest[np.isin(nearest, solved)]
+    if not shown.size:
+        shown = solved
+    instants, places = np.unique(shown, return_inverse=True)
+    scene = scene_of(motion, view=view, instants=instants)
+    mechanism = motion.mechanism
+    kind = Path(fspath(path)).suffix.lower()
+    writer = (
+        films.PillowWriter(fps=fps)
+        if kind == ".gif"
+        else films.FFMpegWriter(fps=fps, extra_args=["-pix_fmt", "yuv420p"])
+    )
+    with style(), replacing(path) as beside:
+        drawing = Drawing(scene, found, mechanism.title, None if mechanism.space == "planar" else view)
+        drawing.show(0)
+        drawing.write_names(0, names, still=False)
+        _start_clock(drawing, motion.time)
+        drawing.figure.set_layout_engine("none")
+        _even_pixels(drawing.figure)
+        with writer.saving(drawing.figure, str(beside), dpi=RESOLUTION):
+            for done, place in enumerate(places.tolist(), 1):
+                drawing.show(place)
+                drawing.move_names(place)
+                drawing.clock.set_text(_clock_text(motion.time, float(motion.time[instants[place]])))
+                writer.grab_frame()
+                if progress is not None:
+                    progress(done, len(places))
+
+
+def _nearest(time: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """Return the index of the instant nearest to each time; instants may run backward."""
+    order = np.argsort(time)
+    rising = time[order]
+    above = np.clip(np.searchsorted(rising, wanted), 1, max(len(rising) - 1, 1))
+    if len(rising) == 1:
+        return np.zeros(len(wanted), int)
+    lower = wanted - rising[above - 1] <= rising[above] - wanted
+    return order[np.where(lower, above - 1, above)]
+
+
+def _even_pixels(figure: Any) -> None:
+    """Make width and height even numbers of pixels, which films need."""
+    size = np.ceil(figure.get_size_inches() * RESOLUTION / 2) * 2 / RESOLUTION
+    figure.set_size_inches(*(size + 1e-6))
+
+
+def _start_clock(drawing: Drawing, time: np.ndarray) -> None:
+    axes = drawing.axes
+    text = _clock_text(time, float(time[0]))
+    drawing.clock = axes.text(0.99, 0.01, text, transform=axes.transAxes, ha="right", va="bottom", color=GREY)
+
+
+def _clock_text(time: np.ndarray, now: float) -> str:
+    span = abs(float(time[-1] - time[0])) or 1.0
+    digits = max(0, 2 - int(np.floor(np.log10(span))))
+    return f"t = {now:.{min(digits, 9)}f} s"

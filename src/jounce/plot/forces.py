@@ -1,0 +1,209 @@
+"""Figures of forces: reactions of joints and forces of drivers, energies, and the balance of power."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from jounce.dynamics import kinetic_energy, potential_energy, power_balance, stored_energy
+from jounce.dynamics.inverse import check_loads
+from jounce.dynamics.outputs import (
+    AppliedForceOutput,
+    AppliedTorqueOutput,
+    DriverForceOutput,
+    DriverTorqueOutput,
+    JointForceOutput,
+    JointTorqueOutput,
+    is_turning,
+)
+from jounce.errors import MechanismError, did_you_mean
+from jounce.plot.figure import draw, finish, shade_unsolved
+from jounce.plot.geometry import skeleton
+from jounce.plot.labels import scale_of, unit_label
+from jounce.plot.style import BLUE, GREEN, ORANGE, VERMILION, blank_figure, style
+
+__all__ = ["draw_energy", "draw_power", "draw_reactions"]
+
+NOTHING = 1e-9  # of the largest force times the size: moments below it are rounding
+LINES = {
+    "kinetic": BLUE,
+    "potential": VERMILION,
+    "springs": GREEN,
+    "drivers": GREEN,
+    "forces": ORANGE,
+    "total": "#000000",
+}
+WORDS = {"drivers": "put in by drivers", "forces": "put in by forces", "kinetic": "gain of kinetic energy",
+         "potential": "gain of potential energy"}  # fmt: skip
+PANEL = (6.4, 1.9)  # inches
+
+
+@dataclasses.dataclass(frozen=True)
+class _Forces:
+    """What `draw` needs of a motion, with forces in the place of its outputs."""
+
+    mechanism: Any
+    outputs: dict[str, np.ndarray]
+    time: np.ndarray
+    order: int
+    status: np.ndarray
+
+
+def draw_reactions(motion: Any, names: Sequence[str] | None = None) -> Any:
+    """Draw the reactions of joints, the forces of drivers and the applied forces, with their rates.
+
+    Parameters
+    ----------
+    motion : Motion
+        Of a mechanism with masses or applied forces, solved to order 2 at least.
+    names : sequence of str, optional
+        Joints, drivers and forces; all unless given.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        One column for each force, and one for each moment that a joint carries, in the global frame and on the second
+        body of the joint; rows are force, yank, second rate, ...
+
+    Raises
+    ------
+    MechanismError
+        No joint, driver or force has one of the names, nothing has a mass, or the order is too low.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> from jounce.plot import draw_reactions
+    >>> press = jn.solve(jn.load("examples/press.yaml"), [0.0, 0.01, 0.02], order=2)
+    >>> figure = draw_reactions(press, ["main", "thrust"])
+    >>> [axes.get_title(loc="left") for axes in figure.axes]
+    ['main', 'thrust (applied)']
+    """
+    mechanism = motion.mechanism
+    check_loads(mechanism, "joint")
+    if motion.order < 2:
+        message = "forces need accelerations; solve to order 2 or more"
+        raise MechanismError(message, name="order", value=motion.order)
+    known = [*mechanism.joints, *mechanism.drivers, *mechanism.forces]
+    for name in names or ():
+        if name not in known:
+            message = f"no joint, driver or force has this name; {did_you_mean(name, known)}"
+            raise MechanismError(message, name="output", value=name)
+    wanted = names or known
+    found: dict[str, Any] = {name: JointForceOutput(name) for name in mechanism.joints if name in wanted}
+    moments = {f"{name} (moment)": JointTorqueOutput(name) for name in mechanism.joints if name in wanted}
+    for name, driver in mechanism.drivers.items():
+        if name in wanted:
+            found[f"{name} (driver)"] = (DriverTorqueOutput if is_turning(driver) else DriverForceOutput)(name)
+    for name, force in mechanism.forces.items():
+        if name in wanted:
+            found[f"{name} (applied)"] = (AppliedForceOutput if force.unit == "N" else AppliedTorqueOutput)(name)
+    values = {name: motion.evaluate(output).values for name, output in (found | moments).items()}
+    least = NOTHING * skeleton(mechanism).size * max(_largest(values[name][:, 0]) for name in found)
+    felt = {name: output for name, output in moments.items() if _largest(values[name][:, 0]) > least}
+    ordered = [n for name in found for n in (name, f"{name} (moment)") if n in found or n in felt]
+    shown = dataclasses.replace(mechanism, outputs={name: (found | felt)[name] for name in ordered})
+    outputs = {name: values[name] for name in ordered}
+    return draw(_Forces(shown, outputs, motion.time, motion.order, motion.status))
+
+
+def _largest(values: np.ndarray) -> float:
+    return float(np.max(np.abs(values), initial=0.0, where=np.isfinite(values)))
+
+
+def draw_energy(motion: Any) -> Any:
+    """Draw the energies of a mechanism: kinetic, potential in gravity, stored in springs, and all together.
+
+    Parameters
+    ----------
+    motion : Motion
+        Of a mechanism whose bodies have masses, solved to order 1 at least.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Springs are left out where there are none.
+
+    Raises
+    ------
+    MechanismError
+        No body has a mass, or the order is too low.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> from jounce.plot import draw_energy
+    >>> press = jn.solve(jn.load("examples/press.yaml"), [0.0, 0.01, 0.02], order=1)
+    >>> [line.get_label() for line in draw_energy(press).axes[0].get_lines()][:2]
+    ['kinetic', 'potential']
+    """
+    found = {"kinetic": kinetic_energy(motion).total[:, 0], "potential": potential_energy(motion)[:, 0]}
+    stored = stored_energy(motion)
+    if _largest(stored):
+        found["springs"] = stored
+    found["total"] = np.sum(list(found.values()), axis=0)
+    with style():
+        figure = blank_figure(PANEL[0], 2.9, motion.mechanism.title)
+        axes = figure.subplots()
+        _draw_lines(axes, motion, found, "energy", ("J", 0))
+        axes.set_xlabel("time  $t$  (s)")
+        figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=len(found))
+    return figure
+
+
+def draw_power(motion: Any) -> Any:
+    """Draw where the power in a mechanism comes from and goes to, with its rates.
+
+    Parameters
+    ----------
+    motion : Motion
+        Of a mechanism with masses or applied forces, solved to order 2 at least.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        What drivers and applied forces put in, and what kinetic and potential energy gain; rows are derivatives.
+
+    Raises
+    ------
+    MechanismError
+        Nothing has a mass and no force is applied, or the order is too low.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> from jounce.plot import draw_power
+    >>> press = jn.solve(jn.load("examples/press.yaml"), [0.0, 0.01, 0.02], order=3)
+    >>> [axes.get_ylabel() for axes in draw_power(press).axes]
+    ['power  (W)', 'rate  ($10^{3}$ W/s)']
+    """
+    balance = power_balance(motion)
+    rows = min(balance.sizes["derivative"], max(motion.order - 1, 1))
+    with style():
+        figure = blank_figure(PANEL[0], PANEL[1] * rows + 0.9, motion.mechanism.title)
+        panels = np.atleast_1d(figure.subplots(rows, 1, sharex=True))
+        for order, axes in enumerate(panels):
+            found = {name: balance[name].values[:, order] for name in WORDS if _largest(balance[name].values[:, 0])}
+            word = ("power", "rate", "second rate", "third rate")[order] if order < 4 else f"rate {order}"
+            _draw_lines(axes, motion, found, word, ("W", order))
+        panels[-1].set_xlabel("time  $t$  (s)")
+        figure.align_ylabels()
+        handles, labels = panels[0].get_legend_handles_labels()
+        words = [WORDS[label] for label in labels]
+        figure.legend(handles, words, loc="outside lower center", ncols=min(len(words), 2))
+    return figure
+
+
+def _draw_lines(axes: Any, motion: Any, found: dict[str, np.ndarray], word: str, unit: tuple[str, int]) -> None:
+    """Draw quantities over time in one panel."""
+    values = np.stack(list(found.values()), axis=-1)
+    exponent = scale_of(values)
+    for k, name in enumerate(found):
+        dashes = (0, (4, 1.5)) if name == "total" else "-"
+        axes.plot(motion.time, values[:, k] * 10.0**-exponent, color=LINES[name], linestyle=dashes, label=name)
+    shade_unsolved(axes, motion)
+    finish(axes, motion.time, values * 10.0**-exponent)
+    axes.set_ylabel(f"{word}  ({unit_label(*unit, exponent)})")

@@ -1,0 +1,111 @@
+"""The one style of all figures: type, lines and colours that the colour-blind tell apart (Okabe and Ito)."""
+
+from __future__ import annotations
+
+from contextlib import AbstractContextManager
+from typing import Any
+
+__all__ = [
+    "BLUE",
+    "BODY_COLOURS",
+    "COLOURS",
+    "GREEN",
+    "GREY",
+    "LINE_COLOURS",
+    "ORANGE",
+    "PURPLE",
+    "RESOLUTION",
+    "SKY",
+    "STYLE",
+    "VERMILION",
+    "blank_figure",
+    "shown_name",
+    "style",
+]
+
+BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY = "#0072B2", "#D55E00", "#009E73", "#E69F00", "#CC79A7", "#56B4E9"
+COLOURS = (BLUE, VERMILION, GREEN)  # of components
+LINE_COLOURS = (BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILION, "#000000")
+"""Of many lines in one panel; the yellow of Okabe and Ito is too pale for lines."""
+BODY_COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
+GREY = "#444444"
+PALE_GREY = "#999999"  # of lines through zero
+RESOLUTION = 200  # dots per inch
+
+STYLE: dict[Any, Any] = {
+    "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans"],
+    "font.size": 8.5,
+    "mathtext.fontset": "dejavusans",
+    "figure.titlesize": 11,
+    "figure.titleweight": "bold",
+    "axes.titlesize": 9.5,
+    "axes.labelsize": 8.5,
+    "axes.linewidth": 0.7,
+    "axes.edgecolor": GREY,
+    "axes.labelcolor": "black",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.unicode_minus": True,
+    "axes.axisbelow": True,
+    "axes.grid": True,
+    "grid.color": "#DDDDDD",
+    "grid.linewidth": 0.6,
+    "xtick.color": GREY,
+    "ytick.color": GREY,
+    "xtick.labelsize": 8,
+    "ytick.labelsize": 8,
+    "xtick.major.size": 3,
+    "ytick.major.size": 3,
+    "xtick.major.width": 0.7,
+    "ytick.major.width": 0.7,
+    "lines.linewidth": 1.3,
+    "lines.markersize": 4,
+    "lines.solid_joinstyle": "round",
+    "legend.fontsize": 8.5,
+    "legend.frameon": False,
+    "agg.path.chunksize": 20000,
+    "pdf.fonttype": 42,
+    "svg.hashsalt": "jounce",
+}
+
+
+def style(**changes: Any) -> AbstractContextManager[None]:
+    """Return the settings under which figures are drawn and written, as a context.
+
+    Parameters
+    ----------
+    **changes
+        Settings of matplotlib that differ, with underscores in the place of dots.
+
+    Examples
+    --------
+    >>> import matplotlib as mpl
+    >>> from jounce.plot.style import style
+    >>> with style(font_size=7):
+    ...     mpl.rcParams["font.size"], mpl.rcParams["legend.frameon"]
+    (7.0, False)
+    """
+    import matplotlib as mpl
+
+    changed: dict[Any, Any] = {name.replace("_", "."): value for name, value in changes.items()}
+    return mpl.rc_context(STYLE | changed)
+
+
+def blank_figure(width: float, height: float, title: str = "", **pads: float) -> Any:
+    """Return an empty figure, in inches, that lays out its panels itself; no window and no global state."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
+
+    chosen: dict[str, Any] = {"w_pad": 0.06, "h_pad": 0.045, "hspace": 0.0, "wspace": 0.02} | pads
+    figure = Figure(figsize=(width, height), dpi=RESOLUTION, layout=ConstrainedLayoutEngine(**chosen))
+    FigureCanvasAgg(figure)
+    if title:
+        figure.suptitle(shown_name(title))
+    return figure
+
+
+def shown_name(name: str) -> str:
+    """Return a name as matplotlib shows it letter by letter, dollar signs included."""
+    return name.replace("$", r"\$")
