@@ -1,0 +1,104 @@
+"""Where gears stand and how large they are: it follows from the pins that hold them and from the ratio of the pair."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from jounce.mechanism.builder import starting_guess
+from jounce.mechanism.mechanism import GROUND
+from jounce.mechanism.resolve import resolve
+
+__all__ = ["pitch_radii"]
+
+
+def pitch_radii(
+    mechanism: Any, bodies: tuple[str, ...], ratio: float
+) -> tuple[list[np.ndarray], tuple[float, float] | None]:
+    """Return the centres of two gears, each in the frame of its body, and their pitch radii, m.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        Planar.
+    bodies : tuple of str
+        Gears i and j, and the frame m that carries them; the ground unless named.
+    ratio : float
+        ``-rho_i / rho_j`` of gears that mesh outside each other, ``rho_i / rho_j`` of one inside the other.
+
+    Returns
+    -------
+    centres : list of numpy.ndarray
+        Where each is pinned; its origin where it is not.
+    radii : tuple of float, or None
+        None where no gears with this ratio can stand so: two bodies on one centre, or turning alike.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> from jounce.plot.gears import pitch_radii
+    >>> train = jn.load("examples/epicyclic.yaml")  # teeth of 2 mm: 24 of the sun, 18 of the planet
+    >>> centres, radii = pitch_radii(train, ("sun", "planet", "carrier"), -24 / 18)
+    >>> [round(radius, 6) for radius in radii]
+    [0.024, 0.018]
+    """
+    carrier = bodies[2] if len(bodies) > 2 else GROUND
+    pins = _pins(mechanism)
+    centers = [_center(pins, body, carrier) for body in bodies[:2]]
+    places = [_seen_from(mechanism, pins, body, carrier, center) for body, center in zip(bodies, centers, strict=False)]
+    distance = float(np.linalg.norm(places[1] - places[0]))
+    largest = max(1e-300, *(float(np.max(np.abs(place))) for place in places))
+    if distance <= 1e-9 * largest or ratio in (0.0, 1.0):
+        return centers, None
+    second = distance / abs(1.0 - ratio)
+    return centers, (abs(ratio) * second, second)
+
+
+Pins = list[dict[str, np.ndarray]]
+
+
+def _pins(mechanism: Any) -> Pins:
+    """Return the points of all revolute joints by body."""
+    parameters = mechanism.parameter_values
+    return [
+        {
+            body: np.asarray(resolve(point, parameters), float)
+            for body, point in zip(joint.bodies, (joint.point_i, joint.point_j), strict=True)
+        }
+        for joint in mechanism.joints.values()
+        if joint.type_name == "revolute"
+    ]
+
+
+def _center(pins: Pins, body: str, carrier: str) -> np.ndarray:
+    """Return the point of a gear at which it is pinned: to its carrier, to the ground, or to any other body."""
+    held = [pin for pin in pins if body in pin]
+    for wanted in (carrier, GROUND):
+        for pin in held:
+            if wanted in pin and wanted != body:
+                return pin[body]
+    return held[0][body] if held else np.zeros(2)
+
+
+def _seen_from(mechanism: Any, pins: Pins, body: str, carrier: str, center: np.ndarray) -> np.ndarray:
+    """Return the centre of a gear in the frame of its carrier: by a pin, by two on one line, else by the guess."""
+    held = [pin for pin in pins if body in pin and np.array_equal(pin[body], center)]
+    for pin in held:
+        if carrier in pin:
+            return pin[carrier]
+    for pin in held:
+        (other,) = set(pin) - {body}
+        for second in pins:
+            if other in second and carrier in second and np.allclose(second[other], pin[other], rtol=0, atol=1e-12):
+                return second[carrier]
+    guess = starting_guess(mechanism, mechanism.parameter_values, 2)
+    names = (GROUND, *mechanism.bodies)
+
+    def pose(name: str) -> tuple[np.ndarray, np.ndarray]:
+        angle = float(np.asarray(guess["angle"])[..., names.index(name), 0])
+        turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+        return np.asarray(guess["position"])[:, names.index(name), 0], turn
+
+    (place, turn), (origin, frame) = pose(body), pose(carrier)
+    return frame.T @ (place + turn @ center - origin)

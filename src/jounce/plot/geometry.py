@@ -1,0 +1,393 @@
+"""What a mechanism looks like: links through the points where something touches them, joints as symbols.
+
+A mechanism holds no shapes. What is drawn follows from the points, axes and radii of its joints, drivers, forces and
+outputs, whatever their types, one's own included.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from jounce.constraints.base import field_kind, value_fields
+from jounce.errors import JounceError, MechanismError, did_you_mean
+from jounce.jet import Jet
+from jounce.kinematics.compilation import compiled
+from jounce.mechanism.builder import starting_guess
+from jounce.mechanism.mechanism import GROUND, check_mechanism
+from jounce.mechanism.resolve import check_value, resolve
+from jounce.mechanism.system import POSITION_COMPONENTS
+from jounce.plot.gears import pitch_radii
+from jounce.rigid import PlanarPose, SpatialPose
+
+__all__ = ["Link", "Skeleton", "Symbol", "guessed", "placed", "skeleton"]
+
+SLOTS = {"_i": 0, "_j": 1, "_m": 2}  # endings of fields, and the body that each is fixed to
+DIRECTIONS = ("axis", "vector")  # of joints; the first that there is counts
+SAME = 1e-9  # points nearer than this, in sizes of the mechanism, are one
+
+
+@dataclass(frozen=True)
+class Link:
+    """What a body looks like: the points where something touches it, and the bars between them.
+
+    Parameters
+    ----------
+    body : str
+        Its name; ``"ground"`` has no bars.
+    points : numpy.ndarray of shape (n, components)
+        In the frame of the body, m; at least one.
+    names : tuple of tuple of str
+        Joints, drivers, forces and outputs at each point; none at a centre of mass or an origin that stands in.
+    edges : tuple of tuple of int
+        Pairs of points with a bar between them: one, the outline of a plate, or in space a tree.
+    """
+
+    body: str
+    points: np.ndarray
+    names: tuple[tuple[str, ...], ...]
+    edges: tuple[tuple[int, int], ...]
+
+
+@dataclass(frozen=True)
+class Symbol:
+    """A joint, driver or force as it is drawn.
+
+    Parameters
+    ----------
+    name, kind : str
+        Its name, and its type as files name it; ``gear`` also for a fixed ratio of two angles, ``rack`` for a wheel
+        that rolls along x or y.
+    bodies : tuple of str
+        Those it acts on, in the order i, j, m.
+    points : tuple of numpy.ndarray
+        One on each body, in its frame, m; the centre of a gear.
+    axes : tuple of numpy.ndarray or None
+        Axis, direction of travel or normal on each body, in its frame, of any length.
+    radii : tuple of float or None
+        Pitch radii of gears, the radius of a wheel, of each body, m.
+    """
+
+    name: str
+    kind: str
+    bodies: tuple[str, ...]
+    points: tuple[np.ndarray, ...]
+    axes: tuple[np.ndarray | None, ...]
+    radii: tuple[float | None, ...]
+
+    @property
+    def radius(self) -> float | None:
+        """Radius of the wheel that rolls or of the first gear, m; None where there is none."""
+        return next((radius for radius in self.radii if radius is not None), None)
+
+
+@dataclass(frozen=True)
+class Skeleton:
+    """Links by body, the ground among them, joints as symbols, and the size of the whole.
+
+    Parameters
+    ----------
+    links : dict of str to Link
+        By name of the body.
+    symbols, drivers, forces : tuple of Symbol
+        Joints, drivers and applied forces, in the order of the mechanism.
+    size : float
+        Diagonal of the box around all points at the starting guess, m.
+    """
+
+    links: dict[str, Link]
+    symbols: tuple[Symbol, ...]
+    size: float
+    drivers: tuple[Symbol, ...] = ()
+    forces: tuple[Symbol, ...] = ()
+
+
+@dataclass
+class _Points:
+    """Points of one body as they are found, with the names of what is there."""
+
+    places: list[np.ndarray] = field(default_factory=list)
+    names: list[list[str]] = field(default_factory=list)
+
+    def add(self, place: np.ndarray, name: str, near: float) -> None:
+        for known, names in zip(self.places, self.names, strict=True):
+            if np.linalg.norm(known - place) <= near:
+                if name and name not in names:
+                    names.append(name)
+                return
+        self.places.append(place)
+        self.names.append([name] if name else [])
+
+
+def skeleton(mechanism: Any) -> Skeleton:
+    """Return what a mechanism looks like, with its parameters resolved.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        Planar or spatial.
+
+    Returns
+    -------
+    Skeleton
+        Lengths in m, in the frames of the bodies.
+
+    Raises
+    ------
+    MechanismError
+        It is no mechanism, or a value in it does not fit.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> from jounce.plot.geometry import skeleton
+    >>> seen = skeleton(jn.load("examples/four_bar.yaml"))
+    >>> seen.links["crank"].names, seen.links["crank"].edges
+    ((('A',), ('BC',)), ((0, 1),))
+    >>> [symbol.kind for symbol in seen.symbols]
+    ['revolute', 'revolute', 'double_revolute']
+    """
+    check_mechanism(mechanism)
+    components = POSITION_COMPONENTS[mechanism.space]
+    parameters = mechanism.parameter_values
+    kinds = {
+        kind: {name: _values(element, parameters, components, f"{kind}.{name}") for name, element in elements.items()}
+        for kind, elements in mechanism.elements.items()
+    }
+    found = [touch for kind in kinds for touch in _touched(mechanism.elements[kind], kinds[kind])]
+    local = {body: [place for _, other, place in found if other == body] for body in (GROUND, *mechanism.bodies)}
+    poses = guessed(mechanism)
+    size = _extent(np.concatenate([poses[body](places) for body, places in local.items() if places] or [[0.0]]))
+    if not size:
+        size = 2 * _largest(local, kinds) or 1.0
+    bodies = {body: _Points() for body in local}
+    for name, body, place in found:
+        bodies[body].add(place, name, SAME * size)
+    for body, points in bodies.items():
+        _complete(body, points, mechanism, components, SAME * size)
+    places = {body: np.array(points.places).reshape(-1, components) for body, points in bodies.items()}
+    links = {
+        body: Link(
+            body,
+            places[body],
+            tuple(map(tuple, points.names)),
+            () if body == GROUND else _bars(places[body], SAME * size),
+        )
+        for body, points in bodies.items()
+    }
+    drawn = [_symbols(mechanism, kind, kinds[kind], components) for kind in ("joints", "drivers", "forces")]
+    return Skeleton(links, drawn[0], size, *drawn[1:])
+
+
+def _values(element: Any, parameters: Mapping[str, Any], components: int, name: str) -> dict[str, Any]:
+    """Return the numbers and vectors of an element by field; laws and words are left out."""
+    values = {}
+    for field_name, its_field in value_fields(type(element)).items():
+        kind, value = field_kind(its_field), getattr(element, field_name)
+        if kind in ("scalar", "vector") and value is not None:
+            try:
+                value = resolve(value, parameters)
+                signs = getattr(element, "signs", {})
+                check_value(field_name, kind, value, components, signs.get(field_name, ""))
+            except JounceError as error:
+                raise error.located(name=f"{name}.{field_name}") from None
+            values[field_name] = np.asarray(value, float)
+    return values
+
+
+def _slot(field_name: str) -> int:
+    return SLOTS.get(field_name[-2:], 0)
+
+
+def _touched(elements: Mapping[str, Any], values: Mapping[str, Any]) -> Iterator[tuple[str, str, np.ndarray]]:
+    """Return the name of each element, the body and the place in its frame, for all points of elements."""
+    for name, element in elements.items():
+        for field_name, value in values[name].items():
+            if field_name.startswith("point") and _slot(field_name) < len(element.bodies):
+                yield name, element.bodies[_slot(field_name)], value
+
+
+def _complete(body: str, points: _Points, mechanism: Any, components: int, near: float) -> None:
+    """Add the centre of mass, or the origin, to a body that has too few points to be seen."""
+    if body != GROUND and len(points.places) < 2:
+        center = mechanism.bodies[body].center_of_mass
+        if center is not None:
+            points.add(np.asarray(resolve(center, mechanism.parameter_values), float), "", near)
+    if not points.places:
+        points.add(np.zeros(components), "", near)
+
+
+def guessed(mechanism: Any) -> dict[str, Any]:
+    """Return for each body the function that takes points of its frame, (n, components), to the starting guess, m.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> from jounce.plot.geometry import guessed
+    >>> guessed(jn.load("examples/four_bar.yaml"))["rocker"]([[0.0, 0.0]]).round(6).tolist()
+    [[0.1321, 0.0]]
+    """
+    components = POSITION_COMPONENTS[mechanism.space]
+    guess = starting_guess(mechanism, mechanism.parameter_values, components)
+    frames = np.asarray(_frames(PlanarPose if components == 2 else SpatialPose, {k: (v,) for k, v in guess.items()}))
+
+    def function(frame: np.ndarray) -> Any:
+        return lambda points: frame[:, 0] + np.asarray(points, float).reshape(-1, components) @ frame[:, 1:].T
+
+    return {body: function(frames[0, :, :, k, 0]) for k, body in enumerate((GROUND, *mechanism.bodies))}
+
+
+def _extent(points: np.ndarray) -> float:
+    return float(np.linalg.norm(np.ptp(np.asarray(points, float), axis=0)))
+
+
+def _largest(local: Mapping[str, list[np.ndarray]], kinds: Mapping[str, Any]) -> float:
+    """Return the largest length that is known where all points fall into one."""
+    lengths = [float(np.linalg.norm(place)) for places in local.values() for place in places]
+    for values in kinds.values():
+        for found in values.values():
+            lengths += [abs(float(found[name])) for name in ("length", "radius") if name in found]
+    return max(lengths, default=0.0)
+
+
+def _bars(points: np.ndarray, near: float) -> tuple[tuple[int, int], ...]:
+    """Return the bars of a link: one between two points, a closed outline in the plane, a tree in space."""
+    count = len(points)
+    if count < 2:
+        return ()
+    if count == 2:
+        return ((0, 1),)
+    centred = points - points.mean(axis=0)
+    _, sizes, directions = np.linalg.svd(centred, full_matrices=False)
+    if sizes[1] <= near:  # all on one line
+        order = np.argsort(centred @ directions[0]).tolist()
+        return tuple(pairwise(order))
+    if points.shape[1] == 2:
+        from scipy.spatial import ConvexHull
+
+        around = ConvexHull(points).vertices.tolist()
+        return tuple(zip(around, [*around[1:], around[0]], strict=True))
+    from scipy.sparse.csgraph import minimum_spanning_tree
+
+    tree = minimum_spanning_tree(np.linalg.norm(points[:, None] - points[None], axis=-1)).tocoo()
+    return tuple(sorted((min(i, j), max(i, j)) for i, j in zip(tree.row.tolist(), tree.col.tolist(), strict=True)))
+
+
+def _symbols(mechanism: Any, kind: str, values: Mapping[str, Any], components: int) -> tuple[Symbol, ...]:
+    """Return the symbols of all joints, drivers or forces."""
+    return tuple(
+        _symbol(mechanism, name, element, values[name], components)
+        for name, element in mechanism.elements[kind].items()
+    )
+
+
+def _symbol(mechanism: Any, name: str, element: Any, values: Mapping[str, Any], components: int) -> Symbol:
+    bodies, kind = element.bodies, element.type_name or type(element).__name__
+    points: list[np.ndarray] = [np.zeros(components)] * len(bodies)
+    axes: list[np.ndarray | None] = [None] * len(bodies)
+    radii: list[float | None] = [None] * len(bodies)
+    for field_name, value in values.items():
+        slot = _slot(field_name)
+        if slot < len(bodies) and field_name.startswith("point"):
+            points[slot] = value
+        word = field_name.removesuffix("_i").removesuffix("_j").removesuffix("_m")
+        if slot < len(bodies) and word in DIRECTIONS and (axes[slot] is None or word == "axis"):
+            axes[slot] = value
+    if "radius" in values and len(bodies) > 1:
+        radii[1] = float(values["radius"])
+    if element.role == "joint" and kind in ("gear", "coordinate") and mechanism.space == "planar":
+        return _geared(mechanism, Symbol(name, kind, bodies, tuple(points), tuple(axes), tuple(radii)), element, values)
+    return Symbol(name, kind, bodies, tuple(points), tuple(axes), tuple(radii))
+
+
+def _geared(mechanism: Any, symbol: Symbol, element: Any, values: Mapping[str, Any]) -> Symbol:
+    """Return the symbol of two gears, or of a wheel on a rack, where a joint of coordinates is one."""
+    ratio = float(values.get("ratio", 1.0))
+    coordinate = getattr(element, "coordinate", "angle")
+    if ratio == 0 or symbol.bodies[0] == GROUND:
+        return symbol
+    if coordinate != "angle":
+        along = np.array([1.0, 0.0]) if coordinate == "x" else np.array([0.0, 1.0])
+        center, _ = pitch_radii(mechanism, symbol.bodies, -1.0)
+        points = center[0], symbol.points[1]
+        return Symbol(symbol.name, "rack", symbol.bodies, points, (None, along), (abs(ratio), None))
+    centers, radii = pitch_radii(mechanism, symbol.bodies, ratio)
+    if radii is None:
+        return symbol
+    points = (*centers, *symbol.points[2:])
+    return Symbol(symbol.name, "gear", symbol.bodies, points, symbol.axes, (*radii, *symbol.radii[2:]))
+
+
+@compiled("pose_type")
+def _frames(pose_type: Any, coordinates: Mapping[str, Any]) -> Any:
+    """Return origin and axes of all bodies, shape (order + 1, components, 1 + components, bodies, time)."""
+    import jax.numpy as jnp
+
+    pose = pose_type.from_coordinates({name: Jet(tuple(c)) for name, c in coordinates.items()})
+    columns = [pose.position, *(pose.direction(unit) for unit in np.eye(pose_type.shifts))]
+    return jnp.stack([jnp.stack(column.dense().coefficients) for column in columns], axis=2)
+
+
+def placed(motion: Any, body: str, points: Any, order: int = 0) -> np.ndarray:
+    """Return where points of a body are in the global frame, and their derivatives, at all instants.
+
+    Parameters
+    ----------
+    motion : Motion
+        At instants that were not solved the result is NaN.
+    body : str
+        Name of the body, ``"ground"`` included.
+    points : array_like of shape (n, components)
+        In the frame of the body, m.
+    order : int, default 0
+        Highest derivative.
+
+    Returns
+    -------
+    numpy.ndarray of shape (time, order + 1, n, components)
+        m, m/s, ...
+
+    Raises
+    ------
+    MechanismError
+        No body has the name, the points are no vectors, or the order is above that of the motion.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> from jounce.plot.geometry import placed
+    >>> motion = jn.solve(jn.load("examples/four_bar.yaml"), [0.0], order=1)
+    >>> placed(motion, "crank", [[0.0, 0.0], [0.04, 0.0]], order=1)[0, 0].round(5).tolist()
+    [[0.0, 0.0], [0.03464, 0.02]]
+    """
+    names, components = (GROUND, *motion.mechanism.bodies), POSITION_COMPONENTS[motion.mechanism.space]
+    if body not in names:
+        raise MechanismError(f"no body has this name; {did_you_mean(body, names)}", name="body", value=body)
+    local = np.asarray(points, float)
+    if local.ndim != 2 or local.shape[1] != components:
+        raise MechanismError(f"must be a list of vectors of {components} numbers", name="points", value=local.tolist())
+    if not 0 <= order <= motion.order:
+        message = f"the motion has derivatives up to order {motion.order}; solve it with a higher order"
+        raise MechanismError(message, name="order", value=order)
+    frame = _all_frames(motion, order)[..., names.index(body), :]
+    found = frame[:, :, 0, None, :] + np.einsum("kcdt,nd->kcnt", frame[:, :, 1:], local)
+    found = np.moveaxis(found, (3, 0, 2, 1), (0, 1, 2, 3))
+    found[:, 1:] += 0.0  # no negative zeros
+    return np.where((np.asarray(motion.status) == 0)[:, None, None, None], found, np.nan)
+
+
+def _all_frames(motion: Any, order: int) -> np.ndarray:
+    """Return derivatives of the frames of all bodies; kept with the motion."""
+    known = motion.derived.get("frames")
+    if known is None or len(known) <= order:
+        pose_type, coordinates = motion.poses
+        cut = {name: tuple(c[: order + 1]) for name, c in coordinates.items()}
+        known = np.array(_frames(pose_type, cut))
+        sizes: Sequence[float] = np.cumprod([1.0, *range(1, order + 1)]).tolist()
+        known *= np.array(sizes).reshape(-1, *[1] * (known.ndim - 1))
+        motion.derived["frames"] = known
+    return known[: order + 1]
