@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
@@ -43,6 +42,11 @@ class MechanismSubject:
     def name(self) -> str:
         """The title."""
         return self.mechanism.title or "mechanism"
+
+    @property
+    def loaded(self) -> bool:
+        """Whether anything has a mass, or forces are applied, so that joints carry something."""
+        return has_loads(self.mechanism)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -143,7 +147,7 @@ def take_of(motion: Any, looks: Any = None, title: str = "") -> Take:
         exertions_of=lambda: _exertions(motion, good),
         dataset=lambda: motion.dataset,
         values={name: float(value) for name, value in mechanism.parameter_values.items()},
-        looks=looks_of(mechanism) if looks is None else looks,
+        looks=looks_of(motion) if looks is None else looks,
         notice=notice,
     )
 
@@ -242,9 +246,6 @@ def _reaction(motion: Any, good: np.ndarray, name: str, kind: str) -> Exertion:
     return Exertion(name, "reaction" if kind == "joints" else "driver", place, spatial_vectors(force), torque)
 
 
-def changed(take: Take, **parts: Any) -> Take:
-    """Return a take with other parts."""
-    return dataclasses.replace(take, **parts)
 
 
 def directions(take: Take, body: str, vector: Any) -> np.ndarray:

@@ -22,6 +22,11 @@ class Subject(Protocol):
         ...
 
     @property
+    def loaded(self) -> bool:
+        """Whether there are forces to be shown."""
+        ...
+
+    @property
     def parameters(self) -> tuple[Parameter, ...]:
         """What sliders may set."""
         ...
