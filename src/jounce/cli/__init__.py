@@ -16,6 +16,7 @@ from contextlib import suppress
 from jounce.cli.mechanisms import plot, run, schema, simulate
 from jounce.cli.papers import reproduce
 from jounce.cli.robots import check
+from jounce.cli.views import view
 from jounce.cli.writing import WritingError
 from jounce.errors import JounceError, SolveError
 from jounce.io.terminal import complain, unexpected
@@ -32,6 +33,10 @@ EXAMPLES = {
     plot: """\
   jounce plot examples/four_bar.yaml --out four_bar.png
   jounce plot examples/rsur.yaml --order 6 --output psi --output C""",
+    view: """\
+  jounce view examples/four_bar.yaml
+  jounce view examples/press.yaml --order 6 --set "stroke=80 mm"
+  jounce view examples/robots/panda.urdf examples/trajectories/panda_wave.yaml --no-open --port 8080""",
     check: """\
   jounce check examples/robots/panda.urdf examples/trajectories/panda_good.csv
   jounce check examples/robots/panda.urdf examples/trajectories/panda_pick.yaml \\

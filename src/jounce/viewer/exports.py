@@ -145,4 +145,3 @@ def frames_shown(take: Take) -> list[int]:
     if len(wanted) < 60:  # short motions are shown instant by instant
         return list(range(len(take.time)))
     return sorted({take.frame_at(float(instant)) for instant in wanted} | {len(take.time) - 1})
-

@@ -120,7 +120,7 @@ def looks_of(motion: Any) -> Looks:
     solids, front = (planar_solids if planar else spatial_solids)(motion, seen, colours)
     return Looks(
         solids=solids,
-        stretches=stretches(seen, planar),
+        stretches=stretches(seen),
         spots=spots(mechanism, seen),
         size=seen.size,
         up=(0.0, 1.0, 0.0) if planar else up_of(mechanism.gravity),
@@ -148,17 +148,17 @@ def up_of(gravity: Any) -> tuple[float, float, float]:
     return x, y, z
 
 
-def stretches(seen: Any, planar: bool) -> tuple[Stretch, ...]:
+def stretches(seen: Any) -> tuple[Stretch, ...]:
     """Return the rods, springs and actuators between two points."""
-    kinds = {"double_revolute": "rod", "double_spherical": "rod", "spring": "spring"}
-    kinds |= {"distance": "actuator", "distance_force": "actuator"}
+    rod, spring, actuator = ("rod", 0.012, GREY), ("spring", 0.022, (90, 120, 90)), ("actuator", 0.016, (136, 34, 85))
+    kinds = {"double_revolute": rod, "double_spherical": rod, "spring": spring}
+    kinds |= {"distance": actuator, "distance_force": actuator}
     found = []
     for symbol in (*seen.symbols, *seen.drivers, *seen.forces):
-        kind = kinds.get(symbol.kind)
-        if kind is None or len(symbol.bodies) != 2:
+        if symbol.kind not in kinds or len(symbol.bodies) != 2:
             continue
         points = tuple(spatial_vectors(np.asarray(point, float)) for point in symbol.points)
-        share, colour = {"rod": (0.012, GREY), "spring": (0.022, (90, 120, 90)), "actuator": (0.016, (136, 34, 85))}[kind]
+        kind, share, colour = kinds[symbol.kind]
         bodies = symbol.bodies[0], symbol.bodies[1]
         found.append(Stretch(symbol.name, kind, bodies, (points[0], points[1]), share * seen.size, colour))
     return tuple(found)

@@ -246,8 +246,6 @@ def _reaction(motion: Any, good: np.ndarray, name: str, kind: str) -> Exertion:
     return Exertion(name, "reaction" if kind == "joints" else "driver", place, spatial_vectors(force), torque)
 
 
-
-
 def directions(take: Take, body: str, vector: Any) -> np.ndarray:
     """Return a direction fixed in a body at all instants, (time, 3)."""
     index = take.bodies.index(body)

@@ -85,9 +85,7 @@ class Panel:
             return
         step = _step(parameter.high - parameter.low)
         hint = f"{parameter.name}, SI units; {parameter.value:.6g} in the file"
-        slider = self.gui.add_slider(
-            parameter.name, parameter.low, parameter.high, step, parameter.value, hint=hint
-        )
+        slider = self.gui.add_slider(parameter.name, parameter.low, parameter.high, step, parameter.value, hint=hint)
         self._sliders[parameter.name] = (slider, None)
         slider.on_update(lambda event: self._changed(parameter.name, event))
 

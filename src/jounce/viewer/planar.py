@@ -25,8 +25,9 @@ def planar_solids(motion: Any, seen: Any, colours: Any) -> tuple[dict[str, tuple
     front = (len(bodies) + 1) * THICKNESS * size
     found: dict[str, list[Solid]] = {body: [] for body in bodies}
 
-    def add(body: str, mesh: Any, colour: Any, opacity: float = 1.0) -> None:
-        found[body].append(Solid(*mesh, colour, opacity))
+    def add(body: str, mesh: Any, colour: Any) -> None:
+        vertices, faces = mesh
+        found[body].append(Solid(vertices, faces, colour))
 
     wheels = _wheels(seen)
     for body, link in seen.links.items():
@@ -39,7 +40,8 @@ def planar_solids(motion: Any, seen: Any, colours: Any) -> tuple[dict[str, tuple
         for center, radius, module in wheels.get(body, ()):
             add(body, gear(radius, low, high, center, module), colours[body])
             add(body, gear(0.62 * radius, low, high + 0.1 * (high - low), center), _lighter(colours[body]))
-            add(body, box([0.9 * radius, 0.1 * radius, 0.2 * (high - low)], [*(center + [0.5 * radius, 0]), high]), DARK)
+            mark = [float(center[0]) + 0.5 * radius, float(center[1]), high]
+            add(body, box([0.9 * radius, 0.1 * radius, 0.2 * (high - low)], mark), DARK)
         if len(link.points) > 1:
             add(body, plate(link.points, WIDTH * size, low, high), colours[body])
         elif body not in wheels:
@@ -94,9 +96,9 @@ def _add_symbol(add: Any, motion: Any, symbol: Any, layer: Any, size: float) -> 
 
     thick = THICKNESS * size
     if symbol.kind in ("revolute", "double_revolute", "parallel2"):
-        ends = range(len(symbol.bodies)) if symbol.kind == "double_revolute" else (1,)
-        for k in ends:
-            levels = [layer[body] for body in (symbol.bodies if symbol.kind != "double_revolute" else symbol.bodies[k : k + 1])]
+        rod = symbol.kind == "double_revolute"
+        for k in (0, 1) if rod else (1,):
+            levels = [layer[body] for body in ((symbol.bodies[k],) if rod else symbol.bodies)]
             low, high = min(levels) - 0.15 * thick, max(levels) + 1.1 * thick
             center = [*symbol.points[k], 0.5 * (low + high)]
             add(symbol.bodies[k], cylinder(PIN * size, high - low, center=center), DARK)
@@ -135,5 +137,3 @@ def travel(motion: Any, symbol: Any) -> tuple[float, float]:
     along = np.einsum("tc,tc->t", there - base[:, 0], base[:, 1] - base[:, 0])
     along = along[np.isfinite(along)]
     return float(along.min()), float(along.max())
-
-

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import Any
 
 import numpy as np
@@ -15,10 +16,11 @@ __all__ = ["Chart", "Plots", "cursor_data", "default_charts"]
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73")
 CURSOR = "#555555"
+SETTLING = 1.5  # s
 
 
 def cursor_data(time: np.ndarray, values: np.ndarray, frame: int) -> tuple[np.ndarray, ...]:
-    """Return what a plot draws: time, components, and a vertical line at an instant, which stands there twice.
+    """Return what a plot draws: time, components, and an upright line at an instant, which counts for two.
 
     Parameters
     ----------
@@ -30,10 +32,11 @@ def cursor_data(time: np.ndarray, values: np.ndarray, frame: int) -> tuple[np.nd
     --------
     >>> import numpy as np
     >>> t, y, line = cursor_data(np.array([0.0, 1.0]), np.array([[3.0], [5.0]]), 1)
-    >>> t.tolist(), y.tolist(), line.tolist()
+    >>> t.round(6).tolist(), y.tolist(), line.tolist()
     ([0.0, 1.0, 1.0], [3.0, 5.0, 5.0], [nan, 3.0, 5.0])
     """
-    times = np.insert(time, frame, time[frame])
+    after = time[frame] + 1e-9 * (time[-1] - time[0])  # not the same, or the page finds no ticks
+    times = np.insert(time, min(frame + 1, len(time)), after)
     lines = [np.insert(column, frame, column[frame]) for column in values.T]
     low, high = limits(values)
     cursor = np.full(len(times), np.nan)
@@ -111,9 +114,12 @@ class Chart:
             series,
             title=self.title(take),
             scales=self._scales(take),
-            axes=({"label": "time (s)", "labelSize": 18, "size": 30}, {"size": 62}),
+            axes=(
+                {"label": "time (s)", "labelFont": "11px sans-serif", "ticks": {"size": 4}},
+                {"size": 58, "ticks": {"size": 4}},
+            ),
             legend={"show": count > 1},
-            height=190,
+            height=200,
             padding=(6, 14, 0, 0),
         )
 
@@ -125,6 +131,7 @@ class Chart:
 
     def renew(self, take: Take) -> None:
         """Fit the axes to another motion."""
+        self.handle.title = self.title(take)
         self.handle.scales = self._scales(take)
 
     def show(self, take: Take, frame: int) -> None:
@@ -166,9 +173,7 @@ class Plots:
                 self.output = self.gui.add_dropdown("output", names, initial_value=names[0])
                 self.derivative = self.gui.add_dropdown("derivative", self._words(take, names[0]))
                 self.output.on_update(lambda _: self._offer())
-                self.gui.add_button("Add", icon="plus").on_click(
-                    lambda _: self.add(self.output.value, int(self.derivative.value.partition(":")[0]))
-                )
+                self.gui.add_button("Add", icon="plus").on_click(lambda _: self._add_chosen())
                 self.gui.add_button("Remove the last", icon="trash").on_click(lambda _: self.remove())
                 self.order = self.gui.add_number(
                     "highest derivative", take.order, min=0, max=30, step=1, hint="Solves again, to any order up to 30"
@@ -176,6 +181,17 @@ class Plots:
                 self.order.on_update(lambda event: self._solve_to(event))
         for name, order in default_charts(take):
             self.add(name, order)
+        self._still_until = 0.0
+        page.server.on_client_connect(lambda _: self._settle())
+
+    def _settle(self) -> None:
+        """Let a browser that has just come lay out the plots: data that arrive before leave them without ticks."""
+        self._still_until = time.monotonic() + SETTLING
+        time.sleep(SETTLING)
+        with self.page.lock:
+            for chart in self.charts:
+                chart.renew(self.page.take)
+                chart.show(self.page.take, self.page.frame)
 
     def _words(self, take: Take, name: str) -> tuple[str, ...]:
         if name not in take.outputs:
@@ -185,6 +201,10 @@ class Plots:
 
     def _offer(self) -> None:
         self.derivative.options = self._words(self.page.take, self.output.value)
+
+    def _add_chosen(self) -> None:
+        self.add(self.output.value, int(self.derivative.value.partition(":")[0]))
+        self._settle()
 
     def _solve_to(self, event: Any) -> None:
         if event.client is not None:
@@ -219,8 +239,9 @@ class Plots:
 
     def on_frame(self, take: Take, frame: int) -> None:
         """Move the cursors, and renew the legend."""
-        for chart in self.charts:
-            chart.show(take, frame)
+        if time.monotonic() >= self._still_until:
+            for chart in self.charts:
+                chart.show(take, frame)
         self.legend.content = legend(self.page.prepared, frame)
 
     def on_failure(self, error: JounceError) -> None:

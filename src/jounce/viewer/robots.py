@@ -75,7 +75,7 @@ class RobotSubject:
             raise RobotError("nothing moves: the robot has no moving joint", name=robot.name)
         self.robot, self.looks, self.trajectory = robot, looks, trajectory
         if trajectory is not None:
-            _check_joints(robot, trajectory)
+            check_joints(robot, trajectory)
 
     @property
     def name(self) -> str:
@@ -103,7 +103,9 @@ class RobotSubject:
         robot = self.robot
         order = max(order, 1)
         trajectory = self.trajectory if self.trajectory is not None else swinging(robot, values)
-        time = trajectory.times if self.trajectory is not None else np.linspace(trajectory.start, trajectory.stop, FRAMES)
+        time = (
+            trajectory.times if self.trajectory is not None else np.linspace(trajectory.start, trajectory.stop, FRAMES)
+        )
         q = coordinates(robot, trajectory, time, order)
         position, quaternion = _poses(robot, q)
         return Take(
@@ -123,7 +125,7 @@ class RobotSubject:
         )
 
 
-def _check_joints(robot: Robot, trajectory: Any) -> None:
+def check_joints(robot: Robot, trajectory: Any) -> None:
     from jounce.errors import did_you_mean
 
     for name in trajectory.names:
@@ -290,5 +292,3 @@ def _dataset(robot: Robot, q: np.ndarray, time: np.ndarray) -> Any:
         variables[key] = (("time", "derivative"), padded, {"units": quantity.unit})
     axes = {"time": ("time", time, {"units": "s"}), "derivative": np.arange(q.shape[1])}
     return xarray.Dataset(variables, coords=axes, attrs={"title": robot.name, "source": "jounce"})
-
-

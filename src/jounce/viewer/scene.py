@@ -83,10 +83,10 @@ class Scene:
             f"/stretches/{stretch.name}", vertices, faces, color=stretch.colour, side="double"
         )
         shift = np.array([0.0, 0.0, 0.85 * take.looks.front])
-        ends = [
+        start, end = (
             take.placed(body, point) + shift for body, point in zip(stretch.bodies, stretch.points, strict=True)
-        ]
-        return handle, *ends
+        )
+        return handle, start, end
 
     def show(self, take: Take, frame: int) -> None:
         """Move the bodies to where they are at an instant."""
@@ -167,17 +167,15 @@ class Scene:
     def _flat(self, looks: Looks, center: np.ndarray, low: np.ndarray, high: np.ndarray, size: float) -> None:
         half = 0.5 * MARGIN * max(high[1] - low[1], (high[0] - low[0]) / NARROW, 1e-9 * size)
         distance = half / np.tan(0.5 * FLAT_FIELD_OF_VIEW)
-        self._camera(center + [0, 0, distance], center, looks.up, FLAT_FIELD_OF_VIEW, distance)
+        self._camera(center + np.array([0.0, 0.0, distance]), center, looks.up, FLAT_FIELD_OF_VIEW, distance)
         self._grid("xy", [center[0], center[1], low[2] - 0.02 * size], size)
 
     def _solid(self, looks: Looks, center: np.ndarray, low: np.ndarray, high: np.ndarray, size: float) -> None:
         up = np.array(looks.up)
         k = int(np.argmax(np.abs(up)))
         toward = 0.55 * up + np.roll(up, 1) * 1.0 + np.roll(up, 2) * -0.75
-        distance = 0.5 * MARGIN * size / np.tan(0.5 * FIELD_OF_VIEW)
-        self._camera(
-            center + toward / np.linalg.norm(toward) * distance, center, looks.up, FIELD_OF_VIEW, distance
-        )
+        distance = 0.5 * size / np.tan(0.5 * FIELD_OF_VIEW)
+        self._camera(center + toward / np.linalg.norm(toward) * distance, center, looks.up, FIELD_OF_VIEW, distance)
         place = center.copy()
         place[k] = (low if up[k] > 0 else high)[k] - up[k] * 0.02 * size
         self._grid(("yz", "xz", "xy")[k], place, size)

@@ -56,9 +56,7 @@ class View:
 
     def _lay_out(self, subject: Any, playing: bool) -> None:
         gui = self.page.server.gui
-        gui.configure_theme(
-            control_width="medium", show_logo=False, show_share_button=False, brand_color=(0, 90, 140)
-        )
+        gui.configure_theme(control_width="medium", show_logo=False, show_share_button=False, brand_color=(0, 90, 140))
         gui.main_panel.dock_right()
         gui.main_panel.set_width(330)
         self.panel = Panel(self.page)
@@ -169,7 +167,7 @@ def subject_of(given: Any, trajectory: Any = None) -> Any:
 
     path = None
     if isinstance(given, str | PathLike):
-        path = Path(fspath(given))  # type: ignore[arg-type]
+        path = Path(fspath(given))
         if path.suffix.lower() in MECHANISM_FILES:
             from jounce.io import load
 

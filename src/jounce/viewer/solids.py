@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -74,26 +75,29 @@ def _placed(vertices: np.ndarray, axis: Any, center: Any) -> np.ndarray:
     return vertices @ turned_to(axis).T + np.asarray(center, float)
 
 
-def revolved(profile: Sequence[tuple[float, float]], axis: Any = (0, 0, 1), center: Any = (0, 0, 0)) -> Mesh:
-    """Return the solid that a profile of radii and heights sweeps around an axis; corners are kept sharp.
+def revolved(
+    profile: Sequence[tuple[float, float]], axis: Any = (0, 0, 1), center: Any = (0, 0, 0), smooth: bool = False
+) -> Mesh:
+    """Return the solid that a profile of radii and heights sweeps around an axis, with sharp edges or none.
 
     The profile starts and ends on the axis, or closes in itself.
     """
     angle = np.arange(AROUND) * (2 * np.pi / AROUND)
     ring = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    vertices, faces = [], []
+    pairs = list(pairwise(profile))
+    levels = list(profile) if smooth else [end for pair in pairs for end in pair]
+    vertices = np.concatenate([np.column_stack([ring * r, np.full(AROUND, z)]) for r, z in levels])
     start = np.arange(AROUND)
     after = (start + 1) % AROUND
-    for k in range(len(profile) - 1):
-        (r, z), (s, y) = profile[k], profile[k + 1]
-        base = 2 * AROUND * k
-        vertices += [np.column_stack([ring * r, np.full(AROUND, z)]), np.column_stack([ring * s, np.full(AROUND, y)])]
-        a, b, c, d = base + start, base + after, base + AROUND + after, base + AROUND + start
+    faces = []
+    for k, ((r, _), (s, _)) in enumerate(pairs):
+        first = AROUND * (k if smooth else 2 * k)
+        a, b, c, d = first + start, first + after, first + AROUND + after, first + AROUND + start
         if s > 0:
             faces.append(np.stack([a, c, d], axis=1))
         if r > 0:
             faces.append(np.stack([a, b, c if s > 0 else d], axis=1))
-    return _placed(np.concatenate(vertices), axis, center), np.concatenate(faces)
+    return _placed(vertices, axis, center), np.concatenate(faces)
 
 
 def cylinder(radius: float, length: float, axis: Any = (0, 0, 1), center: Any = (0, 0, 0)) -> Mesh:
@@ -107,7 +111,7 @@ def sphere(radius: float, center: Any = (0, 0, 0)) -> Mesh:
     angle = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 13)
     profile = [(radius * float(np.cos(a)), radius * float(np.sin(a))) for a in angle]
     profile[0], profile[-1] = (0.0, -radius), (0.0, radius)
-    return revolved(profile, center=center)
+    return revolved(profile, center=center, smooth=True)
 
 
 def bar(start: Any, end: Any, radius: float) -> Mesh:
@@ -119,7 +123,7 @@ def bar(start: Any, end: Any, radius: float) -> Mesh:
     round_ = [(radius * float(np.cos(a)), radius * float(np.sin(a))) for a in np.linspace(-0.5 * np.pi, 0, 5)]
     round_[0] = (0.0, -radius)
     profile = [*round_, *((r, length - z) for r, z in reversed(round_))]
-    return revolved(profile, end - start, start)
+    return revolved(profile, end - start, start, smooth=True)
 
 
 def prism(outline: np.ndarray, low: float, high: float, sharp: bool = True) -> Mesh:

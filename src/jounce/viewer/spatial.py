@@ -13,6 +13,7 @@ from jounce.viewer.solids import Solid, bar, box, cylinder, merged, revolved, sp
 __all__ = ["spatial_solids"]
 
 BAR = 0.013  # radius, in sizes of the mechanism
+THREADS = 15  # turns of a screw that are drawn
 SLIDING = ("prismatic", "cylindrical", "screw")
 
 
@@ -24,7 +25,8 @@ def spatial_solids(motion: Any, seen: Any, colours: Any) -> tuple[dict[str, tupl
     found: dict[str, list[Solid]] = {body: [] for body in (GROUND, *motion.mechanism.bodies)}
 
     def add(body: str, mesh: Any, colour: Any) -> None:
-        found[body].append(Solid(*mesh, colour))
+        vertices, faces = mesh
+        found[body].append(Solid(vertices, faces, colour))
 
     for body, link in seen.links.items():
         if body == GROUND:
@@ -80,7 +82,7 @@ def _add_slide(add: Any, motion: Any, symbol: Any, size: float) -> None:
         return
     add(first, cylinder(thin, high - low, axis, middle), GREY)
     if symbol.kind == "screw":
-        turns = 3 * AROUND_THREAD
+        turns = THREADS
         height = np.linspace(low, high, turns * 16)
         angle = (height - low) / (high - low) * 2 * np.pi * turns
         helix = thin * np.stack([np.cos(angle), np.sin(angle), height / thin], axis=1)
@@ -88,6 +90,3 @@ def _add_slide(add: Any, motion: Any, symbol: Any, size: float) -> None:
     ring = 1.7 * BAR * size, 0.85 * BAR * size, 0.04 * size
     profile = [(ring[1], -ring[2]), (ring[0], -ring[2]), (ring[0], ring[2]), (ring[1], ring[2]), (ring[1], -ring[2])]
     add(second, revolved(profile, symbol.axes[1], symbol.points[1]), DARK)
-
-
-AROUND_THREAD = 5
