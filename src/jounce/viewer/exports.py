@@ -14,7 +14,7 @@ from jounce.errors import JounceError
 from jounce.viewer.prepared import Prepared
 from jounce.viewer.take import Take
 
-__all__ = ["animation", "file_name", "picture", "quiet_server", "table"]
+__all__ = ["animation", "file_name", "picture", "quiet_server", "quiet_stop", "table"]
 
 SMOOTH = 1 / 30  # s between two pictures of an animation
 
@@ -96,6 +96,12 @@ def quiet_server(port: int = 0, label: str | None = None) -> Any:
         return viser.ViserServer(host="127.0.0.1", port=port or free_port(), label=label, verbose=False)
 
 
+def quiet_stop(server: Any) -> None:
+    """End a viser server without a word."""
+    with redirect_stdout(io.StringIO()):
+        server.stop()
+
+
 def free_port() -> int:
     """Return a port of this machine that nobody listens on."""
     import socket
@@ -134,7 +140,7 @@ def animation(prepared: Prepared) -> str:
             recording.insert_sleep(SMOOTH if after is None else float(take.time[after] - take.time[frame]))
         return recording.as_html()
     finally:
-        server.stop()
+        quiet_stop(server)
 
 
 def frames_shown(take: Take) -> list[int]:

@@ -242,7 +242,7 @@ def _reaction(motion: Any, good: np.ndarray, name: str, kind: str) -> Exertion:
         torque = np.stack([np.zeros(len(torque)), np.zeros(len(torque)), torque[:, 0]], axis=-1)
     else:
         torque = torque[:, 0]
-    place = spatial_vectors(motion.point(element.bodies[slot], local).values[good][:, 0])
+    place = spatial_vectors(motion.point(element.bodies[slot], local.tolist()).values[good][:, 0])
     return Exertion(name, "reaction" if kind == "joints" else "driver", place, spatial_vectors(force), torque)
 
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import threading
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
 from jounce.errors import JounceError
 from jounce.viewer.arrows import Marked
+from jounce.viewer.exports import quiet_stop
 from jounce.viewer.player import Player
 from jounce.viewer.prepared import Prepared, Wanted
 from jounce.viewer.scene import Scene
@@ -20,6 +21,7 @@ __all__ = ["Follower", "Page"]
 SLOWLY = 6  # legend and plots follow every so many pictures
 
 
+@runtime_checkable
 class Follower(Protocol):
     """A panel, which is told what happens."""
 
@@ -167,4 +169,4 @@ class Page:
         """End the threads and the server."""
         self.player.end()
         self.session.close()
-        self.server.stop()
+        quiet_stop(self.server)

@@ -147,7 +147,9 @@ class Scene:
         if handle is not None:
             handle.remove()
         if len(lines):
-            self._arrows["paths"] = self.scene.add_line_segments("/paths", lines, _linear(colours), line_width=3.0)
+            self._arrows["paths"] = self.scene.add_line_segments(
+                "/paths", lines, _linear(colours), thickness=3.0, thickness_units="screen"
+            )
 
     def remake_arrows(self) -> None:
         """Forget the arrows, so that those shown next have the thickness of the size of now."""

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from jounce.errors import JounceError
-from jounce.viewer.exports import quiet_server
+from jounce.viewer.exports import quiet_server, quiet_stop
 from jounce.viewer.marks import Forces, Marks
 from jounce.viewer.page import Page
 from jounce.viewer.panel import Panel
@@ -50,7 +50,7 @@ class View:
             self.page = Page(server, subject, order)
             self._lay_out(subject, playing)
         except BaseException:
-            server.stop()
+            quiet_stop(server)
             raise
         self.url = f"http://127.0.0.1:{server.get_port()}"
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Mapping
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 from jounce.errors import JounceError
 from jounce.viewer.take import Parameter, Take
@@ -13,6 +13,7 @@ from jounce.viewer.take import Parameter, Take
 __all__ = ["Session", "Subject"]
 
 
+@runtime_checkable
 class Subject(Protocol):
     """What is looked at: something with parameters that has a motion."""
 
