@@ -119,7 +119,8 @@ def test_a_robot_with_closed_loops_moves_as_one():
 URDF = """<robot name="two">
   <material name="red"><color rgba="1 0 0 0.5"/></material>
   <link name="base"><visual><geometry><box size="1 2 3"/></geometry><material name="red"/></visual></link>
-  <link name="arm"><inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
+  <link name="arm"><inertial><mass value="1"/>
+    <inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
   <link name="hand">
     <visual><origin xyz="0 0 1" rpy="0 1.5707963267948966 0"/>
       <geometry><mesh filename="package://pack/wedge.obj" scale="2 2 2"/></geometry></visual>

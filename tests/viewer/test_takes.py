@@ -66,7 +66,7 @@ def test_forces_are_those_of_the_wheel(take):
     drawn = Prepared.of(take, Wanted(kinds=frozenset({"reaction"}), force_stretch=2.0))
     arrow = drawn.forces["reaction"][3, 0]
     np.testing.assert_allclose((arrow[1] - arrow[0]) / (2.0 * scale), [0, 20.0, 0], rtol=0, atol=1e-11)
-    np.testing.assert_allclose(arrow[1, :2], 0.0, atol=1e-14)  # it points at the pin
+    np.testing.assert_allclose(arrow[0, :2], 0.0, atol=1e-14)  # it starts at the pin
     assert largest == pytest.approx(6.0)
     assert {e.kind for e in drawn.exertions} == {"reaction"}
 
@@ -126,7 +126,7 @@ def test_a_motion_that_ends_early_is_shown_as_far_as_it_goes():
 def test_outputs_are_plotted_with_their_words_and_units(take):
     angle = take.outputs["angle"]
     np.testing.assert_allclose(angle.values[:, 1, 0], 6 * take.time**2, rtol=0, atol=1e-12)
-    assert angle.words == ("position", "velocity", "acceleration", "jerk")
+    assert angle.words == ("angle", "velocity", "acceleration", "jerk")
     assert angle.unit == "rad"
     assert take.outputs["rim"].values.shape == (101, 4, 2)
     assert default_charts(take) == [("rim", 0), ("rim", 2)]

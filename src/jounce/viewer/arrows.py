@@ -110,15 +110,12 @@ def force_scale(take: Take, exertions: Sequence[Exertion]) -> tuple[float, float
 
 
 def force_arrows(take: Take, exertions: Sequence[Exertion], scale: float) -> np.ndarray:
-    """Return start and end of the arrows of forces at all instants, (time, arrows, 2, 3), m; they end in their place.
-
-    A force of a joint pushes there, so its arrow points at the place where it acts.
-    """
+    """Return start and end of force arrows at all instants, (time, arrows, 2, 3), m; they start where they act."""
     found = []
     for exertion in exertions:
         if exertion.force is not None:
-            end = exertion.place + in_front(take)
-            found.append(np.stack([end - scale * exertion.force, end], axis=1))
+            start = exertion.place + in_front(take)
+            found.append(np.stack([start, start + scale * exertion.force], axis=1))
     return np.stack(found, axis=1) if found else np.zeros((len(take.time), 0, 2, 3))
 
 

@@ -188,6 +188,8 @@ def _quantities(motion: Any, good: np.ndarray) -> dict[str, Quantity]:
         output = motion.mechanism.outputs[name]
         values = values[good].reshape(np.count_nonzero(good), values.shape[1], -1)
         words = tuple(rate_name(output, k) for k in range(values.shape[1]))
+        if output.unit == "rad" and words[:1] == ("position",):
+            words = ("angle", *words[1:])
         found[name] = Quantity(output.unit, values, words)
     if found:
         return found

@@ -151,6 +151,7 @@ class Page:
             with self.server.atomic():
                 self._refresh()
             for follower in self.followers:
+                follower.on_time(self.player.now)
                 follower.on_frame(self.take, self.frame)
 
     def _played(self, instant: float) -> None:

@@ -178,7 +178,7 @@ class Panel:
     def on_time(self, instant: float) -> None:
         """Follow the player."""
         self.time.value = float(np.clip(instant, self.time.min, self.time.max))
-        if not self.page.player.playing:
+        if self.play.label == "Pause" and not self.page.player.playing:  # it came to the end
             self.set_playing(False)
 
     def on_frame(self, take: Take, frame: int) -> None:

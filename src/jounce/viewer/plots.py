@@ -16,6 +16,7 @@ __all__ = ["Chart", "Plots", "cursor_data", "default_charts"]
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73")
 CURSOR = "#555555"
+TICKS = {"size": 4}
 SETTLING = 1.5  # s
 
 
@@ -115,11 +116,11 @@ class Chart:
             title=self.title(take),
             scales=self._scales(take),
             axes=(
-                {"label": "time (s)", "labelFont": "11px sans-serif", "ticks": {"size": 4}},
-                {"size": 58, "ticks": {"size": 4}},
+                {"label": "time (s)", "labelFont": "11px sans-serif", "labelSize": 15, "size": 28, "ticks": TICKS},
+                {"size": 58, "ticks": TICKS},
             ),
             legend={"show": count > 1},
-            height=200,
+            height=180,
             padding=(6, 14, 0, 0),
         )
 

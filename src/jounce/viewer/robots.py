@@ -246,7 +246,7 @@ def _quantities(robot: Robot, q: np.ndarray) -> dict[str, Quantity]:
     words = tuple(derivative_name(k) for k in range(q.shape[1]))
     turning = [robot.joints[name].turning for name in robot.joint_names]
     found = {
-        name: Quantity("rad" if turns else "m", q[..., k : k + 1], words)
+        name: Quantity("rad" if turns else "m", q[..., k : k + 1], ("angle", *words[1:]) if turns else words)
         for k, (name, turns) in enumerate(zip(robot.joint_names, turning, strict=True))
     }
     torque = _torques(robot, q)
