@@ -31,7 +31,7 @@ def test_a_table_has_all_outputs_and_derivatives(take, tmp_path):
     found = read(path)
     rim = np.stack([found["rim"].sel(component=c).values for c in "xy"], axis=-1)
     np.testing.assert_allclose(rim, derivatives_of_the_rim(take.time)[..., :2], rtol=0, atol=1e-11)
-    assert file_name(take, ".csv") == "wheel.csv"
+    assert file_name(take.title, ".csv") == "wheel.csv"
 
 
 def recorded(html):

@@ -101,11 +101,11 @@ def long_enough(arrows: np.ndarray, size: float) -> np.ndarray:
 
 
 def force_scale(take: Take, exertions: Sequence[Exertion]) -> tuple[float, float]:
-    """Return the length of an arrow by N, m, and the largest torque, N m."""
+    """Return the length of an arrow by N, m, zero where there are no forces, and the largest torque, N m."""
     forces = [np.linalg.norm(e.force, axis=1).max() for e in exertions if e.force is not None]
     torques = [np.linalg.norm(e.torque, axis=1).max() for e in exertions if e.torque is not None]
     largest = max(forces, default=0.0)
-    scale = rounded(LONGEST_FORCE * take.size / largest) if largest > 0 else 1.0
+    scale = rounded(LONGEST_FORCE * take.size / largest) if largest > 0 else 0.0
     return scale, max(torques, default=0.0)
 
 
@@ -164,7 +164,7 @@ def quaternion_to(direction: np.ndarray) -> np.ndarray:
     if z < -1 + 1e-12:
         return np.array([0.0, 1.0, 0.0, 0.0])
     found = np.array([1.0 + z, -y, x, 0.0])
-    return found / np.linalg.norm(found)
+    return found / np.linalg.norm(found) + 0.0
 
 
 def scale_words(scale: float, order: int, size: float) -> str:

@@ -19,16 +19,15 @@ __all__ = ["animation", "file_name", "picture", "quiet_server", "quiet_stop", "t
 SMOOTH = 1 / 30  # s between two pictures of an animation
 
 
-def file_name(take: Take, ending: str) -> str:
-    """Return a name for a file of a take.
+def file_name(title: str, ending: str) -> str:
+    """Return a name for a file of a motion.
 
     Examples
     --------
-    >>> from types import SimpleNamespace
-    >>> file_name(SimpleNamespace(title="Planar four-bar: psi"), ".csv")
+    >>> file_name("Planar four-bar: psi", ".csv")
     'planar_four-bar_psi.csv'
     """
-    kept = "".join(c if c.isascii() and (c.isalnum() or c in "-_") else " " for c in take.title)
+    kept = "".join(c if c.isascii() and (c.isalnum() or c in "-_") else " " for c in title)
     return ("_".join(kept.lower().split()) or "motion") + ending
 
 

@@ -145,7 +145,7 @@ class Panel:
         except JounceError as error:
             event.client.add_notification("Nothing was exported", str(error), color="red", auto_close_seconds=10)
             return
-        event.client.send_file_download(file_name(self.page.take, ending), content, save_immediately=True)
+        event.client.send_file_download(file_name(self.page.take.title, ending), content, save_immediately=True)
 
     def recorded(self) -> str:
         """Return what is shown as an animation in one HTML file: bodies, arrows, paths and forces."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from jounce.errors import JounceError
 from jounce.io.peaks import COMPONENTS, derivative_unit
+from jounce.plot.labels import scale_of
 from jounce.viewer.legend import legend
 from jounce.viewer.take import Quantity, Take
 
@@ -58,6 +59,27 @@ def limits(values: np.ndarray) -> tuple[float, float]:
     return low, high
 
 
+def cleaned(time: np.ndarray, values: np.ndarray, order: int) -> np.ndarray:
+    """Return a derivative, (time, components), or zeros where it is but the rounding of lower ones.
+
+    Parameters
+    ----------
+    time : array of shape (time,)
+    values : array of shape (time, orders, components)
+    order : int
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> steady = np.array([[[1.0], [2.0], [3e-14]], [[3.0], [2.0], [-1e-14]]])
+    >>> cleaned(np.array([0.0, 1.0]), steady, 2).tolist()
+    [[0.0], [0.0]]
+    """
+    span = float(time[-1] - time[0]) or 1.0
+    sizes = [np.abs(values[:, k]).max(initial=0.0) / span ** (order - k) for k in range(order + 1)]
+    return values[:, order] if sizes[-1] > 1e-9 * max(sizes) else np.zeros_like(values[:, order])
+
+
 def default_charts(take: Take) -> list[tuple[str, int]]:
     """Return the output and the derivative of the plots that a page starts with."""
     names = list(take.outputs)
@@ -90,12 +112,16 @@ class Chart:
         return take.outputs[self.name]
 
     def _values(self, take: Take) -> np.ndarray:
-        return self._quantity(take).values[:, self.order]
+        """Return what is drawn: short numbers, and zeros in the place of rounding errors."""
+        values = cleaned(take.time, self._quantity(take).values, self.order)
+        return values * 10.0 ** -scale_of(values)
 
     def title(self, take: Take) -> str:
         """Name, derivative and unit."""
         quantity = self._quantity(take)
         unit = derivative_unit(quantity.unit.replace("*", " "), self.order)
+        exponent = scale_of(cleaned(take.time, quantity.values, self.order))
+        unit = f"10^{exponent} {unit}" if exponent else unit
         return f"{self.name}: {quantity.words[self.order]} ({unit})"
 
     def _drawn(self, take: Take) -> Any:

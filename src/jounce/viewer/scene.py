@@ -16,7 +16,7 @@ __all__ = ["Scene"]
 FIELD_OF_VIEW, FLAT_FIELD_OF_VIEW = 0.6, 0.12  # rad; the second is nearly without perspective
 MARGIN, NARROW = 1.2, 0.85  # width by height of the space between the panels
 ARROW = {"shaft_radius": 0.0045, "head_radius": 0.0125, "head_length": 0.034}  # in sizes
-ARC_RADIUS = 0.05
+ARC_RADIUS = 0.062
 
 
 class Scene:

@@ -216,5 +216,5 @@ def arc_arrow() -> Mesh:
     line = np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
     end = np.array([np.cos(angle[-1]), np.sin(angle[-1]), 0.0])
     ahead = np.array([-end[1], end[0], 0.0])
-    head = revolved([(0.0, 0.0), (0.17, 0.0), (0.0, 0.48)], ahead, end - 0.05 * ahead)
-    return merged([tube(line, 0.06), head])
+    head = revolved([(0.0, 0.0), (0.22, 0.0), (0.0, 0.55)], ahead, end - 0.05 * ahead)
+    return merged([tube(line, 0.08), head])
