@@ -23,6 +23,7 @@ from jounce.cli.mechanisms import run, schema, simulate
 from jounce.cli.papers import reproduce
 from jounce.cli.robots import check
 from jounce.cli.starters import new
+from jounce.cli.views import view
 from jounce.cli.writing import WritingError
 from jounce.errors import JounceError, SolveError
 from jounce.io.terminal import complain, unexpected
@@ -53,6 +54,10 @@ EXAMPLES = {
     report: """\
   jounce report examples/four_bar.yaml --out four_bar.html
   jounce report examples/press.yaml --order 3""",
+    view: """\
+  jounce view examples/four_bar.yaml
+  jounce view examples/press.yaml --order 6 --set "stroke=80 mm"
+  jounce view examples/robots/panda.urdf examples/trajectories/panda_wave.yaml --no-open --port 8080""",
     check: """\
   jounce check examples/robots/panda.urdf examples/trajectories/panda_good.csv
   jounce check examples/robots/panda.urdf \\

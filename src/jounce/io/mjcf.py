@@ -18,7 +18,7 @@ from jounce.robot.model import Closure, Joint, Limits, Link, Mimic
 from jounce.robot.robot import Robot
 from jounce.robot.tree import turn_about
 
-__all__ = ["read_mjcf"]
+__all__ = ["names_of_bodies", "read_mjcf"]
 
 NUMERIC = {  # attributes whose numbers MuJoCo takes even when they are not finite
     "body": ("pos", "quat", "axisangle", "xyaxes", "zaxis", "euler"),
@@ -144,7 +144,7 @@ class _Reader:
         self.root, self.mujoco, self.spec, self.model = root, mujoco, spec, model
         kinds = ("free", "ball", "hinge", "slide")
         self.kind = {name: int(getattr(mujoco.mjtJoint, f"mjJNT_{name.upper()}")) for name in kinds}
-        self.bodies = _names([model.body(k).name for k in range(model.nbody)], "body")
+        self.bodies = names_of_bodies(model)
         self.joint_names = _names([model.joint(k).name for k in range(model.njnt)], "joint")
         self.lines = {f"joints.{self.joint_names[joint.id]}": _line(joint.info) for joint in spec.joints}
         self.lines |= {f"links.{self.bodies[body.id]}": _line(body.info) for body in spec.bodies}
@@ -337,6 +337,11 @@ class _Reader:
         self.links += links[1:]
         first = dataclasses.replace(joints[0], parent=parent, position=position, rotation=rotation)
         self.joints += [first, *joints[1:]]
+
+
+def names_of_bodies(model: Any) -> list[str]:
+    """Return the names of the links that the bodies of a compiled model become, by number."""
+    return _names([model.body(k).name for k in range(model.nbody)], "body")
 
 
 def _names(given: list[str], kind: str) -> list[str]:

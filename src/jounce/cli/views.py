@@ -1,0 +1,64 @@
+"""The command that shows a mechanism or a robot in the browser."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from jounce.errors import JounceError
+from jounce.io.terminal import say
+
+
+def view(
+    file: Path,
+    trajectory: Path | None = None,
+    /,
+    *,
+    port: int = 0,
+    no_open: bool = False,
+    order: int = 4,
+    set_: list[str] | None = None,
+    import_: list[Path] | None = None,
+) -> int:
+    """Show a mechanism or a robot in the browser: moving, with arrows, plots, forces and live parameters.
+
+    The page is served on this machine only, and needs no network. Ctrl-C ends it.
+
+    Parameters
+    ----------
+    file
+        Mechanism file (.yaml, .yml, .toml or .json), or robot: URDF (.urdf) or MJCF (.xml).
+    trajectory
+        Of a robot: samples (.csv), or laws or a motion (.yaml, .yml, .toml or .json); its joints swing unless given.
+    port
+        Of this machine; 0 takes one that is free.
+    no_open
+        Only print the address; do not open the browser.
+    order
+        Highest derivative of arrows and plots, 0 to 30.
+    set_
+        NAME=VALUE of a parameter of a mechanism, with a unit; repeatable.
+    import_
+        Python file with your own joints and forces; repeatable.
+    """
+    from jounce.kinematics.solve import checked_order
+    from jounce.viewer import view as show
+    from jounce.viewer.server import MECHANISM_FILES
+
+    subject: object = file
+    try:
+        checked_order(order)
+        if file.suffix.lower() in MECHANISM_FILES:
+            from jounce.cli.mechanisms import _loaded
+
+            subject = _loaded(file, set_, import_)
+        elif set_ or import_:
+            raise JounceError("is for mechanism files; a robot has no parameters", name="--set" if set_ else "--import")
+        page = show(subject, trajectory, port=port, order=order, open_page=not no_open)
+    except JounceError as error:
+        if error.name in ("port", "order"):
+            error.name = f"--{error.name}"
+            raise
+        raise error.located(path=file) from None
+    say(f"{page.page.take.title or file.name}: {page.url} (Ctrl-C ends)")
+    page.wait()
+    return 0

@@ -1,0 +1,125 @@
+"""Robots with closed loops, which move as the mechanisms that they are."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from jounce.errors import JounceError, MobilityError, RobotError
+from jounce.mechanism.mechanism import GROUND
+from jounce.robot.robot import Robot
+from jounce.viewer.mechanisms import take_of
+from jounce.viewer.robots import FRAMES, check_joints, swing_parameters, swinging
+from jounce.viewer.take import Parameter, Take
+
+__all__ = ["ClosedRobotSubject"]
+
+
+class ClosedRobotSubject:
+    """A robot with closures: as many joints are driven as it has degrees of freedom.
+
+    Parameters
+    ----------
+    robot : Robot
+        With closures.
+    looks : Looks
+        Shapes of its moving links and its base.
+    trajectory : JointTrajectory, optional
+        Of the driven joints. Without, the first joints that determine the others swing.
+
+    Raises
+    ------
+    RobotError
+        If the trajectory names joints that the robot does not have, or no joints drive all others.
+    """
+
+    def __init__(self, robot: Robot, looks: Any, trajectory: Any = None):
+        self.robot, self.looks, self.trajectory = robot, looks, trajectory
+        if trajectory is not None:
+            check_joints(robot, trajectory)
+
+    @property
+    def name(self) -> str:
+        """The name of the robot."""
+        return self.robot.name
+
+    @property
+    def loaded(self) -> bool:
+        """Whether links have a mass."""
+        return any(link.inertia is not None for link in self.robot.links.values())
+
+    @cached_property
+    def driven(self) -> tuple[str, ...]:
+        """Joints that drive all others."""
+        if self.trajectory is not None:
+            return self.trajectory.names
+        return independent(self.robot)
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """How the driven joints swing; none with a trajectory."""
+        if self.trajectory is not None:
+            return ()
+        found = []
+        for parameter in swing_parameters(self.robot, self.driven):
+            if parameter.name.endswith(" swing"):  # loops leave less room than the limits
+                parameter = dataclasses.replace(parameter, value=0.5 * parameter.value)
+            found.append(parameter)
+        return tuple(found)
+
+    def solve(self, values: Mapping[str, float], order: int) -> Take:
+        """Return the motion for some swings.
+
+        Raises
+        ------
+        JounceError
+            If the loops cannot be closed.
+        """
+        from jounce.kinematics import solve
+
+        robot = self.robot
+        laws = self.trajectory if self.trajectory is not None else swinging(robot, values, self.driven)
+        times = laws.times if self.trajectory is not None else np.linspace(laws.start, laws.stop, FRAMES)
+        motion = solve(robot.mechanism(drivers=laws, time=times), order=order, strict=False)
+        take = take_of(motion, self.looks, robot.name)
+        names = tuple(robot.base if name == GROUND else name for name in take.bodies)
+        return dataclasses.replace(
+            take,
+            bodies=names,
+            values=dict(values),
+            motion_of=lambda body, point: take.motion_of(GROUND if body == robot.base else body, point),
+        )
+
+
+def independent(robot: Robot) -> tuple[str, ...]:
+    """Return joints, the first that do, whose coordinates determine all others.
+
+    Raises
+    ------
+    RobotError
+        If there are none.
+    """
+    from jounce.kinematics import solve
+
+    free = len(robot.joint_names)
+    for count in range(1, free + 1):
+        for names in _choices(robot.joint_names, count):
+            try:
+                solve(robot.mechanism(drivers=dict.fromkeys(names, "0*t"), time=[0.0]), order=0)
+            except MobilityError:
+                continue
+            except JounceError:
+                continue
+            return names
+    raise RobotError("no joints drive all others; give a trajectory of those that are driven", name=robot.name)
+
+
+def _choices(names: tuple[str, ...], count: int) -> Any:
+    """Give the choices of some joints in the order of the tree; not more than are tried in a few seconds."""
+    from itertools import combinations, islice
+
+    return islice(combinations(names, count), 60)

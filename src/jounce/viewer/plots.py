@@ -1,0 +1,281 @@
+"""Plots of quantities over time with a cursor at the current instant."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+
+from jounce.errors import JounceError
+from jounce.io.peaks import COMPONENTS, derivative_unit
+from jounce.plot.labels import scale_of
+from jounce.viewer.legend import legend
+from jounce.viewer.take import Quantity, Take
+
+__all__ = ["Chart", "Plots", "cursor_data", "default_charts"]
+
+COLOURS = ("#0072B2", "#D55E00", "#009E73")
+CURSOR = "#555555"
+TICKS = {"size": 4}
+SETTLING = 1.5  # s
+
+
+def cursor_data(time: np.ndarray, values: np.ndarray, frame: int) -> tuple[np.ndarray, ...]:
+    """Return what a plot draws: time, components, and an upright line at an instant, which counts for two.
+
+    Parameters
+    ----------
+    time : array of shape (time,)
+    values : array of shape (time, components)
+    frame : int
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> t, y, line = cursor_data(np.array([0.0, 1.0]), np.array([[3.0], [5.0]]), 1)
+    >>> t.round(6).tolist(), y.tolist(), line.tolist()
+    ([0.0, 1.0, 1.0], [3.0, 5.0, 5.0], [nan, 3.0, 5.0])
+    """
+    after = time[frame] + 1e-9 * (time[-1] - time[0])  # not the same, or the page finds no ticks
+    times = np.insert(time, min(frame + 1, len(time)), after)
+    lines = [np.insert(column, frame, column[frame]) for column in values.T]
+    low, high = limits(values)
+    cursor = np.full(len(times), np.nan)
+    cursor[frame : frame + 2] = low, high
+    return times, *lines, cursor
+
+
+def limits(values: np.ndarray) -> tuple[float, float]:
+    """Return the smallest and the largest value; a constant gets some room, so that rounding is not magnified."""
+    finite = values[np.isfinite(values)]
+    if not finite.size:
+        return -1.0, 1.0
+    low, high = float(finite.min()), float(finite.max())
+    size = max(abs(low), abs(high))
+    if high - low <= 1e-9 * size or size == 0:
+        half = 0.1 * size or 1.0
+        return 0.5 * (low + high) - half, 0.5 * (low + high) + half
+    return low, high
+
+
+def cleaned(time: np.ndarray, values: np.ndarray, order: int) -> np.ndarray:
+    """Return a derivative, (time, components), or zeros where it is but the rounding of lower ones.
+
+    Parameters
+    ----------
+    time : array of shape (time,)
+    values : array of shape (time, orders, components)
+    order : int
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> steady = np.array([[[1.0], [2.0], [3e-14]], [[3.0], [2.0], [-1e-14]]])
+    >>> cleaned(np.array([0.0, 1.0]), steady, 2).tolist()
+    [[0.0], [0.0]]
+    """
+    span = float(time[-1] - time[0]) or 1.0
+    sizes = [np.abs(values[:, k]).max(initial=0.0) / span ** (order - k) for k in range(order + 1)]
+    return values[:, order] if sizes[-1] > 1e-9 * max(sizes) else np.zeros_like(values[:, order])
+
+
+def default_charts(take: Take) -> list[tuple[str, int]]:
+    """Return the output and the derivative of the plots that a page starts with."""
+    names = list(take.outputs)
+    if not names:
+        return []
+    first = names[0]
+    highest = take.outputs[first].values.shape[1] - 1
+    return [(first, 0), *([(first, min(2, highest))] if highest else [])]
+
+
+class Chart:
+    """One plot on the page.
+
+    Parameters
+    ----------
+    gui : viser.GuiApi
+        In the context of the container that the plot is to stand in.
+    take : Take
+    name : str
+        Of the quantity.
+    order : int
+        Derivative.
+    """
+
+    def __init__(self, gui: Any, take: Take, name: str, order: int):
+        self.gui, self.name, self.order = gui, name, order
+        self.handle = self._drawn(take)
+
+    def _quantity(self, take: Take) -> Quantity:
+        return take.outputs[self.name]
+
+    def _values(self, take: Take) -> np.ndarray:
+        """Return what is drawn: short numbers, and zeros in the place of rounding errors."""
+        values = cleaned(take.time, self._quantity(take).values, self.order)
+        return values * 10.0 ** -scale_of(values)
+
+    def title(self, take: Take) -> str:
+        """Name, derivative and unit."""
+        quantity = self._quantity(take)
+        unit = derivative_unit(quantity.unit.replace("*", " "), self.order)
+        exponent = scale_of(cleaned(take.time, quantity.values, self.order))
+        unit = f"10^{exponent} {unit}" if exponent else unit
+        return f"{self.name}: {quantity.words[self.order]} ({unit})"
+
+    def _drawn(self, take: Take) -> Any:
+        values = self._values(take)
+        count = values.shape[1]
+        labels = [f"{self.name} {c}" for c in COMPONENTS[:count]] if count > 1 else [self.name]
+        series = (
+            {"label": "time"},
+            *(
+                {"label": label, "stroke": COLOURS[k % 3], "width": 1.6, "points": {"show": False}}
+                for k, label in enumerate(labels)
+            ),
+            {"label": "now", "stroke": CURSOR, "width": 1.2, "dash": (4, 3), "points": {"show": False}},
+        )
+        return self.gui.add_uplot(
+            cursor_data(take.time, values, 0),
+            series,
+            title=self.title(take),
+            scales=self._scales(take),
+            axes=(
+                {"label": "time (s)", "labelFont": "11px sans-serif", "labelSize": 15, "size": 28, "ticks": TICKS},
+                {"size": 58, "ticks": TICKS},
+            ),
+            legend={"show": count > 1},
+            height=180,
+            padding=(6, 14, 0, 0),
+        )
+
+    def _scales(self, take: Take) -> Any:
+        low, high = limits(self._values(take))
+        room = 0.06 * (high - low)
+        ends = float(take.time[0]), float(take.time[-1])
+        return {"x": {"time": False, "range": ends}, "y": {"auto": False, "range": (low - room, high + room)}}
+
+    def renew(self, take: Take) -> None:
+        """Fit the axes to another motion."""
+        self.handle.title = self.title(take)
+        self.handle.scales = self._scales(take)
+
+    def show(self, take: Take, frame: int) -> None:
+        """Put the cursor at an instant."""
+        self.handle.data = cursor_data(take.time, self._values(take), frame)
+
+    def fits(self, take: Take) -> bool:
+        """Whether a take has the quantity and the derivative."""
+        return self.name in take.outputs and self.order < take.outputs[self.name].values.shape[1]
+
+    def remove(self) -> None:
+        """Take the plot away."""
+        self.handle.remove()
+
+
+class Plots:
+    """The panel on the left: the legend, and plots of any output to any order.
+
+    Parameters
+    ----------
+    page : Page
+        What is shown.
+    """
+
+    def __init__(self, page: Any):
+        self.page, self.gui = page, page.server.gui
+        self.panel = self.gui.add_panel()
+        self.panel.dock_left()
+        self.panel.set_width(370)
+        self.charts: list[Chart] = []
+        self._folders: list[Any] = []
+        take = page.take
+        self.tab = self.panel.add_tab("Legend and plots", "chart-line")
+        with self.tab:
+            self.legend = self.gui.add_html("")
+            self.space = self.gui.add_folder("Plots")
+            with self.gui.add_folder("Add a plot", expand_by_default=False):
+                names = tuple(take.outputs) or ("none",)
+                self.output = self.gui.add_dropdown("output", names, initial_value=names[0])
+                self.derivative = self.gui.add_dropdown("derivative", self._words(take, names[0]))
+                self.output.on_update(lambda _: self._offer())
+                self.gui.add_button("Add", icon="plus").on_click(lambda _: self._add_chosen())
+                self.gui.add_button("Remove the last", icon="trash").on_click(lambda _: self.remove())
+                self.order = self.gui.add_number(
+                    "highest derivative", take.order, min=0, max=30, step=1, hint="Solves again, to any order up to 30"
+                )
+                self.order.on_update(lambda event: self._solve_to(event))
+        for name, order in default_charts(take):
+            self.add(name, order)
+        self._still_until = 0.0
+        page.server.on_client_connect(lambda _: self._settle())
+
+    def _settle(self) -> None:
+        """Let a browser that has just come lay out the plots: data that arrive before leave them without ticks."""
+        self._still_until = time.monotonic() + SETTLING
+        time.sleep(SETTLING)
+        with self.page.lock:
+            for chart in self.charts:
+                chart.renew(self.page.take)
+                chart.show(self.page.take, self.page.frame)
+
+    def _words(self, take: Take, name: str) -> tuple[str, ...]:
+        if name not in take.outputs:
+            return ("0:",)
+        quantity = take.outputs[name]
+        return tuple(f"{k}: {quantity.words[k]}" for k in range(quantity.values.shape[1]))
+
+    def _offer(self) -> None:
+        self.derivative.options = self._words(self.page.take, self.output.value)
+
+    def _add_chosen(self) -> None:
+        self.add(self.output.value, int(self.derivative.value.partition(":")[0]))
+        self._settle()
+
+    def _solve_to(self, event: Any) -> None:
+        if event.client is not None:
+            self.page.session.request(order=int(self.order.value))
+
+    def add(self, name: str, order: int) -> None:
+        """Add a plot of a derivative of an output."""
+        page = self.page
+        with page.lock, self.space:
+            if name in page.take.outputs:
+                self.charts.append(Chart(self.gui, page.take, name, order))
+                self.charts[-1].show(page.take, page.frame)
+
+    def remove(self) -> None:
+        """Take the last plot away."""
+        with self.page.lock:
+            if self.charts:
+                self.charts.pop().remove()
+
+    def on_take(self, take: Take) -> None:
+        """Plot a new motion; plots that it has no derivative for go."""
+        for chart in [chart for chart in self.charts if not chart.fits(take)]:
+            self.charts.remove(chart)
+            chart.remove()
+        for chart in self.charts:
+            chart.renew(take)
+        names = tuple(take.outputs) or ("none",)
+        if tuple(self.output.options) != names:
+            self.output.options = names
+        if tuple(self.derivative.options) != self._words(take, self.output.value):
+            self._offer()
+
+    def on_frame(self, take: Take, frame: int) -> None:
+        """Move the cursors, and renew the legend."""
+        if time.monotonic() >= self._still_until:
+            for chart in self.charts:
+                chart.show(take, frame)
+        self.legend.content = legend(self.page.prepared, frame)
+
+    def on_failure(self, error: JounceError) -> None:
+        """Nothing to be done: the last motion stays."""
+
+    def on_busy(self, busy: bool) -> None:
+        """Nothing to be done."""
+
+    def on_time(self, instant: float) -> None:
+        """Plots follow more slowly, see `on_frame`."""

@@ -1,0 +1,206 @@
+"""Viewing: a page on this machine for a mechanism or a robot, from a file or from Python."""
+
+from __future__ import annotations
+
+import time
+from os import PathLike, fspath
+from pathlib import Path
+from typing import Any
+
+from jounce.errors import JounceError
+from jounce.viewer.exports import quiet_server, quiet_stop
+from jounce.viewer.marks import Forces, Marks
+from jounce.viewer.page import Page
+from jounce.viewer.panel import Panel
+from jounce.viewer.plots import Plots
+
+__all__ = ["View", "view"]
+
+MECHANISM_FILES = (".yaml", ".yml", ".toml", ".json")
+
+
+class View:
+    """A page that is being served.
+
+    Parameters
+    ----------
+    subject : Subject
+        What is looked at.
+    port : int, default 0
+        Of this machine; 0 takes one that is free.
+    order : int, default 4
+        Highest derivative.
+    playing : bool, default True
+        Whether it moves at once.
+
+    Attributes
+    ----------
+    url : str
+        Its address.
+    page : Page
+        What is shown.
+    panel, marks, plots
+        Its controls.
+    """
+
+    def __init__(self, subject: Any, *, port: int = 0, order: int = 4, playing: bool = True):
+        _check_port(port)
+        server = quiet_server(port, label=subject.name)
+        try:
+            self.page = Page(server, subject, order)
+            self._lay_out(subject, playing)
+        except BaseException:
+            quiet_stop(server)
+            raise
+        self.url = f"http://127.0.0.1:{server.get_port()}"
+
+    def _lay_out(self, subject: Any, playing: bool) -> None:
+        gui = self.page.server.gui
+        gui.configure_theme(control_width="medium", show_logo=False, show_share_button=False, brand_color=(0, 90, 140))
+        gui.main_panel.dock_right()
+        gui.main_panel.set_width(330)
+        self.panel = Panel(self.page)
+        tabs = gui.add_tab_group()
+        with tabs.add_tab("Parameters"):
+            self.panel.add_parameters()
+        with tabs.add_tab("Arrows"):
+            self.marks = Marks(self.page)
+        with tabs.add_tab("Forces"):
+            self.forces = Forces(self.page, subject.loaded)
+        with tabs.add_tab("Export"):
+            self.panel.add_exports()
+        self.plots = Plots(self.page)
+        self.page.followers += [self.panel, self.marks, self.plots]
+        self.plots.on_frame(self.page.take, self.page.frame)
+        self.page.player.begin()
+        self.panel.set_playing(playing)
+
+    def wait(self) -> None:
+        """Serve until interrupted (Ctrl-C), then end."""
+        try:
+            while True:
+                time.sleep(3600)
+        except KeyboardInterrupt:
+            pass
+        finally:
+            self.close()
+
+    def close(self) -> None:
+        """End the page."""
+        self.page.close()
+
+    def __enter__(self) -> View:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def view(
+    subject: Any,
+    trajectory: Any = None,
+    *,
+    port: int = 0,
+    order: int = 4,
+    open_page: bool = True,
+    playing: bool = True,
+) -> View:
+    """Show a mechanism or a robot in the browser: moving, with arrows, plots, forces and live parameters.
+
+    The page is served on this machine only, asks nothing of the network, and goes with `View.close`, or with the
+    process.
+
+    Parameters
+    ----------
+    subject : Mechanism, Robot, or path of a file
+        A mechanism (.yaml, .yml, .toml or .json) with a time grid: it is solved, or simulated if it has initial
+        conditions. A robot (.urdf, or .xml for MJCF): its shapes are shown where the file has some.
+    trajectory : JointTrajectory, or path of a file, optional
+        Of a robot; each joint swings within its limits unless given.
+    port : int, default 0
+        Of this machine; 0 takes one that is free.
+    order : int, default 4
+        Highest derivative of arrows and plots.
+    open_page : bool, default True
+        Open the page in the browser of the user.
+    playing : bool, default True
+        Whether it moves at once.
+
+    Returns
+    -------
+    View
+        With its address, `View.url`; `View.wait` serves until Ctrl-C.
+
+    Raises
+    ------
+    JounceError
+        If viser is not installed, the file cannot be read, the mechanism has no motion, or the port is taken.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> from jounce.viewer import view
+    >>> with view("examples/four_bar.yaml", open_page=False) as page:
+    ...     page.url.startswith("http://127.0.0.1:")
+    True
+    """
+    found = View(subject_of(subject, trajectory), port=port, order=order, playing=playing)
+    if open_page:
+        import webbrowser
+
+        webbrowser.open(found.url)
+    return found
+
+
+def subject_of(given: Any, trajectory: Any = None) -> Any:
+    """Return what is to be looked at, from a mechanism, a robot or a file.
+
+    Raises
+    ------
+    JounceError
+        If it is none of them, or a trajectory is given with a mechanism.
+    """
+    from jounce.mechanism import Mechanism
+    from jounce.robot import Robot
+    from jounce.viewer.mechanisms import MechanismSubject
+    from jounce.viewer.robots import robot_subject
+
+    path = None
+    if isinstance(given, str | PathLike):
+        path = Path(fspath(given))
+        if path.suffix.lower() in MECHANISM_FILES:
+            from jounce.io import load
+
+            given = load(path)
+        else:
+            from jounce.io import load_robot
+
+            given = load_robot(path)
+    if isinstance(given, Robot):
+        return robot_subject(given, trajectory, path)
+    if not isinstance(given, Mechanism):
+        message = "must be a mechanism, a robot or the path of a file of one"
+        raise JounceError(message, name="subject", value=type(given).__name__)
+    if trajectory is not None:
+        message = "a mechanism moves by its own drivers; a trajectory is for robots"
+        raise JounceError(message, path=path, name="trajectory")
+    try:
+        return MechanismSubject(given)
+    except JounceError as error:
+        raise error.located(path=path) from None
+
+
+def _check_port(port: Any) -> None:
+    """Raise JounceError unless a port can be listened on."""
+    import socket
+
+    if isinstance(port, bool) or not isinstance(port, int) or not 0 <= port <= 65535:
+        raise JounceError("must be a whole number from 0 to 65535; 0 takes a free one", name="port", value=port)
+    if port:
+        with socket.socket() as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            try:
+                probe.bind(("127.0.0.1", port))
+            except OSError as error:
+                message = f"cannot be used: {error.strerror}; 0 takes a free one"
+                raise JounceError(message, name="port", value=port) from None

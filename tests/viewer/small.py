@@ -1,0 +1,82 @@
+"""A wheel whose motion can be written down, and a subject whose solves take as long as a test wants."""
+
+import threading
+
+import numpy as np
+
+import jounce as jn
+from jounce.viewer.looks import Looks
+from jounce.viewer.solids import Solid, box
+from jounce.viewer.take import Parameter, Spot, Take
+
+INERTIA, MASS, RADIUS = 0.5, 2.0, 0.3
+
+
+def wheel(**parts):
+    """A wheel on the ground's origin, its angle c*t**3 and its centre of mass in the pivot."""
+    given = {
+        "space": "planar",
+        "bodies": {"wheel": jn.Body([0, 0], mass=MASS, inertia=INERTIA)},
+        "joints": {"O": jn.planar.Revolute(("ground", "wheel"), [0, 0], [0, 0])},
+        "drivers": {"turn": jn.drivers.CoordinateDriver(("ground", "wheel"), "angle", motion="c*t**3")},
+        "outputs": {"rim": jn.PointOutput("wheel", point=["r", 0]), "angle": jn.AngleOutput("wheel")},
+        "parameters": {"c": 2.0, "r": RADIUS, "twice": "2*r"},
+        "gravity": [0, -10.0],
+        "time": np.linspace(0.0, 1.0, 101),
+        "title": "Wheel",
+    }
+    return jn.Mechanism(**{**given, **parts})
+
+
+def derivatives_of_the_rim(time, c=2.0, radius=RADIUS):
+    """Position, velocity and acceleration of the rim, (time, 3, 3), by hand."""
+    angle, rate, second = c * time**3, 3 * c * time**2, 6 * c * time
+    along = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    across = np.stack([-np.sin(angle), np.cos(angle), 0 * angle], axis=1)
+    velocity = radius * rate[:, None] * across
+    acceleration = radius * (second[:, None] * across - rate[:, None] ** 2 * along)
+    return np.stack([radius * along, velocity, acceleration], axis=1)
+
+
+def plain_take(value=1.0, notice=""):
+    """A take of a box that moves by a value along x."""
+    time = np.linspace(0.0, 1.0, 5)
+    position = np.zeros((5, 2, 3))
+    position[:, 1, 0] = value * time
+    quaternion = np.zeros((5, 2, 4))
+    quaternion[..., 0] = 1.0
+    motion = np.zeros((5, 2, 3))
+    motion[:, 0], motion[:, 1, 0] = position[:, 1], value
+    vertices, faces = box([0.1, 0.1, 0.1])
+    looks = Looks(
+        {"ground": (), "box": (Solid(vertices, faces, (1, 2, 3)),)},
+        (),
+        (Spot("box", (0.0, 0.0, 0.0), "box"),),
+        1.0,
+        (0.0, 0.0, 1.0),
+    )
+    return Take(
+        "box", False, time, 1, ("ground", "box"), position, quaternion, dict, lambda body, point: motion, list,
+        lambda: None, {"value": value}, looks, notice,
+    )  # fmt: skip
+
+
+class Slow:
+    """A subject that solves when it is let, and fails for values below zero."""
+
+    name, loaded = "slow", False
+    parameters = (Parameter("value", 1.0, 0.5, 1.5),)
+
+    def __init__(self):
+        self.solved = []
+        self.gate = threading.Event()
+        self.gate.set()
+        self.began = threading.Event()
+
+    def solve(self, values, order):
+        self.began.set()
+        assert self.gate.wait(20.0)
+        self.solved.append(values["value"])
+        if values["value"] < 0:
+            raise jn.AssemblyError("the bodies cannot be put together", name="value", value=values["value"])
+        return plain_take(values["value"], "some instants are missing" if values["value"] > 100 else "")

@@ -1,0 +1,165 @@
+"""Solids are closed, face outward and have the volume of what they are; bodies and robots are made of them."""
+
+import math
+
+import numpy as np
+import pytest
+
+import jounce as jn
+from jounce.viewer import solids
+from jounce.viewer.closed import independent
+from jounce.viewer.looks import looks_of
+from jounce.viewer.robots import robot_subject, swing_of
+from jounce.viewer.visuals import file_shapes, robot_looks
+
+
+def volume(mesh):
+    """Signed volume under the faces: positive where they face outward."""
+    vertices, faces = mesh
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    return float(np.einsum("fc,fc->", a, np.cross(b, c)) / 6)
+
+
+CIRCLE = 24 / 2 * math.sin(2 * math.pi / 24)  # area of the polygon that stands for a circle of radius one
+
+
+@pytest.mark.parametrize(
+    "mesh, expected",
+    [
+        (solids.box([1, 2, 3], [5, 5, 5]), 6.0),
+        (solids.cylinder(2.0, 3.0, [1, 1, 0], [0, 0, 4]), 12 * CIRCLE),
+        (solids.prism(np.array([[0, 0], [2, 0], [0, 2]]), -1.0, 1.0), 4.0),
+        (solids.prism(np.array([[0, 0], [2, 0], [0, 2]]), -1.0, 1.0, sharp=False), 4.0),
+        (solids.plate(np.array([[0.0, 0], [4, 0]]), 1.0, 0.0, 1.0), CIRCLE + 8),
+        (solids.gear(2.0, 0.0, 1.0), 48 / 2 * math.sin(2 * math.pi / 48) * 4),
+    ],
+)
+def test_volumes(mesh, expected):
+    assert volume(mesh) == pytest.approx(expected, rel=1e-9)
+
+
+def test_round_solids_come_near_to_what_they_stand_for():
+    assert volume(solids.sphere(2.0, [1, 2, 3])) == pytest.approx(32 / 3 * math.pi, rel=0.03)
+    assert volume(solids.bar([0, 0, 0], [0, 3, 4], 0.5)) == pytest.approx(math.pi * (0.25 * 5 + 0.5 / 3), rel=0.03)
+    assert volume(solids.gear(2.0, 0.0, 1.0, module=0.2)) == pytest.approx(4 * math.pi, rel=0.06)
+    assert volume(solids.coil(6, 0.1, 0.02)) > 0
+    assert volume(solids.arc_arrow()) > 0
+
+
+SLOW = [pytest.param(file, marks=pytest.mark.slow) for file in ("rsur", "scotch_yoke", "screw_press")]
+
+
+@pytest.mark.parametrize("file", ["four_bar", "epicyclic", *SLOW])
+def test_every_body_of_an_example_can_be_seen(file):
+    mechanism = jn.load(f"examples/{file}.yaml")
+    looks = looks_of(jn.solve(mechanism, np.array([0.0, 0.01]), order=0))
+    rods = {body for stretch in looks.stretches for body in stretch.bodies}
+    for body in mechanism.bodies:
+        assert looks.solids[body] or body in rods
+        assert all(np.isfinite(solid.vertices).all() and len(solid.faces) for solid in looks.solids[body])
+    assert {spot.body for spot in looks.spots} >= set(mechanism.bodies) - rods
+
+
+def test_planar_bodies_lie_in_layers_of_their_own():
+    looks = looks_of(jn.solve(jn.load("examples/four_bar.yaml"), [0.0], order=0))
+    plates = [looks.solids[body][0].vertices[:, 2] for body in ("crank", "rocker")]
+    assert plates[0].max() < plates[1].min() < looks.front
+
+
+def test_joints_swing_within_their_limits():
+    robot = jn.load_robot("examples/robots/panda.urdf")
+    subject = robot_subject(robot)
+    take = subject.solve({p.name: p.value for p in subject.parameters}, 2)
+    for name in robot.joint_names:
+        low, high, _ = swing_of(robot.joints[name])
+        values = take.outputs[name].values[:, 0]
+        assert low <= values.min() < values.max() <= high
+        limit = robot.limits[name].velocity
+        assert limit is None or np.abs(take.outputs[name].values[:, 1]).max() <= limit * (1 + 1e-9)
+    spot = take.looks.spots[0]
+    q = np.stack([take.outputs[name].values[7, :, 0] for name in robot.joint_names], axis=-1)
+    expected = jn.forward_kinematics(robot, q, spot.name)
+    np.testing.assert_allclose(take.motion(spot)[7], expected.position, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(take.placed(spot.body, spot.point)[7], expected.position[0], rtol=0, atol=1e-12)
+    drives = {e.name: e for e in take.exertions if e.kind == "driver"}
+    torque = np.linalg.norm(drives["panda_joint2"].torque, axis=1)
+    np.testing.assert_allclose(torque, np.abs(jn.inverse_dynamics(robot, _coordinates(take, robot))[:, 0, 1]))
+
+
+def _coordinates(take, robot):
+    return np.stack([take.outputs[name].values[..., 0] for name in robot.joint_names], axis=-1)
+
+
+def test_a_trajectory_moves_a_robot_and_must_fit_it():
+    robot = jn.load_robot("examples/robots/scara.urdf")
+    law = jn.JointTrajectory({"shoulder": "0.3*t"}, 0.0, 1.0)
+    subject = robot_subject(robot, law)
+    assert subject.parameters == ()
+    take = subject.solve({}, 1)
+    np.testing.assert_allclose(take.outputs["shoulder"].values[:, 0, 0], 0.3 * take.time, atol=1e-14)
+    assert not take.outputs["elbow"].values.any()
+    with pytest.raises(jn.RobotError, match="did you mean 'elbow'"):
+        robot_subject(robot, jn.JointTrajectory({"elbo": "t"}, 0.0, 1.0))
+
+
+@pytest.mark.slow
+def test_a_robot_with_closed_loops_moves_as_one():
+    robot = jn.load_robot("examples/robots/five_bar.xml")
+    assert len(independent(robot)) == 2
+    subject = robot_subject(robot)
+    take = subject.solve({p.name: p.value for p in subject.parameters}, 2)
+    assert not take.notice
+    (closure,) = robot.closures.values()
+    ends = [take.placed(link, point) for link, point in zip(closure.links, closure.points, strict=True)]
+    np.testing.assert_allclose(ends[0], ends[1], rtol=0, atol=1e-9)
+    assert np.ptp(ends[0], axis=0).max() > 0.01
+    assert {exertion.kind for exertion in take.exertions} >= {"reaction", "driver"}
+
+
+URDF = """<robot name="two">
+  <material name="red"><color rgba="1 0 0 0.5"/></material>
+  <link name="base"><visual><geometry><box size="1 2 3"/></geometry><material name="red"/></visual></link>
+  <link name="arm"><inertial><mass value="1"/>
+    <inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
+  <link name="hand">
+    <visual><origin xyz="0 0 1" rpy="0 1.5707963267948966 0"/>
+      <geometry><mesh filename="package://pack/wedge.obj" scale="2 2 2"/></geometry></visual>
+    <visual><geometry><mesh filename="package://pack/missing.stl"/></geometry></visual>
+  </link>
+  <joint name="turn" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 0 1"/>
+    <limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+  <joint name="grip" type="fixed"><parent link="arm"/><child link="hand"/><origin xyz="5 0 0"/></joint>
+</robot>"""
+
+
+def test_shapes_of_a_urdf_are_read_with_places_colours_and_scales(tmp_path):
+    (tmp_path / "pack").mkdir()
+    (tmp_path / "pack" / "wedge.obj").write_text(
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+    )
+    path = tmp_path / "pack" / "two.urdf"
+    path.write_text(URDF)
+    shapes = file_shapes(path)
+    (block,), (wedge,) = shapes["base"], shapes["hand"]
+    assert block.colour == (255, 0, 0)
+    assert block.opacity == 0.5
+    assert np.ptp(block.vertices, axis=0).tolist() == [1, 2, 3]
+    assert volume((wedge.vertices, wedge.faces)) == pytest.approx(8 / 6)
+    assert wedge.vertices.min(axis=0) == pytest.approx([0, 0, -1])  # x turned to -z, then lifted by one
+    looks = robot_looks(jn.load_robot(path), path)
+    assert looks.solids["arm"][0].vertices.min(axis=0) == pytest.approx([5, 0, -1])  # the hand is part of the arm
+
+
+def test_shapes_of_an_mjcf_are_read(tmp_path):
+    path = tmp_path / "one.xml"
+    path.write_text("""<mujoco><worldbody><geom type="plane" size="1 1 1"/><body name="arm" pos="1 0 0">
+      <joint name="turn" axis="0 0 1"/><geom type="capsule" size="0.1" fromto="0 0 0 1 0 0" rgba="0 0 1 1"/>
+      <geom type="box" size="0.1 0.2 0.3" pos="0 0 2" group="3"/></body></worldbody></mujoco>""")
+    (capsule,) = file_shapes(path)["arm"]
+    assert capsule.colour == (0, 0, 255)
+    assert np.ptp(capsule.vertices, axis=0) == pytest.approx([1.2, 0.2, 0.2], rel=1e-6)
+    take = robot_subject(jn.load_robot(path), path=path).solve(
+        {"turn swing": 0.2, "turn middle": 0.0, "period": 1.0}, 1
+    )
+    assert take.looks.solids["arm"]
+    assert take.position[0, 1] == pytest.approx([1, 0, 0])
