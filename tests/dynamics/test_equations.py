@@ -131,17 +131,16 @@ def test_joints_that_follow_others():
 
 
 @pytest.mark.slow
-def test_all_forms_to_the_fifth_rate():
-    robot, q, right = case(functools.partial(random_robot, 1, 4, prismatic=0.3), order=12, samples=1)
+def test_all_forms_to_the_fourth_rate():
+    robot, q, right = case(functools.partial(random_robot, 1, 4, prismatic=0.3), order=10, samples=1)
     bound = 1e-12  # 1.1e-13 was measured, of Gibbs-Appell with m = 4; most are a few roundings
-    agree(newton_euler(robot, q, 5), right, bound)
-    agree(virtual_work(robot, q, 5), right, bound)
-    agree(lagrange(robot, q, 5), right, bound)
-    agree(mangeron_nielsen(robot, q, 5, 2), right, bound)
-    agree(gibbs_appell(robot, q, 5, 4), right, bound)
-    for k in (4, 6):
-        agree(higher_order(robot, q, k)[:, None], right[:, k - 1 : k], bound)
+    agree(newton_euler(robot, q, 4), right, bound)
+    agree(virtual_work(robot, q, 4), right, bound)
+    agree(lagrange(robot, q, 4), right, bound)
+    agree(mangeron_nielsen(robot, q, 4, 2), right, bound)
+    agree(gibbs_appell(robot, q, 4, 4), right, bound)
     agree(higher_order(robot, q, 4, 6)[:, None], right[:, 3:4], bound)
+    agree(higher_order(robot, q, 5)[:, None], right[:, 4:5], bound)
 
 
 # what the paper prints, in fifty digits
