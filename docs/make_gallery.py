@@ -1,0 +1,148 @@
+"""Draw the pictures of the gallery: python docs/make_gallery.py [NAME ...] writes docs/images/gallery/NAME.png.
+
+Every mechanism file of examples/ and every robot of examples/robots has one, with the paths of points coloured by the
+size of their jerk unless said otherwise.
+"""
+
+import dataclasses
+import importlib.util
+import io
+import pathlib
+import sys
+from collections.abc import Mapping
+
+import numpy as np
+
+import jounce as jn
+from jounce import plot
+
+ROOT = pathlib.Path(__file__).parents[1]
+EXAMPLES = ROOT / "examples"
+TARGET = ROOT / "docs" / "images" / "gallery"
+LARGEST = 40_000  # bytes of a picture
+RESOLUTION = 110  # dots per inch
+
+
+@dataclasses.dataclass(frozen=True)
+class Picture:
+    """How a mechanism or a robot is drawn."""
+
+    paths: tuple[str, ...]  # outputs, or points
+    instant: float = 0.0  # s
+    order: int = 3  # of the derivative in the colour of the paths
+    points: Mapping[str, tuple] = dataclasses.field(default_factory=dict)  # name: body and place, m, besides the outputs
+    view: tuple[float, float] = (-60.0, 25.0)
+    stop: float | None = None  # of a simulation, s
+    source: str = ""  # the file in examples/, where it is not NAME.yaml
+    module: str = ""  # the file in examples/ with a joint of one's own
+    trajectory: str = ""  # of a robot: the file in examples/trajectories, or laws
+    laws: Mapping[str, str] = dataclasses.field(default_factory=dict)
+
+
+def robot(source, trajectory, body, place=(0.0, 0.0, 0.0), **options):
+    """Return the picture of a robot, with the path of a point of a link."""
+    options = {"trajectory": trajectory} | options
+    return Picture(("tip",), points={"tip": (body, place)}, source=f"robots/{source}", **options)
+
+
+PICTURES = {
+    "andrews": Picture(("crank_pin", "knee"), 0.018, points={"crank_pin": ("K1", (0.007, 0)), "knee": ("K3", (0, -0.035))}),
+    "cam": Picture(("roller",), 0.2, points={"roller": ("follower", (0, 0))}, source="own_joint/cam.yaml", module="own_joint.py"),
+    "delta_robot": Picture(("platform",), 0.15, view=(-70.0, 18.0)),
+    "double_cardan": Picture(("rim",), 0.1, view=(-70.0, 40.0)),
+    "double_four_bar": Picture(("tip",), 0.25, stop=1.5),
+    "double_pendulum": Picture(("tip",), 0.4, stop=2.0),
+    "epicyclic": Picture(("tooth",), 0.4),
+    "excavator": Picture(("teeth",), 1.0),
+    "five_bar": robot("five_bar.xml", "", "left_forearm", (0.22, 0, 0), laws={"left_motor": "0.3*sin(4*t)", "right_motor": "0.2*sin(6*t) - 0.1"}, view=(-80.0, 12.0), instant=0.3, stop=np.pi),
+    "flyball_governor": Picture(("ball",), 0.02, points={"ball": ("right", (1, 0, 0))}, view=(-70.0, 20.0)),
+    "four_bar": Picture(("C",), 0.3),
+    "gear_pair": Picture(("C",), 0.2),
+    "hooke_joint": Picture(("rim",), 0.1, view=(-70.0, 40.0)),
+    "human_arm": robot("human_arm.xml", "human_arm_reach.yaml", "hand", (0, 0, -0.189), view=(-70.0, 15.0), instant=0.9),
+    "inverted_slider_crank_distance": Picture(("G",), 0.3),
+    "inverted_slider_crank_slide": Picture(("G",), 0.3),
+    "jansen_leg": Picture(("foot",), 0.6),
+    "klann_leg": Picture(("foot",), 0.0),
+    "panda": robot("panda.urdf", "panda_pick.yaml", "panda_hand", (0, 0, 0.1), view=(-50.0, 15.0)),
+    "pantograph": Picture(("P", "Q"), 0.1),
+    "peaucellier": Picture(("P", "B"), 0.2),
+    "planar_arm": robot("planar_arm.xml", "planar_arm_lift.yaml", "ram", (0.25, 0, 0), view=(-80.0, 12.0)),
+    "press": Picture(("ram", "knee_pin"), 0.4, points={"knee_pin": ("upper", (0.4, 0))}),
+    "quick_return": Picture(("B", "pin"), 0.3, points={"B": ("arm", (0.5, 0)), "pin": ("crank", (0.08, 0))}),
+    "rack_pinion": Picture(("spoke",), 0.2),
+    "radial_engine": Picture(("knuckle2", "knuckle4"), 0.01),
+    "rccc": Picture(("coupler_point",), 0.2),
+    "rolling_disc": Picture(("pin",), 0.2),
+    "rspu_distance": Picture(("B",), 0.2),
+    "rspu_slide": Picture(("B",), 0.2),
+    "rssr": Picture(("C",), 0.2),
+    "rsur": Picture(("B", "C"), 0.2),
+    "scara": robot("scara.urdf", "scara_pick.yaml", "spindle", (0, 0, 0.06), view=(-50.0, 25.0)),
+    "scotch_yoke": Picture(("pin",), 0.2, points={"pin": ("crank", (0.04, 0))}),
+    "screw_press": Picture(("tip",), 0.2),
+    "simple_pendulum": Picture(("place",), 0.3, stop=2.0),
+    "six_bar_stephenson": Picture(("P", "F"), 0.1),
+    "six_bar_watt": Picture(("coupler_point",), 0.1),
+    "slider_crank": Picture(("middle",), 0.1),
+    "solo12": robot("solo12.urdf", "solo12_trot.yaml", "FL_LOWER_LEG", (0, 0, -0.16), view=(-60.0, 20.0)),
+    "spatial_slider_crank": Picture(("middle",), 0.1),
+    "spatial_slider_crank_free": Picture(("centre",), 0.1, stop=1.0),
+    "stewart_forces": Picture(("centre",), 0.1),
+    "stewart_platform": Picture(("corner",), 0.1),
+    "swash_plate": Picture(("piston1",), 0.1),
+    "ur5": robot("ur5.urdf", "ur5_stack.yaml", "wrist_3_link", (0, 0.0823, 0), view=(-50.0, 25.0)),
+    "valve_train": Picture(("valve", "tappet"), 0.004, source="own_joint/valve_train.yaml", module="valve_train.py"),
+    "wolfrom_train": Picture(("tooth",), 0.4),
+}
+
+
+def module(path):
+    """Return a Python file as a module; the joints that it defines join the catalogue."""
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    found = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(found)
+    return found
+
+
+def motion(name, picture):
+    """Return the motion of a mechanism or a robot, with the points wanted among its outputs."""
+    points = {key: jn.PointOutput(body, place) for key, (body, place) in picture.points.items()}
+    source = EXAMPLES / (picture.source or f"{name}.yaml")
+    if source.suffix != ".yaml":
+        machine = jn.load_robot(source)
+        laws = picture.laws or jn.load_trajectory(EXAMPLES / "trajectories" / picture.trajectory)
+        time = np.linspace(0.0, picture.stop, 201) if picture.stop else None
+        return jn.solve(machine.mechanism(drivers=laws, outputs=points, time=time), order=picture.order)
+    if picture.module:
+        module(EXAMPLES / picture.module)
+    mechanism = jn.load(source)
+    mechanism = dataclasses.replace(mechanism, outputs={**mechanism.outputs, **points})
+    if not mechanism.initial:
+        return jn.solve(mechanism, order=picture.order)
+    time = np.linspace(0.0, picture.stop, 401) if picture.stop else None
+    return jn.simulate(mechanism, time, order=picture.order)
+
+
+def draw(name):
+    """Write one picture, and return how many bytes it has."""
+    from PIL import Image
+
+    picture = PICTURES[name]
+    figure = plot.sketch(
+        motion(name, picture), picture.instant, names="none", paths=picture.paths, order=picture.order, view=picture.view
+    )
+    drawn, packed = io.BytesIO(), io.BytesIO()
+    figure.savefig(drawn, format="png", dpi=RESOLUTION)
+    few = Image.open(drawn).convert("RGB").quantize(96, dither=Image.Dither.NONE)  # line art needs few colours
+    few.save(packed, format="png", optimize=True)
+    if packed.tell() > LARGEST:
+        raise SystemExit(f"{name}: {packed.tell()} bytes, more than {LARGEST}")
+    TARGET.mkdir(parents=True, exist_ok=True)
+    (TARGET / f"{name}.png").write_bytes(packed.getvalue())
+    return packed.tell()
+
+
+if __name__ == "__main__":
+    for chosen in sys.argv[1:] or PICTURES:
+        print(f"{chosen}.png: {draw(chosen)} bytes", flush=True)
