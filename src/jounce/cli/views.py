@@ -48,9 +48,9 @@ def view(
     try:
         checked_order(order)
         if file.suffix.lower() in MECHANISM_FILES:
-            from jounce.cli.mechanisms import _loaded
+            from jounce.cli.mechanisms import loaded
 
-            subject = _loaded(file, set_, import_)
+            subject = loaded(file, set_, import_)
         elif set_ or import_:
             raise JounceError("is for mechanism files; a robot has no parameters", name="--set" if set_ else "--import")
         page = show(subject, trajectory, port=port, order=order, open_page=not no_open)
