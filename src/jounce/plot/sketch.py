@@ -208,7 +208,7 @@ def sketch(
     >>> from jounce.plot import sketch
     >>> figure = sketch(jn.load("examples/four_bar.yaml"))
     >>> sorted(text.get_text() for text in figure.axes[0].texts)
-    ['50 mm', 'A', 'BC', 'D', 'crank', 'rocker']
+    ['20 mm', 'A', 'BC', 'D', 'crank', 'rocker']
     """
     mechanism = getattr(moving, "mechanism", moving)
     check_mechanism(mechanism)
