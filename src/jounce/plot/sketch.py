@@ -20,7 +20,7 @@ __all__ = ["Drawing", "Paths", "length_text", "paths_of", "round_length", "sketc
 
 NAMES = ("all", "bodies", "joints", "none")
 WIDEST, TALLEST, LEAST = 6.4, 5.2, 2.6  # inches
-LETTER = 0.095  # inches of a title
+LETTER = 0.07  # inches of a title at least, which is then written smaller
 MOST = 400  # instants that a drawing is made for; more would not be seen
 PATH_MAP = "cividis"  # rises evenly in lightness, for the colour-blind too
 
