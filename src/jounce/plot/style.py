@@ -91,7 +91,7 @@ def style(**changes: Any) -> AbstractContextManager[None]:
     import matplotlib as mpl
 
     changed: dict[Any, Any] = {name.replace("_", "."): value for name, value in changes.items()}
-    return mpl.rc_context(STYLE | changed)
+    return mpl.rc_context(STYLE | {"axes.prop_cycle": mpl.cycler(color=LINE_COLOURS)} | changed)
 
 
 def blank_figure(width: float, height: float, title: str = "", **pads: float) -> Any:
