@@ -90,8 +90,11 @@ def style(**changes: Any) -> AbstractContextManager[None]:
     """
     import matplotlib as mpl
 
-    changed: dict[Any, Any] = {name.replace("_", "."): value for name, value in changes.items()}
-    return mpl.rc_context(STYLE | {"axes.prop_cycle": mpl.cycler(color=LINE_COLOURS)} | changed)
+    from matplotlib.rcsetup import cycler
+
+    changed: dict[Any, Any] = {"axes.prop_cycle": cycler(color=LINE_COLOURS)}
+    changed |= {name.replace("_", "."): value for name, value in changes.items()}
+    return mpl.rc_context(STYLE | changed)
 
 
 def blank_figure(width: float, height: float, title: str = "", **pads: float) -> Any:
