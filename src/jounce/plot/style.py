@@ -89,7 +89,6 @@ def style(**changes: Any) -> AbstractContextManager[None]:
     (7.0, False)
     """
     import matplotlib as mpl
-
     from matplotlib.rcsetup import cycler
 
     changed: dict[Any, Any] = {"axes.prop_cycle": cycler(color=LINE_COLOURS)}
