@@ -9,6 +9,7 @@ import pytest
 import jounce as jn
 from jounce.plot import check_figure, draw, save
 from jounce.plot.labels import scale_of, symbol, unit_label
+from jounce.plot.style import blank_figure, style
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 
@@ -155,3 +156,14 @@ def test_units_and_scales():
     assert unit_label("m", 6, 3) == "$10^{3}$ m/s$^6$"
     assert scale_of(np.array([np.nan, -2500.0])) == 3
     assert scale_of(np.array([np.nan])) == 0
+
+
+def test_a_long_title_stays_within_the_figure():
+    title = "Acceleration energies of orders 1 to 3 (equations 141-143 of Negrean 2025), WMQ"
+    with style():
+        figure = blank_figure(6.0, 3.0, title)
+        figure.subplots()
+        figure.draw_without_rendering()
+        extent = figure._suptitle.get_window_extent()
+    assert extent.x0 > 0
+    assert extent.x1 < 6.0 * figure.dpi

@@ -78,9 +78,9 @@ def draw_reactions(motion: Any, names: Sequence[str] | None = None) -> Any:
     >>> import jounce as jn
     >>> from jounce.plot import draw_reactions
     >>> press = jn.solve(jn.load("examples/press.yaml"), [0.0, 0.01, 0.02], order=2)
-    >>> figure = draw_reactions(press, ["main", "thrust"])
+    >>> figure = draw_reactions(press, ["main", "motor"])
     >>> [axes.get_title(loc="left") for axes in figure.axes]
-    ['main', 'thrust (applied)']
+    ['main', 'motor (driver)']
     """
     mechanism = motion.mechanism
     check_loads(mechanism, "joint")

@@ -20,7 +20,7 @@ __all__ = ["Drawing", "Paths", "length_text", "paths_of", "round_length", "sketc
 
 NAMES = ("all", "bodies", "joints", "none")
 WIDEST, TALLEST, LEAST = 6.4, 5.2, 2.6  # inches
-LETTER = 0.095  # inches of a title
+LETTER = 0.07  # inches of a title at least, which is then written smaller
 MOST = 400  # instants that a drawing is made for; more would not be seen
 PATH_MAP = "cividis"  # rises evenly in lightness, for the colour-blind too
 
@@ -208,7 +208,7 @@ def sketch(
     >>> from jounce.plot import sketch
     >>> figure = sketch(jn.load("examples/four_bar.yaml"))
     >>> sorted(text.get_text() for text in figure.axes[0].texts)
-    ['50 mm', 'A', 'BC', 'D', 'crank', 'rocker']
+    ['20 mm', 'A', 'BC', 'D', 'crank', 'rocker']
     """
     mechanism = getattr(moving, "mechanism", moving)
     check_mechanism(mechanism)

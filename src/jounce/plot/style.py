@@ -29,6 +29,8 @@ LINE_COLOURS = (BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILION, "#000000")
 """Of many lines in one panel; the yellow of Okabe and Ito is too pale for lines."""
 BODY_COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
 GREY = "#444444"
+TITLE_SIZE = 11.0  # points
+LETTER = 0.0088  # inches that a bold letter takes for each point of its size
 PALE_GREY = "#999999"  # of lines through zero
 RESOLUTION = 200  # dots per inch
 
@@ -37,7 +39,7 @@ STYLE: dict[Any, Any] = {
     "font.sans-serif": ["DejaVu Sans"],
     "font.size": 8.5,
     "mathtext.fontset": "dejavusans",
-    "figure.titlesize": 11,
+    "figure.titlesize": TITLE_SIZE,
     "figure.titleweight": "bold",
     "axes.titlesize": 9.5,
     "axes.labelsize": 8.5,
@@ -87,13 +89,18 @@ def style(**changes: Any) -> AbstractContextManager[None]:
     (7.0, False)
     """
     import matplotlib as mpl
+    from matplotlib.rcsetup import cycler
 
-    changed: dict[Any, Any] = {name.replace("_", "."): value for name, value in changes.items()}
+    changed: dict[Any, Any] = {"axes.prop_cycle": cycler(color=LINE_COLOURS)}
+    changed |= {name.replace("_", "."): value for name, value in changes.items()}
     return mpl.rc_context(STYLE | changed)
 
 
 def blank_figure(width: float, height: float, title: str = "", **pads: float) -> Any:
-    """Return an empty figure, in inches, that lays out its panels itself; no window and no global state."""
+    """Return an empty figure, in inches, that lays out its panels itself; no window and no global state.
+
+    A title that is too long for its width is written smaller.
+    """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
@@ -102,7 +109,8 @@ def blank_figure(width: float, height: float, title: str = "", **pads: float) ->
     figure = Figure(figsize=(width, height), dpi=RESOLUTION, layout=ConstrainedLayoutEngine(**chosen))
     FigureCanvasAgg(figure)
     if title:
-        figure.suptitle(shown_name(title))
+        size = min(TITLE_SIZE, (width - 0.2) / (LETTER * len(title)))
+        figure.suptitle(shown_name(title), fontsize=size)
     return figure
 
 
