@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from jounce.errors import JounceError, MobilityError, RobotError
+from jounce.errors import JounceError, RobotError
 from jounce.mechanism.mechanism import GROUND
 from jounce.robot.robot import Robot
 from jounce.viewer.mechanisms import take_of
@@ -96,7 +96,7 @@ class ClosedRobotSubject:
 
 
 def independent(robot: Robot) -> tuple[str, ...]:
-    """Return joints, the first that do, whose coordinates determine all others.
+    """Return joints whose coordinates determine all others: first those with drives, and those near the base.
 
     Raises
     ------
@@ -104,18 +104,33 @@ def independent(robot: Robot) -> tuple[str, ...]:
         If there are none.
     """
     from jounce.kinematics import solve
+    from jounce.robot.closed_loop import size_of
+    from jounce.robot.closures import Loops
 
-    free = len(robot.joint_names)
-    for count in range(1, free + 1):
-        for names in _choices(robot.joint_names, count):
-            try:
-                solve(robot.mechanism(drivers=dict.fromkeys(names, "0*t"), time=[0.0]), order=0)
-            except MobilityError:
-                continue
-            except JounceError:
-                continue
-            return names
+    loops = Loops(robot, size_of(robot))
+    start = loops.closed(np.zeros(len(robot.joint_names)), np.ones(len(robot.joint_names), bool))
+    freedom = len(start) - sum(len(kept) for kept, _ in loops.independent(start))
+    names = sorted(robot.joint_names, key=lambda name: (robot.limits[name].effort is None, _depth(robot, name)))
+    for chosen in _choices(tuple(names), freedom):
+        try:
+            solve(robot.mechanism(start, drivers=_still(robot, chosen, start), time=[0.0]), order=0)
+        except JounceError:
+            continue
+        return tuple(name for name in robot.joint_names if name in chosen)
     raise RobotError("no joints drive all others; give a trajectory of those that are driven", name=robot.name)
+
+
+def _depth(robot: Robot, name: str) -> int:
+    """Return how many moving joints are between a joint and the base."""
+    parents = {joint.child: joint for joint in robot.joints.values()}
+    count, link = 0, robot.joints[name].parent
+    while link in parents:
+        count, link = count + parents[link].moving, parents[link].parent
+    return count
+
+
+def _still(robot: Robot, names: tuple[str, ...], start: np.ndarray) -> dict[str, float]:
+    return {name: float(start[robot.joint_names.index(name)]) for name in names}
 
 
 def _choices(names: tuple[str, ...], count: int) -> Any:
