@@ -13,7 +13,8 @@ import sys
 from collections.abc import Sequence
 from contextlib import suppress
 
-from jounce.cli.mechanisms import plot, run, schema, simulate
+from jounce.cli.figures import plot, report
+from jounce.cli.mechanisms import run, schema, simulate
 from jounce.cli.papers import reproduce
 from jounce.cli.robots import check
 from jounce.cli.writing import WritingError
@@ -31,7 +32,13 @@ EXAMPLES = {
   jounce simulate examples/flyball_governor.yaml --method obreshkov-6 --tolerance 1e-9""",
     plot: """\
   jounce plot examples/four_bar.yaml --out four_bar.png
-  jounce plot examples/rsur.yaml --order 6 --output psi --output C""",
+  jounce plot examples/rsur.yaml --order 6 --output psi --output C
+  jounce plot examples/four_bar.yaml --kind sketch --derivative 3 --out sketch.svg
+  jounce plot examples/press.yaml --kind reactions --output main --output knee
+  jounce plot examples/andrews.yaml --out andrews.gif""",
+    report: """\
+  jounce report examples/four_bar.yaml --out four_bar.html
+  jounce report examples/press.yaml --order 3""",
     check: """\
   jounce check examples/robots/panda.urdf examples/trajectories/panda_good.csv
   jounce check examples/robots/panda.urdf examples/trajectories/panda_pick.yaml \\

@@ -1,4 +1,4 @@
-"""The commands for mechanism files: solved, simulated, drawn; and their schema."""
+"""The commands for mechanism files: solved and simulated; and their schema."""
 
 from __future__ import annotations
 
@@ -48,13 +48,13 @@ def run(
 
     if out is not None:
         io.check_writable(out)
-    motion = _solved(_loaded(file, set_, import_), file, order, tolerance)
+    motion = solved(loaded(file, set_, import_), file, order, tolerance)
     say(summary(motion, file))
     show_peaks(peaks(motion))
     if out is not None:
         written(lambda: io.write(motion.dataset, out))
         say(f"\nWritten to {out}")
-    return _outcome(motion, file)
+    return outcome(motion, file)
 
 
 def simulate(
@@ -97,18 +97,18 @@ def simulate(
     if out is not None:
         io.check_writable(out)
     chosen = _method(method, step)
-    mechanism = _loaded(file, set_, import_)
+    mechanism = loaded(file, set_, import_)
     try:
         with Bar("simulating") as bar:
             motion = integrate(mechanism, order=order, method=chosen, tolerance=tolerance, strict=False, progress=bar)
     except JounceError as error:
-        raise _of_option(error, file) from None
+        raise of_option(error, file) from None
     say(simulation_summary(motion, file))
     show_peaks(peaks(motion))
     if out is not None:
         written(lambda: io.write(motion.dataset, out))
         say(f"\nWritten to {out}")
-    return _outcome(motion, file)
+    return outcome(motion, file)
 
 
 def _method(name: str, step: float | None) -> Any:
@@ -127,45 +127,6 @@ def _method(name: str, step: float | None) -> Any:
         raise
 
 
-def plot(
-    file: Path,
-    /,
-    *,
-    order: int = 4,
-    out: Path | None = None,
-    output: list[str] | None = None,
-    set_: list[str] | None = None,
-    import_: list[Path] | None = None,
-) -> int:
-    """Solve a mechanism file and draw its outputs, position to jounce.
-
-    Parameters
-    ----------
-    file
-        Mechanism file: .yaml, .yml, .toml or .json.
-    order
-        Highest derivative, 0 to 30; 3 is jerk, 4 jounce.
-    out
-        Figure, .png, .svg or .pdf [default: FILE's name.png].
-    output
-        Name of an output to draw; repeatable; all unless given.
-    set_
-        NAME=VALUE of a parameter, with a unit; repeatable.
-    import_
-        Python file with your own joints; repeatable.
-    """
-    from jounce.plot import check_figure, draw, save
-
-    out = Path(f"{file.stem}.png") if out is None else out
-    check_figure(out)
-    mechanism = _loaded(file, set_, import_)
-    _check_outputs(mechanism, output or (), file)
-    motion = _solved(mechanism, file, order)
-    written(lambda: save(draw(motion, output), out))
-    say(f"Written to {out}")
-    return _outcome(motion, file)
-
-
 def schema() -> int:
     """Print the JSON Schema of mechanism files, for editors that complete and check."""
     import json
@@ -176,7 +137,8 @@ def schema() -> int:
     return 0
 
 
-def _loaded(file: Path, assignments: Sequence[str] | None, imports: Sequence[Path] | None) -> Mechanism:
+def loaded(file: Path, assignments: Sequence[str] | None, imports: Sequence[Path] | None) -> Mechanism:
+    """Return the mechanism of a file, with parameters changed, after files of one's own joints were run."""
     from jounce.io import load
 
     if imports:
@@ -192,18 +154,7 @@ def _loaded(file: Path, assignments: Sequence[str] | None, imports: Sequence[Pat
     return mechanism
 
 
-def _check_outputs(mechanism: Mechanism, wanted: Sequence[str], file: Path) -> None:
-    from jounce.errors import MechanismError, did_you_mean
-
-    if not mechanism.outputs:
-        raise MechanismError("there is nothing to draw; name some outputs", path=file, name="outputs")
-    for name in wanted:
-        if name not in mechanism.outputs:
-            message = f"no output has this name; {did_you_mean(name, mechanism.outputs)}"
-            raise MechanismError(message, path=file, name="outputs", value=name)
-
-
-def _solved(mechanism: Mechanism, file: Path, order: int, tolerance: float = 1e-12) -> Motion:
+def solved(mechanism: Mechanism, file: Path, order: int, tolerance: float = 1e-12) -> Motion:
     """Solve at all instants of the file; those that fail are NaN."""
     from jounce.kinematics import solve
 
@@ -211,10 +162,10 @@ def _solved(mechanism: Mechanism, file: Path, order: int, tolerance: float = 1e-
         with Bar("solving") as bar:
             return solve(mechanism, order=order, tolerance=tolerance, strict=False, progress=bar)
     except JounceError as error:
-        raise _of_option(error, file) from None
+        raise of_option(error, file) from None
 
 
-def _of_option(error: JounceError, file: Path) -> JounceError:
+def of_option(error: JounceError, file: Path) -> JounceError:
     """Return an error with the option, or the file, that it is about."""
     if error.name in ("order", "tolerance"):
         error.name = f"--{error.name}"
@@ -222,7 +173,7 @@ def _of_option(error: JounceError, file: Path) -> JounceError:
     return error.located(path=file)
 
 
-def _outcome(motion: Motion, file: Path) -> int:
+def outcome(motion: Motion, file: Path) -> int:
     """Return 0, or raise for the first instant that failed."""
     from jounce.kinematics import raise_for_status
 

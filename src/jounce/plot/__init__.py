@@ -9,4 +9,5 @@ from jounce.plot.forces import (
 )
 from jounce.plot.limits import draw_limits as draw_limits
 from jounce.plot.portraits import hodograph as hodograph, phase_portrait as phase_portrait
+from jounce.plot.report import check_report as check_report, report as report
 from jounce.plot.sketch import sketch as sketch

@@ -107,7 +107,7 @@ def draw_reactions(motion: Any, names: Sequence[str] | None = None) -> Any:
     ordered = [n for name in found for n in (name, f"{name} (moment)") if n in found or n in felt]
     shown = dataclasses.replace(mechanism, outputs={name: (found | felt)[name] for name in ordered})
     outputs = {name: values[name] for name in ordered}
-    return draw(_Forces(shown, outputs, motion.time, motion.order - 2, motion.status))
+    return draw(_Forces(shown, outputs, motion.time, motion.order, motion.status))
 
 
 def _largest(values: np.ndarray) -> float:
@@ -181,7 +181,7 @@ def draw_power(motion: Any) -> Any:
     ['power  (W)', 'rate  ($10^{3}$ W/s)']
     """
     balance = power_balance(motion)
-    rows = balance.sizes["derivative"]
+    rows = min(balance.sizes["derivative"], max(motion.order - 1, 1))
     with style():
         figure = blank_figure(PANEL[0], PANEL[1] * rows + 0.9, motion.mechanism.title)
         panels = np.atleast_1d(figure.subplots(rows, 1, sharex=True))

@@ -41,7 +41,8 @@ class Link:
     names : tuple of tuple of str
         Joints, drivers, forces and outputs at each point; none at a centre of mass or an origin that stands in.
     edges : tuple of tuple of int
-        Pairs of points with a bar between them: one, the outline of a plate, or in space a tree.
+        Pairs of points with a bar between them: one, the closed outline of a plate, with bars to points beside it, or
+        for points that lie in no plane a tree.
     """
 
     body: str
@@ -174,7 +175,7 @@ def skeleton(mechanism: Any) -> Skeleton:
             body,
             places[body],
             tuple(map(tuple, points.names)),
-            () if body == GROUND else _bars(places[body], SAME * size),
+            () if body == GROUND else _bars(places[body], SAME * size, _held(points, mechanism)),
         )
         for body, points in bodies.items()
     }
@@ -233,8 +234,14 @@ def _largest(local: Mapping[str, list[np.ndarray]], kinds: Mapping[str, Any]) ->
     return max(lengths, default=0.0)
 
 
-def _bars(points: np.ndarray, near: float) -> tuple[tuple[int, int], ...]:
-    """Return the bars of a link: one between two points, a closed outline in the plane, a tree in space."""
+def _held(points: _Points, mechanism: Any) -> list[bool]:
+    """Tell which points of a body something holds or pushes; at the others it is only watched."""
+    holding = {*mechanism.joints, *mechanism.drivers, *mechanism.forces}
+    return [bool(holding.intersection(names)) for names in points.names]
+
+
+def _bars(points: np.ndarray, near: float, held: list[bool]) -> tuple[tuple[int, int], ...]:
+    """Return the bars of a link: one between two points, the outline of points in one plane, else a tree."""
     count = len(points)
     if count < 2:
         return ()
@@ -245,11 +252,19 @@ def _bars(points: np.ndarray, near: float) -> tuple[tuple[int, int], ...]:
     if sizes[1] <= near:  # all on one line
         order = np.argsort(centred @ directions[0]).tolist()
         return tuple(pairwise(order))
-    if points.shape[1] == 2:
+    if points.shape[1] == 2 or sizes[2] <= near:  # a plate
         from scipy.spatial import ConvexHull
 
-        around = ConvexHull(points).vertices.tolist()
-        return tuple(zip(around, [*around[1:], around[0]], strict=True))
+        around = ConvexHull(centred @ directions[:2].T).vertices.tolist()
+        return tuple(pairwise([*around, around[0]]))
+    corners = np.flatnonzero(held)
+    if 3 <= len(corners) < count:
+        inner = _bars(points[corners], near, [True] * len(corners))
+        if len(inner) >= 3 and inner[-1][1] == inner[0][0]:  # a plate, with what is watched beside it
+            ring = tuple((int(corners[i]), int(corners[j])) for i, j in inner)
+            others = (k for k in range(count) if not held[k])
+            distance = np.linalg.norm(points[:, None] - points[None, corners], axis=-1)
+            return (*ring, *((k, int(corners[np.argmin(distance[k])])) for k in others))
     from scipy.sparse.csgraph import minimum_spanning_tree
 
     tree = minimum_spanning_tree(np.linalg.norm(points[:, None] - points[None], axis=-1)).tocoo()

@@ -105,8 +105,6 @@ def phase_portrait(motion: Any, output: str, orders: tuple[int, int] = (0, 1)) -
     ('$\\psi$  (rad)', 1)
     """
     pair = tuple(orders)
-    if len(pair) != 2:
-        raise MechanismError("two orders are drawn against each other", name="orders", value=list(pair))
     first, second = (values.reshape(len(values), -1) for values in _values(motion, output, pair))
     its_output, count = motion.mechanism.outputs[output], first.shape[1]
     exponents = scale_of(first), scale_of(second)

@@ -17,7 +17,7 @@ from jounce.plot.frames import assembled, frames
 from jounce.plot.geometry import Link, Skeleton, skeleton
 from jounce.plot.style import BODY_COLOURS
 
-__all__ = ["Canvas", "Label", "Scene", "Shape", "outline", "scene_of", "tinted"]
+__all__ = ["Canvas", "Label", "Scene", "Shape", "outline", "scene_of", "screen_of", "tinted"]
 
 AZIMUTH, ELEVATION = -60.0, 25.0  # degrees, of the viewer of a spatial mechanism
 UNIT = 0.021  # half a pin, in diagonals of what is drawn
@@ -103,6 +103,25 @@ class Scene:
         (left, lower), (right, upper) = np.min(low, axis=0).tolist(), np.max(high, axis=0).tolist()
         return left, right, lower, upper
 
+    def only(self, instant: int) -> Scene:
+        """Return the scene at one instant, by index."""
+        shapes = [replace(s, points=s.points[[min(instant, len(s.points) - 1)]]) for s in self.shapes]
+        labels = [replace(label, anchor=label.anchor[[instant]]) for label in self.labels]
+        return Scene(shapes, labels, self.unit)
+
+
+def screen_of(view: tuple[float, float]) -> np.ndarray:
+    """Return unit vectors to the right, upward and toward a viewer, in rows, from azimuth and elevation in degrees.
+
+    Examples
+    --------
+    >>> screen_of((-90.0, 0.0)).round(12).tolist()  # from the front: x to the right, z upward
+    [[1.0, 0.0, 0.0], [-0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]
+    """
+    azimuth, elevation = np.radians(view)
+    sa, ca, se, ce = np.sin(azimuth), np.cos(azimuth), np.sin(elevation), np.cos(elevation)
+    return np.array([[-sa, ca, 0.0], [-se * ca, -se * sa, ce], [ce * ca, ce * sa, se]])
+
 
 @dataclass
 class Canvas:
@@ -133,9 +152,7 @@ class Canvas:
     @cached_property
     def screen(self) -> np.ndarray:
         """Unit vectors to the right, upward and toward the viewer, in rows."""
-        azimuth, elevation = np.radians(self.view)
-        sa, ca, se, ce = np.sin(azimuth), np.cos(azimuth), np.sin(elevation), np.cos(elevation)
-        return np.array([[-sa, ca, 0.0], [-se * ca, -se * sa, ce], [ce * ca, ce * sa, se]])
+        return screen_of(self.view)
 
     @cached_property
     def colours(self) -> dict[str, str]:
@@ -260,23 +277,30 @@ def _draw_link(canvas: Canvas, link: Link) -> None:
     """Draw the bars of a body, or its plate, and write its name."""
     colour, owner = canvas.colours[link.body], f"bodies.{link.body}"
     places = canvas.flat(canvas.at(link.body, link.points))  # time, n, 2
-    closed = len(link.edges) > 1 and link.edges[-1][1] == link.edges[0][0] and len(link.edges) > 2
-    if closed:
-        outline = [first for first, _ in link.edges]
-        canvas.curve(
-            places[:, outline], closed=True, stroke=colour, fill=tinted(colour), width=2.0, layer=PLATES, owner=owner
-        )
-    else:
-        for first, second in link.edges:
-            canvas.curve(places[:, [first, second]], stroke=colour, width=4.0, layer=BARS, owner=owner)
-    if closed:
-        anchor = places[:, [first for first, _ in link.edges]].mean(axis=1)
+    ring = _ring(link)
+    if ring:
+        look = {"stroke": colour, "fill": tinted(colour), "width": 2.0, "layer": PLATES, "owner": owner}
+        canvas.curve(places[:, ring], closed=True, **look)
+    for first, second in link.edges[len(ring) :]:
+        width = 2.0 if ring else 4.0
+        canvas.curve(places[:, [first, second]], stroke=colour, width=width, layer=BARS, owner=owner)
+    anchor = places[:, 0]
+    if ring:
+        anchor = places[:, ring].mean(axis=1)
     elif link.edges:
         lengths = [np.linalg.norm(link.points[i] - link.points[j]) for i, j in link.edges]
         anchor = places[:, link.edges[int(np.argmax(lengths))]].mean(axis=1)
-    else:
-        anchor = places[:, 0]
     canvas.name(link.body, anchor, colour, owner)
+
+
+def _ring(link: Link) -> list[int]:
+    """Return the corners of the plate with which the bars of a link begin; none where it has no plate."""
+    corners: list[int] = []
+    for first, second in link.edges:
+        corners.append(first)
+        if second == corners[0]:
+            return corners if len(corners) > 2 else []
+    return []
 
 
 def outline(shape: Shape, instant: int) -> np.ndarray:

@@ -13,13 +13,14 @@ from jounce.mechanism import PointOutput
 from jounce.mechanism.mechanism import Mechanism, check_mechanism
 from jounce.plot.labels import scale_of, unit_label
 from jounce.plot.naming import place_names
-from jounce.plot.scene import AZIMUTH, ELEVATION, WHEELS, Canvas, Scene, outline, scene_of
+from jounce.plot.scene import AZIMUTH, ELEVATION, WHEELS, Scene, outline, scene_of, screen_of
 from jounce.plot.style import GREY, blank_figure, shown_name, style
 
-__all__ = ["Drawing", "Paths", "paths_of", "sketch"]
+__all__ = ["Drawing", "Paths", "length_text", "paths_of", "round_length", "sketch"]
 
 NAMES = ("all", "bodies", "joints", "none")
 WIDEST, TALLEST, LEAST = 6.4, 5.2, 2.6  # inches
+LETTER = 0.095  # inches of a title
 MOST = 400  # instants that a drawing is made for; more would not be seen
 PATH_MAP = "cividis"  # rises evenly in lightness, for the colour-blind too
 
@@ -40,9 +41,9 @@ class Paths:
     """
 
     def __init__(self, motion: Any, names: Sequence[str], order: int, view: tuple[float, float]):
-        canvas = Canvas(None, {"ground": np.zeros((1, 2 if motion.mechanism.space == "planar" else 3, 1))}, view)  # type: ignore[arg-type]
+        screen = np.eye(2) if motion.mechanism.space == "planar" else screen_of(view)[:2]
         self.names, self.order = list(names), order
-        self.flat = {name: canvas.flat(motion.outputs[name][:, 0]) for name in names}
+        self.flat = {name: motion.outputs[name][:, 0] @ screen.T for name in names}
         self.sizes = {name: np.linalg.norm(motion.outputs[name][:, order], axis=-1) for name in names}
         self.label = ""
         if names and order:
@@ -97,7 +98,8 @@ class Drawing:
         wide, tall = right - left, upper - lower
         scale = min((WIDEST - 0.3) / wide, (TALLEST - 0.3) / tall)
         bar = 0.9 if paths is not None and paths.order and paths.names else 0.0
-        size = max(LEAST, wide * scale + 0.3 + bar), max(LEAST, tall * scale + 0.3 + 0.35 * bool(title))
+        least = max(LEAST, LETTER * len(title))
+        size = max(least, wide * scale + 0.3 + bar), max(LEAST, tall * scale + 0.3 + 0.35 * bool(title))
         self.figure = blank_figure(*size, title)
         self.axes = axes = self.figure.add_subplot()
         axes.set_aspect("equal")
@@ -225,26 +227,12 @@ def sketch(
         chosen = np.unique([*np.linspace(0, len(solved) - 1, min(MOST, len(solved))).round().astype(int)])
         chosen = np.unique([*solved[chosen], at])
         whole = scene_of(moving, view=view, instants=chosen)
-        at = int(np.searchsorted(chosen, at))
-        scene = Scene([_at_instant(shape, at) for shape in whole.shapes], _labels_at(whole, at), whole.unit)
-        at = 0
+        scene, at = whole.only(int(np.searchsorted(chosen, at))), 0
     with style():
         drawing = Drawing(scene, found, mechanism.title, None if mechanism.space == "planar" else view)
         drawing.show(at)
         drawing.write_names(at, names)
     return drawing.figure
-
-
-def _at_instant(shape: Any, at: int) -> Any:
-    from dataclasses import replace
-
-    return replace(shape, points=shape.points[[min(at, len(shape.points) - 1)]])
-
-
-def _labels_at(scene: Scene, at: int) -> list[Any]:
-    from dataclasses import replace
-
-    return [replace(label, anchor=label.anchor[[at]]) for label in scene.labels]
 
 
 def _draw_paths(figure: Any, axes: Any, paths: Paths) -> None:
@@ -274,15 +262,13 @@ def _draw_paths(figure: Any, axes: Any, paths: Paths) -> None:
 def _draw_scale(axes: Any, limits: tuple[float, ...], view: tuple[float, float] | None) -> None:
     """Draw a bar of a round length, and the axes of a view in space."""
     left, right, lower, upper = limits
-    length = 0.22 * (right - left)
-    power = 10.0 ** np.floor(np.log10(length))
-    length = float(power * max(k for k in (1.0, 2.0, 5.0) if k * power <= length * (1 + 1e-9)))
+    length = round_length(0.22 * (right - left))
     start, foot = left + 0.03 * (right - left), lower + 0.25 * (upper - lower) * 0.12
     axes.plot([start, start + length], [foot, foot], color=GREY, linewidth=1.6, solid_capstyle="butt", zorder=8)
-    axes.text(start, foot + 0.008 * (upper - lower), _length_text(length), color=GREY, fontsize=7.5, va="bottom")
+    axes.text(start, foot + 0.008 * (upper - lower), length_text(length), color=GREY, fontsize=7.5, va="bottom")
     if view is None:
         return
-    screen = Canvas(None, {"ground": np.zeros((1, 3, 4))}, view).screen  # type: ignore[arg-type]
+    screen = screen_of(view)
     arm = 0.055 * max(right - left, upper - lower)
     origin = np.array([right - 1.5 * arm, lower + 1.2 * arm])
     for name, direction in zip("xyz", screen[:2].T, strict=True):
@@ -293,7 +279,26 @@ def _draw_scale(axes: Any, limits: tuple[float, ...], view: tuple[float, float] 
         axes.text(*far, name, color=GREY, fontsize=7.5, ha="center", va="center")
 
 
-def _length_text(length: float) -> str:
+def round_length(length: float) -> float:
+    """Return the largest of 1, 2, 5, 10, 20, ... that is not above a length.
+
+    Examples
+    --------
+    >>> round_length(0.07), round_length(3.0)
+    (0.05, 2.0)
+    """
+    power = 10.0 ** np.floor(np.log10(length))
+    return float(f"{power * max(k for k in (1.0, 2.0, 5.0) if k * power <= length * (1 + 1e-9)):.3g}")
+
+
+def length_text(length: float) -> str:
+    """Word a length.
+
+    Examples
+    --------
+    >>> length_text(0.05), length_text(2.0)
+    ('50 mm', '2 m')
+    """
     if length >= 1:
         return f"{length:g} m"
     for factor, unit in ((1e3, "mm"), (1e6, "\u00b5m")):

@@ -88,7 +88,8 @@ def style(**changes: Any) -> AbstractContextManager[None]:
     """
     import matplotlib as mpl
 
-    return mpl.rc_context(STYLE | {name.replace("_", "."): value for name, value in changes.items()})
+    changed: dict[Any, Any] = {name.replace("_", "."): value for name, value in changes.items()}
+    return mpl.rc_context(STYLE | changed)
 
 
 def blank_figure(width: float, height: float, title: str = "", **pads: float) -> Any:

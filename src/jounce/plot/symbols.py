@@ -8,26 +8,22 @@ from typing import Any
 import numpy as np
 
 from jounce.mechanism.mechanism import GROUND
+from jounce.plot.anchors import axis_of, ball, global_place, middle_of, pin, place_of, slot_of, stand
+from jounce.plot.drives import DRIVES
 from jounce.plot.geometry import Symbol
 from jounce.plot.glyphs import (
     DASH_DOT,
     DASHES,
     PAPER,
-    actuator,
     box,
     cylinder,
     normal_of,
     rail,
-    spring,
-    support,
-    turn,
     unit_vector,
 )
 from jounce.plot.scene import BARS, GUIDES, INK, MARKS, SYMBOLS, WHEELS, Canvas, tinted
 
 __all__ = ["draw_symbols"]
-
-HINGES = ("revolute", "cylindrical", "universal", "screw", "spherical", "parallel2", "prismatic")
 
 
 def draw_symbols(canvas: Canvas, mechanism: Any) -> None:
@@ -37,11 +33,11 @@ def draw_symbols(canvas: Canvas, mechanism: Any) -> None:
         draw = (_PLANAR if canvas.planar else _SPATIAL).get(symbol.kind, _unknown)
         draw(canvas, symbol, f"joints.{symbol.name}")
         if symbol.kind not in _UNSEEN:
-            place = _middle(canvas, symbol) if "double" in symbol.kind else _place(canvas, symbol)
+            place = middle_of(canvas, symbol) if "double" in symbol.kind else place_of(canvas, symbol)
             canvas.name(symbol.name, place, INK, f"joints.{symbol.name}")
     for kind, symbols in (("drivers", seen.drivers), ("forces", seen.forces)):
         for symbol in symbols:
-            _ACTIVE.get(symbol.kind, _unknown)(canvas, symbol, f"{kind}.{symbol.name}")
+            DRIVES.get(symbol.kind, _unknown)(canvas, symbol, f"{kind}.{symbol.name}")
     for name, output in mechanism.outputs.items():
         if getattr(output, "point", None) is not None and len(output.bodies) == 1:
             _draw_output(canvas, name, output.bodies[0])
@@ -55,49 +51,20 @@ def _draw_output(canvas: Canvas, name: str, body: str) -> None:
             canvas.disc(place, 0.3 * canvas.unit, stroke="", fill=INK, layer=MARKS, owner=f"outputs.{name}")
 
 
-def _slot(symbol: Symbol) -> int:
-    """Return which body the symbol is fixed to: one that moves, the last of them."""
-    moving = [k for k, body in enumerate(symbol.bodies[:2]) if body != GROUND]
-    return moving[-1] if moving else 0
-
-
-def _global(canvas: Canvas, symbol: Symbol, slot: int | None = None) -> np.ndarray:
-    slot = _slot(symbol) if slot is None else slot
-    return canvas.at(symbol.bodies[slot], symbol.points[slot])
-
-
-def _place(canvas: Canvas, symbol: Symbol, slot: int | None = None) -> np.ndarray:
-    return canvas.flat(_global(canvas, symbol, slot))
-
-
-def _middle(canvas: Canvas, symbol: Symbol) -> np.ndarray:
-    return 0.5 * (_place(canvas, symbol, 0) + _place(canvas, symbol, 1))
-
-
-def _stand(canvas: Canvas, symbol: Symbol, owner: str) -> None:
-    """Draw the support of a joint whose one body is the ground."""
-    if GROUND in symbol.bodies[:2]:
-        support(canvas, _place(canvas, symbol, symbol.bodies.index(GROUND)), owner)
-
-
-def _pin(canvas: Canvas, place: np.ndarray, owner: str) -> None:
-    canvas.disc(place, 0.8 * canvas.unit, fill=PAPER, width=1.3, layer=SYMBOLS, owner=owner)
-
-
 def _revolute(canvas: Canvas, symbol: Symbol, owner: str) -> None:
-    _stand(canvas, symbol, owner)
-    _pin(canvas, _place(canvas, symbol), owner)
+    stand(canvas, symbol, owner)
+    pin(canvas, place_of(canvas, symbol), owner)
 
 
 def _rod(canvas: Canvas, symbol: Symbol, owner: str) -> None:
-    first, second = (_place(canvas, symbol, slot) for slot in (0, 1))
-    _stand(canvas, symbol, owner)
+    first, second = (place_of(canvas, symbol, slot) for slot in (0, 1))
+    stand(canvas, symbol, owner)
     canvas.line(first, second, width=2.6, stroke="#666666", layer=BARS, owner=owner)
     for place in (first, second):
         if symbol.kind == "double_spherical":
-            _sphere(canvas, place, owner)
+            ball(canvas, place, owner)
         else:
-            _pin(canvas, place, owner)
+            pin(canvas, place, owner)
 
 
 def _block_and_rail(symbol: Symbol) -> tuple[int, int]:
@@ -105,23 +72,18 @@ def _block_and_rail(symbol: Symbol) -> tuple[int, int]:
     return (0, 1) if symbol.bodies[1] == GROUND else (1, 0)
 
 
-def _axis(symbol: Symbol, slot: int) -> np.ndarray:
-    axis = symbol.axes[slot] if symbol.axes[slot] is not None else symbol.axes[1 - slot]
-    return np.eye(len(symbol.points[slot]))[0] if axis is None else axis
-
-
 def _prismatic(canvas: Canvas, symbol: Symbol, owner: str) -> None:
     block, guide = _block_and_rail(symbol)
     rail(
         canvas,
         symbol.bodies[guide],
-        _global(canvas, symbol, block),
-        _axis(symbol, guide),
+        global_place(canvas, symbol, block),
+        axis_of(symbol, guide),
         owner,
         start=symbol.points[guide],
     )
-    along = unit_vector(canvas.toward(symbol.bodies[block], _axis(symbol, block)))
-    _block(canvas, symbol.bodies[block], _place(canvas, symbol, block), along, owner)
+    along = unit_vector(canvas.toward(symbol.bodies[block], axis_of(symbol, block)))
+    _block(canvas, symbol.bodies[block], place_of(canvas, symbol, block), along, owner)
 
 
 def _block(canvas: Canvas, body: str, place: np.ndarray, along: np.ndarray, owner: str) -> None:
@@ -132,9 +94,9 @@ def _block(canvas: Canvas, body: str, place: np.ndarray, along: np.ndarray, owne
 
 
 def _pin_in_slot(canvas: Canvas, symbol: Symbol, owner: str) -> None:
-    pin = _global(canvas, symbol, 1)
-    rail(canvas, symbol.bodies[0], pin, _axis(symbol, 0), owner, start=symbol.points[0])
-    _pin(canvas, canvas.flat(pin), owner)
+    held = global_place(canvas, symbol, 1)
+    rail(canvas, symbol.bodies[0], held, axis_of(symbol, 0), owner, start=symbol.points[0])
+    pin(canvas, canvas.flat(held), owner)
 
 
 def _coordinate(canvas: Canvas, symbol: Symbol, owner: str) -> None:
@@ -143,9 +105,9 @@ def _coordinate(canvas: Canvas, symbol: Symbol, owner: str) -> None:
     if direction is None or symbol.bodies[0] != GROUND:
         return
     free = direction[::-1].copy()
-    rail(canvas, GROUND, _global(canvas, symbol, 1), free, owner)
+    rail(canvas, GROUND, global_place(canvas, symbol, 1), free, owner)
     along = np.broadcast_to(free, (len(canvas.frames[GROUND]), 2))
-    _block(canvas, symbol.bodies[1], _place(canvas, symbol, 1), along, owner)
+    _block(canvas, symbol.bodies[1], place_of(canvas, symbol, 1), along, owner)
 
 
 def _wheel(canvas: Canvas, body: str, point: np.ndarray, radius: float, owner: str, *, hollow: bool = False) -> None:
@@ -168,7 +130,7 @@ def _wheel(canvas: Canvas, body: str, point: np.ndarray, radius: float, owner: s
 
 def _gear(canvas: Canvas, symbol: Symbol, owner: str) -> None:  # noqa: ARG001  # a gear may be of two pairs
     inner, outer = (radius or 0.0 for radius in symbol.radii[:2])
-    first, second = (_place(canvas, symbol, slot) for slot in (0, 1))
+    first, second = (place_of(canvas, symbol, slot) for slot in (0, 1))
     apart = float(np.nanmedian(np.linalg.norm(second - first, axis=-1)))
     inside = apart < max(inner, outer)  # one turns in the other
     for slot in (0, 1):
@@ -190,8 +152,8 @@ def _rack(canvas: Canvas, symbol: Symbol, owner: str) -> None:
 
 def _rolling(canvas: Canvas, symbol: Symbol, owner: str) -> None:
     _wheel(canvas, symbol.bodies[1], symbol.points[1], symbol.radius or 0.0, f"bodies.{symbol.bodies[1]}")
-    axis = _axis(symbol, 0)
-    local = canvas.within(symbol.bodies[0], _global(canvas, symbol, 1)) - symbol.points[0]
+    axis = axis_of(symbol, 0)
+    local = canvas.within(symbol.bodies[0], global_place(canvas, symbol, 1)) - symbol.points[0]
     along = axis / np.linalg.norm(axis)
     on_line = symbol.points[0] + (local @ along)[:, None] * along
     frame = canvas.frames[symbol.bodies[0]]
@@ -199,26 +161,20 @@ def _rolling(canvas: Canvas, symbol: Symbol, owner: str) -> None:
     rail(canvas, symbol.bodies[0], touch, axis, owner, start=symbol.points[0])
 
 
-def _sphere(canvas: Canvas, place: np.ndarray, owner: str) -> None:
-    u = canvas.unit
-    canvas.disc(place, 0.85 * u, fill="#BBBBBB", width=1.2, layer=SYMBOLS, owner=owner)
-    canvas.disc(place + np.array([-0.25, 0.25]) * u, 0.22 * u, stroke="", fill=PAPER, layer=SYMBOLS, owner=owner)
-
-
 def _spherical(canvas: Canvas, symbol: Symbol, owner: str) -> None:
-    _stand(canvas, symbol, owner)
-    place = _place(canvas, symbol)
+    stand(canvas, symbol, owner)
+    place = place_of(canvas, symbol)
     angle = np.radians(np.linspace(150.0, 390.0, 20))
     socket = 1.3 * canvas.unit * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     canvas.curve(place[:, None] + socket, width=1.2, layer=SYMBOLS, owner=owner)
-    _sphere(canvas, place, owner)
+    ball(canvas, place, owner)
 
 
 def _hinge(canvas: Canvas, symbol: Symbol, owner: str) -> None:
-    _stand(canvas, symbol, owner)
-    slot = _slot(symbol)
-    axes = canvas.frame_of(symbol.bodies[slot], _axis(symbol, slot))
-    place, axis = _place(canvas, symbol, slot), canvas.flat(axes[:, 0])
+    stand(canvas, symbol, owner)
+    slot = slot_of(symbol)
+    axes = canvas.frame_of(symbol.bodies[slot], axis_of(symbol, slot))
+    place, axis = place_of(canvas, symbol, slot), canvas.flat(axes[:, 0])
     reach = 3.2 * canvas.unit
     canvas.line(place - reach * axis, place + reach * axis, width=0.7, dashes=DASH_DOT, layer=SYMBOLS, owner=owner)
     cylinder(canvas, place, axes, (1.5, 0.75), fill=PAPER, width=1.1, layer=SYMBOLS, owner=owner)
@@ -228,16 +184,16 @@ def _sleeve(canvas: Canvas, symbol: Symbol, owner: str) -> None:
     """Draw a sleeve on a shaft, which it may turn about; with a thread it is a nut on a screw."""
     block, guide = _block_and_rail(symbol)
     body, shaft = symbol.bodies[block], symbol.bodies[guide]
-    place = _global(canvas, symbol, block)
-    rail(canvas, shaft, place, _axis(symbol, guide), owner, beyond=3.5, start=symbol.points[guide])
+    place = global_place(canvas, symbol, block)
+    rail(canvas, shaft, place, axis_of(symbol, guide), owner, beyond=3.5, start=symbol.points[guide])
     if symbol.kind == "screw":
-        frame = canvas.frame_of(shaft, _axis(symbol, guide))
+        frame = canvas.frame_of(shaft, axis_of(symbol, guide))
         flat, u = canvas.flat(frame), canvas.unit
         turns = np.linspace(-3.0, 3.0, 49)
         helix = [turns, 0.45 * np.cos(5 * turns), 0.45 * np.sin(5 * turns)]
         points = canvas.flat(place)[:, None] + u * np.einsum("kn,tkc->tnc", np.array(helix), flat)
         canvas.curve(points, width=0.9, layer=SYMBOLS, owner=owner)
-    axes, colour = canvas.frame_of(body, _axis(symbol, block)), canvas.colours.get(body, INK)
+    axes, colour = canvas.frame_of(body, axis_of(symbol, block)), canvas.colours.get(body, INK)
     look = {"stroke": colour, "fill": tinted(colour, 0.35), "width": 1.2, "layer": SYMBOLS, "owner": owner}
     cylinder(canvas, canvas.flat(place), axes, (1.9, 0.9), **look)
 
@@ -245,16 +201,16 @@ def _sleeve(canvas: Canvas, symbol: Symbol, owner: str) -> None:
 def _slider(canvas: Canvas, symbol: Symbol, owner: str) -> None:
     block, guide = _block_and_rail(symbol)
     body = symbol.bodies[block]
-    place = _global(canvas, symbol, block)
-    rail(canvas, symbol.bodies[guide], place, _axis(symbol, guide), owner, beyond=3.0, start=symbol.points[guide])
-    axes, colour = canvas.frame_of(body, _axis(symbol, block)), canvas.colours.get(body, INK)
+    place = global_place(canvas, symbol, block)
+    rail(canvas, symbol.bodies[guide], place, axis_of(symbol, guide), owner, beyond=3.0, start=symbol.points[guide])
+    axes, colour = canvas.frame_of(body, axis_of(symbol, block)), canvas.colours.get(body, INK)
     look = {"stroke": colour, "fill": tinted(colour, 0.35), "width": 1.2, "layer": SYMBOLS, "owner": owner}
     box(canvas, canvas.flat(place), axes, (1.7, 0.9, 0.9), **look)
 
 
 def _universal(canvas: Canvas, symbol: Symbol, owner: str) -> None:
-    _stand(canvas, symbol, owner)
-    place, u = _place(canvas, symbol), canvas.unit
+    stand(canvas, symbol, owner)
+    place, u = place_of(canvas, symbol), canvas.unit
     for body, axis in zip(symbol.bodies, symbol.axes, strict=True):
         colour = canvas.colours.get(body, INK)
         arm = canvas.flat(canvas.toward(body, np.eye(3)[0] if axis is None else axis)) * 1.7 * u
@@ -265,9 +221,9 @@ def _universal(canvas: Canvas, symbol: Symbol, owner: str) -> None:
 
 def _plane(canvas: Canvas, symbol: Symbol, owner: str) -> None:
     """Draw the plane of a body, as large as the point on it travels, and a ball at the point."""
-    body, normal = symbol.bodies[0], _axis(symbol, 0)
+    body, normal = symbol.bodies[0], axis_of(symbol, 0)
     frame = canvas.frame_of(body, normal)
-    place = _global(canvas, symbol, 1)
+    place = global_place(canvas, symbol, 1)
     local = canvas.within(body, place)
     local_axes = np.array([canvas.within(body, frame[:, k] + canvas.frames[body][:, :, 0])[0] for k in (1, 2)])
     spread = local @ local_axes.T  # time, 2
@@ -279,7 +235,7 @@ def _plane(canvas: Canvas, symbol: Symbol, owner: str) -> None:
     middle = np.nanmean(foot, axis=0)
     flat = [canvas.flat(canvas.at(body, middle + corner @ local_axes)) for corner in corners]
     canvas.area(*flat, fill="#F2F2F2", stroke="#888888", width=0.8, layer=GUIDES - 1, owner=owner)
-    _sphere(canvas, canvas.flat(place), owner)
+    ball(canvas, canvas.flat(place), owner)
 
 
 def _unseen(canvas: Canvas, symbol: Symbol, owner: str) -> None:
@@ -289,80 +245,12 @@ def _unseen(canvas: Canvas, symbol: Symbol, owner: str) -> None:
 def _unknown(canvas: Canvas, symbol: Symbol, owner: str) -> None:
     """Draw a square at each point, and a dotted line between them: what a type of one's own is, nobody else knows."""
     u = canvas.unit
-    places = [_place(canvas, symbol, slot) for slot in range(len(symbol.bodies))]
+    places = [place_of(canvas, symbol, slot) for slot in range(len(symbol.bodies))]
     for place in places:
         corners = [place + 0.7 * u * np.array(c, float) for c in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
         canvas.area(*corners, fill=PAPER, width=1.2, layer=SYMBOLS, owner=owner)
     if len(places) > 1:
         canvas.line(*places, width=1.0, dashes=DASHES, layer=GUIDES, owner=owner)
-
-
-def _spring(canvas: Canvas, symbol: Symbol, owner: str) -> None:
-    _stand(canvas, symbol, owner)
-    first, second = (_place(canvas, symbol, slot) for slot in (0, 1))
-    spring(canvas, first, second, owner)
-    for place in (first, second):
-        canvas.disc(place, 0.4 * canvas.unit, fill=PAPER, width=1.0, layer=SYMBOLS, owner=owner)
-
-
-def _cylinder_drive(canvas: Canvas, symbol: Symbol, owner: str) -> None:
-    _stand(canvas, symbol, owner)
-    first, second = (_place(canvas, symbol, slot) for slot in (0, 1))
-    actuator(canvas, first, second, owner)
-    for place in (first, second):
-        if canvas.planar:
-            _pin(canvas, place, owner)
-        else:
-            _sphere(canvas, place, owner)
-
-
-def _slide_drive(canvas: Canvas, symbol: Symbol, owner: str) -> None:
-    """Draw a double arrow along the direction in which a point is driven, beside it."""
-    if symbol.kind == "coordinate":
-        if symbol.axes[0] is None:
-            _turning(canvas, symbol, owner)
-            return
-        along = canvas.flat(canvas.toward(GROUND, symbol.axes[0]))
-    else:
-        along = canvas.flat(canvas.toward(symbol.bodies[0], _axis(symbol, 0)))
-    u, side = canvas.unit, normal_of(unit_vector(along))
-    place = _place(canvas, symbol, 1) + 2.0 * u * side
-    canvas.line(place - 2.4 * u * along, place + 2.4 * u * along, width=1.3, layer=MARKS, owner=owner)
-    for sign in (-1.0, 1.0):
-        tip = place + sign * 3.4 * u * along
-        back = place + sign * 2.2 * u * along
-        canvas.area(tip, back + 0.55 * u * side, back - 0.55 * u * side, fill=INK, width=0.4, layer=MARKS, owner=owner)
-
-
-def _turning(canvas: Canvas, symbol: Symbol, owner: str) -> None:
-    """Draw an arrow, or a spring, about the axis of a turn, at the joint of its bodies where they have one."""
-    center, plane = _pivot(canvas, symbol)
-    turn(canvas, center, plane, owner, spiral=symbol.kind == "torsional_spring")
-
-
-def _pivot(canvas: Canvas, symbol: Symbol) -> tuple[np.ndarray, np.ndarray]:
-    """Return the place about which two bodies turn, and two flat vectors across the axis there."""
-    between = set(symbol.bodies)
-    shared = [s for s in canvas.skeleton.symbols if s.kind in HINGES and between <= set(s.bodies[:2]) | {GROUND}]
-    shared = [s for s in shared if set(symbol.bodies) - {GROUND} <= set(s.bodies)] or [
-        s for s in canvas.skeleton.symbols if s.kind in HINGES and symbol.bodies[-1] in s.bodies
-    ]
-    body = next(body for body in reversed(symbol.bodies) if body != GROUND)
-    if shared:
-        center = _place(canvas, shared[0], shared[0].bodies.index(body) if body in shared[0].bodies else None)
-    else:
-        center = canvas.flat(canvas.at(body, canvas.skeleton.links[body].points[0]))
-    if canvas.planar:
-        return center, np.broadcast_to(np.eye(2), (len(center), 2, 2))
-    axis = symbol.axes[0] if symbol.axes[0] is not None else np.array([0.0, 0.0, 1.0])
-    return center, canvas.flat(canvas.frame_of(symbol.bodies[0], axis)[:, 1:])
-
-
-def _load(canvas: Canvas, symbol: Symbol, owner: str) -> None:
-    """Draw a mark where a force acts: its direction changes with time."""
-    place, u = _place(canvas, symbol, 0), canvas.unit
-    corners = [place + u * np.array(corner) for corner in ((0.0, 0.9), (0.9, 0.0), (0.0, -0.9), (-0.9, 0.0))]
-    canvas.area(*corners, fill=INK, width=0.6, layer=MARKS, owner=owner)
 
 
 Drawing = Callable[[Canvas, Symbol, str], None]
@@ -389,18 +277,4 @@ _SPATIAL: dict[str, Drawing] = {
     "cylindrical": _sleeve,
     "prismatic": _slider,
     "screw": _sleeve,
-}
-_ACTIVE: dict[str, Drawing] = {
-    "coordinate": _slide_drive,
-    "slide": _slide_drive,
-    "distance": _cylinder_drive,
-    "rotation": _turning,
-    "spring": _spring,
-    "slide_spring": _spring,
-    "distance_force": _cylinder_drive,
-    "slide_force": _slide_drive,
-    "torque": _turning,
-    "torsional_spring": _turning,
-    "moment": _turning,
-    "point_force": _load,
 }

@@ -1,0 +1,230 @@
+"""The commands that draw: figures, sketches and films of a motion, and its report."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from jounce.cli.mechanisms import loaded, of_option, outcome, solved
+from jounce.cli.writing import written
+from jounce.errors import JounceError, MechanismError, did_you_mean
+from jounce.io.terminal import Bar, say
+
+if TYPE_CHECKING:
+    from jounce.kinematics import Motion
+    from jounce.mechanism import Mechanism
+
+Kind = Literal["outputs", "sketch", "hodograph", "phase", "energy", "power", "reactions", "animation"]
+Names = Literal["all", "bodies", "joints", "none"]
+FILMS = (".gif", ".mp4")
+ORDERS = {
+    "outputs": 4,
+    "reactions": 4,
+    "power": 4,
+    "energy": 1,
+    "phase": 1,
+    "hodograph": 1,
+    "sketch": 0,
+    "animation": 0,
+}
+PORTRAITS = ("hodograph", "phase")
+
+
+def plot(
+    file: Path,
+    /,
+    *,
+    kind: Kind | None = None,
+    order: int | None = None,
+    out: Path | None = None,
+    output: list[str] | None = None,
+    derivative: int | None = None,
+    instant: float | None = None,
+    names: Names | None = None,
+    azimuth: float = -60.0,
+    elevation: float = 25.0,
+    speed: float | None = None,
+    fps: int = 25,
+    set_: list[str] | None = None,
+    import_: list[Path] | None = None,
+) -> int:
+    """Solve a mechanism file, or simulate one with initial conditions, and draw the motion.
+
+    Parameters
+    ----------
+    file
+        Mechanism file: .yaml, .yml, .toml or .json.
+    kind
+        What is drawn: the outputs and their derivatives, a sketch with joint symbols, the hodograph of a point, a phase
+        portrait, energies, the balance of power, reactions, or a moving sketch [default: outputs].
+    order
+        Highest derivative, 0 to 30; 3 is jerk, 4 jounce [default: 4, or what is needed].
+    out
+        Figure, .png, .svg or .pdf, or film, .gif or .mp4 [default: FILE's name.png].
+    output
+        Name of an output to draw, of a point whose path is drawn, or of a joint, driver or force for reactions;
+        repeatable; all unless given.
+    derivative
+        Of a hodograph [default: 1, velocity]; of the upward axis of a phase portrait, over the one below it; by whose
+        size paths in a sketch are coloured.
+    instant
+        Time that a sketch shows, s.
+    names
+        Written in a sketch or film [default: all in a sketch, bodies in a film].
+    azimuth
+        From where a spatial mechanism is seen, degrees.
+    elevation
+        From how high, degrees.
+    speed
+        Seconds of motion in a second of film [default: 1, or for 2 to 20 s of film].
+    fps
+        Frames in a second of film.
+    set_
+        NAME=VALUE of a parameter, with a unit; repeatable.
+    import_
+        Python file with your own joints; repeatable.
+    """
+    chosen = _kind(kind, out)
+    out = Path(f"{file.stem}{'.gif' if chosen == 'animation' else '.png'}") if out is None else out
+    _check_target(chosen, out)
+    mechanism = loaded(file, set_, import_)
+    _check_names(mechanism, chosen, output or (), file)
+    least = max(derivative or 0, ORDERS[chosen] if order is None or chosen in PORTRAITS else 0)
+    motion = _moved(mechanism, file, least if order is None else max(order, derivative or 0))
+    view = (azimuth, elevation)
+    look: dict[str, Any] = {"paths": output, "order": derivative or 0, "view": view}
+    if names is not None:
+        look["names"] = names
+    try:
+        if chosen == "animation":
+            from jounce.plot import animate
+
+            with Bar("drawing") as bar:
+                written(lambda: animate(motion, out, speed=speed, fps=fps, progress=bar, **look))
+        else:
+            _draw(motion, chosen, out, output, derivative, {"instant": instant, **look})
+    except JounceError as error:
+        raise of_option(error, file) from None
+    say(f"Written to {out}")
+    return outcome(motion, file)
+
+
+def _kind(kind: Kind | None, out: Path | None) -> str:
+    """Return what is drawn; the ending of a film tells it too."""
+    film = out is not None and out.suffix.lower() in FILMS
+    if kind is None:
+        return "animation" if film else "outputs"
+    if film and kind != "animation":
+        message = f"a figure of this kind does not move; write a .png, .svg or .pdf instead of a {out.suffix}"  # type: ignore[union-attr]
+        raise JounceError(message, name="--kind", value=kind)
+    return kind
+
+
+def _check_target(kind: str, out: Path) -> None:
+    from jounce.plot import check_animation, check_figure
+
+    (check_animation if kind == "animation" else check_figure)(out)
+
+
+def _check_names(mechanism: Mechanism, kind: str, wanted: Sequence[str], file: Path) -> None:
+    """Raise MechanismError for a name that does not exist, before anything is solved."""
+    known = [*mechanism.outputs]
+    if kind == "reactions":
+        known = [*mechanism.joints, *mechanism.drivers, *mechanism.forces]
+    elif not known and kind in ("outputs", *PORTRAITS):
+        raise MechanismError("there is nothing to draw; name some outputs", path=file, name="outputs")
+    what = "joint, driver or force" if kind == "reactions" else "output"
+    for name in wanted:
+        if name not in known:
+            message = f"no {what} has this name; {did_you_mean(name, known)}"
+            raise MechanismError(message, path=file, name="joints" if kind == "reactions" else "outputs", value=name)
+    if kind in PORTRAITS and len(wanted) > 1:
+        raise MechanismError("one output is drawn at a time", path=file, name="--output", value=list(wanted))
+
+
+def _moved(mechanism: Mechanism, file: Path, order: int) -> Motion:
+    """Solve a mechanism that is driven; simulate one that has initial conditions."""
+    if not mechanism.initial:
+        return solved(mechanism, file, order)
+    from jounce.integrate import simulate
+
+    try:
+        with Bar("simulating") as bar:
+            return simulate(mechanism, order=order, strict=False, progress=bar)
+    except JounceError as error:
+        raise of_option(error, file) from None
+
+
+def _draw(
+    motion: Motion, kind: str, out: Path, output: list[str] | None, derivative: int | None, look: dict[str, Any]
+) -> None:
+    from jounce import plot as figures
+
+    one = _portrayed(motion, kind, output)
+    upper = 1 if derivative is None else max(derivative, 1)
+    kinds: dict[str, Callable[[], Any]] = {
+        "outputs": lambda: figures.draw(motion, output),
+        "sketch": lambda: figures.sketch(motion, **look),
+        "hodograph": lambda: figures.hodograph(motion, one, 1 if derivative is None else derivative),
+        "phase": lambda: figures.phase_portrait(motion, one, (upper - 1, upper)),
+        "energy": lambda: figures.draw_energy(motion),
+        "power": lambda: figures.draw_power(motion),
+        "reactions": lambda: figures.draw_reactions(motion, output),
+    }
+    figure = kinds[kind]()
+    written(lambda: figures.save(figure, out))
+
+
+def _portrayed(motion: Motion, kind: str, output: list[str] | None) -> str:
+    """Return the output of a portrait: the first that fits unless one is named."""
+    if output or kind not in PORTRAITS:
+        return output[0] if output else ""
+    vectors = [name for name, values in motion.outputs.items() if values.ndim == 3 or kind == "phase"]
+    return (vectors or list(motion.outputs))[0]
+
+
+def report(
+    file: Path,
+    /,
+    *,
+    order: int = 4,
+    out: Path | None = None,
+    azimuth: float = -60.0,
+    elevation: float = 25.0,
+    set_: list[str] | None = None,
+    import_: list[Path] | None = None,
+) -> int:
+    """Solve a mechanism file, or simulate one with initial conditions, and write a page to explore the motion in.
+
+    The page is one file and needs no network: a moving sketch, plots of all outputs and derivatives, peak values,
+    parameters, bodies and joints.
+
+    Parameters
+    ----------
+    file
+        Mechanism file: .yaml, .yml, .toml or .json.
+    order
+        Highest derivative, 0 to 30; 3 is jerk, 4 jounce.
+    out
+        The page, .html [default: FILE's name.html].
+    azimuth
+        From where a spatial mechanism is seen, degrees.
+    elevation
+        From how high, degrees.
+    set_
+        NAME=VALUE of a parameter, with a unit; repeatable.
+    import_
+        Python file with your own joints; repeatable.
+    """
+    from jounce.plot import check_report, report as write_report
+
+    out = Path(f"{file.stem}.html") if out is None else out
+    check_report(out)
+    motion = _moved(loaded(file, set_, import_), file, order)
+    try:
+        written(lambda: write_report(motion, out, view=(azimuth, elevation), source=file.name))
+    except JounceError as error:
+        raise of_option(error, file) from None
+    say(f"Written to {out}")
+    return outcome(motion, file)

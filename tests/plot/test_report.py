@@ -1,0 +1,142 @@
+"""The report: what is in the page, and that it needs nothing else. A browser is asked in the slow test."""
+
+import json
+import pathlib
+import re
+import shutil
+
+import numpy as np
+import pytest
+
+import jounce as jn
+from jounce.io.peaks import peaks
+from jounce.plot import report
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope="module")
+def four_bar():
+    return jn.solve(jn.load(ROOT / "examples" / "four_bar.yaml"), np.linspace(0.0, 2.0, 41), order=3)
+
+
+@pytest.fixture(scope="module")
+def page(four_bar, tmp_path_factory):
+    path = tmp_path_factory.mktemp("report") / "four_bar.html"
+    report(four_bar, path, source="four_bar.yaml")
+    return path
+
+
+def data_of(path):
+    text = path.read_text(encoding="utf-8")
+    (found,) = re.findall(r'<script id="data" type="application/json">(.*?)</script>', text, re.S)
+    return json.loads(found)
+
+
+def test_values_are_those_of_the_motion(page, four_bar):
+    data = data_of(page)
+    assert [output["name"] for output in data["outputs"]] == ["psi", "C"]
+    psi, c = data["outputs"]
+    np.testing.assert_allclose(np.array(psi["values"])[:, 0].T, four_bar.outputs["psi"], rtol=1e-8)
+    np.testing.assert_allclose(
+        np.moveaxis(c["values"], (0, 1, 2), (1, 2, 0)), four_bar.outputs["C"], rtol=1e-8, atol=1e-30
+    )
+    assert psi["words"] == ["angle", "velocity", "acceleration", "jerk"]
+    assert psi["units"] == ["rad", "rad/s", "rad/s^2", "rad/s^3"]
+    assert data["times"] == four_bar.time.tolist()
+    assert len(data["peaks"]) == len(peaks(four_bar)) == 12
+    assert dict(data["parameters"])["BC"] == 0.1423
+    assert [body["name"] for body in data["bodies"]] == ["crank", "rocker"]
+    assert ["theta", "coordinate driver", "ground, crank"] in data["elements"]
+
+
+def test_the_sketch_moves_with_the_motion(page, four_bar):
+    scene = data_of(page)["scene"]
+    (rocker,) = [shape for shape in scene["shapes"] if shape["owner"] == "bodies.rocker"]
+    places = np.array(rocker["points"]).reshape(len(scene["times"]), 2, 2) * scene["step"]
+    at = np.searchsorted(four_bar.time, scene["times"])
+    np.testing.assert_allclose(places[:, 1], four_bar.outputs["C"][at, 0], rtol=0, atol=scene["step"])
+    still = [shape for shape in scene["shapes"] if shape["owner"] == "joints.A" and shape["kind"] == "line"]
+    assert all(len(shape["points"]) == 2 * shape["count"] for shape in still)  # the ground is told once
+
+
+def test_the_page_asks_for_nothing(page):
+    text = page.read_text(encoding="utf-8")
+    assert "default-src 'none'" in text
+    assert not re.findall(r"""(?:src|href)\s*=|https?://|@import|url\(|fetch\(|XMLHttpRequest""", text)
+    assert not re.findall(r"@[A-Z]+@", text)
+
+
+def test_names_cannot_break_the_page(tmp_path):
+    name = "</script><script>alert(1)</script>"
+    mechanism = jn.Mechanism(
+        space="planar",
+        title=name,
+        bodies={name: jn.Body([0, 0])},
+        joints={"O": jn.planar.Revolute(("ground", name), [0, 0], [0, 0])},
+        drivers={"turn": jn.drivers.CoordinateDriver(("ground", name), "angle", motion="t")},
+        outputs={"tip": jn.PointOutput(name, [1, 0])},
+    )
+    path = tmp_path / "page.html"
+    report(jn.solve(mechanism, [0.0, 1.0], order=1), path)
+    text = path.read_text(encoding="utf-8")
+    assert text.count("</script>") == 2
+    assert "<title>&lt;/script&gt;" in text
+    assert data_of(path)["title"] == name
+
+
+def test_instants_that_failed_are_told(tmp_path):
+    mechanism = jn.load(ROOT / "examples" / "four_bar.yaml").with_parameters(BC=0.11)
+    motion = jn.solve(mechanism, np.linspace(0.0, 2.0, 21), order=1, strict=False)
+    report(motion, tmp_path / "page.html")
+    data = data_of(tmp_path / "page.html")
+    assert data["messages"]
+    assert data["messages"][0].startswith("Not solved at t = ")
+    assert data["solved"] == (motion.status == 0).tolist()
+    assert data["outputs"][0]["values"][0][0][data["solved"].index(False)] is None
+
+
+def test_a_page_that_cannot_be_written_is_told(four_bar, tmp_path):
+    with pytest.raises(jn.OutputError, match=r"valid: \.html"):
+        report(four_bar, tmp_path / "page.pdf")
+    with pytest.raises(jn.OutputError, match="does not exist"):
+        report(four_bar, tmp_path / "none" / "page.html")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.slow
+def test_the_page_works_in_a_browser(page):
+    from playwright.sync_api import sync_playwright
+
+    program = shutil.which("chromium")
+    assert program, "the test needs chromium"
+    with sync_playwright() as playwright:
+        options = ["--no-sandbox", "--enable-unsafe-swiftshader"]
+        browser = playwright.chromium.launch(executable_path=program, args=options)
+        tab = browser.new_page(viewport={"width": 1200, "height": 900})
+        asked, wrong = [], []
+        tab.on("request", lambda request: asked.append(request.url))
+        tab.on("pageerror", lambda error: wrong.append(str(error)))
+        tab.on("console", lambda message: wrong.append(message.text))
+        tab.goto(page.as_uri())
+        tab.wait_for_selector("html[data-ready=true]")
+        assert tab.locator(".panel").count() == 8  # two outputs, four derivatives
+        assert tab.locator("#peaks tbody tr").count() == 12
+        picture = "document.getElementById('sketch').toDataURL()"
+        first = tab.evaluate(picture)
+        tab.locator("#time").fill("0.5")
+        assert tab.inner_text("#clock") == "t = 0.500 s"
+        assert tab.evaluate(picture) != first
+        tab.click("#play")
+        tab.wait_for_function("document.getElementById('clock').textContent !== 't = 0.500 s'")
+        tab.click("#play")
+        tab.locator("#paths").select_option("3")
+        assert tab.inner_text("#range").endswith("m/s^3")
+        tab.locator("#outputs input").first.uncheck()
+        assert tab.locator(".panel").count() == 4
+        box = tab.locator(".panel canvas").first.bounding_box()
+        tab.mouse.click(box["x"] + box["width"] * 0.5, box["y"] + 60)
+        assert 0.9 < float(tab.inner_text("#clock").split()[2]) < 1.2  # press on a plot to go there
+        browser.close()
+    assert wrong == []
+    assert asked == [page.as_uri()]
