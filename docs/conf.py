@@ -19,6 +19,8 @@ source_suffix = {".md": "markdown"}
 html_theme = "furo"
 html_title = f"jounce {release}"
 html_math_renderer = "mathml"
+html_static_path = ["_static"]
+html_css_files = ["gallery.css"]
 html_extra_path = ["schema"] if (HERE / "schema").exists() else []  # the JSON Schema, beside the pages
 
 myst_enable_extensions = ["deflist", "dollarmath"]

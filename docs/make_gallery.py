@@ -1,7 +1,7 @@
 """Draw the pictures of the gallery: python docs/make_gallery.py [NAME ...] writes docs/images/gallery/NAME.png.
 
-Every mechanism file of examples/ and every robot of examples/robots has one, with the paths of points coloured by the
-size of their jerk unless said otherwise.
+Every mechanism file of examples/ and every robot of examples/robots has one, but for those that look like another one
+there; the paths of points are coloured by the size of their jerk.
 """
 
 import dataclasses
@@ -101,7 +101,6 @@ PICTURES = {
     "human_arm": robot(
         "human_arm.xml", "human_arm_reach.yaml", "hand", (0, 0, -0.189), view=(-70.0, 15.0), instant=0.9
     ),
-    "inverted_slider_crank_distance": Picture(("G",), 0.3),
     "inverted_slider_crank_slide": Picture(("G",), 0.3),
     "jansen_leg": Picture(("foot",), 0.6),
     "klann_leg": Picture(("foot",), 0.0),
@@ -115,9 +114,8 @@ PICTURES = {
     "radial_engine": Picture(("knuckle2", "knuckle4"), 0.01),
     "rccc": Picture(("coupler_point",), 0.2),
     "rolling_disc": Picture(("pin",), 0.2),
-    "rspu_distance": Picture(("B",), 0.2),
     "rspu_slide": Picture(("B",), 0.2),
-    "rssr": Picture(("C",), 0.2),
+    "rssr": Picture(("B", "C"), 0.2, points={"B": ("crank", (0, 0.04, 0))}),
     "rsur": Picture(("B", "C"), 0.2),
     "scara": robot("scara.urdf", "scara_pick.yaml", "spindle", (0, 0, 0.06), view=(-50.0, 25.0)),
     "scotch_yoke": Picture(("pin",), 0.2, points={"pin": ("crank", (0.04, 0))}),
@@ -128,8 +126,6 @@ PICTURES = {
     "slider_crank": Picture(("middle",), 0.1),
     "solo12": robot("solo12.urdf", "solo12_trot.yaml", "FL_LOWER_LEG", (0, 0, -0.16), view=(-60.0, 20.0)),
     "spatial_slider_crank": Picture(("middle",), 0.1),
-    "spatial_slider_crank_free": Picture(("centre",), 0.1, stop=1.0),
-    "stewart_forces": Picture(("centre",), 0.1),
     "stewart_platform": Picture(("corner",), 0.1),
     "swash_plate": Picture(("piston1",), 0.1),
     "ur5": robot("ur5.urdf", "ur5_stack.yaml", "wrist_3_link", (0, 0.0823, 0), view=(-50.0, 25.0)),
@@ -158,6 +154,8 @@ def motion(name, picture):
     source = EXAMPLES / (picture.source or f"{name}.yaml")
     if source.suffix != ".yaml":
         machine = jn.load_robot(source)
+        on_bodies = {key: jn.robot.body_point(machine, *there) for key, there in picture.points.items()}
+        points = {key: jn.PointOutput(body, place) for key, (body, place) in on_bodies.items()}
         laws = picture.laws or jn.load_trajectory(EXAMPLES / "trajectories" / picture.trajectory)
         time = np.linspace(0.0, picture.stop, 201) if picture.stop else None
         return jn.solve(machine.mechanism(drivers=laws, outputs=points, time=time), order=picture.order)
