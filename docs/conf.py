@@ -20,7 +20,7 @@ html_theme = "furo"
 html_title = f"jounce {release}"
 html_math_renderer = "mathml"
 html_static_path = ["_static"]
-html_css_files = ["jounce.css"]
+html_css_files = ["jounce.css", "gallery.css"]
 html_extra_path = ["schema"] if (HERE / "schema").exists() else []  # the JSON Schema, beside the pages
 
 myst_enable_extensions = ["deflist", "dollarmath"]

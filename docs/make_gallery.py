@@ -1,7 +1,7 @@
 """Draw the pictures of the gallery: python docs/make_gallery.py [NAME ...] writes docs/images/gallery/NAME.png.
 
-Every mechanism file of examples/ and every robot of examples/robots has one, with the paths of points coloured by the
-size of their jerk unless said otherwise.
+Every mechanism file of examples/ and every robot of examples/robots has one, but for those that look like another one
+there; the paths of points are coloured by the size of their jerk.
 """
 
 import dataclasses
@@ -9,12 +9,13 @@ import importlib.util
 import io
 import pathlib
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
 import jounce as jn
 from jounce import plot
+from jounce.plot.frames import placed
 
 ROOT = pathlib.Path(__file__).parents[1]
 EXAMPLES = ROOT / "examples"
@@ -30,13 +31,33 @@ class Picture:
     paths: tuple[str, ...]  # outputs, or points
     instant: float = 0.0  # s
     order: int = 3  # of the derivative in the colour of the paths
-    points: Mapping[str, tuple] = dataclasses.field(default_factory=dict)  # name: body and place, m, besides the outputs
+    points: Mapping[str, tuple] = dataclasses.field(
+        default_factory=dict
+    )  # name: body and place, m, besides the outputs
     view: tuple[float, float] = (-60.0, 25.0)
     stop: float | None = None  # of a simulation, s
     source: str = ""  # the file in examples/, where it is not NAME.yaml
     module: str = ""  # the file in examples/ with a joint of one's own
     trajectory: str = ""  # of a robot: the file in examples/trajectories, or laws
     laws: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    outline: tuple[str, Callable] | None = None  # a body, and its outline, (n, 2) m, from the parameters
+
+
+def pitch_curve(values):
+    """Return the curve on which the roller centre of examples/own_joint/cam.yaml stays."""
+    angle = np.linspace(0.0, 2 * np.pi, 181)
+    radius = values["base"] + values["rise"] * np.cos(values["lobes"] * angle)
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
+
+
+def flat_face_cam(values):
+    """Return the cam of examples/own_joint/valve_train.yaml, the envelope of the lines of its support function."""
+    angle = np.linspace(-np.pi, np.pi, 361)
+    half = 0.5 * (1 + np.cos(angle))
+    support = values["base"] + values["lift"] * half ** values["sharpness"]
+    slope = -0.5 * values["lift"] * values["sharpness"] * np.sin(angle) * half ** (values["sharpness"] - 1)
+    along, across = np.stack([np.cos(angle), np.sin(angle)], -1), np.stack([-np.sin(angle), np.cos(angle)], -1)
+    return support[:, None] * along + slope[:, None] * across
 
 
 def robot(source, trajectory, body, place=(0.0, 0.0, 0.0), **options):
@@ -46,21 +67,40 @@ def robot(source, trajectory, body, place=(0.0, 0.0, 0.0), **options):
 
 
 PICTURES = {
-    "andrews": Picture(("crank_pin", "knee"), 0.018, points={"crank_pin": ("K1", (0.007, 0)), "knee": ("K3", (0, -0.035))}),
-    "cam": Picture(("roller",), 0.2, points={"roller": ("follower", (0, 0))}, source="own_joint/cam.yaml", module="own_joint.py"),
+    "andrews": Picture(
+        ("crank_pin", "knee"), 0.018, points={"crank_pin": ("K1", (0.007, 0)), "knee": ("K3", (0, -0.035))}
+    ),
+    "cam": Picture(
+        ("roller",),
+        0.2,
+        points={"roller": ("follower", (0, 0))},
+        source="own_joint/cam.yaml",
+        module="own_joint.py",
+        outline=("cam", pitch_curve),
+    ),
     "delta_robot": Picture(("platform",), 0.15, view=(-70.0, 18.0)),
     "double_cardan": Picture(("rim",), 0.1, view=(-70.0, 40.0)),
     "double_four_bar": Picture(("tip",), 0.25, stop=1.5),
     "double_pendulum": Picture(("tip",), 0.4, stop=2.0),
     "epicyclic": Picture(("tooth",), 0.4),
     "excavator": Picture(("teeth",), 1.0),
-    "five_bar": robot("five_bar.xml", "", "left_forearm", (0.22, 0, 0), laws={"left_motor": "0.3*sin(4*t)", "right_motor": "0.2*sin(6*t) - 0.1"}, view=(-80.0, 12.0), instant=0.3, stop=np.pi),
+    "five_bar": robot(
+        "five_bar.xml",
+        "",
+        "left_forearm",
+        (0.22, 0, 0),
+        laws={"left_motor": "0.3*sin(4*t)", "right_motor": "0.2*sin(6*t) - 0.1"},
+        view=(-80.0, 12.0),
+        instant=0.3,
+        stop=np.pi,
+    ),
     "flyball_governor": Picture(("ball",), 0.02, points={"ball": ("right", (1, 0, 0))}, view=(-70.0, 20.0)),
     "four_bar": Picture(("C",), 0.3),
     "gear_pair": Picture(("C",), 0.2),
     "hooke_joint": Picture(("rim",), 0.1, view=(-70.0, 40.0)),
-    "human_arm": robot("human_arm.xml", "human_arm_reach.yaml", "hand", (0, 0, -0.189), view=(-70.0, 15.0), instant=0.9),
-    "inverted_slider_crank_distance": Picture(("G",), 0.3),
+    "human_arm": robot(
+        "human_arm.xml", "human_arm_reach.yaml", "hand", (0, 0, -0.189), view=(-70.0, 15.0), instant=0.9
+    ),
     "inverted_slider_crank_slide": Picture(("G",), 0.3),
     "jansen_leg": Picture(("foot",), 0.6),
     "klann_leg": Picture(("foot",), 0.0),
@@ -74,9 +114,8 @@ PICTURES = {
     "radial_engine": Picture(("knuckle2", "knuckle4"), 0.01),
     "rccc": Picture(("coupler_point",), 0.2),
     "rolling_disc": Picture(("pin",), 0.2),
-    "rspu_distance": Picture(("B",), 0.2),
     "rspu_slide": Picture(("B",), 0.2),
-    "rssr": Picture(("C",), 0.2),
+    "rssr": Picture(("B", "C"), 0.2, points={"B": ("crank", (0, 0.04, 0))}),
     "rsur": Picture(("B", "C"), 0.2),
     "scara": robot("scara.urdf", "scara_pick.yaml", "spindle", (0, 0, 0.06), view=(-50.0, 25.0)),
     "scotch_yoke": Picture(("pin",), 0.2, points={"pin": ("crank", (0.04, 0))}),
@@ -87,12 +126,16 @@ PICTURES = {
     "slider_crank": Picture(("middle",), 0.1),
     "solo12": robot("solo12.urdf", "solo12_trot.yaml", "FL_LOWER_LEG", (0, 0, -0.16), view=(-60.0, 20.0)),
     "spatial_slider_crank": Picture(("middle",), 0.1),
-    "spatial_slider_crank_free": Picture(("centre",), 0.1, stop=1.0),
-    "stewart_forces": Picture(("centre",), 0.1),
     "stewart_platform": Picture(("corner",), 0.1),
     "swash_plate": Picture(("piston1",), 0.1),
     "ur5": robot("ur5.urdf", "ur5_stack.yaml", "wrist_3_link", (0, 0.0823, 0), view=(-50.0, 25.0)),
-    "valve_train": Picture(("valve", "tappet"), 0.004, source="own_joint/valve_train.yaml", module="valve_train.py"),
+    "valve_train": Picture(
+        ("valve", "tappet"),
+        0.004,
+        source="own_joint/valve_train.yaml",
+        module="valve_train.py",
+        outline=("cam", flat_face_cam),
+    ),
     "wolfrom_train": Picture(("tooth",), 0.4),
 }
 
@@ -111,6 +154,8 @@ def motion(name, picture):
     source = EXAMPLES / (picture.source or f"{name}.yaml")
     if source.suffix != ".yaml":
         machine = jn.load_robot(source)
+        on_bodies = {key: jn.robot.body_point(machine, *there) for key, there in picture.points.items()}
+        points = {key: jn.PointOutput(body, place) for key, (body, place) in on_bodies.items()}
         laws = picture.laws or jn.load_trajectory(EXAMPLES / "trajectories" / picture.trajectory)
         time = np.linspace(0.0, picture.stop, 201) if picture.stop else None
         return jn.solve(machine.mechanism(drivers=laws, outputs=points, time=time), order=picture.order)
@@ -124,14 +169,33 @@ def motion(name, picture):
     return jn.simulate(mechanism, time, order=picture.order)
 
 
+def add_outline(figure, moved, picture):
+    """Draw the outline of a body behind the sketch, and widen the view to hold it."""
+    body, outline = picture.outline
+    at = int(np.argmin(np.abs(moved.time - picture.instant)))
+    places = placed(moved, body, outline(moved.mechanism.parameter_values))[at, 0]
+    axes = figure.axes[0]
+    axes.fill(*places.T, facecolor="#cce3f0", edgecolor="#0072B2", linewidth=1.5, zorder=1)
+    (left, right), margin = axes.get_xlim(), 0.12 * np.ptp(places[:, 0])
+    lower, upper = axes.get_ylim()
+    left, right = min(left, places[:, 0].min() - margin), max(right, places[:, 0].max() + margin)
+    lower = min(lower, places[:, 1].min() - 2 * margin)
+    axes.set_xlim(left, right)
+    axes.set_ylim(lower, upper)
+    width, height = figure.get_size_inches()
+    figure.set_size_inches(max(width, (height - 0.6) * (right - left) / (upper - lower) + 1.2), height)
+
+
 def draw(name):
     """Write one picture, and return how many bytes it has."""
     from PIL import Image
 
     picture = PICTURES[name]
-    figure = plot.sketch(
-        motion(name, picture), picture.instant, names="none", paths=picture.paths, order=picture.order, view=picture.view
-    )
+    moved = motion(name, picture)
+    look = {"names": "none", "paths": picture.paths, "order": picture.order, "view": picture.view}
+    figure = plot.sketch(moved, picture.instant, **look)
+    if picture.outline:
+        add_outline(figure, moved, picture)
     drawn, packed = io.BytesIO(), io.BytesIO()
     figure.savefig(drawn, format="png", dpi=RESOLUTION)
     few = Image.open(drawn).convert("RGB").quantize(96, dither=Image.Dither.NONE)  # line art needs few colours

@@ -261,7 +261,7 @@ def test_there_are_broken_files():
         (["run", str(ROOT / "examples")], "examples"),
         (["run"], "FILE"),
         (["runn", FOUR_BAR], "run"),
-        (["plot", FOUR_BAR, "--out", "figure.gif"], ".png, .svg, .pdf"),
+        (["plot", FOUR_BAR, "--out", "figure.bmp"], ".png, .svg, .pdf"),
         (["plot", FOUR_BAR, "--out", "no/such/folder/figure.png"], "does not exist"),
         (["plot", FOUR_BAR, "--output", "phi"], "did you mean 'psi'"),
         (["plot", "none.yaml", "--out", "figure.png"], "file not found"),

@@ -1,4 +1,4 @@
-"""Closed forms of the mechanisms of the gallery on power series in time, in thirty digits; nothing is of the library."""
+"""Closed forms of the mechanisms of the gallery, on power series in time of many digits, without the library."""
 
 from mpmath import mp, mpf
 
@@ -85,11 +85,11 @@ def jansen(t):
 
 
 def klann(t):
-    O, C, A, B = mm("41.395 26.641"), mm("36.033 25.415"), mm("27.690 19.705"), mm("27.690 31.092")
+    axle, C, A, B = mm("41.395 26.641"), mm("36.033 25.415"), mm("27.690 19.705"), mm("27.690 31.092")
     E, K, H = mm("21.501 22.089"), mm("10.879 21.918"), mm("19.432 32.923")
     foot = [mpf(0), mpf(0)]
-    turn = minus(C, O)
-    pin = placed([0 * t + O[0], 0 * t + O[1]], [cos(PI * t), sin(PI * t)], turn)
+    turn = minus(C, axle)
+    pin = placed([0 * t + axle[0], 0 * t + axle[1]], [cos(PI * t), sin(PI * t)], turn)
     fixed = [[0 * t + x for x in point] for point in (A, B)]
     elbow = meeting(pin, length(minus(C, E)), fixed[0], length(minus(A, E)), -1)
     knee = third(pin, elbow, C, E, K)
