@@ -101,7 +101,7 @@ def test_methods(simulate, file, method, tmp_path):
         (("--step", "0"), "--step: the length of steps must be a positive number"),
         (("--step", "nan"), "--step"),
         (("--step", "short"), "--step"),
-        (("--tolerance", "1e-20"), "--tolerance: the tolerance must be a number from 1e-15"),
+        (("--tolerance", "1e-20"), "--tolerance: the tolerance must be a number from 1e-17"),
         (("--order", "31"), "--order"),
         (("--set", "sped=1"), "speed"),
         (("--out", "motion.xls"), ".csv, .nc"),
