@@ -23,7 +23,7 @@ html_static_path = ["_static"]
 html_css_files = ["jounce.css", "gallery.css"]
 html_extra_path = ["schema"] if (HERE / "schema").exists() else []  # the JSON Schema, beside the pages
 
-myst_enable_extensions = ["deflist", "dollarmath"]
+myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3
 
 autosummary_generate = False  # numpydoc loads it; reference pages are automodule directives

@@ -7,11 +7,14 @@ there; the paths of points are coloured by the size of their jerk.
 import dataclasses
 import importlib.util
 import io
+import os
 import pathlib
 import sys
 from collections.abc import Callable, Mapping
 
 import numpy as np
+
+os.environ.setdefault("JAX_DISABLE_MOST_OPTIMIZATIONS", "true")  # each file is compiled once to be run once
 
 import jounce as jn
 from jounce import plot
@@ -154,9 +157,11 @@ def motion(name, picture):
     source = EXAMPLES / (picture.source or f"{name}.yaml")
     if source.suffix != ".yaml":
         machine = jn.load_robot(source)
+        laws = picture.laws or jn.load_trajectory(EXAMPLES / "trajectories" / picture.trajectory)
+        free = set(machine.joint_names) - set(laws.names if picture.trajectory else machine.joint_names)
+        machine = machine.locked(dict.fromkeys(free, 0.0))
         on_bodies = {key: jn.robot.body_point(machine, *there) for key, there in picture.points.items()}
         points = {key: jn.PointOutput(body, place) for key, (body, place) in on_bodies.items()}
-        laws = picture.laws or jn.load_trajectory(EXAMPLES / "trajectories" / picture.trajectory)
         time = np.linspace(0.0, picture.stop, 201) if picture.stop else None
         return jn.solve(machine.mechanism(drivers=laws, outputs=points, time=time), order=picture.order)
     if picture.module:
