@@ -28,7 +28,7 @@ def _taken(array: Any, bodies: tuple[int, ...]) -> Any:
         return jnp.broadcast_to(one, (*one.shape[:-2], len(bodies), one.shape[-1]))
     if stride > 0 and bodies == tuple(range(first, bodies[-1] + 1, stride)):
         return jax.lax.slice_in_dim(array, first, bodies[-1] + 1, stride, axis=jnp.ndim(array) - 2)
-    return array.at[..., np.array(bodies), :].get(mode="promise_in_bounds")
+    return jnp.asarray(array).at[..., np.array(bodies), :].get(mode="promise_in_bounds")
 
 
 def body_vector(local: Any, batch_axes: int) -> Any:
