@@ -238,3 +238,23 @@ class TestTimeGrid:
     def test_of_the_mechanism_is_used_when_none_is_given(self):
         timed = dataclasses.replace(crank("t"), time=jn.TimeGrid(0, 1, count=3))
         np.testing.assert_allclose(jn.solve(timed).time, [0, 0.5, 1])
+
+
+def test_gears_of_a_carrier_in_any_order_with_the_ground_among_them():
+    """A held ring of 60 teeth, a sun of 24: the carrier makes 24/84 of the sun's turns (Willis)."""
+    pins = {name: jn.planar.Revolute(("ground", name), [0, 0], [0, 0]) for name in ("sun", "carrier")}
+    train = jn.Mechanism(
+        space="planar",
+        bodies={"sun": jn.Body([0, 0]), "carrier": jn.Body([0, 0]), "planet": jn.Body([0.042, 0])},
+        joints={
+            **pins,
+            "pin": jn.planar.Revolute(("carrier", "planet"), [0.042, 0], [0, 0]),
+            "inner": jn.planar.Gear(("sun", "planet", "carrier"), ratio=-24 / 18),
+            "outer": jn.planar.Gear(("planet", "ground", "carrier"), ratio=18 / 60),
+        },
+        drivers={"motor": jn.drivers.CoordinateDriver(("ground", "sun"), "angle", motion="3*t**2")},
+        outputs={"carrier": jn.AngleOutput("carrier")},
+    )
+    found = jn.solve(train, [0.0, 1.0, 2.0], order=2).outputs["carrier"]
+    expected = [[3 * t**2, 6 * t, 6] for t in (0.0, 1.0, 2.0)]
+    np.testing.assert_allclose(found, np.array(expected) * 24 / 84, rtol=0, atol=1e-14)
