@@ -19,6 +19,7 @@ os.environ.setdefault("JAX_DISABLE_MOST_OPTIMIZATIONS", "true")  # each file is 
 import jounce as jn
 from jounce import plot
 from jounce.plot.frames import placed
+from jounce.plot.sketch import draw_scale
 
 ROOT = pathlib.Path(__file__).parents[1]
 EXAMPLES = ROOT / "examples"
@@ -41,6 +42,7 @@ class Picture:
     stop: float | None = None  # of a simulation, s
     source: str = ""  # the file in examples/, where it is not NAME.yaml
     module: str = ""  # the file in examples/ with a joint of one's own
+    title: str = ""  # of a robot, whose file has a name only
     trajectory: str = ""  # of a robot: the file in examples/trajectories, or laws
     laws: Mapping[str, str] = dataclasses.field(default_factory=dict)
     outline: tuple[str, Callable] | None = None  # a body, and its outline, (n, 2) m, from the parameters
@@ -63,9 +65,9 @@ def flat_face_cam(values):
     return support[:, None] * along + slope[:, None] * across
 
 
-def robot(source, trajectory, body, place=(0.0, 0.0, 0.0), **options):
+def robot(title, source, trajectory, body, place=(0.0, 0.0, 0.0), **options):
     """Return the picture of a robot, with the path of a point of a link."""
-    options = {"trajectory": trajectory} | options
+    options = {"title": title, "trajectory": trajectory} | options
     return Picture(("tip",), points={"tip": (body, place)}, source=f"robots/{source}", **options)
 
 
@@ -88,6 +90,7 @@ PICTURES = {
     "epicyclic": Picture(("tooth",), 0.4),
     "excavator": Picture(("teeth",), 1.0),
     "five_bar": robot(
+        "Five-bar robot",
         "five_bar.xml",
         "",
         "left_forearm",
@@ -102,15 +105,23 @@ PICTURES = {
     "gear_pair": Picture(("C",), 0.2),
     "hooke_joint": Picture(("rim",), 0.1, view=(-70.0, 40.0)),
     "human_arm": robot(
-        "human_arm.xml", "human_arm_reach.yaml", "hand", (0, 0, -0.189), view=(-70.0, 15.0), instant=0.9
+        "A person's arm",
+        "human_arm.xml",
+        "human_arm_reach.yaml",
+        "hand",
+        (0, 0, -0.189),
+        view=(-70.0, 15.0),
+        instant=0.9,
     ),
     "inverted_slider_crank_slide": Picture(("G",), 0.3),
     "jansen_leg": Picture(("foot",), 0.6),
     "klann_leg": Picture(("foot",), 0.0),
-    "panda": robot("panda.urdf", "panda_pick.yaml", "panda_hand", (0, 0, 0.1), view=(-50.0, 15.0)),
+    "panda": robot("Franka Panda", "panda.urdf", "panda_pick.yaml", "panda_hand", (0, 0, 0.1), view=(-50.0, 15.0)),
     "pantograph": Picture(("P", "Q"), 0.1),
     "peaucellier": Picture(("P", "B"), 0.2),
-    "planar_arm": robot("planar_arm.xml", "planar_arm_lift.yaml", "ram", (0.25, 0, 0), view=(-80.0, 12.0)),
+    "planar_arm": robot(
+        "Planar arm", "planar_arm.xml", "planar_arm_lift.yaml", "ram", (0.25, 0, 0), view=(-80.0, 12.0)
+    ),
     "press": Picture(("ram", "knee_pin"), 0.4, points={"knee_pin": ("upper", (0.4, 0))}),
     "quick_return": Picture(("B", "pin"), 0.3, points={"B": ("arm", (0.5, 0)), "pin": ("crank", (0.08, 0))}),
     "rack_pinion": Picture(("spoke",), 0.2),
@@ -120,18 +131,18 @@ PICTURES = {
     "rspu_slide": Picture(("B",), 0.2),
     "rssr": Picture(("B", "C"), 0.2, points={"B": ("crank", (0, 0.04, 0))}),
     "rsur": Picture(("B", "C"), 0.2),
-    "scara": robot("scara.urdf", "scara_pick.yaml", "spindle", (0, 0, 0.06), view=(-50.0, 25.0)),
+    "scara": robot("SCARA", "scara.urdf", "scara_pick.yaml", "spindle", (0, 0, 0.06), view=(-50.0, 25.0)),
     "scotch_yoke": Picture(("pin",), 0.2, points={"pin": ("crank", (0.04, 0))}),
     "screw_press": Picture(("tip",), 0.2),
     "simple_pendulum": Picture(("place",), 0.3, stop=2.0),
     "six_bar_stephenson": Picture(("P", "F"), 0.1),
     "six_bar_watt": Picture(("coupler_point",), 0.1),
     "slider_crank": Picture(("middle",), 0.1),
-    "solo12": robot("solo12.urdf", "solo12_trot.yaml", "FL_LOWER_LEG", (0, 0, -0.16), view=(-60.0, 20.0)),
+    "solo12": robot("Solo 12", "solo12.urdf", "solo12_trot.yaml", "FL_LOWER_LEG", (0, 0, -0.16), view=(-60.0, 20.0)),
     "spatial_slider_crank": Picture(("middle",), 0.1),
     "stewart_platform": Picture(("corner",), 0.1),
     "swash_plate": Picture(("piston1",), 0.1),
-    "ur5": robot("ur5.urdf", "ur5_stack.yaml", "wrist_3_link", (0, 0.0823, 0), view=(-50.0, 25.0)),
+    "ur5": robot("UR5", "ur5.urdf", "ur5_stack.yaml", "wrist_3_link", (0, 0.0823, 0), view=(-50.0, 25.0)),
     "valve_train": Picture(
         ("valve", "tappet"),
         0.004,
@@ -163,7 +174,8 @@ def motion(name, picture):
         on_bodies = {key: jn.robot.body_point(machine, *there) for key, there in picture.points.items()}
         points = {key: jn.PointOutput(body, place) for key, (body, place) in on_bodies.items()}
         time = np.linspace(0.0, picture.stop, 201) if picture.stop else None
-        return jn.solve(machine.mechanism(drivers=laws, outputs=points, time=time), order=picture.order)
+        machine = machine.mechanism(drivers=laws, outputs=points, time=time)
+        return jn.solve(dataclasses.replace(machine, title=picture.title), order=picture.order)
     if picture.module:
         module(EXAMPLES / picture.module)
     mechanism = jn.load(source)
@@ -189,6 +201,7 @@ def add_outline(figure, moved, picture):
     axes.set_ylim(lower, upper)
     width, height = figure.get_size_inches()
     figure.set_size_inches(max(width, (height - 0.6) * (right - left) / (upper - lower) + 1.2), height)
+    draw_scale(axes)
 
 
 def draw(name):

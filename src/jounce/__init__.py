@@ -121,7 +121,7 @@ from jounce.trajectory import (  # noqa: E402
     motion_profile as motion_profile,
 )
 
-__version__ = "0.3.0"
+__version__ = "0.4.0"
 
 
 def _repr_html_(self: object) -> str:

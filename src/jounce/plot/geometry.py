@@ -70,6 +70,8 @@ class Symbol:
         frame.
     radii : tuple of float or None
         Pitch radii of gears, the radius of a wheel, of each body, m.
+    internal : bool, default False
+        Of gears: whether the smaller one turns inside the larger one.
     """
 
     name: str
@@ -78,6 +80,7 @@ class Symbol:
     points: tuple[np.ndarray, ...]
     axes: tuple[np.ndarray | None, ...]
     radii: tuple[float | None, ...]
+    internal: bool = False
 
     @property
     def radius(self) -> float | None:
@@ -315,4 +318,4 @@ def _geared(mechanism: Any, symbol: Symbol, element: Any, values: Mapping[str, A
     if radii is None:
         return symbol
     points = (*centers, *symbol.points[2:])
-    return Symbol(symbol.name, "gear", symbol.bodies, points, symbol.axes, (*radii, *symbol.radii[2:]))
+    return Symbol(symbol.name, "gear", symbol.bodies, points, symbol.axes, (*radii, *symbol.radii[2:]), ratio > 0)

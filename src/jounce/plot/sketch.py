@@ -16,7 +16,7 @@ from jounce.plot.naming import place_names
 from jounce.plot.scene import AZIMUTH, ELEVATION, WHEELS, Scene, outline, scene_of, screen_of
 from jounce.plot.style import GREY, blank_figure, shown_name, style
 
-__all__ = ["Drawing", "Paths", "length_text", "paths_of", "round_length", "sketch"]
+__all__ = ["Drawing", "Paths", "draw_scale", "length_text", "paths_of", "round_length", "sketch"]
 
 NAMES = ("all", "bodies", "joints", "none")
 WIDEST, TALLEST, LEAST = 6.4, 5.2, 2.6  # inches
@@ -111,7 +111,7 @@ class Drawing:
         self.artists = [self._artist(shape) for shape in scene.shapes]
         self.texts: list[tuple[Any, Any]] = []
         self.clock: Any = None
-        _draw_scale(axes, (left, right, lower, upper), view)
+        draw_scale(axes, view)
 
     @staticmethod
     def _limits(scene: Scene, paths: Paths | None) -> tuple[float, float, float, float]:
@@ -259,13 +259,16 @@ def _draw_paths(figure: Any, axes: Any, paths: Paths) -> None:
     bar.outline.set_visible(False)
 
 
-def _draw_scale(axes: Any, limits: tuple[float, ...], view: tuple[float, float] | None) -> None:
-    """Draw a bar of a round length, and the axes of a view in space."""
-    left, right, lower, upper = limits
+def draw_scale(axes: Any, view: tuple[float, float] | None = None) -> None:
+    """Draw a bar of a round length in the place of the one that is there, and the axes of a view in space."""
+    for artist in axes.findobj(lambda found: found.get_gid() == "scale"):
+        artist.remove()
+    (left, right), (lower, upper) = axes.get_xlim(), axes.get_ylim()
     length = round_length(0.22 * (right - left))
-    start, foot = left + 0.03 * (right - left), lower + 0.25 * (upper - lower) * 0.12
-    axes.plot([start, start + length], [foot, foot], color=GREY, linewidth=1.6, solid_capstyle="butt", zorder=8)
-    axes.text(start, foot + 0.008 * (upper - lower), length_text(length), color=GREY, fontsize=7.5, va="bottom")
+    start, foot = left + 0.03 * (right - left), lower + 0.03 * (upper - lower)
+    look = {"color": GREY, "gid": "scale"}
+    axes.plot([start, start + length], [foot, foot], linewidth=1.6, solid_capstyle="butt", zorder=8, **look)
+    axes.text(start, foot + 0.008 * (upper - lower), length_text(length), fontsize=7.5, va="bottom", **look)
     if view is None:
         return
     screen = screen_of(view)

@@ -129,15 +129,12 @@ def _wheel(canvas: Canvas, body: str, point: np.ndarray, radius: float, owner: s
 
 
 def _gear(canvas: Canvas, symbol: Symbol, owner: str) -> None:  # noqa: ARG001  # a gear may be of two pairs
-    inner, outer = (radius or 0.0 for radius in symbol.radii[:2])
-    first, second = (place_of(canvas, symbol, slot) for slot in (0, 1))
-    apart = float(np.nanmedian(np.linalg.norm(second - first, axis=-1)))
-    inside = apart < max(inner, outer)  # one turns in the other
+    largest = max(radius or 0.0 for radius in symbol.radii[:2])
     for slot in (0, 1):
         radius = symbol.radii[slot] or 0.0
         known = [s for s in canvas.shapes if s.kind == "disc" and s.owner == f"bodies.{symbol.bodies[slot]}"]
         if not any(abs(shape.radius - radius) < 1e-9 * radius for shape in known):
-            hollow = inside and radius == max(inner, outer)
+            hollow = symbol.internal and radius == largest
             _wheel(
                 canvas, symbol.bodies[slot], symbol.points[slot], radius, f"bodies.{symbol.bodies[slot]}", hollow=hollow
             )

@@ -13,7 +13,7 @@ from jounce.errors import JounceError, RobotError
 from jounce.mechanism.mechanism import GROUND
 from jounce.robot.robot import Robot
 from jounce.viewer.mechanisms import take_of
-from jounce.viewer.robots import FRAMES, check_joints, swing_parameters, swinging
+from jounce.viewer.robots import FRAMES, ON_A_TRAJECTORY, check_joints, swing_parameters, swinging
 from jounce.viewer.take import Parameter, Take
 
 __all__ = ["ClosedRobotSubject"]
@@ -36,6 +36,8 @@ class ClosedRobotSubject:
     RobotError
         If the trajectory names joints that the robot does not have, or no joints drive all others.
     """
+
+    no_sliders = ON_A_TRAJECTORY
 
     def __init__(self, robot: Robot, looks: Any, trajectory: Any = None):
         self.robot, self.looks, self.trajectory = robot, looks, trajectory

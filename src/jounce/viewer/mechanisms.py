@@ -33,6 +33,8 @@ class MechanismSubject:
         If there is no time grid.
     """
 
+    no_sliders = "There are no parameters. Name values under `parameters:` in the file to get sliders here."
+
     def __init__(self, mechanism: Mechanism):
         self.mechanism = mechanism
         self.simulated = bool(mechanism.initial)

@@ -67,7 +67,7 @@ class Panel:
         """Add a slider for each parameter, number fields for exact values, and what follows from them."""
         gui, parameters = self.gui, self.page.session.subject.parameters
         if not parameters:
-            gui.add_markdown("This file has no parameters. Name values under `parameters:` to get sliders here.")
+            gui.add_markdown(self.page.session.subject.no_sliders)
             return
         groups = dict.fromkeys(p.group for p in parameters)
         for group in groups:

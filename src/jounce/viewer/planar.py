@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from jounce.mechanism.mechanism import GROUND
-from jounce.viewer.solids import Solid, box, cylinder, gear, merged, plate, prism
+from jounce.viewer.solids import Solid, annulus, box, cylinder, gear, merged, plate, prism
 
 __all__ = ["planar_solids", "travel"]
 
@@ -18,8 +18,6 @@ WHEELS = ("gear", "coordinate", "rolling", "rack")
 
 def planar_solids(motion: Any, seen: Any, colours: Any) -> tuple[dict[str, tuple[Solid, ...]], float]:
     """Return the solids of planar bodies, each in a layer of its own, and the z in front of all."""
-    from jounce.viewer.looks import DARK
-
     size, bodies = seen.size, (GROUND, *motion.mechanism.bodies)
     layer = {body: (k - 1) * THICKNESS * size for k, body in enumerate(bodies)}
     front = (len(bodies) + 1) * THICKNESS * size
@@ -37,11 +35,8 @@ def planar_solids(motion: Any, seen: Any, colours: Any) -> tuple[dict[str, tuple
                 if names:
                     add(body, _pedestal(point, size, layer[body]), STAND)
             continue
-        for center, radius, module in wheels.get(body, ()):
-            add(body, gear(radius, low, high, center, module), colours[body])
-            add(body, gear(0.62 * radius, low, high + 0.1 * (high - low), center), _lighter(colours[body]))
-            mark = [float(center[0]) + 0.5 * radius, float(center[1]), high]
-            add(body, box([0.9 * radius, 0.1 * radius, 0.2 * (high - low)], mark), DARK)
+        for step, wheel in enumerate(wheels.get(body, ())):
+            _add_wheel(add, body, wheel, low, high + 0.2 * step * (high - low), colours[body])
         if len(link.points) > 1:
             add(body, plate(link.points, WIDTH * size, low, high), colours[body])
         elif body not in wheels:
@@ -54,24 +49,45 @@ def planar_solids(motion: Any, seen: Any, colours: Any) -> tuple[dict[str, tuple
     return {body: tuple(solids) for body, solids in found.items()}, front
 
 
-def _wheels(seen: Any) -> dict[str, list[tuple[np.ndarray, float, float]]]:
-    """Return centre, radius and module of the wheels of each body; of several with one centre the largest."""
-    found: dict[str, list[tuple[np.ndarray, float, float]]] = {}
+class _Wheel(NamedTuple):
+    center: np.ndarray
+    radius: float
+    module: float  # of its teeth, zero for none
+    ring: bool  # teeth inside
+
+
+def _wheels(seen: Any) -> dict[str, list[_Wheel]]:
+    """Return the wheels of each body, the largest first."""
+    found: dict[str, list[_Wheel]] = {}
     for symbol in seen.symbols:
         if symbol.kind not in WHEELS:
             continue
         radii = [radius for radius in symbol.radii if radius]
+        module = min(radii, default=0.0) / 9 if symbol.kind == "gear" else 0.0
         for body, point, radius in zip(symbol.bodies, symbol.points, symbol.radii, strict=True):
             if not radius or body == GROUND:
                 continue
-            module = min(radii) / 9 if symbol.kind in ("gear", "coordinate") else 0.0
+            wheel = _Wheel(np.asarray(point, float), radius, module, symbol.internal and radius == max(radii))
             known = found.setdefault(body, [])
-            same = [k for k, (center, _, _) in enumerate(known) if np.allclose(center, point, atol=1e-9 * seen.size)]
-            if not same:
-                known.append((np.asarray(point, float), radius, module))
-            elif known[same[0]][1] < radius:
-                known[same[0]] = (np.asarray(point, float), radius, module)
-    return found
+            if not any(np.allclose([*w.center, w.radius], [*point, radius], atol=1e-9 * seen.size) for w in known):
+                known.append(wheel)
+    return {body: sorted(known, key=lambda wheel: -wheel.radius) for body, known in found.items()}
+
+
+def _add_wheel(add: Any, body: str, wheel: _Wheel, low: float, high: float, colour: Any) -> None:
+    """Draw a wheel with its teeth, and a mark that shows how it turns."""
+    from jounce.viewer.looks import DARK
+
+    center, radius, module, ring = wheel
+    x, y = (float(value) for value in center)
+    if ring:
+        add(body, annulus(radius, 1.16 * radius, low, high, center, module), colour)
+        mark, long = 1.09 * radius, 0.12 * radius
+    else:
+        add(body, gear(radius, low, high, center, module), colour)
+        add(body, gear(0.62 * radius, low, high + 0.1 * (high - low), center), _lighter(colour))
+        mark, long = 0.5 * radius, 0.9 * radius
+    add(body, box([long, 0.1 * radius, 0.2 * (high - low)], [x + mark, y, high]), DARK)
 
 
 def _lighter(colour: tuple[int, int, int]) -> tuple[int, int, int]:

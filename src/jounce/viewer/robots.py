@@ -20,6 +20,7 @@ __all__ = ["RobotSubject", "robot_subject"]
 FRAMES = 181
 SWING = 4.0  # s, of one swing, unless a limit of velocity is slower
 REACH = {True: np.pi / 4, False: 0.1}  # of joints without limits, rad and m: half a swing
+ON_A_TRAJECTORY = "The robot follows a trajectory. Without one, each joint swings, and has sliders here."
 TORQUES = ("torque", "yank", "second rate", "third rate", "fourth rate")
 
 
@@ -69,6 +70,8 @@ class RobotSubject:
     RobotError
         If the robot has no moving joint, or the trajectory names others.
     """
+
+    no_sliders = ON_A_TRAJECTORY
 
     def __init__(self, robot: Robot, looks: Any, trajectory: Any = None):
         if not robot.joint_names:

@@ -32,6 +32,11 @@ class Subject(Protocol):
         """What sliders may set."""
         ...
 
+    @property
+    def no_sliders(self) -> str:
+        """What is said where there are no parameters."""
+        ...
+
     def solve(self, values: Mapping[str, float], order: int) -> Take:
         """Return the motion for some values, or raise JounceError."""
         ...

@@ -11,6 +11,7 @@ import numpy as np
 
 __all__ = [
     "Solid",
+    "annulus",
     "arc_arrow",
     "bar",
     "box",
@@ -173,16 +174,36 @@ def box(size: Any, center: Any = (0, 0, 0), rotation: Any = None) -> Mesh:
 
 def gear(radius: float, low: float, high: float, center: Any = (0, 0), module: float = 0.0) -> Mesh:
     """Return a wheel of a pitch radius with teeth of a module; smooth where that is zero."""
-    if module <= 0:
+    vertices, faces = prism(_toothed(radius, module), low, high)
+    return vertices + np.append(np.asarray(center, float)[:2], 0.0), faces
+
+
+def annulus(radius: float, outside: float, low: float, high: float, center: Any = (0, 0), module: float = 0.0) -> Mesh:
+    """Return a ring between two radii with teeth of a module inside; smooth where that is zero."""
+    inner = _toothed(radius, -module)
+    outer = outside * inner / np.linalg.norm(inner, axis=1, keepdims=True)
+    count, around = len(inner), np.arange(len(inner))
+    after = (around + 1) % count
+    faces = []
+    walls = ((outer, low, outer, high), (inner, high, inner, low), (outer, high, inner, high), (inner, low, outer, low))
+    vertices = [np.column_stack([line, np.full(count, z)]) for a, y, b, z in walls for line, z in ((a, y), (b, z))]
+    for k in range(len(walls)):
+        a, b = 2 * count * k + around, 2 * count * k + after
+        faces += [np.stack([a, b, b + count], axis=1), np.stack([a, b + count, a + count], axis=1)]
+    shift = np.append(np.asarray(center, float)[:2], 0.0)
+    return np.concatenate(vertices) + shift, np.concatenate(faces)
+
+
+def _toothed(radius: float, module: float) -> np.ndarray:
+    """Return the outline of a wheel, (n, 2), with teeth outward, inward where the module is negative."""
+    if module == 0:
         teeth, corners = 2 * AROUND, np.zeros(1)
     else:
-        teeth, corners = max(8, round(2 * radius / module)), module * np.array([-0.55, -0.55, 0.45, 0.45])
+        teeth, corners = max(8, round(2 * radius / abs(module))), module * np.array([-0.55, -0.55, 0.45, 0.45])
     steps = np.arange(teeth * len(corners)) / len(corners)
     angle = 2 * np.pi / teeth * (steps + 0.1 * np.tile((np.arange(len(corners)) % 2) * 2.0 - 1.0, teeth))
     reach = radius + np.tile(corners, teeth)
-    outline = np.stack([reach * np.cos(angle), reach * np.sin(angle)], axis=1)
-    vertices, faces = prism(outline, low, high)
-    return vertices + np.append(np.asarray(center, float)[:2], 0.0), faces
+    return np.stack([reach * np.cos(angle), reach * np.sin(angle)], axis=1)
 
 
 def coil(turns: int, radius: float, wire: float) -> Mesh:
