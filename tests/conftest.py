@@ -4,6 +4,7 @@ import hypothesis
 import jax
 import pytest
 
+from jounce.cli import main
 from jounce.constraints import base  # importing jounce switches on double precision
 
 jax.config.update("jax_numpy_dtype_promotion", "strict")
@@ -19,3 +20,19 @@ def _own_catalogue():
     yield
     base._REGISTRY.clear()
     base._REGISTRY.update(before)
+
+
+@pytest.fixture
+def run(capsys, monkeypatch):
+    """Run a command in this process: exit status, standard output, standard error."""
+    monkeypatch.setenv("JOUNCE_CACHE_DIR", "")  # leaves the settings of JAX in this process alone
+    for name in ("JOUNCE_DEBUG", "NO_COLOR", "FORCE_COLOR", "TTY_COMPATIBLE"):
+        monkeypatch.delenv(name, raising=False)
+
+    def call(*arguments):
+        status = main([str(argument) for argument in arguments])
+        captured = capsys.readouterr()
+        assert "Traceback" not in captured.out + captured.err
+        return status, captured.out, captured.err
+
+    return call

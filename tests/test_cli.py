@@ -19,29 +19,9 @@ RSUR = str(ROOT / "examples" / "rsur.yaml")
 BROKEN = sorted((ROOT / "examples" / "broken").glob("*.yaml"))
 
 
-@pytest.fixture(autouse=True)
-def _no_cache(monkeypatch):
-    """Leave the settings of JAX in this process alone."""
-    monkeypatch.setenv("JOUNCE_CACHE_DIR", "")
-    monkeypatch.delenv("JOUNCE_DEBUG", raising=False)
-
-
 @pytest.fixture(scope="module")
 def four_bar():
     return jn.solve(jn.load(FOUR_BAR))
-
-
-@pytest.fixture
-def run(capsys):
-    """Run a command in this process: exit status, standard output, standard error."""
-
-    def call(*arguments):
-        status = main([str(argument) for argument in arguments])
-        captured = capsys.readouterr()
-        assert "Traceback" not in captured.out + captured.err
-        return status, captured.out, captured.err
-
-    return call
 
 
 def process(*arguments, cwd=None, **environment):
@@ -293,6 +273,12 @@ def test_a_title_cannot_steer_the_terminal(run, tmp_path):
     status, out, err = run("run", path, "--order", "0")
     assert "\x1b" not in out + err
     assert status in (0, 2)
+
+
+def test_both_papers_are_known_by_name(run):
+    status, _, err = run("reproduce", "negrean-2026", "--out", "never")
+    assert status == 2
+    assert "did you mean 'negrean-2025'? valid: negrean-2025, sommer-2024" in err
 
 
 def test_an_unforeseen_error_is_one_line_unless_debugging(run, monkeypatch):

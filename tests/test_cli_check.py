@@ -1,5 +1,6 @@
 """The command ``check``: what it prints, how it ends, and what it says about bad input."""
 
+import functools
 import pathlib
 import re
 import sys
@@ -7,7 +8,6 @@ import sys
 import numpy as np
 import pytest
 
-from jounce.cli import main
 from jounce.dynamics.limits import check_limits
 from jounce.io.limits import load_limits
 from jounce.io.robots import load_robot
@@ -36,26 +36,9 @@ PENDULUM = """<robot name="pendulum">
 """
 
 
-@pytest.fixture(autouse=True)
-def _no_cache(monkeypatch):
-    """Leave the settings of JAX in this process alone."""
-    monkeypatch.setenv("JOUNCE_CACHE_DIR", "")
-    monkeypatch.delenv("JOUNCE_DEBUG", raising=False)
-    for name in ("NO_COLOR", "FORCE_COLOR", "TTY_COMPATIBLE"):
-        monkeypatch.delenv(name, raising=False)
-
-
 @pytest.fixture
-def run(capsys):
-    """Run the command in this process: exit status, standard output, standard error."""
-
-    def call(*arguments):
-        status = main(["check", *(str(argument) for argument in arguments)])
-        captured = capsys.readouterr()
-        assert "Traceback" not in captured.out + captured.err
-        return status, captured.out, captured.err
-
-    return call
+def run(run):
+    return functools.partial(run, "check")
 
 
 @pytest.fixture
@@ -269,8 +252,3 @@ def test_files_that_do_not_exist(run):
         status, out, err = run(*arguments)
         assert (status, out) == (2, "")
         assert "not found" in err
-
-
-def test_both_papers_are_known_by_name(capsys):
-    assert main(["reproduce", "negrean-2026", "--out", "never"]) == 2
-    assert "did you mean 'negrean-2025'? valid: negrean-2025, sommer-2024" in capsys.readouterr().err

@@ -1,5 +1,6 @@
 """``jounce convert``: formats, units kept, robots that become mechanisms with the same torques."""
 
+import functools
 import json
 import pathlib
 
@@ -7,7 +8,6 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.cli import main
 from jounce.io.source import read_source
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
@@ -17,19 +17,12 @@ ROBOTS = ROOT / "examples" / "robots"
 
 @pytest.fixture(autouse=True)
 def _here(monkeypatch, tmp_path):
-    monkeypatch.setenv("JOUNCE_CACHE_DIR", "")
     monkeypatch.chdir(tmp_path)
 
 
 @pytest.fixture
-def call(capsys):
-    def run(*arguments):
-        status = main(["convert", *map(str, arguments)])
-        captured = capsys.readouterr()
-        assert "Traceback" not in captured.out + captured.err
-        return status, captured.out, captured.err
-
-    return run
+def call(run):
+    return functools.partial(run, "convert")
 
 
 def test_formats_turn_into_each_other_with_values_as_written(call):

@@ -5,26 +5,8 @@ import pathlib
 import pytest
 from PIL import Image
 
-from jounce.cli import main
-
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 FOUR_BAR = str(ROOT / "examples" / "four_bar.yaml")
-
-
-@pytest.fixture(autouse=True)
-def _no_cache(monkeypatch):
-    monkeypatch.setenv("JOUNCE_CACHE_DIR", "")
-
-
-@pytest.fixture
-def run(capsys):
-    def call(*arguments):
-        status = main([str(argument) for argument in arguments])
-        captured = capsys.readouterr()
-        assert "Traceback" not in captured.out + captured.err
-        return status, captured.out, captured.err
-
-    return call
 
 
 @pytest.mark.parametrize("kind", ["sketch", "hodograph", "phase"])

@@ -8,29 +8,11 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.cli import main
 from jounce.io.record_schema import record_schema
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 EXAMPLES = ROOT / "examples"
 FOUR_BAR = EXAMPLES / "four_bar.yaml"
-
-
-@pytest.fixture(autouse=True)
-def _no_cache(monkeypatch):
-    monkeypatch.setenv("JOUNCE_CACHE_DIR", "")
-    monkeypatch.delenv("JOUNCE_DEBUG", raising=False)
-
-
-@pytest.fixture
-def call(capsys):
-    def run(*arguments):
-        status = main([str(argument) for argument in arguments])
-        captured = capsys.readouterr()
-        assert "Traceback" not in captured.out + captured.err
-        return status, captured.out, captured.err
-
-    return run
 
 
 @pytest.fixture(scope="module")
@@ -42,9 +24,9 @@ def validator():
 
 
 @pytest.fixture
-def facts(call, validator):
+def facts(run, validator):
     def found(*arguments):
-        status, out, err = call(*arguments, "--json")
+        status, out, err = run(*arguments, "--json")
         data = json.loads(out, parse_constant=lambda token: pytest.fail(f"{token} is no JSON"))
         validator.validate(data)
         return status, data, err
@@ -94,8 +76,8 @@ def test_parameters_take_other_values(facts):
     assert data["parameters"][2]["value"] == 0.15
 
 
-def test_words_for_a_person(call):
-    status, out, err = call("inspect", FOUR_BAR)
+def test_words_for_a_person(run):
+    status, out, err = run("inspect", FOUR_BAR)
     assert (status, err) == (0, "")
     assert out.splitlines()[:2] == ["Planar four-bar", "planar mechanism: 1 degree of freedom, driven by theta"]
     assert re.search(r"BC +double_revolute +crank, rocker +1", out)
@@ -104,7 +86,7 @@ def test_words_for_a_person(call):
     assert "\x1b" not in out
 
 
-def test_what_cannot_be_put_together_is_told_with_all_the_rest(call, facts):
+def test_what_cannot_be_put_together_is_told_with_all_the_rest(run, facts):
     status, data, _ = facts("inspect", FOUR_BAR, "--set", "BC=60 cm")
     assert status == 1
     assert not data["ok"]
@@ -113,7 +95,7 @@ def test_what_cannot_be_put_together_is_told_with_all_the_rest(call, facts):
     assert data["assembly"]["open"] > 0.1
     assert [body["pose"] for body in data["bodies"]] == [None, None]
     assert len(data["joints"]) == 3
-    status, out, _ = call("inspect", FOUR_BAR, "--set", "BC=60 cm")
+    status, out, _ = run("inspect", FOUR_BAR, "--set", "BC=60 cm")
     assert status == 1
     assert "cannot be assembled at t = 0 s" in out
     assert "Bodies, as guessed" in out
@@ -128,7 +110,7 @@ joints:
 """
 
 
-def test_redundant_equations_are_named(facts, call, tmp_path):
+def test_redundant_equations_are_named(facts, run, tmp_path):
     path = tmp_path / "a.yaml"
     path.write_text(REDUNDANT)
     status, data, _ = facts("inspect", path)
@@ -139,7 +121,7 @@ def test_redundant_equations_are_named(facts, call, tmp_path):
     assert set(freedom["redundant_among"]) == {"joints.one", "joints.two"}
     assert set(freedom["moving"]) == {"bar", "other"}
     assert data["assembly"]["status"] == "assembled"
-    assert "1 equation too many, among joints." in call("inspect", path)[1]
+    assert "1 equation too many, among joints." in run("inspect", path)[1]
 
 
 def test_a_body_without_joints(facts, tmp_path):
@@ -166,7 +148,7 @@ def test_every_example_can_start(facts, path):
     assert data["ok"]
 
 
-def test_a_robot(facts, call):
+def test_a_robot(facts, run):
     status, data, err = facts("inspect", EXAMPLES / "robots" / "panda.urdf")
     assert (status, err) == (0, "")
     robot = jn.load_robot(EXAMPLES / "robots" / "panda.urdf")
@@ -177,7 +159,7 @@ def test_a_robot(facts, call):
     assert joints["panda_finger_joint2"]["mimic"]["joint"] == "panda_finger_joint1"
     links = {link["name"]: link for link in data["links"]}
     assert links["panda_hand"]["moves_with"] == "panda_link7"
-    status, out, _ = call("inspect", EXAMPLES / "robots" / "panda.urdf")
+    status, out, _ = run("inspect", EXAMPLES / "robots" / "panda.urdf")
     assert status == 0
     assert "robot on panda_link0: 8 degrees of freedom, 17.4519 kg" in out
 
@@ -188,10 +170,10 @@ def test_a_robot_with_a_loop(facts):
     assert data["closures"][0]["redundant"] == 1
 
 
-def test_bad_input(call):
-    assert call("inspect", "none.yaml")[0] == 2
-    assert call("inspect", "a.stl")[0] == 2
-    assert "--set" in call("inspect", EXAMPLES / "robots" / "panda.urdf", "--set", "a=1")[2]
+def test_bad_input(run):
+    assert run("inspect", "none.yaml")[0] == 2
+    assert run("inspect", "a.stl")[0] == 2
+    assert "--set" in run("inspect", EXAMPLES / "robots" / "panda.urdf", "--set", "a=1")[2]
 
 
 def test_run_as_json(facts, tmp_path):
@@ -247,10 +229,10 @@ def test_check_as_json(facts):
         (("new", "cams"), {"kind": "JounceError", "value": "cams"}),
     ],
 )
-def test_errors_as_json(call, arguments, expected):
+def test_errors_as_json(run, arguments, expected):
     from jsonschema import Draft202012Validator
 
-    status, out, err = call(*arguments, "--json")
+    status, out, err = run(*arguments, "--json")
     assert (status, out) == (2, "")
     found = json.loads(err)
     Draft202012Validator(record_schema()["$defs"]["complaint"]).validate(found)
@@ -259,8 +241,8 @@ def test_errors_as_json(call, arguments, expected):
         assert isinstance(actual, value) if isinstance(value, type) else actual == value
 
 
-def test_the_schema_is_printed(call):
-    status, out, _ = call("schema", "results")
+def test_the_schema_is_printed(run):
+    status, out, _ = run("schema", "results")
     assert status == 0
     assert json.loads(out) == record_schema()
 
@@ -268,8 +250,8 @@ def test_the_schema_is_printed(call):
 @pytest.mark.parametrize(
     "shell, words", [("bash", "complete -F"), ("zsh", "#compdef jounce"), ("fish", "complete -c jounce")]
 )
-def test_completion_knows_commands_and_options(call, shell, words, tmp_path):
-    status, out, err = call("completion", shell)
+def test_completion_knows_commands_and_options(run, shell, words, tmp_path):
+    status, out, err = run("completion", shell)
     assert (status, err) == (0, "")
     assert words in out
     for command in (
@@ -288,15 +270,15 @@ def test_completion_knows_commands_and_options(call, shell, words, tmp_path):
     for option in ("order", "tolerance", "payload"):
         assert option in out
     path = tmp_path / "script"
-    assert call("completion", shell, "--out", path)[0] == 0
+    assert run("completion", shell, "--out", path)[0] == 0
     assert path.read_text().strip() == out.strip()
 
 
-def test_bash_reads_its_completion(call, tmp_path):
+def test_bash_reads_its_completion(run, tmp_path):
     import subprocess
 
     path = tmp_path / "script"
-    call("completion", "bash", "--out", path)
+    run("completion", "bash", "--out", path)
     complete = (
         f"source {path}; COMP_WORDS=(jounce ins); COMP_CWORD=1; COMP_LINE='jounce ins'; COMP_POINT=10; "
         'eval "$(complete -p jounce | sed \'s/.*-F \\([^ ]*\\).*/\\1/\')"; echo "${COMPREPLY[@]}"'
@@ -305,11 +287,11 @@ def test_bash_reads_its_completion(call, tmp_path):
     assert done.stdout.strip() == "inspect"
 
 
-def test_completion_is_installed_in_the_home_of_the_user(call, tmp_path, monkeypatch):
+def test_completion_is_installed_in_the_home_of_the_user(run, tmp_path, monkeypatch):
     monkeypatch.setenv("HOME", str(tmp_path))
     monkeypatch.delenv("XDG_DATA_HOME", raising=False)
     monkeypatch.delenv("XDG_CONFIG_HOME", raising=False)
-    status, out, _ = call("completion", "fish", "--install")
+    status, out, _ = run("completion", "fish", "--install")
     assert status == 0
     path = pathlib.Path(re.search(r"Written to (.*)", out)[1])
     assert path.is_relative_to(tmp_path)
@@ -319,7 +301,7 @@ def test_completion_is_installed_in_the_home_of_the_user(call, tmp_path, monkeyp
 @pytest.mark.parametrize(
     "arguments, part", [(("insect",), "inspect"), (("completion", "tcsh"), "bash"), (("rn",), "run")]
 )
-def test_the_nearest_name_is_suggested(call, arguments, part):
-    status, out, err = call(*arguments)
+def test_the_nearest_name_is_suggested(run, arguments, part):
+    status, out, err = run(*arguments)
     assert (status, out) == (2, "")
     assert part in err

@@ -8,29 +8,16 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.cli import main
 from jounce.io.templates import STARTERS
 
 
 @pytest.fixture(autouse=True)
 def _here(monkeypatch, tmp_path):
-    monkeypatch.setenv("JOUNCE_CACHE_DIR", "")
     monkeypatch.chdir(tmp_path)
 
 
-@pytest.fixture
-def call(capsys):
-    def run(*arguments):
-        status = main([str(argument) for argument in arguments])
-        captured = capsys.readouterr()
-        assert "Traceback" not in captured.out + captured.err
-        return status, captured.out, captured.err
-
-    return run
-
-
-def test_without_a_name_the_starters_are_listed(call):
-    status, out, err = call("new")
+def test_without_a_name_the_starters_are_listed(run):
+    status, out, err = run("new")
     assert (status, err) == (0, "")
     names = {line.split()[0] for line in out.splitlines()[: len(STARTERS)]}
     assert names == STARTERS.keys()
@@ -42,8 +29,8 @@ def test_the_files_are_those_of_the_package():
     assert {path.stem for path in folder.iterdir()} == STARTERS.keys()
 
 
-def test_a_starter_is_written_with_its_comments_and_what_to_try_next(call):
-    status, out, err = call("new", "four-bar")
+def test_a_starter_is_written_with_its_comments_and_what_to_try_next(run):
+    status, out, err = run("new", "four-bar")
     assert (status, err) == (0, "")
     text = pathlib.Path("four-bar.yaml").read_text()
     assert text == STARTERS["four-bar"].text
@@ -52,22 +39,22 @@ def test_a_starter_is_written_with_its_comments_and_what_to_try_next(call):
     assert tried == ["jounce run four-bar.yaml", "jounce plot four-bar.yaml --out four-bar.png"]
 
 
-def test_what_is_suggested_works(call):
-    _, out, _ = call("new", "gear-train", "my gears.yaml")
+def test_what_is_suggested_works(run):
+    _, out, _ = run("new", "gear-train", "my gears.yaml")
     for line in out.splitlines():
         if line.startswith("  jounce "):
-            assert call(*shlex.split(line)[1:])[0] == 0
+            assert run(*shlex.split(line)[1:])[0] == 0
     assert pathlib.Path("my gears.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_a_file_that_is_there_is_kept_unless_forced(call):
+def test_a_file_that_is_there_is_kept_unless_forced(run):
     path = pathlib.Path("four-bar.yaml")
     path.write_text("mine")
-    status, out, err = call("new", "four-bar")
+    status, out, err = run("new", "four-bar")
     assert (status, out) == (2, "")
     assert "--force" in err
     assert path.read_text() == "mine"
-    assert call("new", "four-bar", "--force")[0] == 0
+    assert run("new", "four-bar", "--force")[0] == 0
     assert path.read_text() == STARTERS["four-bar"].text
 
 
@@ -80,26 +67,26 @@ def test_a_file_that_is_there_is_kept_unless_forced(call):
         (("cam", "--forse"), "--force"),
     ],
 )
-def test_bad_calls_write_nothing(call, tmp_path, arguments, part):
-    status, out, err = call("new", *arguments)
+def test_bad_calls_write_nothing(run, tmp_path, arguments, part):
+    status, out, err = run("new", *arguments)
     assert (status, out) == (2, "")
     assert part in err
     assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("name", STARTERS)
-def test_every_format_holds_the_same_mechanism(call, name):
+def test_every_format_holds_the_same_mechanism(run, name):
     made = []
     for suffix in ("yaml", "toml", "json"):
-        assert call("new", name, f"{name}.{suffix}")[0] == 0
+        assert run("new", name, f"{name}.{suffix}")[0] == 0
         made.append(jn.load(f"{name}.{suffix}"))
     assert made[0] == made[1] == made[2]
 
 
-def test_the_list_as_json(call):
-    found = json.loads(call("new", "--json")[1])
+def test_the_list_as_json(run):
+    found = json.loads(run("new", "--json")[1])
     assert [starter["name"] for starter in found["starters"]] == list(STARTERS)
-    found = json.loads(call("new", "cam", "--json")[1])
+    found = json.loads(run("new", "cam", "--json")[1])
     assert found["written"] == "cam.yaml"
     assert found["next"][0] == "jounce run cam.yaml"
 

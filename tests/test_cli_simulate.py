@@ -1,5 +1,6 @@
 """The command ``jounce simulate``: what it prints and writes, and how it ends."""
 
+import functools
 import pathlib
 import re
 
@@ -7,7 +8,6 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.cli import main
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 PENDULUM = """\
@@ -26,12 +26,6 @@ time: {start: 0, stop: 1, step: 0.25}
 """
 
 
-@pytest.fixture(autouse=True)
-def _no_cache(monkeypatch):
-    monkeypatch.setenv("JOUNCE_CACHE_DIR", "")
-    monkeypatch.delenv("JOUNCE_DEBUG", raising=False)
-
-
 @pytest.fixture
 def file(tmp_path):
     path = tmp_path / "pendulum.yaml"
@@ -40,16 +34,8 @@ def file(tmp_path):
 
 
 @pytest.fixture
-def simulate(capsys):
-    """Run ``jounce simulate`` in this process: exit status, standard output, standard error."""
-
-    def call(*arguments):
-        status = main(["simulate", *map(str, arguments)])
-        captured = capsys.readouterr()
-        assert "Traceback" not in captured.out + captured.err
-        return status, captured.out, captured.err
-
-    return call
+def simulate(run):
+    return functools.partial(run, "simulate")
 
 
 def test_summary_table_and_file(simulate, file, tmp_path):

@@ -13,46 +13,22 @@ from jounce.errors import JounceError, RobotError
 from jounce.mechanism.mechanism import GROUND
 from jounce.robot.robot import Robot
 from jounce.viewer.mechanisms import take_of
-from jounce.viewer.robots import FRAMES, ON_A_TRAJECTORY, check_joints, swing_parameters, swinging
+from jounce.viewer.robots import FRAMES, RobotSubject, swing_parameters, swinging
 from jounce.viewer.take import Parameter, Take
 
 __all__ = ["ClosedRobotSubject"]
 
 
-class ClosedRobotSubject:
+class ClosedRobotSubject(RobotSubject):
     """A robot with closures: as many joints are driven as it has degrees of freedom.
 
-    Parameters
-    ----------
-    robot : Robot
-        With closures.
-    looks : Looks
-        Shapes of its moving links and its base.
-    trajectory : JointTrajectory, optional
-        Of the driven joints. Without, the first joints that determine the others swing.
+    Its trajectory is that of the driven joints; without, the first joints that determine the others swing.
 
     Raises
     ------
     RobotError
         If the trajectory names joints that the robot does not have, or no joints drive all others.
     """
-
-    no_sliders = ON_A_TRAJECTORY
-
-    def __init__(self, robot: Robot, looks: Any, trajectory: Any = None):
-        self.robot, self.looks, self.trajectory = robot, looks, trajectory
-        if trajectory is not None:
-            check_joints(robot, trajectory)
-
-    @property
-    def name(self) -> str:
-        """The name of the robot."""
-        return self.robot.name
-
-    @property
-    def loaded(self) -> bool:
-        """Whether links have a mass."""
-        return any(link.inertia is not None for link in self.robot.links.values())
 
     @cached_property
     def driven(self) -> tuple[str, ...]:

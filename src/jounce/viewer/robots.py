@@ -20,7 +20,6 @@ __all__ = ["RobotSubject", "robot_subject"]
 FRAMES = 181
 SWING = 4.0  # s, of one swing, unless a limit of velocity is slower
 REACH = {True: np.pi / 4, False: 0.1}  # of joints without limits, rad and m: half a swing
-ON_A_TRAJECTORY = "The robot follows a trajectory. Without one, each joint swings, and has sliders here."
 TORQUES = ("torque", "yank", "second rate", "third rate", "fourth rate")
 
 
@@ -71,14 +70,14 @@ class RobotSubject:
         If the robot has no moving joint, or the trajectory names others.
     """
 
-    no_sliders = ON_A_TRAJECTORY
+    no_sliders = "The robot follows a trajectory. Without one, each joint swings, and has sliders here."
 
     def __init__(self, robot: Robot, looks: Any, trajectory: Any = None):
         if not robot.joint_names:
             raise RobotError("nothing moves: the robot has no moving joint", name=robot.name)
         self.robot, self.looks, self.trajectory = robot, looks, trajectory
         if trajectory is not None:
-            check_joints(robot, trajectory)
+            _check_joints(robot, trajectory)
 
     @property
     def name(self) -> str:
@@ -128,7 +127,8 @@ class RobotSubject:
         )
 
 
-def check_joints(robot: Robot, trajectory: Any) -> None:
+def _check_joints(robot: Robot, trajectory: Any) -> None:
+    """Raise RobotError where a trajectory moves joints that a robot does not have."""
     from jounce.errors import did_you_mean
 
     for name in trajectory.names:
