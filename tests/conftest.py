@@ -1,5 +1,7 @@
 """The regime of all tests: float64, strict promotion of types and ranks; warnings are errors by pyproject.toml."""
 
+import pathlib
+
 import hypothesis
 import jax
 import pytest
@@ -11,6 +13,16 @@ jax.config.update("jax_numpy_dtype_promotion", "strict")
 jax.config.update("jax_numpy_rank_promotion", "raise")
 hypothesis.settings.register_profile("jounce", deadline=None, max_examples=15, derandomize=True)
 hypothesis.settings.load_profile("jounce")
+MEMORY_MAPS = 65530  # of a process, unless the system is set up otherwise
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _few_programs():
+    """Forget compiled programs in time: each takes six memory maps, and XLA dies where Linux gives no more."""
+    yield
+    maps = pathlib.Path("/proc/self/maps")
+    if maps.exists() and maps.read_text().count("\n") > 0.5 * MEMORY_MAPS:
+        jax.clear_caches()
 
 
 @pytest.fixture(autouse=True)

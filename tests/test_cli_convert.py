@@ -168,9 +168,9 @@ def test_every_robot_of_the_examples(call, path):
     pathlib.Path("a.yaml").unlink()
     assert call(path, "a.yaml", *(x for n, law in sway.items() for x in ("--drive", f"{n}={law}")))[0] == 0
     time = np.linspace(0.0, 1.0, 3)
-    motion = jn.solve(jn.load("a.yaml"), time, order=3)
-    q = jn.JointTrajectory(sway, 0.0, 1.0).derivatives(time, 3, names=robot.joint_names)
+    motion = jn.solve(jn.load("a.yaml"), time, order=2)
+    q = jn.JointTrajectory(sway, 0.0, 1.0).derivatives(time, 2, names=robot.joint_names)
     tau = np.asarray(jn.inverse_dynamics(robot, q))
     for k, name in enumerate(robot.joint_names):
         found = motion.outputs[f"{name}_{'torque' if robot.joints[name].turning else 'force'}"]
-        np.testing.assert_allclose(found[:, :2], tau[..., k], rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(found[:, :1], tau[..., k], rtol=1e-9, atol=1e-9)

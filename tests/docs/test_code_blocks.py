@@ -2,6 +2,8 @@
 
 import pathlib
 import re
+import shlex
+import shutil
 
 import pytest
 
@@ -9,7 +11,7 @@ import jounce as jn
 
 ROOT = pathlib.Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
-SLOW = ("closed_loop_robots.md", "integrators.md", "simulation.md")  # they compile for half a minute
+SLOW = ("closed_loop_robots", "integrators", "reactions", "robots", "simulation", "spatial")  # to compile
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
@@ -22,7 +24,7 @@ def blocks(page, language):
 
 def pages_with(language, needle=""):
     found = [page for page in PAGES if any(needle in code for _, code in blocks(page, language))]
-    cases = [pytest.param(page, marks=pytest.mark.slow if page.name in SLOW else ()) for page in found]
+    cases = [pytest.param(page, marks=pytest.mark.slow if page.stem in SLOW else ()) for page in found]
     return pytest.mark.parametrize("page", cases, ids=[str(page.relative_to(ROOT)) for page in found])
 
 
@@ -50,3 +52,27 @@ def test_mechanism_files_in_the_pages_solve(page, tmp_path):
 def test_the_readme_and_the_start_page_have_code():
     found = [page.name for page in PAGES if any(blocks(page, "python"))]
     assert {"README.md", "start.md", "own_joint.md"} <= set(found)
+
+
+ELSEWHERE = ("python3.11", ".venv/bin/python", "bash", "jounce reproduce")  # set-up, scripts and papers have own checks
+
+
+@pytest.mark.slow
+@pages_with("sh", "jounce ")
+def test_commands_in_the_pages_run(page, run, tmp_path, monkeypatch):
+    (tmp_path / "examples").symlink_to(ROOT / "examples", target_is_directory=True)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setattr("webbrowser.open", lambda _: True)
+    monkeypatch.setattr("jounce.viewer.View.wait", lambda view: view.close())
+    for _, text in blocks(page, "sh"):
+        for line in text.splitlines():
+            command = line.removeprefix(".venv/bin/")
+            if any(line.startswith(word) or command.startswith(word) for word in ELSEWHERE):
+                continue
+            program, *arguments = shlex.split(command, comments=True)
+            assert program == "jounce", line
+            status, _, err = run(*arguments)
+            without_films = ".mp4" in line and shutil.which("ffmpeg") is None
+            assert status == (2 if without_films else 0), f"{line}: {err}"
+            assert ("ffmpeg" in err) == without_films

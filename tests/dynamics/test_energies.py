@@ -376,6 +376,7 @@ def test_power_of_a_planar_mechanism():
     close(energy[:, 1], power)
 
 
+@pytest.mark.slow
 def test_spatial_mechanism_against_point_masses():
     rng = np.random.default_rng(11)
     points, weights = rng.normal(size=(6, 3)) * 0.2, rng.uniform(0.1, 0.4, 6)

@@ -99,15 +99,16 @@ FORMS = {
     "gibbs_appell_3": lambda robot, q: gibbs_appell(robot, q, 0, m=3),
     "higher_order_1": lambda robot, q: higher_order(robot, q, 1)[:, None],
 }
+SLOW = ("mangeron_1", "gibbs_appell_2")  # to compile
 
 
-@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("form", [pytest.param(f, marks=pytest.mark.slow) if f in SLOW else f for f in FORMS])
 def test_equations_124_to_128_agree_with_virtual_work_in_fifty_digits(form):
     robot, q, right = case(tree)
     agree(FORMS[form](robot, q), right)
 
 
-@pytest.mark.parametrize("k", [2, 3])
+@pytest.mark.parametrize("k", [2, pytest.param(3, marks=pytest.mark.slow)])
 def test_equations_129_to_131_and_134_agree_with_virtual_work_in_fifty_digits(k):
     robot, q, right = case(tree)
     agree(higher_order(robot, q, k)[:, None], right[:, k - 1 : k])
@@ -119,6 +120,7 @@ def test_the_order_of_the_derivatives_does_not_matter(k, m):
     agree(higher_order(robot, q, k, m)[:, None], right[:, k - 1 : k])
 
 
+@pytest.mark.slow
 def test_joints_that_follow_others():
     robot = following()
     q = np.random.default_rng(3).uniform(-1, 1, (2, 5, len(robot.joint_names)))

@@ -167,6 +167,7 @@ def test_springs_are_balanced_by_the_driver():
     assert jn.applied_force(motion, "spring").attrs["units"] == "N*m"
 
 
+@pytest.mark.slow
 def test_bearing_of_an_unbalanced_rotor_in_space():
     # in the axes of the rotor the moment is a I u + w^2 u x (I u), and the force m (a u x c + w^2 u x (u x c))
     tensor = np.array([[0.3, 0.02, -0.05], [0.02, 0.4, 0.03], [-0.05, 0.03, 0.2]])

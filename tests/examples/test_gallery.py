@@ -131,6 +131,7 @@ def test_valve_follows_the_lift_law_of_its_cam():
     agrees("own_joint/valve_train", closed_forms.valve_train, time, "tappet", "valve")
 
 
+@pytest.mark.slow
 def test_excavator_and_the_power_of_its_cylinders():
     time = [0.0, 1.7, 3.9, 6.2]
     motion = solved("excavator", time)

@@ -43,6 +43,7 @@ def spread(count):
     }
 
 
+@pytest.mark.slow
 def test_every_run_is_what_it_is_alone():
     values = spread(5)
     batch = jn.simulate_batch(pendulum(), values, TIME, order=3)

@@ -109,6 +109,7 @@ def test_the_trap_of_a_double_pendulum_at_horizontal_rest():
     assert np.allclose(rates, wanted[:, 1], rtol=0, atol=1e-8)
 
 
+@pytest.mark.slow
 def test_a_polynomial_motion_is_exact_in_one_step():
     falling = start(dynamics.thrown_stone(), 0.0)
     wanted = [1 + 2 * 3, 2 + 5 * 3 - 9.81 * 9 / 2, 0.5 - 9, 2, 5 - 9.81 * 3, -3]

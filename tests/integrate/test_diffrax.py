@@ -35,6 +35,7 @@ def solved(term, state, equations, instants):
     )
 
 
+@pytest.mark.slow
 def test_a_run_of_diffrax_agrees_with_taylor_series():
     mechanism = dynamics.double_pendulum(0.3, 1.0, 1.0, -2.0)
     equation = jn.ode_term(mechanism)

@@ -128,6 +128,7 @@ def block(law):
     )
 
 
+@pytest.mark.slow
 def test_what_was_computed_before_a_singularity_is_kept():
     # x'' = -x^-3 from rest at 1: x = sqrt(1 - t^2), which ends at t = 1
     time = [0.0, 0.6, 0.8, 1.5, 2.0]

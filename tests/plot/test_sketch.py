@@ -71,10 +71,14 @@ def test_links_and_pins_are_where_the_bodies_are(four_bar):
     np.testing.assert_allclose(curves[0].get_xydata(), four_bar.outputs["C"][:, 0], rtol=0, atol=1e-15)
 
 
+def names_in(figure):
+    return [text for text in figure.axes[0].texts if str(text.get_gid()).startswith("name.")]
+
+
 def test_names_are_all_there_and_none_covers_another(four_bar):
     andrews = sketch(jn.load(ROOT / "examples" / "andrews.yaml"))
     for figure, wanted in ((sketch(four_bar), {"crank", "rocker", "A", "D", "BC"}), (andrews, {"K1", "K7", "O", "P6"})):
-        texts = [text for text in figure.axes[0].texts if str(text.get_gid()).startswith("name.")]
+        texts = names_in(figure)
         assert wanted <= {text.get_text() for text in texts}
         figure.draw_without_rendering()
         boxes = [text.get_window_extent() for text in texts]
@@ -83,8 +87,8 @@ def test_names_are_all_there_and_none_covers_another(four_bar):
             upward = min(first.y1, second.y1) - max(first.y0, second.y0)
             assert across < 1.0 or upward < 1.0
     bodies = sketch(four_bar, names="bodies")
-    assert {t.get_text() for t in bodies.axes[0].texts if t.get_gid()} == {"crank", "rocker"}
-    assert not [t for t in sketch(four_bar, names="none").axes[0].texts if t.get_gid()]
+    assert {t.get_text() for t in names_in(bodies)} == {"crank", "rocker"}
+    assert not names_in(sketch(four_bar, names="none"))
 
 
 def test_paths_are_coloured_by_the_size_of_a_derivative(four_bar):

@@ -64,7 +64,7 @@ def plain_take(value=1.0, notice=""):
 class Slow:
     """A subject that solves when it is let, and fails for values below zero."""
 
-    name, loaded = "slow", False
+    name, loaded, no_sliders = "slow", False, ""
     parameters = (Parameter("value", 1.0, 0.5, 1.5),)
 
     def __init__(self):

@@ -32,6 +32,7 @@ CIRCLE = 24 / 2 * math.sin(2 * math.pi / 24)  # area of the polygon that stands 
         (solids.prism(np.array([[0, 0], [2, 0], [0, 2]]), -1.0, 1.0, sharp=False), 4.0),
         (solids.plate(np.array([[0.0, 0], [4, 0]]), 1.0, 0.0, 1.0), CIRCLE + 8),
         (solids.gear(2.0, 0.0, 1.0), 48 / 2 * math.sin(2 * math.pi / 48) * 4),
+        (solids.annulus(2.0, 3.0, 0.0, 2.0), 48 * math.sin(2 * math.pi / 48) * (9 - 4)),
     ],
 )
 def test_volumes(mesh, expected):
@@ -148,6 +149,15 @@ def test_shapes_of_a_urdf_are_read_with_places_colours_and_scales(tmp_path):
     assert wedge.vertices.min(axis=0) == pytest.approx([0, 0, -1])  # x turned to -z, then lifted by one
     looks = robot_looks(jn.load_robot(path), path)
     assert looks.solids["arm"][0].vertices.min(axis=0) == pytest.approx([5, 0, -1])  # the hand is part of the arm
+
+
+def test_a_link_whose_shape_cannot_be_read_is_a_bar(tmp_path):
+    path = tmp_path / "two.urdf"
+    path.write_text(URDF.replace('xyz="0 0 1" rpy', 'xyz="0 zero 1" rpy'))
+    assert not file_shapes(path)["hand"]
+    looks = robot_looks(jn.load_robot(path), path)
+    assert np.ptp(looks.solids["base"][0].vertices, axis=0).tolist() == [1, 2, 3]  # from the file
+    assert looks.solids["arm"]
 
 
 def test_shapes_of_an_mjcf_are_read(tmp_path):

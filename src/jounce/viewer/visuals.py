@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -46,8 +47,11 @@ def robot_looks(robot: Robot, path: Path | None = None) -> Looks:
         if link in robot.frames:
             body, position, rotation = _body_of(robot, link)
             found[body] += [Solid(s.vertices @ rotation.T + position, s.faces, s.colour, s.opacity) for s in solids]
-    if not any(found.values()):
-        found = _bars(robot, size, colours)
+    bars = _bars(robot, size, colours)
+    bare = not any(found.values())
+    for link in links:  # a base without shapes stands on nothing, as in its file, unless all is bars
+        if not found[link] and (bare or link != robot.base):
+            found[link] = bars[link]
     return Looks(
         solids={link: tuple(solids) for link, solids in found.items()},
         stretches=(),
@@ -143,23 +147,32 @@ def file_shapes(path: Path) -> dict[str, list[Solid]]:
 
 def _of_urdf(root: Any, path: Path) -> dict[str, list[Solid]]:
     """Return what the elements ``<visual>`` show."""
-    materials = {m.attributes.get("name"): _rgba(m) for m in root.every("material") if _rgba(m) is not None}
+    materials = {}
+    for material in root.every("material"):
+        with suppress(ValueError):
+            materials[material.attributes.get("name")] = _rgba(material)
     found: dict[str, list[Solid]] = {}
     for link in root.every("link"):
         solids = []
         for visual in link.every("visual"):
-            geometry = visual.first("geometry")
-            shape = geometry.children[0] if geometry is not None and geometry.children else None
-            if shape is None:
-                continue
-            own = visual.first("material")
-            rgba = None if own is None else _rgba(own) or materials.get(own.attributes.get("name"))
-            position, rotation = _origin(visual.first("origin"))
-            for vertices, faces, colour in _shape(shape, path):
-                placed = vertices @ rotation.T + position
-                solids.append(_coloured(placed, faces, rgba if rgba is not None else colour))
+            with suppress(KeyError, ValueError):  # words where numbers should be: a bar is shown instead
+                solids += _visual(visual, materials, path)
         found[link.attributes["name"]] = solids
     return found
+
+
+def _visual(visual: Any, materials: Any, path: Path) -> list[Solid]:
+    geometry = visual.first("geometry")
+    shape = geometry.children[0] if geometry is not None and geometry.children else None
+    if shape is None:
+        return []
+    own = visual.first("material")
+    rgba = None if own is None else _rgba(own) or materials.get(own.attributes.get("name"))
+    position, rotation = _origin(visual.first("origin"))
+    return [
+        _coloured(vertices @ rotation.T + position, faces, rgba if rgba is not None else colour)
+        for vertices, faces, colour in _shape(shape, path)
+    ]
 
 
 def _rgba(material: Any) -> tuple[float, ...] | None:
