@@ -245,14 +245,15 @@ def draw(found: dict[str, list[Point]], path: Path) -> None:
     from jounce.plot.style import LINE_COLOURS, RESOLUTION, blank_figure, style
 
     with style():
-        figure = blank_figure(7.5, 4.0, "Double pendulum from horizontal rest")
+        figure = blank_figure(7.5, 3.8)
         axes = figure.subplots()
+        axes.set_title("Double pendulum from horizontal rest")
         for (name, points), marker, colour in zip(found.items(), "os^Dv", LINE_COLOURS, strict=False):
             times, errors = [s * 1e3 for _, s, _ in points], [e for _, _, e in points]
             axes.loglog(times, errors, color=colour, marker=marker, label=name)
         axes.set_xlabel("time for 10 s of motion, one core  (ms)")
         axes.set_ylabel("error of the angles at 10 s  (rad)")
-        figure.legend(loc="outside right upper")
+        axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0))
         figure.savefig(path, dpi=RESOLUTION)
     print(f"wrote {path}")
 
