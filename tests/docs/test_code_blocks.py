@@ -3,7 +3,6 @@
 import pathlib
 import re
 import shlex
-import shutil
 
 import pytest
 
@@ -73,6 +72,4 @@ def test_commands_in_the_pages_run(page, run, tmp_path, monkeypatch):
             program, *arguments = shlex.split(command, comments=True)
             assert program == "jounce", line
             status, _, err = run(*arguments)
-            without_films = ".mp4" in line and shutil.which("ffmpeg") is None
-            assert status == (2 if without_films else 0), f"{line}: {err}"
-            assert ("ffmpeg" in err) == without_films
+            assert status == 0, f"{line}: {err}"

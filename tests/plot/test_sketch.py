@@ -203,15 +203,22 @@ def test_times_of_frames():
             frame_instants([0.0, 1.0], speed=wrong)
 
 
-def test_a_film_that_cannot_be_written_is_told_before(four_bar, tmp_path, monkeypatch):
-    from matplotlib.animation import FFMpegWriter
+def test_an_mp4_has_its_frames(four_bar, tmp_path):
+    from imageio_ffmpeg import count_frames_and_secs
 
+    animate(four_bar, tmp_path / "film.mp4", speed=0.5, fps=5)  # 2 s of motion
+    frames, seconds = count_frames_and_secs(str(tmp_path / "film.mp4"))
+    assert frames == 21
+    assert seconds == pytest.approx(21 / 5, abs=0.01)
+
+
+def test_a_film_that_cannot_be_written_is_told_before(four_bar, tmp_path, monkeypatch):
     with pytest.raises(jn.OutputError, match=r"\.gif, \.mp4"):
         animate(four_bar, tmp_path / "film.avi")
     with pytest.raises(jn.OutputError, match="does not exist"):
         check_animation(tmp_path / "none" / "film.gif")
-    monkeypatch.setattr(FFMpegWriter, "isAvailable", classmethod(lambda _: False))
-    with pytest.raises(jn.OutputError, match=r"needs the program ffmpeg.*write a \.gif"):
+    monkeypatch.setattr("jounce.plot.animation._ffmpeg", lambda: None)
+    with pytest.raises(jn.OutputError, match=r"needs ffmpeg.*write a \.gif"):
         animate(four_bar, tmp_path / "film.mp4")
     assert not list(tmp_path.iterdir())
 

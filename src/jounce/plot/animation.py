@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import numbers
+import shutil
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
@@ -34,12 +36,20 @@ def check_animation(path: str | PathLike[str]) -> None:
         The ending is not .gif or .mp4, the folder does not exist, or there is no ffmpeg, which .mp4 needs.
     """
     check_target(path, ANIMATION_SUFFIXES, "an animation")
-    if Path(fspath(path)).suffix.lower() == ".mp4":
-        from matplotlib.animation import FFMpegWriter
+    if Path(fspath(path)).suffix.lower() == ".mp4" and _ffmpeg() is None:
+        message = 'an .mp4 needs ffmpeg, which is not there: pip install "jounce[viewer]", or write a .gif'
+        raise OutputError(message, path=fspath(path))
 
-        if not FFMpegWriter.isAvailable():
-            message = "an .mp4 needs the program ffmpeg, which is not there; install it, or write a .gif"
-            raise OutputError(message, path=fspath(path))
+
+def _ffmpeg() -> str | None:
+    """Return the program ffmpeg: that of the system, or the one that comes with imageio-ffmpeg."""
+    found = shutil.which("ffmpeg")
+    if found is None:
+        with suppress(ImportError, RuntimeError):
+            from imageio_ffmpeg import get_ffmpeg_exe
+
+            found = get_ffmpeg_exe()
+    return found
 
 
 def frame_instants(time: Any, *, speed: float | None = None, fps: int = FRAMES_PER_SECOND) -> np.ndarray:
@@ -109,7 +119,7 @@ def animate(
     motion : Motion
         Each frame shows its nearest instant; those that were not solved are left out.
     path : str or path
-        The ending tells the kind; .mp4 needs ffmpeg.
+        The ending tells the kind; .mp4 needs ffmpeg, of the system or of the extra ``viewer``.
     speed : float, optional
         Seconds of motion in a second of film; see `frame_instants`.
     fps : int, default 25
@@ -135,6 +145,7 @@ def animate(
     >>> motion = jn.solve(jn.load("examples/four_bar.yaml"), order=0)
     >>> animate(motion, "four_bar.gif", fps=10)  # doctest: +SKIP
     """
+    import matplotlib as mpl
     import matplotlib.animation as films
 
     if names not in NAMES:
@@ -158,7 +169,8 @@ def animate(
         if kind == ".gif"
         else films.FFMpegWriter(fps=fps, extra_args=["-pix_fmt", "yuv420p"])
     )
-    with style(), replacing(path) as beside:
+    program: dict[Any, Any] = {"animation.ffmpeg_path": _ffmpeg()} if kind == ".mp4" else {}
+    with style(), mpl.rc_context(program), replacing(path) as beside:
         drawing = Drawing(scene, found, mechanism.title, None if mechanism.space == "planar" else view)
         drawing.show(0)
         drawing.write_names(0, names, still=False)
