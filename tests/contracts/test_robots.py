@@ -12,7 +12,7 @@ import jounce as jn
 from tests.problems.robots import NAMES, body_poses, coordinates, poses, robot_named
 
 ORDER = 5  # of q, everywhere, so that each function is compiled once for a robot
-QUICK = ("planar_arm", "mimic", "floating_solo12")
+QUICK = ("mimic", "floating_solo12")
 
 
 @pytest.fixture(scope="module", params=[n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in NAMES])

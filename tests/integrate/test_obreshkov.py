@@ -65,6 +65,7 @@ def test_dense_output_joins_the_derivatives_of_both_ends():
             assert np.allclose(value, oracle(t), rtol=1e-13, atol=1e-13)
 
 
+@pytest.mark.slow
 def test_estimate_of_the_error_is_that_of_one_step():
     method = jn.Obreshkov(4)
     tolerance = 1e-9

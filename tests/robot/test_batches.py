@@ -119,6 +119,7 @@ def test_nan_stays_in_its_sample(torque):
     np.testing.assert_allclose(found[rest], torque[rest], rtol=0, atol=1e-14 * np.abs(torque).max())
 
 
+@pytest.mark.slow
 def test_functions_of_jax_run_through(torque):
     expected = torque[:6].reshape(2, 3, 2, 4)
     q = Q[:6].reshape(2, 3, 4, 4)

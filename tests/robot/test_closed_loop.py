@@ -163,6 +163,7 @@ def test_five_bar_against_its_closed_form(five_bar):
             assert abs(found[2, 1, k] - rate) <= 1e-12
 
 
+@pytest.mark.slow
 def test_five_bar_is_closed_where_mujoco_closes_it(five_bar):
     robot, motion = five_bar
     model = mujoco.MjModel.from_xml_path(str(FIVE_BAR))
@@ -190,6 +191,7 @@ def agrees_with_pinocchio(robot, motion):
     return model, q, torque
 
 
+@pytest.mark.slow
 def test_five_bar_against_pinocchio(five_bar):
     agrees_with_pinocchio(*five_bar)
 

@@ -117,7 +117,7 @@ def shuffled(robot, seed):
     return jn.Robot("shuffled", links, joints, robot.gravity)
 
 
-@pytest.mark.parametrize("seed", [0, 2])
+@pytest.mark.parametrize("seed", [pytest.param(0, marks=pytest.mark.slow), 2])
 def test_names_and_order_of_the_list_do_not_matter(seed):
     other = shuffled(ROBOT, seed)
     order = [other.joint_names.index(renamed(name)) for name in ROBOT.joint_names]
