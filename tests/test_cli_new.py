@@ -1,5 +1,6 @@
 """``jounce new``: the starter files, each of which runs; and what is refused."""
 
+import functools
 import json
 import pathlib
 import shlex
@@ -91,6 +92,7 @@ def test_the_list_as_json(run):
     assert found["next"][0] == "jounce run cam.yaml"
 
 
+@functools.cache
 def solved(name):
     path = pathlib.Path(jn.__file__).parent / "templates" / f"{name}.yaml"
     mechanism = jn.load(path)

@@ -19,7 +19,7 @@ MECHANISMS = {
 }
 QUICK = {("Taylor", "double pendulum")}
 APART = {("Obreshkov 4", "double pendulum"), ("Obreshkov 6", "double pendulum")}  # each compiles for half a minute
-APART |= {("Obreshkov 4", "spatial double pendulum"), ("Obreshkov 8", "spatial double pendulum")}
+APART |= {(f"Obreshkov {order}", "spatial double pendulum") for order in (4, 6, 8)}
 CASES = [
     pytest.param(method, name, marks=() if (method, name) in QUICK else pytest.mark.slow)
     for name in MECHANISMS

@@ -18,12 +18,14 @@ BANK = (
     *("inverted_slider_crank_distance", "inverted_slider_crank_slide", "screw_press", "hooke_joint", "rssr", "rccc"),
     *("swash_plate", "rspu_slide", "rspu_distance", "stewart_platform"),
 )
+SECOND_RATE = ("slider_crank", "epicyclic", "rolling_disc", "screw_press", "rssr")  # of power; the others to the first
 
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=() if n == "slider_crank" else pytest.mark.slow) for n in BANK])
 def test_power_balance_of_the_bank(name):
     # the two sides share no code but the motion; 2e-15 measured, 6e-14 at the second rate of the screw press
-    balance = jn.power_balance(jn.solve(massed_example(name), TIME, order=4))
+    order = 4 if name in SECOND_RATE else 3
+    balance = jn.power_balance(jn.solve(massed_example(name), TIME, order=order))
     left = (np.abs(balance["residual"]) / balance["scale"].max("time")).max("time")
     assert float(balance["scale"].min()) > 0
     assert (left <= 3e-13).all(), left.values

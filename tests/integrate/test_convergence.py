@@ -23,7 +23,7 @@ METHODS = {  # steps in s, between those that are too long for the leading term 
     "Obreshkov 8": (jn.Obreshkov(8, step=BIG), [1 / 24, 1 / 32, 1 / 40]),
 }
 QUICK = {("Taylor 5", "plane"), ("Obreshkov 4", "plane")}
-SPATIAL = ("Taylor 8", "Obreshkov 4", "Obreshkov 8")  # these stand for the others: programs in space compile for long
+SPATIAL = ("Taylor 8", "Obreshkov 4")  # these stand for the others: programs in space compile for long
 CASES = [
     pytest.param(method, space, marks=() if (method, space) in QUICK else pytest.mark.slow)
     for method in METHODS
