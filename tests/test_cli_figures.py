@@ -60,3 +60,22 @@ def test_bad_input_ends_with_a_message(run, tmp_path, monkeypatch, arguments, pa
     assert (status, printed) == (2, "")
     assert part in message
     assert not list(tmp_path.iterdir())
+
+
+def test_the_view_says_which_packages_it_needs(run, monkeypatch):
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    status, out, err = run("view", FOUR_BAR)
+    assert (status, out) == (2, "")
+    assert err.startswith("error: the view needs the package viser")
+    assert 'pip install "jounce[viewer]"' in err
+
+
+@pytest.mark.parametrize("command", ["new", "inspect", "run", "simulate", "plot", "report", "view", "check", "convert"])
+def test_help_fits_a_terminal_and_has_examples(run, monkeypatch, command):
+    monkeypatch.setenv("COLUMNS", "80")
+    status, out, _ = run(command, "--help")
+    assert status == 0
+    assert f"  jounce {command} " in out.partition("Examples:")[2]
+    summary = out.split("\n\n")[1]
+    assert "\n" not in summary
+    assert len(summary) < 72

@@ -48,7 +48,7 @@ EXAMPLES = {
     plot: """\
   jounce plot examples/four_bar.yaml --out four_bar.png
   jounce plot examples/rsur.yaml --order 6 --output psi --output C
-  jounce plot examples/four_bar.yaml --kind sketch --derivative 3 --out sketch.svg
+  jounce plot examples/four_bar.yaml --kind sketch --derivative 3
   jounce plot examples/press.yaml --kind reactions --output main --output knee
   jounce plot examples/andrews.yaml --out andrews.gif""",
     report: """\
@@ -57,7 +57,8 @@ EXAMPLES = {
     view: """\
   jounce view examples/four_bar.yaml
   jounce view examples/press.yaml --order 6 --set "stroke=80 mm"
-  jounce view examples/robots/panda.urdf examples/trajectories/panda_wave.yaml --no-open --port 8080""",
+  jounce view examples/robots/panda.urdf \\
+    examples/trajectories/panda_wave.yaml --port 8080 --no-open""",
     check: """\
   jounce check examples/robots/panda.urdf examples/trajectories/panda_good.csv
   jounce check examples/robots/panda.urdf \\
@@ -86,6 +87,7 @@ FIRST = """\
   jounce inspect four-bar.yaml                 # what is in it, can it move?
   jounce run four-bar.yaml                     # peaks, position to jounce
   jounce plot four-bar.yaml --out four-bar.png
+  jounce view four-bar.yaml                    # moving, in the browser
   jounce convert robot.urdf robot.yaml         # a robot as a mechanism
 
 jounce COMMAND --help explains a command, with examples."""

@@ -19,7 +19,7 @@ def completion(shell: Literal["bash", "zsh", "fish"], /, *, install: bool = Fals
     shell
         bash, zsh or fish.
     install
-        Write the script where the shell looks for it, and have its start-up file read it.
+        Write it where the shell looks for it, and have it read.
     out
         Write the script to this file, and leave start-up files alone.
     """

@@ -28,7 +28,8 @@ def convert(
 
     Mechanism files are YAML, TOML or JSON, robot files URDF or MJCF.
 
-    Values keep their units and expressions; comments are lost. What is written is read back before it takes its place.
+    Values keep their units and expressions; comments are lost. What is
+    written is read back before it takes its place.
 
     Parameters
     ----------
@@ -37,7 +38,7 @@ def convert(
     target
         Mechanism file to write: .yaml, .yml, .toml or .json.
     drive
-        JOINT=LAW: a value with a unit or an expression of t; repeatable.
+        JOINT=LAW, a value or an expression of t; repeatable.
     start
         JOINT=VALUE with a unit, where a joint starts; repeatable.
     hold

@@ -49,35 +49,34 @@ def plot(
     set_: list[str] | None = None,
     import_: list[Path] | None = None,
 ) -> int:
-    """Solve a mechanism file, or simulate one with initial conditions, and draw the motion.
+    """Draw outputs, a sketch, reactions, energies, or a film.
+
+    A file with initial conditions is simulated, any other is solved.
 
     Parameters
     ----------
     file
         Mechanism file: .yaml, .yml, .toml or .json.
     kind
-        What is drawn: the outputs and their derivatives, a sketch with joint symbols, the hodograph of a point, a phase
-        portrait, energies, the balance of power, reactions, or a moving sketch [default: outputs].
+        What is drawn [default: outputs, or a film by its ending].
     order
-        Highest derivative, 0 to 30; 3 is jerk, 4 jounce [default: 4, or what is needed].
+        Highest derivative, to 30 [default: 4, or what is needed].
     out
-        Figure, .png, .svg or .pdf, or film, .gif or .mp4 [default: FILE's name.png].
+        .png, .svg, .pdf, .gif or .mp4 [default: FILE's name.png].
     output
-        Name of an output to draw, of a point whose path is drawn, or of a joint, driver or force for reactions;
-        repeatable; all unless given.
+        Output, point with a path, or joint; repeatable [all].
     derivative
-        Of a hodograph [default: 1, velocity]; of the upward axis of a phase portrait, over the one below it; by whose
-        size paths in a sketch are coloured.
+        Of a hodograph, a portrait, or the colour of paths.
     instant
         Time that a sketch shows, s.
     names
-        Written in a sketch or film [default: all in a sketch, bodies in a film].
+        Written in a sketch or film.
     azimuth
-        From where a spatial mechanism is seen, degrees.
+        Around a spatial mechanism, degrees.
     elevation
-        From how high, degrees.
+        Above it, degrees.
     speed
-        Seconds of motion in a second of film [default: 1, or for 2 to 20 s of film].
+        Seconds of motion in a second of film.
     fps
         Frames in a second of film.
     set_
@@ -195,10 +194,11 @@ def report(
     set_: list[str] | None = None,
     import_: list[Path] | None = None,
 ) -> int:
-    """Solve a mechanism file, or simulate one with initial conditions, and write a page to explore the motion in.
+    """Write a page to explore a motion in: one HTML file, offline.
 
-    The page is one file and needs no network: a moving sketch, plots of all outputs and derivatives, peak values,
-    parameters, bodies and joints.
+    A moving sketch, plots of all outputs and derivatives, peak values,
+    parameters, bodies and joints. A file with initial conditions is
+    simulated, any other is solved.
 
     Parameters
     ----------
@@ -209,9 +209,9 @@ def report(
     out
         The page, .html [default: FILE's name.html].
     azimuth
-        From where a spatial mechanism is seen, degrees.
+        Around a spatial mechanism, degrees.
     elevation
-        From how high, degrees.
+        Above it, degrees.
     set_
         NAME=VALUE of a parameter, with a unit; repeatable.
     import_

@@ -30,13 +30,13 @@ def check(
     robot
         Robot file: URDF (.urdf) or MJCF (.xml).
     trajectory
-        Samples (.csv), or laws or a motion (.yaml, .yml, .toml or .json).
+        Samples (.csv), laws or a motion (.yaml, .toml, .json).
     limits
         File of limits, which go before those of the robot file.
     out
         Draw the joints' shares of their limits: .png, .svg or .pdf.
     payload
-        LINK=MASS held in the origin of a link, with a unit; repeatable.
+        LINK=MASS with a unit, held in its origin; repeatable.
     degree
         Of the splines through samples, odd from 3 to 11.
     json

@@ -19,16 +19,18 @@ def view(
     set_: list[str] | None = None,
     import_: list[Path] | None = None,
 ) -> int:
-    """Show a mechanism or a robot in the browser: moving, with arrows, plots, forces and live parameters.
+    """Show a mechanism or a robot in the browser, moving.
 
-    The page is served on this machine only, and needs no network. Ctrl-C ends it.
+    With arrows, paths, plots, forces, and a slider for each parameter.
+    The page is served on this machine only, and needs no network. Ctrl-C
+    ends it.
 
     Parameters
     ----------
     file
-        Mechanism file (.yaml, .yml, .toml or .json), or robot: URDF (.urdf) or MJCF (.xml).
+        Mechanism file, or robot file: .urdf or .xml.
     trajectory
-        Of a robot: samples (.csv), or laws or a motion (.yaml, .yml, .toml or .json); its joints swing unless given.
+        Of a robot (.csv, .yaml, .toml, .json); it swings without.
     port
         Of this machine; 0 takes one that is free.
     no_open
@@ -36,14 +38,16 @@ def view(
     order
         Highest derivative of arrows and plots, 0 to 30.
     set_
-        NAME=VALUE of a parameter of a mechanism, with a unit; repeatable.
+        NAME=VALUE of a parameter, with a unit; repeatable.
     import_
         Python file with your own joints and forces; repeatable.
     """
     from jounce.kinematics.solve import checked_order
     from jounce.viewer import view as show
+    from jounce.viewer.exports import check_installed
     from jounce.viewer.server import MECHANISM_FILES
 
+    check_installed()
     subject: object = file
     try:
         checked_order(order)

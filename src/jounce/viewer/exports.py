@@ -14,7 +14,7 @@ from jounce.errors import JounceError
 from jounce.viewer.prepared import Prepared
 from jounce.viewer.take import Take
 
-__all__ = ["animation", "file_name", "picture", "quiet_server", "quiet_stop", "table"]
+__all__ = ["animation", "check_installed", "file_name", "picture", "quiet_server", "quiet_stop", "table"]
 
 SMOOTH = 1 / 30  # s between two pictures of an animation
 
@@ -78,6 +78,15 @@ def picture(client: Any, height: int | None = None, width: int | None = None) ->
     return stream.getvalue()
 
 
+def check_installed() -> None:
+    """Raise JounceError unless the packages of the extra ``viewer`` are there."""
+    from importlib.util import find_spec
+
+    if find_spec("viser") is None or find_spec("trimesh") is None:
+        message = 'the view needs the package viser, which is not installed: pip install "jounce[viewer]"'
+        raise JounceError(message)
+
+
 def quiet_server(port: int = 0, label: str | None = None) -> Any:
     """Return a viser server that listens on this machine only and prints nothing.
 
@@ -86,11 +95,9 @@ def quiet_server(port: int = 0, label: str | None = None) -> Any:
     JounceError
         If viser is not installed, or the port is taken.
     """
-    try:
-        import viser
-    except ImportError:
-        message = 'the view needs the package viser, which is not installed: pip install "jounce[viewer]"'
-        raise JounceError(message) from None
+    check_installed()
+    import viser
+
     with redirect_stdout(io.StringIO()):
         return viser.ViserServer(host="127.0.0.1", port=port or free_port(), label=label, verbose=False)
 
