@@ -18,7 +18,7 @@ MEMORY_MAPS = 65530  # of a process, unless the system is set up otherwise
 
 @pytest.fixture(autouse=True, scope="module")
 def _few_programs():
-    """Forget compiled programs in time: each takes six memory maps, and XLA dies where Linux gives no more."""
+    """Forget compiled programs in time: each takes some memory maps, and XLA dies where Linux gives no more."""
     yield
     maps = pathlib.Path("/proc/self/maps")
     if maps.exists() and maps.read_text().count("\n") > 0.5 * MEMORY_MAPS:
