@@ -24,6 +24,7 @@ PASSAGE = 1e-3  # of the radius of the series: so near a singular position it is
 PASSAGE_ORDER = 4  # of the series that leads through: rounding spoils higher derivatives near a singular position
 PASSAGE_DEVIATION = 1e-8  # from that series, as a part of the way: two branches a gap of g apart deviate by (g / way)^2
 NEARLY_SINGULAR = 1e-6  # of the span: a motion that ends so short before a singular position ends at it
+NEARBY = 0.1  # radii: a singular position nearer than this spoils high derivatives, if the motion is smooth there
 SMALL_BATCH, LARGE_BATCH = 64, 512  # lanes; a batch width compiles once, so a short grid uses one
 
 
@@ -129,6 +130,16 @@ class Track:
     status: Status = Status.OK
     ended_at: float = np.inf
     culprit: str = ""
+
+    def singular_positions_outside(self) -> list[ChangePoint]:
+        """Return where the motion would be singular just before its start or after its end, and smooth all the same."""
+        first, last = self.anchors[0], self.anchors[-1]
+        found = [
+            ChangePoint(anchor.instant + sense * anchor.reach, anchor.radius)
+            for anchor, sense in ((first, -1), (last, 1))
+            if sense * anchor.turnover < 0 and anchor.reach < NEARBY * anchor.radius
+        ]
+        return found if self.status == Status.OK else found[:1]
 
 
 def follow(solver: Solver, start: Anchor, stop: float, span: float, first_step: float = np.inf) -> Track:

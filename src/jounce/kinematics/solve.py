@@ -86,7 +86,8 @@ def solve(
     track = follow(solver, _first(solver, coordinates, instants[:1]), instants[-1], instants[-1] - instants[0])
     grid = Grid(solver, track, instants)
     grid.solve(progress)
-    motion = Motion(mechanism, model, instants, order, grid.state, grid.status, grid.culprits)
+    change_points = np.array([point.instant for point in track.change_points])
+    motion = Motion(mechanism, model, instants, order, grid.state, grid.status, grid.culprits, change_points)
     if strict:
         raise_for_status(motion)
     return motion
