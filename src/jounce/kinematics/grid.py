@@ -12,7 +12,7 @@ import jax
 import numpy as np
 
 from jounce.kinematics.bridge import LARGEST_DISAGREEMENT, bridged, half_width, spoiled_width
-from jounce.kinematics.path import LARGE_BATCH, SMALL_BATCH, ChangePoint, Solver, Track, follow
+from jounce.kinematics.path import LARGE_BATCH, PASSABLE, SMALL_BATCH, ChangePoint, Solver, Track, follow
 from jounce.kinematics.status import Status
 
 LONG_GRID = 1024  # instants: from here on in large batches
@@ -81,7 +81,8 @@ class Grid:
         self._keep(_slice_of(lanes), (arrival.coordinates, arrival.outputs, arrival.sign))
         for k in np.flatnonzero(arrival.status != Status.OK).tolist():
             self.culprits[int(lanes[k])] = self.solver.culprit(arrival, k)
-            self._rescue(int(lanes[k]))
+            if arrival.status[k] not in PASSABLE:
+                self._rescue(int(lanes[k]))
 
     def _away(self, lanes: np.ndarray, source: np.ndarray) -> np.ndarray:
         return np.abs(self.time[lanes] - self._instants[source])
@@ -101,7 +102,7 @@ class Grid:
         if local.status != Status.OK:
             self.status[lane], self.culprits[lane] = local.status, local.culprit
         elif len(local.anchors) > 1:
-            self.status[lane] = Status.OK
+            self.status[lane] = local.anchors[-1].status
             self.culprits.pop(lane)
             self._keep(slice(lane, lane + 1), local.anchors[-1].state)
 
