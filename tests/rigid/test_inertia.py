@@ -113,11 +113,16 @@ PRODUCTS = [[1.0, 0.1, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
             lambda: jn.Inertia(1.0, tensor=PRODUCTS),
             "inertia: must be symmetric, got [[1.0, 0.1, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]",
         ),
-        (lambda: jn.Inertia(1.0, tensor=[-1, 1, 1]), "inertia: has a negative principal moment, got -1.0"),
+        (
+            lambda: jn.Inertia(1.0, tensor=[-1, 1, 1]),
+            "inertia: has a negative principal moment, got -1.0; check the units, the signs of the products of inertia "
+            "and the axes, or compute with the numbers as they are, by strict=False",
+        ),
         (
             lambda: jn.Inertia(1.0, tensor=[1, 1, 4]),
             "inertia: breaks the triangle inequality: the largest principal moment exceeds the sum of the others, got "
-            "[1.0, 1.0, 4.0]; check the units, the signs of the products of inertia and the axes",
+            "[1.0, 1.0, 4.0]; check the units, the signs of the products of inertia and the axes, or compute with the "
+            "numbers as they are, by strict=False",
         ),
         (lambda: jn.Inertia.total([]), "parts: the sum of inertias needs at least one, got an empty list"),
     ],

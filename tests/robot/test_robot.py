@@ -165,7 +165,8 @@ REFUSED = [
     ),
     (
         lambda: jn.Robot("r", [jn.Link("base"), jn.Link("a")], [pin("x", "base", "a")]),
-        "links.a.inertia: this joint moves no mass, got nothing; give its link, or one that it carries, an inertia",
+        "links.a.inertia: this joint moves no mass, got nothing; give its link, or one that it carries, an inertia, or "
+        "keep it with strict=False, where its torque is zero",
     ),
     (
         lambda: chain(

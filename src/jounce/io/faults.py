@@ -9,7 +9,7 @@ __all__ = ["Faults"]
 
 MASSLESS = "these links move but have no mass"
 IDLE = "these links move and neither have nor carry mass, so that a simulation has no answer unless they are driven"
-FOLLOWS_NONE = "these joints follow one that the file does not have or that does not move, and are taken as free"
+FOLLOWS_NONE = "these joints follow one that the file does not have, and are taken as free"
 HEADINGS = {
     NEGATIVE: "a principal moment of inertia is negative",
     TRIANGLE: "a principal moment of inertia exceeds the sum of the others",

@@ -16,6 +16,7 @@ from jounce.robot.robot import Robot
 __all__ = ["load_robot"]
 
 ENDINGS = (".urdf", ".xml")
+LOOKS = ("visual", "collision")
 XACRO = "is a xacro file, from which a URDF has yet to be made; run: xacro FILE.urdf.xacro > FILE.urdf"
 
 
@@ -100,8 +101,14 @@ def load_robot(
 
 
 def _check_expanded(root: Element) -> None:
-    """Refuse what xacro has yet to work out."""
-    for element in root.walk():
+    """Refuse what xacro has yet to work out, where it bears on links and joints."""
+    used = [root]
+    for child in root.children:
+        if child.tag in ("link", "joint"):
+            used += [element for part in child.children if part.tag not in LOOKS for element in part.walk()]
+        if child.tag in ("link", "joint") or child.tag.startswith("xacro:"):
+            used.append(child)
+    for element in used:
         if element.tag.startswith("xacro:"):
             raise element.error(XACRO, value=f"<{element.tag}>")
         for value in element.attributes.values():

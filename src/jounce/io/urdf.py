@@ -297,17 +297,17 @@ def _joints(joint: Any, element: Element, mimics: dict[str, Mimic]) -> tuple[lis
 
 
 def _mimics(given: list[Any], joints: dict[str, Element], faults: Faults) -> dict[str, Mimic]:
-    """Return what joints follow; one that follows none that moves is free, as in Pinocchio."""
-    moving = {joint.name for joint in given if joint.type not in ("fixed", *EXPANDED)}
+    """Return what joints follow; one that follows a joint which is not there is free, as in Pinocchio."""
+    leading = [joint.name for joint in given if joint.type not in ("fixed", *EXPANDED) and joint.mimic is None]
     found = {}
     for joint in given:
         mimic, element = joint.mimic, joints[joint.name].first("mimic")
         if mimic is None or element is None or joint.type == "fixed":
             continue
-        if mimic.joint in moving:
+        if mimic.joint in joints:
             found[joint.name] = Mimic(mimic.joint, mimic.multiplier, mimic.offset)
             continue
-        message = f"must follow a moving joint; {did_you_mean(mimic.joint, moving)}"
+        message = f"must follow a moving joint that follows no other; {did_you_mean(mimic.joint, leading)}"
         error = element.error(message, "joints", joint.name, "mimic", value=mimic.joint)
         faults.add(FOLLOWS_NONE, joint.name, error)
     return leaders(found)

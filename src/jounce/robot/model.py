@@ -99,7 +99,7 @@ def leaders(mimics: Mapping[str, Mimic]) -> dict[str, Mimic]:
             leader = mimics[mimic.joint]
             offset = mimic.multiplier * leader.offset + mimic.offset
             mimic = Mimic(leader.joint, mimic.multiplier * leader.multiplier, offset)
-        found[name] = mimic
+        found[name] = mimics[name] if mimic.joint in passed else mimic
     return found
 
 
