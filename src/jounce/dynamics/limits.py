@@ -258,7 +258,7 @@ class _Bounds:
     def __init__(self, robot: Robot, limits: Mapping[str, Limits], rest: np.ndarray):
         every = [limits[name] for name in robot.joint_names]
         largest = np.array([[_or_infinite(getattr(x, field)) for x in every] for field in FIELDS[1:]])
-        faster = largest[ACCELERATION - 1]
+        faster = largest[ACCELERATION - 1].copy()
         slower = np.array([_or_infinite(x.deceleration) for x in every])
         given = np.isfinite(slower)
         bound = np.where(np.isfinite(faster), faster, slower)
