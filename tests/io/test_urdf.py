@@ -301,10 +301,10 @@ def test_a_quaternion_that_is_none_or_stands_beside_angles(tmp_path, origin):
 @pytest.mark.parametrize(
     "limit, expected",
     [
-        ('acceleration="5" deceleration="7" jerk="100"', {"acceleration": 5, "deceleration": 7, "jerk": 100}),
+        ('acceleration="5" deceleration="7" jerk="100"', {"acceleration": 5.0, "deceleration": 7.0, "jerk": 100.0}),
         ('lower="0" upper="0" effort="0" velocity="0" acceleration="0" jerk="inf"', {}),
-        ('upper="2"', {"lower": 0, "upper": 2}),
-        ('lower="-2" upper="inf"', {"lower": -2}),
+        ('upper="2"', {"lower": 0.0, "upper": 2.0}),
+        ('lower="-2" upper="inf"', {"lower": -2.0}),
         ('lower="0.5" upper="0.5"', {"lower": 0.5, "upper": 0.5}),
     ],
 )
