@@ -91,12 +91,11 @@ def test_a_body_that_can_move_with_negative_kinetic_energy_is_named():
 
 def test_a_massless_link_at_the_end_of_a_robot_has_to_be_driven_in_a_simulation():
     inertia = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0], tensor=[0.01, 0.02, 0.02])
-    links = [jn.Link("base"), jn.Link("ring"), jn.Link("arm", inertia), jn.Link("tip")]
-    joints = [jn.Joint("a", "base", "ring"), jn.Joint("b", "ring", "arm", axis=[0, 1, 0])]
-    joints.append(jn.Joint("c", "arm", "tip", axis=[1, 0, 0], position=[0.5, 0, 0]))
+    links = [jn.Link("base"), jn.Link("arm", inertia), jn.Link("tip")]
+    joints = [jn.Joint("b", "base", "arm", axis=[0, 1, 0]), jn.Joint("c", "arm", "tip", position=[0.5, 0, 0])]
     robot = jn.Robot("end", links, joints, strict=False)
     refused(jn.MechanismError, r"bodies\.tip\.mass: the body can move but has no mass", robot.mechanism())
-    assert start(robot.mechanism(drivers={"c": 0.3}), 0.0).mobility.startswith("2 degrees of freedom")
+    assert start(robot.mechanism(drivers={"c": 0.3}), 0.0).mobility.startswith("1 degree of freedom")
 
 
 def test_conditions_that_contradict_each_other_or_the_joints():
