@@ -97,12 +97,15 @@ def _robot(
     from jounce.io.conversion import assigned, robot_mechanism, with_file_names
     from jounce.io.formats import dumped
     from jounce.io.writer import mechanism_data
+    from jounce.mechanism.masses import body_mass
 
     robot, renamed = with_file_names(given)
     laws = assigned(robot, drive or (), "--drive", law=True)
     begin: dict[str, Any] = assigned(robot, start or (), "--start", law=False)
     try:
         mechanism = robot_mechanism(robot, begin, laws, hold=hold, drives=drives)
+        for name, body in mechanism.bodies.items():
+            body_mass(name, body, {}, 3)  # mechanism files hold bodies as real ones only
         data, _ = mechanism_data(mechanism, target.stem)
     except JounceError as error:
         raise error.located(path=source) from None
