@@ -52,6 +52,7 @@ from jounce.errors import (  # noqa: E402
     OutputError as OutputError,
     RobotError as RobotError,
     RobotFileError as RobotFileError,
+    RobotWarning as RobotWarning,
     SampleWarning as SampleWarning,
     SingularityError as SingularityError,
     SolveError as SolveError,

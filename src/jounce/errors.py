@@ -21,6 +21,7 @@ __all__ = [
     "OutputError",
     "RobotError",
     "RobotFileError",
+    "RobotWarning",
     "SampleWarning",
     "SingularityError",
     "SolveError",
@@ -217,6 +218,10 @@ class TrajectoryError(JounceError):
 
 class SingularityError(JounceError):
     """An orientation or a configuration is singular: what was asked for does not exist or is not unique there."""
+
+
+class RobotWarning(UserWarning):
+    """A robot file holds what no real robot has, and is read all the same: negative moments of inertia, no mass."""
 
 
 class SampleWarning(UserWarning):

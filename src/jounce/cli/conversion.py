@@ -22,6 +22,7 @@ def convert(
     hold: bool = False,
     drives: bool = False,
     force: bool = False,
+    strict: bool = False,
     import_: list[Path] | None = None,
 ) -> int:
     """Turn a mechanism file into another format, a robot into a mechanism.
@@ -47,6 +48,8 @@ def convert(
         Take over damping and armature of a robot's drives.
     force
         Replace a file that is there.
+    strict
+        Refuse a robot whose links are as those of no real one.
     import_
         Python file with your own joints; repeatable.
     """
@@ -61,8 +64,10 @@ def convert(
     check_target(target, SUFFIXES, "mechanism file")
     refuse_existing(target, force=force)
     if suffix in ROBOTS:
-        return _robot(source, target, drive, start, hold, drives)
-    given = {"--drive": drive, "--start": start, "--hold": hold, "--drives": drives}
+        from jounce.io.robots import load_robot
+
+        return _robot(load_robot(source, strict=strict), source, target, drive, start, hold, drives)
+    given = {"--drive": drive, "--start": start, "--hold": hold, "--drives": drives, "--strict": strict}
     for option, value in given.items():
         if value:
             raise JounceError("is for robots; a mechanism file keeps its drivers", name=option, path=source)
@@ -87,18 +92,20 @@ def _mechanism(source: Path, target: Path, imports: list[Path] | None) -> int:
 
 
 def _robot(
-    source: Path, target: Path, drive: list[str] | None, start: list[str] | None, hold: bool, drives: bool
+    given: Any, source: Path, target: Path, drive: list[str] | None, start: list[str] | None, hold: bool, drives: bool
 ) -> int:
     from jounce.io.conversion import assigned, robot_mechanism, with_file_names
     from jounce.io.formats import dumped
-    from jounce.io.robots import load_robot
     from jounce.io.writer import mechanism_data
+    from jounce.mechanism.masses import body_mass
 
-    robot, renamed = with_file_names(load_robot(source))
+    robot, renamed = with_file_names(given)
     laws = assigned(robot, drive or (), "--drive", law=True)
     begin: dict[str, Any] = assigned(robot, start or (), "--start", law=False)
     try:
         mechanism = robot_mechanism(robot, begin, laws, hold=hold, drives=drives)
+        for name, body in mechanism.bodies.items():
+            body_mass(name, body, {}, 3)  # mechanism files hold bodies as real ones only
         data, _ = mechanism_data(mechanism, target.stem)
     except JounceError as error:
         raise error.located(path=source) from None

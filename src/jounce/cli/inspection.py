@@ -16,6 +16,7 @@ def inspect(
     *,
     set_: list[str] | None = None,
     import_: list[Path] | None = None,
+    strict: bool = False,
     json: bool = False,
 ) -> int:
     """Tell what is in a mechanism or robot file, and whether it can move.
@@ -34,6 +35,8 @@ def inspect(
         NAME=VALUE of a parameter, with a unit; repeatable.
     import_
         Python file with your own joints; repeatable.
+    strict
+        Refuse a robot whose links are as those of no real one.
     json
         Print the result as JSON.
     """
@@ -48,8 +51,10 @@ def inspect(
         from jounce.io.robot_inspection import inspected_robot
         from jounce.io.robots import load_robot
 
-        facts = inspected_robot(load_robot(file), file)
+        facts = inspected_robot(load_robot(file, strict=strict), file)
     else:
+        if strict:
+            raise JounceError("is for robot files; mechanism files are always read so", name="--strict", path=file)
         from jounce.io.briefing import brief as tell
         from jounce.io.inspection import inspected
 

@@ -19,6 +19,7 @@ def check(
     out: Path | None = None,
     payload: list[str] | None = None,
     degree: int = 5,
+    strict: bool = False,
     json: bool = False,
 ) -> int:
     """Compare a trajectory with the limits of a robot, to torque rate.
@@ -39,6 +40,8 @@ def check(
         LINK=MASS with a unit, held in its origin; repeatable.
     degree
         Of the splines through samples, odd from 3 to 11.
+    strict
+        Refuse a robot whose links are as those of no real one.
     json
         Print the result as JSON.
     """
@@ -53,7 +56,7 @@ def check(
         from jounce.plot import check_figure
 
         check_figure(out)
-    model = load_robot(robot)
+    model = load_robot(robot, strict=strict)
     laid = load_limits(limits, model) if limits is not None else None
     if payload:
         from jounce.io.payloads import with_payloads

@@ -151,6 +151,7 @@ def with_file_names(robot: Robot) -> tuple[Robot, dict[str, str]]:
             dataclasses.replace(given, name=held[given.name], links=[links[name] for name in given.links])
             for given in robot.closures.values()
         ],
+        robot.strict,
     )
     return made, changed
 
