@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from os import PathLike, fspath
 from pathlib import Path
 
 from jounce.errors import RobotFileError
 from jounce.io.markup import Element, read_markup
 from jounce.io.mjcf import read_mjcf
+from jounce.io.reading import check_allowed
 from jounce.io.urdf import read_urdf
 from jounce.robot.robot import Robot
 
@@ -17,7 +19,13 @@ ENDINGS = (".urdf", ".xml")
 XACRO = "is a xacro file, from which a URDF has yet to be made; run: xacro FILE.urdf.xacro > FILE.urdf"
 
 
-def load_robot(path: str | PathLike[str], *, floating_base: bool | str = False, massless: bool = False) -> Robot:
+def load_robot(
+    path: str | PathLike[str],
+    *,
+    floating_base: bool | str = False,
+    massless: bool = False,
+    allow: Iterable[str | PathLike[str]] = (),
+) -> Robot:
     """Read a robot from a URDF or MJCF file.
 
     Which of the two it is, the root element says. Only what moves is read: links, joints and their limits, masses and
@@ -33,6 +41,8 @@ def load_robot(path: str | PathLike[str], *, floating_base: bool | str = False, 
         sequence of the turns. A base that is only a massless frame with one link fixed to it is left out.
     massless : bool, default False
         Take URDF links that move and have no mass as massless pieces between joints, as long as they carry some mass.
+    allow
+        Folders besides that of the file that included files and meshes of MJCF may be below.
 
     Returns
     -------
@@ -71,7 +81,7 @@ def load_robot(path: str | PathLike[str], *, floating_base: bool | str = False, 
     elif root.tag == "mujoco":
         if suffix != ".xml":
             raise RobotFileError("MuJoCo reads MJCF only from files whose names end in .xml; rename it", path=name)
-        robot = read_mjcf(root)
+        robot = read_mjcf(root, check_allowed(allow))
     else:
         message = "is no robot file; the root element of a URDF is <robot>, that of an MJCF file is <mujoco>"
         raise root.error(message, value=f"<{root.tag}>")
