@@ -9,7 +9,8 @@ import pytest
 
 from jounce.errors import MechanismFileError
 from jounce.io import source
-from jounce.io.source import MAX_BYTES, MAX_DEPTH, dotted, read_source
+from jounce.io.reading import MAX_BYTES
+from jounce.io.source import MAX_DEPTH, dotted, read_source
 
 YAML = """\
 title: Four-bar   # a comment

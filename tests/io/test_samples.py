@@ -56,6 +56,6 @@ def test_files_that_cannot_be_read(tmp_path, monkeypatch):
         read_samples(tmp_path / "no.csv")
     with pytest.raises(MechanismFileError, match="the samples cannot be read: Is a directory"):
         read_samples(tmp_path)
-    monkeypatch.setattr("jounce.io.samples.MAX_BYTES", 10)
+    monkeypatch.setattr("jounce.io.reading.MAX_SAMPLES", 10)
     with pytest.raises(MechanismFileError, match="at most 1e-05 MB are read"):
         read_samples(write(tmp_path, "time,lift\n0,1\n"))

@@ -64,6 +64,8 @@ def check_target(
 def _check_replaceable(target: Path, overwrite: bool) -> None:
     if target.is_dir():
         raise OutputError("is a directory, the name of a file is needed")
+    if target.is_symlink():  # though links were followed
+        raise OutputError("is a circle of symbolic links")
     if not target.exists():
         return
     if not (target.is_file() and os.access(target, os.W_OK)):
