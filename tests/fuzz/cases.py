@@ -25,7 +25,7 @@ TIME_LIMIT = 10.0  # s, for one case; they take milliseconds
 WHOLE = re.compile(
     # what is said of a file as a whole, or by MuJoCo, which names no line then
     r"the file is empty|the file of samples is empty|has \d+ lines, at most|has \d+(\.\d+)? MB|MuJoCo cannot use|"
-    r"is in no encoding|the JSON cannot be read: a number has too many digits|The (YAML|TOML) cannot be read"
+    r"is in no encoding|need at least \d+ samples|at least two samples are needed|no spline goes through|the JSON cannot be read: a number has too many digits|The (YAML|TOML) cannot be read"
 )
 
 
@@ -63,9 +63,7 @@ def judged(reader: str, content: bytes, folder: pathlib.Path, limit: float = TIM
     printed = io.StringIO()
     try:
         with _limited(limit), warnings.catch_warnings(), contextlib.redirect_stdout(printed):
-            warnings.simplefilter(
-                "error", RuntimeWarning
-            )  # numbers that overflow: a user would see where in our source
+            warnings.simplefilter("error", RuntimeWarning)  # a user would be shown lines of our source
             warnings.simplefilter("ignore", UserWarning)
             subject.read(given)
     except JounceError as error:

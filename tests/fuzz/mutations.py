@@ -7,26 +7,32 @@ import re
 
 __all__ = ["mutated"]
 
-HOSTILE = (
-    "0 -0 -1 1e309 -1e309 nan -inf .nan .inf 1e-320 1e300 0x10 0o7 1_000 + - . null true ~ yes 1e400m 1/0 0**-1 "
-    "(-1)**0.5 9**9**9**9 t sin(t exp(1e9) log(0) a.b __import__('os') [[[[ {{{{ ]] }} &a *a !!python/object:os.system "
-    "--- ... ../x.csv /dev/zero /dev/tty . .. lift.csv =1+1 < > </robot> <!ENTITY &amp; &x; ]]> ${x} ground world t pi "
-    "deg 1e3 5e-324 1.7976931348623157e308 18446744073709551616 %s {} | > ? : :: - - # @ ` ' \" ,, ;"
-).split() + [
-    "", " ", "\t", "\n", "\r", "\0", "\x7f", "\x85", "\u2028", "\ufeff", "\ud7ff", "\U0001f642", "é", "e\u0301",
-    "9" * 400, "(" * 300, "[" * 100, "a" * 3000, "-" * 50, "1 m", "3 deg", "5 Nm", "2 furlong/fortnight", "1 m**99999",
-    "m*" * 200 + "m", "1 kg*m**2", "10 degC", "5 %", "1 1", "1 2 3", "0 0 0", "nan nan nan", "1e200 1e200 1e200",
-    "x: {x: {x: {}}}", "[1, [2, [3]]]", "<joint/>", "<link name='base'/>", "<include file='a.xml'/>", "t**0.5",
-    "1e200*t", "abs(t)", "2*" * 400 + "t", "t=3", "BC=", "=5",
-]  # fmt: skip
+HOSTILE = [
+    *(
+        "0 -0 -1 1e309 -1e309 nan -inf .nan .inf 1e-320 1e300 0x10 0o7 1_000 + - . null true ~ yes 1e400m 1/0 0**-1 "
+        "(-1)**0.5 9**9**9**9 t sin(t exp(1e9) log(0) a.b __import__('os') [[[[ {{{{ ]] }} &a *a !!python/object:os "
+        "--- ... ../x.csv /dev/zero /dev/tty . .. lift.csv =1+1 < > </robot> <!ENTITY &amp; &x; ]]> ${x} ground world "
+        "t pi deg 1e3 5e-324 1.7976931348623157e308 18446744073709551616 %s {} | > ? : :: - - # @ ` ' \" ,, ;"
+    ).split(),
+    *("", " ", "\t", "\n", "\r", "\0", "\x7f", "\x85", "\u2028", "\ufeff", "\ud7ff", "\U0001f642", "\xe9", "e\u0301"),
+    *("9" * 400, "(" * 300, "[" * 100, "a" * 3000, "-" * 50, "m*" * 200 + "m", "2*" * 400 + "t"),
+    *("1 m", "3 deg", "5 Nm", "2 furlong/fortnight", "1 m**99999", "1 kg*m**2", "10 degC", "5 %", "1 1", "1 2 3"),
+    *("0 0 0", "nan nan nan", "1e200 1e200 1e200", "x: {x: {x: {}}}", "[1, [2, [3]]]", "<joint/>"),
+    *("<link name='base'/>", "<include file='a.xml'/>", "t**0.5", "1e200*t", "abs(t)", "t=3", "BC=", "=5"),
+]
+VALUES = re.compile(r'(?<==")[^"]*(?=")|(?<=: )[^,\n}\]]+|(?<=,)[^,\n]+|(?<== )[^\n]+')
 TOKENS = re.compile(r"[A-Za-z_][A-Za-z0-9_]*|[0-9.]+(?:[eE][-+]?[0-9]+)?|\s+|.", re.DOTALL)
 
 
 def mutated(chance: random.Random, seeds: list[str]) -> bytes:
     """Return a good text changed in one to six places, mostly few."""
     text = chance.choice(seeds)
-    for _ in range(min(6, 1 + int(chance.expovariate(1.0)))):
-        text = chance.choice(CHANGES)(chance, text, seeds)[:200_000]
+    if chance.random() < 0.3:  # what may well be read, so that more than the first check is reached
+        for _ in range(chance.randrange(4)):
+            text = chance.choice(GENTLE)(chance, text, seeds)
+    else:
+        for _ in range(min(6, 1 + int(chance.expovariate(1.5)))):
+            text = chance.choice(CHANGES)(chance, text, seeds)[:200_000]
     content = text.encode("utf-8", "surrogatepass")
     if chance.random() < 0.06:
         content = _bytes(chance, content)
@@ -108,11 +114,33 @@ def _insert(chance: random.Random, text: str, _seeds: list[str]) -> str:
 
 def _value(chance: random.Random, text: str, _seeds: list[str]) -> str:
     """Give a key, an attribute or an entry of a table a hostile value."""
-    found = list(re.finditer(r'(?<==")[^"]*(?=")|(?<=: )[^,\n}\]]+|(?<=,)[^,\n]+|(?<== )[^\n]+', text))
+    found = list(re.finditer(VALUES, text))
     if not found:
         return text
     match = chance.choice(found)
     return text[: match.start()] + chance.choice(HOSTILE) + text[match.end() :]
+
+
+def _exchange(chance: random.Random, text: str, _seeds: list[str]) -> str:
+    """Exchange two values of one text, which may fit."""
+    found = list(re.finditer(VALUES, text))
+    if len(found) < 2:
+        return text
+    first, second = sorted(chance.sample(found, 2), key=re.Match.start)
+    if first.end() > second.start():
+        return text
+    between = text[first.end() : second.start()]
+    return text[: first.start()] + second.group() + between + first.group() + text[second.end() :]
+
+
+def _scale(chance: random.Random, text: str, _seeds: list[str]) -> str:
+    """Exchange a number for another of any size."""
+    found = list(re.finditer(r"(?<![\w.])[0-9]+(?:\.[0-9]+)?(?:[eE][-+]?[0-9]+)?(?![\w.])", text))
+    if not found:
+        return text
+    match = chance.choice(found)
+    number = chance.choice([0, 1, -1, 2, 1e-12, 1e12, 1e-200, 1e200, chance.gauss(0, 1), -float(match.group())])
+    return text[: match.start()] + repr(number) + text[match.end() :]
 
 
 def _bytes(chance: random.Random, content: bytes) -> bytes:
@@ -123,4 +151,5 @@ def _bytes(chance: random.Random, content: bytes) -> bytes:
     return bytes(changed)
 
 
+GENTLE = (_exchange, _scale, _scale)
 CHANGES = (_token, _token, _value, _value, _number, _lines, _piece, _insert)

@@ -15,9 +15,8 @@ from jounce.io.limits import load_limits
 from jounce.io.overrides import override
 from jounce.io.payloads import with_payloads
 from jounce.io.readers import read_yaml
-from jounce.io.samples import read_samples
 from jounce.io.units import parse_value
-from jounce.trajectory import Expression, SplineMotion
+from jounce.trajectory import Expression
 
 __all__ = ["READERS", "Reader"]
 
@@ -61,7 +60,7 @@ def _scara() -> Any:
 
 
 def _samples(path: pathlib.Path) -> None:
-    SplineMotion(*read_samples(path))
+    jn.load(path.with_name("cam.yaml"))
 
 
 def _expression(text: str) -> None:
@@ -99,6 +98,7 @@ class Reader:
 
 
 SAMPLES_BESIDE = {"lift.csv": TABLE, "data.csv": "t;x\n1;2\n"}
+CAM_BESIDE = {"cam.yaml": SAMPLED.replace("lift.csv", "case.csv")}
 ROBOTS = EXAMPLES / "robots"
 INCLUDED = """<mujoco model="m"><include file="part.xml"/><default><joint damping="1"/></default>
 <worldbody><body name="a" pos="0 0 1"><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>
@@ -124,7 +124,7 @@ READERS = {
     "yaml": Reader(jn.load, _mechanisms, ".yaml", SAMPLES_BESIDE),
     "toml": Reader(jn.load, _as(".toml"), ".toml", SAMPLES_BESIDE),
     "json": Reader(jn.load, _as(".json"), ".json", SAMPLES_BESIDE),
-    "samples": Reader(_samples, lambda: [TABLE, TABLE.replace("time,value\n", ""), WIDE], ".csv"),
+    "samples": Reader(_samples, lambda: [TABLE, TABLE.replace("time,value\n", ""), WIDE], ".csv", CAM_BESIDE),
     "urdf": Reader(jn.load_robot, lambda: _read(ROBOTS / "scara.urdf", ROBOTS / "ur5.urdf"), ".urdf"),
     "mjcf": Reader(
         jn.load_robot,
@@ -134,7 +134,7 @@ READERS = {
     ),
     "limits": Reader(lambda path: load_limits(path, _scara()), lambda: [LIMITS], ".yaml"),
     "trajectory": Reader(jn.load_trajectory, lambda: _read(*MOVES), ".yaml"),
-    "table": Reader(jn.load_trajectory, lambda: [WIDE], ".csv"),
+    "table": Reader(jn.load_trajectory, lambda: [WIDE], ".csv", CAM_BESIDE),
     "expression": Reader(
         _expression,
         lambda: [

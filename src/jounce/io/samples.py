@@ -59,8 +59,8 @@ def _columns(path: str, header: list[str], time: str | None, value: str | None) 
     if value is not None:
         return first, _find(path, header, value)
     if len(header) != 2:
-        others = ", ".join(column for column in header if column != header[first])
-        message = f"has several columns besides the time, name that of the value; valid: {others}"
+        others = [column for column in header if column != header[first]]
+        message = f"has several columns besides the time, name that of the value; {did_you_mean('', others)}"
         raise MechanismFileError(message, path=path, line=1)
     return first, 1 - first
 

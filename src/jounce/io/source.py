@@ -208,5 +208,7 @@ def read_source(path: str | PathLike[str], allow: Iterable[str | PathLike[str]] 
             f"the kind of a mechanism file is told by its ending; valid: {', '.join(SUFFIXES)}", path=name
         )
     source = reader(name, _decode(name, read_file(name)))
+    if source.data is None and not source.lines:  # only comments
+        raise MechanismFileError("the file is empty", path=name)
     source.allow = check_allowed(allow)
     return source
