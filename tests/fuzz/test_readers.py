@@ -14,7 +14,7 @@ from hypothesis import given, settings, strategies as st
 from tests.fuzz.cases import ALLOWED, case, judged, shrunk
 from tests.fuzz.readers import READERS, ROOT
 
-CASES = 60  # of each reader, in this process
+CASES = 30  # of each reader, in this process
 plain = st.recursive(
     st.none()
     | st.booleans()
@@ -25,7 +25,7 @@ plain = st.recursive(
     lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=8), inner, max_size=3),
     max_leaves=6,
 )
-thorough = settings(max_examples=40)
+thorough = settings(max_examples=25)
 
 
 def check(reader, content):
@@ -116,7 +116,7 @@ pieces = st.lists(signs | words | st.floats().map(repr) | st.integers().map(str)
 
 
 @pytest.mark.parametrize("reader", ["expression", "set", "payload", "drive"])
-@settings(max_examples=150)
+@settings(max_examples=100)
 @given(text=pieces | st.text(max_size=30), name=st.booleans())
 def test_any_words(reader, text, name):
     names = {"set": "BC=", "payload": READERS["payload"].texts[0].partition("=")[0] + "=", "drive": "elbow="}
