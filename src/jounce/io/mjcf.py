@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from jounce.errors import RobotError, RobotFileError
+from jounce.errors import JounceError, RobotError, RobotFileError
 from jounce.io.markup import Element
 from jounce.io.mjcf_files import check_assets, included, quiet_mujoco
 from jounce.rigid.inertia import Inertia
@@ -253,8 +253,11 @@ class _Reader:
         model, name = self.model, self.bodies[k]
         inertia = None
         if model.body_mass[k] > 0:
-            principal = Inertia(model.body_mass[k], tensor=model.body_inertia[k])
-            inertia = principal.moved(model.body_ipos[k], _matrix(model.body_iquat[k]))
+            try:
+                principal = Inertia(model.body_mass[k], tensor=model.body_inertia[k])
+                inertia = principal.moved(model.body_ipos[k], _matrix(model.body_iquat[k]))
+            except JounceError as error:
+                raise self.error(error.message, f"links.{name}.{error.name}", value=error.value) from None
         self.links.append(Link(name, inertia))
         if k == 0:
             return
