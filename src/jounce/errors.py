@@ -76,7 +76,9 @@ def _represent(value: object, limit: int, depth: int = 3) -> str:
         if depth == 0:
             return "{...}"
         items = list(value.items())[:10]
-        inside = ", ".join(f"{str(key)[:limit]}: {_represent(item, limit, depth - 1)}" for key, item in items)
+        inside = ", ".join(
+            f"{_printable(str(key)[:limit])}: {_represent(item, limit, depth - 1)}" for key, item in items
+        )
         return "{" + inside + (", ...}" if len(value) > 10 else "}")
     if isinstance(value, (list, tuple)):
         if depth == 0:
@@ -90,6 +92,11 @@ def _represent(value: object, limit: int, depth: int = 3) -> str:
     return " ".join(text.split())
 
 
+def _printable(text: str) -> str:
+    """Return a text with escapes for what no terminal should be given: it may come from anyone's file."""
+    return text if text.isprintable() else "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
 def did_you_mean(name: object, valid: Iterable[str], limit: int = 20) -> str:
     """Word a suggestion: the nearest valid name, and the valid names when they are few.
 
@@ -101,14 +108,15 @@ def did_you_mean(name: object, valid: Iterable[str], limit: int = 20) -> str:
     'valid: prismatic, revolute'
     """
     names = sorted(set(valid))
+    words = [ascii(candidate[:80])[1:-1] for candidate in names]
     parts = []
     near = difflib.get_close_matches(str(name)[:100], names, n=1, cutoff=0.6)
     if not near:
         near = [candidate for candidate in names if candidate.lower() == str(name).lower()]
     if near:
-        parts.append(f"did you mean '{near[0]}'?")
+        parts.append(f"did you mean '{words[names.index(near[0])]}'?")
     if 0 < len(names) <= limit:
-        parts.append(f"valid: {', '.join(names)}")
+        parts.append(f"valid: {', '.join(words)}")
     elif not names:
         parts.append("none is defined")
     return " ".join(parts)
@@ -153,12 +161,12 @@ class JounceError(Exception):
         self.value = value
 
     def __str__(self) -> str:
-        place = [] if self.path is None else [str(self.path)]
+        place = [] if self.path is None else [_printable(str(self.path))]
         if self.line is not None:
             place.append(f"line {self.line}")
         if self.name:
-            place.append(self.name)
-        message = self.message
+            place.append(_printable(self.name))
+        message = "\n".join(map(_printable, self.message.split("\n")))
         if self.value is not UNSET:  # what is wrong, got this; what to do about it
             problem, semicolon, advice = message.partition("; ")
             message = f"{problem}, got {show_value(self.value)}{semicolon}{advice}"

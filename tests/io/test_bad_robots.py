@@ -157,7 +157,8 @@ def test_name_of_no_robot_file(tmp_path, name, says):
     (tmp_path / "folder.urdf").mkdir()
     with pytest.raises(RobotFileError) as caught:
         load_robot(f"{tmp_path}/{name}")
-    assert str(caught.value).startswith(f"{tmp_path}/{name}: {says}")
+    shown = name.replace("\0", "\\x00")  # no terminal is given a control character
+    assert str(caught.value).startswith(f"{tmp_path}/{shown}: {says}")
 
 
 def test_a_name_nearly_right(tmp_path):

@@ -5,14 +5,16 @@ from __future__ import annotations
 import dataclasses
 import importlib
 import re
-import warnings
+from collections.abc import Iterable
+from os import PathLike
 from typing import Any
 
 import numpy as np
 
-from jounce.errors import RobotError, RobotFileError
+from jounce.errors import JounceError, RobotError, RobotFileError
 from jounce.io.faults import Faults
 from jounce.io.markup import Element
+from jounce.io.mjcf_files import check_assets, included, quiet_mujoco
 from jounce.rigid.inertia import Inertia
 from jounce.robot.construct import floating_joints
 from jounce.robot.model import Closure, Joint, Limits, Link, Mimic, leaders
@@ -30,7 +32,7 @@ NUMERIC = {  # attributes whose numbers MuJoCo takes even when they are not fini
 }
 
 
-def read_mjcf(root: Element, faults: Faults) -> Robot:
+def read_mjcf(root: Element, faults: Faults, allow: Iterable[str | PathLike[str]] = ()) -> Robot:
     """Return the robot that an MJCF file describes, as MuJoCo compiles it.
 
     The base is the link ``world``. Hinges and slides are taken with their anchors and reference positions: a coordinate
@@ -49,6 +51,8 @@ def read_mjcf(root: Element, faults: Faults) -> Robot:
         The element ``<mujoco>``; MuJoCo reads the file again itself.
     faults : Faults
         Takes what no real robot has.
+    allow
+        Folders besides that of the file that included files and meshes may be below.
 
     Raises
     ------
@@ -60,14 +64,14 @@ def read_mjcf(root: Element, faults: Faults) -> Robot:
     except ImportError:
         message = 'reading MJCF files needs the package mujoco, which is not installed: pip install "jounce[mjcf]"'
         raise RobotFileError(message, path=root.path) from None
-    _check_numbers(root)
+    parts = [root, *included(root, allow)]
+    for part in parts:
+        _check_numbers(part)
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # they are about simulations
+        with quiet_mujoco(mujoco):
             spec = mujoco.MjSpec.from_file(root.path)
-            if spec.flexes:
-                raise RobotFileError("has deformable parts (flex), which no rigid body stands for", path=root.path)
             _strip(spec, mujoco)
+            check_assets(spec, parts, allow)
             model = spec.compile()
     except (ValueError, RuntimeError, OSError) as error:
         raise _refused(str(error), root) from None
@@ -75,9 +79,11 @@ def read_mjcf(root: Element, faults: Faults) -> Robot:
 
 
 def _check_numbers(root: Element) -> None:
-    """Refuse numbers that are not finite: MuJoCo takes some, and writes a log beside the user for others."""
+    """Refuse numbers that are not finite, some of which MuJoCo takes, and deformable parts, whose files it reads."""
     names = {element.attributes.get(key) for element in root.walk() for key in ("name", "class")}
     for element in root.walk():
+        if element.tag in ("flex", "flexcomp"):
+            raise element.error("has deformable parts (flex), which no rigid body stands for")
         numeric = NUMERIC.get(element.tag, ())
         for key, text in element.attributes.items():
             words = text.split()
@@ -253,9 +259,12 @@ class _Reader:
         model, name = self.model, self.bodies[k]
         inertia = None
         if model.body_mass[k] > 0 or model.body_inertia[k].any():
-            principal = Inertia(model.body_mass[k], tensor=model.body_inertia[k], strict=False)
-            self.faults.check(principal, name, self.lines.get(f"links.{name}"))
-            inertia = principal.moved(model.body_ipos[k], quaternion_matrix(model.body_iquat[k]))
+            try:
+                principal = Inertia(model.body_mass[k], tensor=model.body_inertia[k], strict=False)
+                self.faults.check(principal, name, self.lines.get(f"links.{name}"))
+                inertia = principal.moved(model.body_ipos[k], quaternion_matrix(model.body_iquat[k]))
+            except JounceError as error:
+                raise self.error(error.message, f"links.{name}.{error.name}", value=error.value) from None
         self.links.append(Link(name, inertia))
         if k == 0:
             return

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterable
 from os import PathLike, fspath
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from jounce.errors import RobotFileError
 from jounce.io.faults import Faults
 from jounce.io.markup import Element, read_markup
 from jounce.io.mjcf import read_mjcf
+from jounce.io.reading import check_allowed
 from jounce.io.urdf import read_urdf
 from jounce.robot.robot import Robot
 
@@ -26,6 +28,7 @@ def load_robot(
     floating_base: bool | str = False,
     massless: bool = False,
     strict: bool = False,
+    allow: Iterable[str | PathLike[str]] = (),
 ) -> Robot:
     """Read a robot from a URDF or MJCF file.
 
@@ -44,6 +47,8 @@ def load_robot(
         URDF links that move, have no mass and carry some are meant so: there is no warning of them.
     strict : bool, default False
         Make an error of what is warned of.
+    allow
+        Folders besides that of the file that included files and meshes of MJCF may be below.
 
     Returns
     -------
@@ -89,7 +94,7 @@ def load_robot(
     elif root.tag == "mujoco":
         if suffix != ".xml":
             raise RobotFileError("MuJoCo reads MJCF only from files whose names end in .xml; rename it", path=name)
-        robot = read_mjcf(root, faults)
+        robot = read_mjcf(root, faults, check_allowed(allow))
     else:
         message = "is no robot file; the root element of a URDF is <robot>, that of an MJCF file is <mujoco>"
         raise root.error(message, value=f"<{root.tag}>")

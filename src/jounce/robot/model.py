@@ -1,6 +1,7 @@
 """What a robot is made of: links, joints and limits, as a file or a script gives them; frozen and checked."""
 
 import dataclasses
+import math
 import numbers
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -186,7 +187,7 @@ class Joint:
         for field, shape in (("position", (3,)), ("rotation", (3, 3)), ("axis", (3,))):
             object.__setattr__(self, field, finite_numbers(f"{where}.{field}", getattr(self, field), shape))
         rotation_matrix(f"{where}.rotation", self.rotation)
-        length = float(np.linalg.norm(self.axis))
+        length = math.hypot(*self.axis)
         if self.type != "fixed":
             if length < 1e-9:
                 raise RobotError("must have a direction", name=f"{where}.axis", value=self.axis.tolist())
