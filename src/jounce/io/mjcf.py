@@ -261,10 +261,10 @@ class _Reader:
         if model.body_mass[k] > 0 or model.body_inertia[k].any():
             try:
                 principal = Inertia(model.body_mass[k], tensor=model.body_inertia[k], strict=False)
-                self.faults.check(principal, name, self.lines.get(f"links.{name}"))
                 inertia = principal.moved(model.body_ipos[k], quaternion_matrix(model.body_iquat[k]))
             except JounceError as error:
                 raise self.error(error.message, f"links.{name}.{error.name}", value=error.value) from None
+            self.faults.check(principal, name, self.lines.get(f"links.{name}"))
         self.links.append(Link(name, inertia))
         if k == 0:
             return
