@@ -12,7 +12,8 @@ from jax.core import Tracer
 
 from jounce.errors import UnsupportedError
 
-P, R = ParamSpec("P"), TypeVar("R")
+P = ParamSpec("P")
+R = TypeVar("R")
 _left_behind = False  # whether the threads of XLA stayed in the process that this one was forked from
 
 
