@@ -27,6 +27,7 @@ __all__ = [
     "SolveError",
     "TrajectoryError",
     "UnitError",
+    "UnsupportedError",
     "did_you_mean",
     "show_value",
 ]
@@ -198,6 +199,10 @@ class ExpressionError(JounceError):
 
 class UnitError(JounceError):
     """A value has a unit that does not exist, or one of the wrong dimension."""
+
+
+class UnsupportedError(JounceError):
+    """What is right in itself cannot be done here: with values that JAX traces, or in a process that was forked."""
 
 
 class MechanismError(JounceError):
