@@ -15,7 +15,9 @@ from typing import NamedTuple
 import numpy as np
 
 SMALLEST_STEP = 2e-14  # of the driven angle or distance: what needs smaller ones ends at a dead point
+SHARPEST = 1e-10  # at the end of a motion, of the driven value: what may be left to the dead point
 CONTRACTION = 0.5  # the largest that is accepted
+LEAST_WEIGHT = 0.2  # of an unknown, by that of the fastest or of the driven value
 
 
 class Law(NamedTuple):
@@ -95,6 +97,7 @@ class Paths(NamedTuple):
     determinant: np.ndarray  # of the scaled Jacobian, (linkages, time)
     margin: np.ndarray  # smallest size of the determinant on the way from the start to the instant, (linkages, time)
     limit: np.ndarray  # driven value at which the motion ends, NaN where it does not, (linkages,)
+    proved: np.ndarray  # False where the end is none, but too close to a singular position to go on, (linkages,)
     steps: np.ndarray  # taken, (linkages,)
 
 
@@ -123,29 +126,39 @@ class State:
         self.bend = full(np.zeros_like(self.x), ddu, 0.0)
 
     def steps(self, wanted):
-        """Return steps no longer than wanted, and radii about their linear predictions that hold one solution."""
+        """Return steps no longer than wanted, and how far about their linear predictions one solution is proved."""
         n = self.x.shape[1]
-        weighed = np.einsum("lij,ljkm->likm", self.inverse, self.forms)
-        size = np.abs(weighed).sum(axis=(2, 3)).max(axis=1)  # of the second derivative, over two
-        slope = 2 * np.abs(weighed[:, :, :n]).sum(axis=(2, 3)).max(axis=1)
-        second = np.einsum("likm,lk,lm->li", weighed, self.rate, self.rate)
-        second += np.einsum("likm,lk,lm->li", weighed, self.z, self.bend)
-        second = np.abs(second).max(axis=1)
-        speed = np.maximum(np.abs(self.rate).max(axis=1), 1.0)
-        third = size * (3 * speed + np.abs(self.z).max(axis=1))
-        offset = np.abs(np.einsum("lij,lj->li", self.inverse, self.residual)).max(axis=1)
-        step = np.minimum(0.8 * CONTRACTION / (slope * speed), np.abs(wanted))
+        g = np.einsum("lij,ljkm->likm", self.inverse, self.forms)
+        with_rate, with_z = np.einsum("likm,lk->lim", g, self.rate), np.einsum("likm,lk->lim", g, self.z)
+        # the prediction is off by half the second derivative over the step, which changes by so much for each unit of it
+        second = np.abs(np.einsum("lim,lm->li", with_rate, self.rate) + np.einsum("lim,lm->li", with_z, self.bend))
+        size, u = np.abs(g), slice(n, n + 2)
+        third = (2 * np.abs(with_rate) + np.abs(with_z))[..., u].sum(axis=2)
+        third += np.einsum("likm,lk->li", size[:, :, :n, u], np.abs(self.tangent)) + size[:, :, u, u].sum(axis=(2, 3))
+        fourth = size[:, :, u, u].sum(axis=(2, 3))
+        offset = np.abs(np.einsum("lij,lj->li", self.inverse, self.residual))
+        # every unknown is measured by how fast it moves
+        speed = np.abs(self.tangent)
+        speed = np.maximum(speed, LEAST_WEIGHT * np.maximum(speed.max(axis=1, keepdims=True), 1.0))
+        weight = np.concatenate([speed, np.ones((len(speed), 2)), np.zeros((len(speed), 1))], axis=1)
+        slope = (2 * np.einsum("likm,lk,lm->li", size[:, :, :n], speed, weight) / speed).max(axis=1)
+        second, third, fourth, offset = ((term / speed).max(axis=1) for term in (second, third, fourth, offset))
+        step = np.minimum(0.8 * CONTRACTION / slope, np.abs(wanted))
         step = np.where(np.isfinite(step), step, 0.0)
         for _ in range(60):
-            # the prediction is off by its second derivative over the step, which changes by at most `third` per step
-            bound = offset + (second + (third + size * (1 + speed) * step) * step) * step**2
-            radius = bound / (1 - CONTRACTION)
-            refused = ~(slope * (speed * step + radius) <= CONTRACTION) & (step > 0)
+            radius = (offset + (second + (third + fourth * step) * step) * step**2) / (1 - CONTRACTION)
+            refused = ~(slope * (step + radius) <= CONTRACTION) & (step > 0)
             if not refused.any():
                 break
-            step = np.where(refused, 0.6 * step, step)
+            step = np.where(refused, 0.7 * step, step)
         step[step < SMALLEST_STEP] = 0.0
-        return np.copysign(step, wanted), radius
+        return np.copysign(step, wanted), radius[:, None] * speed
+
+    def to_dead_point(self):
+        """Return the way to the dead point ahead, where the square of the determinant vanishes with a finite slope."""
+        change = 2 * np.einsum("lijk,lk->lij", self.forms, self.rate)[..., : self.x.shape[1]]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return 1 / np.abs(2 * np.einsum("lij,lji->l", self.inverse, change))
 
 
 def driven(value, circular):
@@ -179,6 +192,15 @@ def polished(forms, circular, x, value, iterations=8):
     return x, size
 
 
+def rounding(forms, circular, x, value):
+    """Return by how much the unknowns change if every equation does by the size of its terms."""
+    n = x.shape[-1]
+    z = full(x, driven(value, circular)[0])
+    jacobian = 2 * np.einsum("lijk,lk->lij", forms, z)[..., :n]
+    terms = np.einsum("lijk,lj,lk->li", np.abs(forms), np.abs(z), np.abs(z))
+    return np.einsum("lij,lj->li", np.abs(np.linalg.inv(jacobian)), terms)
+
+
 def follow(forms, circular, start, targets):
     """Follow linkages through driven values, one after another.
 
@@ -199,7 +221,7 @@ def follow(forms, circular, start, targets):
         row[: len(target)] = target
     shape = values.shape
     position, determinant, margin = np.full((*shape, n), np.nan), np.full(shape, np.nan), np.full(shape, np.nan)
-    limit, steps = np.full(count, np.nan), np.zeros(count, int)
+    limit, proved, steps = np.full(count, np.nan), np.ones(count, bool), np.zeros(count, int)
     lanes, state = np.arange(count), State(forms, circular, start, values[:, 0])
     position[:, 0], determinant[:, 0], margin[:, 0] = start, state.determinant, np.abs(state.determinant)
     smallest, at = np.abs(state.determinant), np.ones(count, int)
@@ -209,15 +231,17 @@ def follow(forms, circular, start, targets):
             lanes, at, smallest = lanes[going], at[going], smallest[going]
             state = State(state.forms[going], circular, state.x[going], state.value[going])
         if not lanes.size:
-            return Paths(position, determinant, margin, limit, steps)
+            return Paths(position, determinant, margin, limit, proved, steps)
         remaining = values[lanes, at] - state.value
         step, radius = state.steps(remaining)
         arriving = np.abs(step) >= np.abs(remaining)
         value = np.where(arriving, values[lanes, at], state.value + step)
         predicted = state.x + state.tangent * step[:, None]
         x, _ = polished(state.forms, circular, predicted, value)
-        ended = (step == 0) & ~arriving | ~(np.abs(x - predicted).max(axis=1) <= 1.01 * radius + 1e-12)
+        noise = 1e-14 * np.abs(state.inverse).sum(axis=2)  # of what Newton's method finds
+        ended = (step == 0) & ~arriving | ~(np.abs(x - predicted) <= 1.01 * radius + noise).all(axis=1)
         limit[lanes[ended]] = state.value[ended]
+        proved[lanes[ended]] = state.to_dead_point()[ended] < SHARPEST
         x, value = np.where(ended[:, None], state.x, x), np.where(ended, state.value, value)
         state = State(state.forms, circular, x, value)
         steps[lanes] += 1

@@ -9,14 +9,29 @@ from typing import Any
 import numpy as np
 
 import jounce as jn
-from tests.oracles.linkage_paths import Paths, derivatives, follow, polished
+from tests.oracles.linkage_paths import Paths, derivatives, follow, polished, rounding
 from tests.problems.linkages import Family, FourBar, Linkage, SliderCrank, SliderDriven
+from tests.problems.six_bars import SixBar, StephensonAtLink, StephensonSecond
+from tests.problems.spatial_linkages import RCCC, RSSR
 
-FAMILIES: dict[str, Family] = {family.name: family for family in (SliderCrank(), SliderDriven(), FourBar())}
-ORDERS = (0, 1, 2, 3, 4, 6, 8)
+ALL = (
+    SliderCrank(),
+    SliderDriven(),
+    FourBar(),
+    SixBar("Watt I", "coupler", "rocker"),
+    SixBar("Watt II", "rocker", "ground"),
+    SixBar("Stephenson I", "crank", "rocker"),
+    SixBar("Stephenson III", "coupler", "ground"),
+    StephensonAtLink("Stephenson III at the link", "coupler", "ground"),
+    StephensonSecond(),
+    RSSR(),
+    RCCC(),
+)
+FAMILIES: dict[str, Family] = {family.name: family for family in ALL}
+ORDERS = (0, 1, 2, 3, 4, 8)  # of few heights, as jounce computes at least to order 4 and compiles for each
 NEAR = 1e-4  # by the determinant of the scaled Jacobian
 SMOOTH = 0.1
-POSITION, ROUNDING = 1e-9, 1e-13  # what a position may be off, and for each unit of 1 / determinant
+POSITION, ROUNDING = 1e-9, 1e-13  # what a position may be off, and each equation, of the size of its terms
 SHARPEST = 1e-9  # of the driven value: an end of the motion is not known more sharply
 RATE, SMALLEST_FOR_RATES = 1e-6, 1e-2  # relative error of derivatives, and the determinant down to which it is asked
 BATCH = 128
@@ -108,10 +123,10 @@ def judged(solutions: list[Solution]) -> Iterator[tuple[Case, Verdict]]:
 def followed(batch: list[Solution]) -> tuple[Paths, list[np.ndarray]]:
     """Follow linkages from where jounce starts, or from their own start where it does not."""
     linkages = [solution.case.linkage for solution in batch]
-    forms, circular = np.stack([linkage.form for linkage in linkages]), linkages[0].family.circular
+    forms, circular = np.stack([linkage.tracked_form for linkage in linkages]), linkages[0].family.circular
     starts = [linkage.start if s.status[0] else s.position[0, 0] for s, linkage in zip(batch, linkages, strict=True)]
     values = np.array([linkage.law(0.0) for linkage in linkages])
-    starts, _ = polished(forms, circular, np.stack(starts), values)
+    starts, _ = polished(forms, circular, np.stack(starts)[:, : forms.shape[1]], values)
     targets, places = [], []
     for solution, linkage in zip(batch, linkages, strict=True):
         grid = solution.case.time
@@ -123,6 +138,20 @@ def followed(batch: list[Solution]) -> tuple[Paths, list[np.ndarray]]:
     return follow(forms, circular, starts, targets), places
 
 
+def whole(case: Case, path: Paths, reached: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return all unknowns at all instants, and by how much those of jounce may be off."""
+    linkage, values = case.linkage, case.linkage.law(case.time[reached])
+    forms = np.broadcast_to(linkage.form, (len(values), *linkage.form.shape))
+    known, circular = path.position[reached], linkage.family.circular
+    start = np.concatenate([known, np.zeros((len(known), len(linkage.form) - known.shape[1]))], axis=1)
+    found = polished(forms, circular, start, values)[0]
+    position = np.full((len(case.time), found.shape[1]), np.nan)
+    allowed = position.copy()
+    position[reached] = found
+    allowed[reached] = POSITION * np.maximum(np.abs(found), 1.0) + ROUNDING * rounding(forms, circular, found, values)
+    return position, allowed
+
+
 def _verdict(solution: Solution, path: Paths) -> Verdict:
     case, law = solution.case, solution.case.linkage.law
     reached = np.isfinite(path.margin)
@@ -130,15 +159,12 @@ def _verdict(solution: Solution, path: Paths) -> Verdict:
     sharp = np.ones(len(fine), bool)
     if np.isfinite(path.limit):  # at the very end of the motion, neither answer is wrong
         sharp = np.abs(law(case.time) - path.limit) > SHARPEST * max(1.0, abs(path.limit))
-    size = np.abs(np.nan_to_num(path.position)).max(initial=1.0)
-    away = np.abs(solution.position[:, 0] - path.position).max(axis=1)
-    with np.errstate(divide="ignore"):
-        allowed = size * (POSITION + ROUNDING / np.abs(path.determinant))
-    elsewhere = fine & reached & ~(away <= allowed)
+    position, allowed = whole(case, path, reached)
+    elsewhere = fine & reached & ~(np.abs(solution.position[:, 0] - position) <= allowed).all(axis=1)
     beyond = fine & ~reached & sharp
     given_up = ~fine & reached & sharp
     near = ~(path.margin > NEAR)
-    rates, compared = _wrong_rates(solution, path, fine & reached & ~elsewhere)
+    rates, compared = _wrong_rates(solution, path, position, fine & reached & ~elsewhere)
     smallest = float(np.nanmin(path.margin))
     which = "smooth" if smallest > SMOOTH else "close"
     tally = Counter(
@@ -174,7 +200,9 @@ def _verdict(solution: Solution, path: Paths) -> Verdict:
     return Verdict(tally, reasons, first, smallest, float(path.limit) if np.isfinite(path.limit) else None)
 
 
-def _wrong_rates(solution: Solution, path: Paths, judged: np.ndarray) -> tuple[np.ndarray, int]:
+def _wrong_rates(
+    solution: Solution, path: Paths, position: np.ndarray, judged: np.ndarray
+) -> tuple[np.ndarray, int]:
     """Tell at which instants velocity, acceleration or jerk are not those of the branch; away from dead points."""
     case, order = solution.case, min(solution.case.order, 3)
     wrong = np.zeros(len(case.time), bool)
@@ -183,7 +211,7 @@ def _wrong_rates(solution: Solution, path: Paths, judged: np.ndarray) -> tuple[n
         return wrong, 0
     linkage = case.linkage
     known = derivatives(
-        linkage.form, linkage.family.circular, linkage.law, case.time[chosen], path.position[chosen], order
+        linkage.form, linkage.family.circular, linkage.law, case.time[chosen], position[chosen], order
     )
     found = solution.position[chosen, : order + 1]
     scale = np.maximum(np.abs(known), np.abs(known[:, :1])).max(axis=2)

@@ -12,7 +12,7 @@ import numpy as np
 
 import jounce as jn
 from jounce import drivers, planar
-from tests.oracles.linkage_paths import Affine, Law, driven, polished
+from tests.oracles.linkage_paths import Affine, Law, driven
 
 LAW = "start + rate*t + wave*sin(speed*t + phase)"
 LAW_PARAMETERS = dict.fromkeys(Law._fields, 0.0)
@@ -34,6 +34,13 @@ class Linkage:
         """The loop equations, shape (unknowns, size, size)."""
         return np.stack(self.family.forms(self.values))
 
+    @cached_property
+    def tracked_form(self):
+        """Those of the unknowns that are followed."""
+        tracked, count = self.family.tracked or len(self.form), len(self.form)
+        kept = [*range(tracked), *range(count, count + 3)]
+        return self.form[:tracked][:, kept][:, :, kept]
+
     @property
     def mechanism(self):
         """The mechanism for jounce."""
@@ -47,6 +54,7 @@ class Family(abc.ABC):
     circular = True  # whether an angle is driven, or a distance
     dimensions: tuple[str, ...]
     guessed: tuple[str, ...]
+    tracked: int | None = None  # the first unknowns if they have equations of their own, linear in the others
 
     @cached_property
     def mechanism(self):
@@ -73,44 +81,48 @@ class Family(abc.ABC):
         """Return the starting guess of the poses."""
 
     @abc.abstractmethod
-    def unknowns(self, outputs):
-        """Return the unknowns, shape (time, unknowns), from what jounce puts out, by derivative 0."""
+    def unknowns(self, outputs, values):
+        """Return the unknowns with their derivatives, shape (time, derivative, unknowns), from outputs of jounce."""
 
-    def positions(self, values, u, random):
-        """Return a random assembly at a driven value, or None."""
-        form = np.stack(self.forms(values))
-        n = len(form)
-        for _ in range(20):
-            x, size = polished(form[None], self.circular, random.normal(size=(1, n)), u[None], 60)
-            if size[0] < 1e-12:
-                return x[0]
-        return None
+    @abc.abstractmethod
+    def assembly(self, values, value, random):
+        """Return one of the assemblies at a driven value, at random, or None."""
 
-    def law(self, random, values, start, turns):
-        """Return a law that begins at a driven value, and the time to stop at."""
-        rate = random.choice([-1, 1]) * 10 ** random.uniform(-0.5, 1.5)
-        return Law(start, rate, 0.0, 0.0, 0.0), turns * 2 * np.pi / abs(rate)
+    def law(self, random, values, nearness, sign):
+        """Return a law, uniform or waving, and the time to stop at."""
+        speed, turns = 10 ** random.uniform(-0.5, 1.5), random.uniform(0.3, 2.0)
+        stop, start = turns * 2 * np.pi / speed, random.uniform(-np.pi, np.pi)
+        if random.random() < 0.8:
+            return Law(start, random.choice([-1, 1]) * speed, 0.0, 0.0, 0.0), stop
+        return Law(start, 0.0, random.uniform(0.3, 3.0), speed, random.uniform(-np.pi, np.pi)), stop
 
     def linkage(self, random, near):
         """Return a random linkage, near a singular position if wanted, and the time at which its motion stops."""
         while True:
-            nearness = 10 ** random.uniform(-6, -1) if near else None
-            values = self.draw(random, nearness, random.choice([-1, 1]))
+            nearness, sign = 10 ** random.uniform(-6, -1) if near else None, random.choice([-1, 1])
+            values = self.draw(random, nearness, sign)
             if values is None:
                 continue
-            law, stop = self.law(random, values, random.uniform(-np.pi, np.pi), random.uniform(0.3, 2.0))
-            with np.errstate(invalid="ignore"):
-                start = self.positions(values, np.asarray(law(0.0)), random)
-            if start is None:
-                continue
-            guess = self.guess(values, driven(np.asarray(law(0.0)), self.circular)[0], start)
-            guess = {name: float(v + 1e-4 * random.normal()) for name, v in zip(self.guessed, guess, strict=True)}
-            return Linkage(self, values, law, start, guess, nearness), float(stop)
+            law, stop = self.law(random, values, nearness, sign)
+            start = self.assembly(values, np.asarray(law(0.0)), random)
+            if start is not None:
+                return Linkage(self, values, law, start, self.near_guess(random, values, law, start), nearness), stop
+
+    def near_guess(self, random, values, law, start):
+        """Return a guess that is off by something."""
+        off = 10 ** random.uniform(-6, -2)
+        guess = self.guess(values, driven(np.asarray(law(0.0)), self.circular)[0], start)
+        return {name: float(v + off * random.normal()) for name, v in zip(self.guessed, guess, strict=True)}
 
 
 def angle_of(vector):
     """Return the angle of a plane vector."""
     return np.arctan2(vector[1], vector[0])
+
+
+def direction(angle):
+    """Return a unit vector in the plane."""
+    return np.array([np.cos(angle), np.sin(angle)])
 
 
 def lengths(random, count):
@@ -161,14 +173,14 @@ class SliderCrank(Family):
             e = random.choice([-1, 1]) * (a - b * np.sqrt(1 - sign * nearness**2))
         return {"a": a, "b": b, "e": e}
 
-    def positions(self, values, u, random):
-        under = values["b"] ** 2 - (values["a"] * np.sin(u) - values["e"]) ** 2
-        return None if under < 1e-16 else np.array([values["a"] * np.cos(u) + random.choice([-1, 1]) * np.sqrt(under)])
+    def assembly(self, values, value, random):
+        under = values["b"] ** 2 - (values["a"] * np.sin(value) - values["e"]) ** 2
+        return None if under < 1e-16 else np.array([values["a"] * np.cos(value) + random.choice([-1, 1]) * np.sqrt(under)])
 
     def guess(self, values, u, x):
         return angle_of(u), angle_of([x[0] - values["a"] * u[0], values["e"] - values["a"] * u[1]]), x[0]
 
-    def unknowns(self, outputs):
+    def unknowns(self, outputs, values):  # noqa: ARG002
         return outputs["B"][..., :1]
 
 
@@ -189,36 +201,29 @@ class SliderDriven(SliderCrank):
 
     def draw(self, random, nearness, sign):
         a, b = lengths(random, 2)
-        values = {"a": a, "b": b, "e": random.uniform(-0.9, 0.9) * (a + b)}
-        if abs(values["e"]) < abs(a - b) + 0.1:
-            values["e"] *= 0.3
-        self._nearness, self._sign = nearness, sign
-        return values
+        e = random.uniform(-0.9, 0.9) * (a + b)
+        return {"a": a, "b": b, "e": 0.3 * e if abs(e) < abs(a - b) + 0.1 else e}
 
-    def law(self, random, values, start, turns):
+    def law(self, random, values, nearness, sign):
         a, b, e = values["a"], values["b"], values["e"]
         outer = np.sqrt((a + b) ** 2 - e**2)
         inner = np.sqrt((a - b) ** 2 - e**2) if abs(e) < abs(a - b) else -outer
-        low, high = 0.5 * (inner + outer), outer
-        if self._nearness:
-            high = np.sqrt((a + b) ** 2 - self._sign * a * b * self._nearness**2 - e**2)
+        low, side, speed = 0.5 * (inner + outer), random.choice([-1, 1]), 10 ** random.uniform(-0.5, 1.5)
         middle = random.uniform(low - 0.4 * (outer - low), low + 0.5 * (outer - low))
-        wave = (high - middle) * (1.0 if self._nearness else random.uniform(0.3, 1.1))
-        if self._nearness:
-            wave = min(wave, high - inner) if self._sign > 0 else wave
-        side = random.choice([-1, 1])
-        speed = 10 ** random.uniform(-0.5, 1.5)
+        wave = (outer - middle) * random.uniform(0.3, 1.1)
+        if nearness:
+            wave = np.sqrt((a + b) ** 2 - sign * a * b * nearness**2 - e**2) - middle
         law = Law(side * middle, 0.0, side * wave, speed, random.uniform(-np.pi, np.pi))
-        return law, turns * 2 * np.pi / speed
+        return law, random.uniform(0.3, 2.0) * 2 * np.pi / speed
 
-    def positions(self, values, u, random):
+    def assembly(self, values, value, random):
         a, b, e = values["a"], values["b"], values["e"]
-        return dyad(np.zeros(2), np.array([float(u), e]), a, b, random.choice([-1, 1]))
+        return dyad(np.zeros(2), np.array([float(value), e]), a, b, random.choice([-1, 1]))
 
     def guess(self, values, u, x):
         return angle_of(x), angle_of([u[0] - x[0], values["e"] - x[1]]), u[0]
 
-    def unknowns(self, outputs):
+    def unknowns(self, outputs, values):  # noqa: ARG002
         return outputs["A"]
 
 
@@ -227,7 +232,7 @@ def dyad(p, q, first, second, side):
     d = q - p
     square = d @ d
     under = ((first + second) ** 2 - square) * (square - (first - second) ** 2)
-    if under < 1e-10 * square**2 * 1e-8:
+    if not under > 1e-16 * square**2:
         return None
     along = (square + first**2 - second**2) / (2 * square)
     return p + along * d + side * np.sqrt(under) / (2 * square) * np.array([-d[1], d[0]])
@@ -278,12 +283,12 @@ class FourBar(Family):
         found = four_bar_lengths(random, nearness, sign)
         return found and dict(zip(self.dimensions, found, strict=True))
 
-    def positions(self, values, u, random):
-        tip = values["a"] * np.array([np.cos(u), np.sin(u)])
+    def assembly(self, values, value, random):
+        tip = values["a"] * direction(value)
         return dyad(tip, np.array([values["d"], 0.0]), values["b"], values["c"], random.choice([-1, 1]))
 
     def guess(self, values, u, x):
         return angle_of(u), angle_of([x[0] - values["d"], x[1]])
 
-    def unknowns(self, outputs):
+    def unknowns(self, outputs, values):  # noqa: ARG002
         return outputs["C"]
