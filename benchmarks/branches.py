@@ -82,6 +82,7 @@ def _summary(total: Counter, reasons: Counter) -> str:
         f"derivatives {total['rates']}) of {total['OK']:,} called OK; {total['derivatives']:,} compared to jerk too",
         f"given up above 1e-4: {far} of {total['far']:,} ({100 * far / max(total['far'], 1):.3f} percent), "
         f"below: {total['of them near']} of {total['near']:,}",
+        f"not judged, at or beyond an end that is too close to a singular position: {total['undecided']}",
         f"us an instant: {smooth:.1f} away from singular positions (above 0.1), {near:.1f} close to them",
         *(f"  {reason}: {number}" for reason, number in reasons.most_common()),
     ]

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 SMALLEST_STEP = 2e-14  # of the driven angle or distance: what needs smaller ones ends at a dead point
-SHARPEST = 1e-10  # at the end of a motion, of the driven value: what may be left to the dead point
+SHARPEST = 1e-9  # at the end of a motion, of the driven value: what may be left to the dead point
 CONTRACTION = 0.5  # the largest that is accepted
 LEAST_WEIGHT = 0.2  # of an unknown, by that of the fastest or of the driven value
 

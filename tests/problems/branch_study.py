@@ -159,6 +159,7 @@ def _verdict(solution: Solution, path: Paths) -> Verdict:
     sharp = np.ones(len(fine), bool)
     if np.isfinite(path.limit):  # at the very end of the motion, neither answer is wrong
         sharp = np.abs(law(case.time) - path.limit) > SHARPEST * max(1.0, abs(path.limit))
+        sharp &= reached | bool(path.proved)
     position, allowed = whole(case, path, reached)
     elsewhere = fine & reached & ~(np.abs(solution.position[:, 0] - position) <= allowed).all(axis=1)
     beyond = fine & ~reached & sharp
@@ -181,7 +182,8 @@ def _verdict(solution: Solution, path: Paths) -> Verdict:
             "of them near": (given_up & near).sum(),
             "far": (reached & ~near).sum(),
             "near": (reached & near).sum(),
-            "rightly refused": (~fine & ~reached).sum(),
+            "rightly refused": (~fine & ~reached & sharp).sum(),
+            "undecided": (~sharp).sum(),
             "nanoseconds": solution.nanoseconds,
             f"{which} nanoseconds": solution.nanoseconds,
             f"{which} instants": len(fine),
