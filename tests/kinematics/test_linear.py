@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jounce.kinematics.linear import DenseFactor, InverseFactor, factor_type
+from jounce.kinematics.linear import DenseFactor
 
 RANDOM = np.random.default_rng(4)
 MATRIX = RANDOM.normal(size=(7, 7, 5))
@@ -37,27 +37,59 @@ def test_ratio_of_pivots_falls_to_zero_at_a_singular_matrix():
 
 
 @pytest.mark.parametrize("size", [1, 2, 7, 12])
-def test_inverses_by_elimination(size):
+def test_inverses_determinants_and_solutions_where_rows_must_change_places(size):
     generator = np.random.default_rng(size)
     matrices = generator.normal(size=(size, size, 5))
     matrices[0, 0] = 0.0 if size > 1 else 1.0  # the pivot is elsewhere
     right = generator.normal(size=(size, 5))
-    factor = InverseFactor.of(jnp.asarray(matrices))
-    expected = np.linalg.inv(np.moveaxis(matrices, -1, 0))
-    np.testing.assert_allclose(
-        np.moveaxis(factor.inverse(), -1, 0), expected, rtol=0, atol=1e-13 * np.abs(expected).max()
-    )
+    factor = DenseFactor.of(jnp.asarray(matrices))
+    by_numpy = np.moveaxis(matrices, -1, 0)
+    expected = np.moveaxis(np.linalg.inv(by_numpy), 0, -1)
+    np.testing.assert_allclose(factor.inverse(), expected, rtol=0, atol=1e-13 * np.abs(expected).max())
     np.testing.assert_allclose(np.einsum("ijk,jk->ik", matrices, factor.solve(jnp.asarray(right))), right, atol=1e-12)
-    singular = np.ones((size + 1, size + 1, 1))
-    assert not np.isfinite(InverseFactor.of(jnp.asarray(singular)).inverse()).all()
+    x = factor.solve_transposed(jnp.asarray(right))
+    np.testing.assert_allclose(np.einsum("jik,jk->ik", matrices, x), right, atol=1e-12)
+    np.testing.assert_array_equal(factor.sign(), np.sign(np.linalg.det(by_numpy)))
 
 
-def test_elimination_alone_is_free_of_lapack():
-    """Programs for several threads are: batches of LAPACK wait for threads of XLA in a thread of XLA."""
-    matrices = jnp.ones((4, 4, 3))
-    with_lapack, without = (
-        jax.jit(lambda m, kind=kind: kind.of(m).inverse()).lower(matrices).as_text()
-        for kind in (DenseFactor, factor_type(3))
-    )
-    assert "lapack" in with_lapack
-    assert "custom_call" not in without
+@pytest.mark.parametrize("transposed", [False, True])
+@pytest.mark.parametrize("condition", [1e1, 1e8])
+def test_residuals_are_rounding_however_ill_conditioned(condition, transposed):
+    """As Gaussian elimination with substitution leaves them; a product with the inverse would leave 1e-10."""
+    generator = np.random.default_rng(3)
+    turns = [np.linalg.qr(generator.normal(size=(12, 12)))[0] for _ in range(2)]
+    matrix = (turns[0] * np.logspace(0, -np.log10(condition), 12)) @ turns[1]
+    wanted = matrix.T if transposed else matrix
+    right = wanted @ generator.normal(size=12)
+    factor = DenseFactor.of(jnp.asarray(matrix[..., None]))
+    solve = factor.solve_transposed if transposed else factor.solve
+    solution = np.asarray(solve(jnp.asarray(right[:, None])))[:, 0]
+    scale = np.abs(wanted) @ np.abs(solution) + np.abs(right)
+    assert (np.abs(wanted @ solution - right) <= 1e-15 * scale).all()
+
+
+def test_singular_matrices_are_told_and_leave_their_neighbours_alone():
+    matrices = MATRIX.copy()
+    matrices[:, :, 1] = 1.0
+    matrices[2, 3, 3] = np.nan
+    factor = DenseFactor.of(jnp.asarray(matrices))
+    assert factor.pivot_ratio()[1] == 0
+    assert factor.sign()[1] == 0
+    assert np.isnan(factor.sign()[3])
+    right = jnp.asarray(RIGHT)
+    for result in (factor.solve(right), factor.solve_transposed(right), factor.inverse()):
+        flat = np.asarray(result).reshape(-1, 5)
+        assert np.isnan(flat[:, 1]).all()
+        assert np.isnan(flat[:, 3]).any()
+        assert np.isfinite(flat[:, [0, 2, 4]]).all()
+
+
+def test_no_operation_is_left_to_lapack():
+    """Batches of LAPACK wait for threads of XLA in a thread of XLA: two such programs may wait forever."""
+
+    def everything(matrices):
+        factor = DenseFactor.of(matrices)
+        right = matrices[0]
+        return factor.solve(right), factor.solve_transposed(right), factor.inverse(), factor.sign()
+
+    assert "custom_call" not in jax.jit(everything).lower(jnp.ones((4, 4, 3))).as_text()

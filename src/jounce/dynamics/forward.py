@@ -15,7 +15,7 @@ from jounce.dynamics.loads import inertia_forces, mass_matrices
 from jounce.jet import Jet
 from jounce.jet.algebra import total
 from jounce.jet.series import Recursion
-from jounce.kinematics.linear import factor_type
+from jounce.kinematics.linear import DenseFactor
 from jounce.mechanism.system import System
 from jounce.rigid import PlanarPose, SpatialPose
 from jounce.rigid.spatial import body_axes, quaternion_spins
@@ -232,7 +232,7 @@ def expand(equations: Equations, state: State, time: Any, order: int, inverse: A
     """
     count, bodies, lanes = equations.coordinates, *state.position.shape[1:]
     if inverse is None:
-        inverse = factor_type(lanes).of(equations.matrix(state, time)).inverse()
+        inverse = DenseFactor.of(equations.matrix(state, time)).inverse()
     columns, rows = count * bodies, equations.system.row_scale.shape[0]
 
     def program(*leaves: Any) -> Any:
@@ -291,5 +291,5 @@ def least_change(equations: Equations, state: State, time: Any, gap: Any) -> Any
         Of the scaled rows, to first order.
     """
     columns = equations.system.cells.shape[1]
-    factor = factor_type(time.shape[-1]).of(equations.matrix(state, time))
+    factor = DenseFactor.of(equations.matrix(state, time))
     return equations.bodies(factor.solve(-jnp.concatenate([jnp.zeros((columns, gap.shape[-1])), gap]))[:columns])

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 
 from jounce.dynamics.forward import Equations, State, grounded
 from jounce.jet import Jet
-from jounce.kinematics.linear import factor_type
+from jounce.kinematics.linear import DenseFactor
 
 MOST_ITERATIONS = 10
 CLOSE = 4e-15  # so near to where the matrix was inverted, in the same unit, the inverse is the same but for rounding
@@ -38,11 +38,10 @@ def projected(equations: Equations, state: State, time: Any) -> tuple[State, Any
         Of the equations' matrix at this state, which `expand` takes.
     """
     clock, lanes = Jet([time]), time.shape[-1]
-    linear = factor_type(lanes)
     position, attitude = state.position, normalised(state.attitude)
 
     def correction(position: Any, attitude: Any) -> tuple[Any, Any]:
-        factor = linear.of(equations.matrix(state._replace(position=position, attitude=attitude), time))
+        factor = DenseFactor.of(equations.matrix(state._replace(position=position, attitude=attitude), time))
         gap = equations.system.residual(equations.still(position, attitude), clock).coefficients[0]
         return factor, gap
 
@@ -65,7 +64,7 @@ def projected(equations: Equations, state: State, time: Any) -> tuple[State, Any
         return jnp.any((size > 1e-9) & jnp.isfinite(size)) & (count < MOST_ITERATIONS) | (count == 0)
 
     size = equations.system.cells.shape
-    blank = linear.blank((sum(size), sum(size)), lanes)
+    blank = DenseFactor.blank((sum(size), sum(size)), lanes)
     start = (position, attitude, blank, jnp.full(lanes, jnp.inf), jnp.zeros(lanes), 0)
     position, attitude, factor, last, first, _ = jax.lax.while_loop(unfinished, iterate, start)
     moving = state._replace(position=position, attitude=attitude)
@@ -76,7 +75,7 @@ def projected(equations: Equations, state: State, time: Any) -> tuple[State, Any
     inverse = jax.lax.cond(
         jnp.all(last <= CLOSE),
         lambda: factor.inverse(),
-        lambda: linear.of(equations.matrix(moving, time)).inverse(),
+        lambda: DenseFactor.of(equations.matrix(moving, time)).inverse(),
     )
     return moving, jnp.where(last <= 1e-9, first, jnp.inf), inverse
 

@@ -1,7 +1,10 @@
 """One compiled function: from solved neighbours to solved instants, with all their derivatives.
 
 Each lane of the batch is predicted by the Taylor series of a neighbour, corrected by Newton-Raphson, and
-differentiated order after order with the last factorisation of its Jacobian (Sommer 2024, equations 1-8).
+differentiated order after order with the last factorisation of its Jacobian (Sommer 2024, equations 1-8). That it is on
+the branch of its neighbour is not judged by how near the prediction was: the simplified Newton iteration must contract
+(Deuflhard 2011, chapter 5), the determinant of the Jacobian must keep its sign, and where an instant is surveyed, the
+nearest zero of that determinant is told, real or complex, beyond which no step may go.
 """
 
 from typing import Any, NamedTuple
@@ -19,8 +22,10 @@ from jounce.mechanism.system import System
 MAX_ITERATIONS = 30
 CONVERGED = 1e-9  # a last correction above this is no convergence, however small the tolerance
 SAFE_FRACTION = 0.4  # of the time in which some Taylor term would move a body by a radian, or by the mechanism's size
-LARGEST_DEPARTURE = 0.05  # from a prediction, rad or sizes of the mechanism
+LARGEST_CONTRACTION = 0.25  # of the first simplified Newton corrections: Deuflhard 2011, section 5.1
+LARGEST_DEPARTURE = 0.05  # from a prediction, rad or sizes of the mechanism: beyond, a motion law jumps
 SMALLEST_DEPARTURE = 1e-6  # below this no prediction is called wrong
+POWER_STEPS = 4  # of the iteration that finds the largest eigenvalue: so many to forget the start, so many to measure
 SINGULAR_PIVOT = 1e-8
 FIRST_REFINED_ORDER = 5  # above, derivatives of some bodies are 10^10 times those of others, and lend them their errors
 ROUNDING = 4e-15  # a correction this small (in rad, or in sizes of the mechanism) leaves the Jacobian as good as new
@@ -34,6 +39,10 @@ class Arrival(NamedTuple):
     status: Any  # see Status
     body: Any  # index of the moving body that is farthest from its prediction
     safe_step: Any  # s, over which the motion from here can be predicted
+    radius: Any  # s, the same by the first four Taylor terms only, which rounding spoils least
+    deviation: Any  # departure from the prediction, over how far that moves
+    sign: Any  # of the determinant of the Jacobian
+    turnover: Any  # 1/s, how fast the Jacobian nears a singular one (below zero) or leaves it; 0 unless surveyed
     pivot_ratio: Any  # smallest pivot of the Jacobian over the largest
     admissible: Any  # whether each driver has a permitted value, shape (drivers, batch)
 
@@ -42,34 +51,54 @@ def _size(increment: Any) -> Any:
     return jnp.max(jnp.abs(increment), axis=0)
 
 
-def newton_raphson(system: System, pose: Any, time: Jet, tolerance: Any, refine: Any) -> tuple[Any, DenseFactor, Any]:
-    """Return the assembled pose, the factored Jacobian there, and the size of the last correction.
+class Correction(NamedTuple):
+    """How Newton-Raphson went; every array has the shape (batch,)."""
+
+    last: Any  # size of the last correction, rad or sizes of the mechanism
+    first: Any
+    simplified: Any  # size of the second, with the Jacobian of the first
+
+    def contracts(self) -> Any:
+        """Tell whether the simplified Newton iteration contracts, as it must where one solution only is near."""
+        return (self.simplified <= LARGEST_CONTRACTION * self.first) | (self.first <= SMALLEST_DEPARTURE)
+
+
+def newton_raphson(
+    system: System, pose: Any, time: Jet, tolerance: Any, refine: Any
+) -> tuple[Any, DenseFactor, Correction]:
+    """Return the assembled pose, the factored Jacobian there, and how large the corrections were.
 
     An instant is accepted when its correction is at most the tolerance. With `refine` that correction is still made,
     and one more unless it was rounding already, so that quadratic convergence brings the pose to rounding.
     """
 
-    def corrected(pose: Any) -> tuple[Any, DenseFactor, Any]:
-        factor = DenseFactor.of(system.jacobian(pose, time))
-        step = factor.solve(-system.residual(pose, time).coefficients[0])
-        size = _size(step)
-        step = jnp.where(refine | ~(size <= tolerance), step, 0.0)
-        return pose.displaced(*system.coordinates(step, pose.shifts)), factor, size
-
     def unfinished(state: Any) -> Any:
-        _, _, size, accepted_before, count = state
+        _, _, correction, accepted_before, count = state
+        size = correction.last
         done = jnp.where(refine, (size <= ROUNDING) | accepted_before, size <= tolerance)
         hopeful = jnp.isfinite(size) | (count == 0)  # what is not finite never will be
         return jnp.any(~done & hopeful) & (count < MAX_ITERATIONS)
 
     def iterate(state: Any) -> Any:
-        pose, _, size, _, count = state
-        return (*corrected(pose), size <= tolerance, count + 1)
+        pose, before, correction, _, count = state
+        residual = system.residual(pose, time).coefficients[0]
+        again = jax.lax.cond(count == 1, lambda: _size(before.solve(residual)), lambda: correction.simplified)
+        accepted = correction.last <= tolerance
+        simplified = jnp.where(refine | ~accepted, again, correction.simplified)  # else the pose was left as it was
+        factor = DenseFactor.of(system.jacobian(pose, time))
+        step = factor.solve(-residual)
+        size = _size(step)
+        step = jnp.where(refine | ~(size <= tolerance), step, 0.0)
+        pose = pose.displaced(*system.coordinates(step, pose.shifts))
+        first = jnp.where(count == 0, size, correction.first)
+        return pose, factor, Correction(size, first, simplified), accepted, count + 1
 
     lanes = time.coefficients[0].shape[-1]
-    state = (pose, DenseFactor.blank(system.cells.shape, lanes), jnp.full(lanes, jnp.inf), jnp.zeros(lanes, bool), 0)
-    pose, factor, size, _, _ = jax.lax.while_loop(unfinished, iterate, state)
-    return pose, factor, size
+    unknown = jnp.full(lanes, jnp.inf)
+    blank = DenseFactor.blank(system.cells.shape, lanes)
+    state = (pose, blank, Correction(unknown, unknown, jnp.zeros(lanes)), jnp.zeros(lanes, bool), 0)
+    pose, factor, correction, _, _ = jax.lax.while_loop(unfinished, iterate, state)
+    return pose, factor, correction
 
 
 def differentiated(system: System, pose: Any, factor: DenseFactor, time: Jet) -> Any:
@@ -125,6 +154,37 @@ def _safe_step(terms: list[Any]) -> Any:
     return SAFE_FRACTION * jnp.min(jnp.stack(steps), axis=0)
 
 
+def _turnover(system: System, pose_type: type, coordinates: dict[str, Jet], factor: DenseFactor, time: Any) -> Any:
+    """Return the eigenvalue of ``J^-1 J'`` of largest size with the sign of its real part, 1/s, shape (batch,).
+
+    To first order in a step s the determinant is ``det(J) det(1 + s J^-1 J')``: minus the inverse of that eigenvalue is
+    the distance in time to its nearest zero, which may be complex. All zeros count, also those that leave the sign of
+    the determinant as it is, as two loops do that pass their dead points together. A power iteration finds it.
+    """
+    moving = {name: jet.truncate(1) for name, jet in coordinates.items()}
+
+    def jacobian(step: Any) -> Any:
+        return system.jacobian(pose_type.predicted_from(moving, step), Jet([(time + step)[None]]))
+
+    still = jnp.zeros_like(time)
+    _, slope = jax.jvp(jacobian, (still,), (jnp.ones_like(still),))
+    count = system.cells.shape[1]
+    start = jnp.broadcast_to(jnp.cos(jnp.arange(float(count)) ** 2 + 1.0)[:, None], (count, time.shape[0]))
+
+    def apply(_: Any, state: Any) -> Any:
+        vector, _, grown = state
+        moved = factor.solve(jnp.sum(slope * vector[None], axis=1))
+        size = jnp.maximum(jnp.sqrt(jnp.sum(moved * moved, axis=0)), 1e-300)
+        return moved / size, jnp.sum(moved * vector, axis=0), grown + jnp.log(size)
+
+    none = jnp.zeros_like(time)
+    start = (start / jnp.sqrt(jnp.sum(start * start, axis=0)), none, none)
+    middle = jax.lax.fori_loop(0, POWER_STEPS, apply, start)
+    _, along, grown = jax.lax.fori_loop(0, POWER_STEPS, apply, middle)
+    size = jnp.exp(jnp.maximum((grown - middle[2]) / POWER_STEPS, grown / (2 * POWER_STEPS)))
+    return jnp.where(along < 0, -size, size)
+
+
 def _predictable(departure: Any, travel: Any) -> Any:
     """Tell whether a departure from a prediction is small enough, for how far the prediction moves."""
     return departure <= jnp.minimum(LARGEST_DEPARTURE, jnp.maximum(0.2 * travel, SMALLEST_DEPARTURE))
@@ -165,10 +225,12 @@ def advance(
     system: System,
     coordinates: dict[str, Any],
     angles: tuple[Any, ...],
+    sign: Any,
     step: Any,
     instant: Any,
     tolerance: Any,
     refine: Any,
+    survey: Any,
     *,
     pose_type: type,
     order: int,
@@ -182,12 +244,16 @@ def advance(
     coordinates, angles
         Jets of the neighbours, shape (order + 1, ..., batch): of the pose, by name, and of each group of outputs that
         are angles known up to whole turns.
+    sign : array of shape (batch,)
+        Of the determinant of the Jacobian at the neighbours; 0 where it does not matter.
     step, instant : array of shape (batch,)
         Time from the neighbour, and the time arrived at, s.
     tolerance : float
         Largest correction of an accepted pose, rad or sizes of the mechanism.
     refine : bool
         Whether to correct accepted poses to rounding.
+    survey : bool
+        Whether to look for the nearest singular position.
     pose_type, order
         PlanarPose or SpatialPose; derivatives wanted.
     """
@@ -204,19 +270,30 @@ def advance(
         if group.element.turning:
             result = _continued(result, Jet(tuple(next(known))).evaluate(step))
         results.append(jnp.stack(result.dense().coefficients))
+    reached = pose.coordinates()
     departures = _departures(system, pose, predicted)
+    departure = jnp.max(departures, axis=0)
     travel = _travel(_terms(system, moving, pose_type.predictor), step)
-    predictable = _predictable(jnp.max(departures, axis=0), travel) & _laws_predictable(system, instant, step, order)
+    found = factor.sign()
+    predictable = _predictable(departure, travel) & _laws_predictable(system, instant, step, order)
+    predictable &= correction.contracts() & ((sign == 0) | (found == sign))
     admissible = system.admissible(time)
     pivot_ratio = factor.pivot_ratio()
-    status = _status(correction, predictable, pivot_ratio, jnp.all(admissible, axis=0), tolerance)
-    reached = pose.coordinates()
+    status = _status(correction.last, predictable, pivot_ratio, jnp.all(admissible, axis=0), tolerance)
+    terms = _terms(system, reached, pose_type.predictor)
+    turnover = jax.lax.cond(
+        survey, lambda: _turnover(system, pose_type, reached, factor, instant), lambda: jnp.zeros_like(instant)
+    )
     return Arrival(
         {name: jnp.stack(jet.dense().coefficients) for name, jet in reached.items()},
         tuple(results),
         status,
         jnp.argmax(departures, axis=0),
-        _safe_step(_terms(system, reached, pose_type.predictor)),
+        _safe_step(terms),
+        _safe_step(terms[:4]) / SAFE_FRACTION,
+        departure / jnp.maximum(travel, 1e-300),
+        found,
+        turnover,
         pivot_ratio,
         admissible,
     )

@@ -8,8 +8,9 @@ import numpy as np
 
 from jounce.errors import MechanismError, SolveError
 from jounce.kinematics.assembly import assemble
+from jounce.kinematics.grid import Grid
 from jounce.kinematics.motion import Motion
-from jounce.kinematics.path import Grid, Solver, Track, follow
+from jounce.kinematics.path import Anchor, Solver, follow
 from jounce.kinematics.status import Status
 from jounce.mechanism import Mechanism, build, check_mechanism, time_grid
 
@@ -115,17 +116,17 @@ def checked_order(order: Any) -> int:
     return int(order)
 
 
-def _first(solver: Solver, coordinates: dict[str, np.ndarray], instant: np.ndarray) -> Track:
+def _first(solver: Solver, coordinates: dict[str, np.ndarray], instant: np.ndarray) -> Anchor:
     """Solve the first instant with its derivatives, from its assembled position."""
     levels = solver.order + 1
     still = {name: np.stack([x, *[np.zeros_like(x)] * (levels - 1)]) for name, x in coordinates.items()}
     angles = tuple(np.zeros((levels, 1, group.instances, 1)) for group in solver.model.system.outputs)
-    arrival = solver((still, angles), np.zeros(1), instant)
+    arrival = solver((still, angles, np.zeros(1)), np.zeros(1), instant, survey=True)
     status = Status(int(arrival.status[0]))
     if status != Status.OK:
         where = f"t = {instant[0]:g} s, {solver.culprit(arrival, 0)}"
         raise SolveError(f"{where}: {_words(status)}: {status.advice}", status=status)
-    return Track([float(instant[0])], [(arrival.coordinates, arrival.outputs)], float(arrival.safe_step[0]))
+    return Anchor.of(arrival, instant[0])
 
 
 def _words(status: Status) -> str:

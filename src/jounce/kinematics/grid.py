@@ -1,0 +1,142 @@
+"""All instants of a time grid, solved in batches from the anchors of a motion that was followed.
+
+A long grid is not solved one instant after another. The instants start from their nearest anchor, in levels that halve
+the spacing, so that most are predicted to rounding by an instant solved before and all of a level are solved together.
+Between two anchors lies no singular position, so that the sign of the determinant tells an instant on another branch.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import numpy as np
+
+from jounce.kinematics.path import LARGE_BATCH, SMALL_BATCH, Solver, Track, follow
+from jounce.kinematics.status import Status
+
+LONG_GRID = 1024  # instants: from here on in large batches
+
+
+class Grid:
+    """All instants of a time grid, solved from the anchors of a track.
+
+    Attributes
+    ----------
+    status : array of int, shape (time,)
+    culprits : dict of int to str
+        For instants that failed, the body farthest from its prediction, or the driver without a permitted value.
+    """
+
+    def __init__(self, solver: Solver, track: Track, time: np.ndarray):
+        self.solver, self.track, self.time = solver, track, time
+        self.status = np.full(len(time), int(Status.NOT_REACHED))
+        self.culprits: dict[int, str] = {}
+        anchors = np.array([anchor.instant for anchor in track.anchors])
+        self._instants = np.concatenate([time, anchors])
+        self._nearest = len(time) + _nearest(anchors, time)
+        self._store = jax.tree.map(
+            lambda *xs: np.concatenate([np.zeros((*xs[0].shape[:-1], len(time))), *xs], axis=-1),
+            *(anchor.state for anchor in track.anchors),
+        )
+
+    @property
+    def state(self) -> tuple[dict[str, Any], tuple[Any, ...]]:
+        """Jets of the coordinates and of the outputs, time last."""
+        coordinates, outputs, _ = jax.tree.map(lambda x: x[..., : len(self.time)], self._store)
+        return coordinates, outputs
+
+    def solve(self, progress: Callable[[int, int], None] | None) -> None:
+        """Solve level after level; an instant that its neighbour cannot predict is followed to from an anchor."""
+        count = len(self.time)
+        reached = self.time < self.track.ended_at
+        width = LARGE_BATCH if count > LONG_GRID else SMALL_BATCH
+        done = 0
+        for level, distance in _levels(count, len(self.track.anchors), width):
+            lanes = level[reached[level]]
+            source = self._nearest[lanes]
+            if distance is not None:
+                neighbour = lanes - distance
+                nearer = self._away(lanes, neighbour) <= self._away(lanes, source)
+                source = np.where(nearer & (self.status[neighbour] == Status.OK), neighbour, source)
+            for first in range(0, len(lanes), width):
+                self._solve_batch(lanes[first : first + width], source[first : first + width])
+                done += min(width, len(lanes) - first)
+                if progress is not None:
+                    progress(done, count)
+        if not reached.all():
+            self._explain_end(int(np.argmin(reached)))
+        if progress is not None and done < count:
+            progress(count, count)
+
+    def _solve_batch(self, lanes: np.ndarray, source: np.ndarray) -> None:
+        chosen = _slice_of(source)
+        known = jax.tree.map(lambda x: x[..., chosen], self._store)
+        arrival = self.solver(known, self.time[lanes] - self._instants[source], self.time[lanes])
+        self.status[lanes] = arrival.status
+        self._keep(_slice_of(lanes), (arrival.coordinates, arrival.outputs, arrival.sign))
+        for k in np.flatnonzero(arrival.status != Status.OK).tolist():
+            self.culprits[int(lanes[k])] = self.solver.culprit(arrival, k)
+            self._rescue(int(lanes[k]))
+
+    def _away(self, lanes: np.ndarray, source: np.ndarray) -> np.ndarray:
+        return np.abs(self.time[lanes] - self._instants[source])
+
+    def _keep(self, lanes: Any, state: Any) -> None:
+        def put(whole: np.ndarray, part: np.ndarray) -> None:
+            whole[..., lanes] = part
+
+        jax.tree.map(put, self._store, state)
+
+    def _rescue(self, lane: int) -> None:
+        """Follow the motion to one instant from the anchor before it."""
+        anchors, instant = self.track.anchors, float(self.time[lane])
+        before = int(np.searchsorted([a.instant for a in anchors], instant, side="right")) - 1
+        start = anchors[before]
+        local = follow(self.solver, start, instant, self.time[-1] - self.time[0], (instant - start.instant) / 2)
+        if local.status != Status.OK:
+            self.status[lane], self.culprits[lane] = local.status, local.culprit
+        elif len(local.anchors) > 1:
+            self.status[lane] = Status.OK
+            self.culprits.pop(lane)
+            self._keep(slice(lane, lane + 1), local.anchors[-1].state)
+
+    def _explain_end(self, lost: int) -> None:
+        """Say at the first instant that was not reached why the motion could not be followed to it."""
+        track, instant = self.track, self.time[lost : lost + 1]
+        self.status[lost], self.culprits[lost] = track.status, track.culprit
+        last = track.anchors[-1]
+        arrival = self.solver(last.state, instant - last.instant, instant)
+        if arrival.status[0] == Status.INADMISSIBLE:  # the fault is the law's, not that of the position before
+            self.status[lost], self.culprits[lost] = Status.INADMISSIBLE, self.solver.culprit(arrival, 0)
+
+
+def _slice_of(indices: np.ndarray) -> Any:
+    """Return evenly spaced indices as a slice, with which NumPy copies several times faster."""
+    first, last = int(indices[0]), int(indices[-1])
+    step = (last - first) // (len(indices) - 1) if len(indices) > 1 else 1
+    if step > 0 and np.array_equal(indices, np.arange(first, last + 1, step)):
+        return slice(first, last + 1, step)
+    return indices
+
+
+def _nearest(anchors: np.ndarray, time: np.ndarray) -> np.ndarray:
+    after = np.clip(np.searchsorted(anchors, time), 1, max(len(anchors) - 1, 1))
+    if len(anchors) == 1:
+        return np.zeros(len(time), int)
+    return np.where(time - anchors[after - 1] <= anchors[after] - time, after - 1, after)
+
+
+def _levels(count: int, anchors: int, width: int) -> list[tuple[np.ndarray, int | None]]:
+    """Return the instants of each level, with the distance in the grid of the neighbour that each is predicted from.
+
+    The first level starts from the anchors, and fills at least one batch.
+    """
+    stride = 1
+    while count // (2 * stride) >= max(2 * anchors, width):
+        stride *= 2
+    levels: list[tuple[np.ndarray, int | None]] = [(np.arange(0, count, stride), None)]
+    while stride > 1:
+        half = stride // 2
+        levels.append((np.arange(half, count, stride), half))
+        stride = half
+    return levels
