@@ -54,7 +54,7 @@ def main() -> int:
             tally += verdict.tally
             reasons += verdict.reasons
             if lines and (verdict.tally["wrong"] or verdict.tally["given up"]):
-                lines.write(json.dumps(_record(case, verdict)) + "\n")
+                print(json.dumps(_record(case, verdict)), file=lines, flush=True)
         total += tally
         print(_row(kind, tally), flush=True)
     print(_row("all", total))

@@ -90,14 +90,14 @@ def solved(case: Case) -> Solution:
     if (case.linkage.family.name, case.order) not in _warm:  # compile apart from what is timed
         _solve(mechanism, case.time, case.order)
         _warm.add((case.linkage.family.name, case.order))
-    begun = time.perf_counter_ns()
+    begun = time.process_time_ns()
     motion = _solve(mechanism, case.time, case.order)
-    spent = time.perf_counter_ns() - begun
+    spent = time.process_time_ns() - begun
     unknowns = len(case.linkage.start)
     if isinstance(motion, jn.JounceError):
         lost = np.full((len(case.time), case.order + 1, unknowns), np.nan)
         return Solution(case, spent, np.full(len(case.time), -1), lost, type(motion).__name__)
-    found = case.linkage.family.unknowns(motion.outputs)
+    found = case.linkage.family.unknowns(motion.outputs, case.linkage.values)
     return Solution(case, spent, motion.status, found)
 
 
@@ -202,9 +202,7 @@ def _verdict(solution: Solution, path: Paths) -> Verdict:
     return Verdict(tally, reasons, first, smallest, float(path.limit) if np.isfinite(path.limit) else None)
 
 
-def _wrong_rates(
-    solution: Solution, path: Paths, position: np.ndarray, judged: np.ndarray
-) -> tuple[np.ndarray, int]:
+def _wrong_rates(solution: Solution, path: Paths, position: np.ndarray, judged: np.ndarray) -> tuple[np.ndarray, int]:
     """Tell at which instants velocity, acceleration or jerk are not those of the branch; away from dead points."""
     case, order = solution.case, min(solution.case.order, 3)
     wrong = np.zeros(len(case.time), bool)
@@ -212,9 +210,7 @@ def _wrong_rates(
     if not case.rates or order == 0 or not chosen.size:
         return wrong, 0
     linkage = case.linkage
-    known = derivatives(
-        linkage.form, linkage.family.circular, linkage.law, case.time[chosen], position[chosen], order
-    )
+    known = derivatives(linkage.form, linkage.family.circular, linkage.law, case.time[chosen], position[chosen], order)
     found = solution.position[chosen, : order + 1]
     scale = np.maximum(np.abs(known), np.abs(known[:, :1])).max(axis=2)
     away = np.abs(found - known).max(axis=2)

@@ -12,7 +12,7 @@ import numpy as np
 
 import jounce as jn
 from jounce import drivers, planar
-from tests.oracles.linkage_paths import Affine, Law, driven
+from tests.oracles.linkage_paths import Affine, Law
 
 LAW = "start + rate*t + wave*sin(speed*t + phase)"
 LAW_PARAMETERS = dict.fromkeys(Law._fields, 0.0)
@@ -77,8 +77,8 @@ class Family(abc.ABC):
         """
 
     @abc.abstractmethod
-    def guess(self, values, u, x):
-        """Return the starting guess of the poses."""
+    def guess(self, values, value, x):
+        """Return the starting guess of the poses at a driven value."""
 
     @abc.abstractmethod
     def unknowns(self, outputs, values):
@@ -111,7 +111,7 @@ class Family(abc.ABC):
     def near_guess(self, random, values, law, start):
         """Return a guess that is off by something."""
         off = 10 ** random.uniform(-6, -2)
-        guess = self.guess(values, driven(np.asarray(law(0.0)), self.circular)[0], start)
+        guess = self.guess(values, float(law(0.0)), start)
         return {name: float(v + off * random.normal()) for name, v in zip(self.guessed, guess, strict=True)}
 
 
@@ -175,12 +175,15 @@ class SliderCrank(Family):
 
     def assembly(self, values, value, random):
         under = values["b"] ** 2 - (values["a"] * np.sin(value) - values["e"]) ** 2
-        return None if under < 1e-16 else np.array([values["a"] * np.cos(value) + random.choice([-1, 1]) * np.sqrt(under)])
+        return (
+            None if under < 1e-16 else np.array([values["a"] * np.cos(value) + random.choice([-1, 1]) * np.sqrt(under)])
+        )
 
-    def guess(self, values, u, x):
-        return angle_of(u), angle_of([x[0] - values["a"] * u[0], values["e"] - values["a"] * u[1]]), x[0]
+    def guess(self, values, value, x):
+        tip = values["a"] * direction(value)
+        return value, angle_of([x[0] - tip[0], values["e"] - tip[1]]), x[0]
 
-    def unknowns(self, outputs, values):  # noqa: ARG002
+    def unknowns(self, outputs, values):
         return outputs["B"][..., :1]
 
 
@@ -220,10 +223,10 @@ class SliderDriven(SliderCrank):
         a, b, e = values["a"], values["b"], values["e"]
         return dyad(np.zeros(2), np.array([float(value), e]), a, b, random.choice([-1, 1]))
 
-    def guess(self, values, u, x):
-        return angle_of(x), angle_of([u[0] - x[0], values["e"] - x[1]]), u[0]
+    def guess(self, values, value, x):
+        return angle_of(x), angle_of([value - x[0], values["e"] - x[1]]), value
 
-    def unknowns(self, outputs, values):  # noqa: ARG002
+    def unknowns(self, outputs, values):
         return outputs["A"]
 
 
@@ -287,8 +290,8 @@ class FourBar(Family):
         tip = values["a"] * direction(value)
         return dyad(tip, np.array([values["d"], 0.0]), values["b"], values["c"], random.choice([-1, 1]))
 
-    def guess(self, values, u, x):
-        return angle_of(u), angle_of([x[0] - values["d"], x[1]])
+    def guess(self, values, value, x):
+        return value, angle_of([x[0] - values["d"], x[1]])
 
-    def unknowns(self, outputs, values):  # noqa: ARG002
+    def unknowns(self, outputs, values):
         return outputs["C"]

@@ -126,15 +126,12 @@ class SixBar(Family):
         r = None if points is None else dyad(points[1], points[2], values["r"], values["l"], random.choice([-1, 1]))
         return None if r is None else np.concatenate([points[0], r])
 
-    def guess(self, values, u, x):
-        q = self.attached(values, u, x[:2], np.array([values["d"], 0.0]), np.array([values["qx"], values["qy"]]))[1]
-        return self.poses(values, values["a"] * u, x[:2], x[2:], q)
+    def guess(self, values, value, x):
+        u, c, r, d = direction(value), x[:2], x[2:], np.array([values["d"], 0.0])
+        q = self.attached(values, u, c, d, np.array([values["qx"], values["qy"]]))[1]
+        return value, angle_of(c - values["a"] * u), angle_of(c - d), angle_of(r - q), *q
 
-    def poses(self, values, b, c, r, q):
-        """Return the angles of all bodies and the origin of the link."""
-        return angle_of(b), angle_of(c - b), angle_of([c[0] - values["d"], c[1]]), angle_of(r - q), *q
-
-    def unknowns(self, outputs, values):  # noqa: ARG002
+    def unknowns(self, outputs, values):
         return np.concatenate([outputs["C"], outputs["R"]], axis=-1)
 
 
@@ -208,11 +205,11 @@ class StephensonAtLink(Triad, SixBar):
         rod = np.hypot(*(q + values["l"] * direction(link) - p))
         return (values | {"r": rod}, link, np.concatenate([values["a"] * direction(crank), c])) if rod > 0.2 else None
 
-    def guess(self, values, u, x):
-        q = np.array([values["qx"], values["qy"]])
-        return self.poses(values, x[:2], x[2:], q + values["l"] * u, q)
+    def guess(self, values, value, x):
+        b, c, d = x[:2], x[2:], np.array([values["d"], 0.0])
+        return angle_of(b), angle_of(c - b), angle_of(c - d), value, values["qx"], values["qy"]
 
-    def unknowns(self, outputs, values):  # noqa: ARG002
+    def unknowns(self, outputs, values):
         return np.concatenate([outputs["B"], outputs["C"]], axis=-1)
 
 
@@ -274,7 +271,7 @@ class StephensonSecond(Triad):
     def draw(self, random, nearness, sign):
         raise NotImplementedError("the position comes first")
 
-    def place(self, random, nearness):  # noqa: ARG002
+    def place(self, random, nearness):
         values = dict(zip(self.dimensions[:2], lengths(random, 2), strict=True))
         values |= dict(zip(self.dimensions[2:10], random.normal(size=8), strict=True))
         crank, lever, plate = random.uniform(-np.pi, np.pi, size=3)
@@ -283,8 +280,9 @@ class StephensonSecond(Triad):
         values |= {name: np.hypot(*(p - q)) for name, (p, q) in zip("bc", ends, strict=True)}
         return (values, crank, start) if min(values["b"], values["c"]) > 0.2 else None
 
-    def guess(self, values, u, x):
-        return angle_of(u), angle_of(x[:2]), angle_of(x[2:]), values["d"] + values["a"] * u[0], values["a"] * u[1]
+    def guess(self, values, value, x):
+        base = np.array([values["d"], 0.0]) + values["a"] * direction(value)
+        return value, angle_of(x[:2]), angle_of(x[2:]), *base
 
-    def unknowns(self, outputs, values):  # noqa: ARG002
+    def unknowns(self, outputs, values):
         return np.concatenate([outputs["lever"], outputs["plate"] - outputs["E"]], axis=-1)

@@ -25,6 +25,12 @@ def unit_vector(random):
     return vector / np.linalg.norm(vector)
 
 
+def about_z(angle):
+    """Return the matrix of a turn about z."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
 def quaternion_of(rotation):
     """Return the Euler parameters of a rotation matrix."""
     # the eigenvector that belongs to the largest eigenvalue (Bar-Itzhack 2000)
@@ -112,10 +118,9 @@ class RSSR(Family):
         angle = np.arctan2(along[1], along[0]) + random.choice([-1, 1]) * np.arccos(cosine)
         return np.array([np.cos(angle), np.sin(angle)])
 
-    def guess(self, values, u, x):
+    def guess(self, values, value, x):
         _, frame = self.ends(values)
-        turned = np.array([[x[0], -x[1], 0], [x[1], x[0], 0], [0, 0, 1]])
-        return np.arctan2(u[1], u[0]), *quaternion_of(frame @ turned)
+        return value, *quaternion_of(frame @ about_z(np.arctan2(x[1], x[0])))
 
     def unknowns(self, outputs, values):
         return (outputs["C"] - outputs["D"]) @ self.ends(values)[1][:, :2]
@@ -200,7 +205,7 @@ class RCCC(Family):
 
     def assembly(self, values, value, random):
         point, along, base, axis = self.axes(values)
-        about = np.array([[np.cos(value), -np.sin(value), 0], [np.sin(value), np.cos(value), 0], [0, 0, 1]])
+        about = about_z(value)
         point, along = about @ point, about @ along
         # the direction: m = x along + y axis + z (along x axis)
         c, normal = along @ axis, np.cross(along, axis)
@@ -217,17 +222,17 @@ class RCCC(Family):
         ]
         return np.concatenate([m, np.linalg.solve(matrix, right)])
 
-    def guess(self, values, u, x):
+    def guess(self, values, value, x):
         point, along, base, axis = self.axes(values)
-        about = np.array([[u[0], -u[1], 0], [u[1], u[0], 0], [0, 0, 1]])
+        about = about_z(value)
         point, along = about @ point, about @ along
         m, foot = x[:3], np.cross(x[:3], x[3:])
         # on the coupler the first axis is z and the shortest way to the second is x; likewise on the rocker
         coupler = placed(point, along, foot, m)
         rocker = placed(foot, m, base, axis)
-        return np.arctan2(u[1], u[0]), *coupler, *rocker
+        return value, *coupler, *rocker
 
-    def unknowns(self, outputs, values):  # noqa: ARG002
+    def unknowns(self, outputs, values):
         p, m = outputs["origin"], outputs["tip"] - outputs["origin"]
         moment = np.zeros_like(m)
         for k in range(m.shape[1]):
