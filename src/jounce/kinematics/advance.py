@@ -168,18 +168,17 @@ def _turnover(system: System, pose_type: type, coordinates: dict[str, Jet], fact
 
     still = jnp.zeros_like(time)
     _, slope = jax.jvp(jacobian, (still,), (jnp.ones_like(still),))
-    count = system.cells.shape[1]
-    start = jnp.broadcast_to(jnp.cos(jnp.arange(float(count)) ** 2 + 1.0)[:, None], (count, time.shape[0]))
 
     def apply(_: Any, state: Any) -> Any:
         vector, _, grown = state
         moved = factor.solve(jnp.sum(slope * vector[None], axis=1))
-        size = jnp.maximum(jnp.sqrt(jnp.sum(moved * moved, axis=0)), 1e-300)
-        return moved / size, jnp.sum(moved * vector, axis=0), grown + jnp.log(size)
+        size = jnp.maximum(jnp.sqrt(jnp.sum(moved * moved, axis=0, keepdims=True)), 1e-300)
+        return moved / size, jnp.sum(moved * vector, axis=0), grown + jnp.log(size[0])
 
-    none = jnp.zeros_like(time)
-    start = (start / jnp.sqrt(jnp.sum(start * start, axis=0)), none, none)
-    middle = jax.lax.fori_loop(0, POWER_STEPS, apply, start)
+    count = system.cells.shape[1]
+    generic = jnp.cos(jnp.arange(float(count)) ** 2 + 1.0)[:, None]  # no structure that a mechanism has
+    start = jnp.broadcast_to(generic / jnp.sqrt(jnp.sum(generic * generic)), (count, time.shape[0]))
+    middle = jax.lax.fori_loop(0, POWER_STEPS, apply, (start, still, still))
     _, along, grown = jax.lax.fori_loop(0, POWER_STEPS, apply, middle)
     size = jnp.exp(jnp.maximum((grown - middle[2]) / POWER_STEPS, grown / (2 * POWER_STEPS)))
     return jnp.where(along < 0, -size, size)
