@@ -45,6 +45,7 @@ class Arrival(NamedTuple):
     turnover: Any  # 1/s, how fast the Jacobian nears a singular one (below zero) or leaves it; 0 unless surveyed
     pivot_ratio: Any  # smallest pivot of the Jacobian over the largest
     admissible: Any  # whether each driver has a permitted value, shape (drivers, batch)
+    finite: Any  # whether all derivatives wanted are finite, of the pose and of each output, shape (1 + outputs, batch)
 
 
 def _size(increment: Any) -> Any:
@@ -133,12 +134,11 @@ def _departures(system: System, pose: Any, predicted: Any) -> Any:
 def _terms(system: System, coordinates: dict[str, Jet], predictor: tuple[str, ...]) -> list[Any]:
     """Return the size of each Taylor coefficient but the first, rad or sizes of the mechanism: order x (batch,)."""
     scales = {"position": system.column_scale[0]}
-    return [
-        jnp.max(
-            jnp.stack([_largest(c) / scales.get(name, 1.0) for name, c in zip(predictor, level, strict=True)]), axis=0
-        )
+    sizes = [
+        jnp.stack([_largest(c) / scales.get(name, 1.0) for name, c in zip(predictor, level, strict=True)])
         for level in zip(*(coordinates[name].coefficients[1:] for name in predictor), strict=True)
     ]
+    return [jnp.max(jnp.where(jnp.isfinite(size), size, 0.0), axis=0) for size in sizes]
 
 
 def _largest(coefficient: Any) -> Any:
@@ -204,9 +204,19 @@ def _laws_predictable(system: System, instant: Any, step: Any, order: int) -> An
     return result
 
 
-def _status(correction: Any, predictable: Any, pivot_ratio: Any, admissible: Any, tolerance: Any) -> Any:
+def _finite(jets: list[Any], wanted: Any) -> Any:
+    """Tell where the coefficients of jets are finite up to the order wanted, for each instance: (instances, batch)."""
+    found = []
+    for jet in jets:
+        above = (jnp.arange(jet.shape[0]) > wanted).reshape(-1, *[1] * (jet.ndim - 1))
+        found.append(jnp.all(jnp.isfinite(jet) | above, axis=(0, 1)))
+    return jnp.concatenate(found)
+
+
+def _status(correction: Any, predictable: Any, pivot_ratio: Any, admissible: Any, finite: Any, tolerance: Any) -> Any:
     """Return the outcome at each instant, the gravest last."""
     outcomes = (
+        (~finite, Status.UNDEFINED),
         (~predictable, Status.BRANCH_JUMP),
         (~(correction <= jnp.maximum(tolerance, CONVERGED)), Status.NOT_CONVERGED),
         (pivot_ratio <= SINGULAR_PIVOT, Status.SINGULAR),
@@ -230,6 +240,7 @@ def advance(
     tolerance: Any,
     refine: Any,
     survey: Any,
+    wanted: Any,
     *,
     pose_type: type,
     order: int,
@@ -253,10 +264,13 @@ def advance(
         Whether to correct accepted poses to rounding.
     survey : bool
         Whether to look for the nearest singular position.
+    wanted : int
+        Highest derivative that must be finite.
     pose_type, order
         PlanarPose or SpatialPose; derivatives wanted.
     """
-    moving = {name: Jet(tuple(c)) for name, c in coordinates.items()}
+    # what a law makes infinite, such as the third derivative of t**2.5 at t = 0, is of no use to a prediction
+    moving = {name: Jet(tuple(jnp.where(jnp.isfinite(c), c, 0.0))) for name, c in coordinates.items()}
     predicted = pose_type.predicted_from(moving, step)
     time = Jet.variable(instant[None], order)
     pose, factor, correction = newton_raphson(system, predicted, time.truncate(0), tolerance, refine)
@@ -267,7 +281,8 @@ def advance(
     for group in system.outputs:
         result = group.evaluate(pose)
         if group.element.turning:
-            result = _continued(result, Jet(tuple(next(known))).evaluate(step))
+            expected = next(known)
+            result = _continued(result, Jet(tuple(jnp.where(jnp.isfinite(expected), expected, 0.0))).evaluate(step))
         results.append(jnp.stack(result.dense().coefficients))
     reached = pose.coordinates()
     departures = _departures(system, pose, predicted)
@@ -278,13 +293,18 @@ def advance(
     predictable &= correction.contracts() & ((sign == 0) | (found == sign))
     admissible = system.admissible(time)
     pivot_ratio = factor.pivot_ratio()
-    status = _status(correction.last, predictable, pivot_ratio, jnp.all(admissible, axis=0), tolerance)
+    coordinates = {name: jnp.stack(jet.dense().coefficients) for name, jet in reached.items()}
+    posed = [jnp.max(coordinates[name], axis=-2, keepdims=True) for name in pose_type.predictor]
+    finite = _finite([*(x.reshape(x.shape[0], -1, 1, x.shape[-1]) for x in posed), *results], wanted)
+    finite = jnp.concatenate([jnp.all(finite[: len(posed)], axis=0, keepdims=True), finite[len(posed) :]])
+    admitted, defined = jnp.all(admissible, axis=0), jnp.all(finite, axis=0)
+    status = _status(correction.last, predictable, pivot_ratio, admitted, defined, tolerance)
     terms = _terms(system, reached, pose_type.predictor)
     turnover = jax.lax.cond(
         survey, lambda: _turnover(system, pose_type, reached, factor, instant), lambda: jnp.zeros_like(instant)
     )
     return Arrival(
-        {name: jnp.stack(jet.dense().coefficients) for name, jet in reached.items()},
+        coordinates,
         tuple(results),
         status,
         jnp.argmax(departures, axis=0),
@@ -295,4 +315,5 @@ def advance(
         turnover,
         pivot_ratio,
         admissible,
+        finite,
     )

@@ -11,7 +11,8 @@ from typing import Any
 import jax
 import numpy as np
 
-from jounce.kinematics.path import LARGE_BATCH, SMALL_BATCH, Solver, Track, follow
+from jounce.kinematics.bridge import LARGEST_DISAGREEMENT, bridged, half_width, spoiled_width
+from jounce.kinematics.path import LARGE_BATCH, PASSABLE, SMALL_BATCH, ChangePoint, Solver, Track, follow
 from jounce.kinematics.status import Status
 
 LONG_GRID = 1024  # instants: from here on in large batches
@@ -63,6 +64,10 @@ class Grid:
                 done += min(width, len(lanes) - first)
                 if progress is not None:
                     progress(done, count)
+        for point in self.track.change_points:
+            self._bridge(point)
+        for point in self.track.singular_positions_outside():
+            self._refuse(np.abs(self.time - point.instant) < spoiled_width(point, self.solver.order))
         if not reached.all():
             self._explain_end(int(np.argmin(reached)))
         if progress is not None and done < count:
@@ -76,7 +81,8 @@ class Grid:
         self._keep(_slice_of(lanes), (arrival.coordinates, arrival.outputs, arrival.sign))
         for k in np.flatnonzero(arrival.status != Status.OK).tolist():
             self.culprits[int(lanes[k])] = self.solver.culprit(arrival, k)
-            self._rescue(int(lanes[k]))
+            if arrival.status[k] not in PASSABLE:
+                self._rescue(int(lanes[k]))
 
     def _away(self, lanes: np.ndarray, source: np.ndarray) -> np.ndarray:
         return np.abs(self.time[lanes] - self._instants[source])
@@ -96,9 +102,33 @@ class Grid:
         if local.status != Status.OK:
             self.status[lane], self.culprits[lane] = local.status, local.culprit
         elif len(local.anchors) > 1:
-            self.status[lane] = Status.OK
+            self.status[lane] = local.anchors[-1].status
             self.culprits.pop(lane)
             self._keep(slice(lane, lane + 1), local.anchors[-1].state)
+
+    def _bridge(self, point: ChangePoint) -> None:
+        """Replace the instants next to a change point, and the one at it, by what the motion on both sides gives."""
+        away = np.abs(self.time - point.instant)
+        lanes = np.flatnonzero((away < half_width(point, self.solver.order)) & (self.time < self.track.ended_at))
+        if not lanes.size:
+            return
+        state = bridged(self.solver, self.track, point, self.time[lanes])
+        if state is None:
+            self._refuse(away < spoiled_width(point, self.solver.order))
+            return
+        solved = self.status[lanes] == Status.OK
+        names = self.solver.model.pose_type.predictor
+        apart = [np.abs(state[0][name][0] - self._store[0][name][0][..., lanes])[..., solved] for name in names]
+        if max(np.max(x, initial=0.0) for x in apart) > LARGEST_DISAGREEMENT:
+            self._refuse(away < spoiled_width(point, self.solver.order))
+            return
+        self.status[lanes] = Status.OK
+        for lane in lanes.tolist():
+            self.culprits.pop(lane, None)
+        self._keep(lanes, (*state, self._store[2][lanes]))
+
+    def _refuse(self, lanes: np.ndarray) -> None:
+        self.status[lanes & (self.status == Status.OK)] = Status.SINGULAR
 
     def _explain_end(self, lost: int) -> None:
         """Say at the first instant that was not reached why the motion could not be followed to it."""

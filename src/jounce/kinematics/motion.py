@@ -67,6 +67,9 @@ class Motion:
         Outcome at each instant, see `Status`; where it is not 0, all results are NaN.
     culprits : dict of int to str
         For the instants that failed, by index: the body farthest from its prediction, or the driver at fault.
+    change_points : numpy.ndarray of shape (points,)
+        When the motion passed a singular position smoothly, where assembly branches cross, s: there another motion
+        could have branched off, and forces are not determined.
     derived : dict
         What was computed of the motion and may be wanted again, by name: the forces, for one.
     """
@@ -80,9 +83,11 @@ class Motion:
         state: tuple[dict[str, Any], tuple[Any, ...]],
         status: np.ndarray,
         culprits: dict[int, str],
+        change_points: np.ndarray | None = None,
     ):
         self.mechanism, self.time, self.order, self.status = mechanism, time, order, status
         self.culprits = culprits
+        self.change_points = np.zeros(0) if change_points is None else change_points
         self.derived: dict[str, Any] = {}
         self._model = model
         self._coordinates, groups = state
@@ -128,6 +133,8 @@ class Motion:
             for name, values in self.outputs.items()
         }
         attributes = {"title": self.mechanism.title or "motion of a mechanism", "source": "jounce"}
+        if self.change_points.size:
+            attributes["change_points"] = self.change_points
         dataset = xarray.Dataset(variables, coords=self._axes(), attrs=attributes)
         dataset["time"].attrs = {"units": "s", "long_name": "time"}
         dataset["derivative"].attrs = {"long_name": "order of the time derivative"}

@@ -18,12 +18,14 @@ from jounce.kinematics.advance import SAFE_FRACTION, Arrival, advance
 from jounce.kinematics.status import Status
 from jounce.mechanism import Model
 
+PASSABLE = (Status.OK, Status.UNDEFINED)
 SMALLEST_STEP = 1e-10  # of the span
 LARGEST_TURNOVER = 1.0  # of the Jacobian over a step, seen from its end; from its start, SAFE_FRACTION
 PASSAGE = 1e-3  # of the radius of the series: so near a singular position it is seen whether the motion is smooth there
 PASSAGE_ORDER = 4  # of the series that leads through: rounding spoils higher derivatives near a singular position
 PASSAGE_DEVIATION = 1e-8  # from that series, as a part of the way: two branches a gap of g apart deviate by (g / way)^2
 NEARLY_SINGULAR = 1e-6  # of the span: a motion that ends so short before a singular position ends at it
+NEARBY = 0.1  # radii: a singular position nearer than this spoils high derivatives, if the motion is smooth there
 SMALL_BATCH, LARGE_BATCH = 64, 512  # lanes; a batch width compiles once, so a short grid uses one
 
 
@@ -35,6 +37,7 @@ class Solver:
     order: int
     tolerance: float
     refine: bool = True
+    wanted: int = 0  # highest derivative that must be finite
 
     def __call__(self, known: Any, step: np.ndarray, instant: np.ndarray, *, survey: bool = False) -> Arrival:
         """Solve instants from known neighbours, as many as fit into a batch; `survey` looks for singular positions."""
@@ -47,16 +50,20 @@ class Solver:
             self.tolerance,
             self.refine,
             survey,
+            self.wanted,
             pose_type=self.model.pose_type,
             order=self.order,
         )
         return jax.tree.map(lambda x: np.asarray(x)[..., :lanes], arrival)
 
     def culprit(self, arrival: Arrival, lane: int) -> str:
-        """Return where to look for the fault: a driver without a permitted value, or the body farthest astray."""
+        """Return where to look for the fault: a driver without a permitted value, an output, the farthest body."""
         refused = np.flatnonzero(~arrival.admissible[:, lane])
         if refused.size:
             return ", ".join(self.model.drivers[k] for k in refused)
+        if arrival.status[lane] == Status.UNDEFINED and arrival.finite[0, lane]:
+            names = [name for group in self.model.outputs for name in group]
+            return f"output {names[int(np.argmin(arrival.finite[1:, lane]))]}"
         return f"body {self.model.bodies[int(arrival.body[lane])]}"
 
     def _predictor(self, known: Any) -> tuple[dict[str, Any], tuple[Any, ...], Any]:
@@ -86,6 +93,8 @@ class Anchor:
         How far the Taylor series carries, s: with all its terms, and with the first four where its terms grow to one.
     turnover : float
         Rate at which the Jacobian nears a singular one (below zero) or leaves it, 1/s.
+    status : Status
+        OK, or UNDEFINED, where an output has no finite value: the motion goes on there.
     """
 
     instant: float
@@ -93,13 +102,14 @@ class Anchor:
     safe_step: float
     radius: float
     turnover: float
+    status: Status
 
     @classmethod
     def of(cls, arrival: Arrival, instant: float) -> "Anchor":
         """Build the anchor from a batch of one that was surveyed."""
         state = (arrival.coordinates, arrival.outputs, arrival.sign)
         measures = (arrival.safe_step, arrival.radius, arrival.turnover)
-        return cls(float(instant), state, *(float(x[0]) for x in measures))
+        return cls(float(instant), state, *(float(x[0]) for x in measures), Status(int(arrival.status[0])))
 
     @property
     def reach(self) -> float:
@@ -129,6 +139,16 @@ class Track:
     status: Status = Status.OK
     ended_at: float = np.inf
     culprit: str = ""
+
+    def singular_positions_outside(self) -> list[ChangePoint]:
+        """Return where the motion would be singular just before its start or after its end, and smooth all the same."""
+        first, last = self.anchors[0], self.anchors[-1]
+        found = [
+            ChangePoint(anchor.instant + sense * anchor.reach, anchor.radius)
+            for anchor, sense in ((first, -1), (last, 1))
+            if sense * anchor.turnover < 0 and anchor.reach < NEARBY * anchor.radius
+        ]
+        return found if self.status == Status.OK else found[:1]
 
 
 def follow(solver: Solver, start: Anchor, stop: float, span: float, first_step: float = np.inf) -> Track:
@@ -166,7 +186,7 @@ def follow(solver: Solver, start: Anchor, stop: float, span: float, first_step: 
         while True:
             target = stop if step == left else here.instant + step
             arrival = solver(here.state, np.array([target - here.instant]), np.array([target]), survey=True)
-            if arrival.status[0] == Status.OK and step * abs(arrival.turnover[0]) <= LARGEST_TURNOVER:
+            if arrival.status[0] in PASSABLE and step * abs(arrival.turnover[0]) <= LARGEST_TURNOVER:
                 break
             if arrival.status[0] == Status.INADMISSIBLE:
                 refused = refused or (arrival, target)
@@ -200,7 +220,7 @@ def _passed(solver: Solver, here: Anchor, stop: float) -> tuple[Anchor, ChangePo
     known = (*shortened, np.zeros_like(sign))  # the sign may change
     arrival = solver(known, np.array([target - here.instant]), np.array([target]), survey=True)
     beyond = Anchor.of(arrival, target)
-    if arrival.status[0] != Status.OK or not arrival.deviation[0] <= PASSAGE_DEVIATION:
+    if arrival.status[0] not in PASSABLE or not arrival.deviation[0] <= PASSAGE_DEVIATION:
         return None
     if not (beyond.turnover > 0 and abs(beyond.reach - (target - middle)) <= 0.5 * (target - middle)):
         return None

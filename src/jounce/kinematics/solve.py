@@ -10,7 +10,7 @@ from jounce.errors import MechanismError, SolveError
 from jounce.kinematics.assembly import assemble
 from jounce.kinematics.grid import Grid
 from jounce.kinematics.motion import Motion
-from jounce.kinematics.path import Anchor, Solver, follow
+from jounce.kinematics.path import PASSABLE, Anchor, Solver, follow
 from jounce.kinematics.status import Status
 from jounce.mechanism import Mechanism, build, check_mechanism, time_grid
 
@@ -82,11 +82,12 @@ def solve(
     instants = time_grid(mechanism.time if time is None else time, mechanism.parameter_values)
     lost = max((output.lost_orders for output in mechanism.outputs.values()), default=0)
     model, coordinates = assemble(build(mechanism), instants[0], tolerance)
-    solver = Solver(model, max(order + lost, LOWEST_ORDER), float(tolerance), refine)
+    solver = Solver(model, max(order + lost, LOWEST_ORDER), float(tolerance), refine, order)
     track = follow(solver, _first(solver, coordinates, instants[:1]), instants[-1], instants[-1] - instants[0])
     grid = Grid(solver, track, instants)
     grid.solve(progress)
-    motion = Motion(mechanism, model, instants, order, grid.state, grid.status, grid.culprits)
+    change_points = np.array([point.instant for point in track.change_points])
+    motion = Motion(mechanism, model, instants, order, grid.state, grid.status, grid.culprits, change_points)
     if strict:
         raise_for_status(motion)
     return motion
@@ -123,7 +124,7 @@ def _first(solver: Solver, coordinates: dict[str, np.ndarray], instant: np.ndarr
     angles = tuple(np.zeros((levels, 1, group.instances, 1)) for group in solver.model.system.outputs)
     arrival = solver((still, angles, np.zeros(1)), np.zeros(1), instant, survey=True)
     status = Status(int(arrival.status[0]))
-    if status != Status.OK:
+    if status not in PASSABLE:
         where = f"t = {instant[0]:g} s, {solver.culprit(arrival, 0)}"
         raise SolveError(f"{where}: {_words(status)}: {status.advice}", status=status)
     return Anchor.of(arrival, instant[0])

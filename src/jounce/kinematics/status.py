@@ -14,6 +14,7 @@ class Status(enum.IntEnum):
     NOT_REACHED = 5
     INADMISSIBLE = 6
     COLLAPSED = 7
+    UNDEFINED = 8
 
     @property
     def advice(self) -> str:
@@ -34,5 +35,7 @@ _ADVICE = {
     "distance driver above zero",
     Status.COLLAPSED: "the steps of the integration became too small to move on: the motion runs into a singular "
     "position, or a force grows beyond all bounds or jumps; check the mechanism and its forces here",
+    Status.UNDEFINED: "a quantity or a derivative of it is not a finite number here: a distance that is zero has no "
+    "rate, and a motion law such as t**2.5 no third derivative at t = 0; ask for a lower order, or leave it out",
     Status.NOT_REACHED: "not computed, because the motion could not be followed up to here",
 }
