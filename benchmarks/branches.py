@@ -1,4 +1,4 @@
-"""Does a motion stay on its branch? Random linkages, a third of them near singular positions, judged instant by instant.
+"""Does a motion stay on its branch? Random linkages, a third near singular positions, judged instant by instant.
 
 The judge follows the quadratic loop equations of each linkage with steps proved by the theorem of Newton and
 Kantorovich (`tests/oracles/linkage_paths.py`), from the position that jounce starts with, and knows how far the motion

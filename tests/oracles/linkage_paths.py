@@ -130,7 +130,7 @@ class State:
         n = self.x.shape[1]
         g = np.einsum("lij,ljkm->likm", self.inverse, self.forms)
         with_rate, with_z = np.einsum("likm,lk->lim", g, self.rate), np.einsum("likm,lk->lim", g, self.z)
-        # the prediction is off by half the second derivative over the step, which changes by so much for each unit of it
+        # the prediction is off by half the second derivative over the step, and that changes by `third` a unit of it
         second = np.abs(np.einsum("lim,lm->li", with_rate, self.rate) + np.einsum("lim,lm->li", with_z, self.bend))
         size, u = np.abs(g), slice(n, n + 2)
         third = (2 * np.abs(with_rate) + np.abs(with_z))[..., u].sum(axis=2)

@@ -74,7 +74,7 @@ def random_cases(family: Family, count: int, seed: Any, orders: Any) -> Iterator
     for k in range(count):
         random = np.random.default_rng([*seed, k])
         linkage, stop = family.linkage(random, near=k % 3 == 0)
-        instants = int(round(10 ** random.uniform(np.log10(31), np.log10(1001))))
+        instants = round(10 ** random.uniform(np.log10(31), np.log10(1001)))
         grid = np.linspace(0.0, stop, instants)
         if random.random() < 0.25:  # unevenly spaced
             grid[1:-1] += random.uniform(-0.4, 0.4, size=instants - 2) * grid[1]

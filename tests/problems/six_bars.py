@@ -12,7 +12,7 @@ from tests.problems.linkages import LAW, Family, Linkage, angle_of, direction, d
 
 
 class SixBar(Family):
-    """A four-bar ABCD, a link of length `l` hinged at Q on one body, and a rod of length `r` from its tip to P on another.
+    """A four-bar ABCD, a link of length `l` hinged at Q on one body, a rod of length `r` from its tip to P on another.
 
     P is on the crank, the coupler or the rocker, Q on the rocker or on the ground: Watt I (coupler, rocker), Watt II
     (rocker, ground), Stephenson I (crank, rocker) and III (coupler, ground). The unknowns are C and the tip R.
