@@ -26,6 +26,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 import numpy as np  # noqa: E402
 
 from tests.problems.branch_study import FAMILIES, ORDERS, Case, judged, random_cases, solved  # noqa: E402
+from tests.problems.linkages import NEAREST  # noqa: E402
 
 LARGEST_SHARE_GIVEN_UP = 1e-3  # of the instants farther than 1e-4 from singular positions
 HEADINGS = ("mechanisms", "instants", "OK", "wrong", "given up", "of them near", "rightly refused", "us/instant", "ms")
@@ -38,6 +39,9 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--kinds", help="names, with commas between them; all unless given")
     parser.add_argument("--orders", default=",".join(map(str, ORDERS)), help="of derivatives, drawn from these")
+    parser.add_argument(
+        "--nearest", type=float, default=NEAREST, help="distance from singular positions"
+    )
     parser.add_argument("--failures", type=Path, help="file for the linkages that are wrong or given up, JSON by line")
     options = parser.parse_args()
     kinds = options.kinds.split(",") if options.kinds else list(FAMILIES)
@@ -49,7 +53,7 @@ def main() -> int:
     for index, kind in enumerate(kinds):
         count = options.count // len(kinds) + (index < options.count % len(kinds))
         tally = Counter()
-        cases = random_cases(FAMILIES[kind], count, [options.seed, list(FAMILIES).index(kind)], orders)
+        cases = random_cases(FAMILIES[kind], count, [options.seed, list(FAMILIES).index(kind)], orders, options.nearest)
         for case, verdict in judged([solved(case) for case in cases]):
             tally += verdict.tally
             reasons += verdict.reasons

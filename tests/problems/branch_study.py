@@ -10,7 +10,7 @@ import numpy as np
 
 import jounce as jn
 from tests.oracles.linkage_paths import Paths, derivatives, follow, polished, rounding
-from tests.problems.linkages import Family, FourBar, Linkage, SliderCrank, SliderDriven
+from tests.problems.linkages import NEAREST, Family, FourBar, Linkage, SliderCrank, SliderDriven
 from tests.problems.six_bars import SixBar, StephensonAtLink, StephensonSecond
 from tests.problems.spatial_linkages import RCCC, RSSR
 
@@ -69,11 +69,11 @@ class Verdict:
     end: float | None
 
 
-def random_cases(family: Family, count: int, seed: Any, orders: Any) -> Iterator[Case]:
+def random_cases(family: Family, count: int, seed: Any, orders: Any, nearest: float = NEAREST) -> Iterator[Case]:
     """Return random linkages of a family, every third near a singular position, with grids of 31 to 1001 instants."""
     for k in range(count):
         random = np.random.default_rng([*seed, k])
-        linkage, stop = family.linkage(random, near=k % 3 == 0)
+        linkage, stop = family.linkage(random, k % 3 == 0, nearest)
         instants = round(10 ** random.uniform(np.log10(31), np.log10(1001)))
         grid = np.linspace(0.0, stop, instants)
         if random.random() < 0.25:  # unevenly spaced

@@ -14,6 +14,7 @@ import jounce as jn
 from jounce import drivers, planar
 from tests.oracles.linkage_paths import Affine, Law
 
+NEAREST = 1e-6  # by what a linkage near a singular position misses it at least, over a length
 LAW = "start + rate*t + wave*sin(speed*t + phase)"
 LAW_PARAMETERS = dict.fromkeys(Law._fields, 0.0)
 
@@ -96,10 +97,11 @@ class Family(abc.ABC):
             return Law(start, random.choice([-1, 1]) * speed, 0.0, 0.0, 0.0), stop
         return Law(start, 0.0, random.uniform(0.3, 3.0), speed, random.uniform(-np.pi, np.pi)), stop
 
-    def linkage(self, random, near):
+    def linkage(self, random, near, nearest=NEAREST):
         """Return a random linkage, near a singular position if wanted, and the time at which its motion stops."""
         while True:
-            nearness, sign = 10 ** random.uniform(-6, -1) if near else None, random.choice([-1, 1])
+            nearness = 10 ** random.uniform(np.log10(nearest), -1) if near else None
+            sign = random.choice([-1, 1])
             values = self.draw(random, nearness, sign)
             if values is None:
                 continue
@@ -190,7 +192,7 @@ class SliderCrank(Family):
 class SliderDriven(SliderCrank):
     """The same, driven at the slider, which turns back before its dead points or runs into them."""
 
-    name = "slider-crank, slider driven"
+    name = "slider-crank at the slider"
     circular = False
 
     def driver(self):

@@ -8,7 +8,7 @@ from scipy.optimize import minimize_scalar
 import jounce as jn
 from jounce import drivers, planar
 from tests.oracles.linkage_paths import Affine, Law, follow, turned
-from tests.problems.linkages import LAW, Family, Linkage, angle_of, direction, dyad, four_bar_lengths, lengths
+from tests.problems.linkages import LAW, NEAREST, Family, Linkage, angle_of, direction, dyad, four_bar_lengths, lengths
 
 
 class SixBar(Family):
@@ -148,9 +148,10 @@ class Triad(Family):
     def place(self, random, nearness):
         """Return dimensions, a driven angle and the unknowns there, or None."""
 
-    def linkage(self, random, near):
+    def linkage(self, random, near, nearest=NEAREST):
         while True:
-            nearness, sign = 10 ** random.uniform(-6, -1) if near else None, random.choice([-1, 1])
+            nearness = 10 ** random.uniform(np.log10(nearest), -1) if near else None
+            sign = random.choice([-1, 1])
             placed = self.place(random, nearness)
             if placed is None:
                 continue
