@@ -110,7 +110,7 @@ def simulate_batch(
     begun = Family(driven(first), build(driven(first)), names) if first.initial else family
     runs = _Runs(family, rows, instants, order, (float(tolerance), float(longest_step), method))
 
-    starts = Starts(begun, nominal.state, rows, float(instants[0]))
+    starts = Starts(family, begun, nominal.state, rows, float(instants[0]))
 
     def depart(some: np.ndarray) -> None:
         runs.depart(some, starts.of(some))

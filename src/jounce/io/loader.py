@@ -12,6 +12,7 @@ from jounce.errors import JounceError, MechanismFileError, did_you_mean
 from jounce.io.fields import FileKey, file_keys, location_of, output_types
 from jounce.io.source import Location, Source, read_source
 from jounce.mechanism import AngularVelocityOutput, Body, Mechanism, PointOutput, TimeGrid, time_grid
+from jounce.mechanism.builder import check_body
 from jounce.mechanism.masses import body_mass
 from jounce.mechanism.resolve import resolve, resolve_element
 from jounce.trajectory import SplineMotion
@@ -146,7 +147,7 @@ def _build(source: Source, space: str, model: dict[str, Any], places: dict[str, 
 
 
 def _body(source: Source, space: str, name: str, given: dict[str, Any], parameters: dict[str, Any]) -> Body:
-    """Build a body; its orientation, a starting guess, is turned into Euler parameters with the values of now."""
+    """Build a body; its values stay expressions of the parameters."""
     if isinstance(given["inertia"], dict):
         from jounce.io.masses import expanded
 
@@ -155,25 +156,7 @@ def _body(source: Source, space: str, name: str, given: dict[str, Any], paramete
         except JounceError as error:
             key = ("mass",) if error.name == "mass" else ("inertia", *([error.name] if error.name else []))
             raise source.error(error.message, ("bodies", name, *key), value=error.value) from None
-    form = given.pop("orientation", None)
-    if form is None:
-        return Body(**given)
-    location = ("bodies", name, "orientation")
-    try:
-        numbers = {key: value if key == "euler" else resolve(value, parameters) for key, value in form.items()}
-        return Body(**given, orientation=_quaternion(numbers))
-    except JounceError as error:
-        raise source.error(error.message, location, value=error.value) from None
-
-
-def _quaternion(form: dict[str, Any]) -> tuple[float, ...]:
-    from jounce.io import orientation
-
-    if "quaternion" in form:
-        return orientation.from_quaternion(form["quaternion"].tolist())
-    if "euler" in form:
-        return orientation.from_euler(form["euler"], form["angles"].tolist())
-    return orientation.from_axis_angle(form["axis"].tolist(), form["angle"])
+    return Body(**given)
 
 
 def _arguments(keys: tuple[FileKey, ...], given: dict[str, Any]) -> dict[str, Any]:
@@ -271,8 +254,7 @@ def _check_values(mechanism: Mechanism) -> None:
         for name, element in elements.items():
             resolve_element(element, parameters, components, f"{kind}.{name}")
     for name, body in mechanism.bodies.items():
-        for field in ("position", "angle"):
-            _check_expressions(f"bodies.{name}.{field}", getattr(body, field), parameters)
+        check_body(name, body, parameters, components)
         body_mass(name, body, parameters, components)
     _check_expressions("gravity", mechanism.gravity, parameters)
     if mechanism.time is not None:

@@ -12,8 +12,9 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic_core import PydanticCustomError, core_schema
 
-from jounce.errors import UNSET, ExpressionError, JounceError, did_you_mean, show_value
+from jounce.errors import UNSET, ExpressionError, JounceError, MechanismError, did_you_mean, show_value
 from jounce.io.units import KINDS, Value, parse_value
+from jounce.rigid.euler_parameters import form_of
 
 __all__ = [
     "Checked",
@@ -212,21 +213,12 @@ def laws(size: int, quantity: str, variables: tuple[str, ...]) -> Any:
 
 def _orientation(raw: Any, info: Any) -> dict[str, Any]:
     """Read one of the three forms of an orientation; the values stay numbers or expressions."""
-    forms: dict[str, tuple[str, ...]] = {
-        "quaternion": ("quaternion",),
-        "euler": ("euler", "angles"),
-        "axis": ("axis", "angle"),
-    }
     if not isinstance(raw, dict):
         raise problem("must be {quaternion: [e0, e1, e2, e3]}, {axis, angle} or {euler: zxz, angles}")
-    form = next((form for form in forms if form in raw), None)
-    valid = forms[form] if form else [key for keys in forms.values() for key in keys]
-    for key in raw:
-        if key not in valid:
-            raise problem(f"unknown key {show_value(key)}; {did_you_mean(key, valid)}", key, value=UNSET)
-    for key in valid if form else ("quaternion",):
-        if key not in raw:
-            raise problem("is missing", key, value=UNSET)
+    try:
+        form = form_of(raw)
+    except MechanismError as error:
+        raise problem(error.message, error.name or "", value=UNSET) from None
     if form == "quaternion":
         return {"quaternion": vector_value(raw["quaternion"], 4, "ratio", info, "quaternion")}
     if form == "euler":

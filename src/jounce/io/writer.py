@@ -133,7 +133,9 @@ class _Writer:
         if self.mechanism.space == "planar":
             found["angle"] = _plain(body.angle, f"{place}.angle")
         elif body.orientation is not None:
-            found["orientation"] = {"quaternion": _plain(body.orientation, f"{place}.orientation")}
+            given = body.orientation
+            form = given if isinstance(given, Mapping) else {"quaternion": given}
+            found["orientation"] = _plain(form, f"{place}.orientation")
         for key in ("mass", "inertia", "center_of_mass"):
             value = getattr(body, key)
             if value is not None:

@@ -29,8 +29,10 @@ class Body:
         Starting guess of the origin of its frame in the global frame, (2,) or (3,), m.
     angle : number or expression, default 0
         Starting guess of the angle of a planar body, rad.
-    orientation : sequence of 4 numbers, optional
-        Starting guess of the Euler parameters [e0, e1, e2, e3] of a spatial body; normalised when used.
+    orientation : sequence of 4 numbers, or dict, optional
+        Starting guess of the Euler parameters [e0, e1, e2, e3] of a spatial body, normalised when used; or
+        ``{"axis": [x, y, z], "angle": ...}``, or ``{"euler": "zxz", "angles": [...]}`` (lower-case letters for fixed
+        axes, upper-case ones for those of the body), rad. Numbers may be expressions of the parameters.
     mass : number or expression, optional
         For the dynamics; kinematics does not use it. kg.
     inertia : number, sequence, expression or Inertia, optional
