@@ -120,6 +120,7 @@ from jounce.trajectory import (  # noqa: E402
     TrapezoidalMotion as TrapezoidalMotion,
     motion_profile as motion_profile,
 )
+from jounce.trajectory.units import elsewhere as _elsewhere  # noqa: E402
 
 __version__ = "0.4.0"
 
@@ -130,6 +131,15 @@ def _repr_html_(self: object) -> str:
 
     return shown(self)
 
+
+def _asked_of_pint(name: str) -> object:
+    """Look a unit up that is not in the table."""
+    from jounce.io.units import ask_pint
+
+    return ask_pint(name)
+
+
+_elsewhere.append(_asked_of_pint)  # type: ignore[arg-type]
 
 for _kind in (Mechanism, Motion, Robot, JointTrajectory, Batch):  # here, as the files know all of these
     setattr(_kind, "_repr_html_", _repr_html_)  # noqa: B010 - no attribute that a type checker knows

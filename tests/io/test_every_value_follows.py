@@ -162,7 +162,7 @@ def test_every_value_follows_its_parameters(tmp_path, space, part):
         after = before + 2 if slot[-1] in ("count", "stop") else 1.0625 * before
         first = jn.load(written(tmp_path, space, part, slot, before))
         changed = first.with_parameters(p=after)
-        told = override(first, tmp_path / "part.json", [f"p={after!r}"])
+        told = override(first, [f"p={after!r}"])
         fresh = jn.load(written(tmp_path, space, part, slot, after))
         flat = any(slot[-len(end) :] == end for end in FLAT) and "density" not in at(part, slot[:3])
         bears = space == "spatial" or not flat
@@ -201,7 +201,8 @@ space: spatial
 gravity: [0, 0, -9.81]
 parameters: {tilt: 10 deg}
 bodies:
-  top: {position: [0, 0, 0], orientation: {axis: [1, 0, 0], angle: tilt}, mass: 1, inertia: [0.2, 0.3, 0.4], center_of_mass: [0, 0, 0.3]}
+  top:
+    {orientation: {axis: [1, 0, 0], angle: tilt}, mass: 1, inertia: [0.2, 0.3, 0.4], center_of_mass: [0, 0, 0.3]}
 joints:
   O: {type: spherical, bodies: [ground, top], points: [[0, 0, 0], [0, 0, 0]]}
 outputs:

@@ -178,7 +178,7 @@ def loaded(file: Path, assignments: Sequence[str] | None, imports: Sequence[Path
     if assignments:
         from jounce.io.overrides import override
 
-        mechanism = override(mechanism, file, assignments)
+        mechanism = override(mechanism, assignments)
     return mechanism
 
 

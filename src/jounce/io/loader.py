@@ -6,6 +6,8 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from jounce.constraints import catalogue
 from jounce.dynamics import AppliedForceOutput, AppliedTorqueOutput, JointForceOutput, JointTorqueOutput
 from jounce.errors import JounceError, MechanismFileError, did_you_mean
@@ -15,7 +17,8 @@ from jounce.mechanism import AngularVelocityOutput, Body, Mechanism, PointOutput
 from jounce.mechanism.builder import check_body
 from jounce.mechanism.masses import body_mass
 from jounce.mechanism.resolve import resolve, resolve_element
-from jounce.trajectory import SplineMotion
+from jounce.rigid.euler_parameters import euler_parameters
+from jounce.trajectory import Expression, SplineMotion
 
 __all__ = ["load"]
 
@@ -94,26 +97,33 @@ def _validate(source: Source, space: str) -> dict[str, Any]:
         "names": names,
         "bodies": ["ground", *(bodies if isinstance(bodies, dict) else ())],
         "dimensions": _dimensions(parameters) if names else {},
+        "uses": dict.fromkeys(names, ()),
     }
     try:
         model = file_model(space).model_validate(source.data, context=context)
     except ValidationError as error:
         raise first_problem(source, space, error.errors(include_url=False)) from None
-    return _plain(model)
+    uses = {name: allowed for name, allowed in context["uses"].items() if allowed}
+    dimensions = uses | {name: (dimension,) for name, dimension in context["dimensions"].items()}
+    return _plain(model) | {"dimensions": dimensions}
 
 
 def _dimensions(parameters: dict[str, Any]) -> dict[str, Any]:
-    """Return the dimensions of those parameters that have a unit."""
+    """Return the dimensions of those parameters that have a unit, or follow from others that have one."""
     from jounce.io.units import parse_value
 
-    found = {}
-    for name, raw in parameters.items():
-        try:
-            dimension = parse_value(raw, "any", parameters).dimension
-        except JounceError:
-            continue
-        if dimension is not None:
-            found[name] = dimension
+    found: dict[str, Any] = {}
+    waiting, count = dict(parameters), -1
+    while len(found) > count:
+        count = len(found)
+        for name, raw in list(waiting.items()):
+            try:
+                dimension = parse_value(raw, "any", parameters, found).dimension
+            except JounceError:  # told where it stands
+                continue
+            if dimension is not None:
+                found[name] = dimension
+                del waiting[name]
     return found
 
 
@@ -141,13 +151,14 @@ def _build(source: Source, space: str, model: dict[str, Any], places: dict[str, 
         gravity=model["gravity"],
         time=TimeGrid(**_plain(model["time"])) if model["time"] is not None else None,
         title=model["title"],
+        dimensions=model["dimensions"],
     )
     _check_columns(source, mechanism)
     return mechanism
 
 
 def _body(source: Source, space: str, name: str, given: dict[str, Any], parameters: dict[str, Any]) -> Body:
-    """Build a body; its values stay expressions of the parameters."""
+    """Build a body; values that depend on parameters stay expressions of them."""
     if isinstance(given["inertia"], dict):
         from jounce.io.masses import expanded
 
@@ -156,6 +167,12 @@ def _body(source: Source, space: str, name: str, given: dict[str, Any], paramete
         except JounceError as error:
             key = ("mass",) if error.name == "mass" else ("inertia", *([error.name] if error.name else []))
             raise source.error(error.message, ("bodies", name, *key), value=error.value) from None
+    form = given.get("orientation")
+    if form is not None and not any(isinstance(x, Expression) for v in form.values() for x in np.ravel(v)):
+        try:
+            given["orientation"] = euler_parameters(form)
+        except JounceError as error:
+            raise source.error(error.message, ("bodies", name, "orientation"), value=error.value) from None
     return Body(**given)
 
 
