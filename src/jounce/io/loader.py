@@ -225,7 +225,9 @@ def _spline(source: Source, location: Location, samples: Any) -> SplineMotion:
 
     path = Path(source.path).parent / samples.samples
     try:
-        return SplineMotion(*read_samples(path, samples.time, samples.value), degree=samples.degree)
+        return SplineMotion(
+            *read_samples(path, samples.time, samples.value), degree=samples.degree, beyond=samples.beyond
+        )
     except JounceError as error:
         raise source.error(str(error), location) from None
 

@@ -7,7 +7,7 @@ JSON Schema. Imported only when a file is loaded, since pydantic takes a while.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic_core import PydanticCustomError, core_schema
@@ -31,6 +31,8 @@ __all__ = [
     "vectors",
     "wrenches",
 ]
+
+WAYS = ("refuse", "hold", "repeat")
 
 
 def problem(message: str, *at: str | int, value: object = ...) -> PydanticCustomError:
@@ -155,13 +157,17 @@ def wrenches() -> Any:
 
 
 class Samples(BaseModel):
-    """A motion law through samples: a CSV file, the degree of the spline, and the columns of time and value."""
+    """A motion law through samples: a CSV file, the degree of the spline, and the columns of time and value.
+
+    Beyond the samples there is no law, unless it is to hold the value at the end, or to repeat them as one period.
+    """
 
     model_config = ConfigDict(extra="forbid", strict=True)
     samples: str
     degree: int = Field(default=5, ge=1, le=11)
     time: str | None = None
     value: str | None = None
+    beyond: Literal["refuse", "hold", "repeat"] = "refuse"
 
 
 def motion(quantity: str, variables: dict[str, Dimension | None] | None = None) -> Any:
@@ -185,6 +191,8 @@ def motion(quantity: str, variables: dict[str, Dimension | None] | None = None) 
         for key, kind in (("samples", str), ("degree", int), ("time", str), ("value", str)):
             if key in raw and (not isinstance(raw[key], kind) or isinstance(raw[key], bool)):
                 raise problem("must be a whole number" if kind is int else "must be a name", key, value=raw[key])
+        if raw.get("beyond", "refuse") not in WAYS:
+            raise problem(f"no such way; {did_you_mean(raw['beyond'], WAYS)}", "beyond", value=raw["beyond"])
         if not 1 <= raw.get("degree", 5) <= 11:
             raise problem("the degree of a spline is from 1 to 11", "degree", value=raw["degree"])
         return Samples(**raw)
