@@ -57,6 +57,7 @@ from jounce.errors import (  # noqa: E402
     SolveError as SolveError,
     TrajectoryError as TrajectoryError,
     UnitError as UnitError,
+    UnitWarning as UnitWarning,
 )
 from jounce.forces import AbstractForce as AbstractForce, Law as Law, Laws as Laws  # noqa: E402
 from jounce.integrate import (  # noqa: E402

@@ -26,6 +26,7 @@ __all__ = [
     "SolveError",
     "TrajectoryError",
     "UnitError",
+    "UnitWarning",
     "did_you_mean",
     "show_value",
 ]
@@ -221,6 +222,10 @@ class SingularityError(JounceError):
 
 class SampleWarning(UserWarning):
     """Samples do not determine the derivatives asked for to a useful accuracy."""
+
+
+class UnitWarning(UserWarning):
+    """A number without a unit is likely meant in another unit than that of SI."""
 
 
 class OutputError(JounceError):

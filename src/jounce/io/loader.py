@@ -12,6 +12,7 @@ from jounce.constraints import catalogue
 from jounce.dynamics import AppliedForceOutput, AppliedTorqueOutput, JointForceOutput, JointTorqueOutput
 from jounce.errors import JounceError, MechanismFileError, did_you_mean
 from jounce.io.fields import FileKey, file_keys, location_of, output_types
+from jounce.io.hints import warn_of_units
 from jounce.io.source import Location, Source, read_source
 from jounce.mechanism import AngularVelocityOutput, Body, Mechanism, PointOutput, TimeGrid, time_grid
 from jounce.mechanism.builder import check_body
@@ -45,6 +46,11 @@ def load(path: str | PathLike[str]) -> Mechanism:
         The file cannot be read or something in it is wrong: the message names the file, the line, the entry and the
         value, and the nearest valid name where one is unknown.
 
+    Warns
+    -----
+    UnitWarning
+        A number without a unit is likely meant in degrees or millimetres.
+
     Examples
     --------
     >>> import jounce as jn
@@ -65,6 +71,7 @@ def load(path: str | PathLike[str]) -> Mechanism:
         location = _find(error.name, places)
         known = location if source.line(location) is not None else ()
         raise source.error(error.message, known or location, value=error.value) from None
+    warn_of_units(source, mechanism)
     return mechanism
 
 

@@ -5,10 +5,13 @@ from __future__ import annotations
 import math
 import sys
 import time
-from collections.abc import Mapping, Sequence
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from jounce.errors import SampleWarning, UnitWarning
 from jounce.io.peaks import Peak
 
 if TYPE_CHECKING:
@@ -17,6 +20,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Bar",
     "caution",
+    "cautions",
     "complain",
     "say",
     "say_json",
@@ -226,6 +230,26 @@ def complain(error: object, *, json: bool = False) -> None:
 def caution(warning: object, *, json: bool = False) -> None:
     """Print a warning on standard error, in one line: of words, or of JSON."""
     _tell("warning", "bold yellow", warning, json)
+
+
+@contextmanager
+def cautions(*, json: bool = False) -> Iterator[None]:
+    """Print warnings about the user's values as the command prints its errors, each once."""
+    told: set[str] = set()
+    with warnings.catch_warnings():
+        usual = warnings.showwarning
+
+        def show(message: Any, category: Any, *place: Any, **more: Any) -> None:
+            if not issubclass(category, SampleWarning | UnitWarning):
+                usual(message, category, *place, **more)
+            elif str(message) not in told:
+                told.add(str(message))
+                caution(message, json=json)
+
+        for category in (SampleWarning, UnitWarning):
+            warnings.simplefilter("always", category)
+        warnings.showwarning = show
+        yield
 
 
 def _tell(kind: str, style: str, message: object, json: bool) -> None:
