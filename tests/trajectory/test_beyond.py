@@ -46,7 +46,7 @@ def test_samples_of_uneven_steps_and_large_times(degree):
 @pytest.mark.parametrize(
     "times, values, degree, words",
     [
-        ([0, 1, 1, 2], [0, 1, 1, 2], 1, "sample 2 has the time of sample 1"),
+        ([0, 1, 1, 2], [0, 1, 1, 2], 1, "sample 2 does not come after sample 1, it has the same time"),
         ([0, 2, 1, 3], [0, 1, 1, 2], 1, "sample 2 does not come after sample 1"),
         ([0], [1], 1, "needs at least 2 samples"),
         ([], [], 1, "needs at least 2 samples"),

@@ -207,8 +207,11 @@ class _Writer:
 
     def _spline(self, place: str, law: SplineMotion) -> dict[str, Any]:
         """Return a spline as its samples, or as samples through which there is no other with the same breakpoints."""
+        if law.degree % 2 == 0:
+            message = f"a spline of even degree ({law.degree}) has no form in a file; use an odd degree"
+            raise MechanismError(message, name=place)
         name = f"{self.stem}_{re.sub(r'[^A-Za-z0-9_]+', '_', place)}.csv"
-        times, values = law.samples.value or _samples_of(place, law)
+        times, values = law.samples.value or _samples_of(law)
         self.samples[name] = (np.asarray(times).tolist(), np.asarray(values).tolist())
         beyond = "hold" if isinstance(law, TrapezoidalMotion) else law.beyond
         if beyond == "continue":
@@ -218,11 +221,8 @@ class _Writer:
         return found if beyond == "refuse" else found | {"beyond": beyond}
 
 
-def _samples_of(place: str, law: SplineMotion) -> tuple[Any, Any]:
+def _samples_of(law: SplineMotion) -> tuple[Any, Any]:
     """Return samples through which there is one spline only of the degree and the breakpoints of a law."""
-    if law.degree % 2 == 0:
-        message = f"a spline of even degree ({law.degree}) has no form in a file once it is made; use an odd degree"
-        raise MechanismError(message, name=place)
     ends = np.asarray(law.breakpoints, float)
     pieces = np.asarray(law.coefficients, float)
     between = (law.degree - 1) // 2  # samples near each end, which are no breakpoints

@@ -27,10 +27,8 @@ def checked_samples(times: Any, values: Any, degree: Any) -> tuple[np.ndarray, n
             raise MechanismError(message, value=float(samples[first]))
     if (np.diff(times) <= 0).any():
         first = int(np.flatnonzero(np.diff(times) <= 0)[0])
-        if times[first + 1] == times[first]:
-            message = f"times of samples must increase; sample {first + 1} has the time of sample {first}"
-        else:
-            message = f"times of samples must increase; sample {first + 1} does not come after sample {first}"
+        same = ", it has the same time" if times[first + 1] == times[first] else ""
+        message = f"times of samples must increase; sample {first + 1} does not come after sample {first}{same}"
         raise MechanismError(message, value=float(times[first + 1]))
     if isinstance(degree, bool) or not isinstance(degree, int | np.integer) or not 1 <= degree <= 11:
         raise MechanismError("the degree of a spline must be a whole number from 1 to 11", value=degree)
