@@ -55,7 +55,7 @@ def test_what_may_be_meant_is_said(tmp_path, changes, words):
         {"angle": "6"},
         {"AB": "0.04"},
         {"AB": "40 m"},
-        {"AB": "1000"},  # an arm so long that its end moves on a line; no link of 1 m stands in mm among these
+        {"AB": "10000"},  # an arm so long that its end moves on a line: 10 m is no link of these either
     ],
 )
 def test_what_is_meant_as_it_stands_is_not_doubted(tmp_path, changes):

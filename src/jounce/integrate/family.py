@@ -75,7 +75,7 @@ class Family:
     def _has_offsets_of_guess(self) -> bool:
         """Tell whether the offset of a joint follows from the starting guess."""
         joints = self.mechanism.joints.values()
-        return any("offset" in value_fields(type(j)) and j.offset is None for j in joints)
+        return any("offset" in value_fields(type(j)) and getattr(j, "offset", 0.0) is None for j in joints)
 
     def _one_by_one(self, rows: np.ndarray) -> tuple[Equations, Any]:
         """Do what `of` does, where offsets follow from guesses that differ: they are found for each run alone."""

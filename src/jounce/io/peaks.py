@@ -162,7 +162,7 @@ def _found(motion: Any) -> list[Peak]:
     for (column, name, order), numbers in zip(rows, extremes, strict=True):
         output = motion.mechanism.outputs[name]
         unit, told = derivative_unit(output.unit, order), [float(x) for x in numbers]
-        found.append(Peak(column, rate_name(output, order), unit, *told, sizes[name, order]))
+        found.append(Peak(column, rate_name(output, order), unit, *told, size=sizes[name, order]))
     return found
 
 
@@ -181,13 +181,14 @@ def _extremes(motion: Any) -> tuple[np.ndarray, np.ndarray]:
         middle = local_maxima(values, PEAKS)
         low, high = time[np.maximum(middle - 1, 0)], time[np.minimum(middle + 1, len(time) - 1)]
         share = np.linspace(0.0, 1.0, POINTS)[:, None, None]
+        near = []
         for _ in range(ROUNDS):
             around = low + share * (high - low)
             own = _own(motion, around)
-            top = np.clip(np.argmax(own, axis=0), 1, POINTS - 2)[None]
             _keep_best(times, sizes, around, own)
-            low, high = (np.take_along_axis(around, top + side, axis=0)[0] for side in (-1, 1))
-        near = [np.take_along_axis(own, top + side, axis=0)[0] for side in (-1, 0, 1)]
+            top = np.clip(np.argmax(own, axis=0), 1, POINTS - 2)
+            near = [np.take_along_axis(own, np.asarray(top + side)[None], axis=0)[0] for side in (-1, 0, 1)]
+            low, high = (np.take_along_axis(around, np.asarray(top + side)[None], axis=0)[0] for side in (-1, 1))
         vertex = _vertex(low, high, *near)[None]
         _keep_best(times, sizes, vertex, _own(motion, vertex))
     solved = np.isfinite(sizes)
@@ -245,8 +246,9 @@ def _keep_best(times: np.ndarray, sizes: np.ndarray, around: np.ndarray, own: np
     sizes[better] = flat[top, every][better]
 
 
-def _vertex(low: np.ndarray, high: np.ndarray, left: Any, middle: Any, right: Any) -> np.ndarray:
+def _vertex(low: np.ndarray, high: np.ndarray, *near: np.ndarray) -> np.ndarray:
     """Return where the parabola through three evenly spaced values is largest, between the outer two."""
+    left, middle, right = near
     with np.errstate(invalid="ignore", divide="ignore"):
         shift = 0.5 * (left - right) / (left - 2 * middle + right)
     shift = np.where(np.isfinite(shift), np.clip(shift, -1.0, 1.0), 0.0)

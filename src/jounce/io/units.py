@@ -83,7 +83,7 @@ def ask_pint(name: str) -> tuple[float, Dimension] | None:
         raise UnitError(f"the unit '{shown}' has no fixed zero, it cannot be used")
     whole = all(Fraction(power).denominator == 1 for power in powers.values())
     dimension = dimension_of(**{base: int(power) for base, power in powers.items()}) if whole else None
-    if dimension not in _MECHANICAL and not (dimension == NUMBER and unit in _PURE):
+    if dimension is None or (dimension not in _MECHANICAL and not (dimension == NUMBER and unit in _PURE)):
         message = f"the unit '{shown}' ({unit}) measures nothing that a mechanism has"
         raise UnitError(f"{message}; {nearest_unit(name)}".rstrip("; "))
     if prefix and (unit not in _PREFIXABLE | _TO_KILO or (unit in _TO_KILO and prefix in _LARGE)):

@@ -101,7 +101,8 @@ class Aside:
     __slots__ = ("derived", "value")
 
     def __init__(self, value: Any):
-        self.value, self.derived = value, None
+        self.value = value
+        self.derived: Any = None
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Aside)
@@ -180,11 +181,12 @@ class SplineMotion(AbstractMotion):
     @property
     def errors(self) -> np.ndarray:
         """Estimated errors of the derivatives, relative to their peaks, (degree + 1,); 0 for a law without samples."""
-        aside = self.samples
-        if aside.derived is None:
-            given = aside.value
-            aside.derived = np.zeros(self.degree + 1) if given is None else derivative_errors(*given, self.degree)
-        return aside.derived
+        if self.samples.value is None:
+            return np.zeros(self.degree + 1)
+        if self.samples.derived is None:
+            times, values = self.samples.value
+            self.samples.derived = derivative_errors(times, values, self.degree)
+        return self.samples.derived
 
     def check_instants(self, first: float, last: float) -> None:
         """Raise MechanismError if the law says nothing of some instants from a first to a last one, s."""

@@ -253,8 +253,8 @@ def _parse_text(
     if expression.text in dimensions:
         check_dimension(dimensions[expression.text], kind, f"the parameter '{expression.text}'")
         return Value(expression, dimensions[expression.text])
-    known = {name: dimension for name, dimension in dimensions.items() if name not in variables}
-    dimension = inferred(expression, known, variables, kind)
+    stated = {name: dimension for name, dimension in dimensions.items() if name not in variables}
+    dimension = inferred(expression, stated, variables, kind)
     if dimension is not None:
         check_dimension(dimension, kind, f"'{expression.text}'", exactly=False)
     return Value(expression, dimension)
