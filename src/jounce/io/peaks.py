@@ -141,7 +141,7 @@ def peaks(motion: Any) -> list[Peak]:
     >>> import jounce as jn
     >>> motion = jn.solve(jn.load("examples/four_bar.yaml"), order=1)
     >>> [(p.output, p.derivative, p.unit, round(p.maximum, 4), round(p.maximum_at, 3)) for p in peaks(motion)][:2]
-    [('psi', 'position', 'rad', 2.6436, 1.5), ('psi', 'velocity', 'rad/s', 1.5179, 1.067)]
+    [('psi', 'position', 'rad', 2.6436, 1.5), ('psi', 'velocity', 'rad/s', 1.5179, 1.069)]
     """
     if "peaks" not in motion.derived:
         motion.derived["peaks"] = _found(motion)

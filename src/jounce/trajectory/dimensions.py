@@ -82,11 +82,6 @@ _WORDS: dict[Dimension, str] = {
     ANGLE: "an angle",
     dimension_of(length=2): "an area",
     dimension_of(length=3): "a volume",
-    _PER_TIME: "a frequency",
-    dimension_of(length=1, time=-1): "a velocity",
-    dimension_of(angle=1, time=-1): "an angular velocity",
-    dimension_of(mass=1, length=-1, time=-2): "a pressure",
-    times(TORQUE, _PER_TIME): "a power",
 }
 
 
@@ -195,7 +190,8 @@ def inferred(
 
     Examples
     --------
-    >>> inferred(Expression("2*pi*r/T"), {"r": LENGTH, "T": TIME})
+    >>> from jounce.trajectory.dimensions import LENGTH, TIME, inferred
+    >>> inferred(Expression("pi*r/T"), {"r": LENGTH, "T": TIME})
     (('length', 1), ('time', -1))
     >>> inferred(Expression("r + T"), {"r": LENGTH, "T": TIME})
     Traceback (most recent call last):

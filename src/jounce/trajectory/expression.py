@@ -173,14 +173,9 @@ class Expression:
         name: Callable[[str], Any],
         operation: Callable[[str, list[Any]], Any],
     ) -> Any:
-        """Return what comes of the formula when numbers, names and operations mean something else.
+        """Return what comes of the formula when its numbers, names and operations mean something else.
 
-        Parameters
-        ----------
-        number, name : callable
-            What a number, and what a name stands for.
-        operation : callable
-            Maps the word for an operation (``+ - * / ** pos neg``, or a function) and its arguments to its result.
+        The last are given by the word for them (``+ - * / ** pos neg``, or a function), with their arguments.
         """
         return self._folded(
             number, lambda text, _: name(text), lambda _, word, arguments, __: operation(word, arguments)
