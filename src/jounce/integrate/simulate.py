@@ -20,6 +20,7 @@ from jounce.kinematics.motion import check_output, output_group
 from jounce.kinematics.solve import checked_order
 from jounce.mechanism import Mechanism, check_mechanism, time_grid
 from jounce.mechanism.doors import concrete
+from jounce.mechanism.laws import check_laws
 
 STEPS = 64  # tried between two looks at progress and events
 TOLERANCES = (1e-17, 1e-2)  # below rounding there is still energy to be kept: what series leave out adds up
@@ -109,6 +110,7 @@ def simulate(
             raise MechanismError("must be a mapping of names to drivers", name="initial", value=initial)
         mechanism = dataclasses.replace(mechanism, initial=dict(initial))
     instants = instants_of(mechanism.time if time is None else time, mechanism.parameter_values)
+    check_laws(mechanism, instants, order, forces=True)
     watched = [_watched(event, mechanism) for event in events]
     start = consistent_start(mechanism, float(instants[0]))
     _check_forces(start, float(instants[0]))

@@ -14,9 +14,11 @@ from jounce.kinematics.path import PASSABLE, Anchor, Solver, follow
 from jounce.kinematics.status import Status
 from jounce.mechanism import Mechanism, build, check_mechanism, time_grid
 from jounce.mechanism.doors import concrete
+from jounce.mechanism.laws import check_laws
 
 LOWEST_ORDER = 4  # of the jets inside: predictions need some, also where the user wants positions only
 HIGHEST_ORDER = 30
+FORCES_LOSE = 2  # derivatives of the motion are used up by outputs of forces
 LARGEST_TOLERANCE = 1e-2
 
 
@@ -83,6 +85,7 @@ def solve(
         raise MechanismError(message, name="tolerance", value=tolerance)
     instants = time_grid(mechanism.time if time is None else time, mechanism.parameter_values)
     lost = max((output.lost_orders for output in mechanism.outputs.values()), default=0)
+    check_laws(mechanism, instants, order + lost, forces=lost >= FORCES_LOSE)
     model, coordinates = assemble(build(mechanism), instants[0], tolerance)
     solver = Solver(model, max(order + lost, LOWEST_ORDER), float(tolerance), refine, order)
     track = follow(solver, _first(solver, coordinates, instants[:1]), instants[-1], instants[-1] - instants[0])

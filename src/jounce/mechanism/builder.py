@@ -1,6 +1,7 @@
 """From names to indices, once: the numeric model of a mechanism and where each of its rows comes from."""
 
 import dataclasses
+from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any
 
@@ -11,9 +12,9 @@ import numpy as np
 from jax.core import Tracer
 
 from jounce.constraints.base import field_kind, value_fields
-from jounce.errors import JounceError, MechanismError
+from jounce.errors import JounceError
 from jounce.jet import Jet
-from jounce.mechanism.mechanism import GROUND, Mechanism
+from jounce.mechanism.mechanism import GROUND, Body, Mechanism
 from jounce.mechanism.outputs import AbstractOutput
 from jounce.mechanism.resolve import check_value, resolve
 from jounce.mechanism.system import (
@@ -24,6 +25,7 @@ from jounce.mechanism.system import (
     jacobian_cells,
 )
 from jounce.rigid import PlanarPose, SpatialPose
+from jounce.rigid.euler_parameters import euler_parameters
 
 
 @dataclasses.dataclass(frozen=True)
@@ -139,13 +141,34 @@ def starting_guess(mechanism: Mechanism, parameters: dict[str, Any], components:
         if components == 2:
             attitudes.append(_guess(body.angle, f"{place}.angle", "scalar", components, parameters))
         else:
-            quaternion = [1.0, 0.0, 0.0, 0.0] if body.orientation is None else body.orientation
-            quaternion = _guess(quaternion, f"{place}.orientation", "vector", 4, parameters)
-            if not np.any(quaternion):
-                raise MechanismError("Euler parameters must not all be zero", name=f"{place}.orientation")
-            attitudes.append(quaternion / np.sqrt(np.sum(quaternion * quaternion)))
+            attitudes.append(_attitude(body.orientation, f"{place}.orientation", parameters))
     position, attitude = (np.stack([np.asarray(x) for x in xs], axis=-1)[..., None] for xs in (positions, attitudes))
     return {"position": position, "angle" if components == 2 else "quaternion": attitude}
+
+
+def check_body(name: str, body: Body, parameters: dict[str, Any], components: int) -> None:
+    """Raise a JounceError unless the starting guess of a body is one, in all that the space has."""
+    place = f"bodies.{name}"
+    _guess(body.position, f"{place}.position", "vector", components, parameters)
+    if components == 2:
+        _guess(body.angle, f"{place}.angle", "scalar", components, parameters)
+    else:
+        _attitude(body.orientation, f"{place}.orientation", parameters)
+
+
+def _attitude(orientation: Any, name: str, parameters: dict[str, Any]) -> np.ndarray:
+    """Return the Euler parameters of an orientation whose numbers may be expressions of the parameters."""
+    if orientation is None:
+        return np.array([1.0, 0.0, 0.0, 0.0])
+    try:
+        if isinstance(orientation, Mapping):
+            given = {k: v if k == "euler" else resolve(v, parameters) for k, v in orientation.items()}
+        else:
+            given = resolve(orientation, parameters)
+        return np.array(euler_parameters(given))
+    except JounceError as error:
+        key = f"{name}.{error.name}" if error.name else name
+        raise type(error)(error.message, name=key, value=error.value) from None
 
 
 def _guess(value: Any, name: str, kind: str, components: int, parameters: dict[str, Any]) -> Any:
