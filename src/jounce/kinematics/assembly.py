@@ -11,10 +11,12 @@ from jounce.jet import Jet
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.status import Status
 from jounce.mechanism import Model
-from jounce.mechanism.builder import pose_at
+from jounce.mechanism.builder import pose_at, referred
 
 MAX_STEPS = 100
 RANK_TOLERANCE = 1e-9
+MAX_DATUMS = 20
+SETTLED = 1e-12  # rad, by which the angles of drivers may be counted otherwise
 
 
 @compiled("pose_type")
@@ -83,15 +85,33 @@ def assemble(
         noun = "degree of freedom" if columns == 1 else "degrees of freedom"
         raise MobilityError(f"the mechanism has no joints and no drivers: {columns} {noun} are left")
     if not model.rows:  # bodies that fly freely are together as they are
+        model, _ = referred(model, model.guess, instant, model.turnings)
         return dataclasses.replace(model, system=jax.device_put(model.system)), model.guess
-    found = put_together(model, instant, tolerance)
+    model, found = _settled(model, instant, tolerance)
     check_assembled(model, found.gaps, instant, tolerance)
     check_mobility(model, found.jacobian, free=free)
     system = jax.device_put(dataclasses.replace(model.system, row_scale=found.scale[:, None]))
     return dataclasses.replace(model, system=system), found.coordinates
 
 
-def put_together(model: Model, instant: float, tolerance: float) -> Trial:
+def _settled(model: Model, instant: float, tolerance: float) -> tuple[Model, Trial]:
+    """Put the bodies together, and count the angles about axes from the position found.
+
+    Where the axes were tilted against each other in the starting guess, the angles in the position found are others
+    than those counted from the guess, and it takes another turn to get to those that the drivers prescribe.
+    """
+    found, told = put_together(model, instant, tolerance), model.turnings
+    for _ in range(MAX_DATUMS):
+        if not closed(found.gaps, tolerance):
+            return model, found
+        model, away = referred(model, found.coordinates, instant, told)
+        if away <= SETTLED:
+            return model, found
+        found = put_together(model, instant, tolerance, found.coordinates)
+    return referred(model, found.coordinates, instant, told, keep=True)[0], found
+
+
+def put_together(model: Model, instant: float, tolerance: float, start: dict[str, np.ndarray] | None = None) -> Trial:
     """Return how far the bodies can be put together at one instant; nothing is refused.
 
     Parameters
@@ -102,6 +122,8 @@ def put_together(model: Model, instant: float, tolerance: float) -> Trial:
         s.
     tolerance : float
         Of the last correction, rad or sizes of the mechanism.
+    start : dict of str to array, optional
+        Coordinates to start from instead of the guess.
     """
     still, instant = np.zeros(model.system.cells.shape[1]), np.float64(instant)
 
@@ -109,11 +131,11 @@ def put_together(model: Model, instant: float, tolerance: float) -> Trial:
         result = _moved(model.system, coordinates, increment, instant, model.pose_type)
         return jax.tree.map(np.asarray, result)
 
-    coordinates, residual, jacobian = moved(model.guess, still)
+    coordinates, residual, jacobian = moved(model.guess if start is None else start, still)
     scale = _row_scale(jacobian)
     for _ in range(MAX_STEPS):
-        if not np.isfinite(residual).all():
-            break  # told below, by name
+        if not (np.isfinite(residual).all() and np.isfinite(jacobian).all()):
+            break  # told by name; what factors a matrix may never end on one that is not finite
         step = np.linalg.lstsq(scale[:, None] * jacobian, -scale * residual, rcond=1e-10)[0]
         size = np.max(np.abs(step), initial=0.0)
         if not np.isfinite(size):
@@ -131,12 +153,18 @@ def put_together(model: Model, instant: float, tolerance: float) -> Trial:
         scale = _row_scale(jacobian)
         if size <= tolerance:
             break
-    return Trial(coordinates, scale, scale * residual, scale[:, None] * jacobian)
+    gaps = np.where(np.isfinite(jacobian).all(axis=1), scale * residual, np.nan)
+    return Trial(coordinates, scale, gaps, scale[:, None] * jacobian)
 
 
 def _row_scale(jacobian: np.ndarray) -> np.ndarray:
     largest = np.max(np.abs(jacobian), axis=1)
     return 1 / np.where((largest > 0) & np.isfinite(largest), largest, 1.0)
+
+
+def closed(gaps: np.ndarray, tolerance: float) -> bool:
+    """Tell whether all gaps are closed, to a tolerance of the last correction."""
+    return bool(np.all(np.abs(gaps) <= max(1e3 * tolerance, 1e-9)))
 
 
 def check_assembled(model: Model, gaps: np.ndarray, instant: float, tolerance: float) -> None:
@@ -146,10 +174,10 @@ def check_assembled(model: Model, gaps: np.ndarray, instant: float, tolerance: f
         named = ", ".join(unknown)
         message = f"no finite value at t = {instant:g} s: {named}; check motion laws and the starting guess"
         raise AssemblyError(message, status=Status.INADMISSIBLE)
+    if closed(gaps, tolerance):
+        return
     gaps = np.abs(gaps)
     worst = np.argsort(-gaps)
-    if gaps[worst[0]] <= max(1e3 * tolerance, 1e-9):
-        return
     open_rows = list(dict.fromkeys(model.rows[k] for k in worst if gaps[k] > 0.1 * gaps[worst[0]]))
     named = ", ".join(open_rows[:4])
     message = (
