@@ -125,9 +125,9 @@ def all_in_space():
             "hooke": spatial.Universal(("ground", "cross"), [0, 2, 0], o, [1, 0, 0.1], [0, 1, 0.2]),
             "guide": spatial.Prismatic(("ground", "ram"), [0, 3, 1], o, [1, 0, 0.1], [1, 0, 0.1], [0, 1, 0], [0, 1, 0]),
             "ball": spatial.Spherical(("ram", "link"), [0.4, 0.4, 0.3], o),
-            "rod": spatial.DoubleSpherical(("ground", "link"), [0.9, 4.4, 2.0], [0.3, 0.1, 0.2], 1.0),
+            "rod": spatial.DoubleSpherical(("ground", "link"), [0.9, 4.4, 2.0], [0.3, 0.1, 0.2], 1.1),
             "square": spatial.Dot1(("ground", "link"), [0, 0, 1], [1, 0.1, 0]),
-            "plane": spatial.Dot2(("ground", "link"), [1.0, 4.0, 1.3], [0.1, 0.5, 0.0], [0.1, 1.0, 0.2]),
+            "plane": spatial.Dot2(("ground", "link"), [1.5, 3.5, 1.45], [0.5, 0.1, 0.1], [0.1, 1.0, 0.2]),
         },
         drivers={
             "spin": drivers.RotationDriver(("ground", "rotor"), z, turn("spin", LAW)),
@@ -259,17 +259,18 @@ def vars_of(mechanism):
     return {name: getattr(mechanism, name) for name in names}
 
 
+@pytest.mark.parametrize("order", [1, pytest.param(ORDER, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("build", [all_in_space, all_in_the_plane], ids=["space", "plane"])
-def test_nothing_depends_on_how_frames_are_drawn(build):
+def test_no_quantity_depends_on_how_frames_are_drawn(build, order):
     """Every body and the ground with another random frame: the same motion and the same forces, with their rates."""
     mechanism = with_all_outputs(build())
-    kept = jn.solve(mechanism, INSTANTS, ORDER)
+    kept = jn.solve(mechanism, [0.0, 0.1, 0.3], order)
     random = np.random.default_rng(2)
     drawings = {name: Drawing.random(random, mechanism.space) for name in ("ground", *mechanism.bodies)}
     moved = shifts(mechanism, kept, drawings)
     other = redrawn(mechanism, drawings)
     other = other.with_parameters(**{f"{n}_shift": x for n, x in moved.items() if f"{n}_shift" in other.parameters})
-    found = jn.solve(other, INSTANTS, ORDER)
+    found = jn.solve(other, kept.time, order)
     world = drawings["ground"]
     scales = {}
     for name, values in kept.outputs.items():

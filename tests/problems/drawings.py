@@ -53,7 +53,7 @@ def matrix(quaternion):
 def redrawn(mechanism, drawings):
     """Return a mechanism in which every body, by name, and the ground have other frames.
 
-    What is told in the axes of the frames goes with them, but for the angles that are counted between them: see `shifts`.
+    What is told in the axes of the frames goes with them; where angles are counted from does not: see `shifts`.
     """
     values = mechanism.parameter_values
     world = drawings["ground"]
@@ -124,7 +124,8 @@ def shifts(mechanism, motion, drawings):
         drawn = {name: drawing.angle - drawings["ground"].angle for name, drawing in drawings.items()}
     for name, it in named.items():
         if isinstance(it, PLANAR_ANGLES) and getattr(it, "coordinate", "angle") == "angle":
-            found[name] = drawn[it.bodies[-1]] - (drawn[it.bodies[0]] if len(it.bodies) > 1 else 0.0)
+            ratio = resolve(getattr(it, "ratio", None) or 1.0, values)  # of the first of two bodies
+            found[name] = drawn[it.bodies[-1]] - (ratio * drawn[it.bodies[0]] if len(it.bodies) > 1 else 0.0)
         elif hasattr(it, "datum") and it.vector_i is None:
             axis = resolve(it.axis if hasattr(it, "axis") else it.axis_i, values)
             old = [matrix(attitude[0, :, index(body), 0]) for body in it.bodies]

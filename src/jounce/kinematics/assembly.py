@@ -1,6 +1,7 @@
 """The first assembly: bodies put together from the starting guess, and degrees of freedom counted and explained."""
 
 import dataclasses
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import jax
@@ -10,8 +11,10 @@ from jounce.errors import AssemblyError, MobilityError
 from jounce.jet import Jet
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.status import Status
+from jounce.kinematics.turns import Lag, course, lag_of, nearest_turns
 from jounce.mechanism import Model
 from jounce.mechanism.builder import pose_at, referred
+from jounce.mechanism.datums import with_angles, with_datums
 
 MAX_STEPS = 100
 RANK_TOLERANCE = 1e-9
@@ -100,7 +103,10 @@ def _settled(model: Model, instant: float, tolerance: float) -> tuple[Model, Tri
     Where the axes were tilted against each other in the starting guess, the angles in the position found are others
     than those counted from the guess, and it takes another turn to get to those that the drivers prescribe.
     """
-    found, told = put_together(model, instant, tolerance), model.turnings
+    model, start = _turned(model, instant, tolerance)
+    found, told = put_together(model, instant, tolerance, start), model.turnings
+    if "angle" in found.coordinates and start is None and closed(found.gaps, tolerance):
+        found = _nearest(model, found, instant)
     for _ in range(MAX_DATUMS):
         if not closed(found.gaps, tolerance):
             return model, found
@@ -111,7 +117,55 @@ def _settled(model: Model, instant: float, tolerance: float) -> tuple[Model, Tri
     return referred(model, found.coordinates, instant, told, keep=True)[0], found
 
 
-def put_together(model: Model, instant: float, tolerance: float, start: dict[str, np.ndarray] | None = None) -> Trial:
+def _turned(model: Model, instant: float, tolerance: float) -> tuple[Model, dict[str, np.ndarray] | None]:
+    """Return the model and the coordinates to start from where laws begin more than half a turn from the guess.
+
+    The drivers are turned from the guess to their laws then, and all angles count their turns; None where none is so
+    far away, or the way cannot be gone.
+    """
+    moved = _mover(model, instant)
+    lag = lag_of(model, instant, moved(model.guess, np.zeros(model.system.cells.shape[1]))[1])
+    if lag is None or not np.pi < lag.angle < np.inf:
+        return model, None
+    begin = put_together(model, instant, tolerance, lag=lag)
+    if not closed(begin.gaps, tolerance):
+        return model, None
+    found = course(model, lag, begin.coordinates, moved, _row_scale)
+    if found is None:
+        return model, None
+    outputs = with_angles(with_datums(model.system.outputs, found.coordinates), found.angles)
+    system = dataclasses.replace(model.system, outputs=outputs)
+    return dataclasses.replace(model, system=system), found.coordinates
+
+
+def _nearest(model: Model, found: Trial, instant: float) -> Trial:
+    """Return planar bodies put together, with every angle shifted by whole turns to be nearest to the guess."""
+    moved, still = _mover(model, instant), np.zeros(model.system.cells.shape[1])
+
+    def residual_at(angle: np.ndarray) -> np.ndarray:
+        return found.scale * moved({**found.coordinates, "angle": angle}, still)[1]
+
+    return found._replace(coordinates=nearest_turns(model.guess, found.coordinates, residual_at))
+
+
+def _mover(model: Model, instant: float) -> Callable[[dict[str, Any], np.ndarray], Any]:
+    """Return what takes coordinates and an increment to coordinates, residual and Jacobian, all NumPy arrays."""
+
+    def moved(coordinates: dict[str, Any], increment: np.ndarray) -> Any:
+        result = _moved(model.system, coordinates, increment, np.float64(instant), model.pose_type)
+        return jax.tree.map(np.asarray, result)
+
+    return moved
+
+
+def put_together(
+    model: Model,
+    instant: float,
+    tolerance: float,
+    start: dict[str, np.ndarray] | None = None,
+    *,
+    lag: Lag | None = None,
+) -> Trial:
     """Return how far the bodies can be put together at one instant; nothing is refused.
 
     Parameters
@@ -124,12 +178,14 @@ def put_together(model: Model, instant: float, tolerance: float, start: dict[str
         Of the last correction, rad or sizes of the mechanism.
     start : dict of str to array, optional
         Coordinates to start from instead of the guess.
+    lag : Lag, optional
+        What drivers may still lack.
     """
-    still, instant = np.zeros(model.system.cells.shape[1]), np.float64(instant)
+    still, free = np.zeros(model.system.cells.shape[1]), _mover(model, instant)
 
     def moved(coordinates: dict[str, Any], increment: np.ndarray) -> Any:
-        result = _moved(model.system, coordinates, increment, instant, model.pose_type)
-        return jax.tree.map(np.asarray, result)
+        moved_to, residual, jacobian = free(coordinates, increment)
+        return moved_to, residual if lag is None else lag.open(residual, 1.0), jacobian
 
     coordinates, residual, jacobian = moved(model.guess if start is None else start, still)
     scale = _row_scale(jacobian)

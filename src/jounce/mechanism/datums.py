@@ -56,6 +56,27 @@ def with_datums(
     )
 
 
+def raw_angles(groups: Sequence[Group], coordinates: dict[str, Any]) -> list[np.ndarray]:
+    """Return the angles about axes that groups measure at a position, up to whole turns, (instances, 1) each."""
+    found = []
+    for group in filter(measures_angle, groups):
+        element, axis = group.element, axis_of(group)
+        attitude = relative_attitude(group, coordinates)
+        if element.vector_i is None:
+            found.append(since(element.datum, attitude, axis))
+        else:
+            found.append(_between(attitude, axis, np.asarray(element.vector_i), np.asarray(element.vector_j)))
+    return found
+
+
+def with_angles(groups: Sequence[Group], angles: Sequence[np.ndarray]) -> tuple[Group, ...]:
+    """Return groups of which the data hold other angles, for those that measure one about an axis."""
+    found = iter(angles)
+    return tuple(
+        _put(g, "datum", Datum(g.element.datum.attitude, next(found))) if measures_angle(g) else g for g in groups
+    )
+
+
 def _with_datum(group: Group, coordinates: dict[str, Any], turnings: Sequence[Turning], *, keep: bool) -> Group:
     element, attitude = group.element, relative_attitude(group, coordinates)
     axis, known = axis_of(group), element.datum
