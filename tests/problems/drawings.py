@@ -108,15 +108,15 @@ def _body(body, drawing, world, values):
     return dataclasses.replace(body, center_of_mass=drawing.point(center), **changed)
 
 
-def shifts(mechanism, motion, drawings):
-    """Return by how much the frames alone change the angle of each element, at the first instant of a motion.
+def shifts(mechanism, coordinates, drawings):
+    """Return by how much the frames alone change the angle of each element, at a position put together.
 
     In space it is the angle of ``A_i^T A_j`` about the axis, of elements without vectors; in the plane that of the
     bodies.
     """
     found = {}
     named = {**mechanism.drivers, **mechanism.forces, **mechanism.outputs}
-    attitude = motion.poses[1].get("quaternion")
+    attitude = coordinates.get("quaternion")
     index = ["ground", *mechanism.bodies].index
     values = mechanism.parameter_values
     drawn = {}
@@ -128,7 +128,7 @@ def shifts(mechanism, motion, drawings):
             found[name] = drawn[it.bodies[-1]] - (ratio * drawn[it.bodies[0]] if len(it.bodies) > 1 else 0.0)
         elif hasattr(it, "datum") and it.vector_i is None:
             axis = resolve(it.axis if hasattr(it, "axis") else it.axis_i, values)
-            old = [matrix(attitude[0, :, index(body), 0]) for body in it.bodies]
+            old = [matrix(attitude.reshape(-1, *attitude.shape[-3:])[0, :, index(body), 0]) for body in it.bodies]
             new = [a @ drawings[body].axes for a, body in zip(old, it.bodies, strict=True)]
             around = drawings[it.bodies[0]].direction(axis)
             found[name] = angle_101(*new, around) - angle_101(*old, axis)

@@ -18,7 +18,7 @@ from jounce.mechanism.datums import with_angles, with_datums
 
 MAX_STEPS = 100
 RANK_TOLERANCE = 1e-9
-MAX_DATUMS = 20
+MAX_DATUMS = 100
 SETTLED = 1e-12  # rad, by which the angles of drivers may be counted otherwise
 
 
