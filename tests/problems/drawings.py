@@ -68,8 +68,8 @@ def redrawn(mechanism, drawings):
                 drawing = drawings[it.bodies[slot]]
                 convert = drawing.point if stem in POINTS else drawing.direction
                 changed[field.name] = convert(resolve(value, values))
-        if getattr(it, "frame", "") == "body" and hasattr(it, "law"):
-            changed["law"] = turned(it.law, drawings[it.bodies[0]])
+        if hasattr(it, "frame") and hasattr(it, "law"):  # components
+            changed["law"] = turned(it.law, drawings[it.bodies[0]] if it.frame == "body" else world)
         return dataclasses.replace(it, **changed)
 
     def turned(law, drawing):
@@ -106,6 +106,20 @@ def _body(body, drawing, world, values):
     center = np.zeros(len(position)) if body.center_of_mass is None else resolve(body.center_of_mass, values)
     changed["position"] = world.point(position + axes @ drawing.origin)
     return dataclasses.replace(body, center_of_mass=drawing.point(center), **changed)
+
+
+def at(mechanism, coordinates):
+    """Return a mechanism of which the guess is a position put together."""
+    values = {name: x.reshape(-1, *x.shape[-3:])[0] if name != "angle" else x for name, x in coordinates.items()}
+    bodies = {}
+    for k, (name, body) in enumerate(mechanism.bodies.items(), start=1):
+        changed = {"position": values["position"][:, k, 0].tolist()}
+        if "quaternion" in values:
+            changed["orientation"] = values["quaternion"][:, k, 0].tolist()
+        else:
+            changed["angle"] = float(values["angle"].reshape(-1, *values["angle"].shape[-2:])[0, k, 0])
+        bodies[name] = dataclasses.replace(body, **changed)
+    return dataclasses.replace(mechanism, bodies=bodies)
 
 
 def shifts(mechanism, coordinates, drawings):

@@ -14,7 +14,7 @@ from jounce.kinematics.status import Status
 from jounce.kinematics.turns import Lag, course, lag_of, nearest_turns
 from jounce.mechanism import Model
 from jounce.mechanism.builder import pose_at, referred
-from jounce.mechanism.datums import with_angles, with_datums
+from jounce.mechanism.datums import measures_angle, with_angles, with_datums
 
 MAX_STEPS = 100
 RANK_TOLERANCE = 1e-9
@@ -105,6 +105,13 @@ def _settled(model: Model, instant: float, tolerance: float) -> tuple[Model, Tri
     """
     model, start = _turned(model, instant, tolerance)
     found, told = put_together(model, instant, tolerance, start), model.turnings
+    if not closed(found.gaps, tolerance) and any(map(measures_angle, model.system.groups)):
+        # angles counted from a tilted guess may be far off: first the joints alone, with the drivers as they are
+        lag = _lag(model, instant)
+        begin = found if lag is None else put_together(model, instant, tolerance, lag=lag)
+        if closed(begin.gaps, tolerance):
+            model, _ = referred(model, begin.coordinates, instant, told)
+            found = put_together(model, instant, tolerance, begin.coordinates)
     if "angle" in found.coordinates and start is None and closed(found.gaps, tolerance):
         found = _nearest(model, found, instant)
     for _ in range(MAX_DATUMS):
@@ -123,8 +130,7 @@ def _turned(model: Model, instant: float, tolerance: float) -> tuple[Model, dict
     The drivers are turned from the guess to their laws then, and all angles count their turns; None where none is so
     far away, or the way cannot be gone.
     """
-    moved = _mover(model, instant)
-    lag = lag_of(model, instant, moved(model.guess, np.zeros(model.system.cells.shape[1]))[1])
+    moved, lag = _mover(model, instant), _lag(model, instant)
     if lag is None or not np.pi < lag.angle < np.inf:
         return model, None
     begin = put_together(model, instant, tolerance, lag=lag)
@@ -136,6 +142,12 @@ def _turned(model: Model, instant: float, tolerance: float) -> tuple[Model, dict
     outputs = with_angles(with_datums(model.system.outputs, found.coordinates), found.angles)
     system = dataclasses.replace(model.system, outputs=outputs)
     return dataclasses.replace(model, system=system), found.coordinates
+
+
+def _lag(model: Model, instant: float) -> Lag | None:
+    """Return what the drivers lack at the guess."""
+    still = np.zeros(model.system.cells.shape[1])
+    return lag_of(model, instant, _mover(model, instant)(model.guess, still)[1])
 
 
 def _nearest(model: Model, found: Trial, instant: float) -> Trial:
