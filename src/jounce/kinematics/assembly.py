@@ -7,6 +7,9 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 
+from jounce.constraints.drivers import DistanceDriver
+from jounce.constraints.planar import DoubleRevolute
+from jounce.constraints.spatial import DoubleSpherical
 from jounce.errors import AssemblyError, MobilityError
 from jounce.jet import Jet
 from jounce.kinematics.compilation import compiled
@@ -91,7 +94,7 @@ def assemble(
         model, _ = referred(model, model.guess, instant, model.turnings)
         return dataclasses.replace(model, system=jax.device_put(model.system)), model.guess
     model, found = _settled(model, instant, tolerance)
-    check_assembled(model, found.gaps, instant, tolerance)
+    check_assembled(model, found, instant, tolerance, free=free)
     check_mobility(model, found.jacobian, free=free)
     system = jax.device_put(dataclasses.replace(model.system, row_scale=found.scale[:, None]))
     return dataclasses.replace(model, system=system), found.coordinates
@@ -235,8 +238,12 @@ def closed(gaps: np.ndarray, tolerance: float) -> bool:
     return bool(np.all(np.abs(gaps) <= max(1e3 * tolerance, 1e-9)))
 
 
-def check_assembled(model: Model, gaps: np.ndarray, instant: float, tolerance: float) -> None:
-    """Raise AssemblyError, with the joints concerned, where gaps stay open."""
+def check_assembled(model: Model, found: Trial, instant: float, tolerance: float, *, free: bool = False) -> None:
+    """Raise AssemblyError, with the joints concerned and by how much they stay open, where gaps are not closed.
+
+    What is missing for every motion to be prescribed is told too, unless degrees of freedom may be left (`free`).
+    """
+    gaps = found.gaps
     unknown = list(dict.fromkeys(name for name, gap in zip(model.rows, gaps, strict=True) if not np.isfinite(gap)))
     if unknown:
         named = ", ".join(unknown)
@@ -247,13 +254,58 @@ def check_assembled(model: Model, gaps: np.ndarray, instant: float, tolerance: f
     gaps = np.abs(gaps)
     worst = np.argsort(-gaps)
     open_rows = list(dict.fromkeys(model.rows[k] for k in worst if gaps[k] > 0.1 * gaps[worst[0]]))
-    named = ", ".join(open_rows[:4])
+    wide = _widths(model, found, instant)
     message = (
-        f"the mechanism cannot be assembled at t = {instant:g} s from its starting guess: {named} "
-        f"{'stays' if len(open_rows) == 1 else 'stay'} open by about {gaps[worst[0]]:.2g} (rad, or sizes of the "
-        "mechanism); check lengths and positions, or guess the pose of the bodies more closely"
+        f"the mechanism cannot be assembled at t = {instant:g} s from its starting guess: {', '.join(open_rows[:4])} "
+        f"{'stays' if len(open_rows) == 1 else 'stay'} open, by {', '.join(wide[name] for name in open_rows[:4])}; "
+        "check lengths and positions, or guess the pose of the bodies more closely"
     )
+    missing = found.jacobian.shape[1] - len(model.rows)
+    if missing > 0 and not free:
+        message += f"; {_count(missing, 'equation')} too few for all coordinates: a joint may be missing"
     raise AssemblyError(message, status=Status.NOT_ASSEMBLED)
+
+
+def _widths(model: Model, found: Trial, instant: float) -> dict[str, str]:
+    """Return by how much each joint and driver is open, as a length or as an angle, whichever it closes."""
+    shifts, jacobian = model.pose_type.shifts, found.jacobian
+    entries = np.abs(jacobian).reshape(len(jacobian), len(model.bodies), -1)
+    by_shift, by_turn = (np.max(part, axis=(1, 2)) for part in (entries[:, :, :shifts], entries[:, :, shifts:]))
+    lengthy = by_shift > 1e-9 * by_turn
+    unit = np.where(lengthy, 1e3 * model.length, np.degrees(1.0))
+    open_by = np.abs(found.gaps) * unit / np.maximum(np.where(lengthy, by_shift, by_turn), 1e-300)
+    squares = _squared_lengths(model, instant)
+    for row, name in enumerate(model.rows):
+        if name in squares:  # the residual is the square of a distance less this
+            square = max(found.gaps[row] / found.scale[row] + squares[name], 0.0)
+            open_by[row] = 1e3 * abs(np.sqrt(square) - np.sqrt(squares[name]))
+    words = {}
+    for name in dict.fromkeys(model.rows):
+        its = np.array([row == name for row in model.rows])
+        sizes = (
+            (np.max(open_by[its & kind], initial=0.0), unit) for kind, unit in ((lengthy, "mm"), (~lengthy, "deg"))
+        )
+        words[name] = " and ".join(f"{size:.3g} {unit}" for size, unit in sizes if size > 1e-6)
+    return words
+
+
+def _squared_lengths(model: Model, instant: float) -> dict[str, float]:
+    """Return the squares of the distances that joints and drivers keep between two points, by name, m^2."""
+    found, first = {}, 0
+    clock = Jet([np.full((1, 1), instant)])
+    for group in model.system.groups:
+        element, names = group.element, model.rows[first : first + group.instances]
+        kind = type(element)
+        first += len([name for name in model.rows if name in set(names)])
+        if kind in (DoubleRevolute, DoubleSpherical):
+            lengths = element.length
+        elif isinstance(element, DistanceDriver):
+            lengths = element.motion(clock).coefficients[0]
+        else:
+            continue
+        lengths = np.broadcast_to(lengths, (group.instances, 1))[:, 0]
+        found |= {name: float(length) ** 2 for name, length in zip(names, lengths, strict=True)}
+    return found
 
 
 def check_mobility(model: Model, jacobian: np.ndarray, *, free: bool = False) -> None:
