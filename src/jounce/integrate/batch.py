@@ -20,6 +20,7 @@ from jounce.integrate.simulate import checked, instants_of
 from jounce.integrate.simulation import expanded
 from jounce.kinematics import Status
 from jounce.mechanism import Mechanism, build, check_mechanism
+from jounce.mechanism.builder import referred
 from jounce.mechanism.doors import concrete
 from jounce.mechanism.laws import check_laws
 
@@ -111,7 +112,10 @@ def simulate_batch(
     check_laws(mechanism, instants, order, forces=True)
     nominal = start(first, float(instants[0]))
     family = Family(first, nominal.model, names)
-    begun = Family(driven(first), build(driven(first)), names) if first.initial else family
+    begun = family
+    if first.initial:
+        model, _ = referred(build(driven(first)), nominal.model.reference, float(instants[0]))
+        begun = Family(driven(first), model, names)
     runs = _Runs(family, rows, instants, order, (float(tolerance), float(longest_step), method))
 
     starts = Starts(family, begun, nominal.state, rows, float(instants[0]))
