@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from jounce.errors import RobotWarning, SampleWarning, UnitWarning
 from jounce.io.peaks import Peak
 
 if TYPE_CHECKING:

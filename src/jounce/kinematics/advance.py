@@ -38,7 +38,7 @@ class Arrival(NamedTuple):
     status: Any  # see Status
     body: Any  # index of the moving body that is farthest from its prediction
     safe_step: Any  # s, over which the motion from here can be predicted
-    radius: Any  # s, the same by the first four Taylor terms only, which rounding spoils least
+    radius: Any  # s, the same by the first three Taylor terms only, which rounding spoils least
     deviation: Any  # departure from the prediction, over how far that moves
     sign: Any  # of the determinant of the Jacobian
     turnover: Any  # 1/s, how fast the first lane nears a singular position (below zero) or leaves it; 0 unless surveyed
@@ -130,7 +130,8 @@ def _departures(system: System, pose: Any, predicted: Any) -> Any:
 
 def _terms(system: System, coordinates: dict[str, Jet], predictor: tuple[str, ...]) -> list[Any]:
     """Return the size of each Taylor coefficient but the first, rad or sizes of the mechanism: order x (batch,)."""
-    scales = {"position": system.column_scale[0]}
+    # a slide that runs away, as towards a dead point of its axes, is measured by where it is
+    scales = {"position": jnp.maximum(system.column_scale[0], _largest(coordinates["position"].coefficients[0]))}
     sizes = [
         jnp.stack([_largest(c) / scales.get(name, 1.0) for name, c in zip(predictor, level, strict=True)])
         for level in zip(*(coordinates[name].coefficients[1:] for name in predictor), strict=True)
@@ -305,7 +306,7 @@ def advance(
         status,
         jnp.argmax(departures, axis=0),
         _safe_step(terms),
-        _safe_step(terms[:4]) / SAFE_FRACTION,
+        _safe_step(terms[:3]) / SAFE_FRACTION,
         departure / jnp.maximum(travel, 1e-300),
         found,
         turnover,

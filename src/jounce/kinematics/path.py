@@ -21,7 +21,7 @@ from jounce.mechanism import Model
 PASSABLE = (Status.OK, Status.UNDEFINED)
 SMALLEST_STEP = 1e-10  # of the span
 LARGEST_TURNOVER = 1.0  # of the Jacobian over a step, seen from its end; from its start, SAFE_FRACTION
-PASSAGE = 1e-3  # of the radius of the series: so near a singular position it is seen whether the motion is smooth there
+PASSAGE = 3e-3  # of the radius of the series: so near a singular position it is seen whether the motion is smooth there
 PASSAGE_ORDER = 4  # of the series that leads through: rounding spoils higher derivatives near a singular position
 PASSAGE_DEVIATION = 1e-8  # from that series, as a part of the way: two branches a gap of g apart deviate by (g / way)^2
 NEARLY_SINGULAR = 1e-6  # of the span: a motion that ends so short before a singular position ends at it
@@ -90,7 +90,7 @@ class Anchor:
     state : tuple
         Jets of the coordinates and of the outputs, and the sign of the determinant of the Jacobian.
     safe_step, radius : float
-        How far the Taylor series carries, s: with all its terms, and with the first four where its terms grow to one.
+        How far the Taylor series carries, s: with all its terms, and with the first three where its terms grow to one.
     turnover : float
         Rate at which the Jacobian nears a singular one (below zero) or leaves it, 1/s.
     status : Status
