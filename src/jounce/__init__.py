@@ -3,7 +3,12 @@
 Importing this package switches JAX to double precision (``jax_enable_x64``); it has no other side effect.
 """
 
-import jax as _jax
+from jounce.interrupts import end_on_signals as _end_on_signals, is_command as _is_command
+
+if _is_command():  # before the libraries, which take a second
+    _end_on_signals()
+
+import jax as _jax  # noqa: E402
 
 _jax.config.update("jax_enable_x64", True)
 

@@ -10,6 +10,7 @@ from os import PathLike, fspath
 from pathlib import Path
 
 from jounce.errors import OutputError
+from jounce.interrupts import undoing
 
 __all__ = ["check_target", "reason_of", "replacing"]
 
@@ -42,7 +43,10 @@ def check_target(path: str | PathLike[str], suffixes: tuple[str, ...] = (), kind
             raise OutputError(f"the folder {target.parent} does not exist", path=name)
         if target.exists() and not (target.is_file() and os.access(target, os.W_OK)):
             raise OutputError("the file there may not be replaced", path=name)
-        _new_file(target).unlink()
+        probe = _beside(target)
+        with undoing(lambda: probe.unlink(missing_ok=True)):
+            probe.touch(exist_ok=False)
+            probe.unlink()
     except (OSError, ValueError) as error:
         raise OutputError(f"cannot be written: {reason_of(error)}", path=name) from None
 
@@ -57,19 +61,19 @@ def replacing(path: str | PathLike[str]) -> Iterator[Path]:
         The file cannot be written; what was there before is unchanged.
     """
     target = Path(os.path.realpath(path))
-    scratch: Path | None = None
+    scratch = _beside(target)
     try:
-        scratch = _new_file(target)
-        yield scratch
-        scratch.replace(target)
+        with undoing(lambda: scratch.unlink(missing_ok=True)):
+            scratch.touch(exist_ok=False)
+            yield scratch
+            scratch.replace(target)
     except OutputError as error:
         raise error.located(path=fspath(path)) from None
     except (OSError, ValueError) as error:
         raise OutputError(f"cannot be written: {reason_of(error)}", path=fspath(path)) from error
     finally:
-        if scratch is not None:
-            with suppress(OSError):
-                scratch.unlink()
+        with suppress(OSError):
+            scratch.unlink()
 
 
 def reason_of(error: Exception) -> str:
@@ -77,8 +81,6 @@ def reason_of(error: Exception) -> str:
     return getattr(error, "strerror", None) or str(error)
 
 
-def _new_file(target: Path) -> Path:
-    """Create an empty file of a name of its own beside the target."""
-    path = target.with_name(f".jounce-{secrets.token_hex(6)}{target.suffix}")
-    path.touch(exist_ok=False)
-    return path
+def _beside(target: Path) -> Path:
+    """Return the path of a new file beside the target."""
+    return target.with_name(f".jounce-{secrets.token_hex(6)}{target.suffix}")
