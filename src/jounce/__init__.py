@@ -8,7 +8,7 @@ from jounce.interrupts import end_on_signals as _end_on_signals, is_command as _
 if _is_command():  # before the libraries, which take a second
     _end_on_signals()
 
-import jax as _jax  # noqa: E402
+import jax as _jax
 
 _jax.config.update("jax_enable_x64", True)
 

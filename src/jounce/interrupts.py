@@ -1,9 +1,9 @@
 """How the command ends when it is told to stop: at once, with a status that says so, and nothing half written.
 
 `KeyboardInterrupt` is no way to end a program that computes in JAX: raised in a callback of the tracer or the collector
-it is lost, and the command goes on; raised while XLA's threads compile, the interpreter is taken down under them. So the
-command handles signals itself, from before the libraries are imported: it undoes what it has begun and leaves the process
-without unwinding anything. Nothing here is active in a program that imports this package.
+it is lost, and the command goes on; raised while XLA's threads compile, the interpreter is taken down under them. So
+the command handles signals itself, from before the libraries are imported: it undoes what it has begun and leaves the
+process without unwinding anything. Nothing here is active in a program that imports this package.
 """
 
 from __future__ import annotations
@@ -31,8 +31,9 @@ _ender = 0  # the thread that ends the process
 def is_command() -> bool:
     """Tell whether this process was started as the command ``jounce`` or as ``python -m jounce``."""
     if sys.argv[:1] == ["-m"]:  # while the module is being looked for
-        given = sys.orig_argv[1:]
-        return any(a == "-mjounce" or pair == ("-m", "jounce") for a, pair in zip(given, zip(given, given[1:] + [""])))
+        given = sys.orig_argv
+        after = given[given.index("-m") + 1 :] if "-m" in given else []
+        return "-mjounce" in given or after[:1] == ["jounce"]
     name = os.path.basename(sys.argv[0]) if sys.argv else ""  # noqa: PTH119 - pathlib takes a while to import
     return name.removesuffix(".exe").removesuffix("-script.py") == "jounce"
 
@@ -40,13 +41,13 @@ def is_command() -> bool:
 def end_on_signals() -> None:
     """End this process on Ctrl-C, SIGTERM and SIGHUP, each unless ignored, with status 128 plus the signal's number.
 
-    Python calls handlers between two of its own instructions in the main thread, which may be in native code for long, or
-    for ever: a second thread is woken by the signal itself, and ends the process if the handler has not.
+    Python calls handlers between two of its own instructions in the main thread, which may be in native code for long,
+    or for ever: a second thread is woken by the signal itself, and ends the process if the handler has not.
     """
     if threading.current_thread() is not threading.main_thread() or signal.getsignal(signal.SIGINT) is _end:
         return
     handled = [number for number in SIGNALS if signal.getsignal(number) not in (signal.SIG_IGN, None)]
-    reading, writing = os.pipe()
+    reading, writing = _pipe()
     os.set_blocking(writing, False)
     for number in handled:
         signal.signal(number, _end)
@@ -54,9 +55,17 @@ def end_on_signals() -> None:
     threading.Thread(target=_watch, args=(reading,), name="jounce-signals", daemon=True).start()
 
 
+def _pipe() -> tuple[int, int]:
+    """Return a pipe; standard files that are closed go nowhere first, or it, or a result, would take their places."""
+    while (nowhere := os.open(os.devnull, os.O_RDWR)) <= 2:
+        pass
+    os.close(nowhere)
+    return os.pipe()
+
+
 def _watch(reading: int) -> None:
     while number := os.read(reading, 1):
-        if signal.getsignal(number[0]) is _end:
+        if number[0] in SIGNALS and signal.getsignal(number[0]) is _end:
             time.sleep(PATIENCE)
             _end(number[0])
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from jounce.errors import JounceError, did_you_mean
+from jounce.cli.arguments import check_ending, named_once
+from jounce.errors import JounceError
+from jounce.io.kinds import expecting
 from jounce.io.terminal import caution, say
 
 MECHANISMS = (".yaml", ".yml", ".toml", ".json")
@@ -55,12 +57,13 @@ def convert(
     from jounce.io.templates import refuse_existing
 
     suffix = source.suffix.lower()
-    if suffix not in (*MECHANISMS, *ROBOTS) and not source.is_dir():
-        message = f"the kind of a file is told by its ending; {did_you_mean(suffix, (*MECHANISMS, *ROBOTS))}"
-        raise JounceError(message, path=source)
+    with expecting(source, "mechanism", "robot"):
+        check_ending(source, (*MECHANISMS, *ROBOTS))
     check_target(target, SUFFIXES, "mechanism file")
     refuse_existing(target, force=force)
     if suffix in ROBOTS:
+        named_once(drive, "--drive")
+        named_once(start, "--start")
         return _robot(source, target, drive, start, hold, drives)
     given = {"--drive": drive, "--start": start, "--hold": hold, "--drives": drives}
     for option, value in given.items():
@@ -78,7 +81,8 @@ def _mechanism(source: Path, target: Path, imports: list[Path] | None) -> int:
 
         for path in imports:
             import_file(path)
-    data = converted(source, target)
+    with expecting(source, "mechanism"):
+        data = converted(source, target)
     _put(dumped(data, target.suffix.lower(), str(target)), target)
     say(f"Written to {target}")
     if source.suffix.lower() != ".json" and "#" in source.read_text(encoding="utf-8-sig"):
@@ -94,7 +98,8 @@ def _robot(
     from jounce.io.robots import load_robot
     from jounce.io.writer import mechanism_data
 
-    robot, renamed = with_file_names(load_robot(source))
+    with expecting(source, "robot"):
+        robot, renamed = with_file_names(load_robot(source))
     laws = assigned(robot, drive or (), "--drive", law=True)
     begin: dict[str, Any] = assigned(robot, start or (), "--start", law=False)
     try:

@@ -6,8 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from jounce.cli.arguments import named_once
 from jounce.cli.writing import written
 from jounce.errors import JounceError, SolveError
+from jounce.io.kinds import expecting
 from jounce.io.summaries import simulation_summary, summary
 from jounce.io.terminal import Bar, say, say_json, show_peaks
 
@@ -174,8 +176,10 @@ def loaded(file: Path, assignments: Sequence[str] | None, imports: Sequence[Path
 
         for path in imports:
             import_file(path)
-    mechanism = load(file)
+    with expecting(file, "mechanism"):
+        mechanism = load(file)
     if assignments:
+        named_once(assignments, "--set")
         from jounce.io.overrides import override
 
         mechanism = override(mechanism, file, assignments)

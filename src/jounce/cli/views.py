@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from jounce.cli.arguments import check_ending
 from jounce.errors import JounceError
+from jounce.interrupts import raising
+from jounce.io.kinds import expecting
 from jounce.io.terminal import say
 
 
@@ -42,6 +45,7 @@ def view(
     import_
         Python file with your own joints and forces; repeatable.
     """
+    from jounce.io.robots import ENDINGS
     from jounce.kinematics.solve import checked_order
     from jounce.viewer import view as show
     from jounce.viewer.exports import check_installed
@@ -57,12 +61,15 @@ def view(
             subject = loaded(file, set_, import_)
         elif set_ or import_:
             raise JounceError("is for mechanism files; a robot has no parameters", name="--set" if set_ else "--import")
-        page = show(subject, trajectory, port=port, order=order, open_page=not no_open)
+        with expecting(file, "mechanism", "robot"):
+            check_ending(file, (*MECHANISM_FILES, *ENDINGS))
+            page = show(subject, trajectory, port=port, order=order, open_page=not no_open)
     except JounceError as error:
         if error.name in ("port", "order"):
             error.name = f"--{error.name}"
             raise
         raise error.located(path=file) from None
     say(f"{page.page.take.title or file.name}: {page.url} (Ctrl-C ends)")
-    page.wait()
+    with raising():
+        page.wait()
     return 0

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+import os
 import sys
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from jounce.interrupts import undoing
 from jounce.io.peaks import Peak
 
 if TYPE_CHECKING:
@@ -28,6 +31,8 @@ __all__ = [
 ]
 
 WIDTH = 80  # of tables that do not go to a terminal
+NARROWEST, WIDEST = 40, 9999
+SHOW_CURSOR = b"\r\x1b[2K\x1b[?25h"  # on a cleared line; a progress bar hides it
 PATIENCE = 1.0  # s, before a progress bar is shown
 ROUNDING = 1e-15  # of the other components; what is smaller is shown as 0
 HEADINGS = ("output", "derivative", "unit", "minimum", "at t/s", "maximum", "at t/s")
@@ -73,8 +78,7 @@ def _show_table(
     style: str = "bold",
 ) -> None:
     """Print rows grouped by their first cell; the next two are text, the rest numbers, of which some are marked."""
-    if sys.stdout.isatty():
-        _print_table(headings, table, marks, meaning, style)
+    if sys.stdout.isatty() and _print_table(headings, table, marks, meaning, style):
         return
     starred = [
         [cell + ("*" if k in marked else " ") if k in markable else cell for k, cell in enumerate(cells)]
@@ -105,7 +109,8 @@ def _plain_table(headings: Sequence[str], table: list[list[str]]) -> list[str]:
 
 def _print_table(
     headings: Sequence[str], found: list[list[str]], marks: list[list[int]], meaning: str, style: str
-) -> None:
+) -> bool:
+    """Print a table in colour, unless the terminal cannot show marks or is so narrow that rich would cut numbers."""
     from rich import box
     from rich.console import Console
     from rich.table import Table
@@ -125,7 +130,11 @@ def _print_table(
         before = row[0]
         table.add_row(*cells)
     notes = [f"{style}: {meaning}"] if meaning else []
-    Console().print(table, *notes, sep="\n")
+    console = Console()
+    if console.is_dumb_terminal or Console(width=WIDEST).measure(table).minimum > console.width:
+        return False
+    console.print(table, *notes, sep="\n")
+    return True
 
 
 def show_columns(pairs: Sequence[tuple[str, str]]) -> None:
@@ -158,7 +167,9 @@ def show_rows(title: str, headings: Sequence[str], rows: Sequence[Sequence[str]]
             table.add_column(headings[k], justify=justify, style=style, overflow="fold")
         for row in rows:
             table.add_row(*(Text(_clean(row[k])) for k in kept))
-        Console().print("", table)
+        console = Console()
+        console.width = max(console.width, NARROWEST)  # narrower, rich leaves columns out
+        console.print("", table)
         return
     widths = {k: max(len(row[k]) for row in [headings, *rows]) for k in kept}
     lines = ["", title]
@@ -175,13 +186,13 @@ class Bar:
         self._task = task
         self._started: float | None = None
         self._bar: Any = None
+        self._shown = ExitStack()
 
     def __enter__(self) -> Bar:
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self._bar is not None:
-            self._bar.stop()
+        self._shown.close()
 
     def __call__(self, done: int, total: int) -> None:
         """Tell how much is done; compiling, before the first call, does not count as work."""
@@ -194,7 +205,8 @@ class Bar:
             from rich.progress import Progress
 
             self._bar = Progress(console=Console(stderr=True), transient=True)
-            self._bar.start()
+            self._shown.enter_context(undoing(lambda: os.write(2, SHOW_CURSOR)))
+            self._shown.enter_context(self._bar)
             self._id = self._bar.add_task(self._task, total=total)
         self._bar.update(self._id, completed=done, total=total)
 
