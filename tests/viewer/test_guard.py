@@ -36,18 +36,14 @@ def fetched(address, **headers):
         return error.code, error.read()
 
 
-def connected(address, origin=None, **headers):
-    """Whether a WebSocket gets what the page shows."""
-    protocol = f"viser-v{viser.__version__}"
-    address = address.replace("http", "ws", 1)
+def connected(address, origin=None):
+    """Whether a WebSocket gets what the page shows; refusals have status 403."""
+    given = {"origin": origin, "subprotocols": [f"viser-v{viser.__version__}"], "max_size": None}
     try:
-        with connect(
-            address, origin=origin, additional_headers=headers, subprotocols=[protocol], max_size=None
-        ) as socket:
+        with connect(address.replace("http", "ws", 1), **given) as socket:
             return len(socket.recv(timeout=20)) > 0
     except InvalidStatus as error:
-        assert error.response.status_code == 403
-        return False
+        return error.response.status_code != 403
 
 
 def test_the_address_holds_a_token_of_128_bits_that_is_new_each_time(page):
