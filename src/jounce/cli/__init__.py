@@ -12,6 +12,7 @@ import gc
 import os
 import re
 import sys
+import warnings
 from collections.abc import Sequence
 from typing import Any
 
@@ -29,7 +30,7 @@ from jounce.cli.writing import WritingError
 from jounce.errors import JounceError, SolveError
 from jounce.interrupts import end_on_signals
 from jounce.io.streams import lasting_streams
-from jounce.io.terminal import complain, unexpected
+from jounce.io.terminal import caution, complain, unexpected
 
 EXAMPLES = {
     new: """\
@@ -123,7 +124,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if not re.fullmatch("[1-9][0-9]{0,3}", os.environ.get(name, "1")):  # 0 is "unknown" to some, nothing to others
             del os.environ[name]
     as_json = "--json" in given
-    with lasting_streams() as output:
+    with lasting_streams() as output, warnings.catch_warnings():
+        warnings.showwarning = lambda message, *_, **__: caution(message, json=as_json)
         status = _status(given, as_json)
         output.flush()
         if output.failure is None:
