@@ -114,7 +114,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0 success, 2 bad input, 1 a solve or a writing that failed or a limit that is broken, 130 interrupted.
+        0 success, 2 bad input, 1 a solve or a writing that failed or a limit that is broken, 130 interrupted. As a
+        command, the process ends on signals by itself, see `jounce.interrupts`.
     """
     given = list(sys.argv[1:] if arguments is None else arguments)
     if arguments is None:

@@ -9,7 +9,7 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
 
-from jounce.errors import JounceError, MechanismFileError, RobotFileError, TrajectoryError
+from jounce.errors import JounceError, MechanismFileError, RobotError, TrajectoryError
 
 __all__ = ["expecting", "kind_of"]
 
@@ -76,7 +76,7 @@ def expecting(path: str | PathLike[str], *wanted: str) -> Iterator[None]:
     """
     try:
         yield
-    except (MechanismFileError, RobotFileError, TrajectoryError) as error:
+    except (MechanismFileError, RobotError, TrajectoryError) as error:
         kind = kind_of(path)
         if kind is None or kind in wanted:
             raise

@@ -79,7 +79,7 @@ def lasting_streams() -> Iterator[Lasting]:
         with suppress(AttributeError, ValueError):
             stream.reconfigure(errors="backslashreplace")
     output, messages = Lasting(before[0]), Lasting(before[1])
-    sys.stdout, sys.stderr = output, messages  # type: ignore[assignment]
+    sys.stdout, sys.stderr = output, messages
     try:
         yield output
     finally:
