@@ -15,7 +15,6 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from typing import Any
 
 __all__ = ["end_on_signals", "is_command", "raising", "undoing"]
 
@@ -23,7 +22,7 @@ SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP"
 PATIENCE = 0.2  # s that the main thread has to come out of native code before another one ends the process
 STATUS = 128  # of a process ended by a signal, plus its number
 
-_undo: dict[object, Callable[[], Any]] = {}
+_undo: dict[object, Callable[[], object]] = {}
 _ending = threading.Lock()
 _ender = 0  # the thread that ends the process
 
@@ -85,7 +84,7 @@ def _end(number: int, _frame: object = None) -> None:
 
 
 @contextmanager
-def undoing(undo: Callable[[], Any]) -> Iterator[None]:
+def undoing(undo: Callable[[], object]) -> Iterator[None]:
     """Call a function if a signal ends the process meanwhile, such as one that removes an unfinished file.
 
     It may run in any thread while another stands still anywhere, so it must need no lock.
