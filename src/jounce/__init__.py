@@ -4,6 +4,11 @@ Importing this package switches JAX to double precision (``jax_enable_x64``); it
 mark that a process gets when it is forked, see `jounce.mechanism.doors`.
 """
 
+from jounce.interrupts import end_on_signals as _end_on_signals, is_command as _is_command
+
+if _is_command():  # before the libraries, which take a second
+    _end_on_signals()
+
 import jax as _jax
 
 _jax.config.update("jax_enable_x64", True)

@@ -1,5 +1,6 @@
 """The report: what is in the page, and that it needs nothing else. A browser is asked in the slow test."""
 
+import html
 import json
 import pathlib
 import re
@@ -67,8 +68,17 @@ def test_the_page_asks_for_nothing(page):
     assert not re.findall(r"@[A-Z]+@", text)
 
 
-def test_names_cannot_break_the_page(tmp_path):
-    name = "</script><script>alert(1)</script>"
+@pytest.mark.parametrize(
+    "name",
+    [
+        "</script><script>alert(1)</script>",
+        "@DATA@ @SCRIPT@ @STYLE@ @TITLE@",
+        "<!--<script>",
+        "a\u2028b\u0000c\x1b[31m",
+        "\\u003c \\1 \\g<0> &amp; \"'",
+    ],
+)
+def test_names_cannot_break_the_page(tmp_path, name):
     mechanism = jn.Mechanism(
         space="planar",
         title=name,
@@ -80,9 +90,10 @@ def test_names_cannot_break_the_page(tmp_path):
     path = tmp_path / "page.html"
     report(jn.solve(mechanism, [0.0, 1.0], order=1), path)
     text = path.read_text(encoding="utf-8")
-    assert text.count("</script>") == 2
-    assert "<title>&lt;/script&gt;" in text
+    assert (text.count("<script"), text.count("</script>")) == (2, 2)
+    assert html.unescape(re.search("<title>(.*?)</title>", text, re.S)[1]) == name
     assert data_of(path)["title"] == name
+    assert [body["name"] for body in data_of(path)["bodies"]] == [name]
 
 
 def test_instants_that_failed_are_told(tmp_path):

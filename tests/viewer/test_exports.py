@@ -112,7 +112,7 @@ def page():
 
 
 def test_a_page_listens_on_this_machine_only(page):
-    assert re.fullmatch(r"http://127\.0\.0\.1:\d+", page.url)
+    assert re.match(r"http://127\.0\.0\.1:\d+/", page.url)
     server = page.page.server
     assert server.get_host() == "127.0.0.1"
     with pytest.raises(jn.JounceError, match="port: cannot be used"):

@@ -10,11 +10,13 @@ from __future__ import annotations
 
 import gc
 import os
+import re
 import sys
+import warnings
 from collections.abc import Sequence
-from contextlib import suppress
 from typing import Any
 
+from jounce.cli.arguments import converted
 from jounce.cli.completing import completion
 from jounce.cli.conversion import convert
 from jounce.cli.figures import plot, report
@@ -26,6 +28,8 @@ from jounce.cli.starters import new
 from jounce.cli.views import view
 from jounce.cli.writing import WritingError
 from jounce.errors import JounceError, SolveError
+from jounce.interrupts import end_on_signals
+from jounce.io.streams import lasting_streams
 from jounce.io.terminal import cautions, complain, unexpected
 
 EXAMPLES = {
@@ -96,7 +100,7 @@ Exit status:
   0  success
   1  a failed instant, a broken limit, no possible start, nothing written
   2  bad input
-  130  interrupted"""
+  130  interrupted by Ctrl-C; 143 ended by SIGTERM"""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -110,28 +114,37 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0 success, 2 bad input, 1 a solve or a writing that failed or a limit that is broken, 130 interrupted.
+        0 success, 2 bad input, 1 a solve or a writing that failed or a limit that is broken, 130 interrupted. As a
+        command, the process ends on signals by itself, see `jounce.interrupts`.
     """
-    as_json = False
+    given = list(sys.argv[1:] if arguments is None else arguments)
     if arguments is None:
+        end_on_signals()
         gc.freeze()  # the collector need not look at the libraries again: 0.15 s of a short run
-    for stream in (sys.stdout, sys.stderr):
-        with suppress(AttributeError, ValueError):
-            stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
+    for name in ("COLUMNS", "LINES"):
+        if not re.fullmatch("[1-9][0-9]{0,3}", os.environ.get(name, "1")):  # 0 is "unknown" to some, nothing to others
+            del os.environ[name]
+    as_json = "--json" in given
+    with lasting_streams() as output, cautions(json=as_json):
+        status = _status(given, as_json)
+        output.flush()
+        if output.failure is None:
+            return status
+        from jounce.io.files import reason_of
+
+        complain(f"standard output cannot be written: {reason_of(output.failure)}", json=as_json)
+    return status or 1
+
+
+def _status(given: list[str], as_json: bool) -> int:
+    """Return the exit status of a command, whose errors are told."""
     try:
         from jounce.io.cache import use_compilation_cache
 
         use_compilation_cache()
-        given = list(sys.argv[1:] if arguments is None else arguments)
-        as_json = "--json" in given
-        with cautions(json=as_json):
-            return _dispatch(given)
+        return _dispatch(given)
     except KeyboardInterrupt:
         return 130
-    except BrokenPipeError:  # who reads us has read enough
-        with suppress(OSError, ValueError):
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
     except SolveError as error:
         complain(error, json=as_json)
         return 2 if error.motion is None else 1
@@ -170,7 +183,7 @@ def application() -> Any:
         help_formatter="default" if sys.stdout.isatty() else "plain",
         help_epilogue=f"Examples:\n{FIRST}\n\n{STATUS}",
         version=__version__,
-        default_parameter=cyclopts.Parameter(negative=()),
+        default_parameter=cyclopts.Parameter(negative=(), converter=converted),
         result_action="return_value",
         suppress_keyboard_interrupt=False,
     )

@@ -6,8 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from jounce.cli.arguments import check_ending, named_once
 from jounce.cli.writing import Overwrite, allowed
-from jounce.errors import JounceError, did_you_mean
+from jounce.errors import JounceError
+from jounce.io.kinds import expecting
 from jounce.io.terminal import caution, say
 
 if TYPE_CHECKING:
@@ -66,15 +68,17 @@ def convert(
     from jounce.io.templates import refuse_existing
 
     suffix = source.suffix.lower()
-    if suffix not in (*MECHANISMS, *ROBOTS) and not source.is_dir():
-        message = f"the kind of a file is told by its ending; {did_you_mean(suffix, (*MECHANISMS, *ROBOTS))}"
-        raise JounceError(message, path=source)
+    with expecting(source, "mechanism", "robot"):
+        check_ending(source, (*MECHANISMS, *ROBOTS))
     check_target(target, SUFFIXES, "mechanism file", overwrite=overwrite)
     refuse_existing(target, overwrite=overwrite)
     if suffix in ROBOTS:
         from jounce.io.robots import load_robot
 
-        model = load_robot(source, strict=strict, allow=allowed(allow))
+        named_once(drive, "--drive")
+        named_once(start, "--start")
+        with expecting(source, "robot"):
+            model = load_robot(source, strict=strict, allow=allowed(allow))
         return _robot(source, model, target, drive, start, hold, drives)
     given = {"--drive": drive, "--start": start, "--hold": hold, "--drives": drives, "--strict": strict}
     for option, value in given.items():
@@ -95,7 +99,8 @@ def _mechanism(source: Path, target: Path, imports: list[Path] | None, allow: Se
 
         for path in imports:
             import_file(path)
-    data, samples = converted(source, target, allow)
+    with expecting(source, "mechanism"):
+        data, samples = converted(source, target, allow)
     text = dumped(data, target.suffix.lower(), str(target))
     for beside in samples:  # all, before the first is written
         check_target(beside, overwrite=overwrite)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from jounce.cli.arguments import check_ending
 from jounce.cli.conversion import MECHANISMS, ROBOTS
 from jounce.cli.mechanisms import loaded
 from jounce.cli.writing import allowed
-from jounce.errors import JounceError, did_you_mean
+from jounce.errors import JounceError
+from jounce.io.kinds import expecting
 from jounce.io.terminal import say_json
 
 
@@ -45,9 +47,8 @@ def inspect(
         Print the result as JSON.
     """
     suffix = file.suffix.lower()
-    if suffix not in (*MECHANISMS, *ROBOTS) and not file.is_dir():
-        message = f"the kind of a file is told by its ending; {did_you_mean(suffix, (*MECHANISMS, *ROBOTS))}"
-        raise JounceError(message, path=file)
+    with expecting(file, "mechanism", "robot"):
+        check_ending(file, (*MECHANISMS, *ROBOTS))
     if suffix in ROBOTS:
         if set_:
             raise JounceError("is for mechanism files; a robot file has no parameters", name="--set", path=file)
@@ -55,7 +56,8 @@ def inspect(
         from jounce.io.robot_inspection import inspected_robot
         from jounce.io.robots import load_robot
 
-        facts = inspected_robot(load_robot(file, strict=strict, allow=allowed(allow)), file)
+        with expecting(file, "robot"):
+            facts = inspected_robot(load_robot(file, strict=strict, allow=allowed(allow)), file)
     else:
         if strict:
             raise JounceError("is for robot files; mechanism files are always read so", name="--strict", path=file)

@@ -6,8 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from jounce.cli.arguments import named_once
 from jounce.cli.writing import allowed, spared, written
 from jounce.errors import JounceError, SolveError
+from jounce.io.kinds import expecting
 from jounce.io.summaries import simulation_summary, summary
 from jounce.io.terminal import Bar, say, say_json, show_peaks
 
@@ -194,8 +196,10 @@ def loaded(
 
         for path in imports:
             import_file(path)
-    mechanism = load(file, allow=allowed(allow))
+    with expecting(file, "mechanism"):
+        mechanism = load(file, allow=allowed(allow))
     if assignments:
+        named_once(assignments, "--set")
         from jounce.io.overrides import override
 
         mechanism = override(mechanism, assignments)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from jounce.cli.writing import allowed, spared, written
 from jounce.errors import JounceError, RobotError, SampleWarning
+from jounce.io.kinds import expecting
 from jounce.io.summaries import limits_summary, verdict
 from jounce.io.terminal import caution, say, say_json, show_limits
 
@@ -54,7 +56,6 @@ def check(
     import warnings
 
     from jounce.dynamics.limits import check_limits
-    from jounce.io.limits import load_limits
     from jounce.io.robots import load_robot
     from jounce.io.trajectories import load_trajectory
 
@@ -62,15 +63,17 @@ def check(
         from jounce.plot import check_figure
 
         check_figure(out, overwrite=overwrite)
-    model = load_robot(robot, strict=strict, allow=allowed(allow))
-    laid = load_limits(limits, model) if limits is not None else None
+    with expecting(robot, "robot"):
+        model = load_robot(robot, strict=strict, allow=allowed(allow))
+    laid = _laid_down(limits, model)
     if payload:
         from jounce.io.payloads import with_payloads
 
         model = with_payloads(model, payload)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", SampleWarning)
-        motion = load_trajectory(trajectory, degree)
+        with expecting(trajectory, "trajectory"):
+            motion = load_trajectory(trajectory, degree)
         try:
             spared(out, overwrite)
             report = check_limits(model, motion, laid)
@@ -98,3 +101,13 @@ def check(
     elif out is not None:
         say(f"\nWritten to {out}")
     return 0 if report.kept else 1
+
+
+def _laid_down(limits: Path | None, model: Any) -> Any:
+    """Return the limits of a file, None without one."""
+    from jounce.io.limits import load_limits
+
+    if limits is None:
+        return None
+    with expecting(limits, "limits"):
+        return load_limits(limits, model)

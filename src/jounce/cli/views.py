@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from jounce.cli.arguments import check_ending
 from jounce.cli.writing import allowed
 from jounce.errors import JounceError
+from jounce.interrupts import raising
+from jounce.io.kinds import expecting
 from jounce.io.terminal import say
 
 
@@ -46,6 +49,7 @@ def view(
     allow
         Folder whose files it may name, besides its own; repeatable.
     """
+    from jounce.io.robots import ENDINGS
     from jounce.kinematics.solve import checked_order
     from jounce.viewer import view as show
     from jounce.viewer.exports import check_installed
@@ -61,12 +65,15 @@ def view(
             subject = loaded(file, set_, import_, allow)
         elif set_ or import_:
             raise JounceError("is for mechanism files; a robot has no parameters", name="--set" if set_ else "--import")
-        page = show(subject, trajectory, port=port, order=order, open_page=not no_open, allow=allowed(allow))
+        with expecting(file, "mechanism", "robot"):
+            check_ending(file, (*MECHANISM_FILES, *ENDINGS))
+            page = show(subject, trajectory, port=port, order=order, open_page=not no_open, allow=allowed(allow))
     except JounceError as error:
         if error.name in ("port", "order"):
             error.name = f"--{error.name}"
             raise
         raise error.located(path=file) from None
     say(f"{page.page.take.title or file.name}: {page.url} (Ctrl-C ends)")
-    page.wait()
+    with raising():
+        page.wait()
     return 0

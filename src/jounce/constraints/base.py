@@ -15,14 +15,34 @@ Vector = Annotated[Any, "vector"]
 Motion = Annotated[Any, "motion"]
 Wrenches = Annotated[Any, "wrenches"]
 
+SPACES = ("planar", "spatial")
+ROLES = ("joint", "driver", "force")
 _REGISTRY: dict[tuple[str, str], dict[str, type[Any]]] = {}
 
 
 def register(kind: type[Any], type: str, space: str, role: str) -> None:  # noqa: A002
-    """Let files name a class by its type; one of no particular space is of both."""
+    """Let files name a class by its type; one of no particular space is of both.
+
+    Raises
+    ------
+    MechanismError
+        If another class has this type: files would silently mean the new one. The same class defined again, as in a
+        cell of a notebook that is run again, takes its own place.
+    """
+    check_text("role", role, ROLES)
+    if space:
+        check_text("space", space, SPACES)
+    catalogues = [_REGISTRY.setdefault((each, role), {}) for each in ((space,) if space else SPACES)]
+    for taken in catalogues:
+        other = taken.get(type, kind)
+        if (other.__module__, other.__qualname__) != (kind.__module__, kind.__qualname__):
+            message = (
+                f"the {role} type of {kind.__qualname__} is that of {other.__module__}.{other.__qualname__} already"
+            )
+            raise MechanismError(f"{message}; give it another one", name="type", value=type)
     kind.type_name, kind.space, kind.role = type, space, role
-    for each in (space,) if space else ("planar", "spatial"):
-        _REGISTRY.setdefault((each, role), {})[type] = kind
+    for free in catalogues:
+        free[type] = kind
 
 
 class AbstractConstraint(eqx.Module):

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from jounce.errors import OutputError
+from jounce.interrupts import undoing
 from jounce.io.reading import is_input, note_result
 
 __all__ = ["check_target", "reason_of", "replacing"]
@@ -99,7 +100,7 @@ def replacing(path: str | PathLike[str], *, overwrite: bool = False) -> Iterator
         _check_replaceable(target, overwrite)
         # a name that starts with a dot is in nobody's way, and the ending tells programs what to write
         scratch = target.with_name(f".jounce-{secrets.token_hex(6)}{target.suffix}")
-        with _removed(scratch):
+        with undoing(lambda: scratch.unlink(missing_ok=True)), _removed(scratch):
             before = target.stat() if target.exists() else None
             os.close(os.open(scratch, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666 if before is None else 0o600))
             yield scratch

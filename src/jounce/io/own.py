@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import importlib.util
+import os
 import sys
+import zlib
 from os import PathLike, fspath
 from pathlib import Path
 
@@ -30,7 +32,8 @@ def import_file(path: str | PathLike[str]) -> None:
     if not name.endswith(".py"):
         raise MechanismFileError("own joints come from a Python file, ending in .py", path=name)
     read_file(name)
-    module_name = f"jounce_own_{Path(name).stem}"
+    place = zlib.crc32(os.fsencode(Path(name).resolve()))  # files of one name in two folders hold different classes
+    module_name = f"jounce_own_{Path(name).stem}_{place:08x}"
     spec = importlib.util.spec_from_file_location(module_name, name)
     if spec is None or spec.loader is None:
         raise MechanismFileError("cannot be read as Python", path=name)

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
+import os
 import sys
 import time
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from jounce.errors import RobotWarning, SampleWarning, UnitWarning
+from jounce.interrupts import undoing
 from jounce.io.peaks import Peak
 
 if TYPE_CHECKING:
@@ -31,8 +33,10 @@ __all__ = [
     "unexpected",
 ]
 
-TOLD = (RobotWarning, SampleWarning, UnitWarning)  # warnings that a command prints as it prints errors
+OURS = (RobotWarning, SampleWarning, UnitWarning)  # warnings of this package, which nobody may turn off by mistake
 WIDTH = 80  # of tables that do not go to a terminal
+NARROWEST, WIDEST = 40, 9999
+SHOW_CURSOR = b"\r\x1b[2K\x1b[?25h"  # on a cleared line; a progress bar hides it
 PATIENCE = 1.0  # s, before a progress bar is shown
 ROUNDING = 1e-15  # of the other components; what is smaller is shown as 0
 HEADINGS = ("output", "derivative", "unit", "minimum", "at t/s", "maximum", "at t/s")
@@ -78,8 +82,7 @@ def _show_table(
     style: str = "bold",
 ) -> None:
     """Print rows grouped by their first cell; the next two are text, the rest numbers, of which some are marked."""
-    if sys.stdout.isatty():
-        _print_table(headings, table, marks, meaning, style)
+    if sys.stdout.isatty() and _print_table(headings, table, marks, meaning, style):
         return
     starred = [
         [cell + ("*" if k in marked else " ") if k in markable else cell for k, cell in enumerate(cells)]
@@ -110,7 +113,8 @@ def _plain_table(headings: Sequence[str], table: list[list[str]]) -> list[str]:
 
 def _print_table(
     headings: Sequence[str], found: list[list[str]], marks: list[list[int]], meaning: str, style: str
-) -> None:
+) -> bool:
+    """Print a table in colour, unless the terminal cannot show marks or is so narrow that rich would cut numbers."""
     from rich import box
     from rich.console import Console
     from rich.table import Table
@@ -130,7 +134,11 @@ def _print_table(
         before = row[0]
         table.add_row(*cells)
     notes = [f"{style}: {meaning}"] if meaning else []
-    Console().print(table, *notes, sep="\n")
+    console = Console()
+    if console.is_dumb_terminal or Console(width=WIDEST).measure(table).minimum > console.width:
+        return False
+    console.print(table, *notes, sep="\n")
+    return True
 
 
 def show_columns(pairs: Sequence[tuple[str, str]]) -> None:
@@ -163,7 +171,9 @@ def show_rows(title: str, headings: Sequence[str], rows: Sequence[Sequence[str]]
             table.add_column(headings[k], justify=justify, style=style, overflow="fold")
         for row in rows:
             table.add_row(*(Text(_clean(row[k])) for k in kept))
-        Console().print("", table)
+        console = Console()
+        console.width = max(console.width, NARROWEST)  # narrower, rich leaves columns out
+        console.print("", table)
         return
     widths = {k: max(len(row[k]) for row in [headings, *rows]) for k in kept}
     lines = ["", title]
@@ -180,13 +190,13 @@ class Bar:
         self._task = task
         self._started: float | None = None
         self._bar: Any = None
+        self._shown = ExitStack()
 
     def __enter__(self) -> Bar:
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self._bar is not None:
-            self._bar.stop()
+        self._shown.close()
 
     def __call__(self, done: int, total: int) -> None:
         """Tell how much is done; compiling, before the first call, does not count as work."""
@@ -199,7 +209,8 @@ class Bar:
             from rich.progress import Progress
 
             self._bar = Progress(console=Console(stderr=True), transient=True)
-            self._bar.start()
+            self._shown.enter_context(undoing(lambda: os.write(2, SHOW_CURSOR)))
+            self._shown.enter_context(self._bar)
             self._id = self._bar.add_task(self._task, total=total)
         self._bar.update(self._id, completed=done, total=total)
 
@@ -235,19 +246,16 @@ def caution(warning: object, *, json: bool = False) -> None:
 
 @contextmanager
 def cautions(*, json: bool = False) -> Iterator[None]:
-    """Print warnings about the user's values as the command prints its errors, each once."""
+    """Print warnings as the command prints its errors, each once and without its place in the code."""
     told: set[str] = set()
+
+    def show(message: Any, *_: Any, **__: Any) -> None:
+        if str(message) not in told:
+            told.add(str(message))
+            caution(message, json=json)
+
     with warnings.catch_warnings():
-        usual = warnings.showwarning
-
-        def show(message: Any, category: Any, *place: Any, **more: Any) -> None:
-            if not issubclass(category, TOLD):
-                usual(message, category, *place, **more)
-            elif str(message) not in told:
-                told.add(str(message))
-                caution(message, json=json)
-
-        for category in TOLD:
+        for category in OURS:
             warnings.simplefilter("always", category)
         warnings.showwarning = show
         yield

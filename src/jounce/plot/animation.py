@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from jounce.errors import MechanismError, OutputError, did_you_mean
+from jounce.interrupts import undoing
 from jounce.io.files import check_target, replacing
 from jounce.plot.scene import AZIMUTH, ELEVATION, scene_of
 from jounce.plot.sketch import NAMES, Drawing, paths_of
@@ -180,7 +181,7 @@ def animate(
         _start_clock(drawing, motion.time)
         drawing.figure.set_layout_engine("none")
         _even_pixels(drawing.figure)
-        with writer.saving(drawing.figure, str(beside), dpi=RESOLUTION):
+        with writer.saving(drawing.figure, str(beside), dpi=RESOLUTION), undoing(lambda: _stop(writer)):
             for done, place in enumerate(places.tolist(), 1):
                 drawing.show(place)
                 drawing.move_names(place)
@@ -188,6 +189,14 @@ def animate(
                 writer.grab_frame()
                 if progress is not None:
                     progress(done, len(places))
+
+
+def _stop(writer: Any) -> None:
+    """End the encoder, which would put the file back that is being removed."""
+    encoder = getattr(writer, "_proc", None)
+    if encoder is not None:
+        encoder.kill()
+        encoder.wait(1.0)
 
 
 def _nearest(time: np.ndarray, wanted: np.ndarray) -> np.ndarray:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from os import PathLike, fspath
 from pathlib import Path
@@ -175,6 +174,5 @@ def save(figure: Any, path: str | PathLike[str], *, overwrite: bool = False) -> 
     """
     check_figure(path, overwrite=overwrite)
     metadata = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(Path(fspath(path)).suffix.lower())
-    with replacing(path, overwrite=overwrite) as beside, style(), warnings.catch_warnings():
-        warnings.filterwarnings("ignore", message="Glyph .* missing")  # names in other scripts get boxes
+    with replacing(path, overwrite=overwrite) as beside, style():
         figure.savefig(beside, dpi=RESOLUTION, metadata=metadata)

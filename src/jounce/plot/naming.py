@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from jounce.plot.style import shown_name
+from jounce.plot.style import printable, shown_name
 
 __all__ = ["place_names"]
 
@@ -65,7 +65,7 @@ def place_names(
             continue
         text = axes.text(*place, shown_name(label.text), color=label.colour, fontsize=8, ha="center", va="center")
         text.set(zorder=9, path_effects=[withStroke(linewidth=1.8, foreground="white")])
-        text.set_gid(f"name.{label.owner}")
+        text.set_gid(printable(f"name.{label.owner}"))
         if label.owner.startswith("bodies."):
             text.set_fontweight("bold")
         extent = text.get_window_extent(renderer)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 import json
 import math
+import re
 from importlib.resources import files
 from os import PathLike
 from pathlib import Path
@@ -94,9 +95,7 @@ def report(
         "SCRIPT": _part("report.js") + _part("plots.js"),
         "DATA": data.replace("<", "\\u003c"),  # no name can end the script early
     }
-    page = _part("report.html")
-    for name, text in parts.items():
-        page = page.replace(f"@{name}@", text, 1)
+    page = re.sub("@([A-Z]+)@", lambda place: parts[place[1]], _part("report.html"))  # once: titles are not looked at
     with replacing(path, overwrite=overwrite) as beside:
         beside.write_text(page, encoding="utf-8")
 

@@ -14,13 +14,14 @@ from jounce.mechanism.mechanism import Mechanism, check_mechanism
 from jounce.plot.labels import scale_of, unit_label
 from jounce.plot.naming import place_names
 from jounce.plot.scene import AZIMUTH, ELEVATION, WHEELS, Scene, outline, scene_of, screen_of
-from jounce.plot.style import GREY, blank_figure, shown_name, style
+from jounce.plot.style import GREY, blank_figure, printable, shown_name, style
 
 __all__ = ["Drawing", "Paths", "draw_scale", "length_text", "paths_of", "round_length", "sketch"]
 
 NAMES = ("all", "bodies", "joints", "none")
 WIDEST, TALLEST, LEAST = 6.4, 5.2, 2.6  # inches
 LETTER = 0.07  # inches of a title at least, which is then written smaller
+WIDEST_TITLE = 8.0  # inches; what is longer is cut
 MOST = 400  # instants that a drawing is made for; more would not be seen
 PATH_MAP = "cividis"  # rises evenly in lightness, for the colour-blind too
 
@@ -98,7 +99,7 @@ class Drawing:
         wide, tall = right - left, upper - lower
         scale = min((WIDEST - 0.3) / wide, (TALLEST - 0.3) / tall)
         bar = 0.9 if paths is not None and paths.order and paths.names else 0.0
-        least = max(LEAST, LETTER * len(title))
+        least = max(LEAST, min(LETTER * len(title), WIDEST_TITLE))
         size = max(least, wide * scale + 0.3 + bar), max(LEAST, tall * scale + 0.3 + 0.35 * bool(title))
         self.figure = blank_figure(*size, title)
         self.axes = axes = self.figure.add_subplot()
@@ -128,7 +129,7 @@ class Drawing:
         from matplotlib.lines import Line2D
         from matplotlib.patches import Circle, Polygon
 
-        look = {"linewidth": shape.width, "zorder": shape.layer, "gid": shape.owner}
+        look = {"linewidth": shape.width, "zorder": shape.layer, "gid": printable(shape.owner)}
         if shape.kind == "line":
             dashes = (0, shape.dashes) if shape.dashes else "-"
             caps = {"solid_capstyle": "round", "solid_joinstyle": "round"}

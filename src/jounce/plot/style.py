@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 __all__ = [
@@ -19,6 +21,7 @@ __all__ = [
     "STYLE",
     "VERMILION",
     "blank_figure",
+    "printable",
     "shown_name",
     "style",
 ]
@@ -29,7 +32,8 @@ LINE_COLOURS = (BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILION, "#000000")
 """Of many lines in one panel; the yellow of Okabe and Ito is too pale for lines."""
 BODY_COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
 GREY = "#444444"
-TITLE_SIZE = 11.0  # points
+TITLE_SIZE, SMALLEST_TITLE = 11.0, 4.0  # points
+LONGEST_NAME = 100  # characters, as files have it
 LETTER = 0.0088  # inches that a bold letter takes for each point of its size
 PALE_GREY = "#999999"  # of lines through zero
 RESOLUTION = 200  # dots per inch
@@ -72,8 +76,9 @@ STYLE: dict[Any, Any] = {
 }
 
 
-def style(**changes: Any) -> AbstractContextManager[None]:
-    """Return the settings under which figures are drawn and written, as a context.
+@contextmanager
+def style(**changes: Any) -> Iterator[None]:
+    """Give the settings under which figures are drawn and written; letters that their font lacks become boxes.
 
     Parameters
     ----------
@@ -93,13 +98,15 @@ def style(**changes: Any) -> AbstractContextManager[None]:
 
     changed: dict[Any, Any] = {"axes.prop_cycle": cycler(color=LINE_COLOURS)}
     changed |= {name.replace("_", "."): value for name, value in changes.items()}
-    return mpl.rc_context(STYLE | changed)
+    with mpl.rc_context(STYLE | changed), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Glyph .* missing", category=UserWarning)
+        yield
 
 
 def blank_figure(width: float, height: float, title: str = "", **pads: float) -> Any:
     """Return an empty figure, in inches, that lays out its panels itself; no window and no global state.
 
-    A title that is too long for its width is written smaller.
+    A title that is too long for its width is written smaller, or cut where it could not be read any more.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -109,11 +116,19 @@ def blank_figure(width: float, height: float, title: str = "", **pads: float) ->
     figure = Figure(figsize=(width, height), dpi=RESOLUTION, layout=ConstrainedLayoutEngine(**chosen))
     FigureCanvasAgg(figure)
     if title:
+        longest = int((width - 0.2) / (LETTER * SMALLEST_TITLE))
+        title = title if len(title) <= longest else title[: longest - 3] + "..."
         size = min(TITLE_SIZE, (width - 0.2) / (LETTER * len(title)))
-        figure.suptitle(shown_name(title), fontsize=size)
+        figure.suptitle(printable(title).replace("$", r"\$"), fontsize=size)
     return figure
 
 
+def printable(text: str) -> str:
+    """Return text in one line, without characters that steer what shows it, or that an SVG file cannot hold."""
+    return "".join(c if c.isprintable() else " " for c in text)
+
+
 def shown_name(name: str) -> str:
-    """Return a name as matplotlib shows it letter by letter, dollar signs included."""
-    return name.replace("$", r"\$")
+    """Return a name as matplotlib shows it letter by letter, dollar signs included; very long ones are cut."""
+    short = name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME - 3]}..."
+    return printable(short).replace("$", r"\$")

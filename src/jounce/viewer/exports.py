@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from jounce.errors import JounceError
+from jounce.viewer.guard import Guard, refuse_uploads
 from jounce.viewer.prepared import Prepared
 from jounce.viewer.take import Take
 
@@ -87,19 +88,27 @@ def check_installed() -> None:
         raise JounceError(message)
 
 
-def quiet_server(port: int = 0, label: str | None = None) -> Any:
-    """Return a viser server that listens on this machine only and prints nothing.
+def quiet_server(port: int = 0, label: str | None = None, guard: Guard | None = None) -> Any:
+    """Return a viser server that listens on this machine only, answers whom its guard allows, and prints nothing.
 
     Raises
     ------
     JounceError
-        If viser is not installed, or the port is taken.
+        If viser is not installed or cannot be guarded, or the port is taken.
     """
     check_installed()
     import viser
 
-    with redirect_stdout(io.StringIO()):
-        return viser.ViserServer(host="127.0.0.1", port=port or free_port(), label=label, verbose=False)
+    server = None
+    try:
+        with redirect_stdout(io.StringIO()), (guard or Guard()).starting():
+            server = viser.ViserServer(host="127.0.0.1", port=port or free_port(), label=label, verbose=False)
+        refuse_uploads(server)
+    except BaseException:
+        if server is not None:
+            quiet_stop(server)
+        raise
+    return server
 
 
 def quiet_stop(server: Any) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 
 from jounce.errors import JounceError
 from jounce.viewer.exports import quiet_server, quiet_stop
+from jounce.viewer.guard import Guard
 from jounce.viewer.marks import Forces, Marks
 from jounce.viewer.page import Page
 from jounce.viewer.panel import Panel
@@ -37,7 +38,7 @@ class View:
     Attributes
     ----------
     url : str
-        Its address.
+        Its address, with the token that it takes to see and move it.
     page : Page
         What is shown.
     panel, marks, plots
@@ -46,14 +47,15 @@ class View:
 
     def __init__(self, subject: Any, *, port: int = 0, order: int = 4, playing: bool = True):
         _check_port(port)
-        server = quiet_server(port, label=subject.name)
+        guard = Guard()
+        server = quiet_server(port, label=subject.name, guard=guard)
         try:
             self.page = Page(server, subject, order)
             self._lay_out(subject, playing)
         except BaseException:
             quiet_stop(server)
             raise
-        self.url = f"http://127.0.0.1:{server.get_port()}"
+        self.url = f"http://127.0.0.1:{server.get_port()}/?token={guard.token}"
 
     def _lay_out(self, subject: Any, playing: bool) -> None:
         gui = self.page.server.gui

@@ -1,0 +1,62 @@
+"""How words of the command line become values: strictly, as what is rounded or dropped would not be noticed."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from jounce.errors import JounceError, MechanismFileError, did_you_mean
+
+__all__ = ["check_ending", "converted", "named_once"]
+
+_WHOLE = re.compile(r"[+-]?[0-9]{1,18}(\.0*)?")
+
+
+def converted(kind: Any, tokens: Sequence[Any]) -> Any:
+    """Return the value of an option; cyclopts alone takes 2.5 as 2, and numbers that are not finite.
+
+    Raises
+    ------
+    JounceError
+        A number is not whole where it must be, or not finite.
+    """
+    import cyclopts
+
+    if kind in (int, float):
+        return [_number(kind, token) for token in tokens][-1]
+    return cyclopts.convert(kind, tokens)
+
+
+def _number(kind: type, token: Any) -> int | float:
+    text = token.value.strip()
+    if kind is int:
+        if not _WHOLE.fullmatch(text):
+            raise JounceError("must be a whole number", name=token.keyword, value=token.value)
+        return int(text.partition(".")[0])
+    try:
+        number = math.nan if "_" in text else float(text)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise JounceError("must be a finite number", name=token.keyword, value=token.value)
+    return number
+
+
+def named_once(assignments: Sequence[str] | None, option: str) -> None:
+    """Raise JounceError where NAME=VALUE is given twice for a name: which of the two is meant, nobody can know."""
+    found: dict[str, str] = {}
+    for text in assignments or ():
+        name, _, value = (part.strip() for part in text.partition("="))
+        if name in found:
+            raise JounceError(f"is given more than once, as {found[name]} and as {value}", name=f"{option} {name}")
+        found[name] = value
+
+
+def check_ending(path: Path, valid: Sequence[str]) -> None:
+    """Raise MechanismFileError unless a file has one of the endings; what a folder is, its reader says."""
+    suffix = path.suffix.lower()
+    if suffix not in valid and not path.is_dir():
+        raise MechanismFileError(f"the kind of a file is told by its ending; {did_you_mean(suffix, valid)}", path=path)

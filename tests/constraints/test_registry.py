@@ -1,0 +1,68 @@
+"""A type of joints, drivers and forces is one class: none takes the place of another without a word."""
+
+import pytest
+
+import jounce as jn
+from jounce.constraints import catalogue
+from jounce.io.own import import_file
+
+
+def own(kind="mine", name="Own", **keywords):
+    """Define a class as if in a module."""
+    body = {"residual": lambda self, *_: None, "__qualname__": name, "__module__": "notebook"}
+    return jn.AbstractConstraint.__class__(name, (jn.AbstractConstraint,), body, type=kind, **keywords)
+
+
+@pytest.mark.parametrize(
+    "kind, space, role",
+    [
+        ("revolute", "planar", "joint"),
+        ("revolute", "spatial", "joint"),
+        ("spherical", "", "joint"),
+        ("slide", "", "driver"),
+    ],
+)
+def test_types_of_the_library_are_taken(kind, space, role):
+    before = {each: catalogue(each, role) for each in ("planar", "spatial")}
+    with pytest.raises(jn.MechanismError, match=rf"jounce\.constraints\..*got '{kind}'"):
+        own(kind, space=space, role=role)
+    assert {each: catalogue(each, role) for each in ("planar", "spatial")} == before
+
+
+def test_forces_too():
+    with pytest.raises(jn.MechanismError, match=r"jounce\.forces\..*got 'spring'"):
+
+        class Spring(jn.AbstractForce, type="spring", space="planar"):
+            pass
+
+    assert catalogue("planar", "force")["spring"] is jn.forces.Spring
+
+
+def test_a_class_defined_again_takes_its_own_place():
+    first, second = own(space="planar"), own(space="planar")
+    assert first is not second
+    assert catalogue("planar", "joint")["mine"] is second
+    with pytest.raises(jn.MechanismError, match=r"notebook\.Own"):
+        own(space="planar", name="Other")
+    assert own(space="spatial", name="Other") is catalogue("spatial", "joint")["mine"]
+    assert own(space="planar", name="Other", role="driver") is catalogue("planar", "driver")["mine"]
+
+
+def test_a_space_or_role_that_does_not_exist_is_told():
+    with pytest.raises(jn.MechanismError, match="did you mean 'planar'"):
+        own(space="plannar")
+    with pytest.raises(jn.MechanismError, match="did you mean 'driver'"):
+        own(role="drivers")
+
+
+def test_files_of_one_name_are_two_files(tmp_path):
+    text = 'import jounce as jn\nclass Own(jn.AbstractConstraint, type="mine", space="planar"):\n    size: jn.Scalar\n'
+    paths = [tmp_path / folder / "own.py" for folder in ("a", "b")]
+    for path in paths:
+        path.parent.mkdir()
+        path.write_text(text)
+    import_file(paths[0])
+    import_file(paths[0])
+    with pytest.raises(jn.MechanismError, match="got 'mine'") as caught:
+        import_file(paths[1])
+    assert (caught.value.path, caught.value.line) == (str(paths[1]), 2)
