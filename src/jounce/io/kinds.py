@@ -32,12 +32,13 @@ def kind_of(path: str | PathLike[str]) -> str | None:
     >>> kind_of("examples/robots/panda.urdf"), kind_of("examples/four_bar.yaml"), kind_of("README.md")
     ('robot', 'mechanism', None)
     """
-    from jounce.io.source import SUFFIXES, read_bytes, read_source
+    from jounce.io.reading import read_file
+    from jounce.io.source import SUFFIXES, read_source
 
     name = fspath(path)
     suffix = Path(name).suffix.lower()
     try:
-        content = read_bytes(name)
+        content = read_file(name)
         if content.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<") and _ROOT.search(content):
             return "robot"
         if suffix == ".csv" and content.lstrip(b'\xef\xbb\xbf"').startswith(b"time"):

@@ -58,7 +58,8 @@ def bridged(solver: Solver, track: Track, point: ChangePoint, instants: np.ndarr
         if local.status != Status.OK:
             return None
         ends.append(local.anchors[-1])
-    return _interpolated(*ends, instants)
+    before, after = ends
+    return _interpolated(before, after, instants)
 
 
 def _interpolated(before: Anchor, after: Anchor, instants: np.ndarray) -> Any:

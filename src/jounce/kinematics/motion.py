@@ -137,7 +137,7 @@ class Motion:
             name: self._labelled(name, values, self.mechanism.outputs[name].unit)
             for name, values in self.outputs.items()
         }
-        attributes = {"title": self.mechanism.title or "motion of a mechanism", "source": "jounce"}
+        attributes: dict[str, Any] = {"title": self.mechanism.title or "motion of a mechanism", "source": "jounce"}
         if self.change_points.size:
             attributes["change_points"] = self.change_points
         dataset = xarray.Dataset(variables, coords=self._axes(), attrs=attributes)

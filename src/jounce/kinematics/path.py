@@ -108,8 +108,8 @@ class Anchor:
     def of(cls, arrival: Arrival, instant: float) -> "Anchor":
         """Build the anchor from a batch of one that was surveyed."""
         state = (arrival.coordinates, arrival.outputs, arrival.sign)
-        measures = (arrival.safe_step, arrival.radius, arrival.turnover)
-        return cls(float(instant), state, *(float(x[0]) for x in measures), Status(int(arrival.status[0])))
+        safe_step, radius, turnover = (float(x[0]) for x in (arrival.safe_step, arrival.radius, arrival.turnover))
+        return cls(float(instant), state, safe_step, radius, turnover, Status(int(arrival.status[0])))
 
     @property
     def reach(self) -> float:
