@@ -31,12 +31,17 @@ def summary(motion: Motion, file: Path) -> str:
     solved = int(np.sum(motion.status == 0))
     instants = count(len(time_), "instant") if solved == len(time_) else f"{solved} of {len(time_)} instants"
     span = f"t = {time_[0]:g} s" if len(time_) == 1 else f"from t = {time_[0]:g} s to {time_[-1]:g} s"
-    return "\n".join([
+    lines = [
         mechanism.title or file.name,
         f"{mechanism.space}: {bodies} ({len(rows)} coordinates), {joints}",
         f"{freedom}{driven}",
         f"{instants} {span}, derivatives to order {motion.order}",
-    ])  # fmt: skip
+    ]
+    if motion.change_points.size:
+        passed = ", ".join(f"{t:g} s" for t in motion.change_points[:6])
+        more = ", ..." if motion.change_points.size > 6 else ""
+        lines.append(f"passes a change point, where another motion could branch off, at t = {passed}{more}")
+    return "\n".join(lines)
 
 
 def simulation_summary(motion: Simulation, file: Path) -> str:
