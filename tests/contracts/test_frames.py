@@ -20,7 +20,9 @@ from jounce.jet import Jet
 from jounce.kinematics.assembly import _moved, assemble
 from jounce.mechanism import build
 from jounce.mechanism.builder import pose_at
+from jounce.mechanism.datums import with_datums
 from jounce.rigid import PlanarPose, SpatialPose
+from tests.problems.bank import group_of, pose_of, random_motion
 from tests.problems.drawings import Drawing, at, matrix, redrawn, rotation, shifts
 
 ORDER = 4
@@ -264,6 +266,43 @@ def vars_of(mechanism):
     """Return the arguments of a mechanism."""
     names = ("space", "bodies", "joints", "drivers", "forces", "outputs", "parameters", "gravity")
     return {name: getattr(mechanism, name) for name in names}
+
+
+def drawn(motion, frames):
+    """The quaternions of a random motion of bodies, with each frame turned: products with constant quaternions."""
+    p, q = np.moveaxis(motion["quaternion"], 1, 0), np.moveaxis(frames, 1, 0)
+    turned = [
+        p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3],
+        p[0] * q[1] + p[1] * q[0] + p[2] * q[3] - p[3] * q[2],
+        p[0] * q[2] + p[2] * q[0] + p[3] * q[1] - p[1] * q[3],
+        p[0] * q[3] + p[3] * q[0] + p[1] * q[2] - p[2] * q[1],
+    ]
+    return {**motion, "quaternion": np.stack(turned, axis=1)}
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_an_angle_between_bodies_in_any_motion_changes_by_a_constant_with_their_frames(seed):
+    """The axis tilts by far; from order 1 on nothing changes, and the value by that of the frames at the datum."""
+    random = np.random.default_rng(seed)
+    axis = random.normal(size=3)
+    first = random_motion(random, "spatial", ORDER)
+    frames = Rotation.random(2, random_state=random)
+    turned = np.ones((5, 1))[None, None] * np.array([1.0, 0, 0, 0])[None, :, None, None]
+    for body, frame in zip((1, 2), frames, strict=True):
+        turned[0, :, body, 0] = frame.as_quat(scalar_first=True)
+    found = []
+    for motion, around in ((first, axis), (drawn(first, turned), frames[0].inv().apply(axis))):
+        pose = pose_of(motion)
+        output = jn.RelativeAngleOutput(("one", "two"), around.tolist())
+        start = {"quaternion": np.array(pose.quaternion.coefficients[0])}
+        (group,) = with_datums([group_of([output], "spatial")], start)
+        plain = group_of([output], "spatial").evaluate(pose.truncate(0)).coefficients[0]
+        result = np.array(group.evaluate(pose).dense().coefficients).reshape(ORDER + 1)
+        turns = (result[0] - float(np.squeeze(plain))) / (2 * np.pi)
+        assert turns == pytest.approx(np.round(turns), abs=1e-12)
+        found.append(result)
+    np.testing.assert_allclose(found[1][1:], found[0][1:], rtol=1e-11, atol=1e-11)
+    assert np.abs(found[0][1:]).min() > 1e-4
 
 
 @jax.jit

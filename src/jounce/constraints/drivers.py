@@ -71,7 +71,8 @@ class SpatialDistanceDriver(DistanceDriver, type="distance", space="spatial", ro
 class RotationDriver(AbstractConstraint, type="rotation", space="spatial", role="driver"):
     """Prescribed angle of body j about an axis of body i. Sommer 2024, equations 101-103, continuous over turns.
 
-    Without vectors the angle is that of ``A_i^T A_j``; with them, the signed angle from `vector_i` to `vector_j`.
+    Without vectors the angle is that of ``A_i^T A_j`` where the mechanism is put together, and the turn from there;
+    with them, the signed angle from `vector_i` to `vector_j`.
     What is left of angle minus motion after whole turns must vanish, so that the motion may go on for many turns.
     """
 

@@ -82,7 +82,7 @@ class AngleOutput(AbstractOutput):
 class RelativeAngleOutput(AbstractOutput):
     """Signed angle about an axis of body i, from a vector of body i to one of body j, rad, continuous over turns.
 
-    Without vectors it is the angle of ``A_i^T A_j`` about the axis.
+    Without vectors it is the angle of ``A_i^T A_j`` where the mechanism is put together, and the turn from there.
     """
 
     axis: Vector
