@@ -53,11 +53,13 @@ def test_run_tabulates_the_extremes_of_every_output_and_derivative(run, four_bar
             unit, low, low_at, high, high_at = rows[column, name]
             base = "rad" if column == "psi" else "m"
             assert unit == base + ("", "/s", "/s^2", "/s^3", "/s^4")[k]
-            assert low == pytest.approx(values[:, k].min(), rel=1e-5)
-            assert high == pytest.approx(values[:, k].max(), rel=1e-5)
-            for at, extreme in ((low_at, low), (high_at, high)):
-                found = values[round(at / 0.01), k]
-                assert found == pytest.approx(extreme, rel=1e-5)
+            for sign, at, extreme in ((-1, low_at, low), (1, high_at, high)):  # of the motion, not of its instants
+                grid = (sign * values[:, k]).max()
+                assert grid - 1e-5 * abs(grid) <= sign * extreme <= grid + 1e-2 * abs(grid)
+                around = np.unique([0.0, *np.linspace(max(at - 1e-3, 0), at + 1e-3, 21)])
+                fine = jn.solve(jn.load(FOUR_BAR), around).outputs
+                fine = fine["psi"] if column == "psi" else fine["C"][..., "xy".index(column[-1])]
+                assert extreme == pytest.approx(sign * (sign * fine[:, k]).max(), rel=1e-5)
 
 
 def test_run_says_what_was_solved_in_lines_of_at_most_80_plain_characters(run):
@@ -211,7 +213,8 @@ def test_a_solve_that_fails_on_the_way_keeps_the_good_instants(run, tmp_path):
     assert good[:100].all()
     assert not good[150:].any()
     low = table_rows(out)["psi", "position"][1]
-    assert low == pytest.approx(np.nanmin(table["psi"]), rel=1e-5)
+    assert low == pytest.approx(np.nanmin(table["psi"]), rel=1e-4)  # a little less between the instants
+    assert low < np.nanmin(table["psi"])
 
 
 @pytest.mark.parametrize("path", BROKEN, ids=[path.stem for path in BROKEN])

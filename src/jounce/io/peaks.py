@@ -176,6 +176,7 @@ def _extremes(motion: Any) -> tuple[np.ndarray, np.ndarray]:
     best = np.argmax(values, axis=0)
     every = np.arange(values.shape[1])
     times, sizes = time[best], values[best, every]
+    rounding = ROUNDING * _scales(motion)
     if len(time) > 1:
         time, values = _denser(motion, time, values)
         middle = local_maxima(values, PEAKS)
@@ -185,12 +186,12 @@ def _extremes(motion: Any) -> tuple[np.ndarray, np.ndarray]:
         for _ in range(ROUNDS):
             around = low + share * (high - low)
             own = _own(motion, around)
-            _keep_best(times, sizes, around, own)
+            _keep_best(times, sizes, rounding, around, own)
             top = np.clip(np.argmax(own, axis=0), 1, POINTS - 2)
             near = [np.take_along_axis(own, np.asarray(top + side)[None], axis=0)[0] for side in (-1, 0, 1)]
             low, high = (np.take_along_axis(around, np.asarray(top + side)[None], axis=0)[0] for side in (-1, 1))
         vertex = _vertex(low, high, *near)[None]
-        _keep_best(times, sizes, vertex, _own(motion, vertex))
+        _keep_best(times, sizes, rounding, vertex, _own(motion, vertex))
     solved = np.isfinite(sizes)
     return np.where(solved, times, np.nan), np.where(solved, sizes, np.nan)
 
@@ -235,13 +236,22 @@ def _curves(motion: Any) -> np.ndarray:
     return np.nan_to_num(np.concatenate([-whole, whole], axis=1), nan=-np.inf, posinf=-np.inf, neginf=-np.inf)
 
 
-def _keep_best(times: np.ndarray, sizes: np.ndarray, around: np.ndarray, own: np.ndarray) -> None:
+def _scales(motion: Any) -> np.ndarray:
+    """Return the largest magnitude that any component of the output of a curve has in its derivative, (2 curves,)."""
+    found = []
+    for name, values in scalar_outputs(motion).values():
+        whole = np.nan_to_num(motion.outputs[name]).reshape(*values.shape, -1)
+        found.append(np.abs(whole).max(axis=(0, 2)))
+    return np.tile(np.concatenate(found), 2)
+
+
+def _keep_best(times: np.ndarray, sizes: np.ndarray, rounding: np.ndarray, around: np.ndarray, own: np.ndarray) -> None:
     """Take over what is larger than what was found before, by more than rounding: instants asked for are round."""
     flat = own.reshape(-1, own.shape[-1])
     every = np.arange(own.shape[-1])
     top = np.argmax(flat, axis=0)
     with np.errstate(invalid="ignore"):
-        better = flat[top, every] > sizes + ROUNDING * np.abs(sizes)
+        better = flat[top, every] > sizes + rounding
     times[better] = around.reshape(flat.shape)[top, every][better]
     sizes[better] = flat[top, every][better]
 

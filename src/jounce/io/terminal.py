@@ -48,7 +48,9 @@ def show_peaks(found: list[Peak]) -> None:
     if not found:
         say("\nNo outputs are defined, so there is nothing to tabulate.")
         return
-    table = [_cells(peak) for peak in found]
+    latest = max((abs(at) for p in found for at in (p.minimum_at, p.maximum_at) if math.isfinite(at)), default=1.0)
+    decimals = 3 - math.floor(math.log10(latest or 1.0))  # of times: a table is read, not computed with
+    table = [_cells(peak, decimals) for peak in found]
     marks = [[k for k, largest in zip((3, 5), peak.largest, strict=True) if largest] for peak in found]
     _show_table(HEADINGS, table, marks, "largest magnitude", (3, 5))
 
@@ -67,9 +69,11 @@ def _shown(number: float) -> str:
     return "-" if math.isnan(number) else f"{number:.6g}"
 
 
-def _cells(peak: Peak) -> list[str]:
+def _cells(peak: Peak, decimals: int) -> list[str]:
     low, high = (0.0 if abs(x) < ROUNDING * peak.size else x for x in (peak.minimum, peak.maximum))
-    extremes = (_shown(x) for x in (low, peak.minimum_at, high, peak.maximum_at))
+    times = peak.minimum_at, peak.maximum_at
+    early, late = (x if float(f"{x:.3g}") == x else round(x, decimals) for x in times)
+    extremes = (_shown(x) for x in (low, early, high, late))
     return [peak.output, peak.derivative, peak.unit, *extremes]
 
 
