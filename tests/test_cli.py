@@ -303,7 +303,7 @@ def test_an_interrupt_ends_quietly_with_130(run, monkeypatch):
 
 
 def test_a_result_that_cannot_be_written_after_all_ends_with_1(run, monkeypatch, tmp_path):
-    def full(*_):
+    def full(*_, **_options):
         raise jn.OutputError("cannot be written: No space left on device", path="motion.csv")
 
     monkeypatch.setattr("jounce.io.results.write", full)

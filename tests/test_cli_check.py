@@ -1,6 +1,7 @@
 """The command ``check``: what it prints, how it ends, and what it says about bad input."""
 
 import functools
+import json
 import pathlib
 import re
 import sys
@@ -203,8 +204,7 @@ def test_bad_trajectories_end_with_2_and_one_line(suffix, text, message, run, fi
 
 BAD_ROBOTS = {
     "malformed": (PENDULUM.replace("</robot>", ""), "pendulum.urdf, line "),
-    "no mass": (PENDULUM.replace('value="2"', 'value="0"'), "got "),
-    "triangle inequality": (PENDULUM.replace('ixx="0.01"', 'ixx="1"'), "breaks the triangle inequality"),
+    "negative mass": (PENDULUM.replace('value="2"', 'value="-2"'), "must be greater than zero"),
     "no robot": ("<sdf/>", "is no robot file"),
 }
 
@@ -217,6 +217,22 @@ def test_bad_robots_end_with_2_and_one_line(text, message, run, files):
     assert err.startswith(f"error: {robot}")
     assert err.count("\n") == 1
     assert message in err
+
+
+def test_a_robot_as_no_real_one_is_warned_of_in_one_line_and_refused_if_strict(run, files):
+    robot, trajectory = files(pendulum_urdf=PENDULUM.replace('ixx="0.01"', 'ixx="1"'), motion_yaml=HOLD)
+    status, out, err = run(robot, trajectory)
+    assert status in (0, 1)
+    assert out
+    assert err.startswith(f"warning: {robot}: ")
+    assert err.count("\n") == 1
+    assert "exceeds the sum of the others: " in err
+    status, out, err = run(robot, trajectory, "--strict")
+    assert (status, out) == (2, "")
+    assert "breaks the triangle inequality" in err
+    status, out, err = run(robot, trajectory, "--json")
+    assert json.loads(err)["warning"]["kind"] == "RobotWarning"
+    assert json.loads(out)["command"] == "check"
 
 
 BAD_OPTIONS = {

@@ -60,7 +60,7 @@ def test_text_that_looks_like_a_number_stays_text(call):
         assert list(data["bodies"]) == ["7"]
 
 
-def test_samples_are_found_from_another_folder(call, tmp_path):
+def test_samples_go_with_the_file_to_another_folder(call, tmp_path):
     there = tmp_path / "there"
     there.mkdir()
     t = np.linspace(0, 1, 21)
@@ -69,7 +69,8 @@ def test_samples_are_found_from_another_folder(call, tmp_path):
     law = text[text.index("motion: ") : text.index("}", text.index("motion: "))]
     pathlib.Path("a.yaml").write_text(text.replace(law, "motion: {samples: lift.csv, degree: 5}"))
     assert call("a.yaml", there / "b.json")[0] == 0
-    assert read_source(there / "b.json").data["drivers"]["theta"]["motion"]["samples"] == "../lift.csv"
+    assert read_source(there / "b.json").data["drivers"]["theta"]["motion"]["samples"] == "lift.csv"
+    assert (there / "lift.csv").read_bytes() == pathlib.Path("lift.csv").read_bytes()
     first, second = (jn.load(path).drivers["theta"].motion for path in ("a.yaml", there / "b.json"))
     assert np.array_equal(first.coefficients, second.coefficients)
 

@@ -53,9 +53,10 @@ def test_a_file_that_is_there_is_kept_unless_forced(run):
     path.write_text("mine")
     status, out, err = run("new", "four-bar")
     assert (status, out) == (2, "")
-    assert "--force" in err
+    assert "--overwrite" in err
     assert path.read_text() == "mine"
-    assert run("new", "four-bar", "--force")[0] == 0
+    assert run("new", "four-bar", "--overwrite")[0] == 0
+    assert run("new", "four-bar", "--force")[0] == 0  # as it was called first
     assert path.read_text() == STARTERS["four-bar"].text
 
 

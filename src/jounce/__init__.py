@@ -1,6 +1,7 @@
 """Exact time derivatives of any order of mechanisms and robots: jerk, jounce and beyond, torques and their rates.
 
-Importing this package switches JAX to double precision (``jax_enable_x64``); it has no other side effect.
+Importing this package switches JAX to double precision (``jax_enable_x64``); it has no other side effect but a
+mark that a process gets when it is forked, see `jounce.mechanism.doors`.
 """
 
 import jax as _jax
@@ -52,11 +53,13 @@ from jounce.errors import (  # noqa: E402
     OutputError as OutputError,
     RobotError as RobotError,
     RobotFileError as RobotFileError,
+    RobotWarning as RobotWarning,
     SampleWarning as SampleWarning,
     SingularityError as SingularityError,
     SolveError as SolveError,
     TrajectoryError as TrajectoryError,
     UnitError as UnitError,
+    UnsupportedError as UnsupportedError,
 )
 from jounce.forces import AbstractForce as AbstractForce, Law as Law, Laws as Laws  # noqa: E402
 from jounce.integrate import (  # noqa: E402

@@ -21,11 +21,13 @@ __all__ = [
     "OutputError",
     "RobotError",
     "RobotFileError",
+    "RobotWarning",
     "SampleWarning",
     "SingularityError",
     "SolveError",
     "TrajectoryError",
     "UnitError",
+    "UnsupportedError",
     "did_you_mean",
     "show_value",
 ]
@@ -75,7 +77,9 @@ def _represent(value: object, limit: int, depth: int = 3) -> str:
         if depth == 0:
             return "{...}"
         items = list(value.items())[:10]
-        inside = ", ".join(f"{str(key)[:limit]}: {_represent(item, limit, depth - 1)}" for key, item in items)
+        inside = ", ".join(
+            f"{_printable(str(key)[:limit])}: {_represent(item, limit, depth - 1)}" for key, item in items
+        )
         return "{" + inside + (", ...}" if len(value) > 10 else "}")
     if isinstance(value, (list, tuple)):
         if depth == 0:
@@ -89,6 +93,11 @@ def _represent(value: object, limit: int, depth: int = 3) -> str:
     return " ".join(text.split())
 
 
+def _printable(text: str) -> str:
+    """Return a text with escapes for what no terminal should be given: it may come from anyone's file."""
+    return text if text.isprintable() else "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
 def did_you_mean(name: object, valid: Iterable[str], limit: int = 20) -> str:
     """Word a suggestion: the nearest valid name, and the valid names when they are few.
 
@@ -100,14 +109,15 @@ def did_you_mean(name: object, valid: Iterable[str], limit: int = 20) -> str:
     'valid: prismatic, revolute'
     """
     names = sorted(set(valid))
+    words = [ascii(candidate[:80])[1:-1] for candidate in names]
     parts = []
     near = difflib.get_close_matches(str(name)[:100], names, n=1, cutoff=0.6)
     if not near:
         near = [candidate for candidate in names if candidate.lower() == str(name).lower()]
     if near:
-        parts.append(f"did you mean '{near[0]}'?")
+        parts.append(f"did you mean '{words[names.index(near[0])]}'?")
     if 0 < len(names) <= limit:
-        parts.append(f"valid: {', '.join(names)}")
+        parts.append(f"valid: {', '.join(words)}")
     elif not names:
         parts.append("none is defined")
     return " ".join(parts)
@@ -152,12 +162,12 @@ class JounceError(Exception):
         self.value = value
 
     def __str__(self) -> str:
-        place = [] if self.path is None else [str(self.path)]
+        place = [] if self.path is None else [_printable(str(self.path))]
         if self.line is not None:
             place.append(f"line {self.line}")
         if self.name:
-            place.append(self.name)
-        message = self.message
+            place.append(_printable(self.name))
+        message = "\n".join(map(_printable, self.message.split("\n")))
         if self.value is not UNSET:  # what is wrong, got this; what to do about it
             problem, semicolon, advice = message.partition("; ")
             message = f"{problem}, got {show_value(self.value)}{semicolon}{advice}"
@@ -191,6 +201,10 @@ class UnitError(JounceError):
     """A value has a unit that does not exist, or one of the wrong dimension."""
 
 
+class UnsupportedError(JounceError):
+    """What is right in itself cannot be done here: with values that JAX traces, or in a process that was forked."""
+
+
 class MechanismError(JounceError):
     """The structure of a mechanism is wrong: a missing body, an axis of zero length, a bad grid of time."""
 
@@ -217,6 +231,10 @@ class TrajectoryError(JounceError):
 
 class SingularityError(JounceError):
     """An orientation or a configuration is singular: what was asked for does not exist or is not unique there."""
+
+
+class RobotWarning(UserWarning):
+    """A robot file holds what no real robot has, and is read all the same: negative moments of inertia, no mass."""
 
 
 class SampleWarning(UserWarning):

@@ -65,6 +65,34 @@ def test_worst_values_are_those_of_the_closed_form():
         assert row.ratio == pytest.approx(stated, rel=1e-12), quantity
 
 
+@pytest.mark.parametrize(
+    "limits, start, stop, ratio, bound",
+    [
+        ({"acceleration": 4.0, "deceleration": 1.0}, 0.0, 0.6, 2 * np.sin(1.2), -1.0),  # slows down all the time
+        ({"acceleration": 4.0, "deceleration": 1.0}, 1.0, 1.5, np.sin(2.0) / 2, -4.0),  # speeds up
+        ({"acceleration": 4.0, "deceleration": 1.0}, 0.0, 1.5, 2.0, -1.0),
+        ({"acceleration": 1.0, "deceleration": 4.0}, 0.0, 1.5, 2.0, -1.0),
+        ({"deceleration": 1.0}, 1.0, 1.5, 0.0, None),
+        ({"acceleration": 4.0}, 0.0, 0.6, np.sin(1.2) / 2, -4.0),
+    ],
+)
+def test_an_acceleration_against_the_velocity_may_have_a_limit_of_its_own(limits, start, stop, ratio, bound):
+    trajectory = JointTrajectory({"pin": "0.5*sin(2*t)"}, start=start, stop=stop)  # q' = cos 2t, q'' = -2 sin 2t
+    row = rows_of(check_limits(pendulum(**limits), trajectory))["pin", "acceleration"]
+    assert row.ratio == pytest.approx(ratio, rel=1e-6)  # from one side, where the bound changes at t = pi/4
+    assert bound is None or row.limit == pytest.approx(bound, rel=1e-15)
+
+
+def test_a_joint_that_starts_and_ends_at_rest_speeds_up_there():
+    limits = {"acceleration": 6.0, "deceleration": 3.0}  # q'' = 6 - 12 t, which slows down from t = 1/2 on
+    trajectory = JointTrajectory({"pin": "3*t**2 - 2*t**3"}, start=0.0, stop=1.0)
+    report = check_limits(pendulum(**limits), trajectory)
+    row = rows_of(report)["pin", "acceleration"]
+    assert row.ratio == pytest.approx(2.0, rel=1e-5)
+    assert row.value == pytest.approx(-6.0, rel=1e-5)
+    assert report.shares[0, 2, 0] == pytest.approx(1.0, rel=1e-12)
+
+
 def test_units_and_words_tell_turning_from_sliding():
     found = check_limits(slide_and_pin(), JointTrajectory({"slide": "sin(t)", "pin": "t"}, start=0.0, stop=1.0))
     told = [(row.joint, row.quantity, row.unit) for row in found.rows]

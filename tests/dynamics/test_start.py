@@ -77,6 +77,27 @@ def test_a_massless_body_that_can_move_is_named():
     refused(jn.MechanismError, "bodies.dust.(mass|inertia): the body can move but has no", loose)
 
 
+def turning(moments):
+    """Return a body that turns about its own x axis."""
+    inertia = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0], tensor=moments, strict=False)
+    links, pin = [jn.Link("base"), jn.Link("x", inertia)], jn.Joint("pin", "base", "x", axis=[1, 0, 0])
+    return jn.Robot("axle", links, [pin]).mechanism()
+
+
+def test_a_body_that_can_move_with_negative_kinetic_energy_is_named():
+    refused(jn.MechanismError, r"bodies\.x\.inertia: .* kinetic energy is negative", turning([-0.01, 0.02, 0.02]))
+    assert start(turning([0.01, 0.02, 0.05]), 0.0).mobility  # no real body, but its motion is determined
+
+
+def test_a_massless_link_at_the_end_of_a_robot_has_to_be_driven_in_a_simulation():
+    inertia = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0], tensor=[0.01, 0.02, 0.02])
+    links = [jn.Link("base"), jn.Link("arm", inertia), jn.Link("tip")]
+    joints = [jn.Joint("b", "base", "arm", axis=[0, 1, 0]), jn.Joint("c", "arm", "tip", position=[0.5, 0, 0])]
+    robot = jn.Robot("end", links, joints, strict=False)
+    refused(jn.MechanismError, r"bodies\.tip\.mass: the body can move but has no mass", robot.mechanism())
+    assert start(robot.mechanism(drivers={"c": 0.3}), 0.0).mobility.startswith("1 degree of freedom")
+
+
 def test_conditions_that_contradict_each_other_or_the_joints():
     refused(jn.AssemblyError, "initial.a, initial.b stay open", with_initial(a=turn("bob", 0.3), b=turn("bob", 1.0)))
     shifted = drivers.CoordinateDriver(("ground", "bob"), "x", 1.0)

@@ -102,7 +102,7 @@ def test_toml_and_json_are_read_too(read):
         ),
         ("joints:\n  finger: {jerk: 1}", "line 2, joints.finger: this joint follows pin; give limits of that one"),
         ("joints: {plate: {jerk: 1}}", "line 1, joints.plate: this joint is fixed and has no limits; leave it out"),
-        ("joints:\n  pin:\n    speed: 1", "line 3, joints.pin.speed: unknown key; valid: acceleration, effort,"),
+        ("joints:\n  pin:\n    speed: 1", "line 3, joints.pin.speed: unknown key; valid: acceleration, deceleration,"),
         ("joints:\n  pin:\n    velocty: 1", "line 3, joints.pin.velocty: unknown key; did you mean 'velocity'?"),
         ("max_velocity: 1", "line 1, max_velocity: unknown key; valid: default, joints, title"),
         ("title: none", "line 1: a limits file has the key 'joints', 'default', or both, got ['title']"),

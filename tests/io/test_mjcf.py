@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+import jounce as jn
 from jounce.errors import RobotFileError
 from jounce.io.robots import load_robot
 from tests.problems.robots import FILES, body_poses, coordinates, poses
@@ -347,3 +348,43 @@ def test_connects_and_welds_are_closures_that_miss_what_mujoco_says(tmp_path):
         if closure.type == "weld":
             turn = Rotation.from_matrix(second[:3, :3].T @ first[:3, :3] @ closure.rotation).magnitude()
             assert np.sin(turn / 2) == pytest.approx(np.linalg.norm(gap[3:]), rel=1e-13)
+
+
+def test_moments_without_mass_count_as_in_mujoco_and_are_warned_of(tmp_path):
+    path = tmp_path / "rotor.xml"
+    rotor = '<body name="rotor" pos="0.1 0 0"><inertial pos="0 0 0" mass="0" diaginertia="0.2 0.3 0.4"/></body>'
+    path.write_text(
+        f'<mujoco><worldbody><body name="arm"><joint axis="0 0 1"/>{INERTIAL}{rotor}</body></worldbody></mujoco>'
+    )
+    with pytest.warns(jn.RobotWarning, match=r"no mass beside them: rotor \(line 1\)"):
+        robot = load_robot(path)
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+    data.qacc[:] = 2.0
+    mujoco.mj_inverse(model, data)
+    torque = jn.inverse_dynamics(robot, [[0.0], [0.0], [2.0]])
+    np.testing.assert_allclose(torque[0], data.qfrc_inverse, rtol=1e-14)
+    with pytest.raises(RobotFileError, match=r"line 1, links\.rotor\.inertia: has moments of inertia but no mass"):
+        load_robot(path, strict=True)
+
+
+def test_a_joint_may_follow_one_that_follows_another(tmp_path):
+    path = tmp_path / "chain.xml"
+    bodies = "".join(f'<body name="b{k}"><joint name="j{k}"/>{INERTIAL}' for k in range(3)) + "</body>" * 3
+    ties = (
+        '<joint joint1="j2" joint2="j1" polycoef="1 -3 0 0 0"/><joint joint1="j1" joint2="j0" polycoef="0.5 2 0 0 0"/>'
+    )
+    path.write_text(f"<mujoco><worldbody>{bodies}</worldbody><equality>{ties}</equality></mujoco>")
+    robot = load_robot(path)
+    assert robot.joint_names == ("j0",)
+    assert robot.joints["j2"].mimic == jn.Mimic("j0", -6.0, -0.5)
+
+
+def test_closures_stay_where_the_base_is_set_free(tmp_path):
+    path = tmp_path / "loop.xml"
+    legs = "".join(
+        f'<body name="{n}" pos="{x} 0 0"><joint axis="0 1 0"/>{INERTIAL}</body>' for n, x in (("a", 0), ("b", 1))
+    )
+    tie = '<equality><connect name="tie" body1="a" body2="b" anchor="0 0 -1"/></equality>'
+    path.write_text(f'<mujoco><worldbody><body name="trunk">{INERTIAL}{legs}</body></worldbody>{tie}</mujoco>')
+    assert list(load_robot(path, floating_base=True).closures) == ["tie"]

@@ -9,7 +9,8 @@ import pytest
 
 from jounce.errors import MechanismFileError
 from jounce.io import source
-from jounce.io.source import MAX_BYTES, MAX_DEPTH, dotted, read_source
+from jounce.io.reading import MAX_BYTES
+from jounce.io.source import MAX_DEPTH, dotted, read_source
 
 YAML = """\
 title: Four-bar   # a comment
@@ -252,6 +253,6 @@ def test_a_file_without_the_right_to_read_it(tmp_path, monkeypatch):
     def refuse(*_args, **_keywords):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(type(tmp_path), "open", refuse)
+    monkeypatch.setattr("os.open", refuse)
     with pytest.raises(MechanismFileError, match="cannot be read: Permission denied"):
         read_source(tmp_path / "a.yaml")

@@ -54,8 +54,8 @@ def test_what_is_wrong_is_said_with_its_line(tmp_path, text, names, words):
 def test_files_that_cannot_be_read(tmp_path, monkeypatch):
     with pytest.raises(MechanismFileError, match="file of samples not found"):
         read_samples(tmp_path / "no.csv")
-    with pytest.raises(MechanismFileError, match="the samples cannot be read: Is a directory"):
+    with pytest.raises(MechanismFileError, match="is a directory, a file is needed"):
         read_samples(tmp_path)
-    monkeypatch.setattr("jounce.io.samples.MAX_BYTES", 10)
+    monkeypatch.setattr("jounce.io.reading.MAX_SAMPLES", 10)
     with pytest.raises(MechanismFileError, match="at most 1e-05 MB are read"):
         read_samples(write(tmp_path, "time,lift\n0,1\n"))

@@ -7,6 +7,7 @@ import pinocchio
 import pytest
 from scipy.spatial.transform import Rotation
 
+import jounce as jn
 from jounce.errors import RobotFileError
 from jounce.io.robots import load_robot
 from tests.problems.robots import FILES, body_poses, coordinates, poses
@@ -226,17 +227,133 @@ def test_an_inertial_of_zeros_is_a_frame():
     assert robot.links["panda_hand_tcp"].inertia is None
 
 
-def test_a_massless_link_between_joints_has_to_be_asked_for(tmp_path):
+def test_a_massless_link_between_joints_is_warned_of_unless_it_is_meant(tmp_path):
     path = tmp_path / "gimbal.urdf"
     path.write_text(
         f'<robot name="gimbal"><link name="base"/><link name="ring"/><link name="rotor">{INERTIAL}</link>\n'
         '<joint name="a" type="continuous"><parent link="base"/><child link="ring"/></joint>\n'
         '<joint name="b" type="continuous"><parent link="ring"/><child link="rotor"/></joint></robot>'
     )
-    with pytest.raises(RobotFileError, match=r"line 1, links.ring: <inertial> is missing .*massless=True"):
-        load_robot(path)
-    robot = load_robot(path, massless=True)
+    with pytest.warns(jn.RobotWarning, match=r"have no mass: ring \(line 1\)"):
+        robot = load_robot(path)
     np.testing.assert_array_equal(robot.tree.mass, [0.0, 1.0])
+    assert load_robot(path, massless=True).joint_names == robot.joint_names
+    with pytest.raises(RobotFileError, match=r"line 1, links.ring: <inertial> is missing .*massless=True"):
+        load_robot(path, strict=True)
+
+
+def test_a_robot_without_any_mass_needs_no_torque_and_moves(tmp_path):
+    with pytest.warns(jn.RobotWarning, match=r"neither have nor carry mass.*: arm \(line 1\)"):
+        robot = load_robot(small(tmp_path, 'type="continuous">', child=""))
+    assert robot.massless_joints == ("j",)
+    np.testing.assert_array_equal(jn.inverse_dynamics(robot, np.ones((4, 1))), np.zeros((2, 1)))
+    assert robot.with_floating_base().massless_joints[-1] == "j"
+
+
+def six_digits(tensor):
+    """Return a tensor as the attributes of <inertia>, of six significant digits."""
+    names = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
+    return " ".join(f'{name}="{tensor[at]:.6g}"' for name, at in names.items())
+
+
+def inertial(tensor, mass=1.0):
+    return f'<inertial><mass value="{mass}"/><inertia {six_digits(tensor)}/></inertial>'
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_rods_and_plates_of_six_digits_have_no_warning(tmp_path, seed):
+    turn = Rotation.random(rng=np.random.default_rng(seed)).as_matrix()
+    for moments in ([0, 1, 1], [1, 2, 3], [1e-8, 2e-8, 3e-8]):
+        load_robot(small(tmp_path, 'type="revolute">', inertial(turn @ np.diag(moments) @ turn.T)))
+
+
+def test_impossible_moments_are_used_as_they_are_with_a_warning(tmp_path):
+    path = small(tmp_path, 'type="continuous"><axis xyz="0 0 1"/>', inertial(np.diag([1.0, 1.0, 3.0])))
+    with pytest.warns(jn.RobotWarning, match=r"exceeds the sum of the others: arm \(line 1\)"):
+        robot = load_robot(path)
+    assert jn.inverse_dynamics(robot, [[0.0], [0.0], [2.0]]).tolist() == [[6.0]]
+    assert robot.links["arm"].inertia.fault
+    path = small(tmp_path, 'type="continuous"><axis xyz="0 0 1"/>', inertial(np.diag([1.0, 1.0, -2.0])))
+    with pytest.warns(jn.RobotWarning, match=r"negative: arm \(line 1\)"):
+        robot = load_robot(path)
+    with pytest.raises(jn.MechanismError, match=r"bodies\.arm\.inertia: .*kinetic energy is negative"):
+        jn.simulate(robot.mechanism(), [0.0, 0.1])
+
+
+def test_a_quaternion_of_urdf_1_1_is_read(tmp_path):
+    quaternion = [0.5, -1.0, 2.0, 1.5]
+    text = " ".join(map(str, quaternion))
+    path = small(tmp_path, f'type="revolute"><origin xyz="1 2 3" quat_xyzw="{text}"/>')
+    rotation = load_robot(path).joints["j"].rotation
+    np.testing.assert_allclose(rotation, Rotation.from_quat(quaternion).as_matrix(), rtol=0, atol=1e-15)
+    moments = np.diag([1.0, 2.0, 2.5])
+    child = inertial(moments).replace("<mass", f'<origin quat_xyzw="{text}"/><mass')
+    tensor = load_robot(small(tmp_path, 'type="revolute">', child)).links["arm"].inertia.tensor
+    np.testing.assert_allclose(tensor, rotation @ moments @ rotation.T, rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize("origin", ['quat_xyzw="0 0 0 0"', 'quat_xyzw="0 0 1"', 'quat_xyzw="0 0 0 1" rpy="0 0 0"'])
+def test_a_quaternion_that_is_none_or_stands_beside_angles(tmp_path, origin):
+    with pytest.raises(RobotFileError, match=r"line 1, joints\.j\.origin: .*quat_xyzw"):
+        load_robot(small(tmp_path, f'type="revolute"><origin {origin}/>'))
+
+
+@pytest.mark.parametrize(
+    "limit, expected",
+    [
+        ('acceleration="5" deceleration="7" jerk="100"', {"acceleration": 5.0, "deceleration": 7.0, "jerk": 100.0}),
+        ('lower="0" upper="0" effort="0" velocity="0" acceleration="0" jerk="inf"', {}),
+        ('upper="2"', {"lower": 0.0, "upper": 2.0}),
+        ('lower="-2" upper="inf"', {"lower": -2.0}),
+        ('lower="0.5" upper="0.5"', {"lower": 0.5, "upper": 0.5}),
+    ],
+)
+def test_limits_of_urdf_1_2_and_zeros(tmp_path, limit, expected):
+    assert load_robot(small(tmp_path, f'type="revolute"><limit {limit}/>')).limits["j"] == jn.Limits(**expected)
+
+
+@pytest.mark.parametrize("key", ["acceleration", "deceleration", "jerk"])
+@pytest.mark.parametrize("value", ["-1", "fast", "nan"])
+def test_limits_of_urdf_1_2_that_are_none(tmp_path, key, value):
+    with pytest.raises(RobotFileError, match=rf"line 1, joints\.j\.limit\.{key}"):
+        load_robot(small(tmp_path, f'type="revolute"><limit {key}="{value}"/>'))
+
+
+def chain(tmp_path, *mimics):
+    """Return the file of a chain of joints a, b, c, ... that follow others."""
+    names = "abcd"[: len(mimics)]
+    links = "".join(f'<link name="{name}">{INERTIAL}</link>' for name in ("base", *names))
+    joints = "".join(
+        f'<joint name="j{name}" type="continuous"><parent link="{parent}"/><child link="{name}"/>{mimic}</joint>'
+        for parent, name, mimic in zip(("base", *names), names, mimics, strict=False)
+    )
+    path = tmp_path / "chain.urdf"
+    path.write_text(f'<robot name="chain">{links}{joints}</robot>')
+    return path
+
+
+def test_a_joint_may_follow_one_that_follows_another(tmp_path):
+    second = '<mimic joint="ja" multiplier="2" offset="0.5"/>'
+    robot = load_robot(chain(tmp_path, "", second, '<mimic joint="jb" multiplier="-3" offset="1"/>'))
+    assert robot.joint_names == ("ja",)
+    assert robot.joints["jc"].mimic == jn.Mimic("ja", -6.0, -0.5)
+
+
+def test_joints_that_follow_in_a_circle_or_one_that_is_not_there(tmp_path):
+    with pytest.raises(RobotFileError, match=r"joints\.ja\.mimic: must follow a moving joint"):
+        load_robot(chain(tmp_path, '<mimic joint="jb"/>', '<mimic joint="ja"/>'))
+    with pytest.warns(jn.RobotWarning, match=r"taken as free: jb \(line 1\)"):
+        robot = load_robot(chain(tmp_path, "", '<mimic joint="jx"/>'))
+    assert robot.joint_names == ("ja", "jb")
+
+
+@pytest.mark.parametrize(
+    "left", ['<visual><geometry><mesh filename="$(find x)/a.stl"/></geometry></visual>', "<visual/><collision/>"]
+)
+def test_leftovers_of_xacro_that_bear_on_looks_and_plugins_do_not_matter(tmp_path, left):
+    path = small(tmp_path, 'type="revolute">', child=INERTIAL + left)
+    path.write_text(path.read_text().replace("</robot>", '<gazebo><plugin file="${x}"/></gazebo></robot>'))
+    assert load_robot(path).joint_names == ("j",)
 
 
 def test_a_base_can_be_set_free():

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jounce.kinematics.linear import DenseFactor
+from jounce.kinematics.linear import DenseFactor, singular_values
 
 RANDOM = np.random.default_rng(4)
 MATRIX = RANDOM.normal(size=(7, 7, 5))
@@ -84,12 +84,36 @@ def test_singular_matrices_are_told_and_leave_their_neighbours_alone():
         assert np.isfinite(flat[:, [0, 2, 4]]).all()
 
 
+@pytest.mark.parametrize("shape", [(1, 4), (3, 3), (6, 7), (6, 4)])
+def test_singular_value_decompositions(shape):
+    generator = np.random.default_rng(sum(shape))
+    matrices = generator.normal(size=(*shape, 6))
+    matrices[:, :, 1] *= np.logspace(0, -12, shape[1])  # nearly singular
+    matrices[-1, :, 2] = matrices[0, :, 2]  # of lower rank
+    matrices[:, :, 3] = 0.0
+    matrices[:, :, 4] = np.eye(*shape)  # all alike
+    u, s, v = (np.asarray(part) for part in jax.jit(singular_values)(jnp.asarray(matrices)))
+    expected = np.linalg.svd(np.moveaxis(matrices, -1, 0), compute_uv=False).T
+    np.testing.assert_allclose(s, expected, rtol=0, atol=4e-15 * max(expected.max(), 1))
+    np.testing.assert_allclose(np.einsum("ikb,kb,jkb->ijb", u, s, v), matrices, rtol=0, atol=1e-14)
+    full = s.min(axis=0) > 1e-14
+    for part in (u[..., full], v[..., full]):
+        products = np.einsum("ikb,ilb->klb", part, part)
+        np.testing.assert_allclose(products, np.eye(len(s))[..., None] + 0 * products, rtol=0, atol=1e-13)
+
+
 def test_no_operation_is_left_to_lapack():
     """Batches of LAPACK wait for threads of XLA in a thread of XLA: two such programs may wait forever."""
 
     def everything(matrices):
         factor = DenseFactor.of(matrices)
         right = matrices[0]
-        return factor.solve(right), factor.solve_transposed(right), factor.inverse(), factor.sign()
+        return (
+            factor.solve(right),
+            factor.solve_transposed(right),
+            factor.inverse(),
+            factor.sign(),
+            singular_values(matrices),
+        )
 
     assert "custom_call" not in jax.jit(everything).lower(jnp.ones((4, 4, 3))).as_text()

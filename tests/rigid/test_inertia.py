@@ -113,11 +113,16 @@ PRODUCTS = [[1.0, 0.1, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
             lambda: jn.Inertia(1.0, tensor=PRODUCTS),
             "inertia: must be symmetric, got [[1.0, 0.1, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]",
         ),
-        (lambda: jn.Inertia(1.0, tensor=[-1, 1, 1]), "inertia: has a negative principal moment, got -1.0"),
+        (
+            lambda: jn.Inertia(1.0, tensor=[-1, 1, 1]),
+            "inertia: has a negative principal moment, got -1.0; check the units, the signs of the products of inertia "
+            "and the axes, or compute with the numbers as they are, by strict=False",
+        ),
         (
             lambda: jn.Inertia(1.0, tensor=[1, 1, 4]),
             "inertia: breaks the triangle inequality: the largest principal moment exceeds the sum of the others, got "
-            "[1.0, 1.0, 4.0]; check the units, the signs of the products of inertia and the axes",
+            "[1.0, 1.0, 4.0]; check the units, the signs of the products of inertia and the axes, or compute with the "
+            "numbers as they are, by strict=False",
         ),
         (lambda: jn.Inertia.total([]), "parts: the sum of inertias needs at least one, got an empty list"),
     ],
@@ -126,3 +131,34 @@ def test_no_body_has_such_an_inertia(make, message):
     with pytest.raises(jn.RobotError) as caught:
         make()
     assert str(caught.value) == message
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_rods_and_plates_of_six_digits_are_bodies(seed):
+    turn = Rotation.random(rng=np.random.default_rng(seed)).as_matrix()
+    for moments in ([0.0, 1.0, 1.0], [1.0, 2.0, 3.0]):
+        exact = turn @ np.diag(moments) @ turn.T
+        rounded = np.array([[float(f"{x:.6g}") for x in row] for row in exact])
+        assert jn.Inertia(1.0, tensor=rounded).fault is None
+
+
+def test_the_numbers_of_no_real_body_are_kept_as_they_are():
+    moments, place = [-0.5, 1.0, 3.0], np.array([0.1, 0.2, 0.3])
+    turn = Rotation.random(rng=np.random.default_rng(1)).as_matrix()
+    inertia = jn.Inertia(2.0, tensor=moments, strict=False)
+    assert inertia.fault.value == -0.5
+    moved = inertia.moved(place, turn)
+    np.testing.assert_allclose(moved.tensor, turn @ np.diag(moments) @ turn.T, rtol=0, atol=1e-15)
+    whole = jn.Inertia.total([moved, jn.Inertia(1.0, place)])
+    np.testing.assert_allclose(whole.tensor, moved.tensor, rtol=0, atol=1e-15)
+    assert jn.Inertia(1.0, tensor=[1.0, 1.0, 3.0], strict=False).fault.value == [1.0, 1.0, 3.0]
+
+
+def test_moments_without_mass_add_to_those_of_what_they_are_fixed_to():
+    rotor = jn.Inertia(0.0, [0.1, 0.2, 0.3], [0.3, 0.2, 0.1], strict=False)
+    assert rotor.fault.words == "has moments of inertia but no mass"
+    body = jn.Inertia(2.0, [0.5, 0.0, 0.0], [0.1, 0.2, 0.2])
+    same(jn.Inertia.total([body, rotor]), jn.Inertia(2.0, [0.5, 0.0, 0.0], [0.4, 0.4, 0.3]))
+    np.testing.assert_allclose(jn.Inertia.total([rotor, rotor]).tensor.diagonal(), [0.6, 0.4, 0.2], rtol=1e-15)
+    with pytest.raises(jn.RobotError, match=r"mass: must be greater than zero, got -1\.0"):
+        jn.Inertia(-1.0, strict=False)

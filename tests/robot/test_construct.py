@@ -132,7 +132,7 @@ SKEWED = np.diag([1.0, 1.0, 1.0, 2.0])
         (
             lambda: from_denavit_hartenberg([DenavitHartenberg(a=1.0)]),
             "links.axis_1.inertia: this joint moves no mass, got nothing; give its link, or one that it carries, an "
-            "inertia",
+            "inertia, or keep it with strict=False, where its torque is zero",
         ),
         (
             lambda: from_screws([Screw([0, 0, 0], inertia=BODY)]),

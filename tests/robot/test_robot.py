@@ -165,7 +165,8 @@ REFUSED = [
     ),
     (
         lambda: jn.Robot("r", [jn.Link("base"), jn.Link("a")], [pin("x", "base", "a")]),
-        "links.a.inertia: this joint moves no mass, got nothing; give its link, or one that it carries, an inertia",
+        "links.a.inertia: this joint moves no mass, got nothing; give its link, or one that it carries, an inertia, or "
+        "keep it with strict=False, where its torque is zero",
     ),
     (
         lambda: chain(
@@ -209,3 +210,14 @@ def test_refused(make, message):
     with pytest.raises(jn.RobotError) as caught:
         make()
     assert str(caught.value) == message
+
+
+def test_a_joint_that_moves_no_mass_may_be_kept():
+    links = [jn.Link("base"), jn.Link("a", BODY), jn.Link("b"), jn.Link("c")]
+    joints = [pin("one", "base", "a"), pin("two", "a", "b"), pin("three", "b", "c")]
+    robot = jn.Robot("chain", links, joints, strict=False)
+    assert robot.massless_joints == ("two", "three")
+    for other in (pickle.loads(pickle.dumps(robot)), robot.with_gravity([0, 0, 0]), robot.with_floating_base()):
+        assert other.massless_joints == ("two", "three")
+    assert robot.with_payload("b", BODY).massless_joints == ("three",)
+    assert robot.with_payload("c", BODY).massless_joints == ()

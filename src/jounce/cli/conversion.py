@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from jounce.cli.writing import Overwrite, allowed
 from jounce.errors import JounceError, did_you_mean
 from jounce.io.terminal import caution, say
+
+if TYPE_CHECKING:
+    from jounce.robot import Robot
 
 MECHANISMS = (".yaml", ".yml", ".toml", ".json")
 ROBOTS = (".urdf", ".xml")
@@ -21,8 +26,10 @@ def convert(
     start: list[str] | None = None,
     hold: bool = False,
     drives: bool = False,
-    force: bool = False,
+    strict: bool = False,
     import_: list[Path] | None = None,
+    allow: list[Path] | None = None,
+    overwrite: Overwrite = False,
 ) -> int:
     """Turn a mechanism file into another format, a robot into a mechanism.
 
@@ -45,10 +52,14 @@ def convert(
         Hold the joints of a robot that are not driven.
     drives
         Take over damping and armature of a robot's drives.
-    force
-        Replace a file that is there.
+    strict
+        Refuse a robot whose links are as those of no real one.
     import_
         Python file with your own joints; repeatable.
+    allow
+        Folder whose files it may name, besides its own; repeatable.
+    overwrite
+        Replace files that are there.
     """
     from jounce.io.files import check_target
     from jounce.io.formats import SUFFIXES
@@ -58,51 +69,72 @@ def convert(
     if suffix not in (*MECHANISMS, *ROBOTS) and not source.is_dir():
         message = f"the kind of a file is told by its ending; {did_you_mean(suffix, (*MECHANISMS, *ROBOTS))}"
         raise JounceError(message, path=source)
-    check_target(target, SUFFIXES, "mechanism file")
-    refuse_existing(target, force=force)
+    check_target(target, SUFFIXES, "mechanism file", overwrite=overwrite)
+    refuse_existing(target, overwrite=overwrite)
     if suffix in ROBOTS:
-        return _robot(source, target, drive, start, hold, drives)
-    given = {"--drive": drive, "--start": start, "--hold": hold, "--drives": drives}
+        from jounce.io.robots import load_robot
+
+        model = load_robot(source, strict=strict, allow=allowed(allow))
+        return _robot(source, model, target, drive, start, hold, drives)
+    given = {"--drive": drive, "--start": start, "--hold": hold, "--drives": drives, "--strict": strict}
     for option, value in given.items():
         if value:
             raise JounceError("is for robots; a mechanism file keeps its drivers", name=option, path=source)
-    return _mechanism(source, target, import_)
+    return _mechanism(source, target, import_, allowed(allow), overwrite)
 
 
-def _mechanism(source: Path, target: Path, imports: list[Path] | None) -> int:
+def _mechanism(source: Path, target: Path, imports: list[Path] | None, allow: Sequence[Path], overwrite: bool) -> int:
     from jounce.io.conversion import converted
+    from jounce.io.files import check_target, replacing
     from jounce.io.formats import dumped
+    from jounce.io.reading import MAX_SAMPLES, read_file
+    from jounce.io.templates import refuse_existing
 
     if imports:
         from jounce.io.own import import_file
 
         for path in imports:
             import_file(path)
-    data = converted(source, target)
-    _put(dumped(data, target.suffix.lower(), str(target)), target)
-    say(f"Written to {target}")
+    data, samples = converted(source, target, allow)
+    text = dumped(data, target.suffix.lower(), str(target))
+    for beside in samples:  # all, before the first is written
+        check_target(beside, overwrite=overwrite)
+        refuse_existing(beside, overwrite=overwrite)
+    for beside, path in samples.items():
+        with replacing(beside, overwrite=overwrite) as scratch:
+            scratch.write_bytes(read_file(path, MAX_SAMPLES, what="the samples"))
+    _put(text, target, allow, overwrite)
+    say(f"Written to {', '.join(str(path) for path in (target, *samples))}")
     if source.suffix.lower() != ".json" and "#" in source.read_text(encoding="utf-8-sig"):
         caution(f"the comments of {source} are not in {target}")
     return 0
 
 
 def _robot(
-    source: Path, target: Path, drive: list[str] | None, start: list[str] | None, hold: bool, drives: bool
+    source: Path,
+    model: Robot,
+    target: Path,
+    drive: list[str] | None,
+    start: list[str] | None,
+    hold: bool,
+    drives: bool,
 ) -> int:
     from jounce.io.conversion import assigned, robot_mechanism, with_file_names
     from jounce.io.formats import dumped
-    from jounce.io.robots import load_robot
     from jounce.io.writer import mechanism_data
+    from jounce.mechanism.masses import body_mass
 
-    robot, renamed = with_file_names(load_robot(source))
+    robot, renamed = with_file_names(model)
     laws = assigned(robot, drive or (), "--drive", law=True)
     begin: dict[str, Any] = assigned(robot, start or (), "--start", law=False)
     try:
         mechanism = robot_mechanism(robot, begin, laws, hold=hold, drives=drives)
+        for name, body in mechanism.bodies.items():
+            body_mass(name, body, {}, 3)  # mechanism files hold bodies as real ones only
         data, _ = mechanism_data(mechanism, target.stem)
     except JounceError as error:
         raise error.located(path=source) from None
-    _put(dumped(data, target.suffix.lower(), str(target)), target)
+    _put(dumped(data, target.suffix.lower(), str(target)), target, (), True)
     driven = hold or len(laws) == len(robot.joint_names)
     following = [] if robot.closures else [f"jounce {'run' if driven else 'simulate'} {target}"]
     say(f"Written to {target}\n\nTry now:\n  " + "\n  ".join([f"jounce inspect {target}", *following]))
@@ -111,15 +143,15 @@ def _robot(
     return 0
 
 
-def _put(text: str, target: Path) -> None:
+def _put(text: str, target: Path, allow: Sequence[Path], overwrite: bool) -> None:
     """Write a file, and read it before it takes its place."""
     from jounce.io import load
     from jounce.io.files import replacing
 
-    with replacing(target) as scratch:
+    with replacing(target, overwrite=overwrite) as scratch:
         scratch.write_text(text, encoding="utf-8")
         try:
-            load(scratch)
+            load(scratch, allow=allow)
         except JounceError as error:
             error.path = str(target)
             raise

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from jounce.cli.mechanisms import loaded, of_option, outcome, solved
-from jounce.cli.writing import written
+from jounce.cli.writing import spared, written
 from jounce.errors import JounceError, MechanismError, did_you_mean
 from jounce.io.terminal import Bar, say
 
@@ -48,6 +48,8 @@ def plot(
     fps: int = 25,
     set_: list[str] | None = None,
     import_: list[Path] | None = None,
+    allow: list[Path] | None = None,
+    overwrite: bool = False,
 ) -> int:
     """Draw outputs, a sketch, reactions, energies, or a film.
 
@@ -83,11 +85,16 @@ def plot(
         NAME=VALUE of a parameter, with a unit; repeatable.
     import_
         Python file with your own joints; repeatable.
+    allow
+        Folder whose files it may name, besides its own; repeatable.
+    overwrite
+        Let --out replace a file that is read here.
     """
     chosen = _kind(kind, out)
     out = Path(f"{file.stem}{'.gif' if chosen == 'animation' else '.png'}") if out is None else out
-    _check_target(chosen, out)
-    mechanism = loaded(file, set_, import_)
+    _check_target(chosen, out, overwrite)
+    mechanism = loaded(file, set_, import_, allow)
+    spared(out, overwrite)
     _check_names(mechanism, chosen, output or (), file)
     least = max(derivative or 0, ORDERS[chosen] if order is None or chosen in PORTRAITS else 0)
     motion = _moved(mechanism, file, least if order is None else max(order, derivative or 0))
@@ -99,10 +106,12 @@ def plot(
         if chosen == "animation":
             from jounce.plot import animate
 
+            film = {"speed": speed, "fps": fps, "overwrite": overwrite}
             with Bar("drawing") as bar:
-                written(lambda: animate(motion, out, speed=speed, fps=fps, progress=bar, **look))
+                written(lambda: animate(motion, out, progress=bar, **film, **look))
         else:
-            _draw(motion, chosen, out, output, derivative, {"instant": instant, **look})
+            figure = _drawn(motion, chosen, output, derivative, {"instant": instant, **look})
+            _save(figure, out, overwrite)
     except JounceError as error:
         raise of_option(error, file) from None
     say(f"Written to {out}")
@@ -120,10 +129,10 @@ def _kind(kind: Kind | None, out: Path | None) -> str:
     return kind
 
 
-def _check_target(kind: str, out: Path) -> None:
+def _check_target(kind: str, out: Path, overwrite: bool) -> None:
     from jounce.plot import check_animation, check_figure
 
-    (check_animation if kind == "animation" else check_figure)(out)
+    (check_animation if kind == "animation" else check_figure)(out, overwrite=overwrite)
 
 
 def _check_names(mechanism: Mechanism, kind: str, wanted: Sequence[str], file: Path) -> None:
@@ -155,9 +164,7 @@ def _moved(mechanism: Mechanism, file: Path, order: int) -> Motion:
         raise of_option(error, file) from None
 
 
-def _draw(
-    motion: Motion, kind: str, out: Path, output: list[str] | None, derivative: int | None, look: dict[str, Any]
-) -> None:
+def _drawn(motion: Motion, kind: str, output: list[str] | None, derivative: int | None, look: dict[str, Any]) -> Any:
     from jounce import plot as figures
 
     one = _portrayed(motion, kind, output)
@@ -171,8 +178,13 @@ def _draw(
         "power": lambda: figures.draw_power(motion),
         "reactions": lambda: figures.draw_reactions(motion, output),
     }
-    figure = kinds[kind]()
-    written(lambda: figures.save(figure, out))
+    return kinds[kind]()
+
+
+def _save(figure: Any, out: Path, overwrite: bool) -> None:
+    from jounce.plot import save
+
+    written(lambda: save(figure, out, overwrite=overwrite))
 
 
 def _portrayed(motion: Motion, kind: str, output: list[str] | None) -> str:
@@ -193,6 +205,8 @@ def report(
     elevation: float = 25.0,
     set_: list[str] | None = None,
     import_: list[Path] | None = None,
+    allow: list[Path] | None = None,
+    overwrite: bool = False,
 ) -> int:
     """Write a page to explore a motion in: one HTML file, offline.
 
@@ -216,14 +230,21 @@ def report(
         NAME=VALUE of a parameter, with a unit; repeatable.
     import_
         Python file with your own joints; repeatable.
+    allow
+        Folder whose files it may name, besides its own; repeatable.
+    overwrite
+        Let --out replace a file that is read here.
     """
     from jounce.plot import check_report, report as write_report
 
     out = Path(f"{file.stem}.html") if out is None else out
-    check_report(out)
-    motion = _moved(loaded(file, set_, import_), file, order)
+    check_report(out, overwrite=overwrite)
+    mechanism = loaded(file, set_, import_, allow)
+    spared(out, overwrite)
+    motion = _moved(mechanism, file, order)
+    look: dict[str, Any] = {"view": (azimuth, elevation), "source": file.name, "overwrite": overwrite}
     try:
-        written(lambda: write_report(motion, out, view=(azimuth, elevation), source=file.name))
+        written(lambda: write_report(motion, out, **look))
     except JounceError as error:
         raise of_option(error, file) from None
     say(f"Written to {out}")

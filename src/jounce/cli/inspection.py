@@ -6,6 +6,7 @@ from pathlib import Path
 
 from jounce.cli.conversion import MECHANISMS, ROBOTS
 from jounce.cli.mechanisms import loaded
+from jounce.cli.writing import allowed
 from jounce.errors import JounceError, did_you_mean
 from jounce.io.terminal import say_json
 
@@ -16,6 +17,8 @@ def inspect(
     *,
     set_: list[str] | None = None,
     import_: list[Path] | None = None,
+    strict: bool = False,
+    allow: list[Path] | None = None,
     json: bool = False,
 ) -> int:
     """Tell what is in a mechanism or robot file, and whether it can move.
@@ -34,6 +37,10 @@ def inspect(
         NAME=VALUE of a parameter, with a unit; repeatable.
     import_
         Python file with your own joints; repeatable.
+    strict
+        Refuse a robot whose links are as those of no real one.
+    allow
+        Folder whose files it may name, besides its own; repeatable.
     json
         Print the result as JSON.
     """
@@ -48,12 +55,14 @@ def inspect(
         from jounce.io.robot_inspection import inspected_robot
         from jounce.io.robots import load_robot
 
-        facts = inspected_robot(load_robot(file), file)
+        facts = inspected_robot(load_robot(file, strict=strict, allow=allowed(allow)), file)
     else:
+        if strict:
+            raise JounceError("is for robot files; mechanism files are always read so", name="--strict", path=file)
         from jounce.io.briefing import brief as tell
         from jounce.io.inspection import inspected
 
-        mechanism = loaded(file, set_, import_)
+        mechanism = loaded(file, set_, import_, allow)
         try:
             facts = inspected(mechanism, file)
         except JounceError as error:

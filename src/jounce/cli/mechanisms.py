@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from jounce.cli.writing import written
+from jounce.cli.writing import allowed, spared, written
 from jounce.errors import JounceError, SolveError
 from jounce.io.summaries import simulation_summary, summary
 from jounce.io.terminal import Bar, say, say_json, show_peaks
@@ -25,6 +25,8 @@ def run(
     tolerance: float = 1e-12,
     set_: list[str] | None = None,
     import_: list[Path] | None = None,
+    allow: list[Path] | None = None,
+    overwrite: bool = False,
     json: bool = False,
 ) -> int:
     """Solve a mechanism file and print peak values, position to jounce.
@@ -43,6 +45,10 @@ def run(
         NAME=VALUE of a parameter, with a unit; repeatable.
     import_
         Python file with your own joints; repeatable.
+    allow
+        Folder whose files it may name, besides its own; repeatable.
+    overwrite
+        Let --out replace a file that is read here.
     json
         Print the result as JSON.
     """
@@ -50,12 +56,14 @@ def run(
     from jounce.io.peaks import peaks
 
     if out is not None:
-        io.check_writable(out)
-    motion = solved(loaded(file, set_, import_), file, order, tolerance)
+        io.check_writable(out, overwrite=overwrite)
+    mechanism = loaded(file, set_, import_, allow)
+    spared(out, overwrite)
+    motion = solved(mechanism, file, order, tolerance)
     if not json:
         say(summary(motion, file))
         show_peaks(peaks(motion))
-    return _finished("run", motion, file, out, json)
+    return _finished("run", motion, file, out, overwrite, json)
 
 
 def simulate(
@@ -69,6 +77,8 @@ def simulate(
     step: float | None = None,
     set_: list[str] | None = None,
     import_: list[Path] | None = None,
+    allow: list[Path] | None = None,
+    overwrite: bool = False,
     json: bool = False,
 ) -> int:
     """Move a mechanism by its forces and print peak values, energy, drift.
@@ -91,6 +101,10 @@ def simulate(
         NAME=VALUE of a parameter, with a unit; repeatable.
     import_
         Python file with your own joints and forces; repeatable.
+    allow
+        Folder whose files it may name, besides its own; repeatable.
+    overwrite
+        Let --out replace a file that is read here.
     json
         Print the result as JSON.
     """
@@ -99,9 +113,10 @@ def simulate(
     from jounce.io.peaks import peaks
 
     if out is not None:
-        io.check_writable(out)
+        io.check_writable(out, overwrite=overwrite)
     chosen = _method(method, step)
-    mechanism = loaded(file, set_, import_)
+    mechanism = loaded(file, set_, import_, allow)
+    spared(out, overwrite)
     try:
         with Bar("simulating") as bar:
             motion = integrate(mechanism, order=order, method=chosen, tolerance=tolerance, strict=False, progress=bar)
@@ -110,15 +125,15 @@ def simulate(
     if not json:
         say(simulation_summary(motion, file))
         show_peaks(peaks(motion))
-    return _finished("simulate", motion, file, out, json)
+    return _finished("simulate", motion, file, out, overwrite, json)
 
 
-def _finished(command: str, motion: Motion, file: Path, out: Path | None, json: bool) -> int:
+def _finished(command: str, motion: Motion, file: Path, out: Path | None, overwrite: bool, json: bool) -> int:
     """Write the results of a motion where they are wanted, and return the exit status."""
     from jounce import io
 
     if out is not None:
-        written(lambda: io.write(motion.dataset, out))
+        written(lambda: io.write(motion.dataset, out, overwrite=overwrite))
     if json:
         from jounce.io.records import motion_record
 
@@ -165,7 +180,12 @@ def schema(of: Literal["mechanism", "results"] = "mechanism", /) -> int:
     return 0
 
 
-def loaded(file: Path, assignments: Sequence[str] | None, imports: Sequence[Path] | None) -> Mechanism:
+def loaded(
+    file: Path,
+    assignments: Sequence[str] | None,
+    imports: Sequence[Path] | None,
+    allow: Sequence[Path] | None = None,
+) -> Mechanism:
     """Return the mechanism of a file, with parameters changed, after files of one's own joints were run."""
     from jounce.io import load
 
@@ -174,7 +194,7 @@ def loaded(file: Path, assignments: Sequence[str] | None, imports: Sequence[Path
 
         for path in imports:
             import_file(path)
-    mechanism = load(file)
+    mechanism = load(file, allow=allowed(allow))
     if assignments:
         from jounce.io.overrides import override
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from jounce.cli.writing import written
+from jounce.cli.writing import allowed, spared, written
 from jounce.errors import JounceError, RobotError, SampleWarning
 from jounce.io.summaries import limits_summary, verdict
 from jounce.io.terminal import caution, say, say_json, show_limits
@@ -19,6 +19,9 @@ def check(
     out: Path | None = None,
     payload: list[str] | None = None,
     degree: int = 5,
+    strict: bool = False,
+    allow: list[Path] | None = None,
+    overwrite: bool = False,
     json: bool = False,
 ) -> int:
     """Compare a trajectory with the limits of a robot, to torque rate.
@@ -39,6 +42,12 @@ def check(
         LINK=MASS with a unit, held in its origin; repeatable.
     degree
         Of the splines through samples, odd from 3 to 11.
+    strict
+        Refuse a robot whose links are as those of no real one.
+    allow
+        Folder whose files it may name, besides its own; repeatable.
+    overwrite
+        Let --out replace a file that is read here.
     json
         Print the result as JSON.
     """
@@ -52,8 +61,8 @@ def check(
     if out is not None:
         from jounce.plot import check_figure
 
-        check_figure(out)
-    model = load_robot(robot)
+        check_figure(out, overwrite=overwrite)
+    model = load_robot(robot, strict=strict, allow=allowed(allow))
     laid = load_limits(limits, model) if limits is not None else None
     if payload:
         from jounce.io.payloads import with_payloads
@@ -63,6 +72,7 @@ def check(
         warnings.simplefilter("always", SampleWarning)
         motion = load_trajectory(trajectory, degree)
         try:
+            spared(out, overwrite)
             report = check_limits(model, motion, laid)
         except RobotError as error:
             raise error.located(path=robot) from None
@@ -80,7 +90,7 @@ def check(
     if out is not None:
         from jounce.plot import draw_limits, save
 
-        written(lambda: save(draw_limits(report, f"{report.robot}: {trajectory.name}"), out))
+        written(lambda: save(draw_limits(report, f"{report.robot}: {trajectory.name}"), out, overwrite=overwrite))
     if json:
         from jounce.io.records import limits_record
 

@@ -4,10 +4,18 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from jounce.cli.writing import Overwrite
 from jounce.io.terminal import say, say_json, show_columns
 
 
-def new(name: str | None = None, file: Path | None = None, /, *, force: bool = False, json: bool = False) -> int:
+def new(
+    name: str | None = None,
+    file: Path | None = None,
+    /,
+    *,
+    overwrite: Overwrite = False,
+    json: bool = False,
+) -> int:
     """Write a commented starter file; without a name, list them.
 
     Parameters
@@ -16,7 +24,7 @@ def new(name: str | None = None, file: Path | None = None, /, *, force: bool = F
         Of the starter, such as four-bar.
     file
         File to write: .yaml, .yml, .toml or .json [default: NAME.yaml].
-    force
+    overwrite
         Replace a file that is there.
     json
         Print the result as JSON.
@@ -32,7 +40,7 @@ def new(name: str | None = None, file: Path | None = None, /, *, force: bool = F
         say("\nWrite one with: jounce new NAME [FILE]")
         return 0
     target = Path(f"{name}.yaml") if file is None else file
-    starter = write_starter(name, target, force=force)
+    starter = write_starter(name, target, overwrite=overwrite)
     following = [f"jounce {starter.command} {_quoted(target)}"]
     if starter.command == "run":
         following.append(f"jounce plot {_quoted(target)} --out {_quoted(target.with_suffix('.png'))}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from jounce.cli.writing import allowed
 from jounce.errors import JounceError
 from jounce.io.terminal import say
 
@@ -18,6 +19,7 @@ def view(
     order: int = 4,
     set_: list[str] | None = None,
     import_: list[Path] | None = None,
+    allow: list[Path] | None = None,
 ) -> int:
     """Show a mechanism or a robot in the browser, moving.
 
@@ -41,6 +43,8 @@ def view(
         NAME=VALUE of a parameter, with a unit; repeatable.
     import_
         Python file with your own joints and forces; repeatable.
+    allow
+        Folder whose files it may name, besides its own; repeatable.
     """
     from jounce.kinematics.solve import checked_order
     from jounce.viewer import view as show
@@ -54,10 +58,10 @@ def view(
         if file.suffix.lower() in MECHANISM_FILES:
             from jounce.cli.mechanisms import loaded
 
-            subject = loaded(file, set_, import_)
+            subject = loaded(file, set_, import_, allow)
         elif set_ or import_:
             raise JounceError("is for mechanism files; a robot has no parameters", name="--set" if set_ else "--import")
-        page = show(subject, trajectory, port=port, order=order, open_page=not no_open)
+        page = show(subject, trajectory, port=port, order=order, open_page=not no_open, allow=allowed(allow))
     except JounceError as error:
         if error.name in ("port", "order"):
             error.name = f"--{error.name}"

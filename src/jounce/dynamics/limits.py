@@ -16,9 +16,11 @@ from jounce.trajectory.joint_trajectory import JointTrajectory
 FIELDS = ("position", "velocity", "acceleration", "jerk", "effort", "effort_rate")
 TURNING = dict(zip(FIELDS, ("rad", "rad/s", "rad/s^2", "rad/s^3", "N m", "N m/s"), strict=True))
 SLIDING = dict(zip(FIELDS, ("m", "m/s", "m/s^2", "m/s^3", "N", "N/s"), strict=True))
+ACCELERATION = 2
 EFFORTS = (4, 5)  # which of them the dynamics give
 ORDER = 3  # of the motion: jerk, and with it the rate of the torque
 
+REST = 1e-9  # of the largest velocity of a joint, below which it is at rest
 ROUNDING = 1e-9  # by which a ratio may exceed 1
 INSTANTS = 2000  # at least, over the trajectory
 BETWEEN = 4  # intervals at least, from one instant of the trajectory to the next
@@ -128,6 +130,9 @@ def check_limits(
 ) -> LimitReport:
     """Compare a trajectory, and the torques and torque rates that it needs, with the limits of the joints.
 
+    An acceleration against the velocity is compared with the limit of deceleration, where there is one; a joint at rest
+    counts as one that speeds up.
+
     All values are exact derivatives of the trajectory, at its own instants and at least three between each two of them,
     2000 in all or more. Around the highest peaks of each curve the step is then refined to less than a millionth of
     the duration: what is reported are true values of the curves.
@@ -175,19 +180,20 @@ def check_limits(
     (False, [('velocity', 0.5, 0.0), ('torque', 1.2263, 0.0)])
     """
     curves = _Curves(robot, trajectory, drives)
-    bounds = _Bounds(robot, _merged(robot, limits))
+    merged = _merged(robot, limits)
     grid = _grid(trajectory) if times is None else _checked_times(times)
     values = curves(grid)
+    bounds = _Bounds(robot, merged, REST * np.abs(values[:, 1]).max(axis=0))
     wanted = [
         (quantity, joint)
         for joint, name in enumerate(robot.joint_names)
         for quantity in range(len(FIELDS))
         if quantity in EFFORTS or name not in curves.held
     ]
-    at, found = _worst(curves, bounds, grid, values, np.array(wanted))
+    at, found, shown = _worst(curves, bounds, grid, values, np.array(wanted))
     rows = tuple(
-        _row(robot, bounds, quantity, joint, time, value)
-        for (quantity, joint), time, value in zip(wanted, at.tolist(), found.tolist(), strict=True)
+        _row(robot, bounds, quantity, joint, *worst)
+        for (quantity, joint), *worst in zip(wanted, at.tolist(), found.tolist(), shown.tolist(), strict=True)
     )
     for message in curves.doubts:
         warnings.warn(SampleWarning(message), stacklevel=2)
@@ -243,11 +249,22 @@ class _Curves:
 
 
 class _Bounds:
-    """What is allowed, in arrays of shape (6, joints), infinite where there is no bound."""
+    """What is allowed, in arrays of shape (6, joints), infinite where there is no bound.
 
-    def __init__(self, robot: Robot, limits: Mapping[str, Limits]):
+    Accelerations are held against one bound, whether they speed a joint up or slow it down, each weighted by that bound
+    over its own.
+    """
+
+    def __init__(self, robot: Robot, limits: Mapping[str, Limits], rest: np.ndarray):
         every = [limits[name] for name in robot.joint_names]
         largest = np.array([[_or_infinite(getattr(x, field)) for x in every] for field in FIELDS[1:]])
+        faster = largest[ACCELERATION - 1].copy()
+        slower = np.array([_or_infinite(x.deceleration) for x in every])
+        given = np.isfinite(slower)
+        bound = np.where(np.isfinite(faster), faster, slower)
+        largest[ACCELERATION - 1], self.rest = bound, rest
+        self.speeding = np.where(given & ~np.isfinite(faster), 0.0, 1.0)
+        self.slowing = np.divide(bound, slower, out=np.ones(len(every)), where=given)
         self.upper = np.concatenate([[[_or_infinite(x.upper) for x in every]], largest])
         self.lower = np.concatenate([[[-_or_infinite(x.lower, -1.0) for x in every]], -largest])
         self.limited = np.isfinite(self.upper) | np.isfinite(self.lower)
@@ -257,8 +274,16 @@ class _Bounds:
         unit = np.where(np.isfinite(size) & (size > 0), size, 1.0)
         self.scale = np.where(np.isfinite(half) & (half > 0), half, unit)
 
+    def weights(self, values: np.ndarray) -> np.ndarray:
+        """Return by how much values of shape (..., 6, joints) count against the bounds."""
+        velocity, acceleration = values[..., 1, :], values[..., ACCELERATION, :]
+        slows = (velocity * acceleration < 0) & (np.abs(velocity) > self.rest)
+        found = np.ones_like(values)
+        found[..., ACCELERATION, :] = np.where(slows, self.slowing, self.speeding)
+        return found
+
     def sides(self, values: Any, at: Any = ...) -> tuple[Any, Any]:
-        """Return the ratios to the upper and to the lower bound, -inf where there is none."""
+        """Return the ratios of weighted values to the upper and to the lower bound, -inf where there is none."""
         upper, lower, scale = self.upper[at], self.lower[at], self.scale[at]
         return (values - upper + scale) / scale, (lower - values + scale) / scale
 
@@ -268,23 +293,25 @@ class _Bounds:
 
     def shares(self, values: np.ndarray) -> np.ndarray:
         """Return the ratios with the sign of the bound that is nearer, NaN where there is no limit."""
-        above, below = self.sides(values)
+        above, below = self.sides(values * self.weights(values))
         return np.where(self.limited, np.where(above >= below, np.maximum(above, 0), -np.maximum(below, 0)), np.nan)
 
 
 def _worst(
     curves: _Curves, bounds: _Bounds, grid: np.ndarray, values: np.ndarray, wanted: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the worst instant of each wanted curve and its value there.
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the worst instant of each wanted curve, its value there and the weight of that.
 
     Around the highest peaks on the grid, the best of a few instants becomes the middle of a shorter interval, again and
     again. A jump between two instants is found from the side on which the curve is worse.
     """
     at = tuple(wanted.T)
-    measures = bounds.measure(values)[:, *at]
+    weights = bounds.weights(values)
+    measures = bounds.measure(values * weights)[:, *at]
     every = np.arange(len(wanted))
     best = np.argmax(measures, axis=0)
-    times, sizes, found = grid[best], measures[best, every], values[best, *at]
+    times, sizes = grid[best], measures[best, every]
+    found, weight = values[best, *at], weights[best, *at]
     peaks = _peaks(measures)
     low, high = grid[np.maximum(peaks - 1, 0)], grid[np.minimum(peaks + 1, len(grid) - 1)]
     share = np.linspace(0.0, 1.0, POINTS)
@@ -292,18 +319,17 @@ def _worst(
     for _ in range(ROUNDS):
         around = low + share[:, None, None] * (high - low)
         there = curves(around.reshape(-1)).reshape(*around.shape, *values.shape[1:])
-        own = there[:, peak, curve, *at]
-        measured = bounds.measure(own, at)
+        own, weights = (x[:, peak, curve, *at] for x in (there, bounds.weights(there)))
+        measured = bounds.measure(own * weights, at)
         top = np.argmax(measured, axis=0)
         chosen = np.argmax(np.max(measured, axis=0), axis=0)  # of the peaks of each curve
         new = (top[chosen, every], chosen, every)
         better = measured[new] > sizes + 1e-12 * np.abs(sizes)  # else the instant on the grid, which has a round number
-        sizes, times, found = (
-            np.where(better, x[new], y) for x, y in ((measured, sizes), (around, times), (own, found))
-        )
+        pairs = ((measured, sizes), (around, times), (own, found), (weights, weight))
+        sizes, times, found, weight = (np.where(better, x[new], y) for x, y in pairs)
         low = np.take_along_axis(around, np.maximum(top - 1, 0)[None], axis=0)[0]
         high = np.take_along_axis(around, np.minimum(top + 1, POINTS - 1)[None], axis=0)[0]
-    return times, found
+    return times, found, weight
 
 
 def _peaks(measures: np.ndarray) -> np.ndarray:
@@ -317,15 +343,17 @@ def _peaks(measures: np.ndarray) -> np.ndarray:
     return np.where(usable, order, np.argmax(measures, axis=0))
 
 
-def _row(robot: Robot, bounds: _Bounds, quantity: int, joint: int, time: float, value: float) -> LimitRow:
+def _row(
+    robot: Robot, bounds: _Bounds, quantity: int, joint: int, time: float, value: float, weight: float
+) -> LimitRow:
     name = robot.joint_names[joint]
     turning = robot.joints[name].turning
     field, units = FIELDS[quantity], TURNING if turning else SLIDING
     word = field.replace("effort", "torque" if turning else "force").replace("_", " ")
     if not bounds.limited[quantity, joint]:
         return LimitRow(name, word, units[field], value, time)
-    above, below = (float(x) for x in bounds.sides(np.array(value), (quantity, joint)))
-    limit = (bounds.upper if above >= below else bounds.lower)[quantity, joint]
+    above, below = (float(x) for x in bounds.sides(np.array(value * weight), (quantity, joint)))
+    limit = (bounds.upper if above >= below else bounds.lower)[quantity, joint] / (weight or 1.0)
     return LimitRow(name, word, units[field], value, time, float(limit), max(above, below, 0.0))
 
 

@@ -55,7 +55,8 @@ def start(mechanism: Mechanism, instant: float) -> Start:
     Raises
     ------
     MechanismError
-        If a value is not valid, no body has a mass, or one that can move has none.
+        If a value is not valid, no body has a mass, one that can move has none, or a motion that is free would have
+        negative kinetic energy.
     AssemblyError
         If joints, drivers and initial conditions cannot all be fulfilled.
     MobilityError
@@ -165,5 +166,18 @@ def _explain(equations: Equations, model: Model, state: State, instant: float, m
     free = columns - rank
     if not free:
         return "no degree of freedom: all motion is prescribed"
+    _check_energy(model, whole[:columns, :columns], right[rank:])
     noun = "degree of freedom" if free == 1 else "degrees of freedom"
     return f"{free} {noun}: {freely_moving(model, right[rank:])}"
+
+
+def _check_energy(model: Model, mass: np.ndarray, free: np.ndarray) -> None:
+    """Refuse masses and moments by which a motion along the rows of `free` would have negative kinetic energy."""
+    values, motions = np.linalg.eigh(free @ mass @ free.T)
+    if values[0] >= -RANK_TOLERANCE * np.abs(values).max():
+        return
+    motion = (motions[:, 0] @ free).reshape(len(model.bodies), -1)
+    energies = np.einsum("bi,bibj,bj->b", motion, mass.reshape(*motion.shape, *motion.shape), motion)
+    name = model.bodies[int(np.argmin(energies))]
+    message = "the body can move so that its kinetic energy is negative; correct its mass and its moments of inertia"
+    raise MechanismError(message, name=f"bodies.{name}.inertia")

@@ -20,6 +20,7 @@ from jounce.integrate.simulate import checked, instants_of
 from jounce.integrate.simulation import expanded
 from jounce.kinematics import Status
 from jounce.mechanism import Mechanism, build, check_mechanism
+from jounce.mechanism.doors import concrete
 
 LANES = 64  # runs marched together: more fall out of the cache
 STEPS = 16  # tried before runs that have ended make room for others
@@ -51,6 +52,7 @@ class Batch:
     steps: np.ndarray
 
 
+@concrete
 def simulate_batch(
     mechanism: Mechanism,
     parameters: Mapping[str, Any],

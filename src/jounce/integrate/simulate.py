@@ -19,11 +19,13 @@ from jounce.kinematics import Status, raise_for_status
 from jounce.kinematics.motion import check_output, output_group
 from jounce.kinematics.solve import checked_order
 from jounce.mechanism import Mechanism, check_mechanism, time_grid
+from jounce.mechanism.doors import concrete
 
 STEPS = 64  # tried between two looks at progress and events
 TOLERANCES = (1e-17, 1e-2)  # below rounding there is still energy to be kept: what series leave out adds up
 
 
+@concrete
 def simulate(
     mechanism: Mechanism,
     time: Any = None,

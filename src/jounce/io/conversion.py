@@ -13,6 +13,7 @@ from typing import Any
 
 from jounce.dynamics import DriverForceOutput, DriverTorqueOutput
 from jounce.errors import JounceError, RobotError, did_you_mean
+from jounce.io.reading import named_file
 from jounce.io.source import read_source
 from jounce.io.units import parse_value
 from jounce.mechanism import Mechanism, TimeGrid
@@ -24,7 +25,9 @@ __all__ = ["assigned", "converted", "robot_mechanism", "with_file_names"]
 RESERVED = ("ground", "time", "derivative", "component")
 
 
-def converted(path: str | PathLike[str], target: str | PathLike[str]) -> dict[str, Any]:
+def converted(
+    path: str | PathLike[str], target: str | PathLike[str], allow: Iterable[str | PathLike[str]] = ()
+) -> tuple[dict[str, Any], dict[Path, str]]:
     """Return the data of a mechanism file, checked, values as they are written, for a file elsewhere.
 
     Parameters
@@ -33,6 +36,15 @@ def converted(path: str | PathLike[str], target: str | PathLike[str]) -> dict[st
         The file.
     target
         Where the data are to go: files of samples are named from there.
+    allow
+        Folders besides that of the file that files of samples may be below.
+
+    Returns
+    -------
+    data : dict
+        By the keys of the schema.
+    samples : dict of Path to str
+        Files of samples to be copied beside the target, since they do not lie below it, by where they are to go.
 
     Raises
     ------
@@ -41,26 +53,37 @@ def converted(path: str | PathLike[str], target: str | PathLike[str]) -> dict[st
 
     Examples
     --------
-    >>> converted("examples/four_bar.yaml", "four_bar.toml")["parameters"]["BC"]
+    >>> converted("examples/four_bar.yaml", "four_bar.toml")[0]["parameters"]["BC"]
     '14.23 cm'
     """
     from jounce.io.loader import load
 
-    load(path)
+    allow = tuple(allow)
+    load(path, allow=allow)
     data = copy.deepcopy(read_source(path).data)
     data = {key: value for key, value in data.items() if value is not None}
-    here, there = (Path(os.path.realpath(name)).parent for name in (path, target))
-    if here != there:
-        _move_samples(data, here, there)
-    return data
+    copies: dict[Path, str] = {}
+    if Path(os.path.realpath(path)).parent != Path(os.path.realpath(target)).parent:
+        _move_samples(data, path, Path(target).parent, allow, copies)
+    return data, copies
 
 
-def _move_samples(node: Any, here: Path, there: Path) -> None:
-    """Name files of samples from another folder."""
+def _move_samples(
+    node: Any, path: str | PathLike[str], there: Path, allow: Iterable[str | PathLike[str]], copies: dict[Path, str]
+) -> None:
+    """Name files of samples from another folder, and note those that have to go there."""
+    folders = [Path(os.path.realpath(folder)) for folder in (there, *allow)]
     for entry in node.values() if isinstance(node, dict) else node if isinstance(node, list) else ():
         if isinstance(entry, dict) and isinstance(entry.get("samples"), str):
-            entry["samples"] = Path(os.path.relpath(here / entry["samples"], there)).as_posix()
-        _move_samples(entry, here, there)
+            file = named_file(entry["samples"], path, allow)
+            if any(Path(file).is_relative_to(folder) for folder in folders):
+                entry["samples"] = Path(os.path.relpath(file, folders[0])).as_posix()
+            else:
+                beside = there / Path(file).name
+                while copies.setdefault(beside, file) != file:  # another of the same name
+                    beside = beside.with_name(f"{beside.stem}_{beside.suffix}")
+                entry["samples"] = beside.name
+        _move_samples(entry, path, there, allow, copies)
 
 
 def assigned(robot: Robot, assignments: Iterable[str], option: str, *, law: bool) -> dict[str, Any]:
@@ -151,6 +174,7 @@ def with_file_names(robot: Robot) -> tuple[Robot, dict[str, str]]:
             dataclasses.replace(given, name=held[given.name], links=[links[name] for name in given.links])
             for given in robot.closures.values()
         ],
+        robot.strict,
     )
     return made, changed
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from os import PathLike
-from pathlib import Path
 from typing import Any
 
 __all__ = ["json_schema", "write_json_schema"]
@@ -63,4 +62,7 @@ def _without_titles(node: Any) -> Any:
 
 def write_json_schema(path: str | PathLike[str]) -> None:
     """Write the JSON Schema of the types of this package to a file, as the documentation publishes it."""
-    Path(path).write_text(json.dumps(json_schema(own_types=False), indent=1) + "\n", encoding="utf-8")
+    from jounce.io.files import replacing
+
+    with replacing(path) as scratch:
+        scratch.write_text(json.dumps(json_schema(own_types=False), indent=1) + "\n", encoding="utf-8")

@@ -19,11 +19,11 @@ __all__ = ["load_limits"]
 
 KEYS = tuple(field.name for field in dataclasses.fields(Limits))
 RANGE = ("lower", "upper")
-POWERS = dict(zip(KEYS, (0, 0, 1, 2, 3, 2, 3), strict=True))
+POWERS = dict(zip(KEYS, (0, 0, 1, 2, 3, 2, 3, 2), strict=True))
 """Powers of 1/s in the units of each key."""
 EXAMPLES = {
-    True: ("rad", "rad", "rad/s", "rad/s^2", "rad/s^3", "N*m", "N*m/s"),
-    False: ("m", "m", "m/s", "m/s^2", "m/s^3", "N", "N/s"),
+    True: ("rad", "rad", "rad/s", "rad/s^2", "rad/s^3", "N*m", "N*m/s", "rad/s^2"),
+    False: ("m", "m", "m/s", "m/s^2", "m/s^3", "N", "N/s", "m/s^2"),
 }
 """Units of the keys for a joint that turns, and for one that slides."""
 
@@ -32,10 +32,10 @@ def load_limits(path: str | PathLike[str], robot: Robot) -> dict[str, Limits]:
     """Read limits of the joints of a robot from a file, in addition to those that it has or in their place.
 
     The file has the keys ``joints``, with an entry for each joint, and ``default``, for all joints; each entry has some
-    of the keys ``lower``, ``upper``, ``velocity``, ``acceleration``, ``jerk``, ``effort`` (torque or force) and
-    ``effort_rate``. A value is a number in SI units or a number with a unit; ``null`` takes a limit away. An entry of a
-    joint goes before ``default``, and that before the robot's own. A default with a unit of angle or torque is for the
-    joints that turn, one with a unit of length or force for those that slide.
+    of the keys ``lower``, ``upper``, ``velocity``, ``acceleration``, ``deceleration``, ``jerk``, ``effort`` (torque or
+    force) and ``effort_rate``. A value is a number in SI units or a number with a unit; ``null`` takes a limit away. An
+    entry of a joint goes before ``default``, and that before the robot's own. A default with a unit of angle or torque
+    is for the joints that turn, one with a unit of length or force for those that slide.
 
     Parameters
     ----------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -22,13 +23,15 @@ SPACES = {"planar": 2, "spatial": 3}
 ROLES = {"joints": "joint", "drivers": "driver", "forces": "force", "initial": "driver"}
 
 
-def load(path: str | PathLike[str]) -> Mechanism:
+def load(path: str | PathLike[str], *, allow: Iterable[str | PathLike[str]] = ()) -> Mechanism:
     """Read a mechanism from a YAML, TOML or JSON file.
 
     Parameters
     ----------
     path
         A file ending in .yaml, .yml, .toml or .json. Values in it are in SI units unless they say otherwise.
+    allow
+        Folders besides that of the file that files of samples may be below.
 
     Returns
     -------
@@ -48,7 +51,7 @@ def load(path: str | PathLike[str]) -> Mechanism:
     >>> list(mechanism.bodies)
     ['crank', 'rocker']
     """
-    source = read_source(path)
+    source = read_source(path, allow)
     space = _space(source)
     model = _validate(source, space)
     places: dict[str, tuple[Location, tuple[FileKey, ...]]] = {}
@@ -223,10 +226,12 @@ def _splines(source: Source, location: Location, value: Any) -> Any:
 def _spline(source: Source, location: Location, samples: Any) -> SplineMotion:
     from jounce.io.samples import read_samples
 
-    path = Path(source.path).parent / samples.samples
+    path = source.named_file(samples.samples, location)
     try:
         return SplineMotion(*read_samples(path, samples.time, samples.value), degree=samples.degree)
     except JounceError as error:
+        if error.path == path:  # as the user knows it
+            error.path = Path(source.path).parent / samples.samples
         raise source.error(str(error), location) from None
 
 

@@ -8,8 +8,9 @@ from dataclasses import dataclass, field
 from typing import Any
 from xml.parsers import expat
 
-from jounce.errors import MechanismFileError, RobotFileError, did_you_mean
-from jounce.io.source import dotted, read_bytes
+from jounce.errors import RobotFileError, did_you_mean
+from jounce.io.reading import read_file
+from jounce.io.source import dotted
 
 __all__ = ["Element", "read_markup"]
 
@@ -98,10 +99,7 @@ def read_markup(path: str) -> Element:
         The file cannot be read, is empty, or is not well-formed XML: the message has line and column, and what the
         parser says.
     """
-    try:
-        content = read_bytes(path)
-    except MechanismFileError as error:
-        raise RobotFileError(error.message, path=path) from None
+    content = read_file(path, error=RobotFileError)
     if not content.strip():
         raise RobotFileError("the file is empty", path=path)
     if b"\0" in content and not content.startswith((b"\xff\xfe", b"\xfe\xff")):

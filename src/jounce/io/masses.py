@@ -12,7 +12,7 @@ from pydantic_core import PydanticCustomError
 from jounce.errors import UNSET, MechanismError, RobotError, did_you_mean, show_value
 from jounce.io.values import Checked, below, parse, problem, scalar_schema, vector_schema, vector_value
 from jounce.mechanism.resolve import resolve
-from jounce.rigid.inertia import Inertia, check_solid
+from jounce.rigid.inertia import ADVICE, Inertia, check_solid
 from jounce.rigid.solids import SOLIDS, pseudo_parts, solid_moments
 from jounce.trajectory import Expression
 
@@ -225,10 +225,12 @@ def _from_pseudo(matrix: Any, parameters: dict[str, Any], *, planar: bool) -> di
     if planar:  # a lamina
         numbers = [[*row[:2], 0.0, row[2]] for row in (*numbers[:2], [0.0] * 3, numbers[2])]
     try:
-        Inertia.from_pseudo(numbers)
+        fault = Inertia.from_pseudo(numbers, strict=False).fault
     except RobotError as error:
         message = f"its mass {error.message}" if error.name == "mass" else error.message
         raise MechanismError(message, name="pseudo", value=error.value) from None
+    if fault:
+        raise MechanismError(f"{fault.words}; {ADVICE}", name="pseudo", value=fault.value)
     mass, center, second = pseudo_parts(_open(matrix))
     trace = second[0][0] + second[1][1] if planar else second[0][0] + second[1][1] + second[2][2]
     tensor = trace if planar else [[(trace if i == k else 0.0) - second[i][k] for k in range(3)] for i in range(3)]

@@ -5,18 +5,21 @@ from __future__ import annotations
 import dataclasses
 import importlib
 import re
-import warnings
+from collections.abc import Iterable
+from os import PathLike
 from typing import Any
 
 import numpy as np
 
-from jounce.errors import RobotError, RobotFileError
+from jounce.errors import JounceError, RobotError, RobotFileError
+from jounce.io.faults import Faults
 from jounce.io.markup import Element
+from jounce.io.mjcf_files import check_assets, included, quiet_mujoco
 from jounce.rigid.inertia import Inertia
 from jounce.robot.construct import floating_joints
-from jounce.robot.model import Closure, Joint, Limits, Link, Mimic
+from jounce.robot.model import Closure, Joint, Limits, Link, Mimic, leaders
 from jounce.robot.robot import Robot
-from jounce.robot.tree import turn_about
+from jounce.robot.tree import quaternion_matrix, turn_about
 
 __all__ = ["names_of_bodies", "read_mjcf"]
 
@@ -29,7 +32,7 @@ NUMERIC = {  # attributes whose numbers MuJoCo takes even when they are not fini
 }
 
 
-def read_mjcf(root: Element) -> Robot:
+def read_mjcf(root: Element, faults: Faults, allow: Iterable[str | PathLike[str]] = ()) -> Robot:
     """Return the robot that an MJCF file describes, as MuJoCo compiles it.
 
     The base is the link ``world``. Hinges and slides are taken with their anchors and reference positions: a coordinate
@@ -46,6 +49,10 @@ def read_mjcf(root: Element) -> Robot:
     ----------
     root : Element
         The element ``<mujoco>``; MuJoCo reads the file again itself.
+    faults : Faults
+        Takes what no real robot has.
+    allow
+        Folders besides that of the file that included files and meshes may be below.
 
     Raises
     ------
@@ -57,24 +64,26 @@ def read_mjcf(root: Element) -> Robot:
     except ImportError:
         message = 'reading MJCF files needs the package mujoco, which is not installed: pip install "jounce[mjcf]"'
         raise RobotFileError(message, path=root.path) from None
-    _check_numbers(root)
+    parts = [root, *included(root, allow)]
+    for part in parts:
+        _check_numbers(part)
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # they are about simulations
+        with quiet_mujoco(mujoco):
             spec = mujoco.MjSpec.from_file(root.path)
-            if spec.flexes:
-                raise RobotFileError("has deformable parts (flex), which no rigid body stands for", path=root.path)
             _strip(spec, mujoco)
+            check_assets(spec, parts, allow)
             model = spec.compile()
     except (ValueError, RuntimeError, OSError) as error:
         raise _refused(str(error), root) from None
-    return _Reader(root, mujoco, spec, model).robot()
+    return _Reader(root, mujoco, spec, model, faults).robot()
 
 
 def _check_numbers(root: Element) -> None:
-    """Refuse numbers that are not finite: MuJoCo takes some, and writes a log beside the user for others."""
+    """Refuse numbers that are not finite, some of which MuJoCo takes, and deformable parts, whose files it reads."""
     names = {element.attributes.get(key) for element in root.walk() for key in ("name", "class")}
     for element in root.walk():
+        if element.tag in ("flex", "flexcomp"):
+            raise element.error("has deformable parts (flex), which no rigid body stands for")
         numeric = NUMERIC.get(element.tag, ())
         for key, text in element.attributes.items():
             words = text.split()
@@ -140,8 +149,8 @@ def _weighs(shape: Any, compiler: Any) -> bool:
 class _Reader:
     """Turns a compiled model into links and joints."""
 
-    def __init__(self, root: Element, mujoco: Any, spec: Any, model: Any):
-        self.root, self.mujoco, self.spec, self.model = root, mujoco, spec, model
+    def __init__(self, root: Element, mujoco: Any, spec: Any, model: Any, faults: Faults):
+        self.root, self.mujoco, self.spec, self.model, self.faults = root, mujoco, spec, model, faults
         kinds = ("free", "ball", "hinge", "slide")
         self.kind = {name: int(getattr(mujoco.mjtJoint, f"mjJNT_{name.upper()}")) for name in kinds}
         self.bodies = names_of_bodies(model)
@@ -221,6 +230,7 @@ class _Reader:
                 slope = float(coefficients[1])
                 offset = float(start - slope * self._reference(second))
                 self.mimics[name] = Mimic(self.joint_names[second], slope, offset)
+        self.mimics = leaders(self.mimics)
 
     def _closure(self, k: Any, name: str) -> Closure:
         """Return a connect or weld: its anchors and its relative pose as MuJoCo holds them."""
@@ -228,11 +238,13 @@ class _Reader:
         weld = model.eq_type[k] == int(self.mujoco.mjtEq.mjEQ_WELD)
         numbers = (int(model.eq_obj1id[k]), int(model.eq_obj2id[k]))
         if model.eq_objtype[k] == int(self.mujoco.mjtObj.mjOBJ_SITE):
-            ends = [(int(model.site_bodyid[i]), model.site_pos[i], _matrix(model.site_quat[i])) for i in numbers]
+            ends = [
+                (int(model.site_bodyid[i]), model.site_pos[i], quaternion_matrix(model.site_quat[i])) for i in numbers
+            ]
             points, rotation = [position for _, position, _ in ends], ends[0][2] @ ends[1][2].T
             numbers = tuple(body for body, _, _ in ends)
         elif weld:  # the anchor is kept in the frame of the second body, and where it has to be in that of the first
-            points, rotation = [data[3:6], data[0:3]], _matrix(data[6:10])
+            points, rotation = [data[3:6], data[0:3]], quaternion_matrix(data[6:10])
         else:
             points, rotation = [data[0:3], data[3:6]], None
         turning = weld and data[10] != 0  # a weld without torque holds a point only
@@ -246,14 +258,18 @@ class _Reader:
         """Add the link of a body, the joints that move it, and the massless links between these."""
         model, name = self.model, self.bodies[k]
         inertia = None
-        if model.body_mass[k] > 0:
-            principal = Inertia(model.body_mass[k], tensor=model.body_inertia[k])
-            inertia = principal.moved(model.body_ipos[k], _matrix(model.body_iquat[k]))
+        if model.body_mass[k] > 0 or model.body_inertia[k].any():
+            try:
+                principal = Inertia(model.body_mass[k], tensor=model.body_inertia[k], strict=False)
+                inertia = principal.moved(model.body_ipos[k], quaternion_matrix(model.body_iquat[k]))
+            except JounceError as error:
+                raise self.error(error.message, f"links.{name}.{error.name}", value=error.value) from None
+            self.faults.check(principal, name, self.lines.get(f"links.{name}"))
         self.links.append(Link(name, inertia))
         if k == 0:
             return
         parent = self.bodies[model.body_parentid[k]]
-        position, rotation = np.array(model.body_pos[k]), _matrix(model.body_quat[k])
+        position, rotation = np.array(model.body_pos[k]), quaternion_matrix(model.body_quat[k])
         numbers = range(model.body_jntadr[k], model.body_jntadr[k] + model.body_jntnum[k])
         for j in numbers:
             anchor, last = np.array(model.jnt_pos[j]), j == numbers[-1]
@@ -359,14 +375,6 @@ def _names(given: list[str], kind: str) -> list[str]:
 def _line(info: str) -> int | None:
     found = re.search(r"line (\d+)", info)
     return None if found is None else int(found.group(1))
-
-
-def _matrix(quaternion: Any) -> np.ndarray:
-    """Return the rotation matrix of a unit quaternion, scalar first."""
-    w, x, y, z = (float(value) for value in quaternion)
-    vector = np.array([x, y, z])
-    across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return (w * w - vector @ vector) * np.eye(3) + 2 * np.outer(vector, vector) + 2 * w * across
 
 
 def _efforts(model: Any, mujoco: Any) -> dict[int, float]:

@@ -8,6 +8,7 @@ from os import PathLike, fspath
 from pathlib import Path
 
 from jounce.errors import JounceError, MechanismFileError
+from jounce.io.reading import read_file
 
 __all__ = ["import_file"]
 
@@ -28,8 +29,7 @@ def import_file(path: str | PathLike[str]) -> None:
     name = fspath(path)
     if not name.endswith(".py"):
         raise MechanismFileError("own joints come from a Python file, ending in .py", path=name)
-    if not Path(name).is_file():
-        raise MechanismFileError("file not found", path=name)
+    read_file(name)
     module_name = f"jounce_own_{Path(name).stem}"
     spec = importlib.util.spec_from_file_location(module_name, name)
     if spec is None or spec.loader is None:

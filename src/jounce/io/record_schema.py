@@ -92,7 +92,7 @@ def _mechanism() -> dict[str, Any]:
 
 def _robot() -> dict[str, Any]:
     link = {"name": TEXT, "moves_with": TEXT, "mass": _maybe(NUMBER), "center_of_mass": _maybe(NUMBERS)}
-    limits = ("lower", "upper", "velocity", "acceleration", "jerk", "effort", "effort_rate")
+    limits = ("lower", "upper", "velocity", "acceleration", "jerk", "effort", "effort_rate", "deceleration")
     joint = {
         **dict.fromkeys(("name", "type", "parent", "child"), TEXT),
         "axis": _maybe(NUMBERS),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import itertools
 import re
 from os import PathLike, fspath
@@ -13,6 +14,7 @@ import numpy as np
 
 from jounce.errors import OutputError
 from jounce.io.files import check_target, reason_of, replacing
+from jounce.io.reading import known_name, read_file, written_name
 
 __all__ = ["check_writable", "columns", "read", "write"]
 
@@ -20,28 +22,31 @@ SUFFIXES = (".csv", ".nc")
 COMPONENTS = ("x", "y", "z")
 
 
-def check_writable(path: str | PathLike[str]) -> None:
+def check_writable(path: str | PathLike[str], *, overwrite: bool = False) -> None:
     """Raise OutputError unless results can be written to a path; meant to be asked before a long computation.
 
     Parameters
     ----------
     path
         A file ending in .csv or .nc, in a folder that exists. A file there already is left as it is.
+    overwrite
+        Whether it may be a file that this process has read as an input.
 
     Raises
     ------
     OutputError
-        The ending is another, the folder does not exist, or nothing may be written there.
+        The ending is another, the folder does not exist, the file is an input, or nothing may be written there.
     """
-    check_target(path, SUFFIXES, "an output")
+    check_target(path, SUFFIXES, "an output", overwrite=overwrite)
 
 
-def write(dataset: Any, path: str | PathLike[str]) -> None:
+def write(dataset: Any, path: str | PathLike[str], *, overwrite: bool = False) -> None:
     """Write the dataset of a motion to a .csv or .nc file, whole or not at all.
 
     A CSV file has the columns ``time``, then for each output ``NAME, NAME_d1, NAME_d2, ...``, and for a vector
     ``NAME_x, NAME_x_d1, ..., NAME_y, ...``; numbers have 17 significant digits, so that they read back to the bit, and
-    a missing value is ``nan``. A NetCDF 4 file holds the dataset as it is, by the CF conventions.
+    a missing value is ``nan``. A name that spreadsheets would take for a formula, as ``=A1``, has an apostrophe in
+    front, which `read` takes away. A NetCDF 4 file holds the dataset as it is, by the CF conventions.
 
     Parameters
     ----------
@@ -49,11 +54,13 @@ def write(dataset: Any, path: str | PathLike[str]) -> None:
         With dimensions time, derivative and component, as ``Motion.dataset``.
     path
         The file; one of that name is replaced.
+    overwrite
+        Whether that may be a file which this process has read as an input, such as the samples of a motion law.
 
     Raises
     ------
     OutputError
-        The file cannot be written.
+        The file cannot be written, or is an input.
 
     Examples
     --------
@@ -66,8 +73,8 @@ def write(dataset: Any, path: str | PathLike[str]) -> None:
     ...     print(pathlib.Path(folder, "motion.csv").read_text().splitlines()[0])
     time,psi,psi_d1,C_x,C_x_d1,C_y,C_y_d1
     """
-    check_writable(path)
-    with replacing(path) as scratch:
+    check_writable(path, overwrite=overwrite)
+    with replacing(path, overwrite=overwrite) as scratch:
         if Path(fspath(path)).suffix.lower() == ".csv":
             _write_csv(dataset, scratch)
         else:
@@ -105,7 +112,7 @@ def _write_csv(dataset: Any, path: Path) -> None:
     rows = np.stack(list(table.values()), axis=1)
     line = ",".join(["%.17g"] * rows.shape[1]) + "\n"
     with path.open("w", newline="", encoding="utf-8") as stream:
-        csv.writer(stream, lineterminator="\n").writerow(table)
+        csv.writer(stream, lineterminator="\n").writerow(map(written_name, table))
         for start in range(0, len(rows), 1000):
             stream.writelines(line % tuple(row) for row in rows[start : start + 1000].tolist())
 
@@ -121,7 +128,8 @@ def _write_netcdf(dataset: Any, path: Path) -> None:
         named = named.assign_coords(time=named["time"].assign_attrs(usual | named["time"].attrs))
     for holder in (named, *(named[name] for name in named.variables)):
         holder.attrs = {key: _attribute(value) for key, value in holder.attrs.items() if value is not None}
-    named.to_netcdf(path, engine="h5netcdf", format="NETCDF4")
+    # HDF5 never closes a file on a full disk, says so on standard error, and may take the process with it
+    path.write_bytes(named.to_netcdf(engine="h5netcdf", format="NETCDF4"))
 
 
 def _attribute(value: Any) -> Any:
@@ -161,14 +169,13 @@ def read(path: str | PathLike[str]) -> Any:
     suffix = Path(name).suffix.lower()
     if suffix not in SUFFIXES:
         raise OutputError(f"the kind of results is told by the ending; valid: {', '.join(SUFFIXES)}", path=name)
+    content = read_file(name, None, error=OutputError, is_input=False)
     try:
         if suffix == ".nc":
-            return xarray.load_dataset(path, engine="h5netcdf")
-        with Path(name).open(newline="", encoding="utf-8") as stream:
-            header = next(csv.reader(stream), [])
-            rows = [[float(entry) for entry in row] for row in csv.reader(stream)]
-    except FileNotFoundError:
-        raise OutputError("file not found", path=name) from None
+            return xarray.load_dataset(io.BytesIO(content), engine="h5netcdf")
+        lines = csv.reader(io.StringIO(content.decode(), newline=""))
+        header = [known_name(entry) for entry in next(lines, [])]
+        rows = [[float(entry) for entry in row] for row in lines]
     except (OSError, ValueError, csv.Error) as error:
         raise OutputError(f"cannot be read: {reason_of(error)}", path=name) from None
     if header[:1] != ["time"] or not rows:

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from pathlib import Path
 
 from jounce.errors import MechanismFileError, did_you_mean
+from jounce.io.reading import read_rows
 
 __all__ = ["read_samples"]
-
-MAX_BYTES = 100_000_000
 
 
 def read_samples(
@@ -39,20 +37,7 @@ def read_samples(
         The file cannot be read, a column does not exist, or an entry is not a finite number.
     """
     name = str(path)
-    try:
-        size = Path(path).stat().st_size
-        if size > MAX_BYTES:
-            raise MechanismFileError(
-                f"the samples have {size / 1e6:.3g} MB, at most {MAX_BYTES / 1e6:.3g} MB are read", path=name
-            )
-        with Path(path).open(newline="", encoding="utf-8-sig") as stream:
-            reader = csv.reader(stream, strict=True)
-            rows = [(reader.line_num, [entry.strip() for entry in row]) for row in reader if row]
-    except FileNotFoundError:
-        raise MechanismFileError("file of samples not found", path=name) from None
-    except (OSError, csv.Error, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise MechanismFileError(f"the samples cannot be read: {reason}", path=name) from None
+    rows = [(line, row) for line, row in read_rows(path, MechanismFileError) if row]
     if not rows:
         raise MechanismFileError("the file of samples is empty", path=name)
     header = [f"column {k + 1}" for k in range(len(rows[0][1]))]
@@ -74,8 +59,8 @@ def _columns(path: str, header: list[str], time: str | None, value: str | None) 
     if value is not None:
         return first, _find(path, header, value)
     if len(header) != 2:
-        others = ", ".join(column for column in header if column != header[first])
-        message = f"has several columns besides the time, name that of the value; valid: {others}"
+        others = [column for column in header if column != header[first]]
+        message = f"has several columns besides the time, name that of the value; {did_you_mean('', others)}"
         raise MechanismFileError(message, path=path, line=1)
     return first, 1 - first
 

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import stat
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
 
-from jounce.errors import MechanismFileError, did_you_mean
+from jounce.errors import MechanismFileError
+from jounce.io.reading import check_allowed, named_file, read_file
 
-__all__ = ["Builder", "Location", "Source", "dotted", "read_bytes", "read_source"]
+__all__ = ["Builder", "Location", "Source", "dotted", "read_source"]
 
-MAX_BYTES = 10_000_000
 MAX_LINES = 200_000
 MAX_LINE_LENGTH = 100_000
 MAX_VALUES = 200_000
@@ -46,6 +46,7 @@ class Source:
     path: str
     data: Any
     lines: dict[Location, int] = field(default_factory=dict)
+    allow: tuple[str, ...] = ()
 
     def line(self, location: Location) -> int | None:
         """Return the line of an entry, or of the nearest entry around it whose line is known."""
@@ -59,6 +60,13 @@ class Source:
         return MechanismFileError(
             message, path=self.path, line=self.line(location), name=dotted(location) or None, **value
         )
+
+    def named_file(self, name: str, location: Location) -> str:
+        """Return the path of a file that an entry names, below the folder of this one or one that is allowed."""
+        try:
+            return named_file(name, self.path, self.allow)
+        except MechanismFileError as error:
+            raise self.error(error.message, location, value=name) from None
 
 
 class Builder:
@@ -147,49 +155,6 @@ class Builder:
             self._key = None
 
 
-def read_bytes(path: str) -> bytes:
-    """Read a regular file of at most 10 MB, or say why it cannot be.
-
-    Raises
-    ------
-    MechanismFileError
-        The file does not exist, is a directory or a device, is too large, or may not be read.
-    """
-    try:
-        status = Path(path).stat()
-        if stat.S_ISDIR(status.st_mode):
-            raise MechanismFileError("is a directory, a file is needed", path=path)
-        if not stat.S_ISREG(status.st_mode):
-            raise MechanismFileError("is not a regular file", path=path)
-        if status.st_size > MAX_BYTES:
-            raise _too_large(path, status.st_size)
-        with Path(path).open("rb") as stream:
-            content = stream.read(MAX_BYTES + 1)
-    except FileNotFoundError:
-        raise MechanismFileError(f"file not found{_nearby(path)}", path=path) from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise MechanismFileError(f"cannot be read: {reason}", path=path) from None
-    if len(content) > MAX_BYTES:
-        raise _too_large(path, len(content))
-    return content
-
-
-def _too_large(path: str, size: int) -> MechanismFileError:
-    return MechanismFileError(f"the file has {size / 1e6:.3g} MB, at most {MAX_BYTES / 1e6:.3g} MB are read", path=path)
-
-
-def _nearby(path: str) -> str:
-    """Suggest a file of nearly the same name in the same folder."""
-    wanted = Path(path)
-    try:
-        names = [entry.name for entry in wanted.parent.iterdir() if entry.suffix == wanted.suffix][:1000]
-    except (OSError, ValueError):
-        return ""
-    suggestion = did_you_mean(wanted.name, names, limit=0)
-    return f"; {suggestion}" if suggestion.startswith("did") else ""
-
-
 def _decode(path: str, content: bytes) -> str:
     """Decode UTF-8 text within the limits on lines; refuse anything that is not text."""
     try:
@@ -210,13 +175,15 @@ def _decode(path: str, content: bytes) -> str:
     return text
 
 
-def read_source(path: str | PathLike[str]) -> Source:
+def read_source(path: str | PathLike[str], allow: Iterable[str | PathLike[str]] = ()) -> Source:
     """Read a YAML, TOML or JSON file, chosen by its suffix, into plain data with line numbers.
 
     Parameters
     ----------
     path
         A file ending in .yaml, .yml, .toml or .json.
+    allow
+        Folders besides its own that files named in it may be below.
 
     Returns
     -------
@@ -240,4 +207,8 @@ def read_source(path: str | PathLike[str]) -> Source:
         raise MechanismFileError(
             f"the kind of a mechanism file is told by its ending; valid: {', '.join(SUFFIXES)}", path=name
         )
-    return reader(name, _decode(name, read_bytes(name)))
+    source = reader(name, _decode(name, read_file(name)))
+    if source.data is None and not source.lines:  # only comments
+        raise MechanismFileError("the file is empty", path=name)
+    source.allow = check_allowed(allow)
+    return source

@@ -52,7 +52,7 @@ STARTERS: dict[str, Starter] = {
 """The starter files by name."""
 
 
-def write_starter(name: str, path: str | PathLike[str], *, force: bool = False) -> Starter:
+def write_starter(name: str, path: str | PathLike[str], *, overwrite: bool = False) -> Starter:
     """Write a starter file.
 
     Parameters
@@ -61,7 +61,7 @@ def write_starter(name: str, path: str | PathLike[str], *, force: bool = False) 
         One of `STARTERS`.
     path
         A file ending in .yaml or .yml, with its comments, or in .toml or .json, without.
-    force : bool, default False
+    overwrite : bool, default False
         Whether a file that is there may be replaced.
 
     Raises
@@ -86,17 +86,17 @@ def write_starter(name: str, path: str | PathLike[str], *, force: bool = False) 
     if name not in STARTERS:
         raise JounceError(f"no starter has this name; {did_you_mean(name, STARTERS)}", value=name)
     starter, suffix = STARTERS[name], Path(path).suffix.lower()
-    check_target(path, SUFFIXES, "mechanism file")
-    refuse_existing(path, force=force)
+    check_target(path, SUFFIXES, "mechanism file", overwrite=overwrite)
+    refuse_existing(path, overwrite=overwrite)
     text = starter.text
     if suffix in (".toml", ".json"):
         text = dumped(read_yaml(name, text).data, suffix, str(path))
-    with replacing(path) as scratch:
+    with replacing(path, overwrite=overwrite) as scratch:
         scratch.write_text(text, encoding="utf-8")
     return starter
 
 
-def refuse_existing(path: str | PathLike[str], *, force: bool) -> None:
+def refuse_existing(path: str | PathLike[str], *, overwrite: bool) -> None:
     """Raise OutputError where a file is that must not be replaced."""
-    if not force and Path(path).exists():
-        raise OutputError("is there already; give another name, or replace it with --force", path=str(path))
+    if not overwrite and Path(path).exists():
+        raise OutputError("is there already; give another name, or replace it with --overwrite", path=str(path))

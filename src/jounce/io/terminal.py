@@ -5,10 +5,13 @@ from __future__ import annotations
 import math
 import sys
 import time
-from collections.abc import Mapping, Sequence
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from jounce.errors import RobotWarning, SampleWarning
 from jounce.io.peaks import Peak
 
 if TYPE_CHECKING:
@@ -25,6 +28,7 @@ __all__ = [
     "show_peaks",
     "show_rows",
     "unexpected",
+    "warnings_told",
 ]
 
 WIDTH = 80  # of tables that do not go to a terminal
@@ -226,6 +230,24 @@ def complain(error: object, *, json: bool = False) -> None:
 def caution(warning: object, *, json: bool = False) -> None:
     """Print a warning on standard error, in one line: of words, or of JSON."""
     _tell("warning", "bold yellow", warning, json)
+
+
+@contextmanager
+def warnings_told(json: bool = False) -> Iterator[None]:
+    """Print the warnings of this package as `caution` does, each time, instead of with their place in the code."""
+    with warnings.catch_warnings():
+        kinds, others = (RobotWarning, SampleWarning), warnings.showwarning
+        for kind in kinds:
+            warnings.simplefilter("always", kind)
+
+        def told(message: Any, category: type[Warning], *place: Any, **more: Any) -> None:
+            if issubclass(category, kinds):
+                caution(message, json=json)
+            else:
+                others(message, category, *place, **more)
+
+        warnings.showwarning = told
+        yield
 
 
 def _tell(kind: str, style: str, message: object, json: bool) -> None:

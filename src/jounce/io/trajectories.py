@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping
@@ -13,12 +12,12 @@ from typing import Any
 import numpy as np
 
 from jounce.errors import JounceError, MechanismFileError, TrajectoryError, did_you_mean
+from jounce.io.reading import known_name, read_rows
 from jounce.io.source import SUFFIXES, Location, Source, dotted, read_source
 from jounce.trajectory import Expression, ExpressionMotion, JointTrajectory
 
 __all__ = ["load_trajectory"]
 
-MAX_BYTES = 100_000_000
 _DERIVATIVE = re.compile(r"(.+)_d[0-9]+")
 
 
@@ -75,7 +74,7 @@ def load_trajectory(path: str | PathLike[str], degree: int = 5) -> JointTrajecto
 
 def _read_csv(path: str, degree: int) -> JointTrajectory:
     rows = _rows(path)
-    header_line, header = rows[0]
+    header_line, header = rows[0][0], [known_name(entry) for entry in rows[0][1]]
     columns = _columns(path, header_line, header)
     body = rows[1:]
     for line, row in body:
@@ -101,20 +100,7 @@ def _read_csv(path: str, degree: int) -> JointTrajectory:
 
 def _rows(path: str) -> list[tuple[int, list[str]]]:
     """Return the rows that are not blank, with their lines; the first one holds names."""
-    try:
-        size = Path(path).stat().st_size
-        if size > MAX_BYTES:
-            message = f"the samples have {size / 1e6:.3g} MB, at most {MAX_BYTES / 1e6:.3g} MB are read"
-            raise TrajectoryError(message, path=path)
-        with Path(path).open(newline="", encoding="utf-8-sig") as stream:
-            reader = csv.reader(stream, strict=True)
-            rows = [(reader.line_num, [entry.strip() for entry in row]) for row in reader]
-    except FileNotFoundError:
-        raise TrajectoryError("file of samples not found", path=path) from None
-    except (OSError, csv.Error, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise TrajectoryError(f"the samples cannot be read: {reason}", path=path) from None
-    rows = [(line, row) for line, row in rows if any(row)]
+    rows = [(line, row) for line, row in read_rows(path, TrajectoryError) if any(row)]
     if not rows:
         raise TrajectoryError("the file of samples is empty", path=path)
     return rows

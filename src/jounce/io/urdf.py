@@ -12,12 +12,13 @@ from xml.etree import ElementTree
 import numpy as np
 
 from jounce.errors import RobotError, RobotFileError, did_you_mean
+from jounce.io.faults import FOLLOWS_NONE, IDLE, MASSLESS, Faults
 from jounce.io.markup import Element
 from jounce.rigid.inertia import Inertia
 from jounce.robot.construct import floating_joints
-from jounce.robot.model import Joint, Limits, Link, Mimic
+from jounce.robot.model import Joint, Limits, Link, Mimic, leaders
 from jounce.robot.robot import Robot
-from jounce.robot.tree import axes_with_z_along, ordered
+from jounce.robot.tree import axes_with_z_along, ordered, quaternion_matrix
 
 __all__ = ["read_urdf"]
 
@@ -26,23 +27,27 @@ TYPES = ("continuous", "fixed", "prismatic", "revolute", *EXPANDED)
 LINK_PARTS = ("inertial", "visual", "collision", "contact", "material", "sensor")
 INERTIAL_PARTS = ("origin", "mass", "inertia")
 JOINT_PARTS = ("origin", "parent", "child", "axis", "limit", "dynamics", "mimic", "calibration", "safety_controller")
+SIZES = ("velocity", "acceleration", "deceleration", "jerk", "effort")
 TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
-def read_urdf(root: Element, massless: bool = False) -> Robot:
+def read_urdf(root: Element, faults: Faults, massless: bool = False) -> Robot:
     """Return the robot that a URDF file describes.
 
     Revolute, continuous, prismatic and fixed joints are taken as they are. A floating joint becomes three slides and
     three turns, a planar one two slides and a turn, all massless between; what the file says of their limits, damping
     and friction is left out, since it does not say to which of the coordinates it belongs. An ``<inertial>`` of zero
-    mass and zero inertia is a frame. Limits of velocity and effort that are zero are not given.
+    mass and zero inertia is a frame. Limits that are zero are not given, nor is a range from zero to zero. A joint that
+    follows one which itself follows another follows that one.
 
     Parameters
     ----------
     root : Element
         The element ``<robot>``.
+    faults : Faults
+        Takes what no real robot has.
     massless : bool, default False
-        Whether links that move may have no mass, as long as they carry some.
+        Whether links that move and have no mass, but carry some, are no fault.
 
     Returns
     -------
@@ -65,19 +70,20 @@ def read_urdf(root: Element, massless: bool = False) -> Robot:
         _check_joint(element, name, links)
         _add_joint_lines(lines, element, name)
     file = _parsed(root, links, joints)
-    made = [_link(link, links[link.name]) for link in file.links]
+    made = [_link(link, links[link.name], faults) for link in file.links]
     parts: list[Joint] = []
+    mimics = _mimics(file.joints, joints, faults)
     try:
         for joint in file.joints:
-            more, expanded = _joints(joint, joints[joint.name])
+            more, expanded = _joints(joint, joints[joint.name], mimics)
             made += more
             parts += expanded
             for part in expanded:
                 lines.add(joints[joint.name], "joints", part.name)
         ordered(_distinct("links", made, root), _distinct("joints", parts, root))
-        if not massless:
-            _check_masses(file.joints, links, {link.name: link for link in made})
-        return Robot(file.name, made, parts)
+        robot = Robot(file.name, made, parts, strict=False)
+        _check_masses(robot, file.joints, links, faults, massless)
+        return robot
     except RobotFileError:
         raise
     except RobotError as error:
@@ -142,8 +148,8 @@ def _check_link(element: Element, name: str) -> None:
     values = mass.numbers("value", 1, *where, "mass") or [0.0]
     for key in TENSOR:
         tensor.text(key, *where, "inertia", key)
-        values += tensor.numbers(key, 1, *where, "inertia", key) or []
-    if values[0] < 0 or (values[0] == 0 and any(values)):
+        tensor.numbers(key, 1, *where, "inertia", key)
+    if values[0] < 0:
         raise mass.error("must be greater than zero", *where, "mass", value=values[0])
 
 
@@ -160,6 +166,11 @@ def _check_origin(element: Element, *name: str) -> None:
     if origin is not None:
         for key in ("xyz", "rpy"):
             origin.numbers(key, 3, *name, "origin")
+        quaternion = origin.numbers("quat_xyzw", 4, *name, "origin")
+        if quaternion is not None and math.hypot(*quaternion) < 1e-9:
+            raise origin.error("quat_xyzw must not be zero", *name, "origin", value=quaternion)
+        if quaternion is not None and "rpy" in origin.attributes:
+            raise origin.error("has both rpy and quat_xyzw; leave one of them out", *name, "origin")
 
 
 def _check_joint(element: Element, name: str, links: dict[str, Element]) -> None:
@@ -192,7 +203,7 @@ def _check_joint(element: Element, name: str, links: dict[str, Element]) -> None
 def _check_drive(element: Element, *where: str) -> None:
     limit, dynamics = element.first("limit"), element.first("dynamics")
     if limit is not None:
-        for key in ("lower", "upper", "velocity", "effort"):
+        for key in ("lower", "upper", *SIZES):
             none = -math.inf if key == "lower" else math.inf
             if limit.numbers(key, 1, *where, "limit", key, infinite=True) not in (None, [none]):
                 limit.numbers(key, 1, *where, "limit", key)
@@ -243,27 +254,31 @@ def _copy(element: Element, target: ElementTree.Element, tags: tuple[str, ...]) 
             ElementTree.SubElement(target, tag, plain)
 
 
-def _pose(matrix: Any) -> tuple[np.ndarray, np.ndarray]:
+def _pose(matrix: Any, element: Element) -> tuple[np.ndarray, np.ndarray]:
+    """Return the pose of an ``<origin>``, whose quaternion of URDF 1.1 yourdfpy does not know."""
     matrix = np.eye(4) if matrix is None else matrix
-    return matrix[:3, 3], matrix[:3, :3]
+    origin = element.first("origin")
+    quaternion = None if origin is None else origin.numbers("quat_xyzw", 4)
+    if quaternion is None:
+        return matrix[:3, 3], matrix[:3, :3]
+    *vector, scalar = np.array(quaternion) / math.hypot(*quaternion)
+    return matrix[:3, 3], quaternion_matrix([scalar, *vector])
 
 
-def _link(link: Any, element: Element) -> Link:
+def _link(link: Any, element: Element, faults: Faults) -> Link:
     """Return a link; its inertia is turned from the axes of ``<inertial>`` to those of the link."""
-    given = link.inertial
-    if given is None or given.mass == 0:
+    given, inertial = link.inertial, element.first("inertial")
+    if given is None or inertial is None or (given.mass == 0 and not given.inertia.any()):
         return Link(link.name)
-    try:
-        return Link(link.name, Inertia(given.mass, tensor=given.inertia).moved(*_pose(given.origin)))
-    except RobotError as error:
-        inertial = element.first("inertial")
-        part = (inertial and inertial.first("inertia")) or element
-        raise part.error(error.message, "links", link.name, error.name or "inertia", value=error.value) from None
+    inertia = Inertia(given.mass, tensor=given.inertia, strict=False)
+    at = inertial.first("mass" if given.mass == 0 else "inertia") or inertial
+    faults.check(inertia, link.name, at.line)
+    return Link(link.name, inertia.moved(*_pose(given.origin, inertial)))
 
 
-def _joints(joint: Any, element: Element) -> tuple[list[Link], list[Joint]]:
+def _joints(joint: Any, element: Element, mimics: dict[str, Mimic]) -> tuple[list[Link], list[Joint]]:
     """Return a joint of the file, or those that it is expanded to and the massless links between them."""
-    position, rotation = _pose(joint.origin)
+    position, rotation = _pose(joint.origin, element)
     if joint.type == "floating":
         links, parts = floating_joints(joint.child, prefix=joint.name)
         first = dataclasses.replace(parts[0], parent=joint.parent, position=position, rotation=rotation)
@@ -273,12 +288,29 @@ def _joints(joint: Any, element: Element) -> tuple[list[Link], list[Joint]]:
     kept: dict[str, Any] = {"limits": _limits(joint, element)}
     if joint.type == "fixed":
         kept = {}
-    elif joint.mimic is not None:
-        kept["mimic"] = Mimic(joint.mimic.joint, joint.mimic.multiplier, joint.mimic.offset)
+    else:
+        kept["mimic"] = mimics.get(joint.name)
     if joint.dynamics is not None and joint.type != "fixed":  # these come as text
         kept["damping"], kept["friction"] = float(joint.dynamics.damping or 0), float(joint.dynamics.friction or 0)
     axis = {} if joint.type == "fixed" else {"axis": joint.axis}
     return [], [Joint(joint.name, joint.parent, joint.child, joint.type, position, rotation, **axis, **kept)]
+
+
+def _mimics(given: list[Any], joints: dict[str, Element], faults: Faults) -> dict[str, Mimic]:
+    """Return what joints follow; one that follows a joint which is not there is free, as in Pinocchio."""
+    leading = [joint.name for joint in given if joint.type not in ("fixed", *EXPANDED) and joint.mimic is None]
+    found = {}
+    for joint in given:
+        mimic, element = joint.mimic, joints[joint.name].first("mimic")
+        if mimic is None or element is None or joint.type == "fixed":
+            continue
+        if mimic.joint in joints:
+            found[joint.name] = Mimic(mimic.joint, mimic.multiplier, mimic.offset)
+            continue
+        message = f"must follow a moving joint that follows no other; {did_you_mean(mimic.joint, leading)}"
+        error = element.error(message, "joints", joint.name, "mimic", value=mimic.joint)
+        faults.add(FOLLOWS_NONE, joint.name, error)
+    return leaders(found)
 
 
 def _planar(joint: Any, position: np.ndarray, rotation: np.ndarray) -> tuple[list[Link], list[Joint]]:
@@ -295,41 +327,37 @@ def _planar(joint: Any, position: np.ndarray, rotation: np.ndarray) -> tuple[lis
 
 
 def _limits(joint: Any, element: Element) -> Limits:
-    given = joint.limit
-    if given is None:
+    limit = element.first("limit")
+    if limit is None:
         return Limits()
-    values = {key: getattr(given, key) for key in ("velocity", "effort")}
-    values = {key: None if value == 0 else value for key, value in values.items()}
-    if joint.type != "continuous":
-        values |= {"lower": given.lower, "upper": given.upper}
+    values = {key: (limit.numbers(key, 1, infinite=True) or [0.0])[0] for key in (*SIZES, "lower", "upper")}
+    given = {key: values[key] for key in SIZES if values[key] != 0}
+    if joint.type != "continuous" and (values["lower"], values["upper"]) != (0, 0):
+        given |= {key: values[key] for key in ("lower", "upper")}
     try:
-        return Limits(**{key: value for key, value in values.items() if value is not None and math.isfinite(value)})
+        return Limits(**{key: value for key, value in given.items() if math.isfinite(value)})
     except RobotError as error:
-        limit = element.first("limit") or element
         steps = ("joints", joint.name, "limit", *([error.name] if error.name else []))
         raise limit.error(error.message, *steps, value=error.value) from None
 
 
-def _check_masses(joints: list[Any], elements: dict[str, Element], links: dict[str, Link]) -> None:
-    """Every link that a joint of the file moves must have mass, with all that is fixed to it."""
-    fixed: dict[str, list[str]] = {}
+def _check_masses(robot: Robot, joints: list[Any], elements: dict[str, Element], faults: Faults, meant: bool) -> None:
+    """Note every link that a joint of the file moves and that has no mass, with all that is fixed to it."""
+    heavy = {robot.frames[name].body for name, link in robot.links.items() if link.inertia is not None}
+    idle = {robot.joints[name].child for name in robot.massless_joints}
     for joint in joints:
-        if joint.type == "fixed":
-            fixed.setdefault(joint.parent, []).append(joint.child)
-    for joint in joints:
-        if joint.type == "fixed":
+        link = joint.child
+        if joint.type == "fixed" or robot.frames[link].body in heavy or (meant and link not in idle):
             continue
-        together = [joint.child]
-        for name in together:  # grows while it is walked through
-            together += fixed.get(name, [])
-        if any(links[name].inertia is not None for name in together):
-            continue
-        element = elements[joint.child]
-        advice = "give it its mass, or load with massless=True to keep it as a massless piece between joints"
+        element = elements[link]
         inertial = element.first("inertial")
         mass = None if inertial is None else inertial.first("mass")
-        if mass is not None:
-            raise mass.error(
-                f"must be greater than zero on a link that moves; {advice}", "links", joint.child, "mass", value=0.0
-            )
-        raise element.error(f"<inertial> is missing on a link that moves; {advice}", "links", joint.child)
+        advice = "give it its mass, or load with massless=True to keep it as a massless piece between joints"
+        if link in idle:
+            advice = "give it, or a link that it carries, a mass"
+        if mass is None:
+            error = element.error(f"<inertial> is missing on a link that moves; {advice}", "links", link)
+        else:
+            message = f"must be greater than zero on a link that moves; {advice}"
+            error = mass.error(message, "links", link, "mass", value=0.0)
+        faults.add(IDLE if link in idle else MASSLESS, link, error)

@@ -28,7 +28,7 @@ ROLES = {"joints": "joint", "drivers": "driver", "forces": "force", "initial": "
 _WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 
-def write_mechanism(mechanism: Mechanism, path: str | PathLike[str]) -> None:
+def write_mechanism(mechanism: Mechanism, path: str | PathLike[str], *, overwrite: bool = False) -> None:
     """Write a mechanism to a YAML, TOML or JSON file that `load` reads.
 
     Values are written in SI units, expressions as they are. Splines through samples go to CSV files beside the file.
@@ -39,13 +39,15 @@ def write_mechanism(mechanism: Mechanism, path: str | PathLike[str]) -> None:
         Built in Python, read from a file, or made of a robot (`Robot.mechanism`).
     path
         A file ending in .yaml, .yml, .toml or .json; one that is there is replaced.
+    overwrite
+        Whether that file, or one of samples beside it, may be one that this process has read as an input.
 
     Raises
     ------
     MechanismError
         Something in the mechanism has no form in files, such as a Python function.
     OutputError
-        The file cannot be written.
+        The file cannot be written, or is an input; nothing is written then.
 
     Examples
     --------
@@ -60,14 +62,17 @@ def write_mechanism(mechanism: Mechanism, path: str | PathLike[str]) -> None:
     from jounce.io.files import check_target, replacing
     from jounce.io.formats import SUFFIXES, dumped
 
-    check_target(path, SUFFIXES, "mechanism file")
+    check_target(path, SUFFIXES, "mechanism file", overwrite=overwrite)
     data, samples = mechanism_data(mechanism, Path(path).stem)
     text = dumped(data, Path(path).suffix.lower(), str(path))
-    for name, (times, values) in samples.items():
+    tables = {Path(path).parent / name: columns for name, columns in samples.items()}
+    for beside in tables:  # all, before the first is replaced
+        check_target(beside, overwrite=overwrite)
+    for beside, (times, values) in tables.items():
         rows = "".join(f"{t!r},{x!r}\n" for t, x in zip(times, values, strict=True))
-        with replacing(Path(path).parent / name) as scratch:
+        with replacing(beside, overwrite=overwrite) as scratch:
             scratch.write_text(f"time,value\n{rows}", encoding="utf-8")
-    with replacing(path) as scratch:
+    with replacing(path, overwrite=overwrite) as scratch:
         scratch.write_text(text, encoding="utf-8")
 
 

@@ -25,9 +25,8 @@ SAFE_FRACTION = 0.4  # of the time in which some Taylor term would move a body b
 LARGEST_CONTRACTION = 0.25  # of the first simplified Newton corrections: Deuflhard 2011, section 5.1
 LARGEST_DEPARTURE = 0.05  # from a prediction, rad or sizes of the mechanism: beyond, a motion law jumps
 SMALLEST_DEPARTURE = 1e-6  # below this no prediction is called wrong
-POWER_STEPS = 4  # of the iteration that finds the largest eigenvalue: so many to forget the start, so many to measure
+SQUARINGS = 4  # of the matrix of which the largest eigenvalue is sought
 SINGULAR_PIVOT = 1e-8
-FIRST_REFINED_ORDER = 5  # above, derivatives of some bodies are 10^10 times those of others, and lend them their errors
 ROUNDING = 4e-15  # a correction this small (in rad, or in sizes of the mechanism) leaves the Jacobian as good as new
 
 
@@ -42,7 +41,7 @@ class Arrival(NamedTuple):
     radius: Any  # s, the same by the first four Taylor terms only, which rounding spoils least
     deviation: Any  # departure from the prediction, over how far that moves
     sign: Any  # of the determinant of the Jacobian
-    turnover: Any  # 1/s, how fast the Jacobian nears a singular one (below zero) or leaves it; 0 unless surveyed
+    turnover: Any  # 1/s, how fast the first lane nears a singular position (below zero) or leaves it; 0 unless surveyed
     pivot_ratio: Any  # smallest pivot of the Jacobian over the largest
     admissible: Any  # whether each driver has a permitted value, shape (drivers, batch)
     finite: Any  # whether all derivatives wanted are finite, of the pose and of each output, shape (1 + outputs, batch)
@@ -108,14 +107,10 @@ def differentiated(system: System, pose: Any, factor: DenseFactor, time: Jet) ->
     The coefficient of order k of the residual is affine in the unknown (r[k], w'[k-1] / k) with the Jacobian as its
     slope, so that it is found from the coefficient with the unknown set to zero.
     """
-    jacobian = system.jacobian(pose, time) if time.order >= FIRST_REFINED_ORDER else None
     for k in range(1, time.order + 1):
         trial = pose.extended(None, None)
         right = -system.residual(trial, time.truncate(k)).dense().coefficients[k]
-        solution = factor.solve(right)
-        if k >= FIRST_REFINED_ORDER:
-            solution += factor.solve(right - jnp.sum(jacobian * solution[None], axis=1))
-        pose = pose.extended(*system.coordinates(solution, pose.shifts))
+        pose = pose.extended(*system.coordinates(factor.solve(right), pose.shifts))
         pose = jax.lax.optimization_barrier(pose)  # or XLA computes it again in everything that uses it
     return pose
 
@@ -155,33 +150,29 @@ def _safe_step(terms: list[Any]) -> Any:
 
 
 def _turnover(system: System, pose_type: type, coordinates: dict[str, Jet], factor: DenseFactor, time: Any) -> Any:
-    """Return the eigenvalue of ``J^-1 J'`` of largest size with the sign of its real part, 1/s, shape (batch,).
+    """Return the eigenvalue of ``J^-1 J'`` of largest size with the sign of its real part, 1/s, for the first lane.
 
     To first order in a step s the determinant is ``det(J) det(1 + s J^-1 J')``: minus the inverse of that eigenvalue is
     the distance in time to its nearest zero, which may be complex. All zeros count, also those that leave the sign of
-    the determinant as it is, as two loops do that pass their dead points together. A power iteration finds it.
+    the determinant as it is, as two loops do that pass their dead points together. A power of the matrix finds it:
+    the root of its norm is never too small, and tends to the size of the eigenvalue.
     """
-    moving = {name: jet.truncate(1) for name, jet in coordinates.items()}
+    first = {name: jet.truncate(1).map(lambda c: c[..., :1]) for name, jet in coordinates.items()}
+    instant = time[:1]
 
     def jacobian(step: Any) -> Any:
-        return system.jacobian(pose_type.predicted_from(moving, step), Jet([(time + step)[None]]))
+        return system.jacobian(pose_type.predicted_from(first, step), Jet([(instant + step)[None]]))
 
-    still = jnp.zeros_like(time)
+    still = jnp.zeros_like(instant)
     _, slope = jax.jvp(jacobian, (still,), (jnp.ones_like(still),))
-
-    def apply(_: Any, state: Any) -> Any:
-        vector, _, grown = state
-        moved = factor.solve(jnp.sum(slope * vector[None], axis=1))
-        size = jnp.maximum(jnp.sqrt(jnp.sum(moved * moved, axis=0, keepdims=True)), 1e-300)
-        return moved / size, jnp.sum(moved * vector, axis=0), grown + jnp.log(size[0])
-
-    count = system.cells.shape[1]
-    generic = jnp.cos(jnp.arange(float(count)) ** 2 + 1.0)[:, None]  # no structure that a mechanism has
-    start = jnp.broadcast_to(generic / jnp.sqrt(jnp.sum(generic * generic)), (count, time.shape[0]))
-    middle = jax.lax.fori_loop(0, POWER_STEPS, apply, (start, still, still))
-    _, along, grown = jax.lax.fori_loop(0, POWER_STEPS, apply, middle)
-    size = jnp.exp(jnp.maximum((grown - middle[2]) / POWER_STEPS, grown / (2 * POWER_STEPS)))
-    return jnp.where(along < 0, -size, size)
+    inverse = jax.tree.map(lambda x: x[..., :1], factor).inverse()
+    relative = inverse[..., 0] @ slope[..., 0]
+    power, grown = relative, jnp.zeros(())
+    for k in range(1, SQUARINGS + 1):
+        size = jnp.maximum(jnp.sqrt(jnp.sum(power * power)), 1e-300)
+        power, grown = (power / size) @ (power / size), grown + jnp.log(size) / 2 ** (k - 1)
+    size = jnp.exp(grown + jnp.log(jnp.maximum(jnp.sqrt(jnp.sum(power * power)), 1e-300)) / 2**SQUARINGS)
+    return jnp.where(jnp.sum(power * relative.T) < 0, -size, size)[None]
 
 
 def _predictable(departure: Any, travel: Any) -> Any:
@@ -301,7 +292,7 @@ def advance(
     status = _status(correction.last, predictable, pivot_ratio, admitted, defined, tolerance)
     terms = _terms(system, reached, pose_type.predictor)
     turnover = jax.lax.cond(
-        survey, lambda: _turnover(system, pose_type, reached, factor, instant), lambda: jnp.zeros_like(instant)
+        survey, lambda: _turnover(system, pose_type, reached, factor, instant), lambda: jnp.zeros(1)
     )
     return Arrival(
         coordinates,

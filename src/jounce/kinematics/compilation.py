@@ -6,6 +6,8 @@ from typing import Any
 
 import jax
 
+from jounce.mechanism.doors import check_process
+
 
 @lru_cache(maxsize=1)
 def compiler_options() -> dict[str, Any] | None:
@@ -37,6 +39,7 @@ class Compiled:
 
     def __call__(self, *arguments: Any, **keywords: Any) -> Any:
         """Call the compiled function."""
+        check_process()
         return self.jitted(*arguments, **keywords)
 
 

@@ -26,7 +26,7 @@ PASSAGE_ORDER = 4  # of the series that leads through: rounding spoils higher de
 PASSAGE_DEVIATION = 1e-8  # from that series, as a part of the way: two branches a gap of g apart deviate by (g / way)^2
 NEARLY_SINGULAR = 1e-6  # of the span: a motion that ends so short before a singular position ends at it
 NEARBY = 0.1  # radii: a singular position nearer than this spoils high derivatives, if the motion is smooth there
-SMALL_BATCH, LARGE_BATCH = 64, 512  # lanes; a batch width compiles once, so a short grid uses one
+SMALL_BATCH, LARGE_BATCH = 16, 512  # lanes; a batch width compiles once, so a short grid uses one, and so do anchors
 
 
 @dataclasses.dataclass(frozen=True)

@@ -13,12 +13,14 @@ from jounce.kinematics.motion import Motion
 from jounce.kinematics.path import PASSABLE, Anchor, Solver, follow
 from jounce.kinematics.status import Status
 from jounce.mechanism import Mechanism, build, check_mechanism, time_grid
+from jounce.mechanism.doors import concrete
 
 LOWEST_ORDER = 4  # of the jets inside: predictions need some, also where the user wants positions only
 HIGHEST_ORDER = 30
 LARGEST_TOLERANCE = 1e-2
 
 
+@concrete
 def solve(
     mechanism: Mechanism,
     time: Any = None,

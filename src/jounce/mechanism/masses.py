@@ -9,7 +9,7 @@ from jax.core import Tracer
 from jounce.errors import JounceError, MechanismError, RobotError
 from jounce.mechanism.mechanism import Body
 from jounce.mechanism.resolve import check_value, resolve
-from jounce.rigid.inertia import Inertia
+from jounce.rigid.inertia import ADVICE, Inertia
 
 
 def body_mass(
@@ -55,9 +55,12 @@ def body_mass(
             raise MechanismError("must not be negative", name=f"{place}.{field}", value=float(value))
     if solid and components == 3 and not isinstance(inertia, Tracer):
         try:
-            inertia = Inertia(1.0, tensor=inertia).tensor
+            whole = Inertia(1.0, tensor=inertia, strict=False)
         except RobotError as error:
             raise MechanismError(error.message, name=f"{place}.inertia", value=error.value) from None
+        if fault := whole.fault:
+            raise MechanismError(f"{fault.words}; {ADVICE}", name=f"{place}.inertia", value=fault.value)
+        inertia = whole.tensor
     return mass, center, inertia
 
 

@@ -27,7 +27,7 @@ MOST_FRAMES = 3000
 RESOLUTION = 110  # dots per inch
 
 
-def check_animation(path: str | PathLike[str]) -> None:
+def check_animation(path: str | PathLike[str], *, overwrite: bool = False) -> None:
     """Raise OutputError unless an animation can be written to a path; meant to be asked before a long computation.
 
     Raises
@@ -35,7 +35,7 @@ def check_animation(path: str | PathLike[str]) -> None:
     OutputError
         The ending is not .gif or .mp4, the folder does not exist, or there is no ffmpeg, which .mp4 needs.
     """
-    check_target(path, ANIMATION_SUFFIXES, "an animation")
+    check_target(path, ANIMATION_SUFFIXES, "an animation", overwrite=overwrite)
     if Path(fspath(path)).suffix.lower() == ".mp4" and _ffmpeg() is None:
         message = 'an .mp4 needs ffmpeg, which is not there: pip install "jounce[viewer]", or write a .gif'
         raise OutputError(message, path=fspath(path))
@@ -111,6 +111,7 @@ def animate(
     order: int = 0,
     view: tuple[float, float] = (AZIMUTH, ELEVATION),
     progress: Callable[[int, int], None] | None = None,
+    overwrite: bool = False,
 ) -> None:
     """Write the moving sketch of a motion to a .gif or .mp4 file.
 
@@ -130,6 +131,8 @@ def animate(
         As for `sketch`.
     progress : callable, optional
         Called with the number of frames done and their total.
+    overwrite : bool, default False
+        Whether the film may replace a file that this process has read as an input.
 
     Raises
     ------
@@ -150,7 +153,7 @@ def animate(
 
     if names not in NAMES:
         raise MechanismError(f"unknown choice; {did_you_mean(names, NAMES)}", name="names", value=names)
-    check_animation(path)
+    check_animation(path, overwrite=overwrite)
     found = paths_of(motion, paths, order, view)
     solved = np.flatnonzero(np.asarray(motion.status) == 0)
     if not solved.size:
@@ -170,7 +173,7 @@ def animate(
         else films.FFMpegWriter(fps=fps, extra_args=["-pix_fmt", "yuv420p"])
     )
     program: dict[Any, Any] = {"animation.ffmpeg_path": _ffmpeg()} if kind == ".mp4" else {}
-    with style(), mpl.rc_context(program), replacing(path) as beside:
+    with style(), mpl.rc_context(program), replacing(path, overwrite=overwrite) as beside:
         drawing = Drawing(scene, found, mechanism.title, None if mechanism.space == "planar" else view)
         drawing.show(0)
         drawing.write_names(0, names, still=False)

@@ -154,7 +154,7 @@ def shade_unsolved(axes: Any, motion: Any) -> None:
         axes.axvspan(motion.time[begin], motion.time[end], color="#EEEEEE", linewidth=0, zorder=0)
 
 
-def check_figure(path: str | PathLike[str]) -> None:
+def check_figure(path: str | PathLike[str], *, overwrite: bool = False) -> None:
     """Raise OutputError unless a figure can be written to a path; meant to be asked before a long computation.
 
     Raises
@@ -162,10 +162,10 @@ def check_figure(path: str | PathLike[str]) -> None:
     OutputError
         The ending is not .png, .svg or .pdf, the folder does not exist, or nothing may be written there.
     """
-    check_target(path, SUFFIXES, "a figure")
+    check_target(path, SUFFIXES, "a figure", overwrite=overwrite)
 
 
-def save(figure: Any, path: str | PathLike[str]) -> None:
+def save(figure: Any, path: str | PathLike[str], *, overwrite: bool = False) -> None:
     """Write a figure to a .png, .svg or .pdf file.
 
     Raises
@@ -173,8 +173,8 @@ def save(figure: Any, path: str | PathLike[str]) -> None:
     OutputError
         It cannot be written.
     """
-    check_figure(path)
+    check_figure(path, overwrite=overwrite)
     metadata = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(Path(fspath(path)).suffix.lower())
-    with replacing(path) as beside, style(), warnings.catch_warnings():
+    with replacing(path, overwrite=overwrite) as beside, style(), warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing")  # names in other scripts get boxes
         figure.savefig(beside, dpi=RESOLUTION, metadata=metadata)

@@ -34,7 +34,7 @@ KINDS = {"joints": "joint", "drivers": "driver", "forces": "force", "initial": "
 SPEEDS = (0.001, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 100.0)
 
 
-def check_report(path: str | PathLike[str]) -> None:
+def check_report(path: str | PathLike[str], *, overwrite: bool = False) -> None:
     """Raise OutputError unless a report can be written to a path; meant to be asked before a long computation.
 
     Raises
@@ -42,7 +42,7 @@ def check_report(path: str | PathLike[str]) -> None:
     OutputError
         The ending is not .html, the folder does not exist, or nothing may be written there.
     """
-    check_target(path, (".html", ".htm"), "a report")
+    check_target(path, (".html", ".htm"), "a report", overwrite=overwrite)
 
 
 def report(
@@ -51,6 +51,7 @@ def report(
     *,
     view: tuple[float, float] = (AZIMUTH, ELEVATION),
     source: str = "",
+    overwrite: bool = False,
 ) -> None:
     """Write a page to explore a motion in: a moving sketch, plots of all outputs, peak values, and what was solved.
 
@@ -66,6 +67,8 @@ def report(
         Azimuth and elevation from which a spatial mechanism is seen, degrees.
     source : str, optional
         The file that the mechanism came from, for the foot of the page.
+    overwrite : bool, default False
+        Whether the page may replace a file that this process has read as an input.
 
     Raises
     ------
@@ -83,7 +86,7 @@ def report(
     >>> "Planar four-bar" in page.read_text(encoding="utf-8")
     True
     """
-    check_report(path)
+    check_report(path, overwrite=overwrite)
     data = json.dumps(_data(motion, view, source), allow_nan=False, separators=(",", ":"))
     parts = {
         "TITLE": html.escape(motion.mechanism.title or source or "Motion of a mechanism"),
@@ -94,7 +97,7 @@ def report(
     page = _part("report.html")
     for name, text in parts.items():
         page = page.replace(f"@{name}@", text, 1)
-    with replacing(path) as beside:
+    with replacing(path, overwrite=overwrite) as beside:
         beside.write_text(page, encoding="utf-8")
 
 

@@ -2,14 +2,25 @@
 
 import dataclasses
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from jounce.errors import RobotError, did_you_mean
 from jounce.rigid.solids import SOLIDS, pseudo_parts, solid_moments
 
-ROUNDING = 1e-5  # of the largest principal moment: what files with six digits may break the triangle inequality by
+ROUNDING = 1e-5  # of the largest principal moment: what files with six digits may miss a possible tensor by
+ADVICE = "check the units, the signs of the products of inertia and the axes"
+WITHOUT_MASS = "has moments of inertia but no mass"
+NEGATIVE = "has a negative principal moment"
+TRIANGLE = "breaks the triangle inequality: the largest principal moment exceeds the sum of the others"
+
+
+class Fault(NamedTuple):
+    """What is wrong with an inertia, in words, and the value that shows it."""
+
+    words: str
+    value: Any
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -25,12 +36,15 @@ class Inertia:
     tensor : array_like of shape (3, 3) or (3,), default zero
         Inertia about the centre of mass, in axes parallel to those of the body, kg m^2; three numbers are its
         diagonal. Zero is a point mass.
+    strict : bool, default True
+        Refuse what no real body has. Otherwise all is computed with the numbers as they are, and `fault` says what is
+        wrong with them; the mass may then be zero. What is missed by 1e-5 of the largest moment counts as rounding.
 
     Raises
     ------
     RobotError
-        If the mass is not greater than zero, a value is not finite, or the tensor is not symmetric, has a negative
-        principal moment, or one that exceeds the sum of the other two: no real body has such moments.
+        If the mass is negative, a value is not finite, or the tensor is not symmetric; if it is strict, also if the
+        mass is zero or the tensor has a negative principal moment, or one that exceeds the sum of the other two.
 
     Examples
     --------
@@ -43,27 +57,33 @@ class Inertia:
     mass: float
     center_of_mass: Any = (0.0, 0.0, 0.0)
     tensor: Any = (0.0, 0.0, 0.0)
+    strict: dataclasses.InitVar[bool] = True
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, strict: bool) -> None:
         for name, shapes in (("mass", ((),)), ("center_of_mass", ((3,),)), ("tensor", ((3, 3), (3,)))):
             object.__setattr__(self, name, finite_numbers(name, getattr(self, name), *shapes))
         object.__setattr__(self, "mass", float(self.mass))
         if self.tensor.shape == (3,):
             object.__setattr__(self, "tensor", unchanging(np.diag(self.tensor)))
-        if self.mass <= 0:
+        if self.mass < 0 or (strict and self.mass == 0):
             raise RobotError("must be greater than zero", name="mass", value=self.mass)
-        scale = float(np.abs(self.tensor).max())
-        if not np.allclose(self.tensor, self.tensor.T, rtol=0, atol=1e-9 * scale):
+        if not np.allclose(self.tensor, self.tensor.T, rtol=0, atol=1e-9 * float(np.abs(self.tensor).max())):
             raise RobotError("must be symmetric", name="inertia", value=self.tensor.tolist())
+        if strict and (found := self.fault):
+            message = f"{found.words}; {ADVICE}, or compute with the numbers as they are, by strict=False"
+            raise RobotError(message, name="inertia", value=found.value)
+
+    @property
+    def fault(self) -> "Fault | None":
+        """What is wrong with the mass and the tensor, as no real body has them; None where nothing is."""
         small, middle, large = (float(x) for x in np.linalg.eigvalsh(self.tensor))
-        if small < -1e-9 * scale:
-            raise RobotError("has a negative principal moment", name="inertia", value=small)
+        if not self.mass and self.tensor.any():
+            return Fault(WITHOUT_MASS, self.tensor.tolist())
+        if small < -ROUNDING * max(large, -small):
+            return Fault(NEGATIVE, small)
         if large - small - middle > ROUNDING * large:
-            message = (
-                "breaks the triangle inequality: the largest principal moment exceeds the sum of the others; check the "
-                "units, the signs of the products of inertia and the axes"
-            )
-            raise RobotError(message, name="inertia", value=[small, middle, large])
+            return Fault(TRIANGLE, [small, middle, large])
+        return None
 
     @property
     def about_origin(self) -> np.ndarray:
@@ -96,7 +116,7 @@ class Inertia:
         """
         position, rotation = np.asarray(position, float), np.asarray(rotation, float)
         tensor = rotation @ self.tensor @ rotation.T
-        return Inertia(self.mass, position + rotation @ self.center_of_mass, (tensor + tensor.T) / 2)
+        return Inertia(self.mass, position + rotation @ self.center_of_mass, (tensor + tensor.T) / 2, strict=False)
 
     @classmethod
     def solid(
@@ -144,13 +164,15 @@ class Inertia:
         return cls(mass, center_of_mass, np.array(moments, float) * mass)
 
     @classmethod
-    def from_pseudo(cls, pseudo: Any) -> "Inertia":
+    def from_pseudo(cls, pseudo: Any, strict: bool = True) -> "Inertia":
         """Return the inertia that a matrix of pseudo-inertia describes: the inverse of `pseudo_inertia`.
 
         Parameters
         ----------
         pseudo : array_like of shape (4, 4)
             Second moments about the origin of the frame, kg m^2, first moments, kg m, and mass, kg.
+        strict : bool, default True
+            Refuse what no real body has.
 
         Raises
         ------
@@ -173,7 +195,7 @@ class Inertia:
             mass, center, second = pseudo_parts(pseudo)
             moments = np.array(second)
             tensor = np.trace(moments) * np.eye(3) - (moments / 2 + moments.T / 2)
-        return cls(float(mass), center, tensor)
+        return cls(float(mass), center, tensor, strict)
 
     @classmethod
     def total(cls, parts: Iterable["Inertia"]) -> "Inertia":
@@ -188,12 +210,12 @@ class Inertia:
         if not parts:
             raise RobotError("the sum of inertias needs at least one", name="parts", value=parts)
         mass = sum(part.mass for part in parts)
-        center = sum(part.mass * part.center_of_mass for part in parts) / mass
+        center = sum(part.mass * part.center_of_mass for part in parts) / (mass or 1.0)
         tensor = np.zeros((3, 3))
         for part in parts:
             d = part.center_of_mass - center
             tensor += part.tensor + part.mass * (d @ d * np.eye(3) - np.outer(d, d))
-        return cls(mass, center, tensor)
+        return cls(mass, center, tensor, strict=False)
 
 
 def check_solid(kind: str, axis: str, given: dict[str, Any]) -> str:

@@ -12,6 +12,7 @@ from jax.core import Tracer
 
 from jounce.errors import RobotError
 from jounce.kinematics.compilation import compiler_options
+from jounce.mechanism.doors import check_process
 from jounce.robot.robot import Robot
 
 CHUNK = 128  # samples that are computed side by side
@@ -96,6 +97,7 @@ class Batched:
 
     def __call__(self, robot: Robot, arrays: tuple[Any, ...], constants: Any = (), static: tuple[Any, ...] = ()) -> Any:
         """Return results for arrays of derivatives, the first one of shape (batch..., order + 1, n)."""
+        check_process()
         lead = arrays[0].shape[:-2]
         axes, count = len(lead), math.prod(lead)
         if any(isinstance(x, Tracer) for x in jax.tree.leaves((arrays, constants))):

@@ -10,6 +10,7 @@ import numpy as np
 from jax.core import Tracer
 
 from jounce.errors import RobotError, SingularityError, did_you_mean
+from jounce.kinematics.linear import singular_values
 from jounce.rigid.inertia import finite_numbers
 from jounce.robot.batches import Batched, floats
 from jounce.robot.jacobian import jacobian_jet, twist
@@ -53,21 +54,20 @@ def _solved(tree: Tree, arrays: Any, constants: Any, rows: tuple[int, ...]) -> A
     def task_twist(q: Any) -> Any:
         return stacked(twist(tree, q, frame))[:, rows_]
 
-    matrix = jnp.moveaxis(jacobian_jet(tree, position, frame).coefficients[0][rows_], -1, 0)
-    u, s, v = jnp.linalg.svd(matrix, full_matrices=False)
-    limit = threshold * s[:, :1]
+    u, s, v = singular_values(jacobian_jet(tree, position, frame).coefficients[0][rows_])
+    limit = threshold * s[:1]
     near = s <= limit  # also where all are zero, and no motion is possible
     squares = jnp.where(near, damping**2 * (1 - (s / jnp.where(limit == 0, 1.0, limit)) ** 2), 0.0)
     inverse = jnp.where(near & (damping == 0), jnp.nan, s / jnp.where(squares + s == 0, 1.0, s**2 + squares))
     # the pseudo-inverse is made once, and serves all orders
-    pseudo = jnp.einsum("bji,bj,bkj->bik", v, inverse, u)
+    pseudo = jnp.sum(v[:, None] * (u * inverse[None])[None], axis=2)
     q = position
     for k in range(wanted.shape[0]):
         trial = jnp.concatenate([q, jnp.zeros_like(position)])
         missing = wanted[k] - task_twist(trial)[k]
-        q = jnp.concatenate([q, jnp.einsum("bik,kb->ib", pseudo, missing)[None] / (k + 1)])
+        q = jnp.concatenate([q, jnp.sum(pseudo * missing[None], axis=1)[None] / (k + 1)])
     residual = wanted - task_twist(q)
-    return q, jnp.swapaxes(s, 0, 1)[None], near.any(axis=1).astype(float)[None, None], residual
+    return q, s[None], near.any(axis=0).astype(float)[None, None], residual
 
 
 def joint_motion(

@@ -1,8 +1,9 @@
 """What a robot is made of: links, joints and limits, as a file or a script gives them; frozen and checked."""
 
 import dataclasses
+import math
 import numbers
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,9 @@ class Limits:
         Largest torque or force.
     effort_rate : float or None
         Largest rate of the torque or force.
+    deceleration : float or None
+        Largest absolute value of the acceleration while it slows the joint down, where it has the sign opposite to the
+        velocity; `acceleration` holds there too unless this is given.
     """
 
     lower: float | None = None
@@ -37,6 +41,7 @@ class Limits:
     jerk: float | None = None
     effort: float | None = None
     effort_rate: float | None = None
+    deceleration: float | None = None
 
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
@@ -80,6 +85,23 @@ class Mimic:
     def __post_init__(self) -> None:
         for field in ("multiplier", "offset"):
             object.__setattr__(self, field, float(finite_numbers(f"mimic.{field}", getattr(self, field), ())))
+
+
+def leaders(mimics: Mapping[str, Mimic]) -> dict[str, Mimic]:
+    """Return what joints follow, by name: those that follow a follower made to follow its leader.
+
+    Circles are left as they are, for the robot to refuse.
+    """
+    found = {}
+    for name, mimic in mimics.items():
+        passed = {name}
+        while mimic.joint in mimics and mimic.joint not in passed:
+            passed.add(mimic.joint)
+            leader = mimics[mimic.joint]
+            offset = mimic.multiplier * leader.offset + mimic.offset
+            mimic = Mimic(leader.joint, mimic.multiplier * leader.multiplier, offset)
+        found[name] = mimics[name] if mimic.joint in passed else mimic
+    return found
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -165,7 +187,7 @@ class Joint:
         for field, shape in (("position", (3,)), ("rotation", (3, 3)), ("axis", (3,))):
             object.__setattr__(self, field, finite_numbers(f"{where}.{field}", getattr(self, field), shape))
         rotation_matrix(f"{where}.rotation", self.rotation)
-        length = float(np.linalg.norm(self.axis))
+        length = math.hypot(*self.axis)
         if self.type != "fixed":
             if length < 1e-9:
                 raise RobotError("must have a direction", name=f"{where}.axis", value=self.axis.tolist())

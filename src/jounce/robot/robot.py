@@ -31,6 +31,9 @@ class Robot:
     closures : sequence of Closure, default none
         What closes loops of the tree. A robot that has some moves as a mechanism does (`mechanism`); the functions on
         coordinates refuse it, as its coordinates depend on one another, and take `opened` instead.
+    strict : bool, default True
+        Refuse joints that move no mass. Otherwise they are kept (`massless_joints`): inverse dynamics gives them no
+        torque, and a simulation in which they are free is refused, since nothing determines their acceleration.
 
     Attributes
     ----------
@@ -44,8 +47,8 @@ class Robot:
     Raises
     ------
     RobotError
-        If names repeat or lead nowhere, the joints form a loop or several trees, a moving link that ends a branch has
-        no mass, a joint follows one that cannot be followed, or a closure joins links that move as one.
+        If names repeat or lead nowhere, the joints form a loop or several trees, a joint moves no mass and the robot
+        is strict, a joint follows one that cannot be followed, or a closure joins links that move as one.
 
     Examples
     --------
@@ -65,8 +68,9 @@ class Robot:
         joints: Sequence[Joint],
         gravity: Any = (0.0, 0.0, -STANDARD_GRAVITY),
         closures: Sequence[Closure] = (),
+        strict: bool = True,
     ):
-        self.name = name
+        self.name, self.strict = name, strict
         self.gravity = finite_numbers("gravity", gravity, (3,))
         self.links: Mapping[str, Link] = MappingProxyType(_by_name("links", links, Link))
         in_order = ordered(self.links, _by_name("joints", joints, Joint))
@@ -77,6 +81,12 @@ class Robot:
         for joint in moving:
             self._check_mimic(joint)
         self._tree, self.frames = arrange(self)
+        if strict and (massless := self.massless_joints):
+            message = (
+                "this joint moves no mass; give its link, or one that it carries, an inertia, or keep it with "
+                "strict=False, where its torque is zero"
+            )
+            raise RobotError(message, name=f"links.{self.joints[massless[0]].child}.inertia", value=None)
         given = _by_name("closures", closures, Closure)
         placed = {name: self._checked_closure(closure) for name, closure in given.items()}
         self.closures: Mapping[str, Closure] = MappingProxyType(placed)
@@ -90,7 +100,8 @@ class Robot:
 
     def __reduce__(self) -> tuple[Any, ...]:
         closures = list(self.closures.values())
-        return Robot, (self.name, list(self.links.values()), list(self.joints.values()), self.gravity, closures)
+        parts = (list(self.links.values()), list(self.joints.values()))
+        return Robot, (self.name, *parts, self.gravity, closures, self.strict)
 
     def __repr__(self) -> str:
         count = len(self.joint_names)
@@ -121,6 +132,13 @@ class Robot:
         Links fixed to one of them move with it, and their mass is counted there.
         """
         return tuple(joint.child for joint in self.joints.values() if joint.moving)
+
+    @property
+    def massless_joints(self) -> tuple[str, ...]:
+        """Joints that move no mass, so that no force is needed for any motion of them."""
+        tree, moving = self._tree, [joint.name for joint in self.joints.values() if joint.moving]
+        moved = ((tree.mass > 0) | tree.inertia.any((1, 2))) @ tree.ancestors[:-1]
+        return tuple(name for name, some in zip(moving, moved, strict=True) if not some)
 
     @property
     def limits(self) -> dict[str, Limits]:
@@ -234,7 +252,7 @@ class Robot:
     def _changed(self, **parts: Any) -> "Robot":
         """Return the robot with other links, joints, gravity or closures."""
         held = {name: list(getattr(self, name).values()) for name in ("links", "joints", "closures")}
-        return Robot(**{"name": self.name, "gravity": self.gravity, **held, **parts})
+        return Robot(**{"name": self.name, "gravity": self.gravity, "strict": self.strict, **held, **parts})
 
     def _checked_closure(self, closure: Closure) -> Closure:
         """Return a closure with what it leaves to the pose at coordinates zero."""

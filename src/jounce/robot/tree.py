@@ -150,7 +150,6 @@ def arrange(robot: "Robot") -> tuple[Tree, dict[str, Frame]]:
         inertia = robot.links[joint.child].inertia
         if inertia is not None and body >= 0:
             masses[body].append(inertia.moved(position, rotation))
-    _check_masses(moving, parents, masses)
     whole = [Inertia.total(parts) if parts else None for parts in masses]
     slots, parent_slots, count = _slots(parents)
     bodies, order = len(moving), list(robot.joint_names)
@@ -203,21 +202,17 @@ def turn_about(axis: np.ndarray, angle: float) -> np.ndarray:
     return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
 
 
+def quaternion_matrix(quaternion: Any) -> np.ndarray:
+    """Return the rotation matrix of a unit quaternion, scalar first."""
+    w, x, y, z = (float(value) for value in quaternion)
+    vector = np.array([x, y, z])
+    across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return (w * w - vector @ vector) * np.eye(3) + 2 * np.outer(vector, vector) + 2 * w * across
+
+
 def _at_coordinates(values: list[float], weights: np.ndarray, coordinate: np.ndarray, count: int) -> np.ndarray:
     """Return what the drives of joints make together at each coordinate, by virtual work."""
     return np.bincount(coordinate, weights * values, count) if values else np.zeros(count)
-
-
-def _check_masses(moving: list[Joint], parents: list[int], masses: list[list[Inertia]]) -> None:
-    """Every joint must move some mass, or no force is needed for any motion of it."""
-    moves = [bool(parts) for parts in masses]
-    for k in reversed(range(len(moving))):
-        if moves[k] and parents[k] >= 0:
-            moves[parents[k]] = True
-    for joint, some in zip(moving, moves, strict=True):
-        if not some:
-            message = "this joint moves no mass; give its link, or one that it carries, an inertia"
-            raise RobotError(message, name=f"links.{joint.child}.inertia", value=None)
 
 
 def _slots(parents: list[int]) -> tuple[list[int], list[int], int]:

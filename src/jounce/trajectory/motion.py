@@ -139,7 +139,11 @@ class SplineMotion(AbstractMotion):
             raise MechanismError(f"a spline of degree {degree} needs at least {degree + 1} samples", value=len(times))
         from scipy.interpolate import PPoly, make_interp_spline  # here, since importing SciPy takes half a second
 
-        pieces = PPoly.from_spline(make_interp_spline(times, values, k=degree))
+        try:
+            pieces = PPoly.from_spline(make_interp_spline(times, values, k=degree))
+        except (np.linalg.LinAlgError, ValueError):
+            message = "no spline goes through the samples: their spacing is too uneven; sample evenly"
+            raise MechanismError(message, value=float(np.diff(times).min())) from None
         inside = np.diff(pieces.x) > 0
         self.breakpoints = pieces.x[:-1][inside]
         self.coefficients = pieces.c[::-1, inside]  # lowest power first

@@ -277,7 +277,11 @@ def _spline(knots: np.ndarray, values: np.ndarray, degree: int, conditions: _End
             raise TrajectoryError(f"{message}; give more, or conditions at the start and the end", value=len(knots))
         inside = knots[1 + first : len(knots) - 1 - last]
         bounds = [np.full(degree + 1, knot) for knot in (knots[0], knots[-1])]
-        spline = make_interp_spline(knots, values, k=degree, t=np.concatenate([bounds[0], inside, bounds[1]]))
+        try:
+            spline = make_interp_spline(knots, values, k=degree, t=np.concatenate([bounds[0], inside, bounds[1]]))
+        except (np.linalg.LinAlgError, ValueError):
+            message = "no spline goes through the samples: their spacing is too uneven; sample evenly"
+            raise TrajectoryError(message, value=float(np.diff(knots).min())) from None
     else:
         if not given:
             top = degree if ends == "natural" else 0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -23,7 +23,9 @@ REACH = {True: np.pi / 4, False: 0.1}  # of joints without limits, rad and m: ha
 TORQUES = ("torque", "yank", "second rate", "third rate", "fourth rate")
 
 
-def robot_subject(robot: Robot, trajectory: Any = None, path: Path | None = None) -> Any:
+def robot_subject(
+    robot: Robot, trajectory: Any = None, path: Path | None = None, allow: Iterable[str | PathLike[str]] = ()
+) -> Any:
     """Return a robot as what is looked at; one with closures moves as the mechanism that it is.
 
     Parameters
@@ -32,6 +34,8 @@ def robot_subject(robot: Robot, trajectory: Any = None, path: Path | None = None
     trajectory : JointTrajectory, path or None
     path : Path, optional
         The file of the robot, whose shapes are shown.
+    allow
+        Folders besides that of the file that meshes may be below.
 
     Raises
     ------
@@ -40,7 +44,7 @@ def robot_subject(robot: Robot, trajectory: Any = None, path: Path | None = None
     """
     from jounce.viewer.visuals import robot_looks
 
-    looks = robot_looks(robot, path)
+    looks = robot_looks(robot, path, allow)
     if isinstance(trajectory, str | PathLike):
         from jounce.io import load_trajectory
 

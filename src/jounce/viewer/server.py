@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterable
 from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
@@ -104,6 +105,7 @@ def view(
     order: int = 4,
     open_page: bool = True,
     playing: bool = True,
+    allow: Iterable[str | PathLike[str]] = (),
 ) -> View:
     """Show a mechanism or a robot in the browser: moving, with arrows, plots, forces and live parameters.
 
@@ -125,6 +127,8 @@ def view(
         Open the page in the browser of the user.
     playing : bool, default True
         Whether it moves at once.
+    allow
+        Folders besides that of the file that samples and meshes named in it may be below.
 
     Returns
     -------
@@ -144,7 +148,7 @@ def view(
     ...     page.url.startswith("http://127.0.0.1:")
     True
     """
-    found = View(subject_of(subject, trajectory), port=port, order=order, playing=playing)
+    found = View(subject_of(subject, trajectory, allow), port=port, order=order, playing=playing)
     if open_page:
         import webbrowser
 
@@ -152,7 +156,7 @@ def view(
     return found
 
 
-def subject_of(given: Any, trajectory: Any = None) -> Any:
+def subject_of(given: Any, trajectory: Any = None, allow: Iterable[str | PathLike[str]] = ()) -> Any:
     """Return what is to be looked at, from a mechanism, a robot or a file.
 
     Raises
@@ -171,13 +175,13 @@ def subject_of(given: Any, trajectory: Any = None) -> Any:
         if path.suffix.lower() in MECHANISM_FILES:
             from jounce.io import load
 
-            given = load(path)
+            given = load(path, allow=allow)
         else:
             from jounce.io import load_robot
 
-            given = load_robot(path)
+            given = load_robot(path, allow=allow)
     if isinstance(given, Robot):
-        return robot_subject(given, trajectory, path)
+        return robot_subject(given, trajectory, path, allow)
     if not isinstance(given, Mechanism):
         message = "must be a mechanism, a robot or the path of a file of one"
         raise JounceError(message, name="subject", value=type(given).__name__)

@@ -3,25 +3,28 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterable
 from contextlib import suppress
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from jounce.errors import RobotFileError
 from jounce.robot.parts import on_body
 from jounce.robot.robot import Robot
 from jounce.viewer.looks import BODIES, DARK, GREY, Looks, up_of
+from jounce.viewer.meshes import Meshes
 from jounce.viewer.solids import Solid, bar, box, cylinder, merged, sphere, turned_to
 from jounce.viewer.take import Spot
 
 __all__ = ["file_shapes", "robot_looks"]
 
-LARGEST = 400_000  # triangles of one mesh that a page can move smoothly
 PLAIN = (190, 195, 202)
 
 
-def robot_looks(robot: Robot, path: Path | None = None) -> Looks:
+def robot_looks(robot: Robot, path: Path | None = None, allow: Iterable[str | PathLike[str]] = ()) -> Looks:
     """Return what a robot looks like.
 
     Parameters
@@ -29,6 +32,8 @@ def robot_looks(robot: Robot, path: Path | None = None) -> Looks:
     robot : Robot
     path : Path, optional
         Its file; shapes in it are shown, and bars in the place of those that cannot be read.
+    allow
+        Folders besides that of the file that meshes may be below.
 
     Examples
     --------
@@ -41,7 +46,7 @@ def robot_looks(robot: Robot, path: Path | None = None) -> Looks:
     links = (robot.base, *robot.moving_links)
     size = _size(robot)
     colours = {link: BODIES[k % len(BODIES)] for k, link in enumerate(robot.moving_links)} | {robot.base: DARK}
-    shapes = file_shapes(path) if path is not None else {}
+    shapes = file_shapes(path, allow) if path is not None else {}
     found: dict[str, list[Solid]] = {link: [] for link in links}
     for link, solids in shapes.items():
         if link in robot.frames:
@@ -131,21 +136,23 @@ def _spots(robot: Robot) -> tuple[Spot, ...]:
     return tuple(found)
 
 
-def file_shapes(path: Path) -> dict[str, list[Solid]]:
+def file_shapes(path: Path, allow: Iterable[str | PathLike[str]] = ()) -> dict[str, list[Solid]]:
     """Return the shapes of a robot file by link, in its frame; none where they cannot be read.
 
     Parameters
     ----------
     path : Path
         URDF or MJCF.
+    allow
+        Folders besides that of the file that meshes may be below; a warning tells of those that lie elsewhere.
     """
     from jounce.io.markup import read_markup
 
     root = read_markup(str(path))
-    return _of_urdf(root, path) if root.tag == "robot" else _of_mjcf(root, path)
+    return _of_urdf(root, Meshes(path, allow)) if root.tag == "robot" else _of_mjcf(root, path, allow)
 
 
-def _of_urdf(root: Any, path: Path) -> dict[str, list[Solid]]:
+def _of_urdf(root: Any, meshes: Meshes) -> dict[str, list[Solid]]:
     """Return what the elements ``<visual>`` show."""
     materials = {}
     for material in root.every("material"):
@@ -156,12 +163,12 @@ def _of_urdf(root: Any, path: Path) -> dict[str, list[Solid]]:
         solids = []
         for visual in link.every("visual"):
             with suppress(KeyError, ValueError):  # words where numbers should be: a bar is shown instead
-                solids += _visual(visual, materials, path)
+                solids += _visual(visual, materials, meshes)
         found[link.attributes["name"]] = solids
     return found
 
 
-def _visual(visual: Any, materials: Any, path: Path) -> list[Solid]:
+def _visual(visual: Any, materials: Any, meshes: Meshes) -> list[Solid]:
     geometry = visual.first("geometry")
     shape = geometry.children[0] if geometry is not None and geometry.children else None
     if shape is None:
@@ -171,7 +178,7 @@ def _visual(visual: Any, materials: Any, path: Path) -> list[Solid]:
     position, rotation = _origin(visual.first("origin"))
     return [
         _coloured(vertices @ rotation.T + position, faces, rgba if rgba is not None else colour)
-        for vertices, faces, colour in _shape(shape, path)
+        for vertices, faces, colour in _shape(shape, meshes)
     ]
 
 
@@ -196,7 +203,7 @@ def _origin(element: Any) -> tuple[np.ndarray, np.ndarray]:
     return position, Rotation.from_euler("xyz", angles).as_matrix()
 
 
-def _shape(shape: Any, path: Path) -> list[tuple[np.ndarray, np.ndarray, Any]]:
+def _shape(shape: Any, meshes: Meshes) -> list[tuple[np.ndarray, np.ndarray, Any]]:
     """Return the triangles of a shape of a URDF, with a colour where a mesh brings its own."""
     given = shape.attributes
     if shape.tag == "box":
@@ -209,62 +216,31 @@ def _shape(shape: Any, path: Path) -> list[tuple[np.ndarray, np.ndarray, Any]]:
         half = 0.5 * float(given["length"])
         return [(*bar([0, 0, -half], [0, 0, half], float(given["radius"])), None)]
     if shape.tag == "mesh":
-        file = _mesh_file(given.get("filename", ""), path)
         scale = np.array([float(x) for x in given.get("scale", "1 1 1").split()])
-        return [(v * scale, f, c) for v, f, c in _mesh(file)] if file is not None else []
+        return [(v * scale, f, c) for v, f, c in meshes.triangles(given.get("filename", ""))]
     return []
 
 
-def _mesh_file(name: str, path: Path) -> Path | None:
-    """Return the file of a mesh: beside the robot, or in the folder of its package somewhere above."""
-    scheme, _, rest = name.rpartition("://")
-    if scheme == "file":
-        return Path(rest) if Path(rest).is_file() else None
-    candidates = [path.parent / rest]
-    for folder in path.resolve().parents:
-        candidates += [folder / rest, folder / rest.partition("/")[2]]
-    return next((file for file in candidates if rest and file.is_file()), None)
-
-
-def _mesh(file: Path) -> list[tuple[np.ndarray, np.ndarray, Any]]:
-    """Return the triangles of a mesh file with their colours; none where it cannot be read."""
-    import trimesh
-
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            scene = trimesh.load_scene(file)
-            parts = scene.dump()
-    except Exception:  # noqa: BLE001 - readers of meshes fail in ways of their own; bars are shown instead
-        return []
-    found = []
-    for part in parts:
-        if isinstance(part, trimesh.Trimesh) and 0 < len(part.faces) <= LARGEST:
-            try:
-                visual: Any = part.visual
-                rgba = np.asarray(visual.to_color().main_color if visual.defined else None, float) / 255
-            except (AttributeError, TypeError, ValueError):
-                rgba = None
-            rgba = rgba if rgba is not None and rgba.shape == (4,) and np.isfinite(rgba).all() else None
-            found.append((np.asarray(part.vertices), np.asarray(part.faces), rgba))
-    return found
-
-
-def _of_mjcf(root: Any, path: Path) -> dict[str, list[Solid]]:
+def _of_mjcf(root: Any, path: Path, allow: Iterable[str | PathLike[str]]) -> dict[str, list[Solid]]:
     """Return the geoms that MuJoCo shows: groups 0 to 2."""
     import importlib
 
     from jounce.io.mjcf import names_of_bodies
+    from jounce.io.mjcf_files import check_assets, included, quiet_mujoco
 
     mujoco: Any = importlib.import_module("mujoco")
     if not any(element.tag == "geom" for element in root.walk()):
         return {}
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
+        parts = [root, *included(root, allow)]
+        with quiet_mujoco(mujoco):
             spec = mujoco.MjSpec.from_file(str(path))
+            check_assets(spec, parts, allow)
             spec.compiler.fusestatic = False
             model = spec.compile()
+    except RobotFileError as error:
+        warnings.warn(f"the shapes are not shown: {error}", stacklevel=2)
+        return {}
     except (ValueError, RuntimeError, OSError):  # a mesh is missing: the robot itself could be read without
         return {}
     names, found = names_of_bodies(model), {}

@@ -1,0 +1,86 @@
+"""What a computation cannot start from, told at its door: values that JAX traces, a fork of a process that used JAX."""
+
+import dataclasses
+import functools
+import inspect
+import os
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, ParamSpec, TypeVar
+
+import jax
+from jax.core import Tracer
+
+from jounce.errors import UnsupportedError
+
+P = ParamSpec("P")
+R = TypeVar("R")
+_left_behind = False  # whether the threads of XLA stayed in the process that this one was forked from
+
+
+def _after_fork() -> None:
+    global _left_behind
+    from jax._src import xla_bridge
+
+    started = getattr(xla_bridge, "backends_are_initialized", lambda: True)  # private to JAX: if unknown, the worst
+    _left_behind = _left_behind or started()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_after_fork)
+
+
+def check_process() -> None:
+    """Raise UnsupportedError in a process that was forked after JAX had started: it would wait for ever.
+
+    XLA computes in threads, and a fork has none of them, only the locks that they held.
+    """
+    if _left_behind:
+        raise UnsupportedError(
+            "this process was forked from one in which JAX had already computed, and would wait for ever for threads "
+            "that are not here; start processes by 'spawn' or 'forkserver' (multiprocessing.get_context), or fork "
+            "before the first computation"
+        )
+
+
+def concrete(function: Callable[P, R]) -> Callable[P, R]:
+    """Make a function that decides by values refuse what JAX traces, and a fork of a process that used JAX.
+
+    Within `jax.jit` it computes at once, since nothing it gets depends on what is traced: the result is a constant.
+
+    Raises
+    ------
+    UnsupportedError
+        If an argument holds a value that `jax.jit`, `jax.grad` or `jax.vmap` traces.
+    """
+    names = tuple(inspect.signature(function).parameters)
+
+    @functools.wraps(function)
+    def door(*arguments: P.args, **keywords: P.kwargs) -> R:
+        check_process()
+        given = dict(zip(names, arguments, strict=False)) | keywords
+        for place in _traced(given, ""):
+            raise UnsupportedError(
+                f"jn.{function.__name__} decides by values, and cannot yet be used with values that jax.jit, jax.grad "
+                "or jax.vmap trace; call it with numbers, one design after another",
+                name=place,
+            )
+        with jax.ensure_compile_time_eval():
+            return function(*arguments, **keywords)
+
+    return door
+
+
+def _traced(value: Any, place: str) -> Iterator[str]:
+    """Yield the dotted names of values that JAX traces."""
+    if isinstance(value, Tracer):
+        yield place
+    elif isinstance(value, Mapping):
+        for key, entry in value.items():
+            yield from _traced(entry, f"{place}.{key}".lstrip("."))
+    elif isinstance(value, (list, tuple)):
+        for k, entry in enumerate(value):
+            if not isinstance(entry, (int, float, str)):
+                yield from _traced(entry, f"{place}[{k}]")
+    elif dataclasses.is_dataclass(value):
+        for field in dataclasses.fields(value):
+            yield from _traced(getattr(value, field.name, None), f"{place}.{field.name}".lstrip("."))

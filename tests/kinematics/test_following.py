@@ -1,0 +1,166 @@
+"""Staying on the branch: near misses, dead points, change points, laws that jump, outputs without a value."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jounce as jn
+from jounce import drivers, planar
+from jounce.jet import Jet
+from jounce.kinematics import Status
+from jounce.kinematics.advance import _status
+from jounce.kinematics.assembly import assemble
+from jounce.kinematics.linear import DenseFactor
+from jounce.kinematics.path import Solver
+from jounce.mechanism import build
+from tests.problems.small import crank, distance_slider, four_bar, slider_crank
+
+NEAR_MISS = {"a": 0.8, "b": 1.0, "e": 0.8 - np.sqrt(1 - 0.03**2)}  # comes within 1.7 degrees of its dead point
+
+
+def twin_slider_cranks(law="6*t"):
+    """Two slider-cranks alike on one crank: near their dead points both determinants change sign together."""
+    a, b, e = NEAR_MISS.values()
+    guide = {"vector_i": [1, 0], "vector_j": [1, 0], "point_i": [0, "e"], "point_j": [0, 0]}
+    names = ("one", "two")
+    return jn.Mechanism(
+        space="planar",
+        parameters=NEAR_MISS,
+        bodies={"crank": jn.Body([0, 0])} | {n: jn.Body([a + np.sqrt(b * b - e * e), "e"]) for n in names},
+        joints={"O": planar.Revolute(("ground", "crank"), [0, 0], [0, 0])}
+        | {f"rod_{n}": planar.DoubleRevolute(("crank", n), ["a", 0], [0, 0], "b") for n in names}
+        | {f"guide_{n}": planar.Prismatic(("ground", n), **guide) for n in names},
+        drivers={"turn": drivers.CoordinateDriver(("ground", "crank"), "angle", law)},
+        outputs={n: jn.PointOutput(n, [0, 0]) for n in names},
+    )
+
+
+@pytest.mark.parametrize("count", [31, 301])
+def test_two_loops_that_miss_their_dead_points_together(count):
+    """The determinant of the whole would change its sign twice at once, if both went over to the other branch."""
+    time = np.linspace(0, 1, count)
+    motion = jn.solve(twin_slider_cranks(), time, order=0)
+    a, b, e = NEAR_MISS.values()
+    expected = a * np.cos(6 * time) + np.sqrt(b * b - (a * np.sin(6 * time) - e) ** 2)
+    for name in ("one", "two"):
+        np.testing.assert_allclose(motion.outputs[name][:, 0, 0], expected, rtol=0, atol=1e-13)
+    assert not motion.change_points.size
+
+
+def turnover_of(mechanism, instant):
+    """What `advance` finds for a solved instant, and all eigenvalues of J^-1 J' by differences, from NumPy."""
+    model, coordinates = assemble(build(mechanism), instant, 1e-12)
+    solver = Solver(model, 4, 1e-12)
+    known = {name: np.stack([x, *[np.zeros_like(x)] * 4]) for name, x in coordinates.items()}
+    angles = tuple(np.zeros((5, 1, group.instances, 1)) for group in model.system.outputs)
+    arrival = solver((known, angles, np.zeros(1)), np.zeros(1), np.array([instant]), survey=True)
+    jets = {name: Jet(tuple(map(jnp.asarray, c))) for name, c in arrival.coordinates.items()}
+
+    def jacobian(step):
+        pose = model.pose_type.predicted_from(jets, jnp.array([step]))
+        return np.asarray(model.system.jacobian(pose, Jet([jnp.array([[instant + step]])])))[:, :, 0]
+
+    step = 1e-5
+    slope = (jacobian(step) - jacobian(-step)) / (2 * step)
+    return float(arrival.turnover[0]), np.linalg.eigvals(np.linalg.solve(jacobian(0.0), slope))
+
+
+@pytest.mark.parametrize("instant", [2.0, 3.0, 3.5])
+def test_turnover_is_the_largest_eigenvalue(instant):
+    mechanism = four_bar("t0", "t0", "t", AB=0.1, CD=0.1, AD=0.2, BC=0.2, t0=instant)
+    found, eigenvalues = turnover_of(mechanism, instant)
+    largest = eigenvalues[np.argmax(np.abs(eigenvalues))]
+    assert np.abs(largest) <= abs(found) * (1 + 1e-6)
+    assert abs(found) < 1.4 * np.abs(largest)
+    assert np.sign(found) == np.sign(largest.real)
+    assert np.sign(found) == np.sign(instant - np.pi)  # a change point is ahead, or behind
+
+
+PARALLELOGRAM = four_bar("0.5", "0.5", "t", AB=0.1, CD=0.1, AD=0.2, BC=0.2)
+
+
+@pytest.mark.parametrize("order, tolerance", [(0, [1e-14]), (4, [1e-14, 1e-13, 1e-11, 1e-9, 1e-7])])
+def test_change_point_is_passed_at_any_instant_and_told(order, tolerance):
+    time = np.sort(np.r_[np.linspace(0.5, 6, 23), np.pi, np.pi + np.array([-1e-2, -1e-5, 1e-9, 1e-3])])
+    motion = jn.solve(PARALLELOGRAM, time, order=order)
+    np.testing.assert_allclose(motion.change_points, [np.pi], atol=1e-12)
+    np.testing.assert_allclose(motion.dataset.attrs["change_points"], motion.change_points)
+    for k, limit in enumerate(tolerance):
+        truth = (time, np.ones_like(time), *np.zeros((3, len(time))))[k]
+        np.testing.assert_allclose(motion.outputs["psi"][:, k], truth, atol=limit * 10)
+
+
+def test_change_point_at_the_end_of_a_grid():
+    motion = jn.solve(PARALLELOGRAM, [0.5, 2.0, np.pi + 1e-4], order=1, strict=False)
+    assert motion.status[:2].tolist() == [Status.OK] * 2
+    if motion.status[2] == Status.OK:
+        np.testing.assert_allclose(motion.outputs["psi"][2], [np.pi + 1e-4, 1.0], atol=1e-9)
+
+
+def test_dead_centre_touched_by_the_law_is_a_change_point():
+    """The crank goes on through the dead centre: cos(angle) follows from the position of the slider."""
+    time = np.linspace(0, 3, 31)
+    motion = jn.solve(slider_crank("4 - 0.5*cos(t)**2"), time, order=0)
+    np.testing.assert_allclose(motion.change_points, [np.pi / 2], atol=1e-9)
+    x = 4 - 0.5 * np.cos(time) ** 2
+    angle = np.sign(np.pi / 2 - time) * np.arccos(np.clip((x * x + 1 - 9) / (2 * x), -1, 1))
+    np.testing.assert_allclose(motion.outputs["angle"][:, 0], angle, atol=1e-9)
+
+
+def test_branches_a_little_apart_are_no_change_point():
+    """A coupler longer by 1e-9 turns the crossing into a near miss, a gap of 1e-5 rad wide: the rocker turns back."""
+    mechanism = four_bar("0.5", "0.5", "t", AB=0.1, CD=0.1, AD=0.2, BC=0.2 + 1e-9)
+    time = np.linspace(0.5, 6, 12)
+    motion = jn.solve(mechanism, time, order=0, strict=False)
+    assert not motion.change_points.size
+    psi, good = motion.outputs["psi"][:, 0], motion.status == Status.OK
+    gap = 0.1 * np.exp(1j * time) - 0.2 - 0.1 * np.exp(1j * psi)
+    np.testing.assert_allclose(np.abs(gap[good]), 0.2 + 1e-9, rtol=1e-14)
+    side = np.sign((np.conj(gap) * np.exp(1j * psi)).imag)[good]  # of the rocker, seen along the coupler
+    assert (side == side[0]).all()
+
+
+@pytest.mark.parametrize("jump", [0.06, 0.3, 1.0, 3.0, 2 * np.pi])
+def test_law_that_jumps_is_refused_at_any_size(jump):
+    mechanism = crank(lambda t: 2 * t + jnp.where(t < 0.5, 0.0, jump))
+    motion = jn.solve(mechanism, np.linspace(0, 1, 11), order=0, strict=False)
+    assert motion.status[:5].tolist() == [Status.OK] * 5
+    assert motion.status[6] != Status.OK
+    assert Status.BRANCH_JUMP in motion.status
+
+
+def test_output_without_a_rate_is_not_ok_and_the_motion_goes_on():
+    mechanism = jn.Mechanism(
+        space="planar",
+        bodies={"block": jn.Body([0.5, 0])},
+        joints={"guide": planar.Prismatic(("ground", "block"), [0, 0], [0, 0], [1, 0], [1, 0])},
+        drivers={"slide": drivers.SlideDriver(("ground", "block"), [0, 0], [0, 0], [1, 0], "0.5 - 0.5*t")},
+        outputs={"gap": jn.DistanceOutput(("ground", "block"), [0, 0], [0, 0])},
+    )
+    time = np.linspace(0, 2, 5)
+    np.testing.assert_allclose(jn.solve(mechanism, time, order=0).outputs["gap"][:, 0], abs(0.5 - 0.5 * time))
+    motion = jn.solve(mechanism, time, order=1, strict=False)
+    assert motion.status.tolist() == [0, 0, Status.UNDEFINED, 0, 0]
+    assert motion.culprits == {2: "output gap"}
+    np.testing.assert_allclose(motion.outputs["gap"][[1, 3]], [[0.25, -0.5], [0.25, 0.5]], atol=1e-15)
+    with pytest.raises(jn.SolveError, match="output gap"):
+        jn.solve(mechanism, time, order=1)
+
+
+def test_law_without_a_third_derivative_at_the_start():
+    mechanism = distance_slider("1 + t**2.5")
+    time = np.linspace(0, 2, 5)
+    for order in (0, 2):
+        motion = jn.solve(mechanism, time, order=order)
+        np.testing.assert_allclose(motion.outputs["x"][:, 0, 0], 1 + time**2.5, rtol=1e-14)
+    motion = jn.solve(mechanism, time, order=3, strict=False)
+    assert motion.status.tolist() == [Status.UNDEFINED, 0, 0, 0, 0]
+    np.testing.assert_allclose(motion.outputs["x"][1:, 3, 0], 1.875 * time[1:] ** -0.5, rtol=1e-12)
+
+
+def test_nearly_singular_factor_is_singular():
+    """A pivot of 1e-9 of the largest leaves seven digits: no instant is called OK there."""
+    matrix = np.diag([1.0, 1.0, 1e-9])[:, :, None]
+    ratio = DenseFactor.of(jnp.asarray(matrix)).pivot_ratio()
+    yes = jnp.ones(1, bool)
+    assert int(_status(jnp.zeros(1), yes, ratio, yes, yes, 1e-12)[0]) == Status.SINGULAR
