@@ -39,7 +39,9 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--kinds", help="names, with commas between them; all unless given")
     parser.add_argument("--orders", default=",".join(map(str, ORDERS)), help="of derivatives, drawn from these")
-    parser.add_argument("--nearest", type=float, default=NEAREST, help="distance from singular positions")
+    parser.add_argument(
+        "--nearest", type=float, default=NEAREST, help="smallest h over a length; rounding decides below 1e-7"
+    )
     parser.add_argument("--failures", type=Path, help="file for the linkages that are wrong or given up, JSON by line")
     options = parser.parse_args()
     kinds = options.kinds.split(",") if options.kinds else list(FAMILIES)
