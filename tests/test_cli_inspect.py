@@ -184,7 +184,10 @@ def test_run_as_json(facts, tmp_path):
     assert path.exists()
     motion = jn.solve(jn.load(FOUR_BAR), order=2)
     peak = next(p for p in data["peaks"] if (p["output"], p["derivative"]) == ("psi", "acceleration"))
-    assert peak["maximum"] == motion.outputs["psi"][:, 2].max()
+    grid = motion.outputs["psi"][:, 2].max()
+    assert grid <= peak["maximum"] <= grid * 1.001  # between the instants it is a little more
+    near = jn.solve(jn.load(FOUR_BAR), [0.0, peak["maximum_at"]], order=2)
+    assert peak["maximum"] == pytest.approx(near.outputs["psi"][1, 2], rel=1e-12)
     assert data["time"] == {"start": 0.0, "stop": 2.0, "count": 201, "solved": 201}
     assert data["failures"] == []
 

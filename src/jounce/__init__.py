@@ -59,6 +59,7 @@ from jounce.errors import (  # noqa: E402
     SolveError as SolveError,
     TrajectoryError as TrajectoryError,
     UnitError as UnitError,
+    UnitWarning as UnitWarning,
     UnsupportedError as UnsupportedError,
 )
 from jounce.forces import AbstractForce as AbstractForce, Law as Law, Laws as Laws  # noqa: E402
@@ -123,6 +124,7 @@ from jounce.trajectory import (  # noqa: E402
     TrapezoidalMotion as TrapezoidalMotion,
     motion_profile as motion_profile,
 )
+from jounce.trajectory.units import elsewhere as _elsewhere  # noqa: E402
 
 __version__ = "0.4.0"
 
@@ -133,6 +135,15 @@ def _repr_html_(self: object) -> str:
 
     return shown(self)
 
+
+def _asked_of_pint(name: str) -> object:
+    """Look a unit up that is not in the table."""
+    from jounce.io.units import ask_pint
+
+    return ask_pint(name)
+
+
+_elsewhere.append(_asked_of_pint)  # type: ignore[arg-type]
 
 for _kind in (Mechanism, Motion, Robot, JointTrajectory, Batch):  # here, as the files know all of these
     setattr(_kind, "_repr_html_", _repr_html_)  # noqa: B010 - no attribute that a type checker knows

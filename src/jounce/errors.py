@@ -27,6 +27,7 @@ __all__ = [
     "SolveError",
     "TrajectoryError",
     "UnitError",
+    "UnitWarning",
     "UnsupportedError",
     "did_you_mean",
     "show_value",
@@ -239,6 +240,10 @@ class RobotWarning(UserWarning):
 
 class SampleWarning(UserWarning):
     """Samples do not determine the derivatives asked for to a useful accuracy."""
+
+
+class UnitWarning(UserWarning):
+    """A number without a unit is likely meant in another unit than that of SI."""
 
 
 class OutputError(JounceError):

@@ -126,7 +126,7 @@ def test_toml_and_json_are_read_too(read):
             "joints: {slide: {effort: 2 N*m}}",
             "the unit is that of a torque, got '2 N*m'; a joint that slides has effort in N",
         ),
-        ("joints: {pin: {effort: 87 Nm}}", "joints.pin.effort: newton metres are written N*m, got '87 Nm'"),
+        ("joints: {pin: {effort: 87 NM}}", "joints.pin.effort: unknown unit 'NM', got '87 NM'; did you mean 'Nm'?"),
         ("default: {effort: 3 kg}", "default.effort: the unit is that of a mass, got '3 kg'; effort is in N*m or N"),
         (
             "joints:\n  slide:\n    lower: 2",

@@ -1,5 +1,7 @@
 """What cannot be solved: said by name and time, never silently wrong."""
 
+import dataclasses
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -197,3 +199,16 @@ def test_what_is_no_mechanism():
     # of the public functions, the checks of types in the tests would say so first
     with pytest.raises(jn.MechanismError, match=r"must be a jn\.Mechanism, got 'a\.yaml'; jn\.load reads one"):
         check_mechanism("a.yaml")
+
+
+def test_gaps_of_what_cannot_be_assembled_are_lengths_and_angles():
+    free = dataclasses.replace(four_bar(BC=1.0), drivers={})  # AB and CD reach 0.0400 + 0.1321 + 0.2031 m
+    with pytest.raises(jn.AssemblyError, match=r"joints\.BC stays open, by 625 mm.*a joint may be missing"):
+        jn.solve(free, [0.0])
+    base = four_bar()
+    level = jn.planar.Parallel1(("ground", "crank"), [1, 0], [1, 0])
+    upright = jn.planar.Parallel1(("ground", "crank"), [np.cos(0.4), np.sin(0.4)], [1, 0])
+    both = {"level": level, "upright": upright}
+    with pytest.raises(jn.AssemblyError, match=r"11\.\d* deg, 11\.\d* deg") as caught:
+        jn.solve(dataclasses.replace(base, joints=base.joints | both, drivers={}), [0.0])
+    assert "missing" not in str(caught.value)

@@ -80,8 +80,8 @@ class TestSplineMotion:
         found = derivatives(law, 0, jnp.asarray(self.times)[None])
         np.testing.assert_allclose(found[0, 0], values, atol=1e-14)
 
-    def test_outside_the_samples_the_end_pieces_go_on(self):
-        law = jn.SplineMotion(self.times, self.times**3, 3)
+    def test_outside_the_samples_the_end_pieces_go_on_where_they_are_to(self):
+        law = jn.SplineMotion(self.times, self.times**3, 3, beyond="continue")
         np.testing.assert_allclose(derivatives(law, 0, jnp.asarray([[-0.5, 1.5]])), [[[-0.125, 3.375]]], rtol=1e-11)
 
     def test_jets_of_the_law_agree_with_its_values_nearby(self):

@@ -26,7 +26,7 @@ from jounce.cli.starters import new
 from jounce.cli.views import view
 from jounce.cli.writing import WritingError
 from jounce.errors import JounceError, SolveError
-from jounce.io.terminal import complain, unexpected, warnings_told
+from jounce.io.terminal import cautions, complain, unexpected
 
 EXAMPLES = {
     new: """\
@@ -124,7 +124,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         use_compilation_cache()
         given = list(sys.argv[1:] if arguments is None else arguments)
         as_json = "--json" in given
-        with warnings_told(as_json):
+        with cautions(json=as_json):
             return _dispatch(given)
     except KeyboardInterrupt:
         return 130

@@ -198,7 +198,7 @@ def loaded(
     if assignments:
         from jounce.io.overrides import override
 
-        mechanism = override(mechanism, file, assignments)
+        mechanism = override(mechanism, assignments)
     return mechanism
 
 

@@ -103,8 +103,8 @@ def rows(*parts: Any) -> Jet:
 
 
 def value_fields(kind: type[Any]) -> dict[str, dataclasses.Field]:
-    """Return the fields of a joint, driver or force that hold values, by name; `bodies` is not among them."""
-    return {field.name: field for field in dataclasses.fields(kind) if field.name != "bodies"}
+    """Return the fields of a joint, driver or force that a user gives, by name; `bodies` is not among them."""
+    return {field.name: field for field in dataclasses.fields(kind) if field.name != "bodies" and field.init}
 
 
 def field_kind(field: dataclasses.Field) -> str:

@@ -1,11 +1,13 @@
 """Drivers: constraints with a motion law ``f(t)``. Sommer 2024, equations 39-40, 44-49, 53-55 and 101-111."""
 
+from typing import Any
+
 import equinox as eqx
 import jax.numpy as jnp
 
+from jounce.constraints.angles import relative_angle
 from jounce.constraints.base import AbstractConstraint, Motion, Scalar, Vector, check_text
 from jounce.constraints.planar import COORDINATES, coordinate_of, slide
-from jounce.constraints.spatial import relative_angle
 from jounce.errors import MechanismError
 from jounce.jet import wrap
 
@@ -77,6 +79,7 @@ class RotationDriver(AbstractConstraint, type="rotation", space="spatial", role=
     motion: Motion  # rad
     vector_i: Vector = None
     vector_j: Vector = None
+    datum: Any = eqx.field(default=None, init=False)  # found when the mechanism is put together
 
     periodic = True
 
@@ -85,5 +88,5 @@ class RotationDriver(AbstractConstraint, type="rotation", space="spatial", role=
             raise MechanismError("a rotation driver takes two vectors, one on each body, or none", name="vectors")
 
     def residual(self, body_i, body_j, time):
-        angle = relative_angle(body_i, body_j, self.axis_i, self.vector_i, self.vector_j)
+        angle = relative_angle(body_i, body_j, self.axis_i, self.vector_i, self.vector_j, self.datum)
         return wrap(angle - self.motion(time), 2 * jnp.pi)

@@ -7,57 +7,10 @@ from typing import Any
 
 import jax.numpy as jnp
 
+from jounce.constraints.angles import coaxial, perpendiculars, relative_angle
 from jounce.constraints.base import AbstractConstraint, Scalar, Vector, rows
 from jounce.constraints.planar import length_of, slide
-from jounce.jet import Jet, cross, dot, stack, wrap
-
-
-def perpendiculars(axis: Any) -> tuple[Any, Any]:
-    """Return two unit vectors that complete a constant axis, of shape (3, ...), to a right-handed frame."""
-    x, y, z = axis / length_of(axis)[None]
-    sign = jnp.where(z < 0, -1.0, 1.0)
-    a = -1.0 / (sign + z)
-    return (
-        jnp.stack([1.0 + sign * a * x * x, sign * a * x * y, -sign * x]),
-        jnp.stack([a * x * y, sign + a * y * y, -y]),
-    )
-
-
-def relative_angle(body_i: Any, body_j: Any, axis_i: Any, vector_i: Any = None, vector_j: Any = None) -> Jet:
-    """Return the angle in rad, known up to whole turns, by which body j is turned about an axis of body i.
-
-    Without vectors it is that of ``A_i^T A_j``, by ``2 atan2(u.e, e0)`` of the relative Euler parameters, which keeps
-    the sign that Sommer 2024, equation 101, loses; with vectors, the signed angle from the first, on body i, to the
-    second, on body j.
-    """
-    # The rate of the angle is the angular velocity along the axis, but for terms that vanish while the bodies turn
-    # about the axis only: jets of the arctangent would subtract products that are larger by 2^k at order k.
-    axis = axis_i / length_of(axis_i)[None]
-    if vector_i is None:
-        e0 = body_i.quaternion.dot(body_j.quaternion)
-        e = stack([spin.dot(body_j.quaternion) for spin in body_i.spins])
-        along = dot(axis, e)
-        value = 2.0 * jnp.arctan2(along.coefficients[0], e0.coefficients[0])
-        w = body_j.angular_velocity  # in the frame of body j
-        if body_i.angular_velocity is not None:
-            turning = body_j.to_body(body_i.global_angular_velocity())
-            w = -turning if w is None else w - turning
-        if w is None:
-            return Jet.constant(value, body_i.order)
-        across = e - along * axis
-        excess = e0 * dot(axis, cross(across, w)) + along * dot(across, w)
-        rate = dot(axis, w) + excess / (e0.square() + along.square())
-    else:
-        u, a, b = body_i.direction(axis), body_i.direction(vector_i), body_j.direction(vector_j)
-        along = u.dot(b)
-        across = b - along * u
-        first = [x.coefficients[0] for x in (u, a, across)]
-        value = jnp.arctan2(dot(cross(first[0], first[1]), first[2]), dot(first[1], first[2]))
-        if body_i.order == 0:
-            return Jet([value])
-        w = body_j.global_angular_velocity() - body_i.global_angular_velocity()
-        rate = u.dot(w) - along * w.dot(across) / across.dot(across)
-    return rate.integrate(value)
+from jounce.jet import Jet, cross, wrap
 
 
 class Spherical(AbstractConstraint, type="spherical", space="spatial"):
@@ -173,7 +126,7 @@ class Screw(AbstractConstraint, type="screw", space="spatial"):
 
     def residual(self, body_i, body_j, time):
         advance = slide(body_i, body_j, self.point_i, self.point_j, self.axis_i)
-        angle = relative_angle(body_i, body_j, self.axis_i)
+        angle = relative_angle(body_i, body_j, self.axis_i, datum=coaxial(self.axis_i, self.axis_j))
         excess = advance - self.lead / (2 * jnp.pi) * angle - self.offset
         return rows(*_collinear(self, body_i, body_j), wrap(excess, self.lead))
 

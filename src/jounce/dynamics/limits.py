@@ -312,7 +312,7 @@ def _worst(
     best = np.argmax(measures, axis=0)
     times, sizes = grid[best], measures[best, every]
     found, weight = values[best, *at], weights[best, *at]
-    peaks = _peaks(measures)
+    peaks = local_maxima(measures, PEAKS)
     low, high = grid[np.maximum(peaks - 1, 0)], grid[np.minimum(peaks + 1, len(grid) - 1)]
     share = np.linspace(0.0, 1.0, POINTS)
     peak, curve = np.indices(low.shape)
@@ -332,13 +332,13 @@ def _worst(
     return times, found, weight
 
 
-def _peaks(measures: np.ndarray) -> np.ndarray:
-    """Return the indices of the highest local maxima of each curve, shape (PEAKS, curves); the best fills up."""
+def local_maxima(measures: np.ndarray, count: int) -> np.ndarray:
+    """Return the indices of the highest local maxima of curves, (time, curves), as (count, curves); best first."""
     edge = np.full((1, measures.shape[1]), -np.inf)
     before, after = np.concatenate([edge, measures[:-1]]), np.concatenate([measures[1:], edge])
     height = np.where((measures > before) & (measures >= after), measures, -np.inf)
-    order = np.argsort(-height, axis=0, kind="stable")[:PEAKS]
-    order = np.concatenate([order, np.repeat(order[:1], PEAKS - len(order), axis=0)])
+    order = np.argsort(-height, axis=0, kind="stable")[:count]
+    order = np.concatenate([order, np.repeat(order[:1], count - len(order), axis=0)])
     usable = np.isfinite(np.take_along_axis(height, order, axis=0))
     return np.where(usable, order, np.argmax(measures, axis=0))
 

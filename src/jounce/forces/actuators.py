@@ -2,11 +2,12 @@
 
 from typing import Any
 
+import equinox as eqx
 import jax.numpy as jnp
 
+from jounce.constraints.angles import Datum, relative_angle
 from jounce.constraints.base import Vector
 from jounce.constraints.planar import slide
-from jounce.constraints.spatial import relative_angle
 from jounce.errors import MechanismError
 from jounce.forces.base import AbstractForce, Law
 from jounce.jet import Jet, sqrt, wrap
@@ -18,9 +19,9 @@ def distance(body_i: Any, body_j: Any, point_i: Any, point_j: Any) -> Jet:
     return sqrt(d.dot(d))
 
 
-def turn(body_i: Any, body_j: Any, axis_i: Any, vector_i: Any, vector_j: Any) -> Jet:
+def turn(body_i: Any, body_j: Any, axis_i: Any, vector_i: Any, vector_j: Any, datum: Datum | None) -> Jet:
     """Return the angle in rad, from -pi to pi, by which body j is turned about an axis of body i, in space."""
-    return wrap(relative_angle(body_i, body_j, axis_i, vector_i, vector_j), 2 * jnp.pi)
+    return wrap(relative_angle(body_i, body_j, axis_i, vector_i, vector_j, datum), 2 * jnp.pi)
 
 
 def check_vectors(force: Any) -> None:
@@ -90,6 +91,7 @@ class SpatialTorque(AbstractForce, type="torque", space="spatial"):
     law: Law  # N m
     vector_i: Vector = None
     vector_j: Vector = None
+    datum: Any = eqx.field(default=None, init=False)  # found when the mechanism is put together
 
     unit = "N*m"
     dimensions = {"law": "torque"}
@@ -98,7 +100,7 @@ class SpatialTorque(AbstractForce, type="torque", space="spatial"):
         check_vectors(self)
 
     def displacement(self, body_i, body_j, time):
-        return turn(body_i, body_j, self.axis_i, self.vector_i, self.vector_j)
+        return turn(body_i, body_j, self.axis_i, self.vector_i, self.vector_j, self.datum)
 
     def force(self, displacement, velocity, time):
         return self.law(displacement, velocity, time)

@@ -1,5 +1,8 @@
 """Linear springs with damping: along the line of two points, along a direction, about an axis."""
 
+from typing import Any
+
+import equinox as eqx
 import jax.numpy as jnp
 
 from jounce.constraints.base import Scalar, Vector
@@ -90,6 +93,7 @@ class SpatialTorsionalSpring(AbstractForce, type="torsional_spring", space="spat
     damping: Scalar = 0.0  # N m s/rad
     vector_i: Vector = None
     vector_j: Vector = None
+    datum: Any = eqx.field(default=None, init=False)  # found when the mechanism is put together
 
     unit = "N*m"
     dimensions = {"stiffness": "torsional stiffness", "damping": "torsional damping", "angle": "angle"}
@@ -98,7 +102,7 @@ class SpatialTorsionalSpring(AbstractForce, type="torsional_spring", space="spat
         check_vectors(self)
 
     def displacement(self, body_i, body_j, time):
-        return turn(body_i, body_j, self.axis_i, self.vector_i, self.vector_j)
+        return turn(body_i, body_j, self.axis_i, self.vector_i, self.vector_j, self.datum)
 
     def force(self, displacement, velocity, time):
         return -wrap(displacement - self.angle, 2 * jnp.pi) * self.stiffness - velocity * self.damping

@@ -20,7 +20,9 @@ from jounce.integrate.simulate import checked, instants_of
 from jounce.integrate.simulation import expanded
 from jounce.kinematics import Status
 from jounce.mechanism import Mechanism, build, check_mechanism
+from jounce.mechanism.builder import referred
 from jounce.mechanism.doors import concrete
+from jounce.mechanism.laws import check_laws
 
 LANES = 64  # runs marched together: more fall out of the cache
 STEPS = 16  # tried before runs that have ended make room for others
@@ -107,12 +109,16 @@ def simulate_batch(
     first = mechanism.with_parameters(**dict(zip(names, rows[0].tolist(), strict=True)))
     order, method = checked(order, method, tolerance, longest_step)
     instants = instants_of(mechanism.time if time is None else time, first.parameter_values)
+    check_laws(mechanism, instants, order, forces=True)
     nominal = start(first, float(instants[0]))
     family = Family(first, nominal.model, names)
-    begun = Family(driven(first), build(driven(first)), names) if first.initial else family
+    begun = family
+    if first.initial:
+        model, _ = referred(build(driven(first)), nominal.model.reference, float(instants[0]))
+        begun = Family(driven(first), model, names)
     runs = _Runs(family, rows, instants, order, (float(tolerance), float(longest_step), method))
 
-    starts = Starts(begun, nominal.state, rows, float(instants[0]))
+    starts = Starts(family, begun, nominal.state, rows, float(instants[0]))
 
     def depart(some: np.ndarray) -> None:
         runs.depart(some, starts.of(some))

@@ -8,12 +8,15 @@ import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
 
+from jounce.constraints.base import value_fields
 from jounce.dynamics.energies import gravity_of, masses_of
 from jounce.dynamics.forward import Equations, State
-from jounce.dynamics.start import with_rates
+from jounce.dynamics.start import start, with_rates
 from jounce.integrate.projection import projected
 from jounce.kinematics.compilation import compiled
 from jounce.mechanism import Mechanism, Model, build
+from jounce.mechanism.builder import starting_guess
+from jounce.mechanism.system import POSITION_COMPONENTS
 
 STAGES = 8  # in which parameters go from those of the first run to their own, so that positions follow
 
@@ -44,9 +47,11 @@ class Family:
 
     def of(self, rows: np.ndarray) -> tuple[Equations, Any]:
         """Return equations of motion and outputs for values of the parameters, (runs, parameters)."""
+        if self._has_offsets_of_guess() and self.guesses_differ(rows):
+            return self._one_by_one(rows)
 
         def one(row: Any) -> list[Any]:
-            varied = self.mechanism.with_parameters(**dict(zip(self.names, row, strict=True)))
+            varied = self.varied(row)
             leaves = jax.tree.leaves(self._made(varied, build(varied, like=self.model)))
             self._moved = [isinstance(leaf, Tracer) for leaf in leaves]
             return [leaf for leaf in leaves if isinstance(leaf, Tracer)]
@@ -54,6 +59,35 @@ class Family:
         varied = iter(jax.vmap(one, out_axes=-1)(rows))
         pairs = zip(self._leaves, self._moved, strict=True)
         leaves = [np.asarray(next(varied))[..., 0, :] if moved else leaf for leaf, moved in pairs]
+        return jax.tree.unflatten(self._structure, leaves)
+
+    def varied(self, row: Any) -> Mechanism:
+        """Return the mechanism with values of the parameters in which the runs differ."""
+        return self.mechanism.with_parameters(**dict(zip(self.names, row, strict=True)))
+
+    def guesses_differ(self, rows: np.ndarray) -> bool:
+        """Tell whether the starting guess of the bodies depends on what the runs differ in."""
+        components = POSITION_COMPONENTS[self.mechanism.space]
+        guesses = (starting_guess(m, m.parameter_values, components) for m in map(self.varied, rows.tolist()))
+        first = jax.tree.leaves(next(guesses))
+        return any(not np.array_equal(a, b) for g in guesses for a, b in zip(jax.tree.leaves(g), first, strict=True))
+
+    def _has_offsets_of_guess(self) -> bool:
+        """Tell whether the offset of a joint follows from the starting guess."""
+        joints = self.mechanism.joints.values()
+        return any("offset" in value_fields(type(j)) and getattr(j, "offset", 0.0) is None for j in joints)
+
+    def _one_by_one(self, rows: np.ndarray) -> tuple[Equations, Any]:
+        """Do what `of` does, where offsets follow from guesses that differ: they are found for each run alone."""
+        whole = []
+        for varied in map(self.varied, rows.tolist()):
+            system = dataclasses.replace(self.model.system, groups=build(varied).system.groups)
+            like = dataclasses.replace(self.model, system=system)
+            whole.append(jax.tree.leaves(self._made(varied, build(varied, like=like))))
+        columns = [[np.asarray(leaf, float) for leaf in column] for column in zip(*whole, strict=True)]
+        self._moved = [any(not np.array_equal(leaf, column[0]) for leaf in column) for column in columns]
+        pairs = zip(self._leaves, columns, self._moved, strict=True)
+        leaves = [np.concatenate(column, axis=-1) if moved else leaf for leaf, column, moved in pairs]
         return jax.tree.unflatten(self._structure, leaves)
 
     def picked(self, made: tuple[Equations, Any], runs: np.ndarray) -> tuple[Equations, Any]:
@@ -65,8 +99,12 @@ class Family:
 class Starts:
     """Consistent states of runs at the start: positions followed from those of the first run, least velocities.
 
+    Where the starting guess of bodies that are free to move differs, each run is put together from its own guess.
+
     Parameters
     ----------
+    family : Family
+        Of the runs.
     begun : Family
         With the initial conditions as drivers.
     state : State
@@ -77,13 +115,21 @@ class Starts:
         s.
     """
 
-    def __init__(self, begun: Family, state: State, rows: np.ndarray, instant: float):
+    def __init__(self, family: Family, begun: Family, state: State, rows: np.ndarray, instant: float):
         self._begun, self._state, self._instant = begun, state, instant
+        self._own: State | None = None
+        equations, coordinates = begun.model.system.cells.shape
+        if equations < coordinates and family.guesses_differ(rows):
+            own = [start(family.varied(row), instant).state for row in rows.tolist()]
+            self._own = State(*(np.concatenate(parts, axis=-1) for parts in zip(*own, strict=True)))
+            return
         change = (rows - rows[0]) / STAGES
         self._stages = [begun.of(rows[0] + stage * change) for stage in range(1, STAGES)] + [begun.of(rows)]
 
     def of(self, runs: np.ndarray) -> State:
         """Return the states of some runs."""
+        if self._own is not None:
+            return State(*(part[..., runs] for part in self._own))
         clock = np.full((1, len(runs)), self._instant)
         still = self._state._replace(velocity=np.zeros_like(self._state.velocity), spin=np.zeros_like(self._state.spin))
         state = State(*(np.repeat(np.asarray(part), len(runs), axis=-1) for part in still))

@@ -20,6 +20,7 @@ from jounce.kinematics.motion import check_output, output_group
 from jounce.kinematics.solve import checked_order
 from jounce.mechanism import Mechanism, check_mechanism, time_grid
 from jounce.mechanism.doors import concrete
+from jounce.mechanism.laws import check_laws
 
 STEPS = 64  # tried between two looks at progress and events
 TOLERANCES = (1e-17, 1e-2)  # below rounding there is still energy to be kept: what series leave out adds up
@@ -109,10 +110,12 @@ def simulate(
             raise MechanismError("must be a mapping of names to drivers", name="initial", value=initial)
         mechanism = dataclasses.replace(mechanism, initial=dict(initial))
     instants = instants_of(mechanism.time if time is None else time, mechanism.parameter_values)
-    watched = [_watched(event, mechanism) for event in events]
+    check_laws(mechanism, instants, order, forces=True)
+    for event in events:
+        _check_event(event, mechanism)
     start = consistent_start(mechanism, float(instants[0]))
     _check_forces(start, float(instants[0]))
-    watches = [_watch_of(event, group, start) for event, group in zip(events, watched, strict=True)]
+    watches = [_watch_of(event, mechanism, start) for event in events]
     run = _Run(start, method, float(tolerance), float(longest_step), watches)
     run.go(instants, progress)
     simulation = Simulation(mechanism, start, run.track, instants, order, run.ending, run.happened)
@@ -148,16 +151,17 @@ def instants_of(time: Any, parameters: Mapping[str, Any]) -> np.ndarray:
     return instants[::-1] if backward else instants
 
 
-def _watched(event: Any, mechanism: Mechanism) -> Any:
-    """Return the output of an event as a group of one."""
+def _check_event(event: Any, mechanism: Mechanism) -> None:
+    """Raise MechanismError unless an event looks at an output that the mechanism can have."""
     if not isinstance(event, Event):
         raise MechanismError("must be a jn.Event", name="events", value=event)
     check_output(event.output, mechanism, "events")
-    return output_group(event.output, mechanism)
+    output_group(event.output, mechanism)
 
 
-def _watch_of(event: Event, group: Any, start: Start) -> Watch:
+def _watch_of(event: Event, mechanism: Mechanism, start: Start) -> Watch:
     """Return what looks for an event, or raise if its output has no such component."""
+    group = output_group(event.output, mechanism, start.model)
     pose = start.equations.pose(start.state)
     components = jax.eval_shape(lambda: group.evaluate(pose).coefficients[0]).shape[0]
     if event.component >= components:

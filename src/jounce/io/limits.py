@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import re
 from collections.abc import Iterable, Mapping
 from os import PathLike
 from typing import Any
@@ -119,7 +118,7 @@ class _LimitsFile:
         if dimension and dimension not in _dimensions(key, joint.turning):
             unit = EXAMPLES[joint.turning][KEYS.index(key)]
             kind = "turns" if joint.turning else "slides"
-            message = f"{_wrong_unit(raw, dimension)}; a joint that {kind} has {key} in {unit}"
+            message = f"{_wrong_unit(dimension)}; a joint that {kind} has {key} in {unit}"
             raise self._error(message, at, value=raw)
         self._check_size(number, raw, key, at)
         return number
@@ -148,7 +147,7 @@ class _LimitsFile:
         number, dimension = self._parsed(raw, at)
         if dimension and dimension not in (*_dimensions(key, True), *_dimensions(key, False)):
             turning, sliding = (EXAMPLES[kind][KEYS.index(key)] for kind in (True, False))
-            message = f"{_wrong_unit(raw, dimension)}; {key} is in {turning} or {sliding}"
+            message = f"{_wrong_unit(dimension)}; {key} is in {turning} or {sliding}"
             raise self._error(message, at, value=raw)
         self._check_size(number, raw, key, at)
 
@@ -182,9 +181,7 @@ class _LimitsFile:
         return RobotError(message, path=place.path, line=place.line, name=place.name, **value)
 
 
-def _wrong_unit(raw: Any, dimension: Dimension) -> str:
-    if re.search(r"(?<![A-Za-z])Nm(?![A-Za-z])", str(raw)):  # to pint a measure of yarns, number metric
-        return "newton metres are written N*m"
+def _wrong_unit(dimension: Dimension) -> str:
     words = {_dimensions("effort", turning)[0]: word for turning, word in ((True, "a torque"), (False, "a force"))}
     return f"the unit is that of {words.get(dimension) or describe_dimension(dimension)}"
 

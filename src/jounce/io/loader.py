@@ -7,15 +7,20 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from jounce.constraints import catalogue
 from jounce.dynamics import AppliedForceOutput, AppliedTorqueOutput, JointForceOutput, JointTorqueOutput
 from jounce.errors import JounceError, MechanismFileError, did_you_mean
 from jounce.io.fields import FileKey, file_keys, location_of, output_types
+from jounce.io.hints import warn_of_units
 from jounce.io.source import Location, Source, read_source
 from jounce.mechanism import AngularVelocityOutput, Body, Mechanism, PointOutput, TimeGrid, time_grid
+from jounce.mechanism.builder import check_body
 from jounce.mechanism.masses import body_mass
 from jounce.mechanism.resolve import resolve, resolve_element
-from jounce.trajectory import SplineMotion
+from jounce.rigid.euler_parameters import euler_parameters
+from jounce.trajectory import Expression, SplineMotion
 
 __all__ = ["load"]
 
@@ -44,6 +49,11 @@ def load(path: str | PathLike[str], *, allow: Iterable[str | PathLike[str]] = ()
         The file cannot be read or something in it is wrong: the message names the file, the line, the entry and the
         value, and the nearest valid name where one is unknown.
 
+    Warns
+    -----
+    UnitWarning
+        A number without a unit is likely meant in degrees or millimetres.
+
     Examples
     --------
     >>> import jounce as jn
@@ -64,6 +74,7 @@ def load(path: str | PathLike[str], *, allow: Iterable[str | PathLike[str]] = ()
         location = _find(error.name, places)
         known = location if source.line(location) is not None else ()
         raise source.error(error.message, known or location, value=error.value) from None
+    warn_of_units(source, mechanism)
     return mechanism
 
 
@@ -96,26 +107,33 @@ def _validate(source: Source, space: str) -> dict[str, Any]:
         "names": names,
         "bodies": ["ground", *(bodies if isinstance(bodies, dict) else ())],
         "dimensions": _dimensions(parameters) if names else {},
+        "uses": dict.fromkeys(names, ()),
     }
     try:
         model = file_model(space).model_validate(source.data, context=context)
     except ValidationError as error:
         raise first_problem(source, space, error.errors(include_url=False)) from None
-    return _plain(model)
+    uses = {name: allowed for name, allowed in context["uses"].items() if allowed}
+    dimensions = uses | {name: (dimension,) for name, dimension in context["dimensions"].items()}
+    return _plain(model) | {"dimensions": dimensions}
 
 
 def _dimensions(parameters: dict[str, Any]) -> dict[str, Any]:
-    """Return the dimensions of those parameters that have a unit."""
+    """Return the dimensions of those parameters that have a unit, or follow from others that have one."""
     from jounce.io.units import parse_value
 
-    found = {}
-    for name, raw in parameters.items():
-        try:
-            dimension = parse_value(raw, "any", parameters).dimension
-        except JounceError:
-            continue
-        if dimension is not None:
-            found[name] = dimension
+    found: dict[str, Any] = {}
+    waiting, count = dict(parameters), -1
+    while len(found) > count:
+        count = len(found)
+        for name, raw in list(waiting.items()):
+            try:
+                dimension = parse_value(raw, "any", parameters, found).dimension
+            except JounceError:  # told where it stands
+                continue
+            if dimension is not None:
+                found[name] = dimension
+                del waiting[name]
     return found
 
 
@@ -143,13 +161,14 @@ def _build(source: Source, space: str, model: dict[str, Any], places: dict[str, 
         gravity=model["gravity"],
         time=TimeGrid(**_plain(model["time"])) if model["time"] is not None else None,
         title=model["title"],
+        dimensions=model["dimensions"],
     )
     _check_columns(source, mechanism)
     return mechanism
 
 
 def _body(source: Source, space: str, name: str, given: dict[str, Any], parameters: dict[str, Any]) -> Body:
-    """Build a body; its orientation, a starting guess, is turned into Euler parameters with the values of now."""
+    """Build a body; values that depend on parameters stay expressions of them."""
     if isinstance(given["inertia"], dict):
         from jounce.io.masses import expanded
 
@@ -158,25 +177,13 @@ def _body(source: Source, space: str, name: str, given: dict[str, Any], paramete
         except JounceError as error:
             key = ("mass",) if error.name == "mass" else ("inertia", *([error.name] if error.name else []))
             raise source.error(error.message, ("bodies", name, *key), value=error.value) from None
-    form = given.pop("orientation", None)
-    if form is None:
-        return Body(**given)
-    location = ("bodies", name, "orientation")
-    try:
-        numbers = {key: value if key == "euler" else resolve(value, parameters) for key, value in form.items()}
-        return Body(**given, orientation=_quaternion(numbers))
-    except JounceError as error:
-        raise source.error(error.message, location, value=error.value) from None
-
-
-def _quaternion(form: dict[str, Any]) -> tuple[float, ...]:
-    from jounce.io import orientation
-
-    if "quaternion" in form:
-        return orientation.from_quaternion(form["quaternion"].tolist())
-    if "euler" in form:
-        return orientation.from_euler(form["euler"], form["angles"].tolist())
-    return orientation.from_axis_angle(form["axis"].tolist(), form["angle"])
+    form = given.get("orientation")
+    if form is not None and not any(isinstance(x, Expression) for v in form.values() for x in np.ravel(v)):
+        try:
+            given["orientation"] = euler_parameters(form)
+        except JounceError as error:
+            raise source.error(error.message, ("bodies", name, "orientation"), value=error.value) from None
+    return Body(**given)
 
 
 def _arguments(keys: tuple[FileKey, ...], given: dict[str, Any]) -> dict[str, Any]:
@@ -228,7 +235,9 @@ def _spline(source: Source, location: Location, samples: Any) -> SplineMotion:
 
     path = source.named_file(samples.samples, location)
     try:
-        return SplineMotion(*read_samples(path, samples.time, samples.value), degree=samples.degree)
+        return SplineMotion(
+            *read_samples(path, samples.time, samples.value), degree=samples.degree, beyond=samples.beyond
+        )
     except JounceError as error:
         if error.path == path:  # as the user knows it
             error.path = Path(source.path).parent / samples.samples
@@ -276,8 +285,7 @@ def _check_values(mechanism: Mechanism) -> None:
         for name, element in elements.items():
             resolve_element(element, parameters, components, f"{kind}.{name}")
     for name, body in mechanism.bodies.items():
-        for field in ("position", "angle"):
-            _check_expressions(f"bodies.{name}.{field}", getattr(body, field), parameters)
+        check_body(name, body, parameters, components)
         body_mass(name, body, parameters, components)
     _check_expressions("gravity", mechanism.gravity, parameters)
     if mechanism.time is not None:

@@ -3,21 +3,29 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 import re
+import warnings
 from typing import Any
 
 import numpy as np
+
+from jounce.dynamics.limits import local_maxima
+from jounce.errors import SampleWarning
+from jounce.kinematics import solve
 
 __all__ = ["Peak", "derivative_name", "derivative_unit", "peaks", "rate_name", "scalar_outputs"]
 
 NAMES = ("position", "velocity", "acceleration", "jerk", "jounce")
 COMPONENTS = ("x", "y", "z")
+LEAST = 200  # instants that are looked at, at least
+PEAKS, POINTS, ROUNDS = 2, 7, 3  # highest maxima of each curve, instants around each, and how often these close in
+CHUNK = 1000  # instants solved together
+ROUNDING = 1e-9
 
 
 @dataclasses.dataclass(frozen=True)
 class Peak:
-    """Extreme values of one derivative of one output over the instants that were solved.
+    """Extreme values of one derivative of one output, on the instants that were solved and between them.
 
     Parameters
     ----------
@@ -29,7 +37,7 @@ class Peak:
     minimum, maximum : float
         In the unit; NaN where no instant was solved.
     minimum_at, maximum_at : float
-        The first instants at which they are reached, s.
+        Where they are reached, s.
     size : float
         The largest magnitude that any component of the output has in this derivative.
     """
@@ -120,7 +128,8 @@ def peaks(motion: Any) -> list[Peak]:
     Parameters
     ----------
     motion : Motion
-        The peaks are those at its instants; between them the motion may go a little beyond.
+        Peaks between its instants are found too: the motion is solved at more instants where it has few, and then, as
+        often as it takes, around the highest of them.
 
     Returns
     -------
@@ -131,24 +140,116 @@ def peaks(motion: Any) -> list[Peak]:
     --------
     >>> import jounce as jn
     >>> motion = jn.solve(jn.load("examples/four_bar.yaml"), order=1)
-    >>> [(p.output, p.derivative, p.unit, round(p.maximum, 4), p.maximum_at) for p in peaks(motion)][:2]
-    [('psi', 'position', 'rad', 2.6436, 1.5), ('psi', 'velocity', 'rad/s', 1.5179, 1.07)]
+    >>> [(p.output, p.derivative, p.unit, round(p.maximum, 4), round(p.maximum_at, 3)) for p in peaks(motion)][:2]
+    [('psi', 'position', 'rad', 2.6436, 1.5), ('psi', 'velocity', 'rad/s', 1.5179, 1.069)]
     """
+    if "peaks" not in motion.derived:
+        motion.derived["peaks"] = _found(motion)
+    return motion.derived["peaks"]
+
+
+def _found(motion: Any) -> list[Peak]:
+    scalars = scalar_outputs(motion)
+    rows = [(column, name, order) for column, (name, values) in scalars.items() for order in range(values.shape[1])]
+    if not rows:
+        return []
+    times, values = _extremes(motion)
+    extremes = [(-values[k], times[k], values[len(rows) + k], times[len(rows) + k]) for k in range(len(rows))]
+    sizes: dict[tuple[str, int], float] = {}
+    for (_, name, order), (low, _, high, _) in zip(rows, extremes, strict=True):
+        sizes[name, order] = float(np.nanmax([sizes.get((name, order), 0.0), abs(low), abs(high)]))
     found = []
-    for column, (name, values) in scalar_outputs(motion).items():
+    for (column, name, order), numbers in zip(rows, extremes, strict=True):
         output = motion.mechanism.outputs[name]
-        for order in range(values.shape[1]):
-            extremes = _extremes(values[:, order], motion.time)
-            magnitudes = np.abs(motion.outputs[name][:, order])
-            size = float(np.max(magnitudes, initial=0.0, where=np.isfinite(magnitudes)))
-            unit = derivative_unit(output.unit, order)
-            found.append(Peak(column, rate_name(output, order), unit, *extremes, size))
+        unit, told = derivative_unit(output.unit, order), [float(x) for x in numbers]
+        found.append(Peak(column, rate_name(output, order), unit, *told, size=sizes[name, order]))
     return found
 
 
-def _extremes(values: np.ndarray, time: np.ndarray) -> tuple[float, float, float, float]:
-    solved = np.flatnonzero(np.isfinite(values))
-    if not solved.size:
-        return math.nan, math.nan, math.nan, math.nan
-    low, high = solved[np.argmin(values[solved])], solved[np.argmax(values[solved])]
-    return float(values[low]), float(time[low]), float(values[high]), float(time[high])
+def _extremes(motion: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Return where each curve is largest and how large, (2 curves,): all curves upside down, then as they are.
+
+    Around the highest instants, the best of a few becomes the middle of a shorter interval, again and again; the last
+    look is at the vertex of the parabola through three of them.
+    """
+    time, values = motion.time, _curves(motion)
+    best = np.argmax(values, axis=0)
+    every = np.arange(values.shape[1])
+    times, sizes = time[best], values[best, every]
+    if len(time) > 1:
+        time, values = _denser(motion, time, values)
+        middle = local_maxima(values, PEAKS)
+        low, high = time[np.maximum(middle - 1, 0)], time[np.minimum(middle + 1, len(time) - 1)]
+        share = np.linspace(0.0, 1.0, POINTS)[:, None, None]
+        near = []
+        for _ in range(ROUNDS):
+            around = low + share * (high - low)
+            own = _own(motion, around)
+            _keep_best(times, sizes, around, own)
+            top = np.clip(np.argmax(own, axis=0), 1, POINTS - 2)
+            near = [np.take_along_axis(own, np.asarray(top + side)[None], axis=0)[0] for side in (-1, 0, 1)]
+            low, high = (np.take_along_axis(around, np.asarray(top + side)[None], axis=0)[0] for side in (-1, 1))
+        vertex = _vertex(low, high, *near)[None]
+        _keep_best(times, sizes, vertex, _own(motion, vertex))
+    solved = np.isfinite(sizes)
+    return np.where(solved, times, np.nan), np.where(solved, sizes, np.nan)
+
+
+def _denser(motion: Any, time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return instants and curves with enough instants for no peak to be missed that is no needle."""
+    steps = -(-LEAST // (len(time) - 1))
+    if steps == 1:
+        return time, values
+    between = (time[:-1, None] + np.diff(time)[:, None] * np.arange(1, steps) / steps).ravel()
+    whole = np.concatenate([time, between])
+    order = np.argsort(whole)
+    return whole[order], np.concatenate([values, _at(motion, between)])[order]
+
+
+def _own(motion: Any, around: np.ndarray) -> np.ndarray:
+    """Return the values of curves at instants of their own, (points, peaks, curves)."""
+    wanted, places = np.unique(around, return_inverse=True)
+    values = _at(motion, wanted)
+    return values[places.reshape(around.shape), np.arange(around.shape[-1])]
+
+
+def _at(motion: Any, instants: np.ndarray) -> np.ndarray:
+    """Return the curves of a motion at other instants, -inf where it cannot be solved."""
+    parts = []
+    for first in range(0, len(instants), CHUNK):
+        chunk = instants[first : first + CHUNK]
+        if hasattr(motion, "at"):
+            parts.append(_curves(motion.at(chunk)))
+            continue
+        whole = np.unique(np.append(chunk, motion.time[0]))  # from the same start, on the same branch
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SampleWarning)  # told when the motion was solved
+            solved = solve(motion.mechanism, whole, motion.order, strict=False)
+        parts.append(_curves(solved)[np.searchsorted(whole, chunk)])
+    return np.concatenate(parts)
+
+
+def _curves(motion: Any) -> np.ndarray:
+    """Return all derivatives of all outputs, upside down and as they are, (time, 2 curves); -inf where unknown."""
+    whole = np.concatenate([values for _, values in scalar_outputs(motion).values()], axis=1)
+    return np.nan_to_num(np.concatenate([-whole, whole], axis=1), nan=-np.inf, posinf=-np.inf, neginf=-np.inf)
+
+
+def _keep_best(times: np.ndarray, sizes: np.ndarray, around: np.ndarray, own: np.ndarray) -> None:
+    """Take over what is larger than what was found before, by more than rounding: instants asked for are round."""
+    flat = own.reshape(-1, own.shape[-1])
+    every = np.arange(own.shape[-1])
+    top = np.argmax(flat, axis=0)
+    with np.errstate(invalid="ignore"):
+        better = flat[top, every] > sizes + ROUNDING * np.abs(sizes)
+    times[better] = around.reshape(flat.shape)[top, every][better]
+    sizes[better] = flat[top, every][better]
+
+
+def _vertex(low: np.ndarray, high: np.ndarray, *near: np.ndarray) -> np.ndarray:
+    """Return where the parabola through three evenly spaced values is largest, between the outer two."""
+    left, middle, right = near
+    with np.errstate(invalid="ignore", divide="ignore"):
+        shift = 0.5 * (left - right) / (left - 2 * middle + right)
+    shift = np.where(np.isfinite(shift), np.clip(shift, -1.0, 1.0), 0.0)
+    return (low + high) / 2 + shift * (high - low) / 2

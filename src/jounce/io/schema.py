@@ -20,6 +20,7 @@ from jounce.io.fields import HOLDERS, FileKey, file_keys, output_holder, output_
 from jounce.io.masses import inertia
 from jounce.io.values import Checked, laws, motion, orientation, problem, scalar, vector, vectors, wrenches
 from jounce.mechanism.outputs import FRAMES
+from jounce.trajectory.dimensions import variables_of
 from jounce.trajectory.expression import CONSTANTS, FUNCTIONS
 
 __all__ = ["file_model", "output_form"]
@@ -109,7 +110,7 @@ def _model(name: str, doc: str | None, fields: dict[str, tuple[Any, Any]]) -> ty
 
 def _annotation(kind: type[Any], key: FileKey, size: int, choices: dict[str, tuple[str, ...]]) -> Any:
     if key.kind in ("law", "laws"):
-        variables = (*kind.displacement_names, *kind.velocity_names)
+        variables = variables_of(kind)
         return motion(key.quantity, variables) if key.kind == "law" else laws(size, key.quantity, variables)
     if key.kind == "motion":
         return motion(key.quantity)

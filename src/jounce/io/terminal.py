@@ -11,7 +11,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from jounce.errors import RobotWarning, SampleWarning
 from jounce.io.peaks import Peak
 
 if TYPE_CHECKING:
@@ -20,6 +19,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Bar",
     "caution",
+    "cautions",
     "complain",
     "say",
     "say_json",
@@ -28,9 +28,9 @@ __all__ = [
     "show_peaks",
     "show_rows",
     "unexpected",
-    "warnings_told",
 ]
 
+TOLD = (RobotWarning, SampleWarning, UnitWarning)  # warnings that a command prints as it prints errors
 WIDTH = 80  # of tables that do not go to a terminal
 PATIENCE = 1.0  # s, before a progress bar is shown
 ROUNDING = 1e-15  # of the other components; what is smaller is shown as 0
@@ -233,20 +233,22 @@ def caution(warning: object, *, json: bool = False) -> None:
 
 
 @contextmanager
-def warnings_told(json: bool = False) -> Iterator[None]:
-    """Print the warnings of this package as `caution` does, each time, instead of with their place in the code."""
+def cautions(*, json: bool = False) -> Iterator[None]:
+    """Print warnings about the user's values as the command prints its errors, each once."""
+    told: set[str] = set()
     with warnings.catch_warnings():
-        kinds, others = (RobotWarning, SampleWarning), warnings.showwarning
-        for kind in kinds:
-            warnings.simplefilter("always", kind)
+        usual = warnings.showwarning
 
-        def told(message: Any, category: type[Warning], *place: Any, **more: Any) -> None:
-            if issubclass(category, kinds):
+        def show(message: Any, category: Any, *place: Any, **more: Any) -> None:
+            if not issubclass(category, TOLD):
+                usual(message, category, *place, **more)
+            elif str(message) not in told:
+                told.add(str(message))
                 caution(message, json=json)
-            else:
-                others(message, category, *place, **more)
 
-        warnings.showwarning = told
+        for category in TOLD:
+            warnings.simplefilter("always", category)
+        warnings.showwarning = show
         yield
 
 

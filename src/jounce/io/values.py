@@ -7,13 +7,16 @@ JSON Schema. Imported only when a file is loaded, since pydantic takes a while.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic_core import PydanticCustomError, core_schema
 
-from jounce.errors import UNSET, ExpressionError, JounceError, did_you_mean, show_value
-from jounce.io.units import KINDS, Value, parse_value
+from jounce.errors import UNSET, ExpressionError, JounceError, MechanismError, did_you_mean, show_value
+from jounce.io.units import KINDS, Dimension, Value, parse_value
+from jounce.rigid.euler_parameters import form_of
+from jounce.trajectory.dimensions import TIME
+from jounce.trajectory.expression import Expression
 
 __all__ = [
     "Checked",
@@ -28,6 +31,8 @@ __all__ = [
     "vectors",
     "wrenches",
 ]
+
+WAYS = ("refuse", "hold", "repeat")
 
 
 def problem(message: str, *at: str | int, value: object = ...) -> PydanticCustomError:
@@ -59,18 +64,27 @@ class Checked:
         return self.schema
 
 
-def parse(raw: Any, quantity: str, info: Any, extra_names: tuple[str, ...] = ()) -> Value:
+def parse(raw: Any, quantity: str, info: Any, variables: dict[str, Dimension | None] | None = None) -> Value:
     if quantity in ("of coordinate", "per angle"):
         turning = info.data.get("coordinate") == "angle"
         by_coordinate = {"of coordinate": ("length", "angle"), "per angle": ("length per angle", "ratio")}
         quantity = by_coordinate[quantity][turning]
     context = info.context or {}
     try:
-        names = (*context.get("names", ()), *extra_names)
-        return parse_value(raw, quantity, names, context.get("dimensions"))
+        value = parse_value(raw, quantity, context.get("names", ()), context.get("dimensions"), variables)
+        _note_use(context.get("uses", {}), value.value, quantity)
+        return value
     except JounceError as error:
         quoted = isinstance(error, ExpressionError) and error.column is not None  # the text is in the message
         raise problem(error.message, value=UNSET if quoted else raw) from None
+
+
+def _note_use(uses: dict[str, tuple[Dimension, ...]], value: Any, quantity: str) -> None:
+    """Note the dimensions that a parameter may have where it stands alone, or with a sign before it."""
+    name = value.text.lstrip("+- ") if isinstance(value, Expression) else ""
+    allowed = KINDS[quantity][1]
+    if name in uses and allowed:
+        uses[name] = tuple(d for d in uses[name] if d in allowed) if uses[name] else allowed
 
 
 def _words(quantity: str) -> str:
@@ -100,7 +114,8 @@ def vector_value(raw: Any, size: int, quantity: str, info: Any, *at: str | int) 
             raise below(error, *at, index) from None
     if quantity == "direction":
         used = {item.dimension for item in parsed if item.value != 0 and isinstance(item.value, float)}
-        if len(used) > 1:
+        stated = {item.dimension for item in parsed} - {None}
+        if len(used) > 1 or len(stated) > 1:
             raise problem("the components of a direction must all have the same unit, or none", *at, value=raw)
     return tuple(item.value for item in parsed)
 
@@ -142,24 +157,29 @@ def wrenches() -> Any:
 
 
 class Samples(BaseModel):
-    """A motion law through samples: a CSV file, the degree of the spline, and the columns of time and value."""
+    """A motion law through samples: a CSV file, the degree of the spline, and the columns of time and value.
+
+    Beyond the samples there is no law, unless it is to hold the value at the end, or to repeat them as one period.
+    """
 
     model_config = ConfigDict(extra="forbid", strict=True)
     samples: str
     degree: int = Field(default=5, ge=1, le=11)
     time: str | None = None
     value: str | None = None
+    beyond: Literal["refuse", "hold", "repeat"] = "refuse"
 
 
-def motion(quantity: str, variables: tuple[str, ...] = ()) -> Any:
+def motion(quantity: str, variables: dict[str, Dimension | None] | None = None) -> Any:
     """Return the annotation of a law of time, and of other variables where there are some: of motion, or of a force."""
+    variables = {"t": TIME} if variables is None else variables
 
     def check(raw: Any, info: Any) -> Any:
         if not isinstance(raw, dict):
-            return parse(raw, quantity, info, ("t", *variables)).value
+            return parse(raw, quantity, info, variables).value
         if raw.keys() == {"expression"}:
             try:
-                return parse(raw["expression"], quantity, info, ("t", *variables)).value
+                return parse(raw["expression"], quantity, info, variables).value
             except PydanticCustomError as error:
                 raise below(error, "expression") from None
         valid = ["expression"] if "expression" in raw else list(Samples.model_fields)
@@ -171,11 +191,14 @@ def motion(quantity: str, variables: tuple[str, ...] = ()) -> Any:
         for key, kind in (("samples", str), ("degree", int), ("time", str), ("value", str)):
             if key in raw and (not isinstance(raw[key], kind) or isinstance(raw[key], bool)):
                 raise problem("must be a whole number" if kind is int else "must be a name", key, value=raw[key])
+        if raw.get("beyond", "refuse") not in WAYS:
+            raise problem(f"no such way; {did_you_mean(raw['beyond'], WAYS)}", "beyond", value=raw["beyond"])
         if not 1 <= raw.get("degree", 5) <= 11:
             raise problem("the degree of a spline is from 1 to 11", "degree", value=raw["degree"])
         return Samples(**raw)
 
-    named = f", {', '.join(variables[:-1])} and {variables[-1]}" if len(variables) > 1 else ""
+    others = [name for name in variables if name != "t"]
+    named = f", {', '.join(others[:-1])} and {others[-1]}" if len(others) > 1 else ""
     described = f" and of t, the time in s{named}"
     law = scalar_schema(quantity, described)
     formula = {"type": "object", "properties": {"expression": law}, "required": ["expression"]}
@@ -191,7 +214,7 @@ def motion(quantity: str, variables: tuple[str, ...] = ()) -> Any:
     return Annotated[Any, Checked(check, schema)]
 
 
-def laws(size: int, quantity: str, variables: tuple[str, ...]) -> Any:
+def laws(size: int, quantity: str, variables: dict[str, Dimension | None]) -> Any:
     """Return the annotation of a list of laws, one for each component of a force."""
     one = motion(quantity, variables)
     single: Checked = one.__metadata__[0]
@@ -212,21 +235,12 @@ def laws(size: int, quantity: str, variables: tuple[str, ...]) -> Any:
 
 def _orientation(raw: Any, info: Any) -> dict[str, Any]:
     """Read one of the three forms of an orientation; the values stay numbers or expressions."""
-    forms: dict[str, tuple[str, ...]] = {
-        "quaternion": ("quaternion",),
-        "euler": ("euler", "angles"),
-        "axis": ("axis", "angle"),
-    }
     if not isinstance(raw, dict):
         raise problem("must be {quaternion: [e0, e1, e2, e3]}, {axis, angle} or {euler: zxz, angles}")
-    form = next((form for form in forms if form in raw), None)
-    valid = forms[form] if form else [key for keys in forms.values() for key in keys]
-    for key in raw:
-        if key not in valid:
-            raise problem(f"unknown key {show_value(key)}; {did_you_mean(key, valid)}", key, value=UNSET)
-    for key in valid if form else ("quaternion",):
-        if key not in raw:
-            raise problem("is missing", key, value=UNSET)
+    try:
+        form = form_of(raw)
+    except MechanismError as error:
+        raise problem(error.message, error.name or "", value=UNSET) from None
     if form == "quaternion":
         return {"quaternion": vector_value(raw["quaternion"], 4, "ratio", info, "quaternion")}
     if form == "euler":

@@ -19,7 +19,7 @@ from jounce.errors import JounceError, MechanismError
 from jounce.forces import ExpressionLaw, TimeLaw, VectorLaw
 from jounce.io.fields import OUTPUTS, file_keys, output_holder
 from jounce.mechanism import Body, Mechanism, TimeGrid
-from jounce.trajectory import Expression, ExpressionMotion, SplineMotion
+from jounce.trajectory import Expression, ExpressionMotion, SplineMotion, TrapezoidalMotion
 from jounce.trajectory.expression import CONSTANTS, FUNCTIONS
 
 __all__ = ["mechanism_data", "write_mechanism"]
@@ -138,7 +138,9 @@ class _Writer:
         if self.mechanism.space == "planar":
             found["angle"] = _plain(body.angle, f"{place}.angle")
         elif body.orientation is not None:
-            found["orientation"] = {"quaternion": _plain(body.orientation, f"{place}.orientation")}
+            given = body.orientation
+            form = given if isinstance(given, Mapping) else {"quaternion": given}
+            found["orientation"] = _plain(form, f"{place}.orientation")
         for key in ("mass", "inertia", "center_of_mass"):
             value = getattr(body, key)
             if value is not None:
@@ -209,26 +211,38 @@ class _Writer:
         raise MechanismError(message, name=place)
 
     def _spline(self, place: str, law: SplineMotion) -> dict[str, Any]:
-        """Return a spline as samples through which there is no other of its degree with the same breakpoints."""
+        """Return a spline as its samples, or as samples through which there is no other with the same breakpoints."""
         if law.degree % 2 == 0:
-            message = f"a spline of even degree ({law.degree}) has no form in a file once it is made; use an odd degree"
+            message = f"a spline of even degree ({law.degree}) has no form in a file; use an odd degree"
             raise MechanismError(message, name=place)
-        ends = np.asarray(law.breakpoints, float)
-        pieces = np.asarray(law.coefficients, float)
-        between = (law.degree - 1) // 2  # samples near each end, which are no breakpoints
-        last = ends[-1] + ((between + 1) * (ends[-1] - ends[0]) / (len(ends) + between) if len(ends) > 1 else 1.0)
-        times = np.unique(np.concatenate([
-            np.linspace(ends[0], ends[1] if len(ends) > 1 else last, between + 2),
-            ends, np.linspace(ends[-1], last, between + 2),
-        ]))  # fmt: skip
-        if len(ends) == 1:
-            times = np.linspace(ends[0], last, law.degree + 1)
-        piece = np.clip(np.searchsorted(ends, times, side="right") - 1, 0, len(ends) - 1)
-        local = times - ends[piece]
-        values = sum(c[piece] * local**k for k, c in enumerate(pieces))
         name = f"{self.stem}_{re.sub(r'[^A-Za-z0-9_]+', '_', place)}.csv"
-        self.samples[name] = (times.tolist(), np.asarray(values).tolist())
-        return {"samples": name, "degree": law.degree}
+        times, values = law.samples.value or _samples_of(law)
+        self.samples[name] = (np.asarray(times).tolist(), np.asarray(values).tolist())
+        beyond = "hold" if isinstance(law, TrapezoidalMotion) else law.beyond
+        if beyond == "continue":
+            message = "a law that goes on beyond its data has no form in a file; choose hold, or more data"
+            raise MechanismError(message, name=place, value=beyond)
+        found = {"samples": name, "degree": law.degree}
+        return found if beyond == "refuse" else found | {"beyond": beyond}
+
+
+def _samples_of(law: SplineMotion) -> tuple[Any, Any]:
+    """Return samples through which there is one spline only of the degree and the breakpoints of a law."""
+    ends = np.asarray(law.breakpoints, float)
+    pieces = np.asarray(law.coefficients, float)
+    between = (law.degree - 1) // 2  # samples near each end, which are no breakpoints
+    last = float(law.stop)
+    if last <= ends[-1]:  # the last piece is rest, without an end
+        last = ends[-1] + ((between + 1) * (ends[-1] - ends[0]) / (len(ends) + between) if len(ends) > 1 else 1.0)
+    times = np.unique(np.concatenate([
+        np.linspace(ends[0], ends[1] if len(ends) > 1 else last, between + 2),
+        ends, np.linspace(ends[-1], last, between + 2),
+    ]))  # fmt: skip
+    if len(ends) == 1:
+        times = np.linspace(ends[0], last, law.degree + 1)
+    piece = np.clip(np.searchsorted(ends, times, side="right") - 1, 0, len(ends) - 1)
+    local = times - ends[piece]
+    return times, sum(c[piece] * local**k for k, c in enumerate(pieces))
 
 
 def _is_default(value: Any, field: Any) -> bool:

@@ -82,11 +82,13 @@ def newton_raphson(
     def iterate(state: Any) -> Any:
         pose, before, correction, _, count = state
         residual = system.residual(pose, time).coefficients[0]
-        again = jax.lax.cond(count == 1, lambda: _size(before.solve(residual)), lambda: correction.simplified)
+        again = jax.lax.cond(
+            count == 1, lambda: _size(before.solve(residual, refined=False)), lambda: correction.simplified
+        )
         accepted = correction.last <= tolerance
         simplified = jnp.where(refine | ~accepted, again, correction.simplified)  # else the pose was left as it was
         factor = DenseFactor.of(system.jacobian(pose, time))
-        step = factor.solve(-residual)
+        step = factor.solve(-residual, refined=False)
         size = _size(step)
         step = jnp.where(refine | ~(size <= tolerance), step, 0.0)
         pose = pose.displaced(*system.coordinates(step, pose.shifts))
@@ -172,7 +174,10 @@ def _turnover(system: System, pose_type: type, coordinates: dict[str, Jet], fact
         size = jnp.maximum(jnp.sqrt(jnp.sum(power * power)), 1e-300)
         power, grown = (power / size) @ (power / size), grown + jnp.log(size) / 2 ** (k - 1)
     size = jnp.exp(grown + jnp.log(jnp.maximum(jnp.sqrt(jnp.sum(power * power)), 1e-300)) / 2**SQUARINGS)
-    return jnp.where(jnp.sum(power * relative.T) < 0, -size, size)[None]
+    along, trace = jnp.sum(power * relative.T), jnp.trace(power)
+    eigenvalue = along / jnp.where(trace == 0, 1.0, trace)  # where one is real and leads, as near a singular position
+    leads = (jnp.abs(eigenvalue) > 0.7 * size) & (jnp.abs(eigenvalue) <= size)
+    return jnp.where(leads, eigenvalue, jnp.where(along < 0, -size, size))[None]
 
 
 def _predictable(departure: Any, travel: Any) -> Any:

@@ -1,20 +1,28 @@
 """The first assembly: bodies put together from the starting guess, and degrees of freedom counted and explained."""
 
 import dataclasses
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import jax
 import numpy as np
 
+from jounce.constraints.drivers import DistanceDriver
+from jounce.constraints.planar import DoubleRevolute
+from jounce.constraints.spatial import DoubleSpherical
 from jounce.errors import AssemblyError, MobilityError
 from jounce.jet import Jet
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.status import Status
+from jounce.kinematics.turns import Lag, course, lag_of, nearest_turns
 from jounce.mechanism import Model
-from jounce.mechanism.builder import pose_at
+from jounce.mechanism.builder import pose_at, referred
+from jounce.mechanism.datums import measures_angle, with_angles, with_datums
 
 MAX_STEPS = 100
 RANK_TOLERANCE = 1e-9
+MAX_DATUMS = 100
+SETTLED = 1e-12  # rad, by which the angles of drivers may be counted otherwise
 
 
 @compiled("pose_type")
@@ -83,15 +91,96 @@ def assemble(
         noun = "degree of freedom" if columns == 1 else "degrees of freedom"
         raise MobilityError(f"the mechanism has no joints and no drivers: {columns} {noun} are left")
     if not model.rows:  # bodies that fly freely are together as they are
+        model, _ = referred(model, model.guess, instant, model.turnings)
         return dataclasses.replace(model, system=jax.device_put(model.system)), model.guess
-    found = put_together(model, instant, tolerance)
-    check_assembled(model, found.gaps, instant, tolerance)
+    model, found = _settled(model, instant, tolerance)
+    check_assembled(model, found, instant, tolerance, free=free)
     check_mobility(model, found.jacobian, free=free)
     system = jax.device_put(dataclasses.replace(model.system, row_scale=found.scale[:, None]))
     return dataclasses.replace(model, system=system), found.coordinates
 
 
-def put_together(model: Model, instant: float, tolerance: float) -> Trial:
+def _settled(model: Model, instant: float, tolerance: float) -> tuple[Model, Trial]:
+    """Put the bodies together, and count the angles about axes from the position found.
+
+    Where the axes were tilted against each other in the starting guess, the angles in the position found are others
+    than those counted from the guess, and it takes another turn to get to those that the drivers prescribe.
+    """
+    model, start = _turned(model, instant, tolerance)
+    found, told = put_together(model, instant, tolerance, start), model.turnings
+    if not closed(found.gaps, tolerance) and any(map(measures_angle, model.system.groups)):
+        # angles counted from a tilted guess may be far off: first the joints alone, with the drivers as they are
+        lag = _lag(model, instant)
+        begin = found if lag is None else put_together(model, instant, tolerance, lag=lag)
+        if closed(begin.gaps, tolerance):
+            model, _ = referred(model, begin.coordinates, instant, told)
+            found = put_together(model, instant, tolerance, begin.coordinates)
+    if "angle" in found.coordinates and start is None and closed(found.gaps, tolerance):
+        found = _nearest(model, found, instant)
+    for _ in range(MAX_DATUMS):
+        if not closed(found.gaps, tolerance):
+            return model, found
+        model, away = referred(model, found.coordinates, instant, told)
+        if away <= SETTLED:
+            return model, found
+        found = put_together(model, instant, tolerance, found.coordinates)
+    return referred(model, found.coordinates, instant, told, keep=True)[0], found
+
+
+def _turned(model: Model, instant: float, tolerance: float) -> tuple[Model, dict[str, np.ndarray] | None]:
+    """Return the model and the coordinates to start from where laws begin more than half a turn from the guess.
+
+    The drivers are turned from the guess to their laws then, and all angles count their turns; None where none is so
+    far away, or the way cannot be gone.
+    """
+    moved, lag = _mover(model, instant), _lag(model, instant)
+    if lag is None or not np.pi < lag.angle < np.inf:
+        return model, None
+    begin = put_together(model, instant, tolerance, lag=lag)
+    if not closed(begin.gaps, tolerance):
+        return model, None
+    found = course(model, lag, begin.coordinates, moved, _row_scale)
+    if found is None:
+        return model, None
+    outputs = with_angles(with_datums(model.system.outputs, found.coordinates), found.angles)
+    system = dataclasses.replace(model.system, outputs=outputs)
+    return dataclasses.replace(model, system=system), found.coordinates
+
+
+def _lag(model: Model, instant: float) -> Lag | None:
+    """Return what the drivers lack at the guess."""
+    still = np.zeros(model.system.cells.shape[1])
+    return lag_of(model, instant, _mover(model, instant)(model.guess, still)[1])
+
+
+def _nearest(model: Model, found: Trial, instant: float) -> Trial:
+    """Return planar bodies put together, with every angle shifted by whole turns to be nearest to the guess."""
+    moved, still = _mover(model, instant), np.zeros(model.system.cells.shape[1])
+
+    def residual_at(angle: np.ndarray) -> np.ndarray:
+        return found.scale * moved({**found.coordinates, "angle": angle}, still)[1]
+
+    return found._replace(coordinates=nearest_turns(model.guess, found.coordinates, residual_at))
+
+
+def _mover(model: Model, instant: float) -> Callable[[dict[str, Any], np.ndarray], Any]:
+    """Return what takes coordinates and an increment to coordinates, residual and Jacobian, all NumPy arrays."""
+
+    def moved(coordinates: dict[str, Any], increment: np.ndarray) -> Any:
+        result = _moved(model.system, coordinates, increment, np.float64(instant), model.pose_type)
+        return jax.tree.map(np.asarray, result)
+
+    return moved
+
+
+def put_together(
+    model: Model,
+    instant: float,
+    tolerance: float,
+    start: dict[str, np.ndarray] | None = None,
+    *,
+    lag: Lag | None = None,
+) -> Trial:
     """Return how far the bodies can be put together at one instant; nothing is refused.
 
     Parameters
@@ -102,18 +191,22 @@ def put_together(model: Model, instant: float, tolerance: float) -> Trial:
         s.
     tolerance : float
         Of the last correction, rad or sizes of the mechanism.
+    start : dict of str to array, optional
+        Coordinates to start from instead of the guess.
+    lag : Lag, optional
+        What drivers may still lack.
     """
-    still, instant = np.zeros(model.system.cells.shape[1]), np.float64(instant)
+    still, free = np.zeros(model.system.cells.shape[1]), _mover(model, instant)
 
     def moved(coordinates: dict[str, Any], increment: np.ndarray) -> Any:
-        result = _moved(model.system, coordinates, increment, instant, model.pose_type)
-        return jax.tree.map(np.asarray, result)
+        moved_to, residual, jacobian = free(coordinates, increment)
+        return moved_to, residual if lag is None else lag.open(residual, 1.0), jacobian
 
-    coordinates, residual, jacobian = moved(model.guess, still)
+    coordinates, residual, jacobian = moved(model.guess if start is None else start, still)
     scale = _row_scale(jacobian)
     for _ in range(MAX_STEPS):
-        if not np.isfinite(residual).all():
-            break  # told below, by name
+        if not (np.isfinite(residual).all() and np.isfinite(jacobian).all()):
+            break  # told by name; what factors a matrix may never end on one that is not finite
         step = np.linalg.lstsq(scale[:, None] * jacobian, -scale * residual, rcond=1e-10)[0]
         size = np.max(np.abs(step), initial=0.0)
         if not np.isfinite(size):
@@ -131,7 +224,8 @@ def put_together(model: Model, instant: float, tolerance: float) -> Trial:
         scale = _row_scale(jacobian)
         if size <= tolerance:
             break
-    return Trial(coordinates, scale, scale * residual, scale[:, None] * jacobian)
+    gaps = np.where(np.isfinite(jacobian).all(axis=1), scale * residual, np.nan)
+    return Trial(coordinates, scale, gaps, scale[:, None] * jacobian)
 
 
 def _row_scale(jacobian: np.ndarray) -> np.ndarray:
@@ -139,25 +233,79 @@ def _row_scale(jacobian: np.ndarray) -> np.ndarray:
     return 1 / np.where((largest > 0) & np.isfinite(largest), largest, 1.0)
 
 
-def check_assembled(model: Model, gaps: np.ndarray, instant: float, tolerance: float) -> None:
-    """Raise AssemblyError, with the joints concerned, where gaps stay open."""
+def closed(gaps: np.ndarray, tolerance: float) -> bool:
+    """Tell whether all gaps are closed, to a tolerance of the last correction."""
+    return bool(np.all(np.abs(gaps) <= max(1e3 * tolerance, 1e-9)))
+
+
+def check_assembled(model: Model, found: Trial, instant: float, tolerance: float, *, free: bool = False) -> None:
+    """Raise AssemblyError, with the joints concerned and by how much they stay open, where gaps are not closed.
+
+    What is missing for every motion to be prescribed is told too, unless degrees of freedom may be left (`free`).
+    """
+    gaps = found.gaps
     unknown = list(dict.fromkeys(name for name, gap in zip(model.rows, gaps, strict=True) if not np.isfinite(gap)))
     if unknown:
         named = ", ".join(unknown)
         message = f"no finite value at t = {instant:g} s: {named}; check motion laws and the starting guess"
         raise AssemblyError(message, status=Status.INADMISSIBLE)
+    if closed(gaps, tolerance):
+        return
     gaps = np.abs(gaps)
     worst = np.argsort(-gaps)
-    if gaps[worst[0]] <= max(1e3 * tolerance, 1e-9):
-        return
     open_rows = list(dict.fromkeys(model.rows[k] for k in worst if gaps[k] > 0.1 * gaps[worst[0]]))
-    named = ", ".join(open_rows[:4])
+    wide = _widths(model, found, instant)
     message = (
-        f"the mechanism cannot be assembled at t = {instant:g} s from its starting guess: {named} "
-        f"{'stays' if len(open_rows) == 1 else 'stay'} open by about {gaps[worst[0]]:.2g} (rad, or sizes of the "
-        "mechanism); check lengths and positions, or guess the pose of the bodies more closely"
+        f"the mechanism cannot be assembled at t = {instant:g} s from its starting guess: {', '.join(open_rows[:4])} "
+        f"{'stays' if len(open_rows) == 1 else 'stay'} open, by {', '.join(wide[name] for name in open_rows[:4])}; "
+        "check lengths and positions, or guess the pose of the bodies more closely"
     )
+    missing = found.jacobian.shape[1] - len(model.rows)
+    if missing > 0 and not free:
+        message += f"; {_count(missing, 'equation')} too few for all coordinates: a joint may be missing"
     raise AssemblyError(message, status=Status.NOT_ASSEMBLED)
+
+
+def _widths(model: Model, found: Trial, instant: float) -> dict[str, str]:
+    """Return by how much each joint and driver is open, as a length or as an angle, whichever it closes."""
+    shifts, jacobian = model.pose_type.shifts, found.jacobian
+    entries = np.abs(jacobian).reshape(len(jacobian), len(model.bodies), -1)
+    by_shift, by_turn = (np.max(part, axis=(1, 2)) for part in (entries[:, :, :shifts], entries[:, :, shifts:]))
+    lengthy = by_shift > 1e-9 * by_turn
+    unit = np.where(lengthy, 1e3 * model.length, np.degrees(1.0))
+    open_by = np.abs(found.gaps) * unit / np.maximum(np.where(lengthy, by_shift, by_turn), 1e-300)
+    squares = _squared_lengths(model, instant)
+    for row, name in enumerate(model.rows):
+        if name in squares:  # the residual is the square of a distance less this
+            square = max(found.gaps[row] / found.scale[row] + squares[name], 0.0)
+            open_by[row] = 1e3 * abs(np.sqrt(square) - np.sqrt(squares[name]))
+    words = {}
+    for name in dict.fromkeys(model.rows):
+        its = np.array([row == name for row in model.rows])
+        sizes = (
+            (np.max(open_by[its & kind], initial=0.0), unit) for kind, unit in ((lengthy, "mm"), (~lengthy, "deg"))
+        )
+        words[name] = " and ".join(f"{size:.3g} {unit}" for size, unit in sizes if size > 1e-6)
+    return words
+
+
+def _squared_lengths(model: Model, instant: float) -> dict[str, float]:
+    """Return the squares of the distances that joints and drivers keep between two points, by name, m^2."""
+    found, first = {}, 0
+    clock = Jet([np.full((1, 1), instant)])
+    for group in model.system.groups:
+        element, names = group.element, model.rows[first : first + group.instances]
+        kind = type(element)
+        first += len([name for name in model.rows if name in set(names)])
+        if kind in (DoubleRevolute, DoubleSpherical):
+            lengths = element.length
+        elif isinstance(element, DistanceDriver):
+            lengths = element.motion(clock).coefficients[0]
+        else:
+            continue
+        lengths = np.broadcast_to(lengths, (group.instances, 1))[:, 0]
+        found |= {name: float(length) ** 2 for name, length in zip(names, lengths, strict=True)}
+    return found
 
 
 def check_mobility(model: Model, jacobian: np.ndarray, *, free: bool = False) -> None:

@@ -54,14 +54,19 @@ class DenseFactor(eqx.Module):
         matrix, column = jnp.zeros((*shape, lanes)), jnp.zeros((shape[0], lanes))
         return cls(matrix, matrix, column.astype(jnp.int32), column)
 
-    def solve(self, right: Any) -> Any:
-        """Return the solution for right-hand sides of shape (rows, batch); it is NaN where a matrix is singular."""
+    def solve(self, right: Any, *, refined: bool = True) -> Any:
+        """Return the solution for right-hand sides of shape (rows, batch); it is NaN where a matrix is singular.
+
+        A correction that is followed by another need not be refined.
+        """
 
         def product(right: Any) -> Any:
             columns = jnp.take_along_axis(right, self.order, axis=0)
             return jnp.take_along_axis(jnp.sum(self.eliminated * columns[None], axis=1), self.order, axis=0)
 
         solution = product(right)
+        if not refined:
+            return solution * self._regular()
         rest = right - jnp.sum(self.matrix * solution[None], axis=1)
         return (solution + product(rest)) * self._regular()
 

@@ -20,6 +20,7 @@ from jounce.mechanism import (
     Model,
     PointOutput,
 )
+from jounce.mechanism.datums import with_datums
 from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.system import POSITION_COMPONENTS, Group, group_elements
 
@@ -44,11 +45,15 @@ def check_output(output: Any, mechanism: Mechanism, name: str = "output") -> Non
     output.check(mechanism)
 
 
-def output_group(output: Any, mechanism: Mechanism, name: str = "output") -> Group:
-    """Return an output of poses as a group of one, which acts on the pose of all bodies."""
+def output_group(output: Any, mechanism: Mechanism, model: Model | None = None, name: str = "output") -> Group:
+    """Return an output of poses as a group of one, which acts on the pose of all bodies.
+
+    With a model, angles about axes are counted from the position in which it was put together.
+    """
     index = {body: k for k, body in enumerate((GROUND, *mechanism.bodies))}
     components = POSITION_COMPONENTS[mechanism.space]
-    (group,), _ = group_elements({name: output}, mechanism.parameter_values, index, components)
+    groups, _ = group_elements({name: output}, mechanism.parameter_values, index, components)
+    (group,) = groups if model is None else with_datums(groups, model.reference, model.turnings)
     return group
 
 
@@ -179,7 +184,7 @@ class Motion:
         check_output(output, self.mechanism, name)
         if isinstance(output, AbstractMotionOutput):
             return self._labelled(name, self._derivatives(output.coefficients(self)), output.unit)
-        group = output_group(output, self.mechanism, name)
+        group = output_group(output, self.mechanism, self._model, name)
         values = np.asarray(_evaluated(group, self._coordinates, self._model.pose_type))[:, :, 0]
         return self._labelled(name, self._derivatives(values), output.unit)
 

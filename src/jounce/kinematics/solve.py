@@ -13,10 +13,14 @@ from jounce.kinematics.motion import Motion
 from jounce.kinematics.path import PASSABLE, Anchor, Solver, follow
 from jounce.kinematics.status import Status
 from jounce.mechanism import Mechanism, build, check_mechanism, time_grid
+from jounce.mechanism.datums import measures_angle
 from jounce.mechanism.doors import concrete
+from jounce.mechanism.laws import check_laws
+from jounce.mechanism.system import Group
 
 LOWEST_ORDER = 4  # of the jets inside: predictions need some, also where the user wants positions only
 HIGHEST_ORDER = 30
+FORCES_LOSE = 2  # derivatives of the motion are used up by outputs of forces
 LARGEST_TOLERANCE = 1e-2
 
 
@@ -83,6 +87,7 @@ def solve(
         raise MechanismError(message, name="tolerance", value=tolerance)
     instants = time_grid(mechanism.time if time is None else time, mechanism.parameter_values)
     lost = max((output.lost_orders for output in mechanism.outputs.values()), default=0)
+    check_laws(mechanism, instants, order + lost, forces=lost >= FORCES_LOSE)
     model, coordinates = assemble(build(mechanism), instants[0], tolerance)
     solver = Solver(model, max(order + lost, LOWEST_ORDER), float(tolerance), refine, order)
     track = follow(solver, _first(solver, coordinates, instants[:1]), instants[-1], instants[-1] - instants[0])
@@ -123,13 +128,21 @@ def _first(solver: Solver, coordinates: dict[str, np.ndarray], instant: np.ndarr
     """Solve the first instant with its derivatives, from its assembled position."""
     levels = solver.order + 1
     still = {name: np.stack([x, *[np.zeros_like(x)] * (levels - 1)]) for name, x in coordinates.items()}
-    angles = tuple(np.zeros((levels, 1, group.instances, 1)) for group in solver.model.system.outputs)
+    angles = tuple(_known_angles(group, levels) for group in solver.model.system.outputs)
     arrival = solver((still, angles, np.zeros(1)), np.zeros(1), instant, survey=True)
     status = Status(int(arrival.status[0]))
     if status not in PASSABLE:
         where = f"t = {instant[0]:g} s, {solver.culprit(arrival, 0)}"
         raise SolveError(f"{where}: {_words(status)}: {status.advice}", status=status)
     return Anchor.of(arrival, instant[0])
+
+
+def _known_angles(group: Group, levels: int) -> np.ndarray:
+    """Return what is known of angles at the first instant: whole turns, where the assembly counted them."""
+    known = np.zeros((levels, 1, group.instances, 1))
+    if measures_angle(group):
+        known[0, 0] = group.element.datum.angle
+    return known
 
 
 def _words(status: Status) -> str:

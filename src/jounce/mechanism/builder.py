@@ -1,6 +1,7 @@
 """From names to indices, once: the numeric model of a mechanism and where each of its rows comes from."""
 
 import dataclasses
+from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any
 
@@ -11,9 +12,10 @@ import numpy as np
 from jax.core import Tracer
 
 from jounce.constraints.base import field_kind, value_fields
-from jounce.errors import JounceError, MechanismError
+from jounce.errors import JounceError
 from jounce.jet import Jet
-from jounce.mechanism.mechanism import GROUND, Mechanism
+from jounce.mechanism.datums import Turning, departure, measures_angle, turnings_of, with_datums
+from jounce.mechanism.mechanism import GROUND, Body, Mechanism
 from jounce.mechanism.outputs import AbstractOutput
 from jounce.mechanism.resolve import check_value, resolve
 from jounce.mechanism.system import (
@@ -24,6 +26,7 @@ from jounce.mechanism.system import (
     jacobian_cells,
 )
 from jounce.rigid import PlanarPose, SpatialPose
+from jounce.rigid.euler_parameters import euler_parameters
 
 
 @dataclasses.dataclass(frozen=True)
@@ -50,6 +53,10 @@ class Model:
         Names of the outputs in each group of the system.
     length : float
         Size of the mechanism, by which positions are scaled, m.
+    reference : dict of str to array
+        Coordinates from which angles about axes are counted: those of the starting guess, until put together.
+    turnings : tuple of Turning
+        Angles that drivers prescribe there, with their whole turns.
     """
 
     system: System
@@ -61,6 +68,8 @@ class Model:
     bodies: tuple[str, ...]
     outputs: tuple[tuple[str, ...], ...]
     length: float
+    reference: dict[str, Any]
+    turnings: tuple[Turning, ...] = ()
 
 
 def build(mechanism: Mechanism, like: Model | None = None) -> Model:
@@ -92,12 +101,17 @@ def build(mechanism: Mechanism, like: Model | None = None) -> Model:
     groups, names = group_elements(elements, parameters, body_index, components)
     if like is None:
         groups = tuple(_with_offsets(group, pose_type, guess) for group in groups)
-    else:
-        groups = tuple(map(_with_offsets_of, groups, like.system.groups))
     applied = {f"forces.{k}": v for k, v in mechanism.forces.items()}
     forces, force_names = group_elements(applied, parameters, body_index, components)
     wanted = {f"outputs.{k}": v for k, v in mechanism.outputs.items() if isinstance(v, AbstractOutput)}
     outputs, output_names = group_elements(wanted, parameters, body_index, components)
+
+    if like is None:
+        groups, forces, outputs = (with_datums(part, guess) for part in (groups, forces, outputs))
+    else:
+        known = like.system
+        pairs = ((groups, known.groups), (forces, known.forces), (outputs, known.outputs))
+        groups, forces, outputs = (tuple(map(_with_found_of, part, its)) for part, its in pairs)
 
     row_counts = [_row_count(group, pose_type, guess) for group in groups]
     row_names = [n for members, count in zip(names, row_counts, strict=True) for _ in range(count) for n in members]
@@ -122,7 +136,45 @@ def build(mechanism: Mechanism, like: Model | None = None) -> Model:
         tuple(mechanism.bodies),
         _plain(output_names),
         length,
+        guess if like is None else like.reference,
+        () if like is None else like.turnings,
     )
+
+
+def referred(
+    model: Model, coordinates: dict[str, Any], instant: float, told: tuple[Turning, ...] = (), *, keep: bool = False
+) -> tuple[Model, float]:
+    """Return the model with angles about axes counted from a position, and how far off those of drivers were, rad.
+
+    Parameters
+    ----------
+    model : Model
+        Of a mechanism.
+    coordinates : dict of str to array
+        Of all bodies, the ground first, put together.
+    instant : float
+        At which they are there, s.
+    told : tuple of Turning
+        Angles that are prescribed there by others than the drivers, such as initial conditions.
+    keep : bool, default False
+        Whether angles go on from those counted so far, instead of those that the frames of the bodies have.
+    """
+    system = model.system
+    if not any(map(measures_angle, (*system.groups, *system.forces, *system.outputs))):
+        return dataclasses.replace(model, reference=coordinates, turnings=told), 0.0
+    groups = with_datums(system.groups, coordinates, keep=keep)
+    motions = [group.element.motion for group in groups if measures_angle(group)]
+    values = [np.asarray(value) for value in _law_values(motions, np.full((1, 1), instant))]
+    turnings = (*turnings_of(groups, coordinates, values), *told)
+    forces, outputs = (with_datums(part, coordinates, turnings) for part in (system.forces, system.outputs))
+    system = dataclasses.replace(system, groups=groups, forces=forces, outputs=outputs)
+    away = departure(model.system.groups, groups)
+    return dataclasses.replace(model, system=system, reference=coordinates, turnings=turnings), away
+
+
+@jax.jit
+def _law_values(motions: list[Any], instant: Any) -> list[Any]:
+    return [motion(Jet([instant])).coefficients[0] for motion in motions]
 
 
 def _plain(names: tuple[tuple[str, ...], ...]) -> tuple[tuple[str, ...], ...]:
@@ -139,13 +191,34 @@ def starting_guess(mechanism: Mechanism, parameters: dict[str, Any], components:
         if components == 2:
             attitudes.append(_guess(body.angle, f"{place}.angle", "scalar", components, parameters))
         else:
-            quaternion = [1.0, 0.0, 0.0, 0.0] if body.orientation is None else body.orientation
-            quaternion = _guess(quaternion, f"{place}.orientation", "vector", 4, parameters)
-            if not np.any(quaternion):
-                raise MechanismError("Euler parameters must not all be zero", name=f"{place}.orientation")
-            attitudes.append(quaternion / np.sqrt(np.sum(quaternion * quaternion)))
+            attitudes.append(_attitude(body.orientation, f"{place}.orientation", parameters))
     position, attitude = (np.stack([np.asarray(x) for x in xs], axis=-1)[..., None] for xs in (positions, attitudes))
     return {"position": position, "angle" if components == 2 else "quaternion": attitude}
+
+
+def check_body(name: str, body: Body, parameters: dict[str, Any], components: int) -> None:
+    """Raise a JounceError unless the starting guess of a body is one, in all that the space has."""
+    place = f"bodies.{name}"
+    _guess(body.position, f"{place}.position", "vector", components, parameters)
+    if components == 2:
+        _guess(body.angle, f"{place}.angle", "scalar", components, parameters)
+    else:
+        _attitude(body.orientation, f"{place}.orientation", parameters)
+
+
+def _attitude(orientation: Any, name: str, parameters: dict[str, Any]) -> np.ndarray:
+    """Return the Euler parameters of an orientation whose numbers may be expressions of the parameters."""
+    if orientation is None:
+        return np.array([1.0, 0.0, 0.0, 0.0])
+    try:
+        if isinstance(orientation, Mapping):
+            given = {k: v if k == "euler" else resolve(v, parameters) for k, v in orientation.items()}
+        else:
+            given = resolve(orientation, parameters)
+        return np.array(euler_parameters(given))
+    except JounceError as error:
+        key = f"{name}.{error.name}" if error.name else name
+        raise type(error)(error.message, name=key, value=error.value) from None
 
 
 def _guess(value: Any, name: str, kind: str, components: int, parameters: dict[str, Any]) -> Any:
@@ -197,8 +270,13 @@ def _with_offsets(group: Group, pose_type: type, guess: dict[str, Any]) -> Group
     return eqx.tree_at(lambda g: g.element.offset, group, offset, is_leaf=lambda x: x is None)
 
 
-def _with_offsets_of(group: Group, known: Group) -> Group:
-    """Take over the offsets that were not given from a group that has them."""
+def _with_found_of(group: Group, known: Group) -> Group:
+    """Take over what was not given, but found from a position, from a group that has it."""
+    if measures_angle(group):
+        group = eqx.tree_at(lambda g: g.element.datum, group, known.element.datum, is_leaf=lambda x: x is None)
+        if group.element.vector_i is None or isinstance(group.element.vector_j, Tracer):
+            return group
+        return eqx.tree_at(lambda g: g.element.vector_j, group, known.element.vector_j)
     if "offset" not in value_fields(type(group.element)) or group.element.offset is not None:
         return group
     return eqx.tree_at(lambda g: g.element.offset, group, known.element.offset, is_leaf=lambda x: x is None)

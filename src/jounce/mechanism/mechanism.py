@@ -6,12 +6,14 @@ from functools import cached_property
 from typing import Any
 
 from jounce.constraints import AbstractConstraint
-from jounce.errors import ExpressionError, MechanismError, did_you_mean
+from jounce.errors import ExpressionError, JounceError, MechanismError, did_you_mean
 from jounce.forces import AbstractForce
 from jounce.mechanism.outputs import AbstractQuantity
 from jounce.mechanism.resolve import parameter_value
 from jounce.rigid.inertia import Inertia
 from jounce.trajectory import Expression
+from jounce.trajectory.dimensions import Dimension, check_one_of
+from jounce.trajectory.units import parse_value
 
 GROUND = "ground"
 RESERVED = ("t", "pi", "deg")
@@ -29,8 +31,10 @@ class Body:
         Starting guess of the origin of its frame in the global frame, (2,) or (3,), m.
     angle : number or expression, default 0
         Starting guess of the angle of a planar body, rad.
-    orientation : sequence of 4 numbers, optional
-        Starting guess of the Euler parameters [e0, e1, e2, e3] of a spatial body; normalised when used.
+    orientation : sequence of 4 numbers, or dict, optional
+        Starting guess of the Euler parameters [e0, e1, e2, e3] of a spatial body, normalised when used; or
+        ``{"axis": [x, y, z], "angle": ...}``, or ``{"euler": "zxz", "angles": [...]}`` (lower-case letters for fixed
+        axes, upper-case ones for those of the body), rad. Numbers may be expressions of the parameters.
     mass : number or expression, optional
         For the dynamics; kinematics does not use it. kg.
     inertia : number, sequence, expression or Inertia, optional
@@ -98,6 +102,8 @@ class Mechanism:
         The instants that `jounce.solve` takes when it is given none, s.
     title : str, optional
         One line for tables and figures.
+    dimensions : dict of str to tuple of Dimension, optional
+        Which dimensions parameters may have, where it is known: a file tells it by units and by use.
 
     Raises
     ------
@@ -131,6 +137,7 @@ class Mechanism:
     gravity: Any = None
     time: Any = None
     title: str = ""
+    dimensions: Mapping[str, tuple[Dimension, ...]] = dataclasses.field(default_factory=dict, compare=False, repr=False)
 
     def __post_init__(self):
         if self.space not in ("planar", "spatial"):
@@ -222,20 +229,49 @@ class Mechanism:
         return values
 
     def with_parameters(self, **values: Any) -> "Mechanism":
-        """Return the mechanism with other values of some parameters, SI.
+        """Return the mechanism with other values of some parameters.
 
         Solving it does not compile anything again.
+
+        Parameters
+        ----------
+        **values
+            By name of the parameter: a number (SI), or text as in a file: a number with a unit, or an expression of
+            the other parameters.
 
         Raises
         ------
         MechanismError
             If a parameter does not exist.
+        UnitError, ExpressionError
+            If a text is no value, or one of another dimension than the file has.
+
+        Examples
+        --------
+        >>> import jounce as jn
+        >>> mechanism = jn.load("examples/four_bar.yaml")
+        >>> mechanism.with_parameters(BC="11 cm").parameters["BC"]
+        0.11
         """
         for name in values:
             if name not in self.parameters:
                 message = f"no parameter has this name; {did_you_mean(name, self.parameters)}"
                 raise MechanismError(message, name="parameters", value=name)
-        return dataclasses.replace(self, parameters={**self.parameters, **values})
+        read = {name: self._read(name, value) if isinstance(value, str) else value for name, value in values.items()}
+        return dataclasses.replace(self, parameters={**self.parameters, **read})
+
+    def _read(self, name: str, text: str) -> Any:
+        """Return the value of a parameter given as text, checked against the dimensions that it may have."""
+        others = [other for other in self.parameters if other != name]
+        known = {other: allowed[0] for other, allowed in self.dimensions.items() if len(allowed) == 1}
+        allowed = self.dimensions.get(name, ())
+        try:
+            given = parse_value(text, "any", others, known)
+            if allowed and given.dimension is not None:
+                check_one_of(given.dimension, allowed, exactly=not isinstance(given.value, Expression))
+        except JounceError as error:
+            raise error.located(name=f"parameters.{name}", value=text) from None
+        return given.value
 
 
 def check_mechanism(given: Any) -> None:

@@ -5,8 +5,8 @@ from typing import Any, ClassVar
 
 import equinox as eqx
 
+from jounce.constraints.angles import relative_angle
 from jounce.constraints.base import Vector, check_text
-from jounce.constraints.spatial import relative_angle
 from jounce.errors import MechanismError
 from jounce.jet import Jet, sqrt
 
@@ -88,6 +88,7 @@ class RelativeAngleOutput(AbstractOutput):
     axis: Vector
     vector_i: Vector = None
     vector_j: Vector = None
+    datum: Any = eqx.field(default=None, init=False)  # found when the mechanism is put together
 
     unit = "rad"
     space = "spatial"
@@ -95,7 +96,7 @@ class RelativeAngleOutput(AbstractOutput):
     body_count = 2
 
     def evaluate(self, body_i, body_j):
-        return relative_angle(body_i, body_j, self.axis, self.vector_i, self.vector_j)
+        return relative_angle(body_i, body_j, self.axis, self.vector_i, self.vector_j, self.datum)
 
 
 class PlanarRelativeAngleOutput(AbstractOutput):

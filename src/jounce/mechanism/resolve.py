@@ -260,6 +260,9 @@ def stack_elements(elements: Sequence[Any], values: Sequence[Mapping[str, Any]])
         else:
             value = jax.tree.map(_along_instances, *(v[name] for v in values))
         object.__setattr__(stacked, name, value)
+    for field in dataclasses.fields(kind):
+        if not field.init:  # found later, from the pose of the bodies
+            object.__setattr__(stacked, field.name, field.default)
     return stacked
 
 

@@ -9,9 +9,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from jounce.constraints import AbstractConstraint, Scalar, Vector
+from jounce.constraints.angles import relative_angle
 from jounce.constraints.base import check_text
 from jounce.constraints.planar import slide
-from jounce.constraints.spatial import relative_angle
 from jounce.errors import MechanismError
 from jounce.jet import Jet, wrap
 from jounce.mechanism import AbstractOutput

@@ -158,19 +158,40 @@ class Expression:
         17.0
         """
         known = {} if environment is None else environment
+
+        def named(name: str, column: int) -> Any:
+            if name not in known:
+                _refuse_name(name, column, self.text, known)
+            value = known[name]
+            return float(value) if isinstance(value, numbers.Real) else value
+
+        return self._folded(float, named, self._apply)
+
+    def folded(
+        self,
+        number: Callable[[float], Any],
+        name: Callable[[str], Any],
+        operation: Callable[[str, list[Any]], Any],
+    ) -> Any:
+        """Return what comes of the formula when its numbers, names and operations mean something else.
+
+        The last are given by the word for them (``+ - * / ** pos neg``, or a function), with their arguments.
+        """
+        return self._folded(
+            number, lambda text, _: name(text), lambda _, word, arguments, __: operation(word, arguments)
+        )
+
+    def _folded(self, number: Any, name: Any, operation: Any) -> Any:
         stack: list[Any] = []
         for kind, operand, count, column in self._program:
             if kind == "number":
-                stack.append(operand)
+                stack.append(number(operand))
             elif kind == "name":
-                if operand not in known:
-                    _refuse_name(operand, column, self.text, known)
-                value = known[operand]
-                stack.append(float(value) if isinstance(value, numbers.Real) else value)
+                stack.append(name(operand, column))
             else:
                 arguments = stack[len(stack) - count :]
                 del stack[len(stack) - count :]
-                stack.append(self._apply(kind, operand, arguments, column))
+                stack.append(operation(kind, operand, arguments, column))
         return stack[0]
 
     def _apply(self, kind: str, operand: str, arguments: list[Any], column: int) -> Any:

@@ -14,12 +14,11 @@ from jounce.trajectory.expression import Expression
 from jounce.trajectory.motion import AbstractMotion, ExpressionMotion
 from jounce.trajectory.polynomial import MAX_CONTINUITY, PolynomialMotion
 from jounce.trajectory.profiles import motion_profile
-from jounce.trajectory.sampling import check_samples, derivative_errors, finite_numbers
+from jounce.trajectory.sampling import TOLERANCE, check_samples, derivative_errors, finite_numbers, words_of_doubt
 from jounce.trajectory.stacking import evaluate_laws, law_derivatives
 from jounce.trajectory.trapezoid import LIMITS
 
 MAX_ORDER = 30
-TOLERANCE = 0.1
 
 
 class JointTrajectory:
@@ -37,8 +36,8 @@ class JointTrajectory:
     Raises
     ------
     TrajectoryError
-        If there is no joint, a law is none, `stop` does not come after `start`, or the times do not increase or leave
-        the trajectory.
+        If there is no joint, a law is none or ends within the trajectory, `stop` does not come after `start`, or the
+        times do not increase or leave the trajectory.
 
     Examples
     --------
@@ -61,6 +60,11 @@ class JointTrajectory:
             raise TrajectoryError("a trajectory needs a law for at least one joint", name="laws", value=laws)
         self.laws: Mapping[str, AbstractMotion] = MappingProxyType({name: _law(name, x) for name, x in laws.items()})
         self.start, self.stop = _bounds(start, stop)
+        for name, law in self.laws.items():
+            try:
+                law.check_instants(self.start, self.stop)
+            except JounceError as error:
+                raise TrajectoryError(error.message, name=f"laws.{name}", value=error.value) from None
         self._samples: dict[str, tuple[np.ndarray, np.ndarray, int]] = {}
         self._estimates: dict[str, np.ndarray] = {}
         instants = np.linspace(self.start, self.stop, 201) if times is None else check_samples(times, times)[0]
@@ -323,16 +327,7 @@ class JointTrajectory:
         worst = int(np.argmax((errors > TOLERANCE).any(axis=1)))
         joint = int(np.argmax(errors[worst]))
         degree = self._samples[names[joint]][2]
-        size = "cannot be told from them" if errors[worst, joint] >= 1 else f"about {100 * errors[worst, joint]:.0f} %"
-        if worst >= degree:
-            cause = (
-                f"splines of degree {degree} have continuous derivatives to order {degree - 1}; choose a higher degree"
-            )
-        else:
-            cause = "sample more often or more exactly, or smooth the samples"
-        message = (
-            f"samples of '{names[joint]}' do not support its derivative of order {worst}: its error is {size}; {cause}"
-        )
+        message = words_of_doubt(names[joint], worst, float(errors[worst, joint]), degree)
         warnings.warn(SampleWarning(message), stacklevel=3)
 
     def _chosen(self, names: Iterable[str] | None) -> tuple[str, ...]:

@@ -8,10 +8,13 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 
-from jounce.errors import MechanismError
+from jounce.errors import MechanismError, did_you_mean
 from jounce.jet import Jet, compose
 from jounce.trajectory.expression import Expression
+from jounce.trajectory.sampling import derivative_errors
+from jounce.trajectory.splines import checked_samples, interpolated, periodic
 
 
 class AbstractMotion(eqx.Module):
@@ -20,6 +23,9 @@ class AbstractMotion(eqx.Module):
     @abc.abstractmethod
     def __call__(self, time: Jet) -> Jet:
         """Return the jet of the law; its batch axes are those of `time`."""
+
+    def check_instants(self, first: float, last: float) -> None:
+        """Raise MechanismError if the law says nothing of some instants from a first to a last one, s."""
 
 
 class ExpressionMotion(AbstractMotion):
@@ -85,6 +91,26 @@ class FunctionMotion(AbstractMotion):
         return compose(self.function, time)
 
 
+BEYOND = ("refuse", "hold", "repeat", "continue")
+SLACK = 1e-9  # of the duration: how far rounding may take an instant out of the samples
+
+
+class Aside:
+    """Data of a law that JAX is not to see: all are equal, so that what is compiled does not depend on them."""
+
+    __slots__ = ("derived", "value")
+
+    def __init__(self, value: Any):
+        self.value = value
+        self.derived: Any = None
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Aside)
+
+    def __hash__(self) -> int:
+        return hash(Aside)
+
+
 class SplineMotion(AbstractMotion):
     """A motion law interpolated through samples by a spline of chosen degree.
 
@@ -98,12 +124,17 @@ class SplineMotion(AbstractMotion):
     values : array_like of shape (samples,)
         Samples of the driven quantity, m or rad.
     degree : int, default 5
-        Odd degrees interpolate best; at least ``degree + 1`` samples are needed.
+        From 1 to 11; odd degrees interpolate best. At least ``degree + 1`` samples are needed.
+    beyond : {"refuse", "hold", "repeat", "continue"}, default "refuse"
+        What the law is before the first and after the last sample: nothing (an error), the value there, at rest; the
+        samples once more, as one period of a smooth motion whose last sample is the first one (or whole turns of 2 pi
+        from it: then the law goes on turning); or what the polynomials at the ends make of it.
 
     Raises
     ------
     MechanismError
-        If the samples are too few for the degree, not finite, not increasing in time, or of unequal number.
+        If the samples are too few for the degree, not finite, not increasing in time, or of unequal number, or do not
+        close where they are to repeat.
 
     Examples
     --------
@@ -113,44 +144,93 @@ class SplineMotion(AbstractMotion):
     >>> law = jn.SplineMotion(t, t**3, degree=5)
     >>> [round(float(x), 9) for x in law(jn.Jet.variable(0.5, order=3)).derivatives()]
     [0.125, 0.75, 3.0, 6.0]
+    >>> held = jn.SplineMotion(t, t**3, beyond="hold")
+    >>> [round(float(x), 9) for x in held(jn.Jet.variable(2.0, order=1)).derivatives()]
+    [1.0, 0.0]
     """
 
     breakpoints: Any
     coefficients: Any
+    stop: Any
+    advance: Any
     degree: int = eqx.field(static=True)
+    beyond: str = eqx.field(static=True)
+    samples: Aside = eqx.field(static=True)
 
-    def __init__(self, times: Any, values: Any, degree: int = 5):
-        times, values = np.asarray(times, float), np.asarray(values, float)
-        if times.ndim != 1 or times.shape != values.shape:
-            shapes = f"{times.shape} and {values.shape}"
-            raise MechanismError("samples need one value for each time, as two lists of equal length", value=shapes)
-        for name, samples in (("times", times), ("values", values)):
-            if not np.isfinite(samples).all():
-                first = int(np.flatnonzero(~np.isfinite(samples))[0])
-                message = f"{name} of samples must be finite numbers; sample {first} is not"
-                raise MechanismError(message, value=float(samples[first]))
-        if (np.diff(times) <= 0).any():
-            first = int(np.flatnonzero(np.diff(times) <= 0)[0])
-            message = f"times of samples must increase; sample {first + 1} does not come after sample {first}"
-            raise MechanismError(message, value=float(times[first + 1]))
-        if not 1 <= degree <= 11:
-            raise MechanismError("the degree of a spline must be a whole number from 1 to 11", value=degree)
-        if len(times) <= degree:
-            raise MechanismError(f"a spline of degree {degree} needs at least {degree + 1} samples", value=len(times))
-        from scipy.interpolate import PPoly, make_interp_spline  # here, since importing SciPy takes half a second
-
+    def __init__(self, times: Any, values: Any, degree: int = 5, beyond: str = "refuse"):
+        times, values = checked_samples(times, values, degree)
+        check_beyond(beyond, BEYOND)
+        advance = 0.0
         try:
-            pieces = PPoly.from_spline(make_interp_spline(times, values, k=degree))
+            if beyond == "repeat":
+                ends, pieces, advance = periodic(times, values, int(degree))
+            else:
+                ends, pieces = interpolated(times, values, int(degree))
         except (np.linalg.LinAlgError, ValueError):
             message = "no spline goes through the samples: their spacing is too uneven; sample evenly"
             raise MechanismError(message, value=float(np.diff(times).min())) from None
-        inside = np.diff(pieces.x) > 0
-        self.breakpoints = pieces.x[:-1][inside]
-        self.coefficients = pieces.c[::-1, inside]  # lowest power first
-        self.degree = degree
+        self._set(ends[:-1], pieces, ends[-1], beyond, advance, (times, values))
+
+    def _set(
+        self, breakpoints: Any, coefficients: Any, stop: Any, beyond: str, advance: float = 0.0, samples: Any = None
+    ) -> None:
+        """Fill in the fields: of the pieces, and of the samples that they go through, if there are any."""
+        self.breakpoints, self.coefficients, self.stop, self.advance = breakpoints, coefficients, stop, advance
+        self.degree, self.beyond, self.samples = len(coefficients) - 1, beyond, Aside(samples)
+
+    @property
+    def errors(self) -> np.ndarray:
+        """Estimated errors of the derivatives, relative to their peaks, (degree + 1,); 0 for a law without samples."""
+        if self.samples.value is None:
+            return np.zeros(self.degree + 1)
+        if self.samples.derived is None:
+            times, values = self.samples.value
+            self.samples.derived = derivative_errors(times, values, self.degree)
+        return self.samples.derived
+
+    def check_instants(self, first: float, last: float) -> None:
+        """Raise MechanismError if the law says nothing of some instants from a first to a last one, s."""
+        if self.beyond != "refuse":
+            return
+        start, stop = float(self.breakpoints[0]), float(self.stop)
+        slack = SLACK * (stop - start)
+        if first < start - slack or last > stop + slack:
+            asked = last if last > stop + slack else first
+            message = (
+                f"the samples go from {start:.9g} to {stop:.9g} s, and say nothing of other instants"
+                "; stay within them, or choose what is beyond: hold or repeat"
+            )
+            raise MechanismError(message, value=float(asked))
 
     def __call__(self, time: Jet) -> Jet:
-        """Return the jet of the law at the instants of the time jet; outside the samples the end pieces go on."""
+        """Return the jet of the law at the instants of the time jet.
+
+        Raises
+        ------
+        MechanismError
+            If an instant is beyond the samples and the law is not told what it is there; in what JAX traces, where
+            nothing can be raised, it is NaN.
+        """
+        instants = time.coefficients[0]
+        first, stop = jnp.asarray(self.breakpoints)[0], jnp.asarray(self.stop)
+        slack = SLACK * (stop - first)
+        outside = (instants < first - slack) | (instants > stop + slack)
+        if self.beyond == "refuse":
+            if not isinstance(outside, Tracer) and bool(outside.any()) and jnp.ndim(first) == 0:
+                self.check_instants(float(jnp.min(instants)), float(jnp.max(instants)))
+            return self._within(time).dense().map(lambda c: jnp.where(outside, jnp.nan, c))
+        if self.beyond == "hold":
+            held = [jnp.clip(instants, first, stop), *(jnp.zeros_like(instants),) * time.order]
+            return self._within(
+                Jet(jnp.where(outside, h, c) for h, c in zip(held, time.dense().coefficients, strict=True))
+            )
+        if self.beyond == "repeat":
+            periods = jnp.floor((instants - first) / (stop - first))
+            return self._within(time - periods * (stop - first)) + periods * jnp.asarray(self.advance)
+        return self._within(time)
+
+    def _within(self, time: Jet) -> Jet:
+        """Return the jet of the polynomials at the instants; outside, those at the ends go on."""
         instants = time.coefficients[0]
         breakpoints, coefficients = jnp.asarray(self.breakpoints), jnp.asarray(self.coefficients)
         if breakpoints.ndim == 1:
@@ -158,8 +238,9 @@ class SplineMotion(AbstractMotion):
             piece = jnp.clip(piece, 0, None)
             start, powers = breakpoints[piece], coefficients[:, piece]
         else:  # several drivers of one kind, stacked along an axis before the batch: (samples, drivers, 1)
-            search = jax.vmap(lambda x: jnp.searchsorted(x, instants[0], side="right") - 1, in_axes=1)
-            piece = jnp.clip(search(breakpoints[..., 0]), 0, None)
+            rows = jnp.broadcast_to(instants, (breakpoints.shape[1], instants.shape[-1]))
+            search = jax.vmap(lambda x, row: jnp.searchsorted(x, row, side="right") - 1, in_axes=(1, 0))
+            piece = jnp.clip(search(breakpoints[..., 0], rows), 0, None)
             start = jnp.take_along_axis(breakpoints[..., 0], piece.T, axis=0).T
             powers = jnp.take_along_axis(coefficients[..., 0], piece.T[None], axis=1)
             powers = jnp.swapaxes(powers, 1, 2)
@@ -168,3 +249,9 @@ class SplineMotion(AbstractMotion):
         for c in powers[-2::-1]:
             value = value * local + c
         return value
+
+
+def check_beyond(beyond: Any, valid: tuple[str, ...]) -> None:
+    """Raise MechanismError unless a word says what a law is beyond its data."""
+    if beyond not in valid:
+        raise MechanismError(f"no such way; {did_you_mean(beyond, valid)}", name="beyond", value=beyond)

@@ -12,6 +12,7 @@ from jounce.trajectory.sampling import check_samples
 
 MAX_CONTINUITY = 10
 ENDS = ("not-a-knot", "natural", "clamped")
+WAYS = ("refuse", "hold", "continue")
 
 _Conditions = Mapping[int, float]
 
@@ -45,6 +46,9 @@ class PolynomialMotion(SplineMotion):
         Conditions on the derivatives above `derivative`, when `start` and `end` give none. With c of them needed, the
         start takes ``ceil(c / 2)`` and the end ``floor(c / 2)``: not-a-knot has the polynomials next to the ends go on
         over as many knots, natural has the highest of the continuous derivatives vanish, and clamped the lowest (rest).
+    beyond : {"refuse", "hold", "continue"}, default "refuse"
+        What the law is outside of the knots: nothing (an error), the value of the nearest knot, at rest, or what the
+        polynomials of the end segments make of it.
 
     Raises
     ------
@@ -53,8 +57,7 @@ class PolynomialMotion(SplineMotion):
 
     Notes
     -----
-    Outside the knots the polynomials of the end segments go on. The formulas are Negrean 2025, equations 61-64; the
-    conditions at the ends are not fixed there.
+    The formulas are Negrean 2025, equations 61-64; the conditions at the ends are not fixed there.
 
     Examples
     --------
@@ -71,8 +74,6 @@ class PolynomialMotion(SplineMotion):
     1.875
     """
 
-    stop: Any
-
     def __init__(
         self,
         times: Any,
@@ -82,9 +83,12 @@ class PolynomialMotion(SplineMotion):
         start: _Conditions | None = None,
         end: _Conditions | None = None,
         ends: str = "not-a-knot",
+        beyond: str = "refuse",
     ):
         times, values = check_samples(times, values)
         _check_orders(continuity, derivative)
+        if beyond not in WAYS:
+            raise TrajectoryError(f"no such way; {did_you_mean(beyond, WAYS)}", name="beyond", value=beyond)
         if ends not in ENDS:
             raise TrajectoryError(f"no conditions have this name; {did_you_mean(ends, ENDS)}", name="ends", value=ends)
         conditions = _checked(start, continuity, "start"), _checked(end, continuity, "end")
@@ -97,10 +101,7 @@ class PolynomialMotion(SplineMotion):
             pieces = _integrated(pieces, np.diff(knots))
         if derivative:
             pieces = pieces + _closing(pieces, knots, constants, times[-1] - times[0])
-        self.breakpoints = times[:-1]
-        self.stop = times[-1]
-        self.coefficients = pieces / step ** np.arange(continuity + 2)[:, None]
-        self.degree = continuity + 1
+        self._set(times[:-1], pieces / step ** np.arange(continuity + 2)[:, None], times[-1], beyond)
 
     @classmethod
     def from_accelerations(
@@ -111,6 +112,7 @@ class PolynomialMotion(SplineMotion):
         start: _Conditions | None = None,
         end: _Conditions | None = None,
         ends: str = "not-a-knot",
+        beyond: str = "refuse",
     ) -> "PolynomialMotion":
         """Return the law whose acceleration goes through samples, integrated twice (Negrean 2025, section 4).
 
@@ -127,6 +129,8 @@ class PolynomialMotion(SplineMotion):
             ``start={0: 0.0, 1: 0.0}``. And either none or ``m - 2`` on the derivatives from the third on.
         ends : {"not-a-knot", "natural", "clamped"}, default "not-a-knot"
             Conditions on the derivatives from the third on, when none are given.
+        beyond : {"refuse", "hold", "continue"}, default "refuse"
+            What the law is outside of the knots.
 
         Returns
         -------
@@ -150,7 +154,7 @@ class PolynomialMotion(SplineMotion):
         if continuity < 2:
             message = "accelerations at the knots are continuous; the order of continuity is at least 2"
             raise TrajectoryError(message, name="continuity", value=continuity)
-        return cls(times, accelerations, continuity, 2, start, end, ends)
+        return cls(times, accelerations, continuity, 2, start, end, ends, beyond)
 
     @property
     def continuity(self) -> int:

@@ -8,6 +8,8 @@ import numpy as np
 from jounce.errors import TrajectoryError
 
 INTERPOLATION_SAFETY, NOISE_SAFETY = 2.0, 3.0
+TOLERANCE = 0.1  # of an error relative to the peak of its derivative
+BLOCKS, BLOCK = 8, 2500  # stretches of very many samples, and samples in each
 
 
 def check_samples(times: Any, values: Any) -> tuple[np.ndarray, np.ndarray]:
@@ -80,29 +82,69 @@ def derivative_errors(times: np.ndarray, values: np.ndarray, degree: int) -> np.
         1 is an error as large as the derivative itself, or nothing known. The peak counts as no less than that of a
         sine of the same range and one period in the duration; samples that are all alike have no error.
     """
-    scatter = float(np.ptp(values))
-    if scatter <= 32 * np.finfo(float).eps * np.abs(values).max():
+    if float(np.ptp(values)) <= 32 * np.finfo(float).eps * np.abs(values).max():
         return np.zeros(degree + 1)
+    blocks = _blocks(len(times))
+    found = [_absolute(times[block], values[block], degree) for block in blocks]
+    scatter, period = float(np.ptp(values)), float(times[-1] - times[0])
+    least = scatter / 2 * (2 * math.pi / period) ** np.arange(degree + 1)
+    errors, peaks = np.max([f[0] for f in found], axis=0), np.max([f[1] for f in found], axis=0)
+    return np.minimum(1.0, errors / np.maximum(peaks, least))
+
+
+def _blocks(count: int) -> list[slice]:
+    """Return all samples, or of very many some stretches that are looked at in their place."""
+    if count <= BLOCKS * BLOCK:
+        return [slice(0, count)]
+    return [slice(first, first + BLOCK) for first in np.linspace(0, count - BLOCK, BLOCKS).astype(int)]
+
+
+def _absolute(times: np.ndarray, values: np.ndarray, degree: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the errors of the derivatives of a spline, and their peaks."""
     half = np.unique(np.append(np.arange(0, len(times), 2), len(times) - 1))
-    found = np.ones(degree + 1)
+    errors, peaks = np.full(degree + 1, math.inf), np.zeros(degree + 1)
+    sigma = noise(times, values)
     if len(half) <= degree:  # too few samples to compare with
-        found[0] = min(1.0, noise(times, values) / scatter)
-        return found
+        errors[0] = sigma
+        return errors, peaks
     from scipy.interpolate import make_interp_spline  # here, since importing SciPy takes half a second
 
     fine = make_interp_spline(times, values, k=degree)
     coarse = make_interp_spline(times[half], values[half], k=degree)
-    at = _between(times)
-    sigma, strength = noise(times, values), amplification(times, degree, degree)
-    period = float(times[-1] - times[0])
+    at, strength = _between(times), amplification(times, degree, degree)
     for k in range(degree + 1):
         curve = fine(at, nu=k)
-        difference = float(np.abs(curve - coarse(at, nu=k)).max())
-        peak = max(float(np.abs(curve).max()), scatter / 2 * (2 * math.pi / period) ** k)
-        interpolation = difference / (2.0 ** (degree + 1 - k) - 1)
-        error = INTERPOLATION_SAFETY * interpolation + NOISE_SAFETY * sigma * strength[k]
-        found[k] = min(1.0, error / peak)
-    return found
+        interpolation = float(np.abs(curve - coarse(at, nu=k)).max()) / (2.0 ** (degree + 1 - k) - 1)
+        errors[k] = INTERPOLATION_SAFETY * interpolation + NOISE_SAFETY * sigma * strength[k]
+        peaks[k] = np.abs(curve).max()
+    return errors, peaks
+
+
+def doubtful_order(errors: np.ndarray, order: int) -> tuple[int, float] | None:
+    """Return the lowest derivative up to an order whose error is above the tolerance, and that error; None if all are.
+
+    Parameters
+    ----------
+    errors : ndarray of shape (degree + 1,)
+        What `derivative_errors` found; above the degree nothing is known, unless the samples are all alike.
+    order : int
+        Highest derivative that is wanted.
+    """
+    known = np.append(errors, 1.0 if errors.any() else 0.0)[: order + 1]
+    if (known <= TOLERANCE).all():
+        return None
+    worst = int(np.argmax(known > TOLERANCE))
+    return worst, float(known[worst])
+
+
+def words_of_doubt(name: str, order: int, error: float, degree: int) -> str:
+    """Word why samples do not support a derivative, and what to do."""
+    size = "cannot be told from them" if error >= 1 else f"about {100 * error:.0f} %"
+    if order >= degree:
+        cause = f"splines of degree {degree} have continuous derivatives to order {degree - 1}; choose a higher degree"
+    else:
+        cause = "sample more often or more exactly, or smooth the samples"
+    return f"samples of '{name}' do not support its derivative of order {order}: its error is {size}; {cause}"
 
 
 def noise(times: np.ndarray, values: np.ndarray) -> float:

@@ -81,9 +81,8 @@ class TrapezoidalMotion(SplineMotion):
         total = quickest if duration is None else duration
         pieces = _phases(lengths, start, end)
         moving = np.concatenate([[0.0], np.cumsum(lengths)[:-1], [total]])
-        self.breakpoints = start_time + np.concatenate([[-1.0], moving])
-        self.coefficients = pieces
-        self.degree = 3
+        begins = start_time + np.concatenate([[-1.0], moving])
+        self._set(begins, pieces, begins[-1], "continue")  # of which the first and the last rest
 
     @property
     def switches(self) -> np.ndarray:

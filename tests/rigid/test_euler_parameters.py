@@ -10,7 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from jounce.errors import MechanismError
-from jounce.io.orientation import from_axis_angle, from_euler, from_quaternion
+from jounce.rigid.euler_parameters import from_axis_angle, from_euler, from_quaternion
 
 SEQUENCES = ["".join(s) for s in itertools.product("xyz", repeat=3) if s[0] != s[1] != s[2]]
 angles = st.floats(-7, 7, allow_nan=False)

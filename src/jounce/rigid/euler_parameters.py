@@ -1,18 +1,93 @@
-"""Orientations as a mechanism file writes them, turned into Euler parameters."""
+"""Orientations as files and users write them, turned into Euler parameters."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
-from jounce.errors import MechanismError
+from jounce.errors import MechanismError, did_you_mean, show_value
 
-__all__ = ["AXES", "from_axis_angle", "from_euler", "from_quaternion"]
+__all__ = ["AXES", "FORMS", "euler_parameters", "form_of", "from_axis_angle", "from_euler", "from_quaternion"]
+
+FORMS: dict[str, tuple[str, ...]] = {
+    "quaternion": ("quaternion",),
+    "euler": ("euler", "angles"),
+    "axis": ("axis", "angle"),
+}
+"""The forms of an orientation by the key that tells them, and the keys that each of them has."""
 
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 Quaternion = tuple[float, float, float, float]
 """Euler parameters (e0, e1, e2, e3), the scalar first, of unit length."""
+
+
+def form_of(keys: Mapping[str, Any]) -> str | None:
+    """Return the form of an orientation by its keys, None where none of them tells it.
+
+    Raises
+    ------
+    MechanismError
+        A key does not belong to the form, or one is missing; its name is the key.
+    """
+    form = next((form for form in FORMS if form in keys), None)
+    valid = FORMS[form] if form else [key for names in FORMS.values() for key in names]
+    for key in keys:
+        if key not in valid:
+            raise MechanismError(f"unknown key {show_value(key)}; {did_you_mean(key, valid)}", name=str(key))
+    for key in valid if form else ("quaternion",):
+        if key not in keys:
+            raise MechanismError("is missing", name=key)
+    return form
+
+
+def euler_parameters(orientation: Any) -> Quaternion:
+    """Return the Euler parameters of an orientation in any of its forms.
+
+    Parameters
+    ----------
+    orientation : sequence of 4 numbers, or dict
+        Euler parameters; or ``{"quaternion": ...}``, ``{"axis": ..., "angle": ...}`` or ``{"euler": ..., "angles":
+        ...}`` with numbers, angles in rad.
+
+    Returns
+    -------
+    tuple of 4 float
+        e0, e1, e2, e3, the scalar first, of unit length.
+
+    Raises
+    ------
+    MechanismError
+        The form is unknown, or its numbers give no orientation.
+
+    Examples
+    --------
+    >>> euler_parameters({"axis": [0.0, 0.0, 1.0], "angle": 0.0})
+    (1.0, 0.0, 0.0, 0.0)
+    """
+    if not isinstance(orientation, Mapping):
+        return from_quaternion(_numbers(orientation, 4, "the Euler parameters"))
+    form = form_of(orientation)
+    if form == "quaternion":
+        return from_quaternion(_numbers(orientation["quaternion"], 4, "the Euler parameters"))
+    if form == "euler":
+        return from_euler(orientation["euler"], _numbers(orientation["angles"], 3, "the Euler angles"))
+    (angle,) = _numbers([orientation["angle"]], 1, "the angle")
+    return from_axis_angle(_numbers(orientation["axis"], 3, "the axis"), angle)
+
+
+def _numbers(values: Any, count: int, what: str) -> list[float]:
+    """Return finite numbers, or raise a MechanismError that says what they are."""
+    try:
+        found = [float(value) for value in values]
+    except (TypeError, ValueError):
+        found = []
+    if isinstance(values, str) or len(found) != count:
+        raise MechanismError(f"{what} must be {'one number' if count == 1 else f'{count} numbers'}", value=values)
+    if not all(map(math.isfinite, found)):
+        raise MechanismError(f"{what} must be finite", value=found)
+    return found
 
 
 def _unit(vector: Sequence[float], what: str) -> tuple[float, ...]:
@@ -90,7 +165,7 @@ def from_euler(sequence: str, angles: Sequence[float]) -> Quaternion:
     >>> [round(e, 3) for e in from_euler("ZXZ", [pi / 2, pi / 2, 0.0])]
     [0.5, 0.5, 0.5, 0.5]
     """
-    letters = sequence.lower()
+    letters = sequence.lower() if isinstance(sequence, str) else ""
     same_case = sequence in (letters, letters.upper())
     if len(letters) != 3 or not same_case or set(letters) - AXES.keys():
         message = "a sequence of Euler angles has three letters, such as zxz (fixed axes) or ZXZ (moving axes)"

@@ -1,0 +1,138 @@
+"""Angles about an axis that do not depend on how the frames of the bodies were drawn. Sommer 2024, equations 101-103.
+
+Between bodies that turn about a common axis, fixed in both, there is one angle, up to where it is counted from. The
+Euler parameters of their frames give it as ``2 atan2(u.e, e0)``; but unless the axis has the same components in both
+frames, that function also changes as the axes tilt against each other, and a torque that works on it tilts the bearing.
+Here body j is therefore given a frame that differs from that of body i by a turn about the axis only, at a position
+where the mechanism is put together, its `Datum`.
+"""
+
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+
+from jounce.constraints.planar import length_of
+from jounce.jet import Jet, components, cross, dot, stack, wrap
+from jounce.jet.algebra import total
+from jounce.rigid.spatial import body_axes
+
+SMALLEST_COSINE = 1e-6  # of half the tilt of the axis: below it the tilt is half a turn, and no angle is told
+
+
+class Datum(eqx.Module):
+    """A relative attitude of two bodies at which the angle about an axis is known.
+
+    Parameters
+    ----------
+    attitude : array of shape (4, ...)
+        Euler parameters of ``A_i^T A_j``.
+    angle : array of shape (...)
+        rad, with its whole turns.
+    """
+
+    attitude: Any
+    angle: Any
+
+
+def perpendiculars(axis: Any) -> tuple[Any, Any]:
+    """Return two unit vectors that complete a constant axis, of shape (3, ...), to a right-handed frame."""
+    x, y, z = axis / length_of(axis)[None]
+    sign = jnp.where(z < 0, -1.0, 1.0)
+    a = -1.0 / (sign + z)
+    return (
+        jnp.stack([1.0 + sign * a * x * x, sign * a * x * y, -sign * x]),
+        jnp.stack([a * x * y, sign + a * y * y, -y]),
+    )
+
+
+def relative_angle(
+    body_i: Any, body_j: Any, axis_i: Any, vector_i: Any = None, vector_j: Any = None, datum: Datum | None = None
+) -> Jet:
+    """Return the angle in rad, known up to whole turns, by which body j is turned about an axis of body i.
+
+    With vectors it is the signed angle from the first, on body i, to the second, on body j. Without, it is the angle at
+    the datum and the turn about the axis from there; where the axis does not stay in its direction on body j, the turn
+    left after the shortest tilt of the axis. Without a datum it is the angle of ``A_i^T A_j``, by ``2 atan2(u.e, e0)``
+    of the relative Euler parameters, which keeps the sign that Sommer 2024, equation 101, loses. With a datum the value
+    is within half a turn of the angle there.
+    """
+    axis = axis_i / length_of(axis_i)[None]
+    if vector_i is not None:
+        angle = _between(body_i, body_j, axis, vector_i, vector_j)
+        return angle if datum is None else wrap(angle - datum.angle, 2 * jnp.pi) + datum.angle
+    turn = _turn(body_i, body_j, axis, datum)
+    return turn if datum is None else wrap(turn, 2 * jnp.pi) + datum.angle
+
+
+# The rate of the angle is the angular velocity along the axis, but for terms that vanish while the bodies turn about
+# the axis only: jets of the arctangent would subtract products that are larger by 2^k at order k.
+
+
+def _turn(body_i: Any, body_j: Any, axis: Any, datum: Datum | None) -> Jet:
+    quaternion, w = body_j.quaternion, body_j.angular_velocity  # the latter in the frame of body j
+    if body_i.angular_velocity is not None:
+        turning = body_j.to_body(body_i.global_angular_velocity())
+        w = -turning if w is None else w - turning
+    if datum is not None:  # what body j has turned by since, if its frame was that of body i then
+        back = [part * sign for part, sign in zip(components(datum.attitude), (1.0, -1.0, -1.0, -1.0), strict=True)]
+        quaternion = total(part * x for part, x in zip((quaternion, *body_j.spins), back, strict=True))
+        w = None if w is None else stack([dot(side, w) for side in body_axes(jnp.concatenate(back))])
+    e0 = body_i.quaternion.dot(quaternion)
+    e = stack([spin.dot(quaternion) for spin in body_i.spins])
+    along = dot(axis, e)
+    value = 2.0 * jnp.arctan2(along.coefficients[0], e0.coefficients[0])
+    if w is None:
+        return Jet.constant(value, body_i.order)
+    across = e - along * axis
+    excess = e0 * dot(axis, cross(across, w)) + along * dot(across, w)
+    rate = dot(axis, w) + excess / (e0.square() + along.square())
+    return rate.integrate(value)
+
+
+def _between(body_i: Any, body_j: Any, axis: Any, vector_i: Any, vector_j: Any) -> Jet:
+    u, a, b = body_i.direction(axis), body_i.direction(vector_i), body_j.direction(vector_j)
+    along = u.dot(b)
+    across = b - along * u
+    first = [x.coefficients[0] for x in (u, a, across)]
+    value = jnp.arctan2(dot(cross(first[0], first[1]), first[2]), dot(first[1], first[2]))
+    if body_i.order == 0:
+        return Jet([value])
+    w = body_j.global_angular_velocity() - body_i.global_angular_velocity()
+    rate = u.dot(w) - along * w.dot(across) / across.dot(across)
+    return rate.integrate(value)
+
+
+def coaxial(axis_i: Any, axis_j: Any) -> Datum:
+    """Return a datum for two bodies that turn about axes, one fixed in each, of shape (3, ...), that coincide.
+
+    The angle there is that of ``A_i^T A_j``, as at every other such attitude.
+    """
+    u, v = (axis / length_of(axis)[None] for axis in (axis_i, axis_j))
+    opposite = dot(u, v) < 0
+    near = jnp.where(opposite[None], -u, u)
+    # the shortest turn that takes the axis of body j to that of body i, or to its opposite
+    attitude = jnp.concatenate([1.0 + dot(v, near)[None], cross(v, near)])
+    attitude = attitude / length_of(attitude)[None]
+    side, _ = perpendiculars(u)  # and half a turn about a perpendicular after it
+    e0, e = attitude[:1], attitude[1:]
+    flipped = jnp.concatenate([-dot(side, e)[None], e0 * side + cross(side, e)])
+    attitude = jnp.where(opposite[None], flipped, attitude)
+    angle, known = angle_of(attitude, u, jnp)
+    return Datum(attitude, jnp.where(known, angle, 0.0))
+
+
+def angle_of(attitude: Any, axis: Any, namespace: Any = np) -> tuple[Any, Any]:
+    """Return the angle about a unit axis, in (-pi, pi], of Euler parameters, and where there is one.
+
+    There is none where the attitude turns the axis to its opposite.
+    """
+    along, e0 = (axis * attitude[1:]).sum(axis=0), attitude[0]
+    return principal(2.0 * namespace.arctan2(along, e0), namespace), namespace.hypot(along, e0) > SMALLEST_COSINE
+
+
+def principal(angle: Any, namespace: Any = np) -> Any:
+    """Return an angle shifted by whole turns to (-pi, pi]; half a turn is pi, whatever its last digits say."""
+    turns = namespace.ceil((angle - np.pi) / (2 * np.pi) - 1e-9)
+    return angle - 2 * np.pi * turns

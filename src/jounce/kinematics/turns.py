@@ -1,0 +1,212 @@
+"""Whole turns at the first assembly: those that the starting guess and the laws of the drivers say.
+
+Where a law starts more than half a turn from where the guess has its body, the drivers are turned from the guess to the
+law step by step, and every body and every angle counts the turns that it makes on the way. Otherwise all angles are
+those nearest to the guess. So the turns depend neither on the path of assembly nor on the instant at which a grid
+starts.
+"""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from jounce.constraints.angles import principal
+from jounce.mechanism import Model
+from jounce.mechanism.builder import referred
+from jounce.mechanism.datums import measures_angle, raw_angles
+
+STEPS_A_TURN = 64
+MOST_TURNS = 4  # followed one by one; beyond, each further turn does what the last one did
+CORRECTIONS = 8
+SMALLEST_PERIOD, LARGEST_PERIOD = 1, 60  # whole turns, among which those are sought that leave coupled bodies coupled
+
+
+class Lag(NamedTuple):
+    """What the drivers still lack at the starting guess, by rows of the residual.
+
+    Attributes
+    ----------
+    size : array of shape (rows,)
+        What the law says less what the guess has, with whole turns; zero in the rows of joints.
+    turning : array of bool, shape (rows,)
+        Whether it is an angle.
+    periodic : array of bool, shape (rows,)
+        Whether the row forgets whole turns.
+    """
+
+    size: np.ndarray
+    turning: np.ndarray
+    periodic: np.ndarray
+
+    @property
+    def angle(self) -> float:
+        """The largest angle, rad."""
+        return float(np.max(np.abs(self.size[self.turning]), initial=0.0))
+
+    def open(self, residual: np.ndarray, part: float) -> np.ndarray:
+        """Return the residual of drivers that lack a part of this still."""
+        opened = residual + part * self.size
+        return np.where(self.periodic, principal(opened), opened)
+
+
+def lag_of(model: Model, instant: float, residual: np.ndarray) -> Lag | None:
+    """Return what the drivers lack where the residual is that of the guess; None where a driver has several rows."""
+    rows = [k for k, name in enumerate(model.rows) if name.partition(".")[0] in ("drivers", "initial")]
+    groups = [group for group in model.system.groups if group.is_driver]
+    if len(rows) != sum(group.instances for group in groups) or not np.isfinite(residual).all():
+        return None
+    size = np.zeros(len(model.rows))
+    turning, periodic = np.zeros(len(size), bool), np.zeros(len(size), bool)
+    told = iter(referred(model, model.guess, instant, keep=True)[0].turnings)
+    first = 0
+    for group in groups:
+        its = rows[first : first + group.instances]
+        first += group.instances
+        size[its] = -residual[its]
+        turning[its] = getattr(group.element, "coordinate", "") == "angle"
+        if measures_angle(group):
+            turning[its] = periodic[its] = True
+            size[its] = [next(told).angle for _ in its] - np.asarray(group.element.datum.angle)[:, 0]
+    return Lag(size, turning, periodic)
+
+
+class Course(NamedTuple):
+    """Where drivers that turned from the guess to their laws have brought the bodies.
+
+    Attributes
+    ----------
+    coordinates : dict of str to array
+        Of all bodies, with the turns of planar ones.
+    angles : list of array
+        Of each group of outputs that measures an angle about an axis, with its turns.
+    """
+
+    coordinates: dict[str, np.ndarray]
+    angles: list[np.ndarray]
+
+
+def course(
+    model: Model, lag: Lag, start: dict[str, np.ndarray], moved: Callable[..., Any], scale_of: Callable[..., Any]
+) -> Course | None:
+    """Follow the mechanism from where drivers are as in the guess to where they fulfil their laws; None if it ends.
+
+    Parameters
+    ----------
+    model : Model
+        The mechanism.
+    lag : Lag
+        At the guess.
+    start : dict of str to array
+        Coordinates, put together with the drivers as in the guess.
+    moved : callable
+        Takes coordinates and an increment to coordinates, residual and Jacobian.
+    scale_of : callable
+        Returns the scale of rows of a Jacobian.
+    """
+    turns, skipped = lag.angle / (2 * np.pi), 0
+    if turns > MOST_TURNS:
+        skipped = int(turns) - MOST_TURNS + 1
+    left = np.arange(0, (turns - skipped) * STEPS_A_TURN)[::-1] / (STEPS_A_TURN * turns)
+    states = [Course(start, raw_angles(model.system.outputs, start))]
+    increment = np.zeros(model.system.cells.shape[1])
+    for part in left + (skipped / turns if skipped else 0.0):
+        found = _corrected(states[-1].coordinates, increment, lambda r, p=part: lag.open(r, p), moved, scale_of)
+        if found is None:
+            return None
+        coordinates, increment = found
+        raw = raw_angles(model.system.outputs, coordinates)
+        angles = [old + principal(new - old) for old, new in zip(states[-1].angles, raw, strict=True)]
+        states.append(Course(coordinates, angles))
+    return _repeated(states, skipped) if skipped else states[-1]
+
+
+def _corrected(coordinates: Any, increment: Any, opened: Any, moved: Any, scale_of: Any) -> Any:
+    """Return coordinates a step on, and the step; None where Newton-Raphson does not go there."""
+    whole, trial = increment, moved(coordinates, increment)
+    for _ in range(CORRECTIONS):
+        residual, jacobian = opened(trial[1]), trial[2]
+        if not (np.isfinite(residual).all() and np.isfinite(jacobian).all()):
+            return None
+        scale = scale_of(jacobian)
+        step = np.linalg.lstsq(scale[:, None] * jacobian, -scale * residual, rcond=1e-10)[0]
+        size = np.max(np.abs(step), initial=0.0)
+        if size > 0.5:
+            return None
+        whole, trial = whole + step, moved(trial[0], step)
+        if size < 1e-9:
+            return trial[0], whole
+    return None
+
+
+def _repeated(states: list[Course], turns: int) -> Course | None:
+    """Return the end of a course after further turns, each like the last; None if that did not lead back."""
+    before, after = states[-1 - STEPS_A_TURN], states[-1]
+    made = [(b, a) for b, a in zip(before.angles, after.angles, strict=True)]
+    if "angle" in after.coordinates:
+        made.append((before.coordinates["angle"], after.coordinates["angle"]))
+    for name, value in after.coordinates.items():
+        away = value - before.coordinates[name]
+        if name == "quaternion":
+            away = np.minimum(np.abs(away).max(axis=0), np.abs(value + before.coordinates[name]).max(axis=0))
+        if np.max(np.abs(principal(away) if name == "angle" else away), initial=0.0) > 1e-6:
+            return None
+    on = [a + turns * 2 * np.pi * np.round((a - b) / (2 * np.pi)) for b, a in made]
+    coordinates = {**after.coordinates, **({"angle": on.pop()} if "angle" in after.coordinates else {})}
+    return Course(coordinates, on)
+
+
+def nearest_turns(guess: dict[str, Any], found: dict[str, Any], residual_at: Callable[[Any], np.ndarray]) -> Any:
+    """Return planar coordinates with every angle shifted by the whole turns that bring it nearest to the guess.
+
+    Drivers, gears and rolling discs count turns: what they couple is shifted together, or not at all.
+
+    Parameters
+    ----------
+    guess, found : dict of str to array
+        Coordinates of all bodies, the ground first.
+    residual_at : callable
+        Returns the scaled residual at some angles, shape (rows,).
+    """
+    away = ((np.asarray(guess["angle"]) - found["angle"]) / (2 * np.pi))[1:, 0]
+    if not np.round(away).any():
+        return found
+    still = residual_at(found["angle"])
+
+    def shifted(turns: np.ndarray) -> np.ndarray:
+        return found["angle"] + 2 * np.pi * np.concatenate([[0.0], turns])[:, None]
+
+    bodies = np.arange(len(away))
+    changes = np.stack([residual_at(shifted((bodies == k) * 1.0)) - still for k in bodies])
+    counted = np.abs(changes) > 1e-6
+    turns = np.where(counted.any(axis=1), 0.0, np.round(away))
+    waiting = {int(k) for k in np.flatnonzero(counted.any(axis=1))}
+    while waiting:  # bodies that share a row that counts turns
+        together, before = {min(waiting)}, set()
+        while together != before:
+            before = set(together)
+            rows = counted[sorted(together)].any(axis=0)
+            together = {k for k in waiting if counted[k][rows].any()}
+        waiting -= together
+        members = np.array(sorted(together))
+        turns[members] = _together(changes[members], away[members])
+    if not turns.any() or np.max(np.abs(residual_at(shifted(turns)) - still)) > 1e-6:
+        return found
+    return {**found, "angle": shifted(turns)}
+
+
+def _together(changes: np.ndarray, away: np.ndarray) -> np.ndarray:
+    """Return the whole turns, nearest to those wanted, that change no row; changes of one turn are (bodies, rows)."""
+    if np.max(np.abs(np.round(away) @ changes)) < 1e-6:
+        return np.round(away)
+    left, sizes, _ = np.linalg.svd(changes)
+    rank = int(np.sum(sizes > 1e-9 * sizes[0]))
+    if len(away) - rank != 1:
+        return np.zeros(len(away))
+    direction = left[:, -1]
+    direction = direction / np.min(np.abs(direction[np.abs(direction) > 1e-9]))
+    for count in range(SMALLEST_PERIOD, LARGEST_PERIOD + 1):
+        whole = np.round(count * direction)
+        if np.max(np.abs(whole - count * direction)) < 1e-7 * count:
+            return np.round(away @ whole / (whole @ whole)) * whole
+    return np.zeros(len(away))

@@ -1,0 +1,176 @@
+"""Where angles about axes are counted from: the position in which a mechanism was put together, and its turns."""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import numpy as np
+
+from jounce.constraints.angles import Datum, angle_of, principal
+from jounce.mechanism.system import Group
+
+PARALLEL = 1e-9  # largest sine between axes that are one
+
+
+class Turning(NamedTuple):
+    """An angle that a driver prescribes.
+
+    Attributes
+    ----------
+    bodies : tuple of int
+        Indices of the bodies i and j.
+    axis : array of shape (3,)
+        Unit axis in the global frame.
+    angle : float
+        As the law says it, with its whole turns, rad.
+    """
+
+    bodies: tuple[int, int]
+    axis: np.ndarray
+    angle: float
+
+
+def measures_angle(group: Group) -> bool:
+    """Tell whether the elements of a group measure an angle about an axis."""
+    return hasattr(group.element, "datum")
+
+
+def with_datums(
+    groups: Sequence[Group], coordinates: dict[str, Any], turnings: Sequence[Turning] = (), *, keep: bool = False
+) -> tuple[Group, ...]:
+    """Return groups with the angles about axes counted from a position.
+
+    Parameters
+    ----------
+    groups : sequence of Group
+        Those that measure no such angle stay as they are.
+    coordinates : dict of str to array
+        Of all bodies, the ground first, shape (..., bodies, 1).
+    turnings : sequence of Turning, optional
+        Angles known with their turns: one about the same axis between the same bodies has as many.
+    keep : bool, default False
+        Whether angles go on from the datum of now, instead of those that the frames of the bodies have.
+    """
+    return tuple(
+        _with_datum(group, coordinates, turnings, keep=keep) if measures_angle(group) else group for group in groups
+    )
+
+
+def raw_angles(groups: Sequence[Group], coordinates: dict[str, Any]) -> list[np.ndarray]:
+    """Return the angles about axes that groups measure at a position, up to whole turns, (instances, 1) each."""
+    found = []
+    for group in filter(measures_angle, groups):
+        element, axis = group.element, axis_of(group)
+        attitude = relative_attitude(group, coordinates)
+        if element.vector_i is None:
+            found.append(since(element.datum, attitude, axis))
+        else:
+            found.append(_between(attitude, axis, np.asarray(element.vector_i), np.asarray(element.vector_j)))
+    return found
+
+
+def with_angles(groups: Sequence[Group], angles: Sequence[np.ndarray]) -> tuple[Group, ...]:
+    """Return groups of which the data hold other angles, for those that measure one about an axis."""
+    found = iter(angles)
+    return tuple(
+        _put(g, "datum", Datum(g.element.datum.attitude, next(found))) if measures_angle(g) else g for g in groups
+    )
+
+
+def _with_datum(group: Group, coordinates: dict[str, Any], turnings: Sequence[Turning], *, keep: bool) -> Group:
+    element, attitude = group.element, relative_attitude(group, coordinates)
+    axis, known = axis_of(group), element.datum
+    before = np.zeros(attitude.shape[1:]) if known is None else since(known, attitude, axis)
+    if element.vector_i is not None:
+        angle = _between(attitude, axis, np.asarray(element.vector_i), np.asarray(element.vector_j))
+    elif keep:
+        angle = before
+    else:
+        angle, told = angle_of(attitude, axis)
+        angle = np.where(told, angle, before)
+    angle = before + principal(angle - before) if known is not None else principal(angle)
+    for k, bodies in enumerate(zip(*group.bodies, strict=True)):
+        for turning in turnings:
+            sense = _sense(bodies, _turned(coordinates["quaternion"][:, bodies[0], 0], axis[:, k, 0]), turning)
+            if sense:
+                expected = sense * turning.angle
+                angle[k] = expected + principal(angle[k] - expected)
+    group = _put(group, "datum", Datum(attitude, angle))
+    if element.vector_i is None or not hasattr(element, "role"):
+        return group
+    # a driver or a force acts about the axis, wherever its vector on body j points beside it
+    across, along = np.asarray(element.vector_j), _turned(_inverse(attitude), axis)
+    return _put(group, "vector_j", across - (across * along).sum(axis=0) * along)
+
+
+def departure(before: Sequence[Group], after: Sequence[Group]) -> float:
+    """Return by how much the angles of drivers, and the directions of their axes, differ between two data, rad."""
+    largest = 0.0
+    for old, new in zip(before, after, strict=True):
+        if measures_angle(new) and new.element.vector_i is None:
+            axis, attitude = axis_of(new), new.element.datum.attitude
+            angle = principal(since(old.element.datum, attitude, axis) - new.element.datum.angle)
+            turn = _product(attitude, _inverse(old.element.datum.attitude))[1:]
+            tilt = turn - (turn * axis).sum(axis=0) * axis
+            largest = max(largest, np.max(np.abs(angle)), np.max(np.abs(tilt)))
+    return float(largest)
+
+
+def turnings_of(groups: Sequence[Group], coordinates: dict[str, Any], laws: Sequence[np.ndarray]) -> list[Turning]:
+    """Return the angles that drivers prescribe at a position, in space; `laws` holds the values for each such group."""
+    found = []
+    for group, values in zip((g for g in groups if measures_angle(g)), laws, strict=True):
+        for k, bodies in enumerate(zip(*group.bodies, strict=True)):
+            axis = _turned(coordinates["quaternion"][:, bodies[0], 0], axis_of(group)[:, k, 0])
+            found.append(Turning(bodies, axis, float(np.broadcast_to(values, (group.instances, 1))[k, 0])))
+    return [turning for turning in found if np.isfinite(turning.angle)]
+
+
+def axis_of(group: Group) -> np.ndarray:
+    """Return the unit axes on body i of the elements of a group, (3, instances, 1)."""
+    element = group.element
+    axis = np.asarray(element.axis if hasattr(element, "axis") else element.axis_i)
+    return axis / np.linalg.norm(axis, axis=0)
+
+
+def relative_attitude(group: Group, coordinates: dict[str, Any]) -> np.ndarray:
+    """Return the Euler parameters of the second bodies of a group relative to the first, (4, instances, 1)."""
+    first, second = (np.asarray(coordinates["quaternion"])[:, list(bodies)] for bodies in group.bodies)
+    return _product(_inverse(first), second)
+
+
+def since(datum: Datum, attitude: np.ndarray, axis: np.ndarray) -> np.ndarray:
+    """Return the angle of an attitude, within half a turn of that of a datum."""
+    return np.asarray(datum.angle) + angle_of(_product(attitude, _inverse(np.asarray(datum.attitude))), axis)[0]
+
+
+def _between(attitude: np.ndarray, axis: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Return the signed angle about an axis from a vector of body i to one of body j."""
+    b = _turned(attitude, second)
+    across = b - (b * axis).sum(axis=0) * axis
+    return np.arctan2((np.cross(axis, first, axis=0) * across).sum(axis=0), (first * across).sum(axis=0))
+
+
+def _sense(bodies: tuple[int, ...], axis: np.ndarray, turning: Turning) -> int:
+    """Return 1 where an angle follows that of a driver, -1 where it runs against it, else 0."""
+    if sorted(bodies) != sorted(turning.bodies) or np.linalg.norm(np.cross(axis, turning.axis)) > PARALLEL:
+        return 0
+    return int(np.sign(axis @ turning.axis)) * (1 if bodies == turning.bodies else -1)
+
+
+def _put(group: Group, name: str, value: Any) -> Group:
+    return eqx.tree_at(lambda g: getattr(g.element, name), group, value, is_leaf=lambda x: x is None)
+
+
+def _inverse(p: np.ndarray) -> np.ndarray:
+    return np.concatenate([p[:1], -p[1:]])
+
+
+def _product(p: np.ndarray, q: np.ndarray) -> np.ndarray:
+    e0 = p[:1] * q[:1] - (p[1:] * q[1:]).sum(axis=0, keepdims=True)
+    return np.concatenate([e0, p[:1] * q[1:] + q[:1] * p[1:] + np.cross(p[1:], q[1:], axis=0)])
+
+
+def _turned(p: np.ndarray, vector: np.ndarray) -> np.ndarray:
+    twice = 2 * np.cross(p[1:], vector, axis=0)
+    return vector + p[:1] * twice + np.cross(p[1:], twice, axis=0)

@@ -1,0 +1,75 @@
+"""What the laws of a mechanism say of the instants that are asked for: checked before any computing."""
+
+import warnings
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from jounce.constraints.base import value_fields
+from jounce.errors import JounceError, SampleWarning
+from jounce.forces import TimeLaw, VectorLaw
+from jounce.mechanism.mechanism import Mechanism
+from jounce.trajectory import AbstractMotion, SplineMotion
+from jounce.trajectory.sampling import doubtful_order, words_of_doubt
+
+
+def check_laws(mechanism: Mechanism, instants: np.ndarray, order: int, *, forces: bool) -> None:
+    """Raise for laws that end before the instants do, and warn of samples that do not support the derivatives.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        About to be solved.
+    instants : ndarray of shape (time,)
+        s, in any order.
+    order : int
+        Highest derivative of the motion.
+    forces : bool
+        Whether the applied forces bear on what is wanted.
+
+    Raises
+    ------
+    MechanismError
+        A law through samples says nothing of some of the instants.
+
+    Warns
+    -----
+    SampleWarning
+        The estimated error of a derivative of samples exceeds a tenth of its peak, as for a `JointTrajectory`.
+    """
+    first, last = float(np.min(instants)), float(np.max(instants))
+    begin = float(instants[0])
+    parts = [("drivers", first, last, order)]
+    if forces:
+        parts += [("initial", begin, begin, 1), ("forces", first, last, order - 2)]
+    for kind, since, until, orders in parts:
+        for name, element in getattr(mechanism, kind).items():
+            for field, law in _motions(element):
+                place = f"{kind}.{name}.{field}"
+                try:
+                    law.check_instants(since, until)
+                except JounceError as error:
+                    raise error.located(name=place) from None
+                if orders >= 0 and isinstance(law, SplineMotion):
+                    _warn(place, law, orders)
+
+
+def _motions(element: Any) -> Iterator[tuple[str, AbstractMotion]]:
+    """Return the motion laws among the values of a driver or a force, by field."""
+    for field in value_fields(type(element)):
+        value = getattr(element, field)
+        entries = (
+            value.parts if isinstance(value, VectorLaw) else value if isinstance(value, list | tuple) else (value,)
+        )
+        for entry in entries:
+            law = entry.motion if isinstance(entry, TimeLaw) else entry
+            if isinstance(law, AbstractMotion):
+                yield field, law
+
+
+def _warn(place: str, law: SplineMotion, order: int) -> None:
+    """Warn of the lowest derivative that the samples of a law do not support."""
+    if (doubt := doubtful_order(law.errors, order)) is not None:
+        words = words_of_doubt(place, *doubt, law.degree)
+        warnings.warn(SampleWarning(words), stacklevel=4)

@@ -1,0 +1,284 @@
+"""Values as a mechanism file writes them: a number (SI), a number with a unit, or an expression of parameters.
+
+The units that engineers write are in a table; every other one is asked of a library of units, which is imported only
+then (see `elsewhere`).
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from decimal import Decimal, InvalidOperation, Overflow, localcontext
+from functools import lru_cache
+
+from jounce.errors import ExpressionError, UnitError, did_you_mean, show_value
+from jounce.trajectory.dimensions import (
+    ANGLE,
+    FORCE,
+    LENGTH,
+    MASS,
+    NUMBER,
+    TIME,
+    TORQUE,
+    Dimension,
+    check_dimension,
+    dimension_of,
+    inferred,
+    times,
+)
+from jounce.trajectory.expression import CONSTANTS, FUNCTIONS, MAX_CHARACTERS, Expression
+
+__all__ = ["COMMON", "Value", "elsewhere", "nearest_unit", "parse_unit", "parse_value"]
+
+Size = Decimal | float
+
+_TURN = 2 * math.pi
+
+
+def _sizes(dimension: Dimension, text: str) -> dict[str, tuple[Size, Dimension]]:
+    pairs = (pair.split("=") for pair in text.split())
+    return {name: (Decimal(size), dimension) for name, size in pairs}
+
+
+COMMON: dict[str, tuple[Size, Dimension]] = {
+    **_sizes(LENGTH, "m=1 dm=0.1 cm=0.01 mm=0.001 um=1e-6 km=1e3 in=0.0254 inch=0.0254 ft=0.3048"),
+    **_sizes(LENGTH, "mil=2.54e-5 thou=2.54e-5"),
+    **dict.fromkeys(("deg", "degree", "degrees", "\N{DEGREE SIGN}"), (CONSTANTS["deg"], ANGLE)),
+    **dict.fromkeys(("rev", "turn", "turns", "U", "r", "tr"), (_TURN, ANGLE)),
+    **_sizes(ANGLE, "rad=1 mrad=0.001"),
+    **dict.fromkeys(("rpm", "RPM"), (_TURN / 60, dimension_of(angle=1, time=-1))),
+    **_sizes(TIME, "s=1 sec=1 ms=1e-3 us=1e-6 min=60 h=3600"),
+    **_sizes(dimension_of(time=-1), "Hz=1 kHz=1000"),
+    **_sizes(MASS, "kg=1 g=0.001 mg=1e-6 t=1000"),
+    **_sizes(FORCE, "N=1 mN=0.001 kN=1000 MN=1e6 kgf=9.80665 kp=9.80665"),
+    **_sizes(TORQUE, "J=1 kJ=1000"),
+    **_sizes(times(TORQUE, TIME, -1), "W=1 kW=1000 PS=735.49875 CV=735.49875"),
+    **_sizes(dimension_of(mass=1, length=-1, time=-2), "Pa=1 kPa=1e3 MPa=1e6 GPa=1e9 bar=1e5"),
+}
+"""Size in SI units and dimension. Decimal sizes make ``13.21 cm`` the double nearest to 0.1321."""
+
+_LENGTHS = ("mm", "cm", "dm", "m")
+COMPACT: dict[str, tuple[str, ...]] = {
+    **{f"{force}{arm}": (force, arm) for force in ("N", "mN", "kN", "MN") for arm in _LENGTHS},
+    **{f"{prefix}Nm": (f"{prefix}N", "m") for prefix in "ucd"},
+    **{f"{mass}{arm}": (mass, arm) for mass in ("kg", "g") for arm in _LENGTHS},
+    **{f"{force}ms": (force, "m", "s") for force in ("N", "mN", "kN")},
+    **{f"{force}s": (force, "s") for force in ("N", "kN")},
+    **{f"{power}{time}": (power, time) for power in ("W", "kW") for time in "sh"},
+    **dict.fromkeys(("lbft", "ftlb", "lbfft", "ftlbf"), ("lbf", "ft")),
+    **dict.fromkeys(("lbin", "inlb", "lbfin", "inlbf"), ("lbf", "in")),
+    "ozin": ("ozf", "in"),
+}
+"""Products that are written without a sign between; a power belongs to the last factor, as in ``kgm^2``."""
+
+elsewhere: list[Callable[[str], tuple[Size, Dimension] | None]] = []
+"""Where units are looked up that are not in the table, one after the other: None is for unknown there."""
+
+_DIGITS = str.maketrans("\N{SUPERSCRIPT ONE}\N{SUPERSCRIPT TWO}\N{SUPERSCRIPT THREE}\N{SUPERSCRIPT FOUR}", "1234")
+_NUMBER_PATTERN = r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
+_ATOM = r"[A-Za-z_\u00b0\u00b5\u03bc][A-Za-z_0-9]*"
+_WHOLE = r"[-+]?[0-9]{1,2}"
+_POWER = rf"(?:\s*(?:\*\*|\^)\s*(?:{_WHOLE}|\(\s*{_WHOLE}\s*\))|\u207b?[\u00b9\u00b2\u00b3\u2074])?"
+_SIGN = r"(?:\s*[*/\u00b7\u22c5]\s*|\s+)"
+_TERM = rf"{_ATOM}{_POWER}"
+_GROUP = rf"\(\s*{_TERM}(?:{_SIGN}{_TERM})*\s*\)"
+_WITH_UNIT = re.compile(
+    rf"({_NUMBER_PATTERN})\s*((?:1?\s*/\s*(?:{_GROUP}|{_TERM})|{_TERM})(?:{_SIGN}(?:{_GROUP}|{_TERM}))*)"
+)
+_PIECE = re.compile(rf"({_SIGN})?(?:({_ATOM})({_POWER})|\(([^()]*)\))")
+_TIMES_DEG = re.compile(rf"{_NUMBER_PATTERN}\s*\*\s*deg")
+
+
+@dataclass(frozen=True)
+class Value:
+    """A value from a file: a number in SI units or an expression, and its dimension (None where it is not known)."""
+
+    value: float | Expression
+    dimension: Dimension | None = None
+
+
+@lru_cache(maxsize=256)
+def parse_unit(text: str) -> tuple[Size, Dimension]:
+    """Return the size of a unit in SI units, and its dimension.
+
+    Parameters
+    ----------
+    text : str
+        Names of units with whole powers, joined by ``*``, ``/`` or spaces: ``kg*m^2/s**2``, ``N/(m*s)``; or a product
+        as engineers write it, ``kNm``, ``N/mm2``.
+
+    Raises
+    ------
+    UnitError
+        A unit does not exist, is none of mechanics, or has no fixed zero, as degC.
+
+    Examples
+    --------
+    >>> parse_unit("mm/s")
+    (Decimal('0.001'), (('length', 1), ('time', -1)))
+    >>> parse_unit("kNm/rad")[0]
+    Decimal('1000')
+    """
+    size: Size = Decimal(1)
+    whole: Dimension = NUMBER
+    divided = False
+    text = text.strip().removeprefix("1").lstrip() if re.match(r"1\s*/", text.strip()) else text.strip()
+    for sign, name, exponent, group in _PIECE.findall(text):
+        under = "/" in sign
+        if divided and sign and not sign.strip():
+            raise UnitError("a space after a / can be read in two ways; write * and parentheses")
+        divided |= under
+        factor, dimension = parse_unit(group) if group else _powered(name, _whole_power(exponent))
+        power = -1 if under else 1
+        size, whole = _product(size, factor, power), times(whole, dimension, power)
+    return size, whole
+
+
+def _whole_power(text: str) -> int:
+    plain = text.translate(_DIGITS).replace("\N{SUPERSCRIPT MINUS}", "-")
+    return int(plain.strip(" *^()") or 1)
+
+
+def _powered(name: str, power: int) -> tuple[Size, Dimension]:
+    """Return the size and dimension of a unit to a power; of a compact product the last factor has the power."""
+    factors = COMPACT.get(name) if name not in COMMON else None
+    if factors is None and name not in COMMON and (digit := re.fullmatch(r"([A-Za-z]+)([2-4])", name)) and power == 1:
+        return _powered(digit[1], int(digit[2]))
+    size: Size = Decimal(1)
+    whole: Dimension = NUMBER
+    for factor in factors or (name,):
+        own, dimension = COMMON.get(factor) or _looked_up(factor)
+        count = power if factor is (factors or (name,))[-1] else 1
+        size, whole = _product(size, own, count), times(whole, dimension, count)
+    return size, whole
+
+
+def _product(size: Size, factor: Size, power: int) -> Size:
+    if isinstance(size, Decimal) and isinstance(factor, Decimal):
+        return size * factor**power
+    return float(size) * float(factor) ** power
+
+
+def _looked_up(name: str) -> tuple[Size, Dimension]:
+    for ask in elsewhere:
+        if found := ask(name):
+            return found
+    raise UnitError(f"unknown unit '{_ascii(name)}'; {nearest_unit(name)}".rstrip("; "))
+
+
+def nearest_unit(name: str) -> str:
+    """Suggest the unit of the table that is meant: the one that differs in capitals only, or else the nearest."""
+    names = [*COMMON, *COMPACT]
+    same = [known for known in names if known.lower() == name.lower() and known != name]
+    return f"did you mean '{same[0]}'?" if same else did_you_mean(name, names, limit=0)
+
+
+def _ascii(text: str) -> str:
+    return text.encode("ascii", "backslashreplace").decode("ascii")
+
+
+def parse_value(
+    raw: object,
+    kind: str = "any",
+    names: Iterable[str] = (),
+    dimensions: Mapping[str, Dimension] | None = None,
+    variables: Mapping[str, Dimension | None] | None = None,
+) -> Value:
+    """Read one value of a file.
+
+    Parameters
+    ----------
+    raw : object
+        What the file holds: a number, or text with a number and a unit, or an expression.
+    kind : str
+        What is expected, one of ``KINDS``.
+    names : iterable of str
+        Names that an expression may use.
+    dimensions : mapping of str to Dimension, optional
+        Dimensions of those parameters that have a unit; what follows from them in an expression is checked.
+    variables : mapping of str to Dimension or None, optional
+        Names that an expression may use besides, of variables: time, s, and others of a law.
+
+    Returns
+    -------
+    Value
+        The number in SI units, or the expression.
+
+    Raises
+    ------
+    UnitError, ExpressionError
+        What is wrong, without the place and without the value.
+
+    Examples
+    --------
+    >>> parse_value("13.21 cm", "length").value
+    0.1321
+    >>> parse_value("AB/2", "length", names=["AB"]).value
+    Expression('AB/2')
+    """
+    if isinstance(raw, bool) or not isinstance(raw, (int, float, str)):
+        raise UnitError("must be a number, a number with a unit, or an expression")
+    if isinstance(raw, str):
+        variables = variables or {}
+        return _parse_text(raw, kind, {*names, *variables}, dimensions or {}, variables)
+    try:
+        number = float(raw)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise UnitError("must be a finite number")
+    return Value(number)
+
+
+def _parse_text(
+    text: str,
+    kind: str,
+    known: set[str],
+    dimensions: Mapping[str, Dimension],
+    variables: Mapping[str, Dimension | None],
+) -> Value:
+    if len(text) > MAX_CHARACTERS:
+        raise ExpressionError(f"a value has at most {MAX_CHARACTERS} characters")
+    if with_unit := _WITH_UNIT.fullmatch(text.strip()):
+        return _parse_with_unit(*with_unit.groups(), kind=kind, known=known)
+    if text.strip().lower() in {".nan", "nan", "inf", ".inf", "-inf", "-.inf", "+inf", "infinity", "-infinity"}:
+        raise UnitError("must be a finite number")
+    expression = Expression(text, known)
+    if not expression.names:
+        if _TIMES_DEG.fullmatch(expression.text):
+            check_dimension(ANGLE, kind, show_value(expression.text))
+        return Value(expression.evaluate())
+    if expression.text in dimensions:
+        check_dimension(dimensions[expression.text], kind, f"the parameter '{expression.text}'")
+        return Value(expression, dimensions[expression.text])
+    stated = {name: dimension for name, dimension in dimensions.items() if name not in variables}
+    dimension = inferred(expression, stated, variables, kind)
+    if dimension is not None:
+        check_dimension(dimension, kind, f"'{expression.text}'", exactly=False)
+    return Value(expression, dimension)
+
+
+def _parse_with_unit(number: str, unit: str, *, kind: str, known: set[str]) -> Value:
+    try:
+        size, dimension = parse_unit(unit)
+        check_dimension(dimension, kind, f"the unit of {show_value(f'{number} {unit}')}")
+    except UnitError as error:
+        first = re.match(_ATOM, unit)
+        if first and first.group() in known | {"pi"} | FUNCTIONS.keys():
+            raise UnitError(f"{error.message}; a product needs its *, as in {number}*{unit}") from None
+        raise
+    except (ArithmeticError, InvalidOperation):
+        raise UnitError(f"unit out of range in {show_value(unit)}") from None
+    if isinstance(size, Decimal):
+        try:
+            with localcontext(prec=40):
+                value = float(Decimal(number) * size)
+        except (ArithmeticError, InvalidOperation, Overflow):
+            value = math.inf
+    else:
+        value = float(number) * size
+    if not math.isfinite(value):
+        raise UnitError("must be a finite number")
+    return Value(value, dimension)

@@ -1,0 +1,146 @@
+"""Whole turns: the guess and the laws of the drivers say them, not the path of assembly, nor the grid."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import jounce as jn
+from jounce import drivers, forces, planar, spatial
+from jounce.dynamics import AppliedTorqueOutput
+from jounce.kinematics.assembly import assemble
+from jounce.mechanism import build
+from tests.problems.small import four_bar, spindle
+
+X, Z, ORIGIN = [1, 0, 0], [0, 0, 1], [0, 0, 0]
+
+
+def shafts(law):
+    """Two shafts in line by way of two Hooke joints, as fast as each other after each turn."""
+    slope = 0.3
+    return jn.Mechanism(
+        space="spatial",
+        bodies={
+            "first": jn.Body(ORIGIN),
+            "second": jn.Body(ORIGIN, orientation=[np.cos(slope / 2), 0, 0, np.sin(slope / 2)]),
+        },
+        joints={
+            "bearing": spatial.Revolute(("ground", "first"), ORIGIN, ORIGIN, X, X),
+            "cross": spatial.Universal(("first", "second"), ORIGIN, ORIGIN, [0, 1, 0], Z),
+            "level": spatial.Dot1(("ground", "second"), Z, X),
+            "slope": spatial.Dot1(("ground", "second"), [-np.sin(slope), np.cos(slope), 0], X),
+        },
+        drivers={"turn": drivers.RotationDriver(("ground", "first"), X, law)},
+        outputs={
+            "first": jn.RelativeAngleOutput(("ground", "first"), X),
+            "back": jn.RelativeAngleOutput(("first", "ground"), [-2, 0, 0], [0, 1, 0], [0, 1, 0.2]),
+            "second": jn.RelativeAngleOutput(
+                ("ground", "second"), [np.cos(slope), np.sin(slope), 0], [-np.sin(slope), np.cos(slope), 0], [0, 1, 0]
+            ),
+        },
+    )
+
+
+@pytest.mark.parametrize("law, turn", [("t", 0.0), ("7.5 + t", 7.5), ("-100 + t", -100.0), ("4 - t", 4.0)])
+def test_angles_about_axes_have_the_turns_of_the_law(law, turn):
+    mechanism = shafts(law)
+    whole = jn.solve(mechanism, [0.0, 5.0, 10.0], order=1).outputs
+    last = jn.solve(mechanism, [10.0], order=1).outputs
+    expected = turn + (-1 if law.endswith("- t") else 1) * np.array([0.0, 5.0, 10.0])
+    np.testing.assert_allclose(whole["first"][:, 0], expected, rtol=0, atol=1e-12)
+    # -x is the axis, and the ground turns back about it; the last vector is 0.2 rad, by its tangent, ahead
+    np.testing.assert_allclose(whole["back"][:, 0], expected - np.arctan(0.2), rtol=0, atol=1e-12)
+    # Hooke's joint: tan(second) cos(slope) = tan(first), within a quarter of a turn of it
+    assert np.abs(whole["second"][:, 0] - expected).max() < 0.1
+    for name in whole:
+        np.testing.assert_allclose(last[name][0], whole[name][-1], rtol=0, atol=1e-12)
+
+
+def test_half_a_turn_is_pi_whatever_its_last_digit_says():
+    for sign in (1, -1):
+        mechanism = spindle("pi")
+        body = dataclasses.replace(mechanism.bodies["spindle"], orientation=[sign * 1e-17, 0, 0, 1])
+        mechanism = dataclasses.replace(mechanism, bodies={"spindle": body})
+        found = jn.solve(mechanism, [0.0], order=1).outputs
+        assert found["angle"][0, 0] == pytest.approx(np.pi, abs=1e-12)
+
+
+def assembled_angles(mechanism, instant=0.0):
+    """Return the angles of the moving bodies of a planar mechanism where it is put together."""
+    return assemble(build(mechanism), instant, 1e-12)[1]["angle"][1:, 0]
+
+
+def test_planar_bodies_end_at_the_turn_nearest_to_the_guess():
+    """From random guesses of the rocker and of a massless link on it; the torsional spring is on the link."""
+    base = four_bar()
+    random = np.random.default_rng(4)
+    kept = []
+    for _ in range(200):
+        guess = random.uniform(-12, 12)
+        mechanism = dataclasses.replace(base, bodies=base.bodies | {"rocker": jn.Body(["AD", 0], float(guess))})
+        try:
+            angle = assembled_angles(mechanism)[1]
+        except jn.errors.AssemblyError:
+            continue
+        kept.append(abs(angle - guess))
+    assert len(kept) > 150
+    assert max(kept) <= np.pi + 1e-12
+
+
+def test_a_torsional_spring_sees_the_angle_that_the_guess_says():
+    torques = []
+    for turns in (-1, 0, 1):
+        base = four_bar(rocker_angle=f"{100 + 360 * turns}*deg")
+        spring = forces.TorsionalSpring(("ground", "rocker"), 2.0, f"{360 * turns}*deg")
+        output = {"torque": AppliedTorqueOutput("spring")}
+        mechanism = dataclasses.replace(base, forces={"spring": spring}, outputs=output)
+        torques.append(jn.solve(mechanism, [0.0], order=0).outputs["torque"][0, 0])
+    np.testing.assert_allclose(torques, torques[1], rtol=0, atol=1e-12)
+
+
+def drag_link(law, gear=False):
+    """Two cranks that both turn about, the second with the first, a coupler, and a wheel geared to the second crank."""
+    joints = {
+        "A": planar.Revolute(("ground", "first"), [0, 0], [0, 0]),
+        "D": planar.Revolute(("ground", "second"), [0.5, 0], [0, 0]),
+        "B": planar.Revolute(("first", "coupler"), [1, 0], [0, 0]),
+        "C": planar.Revolute(("coupler", "second"), [0.9, 0], [1.1, 0]),
+    }
+    bodies = {"first": jn.Body([0, 0], 0.5), "coupler": jn.Body([0.9, 0.5], 2.4), "second": jn.Body([0.5, 0], 1.8)}
+    if gear:
+        joints["wheel"] = planar.Revolute(("ground", "wheel"), [3, 0], [0, 0])
+        joints["pair"] = planar.Coordinate(("second", "wheel"), "angle", -2.0)
+        bodies["wheel"] = jn.Body([3, 0], 0.2)
+    return jn.Mechanism(
+        space="planar",
+        bodies=bodies,
+        joints=joints,
+        drivers={"turn": drivers.CoordinateDriver(("ground", "first"), "angle", law)},
+        outputs={name: jn.AngleOutput(name) for name in bodies},
+    )
+
+
+@pytest.mark.parametrize("law, start", [("0.5 + t", 0.5), ("7.5 + t", 7.5), ("-200.3 + t", -200.3)])
+def test_planar_bodies_turn_with_the_driver(law, start):
+    mechanism = drag_link(law, gear=True)
+    for instant in (0.0, 5.0, 10.0):
+        first, coupler, second, wheel = assembled_angles(mechanism, instant)
+        assert first == pytest.approx(start + instant, abs=1e-12)
+        assert abs(coupler - first - 1.9) < np.pi / 2  # the coupler leads by up to a quarter of a turn more or less
+        assert abs(second - first - 1.3) < np.pi / 2
+        assert wheel - 0.2 == pytest.approx(-2 * (second - 1.8), abs=1e-11)
+
+
+def test_bodies_that_a_gear_couples_go_back_by_whole_turns_together():
+    """The shortest way to close the loop turns the crank beyond half a turn; the wheel goes with it, both back."""
+    mechanism = drag_link("0.5 + t", gear=True)
+    wheel = dataclasses.replace(mechanism.joints["pair"], offset=3.8)
+    mechanism = dataclasses.replace(mechanism, joints=mechanism.joints | {"pair": wheel})
+    for turns in (-2, 1):
+        bodies = {
+            "second": jn.Body([0.5, 0], 1.8 + 2 * np.pi * turns),
+            "wheel": jn.Body([3, 0], 0.2 - 4 * np.pi * turns),
+        }
+        found = assembled_angles(dataclasses.replace(mechanism, bodies=mechanism.bodies | bodies))
+        assert abs(found[2] - bodies["second"].angle) < np.pi
+        assert found[3] == pytest.approx(3.8 - 2 * found[2], abs=1e-11)
