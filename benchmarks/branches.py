@@ -40,7 +40,7 @@ def main() -> int:
     parser.add_argument("--kinds", help="names, with commas between them; all unless given")
     parser.add_argument("--orders", default=",".join(map(str, ORDERS)), help="of derivatives, drawn from these")
     parser.add_argument(
-        "--nearest", type=float, default=NEAREST, help="distance from singular positions"
+        "--nearest", type=float, default=NEAREST, help="smallest h over a length; rounding decides below 1e-7"
     )
     parser.add_argument("--failures", type=Path, help="file for the linkages that are wrong or given up, JSON by line")
     options = parser.parse_args()
@@ -78,16 +78,22 @@ def _row(name: str, tally: Counter) -> str:
 
 def _summary(total: Counter, reasons: Counter) -> str:
     far = total["given up"] - total["of them near"]
-    smooth, near = (
-        total[f"{which} nanoseconds"] / 1e3 / max(total[f"{which} instants"], 1) for which in ("smooth", "close")
-    )
+    costs = [
+        f"{total[f'{which} nanoseconds'] / 1e3 / max(total[f'{which} instants'], 1):.0f} us an instant, "
+        f"{total[f'{which} nanoseconds'] / 1e6 / max(total[f'{which} mechanisms'], 1):.0f} ms a mechanism {meaning}"
+        for which, meaning in (
+            ("smooth", "away from singular positions (above 0.1)"),
+            ("close", "that misses one"),
+            ("ending", "that ends at one"),
+        )
+    ]
     lines = [
         f"wrong: {total['wrong']} (off the branch {total['elsewhere']}, beyond the end {total['beyond']}, "
         f"derivatives {total['rates']}) of {total['OK']:,} called OK; {total['derivatives']:,} compared to jerk too",
         f"given up above 1e-4: {far} of {total['far']:,} ({100 * far / max(total['far'], 1):.3f} percent), "
         f"below: {total['of them near']} of {total['near']:,}",
         f"not judged, at or beyond an end that is too close to a singular position: {total['undecided']}",
-        f"us an instant: {smooth:.1f} away from singular positions (above 0.1), {near:.1f} close to them",
+        "processor time: " + "; ".join(costs),
         *(f"  {reason}: {number}" for reason, number in reasons.most_common()),
     ]
     return "\n".join(lines) + "\n"

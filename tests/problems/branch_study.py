@@ -167,7 +167,7 @@ def _verdict(solution: Solution, path: Paths) -> Verdict:
     near = ~(path.margin > NEAR)
     rates, compared = _wrong_rates(solution, path, position, fine & reached & ~elsewhere)
     smallest = float(np.nanmin(path.margin))
-    which = "smooth" if smallest > SMOOTH else "close"
+    which = "ending" if np.isfinite(path.limit) else "smooth" if smallest > SMOOTH else "close"
     tally = Counter(
         {
             "mechanisms": 1,
@@ -187,6 +187,7 @@ def _verdict(solution: Solution, path: Paths) -> Verdict:
             "nanoseconds": solution.nanoseconds,
             f"{which} nanoseconds": solution.nanoseconds,
             f"{which} instants": len(fine),
+            f"{which} mechanisms": 1,
         }
     )
     tally = Counter({name: int(number) for name, number in tally.items()})

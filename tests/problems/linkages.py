@@ -107,8 +107,13 @@ class Family(abc.ABC):
                 continue
             law, stop = self.law(random, values, nearness, sign)
             start = self.assembly(values, np.asarray(law(0.0)), random)
-            if start is not None:
+            most = not near and random.random() < 0.75  # else, of those drawn at random, most would end on the way
+            if start is not None and not (most and self.ends(values, law, stop, random)):
                 return Linkage(self, values, law, start, self.near_guess(random, values, law, start), nearness), stop
+
+    def ends(self, values, law, stop, random):
+        """Tell whether there is no assembly at some of the instants."""
+        return any(self.assembly(values, law(t), random) is None for t in np.linspace(0, stop, 25))
 
     def near_guess(self, random, values, law, start):
         """Return a guess that is off by something."""

@@ -72,13 +72,13 @@ class RSSR(Family):
         )
 
     @staticmethod
-    def ends(values):
+    def seat(values):
         """Return D and the frame of the rocker at angle zero."""
         axis = np.array([values["nx"], values["ny"], values["nz"]])
         return np.array([values["dx"], values["dy"], values["dz"]]), frame_about(axis)
 
     def forms(self, values):
-        d, frame = self.ends(values)
+        d, frame = self.seat(values)
         plane, space = Affine(2), Affine(2, components=3)
         turning = plane.unknown(0)
         tip = space.fixed(*d) + values["r"] * frame[:, :2] @ turning
@@ -108,7 +108,7 @@ class RSSR(Family):
         return dict(zip(self.dimensions, (a, r, rod, *d, *n), strict=True))
 
     def assembly(self, values, value, random):
-        d, frame = self.ends(values)
+        d, frame = self.seat(values)
         tip = values["a"] * np.array([np.cos(value), np.sin(value), 0.0]) - d
         along = frame[:, :2].T @ tip
         away = np.hypot(*along)
@@ -119,11 +119,11 @@ class RSSR(Family):
         return np.array([np.cos(angle), np.sin(angle)])
 
     def guess(self, values, value, x):
-        _, frame = self.ends(values)
+        _, frame = self.seat(values)
         return value, *quaternion_of(frame @ about_z(np.arctan2(x[1], x[0])))
 
     def unknowns(self, outputs, values):
-        return (outputs["C"] - outputs["D"]) @ self.ends(values)[1][:, :2]
+        return (outputs["C"] - outputs["D"]) @ self.seat(values)[1][:, :2]
 
 
 class RCCC(Family):
