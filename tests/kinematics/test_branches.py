@@ -72,7 +72,7 @@ def test_random_linkages_are_followed_as_far_as_they_go_and_no_further(family):
         assert verdict.tally["given up"] == verdict.tally["of them near"], (case, verdict.reasons, f"above {NEAR}")
         total += verdict.tally
     assert total["OK"] > 1000
-    assert total["rightly refused"] > 1000
+    assert total["rightly refused"] > 300
     assert total["derivatives"] > 20
 
 
