@@ -26,7 +26,7 @@ LARGEST_CONTRACTION = 0.25  # of the first simplified Newton corrections: Deuflh
 LARGEST_DEPARTURE = 0.05  # from a prediction, rad or sizes of the mechanism: beyond, a motion law jumps
 SMALLEST_DEPARTURE = 1e-6  # below this no prediction is called wrong
 SQUARINGS = 4  # of the matrix of which the largest eigenvalue is sought
-SINGULAR_PIVOT = 1e-8
+SINGULAR_PIVOT = 1e-12  # of the largest; corrections tell before that they no longer converge
 ROUNDING = 4e-15  # a correction this small (in rad, or in sizes of the mechanism) leaves the Jacobian as good as new
 
 
@@ -72,6 +72,12 @@ def newton_raphson(
     and one more unless it was rounding already, so that quadratic convergence brings the pose to rounding.
     """
 
+    def sized(pose: Any, step: Any) -> Any:
+        shift, turn = system.coordinates(step, pose.shifts)
+        away = jnp.max(jnp.abs(pose.position.coefficients[0]), axis=(0, 1), keepdims=True)
+        shift = shift / jnp.maximum(system.column_scale[0], away)  # what is far away is known no better
+        return jnp.maximum(jnp.max(jnp.abs(shift), axis=(0, 1)), jnp.max(jnp.abs(turn), axis=(0, 1)))
+
     def unfinished(state: Any) -> Any:
         _, _, correction, accepted_before, count = state
         size = correction.last
@@ -83,13 +89,13 @@ def newton_raphson(
         pose, before, correction, _, count = state
         residual = system.residual(pose, time).coefficients[0]
         again = jax.lax.cond(
-            count == 1, lambda: _size(before.solve(residual, refined=False)), lambda: correction.simplified
+            count == 1, lambda: sized(pose, before.solve(residual, refined=False)), lambda: correction.simplified
         )
         accepted = correction.last <= tolerance
         simplified = jnp.where(refine | ~accepted, again, correction.simplified)  # else the pose was left as it was
         factor = DenseFactor.of(system.jacobian(pose, time))
         step = factor.solve(-residual, refined=False)
-        size = _size(step)
+        size = sized(pose, step)
         step = jnp.where(refine | ~(size <= tolerance), step, 0.0)
         pose = pose.displaced(*system.coordinates(step, pose.shifts))
         first = jnp.where(count == 0, size, correction.first)
