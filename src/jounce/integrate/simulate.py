@@ -218,7 +218,7 @@ class _Run:
             )
             taken = np.flatnonzero(np.asarray(steps.taken)[: int(tried), 0])
             if len(taken):
-                start, length, _, polynomial = jax.tree.map(lambda x, k=taken: np.asarray(x)[k][..., 0], steps)
+                start, length, _, _, polynomial = jax.tree.map(lambda x, k=taken: np.asarray(x)[k][..., 0], steps)
                 self.parts.append(self._watch(Track(start, length, polynomial)))
             if progress is not None:
                 progress(int(np.sum(sense * instants <= sense * float(front.time[0]))), len(instants))
