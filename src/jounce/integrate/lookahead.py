@@ -152,7 +152,7 @@ class _Signals:
         noise = NOISE * jnp.max(jnp.abs(shaken - knots), axis=0) + FAINT * size
 
         def look(k: Any, carry: tuple[Any, Any]) -> tuple[Any, Any]:
-            share = (k * POINTS + jnp.arange(POINTS) + 0.5) / (rounds * POINTS)
+            share = (k * POINTS + jnp.arange(POINTS)) / (rounds * POINTS - 1)  # both ends too: what hides beside them
             found = jax.vmap(lambda s: self._values(s * step, 0.0))(share)
             away = jnp.abs(found - jnp.einsum("cp,c...->p...", _chebyshev(2.0 * share - 1.0), coefficients))
             away = jnp.maximum(away - jnp.maximum(noise, FAINT * jnp.abs(found)), 0.0)
