@@ -90,7 +90,7 @@ def simulate(
     step
         Length of all steps in s, in the place of a control of the error.
     longest_step
-        Bound of all steps in s; each is looked at in 64 places for what it may miss.
+        Bound of all steps in s; each is looked at in 32 places or more for what it may miss.
     set_
         NAME=VALUE of a parameter, with a unit; repeatable.
     import_

@@ -13,7 +13,6 @@ from jounce.kinematics import Motion, Status
 from jounce.kinematics.compilation import compiled
 from jounce.robot.scan import stacked
 
-
 FAINT = 1e-3  # of what turning bodies would move: coefficients that vanish have its rounding, 1e-12 of this or less
 
 

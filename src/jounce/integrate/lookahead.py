@@ -19,10 +19,11 @@ from jounce.integrate.methods import evaluated
 from jounce.jet import Jet
 from jounce.mechanism.system import Group
 
-POINTS = 64  # at which each step is looked at
-SPAN_POINTS = 16384  # in the whole run, at least, where steps are few
+POINTS = 32  # at which each step is looked at
+SPAN_POINTS = 8192  # in the whole run, at least, where steps are few
 HARMLESS = 1e-12  # rad or sizes of the mechanism: what is overlooked may move a body by this
 SHAKE = 2.0**-51  # relative change of state and time by which the rounding of a force is measured
+SPARSE = 5  # of so many nodes, one is used for that
 NOISE = 16.0  # times what it changes by is rounding still
 FAINT = 1e-13  # of a force: rounding of the polynomial through it
 SHORTEST = 1e-12  # of the run: a step over a jump of a force is not made shorter
@@ -35,7 +36,9 @@ class Look(NamedTuple):
 
     step: Any  # s, shortened where needed
     clear: Any  # whether forces and laws are known over it
-    rough: Any  # index of one that is not resolved over a step that was shortened for it, or -1; see `watched_names`
+    rough: (
+        Any  # index of one that is not resolved over the step, which is too short to matter, or -1; see `watched_names`
+    )
     worst: Any  # index of the one for which it was shortened
 
 
@@ -113,7 +116,7 @@ def looked_ahead(equations: Equations, path: State, mobility: Any, time: Any, st
     one = jnp.ones(step.shape)
     whole = seen(one)
     low, high, best = jax.lax.while_loop(unfinished, narrowed, (jnp.where(whole.clear, one, 0.0), one, whole))
-    rough = jnp.where(best.clear & (low < 1.0), best.rough, -1)
+    rough = jnp.where(best.clear, best.rough, -1)
     return Look(step * jnp.where(low > 0, low, high), low > 0, rough, best.worst)
 
 
@@ -135,7 +138,7 @@ class _Signals:
         """Return what is allowed over the shortest steps, (instances, batch): forces may jump, laws hardly."""
         forces = jnp.full((sum(group.instances for group in self._given), *bound.shape), jnp.finfo(float).max)
         laws = jnp.full((sum(group.instances for group in self._drivers), *bound.shape), JUMP)
-        return jnp.concatenate([forces, jnp.maximum(laws, bound)])
+        return jnp.concatenate([forces, jnp.maximum(laws, bound[None])])
 
     def departure(self, step: Any, span: Any, mobility: Any) -> tuple[Any, Any]:
         """Return how far forces and laws are from the polynomials through the nodes of a step, and what that moves.
@@ -144,23 +147,24 @@ class _Signals:
         of a force, what its departure over the step moves bodies by in the whole run.
         """
         knots = jax.vmap(lambda s: self._values(s * step, 0.0))(NODES)
-        shaken = jax.vmap(lambda s: self._values(s * step, SHAKE))(NODES)
+        shaken = jax.vmap(lambda s: self._values(s * step, SHAKE))(NODES[::SPARSE])
         coefficients = jnp.einsum("cn,n...->c...", INTERPOLATION, knots)
         wanted = jnp.max(jnp.where(span > 0, jnp.abs(step) / span, 0.0)) * (SPAN_POINTS / POINTS)
-        rounds = jnp.clip(jnp.ceil(wanted), 1, SPAN_POINTS // POINTS).astype(int)
+        rounds = jnp.clip(jnp.ceil(wanted), 1, SPAN_POINTS // POINTS)
+        count = rounds * POINTS
         size = jnp.max(jnp.abs(knots), axis=0)
-        noise = NOISE * jnp.max(jnp.abs(shaken - knots), axis=0) + FAINT * size
+        noise = NOISE * jnp.max(jnp.abs(shaken - knots[::SPARSE]), axis=0) + FAINT * size
 
         def look(k: Any, carry: tuple[Any, Any]) -> tuple[Any, Any]:
-            share = (k * POINTS + jnp.arange(POINTS)) / (rounds * POINTS - 1)  # both ends too: what hides beside them
+            share = (k * POINTS + jnp.arange(POINTS)).astype(float) / (count - 1.0)  # both ends too
             found = jax.vmap(lambda s: self._values(s * step, 0.0))(share)
             away = jnp.abs(found - jnp.einsum("cp,c...->p...", _chebyshev(2.0 * share - 1.0), coefficients))
-            away = jnp.maximum(away - jnp.maximum(noise, FAINT * jnp.abs(found)), 0.0)
+            away = jnp.maximum(away - jnp.maximum(noise[None], FAINT * jnp.abs(found)), 0.0)
             return jnp.maximum(carry[0], jnp.max(away, axis=0)), carry[1] + jnp.sum(away, axis=0)
 
-        largest, total = jax.lax.fori_loop(0, rounds, look, (jnp.zeros_like(size), jnp.zeros_like(size)))
-        largest, mean = jnp.max(largest, axis=0), jnp.max(total, axis=0) / (rounds * POINTS)
-        return largest, self._moved(largest, mean * jnp.abs(step * span), mobility)
+        largest, total = jax.lax.fori_loop(0, rounds.astype(int), look, (jnp.zeros_like(size), jnp.zeros_like(size)))
+        largest, mean = jnp.max(largest, axis=0), jnp.max(total, axis=0) / count
+        return largest, self._moved(largest, mean * jnp.abs(step * span)[None], mobility)
 
     def _moved(self, largest: Any, impulse: Any, mobility: Any) -> Any:
         """Return by how much bodies move for departures of forces, by their impulses in N s^2, and of laws."""

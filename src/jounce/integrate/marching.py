@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 
 from jounce.dynamics.forward import Equations, Expansion, State, expand
-from jounce.integrate.lookahead import looked_ahead, mobility_of
+from jounce.integrate.lookahead import HARMLESS, SHORTEST, Look, looked_ahead, mobility_of
 from jounce.integrate.methods import AbstractMethod, near_singular
 from jounce.integrate.projection import projected
 from jounce.kinematics.compilation import compiled
@@ -15,6 +15,7 @@ from jounce.kinematics.linear import factor_type
 
 SMALLEST_STEP = 1e-13  # of the span, or of the time itself
 MARGIN = 10.0  # an estimate of the error that is so many times the tolerance is still accepted: estimates are rough
+STUBBORN = 3  # steps refused one after the other: no series that is only too short for its step needs so many
 
 
 class Outcome(enum.IntEnum):
@@ -46,7 +47,7 @@ class Steps(NamedTuple):
     start: Any  # s
     length: Any  # s, negative backward in time
     taken: Any  # whether it was accepted
-    rough: Any  # index of a force or law that has a kink or a jump in it, or -1
+    rough: Any  # index of a force or law that is not resolved over it, which is too short to matter, or -1
     polynomial: State  # coefficients in the time from the start, (steps, order + 1, components, bodies, batch)
 
 
@@ -108,12 +109,12 @@ def march(
         left = stop - front.time
         start, reach, allowed = method.prepared(front.expansion, length, tolerance, front.singular)
         step = jnp.minimum(reach, jnp.minimum(longest, jnp.abs(left))) * 0.5 ** front.refused.astype(float)
-        clear, rough, worst = jnp.ones(step.shape, bool), jnp.full(step.shape, -1), front.blocked
+        look = Look(jnp.sign(left) * step, jnp.ones(step.shape, bool), jnp.full(step.shape, -1), front.blocked)
         if method.controlled:
             span, bound = jnp.abs(stop - front.begun), MARGIN * allowed
-            there = jnp.sign(left) * step
-            look = looked_ahead(equations, start.state, front.mobility, front.time, there, span, bound)
-            step, clear, rough, worst = jnp.abs(look.step), look.clear, look.rough, look.worst
+            look = looked_ahead(equations, start.state, front.mobility, front.time, look.step, span, bound)
+        suspect = (look.rough >= 0) & (jnp.abs(look.step) < step) | (front.refused >= STUBBORN)
+        step = jnp.abs(look.step)
         last = step >= 0.999 * jnp.abs(left)  # no sliver of a step at the end
         step = jnp.where(last, left, jnp.sign(left) * step)
         time = jnp.where(last, stop, front.time + step)
@@ -125,16 +126,19 @@ def march(
         state, distance, inverse = projected(equations, state, time[None])
         expansion = _kept(expand(equations, state, time[None], order, inverse))
         error = method.error(start, expansion, step, length)
-        good = _finite(expansion) & jnp.isfinite(distance) & (error <= MARGIN * allowed) & running & clear
+        good = _finite(expansion) & jnp.isfinite(distance) & (error <= MARGIN * allowed) & running & look.clear
+        if method.controlled:
+            kick = 0.5 * order * (order + 1) * error
+            good = good & ~(suspect & _lasting(kick, step, jnp.abs(stop - front.begun), MARGIN * allowed, front))
         tiny = jnp.abs(step) < SMALLEST_STEP * jnp.maximum(jnp.abs(front.time), jnp.abs(stop - front.time))
         polynomial = method.polynomial(start, expansion, step)
-        steps = Steps(front.time, step, good, rough, polynomial)
+        steps = Steps(front.time, step, good, look.rough, polynomial)
         outcome = jnp.where(good & last, int(Outcome.ARRIVED), front.outcome)
         outcome = jnp.where(running & ~good & tiny, int(Outcome.COLLAPSED), outcome)
         drift, none = jnp.maximum(front.drift, distance), jnp.full(step.shape, -1)
         known = mobility_of(equations, inverse), near_singular(equations, inverse)
         onwards = Front(time, expansion, jnp.zeros_like(front.refused), outcome, drift, front.begun, *known, none)
-        blocked = jnp.where(clear, front.blocked, worst)
+        blocked = jnp.where(look.clear, front.blocked, look.worst)
         refused = front._replace(refused=front.refused + 1, outcome=outcome, blocked=blocked)
         return jax.tree.map(lambda a, b: jnp.where(good, a, b), onwards, refused), steps
 
@@ -152,6 +156,17 @@ def march(
     shapes = jax.eval_shape(lambda f: attempt(f)[1], front)
     kept = jax.tree.map(lambda s: jnp.zeros((count, *s.shape), s.dtype), shapes) if keep else None
     return jax.lax.while_loop(unfinished, iterate, (front, kept, 0))
+
+
+def _lasting(kick: Any, step: Any, span: Any, bound: Any, front: Front) -> Any:
+    """Tell where a kink at the beginning of a step kicks bodies so that they move by more than is harmless in the run.
+
+    What is left of it in the accelerations at the end is no next term of a series there: `kick` is the displacement
+    within the step of accelerations that are wrong all along it.
+    """
+    span = jnp.maximum(span, jnp.abs(step))
+    moved = kick * span / jnp.maximum(jnp.abs(step), SHORTEST * span)
+    return (moved > jnp.maximum(bound, HARMLESS)) & (jnp.abs(step) > SHORTEST * span) & ~front.singular
 
 
 def _kept(expansion: Expansion) -> Expansion:

@@ -11,8 +11,8 @@ from jounce.dynamics.forward import State
 from jounce.dynamics.start import Start, start as consistent_start
 from jounce.errors import MechanismError, SolveError
 from jounce.integrate.events import Event, Watch, pose_coordinates
-from jounce.integrate.marching import Front, Outcome, departed, march
 from jounce.integrate.lookahead import watched_names
+from jounce.integrate.marching import Front, Outcome, departed, march
 from jounce.integrate.methods import AbstractMethod, Taylor, evaluated
 from jounce.integrate.simulation import Simulation, Track
 from jounce.jet import Jet
@@ -285,9 +285,11 @@ class _Run:
         """Return why steps did not go on, and where to look: a force that is not finite, or the most urgent body."""
         series, time = front.expansion.state, float(front.time[0])
         onwards = self.sense * AHEAD * max(abs(time), abs(time - float(front.begun[0])))
-        for away in (0.0, onwards):
-            if names := _unfit(self.start, evaluated(series, np.array([away])), time + away):
-                return Status.INADMISSIBLE, f"{names} at t = {time + away:g} s"
+        ahead = evaluated(series, np.array([onwards]))
+        for state, instant in ((State(*(part[0] for part in series)), time), (ahead, time + onwards)):
+            finite = all(np.isfinite(part).all() for part in state)
+            if finite and (names := _unfit(self.start, state, instant)):
+                return Status.INADMISSIBLE, f"{names} at t = {instant:g} s"
         if names := unfit_rates(self.start, pose_coordinates(series), time):
             return Status.INADMISSIBLE, f"a derivative of {names} at t = {time:g} s"
         if (blocked := int(front.blocked[0])) >= 0:

@@ -35,7 +35,7 @@ class Track:
     polynomial : State
         Coefficients in the time from the start, (steps, order + 1, components, bodies).
     rough : array of int, shape (steps,), optional
-        Index of a force or law that is not smooth over a step that was shortened for it, or -1; see `watched_names`.
+        Index of a force or law that is not resolved over a step, which is too short to matter, or -1: `watched_names`.
     """
 
     start: np.ndarray
