@@ -138,12 +138,13 @@ def test_every_run_of_a_batch_sees_its_own_pulse():
 def test_a_pulse_of_a_driver():
     # a trolley is thrown to and fro; a damper of 2 N s/m passes it on to 1 kg: v' = -2 (v - s')
     rail = ([0, 0], [0, 0], [1, 0], [1, 0])
+    law = "rise*exp(-((t - t0)/w)**2) + leap*(t - when)/abs(t - when)"
     mechanism = jn.Mechanism(
         space="planar",
-        parameters={"t0": 0.2, "w": 1e-3, "rise": 0.3},
+        parameters={"t0": 0.2, "w": 1e-3, "rise": 0.3, "leap": 0.0, "when": 99.0},
         bodies={name: jn.Body([0, 0], mass=1.0, inertia=1.0) for name in ("trolley", "load")},
         joints={name: planar.Prismatic(("ground", name), *rail) for name in ("trolley", "load")},
-        drivers={"s": drivers.CoordinateDriver(("ground", "trolley"), "x", "rise*exp(-((t - t0)/w)**2)")},
+        drivers={"s": drivers.CoordinateDriver(("ground", "trolley"), "x", law)},
         forces={"oil": forces.SlideForce(("trolley", "load"), [0, 0], [0, 0], [1, 0], "-2*v")},
         outputs={"x": jn.PointOutput("load", [0, 0])},
     )
@@ -152,3 +153,8 @@ def test_a_pulse_of_a_driver():
         wanted = -4 * 0.3 * w * math.sqrt(math.pi) * math.exp(-2 * (0.4 - t0) + w**2)
         assert motion.outputs["x"][-1, 1, 0] == pytest.approx(wanted, rel=1e-7)
         assert motion.drift.max() < 1e-13
+    # where the law jumps, the run ends
+    torn = jn.simulate(mechanism.with_parameters(rise=0.0, leap=0.1, when=0.3), [0.0, 0.2, 0.4], 1, strict=False)
+    assert [jn.Status(s).name for s in torn.status] == ["OK", "OK", "COLLAPSED"]
+    assert torn.ended_at == pytest.approx(0.3, abs=1e-9)
+    assert torn.culprits == {2: "drivers.s at t = 0.3 s"}

@@ -134,7 +134,7 @@ def _powers(
 
 def _spin(pose: Any) -> tuple[Jet, ...]:
     """Return the components of the angular velocities of bodies, in their axes."""
-    return (pose.angle.differentiate(),) if pose.turns == 1 else components(pose.angular_velocity)
+    return (pose.angle.differentiate(),) if pose.turns == 1 else tuple(components(pose.angular_velocity))
 
 
 def _inertia(moments: Any, turns: int) -> Any:

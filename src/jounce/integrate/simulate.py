@@ -209,7 +209,7 @@ def unfit_rates(start: Start, coordinates: Mapping[str, Any], instant: float) ->
     for group, members in zip(start.equations.system.forces, start.model.forces, strict=True):
         sizes = np.stack([np.asarray(c) for c in group.force(pose, clock).dense().coefficients])
         sizes = np.broadcast_to(sizes, (*sizes.shape[:2], len(members), 1))
-        good = np.isfinite(sizes).all(axis=(0, 1, 3))
+        good = np.atleast_1d(np.isfinite(sizes).all(axis=(0, 1, 3)))
         found += [f"forces.{name}" for name, fit in zip(members, good, strict=True) if not fit]
     return ", ".join(found)
 

@@ -34,14 +34,14 @@ class Track:
         s; lengths are negative backward in time.
     polynomial : State
         Coefficients in the time from the start, (steps, order + 1, components, bodies).
-    rough : array of int, shape (steps,), optional
+    rough : array of int, shape (steps,)
         Index of a force or law that is not resolved over a step, which is too short to matter, or -1: `watched_names`.
     """
 
     start: np.ndarray
     length: np.ndarray
     polynomial: State
-    rough: np.ndarray | None = None
+    rough: np.ndarray
 
     @property
     def end(self) -> float:
@@ -123,8 +123,6 @@ class Simulation(Motion):
         A step over such a place is made so short that it costs no digits, and the next may be long again.
         """
         rough, length = self.track.rough, np.abs(self.track.length)
-        if rough is None:
-            return []
         names = watched_names(self._start.model)
         places = np.flatnonzero((rough[:-1] >= 0) & (length[1:] > MUCH_LONGER * length[:-1]))
         return [(float(self.track.start[k] + self.track.length[k]), names[rough[k]]) for k in places]
