@@ -21,7 +21,10 @@ from jounce.kinematics.compilation import compiled
 from jounce.mechanism import Mechanism
 
 SMALL_BATCH, LARGE_BATCH = 16, 64  # instants expanded together
-MUCH_LONGER = 1e3  # than a step over a jump or a kink is the next; what is steep and smooth is left as it was entered
+MUCH_LONGER = (
+    1e3  # than the step over a jump or a kink are one of those before and the next; a steep force takes several
+)
+APPROACH = 4  # steps to such a place, each much shorter than the one before
 
 
 @dataclasses.dataclass(frozen=True)
@@ -124,7 +127,9 @@ class Simulation(Motion):
         """
         rough, length = self.track.rough, np.abs(self.track.length)
         names = watched_names(self._start.model)
-        places = np.flatnonzero((rough[:-1] >= 0) & (length[1:] > MUCH_LONGER * length[:-1]))
+        before = [length[max(k - APPROACH, 0) : k].max(initial=0.0) for k in range(len(length) - 1)]
+        short = MUCH_LONGER * length[:-1]
+        places = np.flatnonzero((rough[:-1] >= 0) & (length[1:] > short) & (np.array(before) > short))
         return [(float(self.track.start[k] + self.track.length[k]), names[rough[k]]) for k in places]
 
     @property
