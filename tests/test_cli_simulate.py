@@ -71,6 +71,12 @@ def test_set_step_and_netcdf(simulate, file, tmp_path):
         assert data["angle"].values[0].tolist() == pytest.approx([0.3, -2.0])
 
 
+def test_a_longest_step_bounds_all_steps(simulate, file):
+    status, out, _ = simulate(file, "--order", 1, "--longest-step", 0.01)
+    assert status == 0
+    assert "in 100 steps, derivatives to order 1" in out
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("method", ["obreshkov-4", "obreshkov-6", "obreshkov-8"])
 def test_methods(simulate, file, method, tmp_path):
@@ -88,6 +94,8 @@ def test_methods(simulate, file, method, tmp_path):
         (("--method", "obreshkov-5"), "did you mean 'obreshkov-"),
         (("--step", "0"), "--step: the length of steps must be a positive number"),
         (("--step", "nan"), "--step"),
+        (("--longest-step", "0"), "--longest-step: must be greater than zero"),
+        (("--longest-step", "nan"), "--longest-step"),
         (("--step", "short"), "--step"),
         (("--tolerance", "1e-20"), "--tolerance: the tolerance must be a number from 1e-17"),
         (("--order", "31"), "--order"),

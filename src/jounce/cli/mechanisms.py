@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -77,6 +78,7 @@ def simulate(
     method: str = "taylor",
     tolerance: float = 1e-15,
     step: float | None = None,
+    longest_step: float | None = None,
     set_: list[str] | None = None,
     import_: list[Path] | None = None,
     allow: list[Path] | None = None,
@@ -99,6 +101,8 @@ def simulate(
         Of the error of a step, rad or sizes of the mechanism.
     step
         Length of all steps in s, in the place of a control of the error.
+    longest_step
+        Bound of all steps in s; each is looked at in 32 places or more for what it may miss.
     set_
         NAME=VALUE of a parameter, with a unit; repeatable.
     import_
@@ -121,7 +125,15 @@ def simulate(
     spared(out, overwrite)
     try:
         with Bar("simulating") as bar:
-            motion = integrate(mechanism, order=order, method=chosen, tolerance=tolerance, strict=False, progress=bar)
+            motion = integrate(
+                mechanism,
+                order=order,
+                method=chosen,
+                tolerance=tolerance,
+                longest_step=math.inf if longest_step is None else longest_step,
+                strict=False,
+                progress=bar,
+            )
     except JounceError as error:
         raise of_option(error, file) from None
     if not json:
@@ -219,8 +231,8 @@ def solved(mechanism: Mechanism, file: Path, order: int, tolerance: float = 1e-1
 
 def of_option(error: JounceError, file: Path) -> JounceError:
     """Return an error with the option, or the file, that it is about."""
-    if error.name in ("order", "tolerance"):
-        error.name = f"--{error.name}"
+    if error.name in ("order", "tolerance", "longest_step"):
+        error.name = f"--{error.name.replace('_', '-')}"
         return error
     return error.located(path=file)
 

@@ -109,7 +109,9 @@ class MotionForces:
             still = None if square else self.taken(None, lanes, 1)
             return _multipliers(system, blocks, load, still, self.masses, self.pose_type)
 
-        return self.in_chunks(chunk)
+        found = self.in_chunks(chunk)
+        self.check_finite(found)
+        return found
 
     def driver_force(self, name: str) -> np.ndarray:
         """Return what a driver exerts along what it prescribes, as Taylor coefficients, (levels, 1, time)."""
@@ -142,6 +144,35 @@ class MotionForces:
 
     def applied_force(self, name: str) -> np.ndarray:
         """Return an applied force, as Taylor coefficients, (levels, components, time)."""
+        found = self._applied_force(name)
+        self.check_finite(found, f"forces.{name}")
+        return found
+
+    def check_finite(self, values: np.ndarray, name: str | None = None) -> None:
+        """Raise MechanismError for the first instant that was solved and at which Taylor coefficients are not finite.
+
+        Parameters
+        ----------
+        values : array of shape (levels, ..., time)
+            Taylor coefficients.
+        name : str, optional
+            Of the force; the applied force that is not finite there is looked for unless given.
+        """
+        bad = ~np.isfinite(values).all(axis=tuple(range(1, values.ndim - 1))) & (self.motion.status == Status.OK)
+        if not bad.any():
+            return
+        lane = int(np.argmax(bad.any(axis=0)))
+        level = int(np.argmax(bad[:, lane]))
+        if name is None:
+            names = [name for names in self.model.forces for name in names]
+            unfit = [n for n in names if not np.isfinite(self._applied_force(n)[: level + 1, :, lane]).all()]
+            name = f"forces.{unfit[0]}" if unfit else "joints"
+        at, advice = f"no finite value at t = {self.motion.time[lane]:g} s", "check its law there"
+        if level:
+            raise MechanismError(f"its derivative {level} has {at}; {advice}, or ask for fewer derivatives", name=name)
+        raise MechanismError(f"has {at}; {advice}", name=name)
+
+    def _applied_force(self, name: str) -> np.ndarray:
         index = next(k for k, names in enumerate(self.model.forces) if name in names)
         instance = self.model.forces[index].index(name)
         if index not in self._applied:

@@ -6,12 +6,14 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
-from jounce.dynamics.energies import body_energy
 from jounce.dynamics.inverse import MotionForces, pose_of
-from jounce.jet import Jet, dot
+from jounce.jet import Jet, components, dot
+from jounce.jet.algebra import total
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.compilation import compiled
 from jounce.robot.scan import stacked
+
+FAINT = 1e-3  # of what turning bodies would move: coefficients that vanish have its rounding, 1e-12 of this or less
 
 
 def power_balance(motion: Motion) -> Any:
@@ -30,7 +32,8 @@ def power_balance(motion: Motion) -> Any:
     xarray.Dataset
         With dimensions time and derivative, in W, W/s, ...: ``drivers`` and ``forces``, the power that they put in;
         ``kinetic`` and ``potential``, the rates of the energies; ``residual``, the first two less the others, which is
-        rounding; and ``scale``, the largest power of any one driver, force or body, by which to judge it.
+        rounding; and ``scale``, the sum of the sizes of all products that enter, by which to judge it at each instant
+        and order: where these cancel, as where the power grows evenly, its rates are rounding and this is not.
 
     Raises
     ------
@@ -57,7 +60,8 @@ def power_balance(motion: Motion) -> Any:
     forces = MotionForces.of(motion)
     driven = [_driver_power(forces, name) for name in motion.mechanism.drivers]
     rest = forces.in_chunks(lambda lanes: _powers(*_of_chunk(forces, lanes), forces.pose_type, forces.levels))
-    applied, kinetic, potential = (np.asarray(part) for part in rest)
+    applied, kinetic, potential, sizes = (np.asarray(part) for part in rest)
+    forces.check_finite(applied)
     factorials = np.array([math.factorial(k) for k in range(forces.levels)], float)[:, None]
     bad = (motion.status != Status.OK)[:, None]
 
@@ -66,26 +70,27 @@ def power_balance(motion: Motion) -> Any:
         return np.where(bad, np.nan, np.swapaxes(values, 1, 2))[..., : motion.order + 1]
 
     terms = {
-        "drivers": derivatives(driven),
+        "drivers": derivatives([power for power, _ in driven]),
         "forces": derivatives(np.moveaxis(applied, 1, 0)),
         "kinetic": derivatives(np.moveaxis(kinetic, 1, 0)),
         "potential": derivatives(np.moveaxis(potential, 1, 0)),
     }
     found = {name: part.sum(axis=0) for name, part in terms.items()}
     found["residual"] = found["drivers"] + found["forces"] - found["kinetic"] - found["potential"]
-    found["scale"] = np.max(np.abs(np.concatenate(list(terms.values()))), axis=0)
+    found["scale"] = derivatives([*(size for _, size in driven), np.sum(sizes, axis=1)]).sum(axis=0)
     axes = {"time": motion.time, "derivative": np.arange(found["scale"].shape[1])}
     variables = {name: (("time", "derivative"), values, {"units": "W"}) for name, values in found.items()}
     return xarray.Dataset(variables, coords=axes)
 
 
-def _driver_power(forces: MotionForces, name: str) -> np.ndarray:
-    """Return the power of a driver, as Taylor coefficients, (levels, time)."""
+def _driver_power(forces: MotionForces, name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return the power of a driver and the size of its products, as Taylor coefficients, (levels, time)."""
     place = forces.places[name]
     element = forces.model.system.groups[place.group].element
     law = forces.in_chunks(lambda lanes: _law(element, forces.motion.time[lanes], forces.levels))[:, place.instance]
     rate, force = Jet(tuple(law)).differentiate(), Jet(tuple(forces.driver_force(name)[:, 0]))
-    return np.stack((force * rate).dense().coefficients)
+    power, size = force * rate, force.map(np.abs) * rate.map(np.abs)
+    return np.stack(power.dense().coefficients), np.stack(size.dense().coefficients)
 
 
 @compiled("levels")
@@ -96,19 +101,58 @@ def _law(driver: Any, instants: Any, levels: int) -> Any:
 
 def _of_chunk(forces: MotionForces, lanes: np.ndarray) -> tuple[Any, ...]:
     bodies = forces.taken(None, lanes, forces.levels + 2)
-    return forces.model.system.forces, bodies, forces.motion.time[lanes], forces.masses, forces.gravity
+    system, length = forces.model.system, forces.model.length
+    return system.forces, bodies, forces.motion.time[lanes], forces.masses, forces.gravity, length
 
 
 @compiled("pose_type", "levels")
-def _powers(groups: Any, bodies: Any, instants: Any, masses: Any, gravity: Any, pose_type: Any, levels: int) -> Any:
-    """Return the power of each force, and the rates of kinetic and potential energy of each body."""
+def _powers(
+    groups: Any, bodies: Any, instants: Any, masses: Any, gravity: Any, length: Any, pose_type: Any, levels: int
+) -> Any:
+    """Return the power of each force, the rates of both energies of each body, and the sizes of all their products."""
     order = levels + 1  # energies have one less, and their rates one less again
     pose, time = pose_of(bodies, pose_type, order), Jet.variable(instants[None], order)
-    applied = [stacked(group.power(pose, time).truncate(levels - 1)) for group in groups]
     mass, center, moments = masses
-    translation, rotation = body_energy(pose, mass, center, moments, 0)
-    height = dot(pose.point(center), gravity)
-    potential = (height.differentiate() * -mass).truncate(levels - 1)
-    kinetic = (translation + rotation).differentiate()
+    velocity, spin, tensor = pose.point(center).differentiate(), _spin(pose), _inertia(moments, pose.turns)
+    axes = [axis.dense() for axis in (pose.axes if pose.turns == 3 else (pose.sine[None], pose.cosine[None]))]
+    turning = _largest(axes).differentiate()
+    speed = _largest([pose.position.differentiate()]) + turning * (jnp.max(jnp.abs(center), axis=0) + FAINT * length)
+    momentum = [total(tensor[i][k] * spin[k] for k in range(pose.turns)) for i in range(pose.turns)]
+    kinetic = dot(velocity, velocity) * (0.5 * mass) + total(a * b for a, b in zip(spin, momentum, strict=True)) * 0.5
+    turns = _largest([w[None] for w in spin]) + turning * FAINT
+    sizes = speed * speed * mass + turns * turns * jnp.max(jnp.sum(jnp.abs(tensor), axis=1), axis=0)
+    sizes = sizes.differentiate() + (speed * mass * jnp.sum(jnp.abs(gravity))).truncate(levels - 1)
+    potential = (dot(velocity, gravity) * -mass).truncate(levels - 1)
+    applied = [_applied(group, pose, time, turning.map(lambda c: jnp.max(c, axis=0)), length) for group in groups]
     nothing = jnp.zeros((levels, 0, len(instants)))
-    return jnp.concatenate([*applied, nothing], axis=1), stacked(kinetic), stacked(potential)
+    powers, products = (
+        jnp.concatenate([*(stacked(pair[k].truncate(levels - 1)) for pair in applied), nothing], axis=1) for k in (0, 1)
+    )
+    products = jnp.concatenate([products, stacked(sizes)], axis=1)
+    return powers, stacked(kinetic.differentiate()), stacked(potential), products
+
+
+def _spin(pose: Any) -> tuple[Jet, ...]:
+    """Return the components of the angular velocities of bodies, in their axes."""
+    return (pose.angle.differentiate(),) if pose.turns == 1 else tuple(components(pose.angular_velocity))
+
+
+def _inertia(moments: Any, turns: int) -> Any:
+    """Return the tensors of inertia about the centres of mass, (turns, turns, bodies, 1), from the second moments."""
+    spread = total(moments[k][k] for k in range(len(moments)))
+    if turns == 1:
+        return spread[None, None]
+    return spread * jnp.eye(3)[:, :, None, None] - moments
+
+
+def _applied(group: Any, pose: Any, time: Jet, turning: Jet, length: Any) -> tuple[Jet, Jet]:
+    """Return the power of forces, (instances, batch), and the size of its products."""
+    lever = length if group.element.unit == "N" else 1.0
+    rates = group.velocity(pose, time).map(jnp.abs) + turning * (FAINT * lever)
+    return group.power(pose, time), group.force(pose, time).map(jnp.abs).dot(rates)
+
+
+def _largest(jets: Any) -> Jet:
+    """Return the largest component of vectors, coefficient by coefficient, (bodies, batch)."""
+    levels = zip(*(jet.dense().coefficients for jet in jets), strict=True)
+    return Jet(tuple(jnp.max(jnp.abs(jnp.concatenate(level)), axis=0) for level in levels))

@@ -110,7 +110,8 @@ class OrdinaryEquation:
             Highest derivative of the outputs.
         """
         instants = np.asarray(time, float)
-        track = Track(instants, np.zeros_like(instants), State(*(np.asarray(part)[:, None] for part in states)))
+        polynomial = State(*(np.asarray(part)[:, None] for part in states))
+        track = Track(instants, np.zeros_like(instants), polynomial, np.full(len(instants), -1))
         return Simulation(self.mechanism, self.start, track, instants, order)
 
 

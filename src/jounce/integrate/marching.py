@@ -7,12 +7,15 @@ import jax
 import jax.numpy as jnp
 
 from jounce.dynamics.forward import Equations, Expansion, State, expand
-from jounce.integrate.methods import AbstractMethod
+from jounce.integrate.lookahead import HARMLESS, SHORTEST, Look, looked_ahead, mobility_of
+from jounce.integrate.methods import AbstractMethod, near_singular
 from jounce.integrate.projection import projected
 from jounce.kinematics.compilation import compiled
+from jounce.kinematics.linear import factor_type
 
 SMALLEST_STEP = 1e-13  # of the span, or of the time itself
 MARGIN = 10.0  # an estimate of the error that is so many times the tolerance is still accepted: estimates are rough
+STUBBORN = 3  # steps refused one after the other: no series that is only too short for its step needs so many
 
 
 class Outcome(enum.IntEnum):
@@ -32,6 +35,10 @@ class Front(NamedTuple):
     refused: Any  # number of steps refused from here, one after the other
     outcome: Any  # see Outcome
     drift: Any  # largest distance from the constraints before a projection, rad or sizes of the mechanism
+    begun: Any  # when the runs began, s
+    mobility: Any  # how readily forces move the bodies here, as `mobility_of` gives it
+    singular: Any  # whether the equations of motion are near to singular here
+    blocked: Any  # index of the force or law over which no step is possible from here, or -1
 
 
 class Steps(NamedTuple):
@@ -40,16 +47,19 @@ class Steps(NamedTuple):
     start: Any  # s
     length: Any  # s, negative backward in time
     taken: Any  # whether it was accepted
+    rough: Any  # index of a force or law that is not resolved over it, which is too short to matter, or -1
     polynomial: State  # coefficients in the time from the start, (steps, order + 1, components, bodies, batch)
 
 
 @compiled("order")
 def departed(equations: Equations, state: State, time: Any, *, order: int) -> Front:
     """Return the start of runs from states on the constraints; `time` has the shape (batch,)."""
-    expansion = _kept(expand(equations, state, time[None], order))
-    finite = _finite(expansion)
-    outcome = jnp.where(finite, int(Outcome.RUNNING), int(Outcome.LOST))
-    return Front(time, expansion, jnp.zeros(time.shape, int), outcome, jnp.zeros(time.shape))
+    inverse = factor_type(time.shape[-1]).of(equations.matrix(state, time[None])).inverse()
+    expansion = _kept(expand(equations, state, time[None], order, inverse))
+    outcome = jnp.where(_finite(expansion), int(Outcome.RUNNING), int(Outcome.LOST))
+    none, nothing = jnp.full(time.shape, -1), jnp.zeros(time.shape)
+    known = mobility_of(equations, inverse), near_singular(equations, inverse)
+    return Front(time, expansion, jnp.zeros(time.shape, int), outcome, nothing, time, *known, none)
 
 
 @compiled("count", "keep")
@@ -97,8 +107,14 @@ def march(
 
     def attempt(front: Front) -> tuple[Front, Steps]:
         left = stop - front.time
-        start, reach, allowed = method.prepared(front.expansion, length, tolerance)
-        step = jnp.minimum(reach * 0.5 ** front.refused.astype(float), longest)
+        start, reach, allowed = method.prepared(front.expansion, length, tolerance, front.singular)
+        step = jnp.minimum(reach, jnp.minimum(longest, jnp.abs(left))) * 0.5 ** front.refused.astype(float)
+        look = Look(jnp.sign(left) * step, jnp.ones(step.shape, bool), jnp.full(step.shape, -1), front.blocked)
+        if method.controlled:
+            span, bound = jnp.abs(stop - front.begun), MARGIN * allowed
+            look = looked_ahead(equations, start.state, front.mobility, front.time, look.step, span, bound)
+        suspect = (look.rough >= 0) & (jnp.abs(look.step) < step) | (front.refused >= STUBBORN)
+        step = jnp.abs(look.step)
         last = step >= 0.999 * jnp.abs(left)  # no sliver of a step at the end
         step = jnp.where(last, left, jnp.sign(left) * step)
         time = jnp.where(last, stop, front.time + step)
@@ -110,14 +126,20 @@ def march(
         state, distance, inverse = projected(equations, state, time[None])
         expansion = _kept(expand(equations, state, time[None], order, inverse))
         error = method.error(start, expansion, step, length)
-        good = _finite(expansion) & jnp.isfinite(distance) & (error <= MARGIN * allowed) & running
+        good = _finite(expansion) & jnp.isfinite(distance) & (error <= MARGIN * allowed) & running & look.clear
+        if method.controlled:
+            kick = 0.5 * order * (order + 1) * error
+            good = good & ~(suspect & _lasting(kick, step, jnp.abs(stop - front.begun), MARGIN * allowed, front))
         tiny = jnp.abs(step) < SMALLEST_STEP * jnp.maximum(jnp.abs(front.time), jnp.abs(stop - front.time))
         polynomial = method.polynomial(start, expansion, step)
-        steps = Steps(front.time, step, good, polynomial)
+        steps = Steps(front.time, step, good, look.rough, polynomial)
         outcome = jnp.where(good & last, int(Outcome.ARRIVED), front.outcome)
         outcome = jnp.where(running & ~good & tiny, int(Outcome.COLLAPSED), outcome)
-        onwards = Front(time, expansion, jnp.zeros_like(front.refused), outcome, jnp.maximum(front.drift, distance))
-        refused = front._replace(refused=front.refused + 1, outcome=outcome)
+        drift, none = jnp.maximum(front.drift, distance), jnp.full(step.shape, -1)
+        known = mobility_of(equations, inverse), near_singular(equations, inverse)
+        onwards = Front(time, expansion, jnp.zeros_like(front.refused), outcome, drift, front.begun, *known, none)
+        blocked = jnp.where(look.clear, front.blocked, look.worst)
+        refused = front._replace(refused=front.refused + 1, outcome=outcome, blocked=blocked)
         return jax.tree.map(lambda a, b: jnp.where(good, a, b), onwards, refused), steps
 
     def unfinished(carry: Any) -> Any:
@@ -134,6 +156,17 @@ def march(
     shapes = jax.eval_shape(lambda f: attempt(f)[1], front)
     kept = jax.tree.map(lambda s: jnp.zeros((count, *s.shape), s.dtype), shapes) if keep else None
     return jax.lax.while_loop(unfinished, iterate, (front, kept, 0))
+
+
+def _lasting(kick: Any, step: Any, span: Any, bound: Any, front: Front) -> Any:
+    """Tell where a kink at the beginning of a step kicks bodies so that they move by more than is harmless in the run.
+
+    What is left of it in the accelerations at the end is no next term of a series there: `kick` is the displacement
+    within the step of accelerations that are wrong all along it.
+    """
+    span = jnp.maximum(span, jnp.abs(step))
+    moved = kick * span / jnp.maximum(jnp.abs(step), SHORTEST * span)
+    return (moved > jnp.maximum(bound, HARMLESS)) & (jnp.abs(step) > SHORTEST * span) & ~front.singular
 
 
 def _kept(expansion: Expansion) -> Expansion:

@@ -15,6 +15,7 @@ from jounce.errors import JounceError
 HIGHEST_ORDER = 40
 LOWEST_ORDER = 4
 FAINT = 1e-10  # what grows in the upper coefficients from an amplitude below is rounding, near a singular position
+BRACED = 20.0  # in multiples of the largest mass, by a gap of one: 30 and more where coefficients drown, else below 26
 NEAR = 1e-6  # rad or sizes of the mechanism: what a body moves within the radius of a series near a pole
 ROUGH = 1e-11  # tolerance of a step there, rad or sizes of the mechanism
 ROUNDING = 1e-14  # relative error of an acceleration that is no sign of a step too long
@@ -26,6 +27,11 @@ class AbstractMethod(eqx.Module):
     Every step starts from the expansion of the motion at its beginning, ends on the constraints, and is accepted where
     the accelerations of the equations there agree with those of its polynomial.
     """
+
+    @property
+    def controlled(self) -> bool:
+        """Whether steps are chosen by their error, and shortened where a force on the way would stay unseen."""
+        return getattr(self, "step", None) is None
 
     @abc.abstractmethod
     def expansion_order(self, tolerance: float) -> int:
@@ -43,7 +49,7 @@ class AbstractMethod(eqx.Module):
             Of the error of a step, in the same measure.
         """
 
-    def prepared(self, expansion: Expansion, length: Any, tolerance: Any) -> tuple[Expansion, Any, Any]:
+    def prepared(self, expansion: Expansion, length: Any, tolerance: Any, singular: Any) -> tuple[Expansion, Any, Any]:
         """Return the expansion as the step shall use it, how far that may go, s, and by which tolerance to judge it.
 
         The last two have the shape (batch,).
@@ -56,6 +62,8 @@ class AbstractMethod(eqx.Module):
             Size of the mechanism, m.
         tolerance : float
             Of the error of the step, rad or sizes of the mechanism.
+        singular : array of bool, shape (batch,)
+            Whether the equations of motion are near to singular there, as `near_singular` tells.
         """
         step = self.longest_step(coefficient_sizes(expansion, length), tolerance)
         return expansion, step, jnp.full(step.shape, tolerance)
@@ -85,8 +93,24 @@ def _horner(coefficients: Any, step: Any) -> Any:
     return value
 
 
+def near_singular(equations: Equations, inverse: Any) -> Any:
+    """Tell where rows of the constraints are about to depend on each other, shape (batch,).
+
+    Parameters
+    ----------
+    equations : Equations
+        Of the mechanism.
+    inverse : array of shape (rows, rows, batch)
+        Of the equations' matrix.
+    """
+    columns = equations.system.cells.shape[1]
+    return jnp.max(jnp.abs(inverse[columns:, columns:]), axis=(0, 1), initial=0.0) > BRACED
+
+
 def _drowned(sizes: Any) -> Any:
-    """Tell where the upper coefficients are rounding that grows geometrically, shape (batch,).
+    """Tell where the upper coefficients may be rounding that grows geometrically, shape (batch,).
+
+    A force of which only the foot has been met grows so too: near a singular position alone is it rounding.
 
     Where the motion itself would hardly get on within the radius that they show, there is a pole in the way, whose
     series grow faintly too: it must not be passed.
@@ -157,7 +181,7 @@ class Taylor(AbstractMethod):
         count = len(sizes)
         return reach(sizes, count // 2) * tolerance ** (1.0 / count)
 
-    def prepared(self, expansion: Expansion, length: Any, tolerance: Any) -> tuple[Expansion, Any, Any]:
+    def prepared(self, expansion: Expansion, length: Any, tolerance: Any, singular: Any) -> tuple[Expansion, Any, Any]:
         """Return the series cut where it carries furthest, and how far that is.
 
         Near a singular position the higher coefficients drown in rounding: the cut series is then much the better one.
@@ -165,14 +189,14 @@ class Taylor(AbstractMethod):
         the distance from there, and steps that keep it small would come near, and nearer.
         """
         if self.step is not None:
-            return super().prepared(expansion, length, tolerance)
+            return super().prepared(expansion, length, tolerance, singular)
         sizes = coefficient_sizes(expansion, length)
         orders = np.arange(1.0, len(sizes) + 1)
         roots = -jnp.log(jnp.maximum(sizes, 1e-300)) / orders[:, None]  # logarithms: powers would cost far more
         cuts = np.arange(LOWEST_ORDER, len(sizes))[:, None]
         counted = (orders >= (cuts + 1) // 2) & (orders <= cuts + 1)  # the upper half of what is kept, and the next
         reaches = jnp.min(jnp.where(counted[:, :, None], roots[None], jnp.inf), axis=1)
-        allowed = jnp.where(_drowned(sizes), jnp.maximum(tolerance, ROUGH), tolerance)
+        allowed = jnp.where(singular & _drowned(sizes), jnp.maximum(tolerance, ROUGH), tolerance)
         steps = reaches + jnp.log(allowed)[None] / (cuts + 1.0)
         best = jnp.argmax(steps, axis=0)
         kept = np.arange(len(sizes))[:, None] <= best[None] + LOWEST_ORDER  # of the coefficients from zero on

@@ -10,9 +10,10 @@ import numpy as np
 from jounce.dynamics.forward import State
 from jounce.dynamics.start import Start, start as consistent_start
 from jounce.errors import MechanismError, SolveError
-from jounce.integrate.events import Event, Watch
+from jounce.integrate.events import Event, Watch, pose_coordinates
+from jounce.integrate.lookahead import watched_names
 from jounce.integrate.marching import Front, Outcome, departed, march
-from jounce.integrate.methods import AbstractMethod, Taylor
+from jounce.integrate.methods import AbstractMethod, Taylor, evaluated
 from jounce.integrate.simulation import Simulation, Track
 from jounce.jet import Jet
 from jounce.kinematics import Status, raise_for_status
@@ -22,6 +23,8 @@ from jounce.mechanism import Mechanism, check_mechanism, time_grid
 from jounce.mechanism.doors import concrete
 from jounce.mechanism.laws import check_laws
 
+AHEAD = 1e-9  # of the time so far: where steps collapse, what is not finite lies that close
+FEW = 4  # derivatives that are looked at for one that is not finite
 STEPS = 64  # tried between two looks at progress and events
 TOLERANCES = (1e-17, 1e-2)  # below rounding there is still energy to be kept: what series leave out adds up
 
@@ -190,6 +193,33 @@ def _unfit(start: Start, state: State, instant: float) -> str:
     return ", ".join(f"forces.{name}" for name, good in zip(names, fit, strict=True) if not good)
 
 
+def unfit_rates(start: Start, coordinates: Mapping[str, Any], instant: float) -> str:
+    """Name the applied forces of which a low derivative is not finite at an instant, where their values may be.
+
+    Parameters
+    ----------
+    start : Start
+        The mechanism.
+    coordinates : dict of str to array
+        Taylor coefficients at the instant, (order + 1, ..., 1); the higher ones need not be finite.
+    instant : float
+        s.
+    """
+    known = np.isfinite(coordinates["position"]).reshape(len(coordinates["position"]), -1).all(axis=1)
+    order = min(int(np.argmin(np.append(known, False))) - 1, FEW)
+    if order < 1:
+        return ""
+    levels = {name: part[: order + 1 - (name == "angular_velocity")] for name, part in coordinates.items()}
+    pose = start.model.pose_type.from_coordinates({name: Jet(tuple(part)) for name, part in levels.items()})
+    clock, found = Jet.variable(np.array([[instant]]), order), []
+    for group, members in zip(start.equations.system.forces, start.model.forces, strict=True):
+        sizes = np.stack([np.asarray(c) for c in group.force(pose, clock).dense().coefficients])
+        sizes = np.broadcast_to(sizes, (*sizes.shape[:2], len(members), 1))
+        good = np.atleast_1d(np.isfinite(sizes).all(axis=(0, 1, 3)))
+        found += [f"forces.{name}" for name, fit in zip(members, good, strict=True) if not fit]
+    return ", ".join(found)
+
+
 class _Run:
     """One run: its steps so far, the events in them, and how it ended."""
 
@@ -202,6 +232,7 @@ class _Run:
         self.parts: list[Track] = []
         self.ending = (Status.OK, "")
         self.stopped_at: float | None = None  # by a terminal event
+        self.sense = 1.0  # of time
 
     @property
     def track(self) -> Track:
@@ -209,11 +240,12 @@ class _Run:
         whole = self.parts
         polynomial = State(*(np.concatenate(part) for part in zip(*(p.polynomial for p in whole), strict=True)))
         start, length = (np.concatenate(part) for part in ([p.start for p in whole], [p.length for p in whole]))
-        return Track(start, length, polynomial)
+        return Track(start, length, polynomial, np.concatenate([p.rough for p in whole]))
 
     def go(self, instants: np.ndarray, progress: Callable[[int, int], None] | None) -> None:
         """March from the first to the last instant."""
-        equations, stop, sense = self.start.equations, instants[-1], np.sign(instants[-1] - instants[0])
+        equations, stop = self.start.equations, instants[-1]
+        self.sense = sense = np.sign(instants[-1] - instants[0])
         order = self.method.expansion_order(self.tolerance)
         front = departed(equations, self.start.state, instants[:1], order=order)
         if len(instants) == 1 or int(front.outcome[0]) != Outcome.RUNNING:
@@ -224,8 +256,8 @@ class _Run:
             )
             taken = np.flatnonzero(np.asarray(steps.taken)[: int(tried), 0])
             if len(taken):
-                start, length, _, polynomial = jax.tree.map(lambda x, k=taken: np.asarray(x)[k][..., 0], steps)
-                self.parts.append(self._watch(Track(start, length, polynomial)))
+                some = jax.tree.map(lambda x, k=taken: np.asarray(x)[k][..., 0], steps)
+                self.parts.append(self._watch(Track(some.start, some.length, some.polynomial, some.rough)))
             if progress is not None:
                 progress(int(np.sum(sense * instants <= sense * float(front.time[0]))), len(instants))
         if not self.parts:
@@ -236,7 +268,7 @@ class _Run:
     def _stand(self, front: Front) -> None:
         """Keep the start as a step of no length."""
         polynomial = State(*(np.asarray(part)[None, ..., 0] for part in front.expansion.state))
-        self.parts.append(Track(np.asarray(front.time), np.zeros(1), polynomial))
+        self.parts.append(Track(np.asarray(front.time), np.zeros(1), polynomial, np.full(1, -1)))
 
     def _watch(self, part: Track) -> Track:
         """Note the events in some steps; cut the steps at the first that is terminal."""
@@ -252,14 +284,22 @@ class _Run:
                 self.stopped_at = instant
                 length = np.append(part.length[:step], after)
                 polynomial = State(*(x[: step + 1] for x in part.polynomial))
-                return Track(part.start[: step + 1], length, polynomial)
+                return Track(part.start[: step + 1], length, polynomial, part.rough[: step + 1])
         return part
 
     def _explained(self, front: Front) -> tuple[Status, str]:
         """Return why steps did not go on, and where to look: a force that is not finite, or the most urgent body."""
-        state = State(*(part[0] for part in front.expansion.state))
-        if names := _unfit(self.start, state, float(front.time[0])):
-            return Status.INADMISSIBLE, names
+        series, time = front.expansion.state, float(front.time[0])
+        onwards = self.sense * AHEAD * max(abs(time), abs(time - float(front.begun[0])))
+        ahead = evaluated(series, np.array([onwards]))
+        for state, instant in ((State(*(part[0] for part in series)), time), (ahead, time + onwards)):
+            finite = all(np.isfinite(part).all() for part in state)
+            if finite and (names := _unfit(self.start, state, instant)):
+                return Status.INADMISSIBLE, f"{names} at t = {instant:g} s"
+        if names := unfit_rates(self.start, pose_coordinates(series), time):
+            return Status.INADMISSIBLE, f"a derivative of {names} at t = {time:g} s"
+        if (blocked := int(front.blocked[0])) >= 0:
+            return Status.COLLAPSED, f"{watched_names(self.start.model)[blocked]} at t = {time:g} s"
         acceleration = np.abs(np.asarray(front.expansion.acceleration[0])[..., 0])
         scale = np.asarray(self.start.equations.system.column_scale)[:, None]
         sizes = np.nan_to_num(acceleration / scale, nan=np.inf).max(axis=0)

@@ -12,6 +12,7 @@ from jounce.dynamics.energies import body_energy
 from jounce.dynamics.forward import Equations, State, expand
 from jounce.dynamics.start import Start
 from jounce.integrate.events import NODES, at_nodes, counted_on, pose_coordinates, series_of
+from jounce.integrate.lookahead import watched_names
 from jounce.integrate.methods import evaluated
 from jounce.integrate.projection import projected
 from jounce.jet import Jet, dot
@@ -20,6 +21,10 @@ from jounce.kinematics.compilation import compiled
 from jounce.mechanism import Mechanism
 
 SMALL_BATCH, LARGE_BATCH = 16, 64  # instants expanded together
+MUCH_LONGER = (
+    1e3  # than the step over a jump or a kink are one of those before and the next; a steep force takes several
+)
+APPROACH = 4  # steps to such a place, each much shorter than the one before
 
 
 @dataclasses.dataclass(frozen=True)
@@ -32,11 +37,14 @@ class Track:
         s; lengths are negative backward in time.
     polynomial : State
         Coefficients in the time from the start, (steps, order + 1, components, bodies).
+    rough : array of int, shape (steps,)
+        Index of a force or law that is not resolved over a step, which is too short to matter, or -1: `watched_names`.
     """
 
     start: np.ndarray
     length: np.ndarray
     polynomial: State
+    rough: np.ndarray
 
     @property
     def end(self) -> float:
@@ -60,6 +68,8 @@ class Simulation(Motion):
         Degrees of freedom and the bodies that have them.
     events : list of list of float
         For each event asked for, the times at which it happened, s.
+    kinks : list of tuple of float and str
+        When a force or a motion law had a jump or a kink, s, and which.
     track : Track
         The steps, as polynomials.
     """
@@ -108,6 +118,19 @@ class Simulation(Motion):
     def steps(self) -> int:
         """Number of steps taken."""
         return len(self.track.start)
+
+    @property
+    def kinks(self) -> list[tuple[float, str]]:
+        """Times at which a force or a motion law had a jump or a kink, s, and its name; derivatives do not exist there.
+
+        A step over such a place is made so short that it costs no digits, and the next may be long again.
+        """
+        rough, length = self.track.rough, np.abs(self.track.length)
+        names = watched_names(self._start.model)
+        before = [length[max(k - APPROACH, 0) : k].max(initial=0.0) for k in range(len(length) - 1)]
+        short = MUCH_LONGER * length[:-1]
+        places = np.flatnonzero((rough[:-1] >= 0) & (length[1:] > short) & (np.array(before) > short))
+        return [(float(self.track.start[k] + self.track.length[k]), names[rough[k]]) for k in places]
 
     @property
     def ended_at(self) -> float:

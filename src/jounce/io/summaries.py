@@ -69,6 +69,10 @@ def simulation_summary(motion: Simulation, file: Path) -> str:
         lines.append(f"energy: {energy[0]:.9g} J at the start; it changes by {change:.2g} J{share}")
         if mechanism.drivers or mechanism.forces:
             lines.append("(drivers, actuators and dampers change it)")
+        if motion.kinks:
+            names = ", ".join(dict.fromkeys(name for _, name in motion.kinks))
+            number = count(len(motion.kinks), "kink or jump", "kinks or jumps")
+            lines.append(f"{number}: {names}, the first at t = {motion.kinks[0][0]:.6g} s; no derivatives there")
         lines.append(f"constraint drift: {np.max(motion.drift[reached]):.1e} (rad, or sizes of the mechanism)")
     return "\n".join(_wrapped(line) for line in lines)
 

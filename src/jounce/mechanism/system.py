@@ -69,6 +69,10 @@ class Group(eqx.Module):
         force = self.element.force(displacement, velocity, time)
         return force.dot(velocity) if len(force.shape) == 3 else force * velocity
 
+    def velocity(self, pose: Any, time: Jet) -> Jet:
+        """Return the velocities that forces work on, shape (components, instances, batch)."""
+        return _with_rows(self._motion(pose, time)[1])
+
     def energy(self, pose: Any, time: Jet) -> Jet:
         """Return the energy that forces have stored, shape (instances, batch), J."""
         return self.element.energy(self.element.displacement(*self._poses(pose), time))

@@ -1,0 +1,214 @@
+"""What a step would pass over unseen: applied forces and motion laws, looked at along its path before it is taken.
+
+A Taylor series knows what it has met. A pulse that lies ahead, in time or in place, leaves no trace in it, and both
+ends of a long step may lie beside the pulse. So forces and laws are evaluated on the polynomial of the step at many
+instants, and compared with the polynomial through a few of them: what is analytic over a step is given by these to
+rounding. Where they disagree, and where that would move the mechanism, the step is halved.
+"""
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jounce.dynamics.forward import Equations, State, grounded
+from jounce.dynamics.outputs import is_turning
+from jounce.integrate.events import INTERPOLATION, NODES
+from jounce.integrate.methods import evaluated
+from jounce.jet import Jet
+from jounce.mechanism.system import Group
+
+POINTS = 32  # at which each step is looked at
+SPAN_POINTS = 8192  # in the whole run, at least, where steps are few
+HARMLESS = 1e-12  # rad or sizes of the mechanism: what is overlooked may move a body by this
+SHAKE = 2.0**-51  # relative change of state and time by which the rounding of a force is measured
+SPARSE = 5  # of so many nodes, one is used for that
+NOISE = 16.0  # times what it changes by is rounding still
+FAINT = 1e-13  # of a force: rounding of the polynomial through it
+SHORTEST = 1e-12  # of the run: a step over a jump of a force is not made shorter
+JUMP = 1e-6  # rad or sizes of the mechanism: no motion law jumps by more in such a step
+NEAR = 1.0 / 16.0  # of the way to where forces and laws are no longer known: a step ends that close
+
+
+class Look(NamedTuple):
+    """What was seen ahead; arrays of shape (batch,)."""
+
+    step: Any  # s, shortened where needed
+    clear: Any  # whether forces and laws are known over it
+    rough: (
+        Any  # index of one that is not resolved over the step, which is too short to matter, or -1; see `watched_names`
+    )
+    worst: Any  # index of the one for which it was shortened
+
+
+def mobility_of(equations: Equations, inverse: Any) -> Any:
+    """Return how readily generalised forces on each body move the mechanism, (bodies, batch), the ground first.
+
+    The largest acceleration, in rad or sizes of the mechanism by s^2, by a force of one on one of the scaled
+    coordinates of the body.
+
+    Parameters
+    ----------
+    equations : Equations
+        Of the mechanism.
+    inverse : array of shape (rows, rows, batch)
+        Of the equations' matrix.
+    """
+    columns, count = equations.system.cells.shape[1], equations.coordinates
+    responses = jnp.max(jnp.abs(inverse[:columns, :columns]), axis=0).reshape(-1, count, inverse.shape[-1])
+    return grounded(jnp.max(responses, axis=1)[None])[0] / equations.scale
+
+
+def watched_names(model: Any) -> list[str]:
+    """Return the names of the forces and drivers of a model, in the order in which they are looked at."""
+    return [f"forces.{name}" for members in model.forces for name in members] + list(model.drivers)
+
+
+def looked_ahead(equations: Equations, path: State, mobility: Any, time: Any, step: Any, span: Any, bound: Any) -> Look:
+    """Return how far a step may go so that no force and no motion law on its way stays unseen.
+
+    Parameters
+    ----------
+    equations : Equations
+        Of the mechanism.
+    path : State
+        Polynomials of the step in the time from its beginning, (order + 1, components, bodies, batch).
+    mobility : array of shape (bodies, batch)
+        As `mobility_of` gives it.
+    time, step : array of shape (batch,)
+        Where the step begins, and its length, negative backward in time, s.
+    span : array of shape (batch,)
+        Of the whole run, s: the longer the step in it, the more points it is looked at.
+    bound : array of shape (batch,)
+        By how much a body may move otherwise than seen, rad or sizes of the mechanism.
+    """
+    groups = tuple(group for group in equations.system.groups if group.is_driver)
+    blank = jnp.full(step.shape, -1)
+    if not equations.system.forces and not groups:
+        return Look(step, jnp.ones(step.shape, bool), blank, blank)
+    signals = _Signals(equations, path, time, groups)
+    bound, shortest = jnp.maximum(bound, HARMLESS), SHORTEST * jnp.maximum(span, jnp.abs(time))
+
+    def seen(part: Any) -> Look:
+        away, moved = signals.departure(part * step, span, mobility)
+        short = jnp.abs(part * step) <= shortest
+        allowed = jnp.where(short[None], signals.at_a_jump(bound), bound[None])
+        over = jnp.where(jnp.isfinite(moved), moved / allowed, jnp.inf)
+        clear, index = jnp.all(over <= 1.0, axis=0), jnp.argmax(over, axis=0)
+        return Look(part, clear, jnp.where(jnp.any(away > 0, axis=0), index, -1), index)
+
+    def open_(low: Any, high: Any) -> Any:
+        return jnp.where(low > 0, high - low > NEAR * low, high * jnp.abs(step) > 0.25 * shortest)
+
+    def narrowed(carry: Any) -> tuple[Any, ...]:
+        low, high, best = carry
+        trial = jnp.where(open_(low, high), jnp.where(low > 0, 0.5 * (low + high), 0.5 * high), low)
+        look = seen(trial)
+        better = look.clear & (trial > low)
+        best = jax.tree.map(lambda new, old: jnp.where(better, new, old), look, best)
+        worst = jnp.where(look.clear, best.worst, look.worst)
+        return jnp.where(better, trial, low), jnp.where(look.clear, high, trial), best._replace(worst=worst)
+
+    def unfinished(carry: Any) -> Any:
+        return jnp.any(open_(*carry[:2]))
+
+    one = jnp.ones(step.shape)
+    whole = seen(one)
+    low, high, best = jax.lax.while_loop(unfinished, narrowed, (jnp.where(whole.clear, one, 0.0), one, whole))
+    rough = jnp.where(best.clear, best.rough, -1)
+    return Look(step * jnp.where(low > 0, low, high), low > 0, rough, best.worst)
+
+
+class _Signals:
+    """Forces and motion laws of a mechanism along the path of a step; arrays have the instances and the batch last."""
+
+    def __init__(self, equations: Equations, path: State, time: Any, drivers: tuple[Group, ...]):
+        forces = equations.system.forces
+        bodies = sorted({body for group in forces for slot in group.bodies for body in slot} - {0})
+        places = {body: k for k, body in enumerate([0, *bodies])}
+        self._equations, self._time, self._drivers, self._given = equations, time, drivers, forces
+        self._forces = [
+            Group(group.element, tuple(tuple(places[body] for body in slot) for slot in group.bodies))
+            for group in forces
+        ]
+        self._path = path.map(lambda part: part[:, :, np.array(bodies, int) - 1])  # of the bodies that forces act on
+
+    def at_a_jump(self, bound: Any) -> Any:
+        """Return what is allowed over the shortest steps, (instances, batch): forces may jump, laws hardly."""
+        forces = jnp.full((sum(group.instances for group in self._given), *bound.shape), jnp.finfo(float).max)
+        laws = jnp.full((sum(group.instances for group in self._drivers), *bound.shape), JUMP)
+        return jnp.concatenate([forces, jnp.maximum(laws, bound[None])])
+
+    def departure(self, step: Any, span: Any, mobility: Any) -> tuple[Any, Any]:
+        """Return how far forces and laws are from the polynomials through the nodes of a step, and what that moves.
+
+        What may be rounding is taken off; shapes (instances, batch). The second is in rad or sizes of the mechanism:
+        of a force, what its departure over the step moves bodies by in the whole run.
+        """
+        knots = jax.vmap(lambda s: self._values(s * step, 0.0))(NODES)
+        shaken = jax.vmap(lambda s: self._values(s * step, SHAKE))(NODES[::SPARSE])
+        coefficients = jnp.einsum("cn,n...->c...", INTERPOLATION, knots)
+        wanted = jnp.max(jnp.where(span > 0, jnp.abs(step) / span, 0.0)) * (SPAN_POINTS / POINTS)
+        rounds = jnp.clip(jnp.ceil(wanted), 1, SPAN_POINTS // POINTS)
+        count = rounds * POINTS
+        size = jnp.max(jnp.abs(knots), axis=0)
+        noise = NOISE * jnp.max(jnp.abs(shaken - knots[::SPARSE]), axis=0) + FAINT * size
+
+        def look(k: Any, carry: tuple[Any, Any]) -> tuple[Any, Any]:
+            share = (k * POINTS + jnp.arange(POINTS)).astype(float) / (count - 1.0)  # both ends too
+            found = jax.vmap(lambda s: self._values(s * step, 0.0))(share)
+            away = jnp.abs(found - jnp.einsum("cp,c...->p...", _chebyshev(2.0 * share - 1.0), coefficients))
+            away = jnp.maximum(away - jnp.maximum(noise[None], FAINT * jnp.abs(found)), 0.0)
+            return jnp.maximum(carry[0], jnp.max(away, axis=0)), carry[1] + jnp.sum(away, axis=0)
+
+        largest, total = jax.lax.fori_loop(0, rounds.astype(int), look, (jnp.zeros_like(size), jnp.zeros_like(size)))
+        largest, mean = jnp.max(largest, axis=0), jnp.max(total, axis=0) / count
+        return largest, self._moved(largest, mean * jnp.abs(step * span)[None], mobility)
+
+    def _moved(self, largest: Any, impulse: Any, mobility: Any) -> Any:
+        """Return by how much bodies move for departures of forces, by their impulses in N s^2, and of laws."""
+        length, parts, first = self._equations.system.column_scale[0], [], 0
+        for group in self._given:
+            reached = jnp.max(jnp.stack([mobility[np.array(slot)] for slot in group.bodies]), axis=0)
+            lever = length if group.element.unit == "N" else 1.0
+            parts.append(impulse[first : first + group.instances] * reached * lever)
+            first += group.instances
+        for group in self._drivers:
+            departure = largest[first : first + group.instances]
+            parts.append(departure if is_turning(group.element) else departure / length)
+            first += group.instances
+        return jnp.concatenate(parts)
+
+    def _values(self, since: Any, shake: float) -> Any:
+        """Return forces and laws a time after the beginning of the step, (components, instances, batch).
+
+        With `shake`, time and all coordinates are changed relatively by so much, this way and that.
+        """
+        lanes = since.shape[-1]
+        clock = Jet.variable(((self._time + since) * (1.0 + shake))[None], 1)
+        parts = []
+        if self._forces:
+            state = evaluated(self._path, since).map(lambda part: part * (1.0 + shake * _signs(part.shape[:2])))
+            pose = self._equations.pose(state)
+            parts += [group.force(pose, clock).coefficients[0] for group in self._forces]
+        for group in self._drivers:
+            law = group.element.motion(clock).coefficients[0]
+            parts.append(jnp.broadcast_to(law, (group.instances, lanes))[None])
+        most = max(len(part) for part in parts)
+        padded = [jnp.pad(part, ((0, most - len(part)), (0, 0), (0, 0))) for part in parts]
+        return jnp.concatenate([jnp.broadcast_to(p, (*p.shape[:2], lanes)) for p in padded], axis=1)
+
+
+def _signs(shape: tuple[int, ...]) -> Any:
+    """Return signs for components of bodies, without a pattern that a force may be blind to."""
+    components, bodies = (np.arange(n) for n in shape)
+    return np.where(np.sin(1.0 + 3.0 * components[:, None] + 5.0 * bodies**2) > 0, 1.0, -1.0)[:, :, None]
+
+
+def _chebyshev(x: Any) -> Any:
+    """Return the Chebyshev polynomials at some places, (polynomials, places)."""
+    found = [jnp.ones_like(x), x]
+    while len(found) < len(INTERPOLATION):
+        found.append(2.0 * x * found[-1] - found[-2])
+    return jnp.stack(found)
