@@ -11,7 +11,7 @@ from jounce.integrate.lookahead import HARMLESS, SHORTEST, Look, looked_ahead, m
 from jounce.integrate.methods import AbstractMethod, near_singular
 from jounce.integrate.projection import projected
 from jounce.kinematics.compilation import compiled
-from jounce.kinematics.linear import factor_type
+from jounce.kinematics.linear import DenseFactor
 
 SMALLEST_STEP = 1e-13  # of the span, or of the time itself
 MARGIN = 10.0  # an estimate of the error that is so many times the tolerance is still accepted: estimates are rough
@@ -54,7 +54,7 @@ class Steps(NamedTuple):
 @compiled("order")
 def departed(equations: Equations, state: State, time: Any, *, order: int) -> Front:
     """Return the start of runs from states on the constraints; `time` has the shape (batch,)."""
-    inverse = factor_type(time.shape[-1]).of(equations.matrix(state, time[None])).inverse()
+    inverse = DenseFactor.of(equations.matrix(state, time[None])).inverse()
     expansion = _kept(expand(equations, state, time[None], order, inverse))
     outcome = jnp.where(_finite(expansion), int(Outcome.RUNNING), int(Outcome.LOST))
     none, nothing = jnp.full(time.shape, -1), jnp.zeros(time.shape)
