@@ -97,6 +97,16 @@ def test_whole_power_given_as_an_array_at_zero(exponent):
             check(lambda x: x ** jnp.asarray(exponent), int(exponent), [x, *tail])
 
 
+@pytest.mark.parametrize("exponent", [4.5, 2.5, 0.5, -0.5, -2.0])
+def test_power_of_zero_with_an_exponent_that_is_an_array(exponent):
+    """Where the power of time has a derivative at t = 0, it is zero; where it has none, no number is made up."""
+    found = np.array((jn.Jet.variable(jnp.array([0.0, 4.0]), 3) ** jnp.asarray(exponent)).derivatives())
+    factors = np.cumprod([1.0, *(exponent - np.arange(3.0))])
+    np.testing.assert_allclose(found[:, 1], factors * 4.0 ** (exponent - np.arange(4)), rtol=1e-14)
+    assert found[0, 0] == 0 if exponent > 0 else np.isnan(found[0, 0])
+    assert not found[:, 0].any() if exponent > 3 else np.isnan(found[3, 0])
+
+
 ANGLES = [
     (1.0, 1.0),
     (0.0, 1.0),
@@ -156,6 +166,12 @@ def test_wrap_takes_whole_periods_away(turns):
         wrapped.coefficients, [rest, 2.0, 3.0], rtol=0, atol=4e-16 * (1 + abs(turns) * 2 * np.pi)
     )
     assert float(jet.wrap(rest + turns * 2.0, 2.0)) == pytest.approx(rest, abs=4e-16 * (1 + 2 * abs(turns)))
+
+
+@pytest.mark.parametrize("value, rest", [(-0.3, -0.3), (3.0, 3.0), (3.5, 3.5 - 2 * np.pi), (-40.0, -40.0 + 12 * np.pi)])
+def test_wrap_is_to_the_nearest_multiple(value, rest):
+    """A torsional spring a little below its free angle is hardly loaded: not by nearly a whole turn."""
+    assert float(jet.wrap(value, 2 * np.pi)) == pytest.approx(rest, abs=1e-14)
 
 
 UNARY = "sin cos tan asin acos atan sinh cosh tanh exp log sqrt abs".split()

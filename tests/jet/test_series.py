@@ -291,6 +291,18 @@ def test_what_does_not_change_stays():
     assert np.array_equal(recursion.outputs["still"], np.arange(3.0))
 
 
+@pytest.mark.parametrize("operation", [jnp.subtract, jnp.divide, jnp.power, jnp.arctan2])
+def test_operands_in_another_order_are_another_operation(operation):
+    """What a program repeats is read once, and `b - a` does not repeat `a - b`."""
+    a, b = jnp.asarray(2.0), jnp.asarray(3.0)
+    recursion = Recursion(lambda a, b: (operation(a, b), operation(b, a)), (a, b), 1)
+    assert recursion.outputs == (operation(a, b), operation(b, a))
+    found, _ = recursion.advanced(recursion.history, 1, (jnp.asarray(0.5), jnp.asarray(0.25)))
+    for (first, second), rates, result in [((a, b), (0.5, 0.25), found[0]), ((b, a), (0.25, 0.5), found[1])]:
+        slopes = jax.grad(operation, (0, 1))(first, second)
+        assert float(result) == pytest.approx(float(slopes[0] * rates[0] + slopes[1] * rates[1]), rel=1e-14)
+
+
 @pytest.mark.parametrize(
     "name, function",
     [
