@@ -175,10 +175,11 @@ def test_truncation(order):
     assert x.truncate(99).order == 5
 
 
-def test_shorter_jet_sets_the_order():
-    long, short = jn.Jet.variable(2.0, 5), jn.Jet.variable(3.0, 2)
+@pytest.mark.parametrize("order", [0, 2])
+def test_shorter_jet_sets_the_order(order):
+    long, short = jn.Jet.variable(2.0, 5), jn.Jet.variable(3.0, order)
     for result in (long + short, short - long, long * short, short / long, long / short, jet.atan2(short, long)):
-        assert result.order == 2
+        assert result.order == order
 
 
 @pytest.mark.parametrize("left", [np.arange(1.0, 4.0), jnp.arange(1.0, 4.0)], ids=["numpy", "jax"])

@@ -1,5 +1,7 @@
 """Composition of jets with JAX functions: against mpmath, or against the same function written on jets."""
 
+import importlib
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -10,6 +12,7 @@ import jounce as jn
 from jounce import jet
 from tests.oracles.mp_taylor import DIGITS, composed, worst
 
+composition = importlib.import_module("jounce.jet.compose")  # the package shows the function under this name
 AT = 0.7
 X, Y = jnp.array([0.0, 1.0, 3.0]), jnp.array([0.0, 2.0, -1.0])
 M = jnp.array([[1.0, 2.0], [3.0, 4.0]])
@@ -67,6 +70,26 @@ SMOOTH = {
     "gelu": (jax.nn.gelu, lambda t: t / 2 * (1 + mp.tanh(mp.sqrt(2 / mp.pi) * (t + mp.mpf(0.044715) * t**3)))),
     "erf": (jax.scipy.special.erf, mp.erf),
     "expm1_log1p": (lambda t: jnp.expm1(t) * jnp.log1p(t), lambda t: mp.expm1(t) * mp.log(1 + t)),
+    "tangent": (lambda t: jnp.tan(t) + jnp.sinh(t) * jnp.log(t), lambda t: mp.tan(t) + mp.sinh(t) * mp.log(t)),
+    "inverse_hyperbolic": (
+        lambda t: jnp.arcsinh(t) + jnp.arccosh(1 + t) * jnp.arctanh(t / 2),
+        lambda t: mp.asinh(t) + mp.acosh(1 + t) * mp.atanh(t / 2),
+    ),
+    "roots": (lambda t: jnp.cbrt(t) * t + jax.lax.rsqrt(t), lambda t: mp.cbrt(t) * t + 1 / mp.sqrt(t)),
+    "exp2_erfc": (lambda t: jnp.exp2(t) * jax.lax.erfc(t), lambda t: mp.mpf(2) ** t * mp.erfc(t)),
+    "gradient_of_a_product": (jax.grad(lambda t: t * jnp.sin(t)), lambda t: mp.sin(t) + t * mp.cos(t)),
+    "beside_constants": (
+        lambda t: jnp.pad(jnp.stack([t * t, 2.0]), 1, constant_values=3.0) @ jnp.array([1.0, 2.0, 5.0, 7.0]),
+        lambda t: 2 * t * t + 34,
+    ),
+    "moved": (
+        lambda t: jnp.sum(jnp.stack([t, t * t, t**3, jnp.sin(t)]).reshape(2, 2).T[:, ::-1] * M),  # [[t3, t], [s, t2]]
+        lambda t: t**3 + 2 * t + 3 * mp.sin(t) + 4 * t * t,
+    ),
+    "gathered": (
+        lambda t: jnp.sum(jnp.stack([t, t * t, jnp.sin(t)])[jnp.array([2, 0, 2])] * jnp.array([1.0, 2.0, 4.0])),
+        lambda t: 5 * mp.sin(t) + 2 * t,
+    ),
     "polyval": (lambda t: jnp.polyval(jnp.array([1.0, -2.0, 3.0]), t), lambda t: t**2 - 2 * t + 3),
     "scan": (
         lambda t: jax.lax.scan(lambda c, x: (c * t + x, None), jnp.zeros_like(t), jnp.array([1.0, 2.0, 3.0]))[0],
@@ -96,6 +119,10 @@ PIECEWISE = {
     "abs": (lambda t: jnp.abs(t - 2) ** 3, lambda t: (2 - t) ** 3),
     "max_and_min": (lambda t: jnp.maximum(t, t * t) * jnp.minimum(jnp.sin(t), 0.5), lambda t: t * mp.mpf(0.5)),
     "rounding": (lambda t: t * jnp.floor(3 * t) + jnp.sign(t) * jnp.ceil(t) * jnp.round(t), lambda t: 2 * t + 1),
+    "logic": (
+        lambda t: jnp.where((jnp.isfinite(t) & ~(t > 1)) ^ (t > 5), t**2, t) * jax.lax.stop_gradient(jnp.ceil(t)),
+        lambda t: t**2,
+    ),
     "largest": (lambda t: jnp.max(jnp.stack([t, t * t])) * t, lambda t: t * t),
 }
 
@@ -115,6 +142,14 @@ def test_composition_against_mpmath(name):
         values, scale = composed(reference, [AT, 1.0, *[0.0] * (order - 1)])
         scale = [max(scale[max(k - 1, 0) : k + 2]) or 1 for k in range(order + 1)]
         assert worst(derivatives(function, AT, order), values, scale) < 1e-14
+
+
+def test_every_rule_is_tried():
+    tried = set()
+    for function, _ in (SMOOTH | PIECEWISE).values():
+        tried.update(composition._operations(jax.make_jaxpr(function)(AT).jaxpr))
+    tables = composition._LINEAR, composition._BILINEAR, composition._PIECEWISE_CONSTANT, composition._WITHOUT_TIME
+    assert set(composition._RULES).union(*tables) <= tried
 
 
 def slider(t):

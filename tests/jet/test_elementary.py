@@ -23,6 +23,11 @@ ENTIRE = {
     "tanh": (jet.tanh, mp.tanh, [0.0, 1e-9, 1.0, -5.0, 18.0, 20.0, -40.0, 300.0]),
     "tan": (jet.tan, mp.tan, [0.0, 1e-9, 1.0, 1.57, -1.5707, 100.0]),
     "atan": (jet.atan, mp.atan, [0.0, 1e-9, 1.0, -1e5, 1e100]),
+    "asinh": (jet.asinh, mp.asinh, [0.0, 1e-9, 1.0, -1e5]),
+    "acosh": (jet.acosh, mp.acosh, [2.0, 1e5]),
+    "expm1": (jet.expm1, mp.expm1, [0.0, 1e-12, -30.0, 600.0]),
+    "log1p": (jet.log1p, mp.log1p, [0.0, 1e-12, 1e5]),
+    "erf": (jet.erf, mp.erf, [0.0, 1e-9, 1.0, -3.0]),
     "square": (lambda x: x**2, 2, [0.0, 1e-9, -3.0]),
     "seventh_power": (lambda x: x**7, 7, [0.0, 1e-3, -2.0]),
     "zeroth_power": (lambda x: x**0, 0, [0.0, 2.0]),
@@ -32,6 +37,8 @@ ENTIRE = {
 SCALE_FREE = {  # the other coefficients are as large as the value: radius of convergence and value go together
     "log": (jet.log, mp.log, [1.0, 1 + 1e-10, 1e-20, 1e200]),
     "sqrt": (jet.sqrt, 0.5, [1.0, 2.0, 1e-200, 1e200]),
+    "cbrt": (jet.cbrt, 1 / 3, [1.0, 1e-30, 1e30]),
+    "cbrt_of_negative": (jet.cbrt, lambda x: -mp.cbrt(-x), [-8.0]),
     "half_power": (lambda x: x**0.5, 0.5, [2.0]),
     "real_power": (lambda x: x**1.7, 1.7, [1.0, 1e-100, 1e100]),
     "negative_real_power": (lambda x: x**-0.3, -0.3, [1.0, 1e-100, 1e100]),
@@ -83,8 +90,12 @@ def test_scale_free_function_against_mpmath(function, reference, x):
 
 
 @pytest.mark.parametrize("x", NEAR_ENDS)
-@pytest.mark.parametrize("function, reference", [(jet.asin, mp.asin), (jet.acos, mp.acos)], ids=["asin", "acos"])
-def test_inverse_sine_and_cosine_up_to_their_ends(function, reference, x):
+@pytest.mark.parametrize(
+    "function, reference",
+    [(jet.asin, mp.asin), (jet.acos, mp.acos), (jet.atanh, mp.atanh)],
+    ids=["asin", "acos", "atanh"],
+)
+def test_inverse_functions_up_to_their_ends(function, reference, x):
     for tail in tails(min(1.0, 0.5 * (1 - abs(x)))):
         check(function, reference, [x, *tail])
 
@@ -95,6 +106,16 @@ def test_whole_power_given_as_an_array_at_zero(exponent):
     for x in (0.0, 1e-9):
         for tail in tails(1.0):
             check(lambda x: x ** jnp.asarray(exponent), int(exponent), [x, *tail])
+
+
+@pytest.mark.parametrize("exponent", [4.5, 2.5, 0.5, -0.5, -2.0])
+def test_power_of_zero_with_an_exponent_that_is_an_array(exponent):
+    """Where the power of time has a derivative at t = 0, it is zero; where it has none, no number is made up."""
+    found = np.array((jn.Jet.variable(jnp.array([0.0, 4.0]), 3) ** jnp.asarray(exponent)).derivatives())
+    factors = np.cumprod([1.0, *(exponent - np.arange(3.0))])
+    np.testing.assert_allclose(found[:, 1], factors * 4.0 ** (exponent - np.arange(4)), rtol=1e-14)
+    assert found[0, 0] == 0 if exponent > 0 else np.isnan(found[0, 0])
+    assert not found[:, 0].any() if exponent > 3 else np.isnan(found[3, 0])
 
 
 ANGLES = [
@@ -158,7 +179,13 @@ def test_wrap_takes_whole_periods_away(turns):
     assert float(jet.wrap(rest + turns * 2.0, 2.0)) == pytest.approx(rest, abs=4e-16 * (1 + 2 * abs(turns)))
 
 
-UNARY = "sin cos tan asin acos atan sinh cosh tanh exp log sqrt abs".split()
+@pytest.mark.parametrize("value, rest", [(-0.3, -0.3), (3.0, 3.0), (3.5, 3.5 - 2 * np.pi), (-40.0, -40.0 + 12 * np.pi)])
+def test_wrap_is_to_the_nearest_multiple(value, rest):
+    """A torsional spring a little below its free angle is hardly loaded: not by nearly a whole turn."""
+    assert float(jet.wrap(value, 2 * np.pi)) == pytest.approx(rest, abs=1e-14)
+
+
+UNARY = "sin cos tan asin acos atan sinh cosh tanh asinh exp expm1 log log1p sqrt cbrt erf abs".split()
 
 
 @pytest.mark.parametrize("name", UNARY)

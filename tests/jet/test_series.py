@@ -8,6 +8,7 @@ from mpmath import mp
 
 import jounce as jn
 from jounce.jet import Jet, elementary
+from jounce.jet.operations import COMPOSED, LINEAR, PAIRS, SLOPES, STEPWISE
 from jounce.jet.series import Recursion
 from jounce.kinematics.compilation import compiler_options
 from tests.oracles import mp_taylor
@@ -102,6 +103,7 @@ FUNCTIONS = {
         lambda x: jnp.mod(7 * x, 0.9),
         lambda x: 7 * x - mp.mpf(0.9) * mp.floor(7 * mp.mpf(0.61) / mp.mpf(0.9)),
     ),
+    "gradient": (jax.grad(lambda x: x * jnp.sin(x)), lambda x: mp.sin(x) + x * mp.cos(x)),
     "composed": (lambda x: jnp.sin(x) * jnp.exp(-x) / (1 + x * x), lambda x: mp.sin(x) * mp.exp(-x) / (1 + x * x)),
 }
 
@@ -179,6 +181,8 @@ def structure(x, y):
         "chosen constant": jnp.where(x > 0.5, 1.0, x),
         "sign": jnp.sign(x - 0.5) * x,
         "whole part": jnp.floor(7 * x) + x,
+        "other whole parts": jnp.ceil(7 * x) * x + jnp.round(7 * y.T),
+        "copied": jnp.copy(x) * y.T,
         "held": jax.lax.stop_gradient(jnp.floor(x)) + x,
         "negative": -x,
         "branch": jax.lax.cond(x[0, 0] > 0.5, lambda a, b: a * b, lambda a, b: a - b, x, y.T),
@@ -210,6 +214,21 @@ def test_rules_agree_with_nested_derivatives(function):
     x, y = paths((2, 3), (3, 2), order=order)
     errors = differences(series(flat(function), x, y), nested(flat(function), x, y))
     assert max(errors.values()) < 2e-14, sorted(errors.items(), key=lambda e: e[1])[-5:]
+
+
+def operations_in(program):
+    """Return the names of all operations of a JAX program, those inside calls, branches and loops too."""
+    names = {equation.primitive.name for equation in program.eqns}
+    inner = jax.tree.leaves([e.params for e in program.eqns], is_leaf=lambda x: hasattr(x, "eqns"))
+    return names.union(*(operations_in(x) for x in inner if hasattr(x, "eqns")))
+
+
+def test_every_rule_is_tried():
+    matrices = (jnp.full((2, 3), 0.5), jnp.full((3, 2), 0.5))
+    programs = [jax.make_jaxpr(function)(0.5) for function, _ in FUNCTIONS.values()]
+    programs += [jax.make_jaxpr(function)(*matrices) for function in (products, structure)]
+    tried = set().union(*map(operations_in, programs))
+    assert LINEAR.union(SLOPES, PAIRS, COMPOSED, STEPWISE) <= tried
 
 
 def test_a_program_agrees_with_the_algebra_of_jets_to_a_high_order():
@@ -289,6 +308,18 @@ def test_what_does_not_change_stays():
     assert not np.any(found["count"])
     assert np.array_equal(found["moving"], x[1])
     assert np.array_equal(recursion.outputs["still"], np.arange(3.0))
+
+
+@pytest.mark.parametrize("operation", [jnp.subtract, jnp.divide, jnp.power, jnp.arctan2])
+def test_operands_in_another_order_are_another_operation(operation):
+    """What a program repeats is read once, and `b - a` does not repeat `a - b`."""
+    a, b = jnp.asarray(2.0), jnp.asarray(3.0)
+    recursion = Recursion(lambda a, b: (operation(a, b), operation(b, a)), (a, b), 1)
+    assert recursion.outputs == (operation(a, b), operation(b, a))
+    found, _ = recursion.advanced(recursion.history, 1, (jnp.asarray(0.5), jnp.asarray(0.25)))
+    for (first, second), rates, result in [((a, b), (0.5, 0.25), found[0]), ((b, a), (0.25, 0.5), found[1])]:
+        slopes = jax.grad(operation, (0, 1))(first, second)
+        assert float(result) == pytest.approx(float(slopes[0] * rates[0] + slopes[1] * rates[1]), rel=1e-14)
 
 
 @pytest.mark.parametrize(

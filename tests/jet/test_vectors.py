@@ -109,6 +109,11 @@ def test_concatenation_of_vectors(random):
     np.testing.assert_array_equal(values(joined), np.concatenate([values(a), values(b)], axis=1))
 
 
+def test_scalar_product_of_vectors_of_unequal_length_is_refused(random):
+    with pytest.raises(ValueError, match="shorter"):
+        jet.dot(some(random, 3), some(random, 2))
+
+
 def test_products_of_orders_that_differ(random):
     assert jet.cross(some(random, 3, order=2), some(random, 3)).order == 2
     assert jet.matvec(some(random, 3, 3), some(random, 3, order=0)).order == 0

@@ -42,6 +42,17 @@ def test_moments_are_those_of_a_cloud_of_points(seed):
 
 
 @pytest.mark.parametrize("seed", range(3))
+def test_pseudo_inertia_tells_the_body(seed):
+    masses, points = cloud(seed)
+    homogeneous = np.column_stack([points, np.ones(len(points))])
+    same(jn.Inertia.from_pseudo((homogeneous.T * masses) @ homogeneous), jn.Inertia(*of_cloud(masses, points)), 1e-13)
+
+
+def test_a_solid_is_centred_in_its_frame_unless_told():
+    assert jn.Inertia.solid("sphere", radius=0.1, mass=2.0).center_of_mass.tolist() == [0, 0, 0]
+
+
+@pytest.mark.parametrize("seed", range(3))
 def test_a_moved_body_is_the_moved_cloud(seed):
     masses, points = cloud(seed)
     position = np.array([0.3, -1.0, 2.0])

@@ -51,6 +51,27 @@ def test_equations_010_to_014_point(seed):
 
 
 @SEEDS
+def test_to_body_undoes_direction(seed):
+    (i, _), (s, _) = bodies(seed)
+    pose = planar_pose(i)
+    turned = pose.direction(s[:, None, None])
+    size = np.abs(derivatives(turned)).max(axis=1, keepdims=True)
+    expected = np.zeros_like(derivatives(turned))
+    expected[0, :, 0, 0] = s
+    assert np.all(np.abs(derivatives(pose.to_body(turned)) - expected) <= 1e-13 * size)
+
+
+@SEEDS
+def test_what_varies_with_time_varies_as_the_derivatives_say(seed):
+    (i, _), _ = bodies(seed)
+    pose = planar_pose(i)
+    rates = pose.truncate(pose.order - 1).varied(pose.position.differentiate(), pose.angle.differentiate()[None])
+    for name in ("position", "angle", "sine", "cosine"):
+        expected = derivatives(getattr(pose, name).differentiate())
+        np.testing.assert_allclose(derivatives(getattr(rates, name)), expected, atol=1e-13 * np.abs(expected).max())
+
+
+@SEEDS
 def test_equations_015_to_018_relative_vector(seed):
     (i, j), (s_i, s_j) = bodies(seed)
     d = planar_pose(j).point(s_j[:, None, None]) - planar_pose(i).point(s_i[:, None, None])

@@ -92,7 +92,7 @@ COMPOSED: dict[str, Callable[..., Any]] = {
 BROADCASTING = frozenset("mul div pow atan2".split())
 ADDITIVE = frozenset("add add_any sub concatenate dynamic_update_slice pad scatter scatter-add select_n stack".split())
 LINEAR = ADDITIVE | frozenset(
-    "broadcast_in_dim convert_element_type copy cumsum div dynamic_slice expand_dims gather mul neg "
+    "broadcast_in_dim convert_element_type copy cumsum div dynamic_slice gather mul neg "
     "reduce_sum reshape rev slice squeeze transpose".split()
 )
 STEPWISE = frozenset("ceil floor round sign stop_gradient".split())  # piecewise constant in time

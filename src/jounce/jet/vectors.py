@@ -43,8 +43,7 @@ def matvec(matrix: Any, vector: Any) -> Any:
 
 def matmul(a: Any, b: Any) -> Any:
     """Return matrix times matrix: shapes (rows, inner, ...) and (inner, columns, ...)."""
-    inner = (b.shape if isinstance(b, Jet) else jnp.shape(b))[0]
-    return total(bilinear(jnp.multiply, a[:, i : i + 1], b[i : i + 1]) for i in range(inner))
+    return total(bilinear(jnp.multiply, a[:, i : i + 1], b[i : i + 1]) for i in range(b.shape[0]))
 
 
 def transpose(matrix: Any) -> Any:
