@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jounce.dynamics.inverse import MotionForces, pose_of
-from jounce.jet import Jet, components, dot
+from jounce.jet import Jet, dot
 from jounce.jet.algebra import total
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.compilation import compiled
@@ -134,7 +134,7 @@ def _powers(
 
 def _spin(pose: Any) -> tuple[Jet, ...]:
     """Return the components of the angular velocities of bodies, in their axes."""
-    return (pose.angle.differentiate(),) if pose.turns == 1 else tuple(components(pose.angular_velocity))
+    return (pose.angle.differentiate(),) if pose.turns == 1 else tuple(pose.angular_velocity[k] for k in range(3))
 
 
 def _inertia(moments: Any, turns: int) -> Any:
@@ -142,7 +142,7 @@ def _inertia(moments: Any, turns: int) -> Any:
     spread = total(moments[k][k] for k in range(len(moments)))
     if turns == 1:
         return spread[None, None]
-    return spread * jnp.eye(3)[:, :, None, None] - moments
+    return spread[None, None] * jnp.eye(3)[:, :, None, None] - moments
 
 
 def _applied(group: Any, pose: Any, time: Jet, turning: Jet, length: Any) -> tuple[Jet, Jet]:
