@@ -31,8 +31,8 @@ _ADVICE = {
     "check that the motion laws are continuous and that the mechanism does not pass a dead point",
     Status.NOT_CONVERGED: "Newton-Raphson did not reach the tolerance; the bodies may not reach each other here, or "
     "the tolerance is too small",
-    Status.INADMISSIBLE: "the motion law has no permitted value here: a law must be finite, and the distance of a "
-    "distance driver above zero",
+    Status.INADMISSIBLE: "the motion law or the force has no permitted value here: it must be finite, and the distance "
+    "of a distance driver above zero",
     Status.COLLAPSED: "the steps of the integration became too small to move on: the motion runs into a singular "
     "position, or a force grows beyond all bounds or jumps; check the mechanism and its forces here",
     Status.UNDEFINED: "a quantity or a derivative of it is not a finite number here: a distance that is zero has no "
