@@ -1,6 +1,7 @@
 """The regime of all tests: float64, strict promotion of types and ranks; warnings are errors by pyproject.toml."""
 
 import pathlib
+import signal
 
 import hypothesis
 import jax
@@ -13,6 +14,10 @@ jax.config.update("jax_numpy_dtype_promotion", "strict")
 jax.config.update("jax_numpy_rank_promotion", "raise")
 hypothesis.settings.register_profile("jounce", deadline=None, max_examples=15, derandomize=True)
 hypothesis.settings.load_profile("jounce")
+for _name in ("SIGINT", "SIGHUP"):  # ignored in what runs in the background; the children of tests would inherit that
+    _number = getattr(signal, _name, None)
+    if _number is not None and signal.getsignal(_number) is signal.SIG_IGN:
+        signal.signal(_number, signal.default_int_handler if _name == "SIGINT" else signal.SIG_DFL)
 MEMORY_MAPS = 65530  # of a process, unless the system is set up otherwise
 
 

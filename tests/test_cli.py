@@ -376,7 +376,8 @@ def test_python_m_jounce_keeps_compiled_programs_for_the_next_call(tmp_path):
     assert kept
     second = process("run", FOUR_BAR, "--order", "1", "--set", "BC=15 cm", JOUNCE_CACHE_DIR=str(cache))
     assert (second.returncode, second.stderr) == (0, "")
-    assert {path.name for path in cache.iterdir() if not path.name.endswith("-atime")} <= kept
+    # what compiles within 0.05 s is not kept, and a busy machine may take longer for it the second time
+    assert {path.name for path in cache.iterdir() if path.name.startswith("jit_advance")} <= kept
 
 
 def test_a_cache_that_cannot_be_made_does_no_harm(tmp_path):

@@ -192,7 +192,7 @@ def on_terminal(columns, *arguments, **environment):
 )
 def test_a_terminal_of_any_size_shows_every_number(columns, environment, cache):
     shown = on_terminal(columns, "run", FOUR_BAR, "--order", "0", **{"TERM": "xterm"} | environment | cache)
-    for number in ("2.06531", "2.64358", "-0.0463302", "0.0357079", "0.0970169", "0.178768"):
+    for number in ("2.06531", "2.64358", "-0.0463302", "0.0357081", "0.0970169", "0.178769"):
         assert number in shown
     assert "largest magnitude" in shown
     if environment.get("TERM") == "dumb":

@@ -73,7 +73,7 @@ def _expression(text: str) -> None:
 
 
 def _set(text: str) -> None:
-    override(_four_bar(), EXAMPLES / "four_bar.yaml", [text])
+    override(_four_bar(), [text])
 
 
 def _drive(text: str) -> None:

@@ -88,9 +88,7 @@ def test_the_files_without_mistakes_are_read(tmp_path, text):
     assert load(path).bodies
 
 
-@pytest.mark.parametrize(
-    "text, words", [("- a\n", "got ['a']"), ("hello", "got 'hello'"), ("# nothing", "got nothing")]
-)
+@pytest.mark.parametrize("text, words", [("- a\n", "got ['a']"), ("hello", "got 'hello'")])
 def test_a_file_that_is_no_mapping(tmp_path, text, words):
     path = tmp_path / "list.yaml"
     path.write_text(text)
@@ -99,6 +97,13 @@ def test_a_file_that_is_no_mapping(tmp_path, text, words):
     ) as caught:
         load(path)
     assert words in str(caught.value)
+
+
+def test_a_file_of_comments_only_is_empty(tmp_path):
+    path = tmp_path / "list.yaml"
+    path.write_text("# nothing")
+    with pytest.raises(MechanismFileError, match=r"list\.yaml: the file is empty"):
+        load(path)
 
 
 def test_a_misspelt_key_is_named_rather_than_the_key_that_misses(tmp_path):

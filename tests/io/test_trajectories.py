@@ -200,5 +200,5 @@ def test_no_such_file(tmp_path, name, message):
 
 def test_a_folder(tmp_path):
     (tmp_path / "folder.csv").mkdir()
-    with pytest.raises(TrajectoryError, match="cannot be read"):
+    with pytest.raises(TrajectoryError, match="is a directory"):
         load_trajectory(tmp_path / "folder.csv")

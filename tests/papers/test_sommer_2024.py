@@ -236,7 +236,7 @@ def test_a_directory_that_cannot_be_made_is_refused_before_any_computing(tmp_pat
 
 def test_a_file_that_cannot_be_written_leaves_nothing_behind(tmp_path):
     (tmp_path / "errors.csv" / "inside").mkdir(parents=True)
-    with pytest.raises(OutputError, match=r"errors\.csv: cannot be written"):
+    with pytest.raises(OutputError, match=r"errors\.csv: is a directory"):
         reproduction.write(tmp_path / "errors.csv", b"text")
     assert [path.name for path in tmp_path.iterdir()] == ["errors.csv"]
 

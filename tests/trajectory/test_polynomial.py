@@ -160,7 +160,7 @@ def test_it_drives_a_mechanism():
 
 
 def test_outside_the_knots_the_end_segments_go_on():
-    law = PolynomialMotion([0.0, 1.0, 2.0, 3.0], np.array([0.0, 1.0, 8.0, 27.0]), 2)
+    law = PolynomialMotion([0.0, 1.0, 2.0, 3.0], np.array([0.0, 1.0, 8.0, 27.0]), 2, beyond="continue")
     close(derivatives(law, 0, [-1.0, 4.0])[0], np.array([-1.0, 64.0]), 1e-13)
 
 

@@ -182,11 +182,14 @@ def draw_power(motion: Any) -> Any:
     """
     balance = power_balance(motion)
     rows = min(balance.sizes["derivative"], max(motion.order - 1, 1))
+    named = [name for name in WORDS if _largest(balance[name].values[:, 0])] or list(
+        WORDS
+    )  # all, where nothing has power
     with style():
         figure = blank_figure(PANEL[0], PANEL[1] * rows + 0.9, motion.mechanism.title)
         panels = np.atleast_1d(figure.subplots(rows, 1, sharex=True))
         for order, axes in enumerate(panels):
-            found = {name: balance[name].values[:, order] for name in WORDS if _largest(balance[name].values[:, 0])}
+            found = {name: balance[name].values[:, order] for name in named}
             word = ("power", "rate", "second rate", "third rate")[order] if order < 4 else f"rate {order}"
             _draw_lines(axes, motion, found, word, ("W", order))
         panels[-1].set_xlabel("time  $t$  (s)")

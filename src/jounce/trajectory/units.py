@@ -241,7 +241,8 @@ def _parse_text(
 ) -> Value:
     if len(text) > MAX_CHARACTERS:
         raise ExpressionError(f"a value has at most {MAX_CHARACTERS} characters")
-    if with_unit := _WITH_UNIT.fullmatch(text.strip()):
+    with_unit = _WITH_UNIT.fullmatch(text.strip())
+    if with_unit and not _divided_by_a_name(with_unit[2], known):
         return _parse_with_unit(*with_unit.groups(), kind=kind, known=known)
     if text.strip().lower() in {".nan", "nan", "inf", ".inf", "-inf", "-.inf", "+inf", "infinity", "-infinity"}:
         raise UnitError("must be a finite number")
@@ -258,6 +259,12 @@ def _parse_text(
     if dimension is not None:
         check_dimension(dimension, kind, f"'{expression.text}'", exactly=False)
     return Value(expression, dimension)
+
+
+def _divided_by_a_name(unit: str, known: set[str]) -> bool:
+    """Tell whether what follows a number is a division by a parameter or a variable: 1/t is no number per tonne."""
+    first = re.match(_ATOM, unit.lstrip("/ "))
+    return unit.startswith("/") and first is not None and first.group() in known
 
 
 def _parse_with_unit(number: str, unit: str, *, kind: str, known: set[str]) -> Value:
