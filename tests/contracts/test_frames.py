@@ -364,10 +364,13 @@ def test_no_position_and_no_reaction_at_rest_depends_on_how_frames_are_drawn(kin
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", [all_in_space, all_in_the_plane], ids=["space", "plane"])
-def test_no_quantity_depends_on_how_frames_are_drawn(kind):
-    """Every body and the ground with another random frame: the same motion and the same forces, with their rates."""
-    mechanism = with_all_outputs(kind())
+def test_no_quantity_depends_on_how_frames_are_drawn_in_the_plane():
+    """Every body and the ground with another random frame: the same motion and the same forces, with their rates.
+
+    In space the mechanism with all elements compiles for more than five minutes; there the reactions at rest, the rotor
+    with its rates, and angles in any motion are compared.
+    """
+    mechanism = with_all_outputs(all_in_the_plane())
     kept = jn.solve(mechanism, [0.0, 0.1, 0.3], ORDER)
     random = np.random.default_rng(2)
     drawings = {name: Drawing.random(random, mechanism.space) for name in ("ground", *mechanism.bodies)}
