@@ -264,7 +264,8 @@ def inertial(tensor, mass=1.0):
 def test_rods_and_plates_of_six_digits_have_no_warning(tmp_path, seed):
     turn = Rotation.random(rng=np.random.default_rng(seed)).as_matrix()
     for moments in ([0, 1, 1], [1, 2, 3], [1e-8, 2e-8, 3e-8]):
-        load_robot(small(tmp_path, 'type="revolute">', inertial(turn @ np.diag(moments) @ turn.T)))
+        robot = load_robot(small(tmp_path, 'type="revolute">', inertial(turn @ np.diag(moments) @ turn.T)))
+        assert not robot.links["arm"].inertia.fault  # and a warning would be an error here
 
 
 def test_impossible_moments_are_used_as_they_are_with_a_warning(tmp_path):
