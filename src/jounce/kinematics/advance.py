@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from jounce.jet import Jet
 from jounce.jet.algebra import total
@@ -45,6 +46,10 @@ class Arrival(NamedTuple):
     pivot_ratio: Any  # smallest pivot of the Jacobian over the largest
     admissible: Any  # whether each driver has a permitted value, shape (drivers, batch)
     finite: Any  # whether all derivatives wanted are finite, of the pose and of each output, shape (1 + outputs, batch)
+
+    def state(self, lanes: slice | np.ndarray) -> tuple[dict[str, Any], tuple[Any, ...], Any]:
+        """Return what the neighbours of some lanes start from: jets of coordinates and outputs, and the sign."""
+        return jax.tree.map(lambda x: x[..., lanes], (self.coordinates, self.outputs, self.sign))
 
 
 def _size(increment: Any) -> Any:

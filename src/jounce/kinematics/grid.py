@@ -16,6 +16,7 @@ from jounce.kinematics.path import LARGE_BATCH, PASSABLE, SMALL_BATCH, ChangePoi
 from jounce.kinematics.status import Status
 
 LONG_GRID = 1024  # instants: from here on in large batches
+FEW_BATCHES = 4  # of instants: no level of its own for each halving of the spacing
 
 
 class Grid:
@@ -39,6 +40,10 @@ class Grid:
             lambda *xs: np.concatenate([np.zeros((*xs[0].shape[:-1], len(time))), *xs], axis=-1),
             *(anchor.state for anchor in track.anchors),
         )
+        for lanes, arrival in track.on_the_way:
+            solved = arrival.status[1:] == Status.OK
+            self._keep(lanes[solved], arrival.state(np.flatnonzero(solved) + 1))
+            self.status[lanes[solved]] = Status.OK
 
     @property
     def state(self) -> tuple[dict[str, Any], tuple[Any, ...]]:
@@ -51,9 +56,9 @@ class Grid:
         count = len(self.time)
         reached = self.time < self.track.ended_at
         width = LARGE_BATCH if count > LONG_GRID else SMALL_BATCH
-        done = 0
-        for level, distance in _levels(count, len(self.track.anchors), width):
-            lanes = level[reached[level]]
+        left = reached & (self.status != Status.OK)
+        done = count - np.count_nonzero(left)
+        for lanes, distance in _levels(left, len(self.track.anchors), width):
             source = self._nearest[lanes]
             if distance is not None:
                 neighbour = lanes - distance
@@ -78,7 +83,7 @@ class Grid:
         known = jax.tree.map(lambda x: x[..., chosen], self._store)
         arrival = self.solver(known, self.time[lanes] - self._instants[source], self.time[lanes])
         self.status[lanes] = arrival.status
-        self._keep(_slice_of(lanes), (arrival.coordinates, arrival.outputs, arrival.sign))
+        self._keep(_slice_of(lanes), arrival.state(slice(None)))
         for k in np.flatnonzero(arrival.status != Status.OK).tolist():
             self.culprits[int(lanes[k])] = self.solver.culprit(arrival, k)
             if arrival.status[k] not in PASSABLE:
@@ -156,12 +161,15 @@ def _nearest(anchors: np.ndarray, time: np.ndarray) -> np.ndarray:
     return np.where(time - anchors[after - 1] <= anchors[after] - time, after - 1, after)
 
 
-def _levels(count: int, anchors: int, width: int) -> list[tuple[np.ndarray, int | None]]:
+def _levels(left: np.ndarray, anchors: int, width: int) -> list[tuple[np.ndarray, int | None]]:
     """Return the instants of each level, with the distance in the grid of the neighbour that each is predicted from.
 
-    The first level starts from the anchors, and fills at least one batch.
+    The first level starts from the anchors, and fills at least one batch. Where few instants are left, it is the only
+    one.
     """
-    stride = 1
+    count, stride = len(left), 1
+    if np.count_nonzero(left) <= FEW_BATCHES * width:
+        return [(np.flatnonzero(left), None)]
     while count // (2 * stride) >= max(2 * anchors, width):
         stride *= 2
     levels: list[tuple[np.ndarray, int | None]] = [(np.arange(0, count, stride), None)]
@@ -169,4 +177,4 @@ def _levels(count: int, anchors: int, width: int) -> list[tuple[np.ndarray, int 
         half = stride // 2
         levels.append((np.arange(half, count, stride), half))
         stride = half
-    return levels
+    return [(level[left[level]], distance) for level, distance in levels]

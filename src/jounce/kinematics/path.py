@@ -75,8 +75,12 @@ class Solver:
 
 def _filled(x: np.ndarray, width: int) -> np.ndarray:
     """Repeat the last lane up to the width of a batch."""
-    missing = width - x.shape[-1]
-    return np.pad(x, [(0, 0)] * (x.ndim - 1) + [(0, missing)], mode="edge") if missing else x
+    lanes = x.shape[-1]
+    if lanes == width:
+        return x
+    filled = np.empty((*x.shape[:-1], width), x.dtype)
+    filled[..., :lanes], filled[..., lanes:] = x, x[..., -1:]
+    return filled
 
 
 @dataclasses.dataclass(frozen=True)
@@ -106,10 +110,9 @@ class Anchor:
 
     @classmethod
     def of(cls, arrival: Arrival, instant: float) -> "Anchor":
-        """Build the anchor from a batch of one that was surveyed."""
-        state = (arrival.coordinates, arrival.outputs, arrival.sign)
+        """Build the anchor from the first lane of a batch that was surveyed."""
         safe_step, radius, turnover = (float(x[0]) for x in (arrival.safe_step, arrival.radius, arrival.turnover))
-        return cls(float(instant), state, safe_step, radius, turnover, Status(int(arrival.status[0])))
+        return cls(float(instant), arrival.state(slice(1)), safe_step, radius, turnover, Status(int(arrival.status[0])))
 
     @property
     def reach(self) -> float:
@@ -132,9 +135,13 @@ class ChangePoint:
 
 @dataclasses.dataclass
 class Track:
-    """Anchors in order of time, the change points passed, and where and why following the motion ended, if it did."""
+    """Anchors in order of time, the change points passed, and where and why following the motion ended, if it did.
+
+    Instants of a grid that were solved on the way are told by their indices, each with the batch that it was solved in.
+    """
 
     anchors: list[Anchor]
+    on_the_way: list[tuple[np.ndarray, Arrival]] = dataclasses.field(default_factory=list)
     change_points: list[ChangePoint] = dataclasses.field(default_factory=list)
     status: Status = Status.OK
     ended_at: float = np.inf
@@ -151,10 +158,16 @@ class Track:
         return found if self.status == Status.OK else found[:1]
 
 
-def follow(solver: Solver, start: Anchor, stop: float, span: float, first_step: float = np.inf) -> Track:
+NO_GRID = np.empty(0)
+
+
+def follow(
+    solver: Solver, start: Anchor, stop: float, span: float, first_step: float = np.inf, grid: np.ndarray = NO_GRID
+) -> Track:
     """Follow the motion from an anchor to another instant, in steps checked one by one.
 
-    A step that is refused is halved until it is not, or is too small to be halved.
+    A step that is refused is halved until it is not, or is too small to be halved. The lanes of a batch that a step
+    leaves free solve the next instants of a grid on the way.
 
     Parameters
     ----------
@@ -168,6 +181,8 @@ def follow(solver: Solver, start: Anchor, stop: float, span: float, first_step: 
         Duration of the whole motion, by which steps are too small, s.
     first_step : float, optional
         Longest first step, s.
+    grid : array of shape (time,), optional
+        Instants to be solved on the way, s.
     """
     track, largest = Track([start]), first_step
     while track.anchors[-1].instant < stop:
@@ -185,7 +200,10 @@ def follow(solver: Solver, start: Anchor, stop: float, span: float, first_step: 
         refused = None
         while True:
             target = stop if step == left else here.instant + step
-            arrival = solver(here.state, np.array([target - here.instant]), np.array([target]), survey=True)
+            first, end = np.searchsorted(grid, (here.instant, target), side="right")
+            way = np.arange(first, min(end, first + SMALL_BATCH - 1))
+            instants = np.concatenate([[target], grid[way]])
+            arrival = solver(here.state, instants - here.instant, instants, survey=True)
             if arrival.status[0] in PASSABLE and step * abs(arrival.turnover[0]) <= LARGEST_TURNOVER:
                 break
             if arrival.status[0] == Status.INADMISSIBLE:
@@ -200,6 +218,8 @@ def follow(solver: Solver, start: Anchor, stop: float, span: float, first_step: 
             step *= 0.5
         largest = 4 * step
         track.anchors.append(Anchor.of(arrival, target))
+        if way.size:
+            track.on_the_way.append((way, arrival))
     return track
 
 
