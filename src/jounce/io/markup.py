@@ -9,7 +9,7 @@ from typing import Any
 from xml.parsers import expat
 
 from jounce.errors import RobotFileError, did_you_mean
-from jounce.io.reading import read_file
+from jounce.io.reading import LARGEST_NUMBER, fault_of_number, read_file
 from jounce.io.source import dotted
 
 __all__ = ["Element", "read_markup"]
@@ -66,9 +66,10 @@ class Element:
             values = [float(word) for word in text.split()]
         except ValueError:
             values = []
-        usable = infinite or all(math.isfinite(value) for value in values)
+        usable = infinite or not any(map(fault_of_number, values))
         if len(values) != count or not usable or any(map(math.isnan, values)) or "_" in text:
-            raise self.error(f"{key} must be {what}", *name, value=text)
+            most = f" of at most {LARGEST_NUMBER:g}" if values and all(map(math.isfinite, values)) and not usable else ""
+            raise self.error(f"{key} must be {what}{most}", *name, value=text)
         return values
 
     def check_children(self, known: Iterable[str], *name: str) -> None:

@@ -23,12 +23,14 @@ from jounce.robot.tree import quaternion_matrix, turn_about
 
 __all__ = ["names_of_bodies", "read_mjcf"]
 
+PLACE = ("pos", "quat", "axisangle", "xyaxes", "zaxis", "euler")
 NUMERIC = {  # attributes whose numbers MuJoCo takes even when they are not finite
-    "body": ("pos", "quat", "axisangle", "xyaxes", "zaxis", "euler"),
-    "inertial": ("pos", "quat", "axisangle", "xyaxes", "zaxis", "euler", "mass", "diaginertia", "fullinertia"),
+    **dict.fromkeys(("body", "site"), PLACE),
+    "inertial": (*PLACE, "mass", "diaginertia", "fullinertia"),
     "joint": ("pos", "axis", "range", "ref", "armature", "damping", "frictionloss", "polycoef"),
     "freejoint": ("armature", "damping", "frictionloss"),
     "option": ("gravity",),
+    **dict.fromkeys(("motor", "position", "velocity", "damper", "general"), ("gear",)),
 }
 
 

@@ -96,7 +96,10 @@ def check_assets(spec: Any, parts: Iterable[Element], allow: Iterable[str | Path
         for folder in folders:
             path = _named(element, name, roots[0], allow, folder)
             if os.path.lexists(path):
-                read_file(path, MAX_SAMPLES, what=f"the {tag}", error=RobotFileError)
+                try:
+                    read_file(path, MAX_SAMPLES, what=f"the {tag}", error=RobotFileError)
+                except RobotFileError as error:
+                    raise element.error(error.message, tag, value=file) from None
 
 
 def _asset_files(spec: Any) -> Iterator[tuple[str, Any, str]]:

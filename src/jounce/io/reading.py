@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 import os
 import stat
 from collections.abc import Iterable, Iterator
@@ -33,6 +34,7 @@ MAX_SAMPLES = 100_000_000
 """Bytes of a table of samples."""
 MAX_ROWS, MAX_ENTRIES = 2_000_000, 8_000_000
 """Of a table of samples: in memory, as text, they take less than 1 GB."""
+LARGEST_NUMBER = 1e75  # in SI units; beyond, products of a few quantities are no numbers
 FORMULA = ("=", "+", "-", "@", "\t", "\r", "'")
 """What spreadsheets take for the beginning of a formula, and the apostrophe that makes it text."""
 
@@ -124,6 +126,13 @@ def _nearby(path: str) -> str:
         return ""
     suggestion = did_you_mean(wanted.name, names, limit=0)
     return f"; {suggestion}" if suggestion.startswith("did") else ""
+
+
+def fault_of_number(number: float) -> str:
+    """Word what keeps a number from being computed with; empty where nothing does."""
+    if not math.isfinite(number):
+        return "must be a finite number"
+    return "" if abs(number) <= LARGEST_NUMBER else f"must be at most {LARGEST_NUMBER:g}"
 
 
 def named_file(

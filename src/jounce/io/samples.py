@@ -6,7 +6,7 @@ import math
 from pathlib import Path
 
 from jounce.errors import MechanismFileError, did_you_mean
-from jounce.io.reading import read_rows
+from jounce.io.reading import fault_of_number, read_rows
 
 __all__ = ["read_samples"]
 
@@ -83,6 +83,7 @@ def _is_number(text: str) -> bool:
 def _number(path: str, line: int, header: list[str], row: list[str], column: int) -> float:
     text = row[column] if column < len(row) else ""
     number = float(text) if _is_number(text) else math.nan
-    if not math.isfinite(number):
-        raise MechanismFileError("must be a finite number", path=path, line=line, name=header[column], value=text)
+    fault = fault_of_number(number)
+    if fault:
+        raise MechanismFileError(fault, path=path, line=line, name=header[column], value=text)
     return number

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from jounce.errors import JounceError, MechanismFileError, TrajectoryError, did_you_mean
-from jounce.io.reading import known_name, read_rows
+from jounce.errors import JounceError, MechanismFileError, TrajectoryError, did_you_mean, show_value
+from jounce.io.reading import fault_of_number, known_name, read_rows
 from jounce.io.source import SUFFIXES, Location, Source, dotted, read_source
 from jounce.trajectory import Expression, ExpressionMotion, JointTrajectory
 
@@ -139,8 +139,9 @@ def _is_number(text: str) -> bool:
 
 def _number(path: str, line: int, column: str, text: str) -> float:
     number = float(text) if _is_number(text) else math.nan
-    if not math.isfinite(number):
-        raise TrajectoryError("must be a finite number", path=path, line=line, name=column, value=text)
+    fault = fault_of_number(number)
+    if fault:
+        raise TrajectoryError(fault, path=path, line=line, name=column, value=text)
     return number
 
 
@@ -183,7 +184,8 @@ class _Laws:
         for here, there, key in ((first, last, "to"), (last, first, "from")):
             for name in here:
                 if name not in there:
-                    raise self.error(f"the joint '{name}' is missing; 'from' and 'to' name the same joints", (*at, key))
+                    message = f"the joint {show_value(name)} is missing; 'from' and 'to' name the same joints"
+                    raise self.error(message, (*at, key))
         start = [self._number(first[name], "any", (*at, "from", name)) for name in first]
         end = [self._number(last[name], "any", (*at, "to", name)) for name in first]
         times = {key: self._number(data[key], "time", (*at, key)) for key in ("duration", "start_time") if key in data}
@@ -247,8 +249,9 @@ class _Laws:
 
     def _finite(self, value: Any, raw: Any, at: Location) -> float:
         number = self._guard(at, lambda: value.evaluate(self.parameters)) if isinstance(value, Expression) else value
-        if not math.isfinite(number):
-            raise self.error("must be a finite number", at, value=raw)
+        fault = fault_of_number(number)
+        if fault:
+            raise self.error(fault, at, value=raw)
         return float(number)
 
     def _value(self, raw: Any, kind: str, names: Iterable[str], at: Location, per_time: int = 0) -> Any:

@@ -167,7 +167,7 @@ class SplineMotion(AbstractMotion):
             else:
                 ends, pieces = interpolated(times, values, int(degree))
         except (np.linalg.LinAlgError, ValueError):
-            message = "no spline goes through the samples: their spacing is too uneven; sample evenly"
+            message = "no spline goes through the samples: too uneven or too large; sample evenly"
             raise MechanismError(message, value=float(np.diff(times).min())) from None
         self._set(ends[:-1], pieces, ends[-1], beyond, advance, (times, values))
 

@@ -101,7 +101,12 @@ class PolynomialMotion(SplineMotion):
             pieces = _integrated(pieces, np.diff(knots))
         if derivative:
             pieces = pieces + _closing(pieces, knots, constants, times[-1] - times[0])
-        self._set(times[:-1], pieces / step ** np.arange(continuity + 2)[:, None], times[-1], beyond)
+        with np.errstate(over="ignore", invalid="ignore"):
+            pieces = pieces / step ** np.arange(continuity + 2)[:, None]
+        if not np.isfinite(pieces).all():
+            message = "are too large, or too close in time, for their derivatives to be numbers"
+            raise TrajectoryError(message, name="values", value=float(np.max(np.abs(values))))
+        self._set(times[:-1], pieces, times[-1], beyond)
 
     @classmethod
     def from_accelerations(

@@ -71,7 +71,10 @@ def interpolated(times: np.ndarray, values: np.ndarray, degree: int, **ends: Any
     scale = (times[-1] - times[0]) / (len(times) - 1)  # in steps, so that high powers stay of one size
     spline = make_interp_spline((times - times[0]) / scale, values, k=degree, **ends)
     inside = np.unique(spline.t[degree : len(spline.t) - degree])
-    powers = [spline(inside[:-1], nu=k) / (math.factorial(k) * scale**k) for k in range(degree + 1)]
+    with np.errstate(over="ignore", invalid="ignore"):
+        powers = [spline(inside[:-1], nu=k) / (math.factorial(k) * scale**k) for k in range(degree + 1)]
+    if not np.isfinite(powers).all():
+        raise ValueError("derivatives beyond the range of numbers")
     breakpoints = times[0] + inside * scale
     near = np.clip(np.searchsorted(times, breakpoints), 1, len(times) - 1)
     near = np.where(breakpoints - times[near - 1] < times[near] - breakpoints, near - 1, near)
