@@ -68,7 +68,9 @@ class Element:
             values = []
         usable = infinite or not any(map(fault_of_number, values))
         if len(values) != count or not usable or any(map(math.isnan, values)) or "_" in text:
-            most = f" of at most {LARGEST_NUMBER:g}" if values and all(map(math.isfinite, values)) and not usable else ""
+            most = (
+                f" of at most {LARGEST_NUMBER:g}" if values and all(map(math.isfinite, values)) and not usable else ""
+            )
             raise self.error(f"{key} must be {what}{most}", *name, value=text)
         return values
 

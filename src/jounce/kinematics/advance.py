@@ -107,9 +107,9 @@ def newton_raphson(
         return pose, factor, Correction(size, first, simplified), accepted, count + 1
 
     lanes = time.coefficients[0].shape[-1]
-    unknown = jnp.full(lanes, jnp.inf)
+    unknown = np.full(lanes, np.inf)
     blank = DenseFactor.blank(system.cells.shape, lanes)
-    state = (pose, blank, Correction(unknown, unknown, jnp.zeros(lanes)), jnp.zeros(lanes, bool), 0)
+    state = (pose, blank, Correction(unknown, unknown, np.zeros(lanes)), np.zeros(lanes, bool), 0)
     pose, factor, correction, _, _ = jax.lax.while_loop(unfinished, iterate, state)
     return pose, factor, correction
 
@@ -177,11 +177,11 @@ def _turnover(system: System, pose_type: type, coordinates: dict[str, Jet], fact
     def jacobian(step: Any) -> Any:
         return system.jacobian(pose_type.predicted_from(first, step), Jet([(instant + step)[None]]))
 
-    still = jnp.zeros_like(instant)
-    _, slope = jax.jvp(jacobian, (still,), (jnp.ones_like(still),))
+    still = np.zeros(1)
+    _, slope = jax.jvp(jacobian, (still,), (np.ones(1),))
     inverse = jax.tree.map(lambda x: x[..., :1], factor).inverse()
     relative = inverse[..., 0] @ slope[..., 0]
-    power, grown = relative, jnp.zeros(())
+    power, grown = relative, np.zeros(())
     for k in range(1, SQUARINGS + 1):
         size = jnp.maximum(jnp.sqrt(jnp.sum(power * power)), 1e-300)
         power, grown = (power / size) @ (power / size), grown + jnp.log(size) / 2 ** (k - 1)
@@ -204,7 +204,7 @@ def _travel(terms: list[Any], step: Any) -> Any:
 def _laws_predictable(system: System, instant: Any, step: Any, order: int) -> Any:
     """Tell whether the laws that may skip whole turns unseen keep to their own Taylor series over the step."""
     start, end = Jet.variable((instant - step)[None], order), Jet([instant[None]])
-    result = jnp.ones(step.shape, bool)
+    result = np.ones(step.shape, bool)
     for before, after in zip(system.laws(start), system.laws(end), strict=True):
         away = jnp.abs(after.coefficients[0] - before.evaluate(step[None]))
         travel = _travel([jnp.abs(c) for c in before.dense().coefficients[1:]], step[None])
@@ -216,7 +216,7 @@ def _finite(jets: list[Any], wanted: Any) -> Any:
     """Tell where the coefficients of jets are finite up to the order wanted, for each instance: (instances, batch)."""
     found = []
     for jet in jets:
-        above = (jnp.arange(jet.shape[0]) > wanted).reshape(-1, *[1] * (jet.ndim - 1))
+        above = (np.arange(jet.shape[0]) > wanted).reshape(-1, *[1] * (jet.ndim - 1))
         found.append(jnp.all(jnp.isfinite(jet) | above, axis=(0, 1)))
     return jnp.concatenate(found)
 
@@ -231,7 +231,7 @@ def _status(correction: Any, predictable: Any, pivot_ratio: Any, admissible: Any
         (~jnp.isfinite(correction), Status.NOT_CONVERGED),
         (~admissible, Status.INADMISSIBLE),
     )
-    status = jnp.full(correction.shape, int(Status.OK))
+    status = np.full(correction.shape, int(Status.OK))
     for happened, outcome in outcomes:
         status = jnp.where(happened, int(outcome), status)
     return status
@@ -308,9 +308,7 @@ def advance(
     admitted, defined = jnp.all(admissible, axis=0), jnp.all(finite, axis=0)
     status = _status(correction.last, predictable, pivot_ratio, admitted, defined, tolerance)
     terms = _terms(system, reached, pose_type.predictor)
-    turnover = jax.lax.cond(
-        survey, lambda: _turnover(system, pose_type, reached, factor, instant), lambda: jnp.zeros(1)
-    )
+    turnover = jax.lax.cond(survey, lambda: _turnover(system, pose_type, reached, factor, instant), lambda: np.zeros(1))
     return Arrival(
         coordinates,
         tuple(results),

@@ -5,6 +5,7 @@ from typing import Any
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 
 class DenseFactor(eqx.Module):
@@ -28,7 +29,7 @@ class DenseFactor(eqx.Module):
     def of(cls, matrix: Any) -> "DenseFactor":
         """Factor matrices of shape (rows, rows, batch)."""
         size, lanes = matrix.shape[0], matrix.shape[-1]
-        rows = jnp.arange(size, dtype=jnp.int32)[:, None]
+        rows = np.arange(size, dtype=np.int32)[:, None]
         at, put = jax.lax.dynamic_index_in_dim, jax.lax.dynamic_update_index_in_dim
 
         def eliminate(k: Any, carry: Any) -> Any:
@@ -43,16 +44,16 @@ class DenseFactor(eqx.Module):
             matrix = others - jnp.where(chosen, -1.0, column)[:, None] * row[None]
             return matrix, free & ~chosen, put(order, largest, k, 0), put(pivots, pivot, k, 0)
 
-        pivots = jnp.zeros((size, lanes))
-        start = (matrix, jnp.ones((size, lanes), bool), jnp.zeros_like(pivots, jnp.int32), pivots)
+        pivots = np.zeros((size, lanes))
+        start = (matrix, np.ones((size, lanes), bool), np.zeros((size, lanes), np.int32), pivots)
         eliminated, _, order, pivots = jax.lax.fori_loop(0, size, eliminate, start)
         return cls(matrix, eliminated, order, pivots)
 
     @classmethod
     def blank(cls, shape: tuple[int, ...], lanes: int) -> "DenseFactor":
         """Return a placeholder for the factors of a batch, to start a loop with."""
-        matrix, column = jnp.zeros((*shape, lanes)), jnp.zeros((shape[0], lanes))
-        return cls(matrix, matrix, column.astype(jnp.int32), column)
+        matrix, column = np.zeros((*shape, lanes)), np.zeros((shape[0], lanes))
+        return cls(matrix, matrix, column.astype(np.int32), column)
 
     def solve(self, right: Any, *, refined: bool = True) -> Any:
         """Return the solution for right-hand sides of shape (rows, batch); it is NaN where a matrix is singular.
@@ -95,7 +96,7 @@ class DenseFactor(eqx.Module):
     def sign(self) -> Any:
         """Return the signs of the determinants, shape (batch,): 0 where singular, NaN where not finite."""
         size = len(self.order)
-        later = jnp.triu(jnp.ones((size, size), bool), 1)[..., None]
+        later = np.triu(np.ones((size, size), bool), 1)[..., None]
         swaps = later & (self.order[:, None] > self.order[None])
         odd = jnp.sum(swaps, axis=(0, 1)) % 2 == 1
         return jnp.prod(jnp.sign(self.pivots), axis=0) * jnp.where(odd, -1.0, 1.0)
@@ -136,7 +137,7 @@ def singular_values(matrix: Any) -> tuple[Any, Any, Any]:
     if rows > columns:
         v, s, u = singular_values(jnp.swapaxes(matrix, 0, 1))
         return u, s, v
-    first, second = jnp.triu_indices(rows, 1)
+    first, second = (jnp.asarray(places) for places in np.triu_indices(rows, 1))
 
     def rotate(k: Any, carry: Any) -> Any:
         p, q = (pairs[k % len(pairs)] for pairs in (first, second))
@@ -154,7 +155,7 @@ def singular_values(matrix: Any) -> tuple[Any, Any, Any]:
 
         return tuple(turned(part) for part in carry)
 
-    unit = jnp.broadcast_to(jnp.eye(rows)[..., None], (rows, rows, lanes))
+    unit = jnp.broadcast_to(np.eye(rows)[..., None], (rows, rows, lanes))
     start = (matrix, unit)
     orthogonal, turns = jax.lax.fori_loop(0, SWEEPS * len(first), rotate, start) if rows > 1 else start
     sizes = jnp.sqrt(jnp.sum(orthogonal**2, axis=1))
