@@ -149,7 +149,7 @@ class Starts:
         self._stages = [begun.of(rows[0] + stage * change) for stage in range(1, count)] + [last]
 
     def _turned(self, made: tuple[Equations, Any], count: int) -> float:
-        """Return by how much a driver of an angle about an axis is turned from the first run to another at most, rad."""
+        """Return by how much drivers of angles about axes turn from the first run to another at most, rad."""
         clock, largest = Jet([np.full((1, 1), self._instant)]), 0.0
         for group in filter(measures_angle, made[0].system.groups):
             law = np.asarray(group.element.motion(clock).coefficients[0])
@@ -181,7 +181,8 @@ class Starts:
 
 def _turns_of(forces: Sequence[Group], outputs: Sequence[Group]) -> Turns:
     """Return the angles about axes that groups count from."""
-    return Turns(*(tuple(np.asarray(g.element.datum.near) for g in part if measures_angle(g)) for part in (forces, outputs)))
+    parts = ([np.asarray(g.element.datum.near) for g in part if measures_angle(g)] for part in (forces, outputs))
+    return Turns(*map(tuple, parts))
 
 
 @compiled()

@@ -36,7 +36,7 @@ class Angles(NamedTuple):
         if not self.places:
             return ()
         share = jnp.clip(since / jnp.where(self.step == 0.0, 1.0, self.step), 0.0, 1.0)
-        away = jnp.abs(share * PLACES - jnp.arange(PLACES + 1.0)[:, None])
+        away = jnp.abs(share[None] * PLACES - jnp.arange(PLACES + 1.0)[:, None])
         weights = jnp.maximum(1.0 - away, 0.0)[:, None]
         return tuple(jnp.sum(weights * angles, axis=0) for angles in self.places)
 

@@ -52,7 +52,8 @@ class Way(NamedTuple):
         """Return the angles about axes that groups measure, (instances, places) each, counted on from their data."""
         measuring = [group for group in groups if measures_angle(group)]
         raw = raw_angles(measuring, {"quaternion": self.quaternion})
-        return [counted_on(np.asarray(g.element.datum.near)[..., 0], angle) for g, angle in zip(measuring, raw, strict=True)]
+        begun = [np.asarray(group.element.datum.near)[..., 0] for group in measuring]
+        return [counted_on(near, angle) for near, angle in zip(begun, raw, strict=True)]
 
     def last_angles(self, groups: Sequence[Group]) -> list[np.ndarray]:
         """Return the angles at the end of the way, (instances, 1) each, with the turns that are repeated."""
@@ -129,9 +130,12 @@ def raw_angles(groups: Sequence[Group], coordinates: dict[str, Any]) -> list[np.
 def with_angles(groups: Sequence[Group], angles: Sequence[np.ndarray]) -> tuple[Group, ...]:
     """Return groups of which the data hold other angles, for those that measure one about an axis."""
     found = iter(angles)
-    return tuple(
-        _put(g, "datum", Datum(g.element.datum.attitude, *[next(found)] * 2)) if measures_angle(g) else g for g in groups
-    )
+
+    def counted(group: Group) -> Group:
+        angle = next(found)
+        return _put(group, "datum", Datum(group.element.datum.attitude, angle, angle))
+
+    return tuple(counted(group) if measures_angle(group) else group for group in groups)
 
 
 def with_turns(groups: Sequence[Group], near: Sequence[Any]) -> tuple[Group, ...]:

@@ -7,8 +7,7 @@ import os
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, ParamSpec, TypeVar
 
-import jax
-from jax.core import Tracer
+from jax.core import Tracer, eval_context
 
 from jounce.errors import UnsupportedError
 
@@ -64,7 +63,7 @@ def concrete(function: Callable[P, R]) -> Callable[P, R]:
                 "or jax.vmap trace; call it with numbers, one design after another",
                 name=place,
             )
-        with jax.ensure_compile_time_eval():
+        with eval_context():  # ensure_compile_time_eval would compile each constant inside on its own
             return function(*arguments, **keywords)
 
     return door
