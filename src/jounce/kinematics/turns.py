@@ -19,6 +19,7 @@ from jounce.mechanism.datums import Way, measures_angle
 STEPS_A_TURN = 64
 MOST_TURNS = 4  # followed one by one; beyond, each further turn does what the last one did
 CORRECTIONS = 8
+MOST_FOLLOWED = 100  # where they do not, as those of drivers that turn unlike each other
 SMALLEST_PERIOD, LARGEST_PERIOD = 1, 60  # whole turns, among which those are sought that leave coupled bodies coupled
 
 
@@ -107,18 +108,25 @@ def course(
     turns, skipped = lag.angle / (2 * np.pi), 0
     if turns > MOST_TURNS:
         skipped = int(turns) - MOST_TURNS + 1
-    left = np.arange(0, (turns - skipped) * STEPS_A_TURN)[::-1] / (STEPS_A_TURN * turns)
-    states = [start]
+    left = np.arange(0, turns * STEPS_A_TURN)[::-1] / (STEPS_A_TURN * turns)
+    states, last = [start], None
     increment = np.zeros(model.system.cells.shape[1])
-    for part in left + (skipped / turns if skipped else 0.0):
+    for count, part in enumerate(left):
+        if skipped and count == len(left) - skipped * STEPS_A_TURN:
+            last = _repeated(states, skipped)
+            if last is not None:
+                break
+            if turns > MOST_FOLLOWED:
+                return None
+            skipped = 0  # drivers that turn unlike each other: no turn is like the last
         found = _corrected(states[-1], increment, lambda r, p=part: lag.open(r, p), moved, scale_of)
         if found is None:
             return None
         coordinates, increment = found
         states.append(coordinates)
-    last = _repeated(states, skipped) if skipped else states[-1]
-    if last is None or "quaternion" not in last:
-        return None if last is None else Course(last, None)
+    last = states[-1] if last is None else last
+    if "quaternion" not in last:
+        return Course(last, None)
     places = [np.asarray(place["quaternion"]) for place in (model.guess, *states)]
     way = Way(np.concatenate(places, axis=-1), np.zeros(len(places)), STEPS_A_TURN, skipped)
     return Course(last, way)
