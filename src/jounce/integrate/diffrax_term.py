@@ -72,9 +72,10 @@ def ode_term(mechanism: Mechanism, time: float = 0.0) -> "OrdinaryEquation":
         message = 'ode_term needs the package diffrax, which is not installed: pip install "jounce[integrators]"'
         raise MechanismError(message) from None
     start = consistent_start(mechanism, float(time))
-    state: Any = State(*(jnp.asarray(part[..., 0]) for part in start.state))
+    state: State | CountedState = State(*(jnp.asarray(part[..., 0]) for part in start.state))
     if angles := measured(start.equations, start.state):
-        state = CountedState(*state, tuple(part[..., 0] for part in angles))
+        known = tuple(part[..., 0] for part in angles)
+        state = CountedState(state.position, state.attitude, state.velocity, state.spin, known)
     return OrdinaryEquation(diffrax.ODETerm(state_rates), state, start.equations, mechanism, start)
 
 
