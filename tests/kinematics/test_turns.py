@@ -7,10 +7,10 @@ import pytest
 
 import jounce as jn
 from jounce import drivers, forces, planar, spatial
-from jounce.dynamics import AppliedTorqueOutput
+from jounce.dynamics import AppliedTorqueOutput, DriverTorqueOutput
 from jounce.kinematics.assembly import assemble
 from jounce.mechanism import build
-from tests.problems.small import four_bar, spindle
+from tests.problems.small import four_bar, law, spindle
 
 X, Z, ORIGIN = [1, 0, 0], [0, 0, 1], [0, 0, 0]
 
@@ -144,3 +144,93 @@ def test_bodies_that_a_gear_couples_go_back_by_whole_turns_together():
         found = assembled_angles(dataclasses.replace(mechanism, bodies=mechanism.bodies | bodies))
         assert abs(found[2] - bodies["second"].angle) < np.pi
         assert found[3] == pytest.approx(3.8 - 2 * found[2], abs=1e-11)
+
+
+GRIDS = [[0, 5, 10], np.linspace(0, 10, 41), [0, 10], [10]]
+LAWS = {"from within half a turn": (0.5, 1.0), "from the second turn": (7.5, 1.0), "back": (-7.5, -3.0)}
+SPRING = {"stiffness": 2.0, "angle": 0.3, "damping": 0.1}
+
+
+def wound(start, rate, space="spatial"):
+    """A driven rotor on a torsional spring, in space or in the plane, and one that turns back twice as fast."""
+    motions = {"first": law(start, rate, wave=0.4), "second": law(0.2, -2 * rate, wave=0.1)}
+    pairs = {"first": ("ground", "first"), "second": ("ground", "second"), "between": ("first", "second")}
+    inertia = {"mass": 1.0, "inertia": 0.7 if space == "planar" else [0.7, 0.7, 0.7]}
+    if space == "planar":
+        bodies = {name: jn.Body([0, 0], **inertia) for name in motions}
+        joints = {name: planar.Revolute(pairs[name], [0, 0], [0, 0]) for name in motions}
+        motors = {f"motor_{k}": drivers.CoordinateDriver(pairs[k], "angle", motion) for k, motion in motions.items()}
+        springs = {name: forces.TorsionalSpring(pair, **SPRING) for name, pair in pairs.items()}
+    else:
+        bodies = {name: jn.Body(ORIGIN, **inertia) for name in motions}
+        joints = {name: spatial.Revolute(pairs[name], ORIGIN, ORIGIN, Z, Z) for name in motions}
+        motors = {f"motor_{k}": drivers.RotationDriver(pairs[k], Z, motion) for k, motion in motions.items()}
+        springs = {name: forces.SpatialTorsionalSpring(pair, Z, **SPRING) for name, pair in pairs.items()}
+    outputs = {f"{name}_spring": AppliedTorqueOutput(name) for name in pairs}
+    outputs |= {f"{name}_motor": DriverTorqueOutput(f"motor_{name}") for name in motions}
+    return jn.Mechanism(space=space, bodies=bodies, joints=joints, drivers=motors, forces=springs, outputs=outputs)
+
+
+def angles_of_law(start, rate, wave, time):
+    """The law of `wound` and its derivatives to the fifth, (time, derivative)."""
+    phase = np.pi * time[:, None] + np.arange(6) * np.pi / 2
+    return np.stack([start + rate * time, 0 * time + rate, *[0 * time] * 4], axis=-1) + wave * np.pi ** np.arange(
+        6
+    ) * np.sin(phase)
+
+
+@pytest.mark.parametrize("start, rate", LAWS.values(), ids=LAWS)
+def test_springs_in_space_count_turns_on_any_grid_as_in_the_plane(start, rate):
+    plane = jn.solve(wound(start, rate, "planar"), GRIDS[1]).outputs
+    for grid in GRIDS:
+        motion = jn.solve(wound(start, rate), grid)
+        found, time = motion.outputs, np.array(grid, float)
+        first, second = angles_of_law(start, rate, 0.4, time), angles_of_law(0.2, -2 * rate, 0.1, time)
+        for name, angle in (("first", first), ("second", second), ("between", second - first)):
+            expected = -2.0 * angle[:, :5] - 0.1 * angle[:, 1:]
+            expected[:, 0] += 2.0 * 0.3
+            size = np.abs(expected).max(axis=0)
+            assert (np.abs(found[f"{name}_spring"] - expected) <= 1e-13 * size).all()
+        both = np.searchsorted(GRIDS[1], time)
+        for name, values in plane.items():
+            size = np.abs(values).max(axis=0)
+            assert (np.abs(found[name] - values[both]) <= 1e-11 * size).all()
+
+
+def test_energies_and_powers_have_the_turns_of_the_forces():
+    start, rate = LAWS["from the second turn"]
+    motion = jn.solve(wound(start, rate), GRIDS[0])
+    time = np.array(GRIDS[0], float)
+    first, second = angles_of_law(start, rate, 0.4, time)[:, 0], angles_of_law(0.2, -2 * rate, 0.1, time)[:, 0]
+    expected = sum((angle - 0.3) ** 2 for angle in (first, second, second - first))
+    np.testing.assert_allclose(jn.dynamics.stored_energy(motion), expected, rtol=1e-13)
+    balance = jn.power_balance(motion)
+    assert float((abs(balance["residual"]) / balance["scale"]).max()) < 1e-13
+
+
+@pytest.mark.parametrize("rule, turn", [("t", 0.0), ("7.5 + t", 7.5), ("-100 + t", -100.0)])
+def test_about_axes_that_tilt_too_and_for_outputs_asked_for_later(rule, turn):
+    mechanism = shafts(rule)
+    slope, twist = 0.3, {}
+    about = [np.cos(slope), np.sin(slope), 0], [-np.sin(slope), np.cos(slope), 0], [0, 1, 0]
+    twist["second"] = forces.SpatialTorsionalSpring(("ground", "second"), about[0], 1.0, 0.0, 0.0, *about[1:])
+    twist["back"] = forces.SpatialTorque(("first", "ground"), [-2, 0, 0], "-x", [0, 1, 0], [0, 1, 0.2])
+    mechanism = dataclasses.replace(mechanism, forces=twist)
+    for grid in ([0.0, 5.0, 10.0], [0.0, 0.4, 10.0], [10.0]):
+        motion = jn.solve(mechanism, grid, order=2)
+        for name, output in mechanism.outputs.items():
+            np.testing.assert_allclose(motion.evaluate(output).values, motion.outputs[name], rtol=0, atol=1e-12)
+            if name in twist:
+                torque = jn.applied_force(motion, name).values[:, 0]
+                np.testing.assert_allclose(torque, -motion.outputs[name][:, 0], rtol=0, atol=1e-12)
+        assert np.abs(motion.outputs["second"][:, 0] - turn - np.array(grid)).max() < 0.1
+
+
+def test_instants_that_failed_have_no_torque():
+    mechanism = wound(0.5, 1.0)
+    motors = {**mechanism.drivers, "motor_first": drivers.RotationDriver(("ground", "first"), Z, "7*t + sqrt(4 - t)")}
+    motion = jn.solve(dataclasses.replace(mechanism, drivers=motors), [0.0, 3.0, 5.0], strict=False)
+    assert motion.status[-1] != 0
+    torque = motion.outputs["first_spring"]
+    assert np.isnan(torque[-1]).all()
+    assert torque[1, 0] == pytest.approx(-2 * (22 - 0.3) - 0.1 * (7 - 0.5), abs=1e-11)

@@ -30,10 +30,14 @@ class Datum(eqx.Module):
         Euler parameters of ``A_i^T A_j``.
     angle : array of shape (...)
         rad, with its whole turns.
+    near : array of shape (...)
+        The angle at the positions that are looked at, to within half a turn, rad: it tells the turns made since. That
+        at the datum, unless a motion has been followed from there.
     """
 
     attitude: Any
     angle: Any
+    near: Any
 
 
 def perpendiculars(axis: Any) -> tuple[Any, Any]:
@@ -50,20 +54,25 @@ def perpendiculars(axis: Any) -> tuple[Any, Any]:
 def relative_angle(
     body_i: Any, body_j: Any, axis_i: Any, vector_i: Any = None, vector_j: Any = None, datum: Datum | None = None
 ) -> Jet:
-    """Return the angle in rad, known up to whole turns, by which body j is turned about an axis of body i.
+    """Return the angle in rad by which body j is turned about an axis of body i.
 
     With vectors it is the signed angle from the first, on body i, to the second, on body j. Without, it is the angle at
     the datum and the turn about the axis from there; where the axis does not stay in its direction on body j, the turn
     left after the shortest tilt of the axis. Without a datum it is the angle of ``A_i^T A_j``, by ``2 atan2(u.e, e0)``
-    of the relative Euler parameters, which keeps the sign that Sommer 2024, equation 101, loses. With a datum the value
-    is within half a turn of the angle there.
+    of the relative Euler parameters, which keeps the sign that Sommer 2024, equation 101, loses, and within half a turn
+    of zero. With a datum it has the turns of what the datum tells it to be near to.
     """
     axis = axis_i / length_of(axis_i)[None]
     if vector_i is not None:
         angle = _between(body_i, body_j, axis, vector_i, vector_j)
-        return angle if datum is None else wrap(angle - datum.angle, 2 * jnp.pi) + datum.angle
+        return angle if datum is None else brought_near(angle, datum.near)
     turn = _turn(body_i, body_j, axis, datum)
-    return turn if datum is None else wrap(turn, 2 * jnp.pi) + datum.angle
+    return wrap(turn, 2 * jnp.pi) if datum is None else brought_near(turn, datum.near - datum.angle) + datum.angle
+
+
+def brought_near(angle: Jet, expected: Any) -> Jet:
+    """Return an angle shifted by the whole turns that bring it nearest to the one expected."""
+    return angle - 2 * jnp.pi * jnp.round((angle.coefficients[0] - expected) / (2 * jnp.pi))
 
 
 # The rate of the angle is the angular velocity along the axis, but for terms that vanish while the bodies turn about
@@ -120,7 +129,8 @@ def coaxial(axis_i: Any, axis_j: Any) -> Datum:
     flipped = jnp.concatenate([-dot(side, e)[None], e0 * side + cross(side, e)])
     attitude = jnp.where(opposite[None], flipped, attitude)
     angle, known = angle_of(attitude, u, jnp)
-    return Datum(attitude, jnp.where(known, angle, 0.0))
+    angle = jnp.where(known, angle, 0.0)
+    return Datum(attitude, angle, angle)
 
 
 def angle_of(attitude: Any, axis: Any, namespace: Any = np) -> tuple[Any, Any]:

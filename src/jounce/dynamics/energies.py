@@ -289,7 +289,7 @@ def stored_energy(motion: Motion) -> np.ndarray:
     """
     pose_type, coordinates = motion.poses
     low = {name: values[: 2 - (name == "angular_velocity")] for name, values in coordinates.items()}
-    stored = np.asarray(_stored(motion.model.system.forces, low, motion.time[None], pose_type))
+    stored = np.asarray(_stored(motion.forces, low, motion.time[None], pose_type))
     return np.where(motion.status == Status.OK, stored, np.nan)
 
 

@@ -5,6 +5,7 @@ their coefficient k is affine in the unknowns ``(q''[k], lambda[k])``, with the 
 ``[[M, Phi_q^T], [Phi_q, 0]]`` at every order: the "hyper-dynamic" equations that Sommer 2024, section 7, announces.
 """
 
+import dataclasses
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -16,6 +17,7 @@ from jounce.jet import Jet
 from jounce.jet.algebra import total
 from jounce.jet.series import Recursion
 from jounce.kinematics.linear import DenseFactor
+from jounce.mechanism.datums import with_turns
 from jounce.mechanism.system import System
 from jounce.rigid import PlanarPose, SpatialPose
 from jounce.rigid.spatial import body_axes, quaternion_spins
@@ -81,6 +83,16 @@ class Equations(eqx.Module):
     def coordinates(self) -> int:
         """Number of coordinates of a body."""
         return self.pose_type.shifts + self.pose_type.turns
+
+    def near(self, angles: tuple[Any, ...]) -> "Equations":
+        """Return the equations where the angles about axes that forces measure have the turns of these.
+
+        There is one array of shape (instances, batch) for each group of such forces, rad.
+        """
+        if not angles:
+            return self
+        system = dataclasses.replace(self.system, forces=with_turns(self.system.forces, angles))
+        return dataclasses.replace(self, system=system)
 
     def pose(self, state: State) -> Any:
         """Return the pose of all bodies, the ground first, with velocities."""

@@ -20,6 +20,7 @@ from jounce.jet import Jet, cross
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.compilation import compiled
 from jounce.mechanism import Mechanism, Model
+from jounce.mechanism.datums import at_lanes
 from jounce.mechanism.system import System
 from jounce.robot.scan import stacked
 
@@ -95,7 +96,7 @@ class MotionForces:
     def multipliers(self) -> np.ndarray:
         """Multipliers of the rows of all residuals, as Taylor coefficients, (levels, rows, time)."""
         system = dataclasses.replace(self.model.system, outputs=())
-        forces = dataclasses.replace(system, groups=(), cells=None, row_scale=None)
+        unjoined = dataclasses.replace(system, groups=(), cells=None, row_scale=None)
         square = system.cells.shape[0] == system.cells.shape[1]
 
         def chunk(lanes: np.ndarray) -> Any:
@@ -104,6 +105,7 @@ class MotionForces:
                 for index, group in enumerate(system.groups)
             ]
             bodies, instants = self.taken(None, lanes, self.levels + 2), self.motion.time[lanes]
+            forces = dataclasses.replace(unjoined, forces=at_lanes(self.motion.forces, lanes))
             load, finite = _loads(forces, bodies, instants, self.masses, self.gravity, self.pose_type)
             self._check_finite(np.asarray(finite), lanes)
             still = None if square else self.taken(None, lanes, 1)
@@ -176,9 +178,10 @@ class MotionForces:
         index = next(k for k, names in enumerate(self.model.forces) if name in names)
         instance = self.model.forces[index].index(name)
         if index not in self._applied:
-            group = self.model.system.forces[index]
+            whole = self.motion.forces[index]
 
             def chunk(lanes: np.ndarray) -> Any:
+                (group,) = at_lanes((whole,), lanes)
                 poses = tuple(self.taken(slot, lanes, self.levels + 1) for slot in group.bodies)
                 return _applied(group.element, poses, self.motion.time[lanes], self.pose_type, self.levels)
 

@@ -11,6 +11,7 @@ from jounce.jet import Jet, dot
 from jounce.jet.algebra import total
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.compilation import compiled
+from jounce.mechanism.datums import at_lanes
 from jounce.robot.scan import stacked
 
 FAINT = 1e-3  # of what turning bodies would move: coefficients that vanish have its rounding, 1e-12 of this or less
@@ -101,8 +102,8 @@ def _law(driver: Any, instants: Any, levels: int) -> Any:
 
 def _of_chunk(forces: MotionForces, lanes: np.ndarray) -> tuple[Any, ...]:
     bodies = forces.taken(None, lanes, forces.levels + 2)
-    system, length = forces.model.system, forces.model.length
-    return system.forces, bodies, forces.motion.time[lanes], forces.masses, forces.gravity, length
+    applied, instants = at_lanes(forces.motion.forces, lanes), forces.motion.time[lanes]
+    return applied, bodies, instants, forces.masses, forces.gravity, forces.model.length
 
 
 @compiled("pose_type", "levels")

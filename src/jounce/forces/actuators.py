@@ -3,25 +3,19 @@
 from typing import Any
 
 import equinox as eqx
-import jax.numpy as jnp
 
-from jounce.constraints.angles import Datum, relative_angle
+from jounce.constraints.angles import relative_angle
 from jounce.constraints.base import Vector
 from jounce.constraints.planar import slide
 from jounce.errors import MechanismError
 from jounce.forces.base import AbstractForce, Law
-from jounce.jet import Jet, sqrt, wrap
+from jounce.jet import Jet, sqrt
 
 
 def distance(body_i: Any, body_j: Any, point_i: Any, point_j: Any) -> Jet:
     """Return the distance of two points, m."""
     d = body_j.point(point_j) - body_i.point(point_i)
     return sqrt(d.dot(d))
-
-
-def turn(body_i: Any, body_j: Any, axis_i: Any, vector_i: Any, vector_j: Any, datum: Datum | None) -> Jet:
-    """Return the angle in rad, from -pi to pi, by which body j is turned about an axis of body i, in space."""
-    return wrap(relative_angle(body_i, body_j, axis_i, vector_i, vector_j, datum), 2 * jnp.pi)
 
 
 def check_vectors(force: Any) -> None:
@@ -84,7 +78,7 @@ class Torque(AbstractForce, type="torque", space="planar"):
 class SpatialTorque(AbstractForce, type="torque", space="spatial"):
     """Torque on body j from body i about an axis of body i, by a law of the angle x, its rate v and t.
 
-    The angle is that of a rotation driver, from -pi to pi: with vectors, from `vector_i` to `vector_j`.
+    The angle is that of a rotation driver: with vectors, from `vector_i` to `vector_j`. Its turns count.
     """
 
     axis_i: Vector
@@ -100,7 +94,7 @@ class SpatialTorque(AbstractForce, type="torque", space="spatial"):
         check_vectors(self)
 
     def displacement(self, body_i, body_j, time):
-        return turn(body_i, body_j, self.axis_i, self.vector_i, self.vector_j, self.datum)
+        return relative_angle(body_i, body_j, self.axis_i, self.vector_i, self.vector_j, self.datum)
 
     def force(self, displacement, velocity, time):
         return self.law(displacement, velocity, time)

@@ -3,13 +3,12 @@
 from typing import Any
 
 import equinox as eqx
-import jax.numpy as jnp
 
+from jounce.constraints.angles import relative_angle
 from jounce.constraints.base import Scalar, Vector
 from jounce.constraints.planar import slide
-from jounce.forces.actuators import check_vectors, distance, turn
+from jounce.forces.actuators import check_vectors, distance
 from jounce.forces.base import AbstractForce
-from jounce.jet import wrap
 
 
 class Spring(AbstractForce, type="spring"):
@@ -81,10 +80,9 @@ class TorsionalSpring(AbstractForce, type="torsional_spring", space="planar"):
 
 
 class SpatialTorsionalSpring(AbstractForce, type="torsional_spring", space="spatial"):
-    """Spring and damper on the angle of body j about an axis of body i, within half a turn from its free angle.
+    """Spring and damper on the angle of body j about an axis of body i: ``T = -k (s - angle) - c s'``; turns count.
 
-    The angle is that of a rotation driver: with vectors, from `vector_i` to `vector_j`. The moment jumps from one side
-    to the other at half a turn from the free angle, as turns are not counted.
+    The angle is that of a rotation driver: with vectors, from `vector_i` to `vector_j`.
     """
 
     axis_i: Vector
@@ -102,10 +100,10 @@ class SpatialTorsionalSpring(AbstractForce, type="torsional_spring", space="spat
         check_vectors(self)
 
     def displacement(self, body_i, body_j, time):
-        return turn(body_i, body_j, self.axis_i, self.vector_i, self.vector_j, self.datum)
+        return relative_angle(body_i, body_j, self.axis_i, self.vector_i, self.vector_j, self.datum)
 
     def force(self, displacement, velocity, time):
-        return -wrap(displacement - self.angle, 2 * jnp.pi) * self.stiffness - velocity * self.damping
+        return -(displacement - self.angle) * self.stiffness - velocity * self.damping
 
     def energy(self, displacement):
-        return wrap(displacement - self.angle, 2 * jnp.pi).square() * (0.5 * self.stiffness)
+        return (displacement - self.angle).square() * (0.5 * self.stiffness)

@@ -9,11 +9,11 @@ from typing import Any
 import jax
 import numpy as np
 
-from jounce.dynamics.forward import State
+from jounce.dynamics.forward import Equations, State
 from jounce.dynamics.start import driven, start
 from jounce.errors import MechanismError, did_you_mean
 from jounce.integrate.events import output_series, pose_coordinates
-from jounce.integrate.family import Family, Starts
+from jounce.integrate.family import Family, Starts, Turns
 from jounce.integrate.marching import Front, Outcome, Steps, departed, march
 from jounce.integrate.methods import AbstractMethod
 from jounce.integrate.simulate import checked, instants_of
@@ -21,6 +21,7 @@ from jounce.integrate.simulation import expanded
 from jounce.kinematics import Status
 from jounce.mechanism import Mechanism, build, check_mechanism
 from jounce.mechanism.builder import referred
+from jounce.mechanism.datums import with_turns
 from jounce.mechanism.doors import concrete
 from jounce.mechanism.laws import check_laws
 
@@ -121,7 +122,7 @@ def simulate_batch(
     starts = Starts(family, begun, nominal.state, rows, float(instants[0]))
 
     def depart(some: np.ndarray) -> None:
-        runs.depart(some, starts.of(some))
+        runs.depart(some, *starts.of(some))
 
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:  # XLA works outside of Python's lock
         lots = runs.lots(np.arange(len(rows)))
@@ -183,6 +184,7 @@ class _Runs:
         self._values: dict[int, np.ndarray] = {}  # of each group, (runs, time, order + 1, components, outputs)
         self._begun = np.full(len(rows), instants[0])  # the time at which the last step began
         self._angles: dict[int, np.ndarray] = {}  # the series of turning outputs there
+        self._turns: tuple[np.ndarray, ...] = ()  # their angles about axes at the start, (instances, runs)
 
     @property
     def moving(self) -> np.ndarray:
@@ -212,9 +214,9 @@ class _Runs:
         """Return runs in lots of one size; the last repeats its last run."""
         return [runs[np.minimum(np.arange(k, k + self.width), len(runs) - 1)] for k in range(0, len(runs), self.width)]
 
-    def depart(self, runs: np.ndarray, state: State) -> None:
-        """Set runs off from states on the constraints."""
-        equations, _ = self.family.picked(self._made, runs)
+    def depart(self, runs: np.ndarray, state: State, angles: Turns) -> None:
+        """Set runs off from states on the constraints, with the turns that angles about axes have there."""
+        equations, _ = self._picked(runs, angles)
         tolerance, _, method = self.settings
         time = np.full(len(runs), self.instants[0])
         front = departed(equations, state, time, order=method.expansion_order(tolerance))
@@ -222,7 +224,11 @@ class _Runs:
         if self._front is None:
             self._front = jax.tree.map(lambda x: np.zeros((*x.shape[:-1], len(self.steps)), x.dtype), front)
         self._put(runs, front)
-        self._note(runs, np.zeros(len(runs), int), front.expansion.state, time, {})
+        if not self._turns:
+            self._turns = tuple(np.zeros((len(angle), len(self.steps))) for angle in angles.outputs)
+        for whole, part in zip(self._turns, angles.outputs, strict=True):
+            whole[:, runs] = part
+        self._note(runs, np.zeros(len(runs), int), front.expansion.state, time, front.angles, {})
         lost = runs[front.outcome == Outcome.LOST]
         self._reached[lost] = False
         for values in self._values.values():
@@ -247,7 +253,17 @@ class _Runs:
         step = step[instant, lane]
         polynomial = State(*(np.moveaxis(part[step, ..., lane], 0, -1) for part in steps.polynomial))
         before = {which: series[..., step, lane] for which, series in angles.items()}
-        self._note(runs[lane], near[instant], polynomial, steps.start[step, lane], before)
+        known = tuple(part[step, :, lane].T for part in steps.angles)
+        self._note(runs[lane], near[instant], polynomial, steps.start[step, lane], known, before)
+
+    def _picked(self, runs: np.ndarray, angles: Turns) -> tuple[Equations, Any]:
+        """Return equations of motion and outputs of some runs, whose angles about axes have the turns of these."""
+        equations, outputs = self.family.picked(self._made, runs)
+        return equations.near(angles.forces), with_turns(outputs, angles.outputs)
+
+    def _begun_with(self, runs: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Return the angles about axes of outputs at the start, (instances, runs) each."""
+        return tuple(angle[:, runs] for angle in self._turns)
 
     def _put(self, runs: np.ndarray, front: Front) -> None:
         for whole, part in zip(jax.tree.leaves(self._front), jax.tree.leaves(front), strict=True):
@@ -258,7 +274,8 @@ class _Runs:
         found = {}
         time = np.concatenate([self._begun[runs][None], steps.start[:tried]])
         self._begun[runs] = time[-1]
-        _, outputs = self.family.picked(self._made, np.tile(runs, len(steps.start)))
+        every = np.tile(runs, len(steps.start))
+        _, outputs = self._picked(every, Turns((), self._begun_with(every)))
         for which, group in enumerate(outputs):
             if group.element.turning:
                 parts = (np.moveaxis(part[:, :3], 0, -2) for part in steps.polynomial)
@@ -273,15 +290,25 @@ class _Runs:
         return found
 
     def _note(
-        self, runs: np.ndarray, at: np.ndarray, polynomial: State, begin: np.ndarray, before: dict[int, np.ndarray]
+        self,
+        runs: np.ndarray,
+        at: np.ndarray,
+        polynomial: State,
+        begin: np.ndarray,
+        angles: tuple[np.ndarray, ...],
+        before: dict[int, np.ndarray],
     ) -> None:
-        """Keep the outputs of runs at instants, given by number, a time into steps that began at others."""
+        """Keep the outputs of runs at instants, given by number, a time into steps that began at others.
+
+        What forces measure where the steps begin is known, and so are the series of turning outputs, but at the start.
+        """
         for lanes in self.lots(np.arange(len(runs))):
-            equations, outputs = self.family.picked(self._made, runs[lanes])
+            known = Turns(tuple(angle[:, lanes] for angle in angles), self._begun_with(runs[lanes]))
+            equations, outputs = self._picked(runs[lanes], known)
             time = self.instants[at[lanes]]
             since = time - begin[lanes]
             started = State(*(part[..., lanes] for part in polynomial))
-            coordinates = pose_coordinates(expanded(equations, started, since, time, order=self._expansion))
+            coordinates = pose_coordinates(expanded(equations, started, since, time, order=self._expansion)[0])
             for which, group in enumerate(outputs):
                 series = np.array(output_series(group, coordinates, self.family.model.pose_type))
                 if which in before:

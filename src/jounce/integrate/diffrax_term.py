@@ -2,7 +2,7 @@
 
 import dataclasses
 import importlib
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -13,8 +13,11 @@ from jounce.dynamics.start import Start, start as consistent_start
 from jounce.errors import MechanismError
 from jounce.integrate.projection import normalised
 from jounce.integrate.simulation import Simulation, Track
+from jounce.integrate.turns import measured
+from jounce.jet import Jet
 from jounce.kinematics.linear import DenseFactor
 from jounce.mechanism import Mechanism
+from jounce.mechanism.datums import measures_angle
 
 
 def ode_term(mechanism: Mechanism, time: float = 0.0) -> "OrdinaryEquation":
@@ -69,8 +72,29 @@ def ode_term(mechanism: Mechanism, time: float = 0.0) -> "OrdinaryEquation":
         message = 'ode_term needs the package diffrax, which is not installed: pip install "jounce[integrators]"'
         raise MechanismError(message) from None
     start = consistent_start(mechanism, float(time))
-    state = State(*(jnp.asarray(part[..., 0]) for part in start.state))
+    state: State | CountedState = State(*(jnp.asarray(part[..., 0]) for part in start.state))
+    if angles := measured(start.equations, start.state):
+        known = tuple(part[..., 0] for part in angles)
+        state = CountedState(state.position, state.attitude, state.velocity, state.spin, known)
     return OrdinaryEquation(diffrax.ODETerm(state_rates), state, start.equations, mechanism, start)
+
+
+class CountedState(NamedTuple):
+    """A state with the angles about axes that forces measure: positions tell them up to whole turns.
+
+    Attributes
+    ----------
+    position, attitude, velocity, spin : array of shape (components, bodies)
+        As in `State`.
+    angles : tuple of array of shape (instances,)
+        rad; carried along by their rates, they need to be right to within half a turn only.
+    """
+
+    position: Any
+    attitude: Any
+    velocity: Any
+    spin: Any
+    angles: tuple[Any, ...]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -81,8 +105,8 @@ class OrdinaryEquation:
     ----------
     term : diffrax.ODETerm
         Its `args` are the equations of motion.
-    state : State
-        To start from: arrays of shape (components, bodies).
+    state : State or CountedState
+        To start from: arrays of shape (components, bodies); with angles where forces in space measure some.
     equations : Equations
         To pass as ``args``: a pytree of masses, lengths and the rest, to differentiate by or to change.
     mechanism : Mechanism
@@ -90,12 +114,12 @@ class OrdinaryEquation:
     """
 
     term: Any
-    state: State
+    state: State | CountedState
     equations: Equations
     mechanism: Mechanism
     start: Start
 
-    def motion(self, time: Any, states: State, order: int = 4) -> Simulation:
+    def motion(self, time: Any, states: State | CountedState, order: int = 4) -> Simulation:
         """Return what a solver gives at instants as a motion, with derivatives of any order.
 
         They follow from the equations of motion at the states, which are put back onto the constraints.
@@ -104,29 +128,43 @@ class OrdinaryEquation:
         ----------
         time : array of shape (time,)
             ``solution.ts``, s.
-        states : State
+        states : State or CountedState
             ``solution.ys``: arrays of shape (time, components, bodies).
         order : int, default 4
             Highest derivative of the outputs.
         """
         instants = np.asarray(time, float)
-        polynomial = State(*(np.asarray(part)[:, None] for part in states))
-        track = Track(instants, np.zeros_like(instants), polynomial, np.full(len(instants), -1))
+        polynomial = State(*(np.asarray(part)[:, None] for part in states[:4]))
+        angles = tuple(np.asarray(part) for part in states.angles) if isinstance(states, CountedState) else ()
+        track = Track(instants, np.zeros_like(instants), polynomial, np.full(len(instants), -1), angles)
         return Simulation(self.mechanism, self.start, track, instants, order)
 
 
-def state_rates(time: Any, state: State, equations: Equations) -> State:
+def state_rates(time: Any, state: Any, equations: Equations) -> Any:
     """Return the rate of a state, arrays of shape (components, bodies): ``f(t, y, args)``.
 
     Parameters
     ----------
     time : float
         s.
-    state : State
+    state : State or CountedState
         Positions and velocities.
     equations : Equations
         Of the mechanism.
     """
+    if isinstance(state, CountedState):
+        equations = equations.near(tuple(part[..., None] for part in state.angles))
+    rate, moving = _rates(time, State(*state[:4]), equations)
+    if not isinstance(state, CountedState):
+        return rate
+    pose, clock = equations.pose(moving), Jet.variable(jnp.reshape(jnp.asarray(time, float), (1, 1)), 1)
+    measuring = [group for group in equations.system.forces if measures_angle(group)]
+    turning = (group.velocity(pose, clock).coefficients[0][0, :, 0] for group in measuring)
+    return CountedState(*rate, tuple(turning))
+
+
+def _rates(time: Any, state: State, equations: Equations) -> tuple[State, State]:
+    """Return the rate of a state, and the state with Euler parameters of unit length, a batch of one."""
     state = state.map(lambda part: part[..., None])
     state = state._replace(attitude=normalised(state.attitude))
     clock = jnp.reshape(jnp.asarray(time, float), (1, 1))
@@ -137,4 +175,4 @@ def state_rates(time: Any, state: State, equations: Equations) -> State:
     column = -factor.solve(jnp.concatenate([equations.flat(forces), second]))[:columns]
     acceleration, shifts = equations.bodies(column), equations.pose_type.shifts
     rate = State(state.velocity, attitude_rate, acceleration[:shifts], acceleration[shifts:])
-    return jax.tree.map(lambda part: part[..., 0], rate)
+    return jax.tree.map(lambda part: part[..., 0], rate), state

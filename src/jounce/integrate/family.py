@@ -1,7 +1,8 @@
 """One mechanism with many values of its parameters: the equations of motion and the starts of all runs of a batch."""
 
 import dataclasses
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -12,13 +13,30 @@ from jounce.constraints.base import value_fields
 from jounce.dynamics.energies import gravity_of, masses_of
 from jounce.dynamics.forward import Equations, State
 from jounce.dynamics.start import start, with_rates
+from jounce.integrate.events import pose_coordinates
 from jounce.integrate.projection import projected
+from jounce.jet import Jet
 from jounce.kinematics.compilation import compiled
 from jounce.mechanism import Mechanism, Model, build
 from jounce.mechanism.builder import starting_guess
-from jounce.mechanism.system import POSITION_COMPONENTS
+from jounce.mechanism.datums import counted_on, measures_angle, raw_angles
+from jounce.mechanism.system import POSITION_COMPONENTS, Group
 
 STAGES = 8  # in which parameters go from those of the first run to their own, so that positions follow
+LARGEST_STAGE = 0.5  # rad, by which a driver may turn in a stage: angles about axes count their turns on the way
+
+
+class Turns(NamedTuple):
+    """Angles about axes that forces and outputs measure at the start of runs, with their turns, rad.
+
+    Attributes
+    ----------
+    forces, outputs : tuple of array of shape (instances, runs)
+        For each group that measures some.
+    """
+
+    forces: tuple[np.ndarray, ...]
+    outputs: tuple[np.ndarray, ...]
 
 
 class Family:
@@ -116,27 +134,55 @@ class Starts:
     """
 
     def __init__(self, family: Family, begun: Family, state: State, rows: np.ndarray, instant: float):
-        self._begun, self._state, self._instant = begun, state, instant
+        self._family, self._begun, self._state, self._instant = family, begun, state, instant
         self._own: State | None = None
         equations, coordinates = begun.model.system.cells.shape
         if equations < coordinates and family.guesses_differ(rows):
-            own = [start(family.varied(row), instant).state for row in rows.tolist()]
-            self._own = State(*(np.concatenate(parts, axis=-1) for parts in zip(*own, strict=True)))
+            own = [start(family.varied(row), instant) for row in rows.tolist()]
+            self._own = State(*(np.concatenate(parts, axis=-1) for parts in zip(*(s.state for s in own), strict=True)))
+            found = [_turns_of(s.model.system.forces, s.model.system.outputs) for s in own]
+            self._turns = jax.tree.map(lambda *xs: np.concatenate(xs, axis=-1), *found)
             return
-        change = (rows - rows[0]) / STAGES
-        self._stages = [begun.of(rows[0] + stage * change) for stage in range(1, STAGES)] + [begun.of(rows)]
+        self._made, last = family.of(rows), begun.of(rows)
+        count = max(STAGES, int(np.ceil(self._turned(last, len(rows)) / LARGEST_STAGE)))
+        change = (rows - rows[0]) / count
+        self._stages = [begun.of(rows[0] + stage * change) for stage in range(1, count)] + [last]
 
-    def of(self, runs: np.ndarray) -> State:
-        """Return the states of some runs."""
+    def _turned(self, made: tuple[Equations, Any], count: int) -> float:
+        """Return by how much drivers of angles about axes turn from the first run to another at most, rad."""
+        clock, largest = Jet([np.full((1, 1), self._instant)]), 0.0
+        for group in filter(measures_angle, made[0].system.groups):
+            law = np.asarray(group.element.motion(clock).coefficients[0])
+            law = np.broadcast_to(law, (group.instances, count))
+            largest = max(largest, float(np.max(np.abs(law - law[:, :1]))))
+        return largest if np.isfinite(largest) else 0.0
+
+    def of(self, runs: np.ndarray) -> tuple[State, Turns]:
+        """Return the states of some runs, and the angles about axes there."""
         if self._own is not None:
-            return State(*(part[..., runs] for part in self._own))
+            return State(*(part[..., runs] for part in self._own)), jax.tree.map(lambda x: x[..., runs], self._turns)
+        equations, outputs = self._family.picked(self._made, runs)
+        measuring = [group for group in (*equations.system.forces, *outputs) if measures_angle(group)]
+        angles = [np.asarray(group.element.datum.near) for group in measuring]
         clock = np.full((1, len(runs)), self._instant)
         still = self._state._replace(velocity=np.zeros_like(self._state.velocity), spin=np.zeros_like(self._state.spin))
         state = State(*(np.repeat(np.asarray(part), len(runs), axis=-1) for part in still))
         stages = [self._begun.picked(made, runs)[0] for made in self._stages]
-        for equations in stages:
-            state = _followed(equations, state, clock)
-        return jax.tree.map(np.asarray, with_rates(stages[-1], state, clock))
+        for stage in stages:
+            state = _followed(stage, state, clock)
+            if measuring:
+                coordinates = pose_coordinates(State(*(np.asarray(part)[None] for part in state)))
+                raw = raw_angles(measuring, {"quaternion": coordinates["quaternion"][0]})
+                angles = [counted_on(near, angle[..., None])[..., 0] for near, angle in zip(angles, raw, strict=True)]
+        count = len([group for group in equations.system.forces if measures_angle(group)])
+        turns = Turns(tuple(angles[:count]), tuple(angles[count:]))
+        return jax.tree.map(np.asarray, with_rates(stages[-1], state, clock)), turns
+
+
+def _turns_of(forces: Sequence[Group], outputs: Sequence[Group]) -> Turns:
+    """Return the angles about axes that groups count from."""
+    parts = ([np.asarray(g.element.datum.near) for g in part if measures_angle(g)] for part in (forces, outputs))
+    return Turns(*map(tuple, parts))
 
 
 @compiled()

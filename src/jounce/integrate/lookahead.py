@@ -16,7 +16,9 @@ from jounce.dynamics.forward import Equations, State, grounded
 from jounce.dynamics.outputs import is_turning
 from jounce.integrate.events import INTERPOLATION, NODES
 from jounce.integrate.methods import evaluated
+from jounce.integrate.turns import Angles
 from jounce.jet import Jet
+from jounce.mechanism.datums import with_turns
 from jounce.mechanism.system import Group
 
 POINTS = 32  # at which each step is looked at
@@ -65,7 +67,9 @@ def watched_names(model: Any) -> list[str]:
     return [f"forces.{name}" for members in model.forces for name in members] + list(model.drivers)
 
 
-def looked_ahead(equations: Equations, path: State, mobility: Any, time: Any, step: Any, span: Any, bound: Any) -> Look:
+def looked_ahead(
+    equations: Equations, path: State, angles: Angles, mobility: Any, time: Any, step: Any, span: Any, bound: Any
+) -> Look:
     """Return how far a step may go so that no force and no motion law on its way stays unseen.
 
     Parameters
@@ -74,6 +78,8 @@ def looked_ahead(equations: Equations, path: State, mobility: Any, time: Any, st
         Of the mechanism.
     path : State
         Polynomials of the step in the time from its beginning, (order + 1, components, bodies, batch).
+    angles : Angles
+        That forces measure along it.
     mobility : array of shape (bodies, batch)
         As `mobility_of` gives it.
     time, step : array of shape (batch,)
@@ -87,7 +93,7 @@ def looked_ahead(equations: Equations, path: State, mobility: Any, time: Any, st
     blank = jnp.full(step.shape, -1)
     if not equations.system.forces and not groups:
         return Look(step, jnp.ones(step.shape, bool), blank, blank)
-    signals = _Signals(equations, path, time, groups)
+    signals = _Signals(equations, path, angles, time, groups)
     bound, shortest = jnp.maximum(bound, HARMLESS), SHORTEST * jnp.maximum(span, jnp.abs(time))
 
     def seen(part: Any) -> Look:
@@ -123,11 +129,12 @@ def looked_ahead(equations: Equations, path: State, mobility: Any, time: Any, st
 class _Signals:
     """Forces and motion laws of a mechanism along the path of a step; arrays have the instances and the batch last."""
 
-    def __init__(self, equations: Equations, path: State, time: Any, drivers: tuple[Group, ...]):
+    def __init__(self, equations: Equations, path: State, angles: Angles, time: Any, drivers: tuple[Group, ...]):
         forces = equations.system.forces
         bodies = sorted({body for group in forces for slot in group.bodies for body in slot} - {0})
         places = {body: k for k, body in enumerate([0, *bodies])}
         self._equations, self._time, self._drivers, self._given = equations, time, drivers, forces
+        self._angles = angles
         self._forces = [
             Group(group.element, tuple(tuple(places[body] for body in slot) for slot in group.bodies))
             for group in forces
@@ -191,7 +198,8 @@ class _Signals:
         if self._forces:
             state = evaluated(self._path, since).map(lambda part: part * (1.0 + shake * _signs(part.shape[:2])))
             pose = self._equations.pose(state)
-            parts += [group.force(pose, clock).coefficients[0] for group in self._forces]
+            forces = with_turns(self._forces, self._angles.at(since))
+            parts += [group.force(pose, clock).coefficients[0] for group in forces]
         for group in self._drivers:
             law = group.element.motion(clock).coefficients[0]
             parts.append(jnp.broadcast_to(law, (group.instances, lanes))[None])

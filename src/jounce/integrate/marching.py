@@ -10,6 +10,7 @@ from jounce.dynamics.forward import Equations, Expansion, State, expand
 from jounce.integrate.lookahead import HARMLESS, SHORTEST, Look, looked_ahead, mobility_of
 from jounce.integrate.methods import AbstractMethod, near_singular
 from jounce.integrate.projection import projected
+from jounce.integrate.turns import followed, measured
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.linear import DenseFactor
 
@@ -39,6 +40,7 @@ class Front(NamedTuple):
     mobility: Any  # how readily forces move the bodies here, as `mobility_of` gives it
     singular: Any  # whether the equations of motion are near to singular here
     blocked: Any  # index of the force or law over which no step is possible from here, or -1
+    angles: tuple[Any, ...]  # about axes, that forces measure here, with their turns, rad, as `measured` gives them
 
 
 class Steps(NamedTuple):
@@ -49,17 +51,23 @@ class Steps(NamedTuple):
     taken: Any  # whether it was accepted
     rough: Any  # index of a force or law that is not resolved over it, which is too short to matter, or -1
     polynomial: State  # coefficients in the time from the start, (steps, order + 1, components, bodies, batch)
+    angles: tuple[Any, ...]  # about axes, that forces measure at the start, (steps, instances, batch) each
 
 
 @compiled("order")
 def departed(equations: Equations, state: State, time: Any, *, order: int) -> Front:
-    """Return the start of runs from states on the constraints; `time` has the shape (batch,)."""
+    """Return the start of runs from states on the constraints; `time` has the shape (batch,).
+
+    Angles about axes have the turns of what they are near to in the equations.
+    """
+    angles = measured(equations, state)
+    equations = equations.near(angles)
     inverse = DenseFactor.of(equations.matrix(state, time[None])).inverse()
     expansion = _kept(expand(equations, state, time[None], order, inverse))
     outcome = jnp.where(_finite(expansion), int(Outcome.RUNNING), int(Outcome.LOST))
     none, nothing = jnp.full(time.shape, -1), jnp.zeros(time.shape)
     known = mobility_of(equations, inverse), near_singular(equations, inverse)
-    return Front(time, expansion, jnp.zeros(time.shape, int), outcome, nothing, time, *known, none)
+    return Front(time, expansion, jnp.zeros(time.shape, int), outcome, nothing, time, *known, none, angles)
 
 
 @compiled("count", "keep")
@@ -110,9 +118,10 @@ def march(
         start, reach, allowed = method.prepared(front.expansion, length, tolerance, front.singular)
         step = jnp.minimum(reach, jnp.minimum(longest, jnp.abs(left))) * 0.5 ** front.refused.astype(float)
         look = Look(jnp.sign(left) * step, jnp.ones(step.shape, bool), jnp.full(step.shape, -1), front.blocked)
+        angles = followed(equations, front.angles, start.state, look.step)
         if method.controlled:
             span, bound = jnp.abs(stop - front.begun), MARGIN * allowed
-            look = looked_ahead(equations, start.state, front.mobility, front.time, look.step, span, bound)
+            look = looked_ahead(equations, start.state, angles, front.mobility, front.time, look.step, span, bound)
         suspect = (look.rough >= 0) & (jnp.abs(look.step) < step) | (front.refused >= STUBBORN)
         step = jnp.abs(look.step)
         last = step >= 0.999 * jnp.abs(left)  # no sliver of a step at the end
@@ -122,9 +131,10 @@ def march(
         step = jnp.where(running, step, 0.0)
         time = jnp.where(running, time, front.time)
 
-        state = method.arrive(equations, start, front.time, step)
-        state, distance, inverse = projected(equations, state, time[None])
-        expansion = _kept(expand(equations, state, time[None], order, inverse))
+        there = equations.near(angles.at(step))
+        state = method.arrive(there, start, front.time, step)
+        state, distance, inverse = projected(there, state, time[None])
+        expansion = _kept(expand(there, state, time[None], order, inverse))
         error = method.error(start, expansion, step, length)
         good = _finite(expansion) & jnp.isfinite(distance) & (error <= MARGIN * allowed) & running & look.clear
         if method.controlled:
@@ -132,12 +142,13 @@ def march(
             good = good & ~(suspect & _lasting(kick, step, jnp.abs(stop - front.begun), MARGIN * allowed, front))
         tiny = jnp.abs(step) < SMALLEST_STEP * jnp.maximum(jnp.abs(front.time), jnp.abs(stop - front.time))
         polynomial = method.polynomial(start, expansion, step)
-        steps = Steps(front.time, step, good, look.rough, polynomial)
+        steps = Steps(front.time, step, good, look.rough, polynomial, front.angles)
         outcome = jnp.where(good & last, int(Outcome.ARRIVED), front.outcome)
         outcome = jnp.where(running & ~good & tiny, int(Outcome.COLLAPSED), outcome)
         drift, none = jnp.maximum(front.drift, distance), jnp.full(step.shape, -1)
         known = mobility_of(equations, inverse), near_singular(equations, inverse)
-        onwards = Front(time, expansion, jnp.zeros_like(front.refused), outcome, drift, front.begun, *known, none)
+        fresh, reached = jnp.zeros_like(front.refused), measured(there, state)
+        onwards = Front(time, expansion, fresh, outcome, drift, front.begun, *known, none, reached)
         blocked = jnp.where(look.clear, front.blocked, look.worst)
         refused = front._replace(refused=front.refused + 1, outcome=outcome, blocked=blocked)
         return jax.tree.map(lambda a, b: jnp.where(good, a, b), onwards, refused), steps

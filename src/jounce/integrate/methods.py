@@ -70,7 +70,10 @@ class AbstractMethod(eqx.Module):
 
     @abc.abstractmethod
     def arrive(self, equations: Equations, expansion: Expansion, time: Any, step: Any) -> State:
-        """Return the state at the end of a step, not yet on the constraints; `time` is that of its beginning."""
+        """Return the state at the end of a step, not yet on the constraints; `time` is that of its beginning.
+
+        Angles about axes that forces measure have, in the equations, the turns of the end of the step.
+        """
 
     @abc.abstractmethod
     def polynomial(self, start: Expansion, end: Expansion, step: Any) -> State:

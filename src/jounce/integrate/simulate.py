@@ -240,7 +240,8 @@ class _Run:
         whole = self.parts
         polynomial = State(*(np.concatenate(part) for part in zip(*(p.polynomial for p in whole), strict=True)))
         start, length = (np.concatenate(part) for part in ([p.start for p in whole], [p.length for p in whole]))
-        return Track(start, length, polynomial, np.concatenate([p.rough for p in whole]))
+        angles = tuple(np.concatenate(part) for part in zip(*(p.angles for p in whole), strict=True))
+        return Track(start, length, polynomial, np.concatenate([p.rough for p in whole]), angles)
 
     def go(self, instants: np.ndarray, progress: Callable[[int, int], None] | None) -> None:
         """March from the first to the last instant."""
@@ -257,7 +258,7 @@ class _Run:
             taken = np.flatnonzero(np.asarray(steps.taken)[: int(tried), 0])
             if len(taken):
                 some = jax.tree.map(lambda x, k=taken: np.asarray(x)[k][..., 0], steps)
-                self.parts.append(self._watch(Track(some.start, some.length, some.polynomial, some.rough)))
+                self.parts.append(self._watch(Track(some.start, some.length, some.polynomial, some.rough, some.angles)))
             if progress is not None:
                 progress(int(np.sum(sense * instants <= sense * float(front.time[0]))), len(instants))
         if not self.parts:
@@ -268,7 +269,8 @@ class _Run:
     def _stand(self, front: Front) -> None:
         """Keep the start as a step of no length."""
         polynomial = State(*(np.asarray(part)[None, ..., 0] for part in front.expansion.state))
-        self.parts.append(Track(np.asarray(front.time), np.zeros(1), polynomial, np.full(1, -1)))
+        angles = tuple(np.asarray(part).T for part in front.angles)
+        self.parts.append(Track(np.asarray(front.time), np.zeros(1), polynomial, np.full(1, -1), angles))
 
     def _watch(self, part: Track) -> Track:
         """Note the events in some steps; cut the steps at the first that is terminal."""
@@ -283,20 +285,23 @@ class _Run:
             if self.watches[which].event.terminal:
                 self.stopped_at = instant
                 length = np.append(part.length[:step], after)
-                polynomial = State(*(x[: step + 1] for x in part.polynomial))
-                return Track(part.start[: step + 1], length, polynomial, part.rough[: step + 1])
+                start, polynomial, rough, angles = jax.tree.map(
+                    lambda x, count=step + 1: x[:count], (part.start, part.polynomial, part.rough, part.angles)
+                )
+                return Track(start, length, polynomial, rough, angles)
         return part
 
     def _explained(self, front: Front) -> tuple[Status, str]:
         """Return why steps did not go on, and where to look: a force that is not finite, or the most urgent body."""
         series, time = front.expansion.state, float(front.time[0])
+        here = self.start._replace(equations=self.start.equations.near(front.angles))
         onwards = self.sense * AHEAD * max(abs(time), abs(time - float(front.begun[0])))
         ahead = evaluated(series, np.array([onwards]))
         for state, instant in ((State(*(part[0] for part in series)), time), (ahead, time + onwards)):
             finite = all(np.isfinite(part).all() for part in state)
-            if finite and (names := _unfit(self.start, state, instant)):
+            if finite and (names := _unfit(here, state, instant)):
                 return Status.INADMISSIBLE, f"{names} at t = {instant:g} s"
-        if names := unfit_rates(self.start, pose_coordinates(series), time):
+        if names := unfit_rates(here, pose_coordinates(series), time):
             return Status.INADMISSIBLE, f"a derivative of {names} at t = {time:g} s"
         if (blocked := int(front.blocked[0])) >= 0:
             return Status.COLLAPSED, f"{watched_names(self.start.model)[blocked]} at t = {time:g} s"

@@ -15,10 +15,13 @@ from jounce.integrate.events import NODES, at_nodes, counted_on, pose_coordinate
 from jounce.integrate.lookahead import watched_names
 from jounce.integrate.methods import evaluated
 from jounce.integrate.projection import projected
+from jounce.integrate.turns import followed, measured
 from jounce.jet import Jet, dot
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.compilation import compiled
 from jounce.mechanism import Mechanism
+from jounce.mechanism.datums import with_turns
+from jounce.mechanism.system import Group
 
 SMALL_BATCH, LARGE_BATCH = 16, 64  # instants expanded together
 MUCH_LONGER = (
@@ -39,12 +42,15 @@ class Track:
         Coefficients in the time from the start, (steps, order + 1, components, bodies).
     rough : array of int, shape (steps,)
         Index of a force or law that is not resolved over a step, which is too short to matter, or -1: `watched_names`.
+    angles : tuple of array of shape (steps, instances)
+        About axes at the start, rad, for each group of forces that measures some.
     """
 
     start: np.ndarray
     length: np.ndarray
     polynomial: State
     rough: np.ndarray
+    angles: tuple[np.ndarray, ...] = ()
 
     @property
     def end(self) -> float:
@@ -89,13 +95,10 @@ class Simulation(Motion):
         self._ending = ending
         lost = max((output.lost_orders for output in mechanism.outputs.values()), default=0)
         reached, chosen = _steps_of(track, instants)
-        state = _at(start.equations, track, instants, chosen, order + max(lost, 1))
+        state, self._angles = _at(start.equations, track, instants, chosen, order + max(lost, 1))
         pose_type = start.model.pose_type
         coordinates = pose_coordinates(state)
-        groups = tuple(
-            self._continued(group, series_of(group, coordinates, pose_type), instants, chosen)
-            for group in start.model.system.outputs
-        )
+        groups = tuple(self._series(group, coordinates, pose_type, instants) for group in start.model.system.outputs)
         status = np.where(reached, int(Status.OK), int(Status.NOT_REACHED))
         culprits = {}
         lost = reached & ~np.all([np.isfinite(p).all(axis=tuple(range(p.ndim - 1))) for p in state], axis=0)
@@ -166,9 +169,18 @@ class Simulation(Motion):
         """Kinetic energy, J, shape (time,)."""
         return self._checked(2)
 
-    def _continued(self, group: Any, series: np.ndarray, instants: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+    @cached_property
+    def forces(self) -> tuple[Group, ...]:
+        """The applied forces, in the groups of the model, with the turns of angles about axes at every instant."""
+        return with_turns(self.model.system.forces, self._angles)
+
+    def _coefficients(self, group: Group) -> np.ndarray:
+        pose_type, coordinates = self.poses
+        return self._series(group, coordinates, pose_type, self.time)
+
+    def _series(self, group: Group, coordinates: dict[str, Any], pose_type: type, instants: np.ndarray) -> np.ndarray:
         """Return the series of outputs at instants; angles known up to whole turns go on from step to step."""
-        track = self.track
+        series, track = series_of(group, coordinates, pose_type), self.track
         if not group.element.turning or not track.length.any():  # no steps: states that another solver gave
             return continuous(group, series, instants)
         nodes = (track.start[:, None] + track.length[:, None] * NODES).ravel()
@@ -183,7 +195,8 @@ class Simulation(Motion):
     def _checked(self, which: int) -> np.ndarray:
         pose_type, coordinates = self.poses
         low = {name: values[: 2 - (name == "angular_velocity")] for name, values in coordinates.items()}
-        found = np.asarray(_checks(self._start.equations, low, self.time[None], pose_type)[which])
+        equations = self._start.equations.near(self._angles)
+        found = np.asarray(_checks(equations, low, self.time[None], pose_type)[which])
         return np.where(self.status == Status.OK, found, np.nan)
 
 
@@ -196,8 +209,8 @@ def _steps_of(track: Track, instants: np.ndarray) -> tuple[np.ndarray, np.ndarra
     return reached, np.clip(chosen, 0, len(track.start) - 1)
 
 
-def _at(equations: Equations, track: Track, instants: np.ndarray, chosen: np.ndarray, order: int) -> State:
-    """Return the Taylor coefficients of the motion at instants, order first and the instants last."""
+def _at(equations: Equations, track: Track, instants: np.ndarray, chosen: np.ndarray, order: int) -> Any:
+    """Return the Taylor coefficients of the motion at instants, order first and the instants last, and its angles."""
     count = len(instants)
     width = SMALL_BATCH if count <= SMALL_BATCH else LARGE_BATCH
     parts = []
@@ -205,16 +218,23 @@ def _at(equations: Equations, track: Track, instants: np.ndarray, chosen: np.nda
         lanes = np.minimum(np.arange(first, first + width), count - 1)
         steps = chosen[lanes]
         polynomial = State(*(np.moveaxis(part[steps], 0, -1) for part in track.polynomial))
-        state = expanded(equations, polynomial, instants[lanes] - track.start[steps], instants[lanes], order=order)
-        parts.append(jax.tree.map(np.asarray, state))
+        begun = equations.near(tuple(part[steps].T for part in track.angles))
+        found = expanded(begun, polynomial, instants[lanes] - track.start[steps], instants[lanes], order=order)
+        parts.append(jax.tree.map(np.asarray, found))
     return jax.tree.map(lambda *xs: np.concatenate(xs, axis=-1)[..., :count], *parts)
 
 
 @compiled("order")
-def expanded(equations: Equations, polynomial: State, step: Any, instants: Any, *, order: int) -> State:
-    """Return the Taylor coefficients of the motion at instants a time `step` into steps, from the equations there."""
-    state, _, inverse = projected(equations, evaluated(polynomial, step), instants[None])
-    return expand(equations, state, instants[None], order, inverse).state
+def expanded(equations: Equations, polynomial: State, step: Any, instants: Any, *, order: int) -> Any:
+    """Return the Taylor coefficients of the motion at instants a time `step` into steps, from the equations there.
+
+    Angles about axes that forces measure are, in the equations, those at the beginnings of the steps; those at the
+    instants are returned too, (instances, batch) for each group.
+    """
+    begun = measured(equations, State(*(part[0] for part in polynomial)))
+    there = equations.near(followed(equations, begun, polynomial, step).at(step))
+    state, _, inverse = projected(there, evaluated(polynomial, step), instants[None])
+    return expand(there, state, instants[None], order, inverse).state, measured(there, state)
 
 
 def continuous(group: Any, series: np.ndarray, instants: np.ndarray) -> np.ndarray:

@@ -13,6 +13,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jounce.constraints.angles import brought_near
 from jounce.jet import Jet
 from jounce.jet.algebra import total
 from jounce.kinematics.compilation import compiled
@@ -126,11 +127,6 @@ def differentiated(system: System, pose: Any, factor: DenseFactor, time: Jet) ->
         pose = pose.extended(*system.coordinates(factor.solve(right), pose.shifts))
         pose = jax.lax.optimization_barrier(pose)  # or XLA computes it again in everything that uses it
     return pose
-
-
-def _continued(jet: Jet, expected: Any) -> Jet:
-    """Shift an angle by the whole turns that bring it nearest to the one expected."""
-    return jet + 2 * jnp.pi * jnp.round((expected - jet.coefficients[0]) / (2 * jnp.pi))
 
 
 def _departures(system: System, pose: Any, predicted: Any) -> Any:
@@ -290,7 +286,8 @@ def advance(
         result = group.evaluate(pose)
         if group.element.turning:
             expected = next(known)
-            result = _continued(result, Jet(tuple(jnp.where(jnp.isfinite(expected), expected, 0.0))).evaluate(step))
+            expected = Jet(tuple(jnp.where(jnp.isfinite(expected), expected, 0.0)))
+            result = brought_near(result, expected.evaluate(step))
         results.append(jnp.stack(result.dense().coefficients))
     reached = pose.coordinates()
     departures = _departures(system, pose, predicted)

@@ -142,9 +142,15 @@ def _turned(model: Model, instant: float, tolerance: float) -> tuple[Model, dict
     found = course(model, lag, begin.coordinates, moved, _row_scale)
     if found is None:
         return model, None
-    outputs = with_angles(with_datums(model.system.outputs, found.coordinates), found.angles)
-    system = dataclasses.replace(model.system, outputs=outputs)
-    return dataclasses.replace(model, system=system), found.coordinates
+    if found.way is not None:
+        forces, outputs = (
+            with_angles(with_datums(part, found.coordinates), found.way.last_angles(part))
+            for part in (model.system.forces, model.system.outputs)
+        )
+        model = dataclasses.replace(
+            model, system=dataclasses.replace(model.system, forces=forces, outputs=outputs), way=found.way
+        )
+    return model, found.coordinates
 
 
 def _lag(model: Model, instant: float) -> Lag | None:

@@ -20,7 +20,8 @@ from jounce.mechanism import (
     Model,
     PointOutput,
 )
-from jounce.mechanism.datums import with_datums
+from jounce.mechanism.builder import placed
+from jounce.mechanism.datums import Way
 from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.system import POSITION_COMPONENTS, Group, group_elements
 
@@ -48,12 +49,12 @@ def check_output(output: Any, mechanism: Mechanism, name: str = "output") -> Non
 def output_group(output: Any, mechanism: Mechanism, model: Model | None = None, name: str = "output") -> Group:
     """Return an output of poses as a group of one, which acts on the pose of all bodies.
 
-    With a model, angles about axes are counted from the position in which it was put together.
+    With a model, angles about axes are counted as those of the outputs that it was put together with.
     """
     index = {body: k for k, body in enumerate((GROUND, *mechanism.bodies))}
     components = POSITION_COMPONENTS[mechanism.space]
     groups, _ = group_elements({name: output}, mechanism.parameter_values, index, components)
-    (group,) = groups if model is None else with_datums(groups, model.reference, model.turnings)
+    (group,) = groups if model is None else placed(groups, model)
     return group
 
 
@@ -89,12 +90,13 @@ class Motion:
         status: np.ndarray,
         culprits: dict[int, str],
         change_points: np.ndarray | None = None,
+        way: Way | None = None,
     ):
         self.mechanism, self.time, self.order, self.status = mechanism, time, order, status
         self.culprits = culprits
         self.change_points = np.zeros(0) if change_points is None else change_points
         self.derived: dict[str, Any] = {}
-        self._model = model
+        self._model, self._way = model, way
         self._coordinates, groups = state
         self._groups = dict(zip(model.outputs, groups, strict=True))
 
@@ -107,6 +109,11 @@ class Motion:
     def poses(self) -> tuple[type, dict[str, Any]]:
         """Type of the poses of all bodies, the ground first, and Taylor coefficients of their coordinates by name."""
         return self._model.pose_type, self._coordinates
+
+    @cached_property
+    def forces(self) -> tuple[Group, ...]:
+        """The applied forces, in the groups of the model, with the turns of angles about axes at every instant."""
+        return self._counting(self._model.system.forces)
 
     def __repr__(self) -> str:
         solved = int(np.sum(self.status == Status.OK))
@@ -184,9 +191,16 @@ class Motion:
         check_output(output, self.mechanism, name)
         if isinstance(output, AbstractMotionOutput):
             return self._labelled(name, self._derivatives(output.coefficients(self)), output.unit)
-        group = output_group(output, self.mechanism, self._model, name)
-        values = np.asarray(_evaluated(group, self._coordinates, self._model.pose_type))[:, :, 0]
+        values = self._coefficients(output_group(output, self.mechanism, self._model, name))[:, :, 0]
         return self._labelled(name, self._derivatives(values), output.unit)
+
+    def _coefficients(self, group: Group) -> np.ndarray:
+        """Return the Taylor coefficients of outputs, (order + 1, components, instances, time)."""
+        (group,) = self._counting((group,))
+        return np.asarray(_evaluated(group, self._coordinates, self._model.pose_type))
+
+    def _counting(self, groups: tuple[Group, ...]) -> tuple[Group, ...]:
+        return groups if self._way is None else self._way.counting(groups, self.time)
 
     def _derivatives(self, coefficients: np.ndarray) -> np.ndarray:
         """Turn Taylor coefficients (order, component, time) into derivatives (time, derivative[, component])."""

@@ -17,6 +17,7 @@ import numpy as np
 from jounce.kinematics.advance import SAFE_FRACTION, Arrival, advance
 from jounce.kinematics.status import Status
 from jounce.mechanism import Model
+from jounce.mechanism.datums import Way
 
 PASSABLE = (Status.OK, Status.UNDEFINED)
 SMALLEST_STEP = 1e-10  # of the span
@@ -26,6 +27,7 @@ PASSAGE_ORDER = 4  # of the series that leads through: rounding spoils higher de
 PASSAGE_DEVIATION = 1e-8  # from that series, as a part of the way: two branches a gap of g apart deviate by (g / way)^2
 NEARLY_SINGULAR = 1e-6  # of the span: a motion that ends so short before a singular position ends at it
 NEARBY = 0.1  # radii: a singular position nearer than this spoils high derivatives, if the motion is smooth there
+PLACES = 8  # in each step at which attitudes are looked at for turns: nowhere between them a body turns by half a turn
 SMALL_BATCH, LARGE_BATCH = 16, 512  # lanes; a batch width compiles once, so a short grid uses one, and so do anchors
 
 
@@ -146,6 +148,21 @@ class Track:
     status: Status = Status.OK
     ended_at: float = np.inf
     culprit: str = ""
+
+    def way(self) -> Way | None:
+        """Return the attitudes of all bodies in space along the motion: at the anchors, and by their series beyond."""
+        if "quaternion" not in self.anchors[0].state[0]:
+            return None
+        times = np.array([anchor.instant for anchor in self.anchors])
+        series = np.concatenate([anchor.state[0]["quaternion"] for anchor in self.anchors], axis=-1)[..., None]
+        series = np.where(np.isfinite(series), series, 0.0)
+        since = np.diff(times, append=times[-1])[:, None] * (np.arange(PLACES) / PLACES)
+        place = np.zeros((*series.shape[1:-1], PLACES))
+        for coefficient in series[::-1]:
+            place = place * since + coefficient
+        count = (len(times) - 1) * PLACES + 1  # the last anchor is the end
+        place = place.reshape(*place.shape[:2], -1)[..., :count]
+        return Way(place, (times[:, None] + since).ravel()[:count])
 
     def singular_positions_outside(self) -> list[ChangePoint]:
         """Return where the motion would be singular just before its start or after its end, and smooth all the same."""

@@ -95,7 +95,8 @@ def solve(
     grid = Grid(solver, track, instants)
     grid.solve(progress)
     change_points = np.array([point.instant for point in track.change_points])
-    motion = Motion(mechanism, model, instants, order, grid.state, grid.status, grid.culprits, change_points)
+    found = (grid.state, grid.status, grid.culprits)
+    motion = Motion(mechanism, model, instants, order, *found, change_points, track.way())
     if strict:
         raise_for_status(motion)
     return motion

@@ -14,11 +14,12 @@ import numpy as np
 from jounce.constraints.angles import principal
 from jounce.mechanism import Model
 from jounce.mechanism.builder import referred
-from jounce.mechanism.datums import measures_angle, raw_angles
+from jounce.mechanism.datums import Way, measures_angle
 
 STEPS_A_TURN = 64
 MOST_TURNS = 4  # followed one by one; beyond, each further turn does what the last one did
 CORRECTIONS = 8
+MOST_FOLLOWED = 100  # where they do not, as those of drivers that turn unlike each other
 SMALLEST_PERIOD, LARGEST_PERIOD = 1, 60  # whole turns, among which those are sought that leave coupled bodies coupled
 
 
@@ -78,12 +79,12 @@ class Course(NamedTuple):
     ----------
     coordinates : dict of str to array
         Of all bodies, with the turns of planar ones.
-    angles : list of array
-        Of each group of outputs that measures an angle about an axis, with its turns.
+    way : Way, optional
+        In space, from the guess to there: angles about axes count their turns along it.
     """
 
     coordinates: dict[str, np.ndarray]
-    angles: list[np.ndarray]
+    way: Way | None
 
 
 def course(
@@ -107,18 +108,28 @@ def course(
     turns, skipped = lag.angle / (2 * np.pi), 0
     if turns > MOST_TURNS:
         skipped = int(turns) - MOST_TURNS + 1
-    left = np.arange(0, (turns - skipped) * STEPS_A_TURN)[::-1] / (STEPS_A_TURN * turns)
-    states = [Course(start, raw_angles(model.system.outputs, start))]
+    left = np.arange(0, turns * STEPS_A_TURN)[::-1] / (STEPS_A_TURN * turns)
+    states, last = [start], None
     increment = np.zeros(model.system.cells.shape[1])
-    for part in left + (skipped / turns if skipped else 0.0):
-        found = _corrected(states[-1].coordinates, increment, lambda r, p=part: lag.open(r, p), moved, scale_of)
+    for count, part in enumerate(left):
+        if skipped and count == len(left) - skipped * STEPS_A_TURN:
+            last = _repeated(states, skipped)
+            if last is not None:
+                break
+            if turns > MOST_FOLLOWED:
+                return None
+            skipped = 0  # drivers that turn unlike each other: no turn is like the last
+        found = _corrected(states[-1], increment, lambda r, p=part: lag.open(r, p), moved, scale_of)
         if found is None:
             return None
         coordinates, increment = found
-        raw = raw_angles(model.system.outputs, coordinates)
-        angles = [old + principal(new - old) for old, new in zip(states[-1].angles, raw, strict=True)]
-        states.append(Course(coordinates, angles))
-    return _repeated(states, skipped) if skipped else states[-1]
+        states.append(coordinates)
+    last = states[-1] if last is None else last
+    if "quaternion" not in last:
+        return Course(last, None)
+    places = [np.asarray(place["quaternion"]) for place in (model.guess, *states)]
+    way = Way(np.concatenate(places, axis=-1), np.zeros(len(places)), STEPS_A_TURN, skipped)
+    return Course(last, way)
 
 
 def _corrected(coordinates: Any, increment: Any, opened: Any, moved: Any, scale_of: Any) -> Any:
@@ -139,21 +150,19 @@ def _corrected(coordinates: Any, increment: Any, opened: Any, moved: Any, scale_
     return None
 
 
-def _repeated(states: list[Course], turns: int) -> Course | None:
+def _repeated(states: list[dict[str, np.ndarray]], turns: int) -> dict[str, np.ndarray] | None:
     """Return the end of a course after further turns, each like the last; None if that did not lead back."""
     before, after = states[-1 - STEPS_A_TURN], states[-1]
-    made = [(b, a) for b, a in zip(before.angles, after.angles, strict=True)]
-    if "angle" in after.coordinates:
-        made.append((before.coordinates["angle"], after.coordinates["angle"]))
-    for name, value in after.coordinates.items():
-        away = value - before.coordinates[name]
+    for name, value in after.items():
+        away = value - before[name]
         if name == "quaternion":
-            away = np.minimum(np.abs(away).max(axis=0), np.abs(value + before.coordinates[name]).max(axis=0))
+            away = np.minimum(np.abs(away).max(axis=0), np.abs(value + before[name]).max(axis=0))
         if np.max(np.abs(principal(away) if name == "angle" else away), initial=0.0) > 1e-6:
             return None
-    on = [a + turns * 2 * np.pi * np.round((a - b) / (2 * np.pi)) for b, a in made]
-    coordinates = {**after.coordinates, **({"angle": on.pop()} if "angle" in after.coordinates else {})}
-    return Course(coordinates, on)
+    if "angle" not in after:
+        return after
+    made = np.round((after["angle"] - before["angle"]) / (2 * np.pi))
+    return {**after, "angle": after["angle"] + turns * 2 * np.pi * made}
 
 
 def nearest_turns(guess: dict[str, Any], found: dict[str, Any], residual_at: Callable[[Any], np.ndarray]) -> Any:

@@ -14,7 +14,7 @@ from jax.core import Tracer
 from jounce.constraints.base import field_kind, value_fields
 from jounce.errors import JounceError
 from jounce.jet import Jet
-from jounce.mechanism.datums import Turning, departure, measures_angle, turnings_of, with_datums
+from jounce.mechanism.datums import Turning, Way, departure, measures_angle, turnings_of, with_angles, with_datums
 from jounce.mechanism.mechanism import GROUND, Body, Mechanism
 from jounce.mechanism.outputs import AbstractOutput
 from jounce.mechanism.resolve import check_value, resolve
@@ -57,6 +57,8 @@ class Model:
         Coordinates from which angles about axes are counted: those of the starting guess, until put together.
     turnings : tuple of Turning
         Angles that drivers prescribe there, with their whole turns.
+    way : Way, optional
+        In space, from the starting guess to where the drivers fulfil their laws, where that is more than half a turn.
     """
 
     system: System
@@ -70,6 +72,7 @@ class Model:
     length: float
     reference: dict[str, Any]
     turnings: tuple[Turning, ...] = ()
+    way: Way | None = None
 
 
 def build(mechanism: Mechanism, like: Model | None = None) -> Model:
@@ -138,6 +141,7 @@ def build(mechanism: Mechanism, like: Model | None = None) -> Model:
         length,
         guess if like is None else like.reference,
         () if like is None else like.turnings,
+        _way_of(guess) if like is None else like.way,
     )
 
 
@@ -170,6 +174,20 @@ def referred(
     system = dataclasses.replace(system, groups=groups, forces=forces, outputs=outputs)
     away = departure(model.system.groups, groups)
     return dataclasses.replace(model, system=system, reference=coordinates, turnings=turnings), away
+
+
+def _way_of(guess: dict[str, Any]) -> Way | None:
+    return Way(guess["quaternion"], np.zeros(1)) if "quaternion" in guess else None
+
+
+def placed(groups: tuple[Group, ...], model: Model) -> tuple[Group, ...]:
+    """Return groups with angles about axes counted as if they had been in the model when it was put together."""
+    if model.way is None or not any(map(measures_angle, groups)):
+        return groups
+    first, last = ({"quaternion": model.way.quaternion[..., place]} for place in (slice(1), slice(-1, None)))
+    groups = with_datums(groups, first)
+    groups = with_angles(with_datums(groups, last), model.way.last_angles(groups))
+    return with_datums(groups, model.reference, model.turnings)
 
 
 @jax.jit

@@ -30,6 +30,56 @@ class Turning(NamedTuple):
     angle: float
 
 
+class Way(NamedTuple):
+    """Attitudes that all bodies went through, so close to each other that no turn in between is lost.
+
+    Attributes
+    ----------
+    quaternion : array of shape (4, bodies, places)
+        The ground first.
+    time : array of shape (places,)
+        When, s; zeros where it was no motion.
+    period, repeated : int
+        The last places make a turn, of which so many more follow.
+    """
+
+    quaternion: np.ndarray
+    time: np.ndarray
+    period: int = 1
+    repeated: int = 0
+
+    def angles(self, groups: Sequence[Group]) -> list[np.ndarray]:
+        """Return the angles about axes that groups measure, (instances, places) each, counted on from their data."""
+        measuring = [group for group in groups if measures_angle(group)]
+        raw = raw_angles(measuring, {"quaternion": self.quaternion})
+        begun = [np.asarray(group.element.datum.near)[..., 0] for group in measuring]
+        return [counted_on(near, angle) for near, angle in zip(begun, raw, strict=True)]
+
+    def last_angles(self, groups: Sequence[Group]) -> list[np.ndarray]:
+        """Return the angles at the end of the way, (instances, 1) each, with the turns that are repeated."""
+        found = self.angles(groups)
+        if not self.repeated:
+            return [angle[:, -1:] for angle in found]
+        turns = [np.round((angle[:, -1:] - angle[:, -1 - self.period, None]) / (2 * np.pi)) for angle in found]
+        return [angle[:, -1:] + 2 * np.pi * self.repeated * n for angle, n in zip(found, turns, strict=True)]
+
+    def counting(self, groups: Sequence[Group], instants: np.ndarray) -> tuple[Group, ...]:
+        """Return groups that have the turns of each instant, from the place nearest to it in time."""
+        if not any(map(measures_angle, groups)):
+            return tuple(groups)
+        after = np.clip(np.searchsorted(self.time, instants), 1, max(len(self.time) - 1, 1))
+        before = np.minimum(after - 1, len(self.time) - 1)
+        after = np.minimum(after, len(self.time) - 1)
+        nearest = np.where(instants - self.time[before] <= self.time[after] - instants, before, after)
+        return with_turns(groups, [angle[:, nearest] for angle in self.angles(groups)])
+
+
+def counted_on(near: np.ndarray, angles: np.ndarray) -> np.ndarray:
+    """Return angles known up to whole turns, (..., places), counted on from one that is near to the first."""
+    steps = np.diff(angles, axis=-1, prepend=np.broadcast_to(near, angles.shape[:-1])[..., None])
+    return angles - 2 * np.pi * np.cumsum(np.round(steps / (2 * np.pi)), axis=-1)
+
+
 def measures_angle(group: Group) -> bool:
     """Tell whether the elements of a group measure an angle about an axis."""
     return hasattr(group.element, "datum")
@@ -57,7 +107,15 @@ def with_datums(
 
 
 def raw_angles(groups: Sequence[Group], coordinates: dict[str, Any]) -> list[np.ndarray]:
-    """Return the angles about axes that groups measure at a position, up to whole turns, (instances, 1) each."""
+    """Return the angles about axes that groups measure, up to whole turns, (instances, batch) each.
+
+    Parameters
+    ----------
+    groups : sequence of Group
+        Those that measure no such angle have no entry.
+    coordinates : dict of str to array
+        Of all bodies, the ground first, shape (..., bodies, batch).
+    """
     found = []
     for group in filter(measures_angle, groups):
         element, axis = group.element, axis_of(group)
@@ -72,9 +130,25 @@ def raw_angles(groups: Sequence[Group], coordinates: dict[str, Any]) -> list[np.
 def with_angles(groups: Sequence[Group], angles: Sequence[np.ndarray]) -> tuple[Group, ...]:
     """Return groups of which the data hold other angles, for those that measure one about an axis."""
     found = iter(angles)
+
+    def counted(group: Group) -> Group:
+        angle = next(found)
+        return _put(group, "datum", Datum(group.element.datum.attitude, angle, angle))
+
+    return tuple(counted(group) if measures_angle(group) else group for group in groups)
+
+
+def with_turns(groups: Sequence[Group], near: Sequence[Any]) -> tuple[Group, ...]:
+    """Return groups that measure angles about axes with the turns of these, (instances, batch) each; may be traced."""
+    found = iter(near)
     return tuple(
-        _put(g, "datum", Datum(g.element.datum.attitude, next(found))) if measures_angle(g) else g for g in groups
+        eqx.tree_at(lambda g: g.element.datum.near, g, next(found)) if measures_angle(g) else g for g in groups
     )
+
+
+def at_lanes(groups: Sequence[Group], lanes: np.ndarray) -> tuple[Group, ...]:
+    """Return groups whose angles about axes have the turns of a whole batch, for some of its lanes."""
+    return with_turns(groups, [g.element.datum.near[..., lanes] for g in groups if measures_angle(g)])
 
 
 def _with_datum(group: Group, coordinates: dict[str, Any], turnings: Sequence[Turning], *, keep: bool) -> Group:
@@ -95,7 +169,7 @@ def _with_datum(group: Group, coordinates: dict[str, Any], turnings: Sequence[Tu
             if sense:
                 expected = sense * turning.angle
                 angle[k] = expected + principal(angle[k] - expected)
-    group = _put(group, "datum", Datum(attitude, angle))
+    group = _put(group, "datum", Datum(attitude, angle, angle))
     if element.vector_i is None or not hasattr(element, "role"):
         return group
     # a driver or a force acts about the axis, wherever its vector on body j points beside it

@@ -1,0 +1,80 @@
+"""Turns of the angles about axes that forces measure, counted along the steps of a simulation.
+
+An attitude tells such an angle up to whole turns. Each step begins with the angle known, and follows it along the path
+at places so close to each other that no half turn lies between two of them.
+"""
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from jounce.dynamics.forward import Equations, State
+from jounce.integrate.methods import evaluated
+from jounce.jet import Jet
+from jounce.mechanism.datums import measures_angle
+
+PLACES = 16  # in a step: series carry over about one turn in it at most
+
+
+class Angles(NamedTuple):
+    """The angles that forces measure along a step.
+
+    Parameters
+    ----------
+    places : tuple of array of shape (places, instances, batch)
+        For each group of forces that measures an angle about an axis, at even parts of the step, rad.
+    step : array of shape (batch,)
+        s.
+    """
+
+    places: tuple[Any, ...]
+    step: Any
+
+    def at(self, since: Any) -> tuple[Any, ...]:
+        """Return the angles a time after the beginning, (instances, batch) each, to within half a turn."""
+        if not self.places:
+            return ()
+        share = jnp.clip(since / jnp.where(self.step == 0.0, 1.0, self.step), 0.0, 1.0)
+        away = jnp.abs(share[None] * PLACES - jnp.arange(PLACES + 1.0)[:, None])
+        weights = jnp.maximum(1.0 - away, 0.0)[:, None]
+        return tuple(jnp.sum(weights * angles, axis=0) for angles in self.places)
+
+
+def measured(equations: Equations, state: State) -> tuple[Any, ...]:
+    """Return the angles about axes that forces measure in a state, (instances, batch) each, rad.
+
+    They have the turns of what they are near to in the equations.
+    """
+    groups = [group for group in equations.system.forces if measures_angle(group)]
+    if not groups:
+        return ()
+    pose, clock = equations.still(state.position, state.attitude), Jet([jnp.zeros_like(state.position[:1, 0])])
+    shape = state.position.shape[-1:]
+    found = [group.displacement(pose, clock).coefficients[0][0] for group in groups]
+    return tuple(jnp.broadcast_to(angle, angle.shape[:1] + shape) for angle in found)
+
+
+def followed(equations: Equations, angles: tuple[Any, ...], path: State, step: Any) -> Angles:
+    """Return the angles along a step.
+
+    Parameters
+    ----------
+    equations : Equations
+        Of the mechanism.
+    angles : tuple of array of shape (instances, batch)
+        At the beginning.
+    path : State
+        Coefficients in the time from there, (order + 1, components, bodies, batch).
+    step : array of shape (batch,)
+        s.
+    """
+    if not angles:
+        return Angles((), step)
+
+    def onwards(near: Any, share: Any) -> tuple[Any, Any]:
+        found = measured(equations.near(near), evaluated(path, share * step))
+        return found, found
+
+    _, found = jax.lax.scan(onwards, angles, jnp.arange(1.0, PLACES + 1) / PLACES)
+    return Angles(tuple(jnp.concatenate([a[None], b]) for a, b in zip(angles, found, strict=True)), step)
