@@ -33,11 +33,14 @@ class Datum(eqx.Module):
     near : array of shape (...)
         The angle at the positions that are looked at, to within half a turn, rad: it tells the turns made since. That
         at the datum, unless a motion has been followed from there.
+    across : array of shape (3, ...), optional
+        Part of the second vector across the axis there, on body j, for what acts about the axis.
     """
 
     attitude: Any
     angle: Any
     near: Any
+    across: Any = None
 
 
 def perpendiculars(axis: Any) -> tuple[Any, Any]:
@@ -56,15 +59,17 @@ def relative_angle(
 ) -> Jet:
     """Return the angle in rad by which body j is turned about an axis of body i.
 
-    With vectors it is the signed angle from the first, on body i, to the second, on body j. Without, it is the angle at
-    the datum and the turn about the axis from there; where the axis does not stay in its direction on body j, the turn
-    left after the shortest tilt of the axis. Without a datum it is the angle of ``A_i^T A_j``, by ``2 atan2(u.e, e0)``
-    of the relative Euler parameters, which keeps the sign that Sommer 2024, equation 101, loses, and within half a turn
-    of zero. With a datum it has the turns of what the datum tells it to be near to.
+    With vectors it is the signed angle from the first, on body i, to the second, on body j, or to the part of it that
+    the datum keeps. Without, it is the angle at the datum and the turn about the axis from there; where the axis does
+    not stay in its direction on body j, the turn left after the shortest tilt of the axis. Without a datum it is the
+    angle of ``A_i^T A_j``, by ``2 atan2(u.e, e0)`` of the relative Euler parameters, which keeps the sign that Sommer
+    2024, equation 101, loses, and within half a turn of zero. With a datum it has the turns of what the datum tells it
+    to be near to.
     """
     axis = axis_i / length_of(axis_i)[None]
     if vector_i is not None:
-        angle = _between(body_i, body_j, axis, vector_i, vector_j)
+        second = vector_j if datum is None or datum.across is None else datum.across
+        angle = _between(body_i, body_j, axis, vector_i, second)
         return angle if datum is None else brought_near(angle, datum.near)
     turn = _turn(body_i, body_j, axis, datum)
     return wrap(turn, 2 * jnp.pi) if datum is None else brought_near(turn, datum.near - datum.angle) + datum.angle

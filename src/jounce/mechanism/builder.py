@@ -14,7 +14,16 @@ from jax.core import Tracer
 from jounce.constraints.base import field_kind, value_fields
 from jounce.errors import JounceError
 from jounce.jet import Jet
-from jounce.mechanism.datums import Turning, Way, departure, measures_angle, turnings_of, with_angles, with_datums
+from jounce.mechanism.datums import (
+    Turning,
+    Way,
+    departure,
+    measures_angle,
+    turnings_of,
+    with_angles,
+    with_datum_of,
+    with_datums,
+)
 from jounce.mechanism.mechanism import GROUND, Body, Mechanism
 from jounce.mechanism.outputs import AbstractOutput
 from jounce.mechanism.resolve import check_value, resolve
@@ -291,10 +300,7 @@ def _with_offsets(group: Group, pose_type: type, guess: dict[str, Any]) -> Group
 def _with_found_of(group: Group, known: Group) -> Group:
     """Take over what was not given, but found from a position, from a group that has it."""
     if measures_angle(group):
-        group = eqx.tree_at(lambda g: g.element.datum, group, known.element.datum, is_leaf=lambda x: x is None)
-        if group.element.vector_i is None or isinstance(group.element.vector_j, Tracer):
-            return group
-        return eqx.tree_at(lambda g: g.element.vector_j, group, known.element.vector_j)
+        return with_datum_of(group, known)
     if "offset" not in value_fields(type(group.element)) or group.element.offset is not None:
         return group
     return eqx.tree_at(lambda g: g.element.offset, group, known.element.offset, is_leaf=lambda x: x is None)

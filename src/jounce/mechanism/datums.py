@@ -116,15 +116,16 @@ def raw_angles(groups: Sequence[Group], coordinates: dict[str, Any]) -> list[np.
     coordinates : dict of str to array
         Of all bodies, the ground first, shape (..., bodies, batch).
     """
-    found = []
-    for group in filter(measures_angle, groups):
-        element, axis = group.element, axis_of(group)
-        attitude = relative_attitude(group, coordinates)
-        if element.vector_i is None:
-            found.append(since(element.datum, attitude, axis))
-        else:
-            found.append(_between(attitude, axis, np.asarray(element.vector_i), np.asarray(element.vector_j)))
-    return found
+    return [_raw_angle(group, relative_attitude(group, coordinates)) for group in filter(measures_angle, groups)]
+
+
+def _raw_angle(group: Group, attitude: np.ndarray) -> np.ndarray:
+    """Return the angles that a group measures at attitudes of its second bodies relative to the first."""
+    element, axis = group.element, axis_of(group)
+    if element.vector_i is None:
+        return since(element.datum, attitude, axis)
+    second = element.vector_j if element.datum.across is None else element.datum.across
+    return _between(attitude, axis, np.asarray(element.vector_i), np.asarray(second))
 
 
 def with_angles(groups: Sequence[Group], angles: Sequence[np.ndarray]) -> tuple[Group, ...]:
@@ -133,7 +134,7 @@ def with_angles(groups: Sequence[Group], angles: Sequence[np.ndarray]) -> tuple[
 
     def counted(group: Group) -> Group:
         angle = next(found)
-        return _put(group, "datum", Datum(group.element.datum.attitude, angle, angle))
+        return _put(group, "datum", Datum(group.element.datum.attitude, angle, angle, group.element.datum.across))
 
     return tuple(counted(group) if measures_angle(group) else group for group in groups)
 
@@ -169,21 +170,28 @@ def _with_datum(group: Group, coordinates: dict[str, Any], turnings: Sequence[Tu
             if sense:
                 expected = sense * turning.angle
                 angle[k] = expected + principal(angle[k] - expected)
-    group = _put(group, "datum", Datum(attitude, angle, angle))
-    if element.vector_i is None or not hasattr(element, "role"):
-        return group
     # a driver or a force acts about the axis, wherever its vector on body j points beside it
-    across, along = np.asarray(element.vector_j), _turned(_inverse(attitude), axis)
-    return _put(group, "vector_j", across - (across * along).sum(axis=0) * along)
+    acts = element.vector_i is not None and hasattr(element, "role")
+    across = _across(np.asarray(element.vector_j), attitude, axis) if acts else None
+    return _put(group, "datum", Datum(attitude, angle, angle, across))
+
+
+def with_datum_of(group: Group, known: Group) -> Group:
+    """Return a group with its angles counted from where those of another are; its own vectors may be traced by JAX."""
+    datum = known.element.datum
+    if datum.across is not None:
+        across = _across(group.element.vector_j, np.asarray(datum.attitude), axis_of(known))
+        datum = Datum(datum.attitude, datum.angle, datum.near, across)
+    return _put(group, "datum", datum)
 
 
 def departure(before: Sequence[Group], after: Sequence[Group]) -> float:
     """Return by how much the angles of drivers, and the directions of their axes, differ between two data, rad."""
     largest = 0.0
     for old, new in zip(before, after, strict=True):
-        if measures_angle(new) and new.element.vector_i is None:
+        if measures_angle(new):
             axis, attitude = axis_of(new), new.element.datum.attitude
-            angle = principal(since(old.element.datum, attitude, axis) - new.element.datum.angle)
+            angle = principal(_raw_angle(old, attitude) - new.element.datum.angle)
             turn = _product(attitude, _inverse(old.element.datum.attitude))[1:]
             tilt = turn - (turn * axis).sum(axis=0) * axis
             largest = max(largest, np.max(np.abs(angle)), np.max(np.abs(tilt)))
@@ -223,6 +231,12 @@ def _between(attitude: np.ndarray, axis: np.ndarray, first: np.ndarray, second: 
     b = _turned(attitude, second)
     across = b - (b * axis).sum(axis=0) * axis
     return np.arctan2((np.cross(axis, first, axis=0) * across).sum(axis=0), (first * across).sum(axis=0))
+
+
+def _across(second: Any, attitude: np.ndarray, axis: np.ndarray) -> Any:
+    """Return the part of vectors of bodies j across axes of bodies i."""
+    along = _turned(_inverse(attitude), axis)
+    return second - (second * along).sum(axis=0) * along
 
 
 def _sense(bodies: tuple[int, ...], axis: np.ndarray, turning: Turning) -> int:
