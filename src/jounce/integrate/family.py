@@ -65,7 +65,7 @@ class Family:
 
     def of(self, rows: np.ndarray) -> tuple[Equations, Any]:
         """Return equations of motion and outputs for values of the parameters, (runs, parameters)."""
-        if self._has_offsets_of_guess() and self.guesses_differ(rows):
+        if self._has_values_of_guess() and self.guesses_differ(rows):
             return self._one_by_one(rows)
 
         def one(row: Any) -> list[Any]:
@@ -90,13 +90,14 @@ class Family:
         first = jax.tree.leaves(next(guesses))
         return any(not np.array_equal(a, b) for g in guesses for a, b in zip(jax.tree.leaves(g), first, strict=True))
 
-    def _has_offsets_of_guess(self) -> bool:
-        """Tell whether the offset of a joint follows from the starting guess."""
+    def _has_values_of_guess(self) -> bool:
+        """Tell whether the offset of a joint, or the sign of its Euler parameters, follows from the starting guess."""
         joints = self.mechanism.joints.values()
-        return any("offset" in value_fields(type(j)) and getattr(j, "offset", 0.0) is None for j in joints)
+        offset = any("offset" in value_fields(type(j)) and getattr(j, "offset", 0.0) is None for j in joints)
+        return offset or any(hasattr(j, "sense") for j in joints)
 
     def _one_by_one(self, rows: np.ndarray) -> tuple[Equations, Any]:
-        """Do what `of` does, where offsets follow from guesses that differ: they are found for each run alone."""
+        """Do what `of` does, where values follow from guesses that differ: they are found for each run alone."""
         whole = []
         for varied in map(self.varied, rows.tolist()):
             system = dataclasses.replace(self.model.system, groups=build(varied).system.groups)

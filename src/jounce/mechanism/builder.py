@@ -112,7 +112,7 @@ def build(mechanism: Mechanism, like: Model | None = None) -> Model:
     elements |= {f"drivers.{k}": v for k, v in mechanism.drivers.items()}
     groups, names = group_elements(elements, parameters, body_index, components)
     if like is None:
-        groups = tuple(_with_offsets(group, pose_type, guess) for group in groups)
+        groups = tuple(_with_sense(_with_offsets(group, pose_type, guess), pose_type, guess) for group in groups)
     applied = {f"forces.{k}": v for k, v in mechanism.forces.items()}
     forces, force_names = group_elements(applied, parameters, body_index, components)
     wanted = {f"outputs.{k}": v for k, v in mechanism.outputs.items() if isinstance(v, AbstractOutput)}
@@ -297,10 +297,25 @@ def _with_offsets(group: Group, pose_type: type, guess: dict[str, Any]) -> Group
     return eqx.tree_at(lambda g: g.element.offset, group, offset, is_leaf=lambda x: x is None)
 
 
+def _with_sense(group: Group, pose_type: type, guess: dict[str, Any]) -> Group:
+    """Fill in with which sign of the Euler parameters an attitude is compared: that of the starting guess."""
+    if not hasattr(group.element, "sense"):
+        return group
+    pose = pose_at(guess, pose_type)
+    sense = group.element.sense_at(*(pose.take(indices) for indices in group.bodies))
+    return _put_sense(group, None if sense is None else np.asarray(sense))
+
+
+def _put_sense(group: Group, sense: Any) -> Group:
+    return eqx.tree_at(lambda g: g.element.sense, group, sense, is_leaf=lambda x: x is None)
+
+
 def _with_found_of(group: Group, known: Group) -> Group:
     """Take over what was not given, but found from a position, from a group that has it."""
     if measures_angle(group):
         return with_datum_of(group, known)
+    if hasattr(group.element, "sense"):
+        return _put_sense(group, known.element.sense)
     if "offset" not in value_fields(type(group.element)) or group.element.offset is not None:
         return group
     return eqx.tree_at(lambda g: g.element.offset, group, known.element.offset, is_leaf=lambda x: x is None)

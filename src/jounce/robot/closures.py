@@ -8,6 +8,7 @@ the coordinates of the tree, near the closed position as well as in it, and left
 from collections.abc import Mapping
 from typing import Any
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -15,7 +16,7 @@ import numpy as np
 from jounce.constraints import AbstractConstraint, Scalar, Vector
 from jounce.constraints.base import Wrenches
 from jounce.errors import MechanismError, RobotError
-from jounce.jet import cross, stack
+from jounce.jet import Jet, cross, dot, stack
 from jounce.jet.algebra import total
 from jounce.robot.batches import Batched
 from jounce.robot.kinematics import body_frames
@@ -41,6 +42,7 @@ class LinkClosure(AbstractConstraint, type="closure", space="spatial"):
     wrenches: Wrenches  # (rows, 6): force and moment, in axes of body i
     vector_part: Vector = None  # of the Euler parameters of the frame of body j in that of body i, when closed
     scalar_part: Scalar = None
+    sense: Any = eqx.field(default=None, init=False)  # 1 or -1, found from the starting guess
 
     dimensions = {"vector_part": "ratio", "scalar_part": "ratio"}
 
@@ -58,10 +60,27 @@ class LinkClosure(AbstractConstraint, type="closure", space="spatial"):
         rows = offset.map(lambda d: jnp.sum(force * d[None], axis=1))
         if self.vector_part is None:
             return rows
-        e0 = body_i.quaternion.dot(body_j.quaternion)
-        e = stack([spin.dot(body_j.quaternion) for spin in body_i.spins])
+        e0, e = _relative_attitude(body_i, body_j)
         turn = 2.0 * (self.scalar_part * e - e0 * self.vector_part - cross(e, self.vector_part))
+        turn = turn if self.sense is None else turn * self.sense
         return rows + turn.map(lambda x: jnp.sum(moment * x[None], axis=1))
+
+    def sense_at(self, body_i, body_j):
+        """Return the sign of the Euler parameters at a pose, (...), as either sign tells the same attitude; or None.
+
+        A row of force and moment both would else be another one. The sign stays along a motion: none is looked for on
+        the way, as it would change where a body turns past half a turn in a pin, and the Jacobian with it.
+        """
+        if self.vector_part is None:
+            return None
+        e0, e = _relative_attitude(body_i, body_j)
+        along = self.scalar_part * e0 + dot(self.vector_part, e)
+        return jnp.where(along.coefficients[0] < 0, -1.0, 1.0)
+
+
+def _relative_attitude(body_i: Any, body_j: Any) -> tuple[Jet, Jet]:
+    """Return the Euler parameters of body j relative to body i: scalar and vector part."""
+    return body_i.quaternion.dot(body_j.quaternion), stack([s.dot(body_j.quaternion) for s in body_i.spins])
 
 
 def borne(closure: Closure) -> np.ndarray:
