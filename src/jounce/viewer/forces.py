@@ -40,7 +40,7 @@ def _places(force: Any, values: Any, position: np.ndarray, quaternion: np.ndarra
     """Return the points of a force on its bodies, (time, 3) each; the origin of a body where it has none."""
     places = []
     for slot, body in enumerate(force.bodies):
-        keys = ("point",) if len(force.bodies) == 1 else (f"point_{'ijm'[slot]}",)
+        keys = ("point",) if len(force.bodies) == 1 else (f"point_{'ijmn'[slot : slot + 1]}",)
         local = next((values[key] for key in keys if values.get(key) is not None), np.zeros(3))
         index = names.index(body)
         places.append(position[:, index] + rotated(quaternion[:, index], spatial_vectors(np.asarray(local, float))))
