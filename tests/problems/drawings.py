@@ -1,15 +1,33 @@
 """The same mechanism with the frames of its bodies drawn otherwise: turned, and with other origins."""
 
 import dataclasses
+from typing import Any
 
 import numpy as np
+import pytest
 from scipy.spatial.transform import Rotation
 
 import jounce as jn
 from jounce import drivers, forces
-from jounce.mechanism.resolve import resolve
+from jounce.constraints.angles import principal
+from jounce.constraints.base import field_kind, value_fields
+from jounce.dynamics import (
+    AppliedForceOutput,
+    AppliedTorqueOutput,
+    DriverForceOutput,
+    DriverTorqueOutput,
+    JointForceOutput,
+    JointTorqueOutput,
+)
+from jounce.dynamics.outputs import is_turning
+from jounce.forces import AbstractLaw
+from jounce.jet import stack
+from jounce.jet.algebra import total
+from jounce.mechanism.resolve import resolve, resolve_law, resolve_motion
+from jounce.robot import CoupledJoints
+from jounce.trajectory import AbstractMotion
 
-POINTS, DIRECTIONS = ("point",), ("vector", "axis", "normal")
+POINTS, DIRECTIONS = ("point",), ("vector", "axis", "normal", "opposite")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -18,13 +36,6 @@ class Drawing:
 
     origin: np.ndarray
     axes: np.ndarray
-
-    @classmethod
-    def random(cls, random, space, *, shift=True):
-        """Return a random frame, at the old origin if not shifted."""
-        size = 2 if space == "planar" else 3
-        axes = rotation(random.uniform(-3, 3)) if size == 2 else Rotation.random(random_state=random).as_matrix()
-        return cls(random.uniform(-0.3, 0.3, size) * shift, axes)
 
     @property
     def angle(self):
@@ -40,6 +51,29 @@ class Drawing:
         return (self.axes.T @ np.asarray(v)).tolist()
 
 
+def as_drawn(mechanism):
+    """Return the frames of all bodies, by name, as they are."""
+    size = 2 if mechanism.space == "planar" else 3
+    return {name: Drawing(np.zeros(size), np.eye(size)) for name in ("ground", *mechanism.bodies)}
+
+
+def random_drawings(mechanism, random):
+    """Return random frames of all bodies, by name; the origin stays where a coupled joint measures its slide to it."""
+    followed = {body for it in mechanism.joints.values() if isinstance(it, CoupledJoints) for body in slid(it)}
+
+    def drawing(name, size):
+        axes = rotation(random.uniform(-3, 3)) if size == 2 else Rotation.random(random_state=random).as_matrix()
+        return Drawing(random.uniform(-0.3, 0.3, size) * (name not in followed), axes)
+
+    return {name: drawing(name, len(same.origin)) for name, same in as_drawn(mechanism).items()}
+
+
+def slid(it):
+    """Return the bodies to the origin of which coupled joints measure how far they slide."""
+    children = [it.bodies["ijmn".index(child)] for child in it.roles[1::2]]
+    return [body for body, kind in zip(children, it.kinds.split("-"), strict=True) if kind == "slide"]
+
+
 def rotation(angle):
     """Return the matrix of a turn in the plane."""
     return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
@@ -50,31 +84,87 @@ def matrix(quaternion):
     return Rotation.from_quat(quaternion, scalar_first=True).as_matrix()
 
 
-def redrawn(mechanism, drawings):
+class ShiftedMotion(AbstractMotion):
+    """A law of a driver, of an angle that is counted from elsewhere."""
+
+    motion: AbstractMotion
+    shift: Any
+
+    def __call__(self, time):
+        return self.motion(time) + self.shift
+
+
+class ShiftedLaw(AbstractLaw):
+    """A law of a torque, of an angle that is counted from elsewhere."""
+
+    law: AbstractLaw
+    shift: Any
+
+    def value(self, displacement, velocity, time):
+        return self.law.value(displacement - self.shift, velocity, time)
+
+
+class DrawnLaw(AbstractLaw):
+    """A law of a force with components, of a place in a ground that is drawn otherwise, in axes drawn otherwise."""
+
+    law: AbstractLaw
+    origin: Any  # of the new ground in the old one
+    world: Any  # axes of the new ground in the old one, the columns of a matrix
+    axes: Any  # those of the frame in which components and velocities are
+
+    def value(self, displacement, velocity, time):
+        place = _product(self.world, displacement)
+        place = stack([part + shift for part, shift in zip(_parts(place), self.origin, strict=True)])
+        found = self.law(place, _product(self.axes, velocity), time)
+        return _product(np.swapaxes(self.axes, 0, 1), found)
+
+
+def _parts(vector):
+    return [vector[k] for k in range(vector.shape[0])]
+
+
+def _product(matrix, vector):
+    """Return a constant matrix times the jet of a vector."""
+    return stack([total(part * x for part, x in zip(row, _parts(vector), strict=True)) for row in matrix])
+
+
+def redrawn(mechanism, drawings, moved):
     """Return a mechanism in which every body, by name, and the ground have other frames.
 
-    What is told in the axes of the frames goes with them; where angles are counted from does not: see `shifts`.
+    What is told in the axes of the frames goes with them, and so do laws of angles, which change by constants, as
+    `shifts` tells them. Whatever the frames are, the same is compiled.
     """
-    values = mechanism.parameter_values
-    world = drawings["ground"]
+    values, world = mechanism.parameter_values, drawings["ground"]
 
-    def element(it):
+    def element(name, it):
         changed = {}
-        for field in dataclasses.fields(it):
-            stem, _, side = field.name.rpartition("_")
-            stem, slot = (stem, "ij".index(side)) if side in ("i", "j") and stem else (field.name, 0)
-            value = getattr(it, field.name) if field.init else None
-            if value is not None and stem in (*POINTS, *DIRECTIONS) and it.bodies:
-                drawing = drawings[it.bodies[slot]]
-                convert = drawing.point if stem in POINTS else drawing.direction
-                changed[field.name] = convert(resolve(value, values))
-        if hasattr(it, "frame") and hasattr(it, "law"):  # components
-            changed["law"] = turned(it.law, drawings[it.bodies[0]] if it.frame == "body" else world)
+        for key, field in value_fields(type(it)).items():
+            value = getattr(it, key)
+            if value is not None and field_kind(field) == "vector" and key != "vector_part":
+                drawing = drawings[_holder(mechanism, it, key)]
+                convert = drawing.point if key.partition("_")[0] in POINTS else drawing.direction
+                changed[key] = convert(resolve(value, values))
+        if hasattr(it, "wrenches"):  # of a closure, and the attitude in which it is closed
+            first, second = (drawings[body].axes for body in it.bodies)
+            changed["wrenches"] = (np.asarray(it.wrenches) @ np.kron(np.eye(2), first)).tolist()
+            if it.vector_part is not None:
+                closed = Rotation.from_matrix(first.T @ matrix([it.scalar_part, *it.vector_part]) @ second)
+                scalar, *vector = closed.as_quat(scalar_first=True).tolist()
+                changed |= {"scalar_part": scalar, "vector_part": vector}
+        if hasattr(it, "law"):
+            changed["law"] = law(it, moved.get(name))
+        elif name in moved and hasattr(it, "motion"):
+            changed["motion"] = ShiftedMotion(resolve_motion(it.motion, values), moved[name])
+        elif name in moved and hasattr(it, "angle"):  # of a spring
+            changed["angle"] = resolve(it.angle, values) + moved[name]
         return dataclasses.replace(it, **changed)
 
-    def turned(law, drawing):
-        rows = drawing.axes.T.tolist()
-        return [" + ".join(f"({x!r})*({part})" for x, part in zip(row, law, strict=True)) for row in rows]
+    def law(it, shift):
+        if hasattr(it, "frame"):
+            axes = drawings[it.bodies[0]].axes if it.frame == "body" else world.axes
+            return DrawnLaw(resolve_law(it.law, it, values, len(axes)), world.origin, world.axes, axes)
+        found = resolve_law(it.law, it, values, None)
+        return found if shift is None else ShiftedLaw(found, shift)
 
     kinds = ("joints", "drivers", "forces", "outputs")
     gravity = None if mechanism.gravity is None else world.direction(resolve(mechanism.gravity, values))
@@ -82,8 +172,36 @@ def redrawn(mechanism, drawings):
         mechanism,
         bodies={name: _body(body, drawings[name], world, values) for name, body in mechanism.bodies.items()},
         gravity=gravity,
-        **{kind: {name: element(it) for name, it in getattr(mechanism, kind).items()} for kind in kinds},
+        **{kind: {name: element(name, it) for name, it in getattr(mechanism, kind).items()} for kind in kinds},
     )
+
+
+def _holder(mechanism, it, key):
+    """Return the name of the body in whose frame a point or a direction of an element is given."""
+    stem, _, side = key.partition("_")
+    if stem not in (*POINTS, *DIRECTIONS) or side not in ("", "i", "j", "m", "1", "2"):
+        raise ValueError(f"{type(it).__name__}.{key}: say in whose frame it is given, or the law cannot be tested")
+    if side in ("1", "2"):  # one of two joints of which the roles say what they join
+        parent, child = it.roles[2 * int(side) - 2 : 2 * int(side)]
+        return it.bodies["ijmn".index(child if stem == "opposite" else parent)]
+    if isinstance(it, JointTorqueOutput):
+        return acted_on(mechanism, it)
+    return it.bodies["ijm".index(side) if side else 0]
+
+
+def acted_on(mechanism, output):
+    """Return the name of the body on which a joint or driver acts with the force or torque that is wanted."""
+    bodies = {**mechanism.joints, **mechanism.drivers}[output.joint].bodies
+    return output.body or bodies[1]
+
+
+def frame_of(mechanism, output):
+    """Return the name of the body in whose axes the components of an output are, the ground's if they are global."""
+    source = mechanism.forces[output.force] if hasattr(output, "force") else output
+    frame = getattr(source, "frame", "global")
+    if frame == "body":
+        return acted_on(mechanism, output) if hasattr(output, "joint") else source.bodies[0]
+    return "ground" if frame == "global" else frame
 
 
 def _body(body, drawing, world, values):
@@ -122,37 +240,96 @@ def at(mechanism, coordinates):
     return dataclasses.replace(mechanism, bodies=bodies)
 
 
-def shifts(mechanism, coordinates, drawings):
-    """Return by how much the frames alone change the angle of each element, at a position put together.
+def attitudes_of(mechanism, coordinates):
+    """Return the attitude matrices of all bodies, the ground first, by name, at the first of the positions given."""
+    if mechanism.space == "planar":
+        angles = coordinates["angle"].reshape(-1, *coordinates["angle"].shape[-2:])[0, :, 0]
+        return dict(zip(("ground", *mechanism.bodies), map(rotation, angles), strict=True))
+    quaternions = coordinates["quaternion"].reshape(-1, *coordinates["quaternion"].shape[-3:])[0, :, :, 0]
+    return dict(zip(("ground", *mechanism.bodies), map(matrix, quaternions.T), strict=True))
 
-    In space it is the angle of ``A_i^T A_j`` about the axis, of elements without vectors; in the plane that of the
-    bodies.
-    """
-    found = {}
+
+def counted(mechanism):
+    """Return what measures an angle that frames alone change by a constant, by name; in space those without vectors."""
     named = {**mechanism.drivers, **mechanism.forces, **mechanism.outputs}
-    attitude = coordinates.get("quaternion")
-    index = ["ground", *mechanism.bodies].index
-    values = mechanism.parameter_values
-    drawn = {}
-    if attitude is None:
-        drawn = {name: drawing.angle - drawings["ground"].angle for name, drawing in drawings.items()}
-    for name, it in named.items():
-        if isinstance(it, PLANAR_ANGLES) and getattr(it, "coordinate", "angle") == "angle":
+
+    def counts(it):
+        if isinstance(it, PLANAR_ANGLES):
+            return getattr(it, "coordinate", "angle") == "angle"
+        return hasattr(it, "datum") and it.vector_i is None
+
+    return {name: it for name, it in named.items() if counts(it)}
+
+
+def shifts(mechanism, coordinates, drawings):
+    """Return by how much the frames alone change the angle of each such element, at a position put together.
+
+    In space it is the angle of ``A_i^T A_j`` about the axis; in the plane that of the bodies.
+    """
+    values, attitudes = mechanism.parameter_values, attitudes_of(mechanism, coordinates)
+
+    def angle(it):
+        if mechanism.space == "planar":
+            drawn = {name: drawing.angle - drawings["ground"].angle for name, drawing in drawings.items()}
             ratio = resolve(getattr(it, "ratio", None) or 1.0, values)  # of the first of two bodies
-            found[name] = drawn[it.bodies[-1]] - (ratio * drawn[it.bodies[0]] if len(it.bodies) > 1 else 0.0)
-        elif hasattr(it, "datum") and it.vector_i is None:
-            axis = resolve(it.axis if hasattr(it, "axis") else it.axis_i, values)
-            old = [matrix(attitude.reshape(-1, *attitude.shape[-3:])[0, :, index(body), 0]) for body in it.bodies]
-            new = [a @ drawings[body].axes for a, body in zip(old, it.bodies, strict=True)]
-            around = drawings[it.bodies[0]].direction(axis)
-            found[name] = angle_101(*new, around) - angle_101(*old, axis)
-    return found
+            return drawn[it.bodies[-1]] - (ratio * drawn[it.bodies[0]] if len(it.bodies) > 1 else 0.0)
+        axis = resolve(it.axis if hasattr(it, "axis") else it.axis_i, values)
+        old = [attitudes[body] for body in it.bodies]
+        new = [a @ drawings[body].axes for a, body in zip(old, it.bodies, strict=True)]
+        around = drawings[it.bodies[0]].direction(axis)
+        return principal(angle_101(*new, around)) - principal(angle_101(*old, axis))
+
+    return {name: angle(it) for name, it in counted(mechanism).items()}
 
 
 def angle_101(first, second, axis):
     """Return the angle of ``A_i^T A_j`` about an axis, by ``2 atan2(u.e, e0)``: Sommer 2024, equation 101, mended."""
     e0, *e = Rotation.from_matrix(first.T @ second).as_quat(scalar_first=True)
     return 2 * np.arctan2(np.dot(e, axis) / np.linalg.norm(axis), e0)
+
+
+def with_all_outputs(mechanism):
+    """Return a mechanism of which everything is asked: points, reactions, forces of drivers, applied forces."""
+    point = [0.3, -0.2, 0.4][: 2 if mechanism.space == "planar" else 3]
+    outputs = dict(mechanism.outputs)
+    for name in mechanism.bodies:
+        outputs[f"point_{name}"] = jn.PointOutput(name, point)
+    for name, joint in {**mechanism.joints, **mechanism.drivers}.items():
+        outputs[f"force_{name}"] = JointForceOutput(name)
+        if hasattr(joint, "point_j"):
+            outputs[f"moment_{name}"] = JointTorqueOutput(name)
+        for slot, body in enumerate(joint.bodies):
+            frames = ("body", joint.bodies[0]) if slot else (joint.bodies[1], "body")
+            if body != "ground":
+                outputs[f"force_{name}_on_{body}"] = JointForceOutput(name, body, frames[0])
+                outputs[f"moment_{name}_on_{body}"] = JointTorqueOutput(name, body, frames[1], point)
+    for name, driver in mechanism.drivers.items():
+        outputs[f"drive_{name}"] = (DriverTorqueOutput if is_turning(driver) else DriverForceOutput)(name)
+    for name, force in mechanism.forces.items():
+        outputs[f"applied_{name}"] = (AppliedForceOutput if force.unit == "N" else AppliedTorqueOutput)(name)
+    return dataclasses.replace(mechanism, outputs=outputs)
+
+
+def assert_same(mechanism, kept, found, drawings, moved):
+    """Assert that a motion in other frames is the same, each value to rounding of the largest of its unit and order."""
+    world, scales, parts = drawings["ground"], {}, {}
+    for name, values in kept.items():
+        scale = np.abs(values).reshape(*values.shape[:2], -1).max(axis=(0, 2))
+        unit = mechanism.outputs[name].unit
+        scales[unit] = np.maximum(scales.get(unit, 0.0), scale)
+    for name, values in found.items():
+        expected, output = kept[name].copy(), mechanism.outputs[name]
+        if expected.ndim == 3:
+            expected = expected @ drawings[frame_of(mechanism, output)].axes
+        if isinstance(output, jn.PointOutput):
+            expected[:, 0] -= world.axes.T @ world.origin
+        if name in moved:
+            turns = values[0, 0] - expected[0, 0] - moved[name]
+            assert turns == pytest.approx(2 * np.pi * np.round(turns / (2 * np.pi)), abs=1e-11)
+            expected[:, 0] += values[0, 0] - expected[0, 0]
+        error = np.abs(values - expected).reshape(*values.shape[:2], -1).max(axis=(0, 2))
+        parts[name] = error / scales[output.unit]
+    assert all((part <= 1e-11).all() for part in parts.values()), {n: p for n, p in parts.items() if (p > 1e-11).any()}
 
 
 PLANAR_ANGLES = (
