@@ -226,14 +226,14 @@ def screw():
             ),
         },
         drivers={
-            "feed": drivers.SpatialSlideDriver(("ground", "nut"), [2, 0, 0], ZERO, Z, wave(0.1, 0.2, 0, 1)),
+            "feed": drivers.SpatialDistanceDriver(("ground", "nut"), [2, 0, -1], ZERO, wave(1.1, 0.2, 0, 1)),
             "crank": drivers.SpatialDistanceDriver(
                 ("ground", "wheel"), [0.8, 2.5, 0.3], [0.5, 0.1, 0], wave(0.55, 0, 0.05, 1.0)
             ),
         },
         forces={
             "slide_force": forces.SlideForce(("nut", "lid"), C, ZERO, A, "sin(x) - 0.2*v"),
-            "torsion": forces.SpatialTorsionalSpring(("nut", "wheel"), A, 7.0, 0.2, 0.1, [0, 1, 0.3], B),
+            "torsion": forces.SpatialTorsionalSpring(("ground", "wheel"), A, 7.0, 0.2, 0.1, [0, 1, 0.3], B),
             "torque": forces.SpatialTorque(("lid", "ground"), Z, "2*sin(x) - 0.3*v", A, C),
         },
     )  # fmt: skip
