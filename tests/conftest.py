@@ -11,8 +11,8 @@ import pytest
 from jounce.cli import main
 from jounce.constraints import base  # importing jounce switches on double precision
 
-# most of the time of the tests goes into compiling; without XLA's last optimisations it takes a fifth less, and the same
-# is asked of the results; the examples, the study of branches and the benchmarks run with them
+# most of the time of the tests goes into compiling; without XLA's last optimisations it takes a fifth less, and the
+# same is asked of the results; the examples, the study of branches and the benchmarks run with them
 os.environ.setdefault("XLA_FLAGS", "--xla_backend_optimization_level=0")
 jax.config.update("jax_numpy_dtype_promotion", "strict")
 jax.config.update("jax_numpy_rank_promotion", "raise")

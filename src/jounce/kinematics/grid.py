@@ -57,7 +57,7 @@ class Grid:
         reached = self.time < self.track.ended_at
         width = LARGE_BATCH if count > LONG_GRID else SMALL_BATCH
         left = reached & (self.status != Status.OK)
-        done = count - np.count_nonzero(left)
+        done = count - int(np.count_nonzero(left))
         for lanes, distance in _levels(left, len(self.track.anchors), width):
             source = self._nearest[lanes]
             if distance is not None:
