@@ -158,8 +158,10 @@ def _verdict(solution: Solution, path: Paths) -> Verdict:
     fine = solution.status == jn.Status.OK
     sharp = np.ones(len(fine), bool)
     if np.isfinite(path.limit):  # at the very end of the motion, neither answer is wrong
-        sharp = np.abs(law(case.time) - path.limit) > SHARPEST * max(1.0, abs(path.limit))
-        sharp &= reached | bool(path.proved)
+        blunt = SHARPEST * max(1.0, abs(path.limit))
+        turns_there = np.any(np.abs(law(law.turning_times(case.time[-1])) - path.limit) <= blunt)
+        sharp = np.abs(law(case.time) - path.limit) > blunt
+        sharp &= reached | bool(path.proved and not turns_there)
     position, allowed = whole(case, path, reached)
     elsewhere = fine & reached & ~(np.abs(solution.position[:, 0] - position) <= allowed).all(axis=1)
     beyond = fine & ~reached & sharp
