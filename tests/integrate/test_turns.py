@@ -100,8 +100,8 @@ def test_an_event_after_turns_ends_the_motion_with_its_turns():
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "method, tolerance, error",
-    [(jn.Obreshkov(8), 1e-12, 1e-10), (jn.Taylor(step=0.2), 1e-15, 1e-12), (jn.Obreshkov(6, step=0.01), 1e-15, 1e-9)],
-    ids=["obreshkov", "taylor with even steps", "obreshkov with even steps"],
+    [(jn.Taylor(step=0.2), 1e-15, 1e-12), (jn.Obreshkov(6, step=0.01), 1e-15, 1e-9)],
+    ids=["taylor", "obreshkov"],
 )
 def test_all_methods_count_turns(method, tolerance, error):
     found = jn.simulate(rotor("spatial"), TIME, order=2, method=method, tolerance=tolerance)
