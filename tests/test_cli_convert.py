@@ -112,6 +112,7 @@ PENDULUM = """<robot name="pendulum"><link name="base"/><link name="rod"><inerti
 <joint name="pin" type="continuous"><parent link="base"/><child link="rod"/><axis xyz="0 1 0"/></joint></robot>"""
 
 
+@pytest.mark.slow
 def test_the_torque_of_a_pendulum_from_a_file_made_of_a_robot(call):
     pathlib.Path("p.urdf").write_text(PENDULUM)
     status, out, err = call("p.urdf", "p.yaml", "--drive", "pin=0.5*t**2")

@@ -99,7 +99,7 @@ FORMS = {
     "gibbs_appell_3": lambda robot, q: gibbs_appell(robot, q, 0, m=3),
     "higher_order_1": lambda robot, q: higher_order(robot, q, 1)[:, None],
 }
-SLOW = ("mangeron_1", "gibbs_appell_2")  # to compile
+SLOW = ("lagrange", "mangeron_1", "mangeron_2", "gibbs_appell_2")  # to compile
 
 
 @pytest.mark.parametrize("form", [pytest.param(f, marks=pytest.mark.slow) if f in SLOW else f for f in FORMS])

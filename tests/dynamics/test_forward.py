@@ -204,6 +204,7 @@ def pinocchio_rates(angles, rates):
 FOUR_BAR_TORQUE = ("2.5*sin(7*t + 0.4)", lambda k: 2.5 * 7**k * np.sin(0.4 + k * np.pi / 2))
 
 
+@pytest.mark.slow
 def test_inverse_after_forward_returns_the_applied_torque_and_its_rates_in_the_plane():
     law, wanted = FOUR_BAR_TORQUE
     free = dataclasses.replace(

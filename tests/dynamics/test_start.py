@@ -89,6 +89,7 @@ def test_a_body_that_can_move_with_negative_kinetic_energy_is_named():
     assert start(turning([0.01, 0.02, 0.05]), 0.0).mobility  # no real body, but its motion is determined
 
 
+@pytest.mark.slow
 def test_a_massless_link_at_the_end_of_a_robot_has_to_be_driven_in_a_simulation():
     inertia = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0], tensor=[0.01, 0.02, 0.02])
     links = [jn.Link("base"), jn.Link("arm", inertia), jn.Link("tip")]

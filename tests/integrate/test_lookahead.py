@@ -48,7 +48,7 @@ def gained(stop, t0, w):
     return STRENGTH * w * math.sqrt(math.pi) / 2 * (erf((stop - t0) / w) + erf(t0 / w))
 
 
-@pytest.mark.parametrize("stop", [0.4, 5.0])
+@pytest.mark.parametrize("stop", [0.4, pytest.param(5.0, marks=pytest.mark.slow)])
 def test_a_pulse_in_time_is_seen_from_any_distance_and_of_any_width(stop):
     for t0 in (0.05, 0.137, 0.2, 0.2137, 0.35):
         for w in (1e-4, 1e-3, 1e-2, 1e-1):

@@ -211,6 +211,7 @@ time: {start: 0, stop: 0.1, count: 2}
 """
 
 
+@pytest.mark.slow
 def test_a_top_starts_from_the_orientation_that_its_parameter_gives(tmp_path):
     path = tmp_path / "top.yaml"
     path.write_text(TOP)

@@ -100,6 +100,7 @@ def test_paths_are_coloured_by_the_size_of_a_derivative(four_bar):
     assert not [c for c in sketch(four_bar, paths=[]).axes[0].collections if isinstance(c, LineCollection)]
 
 
+@pytest.mark.slow
 def test_a_spatial_mechanism_is_seen_from_the_side_asked_for(hooke):
     view = (-90.0, 0.0)  # x to the right, z upward
     figure = sketch(hooke, 0.25, view=view)
