@@ -17,11 +17,10 @@ MECHANISMS = {
     "double pendulum": lambda: dynamics.double_pendulum(0.4, 1.3, 1.0, -2.0),
     "spatial double pendulum": dynamics.spatial_double_pendulum,
 }
-QUICK = {("Taylor", "double pendulum")}
 APART = {("Obreshkov 4", "double pendulum"), ("Obreshkov 6", "double pendulum")}  # each compiles for half a minute
 APART |= {(f"Obreshkov {order}", "spatial double pendulum") for order in (4, 6, 8)}
 CASES = [
-    pytest.param(method, name, marks=() if (method, name) in QUICK else pytest.mark.slow)
+    pytest.param(method, name, marks=pytest.mark.slow)  # a minute each; tests/integrate has quick ones
     for name in MECHANISMS
     for method in METHODS
     if (method, name) not in APART

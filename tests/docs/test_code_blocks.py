@@ -10,7 +10,8 @@ import jounce as jn
 
 ROOT = pathlib.Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
-SLOW = ("closed_loop_robots", "integrators", "reactions", "robots", "simulation", "spatial")  # to compile
+SLOW = ("closed_loop_robots", "coming_from", "integrators", "own_joint", "reactions", "robots", "simulation", "spatial")
+SLOW += ("torque_rates",)  # to compile
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
