@@ -105,6 +105,22 @@ def test_a_signal_is_heard_where_an_exception_is_not(where, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_after_the_work_is_done_changes_nothing(number, tmp_path):
+    program = (
+        "import pathlib, signal, time; from jounce.interrupts import end_on_signals\n"
+        "class Last:\n def __del__(self, touch=pathlib.Path('ending').touch, sleep=time.sleep): touch(); sleep(1)\n"
+        "last = Last(); end_on_signals()"
+    )
+    process = subprocess.Popen([sys.executable, "-c", program], stderr=subprocess.PIPE, cwd=tmp_path, env=ENVIRONMENT)
+    deadline = time.monotonic() + 60
+    while not (tmp_path / "ending").exists() and time.monotonic() < deadline:
+        time.sleep(0.01)
+    process.send_signal(number)
+    _, err = process.communicate(timeout=60)
+    assert (process.returncode, err) == (0, b"")
+
+
 def test_many_signals_at_once_end_it_too():
     process = subprocess.Popen([*COMMAND, "run", FOUR_BAR], stderr=subprocess.PIPE, env=ENVIRONMENT)
     wait_for_handler(process)

@@ -8,6 +8,7 @@ process without unwinding anything. Nothing here is active in a program that imp
 
 from __future__ import annotations
 
+import atexit
 import os
 import signal
 import sys
@@ -50,8 +51,15 @@ def end_on_signals() -> None:
     os.set_blocking(writing, False)
     for number in handled:
         signal.signal(number, _end)
+    atexit.register(_done, handled)  # the first to be registered is the last to be called
     signal.set_wakeup_fd(writing, warn_on_full_buffer=False)
     threading.Thread(target=_watch, args=(reading,), name="jounce-signals", daemon=True).start()
+
+
+def _done(handled: list[signal.Signals]) -> None:
+    """Ignore signals from here on: Python gives handlers up as it ends, and the status shall say that all was done."""
+    for number in handled:
+        signal.signal(number, signal.SIG_IGN)
 
 
 def _pipe() -> tuple[int, int]:
