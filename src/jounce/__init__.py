@@ -109,12 +109,14 @@ from jounce.robot import (  # noqa: E402
     Mimic as Mimic,
     Robot as Robot,
     Wrench as Wrench,
+    bias_forces as bias_forces,
     center_of_mass as center_of_mass,
     forward_kinematics as forward_kinematics,
     inverse_dynamics as inverse_dynamics,
     jacobian as jacobian,
     joint_motion as joint_motion,
     joint_wrenches as joint_wrenches,
+    mass_matrix as mass_matrix,
     operational_accelerations as operational_accelerations,
 )
 from jounce.trajectory import (  # noqa: E402

@@ -5,13 +5,12 @@ from typing import Any
 import jax.numpy as jnp
 
 from jounce.dynamics.equations import checked_levels
-from jounce.jet import Jet, components, cross, dot
-from jounce.jet.algebra import total
 from jounce.robot.batches import Batched
+from jounce.robot.equations_of_motion import centers_of, partial_velocities, times_inertia, work, work_of_weight
 from jounce.robot.inverse_dynamics import inverse_dynamics
 from jounce.robot.kinematics import body_frames
 from jounce.robot.robot import Robot
-from jounce.robot.scan import stacked, to_coordinates
+from jounce.robot.scan import to_coordinates
 from jounce.robot.tree import Tree
 
 
@@ -19,27 +18,11 @@ from jounce.robot.tree import Tree
 def _virtual_work(tree: Tree, arrays: Any, _: Any, inertial: bool) -> Any:
     """Return the work of inertia, or of weight, along each coordinate."""
     frames = body_frames(tree, arrays[0]).without_base()
-    center = frames.point(jnp.swapaxes(jnp.asarray(tree.center), 0, 1)[:, :, None])
-    mass = jnp.asarray(tree.mass)[:, None]
-    if inertial:
-        force = center.differentiate().differentiate() * mass
-        spin = frames.to_body(frames.angular_velocity)
-        tensor = jnp.moveaxis(jnp.asarray(tree.inertia), 0, -1)[..., None]
-        momentum = total(tensor[:, i] * part for i, part in enumerate(components(spin)))
-        moment = frames.direction(momentum).differentiate()
-    else:
-        force = Jet.constant(-jnp.asarray(tree.gravity)[:, None, None] * mass[None], center.order)
-        moment = None
-    # axes and origins of joints stand along a new axis before the bodies
-    axis, origin = (jet.map(lambda c: c[:, :, None]) for jet in (frames.axes[2], frames.position))
-    center, force = (jet.map(lambda c: c[:, None]) for jet in (center, force))
-    turning = jnp.asarray(tree.turning)[:, None, None]
-    partial = cross(axis, center - origin) * turning + axis * (1 - turning)
-    work = dot(partial, force)
-    if moment is not None:
-        work = work + dot(axis * turning, moment.map(lambda c: c[:, None]))
-    moved = jnp.swapaxes(jnp.asarray(tree.ancestors)[:-1], 0, 1)[:, :, None]
-    return to_coordinates(tree, stacked(work.map(lambda c: jnp.sum(c * moved, axis=1))))
+    if not inertial:
+        return to_coordinates(tree, work_of_weight(tree, frames))
+    force = centers_of(tree, frames).differentiate().differentiate() * jnp.asarray(tree.mass)[:, None]
+    moment = times_inertia(tree, frames, frames.angular_velocity).differentiate()
+    return to_coordinates(tree, work(partial_velocities(tree, frames), force, moment))
 
 
 def newton_euler(robot: Robot, q: Any, rates: int = 0) -> Any:
