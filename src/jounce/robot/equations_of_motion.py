@@ -64,7 +64,7 @@ def work(partial: tuple[Jet, Jet], force: Jet, moment: Jet | None = None) -> Any
 
 def work_of_weight(tree: Tree, frames: Frames) -> Any:
     """Return the forces of the joints that hold the bodies against gravity, (levels, joints, batch)."""
-    weight = jnp.asarray(tree.gravity)[:, None, None] * jnp.asarray(tree.mass)[:, None]
+    weight = jnp.asarray(tree.gravity)[:, None, None] * jnp.asarray(tree.mass)[None, :, None]
     return work(partial_velocities(tree, frames), Jet.constant(-weight, frames.position.order))
 
 
@@ -101,7 +101,7 @@ def mass_jet(tree: Tree, q: Any) -> Any:
     moment = (about + cross(lever, momentum)) * turning
     moves = jnp.swapaxes(jnp.asarray(tree.ancestors)[:-1], 0, 1)[:, :, None]
     half = stacked(dot(nearer, moment + momentum * (1 - turning)) * moves)
-    matrix = half + jnp.swapaxes(half, 1, 2) * (1 - np.eye(tree.shape.bodies))[:, :, None]
+    matrix = half + jnp.swapaxes(half, 1, 2) * (1 - np.eye(tree.shape.bodies))[None, :, :, None]
     if tree.shape.direct:
         return matrix
     weights = jnp.zeros((tree.shape.bodies, tree.shape.coordinates))
