@@ -13,8 +13,10 @@ from jounce.dynamics.energies import (
     potential_energy as potential_energy,
     stored_energy as stored_energy,
 )
+from jounce.dynamics.energy_terms import EnergyTerms as EnergyTerms, energy_terms as energy_terms
 from jounce.dynamics.equations import (
     catalan as catalan,
+    energy_slope as energy_slope,
     gibbs_appell as gibbs_appell,
     higher_order as higher_order,
     lagrange as lagrange,

@@ -4,7 +4,8 @@ from typing import Any
 
 import jax.numpy as jnp
 
-from jounce.dynamics.equations import checked_levels
+from jounce.dynamics.energies import whole_number
+from jounce.dynamics.equations import checked_order
 from jounce.robot.batches import Batched
 from jounce.robot.equations_of_motion import centers_of, partial_velocities, times_inertia, work, work_of_weight
 from jounce.robot.inverse_dynamics import inverse_dynamics
@@ -50,7 +51,7 @@ def newton_euler(robot: Robot, q: Any, rates: int = 0) -> Any:
     >>> newton_euler(jn.robot.from_screws([slide]), [[0.0], [3.0], [5.0], [7.0]], rates=1).round(12).tolist()
     [[10.0], [14.0]]
     """
-    q, _ = checked_levels(robot, q, rates, rates + 2)
+    q = checked_order(robot, q, whole_number("rates", rates, 0) + 2)
     return inverse_dynamics(robot.with_gravity((0.0, 0.0, 0.0)), q)
 
 
@@ -81,7 +82,7 @@ def virtual_work(robot: Robot, q: Any, rates: int = 0) -> Any:
     >>> virtual_work(jn.robot.from_screws([slide]), [[0.0], [3.0], [5.0], [7.0]], rates=1).round(12).tolist()
     [[10.0], [14.0]]
     """
-    q, _ = checked_levels(robot, q, rates, rates + 2)
+    q = checked_order(robot, q, whole_number("rates", rates, 0) + 2)
     return _virtual_work(robot, (q,), (), (True,))
 
 
@@ -112,5 +113,5 @@ def gravity_forces(robot: Robot, q: Any, rates: int = 0) -> Any:
     >>> gravity_forces(jn.robot.from_screws([lift]), [[0.0]]).tolist()
     [[19.62]]
     """
-    q, _ = checked_levels(robot, q, rates, rates)
+    q = checked_order(robot, q, whole_number("rates", rates, 0))
     return _virtual_work(robot, (q,), (), (False,))
