@@ -23,7 +23,7 @@ from jounce.cli.figures import plot, report
 from jounce.cli.inspection import inspect
 from jounce.cli.mechanisms import run, schema, simulate
 from jounce.cli.papers import reproduce
-from jounce.cli.robots import check
+from jounce.cli.robots import check, torques
 from jounce.cli.starters import new
 from jounce.cli.views import view
 from jounce.cli.writing import WritingError
@@ -69,6 +69,11 @@ EXAMPLES = {
     examples/trajectories/panda_pick.yaml --out pick.png \\
     --limits examples/limits/franka_panda.yaml
   jounce check examples/robots/panda.urdf \\
+    examples/trajectories/panda_wave.yaml --payload "panda_hand=3 kg\"""",
+    torques: """\
+  jounce torques examples/robots/panda.urdf \\
+    examples/trajectories/panda_good.csv --rates 2 --out tau.csv
+  jounce torques examples/robots/panda.urdf \\
     examples/trajectories/panda_wave.yaml --payload "panda_hand=3 kg\"""",
     convert: """\
   jounce convert examples/four_bar.yaml four_bar.toml

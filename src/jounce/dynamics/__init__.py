@@ -39,3 +39,4 @@ from jounce.dynamics.reactions import (
     driver_force as driver_force,
     joint_reaction as joint_reaction,
 )
+from jounce.dynamics.trajectories import trajectory_torques as trajectory_torques

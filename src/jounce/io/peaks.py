@@ -13,7 +13,7 @@ from jounce.dynamics.limits import local_maxima
 from jounce.errors import SampleWarning
 from jounce.kinematics import solve
 
-__all__ = ["Peak", "derivative_name", "derivative_unit", "peaks", "rate_name", "scalar_outputs"]
+__all__ = ["Peak", "derivative_name", "derivative_unit", "peaks", "rate_name", "scalar_outputs", "table_peaks"]
 
 NAMES = ("position", "velocity", "acceleration", "jerk", "jounce")
 COMPONENTS = ("x", "y", "z")
@@ -146,6 +146,40 @@ def peaks(motion: Any) -> list[Peak]:
     if "peaks" not in motion.derived:
         motion.derived["peaks"] = _found(motion)
     return motion.derived["peaks"]
+
+
+def table_peaks(dataset: Any) -> list[Peak]:
+    """Return the peak values of torques and their rates, at the instants of a dataset only.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Of variables of dimensions time and derivative, with the attribute ``units``: N or N*m.
+    """
+    found = []
+    for name, variable in dataset.data_vars.items():
+        unit = variable.attrs["units"]
+        for order, values in enumerate(variable.transpose("derivative", "time").values):
+            low, high = int(np.argmin(values)), int(np.argmax(values))
+            extremes = [(float(values[k]), float(dataset["time"][k])) for k in (low, high)]
+            (least, least_at), (most, most_at) = extremes
+            told = effort_name(unit, order)
+            size = float(np.abs(values).max())
+            found.append(Peak(str(name), told, derivative_unit(unit, order), least, least_at, most, most_at, size))
+    return found
+
+
+def effort_name(unit: str, order: int) -> str:
+    """Name a torque or a force, or one of its rates.
+
+    Examples
+    --------
+    >>> [effort_name("N*m", k) for k in (0, 1, 2, 3, 5)]
+    ['torque', 'torque rate', 'second rate', 'third rate', '5th rate']
+    """
+    kind = "force" if unit == "N" else "torque"
+    first = (kind, f"{kind} rate", "second rate", "third rate", "fourth rate")
+    return first[order] if order < len(first) else f"{derivative_name(order)} rate"
 
 
 def _found(motion: Any) -> list[Peak]:

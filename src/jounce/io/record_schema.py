@@ -135,13 +135,28 @@ def _limits() -> dict[str, Any]:
     }
 
 
+def _torques() -> dict[str, Any]:
+    numbers = ("minimum", "minimum_at", "maximum", "maximum_at")
+    peak = {"joint": TEXT, "derivative": TEXT, "unit": TEXT} | dict.fromkeys(numbers, NUMBER)
+    return {
+        "robot": TEXT,
+        "file": TEXT,
+        "trajectory": TEXT,
+        "rates": WHOLE,
+        "time": _object(GRID),
+        "held": NAMES,
+        "peaks": _list(_object(peak)),
+        "written": _maybe(TEXT),
+    }
+
+
 def record_schema() -> dict[str, Any]:
     """Return the JSON Schema (2020-12) of the results of commands, and of the errors and warnings beside them.
 
     Examples
     --------
     >>> sorted(record_schema()["$defs"])
-    ['check', 'complaint', 'inspect_mechanism', 'inspect_robot', 'new', 'new_list', 'run', 'simulate']
+    ['check', 'complaint', 'inspect_mechanism', 'inspect_robot', 'new', 'new_list', 'run', 'simulate', 'torques']
     """
     energy = _object({"start": _maybe(NUMBER), "largest_change": _maybe(NUMBER)})
     moved = _motion() | {"mobility": TEXT, "steps": WHOLE, "energy": energy, "drift": _maybe(NUMBER)}
@@ -156,6 +171,7 @@ def record_schema() -> dict[str, Any]:
         "inspect_mechanism": _head("inspect", _mechanism(), about="jounce inspect --json of a mechanism file"),
         "inspect_robot": _head("inspect", _robot(), about="jounce inspect --json of a robot file"),
         "check": _head("check", _limits(), about="jounce check --json"),
+        "torques": _head("torques", _torques(), about="jounce torques --json"),
         "new_list": _head("new", {"starters": _list(starter)}, about="jounce new --json"),
         "new": _head("new", {"name": TEXT, "written": TEXT, "next": NAMES}, about="jounce new NAME --json"),
     }

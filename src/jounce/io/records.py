@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from jounce.dynamics.limits import LimitReport
     from jounce.kinematics import Motion
 
-__all__ = ["complaint", "limits_record", "motion_record", "plain", "record"]
+__all__ = ["complaint", "limits_record", "motion_record", "plain", "record", "torques_record"]
 
 VERSION = 1
 """Number of the form of the records; it grows where a key changes or goes."""
@@ -145,5 +145,23 @@ def limits_record(report: LimitReport, robot: Any, trajectory: Any, written: Any
         "time": {"start": report.times[0], "stop": report.times[-1], "count": len(report.times)},
         "held": dict(report.held),
         "limits": rows,
+        "written": written,
+    }
+
+
+def torques_record(dataset: Any, motion: Any, robot: Any, trajectory: Any, written: Any) -> dict[str, Any]:
+    """Return what `jounce torques` tells of a robot on a trajectory."""
+    from jounce.io.peaks import table_peaks
+
+    times = dataset["time"].values
+    peaks = [_peak(peak) for peak in table_peaks(dataset)]
+    return {
+        "robot": dataset.attrs["title"],
+        "file": robot,
+        "trajectory": trajectory,
+        "rates": dataset.sizes["derivative"] - 1,
+        "time": {"start": times[0], "stop": times[-1], "count": len(times)},
+        "held": [name for name in dataset.data_vars if name not in motion.names],
+        "peaks": [{"joint": peak.pop("output"), **peak} for peak in peaks],
         "written": written,
     }
