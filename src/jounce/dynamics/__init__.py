@@ -13,6 +13,14 @@ from jounce.dynamics.energies import (
     potential_energy as potential_energy,
     stored_energy as stored_energy,
 )
+from jounce.dynamics.energy_outputs import (
+    AccelerationEnergyOutput as AccelerationEnergyOutput,
+    BodyAccelerationEnergyOutput as BodyAccelerationEnergyOutput,
+    BodyKineticEnergyOutput as BodyKineticEnergyOutput,
+    BodyPotentialEnergyOutput as BodyPotentialEnergyOutput,
+    KineticEnergyOutput as KineticEnergyOutput,
+    PotentialEnergyOutput as PotentialEnergyOutput,
+)
 from jounce.dynamics.energy_terms import EnergyTerms as EnergyTerms, energy_terms as energy_terms
 from jounce.dynamics.equations import (
     catalan as catalan,

@@ -282,12 +282,32 @@ def potential_energy(motion: Motion) -> Any:
     >>> jn.dynamics.potential_energy(jn.solve(lift, [0.0, 1.0], order=1))[1].round(9).tolist()  # energy and power
     [60.0, 60.0]
     """
+    found = potential_coefficients(motion)[: motion.order + 1].sum(axis=1)
+    values = found * np.array([float(math.factorial(k)) for k in range(len(found))])[:, None]
+    return np.where((motion.status == Status.OK)[:, None], values.T, np.nan)
+
+
+def potential_coefficients(motion: Motion) -> np.ndarray:
+    """Return the potential energies of bodies as Taylor coefficients, (levels, bodies, time), the ground first."""
     mass, center, _ = mechanism_masses(motion)
     pose_type, coordinates = motion.poses
-    heights = _heights(coordinates, center, gravity_of(motion.mechanism), pose_type)[: motion.order + 1]
-    factorials = np.array([float(math.factorial(k)) for k in range(len(heights))])
-    values = -np.sum(np.asarray(heights) * mass, axis=1) * factorials[:, None]
-    return np.where((motion.status == Status.OK)[:, None], values.T, np.nan)
+    return -np.asarray(_heights(coordinates, center, gravity_of(motion.mechanism), pose_type)) * mass
+
+
+def energy_coefficients(motion: Motion, order: int) -> np.ndarray:
+    """Return the energies of order p of bodies as Taylor coefficients, (levels, bodies, time), the ground first.
+
+    Raises
+    ------
+    MechanismError
+        If no body has a mass, or the motion has too few derivatives.
+    """
+    pose_type, coordinates = motion.poses
+    if len(coordinates["position"]) < order + 2:
+        message = f"an energy of order {order} needs a motion solved to order {order + 1}"
+        raise MechanismError(message, name="order", value=motion.order)
+    parts = _evaluated(coordinates, *mechanism_masses(motion), pose_type, order, body_energy)
+    return np.asarray(parts[0]) + np.asarray(parts[1])
 
 
 @compiled("pose_type")

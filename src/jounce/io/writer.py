@@ -164,10 +164,10 @@ class _Writer:
             raise MechanismError(f"the output {kind.__name__} has no form in a file", name=place)
         holder = output_holder(kind)
         found: dict[str, Any] = {}
-        if holder == "body":
-            found["body"] = output.bodies[0]
-        elif holder == "bodies":
-            found["bodies"] = list(output.bodies)
+        if kind.body_count:
+            found[holder] = output.bodies[0] if holder == "body" else list(output.bodies)
+        elif holder == "mechanism":
+            found["mechanism"] = True
         values = self._values(place, output)
         if holder in values:
             found[holder] = values.pop(holder)

@@ -21,6 +21,7 @@ class AbstractQuantity(eqx.Module):
     lost_orders: ClassVar[int] = 0  # derivatives by which it is shorter than the motion
     rate_names: ClassVar[tuple[str, ...]] = ()  # of the quantity and its rates, where they are no velocities
     body_count: ClassVar[int] = 0
+    of_forces: ClassVar[bool] = False  # whether applied forces bear on it
 
     def check(self, mechanism: Any) -> None:
         """Raise MechanismError unless the quantity exists in a mechanism; names of bodies are checked elsewhere."""
