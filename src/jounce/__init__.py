@@ -134,6 +134,7 @@ from jounce.trajectory import (  # noqa: E402
     ExpressionMotion as ExpressionMotion,
     FunctionMotion as FunctionMotion,
     JointTrajectory as JointTrajectory,
+    MeasuredMotion as MeasuredMotion,
     PolynomialMotion as PolynomialMotion,
     RestToRestMotion as RestToRestMotion,
     SplineMotion as SplineMotion,

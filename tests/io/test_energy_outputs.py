@@ -108,7 +108,11 @@ def test_the_json_schema_has_them(path):
 @pytest.mark.parametrize(
     "old, new, words",
     [
-        ("{body: arm, quantity: kinetic_energy}", "{body: amr, quantity: kinetic_energy}", ("outputs.Ta", "amr", "arm")),
+        (
+            "{body: arm, quantity: kinetic_energy}",
+            "{body: amr, quantity: kinetic_energy}",
+            ("outputs.Ta", "amr", "arm"),
+        ),
         ("order: 2}", "order: 1.5}", ("outputs.E2.order", "1.5", "whole")),
         ("order: 2}", "order: -1}", ("outputs.E2.order", "-1")),
         ("quantity: potential_energy}\ntime", "quantity: potental_energy}\ntime", ("outputs.Vc", "potential_energy")),

@@ -109,7 +109,9 @@ def test_parts_with_rates_of_joints_that_follow():
     alone = np.zeros_like(q)
     alone[:, 0], alone[:, 1:, 0] = q[:, 0], q[:, 1:, 0]  # one coordinate only: no products of two
     weightless = robot.with_gravity([0, 0, 0])
-    assert difference(jn.bias_forces(weightless, alone), jn.bias_forces(weightless, alone, parts="centrifugal")) <= BOUND
+    assert (
+        difference(jn.bias_forces(weightless, alone), jn.bias_forces(weightless, alone, parts="centrifugal")) <= BOUND
+    )
 
 
 def test_what_the_robot_holds_and_what_its_drives_take():

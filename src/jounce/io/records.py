@@ -66,7 +66,7 @@ def complaint(kind: str, problem: object) -> str:
     return json.dumps({kind: told}, allow_nan=False)
 
 
-def motion_record(motion: Motion, file: Any, written: Any) -> dict[str, Any]:
+def motion_record(motion: Motion, file: Any, written: Any, refine: bool = True) -> dict[str, Any]:
     """Return what `jounce run` and `jounce simulate` tell of a motion."""
     import numpy as np
 
@@ -89,7 +89,7 @@ def motion_record(motion: Motion, file: Any, written: Any) -> dict[str, Any]:
             {"index": k, "time": times[k], "status": Status(motion.status[k]).name, "culprit": motion.culprits.get(k)}
             for k in failed.tolist()
         ],
-        "peaks": [_peak(peak) for peak in peaks(motion)],
+        "peaks": [_peak(peak) for peak in peaks(motion, refine=refine)],
         "written": written,
     }
     if hasattr(motion, "energy"):
