@@ -83,7 +83,8 @@ EXAMPLES = {
     --start "panda_joint4=-90 deg\"""",
     reproduce: """\
   jounce reproduce sommer-2024 --out out
-  jounce reproduce negrean-2025 --out out""",
+  jounce reproduce negrean-2025 --out out
+  jounce reproduce negrean-2025 --out out --samples a.csv --masses link.yaml""",
     schema: """\
   jounce schema > mechanism.schema.json
   jounce schema results""",

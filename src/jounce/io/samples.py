@@ -59,7 +59,7 @@ def read_columns(path: str | Path) -> tuple[list[float], dict[str, list[float]]]
     time = _find(name, header, "time")
     found = {column: [_number(name, line, header, row, k) for line, row in rows] for k, column in enumerate(header)}
     if len(found) < 2:
-        raise MechanismFileError("there is no column besides 'time'; give one for each joint", path=name, line=1)
+        raise MechanismFileError("there is no column besides 'time'", path=name, line=1)
     return found.pop(header[time]), found
 
 
