@@ -151,7 +151,9 @@ def _rates(pose: Any, order: int) -> tuple[list[Jet], list[Jet]]:
         return (velocity * float(math.comb(order, j))).truncate(spins[order].order)
 
     leading = [turned(order, axis) for axis in axes]
-    return leading, [total(turned(j, axis) for j in range(order)) if order else axis * 0.0 for axis in axes]
+    if not order:
+        return leading, [part * 0.0 for part in leading]
+    return leading, [total(turned(j, axis) for j in range(order)) for axis in axes]
 
 
 def _rotation(leading: list[Jet], remaining: list[Jet], moments: Any) -> tuple[Jet, Jet, Jet]:
