@@ -24,7 +24,9 @@ def _virtual_work(tree: Tree, arrays: Any, _: Any, inertial: bool) -> Any:
     if not inertial:
         return to_coordinates(tree, work_of_weight(tree, frames))
     force = centers_of(tree, frames).differentiate().differentiate() * jnp.asarray(tree.mass)[:, None]
-    moment = times_inertia(tree, frames, frames.angular_velocity).differentiate()
+    spin = frames.angular_velocity
+    assert spin is not None  # there are accelerations
+    moment = times_inertia(tree, frames, spin).differentiate()
     return to_coordinates(tree, work(partial_velocities(tree, frames), force, moment))
 
 

@@ -147,13 +147,14 @@ def _evaluated(
     form: Callable[..., Any],
     static: tuple[Any, ...],
 ) -> Any:
+    mass, center, moments = masses
     place = pose_type.from_coordinates({name: Jet(tuple(c)) for name, c in still.items()})
     factor = DenseFactor.of(system.jacobian(place, Jet([instants[None]])))
 
     def energies(changes: Any, p: int) -> Jet:
         time = Jet.variable(instants[None], changes.shape[0] - 1)
         pose = followed(with_changes(system, order, changes), place, factor, time)
-        parts = body_energy(pose, *masses, p)
+        parts = body_energy(pose, mass, center, moments, p)
         return total(part.map(lambda c: jnp.sum(c, axis=0)) for part in parts)
 
     return form(energies, jnp.zeros((least + 1, len(order), len(instants))), *static)

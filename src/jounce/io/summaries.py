@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from jounce.dynamics.limits import LimitReport
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from jounce.kinematics import Motion
     from jounce.trajectory import JointTrajectory
 
-__all__ = ["count", "limits_summary", "simulation_summary", "summary", "verdict"]
+__all__ = ["count", "limits_summary", "simulation_summary", "summary", "torques_summary", "verdict"]
 
 
 def summary(motion: Motion, file: Path) -> str:
