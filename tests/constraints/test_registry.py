@@ -4,6 +4,7 @@ import pytest
 
 import jounce as jn
 from jounce.constraints import catalogue
+from jounce.constraints.base import field_kind, value_fields
 from jounce.io.own import import_file
 
 
@@ -66,3 +67,20 @@ def test_files_of_one_name_are_two_files(tmp_path):
     with pytest.raises(jn.MechanismError, match="got 'mine'") as caught:
         import_file(paths[1])
     assert (caught.value.path, caught.value.line) == (str(paths[1]), 2)
+
+
+def test_annotations_may_be_strings(tmp_path):
+    path = tmp_path / "postponed.py"
+    path.write_text(
+        "from __future__ import annotations\n"
+        "import jounce as jn\nfrom jounce import Vector\n"
+        'class Postponed(jn.AbstractConstraint, type="postponed", space="planar"):\n'
+        "    point_i: Vector\n    length: jn.Scalar\n    word: str = 'x'\n"
+    )
+    import_file(str(path))
+    fields = value_fields(catalogue("planar", "joint")["postponed"])
+    assert {name: field_kind(field) for name, field in fields.items()} == {
+        "point_i": "vector",
+        "length": "scalar",
+        "word": "text",
+    }
