@@ -136,14 +136,14 @@ __version__ = "0.4.0"
 
 def _repr_html_(self: object) -> str:
     """Return what a notebook shows."""
-    from jounce.io.notebook import shown
+    from jounce.reporting.notebook import shown
 
     return shown(self)
 
 
 def _asked_of_pint(name: str) -> object:
     """Look a unit up that is not in the table."""
-    from jounce.io.units import ask_pint
+    from jounce.io.files.units import ask_pint
 
     return ask_pint(name)
 

@@ -5,7 +5,7 @@ import pytest
 import jounce as jn
 from jounce.constraints import catalogue
 from jounce.constraints.base import field_kind, value_fields
-from jounce.io.own import import_file
+from jounce.io.mechanisms.user_classes import import_file
 
 
 def own(kind="mine", name="Own", **keywords):

@@ -25,12 +25,12 @@ from jounce.cli.mechanisms import run, schema, simulate
 from jounce.cli.papers import reproduce
 from jounce.cli.robots import check
 from jounce.cli.starters import new
+from jounce.cli.streams import lasting_streams
 from jounce.cli.views import view
 from jounce.cli.writing import WritingError
 from jounce.errors import JounceError, SolveError
 from jounce.interrupts import end_on_signals
-from jounce.io.streams import lasting_streams
-from jounce.io.terminal import cautions, complain, unexpected
+from jounce.reporting.terminal import cautions, complain, unexpected
 
 EXAMPLES = {
     new: """\
@@ -130,7 +130,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         output.flush()
         if output.failure is None:
             return status
-        from jounce.io.files import reason_of
+        from jounce.io.files.writing import reason_of
 
         complain(f"standard output cannot be written: {reason_of(output.failure)}", json=as_json)
     return status or 1
@@ -139,7 +139,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _status(given: list[str], as_json: bool) -> int:
     """Return the exit status of a command, whose errors are told."""
     try:
-        from jounce.io.cache import use_compilation_cache
+        from jounce.cli.compiled_programs import use_compilation_cache
 
         use_compilation_cache()
         return _dispatch(given)

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Literal
 
 from jounce.errors import JounceError, OutputError
-from jounce.io.terminal import say
+from jounce.reporting.terminal import say
 
 SHELLS = ("bash", "zsh", "fish")
 
@@ -24,7 +24,7 @@ def completion(shell: Literal["bash", "zsh", "fish"], /, *, install: bool = Fals
         Write the script to this file, and leave start-up files alone.
     """
     from jounce.cli import application
-    from jounce.io.files import check_target, reason_of, replacing
+    from jounce.io.files.writing import check_target, reason_of, replacing
 
     if install and out is not None:
         raise JounceError("takes a place of its own; give --install or --out", name="--out", value=str(out))

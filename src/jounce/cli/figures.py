@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from jounce.cli.mechanisms import loaded, of_option, outcome, solved
 from jounce.cli.writing import spared, written
 from jounce.errors import JounceError, MechanismError, did_you_mean
-from jounce.io.terminal import Bar, say
+from jounce.reporting.terminal import Bar, say
 
 if TYPE_CHECKING:
     from jounce.kinematics import Motion

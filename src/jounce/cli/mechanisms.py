@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from jounce.cli.arguments import named_once
+from jounce.cli.file_kinds import expecting
 from jounce.cli.writing import allowed, spared, written
 from jounce.errors import JounceError, SolveError
-from jounce.io.kinds import expecting
-from jounce.io.summaries import simulation_summary, summary
-from jounce.io.terminal import Bar, say, say_json, show_peaks
+from jounce.reporting.summaries import simulation_summary, summary
+from jounce.reporting.terminal import Bar, say, say_json, show_peaks
 
 if TYPE_CHECKING:
     from jounce.kinematics import Motion
@@ -56,7 +56,7 @@ def run(
         Print the result as JSON.
     """
     from jounce import io
-    from jounce.io.peaks import peaks
+    from jounce.reporting.peaks import peaks
 
     if out is not None:
         io.check_writable(out, overwrite=overwrite)
@@ -116,7 +116,7 @@ def simulate(
     """
     from jounce import io
     from jounce.integrate import simulate as integrate
-    from jounce.io.peaks import peaks
+    from jounce.reporting.peaks import peaks
 
     if out is not None:
         io.check_writable(out, overwrite=overwrite)
@@ -149,7 +149,7 @@ def _finished(command: str, motion: Motion, file: Path, out: Path | None, overwr
     if out is not None:
         written(lambda: io.write(motion.dataset, out, overwrite=overwrite))
     if json:
-        from jounce.io.records import motion_record
+        from jounce.reporting.records import motion_record
 
         say_json(command, motion_record(motion, file, out))
     elif out is not None:
@@ -186,7 +186,7 @@ def schema(of: Literal["mechanism", "results"] = "mechanism", /) -> int:
     import json
 
     if of == "results":
-        from jounce.io.record_schema import record_schema as made
+        from jounce.reporting.record_schema import record_schema as made
     else:
         from jounce.io import json_schema as made
 
@@ -204,7 +204,7 @@ def loaded(
     from jounce.io import load
 
     if imports:
-        from jounce.io.own import import_file
+        from jounce.io.mechanisms.user_classes import import_file
 
         for path in imports:
             import_file(path)
@@ -212,7 +212,7 @@ def loaded(
         mechanism = load(file, allow=allowed(allow))
     if assignments:
         named_once(assignments, "--set")
-        from jounce.io.overrides import override
+        from jounce.io.mechanisms.overrides import override
 
         mechanism = override(mechanism, assignments)
     return mechanism

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from jounce.errors import JounceError
-from jounce.io.summaries import count
-from jounce.io.terminal import Bar, say
+from jounce.reporting.summaries import count
+from jounce.reporting.terminal import Bar, say
 
 PAPERS = {"sommer-2024": "jounce.papers.sommer_2024", "negrean-2025": "jounce.papers.negrean_2025"}
 

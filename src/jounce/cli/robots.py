@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from jounce.cli.file_kinds import expecting
 from jounce.cli.writing import allowed, spared, written
 from jounce.errors import JounceError, RobotError, SampleWarning
-from jounce.io.kinds import expecting
-from jounce.io.summaries import limits_summary, verdict
-from jounce.io.terminal import caution, say, say_json, show_limits
+from jounce.reporting.summaries import limits_summary, verdict
+from jounce.reporting.terminal import caution, say, say_json, show_limits
 
 
 def check(
@@ -56,8 +56,8 @@ def check(
     import warnings
 
     from jounce.dynamics.limits import check_limits
-    from jounce.io.robots import load_robot
-    from jounce.io.trajectories import load_trajectory
+    from jounce.io.robots.loader import load_robot
+    from jounce.io.robots.trajectories import load_trajectory
 
     if out is not None:
         from jounce.plot import check_figure
@@ -67,7 +67,7 @@ def check(
         model = load_robot(robot, strict=strict, allow=allowed(allow))
     laid = _laid_down(limits, model)
     if payload:
-        from jounce.io.payloads import with_payloads
+        from jounce.io.robots.payloads import with_payloads
 
         model = with_payloads(model, payload)
     with warnings.catch_warnings(record=True) as caught:
@@ -95,7 +95,7 @@ def check(
 
         written(lambda: save(draw_limits(report, f"{report.robot}: {trajectory.name}"), out, overwrite=overwrite))
     if json:
-        from jounce.io.records import limits_record
+        from jounce.reporting.records import limits_record
 
         say_json("check", limits_record(report, robot, trajectory, out))
     elif out is not None:
@@ -105,7 +105,7 @@ def check(
 
 def _laid_down(limits: Path | None, model: Any) -> Any:
     """Return the limits of a file, None without one."""
-    from jounce.io.limits import load_limits
+    from jounce.io.robots.limits import load_limits
 
     if limits is None:
         return None

@@ -14,7 +14,7 @@ import numpy as np
 
 from jounce.errors import MechanismError, OutputError, did_you_mean
 from jounce.interrupts import undoing
-from jounce.io.files import check_target, replacing
+from jounce.io.files.writing import check_target, replacing
 from jounce.plot.scene import AZIMUTH, ELEVATION, scene_of
 from jounce.plot.sketch import NAMES, Drawing, paths_of
 from jounce.plot.style import GREY, style

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from jounce.errors import MechanismError, did_you_mean
-from jounce.io.files import check_target, replacing
-from jounce.io.peaks import COMPONENTS, rate_name
+from jounce.io.files.writing import check_target, replacing
 from jounce.plot.labels import scale_of, symbol, unit_label
 from jounce.plot.style import COLOURS, PALE_GREY, RESOLUTION, blank_figure, shown_name, style
+from jounce.reporting.peaks import COMPONENTS, rate_name
 
 __all__ = ["check_figure", "draw", "finish", "save", "shade_unsolved"]
 

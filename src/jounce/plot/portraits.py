@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from jounce.errors import MechanismError, did_you_mean
-from jounce.io.peaks import COMPONENTS, rate_name
 from jounce.plot.labels import scale_of, symbol, unit_label
 from jounce.plot.style import COLOURS, GREY, PALE_GREY, blank_figure, style
+from jounce.reporting.peaks import COMPONENTS, rate_name
 
 __all__ = ["hodograph", "phase_portrait"]
 

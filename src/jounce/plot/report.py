@@ -13,9 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from jounce.io.files import check_target, replacing
-from jounce.io.peaks import COMPONENTS, derivative_name, derivative_unit, peaks, rate_name
-from jounce.io.summaries import simulation_summary, summary
+from jounce.io.files.writing import check_target, replacing
 from jounce.kinematics import Status
 from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.resolve import resolve
@@ -23,6 +21,8 @@ from jounce.plot.animation import LONGEST, SHORTEST
 from jounce.plot.scene import AZIMUTH, ELEVATION, scene_of
 from jounce.plot.sketch import length_text, paths_of, round_length
 from jounce.plot.style import BODY_COLOURS
+from jounce.reporting.peaks import COMPONENTS, derivative_name, derivative_unit, peaks, rate_name
+from jounce.reporting.summaries import simulation_summary, summary
 
 __all__ = ["check_report", "report"]
 

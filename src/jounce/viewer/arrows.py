@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from jounce.io.peaks import derivative_name, derivative_unit
+from jounce.reporting.peaks import derivative_name, derivative_unit
 from jounce.viewer.take import Exertion, Spot, Take
 
 __all__ = [

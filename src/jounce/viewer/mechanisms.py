@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from jounce.errors import JounceError, SolveError
-from jounce.io.peaks import rate_name
 from jounce.mechanism import AngularVelocityOutput, Mechanism
 from jounce.mechanism.mechanism import GROUND
+from jounce.reporting.peaks import rate_name
 from jounce.trajectory import Expression
 from jounce.viewer.take import Exertion, Parameter, Quantity, Spot, Take, rotated, spatial_vectors
 

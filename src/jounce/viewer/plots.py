@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from jounce.errors import JounceError
-from jounce.io.peaks import COMPONENTS, derivative_unit
 from jounce.plot.labels import scale_of
+from jounce.reporting.peaks import COMPONENTS, derivative_unit
 from jounce.viewer.legend import legend
 from jounce.viewer.take import Quantity, Take
 

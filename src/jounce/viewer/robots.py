@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from jounce.errors import RobotError
-from jounce.io.peaks import derivative_name
+from jounce.reporting.peaks import derivative_name
 from jounce.robot.model import Joint
 from jounce.robot.robot import Robot
 from jounce.viewer.take import Exertion, Parameter, Quantity, Take, rotated
