@@ -11,7 +11,7 @@ from jounce.cli.arguments import named_once
 from jounce.cli.file_kinds import expecting
 from jounce.cli.writing import allowed, spared, written
 from jounce.errors import JounceError, SolveError
-from jounce.reporting.summaries import simulation_summary, summary
+from jounce.reporting.summaries import motion_summary
 from jounce.reporting.terminal import Bar, say, say_json, show_peaks
 
 if TYPE_CHECKING:
@@ -56,6 +56,7 @@ def run(
         Print the result as JSON.
     """
     from jounce import io
+    from jounce.reporting.motion_facts import motion_facts
     from jounce.reporting.peaks import peaks
 
     if out is not None:
@@ -64,7 +65,7 @@ def run(
     spared(out, overwrite)
     motion = solved(mechanism, file, order, tolerance)
     if not json:
-        say(summary(motion, file))
+        say(motion_summary(motion_facts(motion), file.name))
         show_peaks(peaks(motion))
     return _finished("run", motion, file, out, overwrite, json)
 
@@ -116,6 +117,7 @@ def simulate(
     """
     from jounce import io
     from jounce.integrate import simulate as integrate
+    from jounce.reporting.motion_facts import motion_facts
     from jounce.reporting.peaks import peaks
 
     if out is not None:
@@ -137,7 +139,7 @@ def simulate(
     except JounceError as error:
         raise of_option(error, file) from None
     if not json:
-        say(simulation_summary(motion, file))
+        say(motion_summary(motion_facts(motion), file.name))
         show_peaks(peaks(motion))
     return _finished("simulate", motion, file, out, overwrite, json)
 

@@ -9,7 +9,8 @@ from jounce.cli.file_kinds import expecting
 from jounce.cli.writing import allowed, spared, written
 from jounce.errors import JounceError, RobotError, SampleWarning
 from jounce.reporting.summaries import limits_summary, verdict
-from jounce.reporting.terminal import caution, say, say_json, show_limits
+from jounce.reporting.tables import limits_table
+from jounce.reporting.terminal import caution, say, say_json, show_table
 
 
 def check(
@@ -85,7 +86,7 @@ def check(
         raise JounceError("there are no limits to compare with; give a file of limits with --limits", path=robot)
     if not json:
         say(limits_summary(report, motion, robot, trajectory))
-        show_limits(report)
+        show_table(limits_table(report), "bold red")
     for warning in caught:
         caution(warning.message, json=json)
     if not json:

@@ -1,12 +1,13 @@
-"""What a mechanism file holds, counted and put together: the facts that ``jounce inspect`` prints."""
+"""What a mechanism file holds, counted and put together: what ``jounce inspect`` and a notebook show."""
 
 from __future__ import annotations
 
 import dataclasses
 from os import PathLike, fspath
-from typing import Any
+from typing import Any, Literal, NotRequired
 
 import numpy as np
+from typing_extensions import TypedDict
 
 from jounce.constraints.base import value_fields
 from jounce.dynamics.start import driven
@@ -26,16 +27,153 @@ from jounce.kinematics.assembly import (
 from jounce.mechanism import Mechanism, Model, build, time_grid
 from jounce.mechanism.masses import body_mass
 from jounce.mechanism.system import POSITION_COMPONENTS
-from jounce.reporting.summaries import count
+from jounce.reporting.summaries import freedom_words
 
-__all__ = ["inspected", "unit_of_dimension"]
+__all__ = ["InspectedMechanism", "MechanismFacts", "inspected", "mechanism_facts", "unit_of_dimension"]
 
 TOLERANCE = 1e-12
+KINDS = ("joints", "drivers", "forces", "initial")
 BASES = {"mass": "kg", "length": "m", "angle": "rad", "time": "s", "ampere": "A", "kelvin": "K"}
 
 
+class ParameterFacts(TypedDict):
+    """A parameter: its value in SI units, and as it was written where that is another."""
+
+    name: str
+    value: float
+    unit: str | None
+    written: str | None
+
+
+class Pose(TypedDict):
+    """Where a body is: m, rad, Euler parameters."""
+
+    position: list[float]
+    angle: NotRequired[float]
+    quaternion: NotRequired[list[float]]
+
+
+class Shift(TypedDict):
+    """How far a body was moved from its guess, m and rad."""
+
+    distance: float
+    angle: float
+
+
+class BodyFacts(TypedDict):
+    """A body: mass, and where it was guessed and put."""
+
+    name: str
+    mass: float | None
+    center_of_mass: list[float] | None
+    inertia: float | list[float] | list[list[float]] | None
+    guess: Pose
+    pose: Pose | None
+    moved: Shift | None
+
+
+class ElementFacts(TypedDict):
+    """A joint, driver, force or initial condition, with what it has of equations and laws."""
+
+    name: str
+    type: str
+    bodies: list[str]
+    rows: NotRequired[int]
+    motion: NotRequired[str]
+    law: NotRequired[str]
+
+
+class OutputFacts(TypedDict):
+    """An output."""
+
+    name: str
+    quantity: str
+    unit: str
+    of: list[str]
+
+
+class Grid(TypedDict):
+    """Instants of a file, s."""
+
+    start: float
+    stop: float
+    count: int
+
+
+class FreedomFacts(TypedDict):
+    """Coordinates, equations and what they leave."""
+
+    coordinates: int
+    equations: int
+    of_drivers: int
+    independent: int
+    of_joints: int
+    left: int
+    redundant: int
+    redundant_among: list[str]
+    moving: list[str]
+    words: str
+    message: str | None
+
+
+class AssemblyFacts(TypedDict):
+    """Whether the bodies can be put together, at which instant, and how far joints are open."""
+
+    status: Literal["assembled", "open"]
+    message: str | None
+    at: float
+    open: float | None
+
+
+class MechanismFacts(TypedDict):
+    """What a mechanism file holds."""
+
+    kind: Literal["mechanism"]
+    title: str
+    space: Literal["planar", "spatial"]
+    gravity: list[float] | None
+    parameters: list[ParameterFacts]
+    joints: list[ElementFacts]
+    drivers: list[ElementFacts]
+    forces: list[ElementFacts]
+    initial: list[ElementFacts]
+    outputs: list[OutputFacts]
+    time: Grid | None
+
+
+class InspectedMechanism(MechanismFacts):
+    """What a mechanism file holds, and how it starts; ``ok`` is whether a solve or a simulation can."""
+
+    file: str | None
+    bodies: list[BodyFacts]
+    freedom: FreedomFacts
+    assembly: AssemblyFacts
+    ok: bool
+
+
+def mechanism_facts(mechanism: Mechanism, path: str | PathLike[str] | None = None) -> dict[str, Any]:
+    """Return what stands in a mechanism, before anything is put together: MechanismFacts.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    path : optional
+        Its file, which says how parameters are written.
+    """
+    return {
+        "kind": "mechanism",
+        "title": mechanism.title,
+        "space": mechanism.space,
+        "gravity": _numbers(mechanism, mechanism.gravity, POSITION_COMPONENTS[mechanism.space]),
+        "parameters": _parameters(mechanism, path),
+        **{kind: [_element(name, x) for name, x in getattr(mechanism, kind).items()] for kind in KINDS},
+        "outputs": [_output(name, x) for name, x in mechanism.outputs.items()],
+        "time": _time(mechanism),
+    }
+
+
 def inspected(mechanism: Mechanism, path: str | PathLike[str] | None = None) -> dict[str, Any]:
-    """Return what there is to know of a mechanism before it moves, as plain data in SI units.
+    """Return what there is to know of a mechanism before it moves, as plain data in SI units: InspectedMechanism.
 
     Parameters
     ----------
@@ -43,12 +181,6 @@ def inspected(mechanism: Mechanism, path: str | PathLike[str] | None = None) -> 
         One that cannot be put together is told of too.
     path : optional
         Its file, which says how parameters are written.
-
-    Returns
-    -------
-    dict
-        bodies, joints, drivers, forces, initial, outputs, parameters, time; ``freedom`` with what is counted, and
-        ``assembly`` with status, message and instant. ``ok`` is whether a solve or a simulation can start.
 
     Examples
     --------
@@ -59,36 +191,25 @@ def inspected(mechanism: Mechanism, path: str | PathLike[str] | None = None) -> 
     >>> [(joint["name"], joint["rows"]) for joint in facts["joints"]]
     [('A', 2), ('D', 2), ('BC', 1)]
     """
-    model = build(mechanism)
-    instant, time = _time(mechanism)
-    state = _State(mechanism, model, instant)
-    rows = {name: model.rows.count(name) for name in model.rows}
-    return {
-        "kind": "mechanism",
+    facts, model = mechanism_facts(mechanism, path), build(mechanism)
+    state = _State(mechanism, model, 0.0 if facts["time"] is None else facts["time"]["start"])
+    for kind in ("joints", "drivers"):
+        for element in facts[kind]:
+            element["rows"] = model.rows.count(f"{kind}.{element['name']}")
+    return facts | {
         "file": None if path is None else fspath(path),
-        "title": mechanism.title,
-        "space": mechanism.space,
-        "gravity": _numbers(mechanism, mechanism.gravity, POSITION_COMPONENTS[mechanism.space]),
-        "parameters": _parameters(mechanism, path),
         "bodies": _bodies(mechanism, model, state.coordinates),
-        "joints": [_element("joints", n, x, rows) for n, x in mechanism.joints.items()],
-        "drivers": [_element("drivers", n, x, rows) for n, x in mechanism.drivers.items()],
-        "forces": [_element("forces", n, x, {}) for n, x in mechanism.forces.items()],
-        "initial": [_element("initial", n, x, {}) for n, x in mechanism.initial.items()],
-        "outputs": [_output(n, x) for n, x in mechanism.outputs.items()],
-        "time": time,
         "freedom": state.freedom,
         "assembly": state.assembly,
         "ok": state.ok,
     }
 
 
-def _time(mechanism: Mechanism) -> tuple[float, dict[str, Any] | None]:
+def _time(mechanism: Mechanism) -> dict[str, Any] | None:
     if mechanism.time is None:
-        return 0.0, None
+        return None
     instants = time_grid(mechanism.time, mechanism.parameter_values)
-    told = {"start": float(instants[0]), "stop": float(instants[-1]), "count": len(instants)}
-    return told["start"], told
+    return {"start": float(instants[0]), "stop": float(instants[-1]), "count": len(instants)}
 
 
 class _State:
@@ -147,14 +268,9 @@ class _State:
             "redundant": redundant,
             "redundant_among": redundant_rows(model, left[:, rank:]).split(", ") if redundant and finite else [],
             "moving": freely_moving(model, right[rank:]).split(", ") if columns > rank else [],
-            "words": _words(freedom, mechanism),
+            "words": freedom_words(freedom, mechanism.drivers),
             "message": message,
         }
-
-
-def _words(freedom: int, mechanism: Mechanism) -> str:
-    words = count(freedom, "degree of freedom", "degrees of freedom")
-    return f"{words}, driven by {', '.join(mechanism.drivers)}" if mechanism.drivers else words
 
 
 def _masses(mechanism: Mechanism) -> list[str]:
@@ -179,7 +295,7 @@ def _parameters(mechanism: Mechanism, path: Any) -> list[dict[str, Any]]:
         except JounceError:
             dimension = None
         unit = None if dimension is None else unit_of_dimension(dimension)
-        text = written if isinstance(written, str) else None
+        text = written if isinstance(written, str) else getattr(written, "text", None)
         found.append({"name": name, "value": float(value), "unit": unit, "written": text})
     order = list(mechanism.parameters)
     return sorted(found, key=lambda entry: order.index(entry["name"]))
@@ -241,11 +357,9 @@ def _moved(guess: dict[str, Any], pose: dict[str, Any], attitude: str) -> dict[s
     return {"distance": distance, "angle": float(4 * np.arcsin(min(1.0, np.linalg.norm(second - first) / 2)))}
 
 
-def _element(section: str, name: str, element: Any, rows: dict[str, int]) -> dict[str, Any]:
+def _element(name: str, element: Any) -> dict[str, Any]:
     found: dict[str, Any] = {"name": name, "type": element.type_name or type(element).__name__}
     found["bodies"] = list(element.bodies)
-    if section in ("joints", "drivers"):
-        found["rows"] = rows.get(f"{section}.{name}", 0)
     fields = value_fields(type(element))
     for key in ("motion", "law"):
         if key in fields:

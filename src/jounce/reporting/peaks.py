@@ -21,6 +21,7 @@ LEAST = 200  # instants that are looked at, at least
 PEAKS, POINTS, ROUNDS = 2, 7, 3  # highest maxima of each curve, instants around each, and how often these close in
 CHUNK = 1000  # instants solved together
 ROUNDING = 1e-9
+SMALLEST = 1e-15  # share of the size of an output
 
 
 @dataclasses.dataclass(frozen=True)
@@ -50,6 +51,12 @@ class Peak:
     maximum: float
     maximum_at: float
     size: float
+
+    @property
+    def shown(self) -> tuple[float, float]:
+        """The minimum and the maximum, 0 where they are no more than rounding of the other components."""
+        low, high = (0.0 if abs(x) < SMALLEST * self.size else x for x in (self.minimum, self.maximum))
+        return low, high
 
     @property
     def largest(self) -> tuple[bool, bool]:

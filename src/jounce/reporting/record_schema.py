@@ -1,138 +1,163 @@
-"""The JSON Schema of what commands print with ``--json``."""
+"""The JSON Schema of what commands print with ``--json``, made from the types of the facts."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
+
+from pydantic import TypeAdapter
+from pydantic.json_schema import GenerateJsonSchema
+from typing_extensions import TypedDict
+
+from jounce.reporting.mechanism_facts import Grid, InspectedMechanism
+from jounce.reporting.motion_facts import MotionFacts, SimulationFacts
+from jounce.reporting.robot_facts import InspectedRobot
 
 __all__ = ["record_schema"]
 
-TEXT: dict[str, Any] = {"type": "string"}
-NUMBER: dict[str, Any] = {"type": "number"}
-WHOLE: dict[str, Any] = {"type": "integer"}
-FLAG: dict[str, Any] = {"type": "boolean"}
+
+class Record(TypedDict):
+    """What all results begin with."""
+
+    jounce: str
+    record: Literal[1]
 
 
-def _maybe(schema: dict[str, Any]) -> dict[str, Any]:
-    return {"anyOf": [schema, {"type": "null"}]}
+class PeakRecord(TypedDict):
+    """Extreme values of a derivative of an output."""
+
+    output: str
+    derivative: str
+    unit: str
+    minimum: float | None
+    minimum_at: float | None
+    maximum: float | None
+    maximum_at: float | None
 
 
-def _list(items: dict[str, Any]) -> dict[str, Any]:
-    return {"type": "array", "items": items}
+class Written(TypedDict):
+    """What a motion is told with."""
+
+    file: str
+    peaks: list[PeakRecord]
+    written: str | None
 
 
-def _object(keys: dict[str, Any], *optional: str, about: str = "") -> dict[str, Any]:
-    required = [key for key in keys if key not in optional]
-    made = {"type": "object", "properties": keys, "required": required, "additionalProperties": False}
-    return made | ({"description": about} if about else {})
+class RunRecord(Record, MotionFacts, Written):
+    """jounce run --json."""
+
+    command: Literal["run"]
 
 
-NUMBERS = _list(NUMBER)
-NAMES = _list(TEXT)
-MATRIX = {"anyOf": [NUMBER, NUMBERS, _list(NUMBERS), {"type": "null"}]}
-GRID = {"start": NUMBER, "stop": NUMBER, "count": WHOLE}
+class SimulateRecord(Record, SimulationFacts, Written):
+    """jounce simulate --json."""
+
+    command: Literal["simulate"]
 
 
-def _head(command: str, keys: dict[str, Any], *optional: str, about: str) -> dict[str, Any]:
-    head = {"jounce": TEXT, "record": {"const": 1}, "command": {"const": command}}
-    return _object(head | keys, *optional, about=about)
+class InspectMechanismRecord(Record, InspectedMechanism):
+    """jounce inspect --json of a mechanism file."""
+
+    command: Literal["inspect"]
 
 
-def _motion() -> dict[str, Any]:
-    numbers = ("minimum", "minimum_at", "maximum", "maximum_at")
-    peak = {"output": TEXT, "derivative": TEXT, "unit": TEXT} | dict.fromkeys(numbers, _maybe(NUMBER))
-    failure = {"index": WHOLE, "time": NUMBER, "status": TEXT, "culprit": _maybe(TEXT)}
-    return {
-        "file": TEXT,
-        "title": TEXT,
-        "space": {"enum": ["planar", "spatial"]},
-        **dict.fromkeys(("bodies", "joints", "drivers", "forces"), NAMES),
-        "order": WHOLE,
-        "time": _object({**GRID, "solved": WHOLE}),
-        "failures": _list(_object(failure)),
-        "peaks": _list(_object(peak)),
-        "written": _maybe(TEXT),
-    }
+class InspectRobotRecord(Record, InspectedRobot):
+    """jounce inspect --json of a robot file."""
+
+    command: Literal["inspect"]
 
 
-def _mechanism() -> dict[str, Any]:
-    pose = _object({"position": NUMBERS, "angle": NUMBER, "quaternion": NUMBERS}, "angle", "quaternion")
-    body = {"name": TEXT, "mass": _maybe(NUMBER), "center_of_mass": _maybe(NUMBERS), "inertia": MATRIX, "guess": pose}
-    body |= {"pose": _maybe(pose), "moved": _maybe(_object({"distance": NUMBER, "angle": NUMBER}))}
-    element = _object(
-        {"name": TEXT, "type": TEXT, "bodies": NAMES, "rows": WHOLE, "motion": TEXT, "law": TEXT},
-        "rows", "motion", "law",
-    )  # fmt: skip
-    freedom = dict.fromkeys(
-        ("coordinates", "equations", "of_drivers", "independent", "of_joints", "left", "redundant"), WHOLE
-    )
-    freedom |= {"redundant_among": NAMES, "moving": NAMES, "words": TEXT, "message": _maybe(TEXT)}
-    assembly = {
-        "status": {"enum": ["assembled", "open"]},
-        "message": _maybe(TEXT),
-        "at": NUMBER,
-        "open": _maybe(NUMBER),
-    }
-    parameter = {"name": TEXT, "value": NUMBER, "unit": _maybe(TEXT), "written": _maybe(TEXT)}
-    return {
-        "kind": {"const": "mechanism"},
-        "file": _maybe(TEXT),
-        "title": TEXT,
-        "space": {"enum": ["planar", "spatial"]},
-        "gravity": _maybe(NUMBERS),
-        "parameters": _list(_object(parameter)),
-        "bodies": _list(_object(body)),
-        **dict.fromkeys(("joints", "drivers", "forces", "initial"), _list(element)),
-        "outputs": _list(_object({"name": TEXT, "quantity": TEXT, "unit": TEXT, "of": NAMES})),
-        "time": _maybe(_object(GRID)),
-        "freedom": _object(freedom),
-        "assembly": _object(assembly),
-        "ok": FLAG,
-    }
+class LimitRow(TypedDict):
+    """The worst instant of a joint and quantity; without a limit, its ratio is null."""
+
+    joint: str
+    quantity: str
+    unit: str
+    worst: float
+    limit: float | None
+    ratio: float | None
+    at: float
+    broken: bool
 
 
-def _robot() -> dict[str, Any]:
-    link = {"name": TEXT, "moves_with": TEXT, "mass": _maybe(NUMBER), "center_of_mass": _maybe(NUMBERS)}
-    limits = ("lower", "upper", "velocity", "acceleration", "jerk", "effort", "effort_rate", "deceleration")
-    joint = {
-        **dict.fromkeys(("name", "type", "parent", "child"), TEXT),
-        "axis": _maybe(NUMBERS),
-        "unit": _maybe(TEXT),
-        "limits": _maybe(_object(dict.fromkeys(limits, _maybe(NUMBER)))),
-        "mimic": _maybe(_object({"joint": TEXT, "multiplier": NUMBER, "offset": NUMBER})),
-        **dict.fromkeys(("armature", "damping", "friction"), NUMBER),
-    }
-    closure = {"name": TEXT, "type": TEXT, "links": NAMES, "equations": _maybe(WHOLE), "redundant": _maybe(WHOLE)}
-    freedom = {"coordinates": WHOLE, "equations": WHOLE, "left": _maybe(WHOLE), "words": TEXT}
-    return {
-        "kind": {"const": "robot"},
-        "file": _maybe(TEXT),
-        "title": TEXT,
-        "gravity": NUMBERS,
-        "base": TEXT,
-        "mass": NUMBER,
-        "links": _list(_object({**link, "inertia": MATRIX})),
-        "joints": _list(_object(joint)),
-        "closures": _list(_object(closure)),
-        "freedom": _object(freedom),
-        "assembly": _object({"status": {"enum": ["assembled", "open"]}, "message": _maybe(TEXT)}),
-        "ok": FLAG,
-    }
+class CheckRecord(Record):
+    """jounce check --json."""
+
+    command: Literal["check"]
+    robot: str
+    file: str
+    trajectory: str
+    kept: bool
+    broken: int
+    time: Grid
+    held: dict[str, float]
+    limits: list[LimitRow]
+    written: str | None
 
 
-def _limits() -> dict[str, Any]:
-    row = {"joint": TEXT, "quantity": TEXT, "unit": TEXT, "worst": NUMBER, "limit": _maybe(NUMBER)}
-    row |= {"ratio": _maybe(NUMBER), "at": NUMBER, "broken": FLAG}
-    return {
-        "robot": TEXT,
-        "file": TEXT,
-        "trajectory": TEXT,
-        "kept": FLAG,
-        "broken": WHOLE,
-        "time": _object(GRID),
-        "held": {"type": "object", "additionalProperties": NUMBER},
-        "limits": _list(_object(row)),
-        "written": _maybe(TEXT),
-    }
+class Starter(TypedDict):
+    """A mechanism to begin from, and the command that writes it."""
+
+    name: str
+    about: str
+    command: str
+
+
+class NewListRecord(Record):
+    """jounce new --json."""
+
+    command: Literal["new"]
+    starters: list[Starter]
+
+
+class NewRecord(Record):
+    """jounce new NAME --json."""
+
+    command: Literal["new"]
+    name: str
+    written: str
+    next: list[str]
+
+
+class Problem(TypedDict):
+    """An error or a warning, taken apart."""
+
+    kind: str
+    message: str
+    file: str | None
+    line: int | None
+    name: str | None
+    value: Any
+    text: str
+
+
+class ErrorLine(TypedDict):
+    """One line on standard error."""
+
+    error: Problem
+
+
+class WarningLine(TypedDict):
+    """One line on standard error."""
+
+    warning: Problem
+
+
+RECORDS: dict[str, Any] = {
+    "run": RunRecord,
+    "simulate": SimulateRecord,
+    "inspect_mechanism": InspectMechanismRecord,
+    "inspect_robot": InspectRobotRecord,
+    "check": CheckRecord,
+    "new_list": NewListRecord,
+    "new": NewRecord,
+}
+
+
+class _Closed(GenerateJsonSchema):
+    """No keys but the known ones."""
+
+    def typed_dict_schema(self, schema: Any) -> dict[str, Any]:
+        return super().typed_dict_schema(schema) | {"additionalProperties": False}
 
 
 def record_schema() -> dict[str, Any]:
@@ -143,30 +168,24 @@ def record_schema() -> dict[str, Any]:
     >>> sorted(record_schema()["$defs"])
     ['check', 'complaint', 'inspect_mechanism', 'inspect_robot', 'new', 'new_list', 'run', 'simulate']
     """
-    energy = _object({"start": _maybe(NUMBER), "largest_change": _maybe(NUMBER)})
-    moved = _motion() | {"mobility": TEXT, "steps": WHOLE, "energy": energy, "drift": _maybe(NUMBER)}
-    starter = _object({"name": TEXT, "about": TEXT, "command": TEXT})
-    problem = _object({
-        "kind": TEXT, "message": TEXT, "file": _maybe(TEXT), "line": _maybe(WHOLE), "name": _maybe(TEXT),
-        "value": {}, "text": TEXT,
-    })  # fmt: skip
-    found = {
-        "run": _head("run", _motion(), about="jounce run --json"),
-        "simulate": _head("simulate", moved, about="jounce simulate --json"),
-        "inspect_mechanism": _head("inspect", _mechanism(), about="jounce inspect --json of a mechanism file"),
-        "inspect_robot": _head("inspect", _robot(), about="jounce inspect --json of a robot file"),
-        "check": _head("check", _limits(), about="jounce check --json"),
-        "new_list": _head("new", {"starters": _list(starter)}, about="jounce new --json"),
-        "new": _head("new", {"name": TEXT, "written": TEXT, "next": NAMES}, about="jounce new NAME --json"),
-    }
-    complaint = {
-        "description": "one line on standard error, beside --json",
-        "oneOf": [_object({"error": problem}), _object({"warning": problem})],
-    }
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "Results of jounce",
         "description": "Numbers are in SI units; null stands for a number that is not known or not finite.",
-        "oneOf": [{"$ref": f"#/$defs/{name}"} for name in found],
-        "$defs": {**found, "complaint": complaint},
+        "oneOf": [{"$ref": f"#/$defs/{name}"} for name in RECORDS],
+        "$defs": {name: _schema(kind) for name, kind in (RECORDS | {"complaint": ErrorLine | WarningLine}).items()},
     }
+
+
+def _schema(kind: Any) -> dict[str, Any]:
+    """Return the schema of a type, whole: each part in its place."""
+    found = TypeAdapter(kind).json_schema(mode="serialization", schema_generator=_Closed)
+    parts = found.pop("$defs", {})
+
+    def whole(schema: Any) -> Any:
+        if isinstance(schema, dict):
+            part = schema.get("$ref", "").removeprefix("#/$defs/")
+            return whole(parts[part]) if part else {key: whole(entry) for key, entry in schema.items()}
+        return [whole(entry) for entry in schema] if isinstance(schema, list) else schema
+
+    return whole(found)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 from collections.abc import Mapping
@@ -68,74 +69,19 @@ def complaint(kind: str, problem: object) -> str:
 
 def motion_record(motion: Motion, file: Any, written: Any) -> dict[str, Any]:
     """Return what `jounce run` and `jounce simulate` tell of a motion."""
-    import numpy as np
-
-    from jounce.kinematics import Status
+    from jounce.reporting.motion_facts import motion_facts
     from jounce.reporting.peaks import peaks
 
-    mechanism, times = motion.mechanism, motion.time
-    failed = np.flatnonzero(motion.status != Status.OK)
-    found: dict[str, Any] = {
-        "file": file,
-        "title": mechanism.title,
-        "space": mechanism.space,
-        "bodies": list(mechanism.bodies),
-        "joints": list(mechanism.joints),
-        "drivers": list(mechanism.drivers),
-        "forces": list(mechanism.forces),
-        "order": motion.order,
-        "time": {"start": times[0], "stop": times[-1], "count": len(times), "solved": len(times) - len(failed)},
-        "failures": [
-            {"index": k, "time": times[k], "status": Status(motion.status[k]).name, "culprit": motion.culprits.get(k)}
-            for k in failed.tolist()
-        ],
-        "peaks": [_peak(peak) for peak in peaks(motion)],
-        "written": written,
-    }
-    if hasattr(motion, "energy"):
-        reached: Any = motion.status == Status.OK
-        energy = motion.energy[reached]  # type: ignore[attr-defined]
-        drift = motion.drift[reached]  # type: ignore[attr-defined]
-        some = bool(reached.any())
-        found |= {
-            "mobility": motion.mobility,  # type: ignore[attr-defined]
-            "steps": motion.steps,  # type: ignore[attr-defined]
-            "energy": {
-                "start": energy[0] if some else None,
-                "largest_change": np.max(np.abs(energy - energy[0])) if some else None,
-            },
-            "drift": np.max(drift) if some else None,
-        }
-    return found
-
-
-def _peak(peak: Any) -> dict[str, Any]:
-    return {
-        "output": peak.output,
-        "derivative": peak.derivative,
-        "unit": peak.unit,
-        "minimum": peak.minimum,
-        "minimum_at": peak.minimum_at,
-        "maximum": peak.maximum,
-        "maximum_at": peak.maximum_at,
-    }
+    found = [dataclasses.asdict(peak) for peak in peaks(motion)]
+    for peak in found:
+        del peak["size"]
+    return {"file": file, **motion_facts(motion), "peaks": found, "written": written}
 
 
 def limits_record(report: LimitReport, robot: Any, trajectory: Any, written: Any) -> dict[str, Any]:
     """Return what `jounce check` tells of a trajectory and the limits of a robot."""
-    rows = [
-        {
-            "joint": row.joint,
-            "quantity": row.quantity,
-            "unit": row.unit,
-            "worst": row.value,
-            "limit": row.limit,
-            "ratio": row.ratio,
-            "at": row.time,
-            "broken": row.broken,
-        }
-        for row in report.rows
-    ]
+    names = {"worst": "value", "at": "time"}
+    keys = ("joint", "quantity", "unit", "worst", "limit", "ratio", "at", "broken")
     return {
         "robot": report.robot,
         "file": robot,
@@ -144,6 +90,6 @@ def limits_record(report: LimitReport, robot: Any, trajectory: Any, written: Any
         "broken": len(report.broken),
         "time": {"start": report.times[0], "stop": report.times[-1], "count": len(report.times)},
         "held": dict(report.held),
-        "limits": rows,
+        "limits": [{key: getattr(row, names.get(key, key)) for key in keys} for row in report.rows],
         "written": written,
     }

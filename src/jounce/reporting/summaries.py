@@ -1,80 +1,124 @@
-"""What the command says about a motion, and about a trajectory and the limits of a robot."""
+"""Facts in words: of mechanisms, robots and motions, and of a trajectory and the limits of a robot."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from jounce.dynamics.limits import LimitReport
-    from jounce.integrate import Simulation
-    from jounce.kinematics import Motion
     from jounce.trajectory import JointTrajectory
 
-__all__ = ["count", "limits_summary", "simulation_summary", "summary", "verdict"]
+__all__ = [
+    "count",
+    "freedom_words",
+    "limits_summary",
+    "motion_summary",
+    "start_heading",
+    "start_summary",
+    "verdict",
+]
 
 
-def summary(motion: Motion, file: Path) -> str:
-    """Word what was solved: bodies, degrees of freedom, instants."""
-    import numpy as np
-
-    from jounce.mechanism import build
-
-    mechanism, time_ = motion.mechanism, motion.time
-    rows = build(mechanism).rows
-    drives = sum(name.startswith("drivers.") for name in rows)
-    bodies = count(len(mechanism.bodies), "moving body", "moving bodies")
-    joints = f"{count(len(mechanism.joints), 'joint')} ({count(len(rows) - drives, 'equation')})"
-    freedom = count(drives, "degree of freedom", "degrees of freedom")
-    driven = f", driven by {', '.join(mechanism.drivers)}" if mechanism.drivers else ""
-    solved = int(np.sum(motion.status == 0))
-    instants = count(len(time_), "instant") if solved == len(time_) else f"{solved} of {len(time_)} instants"
-    span = f"t = {time_[0]:g} s" if len(time_) == 1 else f"from t = {time_[0]:g} s to {time_[-1]:g} s"
-    lines = [
-        mechanism.title or file.name,
-        f"{mechanism.space}: {bodies} ({len(rows)} coordinates), {joints}",
-        f"{freedom}{driven}",
-        f"{instants} {span}, derivatives to order {motion.order}",
-    ]
-    if motion.change_points.size:
-        passed = ", ".join(f"{t:g} s" for t in motion.change_points[:6])
-        more = ", ..." if motion.change_points.size > 6 else ""
+def motion_summary(facts: Any, file: str) -> str:
+    """Word what was solved or simulated: bodies, degrees of freedom, instants, and how well energy was kept."""
+    time, title = facts["time"], facts["title"] or file
+    span = f"t = {time['start']:g} s" if time["count"] == 1 else f"from t = {time['start']:g} s to {time['stop']:g} s"
+    solved = time["solved"] == time["count"]
+    instants = count(time["count"], "instant") if solved else f"{time['solved']} of {time['count']} instants"
+    bodies = count(len(facts["bodies"]), "moving body", "moving bodies")
+    joints = count(len(facts["joints"]), "joint")
+    order = f"derivatives to order {facts['order']}"
+    if "steps" in facts:
+        head = f"{facts['space']}: {bodies}, {joints}, {count(len(facts['forces']), 'force')}"
+        taken = f"{instants} {span} in {count(facts['steps'], 'step')}, {order}"
+        lines = [title, head, facts["mobility"], taken, *_kept(facts)]
+        return "\n".join(_wrapped(line) for line in lines)
+    equations, drives = facts["equations_of_joints"], facts["equations_of_drivers"]
+    bodies, joints = f"{bodies} ({equations + drives} coordinates)", f"{joints} ({count(equations, 'equation')})"
+    lines = [title, f"{facts['space']}: {bodies}, {joints}", freedom_words(drives, facts["drivers"])]
+    lines.append(f"{instants} {span}, {order}")
+    if facts["change_points"]:
+        passed = ", ".join(f"{t:g} s" for t in facts["change_points"][:6])
+        more = ", ..." if len(facts["change_points"]) > 6 else ""
         lines.append(f"passes a change point, where another motion could branch off, at t = {passed}{more}")
     return "\n".join(lines)
 
 
-def simulation_summary(motion: Simulation, file: Path) -> str:
-    """Word what was simulated: mobility, instants, steps, and how well energy and constraints were kept."""
-    import numpy as np
+def _kept(facts: Any) -> list[str]:
+    """Word how well a simulation kept energy and constraints."""
+    if not facts["time"]["solved"]:
+        return []
+    energy, kinks = facts["energy"], facts["kinks"]
+    change, size = energy["largest_change"], energy["largest_kinetic"]
+    share = f", {change / size:.1e} of the largest kinetic energy" if size else ""
+    lines = [f"energy: {energy['start']:.9g} J at the start; it changes by {change:.2g} J{share}"]
+    if facts["drivers"] or facts["forces"]:
+        lines.append("(drivers, actuators and dampers change it)")
+    if kinks:
+        names = ", ".join(dict.fromkeys(kink["name"] for kink in kinks))
+        found = count(len(kinks), "kink or jump", "kinks or jumps")
+        lines.append(f"{found}: {names}, the first at t = {kinks[0]['time']:.6g} s; no derivatives there")
+    lines.append(f"constraint drift: {facts['drift']:.1e} (rad, or sizes of the mechanism)")
+    return lines
 
-    from jounce.kinematics import Status
 
-    mechanism, time_ = motion.mechanism, motion.time
-    bodies = count(len(mechanism.bodies), "moving body", "moving bodies")
-    joints, forces = count(len(mechanism.joints), "joint"), count(len(mechanism.forces), "force")
-    reached = motion.status == Status.OK
-    instants = count(len(time_), "instant") if reached.all() else f"{int(reached.sum())} of {len(time_)} instants"
+def freedom_words(freedom: int, drivers: Iterable[str]) -> str:
+    """Word degrees of freedom and what drives them."""
+    words, names = count(freedom, "degree of freedom", "degrees of freedom"), ", ".join(drivers)
+    return f"{words}, driven by {names}" if names else words
+
+
+def start_summary(facts: Any) -> str:
+    """Word how many degrees of freedom a mechanism or a robot has, and whether a motion can start."""
+    return "\n".join(_mechanism_start(facts) if facts["kind"] == "mechanism" else _robot_start(facts))
+
+
+def start_heading(facts: Any) -> str:
+    """Word what a file holds."""
+    freedom = facts["freedom"]["words"]
+    if facts["kind"] == "mechanism":
+        return f"{facts['title'] or facts['file']}\n{facts['space']} mechanism: {freedom}"
+    return f"{facts['title']}\nrobot on {facts['base']}: {freedom}, {facts['mass']:.6g} kg"
+
+
+def _mechanism_start(facts: Any) -> list[str]:
+    freedom, assembly, time = facts["freedom"], facts["assembly"], facts["time"]
+    bodies = count(len(facts["bodies"]), "moving body", "moving bodies")
     lines = [
-        mechanism.title or file.name,
-        f"{mechanism.space}: {bodies}, {joints}, {forces}",
-        motion.mobility,
-        f"{instants} from t = {time_[0]:g} s to {time_[-1]:g} s in {count(motion.steps, 'step')}, "
-        f"derivatives to order {motion.order}",
+        "Degrees of freedom",
+        f"  {bodies}: {count(freedom['coordinates'], 'coordinate')}",
+        f"  joints: {count(freedom['equations'] - freedom['of_drivers'], 'equation')}"
+        f"; drivers: {count(freedom['of_drivers'], 'equation')}; independent: {freedom['independent']}",
     ]
-    if reached.any():
-        energy = motion.energy[reached]
-        change, size = float(np.max(np.abs(energy - energy[0]))), float(np.max(motion.kinetic_energy[reached]))
-        share = f", {change / size:.1e} of the largest kinetic energy" if size else ""
-        lines.append(f"energy: {energy[0]:.9g} J at the start; it changes by {change:.2g} J{share}")
-        if mechanism.drivers or mechanism.forces:
-            lines.append("(drivers, actuators and dampers change it)")
-        if motion.kinks:
-            names = ", ".join(dict.fromkeys(name for _, name in motion.kinks))
-            number = count(len(motion.kinks), "kink or jump", "kinks or jumps")
-            lines.append(f"{number}: {names}, the first at t = {motion.kinks[0][0]:.6g} s; no derivatives there")
-        lines.append(f"constraint drift: {np.max(motion.drift[reached]):.1e} (rad, or sizes of the mechanism)")
-    return "\n".join(_wrapped(line) for line in lines)
+    if freedom["redundant"]:
+        among = ", ".join(freedom["redundant_among"])
+        lines.append(f"  {count(freedom['redundant'], 'equation')} too many, among {among}")
+    if freedom["left"]:
+        lines.append(f"  left to move: {freedom['left']}, with which {', '.join(freedom['moving'])} can move")
+    assembled = assembly["status"] == "assembled"
+    lines += ["", "Start", f"  put together at t = {assembly['at']:g} s" if assembled else f"  {assembly['message']}"]
+    if time is not None:
+        lines.append(f"  time: {count(time['count'], 'instant')} from {time['start']:g} s to {time['stop']:g} s")
+    else:
+        lines.append("  no time grid is given")
+    if freedom["message"] and facts["ok"] and freedom["left"]:
+        lines.append("  it has degrees of freedom left: jounce simulate moves it by its forces")
+    elif freedom["message"]:
+        lines.append(f"  {freedom['message']}")
+    elif facts["ok"]:
+        lines.append("  all motion is prescribed: jounce run solves it")
+    return lines
+
+
+def _robot_start(facts: Any) -> list[str]:
+    freedom, message = facts["freedom"], facts["assembly"]["message"]
+    lines = ["Degrees of freedom", f"  {count(freedom['coordinates'], 'moving joint')} that follow no other"]
+    if facts["closures"] and facts["ok"]:
+        lines.append(f"  loops: {count(freedom['equations'], 'independent equation')}; left: {freedom['left']}")
+    return lines + ([f"  {message}"] if message else [])
 
 
 def limits_summary(report: LimitReport, motion: JointTrajectory, robot: Path, trajectory: Path) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import sys
 import time
@@ -10,14 +9,12 @@ import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from jounce.errors import RobotWarning, SampleWarning, UnitWarning
 from jounce.interrupts import undoing
 from jounce.reporting.peaks import Peak
-
-if TYPE_CHECKING:
-    from jounce.dynamics.limits import LimitReport
+from jounce.reporting.tables import Table, peaks_table
 
 __all__ = [
     "Bar",
@@ -27,121 +24,88 @@ __all__ = [
     "say",
     "say_json",
     "show_columns",
-    "show_limits",
     "show_peaks",
-    "show_rows",
+    "show_table",
     "unexpected",
 ]
 
 OURS = (RobotWarning, SampleWarning, UnitWarning)  # warnings of this package, which nobody may turn off by mistake
 WIDTH = 80  # of tables that do not go to a terminal
-NARROWEST, WIDEST = 40, 9999
+WIDEST = 9999
 SHOW_CURSOR = b"\r\x1b[2K\x1b[?25h"  # on a cleared line; a progress bar hides it
 PATIENCE = 1.0  # s, before a progress bar is shown
-ROUNDING = 1e-15  # of the other components; what is smaller is shown as 0
-HEADINGS = ("output", "derivative", "unit", "minimum", "at t/s", "maximum", "at t/s")
-LIMIT_HEADINGS = ("joint", "quantity", "unit", "worst", "limit", "ratio", "at t/s")
 
 
-def show_peaks(found: list[Peak]) -> None:
+def show_peaks(found: Sequence[Peak]) -> None:
     """Print a table of peaks."""
-    if not found:
+    if found:
+        show_table(peaks_table(found))
+    else:
         say("\nNo outputs are defined, so there is nothing to tabulate.")
-        return
-    latest = max((abs(at) for p in found for at in (p.minimum_at, p.maximum_at) if math.isfinite(at)), default=1.0)
-    decimals = 3 - math.floor(math.log10(latest or 1.0))  # of times: a table is read, not computed with
-    table = [_cells(peak, decimals) for peak in found]
-    marks = [[k for k, largest in zip((3, 5), peak.largest, strict=True) if largest] for peak in found]
-    _show_table(HEADINGS, table, marks, "largest magnitude", (3, 5))
 
 
-def show_limits(report: LimitReport) -> None:
-    """Print a table of the worst instant of each joint and quantity that has a limit."""
-    table, marks = [], []
-    for row in report.limited:
-        numbers = (_shown(x) for x in (row.value, row.limit or 0.0))
-        table.append([row.joint, row.quantity, row.unit, *numbers, f"{row.ratio or 0.0:.4f}", f"{row.time:.5g}"])
-        marks.append([5] if row.broken else [])
-    _show_table(LIMIT_HEADINGS, table, marks, "broken" if any(marks) else "", (5,), "bold red")
+def show_table(table: Table, style: str = "bold") -> None:
+    """Print a table, in colour on a terminal that is wide enough for its numbers; marked cells have a style there."""
+    if not (sys.stdout.isatty() and _show_coloured(table, style)):
+        say("\n" + "\n".join(_plain_lines(table)))
 
 
-def _shown(number: float) -> str:
-    return "-" if math.isnan(number) else f"{number:.6g}"
-
-
-def _cells(peak: Peak, decimals: int) -> list[str]:
-    low, high = (0.0 if abs(x) < ROUNDING * peak.size else x for x in (peak.minimum, peak.maximum))
-    times = peak.minimum_at, peak.maximum_at
-    early, late = (x if float(f"{x:.3g}") == x else round(x, decimals) for x in times)
-    extremes = (_shown(x) for x in (low, early, high, late))
-    return [peak.output, peak.derivative, peak.unit, *extremes]
-
-
-def _show_table(
-    headings: Sequence[str],
-    table: list[list[str]],
-    marks: list[list[int]],
-    meaning: str,
-    markable: Sequence[int],
-    style: str = "bold",
-) -> None:
-    """Print rows grouped by their first cell; the next two are text, the rest numbers, of which some are marked."""
-    if sys.stdout.isatty() and _print_table(headings, table, marks, meaning, style):
-        return
-    starred = [
-        [cell + ("*" if k in marked else " ") if k in markable else cell for k, cell in enumerate(cells)]
-        for cells, marked in zip(table, marks, strict=True)
-    ]
-    say("\n" + "\n".join([*_plain_table(headings, starred), *(["", f"* {meaning}"] if meaning else [])]))
-
-
-def _plain_table(headings: Sequence[str], table: list[list[str]]) -> list[str]:
+def _plain_lines(table: Table) -> list[str]:
     """Return the lines of a table in plain text; where names are too long for it, they stand on lines of their own."""
-    columns = list(zip(headings, *table, strict=True))
+    starred = [
+        [cell + ("*" if k in marked else " ") if k in table.markable else cell for k, cell in enumerate(cells)]
+        for cells, marked in zip(table.rows, table.marks or [[]] * len(table.rows), strict=True)
+    ]
+    columns = list(zip(table.headings, *starred, strict=True))
     widths = [max(map(len, column)) for column in columns]
-    first = 0 if sum(widths) + 2 * (len(widths) - 1) <= WIDTH else 1
+    fits = not table.grouped or sum(widths) + 2 * (len(widths) - 1) <= WIDTH
+    indent, first = "  " * bool(table.title), 0 if fits else 1
 
     def line(cells: Sequence[str]) -> str:
-        parts = [c.ljust(w) if k < 3 else c.rjust(w) for k, (c, w) in enumerate(zip(cells, widths, strict=True))]
-        return "  ".join(parts[first:]).rstrip()
+        padded = enumerate(zip(cells, widths, strict=True))
+        parts = [c.rjust(w) if k in table.numbers else c.ljust(w) for k, (c, w) in padded]
+        return (indent + "  ".join(parts[first:])).rstrip()
 
-    lines = [line(headings), line(["-" * w for w in widths])]
+    lines = [*[table.title] * bool(table.title), line(table.headings), line(["-" * w for w in widths])]
     before = ""
-    for cells in table:
-        if cells[0] != before:
+    for cells in starred:
+        if table.grouped and cells[0] != before:
             lines += [""] * bool(before) + [cells[0]] * first
         before = cells[0]
         lines.append(line(cells))
-    return lines
+    return [*lines, *(["", f"* {table.meaning}"] if table.meaning else [])]
 
 
-def _print_table(
-    headings: Sequence[str], found: list[list[str]], marks: list[list[int]], meaning: str, style: str
-) -> bool:
+def _show_coloured(table: Table, style: str) -> bool:
     """Print a table in colour, unless the terminal cannot show marks or is so narrow that rich would cut numbers."""
     from rich import box
     from rich.console import Console
-    from rich.table import Table
+    from rich.table import Table as Grid
     from rich.text import Text
 
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, header_style="bold")
-    for k, heading in enumerate(headings):
-        table.add_column(heading, justify="left" if k < 3 else "right", no_wrap=k > 0, style="cyan" if k == 0 else "")
+    title = table.title or None
+    grid = Grid(box=box.SIMPLE_HEAD, pad_edge=False, header_style="bold", title=title, title_justify="left")
+    grid.title_style = "bold"
+    for k, heading in enumerate(table.headings):
+        whole = k > 0 if table.grouped else k in table.numbers
+        justify, colour = ("right" if k in table.numbers else "left"), ("cyan" if k == 0 else "")
+        grid.add_column(heading, justify=justify, no_wrap=whole, style=colour, overflow="fold")
     before = ""
-    for row, marked in zip(found, marks, strict=True):
-        cells = [Text(cell) for cell in row]
+    for row, marked in zip(table.rows, table.marks or [[]] * len(table.rows), strict=True):
+        cells = [Text(_clean(cell)) for cell in row]
         for column in marked:
             cells[column].stylize(style)
-        cells[0] = Text("" if row[0] == before else _clean(row[0]))
-        if before not in ("", row[0]):
-            table.add_section()
+        if table.grouped and row[0] == before:
+            cells[0] = Text("")
+        elif table.grouped and before:
+            grid.add_section()
         before = row[0]
-        table.add_row(*cells)
-    notes = [f"{style}: {meaning}"] if meaning else []
+        grid.add_row(*cells)
+    notes = [f"{style}: {table.meaning}"] if table.meaning else []
     console = Console()
-    if console.is_dumb_terminal or Console(width=WIDEST).measure(table).minimum > console.width:
+    if console.is_dumb_terminal or Console(width=WIDEST).measure(grid).minimum > console.width:
         return False
-    console.print(table, *notes, sep="\n")
+    console.print(*[""] * bool(title), grid, *notes, sep="\n")
     return True
 
 
@@ -157,34 +121,6 @@ def show_columns(pairs: Sequence[tuple[str, str]]) -> None:
             Console(soft_wrap=True).print(Text.assemble((name.ljust(width), "cyan"), f"  {meaning}"))
         return
     say("\n".join(f"{name:{width}}  {meaning}" for name, meaning in pairs))
-
-
-def show_rows(title: str, headings: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[int] = ()) -> None:
-    """Print a table below a title; columns that are empty throughout are left out, the last one may be long."""
-    kept = [k for k in range(len(headings)) if any(row[k] for row in rows)] or [0]
-    if sys.stdout.isatty():
-        from rich import box
-        from rich.console import Console
-        from rich.table import Table
-        from rich.text import Text
-
-        table = Table(box=box.SIMPLE_HEAD, pad_edge=False, header_style="bold", title=title, title_justify="left")
-        table.title_style = "bold"
-        for k in kept:
-            justify, style = ("right" if k in numbers else "left"), ("cyan" if k == 0 else "")
-            table.add_column(headings[k], justify=justify, style=style, overflow="fold")
-        for row in rows:
-            table.add_row(*(Text(_clean(row[k])) for k in kept))
-        console = Console()
-        console.width = max(console.width, NARROWEST)  # narrower, rich leaves columns out
-        console.print("", table)
-        return
-    widths = {k: max(len(row[k]) for row in [headings, *rows]) for k in kept}
-    lines = ["", title]
-    for row in [headings, ["-" * len(heading) for heading in headings], *rows]:
-        cells = [row[k].rjust(widths[k]) if k in numbers else row[k].ljust(widths[k]) for k in kept]
-        lines.append("  " + "  ".join(cells).rstrip())
-    say("\n".join(lines))
 
 
 class Bar:

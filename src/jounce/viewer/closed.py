@@ -82,8 +82,7 @@ def independent(robot: Robot) -> tuple[str, ...]:
         If there are none.
     """
     from jounce.kinematics import solve
-    from jounce.robot.closed_loop import size_of
-    from jounce.robot.closures import Loops
+    from jounce.robot.closures import Loops, size_of
 
     loops = Loops(robot, size_of(robot))
     start = loops.closed(np.zeros(len(robot.joint_names)), np.ones(len(robot.joint_names), bool))

@@ -16,7 +16,7 @@ from jounce.io.robots.faults import Faults
 from jounce.io.robots.mjcf_files import check_assets, included, quiet_mujoco
 from jounce.io.robots.xml_elements import Element
 from jounce.rigid.inertia import Inertia
-from jounce.robot.construct import floating_joints
+from jounce.robot.floating_base import floating_joints
 from jounce.robot.model import Closure, Joint, Limits, Link, Mimic, leaders
 from jounce.robot.robot import Robot
 from jounce.robot.tree import quaternion_matrix, turn_about

@@ -15,7 +15,7 @@ from jounce.errors import RobotError, RobotFileError, did_you_mean
 from jounce.io.robots.faults import FOLLOWS_NONE, IDLE, MASSLESS, Faults
 from jounce.io.robots.xml_elements import Element
 from jounce.rigid.inertia import Inertia
-from jounce.robot.construct import floating_joints
+from jounce.robot.floating_base import floating_joints
 from jounce.robot.model import Joint, Limits, Link, Mimic, leaders
 from jounce.robot.robot import Robot
 from jounce.robot.tree import axes_with_z_along, ordered, quaternion_matrix
