@@ -42,6 +42,7 @@ from jounce.dynamics import (  # noqa: E402
     acceleration_energy as acceleration_energy,
     applied_force as applied_force,
     check_limits as check_limits,
+    constraint_equations as constraint_equations,
     driver_force as driver_force,
     joint_reaction as joint_reaction,
     kinetic_energy as kinetic_energy,
