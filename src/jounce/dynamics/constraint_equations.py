@@ -116,6 +116,8 @@ def constraint_equations(motion: Motion | Mechanism, state: Mapping[str, Any] | 
         raise MechanismError("must be a jn.Motion, or a jn.Mechanism with a state", name="motion", value=motion)
     labels = _labels(motion)
     numbers = _numbers(motion, order)
+    if isinstance(motion, _State):
+        _check_finite(numbers, labels["row"], float(motion.time[0]))
     found = {
         "residual": (("time", "row"), numbers["residual"]),
         "jacobian": (("time", "row", "column"), numbers["jacobian"]),
@@ -237,7 +239,7 @@ def _right_sides(system: System, bodies: dict[str, Any], instants: Any, pose_typ
     """
     order = len(bodies["position"]) - 1
     residual = system.residual(pose_of(bodies, pose_type, order), Jet.variable(instants[None], order)).dense()
-    parts = [c.reshape(len(c), order, -1)[:, k] for k, c in enumerate(residual.coefficients[1:])]
+    parts = [c.reshape(len(c), order, c.shape[-1] // order)[:, k] for k, c in enumerate(residual.coefficients[1:])]
     factorials = np.array([math.factorial(k + 1) for k in range(order)], float)
     return -factorials[:, None, None] * jnp.stack(parts)
 
@@ -316,6 +318,17 @@ def _mass_matrix(motion: Motion) -> np.ndarray:
 @compiled("pose_type")
 def _body_masses(bodies: dict[str, Any], masses: Any, pose_type: Any) -> Any:
     return mass_matrices(pose_of(bodies, pose_type, 0), *masses)
+
+
+def _check_finite(numbers: dict[str, np.ndarray], rows: np.ndarray, instant: float) -> None:
+    """Raise MechanismError for a state at which a row is not a finite number."""
+    for name, values in numbers.items() if len(rows) else ():
+        bad = ~np.isfinite(np.moveaxis(values[0], -1 if name == "right_side" else 0, 0).reshape(len(rows), -1))
+        if bad.any():
+            row, k = np.argwhere(bad)[0]
+            what = f"its derivative {k + 1}" if name == "right_side" else f"its {name}"
+            message = f"{what} has no finite value at t = {instant:g} s; check its law, and its points, there"
+            raise MechanismError(message, name=str(rows[row]).rpartition(".")[0])
 
 
 class _State(Motion):
