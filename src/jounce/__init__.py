@@ -94,10 +94,16 @@ from jounce.mechanism import (  # noqa: E402
     AngularVelocityOutput as AngularVelocityOutput,
     Body as Body,
     DistanceOutput as DistanceOutput,
+    EulerAnglesOutput as EulerAnglesOutput,
+    EulerParametersOutput as EulerParametersOutput,
     Mechanism as Mechanism,
     PlanarRelativeAngleOutput as PlanarRelativeAngleOutput,
     PointOutput as PointOutput,
     RelativeAngleOutput as RelativeAngleOutput,
+    RelativeEulerAnglesOutput as RelativeEulerAnglesOutput,
+    RelativeEulerParametersOutput as RelativeEulerParametersOutput,
+    RelativeRotationMatrixOutput as RelativeRotationMatrixOutput,
+    RotationMatrixOutput as RotationMatrixOutput,
     TimeGrid as TimeGrid,
 )
 from jounce.robot import (  # noqa: E402

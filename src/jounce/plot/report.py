@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from jounce.io.files import check_target, replacing
-from jounce.io.peaks import COMPONENTS, derivative_name, derivative_unit, peaks, rate_name
+from jounce.io.peaks import derivative_name, derivative_unit, peaks, rate_name
 from jounce.io.summaries import simulation_summary, summary
 from jounce.kinematics import Status
 from jounce.mechanism.mechanism import GROUND
@@ -165,7 +165,7 @@ def _output(name: str, output: Any, values: np.ndarray) -> dict[str, Any]:
         "name": name,
         "words": ["angle" if word == "position" and output.unit == "rad" else word for word in words],
         "units": [derivative_unit(output.unit, k) for k in orders],
-        "components": list(COMPONENTS[:components]) if components > 1 else [""],
+        "components": list(output.labels[:components]) if components > 1 else [""],
         "values": [[[_number(v) for v in columns[:, k, c]] for c in range(components)] for k in orders],
     }
 
