@@ -191,7 +191,8 @@ def _portrayed(motion: Motion, kind: str, output: list[str] | None) -> str:
     """Return the output of a portrait: the first that fits unless one is named."""
     if output or kind not in PORTRAITS:
         return output[0] if output else ""
-    vectors = [name for name, values in motion.outputs.items() if values.ndim == 3 or kind == "phase"]
+    known = motion.mechanism.outputs
+    vectors = [n for n, values in motion.outputs.items() if kind == "phase" or (values.ndim == 3 and not known[n].axes)]
     return (vectors or list(motion.outputs))[0]
 
 
