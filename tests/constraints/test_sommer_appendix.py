@@ -1,4 +1,4 @@
-"""Appendix A of S against what the library reads off jets: Jacobian, gamma, eta and sigma, and the terms between them."""
+"""Appendix A of S against what the library reads off jets: Jacobian, gamma, eta and sigma, and the terms between."""
 
 import numpy as np
 

@@ -1,9 +1,9 @@
 """What a test uses: the objects that its source leads to, with its helpers, fixtures and tables, without running it.
 
-Names are resolved to the objects that they stand for, so that an alias is no obstacle and a name that only looks alike is
-no help. Helpers in `tests` are followed, the library is not: what it calls itself does not count. What is only imported,
-asked for by `isinstance`, expected by `pytest.raises`, or written as an annotation, is not used. A method counts where the
-class of the object before the dot is known.
+Names are resolved to the objects that they stand for, so that an alias is no obstacle and a name that only looks alike
+is no help. Helpers in `tests` are followed, the library is not: what it calls itself does not count. What is only
+imported, asked for by `isinstance`, expected by `pytest.raises`, or written as an annotation, is not used. A method
+counts where the class of the object before the dot is known.
 """
 
 import ast
@@ -125,9 +125,9 @@ class Walk:
     def node_of(self, function):
         wanted = function.__code__.co_firstlineno
         for node in ast.walk(self.tree):
-            if isinstance(node, ast.FunctionDef) and node.name == function.__name__:
-                if wanted in (node.lineno, *(d.lineno for d in node.decorator_list)):
-                    return node
+            named = isinstance(node, ast.FunctionDef) and node.name == function.__name__
+            if named and wanted in (node.lineno, *(d.lineno for d in node.decorator_list)):
+                return node
         return None
 
     def owner_of(self, function):

@@ -25,7 +25,7 @@ DEFINITIONS = [
     "S A22",
     "S A30",
     "N 74",
-]  # what a symbol means; nothing to test
+]  # what a symbol means
 WAITING = [*(f"S {k}" for k in range(1, 9)), "N 73", "N 75"]  # for public functions that give these objects
 
 
