@@ -1,4 +1,4 @@
-"""The robot that Negrean 2025 measured, as an example: its published lengths, and the closed forms 144-146 for its arm."""
+"""The robot that Negrean 2025 measured: its published lengths, and the closed forms 144-146 for its arm."""
 
 import pathlib
 
@@ -29,7 +29,7 @@ def test_swing_is_the_motion_of_the_paper():
 
 
 def test_equations_144_to_146_for_the_third_axis():
-    """Forearm, wrist and flange turn as one body about a level axis; signs as the paper has them: x down is positive."""
+    """Forearm, wrist and flange turn as one body about a level axis; signs are those of the paper."""
     q = SWING.derivatives(np.linspace(0.1, 1.6, 7), order=4)
     third = SWING.names.index("J3")
     found = jn.inverse_dynamics(ROBOT, q)[..., third]
@@ -37,7 +37,7 @@ def test_equations_144_to_146_for_the_third_axis():
     mass, moment, inertia = 0.0, np.zeros(3), 0.0
     for name, offset in offsets.items():
         link = ROBOT.links[name].inertia
-        center = np.array(link.center_of_mass) + [offset, 0.0, 0.0]
+        center = np.array(link.center_of_mass) + np.array([offset, 0.0, 0.0])
         mass, moment = mass + link.mass, moment + link.mass * center
         inertia += np.array(link.tensor)[1, 1] + link.mass * (center[0] ** 2 + center[2] ** 2)
     center = moment / mass
