@@ -15,7 +15,7 @@ def use_one_core() -> None:
 
 
 def race(competitors: Mapping[str, Callable[[], object]], rounds: int = 15, *, best: bool = False) -> dict[str, float]:
-    """Return the median seconds of each competitor, or the least, run in turns so that a busy machine slows all alike."""
+    """Return the median seconds of each, or the least, run in turns so that a busy machine slows all of them alike."""
     times: dict[str, list[float]] = {name: [] for name in competitors}
     for run in competitors.values():
         run()

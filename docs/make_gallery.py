@@ -105,7 +105,7 @@ PICTURES = {
     "gear_pair": Picture(("C",), 0.2),
     "hooke_joint": Picture(("rim",), 0.1, view=(-70.0, 40.0)),
     "human_arm": robot(
-        "A person's arm",
+        "Human arm",
         "human_arm.xml",
         "human_arm_reach.yaml",
         "hand",
