@@ -26,7 +26,6 @@ from jounce.mechanism.datums import Way, attitudes_of
 from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.system import POSITION_COMPONENTS, Group, group_elements
 
-
 _UNDEFINED = Status.UNDEFINED.advice.partition(": ")[2]
 
 
