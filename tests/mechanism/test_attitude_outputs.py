@@ -247,7 +247,7 @@ def test_files_hold_every_form(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "named"),
+    "old, new, named",
     [
         ("sequence: ZXY", "sequence: ZXx", "line 13, .*sequence"),
         ("sequence: ZXY", "sequence: ZZX", "line 13, .*sequence"),
