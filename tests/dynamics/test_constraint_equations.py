@@ -527,3 +527,67 @@ def test_a_simulation_has_equations_too():
     joint = equations.jacobian.isel(time=1).values.T @ at.multipliers.sel(derivative=0).values
     reaction = jn.joint_reaction(simulation, next(iter(pendulum.joints))).force
     np.testing.assert_allclose(joint[:2], -reaction.sel(derivative=0)[1], rtol=1e-12)
+
+
+SKEW = np.array([1.0, 2.0, 2.0]) / 3  # the axis of a flap in the global frame, and, turned, in that of the flap
+TURN = np.array([0.8, 0.1, -0.5, 0.3]) / np.linalg.norm([0.8, 0.1, -0.5, 0.3])
+
+
+def rotated(p, v):
+    return v + 2 * np.cross(p[1:], np.cross(p[1:], v) + p[0] * v)
+
+
+def flap():
+    """Return a solid on a skew hinge, its frame drawn anyhow, its centre of mass and inertia off every axis."""
+    tensor = np.array([[0.30, 0.02, -0.05], [0.02, 0.40, 0.03], [-0.05, 0.03, 0.35]])
+    axis = rotated(TURN * [1, -1, -1, -1], SKEW)
+    return jn.Mechanism(
+        space="spatial",
+        gravity=[1.0, -2.0, -9.81],
+        bodies={
+            "flap": jn.Body(
+                [0.3, 0.1, 0.2], orientation=TURN.tolist(), mass=2.5, inertia=tensor, center_of_mass=[0.2, -0.1, 0.3]
+            )
+        },
+        joints={
+            "hinge": jn.spatial.Revolute(("ground", "flap"), [0.3, 0.1, 0.2], [0, 0, 0], SKEW.tolist(), axis.tolist())
+        },
+        drivers={"swing": jn.drivers.RotationDriver(("ground", "flap"), SKEW.tolist(), motion="0.7*sin(3*t)")},
+    )
+
+
+def test_equations_of_motion_in_space_with_frames_drawn_anyhow():
+    """Newton and Euler about the origin of the body, by NumPy; the first rates by differences of order eight."""
+    mechanism, h = flap(), 1e-2
+    instants = 0.4 + h * np.arange(-4, 5)
+    equations = jn.constraint_equations(jn.solve(mechanism, instants, order=4))
+    at = equations.isel(time=4)
+    body = mechanism.bodies["flap"]
+    m, c = body.mass, np.array(body.center_of_mass)
+    about = np.asarray(body.inertia) + m * (c @ c * np.eye(3) - np.outer(c, c))
+    p = at.attitude.sel(body="flap").values
+    A = np.stack([rotated(p, v) for v in np.eye(3)], axis=1)
+    w = at.velocities.sel(derivative=1).values[3:]
+    lever = np.array([[0, -c[2], c[1]], [c[2], 0, -c[0]], [-c[1], c[0], 0]])
+    matrix = np.block([[m * np.eye(3), -m * A @ lever], [m * lever @ A.T, about]])
+    np.testing.assert_allclose(at.mass_matrix.values, matrix, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(matrix, matrix.T, rtol=0, atol=1e-14)
+    g = np.array(mechanism.gravity)
+    Q = np.concatenate([m * g - m * A @ np.cross(w, np.cross(w, c)), m * np.cross(c, A.T @ g) - np.cross(w, about @ w)])
+    joined = at.jacobian.values.T @ at.multipliers.sel(derivative=0).values
+    np.testing.assert_allclose(matrix @ at.velocities.sel(derivative=2).values + joined, Q, rtol=0, atol=1e-12)
+    weights = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0, 4 / 5, -1 / 5, 4 / 105, -1 / 280]) / h
+    for k in range(2):
+        slope = weights @ equations.multipliers.sel(derivative=k).values
+        np.testing.assert_allclose(slope, at.multipliers.sel(derivative=k + 1), rtol=0, atol=1e-8)
+
+
+def test_a_time_without_a_state_is_refused(linkage_motion):
+    with pytest.raises(jn.MechanismError, match=r"time.*0\.2"):
+        jn.constraint_equations(linkage_motion, time=0.2)
+
+
+def test_a_state_looked_at_with_a_motion_has_the_turns_of_the_motion(linkage_motion):
+    state = {name: {"position": [0, 0], "angle": 0.1} for name in LINKAGE.bodies}
+    one, other = jn.constraint_equations(linkage_motion, state, 0.2), jn.constraint_equations(LINKAGE, state, 0.2)
+    xarray.testing.assert_identical(one, other)

@@ -15,25 +15,23 @@ import numpy as np
 from jounce.dynamics.energies import masses_of
 from jounce.dynamics.inverse import MotionForces, in_chunks, places, pose_of
 from jounce.dynamics.loads import mass_matrices
+from jounce.dynamics.mechanism_state import State, at_state
 from jounce.errors import MechanismError
 from jounce.jet import Jet
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.assembly import split
 from jounce.kinematics.compilation import compiled
-from jounce.kinematics.solve import HIGHEST_ORDER
-from jounce.mechanism import Mechanism, Model, build
-from jounce.mechanism.builder import referred
+from jounce.mechanism import Mechanism, Model
 from jounce.mechanism.doors import concrete
-from jounce.mechanism.laws import check_laws
 from jounce.mechanism.system import System
-from jounce.rigid import SpatialPose
-from jounce.rigid.euler_parameters import euler_parameters
 
 COLUMNS = {"planar": ("x", "y", "angle"), "spatial": ("x", "y", "z", "wx", "wy", "wz")}
 
 
 @concrete
-def constraint_equations(motion: Motion | Mechanism, state: Mapping[str, Any] | None = None, time: float = 0.0) -> Any:
+def constraint_equations(
+    motion: Motion | Mechanism, state: Mapping[str, Any] | None = None, time: float | None = None
+) -> Any:
     """Return the constraint equations of a mechanism along a motion, or at one state: Sommer 2024, equations 1-8.
 
     Joints and drivers are ``Phi(q, t) = 0``, and each time derivative of it is linear in the highest derivative of the
@@ -43,14 +41,14 @@ def constraint_equations(motion: Motion | Mechanism, state: Mapping[str, Any] | 
     Parameters
     ----------
     motion : Motion or Mechanism
-        A motion that was solved or simulated; or, with `state`, a mechanism, which need not be one that can be solved.
+        A motion that was solved or simulated; or a mechanism at a state, which need not be one that can be solved.
     state : mapping of str to mapping, optional
         For each moving body ``position``, m, and its derivatives, (n + 1, c), or the position alone, (c,). In the plane
         ``angle``, rad, and its derivatives, (n + 1,). In space ``orientation``, in any form that a `Body` takes, and
         from n = 1 on ``angular_velocity``, rad/s, along the axes of the body, and its derivatives, (n, 3). It need
-        not fulfil the joints. The starting guess of a mechanism unless given.
-    time : float, default 0
-        When the drivers are looked at for a state, s.
+        not fulfil the joints. For a mechanism the starting guess of its bodies unless given.
+    time : float, optional
+        When the drivers are looked at for a state, s; 0 unless given. A motion has its instants.
 
     Returns
     -------
@@ -58,7 +56,8 @@ def constraint_equations(motion: Motion | Mechanism, state: Mapping[str, Any] | 
         SI units, nothing is scaled. Rows are labelled "JOINT.1", "JOINT.2", ..., joints before drivers in the order of
         the mechanism; columns "BODY.x", "BODY.y", "BODY.angle", in space "BODY.x", "BODY.y", "BODY.z", "BODY.wx",
         "BODY.wy", "BODY.wz": the global position of the origin, and the angular velocity along the axes of the body.
-        A variable has at ``derivative=k`` its k-th derivative, or what belongs to q^(k); NaN where it has none.
+        A variable has at ``derivative=k`` its k-th derivative, or what belongs to q^(k); NaN where it has none, as
+        `right_side` at 0 where there are multipliers.
 
         ``residual`` (time, row)
             Phi; angles about axes within half a turn.
@@ -108,15 +107,17 @@ def constraint_equations(motion: Motion | Mechanism, state: Mapping[str, Any] | 
     import xarray
 
     if isinstance(motion, Mechanism) or state is not None:
-        motion, known = _at_state(motion, state, time)
+        motion, known = at_state(motion, state, 0.0 if time is None else time)
         order = known + 1
+    elif time is not None:
+        raise MechanismError("goes with a state; a motion has its instants", name="time", value=time)
     elif isinstance(motion, Motion):
         order = known = motion.order
     else:
         raise MechanismError("must be a jn.Motion, or a jn.Mechanism with a state", name="motion", value=motion)
     labels = _labels(motion)
     numbers = _numbers(motion, order)
-    if isinstance(motion, _State):
+    if isinstance(motion, State):
         _check_finite(numbers, labels["row"], float(motion.time[0]))
     found = {
         "residual": (("time", "row"), numbers["residual"]),
@@ -294,7 +295,7 @@ def _forces(motion: Motion, jacobian: np.ndarray) -> dict[str, Any]:
 
 def _determined(motion: Motion, jacobian: np.ndarray) -> bool:
     """Tell whether the rows are independent; those of a motion are, a state may be anything."""
-    if not isinstance(motion, _State) or not jacobian.size:
+    if not isinstance(motion, State) or not jacobian.size:
         return bool(jacobian.size)
     scaled = jacobian[0] * np.tile(motion.model.system.column_scale, len(motion.mechanism.bodies))
     sizes = np.max(np.abs(scaled), axis=1, keepdims=True)
@@ -329,119 +330,3 @@ def _check_finite(numbers: dict[str, np.ndarray], rows: np.ndarray, instant: flo
             what = f"its derivative {k + 1}" if name == "right_side" else f"its {name}"
             message = f"{what} has no finite value at t = {instant:g} s; check its law, and its points, there"
             raise MechanismError(message, name=str(rows[row]).rpartition(".")[0])
-
-
-class _State(Motion):
-    """One state of a mechanism, consistent or not, as a motion of one instant."""
-
-
-def _at_state(given: Any, state: Any, time: Any) -> tuple[Motion, int]:
-    """Return a state as a motion of one instant, and how many derivatives are known of it."""
-    if not isinstance(given, Motion | Mechanism):
-        raise MechanismError("must be a jn.Motion or a jn.Mechanism", name="motion", value=given)
-    mechanism = dataclasses.replace(given if isinstance(given, Mechanism) else given.mechanism, outputs={})
-    instant = _array("time", time, ())
-    model = build(mechanism)
-    coordinates = _guessed(model) if state is None else _coordinates(mechanism, model, state)
-    order = len(coordinates["position"]) - 1
-    check_laws(mechanism, instant[None], order + 1, forces=order > 1)
-    if isinstance(given, Motion):  # angles about axes are counted as along it
-        system = dataclasses.replace(given.model.system, outputs=())
-        model = dataclasses.replace(given.model, system=system, outputs=())
-    else:
-        model, _ = referred(model, {name: values[0] for name, values in _still(coordinates).items()}, float(instant))
-    status = np.array([int(Status.OK)])
-    return _State(mechanism, model, instant[None], max(order, 0), (coordinates, ()), status, {}), order
-
-
-def _still(coordinates: dict[str, Any]) -> dict[str, Any]:
-    return {name: values for name, values in coordinates.items() if name != "angular_velocity"}
-
-
-def _guessed(model: Model) -> dict[str, Any]:
-    found = {name: np.asarray(value)[None] for name, value in model.guess.items()}
-    return found | ({} if "angle" in found else {"angular_velocity": np.zeros((0, *found["position"].shape[1:]))})
-
-
-def _coordinates(mechanism: Mechanism, model: Model, state: Any) -> dict[str, Any]:
-    """Return the Taylor coefficients of the coordinates of all bodies, the ground first, from a state as given."""
-    if not isinstance(state, Mapping):
-        raise MechanismError(
-            "must be a mapping of bodies to where they are and how they move", name="state", value=state
-        )
-    for name in state:
-        if name not in mechanism.bodies:
-            raise MechanismError(
-                f"no moving body has this name; there are {', '.join(mechanism.bodies)}", name="state", value=name
-            )
-    missing = [name for name in mechanism.bodies if name not in state]
-    if missing:
-        raise MechanismError("is missing: a state tells of every moving body", name=f"state.{missing[0]}")
-    read = [_body_state(f"state.{name}", state[name], model.pose_type) for name in mechanism.bodies]
-    orders = {len(body["position"]) - 1: name for body, name in zip(read, mechanism.bodies, strict=True)}
-    if len(orders) > 1:
-        told = ", ".join(f"'{name}' has {order}" for order, name in sorted(orders.items()))
-        raise MechanismError(f"all bodies need derivatives to the same order; {told}", name="state")
-    (order,) = orders
-    if order >= HIGHEST_ORDER:
-        raise MechanismError(f"derivatives are taken to order {HIGHEST_ORDER - 1}", name="state", value=order)
-    found = {}
-    for name in read[0]:
-        whole = np.stack([np.zeros_like(read[0][name]), *(body[name] for body in read)], axis=-1)[..., None]
-        if name == "quaternion":
-            whole[0, 0, 0] = 1.0
-        factorials = np.array([math.factorial(k) for k in range(len(whole))], float)
-        found[name] = whole / factorials.reshape(-1, *[1] * (whole.ndim - 1))
-    return found
-
-
-def _body_state(place: str, given: Any, pose_type: Any) -> dict[str, np.ndarray]:
-    """Return the plain derivatives of the coordinates of one body."""
-    spatial = pose_type is SpatialPose
-    keys = ("position", "orientation", "angular_velocity") if spatial else ("position", "angle")
-    if not isinstance(given, Mapping):
-        raise MechanismError(f"must be a mapping with {', '.join(keys)}", name=place, value=given)
-    for key in given:
-        if key not in keys:
-            raise MechanismError(f"unknown key; valid: {', '.join(keys)}", name=place, value=key)
-    for key in keys[:2]:
-        if key not in given:
-            raise MechanismError("is missing", name=f"{place}.{key}")
-    position = _array(f"{place}.position", given["position"], (pose_type.shifts,))
-    order = len(position) - 1
-    if not spatial:
-        angle = _array(f"{place}.angle", given["angle"], (1,))[:, 0]
-        _check_order(f"{place}.angle", len(angle) - 1, order)
-        return {"position": position, "angle": angle}
-    try:
-        quaternion = np.array([euler_parameters(given["orientation"])])
-    except MechanismError as error:
-        raise error.located(name=f"{place}.orientation") from None
-    spin = _array(f"{place}.angular_velocity", given.get("angular_velocity", np.zeros((0, 3))), (3,))
-    _check_order(f"{place}.angular_velocity", len(spin), order)
-    return {"position": position, "quaternion": quaternion, "angular_velocity": spin}
-
-
-def _check_order(name: str, found: int, order: int) -> None:
-    if found != order:
-        message = f"goes with a position and {order} {'derivative' if order == 1 else 'derivatives'} of it"
-        raise MechanismError(f"{message}; give as many here", name=name, value=found)
-
-
-def _array(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
-    """Return finite numbers: of a shape, or where it is not empty, one of them or a list of them."""
-    try:
-        found = np.array(value, float)
-    except (TypeError, ValueError):
-        raise MechanismError("must be numbers", name=name, value=value) from None
-    if shape:
-        scalar = shape == (1,)
-        if found.ndim == len(shape) - scalar:
-            found = found[None]
-        found = found[:, None] if scalar and found.ndim == 1 else found
-    if found.ndim != len(shape) + bool(shape) or found.shape[1:] != shape:
-        wanted = "one number" if not shape else f"a list of {shape[0]} numbers, or one such list for each derivative"
-        raise MechanismError(f"must be {wanted}", name=name, value=value)
-    if not np.isfinite(found).all():
-        raise MechanismError("must be finite", name=name, value=value)
-    return found

@@ -50,10 +50,11 @@ def write(dataset: Any, path: str | PathLike[str], *, overwrite: bool = False) -
     """Write the dataset of a motion to a .csv or .nc file, whole or not at all.
 
     A CSV file has the columns ``time``, then for each output ``NAME, NAME_d1, NAME_d2, ...``, and for a vector
-    ``NAME_x, NAME_x_d1, ..., NAME_y, ...`` (``_e0`` to ``_e3`` for Euler parameters, ``_alpha``, ``_beta``, ``_gamma`` for Euler angles,
-    ``_xx``, ``_xy``, ... row by row for a rotation matrix); numbers have 17 significant digits, so that they read back to the bit, and
-    a missing value is ``nan``. A name that spreadsheets would take for a formula, as ``=A1``, has an apostrophe in
-    front, which `read` takes away. A NetCDF 4 file holds the dataset as it is, by the CF conventions.
+    ``NAME_x, NAME_x_d1, ..., NAME_y, ...``: ``_e0`` to ``_e3`` for Euler parameters, ``_alpha``, ``_beta``, ``_gamma``
+    for Euler angles, ``_xx``, ``_xy``, ... row by row for a rotation matrix. Numbers have 17 significant digits, so
+    that they read back to the bit, and a missing value is ``nan``. A name that spreadsheets would take for a formula,
+    as ``=A1``, has an apostrophe in front, which `read` takes away. A NetCDF 4 file holds the dataset as it is, by the
+    CF conventions.
 
     Parameters
     ----------
@@ -164,7 +165,7 @@ def read(path: str | PathLike[str]) -> Any:
     """Read a file that `write` wrote back into a dataset; values come back to the bit.
 
     A CSV file has no units, and does not say what is a vector: neighbouring columns ``NAME_x, NAME_y`` (and
-    ``NAME_z``) become the vector NAME, and those of Euler parameters, Euler angles and rotation matrices what they were.
+    ``NAME_z``) become the vector NAME, and those of Euler parameters, Euler angles and rotation matrices likewise.
 
     Returns
     -------

@@ -107,6 +107,11 @@ class Motion:
         return self._model
 
     @property
+    def way(self) -> Way | None:
+        """Attitudes that all bodies in space went through, by which turns are counted; None where none are kept."""
+        return self._way
+
+    @property
     def poses(self) -> tuple[type, dict[str, Any]]:
         """Type of the poses of all bodies, the ground first, and Taylor coefficients of their coordinates by name."""
         return self._model.pose_type, self._coordinates

@@ -3,13 +3,12 @@
 from typing import Any
 
 import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
 
 from jounce.errors import JounceError, MechanismError
 from jounce.jet import Jet, stack
 from jounce.mechanism.outputs import AbstractOutput
-from jounce.rigid.orientation import angle_rates, euler_angles
+from jounce.rigid.orientation import euler_angles
 from jounce.rigid.rotations import check_sequence
 
 LETTERS = ("x", "y", "z")
@@ -84,18 +83,7 @@ class EulerAnglesOutput(AbstractOutput):
             raise MechanismError(error.message, name="sequence", value=self.sequence) from None
 
     def evaluate(self, *bodies):
-        *base, body = bodies
-        matrix = jnp.stack([jnp.stack([entry.coefficients[0] for entry in row]) for row in _matrix(bodies)])
-        angles = euler_angles(self.sequence, matrix)
-        if body.order == 0:
-            return Jet([angles])
-        # by the angular velocity: jets of the matrix would lose as many digits more as its entries cancel
-        velocity = (
-            body.to_body(body.global_angular_velocity()) if body.angular_velocity is None else body.angular_velocity
-        )
-        if base:
-            velocity = velocity - body.to_body(base[0].global_angular_velocity())
-        return angle_rates(self.sequence, angles, velocity.dense(), "body").integrate(angles)
+        return euler_angles(self.sequence, stack([stack(row) for row in _matrix(bodies)]))
 
 
 class RelativeEulerAnglesOutput(EulerAnglesOutput):
