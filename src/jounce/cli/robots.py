@@ -152,7 +152,8 @@ def torques(
     """
     from jounce import io
     from jounce.dynamics.trajectories import trajectory_torques
-    from jounce.io.robots import load_robot, load_trajectory
+    from jounce.io.robots.loader import load_robot
+    from jounce.io.robots.trajectories import load_trajectory
     from jounce.reporting.peaks import table_peaks
 
     if not 0 <= rates <= MOST_RATES:
