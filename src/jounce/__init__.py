@@ -153,13 +153,6 @@ from jounce.trajectory.units import elsewhere as _elsewhere  # noqa: E402
 __version__ = "0.4.0"
 
 
-def _repr_html_(self: object) -> str:
-    """Return what a notebook shows."""
-    from jounce.reporting.notebook import shown
-
-    return shown(self)
-
-
 def _asked_of_pint(name: str) -> object:
     """Look a unit up that is not in the table."""
     from jounce.io.files.units import ask_pint
@@ -168,6 +161,3 @@ def _asked_of_pint(name: str) -> object:
 
 
 _elsewhere.append(_asked_of_pint)  # type: ignore[arg-type]
-
-for _kind in (Mechanism, Motion, Robot, JointTrajectory, Batch):  # here, as the files know all of these
-    setattr(_kind, "_repr_html_", _repr_html_)  # noqa: B010 - no attribute that a type checker knows

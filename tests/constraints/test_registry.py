@@ -84,3 +84,29 @@ def test_annotations_may_be_strings(tmp_path):
         "length": "scalar",
         "word": "text",
     }
+
+
+def test_a_class_whose_definition_fails_is_not_in_the_catalogue():
+    before = catalogue("planar", "joint")
+    with pytest.raises(TypeError, match="default"):
+
+        class Torn(jn.AbstractConstraint, type="torn", space="planar"):
+            size: jn.Scalar = 1.0
+            length: jn.Scalar
+
+    assert catalogue("planar", "joint") == before
+    assert own("torn", space="planar") is catalogue("planar", "joint")["torn"]
+
+
+@pytest.mark.parametrize("field", ["type", "bodies"])
+def test_a_field_that_would_break_all_files_is_refused(field):
+    before = catalogue("planar", "joint")
+    body = {"__annotations__": {field: jn.Scalar}, "residual": lambda self, *_: None}
+    with pytest.raises(jn.MechanismError, match=f"got '{field}'"):
+        jn.AbstractConstraint.__class__("Odd", (jn.AbstractConstraint,), body, type="odd", space="planar")
+    assert catalogue("planar", "joint") == before
+
+
+def test_a_joint_is_no_force():
+    with pytest.raises(jn.MechanismError, match="role"):
+        own(role="force")

@@ -14,10 +14,11 @@ import re
 import sys
 import warnings
 from collections.abc import Sequence
-from typing import Any
+from pathlib import Path
+from typing import Any, Literal
 
 from jounce.cli.arguments import converted
-from jounce.cli.completing import completion
+from jounce.cli.completing import complete
 from jounce.cli.conversion import convert
 from jounce.cli.figures import plot, report
 from jounce.cli.inspection import inspect
@@ -31,6 +32,22 @@ from jounce.cli.writing import WritingError
 from jounce.errors import JounceError, SolveError
 from jounce.interrupts import end_on_signals
 from jounce.reporting.terminal import cautions, complain, unexpected
+
+
+def completion(shell: Literal["bash", "zsh", "fish"], /, *, install: bool = False, out: Path | None = None) -> int:
+    """Print or install completion of commands and options for a shell.
+
+    Parameters
+    ----------
+    shell
+        bash, zsh or fish.
+    install
+        Write it where the shell looks for it, and have it read.
+    out
+        Write the script to this file, and leave start-up files alone.
+    """
+    return complete(application(), shell, install, out)
+
 
 EXAMPLES = {
     new: """\

@@ -9,6 +9,7 @@ from typing import Any
 import jax
 import numpy as np
 
+from jounce.display import Displayed
 from jounce.dynamics.forward import Equations, State
 from jounce.dynamics.start import driven, start
 from jounce.errors import MechanismError, did_you_mean
@@ -30,7 +31,7 @@ STEPS = 16  # tried before runs that have ended make room for others
 
 
 @dataclasses.dataclass(frozen=True)
-class Batch:
+class Batch(Displayed):
     """The results of many simulations.
 
     Attributes

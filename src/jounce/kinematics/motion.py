@@ -8,6 +8,7 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
+from jounce.display import Displayed
 from jounce.errors import MechanismError, did_you_mean
 from jounce.jet import Jet
 from jounce.kinematics.compilation import compiled
@@ -59,7 +60,7 @@ def output_group(output: Any, mechanism: Mechanism, model: Model | None = None, 
     return group
 
 
-class Motion:
+class Motion(Displayed):
     """The motion of a mechanism at the instants of a time grid.
 
     Attributes

@@ -15,7 +15,8 @@ import numpy as np
 from jounce.errors import MechanismError, OutputError, did_you_mean
 from jounce.interrupts import undoing
 from jounce.io.files.writing import check_target, replacing
-from jounce.plot.scene import AZIMUTH, ELEVATION, scene_of
+from jounce.plot.canvas import AZIMUTH, ELEVATION
+from jounce.plot.scene import scene_of
 from jounce.plot.sketch import NAMES, Drawing, paths_of
 from jounce.plot.style import GREY, style
 

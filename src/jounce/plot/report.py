@@ -17,7 +17,8 @@ from jounce.kinematics import Status
 from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.resolve import resolve
 from jounce.plot.animation import LONGEST, SHORTEST
-from jounce.plot.scene import AZIMUTH, ELEVATION, scene_of
+from jounce.plot.canvas import AZIMUTH, ELEVATION
+from jounce.plot.scene import scene_of
 from jounce.plot.sketch import length_text, paths_of, round_length
 from jounce.plot.style import BODY_COLOURS
 from jounce.reporting.motion_facts import motion_facts

@@ -10,9 +10,10 @@ import numpy as np
 from jounce.errors import MechanismError, did_you_mean
 from jounce.mechanism import PointOutput
 from jounce.mechanism.mechanism import Mechanism, check_mechanism
+from jounce.plot.canvas import AZIMUTH, ELEVATION, WHEELS, screen_of
 from jounce.plot.labels import scale_of, unit_label
 from jounce.plot.naming import place_names
-from jounce.plot.scene import AZIMUTH, ELEVATION, WHEELS, Scene, outline, scene_of, screen_of
+from jounce.plot.scene import Scene, outline, scene_of
 from jounce.plot.style import GREY, blank_figure, printable, shown_name, style
 from jounce.reporting.peaks import rate_name
 

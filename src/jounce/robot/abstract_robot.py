@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from jounce.display import Displayed
 from jounce.errors import RobotError, did_you_mean
 from jounce.rigid.inertia import Inertia, finite_numbers
 from jounce.robot.floating_base import floating_joints
@@ -19,7 +20,7 @@ Made = TypeVar("Made", bound="AbstractRobot")
 STANDARD_GRAVITY = 9.81  # m/s^2, as in Pinocchio and MuJoCo
 
 
-class AbstractRobot(abc.ABC):
+class AbstractRobot(Displayed, abc.ABC):
     """Links and joints by name and the tree that they form: all of a robot but what is made of it; see `Robot`."""
 
     def __init__(

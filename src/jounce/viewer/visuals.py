@@ -14,9 +14,9 @@ import numpy as np
 from jounce.errors import RobotFileError
 from jounce.robot.parts import on_body
 from jounce.robot.robot import Robot
-from jounce.viewer.looks import BODIES, DARK, GREY, Looks, up_of
+from jounce.viewer.looks import BODIES, Looks, up_of
 from jounce.viewer.meshes import Meshes
-from jounce.viewer.solids import Solid, bar, box, cylinder, merged, sphere, turned_to
+from jounce.viewer.solids import DARK, GREY, Solid, bar, box, cylinder, merged, sphere, turned_to
 from jounce.viewer.take import Spot
 
 __all__ = ["file_shapes", "robot_looks"]

@@ -1,7 +1,5 @@
 """Robots from URDF files against Pinocchio, entry by entry, and what the format leaves open."""
 
-import sys
-
 import numpy as np
 import pinocchio
 import pytest
@@ -381,12 +379,3 @@ def test_no_floating_base_where_a_link_is_named_world_already(tmp_path):
     path.write_text(f'<robot name="r"><link name="world">{INERTIAL}</link></robot>')
     with pytest.raises(RobotFileError, match=r"links.world: the robot cannot have a floating base: a link named world"):
         load_robot(path, floating_base=True)
-
-
-def test_without_the_extra_the_message_says_what_to_install(tmp_path, monkeypatch):
-    path = small(tmp_path, 'type="revolute">')
-    monkeypatch.setitem(sys.modules, "yourdfpy", None)
-    with pytest.raises(RobotFileError) as caught:
-        load_robot(path)
-    words = 'reading URDF files needs the package yourdfpy, which is not installed: pip install "jounce[robots]"'
-    assert str(caught.value) == f"{path}: {words}"

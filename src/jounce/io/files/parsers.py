@@ -11,7 +11,7 @@ import re
 from typing import Any
 
 from jounce.errors import MechanismFileError
-from jounce.io.files.source import MAX_DEPTH, Builder, Location, Source
+from jounce.io.files.entries import MAX_DEPTH, Builder, Location, Source
 
 __all__ = ["plain_scalar", "read_json", "read_toml", "read_yaml"]
 

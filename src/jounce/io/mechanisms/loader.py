@@ -12,7 +12,8 @@ import numpy as np
 from jounce.constraints import catalogue
 from jounce.dynamics import AppliedForceOutput, AppliedTorqueOutput, JointForceOutput, JointTorqueOutput
 from jounce.errors import JounceError, MechanismFileError, did_you_mean
-from jounce.io.files.source import Location, Source, read_source
+from jounce.io.files.entries import Location, Source
+from jounce.io.files.source import read_source
 from jounce.io.mechanisms.keys import FileKey, file_keys, location_of, output_types
 from jounce.io.mechanisms.unit_hints import warn_of_units
 from jounce.mechanism import AngularVelocityOutput, Body, Mechanism, PointOutput, TimeGrid, time_grid

@@ -10,7 +10,7 @@ from typing import Any
 
 from jounce.constraints import catalogue
 from jounce.errors import JounceError, UnitWarning
-from jounce.io.files.source import Location, Source, dotted
+from jounce.io.files.entries import Location, Source, dotted
 from jounce.io.mechanisms.keys import file_keys
 from jounce.mechanism import Mechanism
 from jounce.trajectory import Expression

@@ -9,7 +9,8 @@ from os import PathLike
 from typing import Any
 
 from jounce.errors import JounceError, MechanismFileError, RobotError, did_you_mean
-from jounce.io.files.source import Location, Source, read_source
+from jounce.io.files.entries import Location, Source
+from jounce.io.files.source import read_source
 from jounce.io.files.units import Dimension, describe_dimension, parse_value
 from jounce.robot.model import Joint, Limits
 from jounce.robot.robot import Robot

@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 
 from jounce.errors import JounceError, MechanismFileError, TrajectoryError, did_you_mean, show_value
+from jounce.io.files.entries import Location, Source, dotted
 from jounce.io.files.reading import fault_of_number, known_name, read_rows
 from jounce.io.files.samples import read_columns, read_samples
-from jounce.io.files.source import SUFFIXES, Location, Source, dotted, read_source
+from jounce.io.files.source import SUFFIXES, read_source
 from jounce.trajectory import Expression, ExpressionMotion, JointTrajectory, MeasuredMotion, SplineMotion
 
 __all__ = ["load_trajectory"]

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-import importlib
-import io
 import math
+from collections.abc import Sequence
 from typing import Any
-from xml.etree import ElementTree
 
 import numpy as np
 
@@ -18,7 +16,7 @@ from jounce.rigid.inertia import Inertia
 from jounce.robot.floating_base import floating_joints
 from jounce.robot.model import Joint, Limits, Link, Mimic, leaders
 from jounce.robot.robot import Robot
-from jounce.robot.tree import axes_with_z_along, ordered, quaternion_matrix
+from jounce.robot.tree import axes_with_z_along, ordered
 
 __all__ = ["read_urdf"]
 
@@ -69,20 +67,19 @@ def read_urdf(root: Element, faults: Faults, massless: bool = False) -> Robot:
     for name, element in joints.items():
         _check_joint(element, name, links)
         _add_joint_lines(lines, element, name)
-    file = _parsed(root, links, joints)
-    made = [_link(link, links[link.name], faults) for link in file.links]
+    made = [_link(name, element, faults) for name, element in links.items()]
     parts: list[Joint] = []
-    mimics = _mimics(file.joints, joints, faults)
+    mimics = _mimics(joints, faults)
     try:
-        for joint in file.joints:
-            more, expanded = _joints(joint, joints[joint.name], mimics)
+        for name, element in joints.items():
+            more, expanded = _joints(name, element, mimics)
             made += more
             parts += expanded
             for part in expanded:
-                lines.add(joints[joint.name], "joints", part.name)
+                lines.add(element, "joints", part.name)
         ordered(_distinct("links", made, root), _distinct("joints", parts, root))
-        robot = Robot(file.name, made, parts, strict=False)
-        _check_masses(robot, file.joints, links, faults, massless)
+        robot = Robot(root.attributes.get("name", "robot"), made, parts, strict=False)
+        _check_masses(robot, joints, links, faults, massless)
         return robot
     except RobotFileError:
         raise
@@ -221,133 +218,122 @@ def _add_joint_lines(lines: _Lines, element: Element, name: str) -> None:
         lines.add(element.first("dynamics"), *where, key)
 
 
-def _parsed(root: Element, links: dict[str, Element], joints: dict[str, Element]) -> Any:
-    """Return the robot as yourdfpy reads it.
-
-    It gets the parts that are used only, and only after the checks: it fills in what is missing, mends malformed XML as
-    it sees fit, and would look at shapes and meshes.
-    """
-    try:
-        yourdfpy: Any = importlib.import_module("yourdfpy")
-    except ImportError:
-        message = 'reading URDF files needs the package yourdfpy, which is not installed: pip install "jounce[robots]"'
-        raise RobotFileError(message, path=root.path) from None
-    top = ElementTree.Element("robot", name=root.attributes.get("name", "robot"))
-    for name, element in links.items():
-        link = ElementTree.SubElement(top, "link", name=name)
-        inertial = element.first("inertial")
-        if inertial is not None:
-            _copy(inertial, ElementTree.SubElement(link, "inertial"), INERTIAL_PARTS)
-    for name, element in joints.items():
-        joint = ElementTree.SubElement(top, "joint", name=name, type=element.attributes["type"])
-        _copy(element, joint, JOINT_PARTS[:7])
-    options = {"build_scene_graph": False, "load_meshes": False}
-    return yourdfpy.URDF.load(io.BytesIO(ElementTree.tostring(top)), **options).robot
+def _given(element: Element, tag: str, key: str, default: Sequence[float]) -> np.ndarray:
+    """Return the numbers of an attribute of the first child of a tag."""
+    part = element.first(tag)
+    values = None if part is None else part.numbers(key, len(default))
+    return np.array(default if values is None else values, float)
 
 
-def _copy(element: Element, target: ElementTree.Element, tags: tuple[str, ...]) -> None:
-    """Copy the first child of each tag, with the attributes that have no prefix."""
-    for tag in tags:
-        part = element.first(tag)
-        if part is not None:
-            plain = {key: value for key, value in part.attributes.items() if ":" not in key}
-            ElementTree.SubElement(target, tag, plain)
+def _pose(element: Element) -> tuple[np.ndarray, np.ndarray]:
+    """Return the pose of an ``<origin>``: turns about fixed axes, or a quaternion of URDF 1.1."""
+    from scipy.spatial.transform import Rotation
 
-
-def _pose(matrix: Any, element: Element) -> tuple[np.ndarray, np.ndarray]:
-    """Return the pose of an ``<origin>``, whose quaternion of URDF 1.1 yourdfpy does not know."""
-    matrix = np.eye(4) if matrix is None else matrix
-    origin = element.first("origin")
+    position, origin = _given(element, "origin", "xyz", (0.0, 0.0, 0.0)), element.first("origin")
     quaternion = None if origin is None else origin.numbers("quat_xyzw", 4)
-    if quaternion is None:
-        return matrix[:3, 3], matrix[:3, :3]
-    *vector, scalar = np.array(quaternion) / math.hypot(*quaternion)
-    return matrix[:3, 3], quaternion_matrix([scalar, *vector])
+    if quaternion is not None:
+        return position, Rotation.from_quat(quaternion).as_matrix()
+    return position, Rotation.from_euler("xyz", _given(element, "origin", "rpy", (0.0, 0.0, 0.0))).as_matrix()
 
 
-def _link(link: Any, element: Element, faults: Faults) -> Link:
+def _link(name: str, element: Element, faults: Faults) -> Link:
     """Return a link; its inertia is turned from the axes of ``<inertial>`` to those of the link."""
-    given, inertial = link.inertial, element.first("inertial")
-    if given is None or inertial is None or (given.mass == 0 and not given.inertia.any()):
-        return Link(link.name)
-    inertia = Inertia(given.mass, tensor=given.inertia, strict=False)
-    at = inertial.first("mass" if given.mass == 0 else "inertia") or inertial
-    faults.check(inertia, link.name, at.line)
-    return Link(link.name, inertia.moved(*_pose(given.origin, inertial)))
+    inertial = element.first("inertial")
+    if inertial is None:
+        return Link(name)
+    (mass,) = _given(inertial, "mass", "value", (0.0,))
+    xx, xy, xz, yy, yz, zz = (_given(inertial, "inertia", key, (0.0,))[0] for key in TENSOR)
+    tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    if mass == 0 and not tensor.any():
+        return Link(name)
+    inertia = Inertia(float(mass), tensor=tensor, strict=False)
+    at = inertial.first("mass" if mass == 0 else "inertia") or inertial
+    faults.check(inertia, name, at.line)
+    return Link(name, inertia.moved(*_pose(inertial)))
 
 
-def _joints(joint: Any, element: Element, mimics: dict[str, Mimic]) -> tuple[list[Link], list[Joint]]:
+def _ends(element: Element) -> tuple[str, str]:
+    """Return parent and child of a joint."""
+    parent, child = (_part(element, role, "").attributes["link"] for role in ("parent", "child"))
+    return parent, child
+
+
+def _joints(name: str, element: Element, mimics: dict[str, Mimic]) -> tuple[list[Link], list[Joint]]:
     """Return a joint of the file, or those that it is expanded to and the massless links between them."""
-    position, rotation = _pose(joint.origin, element)
-    if joint.type == "floating":
-        links, parts = floating_joints(joint.child, prefix=joint.name)
-        first = dataclasses.replace(parts[0], parent=joint.parent, position=position, rotation=rotation)
+    kind, (parent, child), (position, rotation) = element.attributes["type"], _ends(element), _pose(element)
+    if kind == "fixed":
+        return [], [Joint(name, parent, child, kind, position, rotation)]
+    if kind == "floating":
+        links, parts = floating_joints(child, prefix=name)
+        first = dataclasses.replace(parts[0], parent=parent, position=position, rotation=rotation)
         return links[1:], [first, *parts[1:]]
-    if joint.type == "planar":
-        return _planar(joint, position, rotation)
-    kept: dict[str, Any] = {"limits": _limits(joint, element)}
-    if joint.type == "fixed":
-        kept = {}
-    else:
-        kept["mimic"] = mimics.get(joint.name)
-    if joint.dynamics is not None and joint.type != "fixed":  # these come as text
-        kept["damping"], kept["friction"] = float(joint.dynamics.damping or 0), float(joint.dynamics.friction or 0)
-    axis = {} if joint.type == "fixed" else {"axis": joint.axis}
-    return [], [Joint(joint.name, joint.parent, joint.child, joint.type, position, rotation, **axis, **kept)]
+    axis = _given(element, "axis", "xyz", (1.0, 0.0, 0.0))
+    if kind == "planar":
+        return _planar(name, element, axis)
+    damping, friction = (float(_given(element, "dynamics", key, (0.0,))[0]) for key in ("damping", "friction"))
+    kept: dict[str, Any] = {"limits": _limits(name, element), "mimic": mimics.get(name)}
+    kept |= {"damping": damping, "friction": friction}
+    return [], [Joint(name, parent, child, kind, position, rotation, axis=axis, **kept)]
 
 
-def _mimics(given: list[Any], joints: dict[str, Element], faults: Faults) -> dict[str, Mimic]:
+def _mimics(joints: dict[str, Element], faults: Faults) -> dict[str, Mimic]:
     """Return what joints follow; one that follows a joint which is not there is free, as in Pinocchio."""
-    leading = [joint.name for joint in given if joint.type not in ("fixed", *EXPANDED) and joint.mimic is None]
+    moving = {name: x for name, x in joints.items() if x.attributes["type"] not in ("fixed", *EXPANDED)}
+    leading = [name for name, element in moving.items() if element.first("mimic") is None]
     found = {}
-    for joint in given:
-        mimic, element = joint.mimic, joints[joint.name].first("mimic")
-        if mimic is None or element is None or joint.type == "fixed":
+    for name, joint in moving.items():
+        mimic = joint.first("mimic")
+        if mimic is None:
             continue
-        if mimic.joint in joints:
-            found[joint.name] = Mimic(mimic.joint, mimic.multiplier, mimic.offset)
+        followed = mimic.attributes["joint"]
+        if followed in joints:
+            multiplier, offset = (
+                _given(joint, "mimic", key, (x,))[0] for key, x in (("multiplier", 1.0), ("offset", 0.0))
+            )
+            found[name] = Mimic(followed, float(multiplier), float(offset))
             continue
-        message = f"must follow a moving joint that follows no other; {did_you_mean(mimic.joint, leading)}"
-        error = element.error(message, "joints", joint.name, "mimic", value=mimic.joint)
-        faults.add(FOLLOWS_NONE, joint.name, error)
+        message = f"must follow a moving joint that follows no other; {did_you_mean(followed, leading)}"
+        faults.add(FOLLOWS_NONE, name, mimic.error(message, "joints", name, "mimic", value=followed))
     return leaders(found)
 
 
-def _planar(joint: Any, position: np.ndarray, rotation: np.ndarray) -> tuple[list[Link], list[Joint]]:
+def _planar(name: str, element: Element, axis: np.ndarray) -> tuple[list[Link], list[Joint]]:
     """Return two slides across the axis and a turn about it."""
-    axes = axes_with_z_along(joint.axis / np.linalg.norm(joint.axis)).T
-    names = [joint.parent, f"{joint.name}_frame_1", f"{joint.name}_frame_2", joint.child]
+    axes, (parent, child) = axes_with_z_along(axis / np.linalg.norm(axis)).T, _ends(element)
+    names = [parent, f"{name}_frame_1", f"{name}_frame_2", child]
     kinds = (("x", "prismatic"), ("y", "prismatic"), ("angle", "continuous"))
     parts = [
-        Joint(f"{joint.name}_{suffix}", names[k], names[k + 1], kind, axis=axes[k])
-        for k, (suffix, kind) in enumerate(kinds)
+        Joint(f"{name}_{suffix}", names[k], names[k + 1], kind, axis=axes[k]) for k, (suffix, kind) in enumerate(kinds)
     ]
+    position, rotation = _pose(element)
     parts[0] = dataclasses.replace(parts[0], position=position, rotation=rotation)
-    return [Link(name) for name in names[1:3]], parts
+    return [Link(frame) for frame in names[1:3]], parts
 
 
-def _limits(joint: Any, element: Element) -> Limits:
+def _limits(name: str, element: Element) -> Limits:
     limit = element.first("limit")
     if limit is None:
         return Limits()
     values = {key: (limit.numbers(key, 1, infinite=True) or [0.0])[0] for key in (*SIZES, "lower", "upper")}
     given = {key: values[key] for key in SIZES if values[key] != 0}
-    if joint.type != "continuous" and (values["lower"], values["upper"]) != (0, 0):
+    if element.attributes["type"] != "continuous" and (values["lower"], values["upper"]) != (0, 0):
         given |= {key: values[key] for key in ("lower", "upper")}
     try:
         return Limits(**{key: value for key, value in given.items() if math.isfinite(value)})
     except RobotError as error:
-        steps = ("joints", joint.name, "limit", *([error.name] if error.name else []))
+        steps = ("joints", name, "limit", *([error.name] if error.name else []))
         raise limit.error(error.message, *steps, value=error.value) from None
 
 
-def _check_masses(robot: Robot, joints: list[Any], elements: dict[str, Element], faults: Faults, meant: bool) -> None:
+def _check_masses(
+    robot: Robot, joints: dict[str, Element], elements: dict[str, Element], faults: Faults, meant: bool
+) -> None:
     """Note every link that a joint of the file moves and that has no mass, with all that is fixed to it."""
     heavy = {robot.frames[name].body for name, link in robot.links.items() if link.inertia is not None}
     idle = {robot.joints[name].child for name in robot.massless_joints}
-    for joint in joints:
-        link = joint.child
-        if joint.type == "fixed" or robot.frames[link].body in heavy or (meant and link not in idle):
+    for joint in joints.values():
+        _, link = _ends(joint)
+        if joint.attributes["type"] == "fixed" or robot.frames[link].body in heavy or (meant and link not in idle):
             continue
         element = elements[link]
         inertial = element.first("inertial")

@@ -9,8 +9,8 @@ from typing import Any
 from xml.parsers import expat
 
 from jounce.errors import RobotFileError, did_you_mean
+from jounce.io.files.entries import dotted
 from jounce.io.files.reading import LARGEST_NUMBER, fault_of_number, read_file
-from jounce.io.files.source import dotted
 
 __all__ = ["Element", "read_markup"]
 
