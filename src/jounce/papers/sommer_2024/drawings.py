@@ -13,8 +13,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from jounce.papers.sommer_2024.simulations import SIMULATIONS
+from jounce.plot.canvas import Label, Shape, screen_of
 from jounce.plot.frames import assembled
-from jounce.plot.scene import Label, Shape, scene_of, screen_of
+from jounce.plot.scene import scene_of
 from jounce.plot.sketch import Drawing, draw_scale
 from jounce.plot.style import GREY, PALE_GREY, blank_figure
 
