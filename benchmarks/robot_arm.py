@@ -21,7 +21,7 @@ import numpy as np  # noqa: E402
 import pinocchio  # noqa: E402
 
 import jounce as jn  # noqa: E402
-from jounce.io.robots import load_robot  # noqa: E402
+from jounce.io.robots.loader import load_robot  # noqa: E402
 
 SAMPLES = 10_000
 ARM = Path(__file__).parents[1] / "examples" / "robots" / "panda.urdf"

@@ -49,6 +49,7 @@ from jounce.dynamics import (  # noqa: E402
     acceleration_energy as acceleration_energy,
     applied_force as applied_force,
     check_limits as check_limits,
+    constraint_equations as constraint_equations,
     driver_force as driver_force,
     energy_slope as energy_slope,
     energy_terms as energy_terms,
@@ -102,10 +103,16 @@ from jounce.mechanism import (  # noqa: E402
     AngularVelocityOutput as AngularVelocityOutput,
     Body as Body,
     DistanceOutput as DistanceOutput,
+    EulerAnglesOutput as EulerAnglesOutput,
+    EulerParametersOutput as EulerParametersOutput,
     Mechanism as Mechanism,
     PlanarRelativeAngleOutput as PlanarRelativeAngleOutput,
     PointOutput as PointOutput,
     RelativeAngleOutput as RelativeAngleOutput,
+    RelativeEulerAnglesOutput as RelativeEulerAnglesOutput,
+    RelativeEulerParametersOutput as RelativeEulerParametersOutput,
+    RelativeRotationMatrixOutput as RelativeRotationMatrixOutput,
+    RotationMatrixOutput as RotationMatrixOutput,
     TimeGrid as TimeGrid,
 )
 from jounce.robot import (  # noqa: E402
@@ -146,21 +153,11 @@ from jounce.trajectory.units import elsewhere as _elsewhere  # noqa: E402
 __version__ = "0.4.0"
 
 
-def _repr_html_(self: object) -> str:
-    """Return what a notebook shows."""
-    from jounce.io.notebook import shown
-
-    return shown(self)
-
-
 def _asked_of_pint(name: str) -> object:
     """Look a unit up that is not in the table."""
-    from jounce.io.units import ask_pint
+    from jounce.io.files.units import ask_pint
 
     return ask_pint(name)
 
 
 _elsewhere.append(_asked_of_pint)  # type: ignore[arg-type]
-
-for _kind in (Mechanism, Motion, Robot, JointTrajectory, Batch):  # here, as the files know all of these
-    setattr(_kind, "_repr_html_", _repr_html_)  # noqa: B010 - no attribute that a type checker knows

@@ -4,7 +4,8 @@ import pytest
 
 import jounce as jn
 from jounce.constraints import catalogue
-from jounce.io.own import import_file
+from jounce.constraints.base import field_kind, value_fields
+from jounce.io.mechanisms.user_classes import import_file
 
 
 def own(kind="mine", name="Own", **keywords):
@@ -66,3 +67,46 @@ def test_files_of_one_name_are_two_files(tmp_path):
     with pytest.raises(jn.MechanismError, match="got 'mine'") as caught:
         import_file(paths[1])
     assert (caught.value.path, caught.value.line) == (str(paths[1]), 2)
+
+
+def test_annotations_may_be_strings(tmp_path):
+    path = tmp_path / "postponed.py"
+    path.write_text(
+        "from __future__ import annotations\n"
+        "import jounce as jn\nfrom jounce import Vector\n"
+        'class Postponed(jn.AbstractConstraint, type="postponed", space="planar"):\n'
+        "    point_i: Vector\n    length: jn.Scalar\n    word: str = 'x'\n"
+    )
+    import_file(str(path))
+    fields = value_fields(catalogue("planar", "joint")["postponed"])
+    assert {name: field_kind(field) for name, field in fields.items()} == {
+        "point_i": "vector",
+        "length": "scalar",
+        "word": "text",
+    }
+
+
+def test_a_class_whose_definition_fails_is_not_in_the_catalogue():
+    before = catalogue("planar", "joint")
+    with pytest.raises(TypeError, match="default"):
+
+        class Torn(jn.AbstractConstraint, type="torn", space="planar"):
+            size: jn.Scalar = 1.0
+            length: jn.Scalar
+
+    assert catalogue("planar", "joint") == before
+    assert own("torn", space="planar") is catalogue("planar", "joint")["torn"]
+
+
+@pytest.mark.parametrize("field", ["type", "bodies"])
+def test_a_field_that_would_break_all_files_is_refused(field):
+    before = catalogue("planar", "joint")
+    body = {"__annotations__": {field: jn.Scalar}, "residual": lambda self, *_: None}
+    with pytest.raises(jn.MechanismError, match=f"got '{field}'"):
+        jn.AbstractConstraint.__class__("Odd", (jn.AbstractConstraint,), body, type="odd", space="planar")
+    assert catalogue("planar", "joint") == before
+
+
+def test_a_joint_is_no_force():
+    with pytest.raises(jn.MechanismError, match="role"):
+        own(role="force")

@@ -10,7 +10,7 @@ import jounce as jn
 from jounce import drivers, forces, planar, spatial
 from jounce.constraints.base import ROLES, catalogue, field_kind, value_fields
 from jounce.dynamics import DriverTorqueOutput, JointTorqueOutput
-from jounce.io.fields import output_types
+from jounce.io.mechanisms.keys import output_types
 from jounce.mechanism import build
 from jounce.mechanism.builder import pose_at
 from jounce.mechanism.datums import with_datums

@@ -9,13 +9,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import jounce as jn
-from jounce.io.conversion import assigned
-from jounce.io.formats import dumped
-from jounce.io.limits import load_limits
-from jounce.io.overrides import override
-from jounce.io.payloads import with_payloads
-from jounce.io.readers import read_yaml
-from jounce.io.units import parse_value
+from jounce.io.files.formats import dumped
+from jounce.io.files.parsers import read_yaml
+from jounce.io.files.units import parse_value
+from jounce.io.mechanisms.conversion import assigned
+from jounce.io.mechanisms.overrides import override
+from jounce.io.robots.limits import load_limits
+from jounce.io.robots.payloads import with_payloads
 from jounce.trajectory import Expression
 
 __all__ = ["READERS", "Reader"]

@@ -67,7 +67,7 @@ def changed(data, at, value):
 @thorough
 @given(data=st.data())
 def test_any_value_in_any_place(reader, data):
-    from jounce.io.readers import read_json, read_yaml
+    from jounce.io.files.parsers import read_json, read_yaml
 
     text = data.draw(st.sampled_from(READERS[reader].texts))
     good = (read_json if reader == "json" else read_yaml)("seed", text).data

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.io.peaks import peaks
 from jounce.plot import report
+from jounce.reporting.peaks import peaks
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 

@@ -12,7 +12,8 @@ from PIL import Image
 import jounce as jn
 from jounce.plot import animate, check_animation, hodograph, phase_portrait, save, sketch
 from jounce.plot.animation import frame_instants
-from jounce.plot.scene import scene_of, screen_of
+from jounce.plot.canvas import screen_of
+from jounce.plot.scene import scene_of
 from jounce.plot.style import BODY_COLOURS
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]

@@ -5,7 +5,7 @@ import pathlib
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from jounce.io.robots import load_robot
+from jounce.io.robots.loader import load_robot
 from jounce.rigid.inertia import Inertia
 from jounce.robot.model import Joint, Limits, Link, Mimic
 from jounce.robot.robot import Robot

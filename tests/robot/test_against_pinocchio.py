@@ -9,7 +9,7 @@ import pytest
 from mpmath import mp
 
 import jounce as jn
-from jounce.io.robots import load_robot
+from jounce.io.robots.loader import load_robot
 from tests.oracles.mp_robot import State, cut, from_numbers, motion, rates, times, transposed
 
 ROBOTS = Path(__file__).parents[2] / "examples" / "robots"

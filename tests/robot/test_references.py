@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.io.robots import load_robot
+from jounce.io.robots.loader import load_robot
 
 HERE = Path(__file__).parent / "references"
 ROBOTS = Path(__file__).parents[2] / "examples" / "robots"

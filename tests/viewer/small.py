@@ -1,5 +1,6 @@
 """A wheel whose motion can be written down, and a subject whose solves take as long as a test wants."""
 
+import dataclasses
 import threading
 
 import numpy as np
@@ -38,6 +39,25 @@ def derivatives_of_the_rim(time, c=2.0, radius=RADIUS):
     return np.stack([radius * along, velocity, acceleration], axis=1)
 
 
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
+class PlainTake(Take):
+    """One motion of every point, and nothing else."""
+
+    motions: np.ndarray
+
+    def quantities(self):
+        return {}
+
+    def motion_of(self, body, point):
+        return self.motions
+
+    def exertions_of(self):
+        return []
+
+    def dataset(self):
+        return None
+
+
 def plain_take(value=1.0, notice=""):
     """A take of a box that moves by a value along x."""
     time = np.linspace(0.0, 1.0, 5)
@@ -55,9 +75,9 @@ def plain_take(value=1.0, notice=""):
         1.0,
         (0.0, 0.0, 1.0),
     )
-    return Take(
-        "box", False, time, 1, ("ground", "box"), position, quaternion, dict, lambda body, point: motion, list,
-        lambda: None, {"value": value}, looks, notice,
+    return PlainTake(
+        title="box", planar=False, time=time, order=1, bodies=("ground", "box"), position=position,
+        quaternion=quaternion, values={"value": value}, looks=looks, notice=notice, motions=motion,
     )  # fmt: skip
 
 

@@ -9,7 +9,8 @@ import jounce as jn
 from jounce.viewer import solids
 from jounce.viewer.closed import independent
 from jounce.viewer.looks import looks_of
-from jounce.viewer.robots import robot_subject, swing_of
+from jounce.viewer.robots import swing_of
+from jounce.viewer.server import robot_subject
 from jounce.viewer.visuals import file_shapes, robot_looks
 
 

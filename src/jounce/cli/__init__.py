@@ -14,10 +14,11 @@ import re
 import sys
 import warnings
 from collections.abc import Sequence
-from typing import Any
+from pathlib import Path
+from typing import Any, Literal
 
 from jounce.cli.arguments import converted
-from jounce.cli.completing import completion
+from jounce.cli.completing import complete
 from jounce.cli.conversion import convert
 from jounce.cli.figures import plot, report
 from jounce.cli.inspection import inspect
@@ -25,12 +26,28 @@ from jounce.cli.mechanisms import run, schema, simulate
 from jounce.cli.papers import reproduce
 from jounce.cli.robots import check, torques
 from jounce.cli.starters import new
+from jounce.cli.streams import lasting_streams
 from jounce.cli.views import view
 from jounce.cli.writing import WritingError
 from jounce.errors import JounceError, SolveError
 from jounce.interrupts import end_on_signals
-from jounce.io.streams import lasting_streams
-from jounce.io.terminal import cautions, complain, unexpected
+from jounce.reporting.terminal import cautions, complain, unexpected
+
+
+def completion(shell: Literal["bash", "zsh", "fish"], /, *, install: bool = False, out: Path | None = None) -> int:
+    """Print or install completion of commands and options for a shell.
+
+    Parameters
+    ----------
+    shell
+        bash, zsh or fish.
+    install
+        Write it where the shell looks for it, and have it read.
+    out
+        Write the script to this file, and leave start-up files alone.
+    """
+    return complete(application(), shell, install, out)
+
 
 EXAMPLES = {
     new: """\
@@ -136,7 +153,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         output.flush()
         if output.failure is None:
             return status
-        from jounce.io.files import reason_of
+        from jounce.io.files.writing import reason_of
 
         complain(f"standard output cannot be written: {reason_of(output.failure)}", json=as_json)
     return status or 1
@@ -145,7 +162,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _status(given: list[str], as_json: bool) -> int:
     """Return the exit status of a command, whose errors are told."""
     try:
-        from jounce.io.cache import use_compilation_cache
+        from jounce.cli.compiled_programs import use_compilation_cache
 
         use_compilation_cache()
         return _dispatch(given)

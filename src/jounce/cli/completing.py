@@ -1,34 +1,20 @@
-"""The command that prints or installs completion for a shell."""
+"""Completion of commands and options, printed or installed for a shell."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
+from typing import Any
 
 from jounce.errors import JounceError, OutputError
-from jounce.io.terminal import say
-
-SHELLS = ("bash", "zsh", "fish")
+from jounce.reporting.terminal import say
 
 
-def completion(shell: Literal["bash", "zsh", "fish"], /, *, install: bool = False, out: Path | None = None) -> int:
-    """Print or install completion of commands and options for a shell.
-
-    Parameters
-    ----------
-    shell
-        bash, zsh or fish.
-    install
-        Write it where the shell looks for it, and have it read.
-    out
-        Write the script to this file, and leave start-up files alone.
-    """
-    from jounce.cli import application
-    from jounce.io.files import check_target, reason_of, replacing
+def complete(app: Any, shell: str, install: bool, out: Path | None) -> int:
+    """Print, write or install the completion script of the command line for a shell."""
+    from jounce.io.files.writing import check_target, reason_of, replacing
 
     if install and out is not None:
         raise JounceError("takes a place of its own; give --install or --out", name="--out", value=str(out))
-    app = application()
     if out is not None:
         check_target(out)
         with replacing(out) as scratch:

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from jounce.cli.arguments import check_ending, named_once
+from jounce.cli.file_kinds import expecting
 from jounce.cli.writing import Overwrite, allowed
 from jounce.errors import JounceError
-from jounce.io.kinds import expecting
-from jounce.io.terminal import caution, say
+from jounce.reporting.terminal import caution, say
 
 if TYPE_CHECKING:
     from jounce.robot import Robot
@@ -63,9 +63,9 @@ def convert(
     overwrite
         Replace files that are there.
     """
-    from jounce.io.files import check_target
-    from jounce.io.formats import SUFFIXES
-    from jounce.io.templates import refuse_existing
+    from jounce.io.files.formats import SUFFIXES
+    from jounce.io.files.writing import check_target
+    from jounce.io.mechanisms.starters import refuse_existing
 
     suffix = source.suffix.lower()
     with expecting(source, "mechanism", "robot"):
@@ -73,7 +73,7 @@ def convert(
     check_target(target, SUFFIXES, "mechanism file", overwrite=overwrite)
     refuse_existing(target, overwrite=overwrite)
     if suffix in ROBOTS:
-        from jounce.io.robots import load_robot
+        from jounce.io.robots.loader import load_robot
 
         named_once(drive, "--drive")
         named_once(start, "--start")
@@ -88,14 +88,14 @@ def convert(
 
 
 def _mechanism(source: Path, target: Path, imports: list[Path] | None, allow: Sequence[Path], overwrite: bool) -> int:
-    from jounce.io.conversion import converted
-    from jounce.io.files import check_target, replacing
-    from jounce.io.formats import dumped
-    from jounce.io.reading import MAX_SAMPLES, read_file
-    from jounce.io.templates import refuse_existing
+    from jounce.io.files.formats import dumped
+    from jounce.io.files.reading import MAX_SAMPLES, read_file
+    from jounce.io.files.writing import check_target, replacing
+    from jounce.io.mechanisms.conversion import converted
+    from jounce.io.mechanisms.starters import refuse_existing
 
     if imports:
-        from jounce.io.own import import_file
+        from jounce.io.mechanisms.user_classes import import_file
 
         for path in imports:
             import_file(path)
@@ -124,9 +124,9 @@ def _robot(
     hold: bool,
     drives: bool,
 ) -> int:
-    from jounce.io.conversion import assigned, robot_mechanism, with_file_names
-    from jounce.io.formats import dumped
-    from jounce.io.writer import mechanism_data
+    from jounce.io.files.formats import dumped
+    from jounce.io.mechanisms.conversion import assigned, robot_mechanism, with_file_names
+    from jounce.io.mechanisms.writer import mechanism_data
     from jounce.mechanism.masses import body_mass
 
     robot, renamed = with_file_names(model)
@@ -151,7 +151,7 @@ def _robot(
 def _put(text: str, target: Path, allow: Sequence[Path], overwrite: bool) -> None:
     """Write a file, and read it before it takes its place."""
     from jounce.io import load
-    from jounce.io.files import replacing
+    from jounce.io.files.writing import replacing
 
     with replacing(target, overwrite=overwrite) as scratch:
         scratch.write_text(text, encoding="utf-8")

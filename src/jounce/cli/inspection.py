@@ -6,11 +6,13 @@ from pathlib import Path
 
 from jounce.cli.arguments import check_ending
 from jounce.cli.conversion import MECHANISMS, ROBOTS
+from jounce.cli.file_kinds import expecting
 from jounce.cli.mechanisms import loaded
 from jounce.cli.writing import allowed
 from jounce.errors import JounceError
-from jounce.io.kinds import expecting
-from jounce.io.terminal import say_json
+from jounce.reporting.summaries import start_heading, start_summary
+from jounce.reporting.tables import bodies_table, mechanism_tables, robot_tables
+from jounce.reporting.terminal import say, say_json, show_table
 
 
 def inspect(
@@ -52,17 +54,15 @@ def inspect(
     if suffix in ROBOTS:
         if set_:
             raise JounceError("is for mechanism files; a robot file has no parameters", name="--set", path=file)
-        from jounce.io.briefing import brief_robot as tell
-        from jounce.io.robot_inspection import inspected_robot
-        from jounce.io.robots import load_robot
+        from jounce.io.robots.loader import load_robot
+        from jounce.reporting.robot_facts import inspected_robot
 
         with expecting(file, "robot"):
             facts = inspected_robot(load_robot(file, strict=strict, allow=allowed(allow)), file)
     else:
         if strict:
             raise JounceError("is for robot files; mechanism files are always read so", name="--strict", path=file)
-        from jounce.io.briefing import brief as tell
-        from jounce.io.inspection import inspected
+        from jounce.reporting.mechanism_facts import inspected
 
         mechanism = loaded(file, set_, import_, allow)
         try:
@@ -72,5 +72,9 @@ def inspect(
     if json:
         say_json("inspect", facts)
     else:
-        tell(facts)
+        say(start_heading(facts))
+        robot = facts["kind"] == "robot"
+        for table in robot_tables(facts) if robot else mechanism_tables(facts, bodies_table(facts)):
+            show_table(table)
+        say(f"\n{start_summary(facts)}")
     return 0 if facts["ok"] else 1

@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from jounce.cli.arguments import named_once
+from jounce.cli.file_kinds import expecting
 from jounce.cli.writing import allowed, spared, written
 from jounce.errors import JounceError, SolveError
-from jounce.io.kinds import expecting
-from jounce.io.summaries import simulation_summary, summary
-from jounce.io.terminal import Bar, say, say_json, show_peaks
+from jounce.reporting.summaries import motion_summary
+from jounce.reporting.terminal import Bar, say, say_json, show_peaks
 
 if TYPE_CHECKING:
     from jounce.kinematics import Motion
@@ -59,7 +59,8 @@ def run(
         Print the result as JSON.
     """
     from jounce import io
-    from jounce.io.peaks import peaks
+    from jounce.reporting.motion_facts import motion_facts
+    from jounce.reporting.peaks import peaks
 
     if out is not None:
         io.check_writable(out, overwrite=overwrite)
@@ -67,7 +68,7 @@ def run(
     spared(out, overwrite)
     motion = solved(mechanism, file, order, tolerance)
     if not json:
-        say(summary(motion, file))
+        say(motion_summary(motion_facts(motion), file.name))
         show_peaks(peaks(motion, refine=not no_refine))
     return _finished("run", motion, file, out, overwrite, json, not no_refine)
 
@@ -122,7 +123,8 @@ def simulate(
     """
     from jounce import io
     from jounce.integrate import simulate as integrate
-    from jounce.io.peaks import peaks
+    from jounce.reporting.motion_facts import motion_facts
+    from jounce.reporting.peaks import peaks
 
     if out is not None:
         io.check_writable(out, overwrite=overwrite)
@@ -143,7 +145,7 @@ def simulate(
     except JounceError as error:
         raise of_option(error, file) from None
     if not json:
-        say(simulation_summary(motion, file))
+        say(motion_summary(motion_facts(motion), file.name))
         show_peaks(peaks(motion, refine=not no_refine))
     return _finished("simulate", motion, file, out, overwrite, json, not no_refine)
 
@@ -157,7 +159,7 @@ def _finished(
     if out is not None:
         written(lambda: io.write(motion.dataset, out, overwrite=overwrite))
     if json:
-        from jounce.io.records import motion_record
+        from jounce.reporting.records import motion_record
 
         say_json(command, motion_record(motion, file, out, refine))
     elif out is not None:
@@ -194,7 +196,7 @@ def schema(of: Literal["mechanism", "results"] = "mechanism", /) -> int:
     import json
 
     if of == "results":
-        from jounce.io.record_schema import record_schema as made
+        from jounce.reporting.record_schema import record_schema as made
     else:
         from jounce.io import json_schema as made
 
@@ -212,7 +214,7 @@ def loaded(
     from jounce.io import load
 
     if imports:
-        from jounce.io.own import import_file
+        from jounce.io.mechanisms.user_classes import import_file
 
         for path in imports:
             import_file(path)
@@ -220,7 +222,7 @@ def loaded(
         mechanism = load(file, allow=allowed(allow))
     if assignments:
         named_once(assignments, "--set")
-        from jounce.io.overrides import override
+        from jounce.io.mechanisms.overrides import override
 
         mechanism = override(mechanism, assignments)
     return mechanism

@@ -1,18 +1,18 @@
-"""The command that makes the figures and tables of papers again."""
+"""The command that reproduces the figures and tables of papers."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 from jounce.errors import JounceError
-from jounce.io.summaries import count
-from jounce.io.terminal import Bar, say
+from jounce.reporting.summaries import count
+from jounce.reporting.terminal import Bar, say
 
 PAPERS = {"sommer-2024": "jounce.papers.sommer_2024", "negrean-2025": "jounce.papers.negrean_2025"}
 
 
 def reproduce(paper: str, /, *, out: Path, samples: Path | None = None, masses: Path | None = None) -> int:
-    """Make the figures and tables of a paper again.
+    """Reproduce the figures and tables of a paper.
 
     Parameters
     ----------

@@ -5,11 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from jounce.cli.file_kinds import expecting
 from jounce.cli.writing import allowed, spared, written
 from jounce.errors import JounceError, RobotError, SampleWarning
-from jounce.io.kinds import expecting
-from jounce.io.summaries import limits_summary, torques_summary, verdict
-from jounce.io.terminal import caution, say, say_json, show_limits, show_peaks
+from jounce.reporting.summaries import limits_summary, torques_summary, verdict
+from jounce.reporting.tables import limits_table
+from jounce.reporting.terminal import caution, say, say_json, show_peaks, show_table
 
 MOST_RATES = 28  # of torques: the highest derivative of a law is 30
 
@@ -58,8 +59,8 @@ def check(
     import warnings
 
     from jounce.dynamics.limits import check_limits
-    from jounce.io.robots import load_robot
-    from jounce.io.trajectories import load_trajectory
+    from jounce.io.robots.loader import load_robot
+    from jounce.io.robots.trajectories import load_trajectory
 
     if out is not None:
         from jounce.plot import check_figure
@@ -69,7 +70,7 @@ def check(
         model = load_robot(robot, strict=strict, allow=allowed(allow))
     laid = _laid_down(limits, model)
     if payload:
-        from jounce.io.payloads import with_payloads
+        from jounce.io.robots.payloads import with_payloads
 
         model = with_payloads(model, payload)
     with warnings.catch_warnings(record=True) as caught:
@@ -87,7 +88,7 @@ def check(
         raise JounceError("there are no limits to compare with; give a file of limits with --limits", path=robot)
     if not json:
         say(limits_summary(report, motion, robot, trajectory))
-        show_limits(report)
+        show_table(limits_table(report), "bold red")
     for warning in caught:
         caution(warning.message, json=json)
     if not json:
@@ -97,7 +98,7 @@ def check(
 
         written(lambda: save(draw_limits(report, f"{report.robot}: {trajectory.name}"), out, overwrite=overwrite))
     if json:
-        from jounce.io.records import limits_record
+        from jounce.reporting.records import limits_record
 
         say_json("check", limits_record(report, robot, trajectory, out))
     elif out is not None:
@@ -151,9 +152,9 @@ def torques(
     """
     from jounce import io
     from jounce.dynamics.trajectories import trajectory_torques
-    from jounce.io.peaks import table_peaks
-    from jounce.io.robots import load_robot
-    from jounce.io.trajectories import load_trajectory
+    from jounce.io.robots.loader import load_robot
+    from jounce.io.robots.trajectories import load_trajectory
+    from jounce.reporting.peaks import table_peaks
 
     if not 0 <= rates <= MOST_RATES:
         raise JounceError(f"must be a whole number from 0 to {MOST_RATES}", name="--rates", value=rates)
@@ -162,7 +163,7 @@ def torques(
     with expecting(robot, "robot"):
         model = load_robot(robot, strict=strict, allow=allowed(allow))
     if payload:
-        from jounce.io.payloads import with_payloads
+        from jounce.io.robots.payloads import with_payloads
 
         model = with_payloads(model, payload)
     with expecting(trajectory, "trajectory"):
@@ -180,7 +181,7 @@ def torques(
     if out is not None:
         written(lambda: io.write(found, out, overwrite=overwrite))
     if json:
-        from jounce.io.records import torques_record
+        from jounce.reporting.records import torques_record
 
         say_json("torques", torques_record(found, motion, robot, trajectory, out))
     elif out is not None:
@@ -190,7 +191,7 @@ def torques(
 
 def _laid_down(limits: Path | None, model: Any) -> Any:
     """Return the limits of a file, None without one."""
-    from jounce.io.limits import load_limits
+    from jounce.io.robots.limits import load_limits
 
     if limits is None:
         return None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from jounce.cli.writing import Overwrite
-from jounce.io.terminal import say, say_json, show_columns
+from jounce.reporting.terminal import say, say_json, show_columns
 
 
 def new(
@@ -29,7 +29,7 @@ def new(
     json
         Print the result as JSON.
     """
-    from jounce.io.templates import STARTERS, write_starter
+    from jounce.io.mechanisms.starters import STARTERS, write_starter
 
     if name is None:
         if json:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from jounce.cli.arguments import check_ending
+from jounce.cli.file_kinds import expecting
 from jounce.cli.writing import allowed
 from jounce.errors import JounceError
 from jounce.interrupts import raising
-from jounce.io.kinds import expecting
-from jounce.io.terminal import say
+from jounce.reporting.terminal import say
 
 
 def view(
@@ -49,7 +49,7 @@ def view(
     allow
         Folder whose files it may name, besides its own; repeatable.
     """
-    from jounce.io.robots import ENDINGS
+    from jounce.io.robots.loader import ENDINGS
     from jounce.kinematics.solve import checked_order
     from jounce.viewer import view as show
     from jounce.viewer.exports import check_installed

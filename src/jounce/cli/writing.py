@@ -18,7 +18,7 @@ class WritingError(Exception):
 
 def allowed(folders: Sequence[Path] | None) -> Sequence[Path]:
     """Return the folders that named files may be in, each of which must exist."""
-    from jounce.io.reading import check_allowed
+    from jounce.io.files.reading import check_allowed
 
     try:
         check_allowed(folders or ())
@@ -31,7 +31,7 @@ def allowed(folders: Sequence[Path] | None) -> Sequence[Path]:
 def spared(out: Path | None, overwrite: bool) -> None:
     """Raise OutputError where a result would replace what has been read; meant to be asked once all is read."""
     if out is not None:
-        from jounce.io.files import check_target
+        from jounce.io.files.writing import check_target
 
         check_target(out, overwrite=overwrite)
 

@@ -18,6 +18,7 @@ Whole = Annotated[int, "whole"]
 
 SPACES = ("planar", "spatial")
 ROLES = ("joint", "driver", "force")
+RESERVED = ("bodies", "type")  # keys that every element of a file has
 _REGISTRY: dict[tuple[str, str], dict[str, type[Any]]] = {}
 
 
@@ -28,15 +29,19 @@ def register(kind: type[Any], type: str, space: str, role: str) -> None:  # noqa
     ------
     MechanismError
         If another class has this type: files would silently mean the new one. The same class defined again, as in a
-        cell of a notebook that is run again, takes its own place.
+        cell of a notebook that is run again, takes its own place. If a field has a name that files use otherwise.
     """
     check_text("role", role, ROLES)
     if space:
         check_text("space", space, SPACES)
+    for field in vars(kind).get("__annotations__", {}):
+        if field in RESERVED:
+            message = f"no field of {kind.__qualname__} may have this name, which files use otherwise; rename it"
+            raise MechanismError(message, name="field", value=field)
     catalogues = [_REGISTRY.setdefault((each, role), {}) for each in ((space,) if space else SPACES)]
     for taken in catalogues:
         other = taken.get(type, kind)
-        if (other.__module__, other.__qualname__) != (kind.__module__, kind.__qualname__):
+        if _is_whole(other) and (other.__module__, other.__qualname__) != (kind.__module__, kind.__qualname__):
             message = (
                 f"the {role} type of {kind.__qualname__} is that of {other.__module__}.{other.__qualname__} already"
             )
@@ -77,17 +82,11 @@ class AbstractConstraint(eqx.Module):
     def __init_subclass__(cls, type: str = "", space: str = "", role: str = "joint", **keywords: Any):  # noqa: A002
         super().__init_subclass__(**keywords)
         if type:
+            check_text("role", role, ("joint", "driver"))
             register(cls, type, space, role)
 
     def __check_init__(self):
-        name = self.type_name or type(self).__name__
-        counts = self.body_counts or (self.body_count,)
-        if len(self.bodies) not in counts:
-            message = f"{name} joins {' or '.join(map(str, counts))} bodies"
-            raise MechanismError(message, name="bodies", value=list(self.bodies))
-        if len(set(self.bodies)) != len(self.bodies):
-            message = f"{name} must join different bodies, not a body with itself"
-            raise MechanismError(message, name="bodies", value=list(self.bodies))
+        check_bodies(self, self.body_counts or (self.body_count,))
 
     @abc.abstractmethod
     def residual(self, *bodies_and_time: Any) -> Jet:
@@ -114,7 +113,24 @@ def catalogue(space: str, role: str) -> dict[str, type[Any]]:
     >>> sorted(catalogue("planar", "driver"))
     ['coordinate', 'distance', 'slide']
     """
-    return dict(_REGISTRY.get((space, role), {}))
+    return {name: kind for name, kind in _REGISTRY.get((space, role), {}).items() if _is_whole(kind)}
+
+
+def _is_whole(kind: type[Any]) -> bool:
+    """Tell a class from one whose definition failed after it was registered, as its fields were in no order."""
+    return "__match_args__" in vars(kind)  # the last that a dataclass gets
+
+
+def check_bodies(element: Any, counts: tuple[int, ...], does: str = "joins", must: str = "join") -> None:
+    """Raise MechanismError unless a joint, driver or force has as many bodies as it needs, all different."""
+    name = element.type_name or type(element).__name__
+    if len(element.bodies) not in counts:
+        noun = "body" if counts == (1,) else "bodies"
+        message = f"{name} {does} {' or '.join(map(str, counts))} {noun}"
+        raise MechanismError(message, name="bodies", value=list(element.bodies))
+    if len(set(element.bodies)) != len(element.bodies):
+        message = f"{name} must {must} different bodies, not a body with itself"
+        raise MechanismError(message, name="bodies", value=list(element.bodies))
 
 
 def rows(*parts: Any) -> Jet:

@@ -75,7 +75,7 @@ def of_drivers(motion: Motion, q: Any, least: int, form: Callable[..., Any], sta
         still = {name: values[..., lanes] for name, values in start.items()}
         return _evaluated(model.system, still, motion.time[lanes], masses, pose_type, order, least, form, static)
 
-    values = np.moveaxis(in_chunks(len(motion.time), chunk), -1, 0)
+    values = np.moveaxis(in_chunks(chunk, len(motion.time)), -1, 0)
     values = values * np.array([float(math.factorial(k)) for k in range(values.shape[1])])[:, None]
     return _labelled(motion, np.where((motion.status == Status.OK)[:, None, None], values, np.nan), names)
 

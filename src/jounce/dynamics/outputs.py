@@ -171,15 +171,3 @@ class AppliedTorqueOutput(_AppliedOutput):
 
     unit = "N*m"
     rate_names = ("torque", *RATES)
-
-
-FORCE_OUTPUTS: tuple[tuple[str, type[AbstractForceOutput]], ...] = (
-    ("force", DriverForceOutput),
-    ("torque", DriverTorqueOutput),
-    ("force", JointForceOutput),
-    ("reaction", JointForceOutput),
-    ("torque", JointTorqueOutput),
-    ("force", AppliedForceOutput),
-    ("torque", AppliedTorqueOutput),
-)
-"""The word for ``quantity`` in a file and the class of each force as an output."""

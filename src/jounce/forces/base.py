@@ -7,8 +7,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from jounce.constraints.base import catalogue, register
-from jounce.errors import MechanismError
+from jounce.constraints.base import catalogue, check_bodies, register
 from jounce.jet import Jet
 
 Law = Annotated[Any, "law"]
@@ -70,14 +69,7 @@ class AbstractForce(eqx.Module):
             register(cls, type, space, "force")
 
     def __check_init__(self):
-        name = self.type_name or type(self).__name__
-        if len(self.bodies) != self.body_count:
-            noun = "body" if self.body_count == 1 else "bodies"
-            message = f"{name} acts on {self.body_count} {noun}"
-            raise MechanismError(message, name="bodies", value=list(self.bodies))
-        if len(set(self.bodies)) != len(self.bodies):
-            message = f"{name} must act between different bodies, not on a body from itself"
-            raise MechanismError(message, name="bodies", value=list(self.bodies))
+        check_bodies(self, (self.body_count,), "acts on", "act between")
 
     @abc.abstractmethod
     def displacement(self, *bodies_and_time: Any) -> Jet:

@@ -9,6 +9,7 @@ from typing import Any
 import jax
 import numpy as np
 
+from jounce.display import Displayed
 from jounce.dynamics.forward import Equations, State
 from jounce.dynamics.start import driven, start
 from jounce.errors import MechanismError, did_you_mean
@@ -30,7 +31,7 @@ STEPS = 16  # tried before runs that have ended make room for others
 
 
 @dataclasses.dataclass(frozen=True)
-class Batch:
+class Batch(Displayed):
     """The results of many simulations.
 
     Attributes
@@ -197,6 +198,9 @@ class _Runs:
         status = np.where(self._reached, int(Status.OK), int(Status.NOT_REACHED))
         stuck = np.flatnonzero(~self._reached.all(axis=1))
         status[stuck, np.argmin(self._reached[stuck], axis=1)] = int(Status.COLLAPSED)
+        for values in self._values.values():
+            finite = np.isfinite(values[:, :, : self.order + 1]).all(axis=(2, 3, 4))
+            status[self._reached & ~finite] = int(Status.UNDEFINED)
         return status
 
     @property

@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from jounce.io.export import json_schema as json_schema
-    from jounce.io.limits import load_limits as load_limits
-    from jounce.io.loader import load as load
+    from jounce.io.mechanisms.json_schema import json_schema as json_schema
+    from jounce.io.mechanisms.loader import load as load
+    from jounce.io.mechanisms.writer import write_mechanism as write_mechanism
     from jounce.io.results import check_writable as check_writable, read as read, write as write
-    from jounce.io.robots import load_robot as load_robot
-    from jounce.io.trajectories import load_trajectory as load_trajectory
-    from jounce.io.writer import write_mechanism as write_mechanism
+    from jounce.io.robots.limits import load_limits as load_limits
+    from jounce.io.robots.loader import load_robot as load_robot
+    from jounce.io.robots.trajectories import load_trajectory as load_trajectory
 
 __all__ = [
     "check_writable",
@@ -26,15 +26,15 @@ __all__ = [
 ]
 
 _HOMES = {
-    "load": "loader",
-    "json_schema": "export",
+    "load": "mechanisms.loader",
+    "json_schema": "mechanisms.json_schema",
     "check_writable": "results",
     "read": "results",
     "write": "results",
-    "load_limits": "limits",
-    "load_robot": "robots",
-    "load_trajectory": "trajectories",
-    "write_mechanism": "writer",
+    "load_limits": "robots.limits",
+    "load_robot": "robots.loader",
+    "load_trajectory": "robots.trajectories",
+    "write_mechanism": "mechanisms.writer",
 }
 
 

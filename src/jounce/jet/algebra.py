@@ -1,13 +1,13 @@
-"""The jet: a truncated Taylor series in time, and its arithmetic."""
+"""The jet: a truncated Taylor series in time, its arithmetic, powers, and products of vectors."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator
-from functools import reduce
-from operator import add
 from typing import Any
 
 import jax
 import jax.numpy as jnp
+
+from jounce.jet.coefficients import elementwise, minus, plus, ranked, sum_of_products, total
 
 
 @jax.tree_util.register_pytree_node_class
@@ -135,19 +135,15 @@ class Jet:
         """Return the Taylor prediction a time `step` (in seconds) away."""
         *lower, value = self.coefficients
         for c in reversed(lower):
-            value = plus(c, None if value is None else _elementwise(jnp.multiply)(value, step))
+            value = plus(c, None if value is None else elementwise(jnp.multiply)(value, step))
         return value
 
     def dot(self, other: Any) -> Any:
         """Return the scalar product along the component axis."""
-        from jounce.jet.vectors import dot
-
         return dot(self, other)
 
     def cross(self, other: Any) -> Any:
         """Return the vector product along the component axis (a scalar in the plane)."""
-        from jounce.jet.vectors import cross
-
         return cross(self, other)
 
     def __neg__(self) -> "Jet":
@@ -180,12 +176,12 @@ class Jet:
         shape = self.shape
         if all(c is None or jnp.shape(c) == shape for c in self.coefficients):
             return self
-        return self.map(lambda c: jnp.broadcast_to(_ranked(c, len(shape)), shape))
+        return self.map(lambda c: jnp.broadcast_to(ranked(c, len(shape)), shape))
 
     def __mul__(self, other: Any) -> "Jet":
         if other is self:
             return self.square()
-        return bilinear(_elementwise(jnp.multiply), self, other)
+        return bilinear(elementwise(jnp.multiply), self, other)
 
     __rmul__ = __mul__
 
@@ -194,13 +190,13 @@ class Jet:
         return symmetric(jnp.multiply, self)
 
     def __truediv__(self, other: Any) -> "Jet":
-        divide = _elementwise(jnp.divide)
+        divide = elementwise(jnp.divide)
         if not isinstance(other, Jet):
             return self.map(lambda c: divide(c, other))
         b0, *b = other.coefficients
         quotient: list[Any] = []
         for k in range(min(self.order, other.order) + 1):
-            known = sum_of_products(_elementwise(jnp.multiply), b[:k], quotient[::-1])
+            known = sum_of_products(elementwise(jnp.multiply), b[:k], quotient[::-1])
             rest = minus(self.coefficients[k], known)
             quotient.append(None if rest is None else divide(rest, b0))
         return Jet(quotient)._filled()
@@ -209,13 +205,9 @@ class Jet:
         return Jet.constant(other, self.order) / self
 
     def __pow__(self, exponent: Any) -> "Jet":
-        from jounce.jet.elementary import power
-
         return power(self, exponent)
 
     def __rpow__(self, base: Any) -> "Jet":
-        from jounce.jet.elementary import power
-
         return power(base, self)
 
 
@@ -223,31 +215,6 @@ def _checked(order: int) -> int:
     if order < 0:
         raise ValueError(f"the order of a jet must not be negative, got {order}")
     return order
-
-
-def total(terms: Iterable[Any]) -> Any:
-    """Sum without the leading ``0 +`` of the built-in, which would put an operation into every trace."""
-    return reduce(add, terms)
-
-
-def plus(a: Any, b: Any) -> Any:
-    """Add coefficients; None is zero."""
-    if a is None or b is None:
-        return b if a is None else a
-    return _elementwise(jnp.add)(a, b)
-
-
-def minus(a: Any, b: Any) -> Any:
-    """Subtract coefficients; None is zero."""
-    if a is None or b is None:
-        return a if b is None else -b
-    return _elementwise(jnp.subtract)(a, b)
-
-
-def sum_of_products(product: Callable[[Any, Any], Any], a: Iterable[Any], b: Iterable[Any]) -> Any:
-    """Return the sum of the products of paired coefficients, None where all of them vanish."""
-    terms = [product(x, y) for x, y in zip(a, b, strict=True) if x is not None and y is not None]
-    return total(terms) if terms else None
 
 
 def bilinear(product: Callable[[Any, Any], Any], a: Any, b: Any) -> Any:
@@ -276,17 +243,159 @@ def symmetric(product: Callable[[Any, Any], Any], a: Jet) -> Jet:
     return Jet(map(coefficient, range(len(x))))
 
 
-def _elementwise(operation: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
-    """Let operands of different rank meet at their trailing (batch) axes, said aloud for strict rank promotion."""
-
-    def aligned(a: Any, b: Any) -> Any:
-        rank = max(jnp.ndim(a), jnp.ndim(b))
-        return operation(_ranked(a, rank), _ranked(b, rank))
-
-    return aligned
+# Components are cut out once for each coefficient, as slices that keep their axis, and their products are written out:
+# high orders trace them hundreds of times, and XLA vectorises them along the batch, which it does not do for sums.
 
 
-def _ranked(a: Any, rank: int) -> Any:
-    """Put axes of length one before those of an array; a number stays a number."""
-    missing = rank - jnp.ndim(a)
-    return jnp.reshape(a, (1,) * missing + jnp.shape(a)) if missing and jnp.ndim(a) else a
+def components(vector: Any) -> list[Any]:
+    """Return the components of a vector of shape (components, ...), each of shape (1, ...)."""
+    size = vector.shape[0] if isinstance(vector, Jet) else len(vector)
+    return [vector[i : i + 1] for i in range(size)]
+
+
+def dot(a: Any, b: Any) -> Any:
+    """Return the scalar product of two vectors, of shape (components, ...), as shape (...)."""
+    if isinstance(a, Jet) and a is b:
+        return total(symmetric(jnp.multiply, x) for x in components(a))[0]
+    return total(bilinear(jnp.multiply, x, y) for x, y in zip(components(a), components(b), strict=True))[0]
+
+
+def cross(a: Any, b: Any) -> Any:
+    """Return the vector product of two 3-vectors, or the scalar ``a_x b_y - a_y b_x`` of two plane vectors."""
+    a, b = components(a), components(b)
+
+    def entry(i: int, j: int) -> Any:
+        return bilinear(jnp.multiply, a[i], b[j]) - bilinear(jnp.multiply, a[j], b[i])
+
+    if len(a) == 2:
+        return entry(0, 1)[0]
+    return concatenate([entry(1, 2), entry(2, 0), entry(0, 1)])
+
+
+def concatenate(parts: list[Any]) -> Any:
+    """Join vectors, jets or arrays, of shape (components, ...), along the component axis.
+
+    Their other axes are broadcast. Jets are joined coefficient by coefficient; None where it is None in all of them.
+    """
+    jets = [part for part in parts if isinstance(part, Jet)]
+    if not jets:
+        return jnp.concatenate(_alike(parts))
+    order = min(jet.order for jet in jets)
+    whole = [part if isinstance(part, Jet) else Jet.constant(part, order) for part in parts]
+    first = _alike([jet.coefficients[0] for jet in whole])
+    shapes = [jnp.shape(value) for value in first]
+
+    def level(coefficients: tuple[Any, ...]) -> Any:
+        if all(c is None for c in coefficients):
+            return None
+        pairs = zip(coefficients, shapes, strict=True)
+        return jnp.concatenate([jnp.zeros(s) if c is None else jnp.broadcast_to(c, s) for c, s in pairs])
+
+    rest = zip(*(jet.coefficients[1 : order + 1] for jet in whole), strict=True)
+    return Jet((jnp.concatenate(first), *map(level, rest)))
+
+
+def _alike(arrays: list[Any]) -> list[Any]:
+    """Broadcast the batch axes, all but the first."""
+    batch = jnp.broadcast_shapes(*(jnp.shape(a)[1:] for a in arrays))
+    return [jnp.broadcast_to(a, (jnp.shape(a)[0], *batch)) for a in arrays]
+
+
+def next_of_chain(outer: list[Any], inner: Jet, slope: list[Any]) -> Any:
+    """Return the next coefficient of y from ``y' = slope * inner'``."""
+    k = len(outer)
+    rates = [None if c is None else j * c for j, c in enumerate(inner.coefficients[: k + 1])]
+    value = sum_of_products(jnp.multiply, rates[1:], slope[k - 1 :: -1])
+    return None if value is None else value * (1 / k)
+
+
+def exp(x: Any) -> Any:
+    """Return the exponential."""
+    if not isinstance(x, Jet):
+        return jnp.exp(x)
+    y = [jnp.exp(x.coefficients[0])]
+    for _ in range(x.order):
+        y.append(next_of_chain(y, x, y))
+    return Jet(y)
+
+
+def log(x: Any) -> Any:
+    """Return the natural logarithm."""
+    if not isinstance(x, Jet):
+        return jnp.log(x)
+    first, *rest = x.coefficients
+    return (x.differentiate() / x.truncate(x.order - 1)).integrate(jnp.log(first)) if rest else Jet([jnp.log(first)])
+
+
+def sqrt(x: Any) -> Any:
+    """Return the square root."""
+    if not isinstance(x, Jet):
+        return jnp.sqrt(x)
+    y: list[Any] = [jnp.sqrt(x.coefficients[0])]
+    for k in range(1, x.order + 1):
+        rest = minus(x.coefficients[k], sum_of_products(jnp.multiply, y[1:k], y[k - 1 : 0 : -1]))
+        y.append(None if rest is None else rest / (2 * y[0]))
+    return Jet(y)
+
+
+def power(x: Any, exponent: Any) -> Any:
+    """Return `x` to the power `exponent`.
+
+    A whole exponent multiplies repeatedly: the recurrence for real exponents divides by the base and fails at zero.
+    """
+    if isinstance(exponent, Jet) or not isinstance(x, Jet):
+        if not isinstance(exponent, Jet):
+            return jnp.power(x, exponent)
+        return exp(exponent * log(x))
+    if isinstance(exponent, float) and exponent.is_integer():
+        exponent = int(exponent)
+    if isinstance(exponent, int):
+        return whole_power(x, exponent)
+    if isinstance(exponent, float) and exponent == 0.5:
+        return sqrt(x)
+    return real_power(x, jnp.asarray(exponent, float))
+
+
+def real_power(x: Jet, exponent: Any) -> Jet:
+    """Return a power whose exponent is known at run time only.
+
+    The recurrence divides by the base, so a whole exponent up to the order is taken from repeated products instead.
+    """
+    at_zero = x.coefficients[0] == 0
+    c = (jnp.where(at_zero, 1.0, x.coefficients[0]), *x.coefficients[1:])
+    y: list[Any] = [jnp.power(c[0], exponent)]
+    for k in range(1, x.order + 1):
+        weighted = [None if c[j] is None else (exponent * j - (k - j)) * c[j] for j in range(1, k + 1)]
+        value = sum_of_products(jnp.multiply, weighted, y[k - 1 :: -1])
+        y.append(None if value is None else value / (k * c[0]))
+    whole = [whole_power(x, m).dense() for m in range(x.order + 1)]
+    beyond = exponent > x.order  # at a base of zero, every coefficient vanishes; other exponents have none there
+
+    def coefficient(k: int, value: Any) -> Any:
+        value = jnp.where(at_zero, jnp.where(beyond | ((exponent > 0) & (k == 0)), 0.0, jnp.nan), value)
+        for m, power_m in enumerate(whole):
+            value = jnp.where(exponent == m, power_m.coefficients[k], value)
+        return value
+
+    return Jet(coefficient(k, value) for k, value in enumerate(Jet(y).dense().coefficients))
+
+
+def square(x: Any) -> Any:
+    """Return the square of a jet or an array."""
+    return x.square() if isinstance(x, Jet) else x * x
+
+
+def whole_power(x: Any, exponent: int) -> Any:
+    """Return a power of a jet or an array by repeated products."""
+    if exponent < 0:
+        return 1.0 / whole_power(x, -exponent)
+    result, doubled = None, x
+    while exponent:
+        if exponent & 1:
+            result = doubled if result is None else result * doubled
+        exponent >>= 1
+        if exponent:
+            doubled = square(doubled)
+    if result is not None:
+        return result
+    return Jet.constant(jnp.ones_like(x.coefficients[0]), x.order) if isinstance(x, Jet) else jnp.ones_like(x)

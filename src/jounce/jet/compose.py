@@ -13,8 +13,8 @@ import jax
 import jax.numpy as jnp
 from jax.extend.core import Literal
 
-from jounce.jet import elementary
-from jounce.jet.algebra import Jet, bilinear
+from jounce.jet.algebra import Jet, bilinear, exp, power, sqrt
+from jounce.jet.elementary import FUNCTIONS, erf, tanh
 from jounce.jet.vectors import stack
 
 
@@ -189,41 +189,22 @@ def _clamp(low: Any, x: Any, high: Any, **_) -> Any:
     return _select(_value(inside) > _value(high), inside, high)
 
 
-_RULES: dict[str, Callable[..., Any]] = {
+def _without_parameters(function: Callable[..., Any]) -> Callable[..., Any]:
+    return lambda *operands, **_: function(*operands)
+
+
+_RULES: dict[str, Callable[..., Any]] = {name: _without_parameters(f) for name, f in FUNCTIONS.items()} | {
     "add": lambda a, b, **_: a + b,
     "add_any": lambda a, b, **_: a + b,
     "sub": lambda a, b, **_: a - b,
     "mul": lambda a, b, **_: a * b,
     "div": lambda a, b, **_: a / b,
     "neg": lambda a, **_: -a,
-    "square": lambda a, **_: a.square(),
-    "integer_pow": lambda a, *, y, **_: elementary.power(a, y),
-    "pow": lambda a, b, **_: elementary.power(a, b),
-    "sqrt": lambda a, **_: elementary.sqrt(a),
-    "rsqrt": lambda a, **_: 1.0 / elementary.sqrt(a),
-    "exp": lambda a, **_: elementary.exp(a),
-    "exp2": lambda a, **_: elementary.exp(a * jnp.log(2.0)),
-    "expm1": lambda a, **_: elementary.expm1(a),
-    "log": lambda a, **_: elementary.log(a),
-    "log1p": lambda a, **_: elementary.log1p(a),
-    "cbrt": lambda a, **_: elementary.cbrt(a),
-    "erf": lambda a, **_: elementary.erf(a),
-    "erfc": lambda a, **_: 1.0 - elementary.erf(a),
-    "asinh": lambda a, **_: elementary.asinh(a),
-    "acosh": lambda a, **_: elementary.acosh(a),
-    "atanh": lambda a, **_: elementary.atanh(a),
-    "sin": lambda a, **_: elementary.sin(a),
-    "cos": lambda a, **_: elementary.cos(a),
-    "tan": lambda a, **_: elementary.tan(a),
-    "asin": lambda a, **_: elementary.asin(a),
-    "acos": lambda a, **_: elementary.acos(a),
-    "atan": lambda a, **_: elementary.atan(a),
-    "atan2": lambda a, b, **_: elementary.atan2(a, b),
-    "sinh": lambda a, **_: elementary.sinh(a),
-    "cosh": lambda a, **_: elementary.cosh(a),
-    "tanh": lambda a, **_: elementary.tanh(a),
-    "logistic": lambda a, **_: 0.5 * (1.0 + elementary.tanh(0.5 * a)),
-    "abs": lambda a, **_: elementary.absolute(a),
+    "integer_pow": lambda a, *, y, **_: power(a, y),
+    "rsqrt": lambda a, **_: 1.0 / sqrt(a),
+    "exp2": lambda a, **_: exp(a * jnp.log(2.0)),
+    "erfc": lambda a, **_: 1.0 - erf(a),
+    "logistic": lambda a, **_: 0.5 * (1.0 + tanh(0.5 * a)),
     "max": lambda a, b, **_: _select(_value(a) >= _value(b), b, a),
     "min": lambda a, b, **_: _select(_value(a) <= _value(b), b, a),
     "clamp": _clamp,

@@ -11,105 +11,14 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
-from jounce.jet.algebra import Jet, minus, sum_of_products
-
-
-def _chain(outer: list[Any], inner: Jet, slope: list[Any]) -> Any:
-    """Return the next coefficient of y from ``y' = slope * inner'``."""
-    k = len(outer)
-    rates = [None if c is None else j * c for j, c in enumerate(inner.coefficients[: k + 1])]
-    value = sum_of_products(jnp.multiply, rates[1:], slope[k - 1 :: -1])
-    return None if value is None else value * (1 / k)
-
-
-def exp(x: Any) -> Any:
-    """Return the exponential."""
-    if not isinstance(x, Jet):
-        return jnp.exp(x)
-    y = [jnp.exp(x.coefficients[0])]
-    for _ in range(x.order):
-        y.append(_chain(y, x, y))
-    return Jet(y)
-
-
-def log(x: Any) -> Any:
-    """Return the natural logarithm."""
-    if not isinstance(x, Jet):
-        return jnp.log(x)
-    first, *rest = x.coefficients
-    return (x.differentiate() / x.truncate(x.order - 1)).integrate(jnp.log(first)) if rest else Jet([jnp.log(first)])
-
-
-def sqrt(x: Any) -> Any:
-    """Return the square root."""
-    if not isinstance(x, Jet):
-        return jnp.sqrt(x)
-    y: list[Any] = [jnp.sqrt(x.coefficients[0])]
-    for k in range(1, x.order + 1):
-        rest = minus(x.coefficients[k], sum_of_products(jnp.multiply, y[1:k], y[k - 1 : 0 : -1]))
-        y.append(None if rest is None else rest / (2 * y[0]))
-    return Jet(y)
-
-
-def power(x: Any, exponent: Any) -> Any:
-    """Return `x` to the power `exponent`.
-
-    A whole exponent multiplies repeatedly: the recurrence for real exponents divides by the base and fails at zero.
-    """
-    if isinstance(exponent, Jet) or not isinstance(x, Jet):
-        if not isinstance(exponent, Jet):
-            return jnp.power(x, exponent)
-        return exp(exponent * log(x))
-    if isinstance(exponent, float) and exponent.is_integer():
-        exponent = int(exponent)
-    if isinstance(exponent, int):
-        return _whole_power(x, exponent)
-    if isinstance(exponent, float) and exponent == 0.5:
-        return sqrt(x)
-    return _real_power(x, jnp.asarray(exponent, float))
-
-
-def _real_power(x: Jet, exponent: Any) -> Jet:
-    """Return a power whose exponent is known at run time only.
-
-    The recurrence divides by the base, so a whole exponent up to the order is taken from repeated products instead.
-    """
-    at_zero = x.coefficients[0] == 0
-    c = (jnp.where(at_zero, 1.0, x.coefficients[0]), *x.coefficients[1:])
-    y: list[Any] = [jnp.power(c[0], exponent)]
-    for k in range(1, x.order + 1):
-        weighted = [None if c[j] is None else (exponent * j - (k - j)) * c[j] for j in range(1, k + 1)]
-        value = sum_of_products(jnp.multiply, weighted, y[k - 1 :: -1])
-        y.append(None if value is None else value / (k * c[0]))
-    whole = [_whole_power(x, m).dense() for m in range(x.order + 1)]
-    beyond = exponent > x.order  # at a base of zero, every coefficient vanishes; other exponents have none there
-
-    def coefficient(k: int, value: Any) -> Any:
-        value = jnp.where(at_zero, jnp.where(beyond | ((exponent > 0) & (k == 0)), 0.0, jnp.nan), value)
-        for m, power_m in enumerate(whole):
-            value = jnp.where(exponent == m, power_m.coefficients[k], value)
-        return value
-
-    return Jet(coefficient(k, value) for k, value in enumerate(Jet(y).dense().coefficients))
-
-
-def _whole_power(x: Jet, exponent: int) -> Jet:
-    if exponent < 0:
-        return 1.0 / _whole_power(x, -exponent)
-    result, square = None, x
-    while exponent:
-        if exponent & 1:
-            result = square if result is None else result * square
-        exponent >>= 1
-        if exponent:
-            square = square.square()
-    return Jet.constant(jnp.ones_like(x.coefficients[0]), x.order) if result is None else result
+from jounce.jet.algebra import Jet, exp, log, next_of_chain, power, real_power, sqrt, square
+from jounce.jet.coefficients import sum_of_products
 
 
 def next_sine_cosine(sine: list[Any], cosine: list[Any], angle: Jet) -> tuple[Any, Any]:
     """Return the next coefficients of sine and cosine, from those before and a jet of the angle that reaches them."""
-    falling = _chain(cosine, angle, sine)
-    return _chain(sine, angle, cosine), None if falling is None else -falling
+    falling = next_of_chain(cosine, angle, sine)
+    return next_of_chain(sine, angle, cosine), None if falling is None else -falling
 
 
 def sine_cosine(x: Jet) -> tuple[Jet, Jet]:
@@ -136,7 +45,7 @@ def _riccati(x: Jet, value: Any, slope: Any, sign: int) -> Jet:
     """Solve ``y' = s x'``, ``s = constant + sign y^2``, from the value of y and of its slope s."""
     y, s = [value], [slope]
     for _ in range(x.order):
-        y.append(_chain(y, x, s))
+        y.append(next_of_chain(y, x, s))
         square = sum_of_products(jnp.multiply, y, y[::-1])
         s.append(None if square is None else sign * square)
     return Jet(y)
@@ -161,7 +70,7 @@ def tanh(x: Any) -> Any:
 def _hyperbolic(x: Jet) -> tuple[Jet, Jet]:
     sine, cosine = ([value] for value in _hyperbolic_values(x.coefficients[0]))
     for _ in range(x.order):
-        s, c = _chain(sine, x, cosine), _chain(cosine, x, sine)
+        s, c = next_of_chain(sine, x, cosine), next_of_chain(cosine, x, sine)
         sine.append(s)
         cosine.append(c)
     return Jet(sine), Jet(cosine)
@@ -187,38 +96,53 @@ def cosh(x: Any) -> Any:
     return _hyperbolic(x)[1] if isinstance(x, Jet) else jnp.cosh(x)
 
 
+def _one_minus_square(x: Any) -> Any:
+    """Return 1 - x^2, its value as (1 - x)(1 + x), which keeps the digits of arcsine and arccosine near their ends."""
+    if not isinstance(x, Jet):
+        return (1.0 - x) * (1.0 + x)
+    return Jet((_one_minus_square(x.coefficients[0]), *(-square(x)).coefficients[1:]))
+
+
+BY_SLOPE: dict[str, tuple[Callable[[Any], Any], Callable[[Any], Any]]] = {
+    "asin": (jnp.arcsin, lambda x: 1.0 / sqrt(_one_minus_square(x))),
+    "acos": (jnp.arccos, lambda x: -1.0 / sqrt(_one_minus_square(x))),
+    "atan": (jnp.arctan, lambda x: 1.0 / (1.0 + square(x))),
+    "asinh": (jnp.arcsinh, lambda x: 1.0 / sqrt(1.0 + square(x))),
+    "acosh": (jnp.arccosh, lambda x: 1.0 / sqrt((x - 1.0) * (x + 1.0))),
+    "atanh": (jnp.arctanh, lambda x: 1.0 / _one_minus_square(x)),
+    "log1p": (jnp.log1p, lambda x: 1.0 / (1.0 + x)),
+    "erf": (jax.lax.erf, lambda x: 2.0 / math.sqrt(math.pi) * exp(-square(x))),
+}
+"""Functions whose slope is an algebraic or elementary function of the argument: both, the slope of jets and arrays."""
+
+
+def _by_slope(name: str, x: Any) -> Any:
+    """Return a function of an array, or of a jet by integrating its slope."""
+    function, slope = BY_SLOPE[name]
+    if not isinstance(x, Jet):
+        return function(x)
+    return _from_slope(x, function(x.coefficients[0]), slope)
+
+
 def _from_slope(x: Jet, value: Any, slope: Callable[[Jet], Jet]) -> Jet:
-    """Return the jet of a function by integrating its slope, which is an algebraic function of `x`."""
     if x.order == 0:
         return Jet([value])
     return (slope(x.truncate(x.order - 1)) * x.differentiate()).integrate(value)
 
 
-def _one_minus_square(x: Jet) -> Jet:
-    """Return 1 - x^2, its value as (1 - x)(1 + x), which keeps the digits of arcsine and arccosine near their ends."""
-    first = x.coefficients[0]
-    return Jet(((1.0 - first) * (1.0 + first), *(-x.square()).coefficients[1:]))
-
-
 def asin(x: Any) -> Any:
     """Return the arcsine, in radians."""
-    if not isinstance(x, Jet):
-        return jnp.arcsin(x)
-    return _from_slope(x, jnp.arcsin(x.coefficients[0]), lambda u: 1.0 / sqrt(_one_minus_square(u)))
+    return _by_slope("asin", x)
 
 
 def acos(x: Any) -> Any:
     """Return the arccosine, in radians."""
-    if not isinstance(x, Jet):
-        return jnp.arccos(x)
-    return _from_slope(x, jnp.arccos(x.coefficients[0]), lambda u: -1.0 / sqrt(_one_minus_square(u)))
+    return _by_slope("acos", x)
 
 
 def atan(x: Any) -> Any:
     """Return the arctangent, in radians."""
-    if not isinstance(x, Jet):
-        return jnp.arctan(x)
-    return _from_slope(x, jnp.arctan(x.coefficients[0]), lambda u: 1.0 / (1.0 + u.square()))
+    return _by_slope("atan", x)
 
 
 def atan2(y: Any, x: Any) -> Any:
@@ -245,9 +169,7 @@ def atan2(y: Any, x: Any) -> Any:
 
 def log1p(x: Any) -> Any:
     """Return ``log(1 + x)``, exact also where x is tiny."""
-    if not isinstance(x, Jet):
-        return jnp.log1p(x)
-    return _from_slope(x, jnp.log1p(x.coefficients[0]), lambda u: 1.0 / (1.0 + u))
+    return _by_slope("log1p", x)
 
 
 def expm1(x: Any) -> Any:
@@ -261,35 +183,27 @@ def cbrt(x: Any) -> Any:
     """Return the real cube root."""
     if not isinstance(x, Jet):
         return jnp.cbrt(x)
-    return _real_power(absolute(x), jnp.asarray(1 / 3)) * jnp.where(x.coefficients[0] < 0, -1.0, 1.0)
+    return real_power(absolute(x), jnp.asarray(1 / 3)) * jnp.where(x.coefficients[0] < 0, -1.0, 1.0)
 
 
 def asinh(x: Any) -> Any:
     """Return the inverse hyperbolic sine."""
-    if not isinstance(x, Jet):
-        return jnp.arcsinh(x)
-    return _from_slope(x, jnp.arcsinh(x.coefficients[0]), lambda u: 1.0 / sqrt(1.0 + u.square()))
+    return _by_slope("asinh", x)
 
 
 def acosh(x: Any) -> Any:
     """Return the inverse hyperbolic cosine."""
-    if not isinstance(x, Jet):
-        return jnp.arccosh(x)
-    return _from_slope(x, jnp.arccosh(x.coefficients[0]), lambda u: 1.0 / sqrt((u - 1.0) * (u + 1.0)))
+    return _by_slope("acosh", x)
 
 
 def atanh(x: Any) -> Any:
     """Return the inverse hyperbolic tangent."""
-    if not isinstance(x, Jet):
-        return jnp.arctanh(x)
-    return _from_slope(x, jnp.arctanh(x.coefficients[0]), lambda u: 1.0 / _one_minus_square(u))
+    return _by_slope("atanh", x)
 
 
 def erf(x: Any) -> Any:
     """Return the error function."""
-    if not isinstance(x, Jet):
-        return jax.lax.erf(x)
-    return _from_slope(x, jax.lax.erf(x.coefficients[0]), lambda u: 2 / math.sqrt(math.pi) * exp(-u.square()))
+    return _by_slope("erf", x)
 
 
 def absolute(x: Any) -> Any:
@@ -304,3 +218,13 @@ def wrap(x: Any, period: Any) -> Any:
     """Shift by whole periods into ``[-period/2, period/2]``: what is left of an angle or a screw's advance."""
     value = x.coefficients[0] if isinstance(x, Jet) else x
     return x - period * jnp.round(value / period)
+
+
+FUNCTIONS: dict[str, Callable[..., Any]] = {
+    function.__name__: function
+    for function in (
+        acos, acosh, asin, asinh, atan, atan2, atanh, cbrt, cos, cosh, erf, exp, expm1, log, log1p, sin, sinh, sqrt,
+        square, tan, tanh,
+    )
+} | {"abs": absolute, "pow": power}  # fmt: skip
+"""By the names that JAX gives its operations."""

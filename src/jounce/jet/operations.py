@@ -6,23 +6,13 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
+from jounce.jet.algebra import square, whole_power
+from jounce.jet.elementary import BY_SLOPE
+
 
 def times(a: Any, b: Any) -> Any:
     """Multiply coefficients; None is zero."""
     return None if a is None or b is None else a * b
-
-
-def _whole_power(x: Any, *, y: int) -> Any:
-    if y < 0:
-        return 1.0 / _whole_power(x, y=-y)
-    result, square = None, x
-    while y:
-        if y & 1:
-            result = square if result is None else result * square
-        y >>= 1
-        if y:
-            square = square * square
-    return jnp.ones_like(x) if result is None else result
 
 
 def _select_larger(a: Any, b: Any) -> Any:
@@ -54,33 +44,31 @@ PAIRS = {
     "sinh": ("sinh", "cosh", 1.0),
     "cosh": ("sinh", "cosh", 1.0),
 }
+
+
+def _of_argument(slope: Callable[[Any], Any]) -> Callable[[Any, Any], Any]:
+    return lambda x, _y: slope(x)
+
+
 _ROOT_OF_PI = 1.7724538509055160273
 # a function and its partial derivatives, which may use its value, the last argument
 SLOPES: dict[str, tuple[Callable[..., Any], tuple[Callable[..., Any], ...]]] = {
     "exp": (jnp.exp, (lambda _x, y: y,)),
     "expm1": (jnp.expm1, (lambda _x, y: y + 1.0,)),
     "log": (jnp.log, (lambda x, _y: 1.0 / x,)),
-    "log1p": (jnp.log1p, (lambda x, _y: 1.0 / (1.0 + x),)),
     "sqrt": (_square_root, (lambda _x, y: 0.5 / y,)),
     "cbrt": (jnp.cbrt, (lambda x, y: y / (3.0 * x),)),
     "pow": (jnp.power, (lambda x, p, y: p * y / x, lambda x, _p, y: y * jnp.log(x))),
     "tan": (jnp.tan, (lambda _x, y: 1.0 + y * y,)),
     "tanh": (jnp.tanh, (lambda _x, y: 1.0 - y * y,)),
-    "atan": (jnp.arctan, (lambda x, _y: 1.0 / (1.0 + x * x),)),
-    "asin": (jnp.arcsin, (lambda x, _y: 1.0 / jnp.sqrt((1.0 - x) * (1.0 + x)),)),
-    "acos": (jnp.arccos, (lambda x, _y: -1.0 / jnp.sqrt((1.0 - x) * (1.0 + x)),)),
-    "asinh": (jnp.arcsinh, (lambda x, _y: 1.0 / jnp.sqrt(1.0 + x * x),)),
-    "acosh": (jnp.arccosh, (lambda x, _y: 1.0 / jnp.sqrt((x - 1.0) * (x + 1.0)),)),
-    "atanh": (jnp.arctanh, (lambda x, _y: 1.0 / ((1.0 - x) * (1.0 + x)),)),
     "atan2": (jnp.arctan2, (lambda y, x, _z: x / (x * x + y * y), lambda y, x, _z: -y / (x * x + y * y))),
-    "erf": (jax.lax.erf, (lambda x, _y: 2.0 / _ROOT_OF_PI * jnp.exp(-x * x),)),
     "erfc": (jax.lax.erfc, (lambda x, _y: -2.0 / _ROOT_OF_PI * jnp.exp(-x * x),)),
     "logistic": (jax.lax.logistic, (lambda _x, y: y * (1.0 - y),)),
-}
+} | {name: (function, (_of_argument(slope),)) for name, (function, slope) in BY_SLOPE.items()}
 COMPOSED: dict[str, Callable[..., Any]] = {
     "dot_general": _contracted,
-    "square": lambda x: x * x,
-    "integer_pow": _whole_power,
+    "square": square,
+    "integer_pow": lambda x, *, y: whole_power(x, y),
     "rsqrt": lambda x, **_: 1.0 / jnp.sqrt(x),
     "exp2": lambda x, **_: jnp.exp(x * 0.69314718055994530942),
     "abs": lambda x: jnp.where(x < 0, -x, x),

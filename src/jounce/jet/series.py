@@ -21,7 +21,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax.extend.core import Literal
 
-from jounce.jet.algebra import minus, plus, total
+from jounce.jet.coefficients import minus, plus, total
 from jounce.jet.operations import ADDITIVE, BROADCASTING, COMPOSED, LINEAR, PAIRS, PLAIN, SLOPES, STEPWISE, times
 
 _BLOCK = 8  # terms of a sum taken at once

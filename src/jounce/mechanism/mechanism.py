@@ -6,6 +6,7 @@ from functools import cached_property
 from typing import Any
 
 from jounce.constraints import AbstractConstraint
+from jounce.display import Displayed
 from jounce.errors import ExpressionError, JounceError, MechanismError, did_you_mean
 from jounce.forces import AbstractForce
 from jounce.mechanism.outputs import AbstractQuantity
@@ -18,7 +19,15 @@ from jounce.trajectory.units import parse_value
 GROUND = "ground"
 RESERVED = ("t", "pi", "deg")
 CLASSES = {"outputs": AbstractQuantity, "forces": AbstractForce}  # constraints otherwise
-RESERVED_OUTPUTS = ("time", "derivative", "component")  # the axes of a result
+RESERVED_OUTPUTS = (  # the axes of a result
+    "time",
+    "derivative",
+    "component",
+    "euler_parameter",
+    "euler_angle",
+    "row_axis",
+    "column_axis",
+)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -76,7 +85,7 @@ class Body:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Mechanism:
+class Mechanism(Displayed):
     """Bodies, the joints and drivers between them, and what is to be known of their motion.
 
     Parameters

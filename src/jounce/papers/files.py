@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from jounce.errors import OutputError
-from jounce.io.files import replacing
+from jounce.io.files.writing import replacing
 
 FORMATS = ("png", "svg")
 

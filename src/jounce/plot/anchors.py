@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from jounce.mechanism.mechanism import GROUND
+from jounce.plot.canvas import SYMBOLS, Canvas
 from jounce.plot.geometry import Symbol
 from jounce.plot.glyphs import PAPER, support
-from jounce.plot.scene import SYMBOLS, Canvas
 
 __all__ = ["axis_of", "ball", "global_place", "middle_of", "pin", "place_of", "slot_of", "stand"]
 

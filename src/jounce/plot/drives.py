@@ -6,9 +6,9 @@ import numpy as np
 
 from jounce.mechanism.mechanism import GROUND
 from jounce.plot.anchors import axis_of, ball, pin, place_of, stand
+from jounce.plot.canvas import INK, MARKS, SYMBOLS, Canvas
 from jounce.plot.geometry import Symbol
 from jounce.plot.glyphs import PAPER, actuator, normal_of, spring, turn, unit_vector
-from jounce.plot.scene import INK, MARKS, SYMBOLS, Canvas
 
 __all__ = ["DRIVES"]
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from jounce.mechanism.mechanism import GROUND
-from jounce.plot.scene import GUIDES, INK, MARKS, SYMBOLS, Canvas
+from jounce.plot.canvas import GUIDES, INK, MARKS, SYMBOLS, Canvas
 
 __all__ = ["actuator", "box", "cylinder", "hatching", "rail", "spring", "support", "turn", "unit_vector"]
 

@@ -7,7 +7,7 @@ import re
 
 import numpy as np
 
-from jounce.io.peaks import derivative_unit
+from jounce.reporting.peaks import derivative_unit
 
 __all__ = ["scale_of", "symbol", "unit_label"]
 

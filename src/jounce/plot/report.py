@@ -8,21 +8,22 @@ import math
 import re
 from importlib.resources import files
 from os import PathLike
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from jounce.io.files import check_target, replacing
-from jounce.io.peaks import COMPONENTS, derivative_name, derivative_unit, peaks, rate_name
-from jounce.io.summaries import simulation_summary, summary
+from jounce.io.files.writing import check_target, replacing
 from jounce.kinematics import Status
 from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.resolve import resolve
 from jounce.plot.animation import LONGEST, SHORTEST
-from jounce.plot.scene import AZIMUTH, ELEVATION, scene_of
+from jounce.plot.canvas import AZIMUTH, ELEVATION
+from jounce.plot.scene import scene_of
 from jounce.plot.sketch import length_text, paths_of, round_length
 from jounce.plot.style import BODY_COLOURS
+from jounce.reporting.motion_facts import motion_facts
+from jounce.reporting.peaks import derivative_name, derivative_unit, peaks, rate_name
+from jounce.reporting.summaries import motion_summary
 
 __all__ = ["check_report", "report"]
 
@@ -30,7 +31,6 @@ MOST_INSTANTS = 2001  # of the plots
 MOST_FRAMES = 240  # of the sketch, which goes on evenly between them
 STEPS = 20000  # of places across the sketch
 DIGITS = 9  # of plotted values; peaks are taken of all instants in full
-ROUNDING = 1e-15  # of the other components; what is smaller is 0
 KINDS = {"joints": "joint", "drivers": "driver", "forces": "force", "initial": "at the start"}
 SPEEDS = (0.001, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 100.0)
 
@@ -115,8 +115,7 @@ def _data(motion: Any, view: tuple[float, float], source: str) -> dict[str, Any]
     start, stop = float(time[0]), float(time[-1])
     speed = _speed(stop - start)
     outputs = [_output(name, mechanism.outputs[name], values[shown]) for name, values in motion.outputs.items()]
-    words = summary if not hasattr(motion, "track") else simulation_summary
-    lines = words(motion, Path(source or "mechanism")).splitlines()
+    lines = motion_summary(motion_facts(motion), source or "mechanism").splitlines()
     return {
         "title": mechanism.title or source or "Motion of a mechanism",
         "summary": "\n".join(lines[1:]),
@@ -165,7 +164,7 @@ def _output(name: str, output: Any, values: np.ndarray) -> dict[str, Any]:
         "name": name,
         "words": ["angle" if word == "position" and output.unit == "rad" else word for word in words],
         "units": [derivative_unit(output.unit, k) for k in orders],
-        "components": list(COMPONENTS[:components]) if components > 1 else [""],
+        "components": list(output.labels[:components]) if components > 1 else [""],
         "values": [[[_number(v) for v in columns[:, k, c]] for c in range(components)] for k in orders],
     }
 
@@ -173,9 +172,7 @@ def _output(name: str, output: Any, values: np.ndarray) -> dict[str, Any]:
 def _peak(peak: Any) -> dict[str, Any]:
     found = {name: getattr(peak, name) for name in ("output", "derivative", "unit")}
     times = {name: _number(getattr(peak, name)) for name in ("minimum_at", "maximum_at")}
-    extremes = {name: getattr(peak, name) for name in ("minimum", "maximum")}
-    small = ROUNDING * peak.size
-    shown = {name: _number(0.0 if abs(value) < small else value) for name, value in extremes.items()}
+    shown = dict(zip(("minimum", "maximum"), map(_number, peak.shown), strict=True))
     return found | times | shown | {"largest": list(peak.largest)}
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from jounce.mechanism.mechanism import GROUND
 from jounce.plot.anchors import axis_of, ball, global_place, middle_of, pin, place_of, slot_of, stand
+from jounce.plot.canvas import BARS, GUIDES, INK, MARKS, SYMBOLS, WHEELS, Canvas, tinted
 from jounce.plot.drives import DRIVES
 from jounce.plot.geometry import Symbol
 from jounce.plot.glyphs import (
@@ -21,7 +22,6 @@ from jounce.plot.glyphs import (
     rail,
     unit_vector,
 )
-from jounce.plot.scene import BARS, GUIDES, INK, MARKS, SYMBOLS, WHEELS, Canvas, tinted
 
 __all__ = ["draw_symbols"]
 

@@ -13,7 +13,7 @@ from jax.core import Tracer
 from jounce.errors import RobotError
 from jounce.kinematics.compilation import compiler_options
 from jounce.mechanism.doors import check_process
-from jounce.robot.robot import Robot
+from jounce.robot.abstract_robot import AbstractRobot
 
 CHUNK = 128  # samples that are computed side by side
 WIDTHS = (8, CHUNK, 16 * CHUNK)  # sizes of blocks: each compiles once for a kind of robot
@@ -51,7 +51,7 @@ def floats(name: str, values: Any) -> Any:
     raise RobotError("must be an array of real numbers", name=name, value=type(values).__name__)
 
 
-def checked(robot: Robot, q: Any, least: int) -> Any:
+def checked(robot: AbstractRobot, q: Any, least: int) -> Any:
     """Return q as an array of shape (..., order + 1, n) with at least so many derivatives.
 
     Raises
@@ -95,7 +95,9 @@ class Batched:
         """The function compiled on its own within transformations of JAX, which take no options of the compiler."""
         return jax.jit(self._block, static_argnums=3)
 
-    def __call__(self, robot: Robot, arrays: tuple[Any, ...], constants: Any = (), static: tuple[Any, ...] = ()) -> Any:
+    def __call__(
+        self, robot: AbstractRobot, arrays: tuple[Any, ...], constants: Any = (), static: tuple[Any, ...] = ()
+    ) -> Any:
         """Return results for arrays of derivatives, the first one of shape (batch..., order + 1, n)."""
         check_process()
         lead = arrays[0].shape[:-2]

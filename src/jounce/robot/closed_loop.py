@@ -11,15 +11,15 @@ from jounce.jet import Jet
 from jounce.mechanism import Body, Mechanism, time_grid
 from jounce.mechanism.resolve import resolve_motion
 from jounce.rigid.inertia import finite_numbers
-from jounce.robot.closures import Loops
+from jounce.robot.abstract_robot import AbstractRobot
+from jounce.robot.closures import Loops, given_coordinates, size_of
 from jounce.robot.parts import Parts, on_body
-from jounce.robot.robot import Robot
 
 DRIVE, START = "_drive", "_start"
 
 
 def mechanism(
-    robot: Robot,
+    robot: AbstractRobot,
     q: Any = None,
     *,
     drivers: Any = None,
@@ -121,18 +121,13 @@ def mechanism(
     )
 
 
-def _known(robot: Robot, name: Any) -> str:
+def _known(robot: AbstractRobot, name: Any) -> str:
     return did_you_mean(name, robot.joint_names)
 
 
-def given_coordinates(robot: Robot, q: Any) -> np.ndarray:
-    """Return coordinates from an array, or from values by name of the joint; zero where none are given."""
-    if q is None or isinstance(q, Mapping):
-        return robot.coordinates(**(q or {}))
-    return np.array(finite_numbers("q", q, (len(robot.joint_names),)))
-
-
-def _start(robot: Robot, q: Any, laws: Mapping[str, Any], parameters: Mapping[str, Any], time: Any) -> np.ndarray:
+def _start(
+    robot: AbstractRobot, q: Any, laws: Mapping[str, Any], parameters: Mapping[str, Any], time: Any
+) -> np.ndarray:
     """Return the coordinates to start from: those given, and what the laws say of the driven joints."""
     start = given_coordinates(robot, q)
     if laws:
@@ -152,14 +147,7 @@ def _start(robot: Robot, q: Any, laws: Mapping[str, Any], parameters: Mapping[st
     return start
 
 
-def size_of(robot: Robot) -> float:
-    """Return a length of the robot, m: the largest distance from a joint to the next, or from a joint to a closure."""
-    lengths = [float(np.linalg.norm(joint.position)) for joint in robot.joints.values()]
-    lengths += [float(np.linalg.norm(p)) for closure in robot.closures.values() for p in closure.points]
-    return max(lengths, default=0.0) or 1.0
-
-
-def body_point(robot: Robot, link: str, point: Any = (0.0, 0.0, 0.0)) -> tuple[str, np.ndarray]:
+def body_point(robot: AbstractRobot, link: str, point: Any = (0.0, 0.0, 0.0)) -> tuple[str, np.ndarray]:
     """Return the body of a mechanism that a link is part of, and where a point of the link is in the frame of the body.
 
     Parameters

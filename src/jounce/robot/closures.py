@@ -18,10 +18,11 @@ from jounce.constraints.base import Wrenches
 from jounce.errors import MechanismError, RobotError
 from jounce.jet import Jet, cross, dot, stack
 from jounce.jet.algebra import total
+from jounce.rigid.inertia import finite_numbers
+from jounce.robot.abstract_robot import AbstractRobot
 from jounce.robot.batches import Batched
 from jounce.robot.kinematics import body_frames
 from jounce.robot.model import Closure
-from jounce.robot.robot import Robot
 from jounce.robot.scan import stacked
 from jounce.robot.tree import Tree, axes_with_z_along
 
@@ -119,7 +120,7 @@ class Loops:
         Length by which offsets and slides are scaled, m.
     """
 
-    def __init__(self, robot: Robot, size: float):
+    def __init__(self, robot: AbstractRobot, size: float):
         self.tree, self.size = robot.opened(), size
         self.names = tuple(robot.closures)
         turning = [robot.joints[name].turning for name in robot.joint_names]
@@ -249,7 +250,21 @@ def _null_space(matrix: np.ndarray) -> np.ndarray:
     return right[int(np.sum(sizes > RANK_TOLERANCE)) :].T
 
 
-def closure_wrenches(robot: Robot, q: Any = None) -> Mapping[str, tuple[np.ndarray, np.ndarray]]:
+def given_coordinates(robot: AbstractRobot, q: Any) -> np.ndarray:
+    """Return coordinates from an array, or from values by name of the joint; zero where none are given."""
+    if q is None or isinstance(q, Mapping):
+        return robot.coordinates(**(q or {}))
+    return np.array(finite_numbers("q", q, (len(robot.joint_names),)))
+
+
+def size_of(robot: AbstractRobot) -> float:
+    """Return a length of the robot, m: the largest distance from a joint to the next, or from a joint to a closure."""
+    lengths = [float(np.linalg.norm(joint.position)) for joint in robot.joints.values()]
+    lengths += [float(np.linalg.norm(p)) for closure in robot.closures.values() for p in closure.points]
+    return max(lengths, default=0.0) or 1.0
+
+
+def closure_wrenches(robot: AbstractRobot, q: Any = None) -> Mapping[str, tuple[np.ndarray, np.ndarray]]:
     """Return what each closure of a robot bears, and what of it is redundant, as the joints of the tree bear it too.
 
     A mechanism of the robot has one equation for each wrench of the first kind. Those of the second kind hold by
@@ -286,8 +301,6 @@ def closure_wrenches(robot: Robot, q: Any = None) -> Mapping[str, tuple[np.ndarr
     >>> abs(redundant).tolist()  # forces along the axes of the hinges
     [[0.0, 0.0, 1.0, 0.0, 0.0, 0.0]]
     """
-    from jounce.robot.closed_loop import given_coordinates, size_of
-
     if not robot.closures:
         return {}
     loops = Loops(robot, size_of(robot))

@@ -1,4 +1,4 @@
-"""Robots from tables: Denavit-Hartenberg parameters, screw axes, and the joints of a floating base."""
+"""Robots from tables: Denavit-Hartenberg parameters and screw axes."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -8,6 +8,7 @@ import numpy as np
 
 from jounce.errors import RobotError, did_you_mean
 from jounce.rigid.inertia import Inertia, finite_numbers
+from jounce.robot.floating_base import floating_joints as floating_joints
 from jounce.robot.model import UNLIMITED, Joint, Limits, Link
 from jounce.robot.robot import Robot
 from jounce.robot.tree import turn_about
@@ -178,40 +179,3 @@ def from_screws(screws: Sequence[Screw], tool: Any = None, name: str = "robot") 
         joints.append(Joint("tool", parent, "tool", "fixed", pose[:3, 3], pose[:3, :3]))
         links.append(Link("tool"))
     return Robot(name, links, joints)
-
-
-def floating_joints(
-    base: str, sequence: str = "ZYX", prefix: str = "base", world: str = "world"
-) -> tuple[list[Link], list[Joint]]:
-    """Return the links and joints that let a link move freely: slides along x, y, z, then turns about moving axes.
-
-    Parameters
-    ----------
-    base : str
-        The link that is set free.
-    sequence : str, default "ZYX"
-        Axes of the three turns.
-    prefix : str, default "base"
-        What the names begin with.
-    world : str, default "world"
-        Name of the new base.
-
-    Raises
-    ------
-    RobotError
-        If the sequence is not made of three letters X, Y, Z of which neighbours differ.
-    """
-    letters = sequence.upper()
-    if len(letters) != 3 or set(letters) - set("XYZ") or letters[0] == letters[1] or letters[1] == letters[2]:
-        message = "must be three letters X, Y, Z of which neighbours differ"
-        raise RobotError(message, name="sequence", value=sequence)
-    axes = dict(zip("XYZ", (X, Y, Z), strict=True))
-    kinds = [("prismatic", axes[letter], letter.lower()) for letter in "XYZ"]
-    kinds += [("continuous", axes[letter], f"angle_{k}") for k, letter in enumerate(letters, 1)]
-    links, joints = [Link(world)], []
-    for k, (kind, axis, suffix) in enumerate(kinds):
-        child = base if k == 5 else f"{prefix}_frame_{k + 1}"
-        joints.append(Joint(f"{prefix}_{suffix}", links[-1].name, child, kind, axis=axis))
-        if k < 5:
-            links.append(Link(child))
-    return links, joints

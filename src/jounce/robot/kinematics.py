@@ -12,8 +12,8 @@ from jounce.jet import Jet, sine_cosine
 from jounce.jet.algebra import total
 from jounce.rigid.frames import Frames
 from jounce.rigid.inertia import finite_numbers
+from jounce.robot.abstract_robot import AbstractRobot
 from jounce.robot.batches import Batched, checked
-from jounce.robot.robot import Robot
 from jounce.robot.scan import entries, joint_coordinates, once, places, read, stacked, write
 from jounce.robot.tree import Tree
 
@@ -72,7 +72,7 @@ def link_frame(tree: Tree, q: Any, constants: Any) -> Frames:
     return Frames(frame.point(position), axes, frame.angular_velocity)
 
 
-def frame_constants(robot: Robot, link: str, point: Any) -> tuple[Any, Any, Any]:
+def frame_constants(robot: AbstractRobot, link: str, point: Any) -> tuple[Any, Any, Any]:
     """Return the index of the body of a link, and the pose there of its frame at a point.
 
     Raises
@@ -117,7 +117,7 @@ def _frame_motion(tree: Tree, arrays: Any, constants: Any) -> Any:
     return stacked(frame.position), stacked(frame.attitude), spin
 
 
-def forward_kinematics(robot: Robot, q: Any, link: str, point: Any = (0.0, 0.0, 0.0)) -> FrameMotion:
+def forward_kinematics(robot: AbstractRobot, q: Any, link: str, point: Any = (0.0, 0.0, 0.0)) -> FrameMotion:
     """Return the motion of the frame of a link, or of the same frame moved to a point, to any order.
 
     Parameters
@@ -164,7 +164,7 @@ def _center_of_mass(tree: Tree, arrays: Any, constants: Any) -> Any:
     return stacked(centers.map(lambda c: jnp.einsum("cbs,b->cs", c, share)))
 
 
-def center_of_mass(robot: Robot, q: Any) -> Any:
+def center_of_mass(robot: AbstractRobot, q: Any) -> Any:
     """Return the centre of mass of the whole robot and its derivatives: Negrean 2025, equations 44-48 and 55.
 
     Parameters

@@ -13,17 +13,17 @@ from jounce.forces.springs import SlideSpring, SpatialTorsionalSpring
 from jounce.mechanism import Body, RelativeAngleOutput
 from jounce.mechanism.mechanism import GROUND
 from jounce.rigid.inertia import Inertia
+from jounce.robot.abstract_robot import AbstractRobot
 from jounce.robot.closures import LinkClosure
 from jounce.robot.coupling import Placed, SlideOutput, coupled
 from jounce.robot.kinematics import forward_kinematics
 from jounce.robot.model import Closure
-from jounce.robot.robot import Robot
 from jounce.robot.tree import axes_with_z_along
 
 DAMPING = "_damping"
 
 
-def on_body(robot: Robot, link: str) -> tuple[str, np.ndarray, np.ndarray]:
+def on_body(robot: AbstractRobot, link: str) -> tuple[str, np.ndarray, np.ndarray]:
     """Return the body that a link is part of, and the pose of the link in its frame."""
     index, position, rotation = robot.frames[link]
     if index < 0:
@@ -48,7 +48,7 @@ class Parts:
         What may name links that are otherwise merged.
     """
 
-    def __init__(self, robot: Robot, kept: set[str], forces: Any, outputs: Any):
+    def __init__(self, robot: AbstractRobot, kept: set[str], forces: Any, outputs: Any):
         self.robot, self.tree = robot, robot.opened().tree
         self.moving = [joint for joint in robot.joints.values() if joint.moving]
         if GROUND in robot.moving_links:

@@ -1,8 +1,8 @@
 """The robot as the algorithms see it: moving bodies in depth-first order, as arrays that are scanned."""
 
 import dataclasses
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
@@ -10,9 +10,6 @@ import numpy as np
 from jounce.errors import RobotError, did_you_mean
 from jounce.rigid.inertia import Inertia
 from jounce.robot.model import Joint, Link
-
-if TYPE_CHECKING:
-    from jounce.robot.robot import Robot
 
 
 @dataclasses.dataclass(frozen=True)
@@ -131,12 +128,17 @@ def ordered(links: Mapping[str, Link], joints: Mapping[str, Joint]) -> list[Join
     return found
 
 
-def arrange(robot: "Robot") -> tuple[Tree, dict[str, Frame]]:
-    """Merge fixed links, turn the axes of all joints to z, and lay the bodies out for the scans."""
+def arrange(
+    base: str, links: Mapping[str, Link], joints: Sequence[Joint], gravity: np.ndarray
+) -> tuple[Tree, dict[str, Frame]]:
+    """Merge fixed links, turn the axes of all joints to z, and lay the bodies out for the scans.
+
+    Joints are in order, those of parents first.
+    """
     identity, zero = np.eye(3), np.zeros(3)
-    frames = {robot.base: Frame(-1, zero, identity)}
+    frames = {base: Frame(-1, zero, identity)}
     parents, places, masses, moving = [], [], [], []
-    for joint in robot.joints.values():
+    for joint in joints:
         body, position, rotation = frames[joint.parent]
         position, rotation = position + rotation @ joint.position, rotation @ joint.rotation
         if joint.moving:
@@ -147,12 +149,12 @@ def arrange(robot: "Robot") -> tuple[Tree, dict[str, Frame]]:
             masses.append([])
             body, position, rotation = len(moving) - 1, zero, aligned.T
         frames[joint.child] = Frame(body, position, rotation)
-        inertia = robot.links[joint.child].inertia
+        inertia = links[joint.child].inertia
         if inertia is not None and body >= 0:
             masses[body].append(inertia.moved(position, rotation))
     whole = [Inertia.total(parts) if parts else None for parts in masses]
     slots, parent_slots, count = _slots(parents)
-    bodies, order = len(moving), list(robot.joint_names)
+    bodies, order = len(moving), [joint.name for joint in moving if joint.mimic is None]
     follows = [joint.name if joint.mimic is None else joint.mimic.joint for joint in moving]
     coordinate = np.array([order.index(name) for name in follows], int)
     multiplier = np.array([1.0 if joint.mimic is None else joint.mimic.multiplier for joint in moving], float)
@@ -173,7 +175,7 @@ def arrange(robot: "Robot") -> tuple[Tree, dict[str, Frame]]:
         armature=_at_coordinates([joint.armature for joint in moving], multiplier**2, coordinate, len(order)),
         damping=_at_coordinates([joint.damping for joint in moving], multiplier**2, coordinate, len(order)),
         friction=_at_coordinates([joint.friction for joint in moving], np.abs(multiplier), coordinate, len(order)),
-        gravity=robot.gravity,
+        gravity=gravity,
         shape=Shape(
             bodies=bodies,
             coordinates=len(order),

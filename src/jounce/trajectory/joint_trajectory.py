@@ -8,6 +8,7 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
+from jounce.display import Displayed
 from jounce.errors import JounceError, SampleWarning, TrajectoryError, did_you_mean
 from jounce.jet import Jet
 from jounce.trajectory.expression import Expression
@@ -21,7 +22,7 @@ from jounce.trajectory.trapezoid import LIMITS
 MAX_ORDER = 30
 
 
-class JointTrajectory:
+class JointTrajectory(Displayed):
     """Laws of named joints from a start to a stop, evaluated together with their derivatives of any order.
 
     Parameters

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from jounce.io.peaks import derivative_name, derivative_unit
+from jounce.reporting.peaks import derivative_unit
 from jounce.viewer.take import Exertion, Spot, Take
 
 __all__ = [
@@ -177,8 +177,3 @@ def scale_words(scale: float, order: int, size: float) -> str:
     """
     length = rounded(0.4 * size)
     return f"{length:g} m is {length / scale:.3g} {derivative_unit('m', order)}"
-
-
-def order_words(orders: Mapping[int, object] | Iterable[int]) -> dict[str, int]:
-    """Return the names of derivatives with their orders."""
-    return {derivative_name(order) + (" derivative" if order > 4 else ""): order for order in orders}

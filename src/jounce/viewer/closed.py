@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from jounce.errors import JounceError, RobotError
-from jounce.mechanism.mechanism import GROUND
 from jounce.robot.robot import Robot
 from jounce.viewer.mechanisms import take_of
 from jounce.viewer.robots import FRAMES, RobotSubject, swing_parameters, swinging
@@ -63,14 +62,7 @@ class ClosedRobotSubject(RobotSubject):
         laws = self.trajectory if self.trajectory is not None else swinging(robot, values, self.driven)
         times = laws.times if self.trajectory is not None else np.linspace(laws.start, laws.stop, FRAMES)
         motion = solve(robot.mechanism(drivers=laws, time=times), order=order, strict=False)
-        take = take_of(motion, self.looks, robot.name)
-        names = tuple(robot.base if name == GROUND else name for name in take.bodies)
-        return dataclasses.replace(
-            take,
-            bodies=names,
-            values=dict(values),
-            motion_of=lambda body, point: take.motion_of(GROUND if body == robot.base else body, point),
-        )
+        return dataclasses.replace(take_of(motion, self.looks, robot.name, robot.base), values=dict(values))
 
 
 def independent(robot: Robot) -> tuple[str, ...]:
@@ -82,8 +74,7 @@ def independent(robot: Robot) -> tuple[str, ...]:
         If there are none.
     """
     from jounce.kinematics import solve
-    from jounce.robot.closed_loop import size_of
-    from jounce.robot.closures import Loops
+    from jounce.robot.closures import Loops, size_of
 
     loops = Loops(robot, size_of(robot))
     start = loops.closed(np.zeros(len(robot.joint_names)), np.ones(len(robot.joint_names), bool))

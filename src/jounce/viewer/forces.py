@@ -8,7 +8,7 @@ import numpy as np
 
 from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.resolve import resolve_element
-from jounce.viewer.take import Exertion, rotated, spatial_vectors
+from jounce.viewer.take import Exertion, poses, rotated, spatial_vectors
 
 __all__ = ["applied"]
 
@@ -16,7 +16,6 @@ __all__ = ["applied"]
 def applied(motion: Any, good: np.ndarray) -> list[Exertion]:
     """Return what the applied forces of a motion do to their last body, at the instants that were solved."""
     from jounce.dynamics import applied_force
-    from jounce.viewer.mechanisms import poses
 
     mechanism = motion.mechanism
     position, quaternion = (array[good] for array in poses(motion))

@@ -6,7 +6,7 @@ from html import escape
 
 import numpy as np
 
-from jounce.io.peaks import derivative_name, derivative_unit
+from jounce.reporting.peaks import derivative_name, derivative_unit
 from jounce.viewer.arrows import KINDS, derivative_colour, rounded, scale_words
 from jounce.viewer.prepared import Prepared
 from jounce.viewer.take import Take

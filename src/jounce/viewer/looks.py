@@ -8,11 +8,15 @@ from typing import Any
 
 import numpy as np
 
+from jounce.mechanism import Mechanism, PointOutput
 from jounce.mechanism.mechanism import GROUND
-from jounce.viewer.solids import Solid
+from jounce.mechanism.resolve import resolve_element
+from jounce.viewer.planar import planar_solids
+from jounce.viewer.solids import DARK, GREY, Solid
+from jounce.viewer.spatial import spatial_solids
 from jounce.viewer.take import Spot, spatial_vectors
 
-__all__ = ["BODIES", "DARK", "GREY", "Looks", "Stretch", "looks_of"]
+__all__ = ["BODIES", "Looks", "Stretch", "looks_of"]
 
 # the light colours of Tol, told apart by the colour-blind; arrows have the strong ones
 BODIES = (
@@ -25,7 +29,6 @@ BODIES = (
     (153, 221, 255),
     (170, 170, 0),
 )
-DARK, GREY = (70, 74, 82), (150, 155, 163)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -110,8 +113,6 @@ def looks_of(motion: Any) -> Looks:
     (['crank', 'ground', 'rocker'], ['BC'])
     """
     from jounce.plot.geometry import skeleton
-    from jounce.viewer.planar import planar_solids
-    from jounce.viewer.spatial import spatial_solids
 
     mechanism = motion.mechanism
     seen = skeleton(mechanism)
@@ -166,8 +167,6 @@ def stretches(seen: Any) -> tuple[Stretch, ...]:
 
 def spots(mechanism: Any, seen: Any) -> tuple[Spot, ...]:
     """Return the points of outputs, then those where joints are, but for those of the ground."""
-    from jounce.viewer.mechanisms import output_spots
-
     found = output_spots(mechanism)
     known = {(spot.body, spot.point) for spot in found}
     for body, link in seen.links.items():
@@ -180,3 +179,14 @@ def spots(mechanism: Any, seen: Any) -> tuple[Spot, ...]:
                 found.append(Spot(body, place, f"{body}: {words}"))
                 known.add((body, place))
     return tuple(found)
+
+
+def output_spots(mechanism: Mechanism) -> list[Spot]:
+    """Return the points that are outputs, with their numbers."""
+    components = 2 if mechanism.space == "planar" else 3
+    found = []
+    for name, output in mechanism.outputs.items():
+        if isinstance(output, PointOutput):
+            point = resolve_element(output, mechanism.parameter_values, components, f"outputs.{name}")["point"]
+            found.append(Spot(output.bodies[0], tuple(float(x) for x in point), name))
+    return found

@@ -6,7 +6,7 @@ import dataclasses
 from typing import Any
 
 from jounce.errors import JounceError
-from jounce.io.peaks import derivative_name
+from jounce.reporting.peaks import derivative_name
 from jounce.viewer.arrows import Marked
 from jounce.viewer.page import Page
 from jounce.viewer.take import Spot, Take

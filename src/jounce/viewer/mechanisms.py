@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from jounce.errors import JounceError, SolveError
-from jounce.io.peaks import rate_name
 from jounce.mechanism import AngularVelocityOutput, Mechanism
 from jounce.mechanism.mechanism import GROUND
+from jounce.reporting.peaks import rate_name
 from jounce.trajectory import Expression
-from jounce.viewer.take import Exertion, Parameter, Quantity, Spot, Take, rotated, spatial_vectors
+from jounce.viewer.forces import applied
+from jounce.viewer.looks import looks_of
+from jounce.viewer.take import Exertion, Parameter, Quantity, Take, poses, rotated, spatial_vectors
 
 __all__ = ["MechanismSubject", "instants_shown", "parameter_range", "take_of"]
 
@@ -107,7 +110,41 @@ def instants_shown(mechanism: Mechanism) -> np.ndarray:
     return given
 
 
-def take_of(motion: Any, looks: Any = None, title: str = "") -> Take:
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
+class MotionTake(Take):
+    """The motion of a mechanism as the page shows it.
+
+    Parameters
+    ----------
+    moving : Motion
+    good : array of bool, shape (time,)
+        Instants that were solved.
+    ground : str
+        What the ground is called.
+    """
+
+    moving: Any
+    good: np.ndarray
+    ground: str
+
+    def quantities(self) -> dict[str, Quantity]:
+        """Return the outputs, or the angles of the bodies."""
+        return _quantities(self.moving, self.good)
+
+    def motion_of(self, body: str, point: Any) -> np.ndarray:
+        """Return position and derivatives of a point."""
+        return spatial_vectors(self.moving.point(GROUND if body == self.ground else body, point).values[self.good])
+
+    def exertions_of(self) -> list[Exertion]:
+        """Return what joints, drivers and applied forces do."""
+        return _exertions(self.moving, self.good)
+
+    def dataset(self) -> Any:
+        """Return the results of all instants."""
+        return self.moving.dataset
+
+
+def take_of(motion: Any, looks: Any = None, title: str = "", ground: str = GROUND) -> MotionTake:
     """Return a motion as the view shows it.
 
     Parameters
@@ -118,6 +155,8 @@ def take_of(motion: Any, looks: Any = None, title: str = "") -> Take:
         Shapes of the bodies; from joints unless given.
     title : str, optional
         That of the mechanism unless given.
+    ground : str, optional
+        What the ground is called.
 
     Raises
     ------
@@ -125,7 +164,6 @@ def take_of(motion: Any, looks: Any = None, title: str = "") -> Take:
         If no instant was solved.
     """
     from jounce.kinematics import Status, raise_for_status
-    from jounce.viewer.looks import looks_of
 
     mechanism, good = motion.mechanism, motion.status == Status.OK
     notice = ""
@@ -136,51 +174,21 @@ def take_of(motion: Any, looks: Any = None, title: str = "") -> Take:
             raise
         notice = str(error)
     position, quaternion = poses(motion)
-    return Take(
+    return MotionTake(
+        moving=motion,
+        good=good,
+        ground=ground,
         title=title or mechanism.title,
         planar=mechanism.space == "planar",
         time=motion.time[good],
         order=motion.order,
-        bodies=(GROUND, *mechanism.bodies),
+        bodies=(ground, *mechanism.bodies),
         position=position[good],
         quaternion=quaternion[good],
-        quantities=lambda: _quantities(motion, good),
-        motion_of=lambda body, point: spatial_vectors(motion.point(body, point).values[good]),
-        exertions_of=lambda: _exertions(motion, good),
-        dataset=lambda: motion.dataset,
         values={name: float(value) for name, value in mechanism.parameter_values.items()},
         looks=looks_of(motion) if looks is None else looks,
         notice=notice,
     )
-
-
-def poses(motion: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Return origins, (time, bodies, 3), and quaternions, (time, bodies, 4), of all bodies, the ground first."""
-    _, coordinates = motion.poses
-    position = spatial_vectors(np.moveaxis(np.asarray(coordinates["position"][0]), (2, 1, 0), (0, 1, 2)))
-    if "angle" in coordinates:
-        half = 0.5 * np.asarray(coordinates["angle"][0]).T
-        zero = np.zeros_like(half)
-        quaternion = np.stack([np.cos(half), zero, zero, np.sin(half)], axis=-1)
-    else:
-        quaternion = np.moveaxis(np.asarray(coordinates["quaternion"][0]), (2, 1, 0), (0, 1, 2))
-    bodies = max(position.shape[1], quaternion.shape[1])
-    shape = (len(motion.time), bodies)
-    return np.broadcast_to(position, (*shape, 3)), np.broadcast_to(quaternion, (*shape, 4))
-
-
-def output_spots(mechanism: Mechanism) -> list[Spot]:
-    """Return the points that are outputs, with their numbers."""
-    from jounce.mechanism import PointOutput
-    from jounce.mechanism.resolve import resolve_element
-
-    components = 2 if mechanism.space == "planar" else 3
-    found = []
-    for name, output in mechanism.outputs.items():
-        if isinstance(output, PointOutput):
-            point = resolve_element(output, mechanism.parameter_values, components, f"outputs.{name}")["point"]
-            found.append(Spot(output.bodies[0], tuple(float(x) for x in point), name))
-    return found
 
 
 def _quantities(motion: Any, good: np.ndarray) -> dict[str, Quantity]:
@@ -192,7 +200,7 @@ def _quantities(motion: Any, good: np.ndarray) -> dict[str, Quantity]:
         words = tuple(rate_name(output, k) for k in range(values.shape[1]))
         if output.unit == "rad" and words[:1] == ("position",):
             words = ("angle", *words[1:])
-        found[name] = Quantity(output.unit, values, words)
+        found[name] = Quantity(output.unit, values, words, output.labels)
     if found:
         return found
     for body in motion.mechanism.bodies:
@@ -215,8 +223,6 @@ def has_loads(mechanism: Mechanism) -> bool:
 
 def _exertions(motion: Any, good: np.ndarray) -> list[Exertion]:
     """Return what joints, drivers and applied forces do to the bodies."""
-    from jounce.viewer.forces import applied
-
     mechanism = motion.mechanism
     if not has_loads(mechanism):
         return []

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from jounce.errors import RobotFileError
-from jounce.io.reading import MAX_SAMPLES, named_file, read_file
+from jounce.io.files.reading import MAX_SAMPLES, named_file, read_file
 
 __all__ = ["Meshes"]
 

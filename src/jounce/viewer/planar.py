@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jounce.mechanism.mechanism import GROUND
-from jounce.viewer.solids import Solid, annulus, box, cylinder, gear, merged, plate, prism
+from jounce.viewer.solids import DARK, GREY, Solid, annulus, box, cylinder, gear, merged, plate, prism
 
 __all__ = ["planar_solids", "travel"]
 
@@ -76,8 +76,6 @@ def _wheels(seen: Any) -> dict[str, list[_Wheel]]:
 
 def _add_wheel(add: Any, body: str, wheel: _Wheel, low: float, high: float, colour: Any) -> None:
     """Draw a wheel with its teeth, and a mark that shows how it turns."""
-    from jounce.viewer.looks import DARK
-
     center, radius, module, ring = wheel
     x, y = (float(value) for value in center)
     if ring:
@@ -108,8 +106,6 @@ def _pedestal(point: np.ndarray, size: float, low: float) -> Any:
 
 
 def _add_symbol(add: Any, motion: Any, symbol: Any, layer: Any, size: float) -> None:
-    from jounce.viewer.looks import DARK
-
     thick = THICKNESS * size
     if symbol.kind in ("revolute", "double_revolute", "parallel2"):
         rod = symbol.kind == "double_revolute"
@@ -124,8 +120,6 @@ def _add_symbol(add: Any, motion: Any, symbol: Any, layer: Any, size: float) -> 
 
 def _add_slide(add: Any, motion: Any, symbol: Any, layer: Any, size: float, block: bool) -> None:
     """Draw a rail on the first body, as long as what slides travels, and a block on the second."""
-    from jounce.viewer.looks import DARK, GREY
-
     along = np.asarray(symbol.axes[0], float) / np.linalg.norm(symbol.axes[0])
     low, high = travel(motion, symbol)
     margin, first, second = 0.06 * size, *symbol.bodies[:2]

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from os import PathLike
-from pathlib import Path
+import dataclasses
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from jounce.errors import RobotError
-from jounce.io.peaks import derivative_name
+from jounce.reporting.peaks import derivative_name
 from jounce.robot.model import Joint
 from jounce.robot.robot import Robot
 from jounce.viewer.take import Exertion, Parameter, Quantity, Take, rotated
 
-__all__ = ["RobotSubject", "robot_subject"]
+__all__ = ["RobotSubject", "RobotTake"]
 
 FRAMES = 181
 SWING = 4.0  # s, of one swing, unless a limit of velocity is slower
@@ -23,37 +22,37 @@ REACH = {True: np.pi / 4, False: 0.1}  # of joints without limits, rad and m: ha
 TORQUES = ("torque", "yank", "second rate", "third rate", "fourth rate")
 
 
-def robot_subject(
-    robot: Robot, trajectory: Any = None, path: Path | None = None, allow: Iterable[str | PathLike[str]] = ()
-) -> Any:
-    """Return a robot as what is looked at; one with closures moves as the mechanism that it is.
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
+class RobotTake(Take):
+    """The motion of a tree of links as the page shows it.
 
     Parameters
     ----------
     robot : Robot
-    trajectory : JointTrajectory, path or None
-    path : Path, optional
-        The file of the robot, whose shapes are shown.
-    allow
-        Folders besides that of the file that meshes may be below.
-
-    Raises
-    ------
-    JounceError
-        If the trajectory cannot be read or does not fit the robot.
+    q : array of shape (time, order + 1, n)
+        Coordinates and their derivatives.
     """
-    from jounce.viewer.visuals import robot_looks
 
-    looks = robot_looks(robot, path, allow)
-    if isinstance(trajectory, str | PathLike):
-        from jounce.io import load_trajectory
+    robot: Robot
+    q: np.ndarray
 
-        trajectory = load_trajectory(trajectory)
-    if robot.closures:
-        from jounce.viewer.closed import ClosedRobotSubject
+    def quantities(self) -> dict[str, Quantity]:
+        """Return coordinates and torques of the joints."""
+        return _quantities(self.robot, self.q)
 
-        return ClosedRobotSubject(robot, looks, trajectory)
-    return RobotSubject(robot, looks, trajectory)
+    def motion_of(self, body: str, point: Any) -> np.ndarray:
+        """Return position and derivatives of a point."""
+        from jounce.robot import forward_kinematics
+
+        return np.asarray(forward_kinematics(self.robot, self.q, body, np.asarray(point, float)).position)
+
+    def exertions_of(self) -> list[Exertion]:
+        """Return what the joints carry, and what their drives exert."""
+        return _exertions(self.robot, self.q, self.position, self.quaternion)
+
+    def dataset(self) -> Any:
+        """Return coordinates and torques."""
+        return _dataset(self.robot, self.q, self.time)
 
 
 class RobotSubject:
@@ -114,7 +113,9 @@ class RobotSubject:
         )
         q = coordinates(robot, trajectory, time, order)
         position, quaternion = _poses(robot, q)
-        return Take(
+        return RobotTake(
+            robot=robot,
+            q=q,
             title=robot.name,
             planar=False,
             time=time,
@@ -122,10 +123,6 @@ class RobotSubject:
             bodies=(robot.base, *robot.moving_links),
             position=position,
             quaternion=quaternion,
-            quantities=lambda: _quantities(robot, q),
-            motion_of=lambda body, point: _point(robot, q, body, point),
-            exertions_of=lambda: _exertions(robot, q, position, quaternion),
-            dataset=lambda: _dataset(robot, q, time),
             values=dict(values),
             looks=self.looks,
         )
@@ -231,12 +228,6 @@ def _poses(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     frames = [forward_kinematics(robot, still, link) for link in (robot.base, *robot.moving_links)]
     position = np.stack([np.asarray(frame.position)[:, 0] for frame in frames], axis=1)
     return position, np.stack([quaternions(np.asarray(frame.rotation)[:, 0]) for frame in frames], axis=1)
-
-
-def _point(robot: Robot, q: np.ndarray, body: str, point: Any) -> np.ndarray:
-    from jounce.robot import forward_kinematics
-
-    return np.asarray(forward_kinematics(robot, q, body, np.asarray(point, float)).position)
 
 
 def _torques(robot: Robot, q: np.ndarray) -> np.ndarray | None:

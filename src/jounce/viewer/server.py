@@ -169,7 +169,6 @@ def subject_of(given: Any, trajectory: Any = None, allow: Iterable[str | PathLik
     from jounce.mechanism import Mechanism
     from jounce.robot import Robot
     from jounce.viewer.mechanisms import MechanismSubject
-    from jounce.viewer.robots import robot_subject
 
     path = None
     if isinstance(given, str | PathLike):
@@ -194,6 +193,39 @@ def subject_of(given: Any, trajectory: Any = None, allow: Iterable[str | PathLik
         return MechanismSubject(given)
     except JounceError as error:
         raise error.located(path=path) from None
+
+
+def robot_subject(
+    robot: Any, trajectory: Any = None, path: Path | None = None, allow: Iterable[str | PathLike[str]] = ()
+) -> Any:
+    """Return a robot as what is looked at; one with closures moves as the mechanism that it is.
+
+    Parameters
+    ----------
+    robot : Robot
+    trajectory : JointTrajectory, path or None
+    path : Path, optional
+        The file of the robot, whose shapes are shown.
+    allow
+        Folders besides that of the file that meshes may be below.
+
+    Raises
+    ------
+    JounceError
+        If the trajectory cannot be read or does not fit the robot.
+    """
+    from jounce.viewer.closed import ClosedRobotSubject
+    from jounce.viewer.robots import RobotSubject
+    from jounce.viewer.visuals import robot_looks
+
+    looks = robot_looks(robot, path, allow)
+    if isinstance(trajectory, str | PathLike):
+        from jounce.io import load_trajectory
+
+        trajectory = load_trajectory(trajectory)
+    if robot.closures:
+        return ClosedRobotSubject(robot, looks, trajectory)
+    return RobotSubject(robot, looks, trajectory)
 
 
 def _check_port(port: Any) -> None:

@@ -154,7 +154,7 @@ class Session:
         except JounceError as error:
             self._failed(error)
         except Exception as error:  # noqa: BLE001 - a worker that dies would leave a page that does nothing
-            from jounce.io.terminal import unexpected
+            from jounce.reporting.terminal import unexpected
 
             self._failed(JounceError(unexpected(error)))
 

@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 
 __all__ = [
+    "DARK",
+    "GREY",
     "Solid",
     "annulus",
     "arc_arrow",
@@ -26,6 +28,7 @@ __all__ = [
     "turned_to",
 ]
 
+DARK, GREY = (70, 74, 82), (150, 155, 163)  # colours of what belongs to no body
 AROUND = 24  # corners of a circle
 
 Mesh = tuple[np.ndarray, np.ndarray]

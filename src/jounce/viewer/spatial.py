@@ -8,7 +8,7 @@ import numpy as np
 
 from jounce.mechanism.mechanism import GROUND
 from jounce.viewer.planar import travel
-from jounce.viewer.solids import Solid, bar, box, cylinder, merged, revolved, sphere, tube, turned_to
+from jounce.viewer.solids import DARK, GREY, Solid, bar, box, cylinder, merged, revolved, sphere, tube, turned_to
 
 __all__ = ["spatial_solids"]
 
@@ -19,8 +19,6 @@ SLIDING = ("prismatic", "cylindrical", "screw")
 
 def spatial_solids(motion: Any, seen: Any, colours: Any) -> tuple[dict[str, tuple[Solid, ...]], float]:
     """Return the solids of spatial bodies; nothing has to be in front of them."""
-    from jounce.viewer.looks import DARK
-
     size = seen.size
     found: dict[str, list[Solid]] = {body: [] for body in (GROUND, *motion.mechanism.bodies)}
 
@@ -44,8 +42,6 @@ def spatial_solids(motion: Any, seen: Any, colours: Any) -> tuple[dict[str, tupl
 
 
 def _add_symbol(add: Any, motion: Any, symbol: Any, size: float) -> None:
-    from jounce.viewer.looks import DARK, GREY
-
     first, *others = symbol.bodies
     second = others[0] if others else first
     points, axes, kind = symbol.points, symbol.axes, symbol.kind
@@ -68,8 +64,6 @@ def _add_symbol(add: Any, motion: Any, symbol: Any, size: float) -> None:
 
 def _add_slide(add: Any, motion: Any, symbol: Any, size: float) -> None:
     """Draw a rail on the first body, as long as the second travels, and what slides on it."""
-    from jounce.viewer.looks import DARK, GREY
-
     first, second = symbol.bodies[:2]
     axis = np.asarray(symbol.axes[0], float) / np.linalg.norm(symbol.axes[0])
     low, high = travel(motion, symbol)

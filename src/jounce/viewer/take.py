@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import abc
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-__all__ = ["Exertion", "Parameter", "Quantity", "Spot", "Take", "rotated", "spatial_vectors"]
+__all__ = ["Exertion", "Parameter", "Quantity", "Spot", "Take", "poses", "rotated", "spatial_vectors"]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -48,11 +49,14 @@ class Quantity:
     values : array of shape (time, orders, components)
     words : tuple of str
         What each derivative is called.
+    labels : tuple of str
+        What each component is called, where there are several.
     """
 
     unit: str
     values: np.ndarray
     words: tuple[str, ...]
+    labels: tuple[str, ...] = ("x", "y", "z")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -96,8 +100,8 @@ class Exertion:
     torque: np.ndarray | None
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Take:
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
+class Take(abc.ABC):
     """One solved motion as the page shows it; everything in three components, planar ones with zero z.
 
     Parameters
@@ -114,14 +118,6 @@ class Take:
         Origins of the bodies, m.
     quaternion : array of shape (time, bodies, 4)
         Their attitudes, scalar part first.
-    quantities : callable
-        Gives the `Quantity` of each output by name.
-    motion_of : callable
-        Gives position and derivatives, (time, order + 1, 3), of a point of a body.
-    exertions_of : callable
-        Gives the `Exertion` list; empty where nothing has a mass.
-    dataset : callable
-        Gives the xarray.Dataset that an export writes.
     values : mapping
         Values of the parameters that it was solved with.
     looks : object
@@ -137,13 +133,25 @@ class Take:
     bodies: tuple[str, ...]
     position: np.ndarray
     quaternion: np.ndarray
-    quantities: Callable[[], Mapping[str, Quantity]]
-    motion_of: Callable[[str, Any], np.ndarray]
-    exertions_of: Callable[[], list[Exertion]]
-    dataset: Callable[[], Any]
     values: Mapping[str, float]
     looks: Any
     notice: str = ""
+
+    @abc.abstractmethod
+    def quantities(self) -> Mapping[str, Quantity]:
+        """Return what is plotted, by name."""
+
+    @abc.abstractmethod
+    def motion_of(self, body: str, point: Any) -> np.ndarray:
+        """Return position and derivatives, (time, order + 1, 3), of a point of a body."""
+
+    @abc.abstractmethod
+    def exertions_of(self) -> list[Exertion]:
+        """Return what joints, drivers and applied forces do to the bodies; empty where nothing has a mass."""
+
+    @abc.abstractmethod
+    def dataset(self) -> Any:
+        """Return the xarray.Dataset that an export writes."""
 
     @cached_property
     def outputs(self) -> Mapping[str, Quantity]:
@@ -192,6 +200,21 @@ class Take:
         """Diagonal of the box, m; 1 where it is a point."""
         low, high = self.box
         return float(np.linalg.norm(high - low)) or 1.0
+
+
+def poses(motion: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Return origins, (time, bodies, 3), and quaternions, (time, bodies, 4), of all bodies, the ground first."""
+    _, coordinates = motion.poses
+    position = spatial_vectors(np.moveaxis(np.asarray(coordinates["position"][0]), (2, 1, 0), (0, 1, 2)))
+    if "angle" in coordinates:
+        half = 0.5 * np.asarray(coordinates["angle"][0]).T
+        zero = np.zeros_like(half)
+        quaternion = np.stack([np.cos(half), zero, zero, np.sin(half)], axis=-1)
+    else:
+        quaternion = np.moveaxis(np.asarray(coordinates["quaternion"][0]), (2, 1, 0), (0, 1, 2))
+    bodies = max(position.shape[1], quaternion.shape[1])
+    shape = (len(motion.time), bodies)
+    return np.broadcast_to(position, (*shape, 3)), np.broadcast_to(quaternion, (*shape, 4))
 
 
 def rotated(quaternion: np.ndarray, vector: np.ndarray) -> np.ndarray:

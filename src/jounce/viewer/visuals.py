@@ -14,9 +14,9 @@ import numpy as np
 from jounce.errors import RobotFileError
 from jounce.robot.parts import on_body
 from jounce.robot.robot import Robot
-from jounce.viewer.looks import BODIES, DARK, GREY, Looks, up_of
+from jounce.viewer.looks import BODIES, Looks, up_of
 from jounce.viewer.meshes import Meshes
-from jounce.viewer.solids import Solid, bar, box, cylinder, merged, sphere, turned_to
+from jounce.viewer.solids import DARK, GREY, Solid, bar, box, cylinder, merged, sphere, turned_to
 from jounce.viewer.take import Spot
 
 __all__ = ["file_shapes", "robot_looks"]
@@ -146,7 +146,7 @@ def file_shapes(path: Path, allow: Iterable[str | PathLike[str]] = ()) -> dict[s
     allow
         Folders besides that of the file that meshes may be below; a warning tells of those that lie elsewhere.
     """
-    from jounce.io.markup import read_markup
+    from jounce.io.robots.xml_elements import read_markup
 
     root = read_markup(str(path))
     return _of_urdf(root, Meshes(path, allow)) if root.tag == "robot" else _of_mjcf(root, path, allow)
@@ -225,8 +225,8 @@ def _of_mjcf(root: Any, path: Path, allow: Iterable[str | PathLike[str]]) -> dic
     """Return the geoms that MuJoCo shows: groups 0 to 2."""
     import importlib
 
-    from jounce.io.mjcf import names_of_bodies
-    from jounce.io.mjcf_files import check_assets, included, quiet_mujoco
+    from jounce.io.robots.mjcf import names_of_bodies
+    from jounce.io.robots.mjcf_files import check_assets, included, quiet_mujoco
 
     mujoco: Any = importlib.import_module("mujoco")
     if not any(element.tag == "geom" for element in root.walk()):

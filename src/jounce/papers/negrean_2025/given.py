@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from jounce.errors import JounceError, MechanismFileError, did_you_mean
-from jounce.io.samples import read_columns
-from jounce.io.source import Source, read_source
+from jounce.io.files.samples import read_columns
+from jounce.io.files.source import Source, read_source
 from jounce.papers.negrean_2025.case import CASES, STAND_IN, Case, Link, law
 
 MASS_KEYS = {  # the field of `Link` and the kind of unit of each key of a file of masses
@@ -83,7 +83,7 @@ def read_link(path: Path) -> Link:
 
 
 def _number(source: Source, key: str, raw: Any) -> float:
-    from jounce.io.units import parse_value
+    from jounce.io.files.units import parse_value
 
     try:
         value = parse_value(raw, MASS_KEYS[key][1]).value

@@ -1,0 +1,103 @@
+"""Compiled programs kept between calls of the command."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sys
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from jounce.errors import OutputError
+from jounce.io.files.writing import replacing
+
+__all__ = ["cache_directory", "use_compilation_cache"]
+
+
+def cache_directory() -> Path | None:
+    """Return where compiled programs are kept: JOUNCE_CACHE_DIR, or the user's cache folder; None where nowhere."""
+    given = os.environ.get("JOUNCE_CACHE_DIR")
+    if given is not None:
+        return Path(given) if given.strip() else None
+    home = Path.home()
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA", home / "AppData" / "Local")) / "jounce" / "cache"
+    if sys.platform == "darwin":
+        return home / "Library" / "Caches" / "jounce"
+    base = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    return (base if base.is_absolute() else home / ".cache") / "jounce"
+
+
+class CheckedEntries:
+    """Compiled programs in the files of a folder, each after a digest of itself.
+
+    JAX's own files have none: it reads what is there, warns where that fails, and never writes over it; it may run a
+    program of which a bit is wrong. Here what is damaged, or cannot be read, is removed.
+
+    Parameters
+    ----------
+    path : str or Path
+        The folder.
+    """
+
+    def __init__(self, path: str | Path):
+        self._path = Path(path)  # the name by which JAX asks for it
+
+    def get(self, key: str) -> bytes | None:
+        """Return the program of this key, or None."""
+        file, size = self._file(key), hashlib.sha256().digest_size
+        with suppress(OSError):
+            if not file.is_file():
+                return None
+            whole = file.read_bytes()
+            if hashlib.sha256(whole[size:]).digest() == whole[:size]:
+                return whole[size:]
+        with suppress(OSError):
+            file.unlink()
+        return None
+
+    def put(self, key: str, value: bytes) -> None:
+        """Keep a program, in one step: other processes find all of it or nothing."""
+        # a full disk, or a folder in the place of the file: compiled again next time
+        with suppress(OutputError), replacing(self._file(key)) as new:
+            new.write_bytes(hashlib.sha256(value).digest() + value)
+
+    def _file(self, key: str) -> Path:
+        return self._path / f"{key}.program"
+
+
+def _keep_checked() -> None:
+    """Have JAX keep its programs in checked files; a release of JAX that works otherwise keeps them in its own."""
+    from jax._src import compilation_cache
+
+    def file_cache(path: str) -> Any:
+        return CheckedEntries(path), path
+
+    if hasattr(compilation_cache, "get_file_cache"):
+        compilation_cache.get_file_cache = file_cache
+
+
+def use_compilation_cache() -> None:
+    """Keep compiled programs between calls of the command, unless JAX was told where or the folder is out of reach."""
+    import warnings
+
+    import jax
+
+    if getattr(jax.config, "jax_compilation_cache_dir", None) is not None:
+        return
+    try:
+        directory = cache_directory()
+        if directory is None:
+            return
+        directory.mkdir(parents=True, exist_ok=True)
+    except (OSError, RuntimeError, ValueError):  # RuntimeError: there is no home
+        return
+    if not os.access(directory, os.W_OK | os.X_OK):
+        return
+    _keep_checked()
+    jax.config.update("jax_compilation_cache_dir", str(directory))
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.05)
+    jax.config.update("jax_persistent_cache_min_entry_size_bytes", 0)
+    jax.config.update("jax_persistent_cache_enable_xla_caches", "none")  # those are for GPUs
+    warnings.filterwarnings("ignore", message="Error (reading|writing) persistent compilation cache")

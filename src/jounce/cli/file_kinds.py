@@ -1,0 +1,85 @@
+"""What a file is that was given for something else, so that a message can say who takes it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from os import PathLike, fspath
+from pathlib import Path
+from typing import Any
+
+from jounce.errors import JounceError, MechanismFileError, RobotError, TrajectoryError
+
+__all__ = ["expecting", "kind_of"]
+
+ADVICE = {
+    "mechanism": "is a mechanism; run, simulate, plot, report, view and inspect take mechanisms",
+    "robot": "is a robot; check, torques, inspect and view take robots, and this makes it a mechanism: "
+    "jounce convert {path} {stem}.yaml --hold",
+    "trajectory": "is a trajectory, which goes with its robot; jounce check ROBOT {path}, or jounce view ROBOT {path}",
+    "limits": "holds limits, which go with robot and trajectory; jounce check ROBOT TRAJECTORY --limits {path}",
+}
+_ROOT = re.compile(rb"<(robot|mujoco)[\s>/]")
+
+
+def kind_of(path: str | PathLike[str]) -> str | None:
+    """Return ``mechanism``, ``robot``, ``trajectory`` or ``limits``, or None where the content does not tell.
+
+    Examples
+    --------
+    >>> from jounce.cli.file_kinds import kind_of
+    >>> kind_of("examples/robots/panda.urdf"), kind_of("examples/four_bar.yaml"), kind_of("README.md")
+    ('robot', 'mechanism', None)
+    """
+    from jounce.io.files.reading import read_file
+    from jounce.io.files.source import SUFFIXES, read_source
+
+    name = fspath(path)
+    suffix = Path(name).suffix.lower()
+    try:
+        content = read_file(name)
+        if content.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<") and _ROOT.search(content):
+            return "robot"
+        if suffix == ".csv" and content.lstrip(b'\xef\xbb\xbf"').startswith(b"time"):
+            return "trajectory"
+        return _kind_of_data(read_source(name).data) if suffix in SUFFIXES else None
+    except JounceError:
+        return None
+
+
+def _kind_of_data(data: Any) -> str | None:
+    from jounce.io.robots.limits import KEYS
+
+    if not isinstance(data, dict):
+        return None
+    if "bodies" in data or "space" in data:
+        return "mechanism"
+    if "point_to_point" in data or "motion" in data:
+        return "trajectory"
+    joints = data.get("joints")
+    rows = list(joints.values()) if isinstance(joints, dict) else []
+    if rows and all(isinstance(row, dict) and row.keys() <= {*KEYS} for row in rows):
+        return "limits"
+    if rows and all(isinstance(row, str | int | float) or "samples" in row for row in rows):
+        return "trajectory"
+    return None
+
+
+@contextmanager
+def expecting(path: str | PathLike[str], *wanted: str) -> Iterator[None]:
+    """Where a file of a kind cannot be read, say which kind it is instead, and what takes it.
+
+    Raises
+    ------
+    JounceError
+        As was raised, or one that names the other kind.
+    """
+    try:
+        yield
+    except (MechanismFileError, RobotError, TrajectoryError) as error:
+        kind = kind_of(path)
+        if kind is None or kind in wanted:
+            raise
+        advice = ADVICE[kind].format(path=path, stem=Path(fspath(path)).stem)
+        raise type(error)(advice, path=path) from None

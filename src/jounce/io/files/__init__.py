@@ -1,0 +1,1 @@
+"""Files of any kind: read safely, parsed with the lines of their entries, written whole."""

@@ -1,0 +1,286 @@
+"""The one way in which files are read: regular ones, within a size, and below the folder of the file that names them.
+
+What was read as an input is remembered, so that no result replaces it unasked (`jounce.io.files.writing`).
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import os
+import stat
+from collections.abc import Iterable, Iterator
+from os import PathLike
+from pathlib import Path
+
+from jounce.errors import JounceError, MechanismFileError, did_you_mean
+
+__all__ = [
+    "MAX_BYTES",
+    "MAX_SAMPLES",
+    "check_allowed",
+    "is_input",
+    "known_name",
+    "named_file",
+    "note_result",
+    "read_file",
+    "read_rows",
+    "written_name",
+]
+
+MAX_BYTES = 10_000_000
+MAX_SAMPLES = 100_000_000
+"""Bytes of a table of samples."""
+MAX_ROWS, MAX_ENTRIES = 2_000_000, 8_000_000
+"""Of a table of samples: in memory, as text, they take less than 1 GB."""
+LARGEST_NUMBER = 1e75  # in SI units; beyond, products of a few quantities are no numbers
+FORMULA = ("=", "+", "-", "@", "\t", "\r", "'")
+"""What spreadsheets take for the beginning of a formula, and the apostrophe that makes it text."""
+
+_inputs: dict[str, tuple[int, int]] = {}
+"""Device and number of the files read by this process, by their real paths."""
+_results: dict[str, tuple[int, ...]] = {}
+"""Device, number, size and time of the files that this process wrote, by their real paths."""
+
+
+def read_file(
+    path: str | PathLike[str],
+    limit: int | None = MAX_BYTES,
+    *,
+    what: str = "the file",
+    error: type[JounceError] = MechanismFileError,
+    is_input: bool = True,
+) -> bytes:
+    """Read a regular file of bounded size, or say why it cannot be.
+
+    Parameters
+    ----------
+    path
+        The file; symbolic links are followed.
+    limit : int or None
+        The most bytes that are read; None for what the user has asked for and this package wrote.
+    what : str
+        What the file is, for messages.
+    error : type
+        Of the exceptions.
+    is_input : bool, default True
+        Whether results must not replace the file unasked.
+
+    Raises
+    ------
+    JounceError
+        Of the type `error`: the file does not exist, is a directory, a device or a pipe, is too large, or may not be
+        read. Nothing is opened that could wait for ever or have effects of its own.
+    """
+    name = os.fsdecode(path)
+    try:
+        _check_regular(name, Path(name).stat(), limit, what, error)
+        # whatever has taken the place of the file since: no pipe is waited for, no terminal taken over
+        flags = os.O_RDONLY | sum(getattr(os, key, 0) for key in ("O_NONBLOCK", "O_NOCTTY", "O_CLOEXEC", "O_BINARY"))
+        with open(os.open(name, flags), "rb") as stream:  # noqa: PTH123 - of a descriptor
+            status = os.fstat(stream.fileno())
+            _check_regular(name, status, limit, what, error)
+            content = stream.read(-1 if limit is None else limit + 1) or b""
+    except FileNotFoundError:
+        word = what.removeprefix("the ")
+        message = f"{word if word == 'file' else f'file of {word}'} not found{_nearby(name)}"
+        raise error(message, path=name) from None
+    except (OSError, ValueError) as reason:
+        raise error(f"{_subject(what)}cannot be read: {_reason(reason)}", path=name) from None
+    if limit is not None and len(content) > limit:
+        raise _too_large(name, len(content), limit, what, error)
+    if is_input:
+        _note_input(name, status)
+    return content
+
+
+def _check_regular(name: str, status: os.stat_result, limit: int | None, what: str, error: type[JounceError]) -> None:
+    if stat.S_ISDIR(status.st_mode):
+        raise error("is a directory, a file is needed", path=name)
+    if not stat.S_ISREG(status.st_mode):
+        raise error("is not a regular file", path=name)
+    if limit is not None and status.st_size > limit:
+        raise _too_large(name, status.st_size, limit, what, error)
+
+
+def _too_large(name: str, size: int, limit: int, what: str, error: type[JounceError]) -> JounceError:
+    has = "have" if what.endswith("s") else "has"
+    return error(f"{what} {has} {size / 1e6:.3g} MB, at most {limit / 1e6:.3g} MB are read", path=name)
+
+
+def _subject(what: str) -> str:
+    return "" if what == "the file" else f"{what} "
+
+
+def _reason(error: Exception) -> str:
+    return getattr(error, "strerror", None) or str(error)
+
+
+def _nearby(path: str) -> str:
+    """Suggest a file of nearly the same name in the same folder."""
+    wanted = Path(path)
+    try:
+        names = [entry.name for entry in wanted.parent.iterdir() if entry.suffix == wanted.suffix][:1000]
+    except (OSError, ValueError):
+        return ""
+    suggestion = did_you_mean(wanted.name, names, limit=0)
+    return f"; {suggestion}" if suggestion.startswith("did") else ""
+
+
+def fault_of_number(number: float) -> str:
+    """Word what keeps a number from being computed with; empty where nothing does."""
+    if not math.isfinite(number):
+        return "must be a finite number"
+    return "" if abs(number) <= LARGEST_NUMBER else f"must be at most {LARGEST_NUMBER:g}"
+
+
+def named_file(
+    name: str,
+    holder: str | PathLike[str],
+    allow: Iterable[str | PathLike[str]] = (),
+    *,
+    folder: str | PathLike[str] | None = None,
+    error: type[JounceError] = MechanismFileError,
+) -> str:
+    """Return the path of a file that another file names, which must lie below the folder of that one.
+
+    Parameters
+    ----------
+    name : str
+        As the file has it: from the folder of the holder, or absolute.
+    holder
+        The file that names it.
+    allow : iterable of path
+        Folders besides that of the holder that the file may be below.
+    folder
+        Where a relative name begins; the folder of the holder unless given.
+    error : type
+        Of the exceptions.
+
+    Returns
+    -------
+    str
+        Without symbolic links; `read_file` reads it.
+
+    Raises
+    ------
+    JounceError
+        Of the type `error`: the file lies elsewhere, where its symbolic links are followed.
+    """
+    beside = Path(os.fsdecode(holder)).parent
+    try:
+        found = os.path.realpath((beside if folder is None else Path(folder)) / name)
+        bases = [beside, Path(os.path.realpath(holder)).parent, *allow]
+        below = any(Path(found).is_relative_to(os.path.realpath(base)) for base in bases)
+    except (OSError, ValueError) as reason:
+        raise error(f"cannot be the name of a file: {_reason(reason)}", value=name) from None
+    if not below:
+        message = (
+            "lies outside the folder of the file that names it; put it there, or allow its folder with --allow DIR (in "
+            "Python allow=[DIR])"
+        )
+        raise error(message, value=name)
+    return found
+
+
+def check_allowed(folders: Iterable[str | PathLike[str]]) -> tuple[str, ...]:
+    """Return folders that files may be named in, each of which must exist.
+
+    Raises
+    ------
+    MechanismFileError
+        One is no folder.
+    """
+    found = (folders,) if isinstance(folders, str | PathLike) else tuple(folders)
+    for folder in found:
+        if not Path(folder).is_dir():
+            raise MechanismFileError("must be a folder that exists", name="allow", value=os.fsdecode(folder))
+    return tuple(os.fsdecode(folder) for folder in found)
+
+
+def read_rows(path: str | PathLike[str], error: type[JounceError]) -> Iterator[tuple[int, list[str]]]:
+    """Read a table of samples from a CSV file of at most 100 MB, 2 million rows and 8 million entries.
+
+    Yields
+    ------
+    line : int
+        Counted from 1.
+    row : list of str
+        The entries, without blanks around them.
+
+    Raises
+    ------
+    JounceError
+        Of the type `error`: the file cannot be read, is not text in UTF-8, breaks the syntax, or is too large.
+    """
+    name = os.fsdecode(path)
+    content = read_file(name, MAX_SAMPLES, what="the samples", error=error)
+    reader = csv.reader(io.TextIOWrapper(io.BytesIO(content), newline="", encoding="utf-8-sig"), strict=True)
+    rows = entries = 0
+    try:
+        for row in reader:
+            rows, entries = rows + 1, entries + len(row)
+            if rows > MAX_ROWS or entries > MAX_ENTRIES:
+                message = f"the samples have more than {MAX_ROWS} rows or {MAX_ENTRIES} entries; no more are read"
+                raise error(message, path=name, line=reader.line_num)
+            yield reader.line_num, [entry.strip() for entry in row]
+    except UnicodeDecodeError:
+        raise error("the samples cannot be read: no text in UTF-8", path=name, line=_bad_line(content)) from None
+    except (csv.Error, ValueError) as reason:
+        raise error(f"the samples cannot be read: {reason}", path=name, line=reader.line_num + 1) from None
+
+
+def _bad_line(content: bytes) -> int | None:
+    """Return the line that is not text in UTF-8."""
+    try:
+        content.decode()
+    except UnicodeDecodeError as error:
+        return content.count(b"\n", 0, error.start) + 1
+    return None
+
+
+def written_name(name: str) -> str:
+    """Return the name of a column as a CSV file holds it: no spreadsheet takes it for a formula.
+
+    Examples
+    --------
+    >>> written_name("psi"), written_name("=1+1")
+    ('psi', "'=1+1")
+    """
+    return f"'{name}" if name.startswith(FORMULA) else name
+
+
+def known_name(entry: str) -> str:
+    """Return the name of a column that `written_name` gave a form."""
+    return entry[1:] if entry.startswith("'") and entry[1:].startswith(FORMULA) else entry
+
+
+def _note_input(name: str, status: os.stat_result) -> None:
+    real = os.path.realpath(name)
+    if _results.get(real) != _identity(status):
+        _inputs[real] = (status.st_dev, status.st_ino)
+
+
+def note_result(path: str | PathLike[str]) -> None:
+    """Remember that this process wrote a file, which may then be replaced, read again or not."""
+    real = os.path.realpath(path)
+    _inputs.pop(real, None)
+    _results[real] = _identity(Path(real).stat())
+
+
+def _identity(status: os.stat_result) -> tuple[int, ...]:
+    return status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns
+
+
+def is_input(path: str | PathLike[str]) -> bool:
+    """Tell whether a file was read as an input by this process, under this name or any other."""
+    real = os.path.realpath(path)
+    try:
+        status = Path(real).stat()
+    except OSError:
+        return False
+    if real in _inputs:
+        return True
+    same = [name for name, known in _inputs.items() if known == (status.st_dev, status.st_ino)]
+    return any(Path(name).exists() and Path(name).samefile(real) for name in same)

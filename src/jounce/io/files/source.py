@@ -1,0 +1,75 @@
+"""YAML, TOML and JSON files read into plain data, chosen by their ending."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from os import PathLike, fspath
+from pathlib import Path
+
+from jounce.errors import MechanismFileError
+from jounce.io.files import parsers
+from jounce.io.files.entries import Source
+from jounce.io.files.reading import check_allowed, read_file
+
+__all__ = ["SUFFIXES", "read_source"]
+
+MAX_LINES = 200_000
+MAX_LINE_LENGTH = 100_000
+SUFFIXES = (".yaml", ".yml", ".toml", ".json")
+
+
+def _decode(path: str, content: bytes) -> str:
+    """Decode UTF-8 text within the limits on lines; refuse anything that is not text."""
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise MechanismFileError("is not text in UTF-8", path=path, line=line) from None
+    line = 0
+    for line, row in enumerate(text.split("\n"), start=1):
+        if len(row) > MAX_LINE_LENGTH:
+            raise MechanismFileError(f"a line has more than {MAX_LINE_LENGTH} characters", path=path, line=line)
+        if not row.isprintable() and any((ord(c) < 32 and c not in "\t\r") or 127 <= ord(c) < 160 for c in row):
+            raise MechanismFileError("holds a control character, it is not a text file", path=path, line=line)
+    if line > MAX_LINES:
+        raise MechanismFileError(f"has {line} lines, at most {MAX_LINES} are read", path=path)
+    if not text.strip():
+        raise MechanismFileError("the file is empty", path=path)
+    return text
+
+
+def read_source(path: str | PathLike[str], allow: Iterable[str | PathLike[str]] = ()) -> Source:
+    """Read a YAML, TOML or JSON file, chosen by its suffix, into plain data with line numbers.
+
+    Parameters
+    ----------
+    path
+        A file ending in .yaml, .yml, .toml or .json.
+    allow
+        Folders besides its own that files named in it may be below.
+
+    Returns
+    -------
+    Source
+        Mappings, lists, text, numbers, booleans and None, and the line of every entry.
+
+    Raises
+    ------
+    MechanismFileError
+        The file cannot be read, breaks the syntax, has a duplicate name, or exceeds a limit on size or nesting.
+    """
+    name = fspath(path)
+    name = name if isinstance(name, str) else str(name)
+    if not name:
+        raise MechanismFileError("the name of a file is needed", value=name)
+    suffix = Path(name).suffix.lower()
+    reader = {".toml": parsers.read_toml, ".json": parsers.read_json}.get(suffix, parsers.read_yaml)
+    if suffix not in SUFFIXES and not Path(name).is_dir():
+        raise MechanismFileError(
+            f"the kind of a mechanism file is told by its ending; valid: {', '.join(SUFFIXES)}", path=name
+        )
+    source = reader(name, _decode(name, read_file(name)))
+    if source.data is None and not source.lines:  # only comments
+        raise MechanismFileError("the file is empty", path=name)
+    source.allow = check_allowed(allow)
+    return source

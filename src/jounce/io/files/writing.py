@@ -1,0 +1,178 @@
+"""Files written whole or not at all, asked about before a long computation, and never onto what was read."""
+
+from __future__ import annotations
+
+import os
+import secrets
+import shutil
+import signal
+import stat
+import tempfile
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from os import PathLike, fspath
+from pathlib import Path
+from typing import Any
+
+from jounce.errors import OutputError
+from jounce.interrupts import undoing
+from jounce.io.files.reading import is_input, note_result
+
+__all__ = ["check_target", "reason_of", "replacing"]
+
+_scratches: set[Path] = set()
+"""Files that are not yet in their places."""
+
+
+def check_target(
+    path: str | PathLike[str], suffixes: tuple[str, ...] = (), kind: str = "output", *, overwrite: bool = False
+) -> None:
+    """Raise OutputError unless a file can be written; one there already is left as it is.
+
+    Parameters
+    ----------
+    path
+        The file, in a folder that exists.
+    suffixes
+        Endings that it may have; any when there are none.
+    kind
+        What the file holds, for the message.
+    overwrite
+        Whether it may be a file that this process has read as an input.
+
+    Raises
+    ------
+    OutputError
+        The ending is another, the folder does not exist, the file is an input, or nothing may be written there.
+    """
+    name = fspath(path)
+    if suffixes and Path(name).suffix.lower() not in suffixes:
+        raise OutputError(f"the kind of {kind} is told by its ending; valid: {', '.join(suffixes)}", path=name)
+    try:
+        target = Path(os.path.realpath(name))
+        _check_replaceable(target, overwrite)
+        if not target.parent.is_dir():
+            raise OutputError(f"the folder {target.parent} does not exist")
+        with tempfile.TemporaryFile(dir=target.parent):
+            pass
+    except OutputError as error:
+        raise error.located(path=name) from None
+    except (OSError, ValueError) as error:
+        raise OutputError(f"cannot be written: {reason_of(error)}", path=name) from None
+
+
+def _check_replaceable(target: Path, overwrite: bool) -> None:
+    if target.is_dir():
+        raise OutputError("is a directory, the name of a file is needed")
+    if target.is_symlink():  # though links were followed
+        raise OutputError("is a circle of symbolic links")
+    if not target.exists():
+        return
+    if not (target.is_file() and os.access(target, os.W_OK)):
+        raise OutputError("the file there may not be replaced")
+    if not overwrite and is_input(target):
+        message = "was read as an input; give another name, or replace it with --overwrite (in Python overwrite=True)"
+        raise OutputError(message)
+
+
+@contextmanager
+def replacing(path: str | PathLike[str], *, overwrite: bool = False) -> Iterator[Path]:
+    """Give a file beside the target to write to, and put it in the place of the target only when that went well.
+
+    A file that is replaced hands its permissions and its owner on. What is written is on the disk before it takes its
+    place, and nothing else is left behind, also where SIGTERM ends the process.
+
+    Parameters
+    ----------
+    path
+        The target; a symbolic link stays one, and what it points to is replaced.
+    overwrite
+        Whether it may be a file that this process has read as an input.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written; what was there before is unchanged.
+    """
+    try:
+        target = Path(os.path.realpath(path))
+        _check_replaceable(target, overwrite)
+        # a name that starts with a dot is in nobody's way, and the ending tells programs what to write
+        scratch = target.with_name(f".jounce-{secrets.token_hex(6)}{target.suffix}")
+        with undoing(lambda: scratch.unlink(missing_ok=True)), _removed(scratch):
+            before = target.stat() if target.exists() else None
+            os.close(os.open(scratch, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666 if before is None else 0o600))
+            yield scratch
+            _put_in_place(scratch, target, before)
+        note_result(target)
+    except OutputError as error:
+        raise error.located(path=fspath(path)) from None
+    except (OSError, ValueError) as error:
+        raise OutputError(f"cannot be written: {reason_of(error)}", path=fspath(path)) from error
+
+
+def _put_in_place(scratch: Path, target: Path, before: os.stat_result | None) -> None:
+    """Put a whole file in the place of the target, with the owner and permissions of the one there."""
+    _sync(scratch)
+    if before is not None and not _take_over(scratch, before):
+        shutil.copyfile(scratch, target)  # only the file itself keeps an owner who is another
+        _sync(target)
+        return
+    scratch.replace(target)
+    with suppress(OSError):  # not every system opens folders
+        _sync(target.parent)
+
+
+def _take_over(scratch: Path, before: os.stat_result) -> bool:
+    """Give a file the owner and permissions of another; return whether the owner could be kept."""
+    if hasattr(os, "chown"):
+        made = scratch.stat()
+        if (made.st_uid, made.st_gid) != (before.st_uid, before.st_gid):
+            try:
+                os.chown(scratch, before.st_uid, before.st_gid)
+            except OSError:
+                return False
+    scratch.chmod(stat.S_IMODE(before.st_mode))
+    return True
+
+
+def _sync(path: Path) -> None:
+    descriptor = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+@contextmanager
+def _removed(scratch: Path) -> Iterator[None]:
+    """Remove a file at the end, also where a signal ends the process that Python leaves to the system."""
+
+    def stop(number: int, _frame: Any) -> None:
+        for path in tuple(_scratches):
+            with suppress(OSError):
+                path.unlink()
+        signal.signal(number, signal.SIG_DFL)
+        os.kill(os.getpid(), number)
+
+    watched = []
+    if threading.current_thread() is threading.main_thread():  # others may set no handlers
+        ends = [getattr(signal, name, None) for name in ("SIGTERM", "SIGHUP")]
+        watched = [number for number in ends if number is not None and signal.getsignal(number) is signal.SIG_DFL]
+    try:
+        _scratches.add(scratch)
+        for number in watched:
+            signal.signal(number, stop)
+        yield
+    finally:
+        with suppress(OSError):
+            scratch.unlink()
+        _scratches.discard(scratch)
+        for number in watched:
+            signal.signal(number, signal.SIG_DFL)
+
+
+def reason_of(error: Exception) -> str:
+    """Word the reason of a failure by the operating system."""
+    return getattr(error, "strerror", None) or str(error)

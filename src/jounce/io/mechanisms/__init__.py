@@ -1,0 +1,1 @@
+"""Files of mechanisms: their keys and schema, how they are read, written, and converted."""

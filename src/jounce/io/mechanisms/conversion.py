@@ -1,0 +1,241 @@
+"""Mechanism files in another format, and robots as mechanism files."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import os
+import re
+from collections.abc import Iterable, Mapping
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from jounce.dynamics import DriverForceOutput, DriverTorqueOutput
+from jounce.errors import JounceError, RobotError, did_you_mean
+from jounce.io.files.reading import named_file
+from jounce.io.files.source import read_source
+from jounce.io.files.units import parse_value
+from jounce.mechanism import Mechanism, TimeGrid
+from jounce.robot import Robot
+from jounce.robot.closed_loop import DRIVE
+
+__all__ = ["assigned", "converted", "robot_mechanism", "with_file_names"]
+
+RESERVED = ("ground", "time", "derivative", "component")
+
+
+def converted(
+    path: str | PathLike[str], target: str | PathLike[str], allow: Iterable[str | PathLike[str]] = ()
+) -> tuple[dict[str, Any], dict[Path, str]]:
+    """Return the data of a mechanism file, checked, values as they are written, for a file elsewhere.
+
+    Parameters
+    ----------
+    path
+        The file.
+    target
+        Where the data are to go: files of samples are named from there.
+    allow
+        Folders besides that of the file that files of samples may be below.
+
+    Returns
+    -------
+    data : dict
+        By the keys of the schema.
+    samples : dict of Path to str
+        Files of samples to be copied beside the target, since they do not lie below it, by where they are to go.
+
+    Raises
+    ------
+    MechanismFileError
+        The file cannot be read or something in it is wrong.
+
+    Examples
+    --------
+    >>> converted("examples/four_bar.yaml", "four_bar.toml")[0]["parameters"]["BC"]
+    '14.23 cm'
+    """
+    from jounce.io.mechanisms.loader import load
+
+    allow = tuple(allow)
+    load(path, allow=allow)
+    data = copy.deepcopy(read_source(path).data)
+    data = {key: value for key, value in data.items() if value is not None}
+    copies: dict[Path, str] = {}
+    if Path(os.path.realpath(path)).parent != Path(os.path.realpath(target)).parent:
+        _move_samples(data, path, Path(target).parent, allow, copies)
+    return data, copies
+
+
+def _move_samples(
+    node: Any, path: str | PathLike[str], there: Path, allow: Iterable[str | PathLike[str]], copies: dict[Path, str]
+) -> None:
+    """Name files of samples from another folder, and note those that have to go there."""
+    folders = [Path(os.path.realpath(folder)) for folder in (there, *allow)]
+    for entry in node.values() if isinstance(node, dict) else node if isinstance(node, list) else ():
+        if isinstance(entry, dict) and isinstance(entry.get("samples"), str):
+            file = named_file(entry["samples"], path, allow)
+            if any(Path(file).is_relative_to(folder) for folder in folders):
+                entry["samples"] = Path(os.path.relpath(file, folders[0])).as_posix()
+            else:
+                beside = there / Path(file).name
+                while copies.setdefault(beside, file) != file:  # another of the same name
+                    beside = beside.with_name(f"{beside.stem}_{beside.suffix}")
+                entry["samples"] = beside.name
+        _move_samples(entry, path, there, allow, copies)
+
+
+def assigned(robot: Robot, assignments: Iterable[str], option: str, *, law: bool) -> dict[str, Any]:
+    """Return values or laws of joints from ``JOINT=VALUE``, with units.
+
+    Parameters
+    ----------
+    robot : Robot
+        Says which joints slide.
+    assignments : iterable of str
+        A number in SI units, a number with a unit, or, for a law, an expression of t.
+    option : str
+        Their name, for messages.
+    law : bool
+        Whether expressions of t are taken.
+
+    Raises
+    ------
+    JounceError
+        A name is no joint, or a value does not fit.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> scara = jn.load_robot("examples/robots/scara.urdf")
+    >>> assigned(scara, ["quill=5 cm"], "--start", law=False)
+    {'quill': 0.05}
+    """
+    found: dict[str, Any] = {}
+    for text in assignments:
+        name, equals, value = (part.strip() for part in text.partition("="))
+        if not equals or not name or not value:
+            raise JounceError(
+                "a joint is given a value by JOINT=VALUE, such as 'elbow=30 deg'", name=option, value=text
+            )
+        if name not in robot.joint_names:
+            message = f"no moving joint has this name; {did_you_mean(name, robot.joint_names)}"
+            raise JounceError(message, name=option, value=name)
+        kind = "angle" if robot.joints[name].turning else "length"
+        try:
+            found[name] = parse_value(_number_or_text(value), kind, ("t",) if law else ()).value
+        except JounceError as error:
+            raise error.located(name=f"{option} {name}", value=value) from None
+    return found
+
+
+def _number_or_text(text: str) -> float | str:
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
+def with_file_names(robot: Robot) -> tuple[Robot, dict[str, str]]:
+    """Return a robot whose names can stand in a mechanism file, and what was renamed.
+
+    Raises
+    ------
+    RobotError
+        The robot cannot be rebuilt.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> rod = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0], tensor=[0, 1 / 12, 1 / 12])
+    >>> arm = jn.Robot("arm", [jn.Link("base"), jn.Link("rod 1", rod)], [jn.Joint("pin", "base", "rod 1")])
+    >>> with_file_names(arm)[1]
+    {'rod 1': 'rod_1'}
+    """
+    links = _file_names(name for name in robot.links if name != robot.base)
+    links[robot.base] = robot.base
+    held = _file_names([*robot.joints, *robot.closures])
+    changed = {old: new for names in (links, held) for old, new in names.items() if old != new}
+    if not changed:
+        return robot, {}
+
+    def joint(given: Any) -> Any:
+        mimic = given.mimic and dataclasses.replace(given.mimic, joint=held[given.mimic.joint])
+        ends = {"parent": links[given.parent], "child": links[given.child]}
+        return dataclasses.replace(given, name=held[given.name], mimic=mimic, **ends)
+
+    made = Robot(
+        robot.name,
+        [dataclasses.replace(link, name=links[link.name]) for link in robot.links.values()],
+        [joint(given) for given in robot.joints.values()],
+        robot.gravity,
+        [
+            dataclasses.replace(given, name=held[given.name], links=[links[name] for name in given.links])
+            for given in robot.closures.values()
+        ],
+        robot.strict,
+    )
+    return made, changed
+
+
+def _file_names(names: Iterable[str]) -> dict[str, str]:
+    found: dict[str, str] = {}
+    names = list(names)
+    for name in names:
+        new = re.sub(r"[^A-Za-z0-9_-]", "_", name)[:80] or "part"
+        new = f"_{new}" if new.startswith("-") else new
+        if new in RESERVED or re.search(r"_d[0-9]+$", new):
+            new += "_"
+        while new in found.values() or (new != name and new in names):
+            new += "_"
+        found[name] = new
+    return found
+
+
+def robot_mechanism(
+    robot: Robot,
+    start: Mapping[str, float],
+    laws: Mapping[str, Any],
+    *,
+    hold: bool = False,
+    drives: bool = False,
+    time: TimeGrid | None = None,
+) -> Mechanism:
+    """Return a robot as a mechanism for a file: coordinates as outputs, and what its drivers must exert.
+
+    Parameters
+    ----------
+    robot : Robot
+        Its names can stand in a file.
+    start : dict of str to float
+        Coordinates near which it is put together, rad or m; zero where none are given.
+    laws : dict of str to law
+        Coordinates that are driven.
+    hold : bool
+        Whether the other coordinates are held where they start, as far as loops leave them free.
+    drives : bool
+        Whether the damping and the armature of the joints are taken over.
+    time : TimeGrid, optional
+        From 0 to 1 s by 0.01 s unless given.
+
+    Raises
+    ------
+    RobotError
+        The robot cannot be such a mechanism, or its loops cannot be closed near the start.
+    """
+    laws = dict(laws)
+    if hold:
+        if robot.closures:
+            message = "the coordinates of a robot with loops depend on one another; name the driven ones by --drive"
+            raise RobotError(message, name="--hold", value=list(robot.closures))
+        laws |= {name: float(start.get(name, 0.0)) for name in robot.joint_names if name not in laws}
+    made = robot.mechanism(dict(start), drivers=laws, drives=drives, time=time or TimeGrid(0.0, 1.0, 0.01))
+    if any(body.mass for body in made.bodies.values()):
+        loads: dict[str, Any] = {}
+        for name in laws:
+            turning = robot.joints[name].turning
+            kind, word = (DriverTorqueOutput, "torque") if turning else (DriverForceOutput, "force")
+            loads[f"{name}_{word}"] = kind(driver=name + DRIVE)
+        made = dataclasses.replace(made, outputs={**made.outputs, **loads})
+    return made

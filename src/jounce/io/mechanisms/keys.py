@@ -1,0 +1,185 @@
+"""The keys of each type in a mechanism file, read off the fields of its class.
+
+Fields that differ only in the body they belong to, such as ``point_i`` and ``point_j``, are one key with a list,
+``points``; a lone ``vector_i`` is the key ``vector``; every other field keeps its name. So a joint of a user's own is
+readable from files as soon as its class exists.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import MISSING, dataclass
+from typing import Any
+
+from jounce.constraints.base import field_kind, value_fields
+from jounce.dynamics import (
+    AppliedForceOutput,
+    AppliedTorqueOutput,
+    DriverForceOutput,
+    DriverTorqueOutput,
+    JointForceOutput,
+    JointTorqueOutput,
+)
+from jounce.dynamics.energy_outputs import ENERGY_OUTPUTS
+from jounce.mechanism import (
+    AbstractQuantity,
+    AngleOutput,
+    AngularVelocityOutput,
+    DistanceOutput,
+    EulerAnglesOutput,
+    EulerParametersOutput,
+    PlanarRelativeAngleOutput,
+    PointOutput,
+    RelativeAngleOutput,
+    RelativeEulerAnglesOutput,
+    RelativeEulerParametersOutput,
+    RelativeRotationMatrixOutput,
+    RotationMatrixOutput,
+)
+from jounce.robot.coupling import SlideOutput
+
+__all__ = [
+    "HOLDERS",
+    "OUTPUTS",
+    "FileKey",
+    "file_keys",
+    "location_of",
+    "output_holder",
+    "output_tag",
+    "output_types",
+]
+
+_PLURALS = {"point": "points", "vector": "vectors", "axis": "axes", "normal": "normals"}
+
+
+@dataclass(frozen=True)
+class FileKey:
+    """One key of a joint, driver or output.
+
+    Attributes
+    ----------
+    key : str
+        As written in a file.
+    fields : tuple of str
+        Fields of the class that it fills; more than one when the key holds a list with an entry for each body.
+    kind : str
+        ``scalar``, ``vector``, ``motion``, ``law``, ``laws``, ``wrenches``, ``whole`` or ``text``.
+    quantity : str
+        Kind of unit, one of ``units.KINDS``; or ``direction`` (any unit, the same in all components), or ``of
+        coordinate`` and ``per angle``, which follow the key ``coordinate`` beside it.
+    required : bool
+        Whether the key must be given.
+    """
+
+    key: str
+    fields: tuple[str, ...]
+    kind: str
+    quantity: str
+    required: bool
+
+
+def file_keys(kind: type[Any]) -> tuple[FileKey, ...]:
+    """Return the keys of a class of joints, drivers or outputs besides ``type``, ``quantity`` and ``bodies``.
+
+    Words come first, since the units of other keys may follow from them.
+
+    Examples
+    --------
+    >>> from jounce.constraints import catalogue
+    >>> [key.key for key in file_keys(catalogue("planar", "joint")["double_revolute"])]
+    ['points', 'length']
+    """
+    fields = value_fields(kind)
+    groups: dict[str, list[str]] = {}
+    for name in fields:
+        stem, _, body = name.rpartition("_")
+        groups.setdefault(stem if stem in _PLURALS and body in ("i", "j", "m") else name, []).append(name)
+    keys = []
+    for stem, names in groups.items():
+        first = fields[names[0]]
+        key = stem if len(names) == 1 else _PLURALS[stem]
+        required = first.default is MISSING and first.default_factory is MISSING
+        quantity = _quantity(kind, stem, set(fields))
+        keys.append(FileKey(key, tuple(names), field_kind(first), quantity, required))
+    return tuple(sorted(keys, key=lambda k: k.kind != "text"))
+
+
+def _quantity(kind: type[Any], stem: str, fields: set[str]) -> str:
+    """Return the kind of unit of a field, by its name, unless the class says otherwise in ``dimensions``."""
+    stated = getattr(kind, "dimensions", {})
+    if stem in stated:
+        return stated[stem]
+    if stem in ("point", "length", "radius", "lead"):
+        return "length"
+    if stem in ("vector", "axis", "normal"):
+        return "direction"
+    if not kind.__module__.startswith("jounce.") or stem not in ("ratio", "offset", "motion"):
+        return "any"
+    if stem == "ratio":
+        return "per angle" if "coordinate" in fields else "ratio"
+    if "coordinate" in fields:
+        return "of coordinate"
+    return "length" if "point_i" in fields else "angle"
+
+
+OUTPUTS: tuple[tuple[str | None, type[AbstractQuantity]], ...] = (
+    (None, PointOutput),
+    ("angle", AngleOutput),
+    ("angle", PlanarRelativeAngleOutput),
+    ("angle", RelativeAngleOutput),
+    ("angular_velocity", AngularVelocityOutput),
+    ("distance", DistanceOutput),
+    ("euler_parameters", EulerParametersOutput),
+    ("euler_parameters", RelativeEulerParametersOutput),
+    ("rotation_matrix", RotationMatrixOutput),
+    ("rotation_matrix", RelativeRotationMatrixOutput),
+    ("euler_angles", EulerAnglesOutput),
+    ("euler_angles", RelativeEulerAnglesOutput),
+    ("slide", SlideOutput),
+    ("force", DriverForceOutput),
+    ("torque", DriverTorqueOutput),
+    ("force", JointForceOutput),
+    ("reaction", JointForceOutput),
+    ("torque", JointTorqueOutput),
+    ("force", AppliedForceOutput),
+    ("torque", AppliedTorqueOutput),
+    *ENERGY_OUTPUTS,
+)
+"""The word for ``quantity`` in a file (None when there is none) and the class of each output."""
+
+HOLDERS = {
+    "driver": "a driver",
+    "joint": "a joint",
+    "force": "a force",
+    "bodies": "bodies",
+    "body": "a body",
+    "mechanism": "the mechanism",
+}
+"""The keys that say what an output is of, and their words; the first that is there counts."""
+
+
+def output_holder(kind: type[AbstractQuantity]) -> str:
+    """Return the key that says what an output of a class is of, one of ``HOLDERS``."""
+    return getattr(kind, "source", "body" if kind.body_count == 1 else "bodies")
+
+
+def output_tag(quantity: object, holder: str) -> str:
+    """Return the name of a form of output, by its quantity and the key that says what it is of."""
+    return f"{quantity or 'point'} of {HOLDERS[holder]}"
+
+
+def output_types(space: str) -> dict[str, tuple[str | None, type[AbstractQuantity]]]:
+    """Return the forms of output that exist in a space, by tag: the word for ``quantity``, and the class."""
+    return {
+        output_tag(quantity, output_holder(kind)): (quantity, kind)
+        for quantity, kind in OUTPUTS
+        if kind.space in ("", space)
+    }
+
+
+def location_of(keys: Iterable[FileKey], field: str) -> tuple[str | int, ...]:
+    """Return where in a file the value of a field stands, below its joint, driver or output."""
+    for key in keys:
+        if field in key.fields:
+            return (key.key,) if len(key.fields) == 1 else (key.key, key.fields.index(field))
+    return (field,)

@@ -1,0 +1,315 @@
+"""Mechanisms from files."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from jounce.constraints import catalogue
+from jounce.dynamics import AppliedForceOutput, AppliedTorqueOutput, JointForceOutput, JointTorqueOutput
+from jounce.errors import JounceError, MechanismFileError, did_you_mean
+from jounce.io.files.entries import Location, Source
+from jounce.io.files.source import read_source
+from jounce.io.mechanisms.keys import FileKey, file_keys, location_of, output_types
+from jounce.io.mechanisms.unit_hints import warn_of_units
+from jounce.mechanism import AngularVelocityOutput, Body, Mechanism, PointOutput, TimeGrid, time_grid
+from jounce.mechanism.builder import check_body
+from jounce.mechanism.masses import body_mass
+from jounce.mechanism.resolve import resolve, resolve_element
+from jounce.rigid.euler_parameters import euler_parameters
+from jounce.trajectory import Expression, MeasuredMotion, SplineMotion
+
+__all__ = ["load"]
+
+SPACES = {"planar": 2, "spatial": 3}
+ROLES = {"joints": "joint", "drivers": "driver", "forces": "force", "initial": "driver"}
+
+
+def load(path: str | PathLike[str], *, allow: Iterable[str | PathLike[str]] = ()) -> Mechanism:
+    """Read a mechanism from a YAML, TOML or JSON file.
+
+    Parameters
+    ----------
+    path
+        A file ending in .yaml, .yml, .toml or .json. Values in it are in SI units unless they say otherwise.
+    allow
+        Folders besides that of the file that files of samples may be below.
+
+    Returns
+    -------
+    Mechanism
+        With the instants of the file's time grid, if it has one.
+
+    Raises
+    ------
+    MechanismFileError
+        The file cannot be read or something in it is wrong: the message names the file, the line, the entry and the
+        value, and the nearest valid name where one is unknown.
+
+    Warns
+    -----
+    UnitWarning
+        A number without a unit is likely meant in degrees or millimetres.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> mechanism = jn.load("examples/four_bar.yaml")
+    >>> list(mechanism.bodies)
+    ['crank', 'rocker']
+    """
+    source = read_source(path, allow)
+    space = _space(source)
+    model = _validate(source, space)
+    places: dict[str, tuple[Location, tuple[FileKey, ...]]] = {}
+    try:
+        mechanism = _build(source, space, model, places)
+        _check_values(mechanism)
+    except MechanismFileError:
+        raise
+    except JounceError as error:
+        location = _find(error.name, places)
+        known = location if source.line(location) is not None else ()
+        raise source.error(error.message, known or location, value=error.value) from None
+    warn_of_units(source, mechanism)
+    return mechanism
+
+
+def _space(source: Source) -> str:
+    """Return the space of a file, the one key that decides how the others are read."""
+    if not isinstance(source.data, dict):
+        raise source.error("a mechanism file is a mapping with the keys space, bodies, joints, ...", value=source.data)
+    source.data = {key: value for key, value in source.data.items() if value is not None or key == "space"}
+    if "space" not in source.data:
+        raise source.error("is missing; valid: planar, spatial", ("space",))
+    space = source.data["space"]
+    if not isinstance(space, str) or space not in SPACES:
+        raise source.error(f"unknown space; {did_you_mean(space, SPACES)}", ("space",), value=space)
+    return space
+
+
+def _validate(source: Source, space: str) -> dict[str, Any]:
+    """Check a file against the schema; return its values by key, with numbers and expressions in place of text."""
+    from pydantic import ValidationError
+
+    from jounce.io.mechanisms.schema import file_model
+    from jounce.io.mechanisms.schema_errors import first_problem
+
+    parameters = source.data.get("parameters")
+    names = list(parameters) if isinstance(parameters, dict) else []
+    bodies = source.data.get("bodies", {})
+    if not bodies:
+        raise source.error("a mechanism needs at least one moving body", ("bodies",), value=bodies)
+    context = {
+        "names": names,
+        "bodies": ["ground", *(bodies if isinstance(bodies, dict) else ())],
+        "dimensions": _dimensions(parameters) if names else {},
+        "uses": dict.fromkeys(names, ()),
+    }
+    try:
+        model = file_model(space).model_validate(source.data, context=context)
+    except ValidationError as error:
+        raise first_problem(source, space, error.errors(include_url=False)) from None
+    uses = {name: allowed for name, allowed in context["uses"].items() if allowed}
+    dimensions = uses | {name: (dimension,) for name, dimension in context["dimensions"].items()}
+    return _plain(model) | {"dimensions": dimensions}
+
+
+def _dimensions(parameters: dict[str, Any]) -> dict[str, Any]:
+    """Return the dimensions of those parameters that have a unit, or follow from others that have one."""
+    from jounce.io.files.units import parse_value
+
+    found: dict[str, Any] = {}
+    waiting, count = dict(parameters), -1
+    while len(found) > count:
+        count = len(found)
+        for name, raw in list(waiting.items()):
+            try:
+                dimension = parse_value(raw, "any", parameters, found).dimension
+            except JounceError:  # told where it stands
+                continue
+            if dimension is not None:
+                found[name] = dimension
+                del waiting[name]
+    return found
+
+
+def _plain(model: Any) -> dict[str, Any]:
+    """Return the values of a model by the keys of the file; one level, the models inside stay."""
+    return {field.alias: getattr(model, name) for name, field in type(model).model_fields.items()}
+
+
+def _build(source: Source, space: str, model: dict[str, Any], places: dict[str, Any]) -> Mechanism:
+    parameters = model["parameters"]
+    bare = Mechanism(space=space, bodies={"any": Body([0.0] * SPACES[space])}, joints={}, parameters=parameters)
+    try:
+        values = bare.parameter_values
+    except JounceError as error:
+        raise error.located(name="parameters") from None
+    mechanism = Mechanism(
+        space=space,
+        bodies={name: _body(source, space, name, _plain(body), values) for name, body in model["bodies"].items()},
+        joints=_constraints(source, space, "joints", model["joints"], places),
+        drivers=_constraints(source, space, "drivers", model["drivers"], places),
+        forces=_constraints(source, space, "forces", model["forces"], places),
+        initial=_constraints(source, space, "initial", model["initial"], places),
+        outputs=_outputs(space, model["outputs"], places),
+        parameters=parameters,
+        gravity=model["gravity"],
+        time=TimeGrid(**_plain(model["time"])) if model["time"] is not None else None,
+        title=model["title"],
+        dimensions=model["dimensions"],
+    )
+    _check_columns(source, mechanism)
+    return mechanism
+
+
+def _body(source: Source, space: str, name: str, given: dict[str, Any], parameters: dict[str, Any]) -> Body:
+    """Build a body; values that depend on parameters stay expressions of them."""
+    if isinstance(given["inertia"], dict):
+        from jounce.io.mechanisms.masses import expanded
+
+        try:
+            given |= expanded(given, parameters, planar=space == "planar")
+        except JounceError as error:
+            key = ("mass",) if error.name == "mass" else ("inertia", *([error.name] if error.name else []))
+            raise source.error(error.message, ("bodies", name, *key), value=error.value) from None
+    form = given.get("orientation")
+    if form is not None and not any(isinstance(x, Expression) for v in form.values() for x in np.ravel(v)):
+        try:
+            given["orientation"] = euler_parameters(form)
+        except JounceError as error:
+            raise source.error(error.message, ("bodies", name, "orientation"), value=error.value) from None
+    return Body(**given)
+
+
+def _arguments(keys: tuple[FileKey, ...], given: dict[str, Any]) -> dict[str, Any]:
+    """Turn values by key into values by field; keys not given are left to their defaults."""
+    found = {}
+    for key in keys:
+        value = given[key.key]
+        if value is not None:
+            found |= dict(zip(key.fields, value if len(key.fields) > 1 else (value,), strict=True))
+    return found
+
+
+def _constraints(
+    source: Source, space: str, section: str, models: dict[str, Any], places: dict[str, Any]
+) -> dict[str, Any]:
+    """Build the joints, drivers or forces, and note where their fields stand in the file."""
+    found = {}
+    for name, model in models.items():
+        given = _plain(model)
+        kind = catalogue(space, ROLES[section])[given["type"]]
+        keys = file_keys(kind)
+        place = f"{section}.{name}"
+        places[place] = ((section, name), keys)
+        arguments = _arguments(keys, given)
+        for field, value in arguments.items():
+            arguments[field] = _splines(source, (section, name, field), value)
+        try:
+            found[name] = kind(bodies=given["bodies"] if "bodies" in given else given["body"], **arguments)
+        except JounceError as error:
+            raise error if isinstance(error, MechanismFileError) else _placed(error, place) from None
+    return found
+
+
+def _placed(error: JounceError, place: str) -> JounceError:
+    """Return an error of a constructor, which knows its fields only, with its full dotted name."""
+    error.name = f"{place}.{error.name}" if error.name else place
+    return error
+
+
+def _splines(source: Source, location: Location, value: Any) -> Any:
+    """Return a value with samples turned into motion laws, also where it is a list of laws."""
+    if isinstance(value, tuple) and any(hasattr(entry, "samples") for entry in value):
+        return tuple(_splines(source, (*location, index), entry) for index, entry in enumerate(value))
+    return _spline(source, location, value) if hasattr(value, "samples") else value
+
+
+def _spline(source: Source, location: Location, samples: Any) -> SplineMotion:
+    from jounce.io.files.samples import read_samples
+
+    path = source.named_file(samples.samples, location)
+    try:
+        table = read_samples(path, samples.time, samples.value)
+        given = {"degree": samples.degree, "beyond": samples.beyond}
+        if samples.derivative:
+            return MeasuredMotion(*table, samples.derivative, samples.initial, **given)
+        return SplineMotion(*table, **given)
+    except JounceError as error:
+        if error.path == path:  # as the user knows it
+            error.path = Path(source.path).parent / samples.samples
+        raise source.error(str(error), location) from None
+
+
+def _outputs(space: str, models: dict[str, Any], places: dict[str, Any]) -> dict[str, Any]:
+    """Build the outputs, and note where their fields stand in the file."""
+    tags = {f"{space}_{tag.replace(' ', '_')}": kind for tag, (_, kind) in output_types(space).items()}
+    found = {}
+    for name, model in models.items():
+        kind = tags[type(model).__name__]
+        keys, given = file_keys(kind), _plain(model)
+        places[f"outputs.{name}"] = (("outputs", name), keys)
+        arguments = _arguments(keys, given)
+        if kind.body_count:
+            arguments["bodies"] = given["bodies"] if kind.body_count > 1 else (given["body"],)
+        try:
+            found[name] = kind(**arguments)
+        except JounceError as error:
+            raise _placed(error, f"outputs.{name}") from None
+    return found
+
+
+def _check_columns(source: Source, mechanism: Mechanism) -> None:
+    """Refuse outputs whose columns in a table would have the same name: a point C and an angle C_x."""
+    for name in mechanism.outputs:
+        stem, _, component = name.rpartition("_")
+        output = mechanism.outputs.get(stem)
+        if output is not None and component in output.labels and _has_components(mechanism, output):
+            raise source.error(f"this name is taken by a component of the output '{stem}'", ("outputs", name))
+
+
+def _has_components(mechanism: Mechanism, output: Any) -> bool:
+    """Tell whether an output is more than one number."""
+    if isinstance(output, AppliedForceOutput | AppliedTorqueOutput):
+        return len(mechanism.forces[output.force].velocity_names) > 1
+    turning = isinstance(output, AngularVelocityOutput | JointTorqueOutput) and mechanism.space == "spatial"
+    return turning or bool(output.axes) or isinstance(output, PointOutput | JointForceOutput)
+
+
+def _check_values(mechanism: Mechanism) -> None:
+    """Check what depends on the values of parameters: finite numbers, lengths above zero, axes that are not zero."""
+    parameters, components = mechanism.parameter_values, SPACES[mechanism.space]
+    for kind, elements in mechanism.elements.items():
+        for name, element in elements.items():
+            resolve_element(element, parameters, components, f"{kind}.{name}")
+    for name, body in mechanism.bodies.items():
+        check_body(name, body, parameters, components)
+        body_mass(name, body, parameters, components)
+    _check_expressions("gravity", mechanism.gravity, parameters)
+    if mechanism.time is not None:
+        time_grid(mechanism.time, parameters)
+
+
+def _check_expressions(name: str, value: Any, parameters: dict[str, Any]) -> None:
+    try:
+        resolve(value, parameters)
+    except JounceError as error:
+        raise error.located(name=name) from None
+
+
+def _find(name: str | None, places: dict[str, tuple[Location, tuple[FileKey, ...]]]) -> Location:
+    """Return the location in the file of a dotted name of the mechanism."""
+    if not name:
+        return ()
+    for place, (location, keys) in places.items():
+        if name.startswith(f"{place}."):
+            return (*location, *location_of(keys, name.removeprefix(f"{place}.")))
+        if name == place:
+            return location
+    return tuple(name.split("."))

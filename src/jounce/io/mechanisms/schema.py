@@ -1,0 +1,232 @@
+"""The schema of mechanism files, as pydantic models built from the classes of joints, drivers and outputs.
+
+It checks names, shapes and units, and turns every value into a number in SI units or an expression. Imported only when
+a file is loaded, since pydantic takes a while.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Annotated, Any, Literal, Union
+
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, create_model
+
+from jounce.constraints import catalogue
+from jounce.constraints.planar import COORDINATES
+from jounce.errors import did_you_mean
+from jounce.io.mechanisms.keys import HOLDERS, FileKey, file_keys, output_holder, output_tag, output_types
+from jounce.io.mechanisms.masses import inertia
+from jounce.io.mechanisms.values import Checked, laws, motion, orientation, problem, scalar, vector, vectors, wrenches
+from jounce.mechanism.mechanism import RESERVED_OUTPUTS
+from jounce.mechanism.outputs import FRAMES
+from jounce.rigid.rotations import SEQUENCES
+from jounce.trajectory.dimensions import variables_of
+from jounce.trajectory.expression import CONSTANTS, FUNCTIONS
+
+__all__ = ["file_model", "output_form"]
+
+COMPONENTS = {"planar": 2, "spatial": 3}
+_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]{0,99}")
+_CHOICES = {"coordinate": COORDINATES, "frame": FRAMES, "sequence": SEQUENCES}
+_Types = tuple[tuple[str, type[Any]], ...]
+_PARAMETER = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,99}")
+
+
+def _text(raw: Any, _info: Any) -> str:
+    if not isinstance(raw, str):
+        raise problem("must be text")
+    return raw
+
+
+def _whole(raw: Any, _info: Any) -> int:
+    if isinstance(raw, bool) or not isinstance(raw, int | float) or raw != raw // 1 or raw < 0:
+        raise problem("must be a whole number, 0 or greater")
+    return int(raw)
+
+
+def _all(raw: Any, _info: Any) -> bool:
+    if raw not in (None, True, "all"):
+        raise problem("an energy of the mechanism is that of all its bodies: write true; for one body, body: NAME")
+    return True
+
+
+def _names(*counts: int) -> Any:
+    """Return the annotation of a list of names of bodies, as many as one of the counts."""
+
+    def check(raw: Any, info: Any) -> tuple[str, ...]:
+        if not isinstance(raw, (list, tuple)) or len(raw) not in counts:
+            raise problem(f"must be a list of {' or '.join(map(str, counts))} names of bodies")
+        for index, name in enumerate(raw):
+            _check_body(name, info, index)
+        if len(set(raw)) != len(raw):
+            raise problem("the bodies must differ, a body cannot be joined with itself")
+        return tuple(raw)
+
+    schema = {"type": "array", "items": {"type": "string"}, "minItems": min(counts), "maxItems": max(counts)}
+    return Annotated[Any, Checked(check, schema)]
+
+
+def _check_body(name: Any, info: Any, *at: int) -> str:
+    if not isinstance(name, str):
+        raise problem("must be the name of a body", *at, value=name)
+    known = (info.context or {}).get("bodies", ())
+    if name not in known:
+        raise problem(f"no body has this name; {did_you_mean(name, known)}", *at, value=name)
+    return name
+
+
+def _named(item: Any, pattern: re.Pattern[str], check: Callable[[str], str | None] | None = None) -> Any:
+    """Return the annotation of a mapping of names to items."""
+
+    def name_of(raw: Any, _info: Any) -> str:
+        if not isinstance(raw, str) or not pattern.fullmatch(raw):
+            start = "" if pattern is _NAME else ", not starting with a digit"
+            dash = " and -" if pattern is _NAME else ""
+            raise problem(f"a name is up to 100 letters, digits, _{dash}{start}")
+        if check is not None and (message := check(raw)):
+            raise problem(message)
+        return raw
+
+    key = Annotated[str, Checked(name_of, {"type": "string", "pattern": f"^{pattern.pattern}$"})]
+    return dict[key, item]
+
+
+def _body_name(name: str) -> str | None:
+    return "the body 'ground' always exists, give this one another name" if name == "ground" else None
+
+
+def _parameter_name(name: str) -> str | None:
+    import keyword
+
+    if name in CONSTANTS or name in FUNCTIONS or name == "t":
+        return f"the name '{name}' is reserved for expressions"
+    return f"the word '{name}' cannot be a name in expressions" if keyword.iskeyword(name) else None
+
+
+def _output_name(name: str) -> str | None:
+    if name in RESERVED_OUTPUTS or re.search(r"_d[0-9]+$", name):
+        return f"the name '{name}' is reserved for columns of the results"
+    return None
+
+
+def _model(name: str, doc: str | None, fields: dict[str, tuple[Any, Any]]) -> type[BaseModel]:
+    """Create a closed model; fields of awkward names are fine, since they are known by alias only."""
+    summary = (doc or "").strip().split("\n\n")[0]
+    aliased = {
+        key if key in ("space", "type", "coordinate") else f"key_{key}": (kind, Field(default, alias=key))
+        for key, (kind, default) in fields.items()
+    }
+    config = ConfigDict(extra="forbid", protected_namespaces=(), title=name)
+    return create_model(name, __config__=config, __doc__=" ".join(summary.split()), **aliased)  # type: ignore[call-overload]
+
+
+def _annotation(kind: type[Any], key: FileKey, size: int, choices: dict[str, tuple[str, ...]]) -> Any:
+    if key.kind in ("law", "laws"):
+        variables = variables_of(kind)
+        return motion(key.quantity, variables) if key.kind == "law" else laws(size, key.quantity, variables)
+    if key.kind == "motion":
+        return motion(key.quantity)
+    if key.kind == "scalar":
+        return scalar(key.quantity)
+    if key.kind == "vector":
+        return vector(size, key.quantity) if len(key.fields) == 1 else vectors(len(key.fields), size, key.quantity)
+    if key.kind == "wrenches":
+        return wrenches()
+    if key.kind == "whole":
+        return Annotated[Any, Checked(_whole, {"type": "integer", "minimum": 0})]
+    words = {"enum": list(choices[key.key])} if key.key in choices else {"type": "string"}
+    return Annotated[Any, Checked(_text, words)]
+
+
+def _values(kind: type[Any], size: int) -> dict[str, tuple[Any, Any]]:
+    """Return the keys of a class besides its bodies, as fields of a model."""
+    own_frames = not kind.body_count  # the frame of a force may also be a body by its name
+    choices = _CHOICES if kind.__module__.startswith("jounce.") and not own_frames else {}
+    return {key.key: (_annotation(kind, key, size, choices), ... if key.required else None) for key in file_keys(kind)}
+
+
+def _bodies(kind: type[Any]) -> dict[str, tuple[Any, Any]]:
+    """Return the key of the bodies of a class: ``body`` for one alone."""
+    if kind.body_count > 1:
+        return {"bodies": (_names(*(getattr(kind, "body_counts", ()) or (kind.body_count,))), ...)}
+    return {"body": (Annotated[Any, Checked(_check_body, {"type": "string"})], ...)}
+
+
+def _constraint_union(space: str, role: str, types: _Types) -> Any:
+    """Return the union of all joints, drivers or forces of a space, told apart by ``type``."""
+    models = []
+    for name, kind in types:
+        fields = {"type": (Literal[name], ...)} | _bodies(kind)
+        title = f"{space}_{name}_{role}"
+        models.append(_model(title, kind.__doc__, fields | _values(kind, COMPONENTS[space])))
+    return Annotated[Union[tuple(models)], Discriminator("type")]  # noqa: UP007
+
+
+def output_form(raw: Any) -> Any:
+    """Return the tag of the form that an output of a file has, None when it is not a mapping."""
+    if not isinstance(raw, dict):
+        return None
+    return output_tag(raw.get("quantity"), next((key for key in HOLDERS if key in raw), "body"))
+
+
+def _output_union(space: str) -> Any:
+    """Return the union of all outputs of a space."""
+    models = []
+    for tag, (quantity, kind) in output_types(space).items():
+        fields: dict[str, tuple[Any, Any]] = _bodies(kind) if kind.body_count else {}
+        if output_holder(kind) == "mechanism":
+            fields["mechanism"] = (Annotated[Any, Checked(_all, {"enum": [True, "all", None]})], ...)
+        if quantity is not None:
+            fields["quantity"] = (Literal[quantity], ...)
+        fields |= _values(kind, COMPONENTS[space])
+        models.append(Annotated[_model(f"{space}_{tag.replace(' ', '_')}", kind.__doc__, fields), Tag(tag)])
+    return Annotated[Union[tuple(models)], Discriminator(output_form)]  # noqa: UP007
+
+
+def _body_model(space: str) -> type[BaseModel]:
+    size = COMPONENTS[space]
+    fields: dict[str, tuple[Any, Any]] = {"position": (vector(size, "length"), (0.0,) * size)}
+    if space == "planar":
+        fields |= {"angle": (scalar("angle"), 0.0)}
+    else:
+        fields |= {"orientation": (orientation(), None)}
+    fields |= {"mass": (scalar("mass"), None), "inertia": (inertia(space), None)}
+    fields |= {"center_of_mass": (vector(size, "length"), None)}
+    return _model(f"{space}_body", "A moving body; its pose is the starting guess for assembly.", fields)
+
+
+@lru_cache(maxsize=8)
+def _file_model(space: str, joints: _Types, drivers: _Types, forces: _Types) -> type[BaseModel]:
+    time = {"start": (scalar("time"), 0.0), "stop": (scalar("time"), ...)}
+    time |= {"step": (scalar("time"), None), "count": (scalar("ratio"), None)}
+    optional = {
+        "title": (Annotated[Any, Checked(_text, {"type": "string"})], ""),
+        "gravity": (vector(COMPONENTS[space], "acceleration"), None),
+        "parameters": (_named(scalar("any"), _PARAMETER, _parameter_name), {}),
+        "joints": (_named(_constraint_union(space, "joint", joints), _NAME), {}),
+        "drivers": (_named(_constraint_union(space, "driver", drivers), _NAME), {}),
+        "forces": (_named(_constraint_union(space, "force", forces), _NAME), {}),
+        "initial": (_named(_constraint_union(space, "driver", drivers), _NAME), {}),
+        "outputs": (_named(_output_union(space), _NAME, _output_name), {}),
+        "time": (_model(f"{space}_time", "Instants from start to stop, by step or by count.", time), None),
+    }
+    fields = {
+        "space": (Literal[space], ...),
+        "bodies": (_named(_body_model(space), _NAME, _body_name), ...),
+        **optional,
+    }
+    return _model(f"{space}_mechanism", f"A {space} mechanism.", fields)
+
+
+def file_model(space: str, *, own_types: bool = True) -> type[BaseModel]:
+    """Return the model of a whole file of a space, with every joint, driver and force registered by now.
+
+    Without ``own_types``, with those of this package only.
+    """
+    types = []
+    for role in ("joint", "driver", "force"):
+        found = catalogue(space, role).items()
+        types.append(tuple((n, kind) for n, kind in found if own_types or kind.__module__.startswith("jounce.")))
+    return _file_model(space, *types)

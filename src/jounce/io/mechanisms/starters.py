@@ -1,0 +1,102 @@
+"""Starter files: small mechanisms with comments, to begin one's own from."""
+
+from __future__ import annotations
+
+import importlib.resources
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+
+from jounce.errors import JounceError, OutputError, did_you_mean
+
+__all__ = ["STARTERS", "Starter", "write_starter"]
+
+
+@dataclass(frozen=True)
+class Starter:
+    """A starter file of the package.
+
+    Parameters
+    ----------
+    name : str
+        By which it is asked for.
+    about : str
+        What it shows, in one sentence.
+    command : str
+        run or simulate: what moves it.
+    """
+
+    name: str
+    about: str
+    command: str = "run"
+
+    @property
+    def text(self) -> str:
+        """The file."""
+        return (importlib.resources.files("jounce") / "templates" / f"{self.name}.yaml").read_text(encoding="utf-8")
+
+
+STARTERS: dict[str, Starter] = {
+    starter.name: starter
+    for starter in (
+        Starter("four-bar", "A planar four-bar linkage: angle of the rocker and a point of the coupler."),
+        Starter("slider-crank", "An engine with masses: torque of the crank and loads of the bearings."),
+        Starter("cam", "An eccentric cam with a roller follower, a spring and the contact force."),
+        Starter("gear-train", "An epicyclic gear train: sun, planet, carrier and a ring that is held."),
+        Starter("spatial-linkage", "A spatial four-bar (RSSR): two hinges and a rod with balls at its ends."),
+        Starter("robot-arm", "An arm with three motors and a payload: torques and their rates."),
+        Starter("free-pendulum", "A damped pendulum that swings freely under its weight.", "simulate"),
+        Starter("spring-mass", "A mass on a spring with a shaken base: vibration.", "simulate"),
+    )
+}
+"""The starter files by name."""
+
+
+def write_starter(name: str, path: str | PathLike[str], *, overwrite: bool = False) -> Starter:
+    """Write a starter file.
+
+    Parameters
+    ----------
+    name : str
+        One of `STARTERS`.
+    path
+        A file ending in .yaml or .yml, with its comments, or in .toml or .json, without.
+    overwrite : bool, default False
+        Whether a file that is there may be replaced.
+
+    Raises
+    ------
+    JounceError
+        There is no such starter.
+    OutputError
+        The file is there already, or cannot be written.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     _ = write_starter("four-bar", pathlib.Path(folder) / "mine.yaml")
+    ...     (pathlib.Path(folder) / "mine.yaml").read_text().splitlines()[3]
+    'title: Four-bar linkage'
+    """
+    from jounce.io.files.formats import SUFFIXES, dumped
+    from jounce.io.files.parsers import read_yaml
+    from jounce.io.files.writing import check_target, replacing
+
+    if name not in STARTERS:
+        raise JounceError(f"no starter has this name; {did_you_mean(name, STARTERS)}", value=name)
+    starter, suffix = STARTERS[name], Path(path).suffix.lower()
+    check_target(path, SUFFIXES, "mechanism file", overwrite=overwrite)
+    refuse_existing(path, overwrite=overwrite)
+    text = starter.text
+    if suffix in (".toml", ".json"):
+        text = dumped(read_yaml(name, text).data, suffix, str(path))
+    with replacing(path, overwrite=overwrite) as scratch:
+        scratch.write_text(text, encoding="utf-8")
+    return starter
+
+
+def refuse_existing(path: str | PathLike[str], *, overwrite: bool) -> None:
+    """Raise OutputError where a file is that must not be replaced."""
+    if not overwrite and Path(path).exists():
+        raise OutputError("is there already; give another name, or replace it with --overwrite", path=str(path))

@@ -1,0 +1,59 @@
+"""A user's own joints and drivers, from Python files named by the user; nothing that a mechanism file names is run."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import sys
+import zlib
+from os import PathLike, fspath
+from pathlib import Path
+
+from jounce.errors import JounceError, MechanismFileError
+from jounce.io.files.reading import read_file
+
+__all__ = ["import_file"]
+
+
+def import_file(path: str | PathLike[str]) -> None:
+    """Run a Python file, so that the joints and drivers it defines join the catalogue.
+
+    Parameters
+    ----------
+    path
+        A file ending in .py. Its ``__name__`` is not ``__main__``, so that what a script does besides is left out.
+
+    Raises
+    ------
+    MechanismFileError
+        There is no such file, or running it fails: the message names the line.
+    """
+    name = fspath(path)
+    if not name.endswith(".py"):
+        raise MechanismFileError("own joints come from a Python file, ending in .py", path=name)
+    read_file(name)
+    place = zlib.crc32(os.fsencode(Path(name).resolve()))  # files of one name in two folders hold different classes
+    module_name = f"jounce_own_{Path(name).stem}_{place:08x}"
+    spec = importlib.util.spec_from_file_location(module_name, name)
+    if spec is None or spec.loader is None:
+        raise MechanismFileError("cannot be read as Python", path=name)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[module_name] = module
+    try:
+        spec.loader.exec_module(module)
+    except JounceError as error:
+        raise error.located(path=name, line=_line(error, name)) from None
+    except (Exception, SystemExit) as error:
+        message = f"running it fails with {type(error).__name__}: {error}".rstrip(": ")
+        line = error.lineno if isinstance(error, SyntaxError) else _line(error, name)
+        raise MechanismFileError(" ".join(message.split()), path=name, line=line) from error
+
+
+def _line(error: BaseException, path: str) -> int | None:
+    """Return the last line of the file that a traceback passes through."""
+    found, step = None, error.__traceback__
+    while step is not None:
+        if step.tb_frame.f_code.co_filename == path:
+            found = step.tb_lineno
+        step = step.tb_next
+    return found

@@ -1,0 +1,1 @@
+"""Files of robots, of their trajectories and of their limits."""

@@ -1,0 +1,140 @@
+"""Robots from files."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable
+from os import PathLike, fspath
+from pathlib import Path
+
+from jounce.errors import RobotFileError
+from jounce.io.files.reading import check_allowed
+from jounce.io.robots.faults import Faults
+from jounce.io.robots.mjcf import read_mjcf
+from jounce.io.robots.urdf import read_urdf
+from jounce.io.robots.xml_elements import Element, read_markup
+from jounce.robot.robot import Robot
+
+__all__ = ["load_robot"]
+
+ENDINGS = (".urdf", ".xml")
+LOOKS = ("visual", "collision")
+XACRO = "is a xacro file, from which a URDF has yet to be made; run: xacro FILE.urdf.xacro > FILE.urdf"
+
+
+def load_robot(
+    path: str | PathLike[str],
+    *,
+    floating_base: bool | str = False,
+    massless: bool = False,
+    strict: bool = False,
+    allow: Iterable[str | PathLike[str]] = (),
+) -> Robot:
+    """Read a robot from a URDF or MJCF file.
+
+    Which of the two it is, the root element says. Only what moves is read: links, joints and their limits, masses and
+    inertias, from MJCF also gravity and the forces of actuators; shapes and meshes need not be there. URDF needs the
+    extra ``robots``, MJCF the extra ``mjcf``.
+
+    Parameters
+    ----------
+    path
+        A file ending in .urdf or .xml.
+    floating_base : bool or str, default False
+        Set the base free, by three slides and three turns, as `Robot.with_floating_base` does; three letters give the
+        sequence of the turns. A base that is only a massless frame with one link fixed to it is left out.
+    massless : bool, default False
+        URDF links that move, have no mass and carry some are meant so: there is no warning of them.
+    strict : bool, default False
+        Make an error of what is warned of.
+    allow
+        Folders besides that of the file that included files and meshes of MJCF may be below.
+
+    Returns
+    -------
+    Robot
+        Its frames, links and joints have the names of the file.
+
+    Raises
+    ------
+    RobotFileError
+        The file cannot be read or describes no possible robot: the message names the file, the line, the entry and the
+        value.
+
+    Warns
+    -----
+    RobotWarning
+        Links are as those of no real robot: negative moments of inertia, one that exceeds the sum of the other two by
+        more than rounding, moments without mass, links that move and have no mass. All is computed with the numbers of
+        the file; one warning names the links.
+
+    Examples
+    --------
+    >>> from jounce.io.robots.loader import load_robot
+    >>> robot = load_robot("examples/robots/scara.urdf")
+    >>> robot.joint_names
+    ('shoulder', 'elbow', 'quill', 'wrist')
+    >>> robot.limits["quill"].effort
+    220.0
+    """
+    name = fspath(path)
+    name = name if isinstance(name, str) else str(name)
+    if not name:
+        raise RobotFileError("the name of a file is needed", value=name)
+    suffix = Path(name).suffix.lower()
+    if suffix == ".xacro":
+        raise RobotFileError(XACRO, path=name)
+    if suffix not in ENDINGS and not Path(name).is_dir():
+        message = f"the kind of a robot file is told by its ending; valid: {', '.join(ENDINGS)}"
+        raise RobotFileError(message, path=name)
+    root, faults = read_markup(name), Faults(name, strict)
+    if root.tag == "robot":
+        _check_expanded(root)
+        robot = read_urdf(root, faults, massless)
+    elif root.tag == "mujoco":
+        if suffix != ".xml":
+            raise RobotFileError("MuJoCo reads MJCF only from files whose names end in .xml; rename it", path=name)
+        robot = read_mjcf(root, faults, check_allowed(allow))
+    else:
+        message = "is no robot file; the root element of a URDF is <robot>, that of an MJCF file is <mujoco>"
+        raise root.error(message, value=f"<{root.tag}>")
+    if (warning := faults.warning()) is not None:
+        warnings.warn(warning, stacklevel=2)
+    if floating_base is False:
+        return robot
+    return _released(robot, "ZYX" if floating_base is True else floating_base, name)
+
+
+def _check_expanded(root: Element) -> None:
+    """Refuse what xacro has yet to work out, where it bears on links and joints."""
+    used = [root]
+    for child in root.children:
+        if child.tag in ("link", "joint"):
+            used += [element for part in child.children if part.tag not in LOOKS for element in part.walk()]
+        if child.tag in ("link", "joint") or child.tag.startswith("xacro:"):
+            used.append(child)
+    for element in used:
+        if element.tag.startswith("xacro:"):
+            raise element.error(XACRO, value=f"<{element.tag}>")
+        for value in element.attributes.values():
+            if "${" in value or "$(" in value:
+                raise element.error(XACRO, value=value)
+
+
+def _released(robot: Robot, sequence: str, path: str) -> Robot:
+    """Return the robot on a floating base, which takes the name world."""
+    joints = list(robot.joints.values())
+    attached = [joint for joint in joints if joint.parent == robot.base]
+    held = {link for closure in robot.closures.values() for link in closure.links}
+    frame = robot.links[robot.base].inertia is None and robot.base not in held
+    if len(attached) == 1 and not attached[0].moving and frame:
+        links = [link for name, link in robot.links.items() if name != robot.base]
+        joints = [joint for joint in joints if joint is not attached[0]]
+        robot = Robot(robot.name, links, joints, robot.gravity, list(robot.closures.values()), robot.strict)
+    if "world" in robot.links:
+        message = (
+            "the robot cannot have a floating base: a link named world carries it; rename that link, or set the robot "
+            "free in the file, by a joint of type floating in a URDF or a <freejoint/> in MJCF"
+        )
+        raise RobotFileError(message, path=path, name="links.world")
+    return robot.with_floating_base(sequence)

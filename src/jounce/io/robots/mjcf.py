@@ -1,0 +1,403 @@
+"""Robots from MJCF files: compiled by MuJoCo, then read body by body."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+import re
+from collections.abc import Iterable
+from os import PathLike
+from typing import Any
+
+import numpy as np
+
+from jounce.errors import JounceError, RobotError, RobotFileError
+from jounce.io.robots.faults import Faults
+from jounce.io.robots.mjcf_files import check_assets, included, quiet_mujoco
+from jounce.io.robots.xml_elements import Element
+from jounce.rigid.inertia import Inertia
+from jounce.robot.floating_base import floating_joints
+from jounce.robot.model import Closure, Joint, Limits, Link, Mimic, leaders
+from jounce.robot.robot import Robot
+from jounce.robot.tree import quaternion_matrix, turn_about
+
+__all__ = ["names_of_bodies", "read_mjcf"]
+
+PLACE = ("pos", "quat", "axisangle", "xyaxes", "zaxis", "euler")
+NUMERIC = {  # attributes whose numbers MuJoCo takes even when they are not finite
+    **dict.fromkeys(("body", "site"), PLACE),
+    "inertial": (*PLACE, "mass", "diaginertia", "fullinertia"),
+    "joint": ("pos", "axis", "range", "ref", "armature", "damping", "frictionloss", "polycoef"),
+    "freejoint": ("armature", "damping", "frictionloss"),
+    "option": ("gravity",),
+    **dict.fromkeys(("motor", "position", "velocity", "damper", "general"), ("gear",)),
+}
+
+
+def read_mjcf(root: Element, faults: Faults, allow: Iterable[str | PathLike[str]] = ()) -> Robot:
+    """Return the robot that an MJCF file describes, as MuJoCo compiles it.
+
+    The base is the link ``world``. Hinges and slides are taken with their anchors and reference positions: a coordinate
+    is MuJoCo's ``qpos``. A ball becomes three turns z, y, x about moving axes, zero in the pose of the file; a free
+    joint three slides along the axes of the world, whose coordinates are the position of the body, and three such
+    turns, zero where its axes are those of the world. Several joints on one body have massless links between them.
+    Bodies and joints without a name are called ``body_1``, ``joint_0`` and so on, by their number in MuJoCo. Armature,
+    damping and friction of joints are kept, with the armature and damping of actuators on them; ranges become limits,
+    and symmetric ranges of force limits of effort. A joint tied to another by a linear equality follows it; active
+    equalities of type connect and weld become closures, named closure_0 and so on where they have no name. Contacts,
+    springs, tendons, gravity compensation and all else that is no body, joint or actuator of a joint are left out.
+
+    Parameters
+    ----------
+    root : Element
+        The element ``<mujoco>``; MuJoCo reads the file again itself.
+    faults : Faults
+        Takes what no real robot has.
+    allow
+        Folders besides that of the file that included files and meshes may be below.
+
+    Raises
+    ------
+    RobotFileError
+        MuJoCo refuses the file, or it holds what a tree of rigid bodies cannot have.
+    """
+    try:
+        mujoco: Any = importlib.import_module("mujoco")
+    except ImportError:
+        message = 'reading MJCF files needs the package mujoco, which is not installed: pip install "jounce[mjcf]"'
+        raise RobotFileError(message, path=root.path) from None
+    parts = [root, *included(root, allow)]
+    for part in parts:
+        _check_numbers(part)
+    try:
+        with quiet_mujoco(mujoco):
+            spec = mujoco.MjSpec.from_file(root.path)
+            _strip(spec, mujoco)
+            check_assets(spec, parts, allow)
+            model = spec.compile()
+    except (ValueError, RuntimeError, OSError) as error:
+        raise _refused(str(error), root) from None
+    return _Reader(root, mujoco, spec, model, faults).robot()
+
+
+def _check_numbers(root: Element) -> None:
+    """Refuse numbers that are not finite, some of which MuJoCo takes, and deformable parts, whose files it reads."""
+    names = {element.attributes.get(key) for element in root.walk() for key in ("name", "class")}
+    for element in root.walk():
+        if element.tag in ("flex", "flexcomp"):
+            raise element.error("has deformable parts (flex), which no rigid body stands for")
+        numeric = NUMERIC.get(element.tag, ())
+        for key, text in element.attributes.items():
+            words = text.split()
+            if key in numeric or (text not in names and any(re.fullmatch(r"[+-]?nan", word, re.I) for word in words)):
+                element.numbers(key, len(words), element.attributes.get("name") or element.tag, key)
+
+
+def _refused(says: str, root: Element) -> RobotFileError:
+    """Return MuJoCo's own message as an error with the place that it names."""
+    line = re.search(r"[Ll]ine (?:number=)?(\d+)", says)
+    name = re.search(r"[Ee]lement (?:name )?'([^']+)'", says)
+    words = re.sub(r"\s*\n?Element (?:name )?'.*", "", says, flags=re.DOTALL)
+    words = " ".join(
+        ascii(re.sub(r"^(?:XML )?Error: (?:Error: )?", "", words.strip()))[1:-1].replace("\\n", " ").split()
+    )
+    advice = ""
+    if "opening file" in words and (name is None or name.group(1) != "include"):
+        advice = (
+            "; meshes are needed only for bodies without an <inertial>: give those bodies one, or put the file where "
+            "the model looks for it"
+        )
+    elif "mass and inertia of moving bodies" in words:
+        advice = "; give the body an <inertial> with a mass and an inertia, or a <geom> with a size"
+    return RobotFileError(
+        f"MuJoCo cannot use this: {words}{advice}",
+        path=root.path,
+        line=None if line is None else int(line.group(1)),
+        name=None if name is None else ascii(name.group(1))[1:-1],
+    )
+
+
+def _strip(spec: Any, mujoco: Any) -> None:
+    """Take away what does not bear on the motion of rigid bodies, so that no mesh or texture has to be there.
+
+    A shape stays where it gives a body its mass.
+    """
+    spec.compiler.fusestatic = False  # or bodies without joints would lose their frames
+    joint = mujoco.mjtTrn.mjTRN_JOINT
+    unused = [actuator for actuator in spec.actuators if actuator.trntype != joint]
+    for parts in (spec.sensors, spec.pairs, spec.excludes, spec.tendons, spec.keys, spec.tuples, spec.skins):
+        unused += list(parts)
+    unused += [e for e in spec.equalities if e.type == mujoco.mjtEq.mjEQ_TENDON and not e.active]
+    always = spec.compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
+    kept = []
+    for body in spec.bodies:
+        moves = body.name != "world" and (always or not body.explicitinertial)
+        for shape in body.geoms:
+            (kept if moves and _weighs(shape, spec.compiler) else unused).append(shape)
+    for shape in kept:
+        shape.material = ""
+    used = {shape.meshname for shape in kept}
+    unused += [*spec.materials, *spec.textures, *spec.hfields, *[mesh for mesh in spec.meshes if mesh.name not in used]]
+    for part in unused:
+        spec.delete(part)
+
+
+def _weighs(shape: Any, compiler: Any) -> bool:
+    """Whether a shape has a part in the mass of its body; its mass is NaN where it follows from the density."""
+    first, last = compiler.inertiagrouprange
+    return bool(first <= shape.group <= last and (shape.density if np.isnan(shape.mass) else shape.mass) > 0)
+
+
+class _Reader:
+    """Turns a compiled model into links and joints."""
+
+    def __init__(self, root: Element, mujoco: Any, spec: Any, model: Any, faults: Faults):
+        self.root, self.mujoco, self.spec, self.model, self.faults = root, mujoco, spec, model, faults
+        kinds = ("free", "ball", "hinge", "slide")
+        self.kind = {name: int(getattr(mujoco.mjtJoint, f"mjJNT_{name.upper()}")) for name in kinds}
+        self.bodies = names_of_bodies(model)
+        self.joint_names = _names([model.joint(k).name for k in range(model.njnt)], "joint")
+        self.lines = {f"joints.{self.joint_names[joint.id]}": _line(joint.info) for joint in spec.joints}
+        self.lines |= {f"links.{self.bodies[body.id]}": _line(body.info) for body in spec.bodies}
+        self.links: list[Link] = []
+        self.joints: list[Joint] = []
+        self.held: dict[str, float] = {}
+        self.mimics: dict[str, Mimic] = {}
+        self.closures: list[Closure] = []
+        self.efforts = _efforts(model, mujoco)
+
+    def error(self, message: str, name: str, **value: Any) -> RobotFileError:
+        """Return an error about a joint or link, with its line."""
+        key = name
+        while key and key not in self.lines:
+            key = key.rpartition(".")[0]
+        return RobotFileError(message, path=self.root.path, line=self.lines.get(key), name=ascii(name)[1:-1], **value)
+
+    def robot(self) -> Robot:
+        """Return the robot."""
+        model = self.model
+        if model.nflex:
+            raise RobotFileError(
+                "has deformable parts (flex), which rigid bodies cannot stand for", path=self.root.path
+            )
+        self._tie()
+        weightless = model.opt.disableflags & int(self.mujoco.mjtDisableBit.mjDSBL_GRAVITY)
+        try:
+            for k in range(model.nbody):
+                self._body(k)
+            gravity = (0.0, 0.0, 0.0) if weightless else model.opt.gravity
+            name = self.root.attributes.get("model") or "robot"
+            robot = Robot(name, self.links, self.joints, gravity, self.closures)
+            return robot.locked(self.held) if self.held else robot
+        except RobotFileError:
+            raise
+        except RobotError as error:
+            raise self.error(error.message, error.name or "", value=error.value) from None
+
+    def _tie(self) -> None:
+        """Read what joints have to do with one another, and what closes loops."""
+        model, kinds = self.model, self.mujoco.mjtEq
+        lines = [_line(equality.info) for equality in self.spec.equalities]
+        names = _names([model.equality(k).name for k in range(model.neq)], "closure")
+        for k in np.flatnonzero(model.eq_active0):
+            kind, name = model.eq_type[k], model.equality(int(k)).name
+            place = {"path": self.root.path, "line": lines[k], "name": f"equality.{name}" if name else "equality"}
+            self.lines[f"closures.{names[k]}"] = lines[k]
+            if kind in (int(kinds.mjEQ_CONNECT), int(kinds.mjEQ_WELD)):
+                self.closures.append(self._closure(k, names[k]))
+                continue
+            if kind != int(kinds.mjEQ_JOINT):
+                word = kinds(int(kind)).name.removeprefix("mjEQ_").lower()
+                message = (
+                    f"an active equality of type {word} ties parts together as no joint or closure can; remove it, or "
+                    "set active='false'"
+                )
+                raise RobotFileError(message, **place)
+            first, second = int(model.eq_obj1id[k]), int(model.eq_obj2id[k])
+            coefficients = model.eq_data[k][:5]
+            name = self.joint_names[first]
+            scalar = all(
+                model.jnt_type[j] in (self.kind["hinge"], self.kind["slide"]) for j in (first, second) if j >= 0
+            )
+            if not scalar or name in self.mimics or name in self.held:
+                message = "ties a joint of several coordinates, or one that is tied already"
+                raise RobotFileError(message, **place, value=name)
+            start = self._reference(first) + coefficients[0]
+            if second < 0:
+                self.held[name] = float(start)
+            elif any(coefficients[2:]):
+                message = "a joint can follow another linearly only; make the last three of polycoef zero"
+                raise RobotFileError(message, **place, value=coefficients.tolist())
+            else:
+                slope = float(coefficients[1])
+                offset = float(start - slope * self._reference(second))
+                self.mimics[name] = Mimic(self.joint_names[second], slope, offset)
+        self.mimics = leaders(self.mimics)
+
+    def _closure(self, k: Any, name: str) -> Closure:
+        """Return a connect or weld: its anchors and its relative pose as MuJoCo holds them."""
+        model, data = self.model, self.model.eq_data[k]
+        weld = model.eq_type[k] == int(self.mujoco.mjtEq.mjEQ_WELD)
+        numbers = (int(model.eq_obj1id[k]), int(model.eq_obj2id[k]))
+        if model.eq_objtype[k] == int(self.mujoco.mjtObj.mjOBJ_SITE):
+            ends = [
+                (int(model.site_bodyid[i]), model.site_pos[i], quaternion_matrix(model.site_quat[i])) for i in numbers
+            ]
+            points, rotation = [position for _, position, _ in ends], ends[0][2] @ ends[1][2].T
+            numbers = tuple(body for body, _, _ in ends)
+        elif weld:  # the anchor is kept in the frame of the second body, and where it has to be in that of the first
+            points, rotation = [data[3:6], data[0:3]], quaternion_matrix(data[6:10])
+        else:
+            points, rotation = [data[0:3], data[3:6]], None
+        turning = weld and data[10] != 0  # a weld without torque holds a point only
+        links = (self.bodies[numbers[0]], self.bodies[numbers[1]])
+        return Closure(name, links, "weld" if turning else "connect", points, rotation=rotation if turning else None)
+
+    def _reference(self, joint: int) -> float:
+        return float(self.model.qpos0[self.model.jnt_qposadr[joint]])
+
+    def _body(self, k: int) -> None:
+        """Add the link of a body, the joints that move it, and the massless links between these."""
+        model, name = self.model, self.bodies[k]
+        inertia = None
+        if model.body_mass[k] > 0 or model.body_inertia[k].any():
+            try:
+                principal = Inertia(model.body_mass[k], tensor=model.body_inertia[k], strict=False)
+                inertia = principal.moved(model.body_ipos[k], quaternion_matrix(model.body_iquat[k]))
+            except JounceError as error:
+                raise self.error(error.message, f"links.{name}.{error.name}", value=error.value) from None
+            self.faults.check(principal, name, self.lines.get(f"links.{name}"))
+        self.links.append(Link(name, inertia))
+        if k == 0:
+            return
+        parent = self.bodies[model.body_parentid[k]]
+        position, rotation = np.array(model.body_pos[k]), quaternion_matrix(model.body_quat[k])
+        numbers = range(model.body_jntadr[k], model.body_jntadr[k] + model.body_jntnum[k])
+        for j in numbers:
+            anchor, last = np.array(model.jnt_pos[j]), j == numbers[-1]
+            here = name if last and not anchor.any() else self._unused(f"{name}_{self.joint_names[j]}")
+            if model.jnt_type[j] == self.kind["free"]:
+                self._expand(j, parent, name, np.zeros(3), np.eye(3))
+                return
+            if here != name:
+                self.links.append(Link(here))
+            if model.jnt_type[j] == self.kind["ball"]:
+                self._expand(j, parent, here, position + rotation @ anchor, rotation)
+            else:
+                self._single(j, parent, here, position + rotation @ anchor, rotation)
+            parent, position, rotation = here, -anchor, np.eye(3)
+        if parent != name:
+            self.joints.append(Joint(self._unused(f"{name}_fixed"), parent, name, "fixed", position, rotation))
+
+    def _unused(self, name: str) -> str:
+        """Return a name that no body, joint or link has."""
+        taken = {*self.bodies, *self.joint_names, *(link.name for link in self.links), *(j.name for j in self.joints)}
+        while name in taken:
+            name += "_"
+        return name
+
+    def _single(self, j: int, parent: str, child: str, position: np.ndarray, rotation: np.ndarray) -> None:
+        """Add a hinge or a slide; the pose in the file is that at its reference coordinate."""
+        model, dof, name = self.model, self.model.jnt_dofadr[j], self.joint_names[j]
+        turning, axis, reference = model.jnt_type[j] == self.kind["hinge"], model.jnt_axis[j], self._reference(j)
+        if turning and reference:
+            rotation = rotation @ turn_about(axis, -reference)
+        elif reference:
+            position = position - rotation @ axis * reference
+        if model.dof_dampingpoly[dof].any():
+            raise self.error("damping must be one number, proportional to the velocity", f"joints.{name}.damping")
+        limited = bool(model.jnt_limited[j])
+        lower, upper = (float(value) for value in model.jnt_range[j]) if limited else (None, None)
+        kind = "prismatic" if not turning else "revolute" if limited else "continuous"
+        armature, damping = self._of_drives(j)
+        self.joints.append(
+            Joint(
+                name,
+                parent,
+                child,
+                kind,
+                position,
+                rotation,
+                axis,
+                limits=Limits(lower=lower, upper=upper, effort=self.efforts.get(j)),
+                mimic=self.mimics.get(name),
+                armature=armature,
+                damping=damping,
+                friction=float(model.dof_frictionloss[dof]),
+            )
+        )
+
+    def _of_drives(self, j: int) -> tuple[float, float]:
+        """Return armature and damping of a joint, with those of its actuators times the square of the gear."""
+        model = self.model
+        armature, damping = (float(values[model.jnt_dofadr[j]]) for values in (model.dof_armature, model.dof_damping))
+        for k in np.flatnonzero(model.actuator_trnid[:, 0] == j):
+            gear = float(model.actuator_gear[k, 0]) ** 2
+            if np.any(model.actuator_dampingpoly[k]):
+                raise self.error("damping of an actuator must be one number", f"joints.{self.joint_names[j]}.damping")
+            armature += gear * float(model.actuator_armature[k])
+            damping += gear * float(np.ravel(model.actuator_damping[k])[0])
+        return armature, damping
+
+    def _expand(self, j: int, parent: str, child: str, position: np.ndarray, rotation: np.ndarray) -> None:
+        """Add the slides and turns that a free joint or a ball stands for."""
+        model, name, dof = self.model, self.joint_names[j], self.model.jnt_dofadr[j]
+        links, joints = floating_joints(child, prefix=name)
+        if model.jnt_type[j] == self.kind["ball"]:
+            links, joints = links[3:], joints[3:]
+        for field, values in (("armature", model.dof_armature), ("damping", model.dof_damping)):
+            if values[dof : dof + len(joints)].any():
+                message = f"{field} of a ball or free joint has no counterpart in slides and turns; set it to zero"
+                raise self.error(message, f"joints.{name}.{field}", value=values[dof : dof + len(joints)].tolist())
+        if model.dof_frictionloss[dof : dof + len(joints)].any():
+            message = "of a ball or free joint has no counterpart in slides and turns; set it to zero"
+            raise self.error(message, f"joints.{name}.frictionloss")
+        self.links += links[1:]
+        first = dataclasses.replace(joints[0], parent=parent, position=position, rotation=rotation)
+        self.joints += [first, *joints[1:]]
+
+
+def names_of_bodies(model: Any) -> list[str]:
+    """Return the names of the links that the bodies of a compiled model become, by number."""
+    return _names([model.body(k).name for k in range(model.nbody)], "body")
+
+
+def _names(given: list[str], kind: str) -> list[str]:
+    """Return the names, with others for those that are empty."""
+    names = list(given)
+    for k, name in enumerate(names):
+        if not name:
+            name = f"{kind}_{k}"
+            while name in names:
+                name += "_"
+            names[k] = name
+    return names
+
+
+def _line(info: str) -> int | None:
+    found = re.search(r"line (\d+)", info)
+    return None if found is None else int(found.group(1))
+
+
+def _efforts(model: Any, mujoco: Any) -> dict[int, float]:
+    """Return the largest force of each joint where its own range, or that of its only actuator, is symmetric."""
+    found: dict[int, float] = {}
+    for j in range(model.njnt):
+        actuators = np.flatnonzero(model.actuator_trnid[:, 0] == j)
+        ranges = []
+        if model.jnt_actfrclimited[j]:
+            ranges.append(model.jnt_actfrcrange[j])
+        if len(actuators) == 1:
+            k = actuators[0]
+            gear = float(model.actuator_gear[k, 0])
+            plain = model.actuator_gaintype[k] == int(mujoco.mjtGain.mjGAIN_FIXED)
+            plain = plain and model.actuator_biastype[k] == int(mujoco.mjtBias.mjBIAS_NONE)
+            plain = plain and model.actuator_dyntype[k] == int(mujoco.mjtDyn.mjDYN_NONE)
+            if model.actuator_forcelimited[k]:
+                ranges.append(model.actuator_forcerange[k] * gear)
+            elif plain and model.actuator_ctrllimited[k]:
+                ranges.append(model.actuator_ctrlrange[k] * model.actuator_gainprm[k, 0] * gear)
+        symmetric = [float(abs(high)) for low, high in ranges if low == -high and high != 0]
+        if symmetric:
+            found[j] = min(symmetric)
+    return found

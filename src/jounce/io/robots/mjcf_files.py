@@ -1,0 +1,111 @@
+"""The files that an MJCF file names, checked before MuJoCo reads them, and its warnings, kept from its log file."""
+
+from __future__ import annotations
+
+import os
+import re
+import warnings
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from jounce.errors import RobotFileError
+from jounce.io.files.reading import MAX_SAMPLES, named_file, read_file
+from jounce.io.robots.xml_elements import Element, read_markup
+
+__all__ = ["check_assets", "included", "quiet_mujoco"]
+
+
+@contextmanager
+def quiet_mujoco(mujoco: Any) -> Iterator[None]:
+    """Keep what MuJoCo warns of, which is about simulations, from Python and from a log file in the working folder."""
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda _message: None)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    finally:
+        mujoco.set_mju_user_warning(before)
+
+
+def included(root: Element, allow: Iterable[str | PathLike[str]] = ()) -> list[Element]:
+    """Return the roots of all files that an MJCF file includes or attaches, each of them once.
+
+    MuJoCo looks for them beside the main file, and then beside the one that names them.
+
+    Raises
+    ------
+    RobotFileError
+        One cannot be read, or lies where it may not.
+    """
+    found: dict[str, Element] = {}
+    waiting = [root]
+    while waiting:
+        holder = waiting.pop()
+        for element in holder.walk():
+            name = element.attributes.get("file", "")
+            if element.tag not in ("include", "model") or not name:
+                continue
+            for folder in dict.fromkeys(Path(file).parent for file in (root.path, holder.path)):
+                path = _named(element, name, root, allow, folder)
+                if os.path.lexists(path):
+                    if path not in found:
+                        found[path] = read_markup(path)
+                        waiting.append(found[path])
+                    break
+    return list(found.values())
+
+
+def _named(
+    element: Element, name: str, root: Element, allow: Iterable[str | PathLike[str]], folder: str | PathLike[str]
+) -> str:
+    """Return the path of a file that an element names."""
+    try:
+        return named_file(name, root.path, allow, folder=folder, error=RobotFileError)
+    except RobotFileError as error:
+        raise element.error(error.message, element.tag, value=name) from None
+
+
+def check_assets(spec: Any, parts: Iterable[Element], allow: Iterable[str | PathLike[str]] = ()) -> None:
+    """Refuse meshes and pictures that lie where they may not, or are no files: MuJoCo reads whatever it is given.
+
+    Parameters
+    ----------
+    spec : mujoco.MjSpec
+        With those only that will be read.
+    parts : iterable of Element
+        The root of the file, and those of the files that it includes.
+    allow
+        Folders besides that of the file that they may be below.
+
+    Raises
+    ------
+    RobotFileError
+        One is refused; MuJoCo says what is missing.
+    """
+    roots = list(parts)
+    folders = list(dict.fromkeys(Path(part.path).parent for part in roots))
+    for tag, asset, file in _asset_files(spec):
+        kept = spec.texturedir if tag == "texture" else spec.meshdir
+        name = str(Path(kept) / (Path(file).name if spec.strippath else file))
+        line = re.search(r"line (\d+)", asset.info)
+        element = Element(tag, {}, roots[0].path, int(line[1]) if line else roots[0].line)
+        for folder in folders:
+            path = _named(element, name, roots[0], allow, folder)
+            if os.path.lexists(path):
+                try:
+                    read_file(path, MAX_SAMPLES, what=f"the {tag}", error=RobotFileError)
+                except RobotFileError as error:
+                    raise element.error(error.message, tag, value=file) from None
+
+
+def _asset_files(spec: Any) -> Iterator[tuple[str, Any, str]]:
+    """Give the kind of each part that comes from a file, the part, and the name of the file."""
+    kinds = {"mesh": spec.meshes, "texture": spec.textures, "hfield": spec.hfields, "skin": spec.skins}
+    for tag, assets in kinds.items():
+        for asset in assets:
+            files = [asset.file, *(asset.cubefiles if tag == "texture" else ())]
+            yield from ((tag, asset, file) for file in files if file)

@@ -1,0 +1,349 @@
+"""Robots from URDF files: checked entry by entry, with the line of each, then read."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from jounce.errors import RobotError, RobotFileError, did_you_mean
+from jounce.io.robots.faults import FOLLOWS_NONE, IDLE, MASSLESS, Faults
+from jounce.io.robots.xml_elements import Element
+from jounce.rigid.inertia import Inertia
+from jounce.robot.floating_base import floating_joints
+from jounce.robot.model import Joint, Limits, Link, Mimic, leaders
+from jounce.robot.robot import Robot
+from jounce.robot.tree import axes_with_z_along, ordered
+
+__all__ = ["read_urdf"]
+
+EXPANDED = ("floating", "planar")
+TYPES = ("continuous", "fixed", "prismatic", "revolute", *EXPANDED)
+LINK_PARTS = ("inertial", "visual", "collision", "contact", "material", "sensor")
+INERTIAL_PARTS = ("origin", "mass", "inertia")
+JOINT_PARTS = ("origin", "parent", "child", "axis", "limit", "dynamics", "mimic", "calibration", "safety_controller")
+SIZES = ("velocity", "acceleration", "deceleration", "jerk", "effort")
+TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+
+
+def read_urdf(root: Element, faults: Faults, massless: bool = False) -> Robot:
+    """Return the robot that a URDF file describes.
+
+    Revolute, continuous, prismatic and fixed joints are taken as they are. A floating joint becomes three slides and
+    three turns, a planar one two slides and a turn, all massless between; what the file says of their limits, damping
+    and friction is left out, since it does not say to which of the coordinates it belongs. An ``<inertial>`` of zero
+    mass and zero inertia is a frame. Limits that are zero are not given, nor is a range from zero to zero. A joint that
+    follows one which itself follows another follows that one.
+
+    Parameters
+    ----------
+    root : Element
+        The element ``<robot>``.
+    faults : Faults
+        Takes what no real robot has.
+    massless : bool, default False
+        Whether links that move and have no mass, but carry some, are no fault.
+
+    Returns
+    -------
+    Robot
+        With the names of the file.
+
+    Raises
+    ------
+    RobotFileError
+        Something is missing or impossible; the message has the line.
+    """
+    links, joints = _named(root, "link"), _named(root, "joint")
+    if not links:
+        raise root.error("a robot needs at least one <link>")
+    lines = _Lines(root)
+    for name, element in links.items():
+        _check_link(element, name)
+        lines.add(element, "links", name)
+    for name, element in joints.items():
+        _check_joint(element, name, links)
+        _add_joint_lines(lines, element, name)
+    made = [_link(name, element, faults) for name, element in links.items()]
+    parts: list[Joint] = []
+    mimics = _mimics(joints, faults)
+    try:
+        for name, element in joints.items():
+            more, expanded = _joints(name, element, mimics)
+            made += more
+            parts += expanded
+            for part in expanded:
+                lines.add(element, "joints", part.name)
+        ordered(_distinct("links", made, root), _distinct("joints", parts, root))
+        robot = Robot(root.attributes.get("name", "robot"), made, parts, strict=False)
+        _check_masses(robot, joints, links, faults, massless)
+        return robot
+    except RobotFileError:
+        raise
+    except RobotError as error:
+        raise lines.placed(error) from None
+
+
+class _Lines:
+    """The elements behind the dotted names that the robot's own checks speak of."""
+
+    def __init__(self, root: Element):
+        self.root = root
+        self.elements: dict[str, Element] = {}
+
+    def add(self, element: Element | None, *name: str) -> None:
+        if element is not None:
+            self.elements.setdefault(".".join(name), element)
+
+    def placed(self, error: RobotError) -> RobotFileError:
+        """Return an error of the robot with the file and the line that it is about."""
+        name = error.name or ""
+        if isinstance(error.value, list) and name in ("links", "joints") and error.value:
+            name = f"{name}.{error.value[-1]}"
+        while name and name not in self.elements:
+            name = name.rpartition(".")[0]
+        element = self.elements.get(name, self.root)
+        shown = None if error.name is None else ascii(error.name)[1:-1]
+        return RobotFileError(error.message, path=element.path, line=element.line, name=shown, value=error.value)
+
+
+def _named(root: Element, tag: str) -> dict[str, Element]:
+    """Return the links or joints by name."""
+    found: dict[str, Element] = {}
+    for element in root.every(tag):
+        name = element.text("name", f"{tag}s")
+        if name in found:
+            raise element.error(f"this name is given twice, first in line {found[name].line}", f"{tag}s", value=name)
+        found[name] = element
+    return found
+
+
+def _distinct(kind: str, parts: list[Any], root: Element) -> dict[str, Any]:
+    """Return links or joints by name; two of one name come from a joint that was expanded."""
+    found: dict[str, Any] = {}
+    for part in parts:
+        if part.name in found:
+            raise root.error("a joint that is expanded needs this name; rename the other", kind, value=part.name)
+        found[part.name] = part
+    return found
+
+
+def _check_link(element: Element, name: str) -> None:
+    where = ("links", name)
+    element.check_children(LINK_PARTS, *where)
+    inertial = element.first("inertial")
+    if inertial is None:
+        return
+    inertial.check_children(INERTIAL_PARTS, *where, "inertial")
+    _check_origin(inertial, *where, "inertial")
+    mass = _part(inertial, "mass", "; give it, or leave out <inertial>", *where, "inertial")
+    tensor = _part(inertial, "inertia", "; six zeros are a point mass", *where, "inertial")
+    mass.text("value", *where, "mass")
+    values = mass.numbers("value", 1, *where, "mass") or [0.0]
+    for key in TENSOR:
+        tensor.text(key, *where, "inertia", key)
+        tensor.numbers(key, 1, *where, "inertia", key)
+    if values[0] < 0:
+        raise mass.error("must be greater than zero", *where, "mass", value=values[0])
+
+
+def _part(element: Element, tag: str, advice: str, *name: str) -> Element:
+    """Return a child that must be there."""
+    part = element.first(tag)
+    if part is None:
+        raise element.error(f"has no <{tag}>{advice}", *name)
+    return part
+
+
+def _check_origin(element: Element, *name: str) -> None:
+    origin = element.first("origin")
+    if origin is not None:
+        for key in ("xyz", "rpy"):
+            origin.numbers(key, 3, *name, "origin")
+        quaternion = origin.numbers("quat_xyzw", 4, *name, "origin")
+        if quaternion is not None and math.hypot(*quaternion) < 1e-9:
+            raise origin.error("quat_xyzw must not be zero", *name, "origin", value=quaternion)
+        if quaternion is not None and "rpy" in origin.attributes:
+            raise origin.error("has both rpy and quat_xyzw; leave one of them out", *name, "origin")
+
+
+def _check_joint(element: Element, name: str, links: dict[str, Element]) -> None:
+    where = ("joints", name)
+    element.check_children(JOINT_PARTS, *where)
+    kind = element.text("type", *where, "type")
+    if kind not in TYPES:
+        raise element.error(f"no joint has this type; {did_you_mean(kind, TYPES)}", *where, "type", value=kind)
+    for role in ("parent", "child"):
+        part = _part(element, role, "", *where)
+        link = part.text("link", *where, role)
+        if link not in links:
+            raise part.error(f"no link has this name; {did_you_mean(link, links)}", *where, role, value=link)
+    _check_origin(element, *where)
+    axis = element.first("axis")
+    if axis is not None:
+        vector = axis.numbers("xyz", 3, *where, "axis")
+        if vector is not None and kind not in ("fixed", "floating") and math.hypot(*vector) < 1e-9:
+            raise axis.error("must have a direction", *where, "axis", value=vector)
+    _check_drive(element, *where)
+    mimic = element.first("mimic")
+    if mimic is not None:
+        mimic.text("joint", *where, "mimic")
+        for key in ("multiplier", "offset"):
+            mimic.numbers(key, 1, *where, "mimic", key)
+        if kind in EXPANDED:
+            raise mimic.error(f"a {kind} joint has several coordinates, it cannot follow another", *where, "mimic")
+
+
+def _check_drive(element: Element, *where: str) -> None:
+    limit, dynamics = element.first("limit"), element.first("dynamics")
+    if limit is not None:
+        for key in ("lower", "upper", *SIZES):
+            none = -math.inf if key == "lower" else math.inf
+            if limit.numbers(key, 1, *where, "limit", key, infinite=True) not in (None, [none]):
+                limit.numbers(key, 1, *where, "limit", key)
+    if dynamics is not None:
+        for key in ("damping", "friction"):
+            dynamics.numbers(key, 1, *where, "dynamics", key)
+
+
+def _add_joint_lines(lines: _Lines, element: Element, name: str) -> None:
+    where = ("joints", name)
+    lines.add(element, *where)
+    for tag in ("parent", "child", "axis", "mimic"):
+        lines.add(element.first(tag), *where, tag)
+    for key in ("damping", "friction"):
+        lines.add(element.first("dynamics"), *where, key)
+
+
+def _given(element: Element, tag: str, key: str, default: Sequence[float]) -> np.ndarray:
+    """Return the numbers of an attribute of the first child of a tag."""
+    part = element.first(tag)
+    values = None if part is None else part.numbers(key, len(default))
+    return np.array(default if values is None else values, float)
+
+
+def _pose(element: Element) -> tuple[np.ndarray, np.ndarray]:
+    """Return the pose of an ``<origin>``: turns about fixed axes, or a quaternion of URDF 1.1."""
+    from scipy.spatial.transform import Rotation
+
+    position, origin = _given(element, "origin", "xyz", (0.0, 0.0, 0.0)), element.first("origin")
+    quaternion = None if origin is None else origin.numbers("quat_xyzw", 4)
+    if quaternion is not None:
+        return position, Rotation.from_quat(quaternion).as_matrix()
+    return position, Rotation.from_euler("xyz", _given(element, "origin", "rpy", (0.0, 0.0, 0.0))).as_matrix()
+
+
+def _link(name: str, element: Element, faults: Faults) -> Link:
+    """Return a link; its inertia is turned from the axes of ``<inertial>`` to those of the link."""
+    inertial = element.first("inertial")
+    if inertial is None:
+        return Link(name)
+    (mass,) = _given(inertial, "mass", "value", (0.0,))
+    xx, xy, xz, yy, yz, zz = (_given(inertial, "inertia", key, (0.0,))[0] for key in TENSOR)
+    tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    if mass == 0 and not tensor.any():
+        return Link(name)
+    inertia = Inertia(float(mass), tensor=tensor, strict=False)
+    at = inertial.first("mass" if mass == 0 else "inertia") or inertial
+    faults.check(inertia, name, at.line)
+    return Link(name, inertia.moved(*_pose(inertial)))
+
+
+def _ends(element: Element) -> tuple[str, str]:
+    """Return parent and child of a joint."""
+    parent, child = (_part(element, role, "").attributes["link"] for role in ("parent", "child"))
+    return parent, child
+
+
+def _joints(name: str, element: Element, mimics: dict[str, Mimic]) -> tuple[list[Link], list[Joint]]:
+    """Return a joint of the file, or those that it is expanded to and the massless links between them."""
+    kind, (parent, child), (position, rotation) = element.attributes["type"], _ends(element), _pose(element)
+    if kind == "fixed":
+        return [], [Joint(name, parent, child, kind, position, rotation)]
+    if kind == "floating":
+        links, parts = floating_joints(child, prefix=name)
+        first = dataclasses.replace(parts[0], parent=parent, position=position, rotation=rotation)
+        return links[1:], [first, *parts[1:]]
+    axis = _given(element, "axis", "xyz", (1.0, 0.0, 0.0))
+    if kind == "planar":
+        return _planar(name, element, axis)
+    damping, friction = (float(_given(element, "dynamics", key, (0.0,))[0]) for key in ("damping", "friction"))
+    kept: dict[str, Any] = {"limits": _limits(name, element), "mimic": mimics.get(name)}
+    kept |= {"damping": damping, "friction": friction}
+    return [], [Joint(name, parent, child, kind, position, rotation, axis=axis, **kept)]
+
+
+def _mimics(joints: dict[str, Element], faults: Faults) -> dict[str, Mimic]:
+    """Return what joints follow; one that follows a joint which is not there is free, as in Pinocchio."""
+    moving = {name: x for name, x in joints.items() if x.attributes["type"] not in ("fixed", *EXPANDED)}
+    leading = [name for name, element in moving.items() if element.first("mimic") is None]
+    found = {}
+    for name, joint in moving.items():
+        mimic = joint.first("mimic")
+        if mimic is None:
+            continue
+        followed = mimic.attributes["joint"]
+        if followed in joints:
+            multiplier, offset = (
+                _given(joint, "mimic", key, (x,))[0] for key, x in (("multiplier", 1.0), ("offset", 0.0))
+            )
+            found[name] = Mimic(followed, float(multiplier), float(offset))
+            continue
+        message = f"must follow a moving joint that follows no other; {did_you_mean(followed, leading)}"
+        faults.add(FOLLOWS_NONE, name, mimic.error(message, "joints", name, "mimic", value=followed))
+    return leaders(found)
+
+
+def _planar(name: str, element: Element, axis: np.ndarray) -> tuple[list[Link], list[Joint]]:
+    """Return two slides across the axis and a turn about it."""
+    axes, (parent, child) = axes_with_z_along(axis / np.linalg.norm(axis)).T, _ends(element)
+    names = [parent, f"{name}_frame_1", f"{name}_frame_2", child]
+    kinds = (("x", "prismatic"), ("y", "prismatic"), ("angle", "continuous"))
+    parts = [
+        Joint(f"{name}_{suffix}", names[k], names[k + 1], kind, axis=axes[k]) for k, (suffix, kind) in enumerate(kinds)
+    ]
+    position, rotation = _pose(element)
+    parts[0] = dataclasses.replace(parts[0], position=position, rotation=rotation)
+    return [Link(frame) for frame in names[1:3]], parts
+
+
+def _limits(name: str, element: Element) -> Limits:
+    limit = element.first("limit")
+    if limit is None:
+        return Limits()
+    values = {key: (limit.numbers(key, 1, infinite=True) or [0.0])[0] for key in (*SIZES, "lower", "upper")}
+    given = {key: values[key] for key in SIZES if values[key] != 0}
+    if element.attributes["type"] != "continuous" and (values["lower"], values["upper"]) != (0, 0):
+        given |= {key: values[key] for key in ("lower", "upper")}
+    try:
+        return Limits(**{key: value for key, value in given.items() if math.isfinite(value)})
+    except RobotError as error:
+        steps = ("joints", name, "limit", *([error.name] if error.name else []))
+        raise limit.error(error.message, *steps, value=error.value) from None
+
+
+def _check_masses(
+    robot: Robot, joints: dict[str, Element], elements: dict[str, Element], faults: Faults, meant: bool
+) -> None:
+    """Note every link that a joint of the file moves and that has no mass, with all that is fixed to it."""
+    heavy = {robot.frames[name].body for name, link in robot.links.items() if link.inertia is not None}
+    idle = {robot.joints[name].child for name in robot.massless_joints}
+    for joint in joints.values():
+        _, link = _ends(joint)
+        if joint.attributes["type"] == "fixed" or robot.frames[link].body in heavy or (meant and link not in idle):
+            continue
+        element = elements[link]
+        inertial = element.first("inertial")
+        mass = None if inertial is None else inertial.first("mass")
+        advice = "give it its mass, or load with massless=True to keep it as a massless piece between joints"
+        if link in idle:
+            advice = "give it, or a link that it carries, a mass"
+        if mass is None:
+            error = element.error(f"<inertial> is missing on a link that moves; {advice}", "links", link)
+        else:
+            message = f"must be greater than zero on a link that moves; {advice}"
+            error = mass.error(message, "links", link, "mass", value=0.0)
+        faults.add(IDLE if link in idle else MASSLESS, link, error)

@@ -1,0 +1,159 @@
+"""XML read into plain elements that know their lines, so that every message about a robot file can name one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from typing import Any
+from xml.parsers import expat
+
+from jounce.errors import RobotFileError, did_you_mean
+from jounce.io.files.entries import dotted
+from jounce.io.files.reading import LARGEST_NUMBER, fault_of_number, read_file
+
+__all__ = ["Element", "read_markup"]
+
+MAX_DEPTH = 2000
+
+
+@dataclass(eq=False)
+class Element:
+    """One element of an XML file: its tag, attributes and children, and the line where it begins."""
+
+    tag: str
+    attributes: dict[str, str]
+    path: str
+    line: int
+    children: list[Element] = field(default_factory=list)
+
+    def first(self, tag: str) -> Element | None:
+        """Return the first child of a tag, None if there is none."""
+        return next((child for child in self.children if child.tag == tag), None)
+
+    def every(self, tag: str) -> list[Element]:
+        """Return all children of a tag."""
+        return [child for child in self.children if child.tag == tag]
+
+    def walk(self) -> Iterator[Element]:
+        """Give the element and all within it, in the order of the file."""
+        waiting: list[Element] = [self]
+        while waiting:
+            element = waiting.pop()
+            yield element
+            waiting.extend(reversed(element.children))
+
+    def error(self, message: str, *name: str, **value: Any) -> RobotFileError:
+        """Return an error at the line of the element, about the entry whose name is given in steps."""
+        return RobotFileError(message, path=self.path, line=self.line, name=dotted(name) or None, **value)
+
+    def text(self, key: str, *name: str) -> str:
+        """Return an attribute that must be there and not be blank."""
+        value = self.attributes.get(key)
+        if value is None:
+            raise self.error(f"<{self.tag}> has no attribute {key}", *name)
+        if not value.strip():
+            raise self.error(f"the attribute {key} of <{self.tag}> is empty", *name, value=value)
+        return value
+
+    def numbers(self, key: str, count: int, *name: str, infinite: bool = False) -> list[float] | None:
+        """Return the finite numbers in an attribute, None if it is not there."""
+        text = self.attributes.get(key)
+        if text is None:
+            return None
+        what = "a finite number" if count == 1 else f"{count} finite numbers"
+        try:
+            values = [float(word) for word in text.split()]
+        except ValueError:
+            values = []
+        usable = infinite or not any(map(fault_of_number, values))
+        if len(values) != count or not usable or any(map(math.isnan, values)) or "_" in text:
+            most = (
+                f" of at most {LARGEST_NUMBER:g}" if values and all(map(math.isfinite, values)) and not usable else ""
+            )
+            raise self.error(f"{key} must be {what}{most}", *name, value=text)
+        return values
+
+    def check_children(self, known: Iterable[str], *name: str) -> None:
+        """Refuse a child whose tag is nearly a known one: what it holds would be left out without a word."""
+        valid = set(known)
+        for child in self.children:
+            near = "" if child.tag in valid else did_you_mean(child.tag, valid, limit=0)
+            if near and abs(len(child.tag) - len(near.split("'")[1])) <= 1:
+                raise child.error(f"unknown element; {near}", *name, value=f"<{child.tag}>")
+
+
+def read_markup(path: str) -> Element:
+    """Read an XML file of at most 10 MB.
+
+    Parameters
+    ----------
+    path : str
+        The file.
+
+    Returns
+    -------
+    Element
+        The root.
+
+    Raises
+    ------
+    RobotFileError
+        The file cannot be read, is empty, or is not well-formed XML: the message has line and column, and what the
+        parser says.
+    """
+    content = read_file(path, error=RobotFileError)
+    if not content.strip():
+        raise RobotFileError("the file is empty", path=path)
+    if b"\0" in content and not content.startswith((b"\xff\xfe", b"\xfe\xff")):
+        line = content.count(b"\n", 0, content.index(b"\0")) + 1
+        raise RobotFileError("is not a text file: robots are read from URDF and MJCF, both XML", path=path, line=line)
+    return _Reader(path).read(content)
+
+
+class _Reader:
+    """Builds elements from the events of the parser."""
+
+    def __init__(self, path: str):
+        self.path = path
+        self.open: list[Element] = []
+        self.root: Element | None = None
+        self.parser = expat.ParserCreate()
+        self.parser.StartElementHandler = self.start
+        self.parser.EndElementHandler = self.end
+        self.parser.EntityDeclHandler = self.entity
+
+    def read(self, content: bytes) -> Element:
+        try:
+            self.parser.Parse(content, True)
+        except expat.ExpatError as error:
+            says = expat.ErrorString(error.code)
+            message = f"is not well-formed XML: {says} at column {error.offset + 1}{self.unclosed()}"
+            raise RobotFileError(message, path=self.path, line=error.lineno) from None
+        except (LookupError, ValueError) as error:
+            raise RobotFileError(f"is in no encoding that can be read: {error}", path=self.path) from None
+        assert self.root is not None  # the parser refuses a file without elements
+        return self.root
+
+    def unclosed(self) -> str:
+        if not self.open:
+            return ""
+        last = self.open[-1]
+        return f"; <{last.tag[:40]}> of line {last.line} is still open there"
+
+    def start(self, tag: str, attributes: dict[str, str]) -> None:
+        element = Element(tag, attributes, self.path, self.parser.CurrentLineNumber)
+        if len(self.open) >= MAX_DEPTH:
+            raise element.error(f"nested more than {MAX_DEPTH} deep")
+        if self.open:
+            self.open[-1].children.append(element)
+        else:
+            self.root = element
+        self.open.append(element)
+
+    def end(self, _tag: str) -> None:
+        self.open.pop()
+
+    def entity(self, name: str, *_rest: object) -> None:
+        message = "declares an entity, which robot files have no use for; write its text where it is used"
+        raise RobotFileError(message, path=self.path, line=self.parser.CurrentLineNumber, value=name)

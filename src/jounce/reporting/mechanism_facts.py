@@ -1,0 +1,387 @@
+"""What a mechanism file holds, counted and put together: what ``jounce inspect`` and a notebook show."""
+
+from __future__ import annotations
+
+import dataclasses
+from os import PathLike, fspath
+from typing import Any, Literal, NotRequired
+
+import numpy as np
+from typing_extensions import TypedDict
+
+from jounce.constraints.base import value_fields
+from jounce.dynamics.start import driven
+from jounce.errors import JounceError, MobilityError
+from jounce.io.files.source import read_source
+from jounce.io.files.units import parse_value
+from jounce.io.mechanisms.keys import OUTPUTS, output_holder
+from jounce.kinematics.assembly import (
+    Trial,
+    check_assembled,
+    check_mobility,
+    freely_moving,
+    put_together,
+    redundant_rows,
+    split,
+)
+from jounce.mechanism import Mechanism, Model, build, time_grid
+from jounce.mechanism.masses import body_mass
+from jounce.mechanism.system import POSITION_COMPONENTS
+from jounce.reporting.summaries import freedom_words
+
+__all__ = ["InspectedMechanism", "MechanismFacts", "inspected", "mechanism_facts", "unit_of_dimension"]
+
+TOLERANCE = 1e-12
+KINDS = ("joints", "drivers", "forces", "initial")
+BASES = {"mass": "kg", "length": "m", "angle": "rad", "time": "s", "ampere": "A", "kelvin": "K"}
+
+
+class ParameterFacts(TypedDict):
+    """A parameter: its value in SI units, and as it was written where that is another."""
+
+    name: str
+    value: float
+    unit: str | None
+    written: str | None
+
+
+class Pose(TypedDict):
+    """Where a body is: m, rad, Euler parameters."""
+
+    position: list[float]
+    angle: NotRequired[float]
+    quaternion: NotRequired[list[float]]
+
+
+class Shift(TypedDict):
+    """How far a body was moved from its guess, m and rad."""
+
+    distance: float
+    angle: float
+
+
+class BodyFacts(TypedDict):
+    """A body: mass, and where it was guessed and put."""
+
+    name: str
+    mass: float | None
+    center_of_mass: list[float] | None
+    inertia: float | list[float] | list[list[float]] | None
+    guess: Pose
+    pose: Pose | None
+    moved: Shift | None
+
+
+class ElementFacts(TypedDict):
+    """A joint, driver, force or initial condition, with what it has of equations and laws."""
+
+    name: str
+    type: str
+    bodies: list[str]
+    rows: NotRequired[int]
+    motion: NotRequired[str]
+    law: NotRequired[str]
+
+
+class OutputFacts(TypedDict):
+    """An output."""
+
+    name: str
+    quantity: str
+    unit: str
+    of: list[str]
+
+
+class Grid(TypedDict):
+    """Instants of a file, s."""
+
+    start: float
+    stop: float
+    count: int
+
+
+class FreedomFacts(TypedDict):
+    """Coordinates, equations and what they leave."""
+
+    coordinates: int
+    equations: int
+    of_drivers: int
+    independent: int
+    of_joints: int
+    left: int
+    redundant: int
+    redundant_among: list[str]
+    moving: list[str]
+    words: str
+    message: str | None
+
+
+class AssemblyFacts(TypedDict):
+    """Whether the bodies can be put together, at which instant, and how far joints are open."""
+
+    status: Literal["assembled", "open"]
+    message: str | None
+    at: float
+    open: float | None
+
+
+class MechanismFacts(TypedDict):
+    """What a mechanism file holds."""
+
+    kind: Literal["mechanism"]
+    title: str
+    space: Literal["planar", "spatial"]
+    gravity: list[float] | None
+    parameters: list[ParameterFacts]
+    joints: list[ElementFacts]
+    drivers: list[ElementFacts]
+    forces: list[ElementFacts]
+    initial: list[ElementFacts]
+    outputs: list[OutputFacts]
+    time: Grid | None
+
+
+class InspectedMechanism(MechanismFacts):
+    """What a mechanism file holds, and how it starts; ``ok`` is whether a solve or a simulation can."""
+
+    file: str | None
+    bodies: list[BodyFacts]
+    freedom: FreedomFacts
+    assembly: AssemblyFacts
+    ok: bool
+
+
+def mechanism_facts(mechanism: Mechanism, path: str | PathLike[str] | None = None) -> dict[str, Any]:
+    """Return what stands in a mechanism, before anything is put together: MechanismFacts.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    path : optional
+        Its file, which says how parameters are written.
+    """
+    return {
+        "kind": "mechanism",
+        "title": mechanism.title,
+        "space": mechanism.space,
+        "gravity": _numbers(mechanism, mechanism.gravity, POSITION_COMPONENTS[mechanism.space]),
+        "parameters": _parameters(mechanism, path),
+        **{kind: [_element(name, x) for name, x in getattr(mechanism, kind).items()] for kind in KINDS},
+        "outputs": [_output(name, x) for name, x in mechanism.outputs.items()],
+        "time": _time(mechanism),
+    }
+
+
+def inspected(mechanism: Mechanism, path: str | PathLike[str] | None = None) -> dict[str, Any]:
+    """Return what there is to know of a mechanism before it moves, as plain data in SI units: InspectedMechanism.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        One that cannot be put together is told of too.
+    path : optional
+        Its file, which says how parameters are written.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> facts = inspected(jn.load("examples/four_bar.yaml"))
+    >>> facts["freedom"]["words"]
+    '1 degree of freedom, driven by theta'
+    >>> [(joint["name"], joint["rows"]) for joint in facts["joints"]]
+    [('A', 2), ('D', 2), ('BC', 1)]
+    """
+    facts, model = mechanism_facts(mechanism, path), build(mechanism)
+    state = _State(mechanism, model, 0.0 if facts["time"] is None else facts["time"]["start"])
+    for kind in ("joints", "drivers"):
+        for element in facts[kind]:
+            element["rows"] = model.rows.count(f"{kind}.{element['name']}")
+    return facts | {
+        "file": None if path is None else fspath(path),
+        "bodies": _bodies(mechanism, model, state.coordinates),
+        "freedom": state.freedom,
+        "assembly": state.assembly,
+        "ok": state.ok,
+    }
+
+
+def _time(mechanism: Mechanism) -> dict[str, Any] | None:
+    if mechanism.time is None:
+        return None
+    instants = time_grid(mechanism.time, mechanism.parameter_values)
+    return {"start": float(instants[0]), "stop": float(instants[-1]), "count": len(instants)}
+
+
+class _State:
+    """The mechanism put together at its first instant, and its degrees of freedom there."""
+
+    def __init__(self, mechanism: Mechanism, model: Model, instant: float):
+        self.mechanism, self.model, self.instant = mechanism, model, instant
+        self.coordinates, self.assembly = self._assembled()
+        self.freedom = self._counted()
+        possible = not self.freedom["redundant"] and (self.freedom["left"] == 0 or bool(_masses(mechanism)))
+        self.ok = self.assembly["status"] == "assembled" and possible
+
+    def _trial(self, model: Model) -> Trial | None:
+        return put_together(model, self.instant, TOLERANCE) if model.rows else None
+
+    def _assembled(self) -> tuple[dict[str, Any] | None, dict[str, Any]]:
+        told = {"status": "assembled", "message": None, "at": self.instant, "open": None}
+        model = build(driven(self.mechanism)) if self.mechanism.initial else self.model
+        trial = self._trial(model)
+        if trial is None:
+            return model.guess, told
+        told["open"] = float(np.max(np.abs(trial.gaps))) if np.isfinite(trial.gaps).all() else None
+        try:
+            check_assembled(model, trial, self.instant, TOLERANCE)
+        except JounceError as error:
+            return None, told | {"status": "open", "message": error.message}
+        return trial.coordinates, told
+
+    def _counted(self) -> dict[str, Any]:
+        mechanism, model = self.mechanism, self.model
+        columns = int(model.system.cells.shape[1])
+        if self.coordinates is not None:
+            model = dataclasses.replace(model, guess=self.coordinates)
+        trial = self._trial(model)
+        jacobian = np.zeros((0, columns)) if trial is None else trial.jacobian
+        finite = bool(np.isfinite(jacobian).all())
+        jacobian = jacobian if finite else np.zeros_like(jacobian)
+        left, rank, right = split(jacobian) if len(jacobian) else (np.zeros((0, 0)), 0, np.eye(columns))
+        drives = np.array([name.startswith("drivers.") for name in model.rows], bool)
+        alone = jacobian[~drives]
+        freedom = columns - (split(alone)[1] if len(alone) else 0)
+        redundant = len(model.rows) - rank
+        try:
+            if trial is not None and finite:
+                check_mobility(model, jacobian)
+            message = None
+        except MobilityError as error:
+            message = error.message
+        return {
+            "coordinates": columns,
+            "equations": len(model.rows),
+            "of_drivers": int(drives.sum()),
+            "independent": rank,
+            "of_joints": freedom,
+            "left": columns - rank,
+            "redundant": redundant,
+            "redundant_among": redundant_rows(model, left[:, rank:]).split(", ") if redundant and finite else [],
+            "moving": freely_moving(model, right[rank:]).split(", ") if columns > rank else [],
+            "words": freedom_words(freedom, mechanism.drivers),
+            "message": message,
+        }
+
+
+def _masses(mechanism: Mechanism) -> list[str]:
+    return [name for name, body in mechanism.bodies.items() if body.mass is not None]
+
+
+def _numbers(mechanism: Mechanism, value: Any, size: int) -> list[float] | None:
+    from jounce.mechanism.resolve import resolve
+
+    if value is None:
+        return None
+    return np.reshape(np.asarray(resolve(value, mechanism.parameter_values), float), size).tolist()
+
+
+def _parameters(mechanism: Mechanism, path: Any) -> list[dict[str, Any]]:
+    given = read_source(path).data.get("parameters") or {} if path is not None else mechanism.parameters
+    found = []
+    for name, value in mechanism.parameter_values.items():
+        written = given.get(name)
+        try:
+            dimension = parse_value(written, "any", mechanism.parameters).dimension
+        except JounceError:
+            dimension = None
+        unit = None if dimension is None else unit_of_dimension(dimension)
+        text = written if isinstance(written, str) else getattr(written, "text", None)
+        found.append({"name": name, "value": float(value), "unit": unit, "written": text})
+    order = list(mechanism.parameters)
+    return sorted(found, key=lambda entry: order.index(entry["name"]))
+
+
+def unit_of_dimension(dimension: Any) -> str:
+    """Return the SI unit of a dimension.
+
+    Examples
+    --------
+    >>> unit_of_dimension((("length", 2), ("mass", 1), ("time", -2)))
+    'kg*m^2/s^2'
+    """
+    order = list(BASES)
+    powers = sorted(dimension, key=lambda x: order.index(x[0]) if x[0] in order else 99)
+    over = [_power(base, power) for base, power in powers if power > 0]
+    under = [_power(base, -power) for base, power in powers if power < 0]
+    return "*".join(over or ["1"] * bool(under)) + "".join(f"/{unit}" for unit in under)
+
+
+def _power(base: str, power: int) -> str:
+    unit = BASES.get(base, base)
+    return unit if power == 1 else f"{unit}^{power}"
+
+
+def _bodies(mechanism: Mechanism, model: Model, coordinates: dict[str, Any] | None) -> list[dict[str, Any]]:
+    components, found = POSITION_COMPONENTS[mechanism.space], []
+    attitude = "angle" if components == 2 else "quaternion"
+    for k, (name, body) in enumerate(mechanism.bodies.items(), start=1):
+        mass, center, inertia = body_mass(name, body, mechanism.parameter_values, components, solid=False)
+        given = body.mass is not None
+        guess = _pose(model.guess, k, attitude)
+        pose = None if coordinates is None else _pose(coordinates, k, attitude)
+        found.append({
+            "name": name,
+            "mass": float(mass) if given else None,
+            "center_of_mass": np.asarray(center, float).tolist() if given else None,
+            "inertia": np.asarray(inertia, float).tolist() if body.inertia is not None else None,
+            "guess": guess,
+            "pose": pose,
+            "moved": None if pose is None else _moved(guess, pose, attitude),
+        })  # fmt: skip
+    return found
+
+
+def _pose(coordinates: dict[str, Any], k: int, attitude: str) -> dict[str, Any]:
+    pose = {"position": np.asarray(coordinates["position"])[:, k, 0].tolist()}
+    turned = np.asarray(coordinates[attitude])[..., k, 0]
+    return pose | {attitude: turned.tolist() if attitude == "quaternion" else float(turned)}
+
+
+def _moved(guess: dict[str, Any], pose: dict[str, Any], attitude: str) -> dict[str, float]:
+    """Return how far a body was moved and turned from its guess."""
+    distance = float(np.linalg.norm(np.subtract(pose["position"], guess["position"])))
+    if attitude == "angle":
+        return {"distance": distance, "angle": abs(pose["angle"] - guess["angle"])}
+    first, second = np.array(guess["quaternion"]), np.array(pose["quaternion"])
+    second = second / np.linalg.norm(second) * (1.0 if first @ second >= 0 else -1.0)
+    return {"distance": distance, "angle": float(4 * np.arcsin(min(1.0, np.linalg.norm(second - first) / 2)))}
+
+
+def _element(name: str, element: Any) -> dict[str, Any]:
+    found: dict[str, Any] = {"name": name, "type": element.type_name or type(element).__name__}
+    found["bodies"] = list(element.bodies)
+    fields = value_fields(type(element))
+    for key in ("motion", "law"):
+        if key in fields:
+            found[key] = _law_words(getattr(element, key))
+    return found
+
+
+def _law_words(law: Any) -> str:
+    """Word a law: its expression, or what kind it is."""
+    if isinstance(law, (list, tuple, np.ndarray)):
+        return "[" + ", ".join(map(_law_words, law)) + "]"
+    text = getattr(law, "text", None) or getattr(getattr(law, "expression", None), "text", None)
+    if text:
+        return text
+    if hasattr(law, "breakpoints"):
+        return f"spline of degree {law.degree} through samples" if hasattr(law, "degree") else "piecewise polynomial"
+    return f"{law:.9g}" if isinstance(law, float | int) else str(law) if isinstance(law, str) else type(law).__name__
+
+
+def _output(name: str, output: Any) -> dict[str, Any]:
+    words = [word for word, kind in OUTPUTS if kind is type(output)]
+    holder = output_holder(type(output))
+    of = list(output.bodies) if holder in ("body", "bodies") else [getattr(output, holder)]
+    quantity = (words[-1] if words else type(output).__name__) or "point"
+    return {"name": name, "quantity": quantity, "unit": output.unit, "of": of}

@@ -1,0 +1,131 @@
+"""What there is to know of a motion that was solved or simulated, as plain data in SI units."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from typing_extensions import TypedDict
+
+from jounce.kinematics import Status
+from jounce.mechanism import build
+
+if TYPE_CHECKING:
+    from jounce.kinematics import Motion
+
+__all__ = ["MotionFacts", "SimulationFacts", "motion_facts"]
+
+
+class Span(TypedDict):
+    """Instants of a motion, s."""
+
+    start: float
+    stop: float
+    count: int
+    solved: int
+
+
+class Failure(TypedDict):
+    """An instant that was not solved."""
+
+    index: int
+    time: float
+    status: str
+    culprit: str | None
+
+
+class MotionFacts(TypedDict):
+    """Facts of a motion."""
+
+    title: str
+    space: Literal["planar", "spatial"]
+    bodies: list[str]
+    joints: list[str]
+    drivers: list[str]
+    forces: list[str]
+    order: int
+    time: Span
+    failures: list[Failure]
+    equations_of_joints: int
+    equations_of_drivers: int
+    change_points: list[float]
+
+
+class EnergyFacts(TypedDict):
+    """Energy of a simulation, J; None where no instant was reached."""
+
+    start: float | None
+    largest_change: float | None
+    largest_kinetic: float | None
+
+
+class Kink(TypedDict):
+    """Where a force has a kink or jumps."""
+
+    time: float
+    name: str
+
+
+class SimulationFacts(MotionFacts):
+    """Facts of a simulation."""
+
+    mobility: str
+    steps: int
+    energy: EnergyFacts
+    drift: float | None
+    kinks: list[Kink]
+
+
+def motion_facts(motion: Motion) -> dict[str, Any]:
+    """Return what was solved or simulated: MotionFacts, or SimulationFacts.
+
+    Parameters
+    ----------
+    motion : Motion
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> facts = motion_facts(jn.solve(jn.load("examples/four_bar.yaml"), order=0))
+    >>> facts["drivers"], facts["equations_of_joints"], facts["time"]
+    (['theta'], 5, {'start': 0.0, 'stop': 2.0, 'count': 201, 'solved': 201})
+    """
+    mechanism, times = motion.mechanism, motion.time
+    failed = np.flatnonzero(motion.status != Status.OK)
+    rows = build(mechanism).rows
+    drives = sum(name.startswith("drivers.") for name in rows)
+    span = {"start": float(times[0]), "stop": float(times[-1])}
+    facts = {
+        "title": mechanism.title,
+        "space": mechanism.space,
+        "bodies": list(mechanism.bodies),
+        "joints": list(mechanism.joints),
+        "drivers": list(mechanism.drivers),
+        "forces": list(mechanism.forces),
+        "order": motion.order,
+        "time": span | {"count": len(times), "solved": len(times) - len(failed)},
+        "failures": [
+            {"index": k, "time": times[k], "status": Status(motion.status[k]).name, "culprit": motion.culprits.get(k)}
+            for k in failed.tolist()
+        ],
+        "equations_of_joints": len(rows) - drives,
+        "equations_of_drivers": drives,
+        "change_points": np.asarray(motion.change_points, float).tolist(),
+    }
+    return facts | _simulated(motion) if hasattr(motion, "energy") else facts
+
+
+def _simulated(motion: Any) -> dict[str, Any]:
+    reached = motion.status == Status.OK
+    some, energy = bool(reached.any()), motion.energy[reached]
+    return {
+        "mobility": motion.mobility,
+        "steps": motion.steps,
+        "energy": {
+            "start": energy[0] if some else None,
+            "largest_change": np.max(np.abs(energy - energy[0])) if some else None,
+            "largest_kinetic": np.max(motion.kinetic_energy[reached]) if some else None,
+        },
+        "drift": np.max(motion.drift[reached]) if some else None,
+        "kinks": [{"time": time, "name": name} for time, name in motion.kinks],
+    }

@@ -1,0 +1,180 @@
+"""How mechanisms, motions, robots, trajectories and batches show themselves in a notebook: small HTML tables."""
+
+from __future__ import annotations
+
+import dataclasses
+import html
+import warnings
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from jounce.errors import JounceError, SampleWarning
+from jounce.reporting.mechanism_facts import mechanism_facts
+from jounce.reporting.motion_facts import motion_facts
+from jounce.reporting.peaks import peaks
+from jounce.reporting.robot_facts import robot_facts
+from jounce.reporting.summaries import count
+from jounce.reporting.tables import Table, mechanism_tables, number, peaks_table, robot_tables, table
+
+__all__ = ["shown"]
+
+ROWS = 30  # of a table, before the rest is counted
+# Colours are left to the page, so that light and dark themes both fit; lines are see-through grey.
+STYLE = (
+    "<style scoped>.jounce{font-size:90%}.jounce table{border-collapse:collapse;margin:.3em 0 .6em}"
+    ".jounce th,.jounce td{text-align:left;padding:.15em .8em .15em 0;border-bottom:1px solid rgba(128,128,128,.3);"
+    "background:transparent;color:inherit}.jounce td.n,.jounce th.n{text-align:right;"
+    "font-variant-numeric:tabular-nums}"
+    ".jounce caption{text-align:left;font-weight:bold;color:inherit;white-space:nowrap}"
+    ".jounce .bad{font-weight:bold;text-decoration:underline}.jounce p{margin:.2em 0}</style>"
+)
+
+
+def shown(thing: Any) -> str:
+    """Return the HTML that a notebook shows of a mechanism, motion, simulation, robot, trajectory or batch.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> page = shown(jn.load("examples/four_bar.yaml"))
+    >>> "Planar four-bar" in page, page.count("<table>")
+    (True, 5)
+    """
+    from jounce.integrate import Batch
+    from jounce.kinematics import Motion
+    from jounce.mechanism import Mechanism
+    from jounce.robot import Robot
+    from jounce.trajectory import JointTrajectory
+
+    kinds: tuple[tuple[type, Any], ...] = (
+        (Mechanism, _mechanism),
+        (Motion, _motion),
+        (Robot, _robot),
+        (JointTrajectory, _trajectory),
+        (Batch, _batch),
+    )
+    parts = next(show for kind, show in kinds if isinstance(thing, kind))(thing)
+    return f'<div class="jounce">{STYLE}{"".join(parts)}</div>'
+
+
+def _text(value: Any) -> str:
+    return html.escape(str(value))
+
+
+def _title(title: str, *lines: str) -> list[str]:
+    return [f"<p><b>{_text(title)}</b></p>", *(f"<p>{_text(line)}</p>" for line in lines if line)]
+
+
+def _tables(found: Iterable[Table]) -> list[str]:
+    """Return tables as HTML; names are escaped, long ones are cut at ROWS rows."""
+    return [_table(each) for each in found if each.rows]
+
+
+def _table(table: Table) -> str:
+    def cells(tag: str, row: Sequence[str]) -> str:
+        marks = [' class="n"' if k in table.numbers else "" for k in range(len(row))]
+        return "".join(f"<{tag}{m}>{_text(x)}</{tag}>" for m, x in zip(marks, row, strict=True))
+
+    body = "".join(f"<tr>{cells('td', row)}</tr>" for row in table.rows[:ROWS])
+    if len(table.rows) > ROWS:
+        body += f'<tr><td colspan="{len(table.headings)}">and {len(table.rows) - ROWS} more</td></tr>'
+    head = f"<thead><tr>{cells('th', table.headings)}</tr></thead>"
+    return f"<table><caption>{_text(table.title)}</caption>{head}<tbody>{body}</tbody></table>"
+
+
+def _written(value: Any) -> str:
+    """Word a value as it was given: a number, an expression of parameters, or a list of them."""
+    if value is None or isinstance(value, str):
+        return value or "-"
+    if np.shape(value):
+        return "[" + ", ".join(map(_written, value)) + "]"
+    return getattr(value, "text", None) or number(float(value))
+
+
+def _mechanism(mechanism: Any) -> list[str]:
+    bodies = count(len(mechanism.bodies), "moving body", "moving bodies")
+    joints = count(len(mechanism.joints), "joint")
+    title = _title(mechanism.title or "Mechanism", f"{mechanism.space}: {bodies}, {joints}")
+    attitude = "angle" if mechanism.space == "planar" else "orientation"
+    guessed = table(
+        "Bodies, as guessed",
+        ("body", "position/m", "angle/rad" if attitude == "angle" else attitude, "mass/kg"),
+        [
+            [n, _written(b.position), _written(getattr(b, attitude)), "" if b.mass is None else _written(b.mass)]
+            for n, b in mechanism.bodies.items()
+        ],
+    )
+    try:
+        return [*title, *_tables(mechanism_tables(mechanism_facts(mechanism), guessed))]
+    except JounceError as error:  # of parameters that go in a circle
+        return [*title, *_title(str(error)), *_tables([guessed])]
+
+
+def _motion(motion: Any) -> list[str]:
+    facts = motion_facts(motion)
+    time = facts["time"]
+    solved = f"{time['solved']} of {count(time['count'], 'instant')} solved"
+    line = f"{solved}, t = {time['start']:g} s to {time['stop']:g} s, order {facts['order']}"
+    lines = _title(facts["title"] or "Motion", line)
+    if facts["failures"]:
+        first = facts["failures"][0]
+        place = f" ({first['culprit']})" if first["culprit"] else ""
+        word = first["status"].lower().replace("_", " ")
+        told = _text(f"t = {first['time']:g} s: {word}{place}")
+        lines.append(f'<p class="bad">{told}</p>')
+    if "steps" in facts:
+        told = [facts["mobility"], count(facts["steps"], "step")]
+        if time["solved"]:
+            energy = facts["energy"]
+            told.append(f"energy {energy['start']:.6g} J at the start, changes by {energy['largest_change']:.2g} J")
+            told.append(f"constraint drift {facts['drift']:.1e}")
+        lines += [f"<p>{_text(line)}</p>" for line in told]
+    if not motion.mechanism.outputs:
+        return [*lines, "<p>No outputs are defined.</p>"]
+    return [*lines, *_tables([dataclasses.replace(peaks_table(peaks(motion)), title="Peaks")])]
+
+
+def _robot(robot: Any) -> list[str]:
+    facts = robot_facts(robot)
+    joints, links = count(len(robot.joint_names), "coordinate"), count(len(facts["links"]), "link")
+    line = f"{joints}, {links}, {facts['mass']:.6g} kg, on {facts['base']}"
+    return [*_title(facts["title"], line), *_tables(robot_tables(facts))]
+
+
+def _trajectory(trajectory: Any) -> list[str]:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SampleWarning)  # ranges only
+        values = np.asarray(trajectory.derivatives(trajectory.times, order=3))
+    names = ("position", "velocity", "acceleration", "jerk")
+    rows = []
+    for k, name in enumerate(trajectory.names):
+        spans = [f"{number(values[:, d, k].min())} to {number(values[:, d, k].max())}" for d in range(4)]
+        rows.append([name, type(trajectory.laws[name]).__name__, *spans])
+    joints = count(len(rows), "joint")
+    line = f"{joints}, t = {trajectory.start:g} s to {trajectory.stop:g} s, {count(len(trajectory.times), 'instant')}"
+    headings = ("joint", "law", *(f"{name}, SI" for name in names))
+    return [*_title("Joint trajectory", line), *_tables([Table("Ranges", headings, rows)])]
+
+
+def _batch(batch: Any) -> list[str]:
+    from jounce.kinematics import Status
+
+    whole = (batch.status == Status.OK).all(axis=1)
+    line = f"{int(whole.sum())} of {count(len(whole), 'run')} complete, {count(len(batch.time), 'instant')}"
+    parameters = [[name, number(x.min()), number(x.max())] for name, x in batch.parameters.items()]
+    outputs = []
+    for name, values in batch.outputs.items():
+        finite = values[np.isfinite(values).all(axis=tuple(range(1, values.ndim)))]
+        first = np.take(finite, 0, axis=2) if finite.size else np.full((1, 1), np.nan)
+        outputs.append([name, " x ".join(map(str, values.shape)), number(first.min()), number(first.max())])
+    return [
+        *_title("Batch of simulations", line, f"t = {batch.time[0]:g} s to {batch.time[-1]:g} s"),
+        *_tables(
+            [
+                Table("Parameters (SI)", ("name", "smallest", "largest"), parameters, (1, 2)),
+                Table("Outputs of complete runs (SI)", ("output", "shape", "smallest", "largest"), outputs, (2, 3)),
+            ]
+        ),
+    ]

@@ -1,0 +1,309 @@
+"""Smallest and largest values of the outputs of a motion and of their derivatives, with their times and units."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+import warnings
+from typing import Any
+
+import numpy as np
+
+from jounce.dynamics.limits import local_maxima
+from jounce.errors import SampleWarning
+from jounce.kinematics import solve
+
+__all__ = ["Peak", "derivative_name", "derivative_unit", "peaks", "rate_name", "scalar_outputs", "table_peaks"]
+
+NAMES = ("position", "velocity", "acceleration", "jerk", "jounce")
+LEAST = 200  # instants that are looked at, at least
+PEAKS, POINTS, ROUNDS = 2, 7, 3  # highest maxima of each curve, instants around each, and how often these close in
+CHUNK = 1000  # instants solved together
+ROUNDING = 1e-9
+SMALLEST = 1e-15  # share of the size of an output
+
+
+@dataclasses.dataclass(frozen=True)
+class Peak:
+    """Extreme values of one derivative of one output, on the instants that were solved and between them.
+
+    Parameters
+    ----------
+    output : str
+        Name of the output, with its component where it has some: ``C_x``.
+    derivative : str
+        ``position``, ``velocity``, ..., or ``torque``, ``yank``, ..., see `rate_name`.
+    unit : str
+    minimum, maximum : float
+        In the unit; NaN where no instant was solved.
+    minimum_at, maximum_at : float
+        Where they are reached, s.
+    size : float
+        The largest magnitude that any component of the output has in this derivative.
+    """
+
+    output: str
+    derivative: str
+    unit: str
+    minimum: float
+    minimum_at: float
+    maximum: float
+    maximum_at: float
+    size: float
+
+    @property
+    def shown(self) -> tuple[float, float]:
+        """The minimum and the maximum, 0 where they are no more than rounding of the other components."""
+        low, high = (0.0 if abs(x) < SMALLEST * self.size else x for x in (self.minimum, self.maximum))
+        return low, high
+
+    @property
+    def largest(self) -> tuple[bool, bool]:
+        """Whether the minimum and the maximum have the largest magnitude; both where they differ by rounding only."""
+        low, high = abs(self.minimum), abs(self.maximum)
+        near = 1e-12 * self.size
+        varies = self.maximum - self.minimum > near
+        return varies and low >= high - near, varies and high >= low - near
+
+
+def derivative_name(order: int) -> str:
+    """Name a time derivative of a position or an angle.
+
+    Examples
+    --------
+    >>> [derivative_name(k) for k in (0, 3, 4, 5, 22)]
+    ['position', 'jerk', 'jounce', '5th', '22nd']
+    """
+    if order < len(NAMES):
+        return NAMES[order]
+    last = order % 10 if order // 10 % 10 != 1 else 0
+    return str(order) + {1: "st", 2: "nd", 3: "rd"}.get(last, "th")
+
+
+def rate_name(output: Any, order: int) -> str:
+    """Name a time derivative of an output: velocity, jerk, ..., or for a force yank, second rate, ...
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> [rate_name(jn.AngleOutput("crank"), k) for k in (0, 1, 4)]
+    ['position', 'velocity', 'jounce']
+    >>> [rate_name(jn.DriverTorqueOutput("theta"), k) for k in (0, 1, 2, 6)]
+    ['torque', 'yank', 'second rate', '6th rate']
+    """
+    names = output.rate_names
+    if not names:
+        return derivative_name(order + output.lost_orders)
+    return names[order] if order < len(names) else f"{derivative_name(order)} rate"
+
+
+def derivative_unit(unit: str, order: int) -> str:
+    """Return the unit of a time derivative of a quantity.
+
+    Examples
+    --------
+    >>> derivative_unit("m", 0), derivative_unit("m", 1), derivative_unit("rad/s", 3)
+    ('m', 'm/s', 'rad/s^4')
+    """
+    per_time = re.search(r"/s(?:\^(\d+))?$", unit)
+    base = unit[: per_time.start()] if per_time else unit
+    total = order + (int(per_time[1] or 1) if per_time else 0)
+    return base if total == 0 else f"{base}/s" if total == 1 else f"{base}/s^{total}"
+
+
+def scalar_outputs(motion: Any) -> dict[str, tuple[str, np.ndarray]]:
+    """Return the outputs of a motion one component at a time.
+
+    Returns
+    -------
+    dict
+        For each name, as in the columns of a CSV file, the name of its output and its values, shape (time, order + 1).
+    """
+    found = {}
+    for name, values in motion.outputs.items():
+        if values.ndim == 2:
+            found[name] = name, values
+        else:
+            labels = motion.mechanism.outputs[name].labels
+            found |= {f"{name}_{labels[c]}": (name, values[..., c]) for c in range(values.shape[2])}
+    return found
+
+
+def peaks(motion: Any, *, refine: bool = True) -> list[Peak]:
+    """Return the peak values of each output, component by component, and of each derivative.
+
+    Parameters
+    ----------
+    motion : Motion
+        What was solved.
+    refine : bool, default True
+        Find peaks between its instants too: the motion is solved at more instants where it has few, and then, as often
+        as it takes, around the highest of them. Otherwise only its own instants count.
+
+    Returns
+    -------
+    list of Peak
+        Outputs in the order of the mechanism, derivatives in rising order.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> motion = jn.solve(jn.load("examples/four_bar.yaml"), order=1)
+    >>> [(p.output, p.derivative, p.unit, round(p.maximum, 4), round(p.maximum_at, 3)) for p in peaks(motion)][:2]
+    [('psi', 'position', 'rad', 2.6436, 1.5), ('psi', 'velocity', 'rad/s', 1.5179, 1.069)]
+    """
+    name = "peaks" if refine else "peaks at the instants"
+    if name not in motion.derived:
+        motion.derived[name] = _found(motion, refine)
+    return motion.derived[name]
+
+
+def table_peaks(dataset: Any) -> list[Peak]:
+    """Return the peak values of torques and their rates, at the instants of a dataset only.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Of variables of dimensions time and derivative, with the attribute ``units``: N or N*m.
+    """
+    found = []
+    for name, variable in dataset.data_vars.items():
+        unit = variable.attrs["units"]
+        for order, values in enumerate(variable.transpose("derivative", "time").values):
+            low, high = int(np.argmin(values)), int(np.argmax(values))
+            extremes = [(float(values[k]), float(dataset["time"][k])) for k in (low, high)]
+            (least, least_at), (most, most_at) = extremes
+            told = effort_name(unit, order)
+            size = float(np.abs(values).max())
+            found.append(Peak(str(name), told, derivative_unit(unit, order), least, least_at, most, most_at, size))
+    return found
+
+
+def effort_name(unit: str, order: int) -> str:
+    """Name a torque or a force, or one of its rates.
+
+    Examples
+    --------
+    >>> [effort_name("N*m", k) for k in (0, 1, 2, 3, 5)]
+    ['torque', 'torque rate', 'second rate', 'third rate', '5th rate']
+    """
+    kind = "force" if unit == "N" else "torque"
+    first = (kind, f"{kind} rate", "second rate", "third rate", "fourth rate")
+    return first[order] if order < len(first) else f"{derivative_name(order)} rate"
+
+
+def _found(motion: Any, refine: bool) -> list[Peak]:
+    scalars = scalar_outputs(motion)
+    rows = [(column, name, order) for column, (name, values) in scalars.items() for order in range(values.shape[1])]
+    if not rows:
+        return []
+    times, values = _extremes(motion, refine)
+    extremes = [(-values[k], times[k], values[len(rows) + k], times[len(rows) + k]) for k in range(len(rows))]
+    sizes: dict[tuple[str, int], float] = {}
+    for (_, name, order), (low, _, high, _) in zip(rows, extremes, strict=True):
+        sizes[name, order] = float(np.nanmax([sizes.get((name, order), 0.0), abs(low), abs(high)]))
+    found = []
+    for (column, name, order), numbers in zip(rows, extremes, strict=True):
+        output = motion.mechanism.outputs[name]
+        unit, told = derivative_unit(output.unit, order), [float(x) for x in numbers]
+        found.append(Peak(column, rate_name(output, order), unit, *told, size=sizes[name, order]))
+    return found
+
+
+def _extremes(motion: Any, refine: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Return where each curve is largest and how large, (2 curves,): all curves upside down, then as they are.
+
+    Around the highest instants, the best of a few becomes the middle of a shorter interval, again and again; the last
+    look is at the vertex of the parabola through three of them.
+    """
+    time, values = motion.time, _curves(motion)
+    best = np.argmax(values, axis=0)
+    every = np.arange(values.shape[1])
+    times, sizes = time[best], values[best, every]
+    rounding = ROUNDING * _scales(motion)
+    if refine and len(time) > 1:
+        time, values = _denser(motion, time, values)
+        middle = local_maxima(values, PEAKS)
+        low, high = time[np.maximum(middle - 1, 0)], time[np.minimum(middle + 1, len(time) - 1)]
+        share = np.linspace(0.0, 1.0, POINTS)[:, None, None]
+        near = []
+        for _ in range(ROUNDS):
+            around = low + share * (high - low)
+            own = _own(motion, around)
+            _keep_best(times, sizes, rounding, around, own)
+            top = np.clip(np.argmax(own, axis=0), 1, POINTS - 2)
+            near = [np.take_along_axis(own, np.asarray(top + side)[None], axis=0)[0] for side in (-1, 0, 1)]
+            low, high = (np.take_along_axis(around, np.asarray(top + side)[None], axis=0)[0] for side in (-1, 1))
+        vertex = _vertex(low, high, *near)[None]
+        _keep_best(times, sizes, rounding, vertex, _own(motion, vertex))
+    solved = np.isfinite(sizes)
+    return np.where(solved, times, np.nan), np.where(solved, sizes, np.nan)
+
+
+def _denser(motion: Any, time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return instants and curves with enough instants for no peak to be missed that is no needle."""
+    steps = -(-LEAST // (len(time) - 1))
+    if steps == 1:
+        return time, values
+    between = (time[:-1, None] + np.diff(time)[:, None] * np.arange(1, steps) / steps).ravel()
+    whole = np.concatenate([time, between])
+    order = np.argsort(whole)
+    return whole[order], np.concatenate([values, _at(motion, between)])[order]
+
+
+def _own(motion: Any, around: np.ndarray) -> np.ndarray:
+    """Return the values of curves at instants of their own, (points, peaks, curves)."""
+    wanted, places = np.unique(around, return_inverse=True)
+    values = _at(motion, wanted)
+    return values[places.reshape(around.shape), np.arange(around.shape[-1])]
+
+
+def _at(motion: Any, instants: np.ndarray) -> np.ndarray:
+    """Return the curves of a motion at other instants, -inf where it cannot be solved."""
+    parts = []
+    for first in range(0, len(instants), CHUNK):
+        chunk = instants[first : first + CHUNK]
+        if hasattr(motion, "at"):
+            parts.append(_curves(motion.at(chunk)))
+            continue
+        whole = np.unique(np.append(chunk, motion.time[0]))  # from the same start, on the same branch
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SampleWarning)  # told when the motion was solved
+            solved = solve(motion.mechanism, whole, motion.order, strict=False)
+        parts.append(_curves(solved)[np.searchsorted(whole, chunk)])
+    return np.concatenate(parts)
+
+
+def _curves(motion: Any) -> np.ndarray:
+    """Return all derivatives of all outputs, upside down and as they are, (time, 2 curves); -inf where unknown."""
+    whole = np.concatenate([values for _, values in scalar_outputs(motion).values()], axis=1)
+    return np.nan_to_num(np.concatenate([-whole, whole], axis=1), nan=-np.inf, posinf=-np.inf, neginf=-np.inf)
+
+
+def _scales(motion: Any) -> np.ndarray:
+    """Return the largest magnitude that any component of the output of a curve has in its derivative, (2 curves,)."""
+    found = []
+    for name, values in scalar_outputs(motion).values():
+        whole = np.nan_to_num(motion.outputs[name]).reshape(*values.shape, -1)
+        found.append(np.abs(whole).max(axis=(0, 2)))
+    return np.tile(np.concatenate(found), 2)
+
+
+def _keep_best(times: np.ndarray, sizes: np.ndarray, rounding: np.ndarray, around: np.ndarray, own: np.ndarray) -> None:
+    """Take over what is larger than what was found before, by more than rounding: instants asked for are round."""
+    flat = own.reshape(-1, own.shape[-1])
+    every = np.arange(own.shape[-1])
+    top = np.argmax(flat, axis=0)
+    with np.errstate(invalid="ignore"):
+        better = flat[top, every] > sizes + rounding
+    times[better] = around.reshape(flat.shape)[top, every][better]
+    sizes[better] = flat[top, every][better]
+
+
+def _vertex(low: np.ndarray, high: np.ndarray, *near: np.ndarray) -> np.ndarray:
+    """Return where the parabola through three evenly spaced values is largest, between the outer two."""
+    left, middle, right = near
+    with np.errstate(invalid="ignore", divide="ignore"):
+        shift = 0.5 * (left - right) / (left - 2 * middle + right)
+    shift = np.where(np.isfinite(shift), np.clip(shift, -1.0, 1.0), 0.0)
+    return (low + high) / 2 + shift * (high - low) / 2

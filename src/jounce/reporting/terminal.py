@@ -1,0 +1,226 @@
+"""What a command shows: tables, a progress bar, messages; in colour on a terminal, plain text elsewhere."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any
+
+from jounce.errors import RobotWarning, SampleWarning, UnitWarning
+from jounce.interrupts import undoing
+from jounce.reporting.peaks import Peak
+from jounce.reporting.tables import Table, peaks_table
+
+__all__ = [
+    "Bar",
+    "caution",
+    "cautions",
+    "complain",
+    "say",
+    "say_json",
+    "show_columns",
+    "show_peaks",
+    "show_table",
+    "unexpected",
+]
+
+OURS = (RobotWarning, SampleWarning, UnitWarning)  # warnings of this package, which nobody may turn off by mistake
+WIDTH = 80  # of tables that do not go to a terminal
+WIDEST = 9999
+SHOW_CURSOR = b"\r\x1b[2K\x1b[?25h"  # on a cleared line; a progress bar hides it
+PATIENCE = 1.0  # s, before a progress bar is shown
+
+
+def show_peaks(found: Sequence[Peak]) -> None:
+    """Print a table of peaks."""
+    if found:
+        show_table(peaks_table(found))
+    else:
+        say("\nNo outputs are defined, so there is nothing to tabulate.")
+
+
+def show_table(table: Table, style: str = "bold") -> None:
+    """Print a table, in colour on a terminal that is wide enough for its numbers; marked cells have a style there."""
+    if not (sys.stdout.isatty() and _show_coloured(table, style)):
+        say("\n" + "\n".join(_plain_lines(table)))
+
+
+def _plain_lines(table: Table) -> list[str]:
+    """Return the lines of a table in plain text; where names are too long for it, they stand on lines of their own."""
+    starred = [
+        [cell + ("*" if k in marked else " ") if k in table.markable else cell for k, cell in enumerate(cells)]
+        for cells, marked in zip(table.rows, table.marks or [[]] * len(table.rows), strict=True)
+    ]
+    columns = list(zip(table.headings, *starred, strict=True))
+    widths = [max(map(len, column)) for column in columns]
+    fits = not table.grouped or sum(widths) + 2 * (len(widths) - 1) <= WIDTH
+    indent, first = "  " * bool(table.title), 0 if fits else 1
+
+    def line(cells: Sequence[str]) -> str:
+        padded = enumerate(zip(cells, widths, strict=True))
+        parts = [c.rjust(w) if k in table.numbers else c.ljust(w) for k, (c, w) in padded]
+        return (indent + "  ".join(parts[first:])).rstrip()
+
+    lines = [*[table.title] * bool(table.title), line(table.headings), line(["-" * w for w in widths])]
+    before = ""
+    for cells in starred:
+        if table.grouped and cells[0] != before:
+            lines += [""] * bool(before) + [cells[0]] * first
+        before = cells[0]
+        lines.append(line(cells))
+    return [*lines, *(["", f"* {table.meaning}"] if table.meaning else [])]
+
+
+def _show_coloured(table: Table, style: str) -> bool:
+    """Print a table in colour, unless the terminal cannot show marks or is so narrow that rich would cut numbers."""
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table as Grid
+    from rich.text import Text
+
+    title = table.title or None
+    grid = Grid(box=box.SIMPLE_HEAD, pad_edge=False, header_style="bold", title=title, title_justify="left")
+    grid.title_style = "bold"
+    for k, heading in enumerate(table.headings):
+        whole = k > 0 if table.grouped else k in table.numbers
+        justify, colour = ("right" if k in table.numbers else "left"), ("cyan" if k == 0 else "")
+        grid.add_column(heading, justify=justify, no_wrap=whole, style=colour, overflow="fold")
+    before = ""
+    for row, marked in zip(table.rows, table.marks or [[]] * len(table.rows), strict=True):
+        cells = [Text(_clean(cell)) for cell in row]
+        for column in marked:
+            cells[column].stylize(style)
+        if table.grouped and row[0] == before:
+            cells[0] = Text("")
+        elif table.grouped and before:
+            grid.add_section()
+        before = row[0]
+        grid.add_row(*cells)
+    notes = [f"{style}: {table.meaning}"] if table.meaning else []
+    console = Console()
+    if console.is_dumb_terminal or Console(width=WIDEST).measure(grid).minimum > console.width:
+        return False
+    console.print(*[""] * bool(title), grid, *notes, sep="\n")
+    return True
+
+
+def show_columns(pairs: Sequence[tuple[str, str]]) -> None:
+    """Print names and what they mean, in two columns."""
+    width = max(len(name) for name, _ in pairs)
+    coloured = sys.stdout.isatty()
+    if coloured:
+        from rich.console import Console
+        from rich.text import Text
+
+        for name, meaning in pairs:
+            Console(soft_wrap=True).print(Text.assemble((name.ljust(width), "cyan"), f"  {meaning}"))
+        return
+    say("\n".join(f"{name:{width}}  {meaning}" for name, meaning in pairs))
+
+
+class Bar:
+    """A progress bar on the terminal's standard error, shown only when work goes on for more than a moment."""
+
+    def __init__(self, task: str):
+        self._task = task
+        self._started: float | None = None
+        self._bar: Any = None
+        self._shown = ExitStack()
+
+    def __enter__(self) -> Bar:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._shown.close()
+
+    def __call__(self, done: int, total: int) -> None:
+        """Tell how much is done; compiling, before the first call, does not count as work."""
+        if self._bar is None:
+            now = time.monotonic()
+            self._started = now if self._started is None else self._started
+            if done >= total or now - self._started < PATIENCE or not sys.stderr.isatty():
+                return
+            from rich.console import Console
+            from rich.progress import Progress
+
+            self._bar = Progress(console=Console(stderr=True), transient=True)
+            self._shown.enter_context(undoing(lambda: os.write(2, SHOW_CURSOR)))
+            self._shown.enter_context(self._bar)
+            self._id = self._bar.add_task(self._task, total=total)
+        self._bar.update(self._id, completed=done, total=total)
+
+
+def _clean(text: str) -> str:
+    """Replace control characters, with which a file could steer the terminal."""
+    return "".join(c if c.isprintable() or c == "\n" else "?" for c in text)
+
+
+def say(text: str) -> None:
+    """Print text on standard output."""
+    sys.stdout.write(_clean(text) + "\n")
+    sys.stdout.flush()
+
+
+def say_json(command: str, data: Mapping[str, Any]) -> None:
+    """Print the result of a command as JSON on standard output."""
+    from jounce.reporting.records import record
+
+    sys.stdout.write(record(command, data) + "\n")
+    sys.stdout.flush()
+
+
+def complain(error: object, *, json: bool = False) -> None:
+    """Print an error on standard error, in one line: of words, or of JSON."""
+    _tell("error", "bold red", error, json)
+
+
+def caution(warning: object, *, json: bool = False) -> None:
+    """Print a warning on standard error, in one line: of words, or of JSON."""
+    _tell("warning", "bold yellow", warning, json)
+
+
+@contextmanager
+def cautions(*, json: bool = False) -> Iterator[None]:
+    """Print warnings as the command prints its errors, each once and without its place in the code."""
+    told: set[str] = set()
+
+    def show(message: Any, *_: Any, **__: Any) -> None:
+        if str(message) not in told:
+            told.add(str(message))
+            caution(message, json=json)
+
+    with warnings.catch_warnings():
+        for category in OURS:
+            warnings.simplefilter("always", category)
+        warnings.showwarning = show
+        yield
+
+
+def _tell(kind: str, style: str, message: object, json: bool) -> None:
+    if json:
+        from jounce.reporting.records import complaint
+
+        sys.stderr.write(complaint(kind, message) + "\n")
+        return
+    text = _clean(" ".join(str(message).split()))
+    if sys.stderr.isatty():
+        from rich.console import Console
+        from rich.text import Text
+
+        Console(stderr=True, soft_wrap=True).print(Text.assemble((f"{kind}: ", style), text))
+    else:
+        sys.stderr.write(f"{kind}: {text}\n")
+
+
+def unexpected(error: Exception) -> str:
+    """Word an error that no check foresaw, with the innermost line that is the user's or this package's own."""
+    import traceback
+
+    words = f"unexpected {type(error).__name__}: {str(error).strip().partition(chr(10))[0]}".rstrip(": ")
+    frames = [f for f in traceback.extract_tb(error.__traceback__) if "site-packages" not in f.filename]
+    return f"{words} ({Path(frames[-1].filename).name}, line {frames[-1].lineno})" if frames else words

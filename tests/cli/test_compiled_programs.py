@@ -1,0 +1,71 @@
+"""Compiled programs kept in files: what is damaged is never used, and is replaced."""
+
+import itertools
+import os
+import pathlib
+import subprocess
+import sys
+
+import pytest
+
+from jounce.cli.compiled_programs import CheckedEntries
+
+FOUR_BAR = pathlib.Path(__file__).resolve().parents[2] / "examples" / "four_bar.yaml"
+PROGRAM = bytes(range(256)) * 40
+
+DAMAGES = {
+    "empty": lambda file: file.write_bytes(b""),
+    "cut short": lambda file: file.write_bytes(file.read_bytes()[:-7]),
+    "garbage": lambda file: file.write_bytes(b"no program at all"),
+    "a bit": lambda file: file.write_bytes(bytes([*file.read_bytes()[:99], 1, *file.read_bytes()[100:]])),
+    "unreadable": lambda file: file.chmod(0),
+    "removed": lambda file: file.unlink(),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_what_is_damaged_is_absent_and_then_replaced(tmp_path, damage):
+    entries = CheckedEntries(tmp_path)
+    assert entries.get("key") is None
+    entries.put("key", PROGRAM)
+    assert entries.get("key") == PROGRAM
+    (file,) = tmp_path.iterdir()
+    DAMAGES[damage](file)
+    if damage != "unreadable" or os.getuid():  # nothing is unreadable to root
+        assert entries.get("key") is None
+    entries.put("key", PROGRAM)
+    assert entries.get("key") == PROGRAM
+    assert list(tmp_path.iterdir()) == [file]
+
+
+def test_an_entry_that_cannot_be_replaced_is_compiled_each_time(tmp_path):
+    entries = CheckedEntries(tmp_path)
+    (tmp_path / "key.program").mkdir()
+    entries.put("key", PROGRAM)
+    assert entries.get("key") is None
+    CheckedEntries(tmp_path / "gone").put("key", PROGRAM)
+
+
+def started(cache):
+    command = [sys.executable, "-m", "jounce", "run", str(FOUR_BAR), "--order", "1"]
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("JAX_")}
+    environment["JOUNCE_CACHE_DIR"] = cache
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment)
+
+
+@pytest.mark.slow
+def test_two_commands_with_a_cold_cache_and_one_with_a_damaged_one(tmp_path):
+    both = [started(str(tmp_path)) for _ in range(2)]
+    told = [process.communicate(timeout=300) for process in both]
+    assert [process.returncode for process in both] == [0, 0]
+    assert told[0] == (told[0][0], "") == told[1]
+    good = {file: file.read_bytes() for file in tmp_path.iterdir()}
+    assert good
+    for file, damage in zip(good, itertools.cycle(["empty", "cut short", "garbage", "a bit"]), strict=False):
+        DAMAGES[damage](file)
+    process = started(str(tmp_path))
+    assert process.communicate(timeout=300) == told[0]
+    assert process.returncode == 0
+    kept = {file: file.read_bytes() for file in tmp_path.iterdir()}  # but those that compile too fast to be kept
+    assert kept
+    assert all(CheckedEntries(tmp_path).get(file.name.removesuffix(".program")) for file in kept)

@@ -1,0 +1,62 @@
+"""Samples of motion laws from CSV files."""
+
+import pytest
+
+from jounce.errors import MechanismFileError
+from jounce.io.files.samples import read_samples
+
+
+def write(folder, text):
+    path = folder / "samples.csv"
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return path
+
+
+@pytest.mark.parametrize(
+    "text, names",
+    [
+        ("time,lift\n0,1\n1,2.5\n", {}),
+        ("lift,time\n1,0\n2.5,1\n", {}),
+        ("t , lift\n0 , 1\n\n1 , 2.5\n", {}),
+        ("0,1\n1,2.5\n", {}),
+        ("\ufefftime,lift\r\n0,1\r\n1,2.5\r\n", {}),
+        ("a,b,c\n9,1,0\n9,2.5,1\n", {"time": "c", "value": "b"}),
+        ("time,b,c\n0,9,1\n1,9,2.5\n", {"value": "c"}),
+    ],
+)
+def test_columns_are_found(tmp_path, text, names):
+    assert read_samples(write(tmp_path, text), **names) == ([0.0, 1.0], [1.0, 2.5])
+
+
+@pytest.mark.parametrize(
+    "text, names, words",
+    [
+        ("", {}, "the file of samples is empty"),
+        ("time\n1\n", {}, "line 1: samples need a column of times and one of values"),
+        ("time,a,b\n0,1,2\n", {}, "line 1: has several columns besides the time, name that of the value; valid: a, b"),
+        ("time,lift\n0,1\n", {"value": "lfit"}, "line 1: no column has this name, got 'lfit'; did you mean 'lift'?"),
+        ("time,lift\n0,1\n", {"time": "t"}, "line 1: no column has this name, got 't'; valid: lift, time"),
+        ("time,lift\n0,1\n1,x\n", {}, "line 3, lift: must be a finite number, got 'x'"),
+        ("time,lift\n0,1\n1\n", {}, "line 3, lift: must be a finite number, got ''"),
+        ("time,lift\n0,1\nnan,2\n", {}, "line 3, time: must be a finite number, got 'nan'"),
+        ("time,lift\n0,1\n1,1e300\n", {}, "line 3, lift: must be at most 1e+75, got '1e300'"),
+        (b"time,lift\n\xff,1\n", {}, "the samples cannot be read"),
+        ('time,lift\n"0,1\n', {}, "the samples cannot be read"),
+    ],
+)
+def test_what_is_wrong_is_said_with_its_line(tmp_path, text, names, words):
+    path = write(tmp_path, text)
+    with pytest.raises(MechanismFileError) as caught:
+        read_samples(path, **names)
+    assert words in str(caught.value)
+    assert str(caught.value).startswith(str(path))
+
+
+def test_files_that_cannot_be_read(tmp_path, monkeypatch):
+    with pytest.raises(MechanismFileError, match="file of samples not found"):
+        read_samples(tmp_path / "no.csv")
+    with pytest.raises(MechanismFileError, match="is a directory, a file is needed"):
+        read_samples(tmp_path)
+    monkeypatch.setattr("jounce.io.files.reading.MAX_SAMPLES", 10)
+    with pytest.raises(MechanismFileError, match="at most 1e-05 MB are read"):
+        read_samples(write(tmp_path, "time,lift\n0,1\n"))

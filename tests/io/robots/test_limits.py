@@ -1,0 +1,169 @@
+"""Files of limits: what they may say, what goes before what, and the messages about what they may not."""
+
+import math
+import pathlib
+
+import pytest
+
+import jounce as jn
+from jounce.io.robots.limits import load_limits
+from jounce.io.robots.loader import load_robot
+from jounce.io.robots.payloads import with_payloads
+
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+FRANKA = ROOT / "examples" / "limits" / "franka_panda.yaml"
+
+
+@pytest.fixture(scope="module")
+def robot():
+    """Return a carriage with a rod, a finger that follows the rod, and a plate fixed to it."""
+    body = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0])
+    links = [jn.Link(name, body) for name in ("base", "carriage", "rod", "finger", "plate")]
+    joints = [
+        jn.Joint("slide", "base", "carriage", "prismatic", limits=jn.Limits(lower=-1.0, upper=1.0, velocity=2.0)),
+        jn.Joint("pin", "carriage", "rod", limits=jn.Limits(velocity=3.0, effort=5.0)),
+        jn.Joint("finger", "rod", "finger", mimic=jn.Mimic("pin")),
+        jn.Joint("plate", "rod", "plate", "fixed"),
+    ]
+    return jn.Robot("crane", links, joints)
+
+
+@pytest.fixture
+def read(robot, tmp_path):
+    def call(text, name="limits.yaml"):
+        path = tmp_path / name
+        path.write_text(text, encoding="utf-8")
+        return load_limits(path, robot)
+
+    return call
+
+
+@pytest.fixture
+def refused(read):
+    def call(text):
+        with pytest.raises(jn.RobotError) as raised:
+            read(text)
+        return str(raised.value).partition("limits.yaml, ")[2]
+
+    return call
+
+
+def test_the_franka_arm_has_its_published_limits():
+    robot = load_robot(ROOT / "examples" / "robots" / "panda.urdf")
+    limits = load_limits(FRANKA, robot)
+    arm = [limits[f"panda_joint{k}"] for k in range(1, 8)]
+    assert [x.lower for x in arm] == [-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973]
+    assert [x.upper for x in arm] == [2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973]
+    assert [x.velocity for x in arm] == [2.175] * 4 + [2.61] * 3
+    assert [x.acceleration for x in arm] == [15, 7.5, 10, 12.5, 15, 20, 20]
+    assert [x.jerk for x in arm] == [7500, 3750, 5000, 6250, 7500, 10000, 10000]
+    assert [x.effort for x in arm] == [87] * 4 + [12] * 3
+    assert [x.effort_rate for x in arm] == [1000] * 7
+    assert limits["panda_finger_joint1"] == robot.limits["panda_finger_joint1"]
+
+
+def test_values_have_units_and_leave_the_others_as_they_are(read):
+    found = read("joints: {pin: {velocity: 90 deg/s, jerk: 1 rev/s**3, effort: 2 kN*mm}, slide: {upper: 250 mm}}")
+    assert found["pin"] == jn.Limits(velocity=math.pi / 2, jerk=2 * math.pi, effort=2.0)
+    assert found["slide"] == jn.Limits(lower=-1.0, upper=0.25, velocity=2.0)
+    bare = read("joints: {pin: {effort_rate: 1e3, acceleration: 5 Hz^2, jerk: 2*pi}}")["pin"]
+    assert (bare.effort_rate, bare.acceleration, bare.jerk) == (1000.0, 5.0, 2 * math.pi)
+
+
+def test_a_joint_goes_before_the_default_and_that_before_the_robot(read):
+    found = read("default: {velocity: 1.5, jerk: 40}\njoints: {pin: {velocity: 1.2}}")
+    assert (found["slide"].velocity, found["pin"].velocity) == (1.5, 1.2)
+    assert (found["slide"].jerk, found["pin"].jerk, found["pin"].effort) == (40.0, 40.0, 5.0)
+
+
+def test_a_default_with_a_unit_is_for_the_joints_that_it_fits(read):
+    found = read("default: {acceleration: 3 m/s^2, jerk: 9 rad/s^3, effort: 7 N, effort_rate: 8 N*m/s}")
+    assert found["slide"] == jn.Limits(lower=-1.0, upper=1.0, velocity=2.0, acceleration=3.0, effort=7.0)
+    assert found["pin"] == jn.Limits(velocity=3.0, effort=5.0, jerk=9.0, effort_rate=8.0)
+
+
+def test_null_takes_a_limit_away(read):
+    found = read("default: {velocity: null}\njoints: {slide: {lower: null}}")
+    assert found["slide"] == jn.Limits(upper=1.0)
+    assert found["pin"] == jn.Limits(effort=5.0)
+
+
+def test_toml_and_json_are_read_too(read):
+    assert read("[joints.pin]\njerk = 4\n", "limits.toml")["pin"].jerk == 4.0
+    assert read('{"joints": {"pin": {"jerk": "4 rad/s^3"}}}', "limits.json")["pin"].jerk == 4.0
+
+
+@pytest.mark.parametrize(
+    "text, message",
+    [
+        (
+            "joints:\n  pim: {jerk: 1}",
+            "line 2, joints.pim: crane has no moving joint of this name; did you mean 'pin'? valid: pin, slide",
+        ),
+        ("joints:\n  finger: {jerk: 1}", "line 2, joints.finger: this joint follows pin; give limits of that one"),
+        ("joints: {plate: {jerk: 1}}", "line 1, joints.plate: this joint is fixed and has no limits; leave it out"),
+        ("joints:\n  pin:\n    speed: 1", "line 3, joints.pin.speed: unknown key; valid: acceleration, deceleration,"),
+        ("joints:\n  pin:\n    velocty: 1", "line 3, joints.pin.velocty: unknown key; did you mean 'velocity'?"),
+        ("max_velocity: 1", "line 1, max_velocity: unknown key; valid: default, joints, title"),
+        ("title: none", "line 1: a limits file has the key 'joints', 'default', or both, got ['title']"),
+        ("joints: {pin: 3}", "line 1, joints.pin: must be a mapping with at least one entry, got 3"),
+        ("joints:", "line 1, joints: must be a mapping with at least one entry, got nothing"),
+        ("- 1", "line 1: must be a mapping with at least one entry, got [1]"),
+        ("joints: {pin: {jerk: -5}}", "line 1, joints.pin.jerk: must be greater than zero, got -5; null is no limit"),
+        ("joints: {pin: {jerk: 0}}", "line 1, joints.pin.jerk: must be greater than zero, got 0"),
+        ("default: {jerk: -5 m/s^3}", "line 1, default.jerk: must be greater than zero, got '-5 m/s^3'"),
+        ("joints: {pin: {jerk: .inf}}", "line 1, joints.pin.jerk: must be a finite number, got inf"),
+        ("joints: {pin: {jerk: .nan}}", "line 1, joints.pin.jerk: must be a finite number, got nan"),
+        ("joints: {pin: {jerk: 1e400 rad/s^3}}", "line 1, joints.pin.jerk: must be a finite number"),
+        ("joints: {pin: {jerk: true}}", "line 1, joints.pin.jerk: must be a number, a number with a unit"),
+        ("joints: {pin: {jerk: fast}}", "line 1, joints.pin.jerk: "),
+        (
+            "joints: {pin: {velocity: 2 m/s}}",
+            "line 1, joints.pin.velocity: the unit is that of length/time, got '2 m/s'; a joint that turns has "
+            "velocity in rad/s",
+        ),
+        (
+            "joints: {slide: {effort: 2 N*m}}",
+            "the unit is that of a torque, got '2 N*m'; a joint that slides has effort in N",
+        ),
+        ("joints: {pin: {effort: 87 NM}}", "joints.pin.effort: unknown unit 'NM', got '87 NM'; did you mean 'Nm'?"),
+        ("default: {effort: 3 kg}", "default.effort: the unit is that of a mass, got '3 kg'; effort is in N*m or N"),
+        (
+            "joints:\n  slide:\n    lower: 2",
+            "line 3, joints.slide.lower: the lower limit of slide, 2, must not exceed the upper one, 1",
+        ),
+        ("joints: {pin: {jerk: 1, jerk: 2}}", "line 1, joints.pin.jerk: duplicate name"),
+    ],
+)
+def test_messages_name_line_entry_and_value(text, message, refused):
+    assert message in refused(text)
+
+
+def test_a_file_that_is_none(robot, tmp_path):
+    with pytest.raises(jn.RobotError, match="file not found"):
+        load_limits(tmp_path / "none.yaml", robot)
+    with pytest.raises(jn.RobotError, match=r"the kind of a limits file is told by its ending; valid: \.yaml"):
+        load_limits(tmp_path / "limits.txt", robot)
+
+
+def test_payloads_are_point_masses_at_links(robot):
+    loaded = with_payloads(robot, ["rod=500 g", "finger = 2"])
+    assert loaded.mass == pytest.approx(robot.mass + 2.5)
+    assert loaded.links["rod"].inertia.center_of_mass[0] == pytest.approx(0.5 / 1.5)
+
+
+@pytest.mark.parametrize(
+    "text, message",
+    [
+        ("rod", "--payload: a load is given by LINK=MASS, such as 'hand=3 kg', got 'rod'"),
+        ("rod=", "--payload: a load is given by LINK=MASS"),
+        ("rodd=1", "--payload: no link has this name, got 'rodd'; did you mean 'rod'?"),
+        ("rod=-1 kg", "--payload: must be greater than zero, got '-1 kg'"),
+        ("rod=1 m", "--payload: expected a mass, such as 2 kg"),
+        ("rod=heavy", "--payload: "),
+    ],
+)
+def test_what_a_payload_cannot_be(robot, text, message):
+    with pytest.raises(jn.RobotError) as raised:
+        with_payloads(robot, [text])
+    assert message in str(raised.value)

@@ -1,0 +1,390 @@
+"""Robots from MJCF files against MuJoCo, which computes its own poses, masses and forces of the same model."""
+
+import sys
+
+import mujoco
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import jounce as jn
+from jounce.errors import RobotFileError
+from jounce.io.robots.loader import load_robot
+from tests.problems.robots import FILES, body_poses, coordinates, poses
+
+INERTIAL = '<inertial pos="0.1 0 0" mass="1" diaginertia="0.1 0.2 0.25"/>'
+FEATURES = """\
+<mujoco model="features">
+  <compiler angle="degree" autolimits="true"/>
+  <option gravity="0.5 0 -9"/>
+  <default>
+    <joint damping="0.3" axis="0 0 2"/>
+    <default class="strong">
+      <joint armature="0.4" frictionloss="0.7"/>
+    </default>
+  </default>
+  <worldbody>
+    <geom type="plane" size="1 1 1"/>
+    <body name="stand" pos="0 0 1" euler="10 20 30">
+      <inertial pos="0 0 0.1" mass="3" diaginertia="0.2 0.2 0.1"/>
+      <body name="arm" pos="0.1 0.2 0.3" quat="0.9 0.1 -0.2 0.3">
+        <joint name="swing" class="strong" pos="0.05 -0.02 0.1" axis="0 1 1" range="-100 60" ref="25"/>
+        <joint name="reach" type="slide" axis="1 0 0.5" pos="0.3 0 0" range="-0.1 0.4" ref="0.15" armature="2"/>
+        <inertial pos="0.2 0 0.05" mass="2.5" fullinertia="0.03 0.05 0.06 0.004 -0.003 0.002"/>
+        <geom type="mesh" mesh="nowhere"/>
+        <body pos="0.4 0 0">
+          <joint name="twist" armature="0.1"/>
+          <geom type="capsule" size="0.03 0.2" pos="0 0 0.2" density="700"/>
+          <body name="flange" pos="0 0 0.4" axisangle="0 1 0 35">
+            <inertial pos="0 0 0" mass="0.3" diaginertia="0.001 0.001 0.001" euler="0 0 45"/>
+            <body name="gimbal" pos="0 0.05 0.1" euler="0 0 15">
+              <joint name="wrist" type="ball" pos="0 0.01 -0.02" damping="0"/>
+              <inertial pos="0 0.1 0" mass="0.6" diaginertia="0.002 0.003 0.004" quat="0.5 0.5 -0.5 0.5"/>
+            </body>
+          </body>
+        </body>
+      </body>
+    </body>
+    <body name="ball" pos="1 2 3" euler="40 0 0">
+      <freejoint name="loose"/>
+      <geom type="ellipsoid" size="0.1 0.2 0.3"/>
+    </body>
+  </worldbody>
+  <actuator>
+    <motor joint="swing" gear="30" ctrlrange="-2 2" armature="0.001" damping="0.002"/>
+    <position joint="reach" kp="100" forcerange="-55 55"/>
+    <motor name="odd" joint="twist" ctrlrange="-1 2"/>
+  </actuator>
+</mujoco>
+"""
+MESHES = '<asset><mesh name="nowhere" file="nowhere.stl"/></asset>\n</mujoco>'
+
+
+@pytest.fixture(params=["features", "planar_arm"])
+def pair(request, tmp_path):
+    path = FILES / f"{request.param}.xml"
+    text = path.read_text() if request.param == "planar_arm" else FEATURES
+    if request.param == "features":
+        path = tmp_path / "features.xml"
+        path.write_text(text.replace("</mujoco>", MESHES))
+    return load_robot(path), mujoco.MjModel.from_xml_string(text.replace('<geom type="mesh" mesh="nowhere"/>', ""))
+
+
+def positions(model, values):
+    """Return MuJoCo's coordinates for ours."""
+    q = np.array(model.qpos0)
+    for k in range(model.njnt):
+        first, name = model.jnt_qposadr[k], model.joint(k).name or f"joint_{k}"
+        angles = [values.get(f"{name}_angle_{i}") for i in (1, 2, 3)]
+        if name in values:
+            q[first] = values[name]
+            continue
+        if f"{name}_x" in values:
+            q[first : first + 3] = [values[f"{name}_{axis}"] for axis in "xyz"]
+            first += 3
+        q[first : first + 4] = Rotation.from_euler("ZYX", angles).as_quat(scalar_first=True)
+    return q
+
+
+def written(tmp_path, inside, after=""):
+    path = tmp_path / "small.xml"
+    path.write_text(
+        f'<mujoco model="small">\n<worldbody>\n<body name="a">{INERTIAL}{inside}</body></worldbody>\n{after}</mujoco>'
+    )
+    return path
+
+
+def named(model, kind, count):
+    return [getattr(model, kind)(k).name or f"{kind}_{k}" for k in range(count)]
+
+
+def test_names_and_order(pair):
+    robot, model = pair
+    bodies, joints = named(model, "body", model.nbody), named(model, "joint", model.njnt)
+    assert set(bodies) <= set(robot.link_names)
+    assert robot.base == "world"
+    order = [name for name in robot.joint_names if name in joints]
+    assert order == [name for name in joints if name in robot.joint_names]
+    assert len(robot.joint_names) == model.nv
+
+
+def test_poses_of_all_bodies(pair):
+    robot, model = pair
+    values, data = coordinates(robot, seed=7), mujoco.MjData(model)
+    data.qpos[:] = positions(model, values)
+    mujoco.mj_forward(model, data)
+    ours, bodies = poses(robot, values), body_poses(robot, values)
+    for k, name in enumerate(named(model, "body", model.nbody)):
+        frame, here = robot.frames[name], np.eye(4)
+        here[:3, :3], here[:3, 3] = frame.rotation, frame.position
+        whole = here if frame.body < 0 else bodies[frame.body] @ here
+        for pose in (ours[name], whole):
+            np.testing.assert_allclose(pose[:3, 3], data.xpos[k], rtol=0, atol=1e-14)
+            np.testing.assert_allclose(pose[:3, :3], data.xmat[k].reshape(3, 3), rtol=0, atol=1e-14)
+
+
+def test_mass_centre_and_inertia_of_bodies(pair):
+    robot, model = pair
+    values, data = coordinates(robot, seed=8), mujoco.MjData(model)
+    data.qpos[:] = positions(model, values)
+    mujoco.mj_forward(model, data)
+    ours = poses(robot, values)
+    assert robot.mass == pytest.approx(model.body_mass.sum(), rel=1e-15)
+    for k, name in enumerate(named(model, "body", model.nbody)):
+        if k == 0:
+            assert robot.links[name].inertia is None
+            continue
+        inertia, rotation = robot.links[name].inertia, ours[name][:3, :3]
+        assert inertia.mass == model.body_mass[k]
+        center = rotation @ inertia.center_of_mass + ours[name][:3, 3]
+        np.testing.assert_allclose(center, data.xipos[k], rtol=0, atol=1e-14)
+        axes = data.ximat[k].reshape(3, 3)
+        expected = axes @ np.diag(model.body_inertia[k]) @ axes.T
+        np.testing.assert_allclose(rotation @ inertia.tensor @ rotation.T, expected, rtol=0, atol=1e-15)
+
+
+def test_armature_damping_and_friction_of_joints_with_their_actuators(pair):
+    robot, model = pair
+    data, bare = mujoco.MjData(model), mujoco.MjData(model)
+    matrices = []
+    for state in (data, bare):
+        mujoco.mj_forward(model, state)
+        full = np.zeros((model.nv, model.nv))
+        mujoco.mj_fullM(model, state, full)
+        matrices.append(full)
+        model.dof_armature[:], model.actuator_armature[:] = 0, 0  # for the second turn
+    armature = np.diag(matrices[0] - matrices[1])
+    data.qvel[:] = 1
+    mujoco.mj_forward(model, data)
+    for k in range(model.njnt):
+        joint, dof = robot.joints.get(model.joint(k).name), model.jnt_dofadr[k]
+        if joint is not None:
+            assert joint.armature == pytest.approx(armature[dof], rel=1e-12)
+            assert joint.damping == pytest.approx(-data.qfrc_passive[dof], rel=1e-15)
+            assert joint.friction == model.dof_frictionloss[dof]
+
+
+def test_ranges_are_limits_and_symmetric_forces_too(pair):
+    robot, model = pair
+    for k in range(model.njnt):
+        joint = robot.joints.get(model.joint(k).name)
+        if joint is not None and model.jnt_limited[k]:
+            assert [joint.limits.lower, joint.limits.upper] == model.jnt_range[k].tolist()
+            assert joint.type in ("revolute", "prismatic")
+        elif joint is not None:
+            assert (joint.type, joint.limits.lower, joint.limits.upper) == ("continuous", None, None)
+    efforts = {name: limits.effort for name, limits in robot.limits.items() if limits.effort is not None}
+    expected = {"swing": 60, "reach": 55} if robot.name == "features" else {"shoulder": 120, "elbow": 60, "ram": 150}
+    assert efforts == pytest.approx(expected, rel=1e-15)
+    np.testing.assert_array_equal(robot.gravity, model.opt.gravity)
+
+
+def test_two_joints_of_one_body_have_a_massless_link_between_them(pair):
+    robot, _ = pair
+    if robot.name == "features":
+        assert robot.joints["swing"].child == robot.joints["reach"].parent == "arm_swing"
+        assert robot.links["arm_swing"].inertia is None
+
+
+def test_a_body_on_a_ball_and_a_free_one_have_three_turns_each(tmp_path):
+    path = tmp_path / "features.xml"
+    path.write_text(FEATURES.replace("</mujoco>", MESHES))
+    names = load_robot(path).joint_names
+    assert names[3:6] == ("wrist_angle_1", "wrist_angle_2", "wrist_angle_3")
+    assert names[6:] == (*(f"loose_{axis}" for axis in "xyz"), *(f"loose_angle_{k}" for k in (1, 2, 3)))
+
+
+def test_the_arm_of_the_examples_has_its_pose_in_the_file_at_the_reference():
+    robot = load_robot(FILES / "planar_arm.xml")
+    assert robot.joint_names == ("shoulder", "elbow", "ram")
+    straight = poses(robot, dict.fromkeys(robot.joint_names, 0.0))
+    np.testing.assert_allclose(straight["ram"][:3, 3], [0.65, 0, 0.64], rtol=0, atol=1e-15)
+    np.testing.assert_allclose(straight["ram"][:3, :3], np.eye(3), rtol=0, atol=1e-15)
+
+
+def test_unnamed_parts_are_called_by_their_number(tmp_path):
+    path = tmp_path / "unnamed.xml"
+    path.write_text(f"<mujoco><worldbody><body>{INERTIAL}<joint/><joint type='slide'/></body></worldbody></mujoco>")
+    robot = load_robot(path)
+    assert robot.joint_names == ("joint_0", "joint_1")
+    assert set(robot.link_names) == {"world", "body_1_joint_0", "body_1"}
+
+
+def test_gravity_that_is_switched_off(tmp_path):
+    robot = load_robot(written(tmp_path, "<joint name='j'/>", "<option><flag gravity='disable'/></option>"))
+    np.testing.assert_array_equal(robot.gravity, [0, 0, 0])
+
+
+def test_a_linear_equality_of_joints_is_a_joint_that_follows(tmp_path):
+    inside = "<joint name='j' ref='20'/><joint name='k' type='slide' ref='0.3'/>"
+    robot = load_robot(
+        written(tmp_path, inside, "<equality><joint joint1='j' joint2='k' polycoef='0.1 -2 0 0 0'/></equality>")
+    )
+    assert robot.joint_names == ("k",)
+    mimic = robot.joints["j"].mimic
+    assert (mimic.joint, mimic.multiplier) == ("k", -2)
+    assert mimic.offset == pytest.approx(np.radians(20) + 0.1 + 2 * 0.3, rel=1e-15)  # about the references, as MuJoCo
+
+
+def test_an_equality_that_holds_a_joint_locks_it(tmp_path):
+    inside = "<joint name='j' axis='0 0 1'/><joint name='k' axis='1 0 0'/>"
+    robot = load_robot(written(tmp_path, inside, "<equality><joint joint1='j' polycoef='0.4 0 0 0 0'/></equality>"))
+    assert robot.joint_names == ("k",)
+    turned = Rotation.from_euler("z", 0.4).as_matrix()
+    np.testing.assert_allclose(robot.joints["j"].rotation, turned, rtol=0, atol=1e-15)
+
+
+def test_an_equality_that_is_not_active_is_left_out(tmp_path):
+    loop = "<equality><weld name='grip' body1='a' active='false'/></equality>"
+    assert load_robot(written(tmp_path, "<joint name='j'/>", loop)).joint_names == ("j",)
+
+
+def test_an_actuated_range_of_force_counts(tmp_path):
+    robot = load_robot(
+        written(tmp_path, "<joint name='j' actuatorfrcrange='-7 7'/>", "<actuator><motor joint='j'/></actuator>")
+    )
+    assert robot.limits["j"].effort == 7
+
+
+def test_what_refers_to_shapes_goes_with_them(tmp_path):
+    inside = "<joint name='j'/><geom name='g' size='0.1' material='m'/><site name='s'/>"
+    after = (
+        "<asset><texture name='t' type='2d' file='no.png'/><material name='m' texture='t'/></asset>"
+        "<contact><pair geom1='g' geom2='g'/><exclude body1='a' body2='world'/></contact>"
+        "<tendon><spatial name='cord'><site site='s'/><geom geom='g'/><site site='s'/></spatial></tendon>"
+        "<actuator><general tendon='cord'/><motor joint='j' gear='3' ctrlrange='-1 1'/></actuator>"
+        "<sensor><tendonpos tendon='cord'/><jointpos joint='j'/></sensor><keyframe><key qpos='0'/></keyframe>"
+    )
+    robot = load_robot(written(tmp_path, inside, after))
+    assert robot.limits["j"].effort == 3
+
+
+@pytest.mark.parametrize("weightless", ["mass='0'", "density='0'", "class='picture'", "group='4'"])
+def test_a_mesh_without_weight_need_not_be_there(tmp_path, weightless):
+    path = tmp_path / "meshes.xml"
+    path.write_text(
+        "<mujoco><compiler inertiagrouprange='0 3'/>"
+        "<default><default class='picture'><geom mass='0'/></default></default>"
+        "<asset><mesh name='m' file='no.stl'/><hfield name='h' file='no.png' size='1 1 1 1'/></asset><worldbody>"
+        "<geom type='hfield' hfield='h'/><body name='a'><joint/><geom size='0.1' density='500'/>"
+        f"<geom type='mesh' mesh='m' {weightless}/></body></worldbody></mujoco>"
+    )
+    assert load_robot(path).mass == pytest.approx(500 * 4 / 3 * np.pi * 0.1**3, rel=1e-14)
+
+
+def test_a_free_base_in_place_of_the_world():
+    robot = load_robot(FILES / "planar_arm.xml", floating_base=True)
+    assert robot.joints["base_angle_3"].child == "post"
+    assert len(robot.joint_names) == 9
+
+
+def test_without_the_extra_the_message_says_what_to_install(tmp_path, monkeypatch):
+    path = written(tmp_path, "<joint/>")
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    with pytest.raises(RobotFileError) as caught:
+        load_robot(path)
+    words = 'reading MJCF files needs the package mujoco, which is not installed: pip install "jounce[mjcf]"'
+    assert str(caught.value) == f"{path}: {words}"
+
+
+@pytest.mark.parametrize("inside", ["<joint axis='0 nan 0'/>", "<joint/><geom size='NaN'/>", "<joint margin='-nan'/>"])
+def test_nothing_is_written_beside_the_user(tmp_path, monkeypatch, inside):
+    monkeypatch.chdir(tmp_path)  # where MuJoCo would leave a log
+    path = written(tmp_path, inside)
+    with pytest.raises(RobotFileError, match=r"(?i)line 3, .*finite number.*got .*nan"):
+        load_robot(path)
+    assert [entry.name for entry in tmp_path.iterdir()] == ["small.xml"]
+
+
+def test_a_part_may_be_called_nan(tmp_path):
+    robot = load_robot(written(tmp_path, "<joint name='nan'/>", "<actuator><motor joint='nan'/></actuator>"))
+    assert robot.joint_names == ("nan",)
+
+
+CLOSURES = """\
+<mujoco model="loops"><compiler angle="radian"/>
+  <worldbody>
+    <site name="sw" pos="0.3 0.4 0.1" quat="0.9 0.1 0.2 0.3"/>
+    <body name="a" quat="0.9 0.1 0.2 0.3"><joint axis="0 0 1"/><geom size="0.1"/>
+      <body name="b" pos="0.3 0 0" euler="0 0 1"><joint axis="0 0.1 1" ref="0.2"/><geom size="0.1"/>
+        <site name="sb" pos="0.11 0.12 0.13" quat="0.5 -0.1 0.7 0.3"/>
+      </body>
+    </body>
+    <body name="c" pos="0.2 0.1 0"><joint axis="1 0 1"/><geom size="0.1"/>
+      <site name="sc" pos="0.1 0.5 0.3" quat="0.5 0.2 0.7 0.3"/>
+    </body>
+  </worldbody>
+  <equality>
+    <connect body1="b" body2="c" anchor="0.3 0.02 0.05"/>
+    <connect name="sites" site1="sb" site2="sc"/>
+    <connect name="to the world" body1="b" anchor="0.3 0.02 0.05"/>
+    <weld name="weld" body1="b" body2="c" anchor="0.3 0.02 0.05"/>
+    <weld name="posed" body1="b" body2="c" anchor="0.3 0.02 0.05" relpose="0.1 0.2 0.3 0.9 0.1 0.3 0.2"/>
+    <weld name="frames" site1="sb" site2="sc"/>
+    <weld name="frame of the world" site1="sb" site2="sw"/>
+    <weld name="whole body" body1="b"/>
+    <weld name="without torque" body1="b" body2="c" torquescale="0"/>
+    <connect name="not active" body1="b" anchor="0 0 0" active="false"/>
+  </equality>
+</mujoco>
+"""
+
+
+def test_connects_and_welds_are_closures_that_miss_what_mujoco_says(tmp_path):
+    path = tmp_path / "loops.xml"
+    path.write_text(CLOSURES)
+    robot, model = load_robot(path), mujoco.MjModel.from_xml_string(CLOSURES)
+    assert (*robot.closures,)[:3] == ("closure_0", "sites", "to the world")
+    assert [c.type for c in robot.closures.values()] == [*["connect"] * 3, *["weld"] * 5, "connect"]
+    data = mujoco.MjData(model)
+    data.qpos[:] = [0.7, -0.4, 1.1]
+    mujoco.mj_forward(model, data)
+    ours = poses(robot, dict(zip(robot.joint_names, data.qpos, strict=True)))
+    for k, closure in enumerate(robot.closures.values()):
+        gap = data.efc_pos[[row for row in range(data.nefc) if data.efc_id[row] == k]]
+        first, second = (ours[link] for link in closure.links)
+        ends = [pose[:3, :3] @ p + pose[:3, 3] for pose, p in zip((first, second), closure.points, strict=True)]
+        np.testing.assert_allclose(ends[0] - ends[1], gap[:3], rtol=0, atol=1e-14)
+        if closure.type == "weld":
+            turn = Rotation.from_matrix(second[:3, :3].T @ first[:3, :3] @ closure.rotation).magnitude()
+            assert np.sin(turn / 2) == pytest.approx(np.linalg.norm(gap[3:]), rel=1e-13)
+
+
+def test_moments_without_mass_count_as_in_mujoco_and_are_warned_of(tmp_path):
+    path = tmp_path / "rotor.xml"
+    rotor = '<body name="rotor" pos="0.1 0 0"><inertial pos="0 0 0" mass="0" diaginertia="0.2 0.3 0.4"/></body>'
+    path.write_text(
+        f'<mujoco><worldbody><body name="arm"><joint axis="0 0 1"/>{INERTIAL}{rotor}</body></worldbody></mujoco>'
+    )
+    with pytest.warns(jn.RobotWarning, match=r"no mass beside them: rotor \(line 1\)"):
+        robot = load_robot(path)
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+    data.qacc[:] = 2.0
+    mujoco.mj_inverse(model, data)
+    torque = jn.inverse_dynamics(robot, [[0.0], [0.0], [2.0]])
+    np.testing.assert_allclose(torque[0], data.qfrc_inverse, rtol=1e-14)
+    with pytest.raises(RobotFileError, match=r"line 1, links\.rotor\.inertia: has moments of inertia but no mass"):
+        load_robot(path, strict=True)
+
+
+def test_a_joint_may_follow_one_that_follows_another(tmp_path):
+    path = tmp_path / "chain.xml"
+    bodies = "".join(f'<body name="b{k}"><joint name="j{k}"/>{INERTIAL}' for k in range(3)) + "</body>" * 3
+    ties = (
+        '<joint joint1="j2" joint2="j1" polycoef="1 -3 0 0 0"/><joint joint1="j1" joint2="j0" polycoef="0.5 2 0 0 0"/>'
+    )
+    path.write_text(f"<mujoco><worldbody>{bodies}</worldbody><equality>{ties}</equality></mujoco>")
+    robot = load_robot(path)
+    assert robot.joint_names == ("j0",)
+    assert robot.joints["j2"].mimic == jn.Mimic("j0", -6.0, -0.5)
+
+
+def test_closures_stay_where_the_base_is_set_free(tmp_path):
+    path = tmp_path / "loop.xml"
+    legs = "".join(
+        f'<body name="{n}" pos="{x} 0 0"><joint axis="0 1 0"/>{INERTIAL}</body>' for n, x in (("a", 0), ("b", 1))
+    )
+    tie = '<equality><connect name="tie" body1="a" body2="b" anchor="0 0 -1"/></equality>'
+    path.write_text(f'<mujoco><worldbody><body name="trunk">{INERTIAL}{legs}</body></worldbody>{tie}</mujoco>')
+    assert list(load_robot(path, floating_base=True).closures) == ["tie"]

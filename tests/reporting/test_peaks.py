@@ -1,0 +1,87 @@
+"""Peaks between the instants of a motion."""
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+
+import jounce as jn
+from jounce.reporting.peaks import peaks
+
+CRANK = jn.Mechanism(
+    space="planar",
+    parameters={"w": 3.0},
+    bodies={"a": jn.Body([0, 0], mass=1.0, inertia=0.5)},
+    joints={"O": jn.planar.Revolute(("ground", "a"), [0, 0], [0, 0])},
+    drivers={"turn": jn.drivers.CoordinateDriver(("ground", "a"), "angle", motion="sin(w*t) + 0.25*sin(2*w*t)")},
+    outputs={"angle": jn.AngleOutput("a")},
+)
+FINE = np.linspace(0.0, 4.0, 400_001)
+
+
+def curve(order):
+    """Derivatives of the law in closed form, on a grid so fine that its maximum is exact to 1e-9."""
+    shift = order * np.pi / 2
+    return 3.0**order * np.sin(3 * FINE + shift) + 0.25 * 6.0**order * np.sin(6 * FINE + shift)
+
+
+@pytest.mark.parametrize("count", [2, 4, 21, 201])
+def test_peaks_do_not_depend_on_the_instants(count):
+    motion = jn.solve(CRANK, np.linspace(0.0, 4.0, count), order=4)
+    for order, peak in enumerate(peaks(motion)):
+        true = curve(order)
+        assert peak.maximum == pytest.approx(true.max(), rel=1e-8)
+        assert peak.minimum == pytest.approx(true.min(), rel=1e-8)
+        at = np.array([peak.minimum_at, peak.maximum_at])
+        shift = order * np.pi / 2
+        there = 3.0**order * np.sin(3 * at + shift) + 0.25 * 6.0**order * np.sin(6 * at + shift)
+        np.testing.assert_allclose(there, [peak.minimum, peak.maximum], rtol=1e-12)
+    assert peaks(motion) is peaks(motion)
+
+
+def test_a_peak_on_an_instant_keeps_its_time():
+    (position, velocity) = peaks(jn.solve(CRANK, [0.0, 0.1], order=1))
+    assert (velocity.maximum_at, position.minimum_at, position.minimum) == (0.0, 0.0, 0.0)
+    (alone,) = peaks(jn.solve(CRANK, [0.3], order=0))
+    assert alone.maximum == alone.minimum
+    assert alone.maximum_at == 0.3
+
+
+def test_peaks_of_a_motion_that_ends_early():
+    link = jn.load("examples/four_bar.yaml").with_parameters(AB="8 cm")
+    motion = jn.solve(link, order=2, strict=False)
+    reached = motion.time[motion.status == 0]
+    for order, peak in enumerate(peaks(motion)[:3]):
+        grid = motion.outputs["psi"][motion.status == 0, order]
+        assert peak.maximum >= grid.max()
+        assert peak.minimum <= grid.min()
+        assert 0 <= peak.maximum_at <= reached[-1] + 0.01
+
+
+def test_peaks_of_a_simulation():
+    free = jn.Mechanism(
+        space="planar",
+        gravity=[0, -9.81],
+        bodies={"rod": jn.Body([0, 0], mass=2.0, inertia=0.5, center_of_mass=[1, 0])},
+        joints={"O": jn.planar.Revolute(("ground", "rod"), [0, 0], [0, 0])},
+        outputs={"angle": jn.AngleOutput("rod")},
+    )
+    (angle, rate) = peaks(jn.simulate(free, [0.0, 1.0, 2.0], order=1))
+    assert angle.minimum == pytest.approx(-np.pi, abs=1e-8)  # it swings from one side to the other
+    assert -rate.minimum == pytest.approx(np.sqrt(2 * 9.81 * 2.0 / 2.5), rel=1e-8)  # energy, at the lowest point
+
+
+def test_peaks_at_the_instants_only(run, tmp_path):
+    time = np.linspace(0.0, 4.0, 8)
+    found = peaks(jn.solve(CRANK, time, order=2), refine=False)
+    for order, peak in enumerate(found):
+        shift = order * np.pi / 2
+        law = 3.0**order * np.sin(3 * time + shift) + 0.25 * 6.0**order * np.sin(6 * time + shift)
+        assert peak.maximum == pytest.approx(law.max(), rel=1e-12)
+        assert peak.maximum_at == time[law.argmax()]
+    path = tmp_path / "crank.yaml"
+    jn.write_mechanism(dataclasses.replace(CRANK, time=jn.TimeGrid(start=0.0, stop=4.0, count=8)), path)
+    status, told, _ = run("run", path, "--order", 2, "--no-refine", "--json")
+    assert status == 0
+    assert [row["maximum"] for row in json.loads(told)["peaks"]] == [peak.maximum for peak in found]
