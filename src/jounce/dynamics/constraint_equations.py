@@ -86,7 +86,7 @@ def constraint_equations(
     --------
     >>> import jounce as jn
     >>> equations = jn.constraint_equations(jn.solve(jn.load("examples/four_bar.yaml"), [0.0, 0.5], order=4))
-    >>> list(equations.row.values), list(equations.column.values)[:3]
+    >>> equations.row.values.tolist(), equations.column.values.tolist()[:3]
     (['A.1', 'A.2', 'D.1', 'D.2', 'BC.1', 'theta.1'], ['crank.x', 'crank.y', 'crank.angle'])
     >>> along = equations.jacobian.dot(equations.velocities, dim="column")  # Phi_q q^(k), at every instant and order
     >>> bool((abs(along - equations.right_side) < 1e-10).all())
