@@ -472,6 +472,19 @@ def test_bodies_without_joints_and_motions_without_derivatives():
     assert still.jacobian.shape == (2, 6, 6)
 
 
+def test_a_free_body_without_a_mass_leaves_multipliers_open():
+    """Two arms on pins, one of them with no mass: nothing tells how it accelerates."""
+    bodies = {"heavy": jn.Body([0, 0], mass=1.0, inertia=0.1, center_of_mass=[0.5, 0]), "light": jn.Body([1, 0])}
+    pins = {name: jn.planar.Revolute(("ground", name), body.position, [0, 0]) for name, body in bodies.items()}
+    state = {name: {"position": [body.position, [0, 0], [0, 0]], "angle": [0, 0, 1]} for name, body in bodies.items()}
+    open_ones = jn.constraint_equations(jn.Mechanism(space="planar", bodies=bodies, joints=pins), state)
+    assert "multipliers" not in open_ones
+    bodies["light"] = jn.Body([1, 0], mass=1.0, inertia=0.1)
+    found = jn.constraint_equations(jn.Mechanism(space="planar", bodies=bodies, joints=pins), state).multipliers
+    np.testing.assert_allclose(found.sel(derivative=0).values[0, 2:], 0, atol=1e-15)
+    assert np.isfinite(found.sel(derivative=0)).all()
+
+
 def test_instants_that_were_not_solved_are_nan():
     """A crank pushed away from a point farther than it reaches."""
     reach = jn.drivers.DistanceDriver(("ground", "crank"), [1, 0], [1, 0], motion="0.5 + 2*t")
