@@ -191,6 +191,7 @@ def test_angles_without_a_value_are_refused_afterwards_too(turning):
     np.testing.assert_allclose(fixed, [derivatives("alpha", t)[:2] for t in turning.time], rtol=0, atol=1e-11)
 
 
+@pytest.mark.slow  # to compile
 def test_simulated_angles_are_continuous_over_turns():
     """A rotor that flies freely, spun about an axis of symmetry, looked at twice in many turns."""
     mechanism = jn.Mechanism(
