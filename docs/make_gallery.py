@@ -105,7 +105,7 @@ PICTURES = {
     "gear_pair": Picture(("C",), 0.2),
     "hooke_joint": Picture(("rim",), 0.1, view=(-70.0, 40.0)),
     "human_arm": robot(
-        "A person's arm",
+        "Human arm",
         "human_arm.xml",
         "human_arm_reach.yaml",
         "hand",
@@ -116,6 +116,7 @@ PICTURES = {
     "inverted_slider_crank_slide": Picture(("G",), 0.3),
     "jansen_leg": Picture(("foot",), 0.6),
     "klann_leg": Picture(("foot",), 0.0),
+    "lr_mate": robot("LR Mate 100iB", "lr_mate.urdf", "lr_mate_swing.yaml", "flange", (0.08, 0, 0), view=(-70.0, 15.0)),
     "panda": robot("Franka Panda", "panda.urdf", "panda_pick.yaml", "panda_hand", (0, 0, 0.1), view=(-50.0, 15.0)),
     "pantograph": Picture(("P", "Q"), 0.1),
     "peaucellier": Picture(("P", "B"), 0.2),

@@ -4,6 +4,7 @@ import pytest
 
 import jounce as jn
 from jounce.constraints import catalogue
+from jounce.constraints.base import field_kind, value_fields
 from jounce.io.mechanisms.user_classes import import_file
 
 
@@ -92,3 +93,20 @@ def test_a_field_that_would_break_all_files_is_refused(field):
 def test_a_joint_is_no_force():
     with pytest.raises(jn.MechanismError, match="role"):
         own(role="force")
+
+
+def test_annotations_may_be_strings(tmp_path):
+    path = tmp_path / "postponed.py"
+    path.write_text(
+        "from __future__ import annotations\n"
+        "import jounce as jn\nfrom jounce import Vector\n"
+        'class Postponed(jn.AbstractConstraint, type="postponed", space="planar"):\n'
+        "    point_i: Vector\n    length: jn.Scalar\n    word: str = 'x'\n"
+    )
+    import_file(str(path))
+    fields = value_fields(catalogue("planar", "joint")["postponed"])
+    assert {name: field_kind(field) for name, field in fields.items()} == {
+        "point_i": "vector",
+        "length": "scalar",
+        "word": "text",
+    }

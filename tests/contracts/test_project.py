@@ -21,6 +21,13 @@ def test_readme_starts_with_the_two_commands():
     assert "jounce run examples/four_bar.yaml" in sh_blocks()[0][1]
 
 
+def test_each_of_the_two_is_one_command_for_any_python_of_the_system():
+    for _, block in sh_blocks()[:2]:
+        assert block.count("\n") == 1
+        assert block.startswith("python3 -m venv .venv && ")
+    assert " -c constraints.txt . &&" in sh_blocks()[0][1], "no extra, which the command does not need"
+
+
 def test_ci_runs_the_test_command_of_the_readme_word_for_word():
     last = sh_blocks()[1][1].strip().splitlines()[-1]
     assert "pytest" in last

@@ -54,7 +54,7 @@ def test_the_readme_and_the_start_page_have_code():
     assert {"README.md", "start.md", "own_joint.md"} <= set(found)
 
 
-ELSEWHERE = ("python3.11", ".venv/bin/python", "bash", "jounce reproduce")  # set-up, scripts and papers have own checks
+ELSEWHERE = ("python3", ".venv/bin/python", "bash", "jounce reproduce")  # set-up, scripts and papers have own checks
 
 
 @pytest.mark.slow

@@ -106,6 +106,20 @@ def test_equations_089_to_102_identities_of_one_particle(seed):
 
 
 @SEEDS
+def test_equations_089_to_102_summed_over_the_particles_give_the_energy_of_rotation(seed):
+    body = body_of(seed)
+    w, e = body.w[:2]
+    W, total = negrean_dynamics.skew(w), 0.0
+    for m, rho in zip(body.masses, (body.points - body.center) @ body.R[0].T, strict=True):
+        P = negrean_dynamics.skew(rho)
+        tangential = np.cross(e, rho) @ np.cross(e, rho)
+        mixed = e @ W @ P @ P.T @ w  # 89-95
+        radial = w @ (w @ P @ P.T @ w * np.eye(3)) @ w  # 98-102
+        total += m / 2 * (tangential + 2 * mixed + radial)
+    close(library(body, 1)[1][0], total)
+
+
+@SEEDS
 @pytest.mark.parametrize("p", range(5))
 def test_equations_107_and_108_any_order_and_its_rates(seed, p):
     body = body_of(seed)
@@ -186,6 +200,7 @@ def test_equation_121_as_printed_contradicts_that_of_first_order():
         body = body_of(seed)
         printed = negrean_dynamics.printed_rotation_any_order(2, body.inertia, body.w)
         found.append(abs(printed / body.rotation(2) - 1))
+        close(library(body, 2)[1][0], body.rotation(2))
     np.testing.assert_allclose(found, ERRORS["121"], rtol=0.06)
     spin = np.array([[0.0, 0.0, 2.0], [0.0, 0.0, 0.0]])  # a steady turn about one axis: E_1 is I w^4 / 2, half of it
     assert negrean_dynamics.printed_rotation_any_order(1, np.eye(3), spin) == 16.0

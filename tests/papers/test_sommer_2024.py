@@ -1,6 +1,7 @@
 """The seven simulations of Sommer 2024: explicit solutions, errors, sweeps, files written."""
 
 import csv
+import dataclasses
 import importlib
 import pathlib
 import subprocess
@@ -12,7 +13,16 @@ import pytest
 
 from jounce.errors import OutputError
 from jounce.papers import sommer_2024
-from jounce.papers.sommer_2024 import QUANTITIES, SIMULATIONS, central_difference, geometry, simulations
+from jounce.papers.sommer_2024 import (
+    QUANTITIES,
+    SIMULATIONS,
+    backward_difference,
+    central_difference,
+    comparison,
+    geometry,
+    simulations,
+)
+from jounce.papers.sommer_2024.lag import STEPS as LAG_STEPS
 from jounce.papers.sommer_2024.simulations import STEPS, TOLERANCES, stencil_instants
 
 reproduction = importlib.import_module("jounce.papers.sommer_2024.reproduce")
@@ -117,7 +127,7 @@ def test_simulation_reaches_rounding_from_velocity_to_jounce(name):
     assert np.abs(cycle.simulated[:, 0] - cycle.explicit[:, 0]).max() <= 1e-14
     assert (cycle.normalised_rmse <= FLOOR).all(), dict(zip(QUANTITIES, cycle.normalised_rmse, strict=True))
     assert (cycle.peak > 0.1).all(), "the motion is worth measuring"
-    for (printed_name, quantity), printed in reproduction.PRINTED.items():
+    for (printed_name, quantity), printed in comparison.PRINTED.items():
         if printed_name == name:
             assert cycle.rmse[QUANTITIES.index(quantity)] < printed
 
@@ -128,6 +138,9 @@ def test_files_in_the_package_are_those_in_examples(name):
     assert inside.read_bytes() == (ROOT / "examples" / f"{name}.yaml").read_bytes()
 
 
+DRAWN = ("figure_01", "figure_02", "figure_04", "figure_05", "figure_08", "phase_lag")
+
+
 @pytest.fixture(scope="module")
 def small_run(tmp_path_factory):
     """A whole reproduction, of the four-bar alone."""
@@ -136,7 +149,7 @@ def small_run(tmp_path_factory):
     calls, kept = [], {}
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(reproduction, "SIMULATIONS", {"four_bar": SIMULATIONS["four_bar"]})
-        patch.setattr(figures, "FIGURES", {k: figures.FIGURES[k] for k in (2, 4, 5)})
+        patch.setattr(figures, "FIGURES", {k: figures.FIGURES[k] for k in DRAWN})
         measure = reproduction.measure
         patch.setattr(reproduction, "measure", lambda s, advanced: kept.setdefault(s.name, measure(s, advanced)))
         paths = reproduction.reproduce(directory, lambda done, total: calls.append((done, total)))
@@ -156,7 +169,7 @@ def check_errors(path, names):
 def test_reproduction_writes_its_files(small_run):
     directory, paths, calls, _ = small_run
     names = ["comparison.md", "errors.csv"]
-    names += [f"figure_0{k}.{kind}" for k in (2, 4, 5) for kind in ("png", "svg")]
+    names += [f"{name}.{kind}" for name in DRAWN for kind in ("png", "svg")]
     assert [path.name for path in paths] == names
     assert sorted(path.name for path in directory.iterdir()) == sorted(names), "nothing else is left behind"
     check_errors(directory / "errors.csv", ["four_bar"])
@@ -172,9 +185,66 @@ def test_reproduction_writes_its_files(small_run):
 
 def test_comparison_puts_printed_errors_beside_ours(small_run):
     text = (small_run[0] / "comparison.md").read_text()
-    row = next(line for line in text.splitlines() if line.startswith("| four_bar | jerk |"))
+    row = next(line for line in text.splitlines() if line.startswith("| four_bar |") and "| jerk |" in line)
     assert "| 1.07e-13 |" in row
-    assert "1.07e-13" not in text.replace(row, "")
+    assert text.count("1.07e-13") == 2, "there, and in the verdict on figure 2"
+
+
+def test_comparison_says_what_is_chosen_before_any_number(small_run):
+    text = (small_run[0] / "comparison.md").read_text()
+    chosen = text.index("stand-ins")
+    assert chosen < text.index("|")
+    assert all(name in text[chosen - 200 : text.index("|")] for name in ("RSUR", "RSSR", "RSPU", "drive"))
+    assert "NOT reproduced" not in text
+
+
+@pytest.mark.parametrize("figure", [2, 3, 4, 5])
+def test_each_figure_has_a_verdict_that_the_numbers_decide(small_run, figure):
+    result = small_run[3]
+    row = verdict(result, figure)
+    assert "| reproduced" in row
+    cycle = dataclasses.replace(result.cycle, simulated=result.cycle.simulated * (1 + 1e-9))
+    worse = {name: values * 1e3 for name, values in result.by_step.items()}
+    apart = result.by_tolerance * np.array([1.0, 1.0, 1.0, 100.0])
+    spoiled = dataclasses.replace(result, cycle=cycle, by_tolerance=apart, by_step=worse)
+    assert "| NOT reproduced" in verdict(spoiled, figure)
+
+
+def verdict(result, figure):
+    page = comparison.comparison({"four_bar": result})
+    return next(line for line in page.splitlines() if line.startswith(f"| {figure} |"))
+
+
+def plain_newton_raphson(tolerance, unit):
+    """The angle of the four-bar's rocker by Haug's textbook iteration on residuals, lengths in m times `unit`."""
+    ad, ab, bc, cd = (unit * length for length in (0.1321, 0.04, 0.1423, 0.2031))
+    q, found = np.array([0.0, 0.0, np.pi / 6, ad, 0.0, 2.2]), []
+    for t in simulations.nominal_time():
+        theta = np.radians(30) + np.radians(60) * np.sin(np.pi * t)
+        while True:
+            b, c = (length * np.array([np.cos(a), np.sin(a)]) for length, a in ((ab, q[2]), (cd, q[5])))
+            d = q[3:5] + c - q[:2] - b
+            residual = np.array([q[0], q[1], q[3] - ad, q[4], d @ d - bc**2, q[2] - theta])
+            if np.abs(residual).max() <= tolerance:
+                break
+            jacobian = np.zeros((6, 6))
+            jacobian[[0, 1, 2, 3, 5], [0, 1, 3, 4, 2]] = 1.0
+            jacobian[4] = 2 * np.concatenate([-d, [-d @ [-b[1], b[0]]], d, [d @ [-c[1], c[0]]]])
+            q = q - np.linalg.solve(jacobian, residual)
+        found.append(q[5])
+    return np.array(found)
+
+
+def test_the_floor_of_the_paper_is_that_of_residuals_in_centimetres(small_run):
+    """Figure 4 has its floor at tolerances below 1e-11: so has the iteration on residuals in cm, not that in m."""
+    right = small_run[3].cycle.explicit[:, 0]
+
+    def error(tolerance, unit):
+        wrong = plain_newton_raphson(tolerance, unit) - right
+        return np.sqrt(np.mean(wrong**2)) / np.abs(right).max()
+
+    assert error(1e-11, 100.0) < 1e-15 < error(1e-10, 100.0)
+    assert error(1e-14, 1.0) > 1e-15
 
 
 def test_errors_fall_with_the_tolerance_until_the_floor(small_run):
@@ -203,6 +273,26 @@ def test_the_simulation_does_not_depend_on_the_time_step(small_run):
     by_step = small_run[3].by_step
     assert (by_step["simulation"] <= FLOOR).all()
     assert all((by_step["simulation"] < 1e-3 * by_step[method]).all() for method in ("second order", "fourth order"))
+
+
+@pytest.mark.parametrize("quantity, steps_late", [("jerk", 0.5), ("jounce", 1.0)])
+def test_backward_differences_are_late_by_half_a_step_and_by_a_step(small_run, quantity, steps_late):
+    lags = [lag for lag in small_run[3].lags if lag.quantity == quantity]
+    assert [lag.step for lag in lags] == list(LAG_STEPS)
+    for lag in lags:
+        assert lag.expected == steps_late * lag.step
+        assert lag.late(lag.difference) == pytest.approx(lag.expected, rel=1e-6)
+        assert abs(lag.late(lag.simulated)) < 1e-15
+        assert lag.measured_error(lag.simulated) <= FLOOR
+        assert lag.measured_error(lag.difference) == pytest.approx(lag.error, rel=2e-3)  # few samples at large steps
+    errors = np.array([lag.error for lag in lags])
+    np.testing.assert_allclose(errors[0] / LAG_STEPS[0], errors[1] / LAG_STEPS[1], rtol=0.02)  # first order in h
+
+
+def test_backward_differences_are_means_of_the_derivative():
+    t = 0.25 * np.arange(9)
+    np.testing.assert_allclose(backward_difference(t**3, 0.25, derivative=1), 3 * t[1:] ** 2 - 0.75 * t[1:] + 0.0625)
+    np.testing.assert_allclose(backward_difference(t**3, 0.25, derivative=2), 6 * (t[2:] - 0.25))
 
 
 def test_differences_are_exact_for_polynomials_of_their_order():
@@ -254,5 +344,5 @@ def test_the_whole_reproduction(tmp_path):
     paths = sommer_2024.reproduce(tmp_path)
     check_errors(tmp_path / "errors.csv", SIMULATIONS)
     figures = {path.name for path in paths if path.suffix == ".png"}
-    assert figures == {f"figure_{k:02d}.png" for k in (2, 3, 4, 5, 6, 7, 10, 11, 12, 13)}
+    assert figures == {f"figure_{k:02d}.png" for k in range(1, 14)} | {"phase_lag.png"}
     assert all(path.stat().st_size > 1000 for path in paths)

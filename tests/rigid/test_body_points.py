@@ -96,6 +96,7 @@ def test_equations_035_to_037_velocity_and_acceleration_of_a_point(seed):
     np.testing.assert_allclose(dR @ R.T, skew(w), atol=1e-15)
     np.testing.assert_allclose(v_0 + np.cross(w, rho), expected[1], rtol=1e-13)
     np.testing.assert_allclose(a_0 + np.cross(e, rho) + np.cross(w, np.cross(w, rho)), expected[2], rtol=1e-13)
+    close(case.pose.point(case.local).derivatives()[:3], expected[:3])
 
 
 @SEEDS
@@ -107,6 +108,7 @@ def test_equations_043_to_049_centre_of_mass(seed):
     mean = sum(m * jet.matvec(case.R, p) for m, p in zip(case.masses, case.points, strict=True)) / case.masses.sum()
     close(mean.derivatives(), rho.derivatives())
     close((case.origin + rho).derivatives(), expected)
+    close(case.pose.point(local).derivatives(), expected)
     close((case.origin.differentiate() + jet.cross(case.w, rho)).derivatives(), expected[1:])  # 45 and 47, k = 0..5
     a_0, (w, e), place = case.origin.derivatives()[2], case.w.derivatives()[:2], rho.coefficients[0]
     np.testing.assert_allclose(a_0 + np.cross(e, place) + np.cross(w, np.cross(w, place)), expected[2], rtol=1e-13)
@@ -148,8 +150,10 @@ def test_equations_038_and_048_exponential_of_a_sum_is_not_the_rotation(seed):
 def test_equations_044_and_045_exponential_of_the_product_is_not_the_rotation(seed):
     """An outer exponential around the product, as the first forms read, does not even keep lengths."""
     case = body(seed)
-    R = np.asarray(case.R.coefficients[0])
-    assert off(expm(R) @ case.local, R @ case.local) > 0.5
+    R, origin = np.asarray(case.R.coefficients[0]), case.origin.coefficients[0]
+    placed = case.pose.point(case.local).coefficients[0]
+    np.testing.assert_allclose(placed, origin + R @ case.local, rtol=1e-13)
+    assert off(expm(R) @ case.local, placed - origin) > 0.5
 
 
 @SEEDS

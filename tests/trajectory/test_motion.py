@@ -7,6 +7,7 @@ from scipy.interpolate import make_interp_spline
 
 import jounce as jn
 from jounce.jet import Jet
+from tests.oracles import sommer_planar
 from tests.problems.small import crank
 
 INSTANTS = jnp.asarray([[0.1, 0.5, 0.93]])
@@ -23,6 +24,11 @@ class TestExpressionMotion:
         np.testing.assert_allclose(found[0], 2 * t**3 + np.cos(3 * t), rtol=1e-15)
         np.testing.assert_allclose(found[1], 6 * t**2 - 3 * np.sin(3 * t), rtol=1e-14)
         np.testing.assert_allclose(found[2], 12 * t - 9 * np.cos(3 * t), rtol=1e-14)
+
+    def test_equation_056_of_sommer_2024(self):
+        law = jn.ExpressionMotion("30*deg + 60*deg*sin(2*pi*t/tau)", {"tau": 2.0})
+        right = sommer_planar.equation_056(np.array(INSTANTS), np.radians(30), np.radians(60), 2.0)
+        np.testing.assert_allclose(derivatives(law), right, rtol=1e-13, atol=1e-12)
 
     @pytest.mark.parametrize("text", ["0.3", "a", "2*a - 1"])
     def test_constant_law(self, text):

@@ -1,4 +1,4 @@
-"""The commands that draw: figures, sketches and films of a motion, and its report."""
+"""The commands that draw: figures, sketches and animations of a motion, and its report."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def plot(
     allow: list[Path] | None = None,
     overwrite: bool = False,
 ) -> int:
-    """Draw outputs, a sketch, reactions, energies, or a film.
+    """Draw outputs, a sketch, reactions, energies, or an animation.
 
     A file with initial conditions is simulated, any other is solved.
 
@@ -60,7 +60,7 @@ def plot(
     file
         Mechanism file: .yaml, .yml, .toml or .json.
     kind
-        What is drawn [default: outputs, or a film by its ending].
+        What is drawn [default: outputs, or an animation by its ending].
     order
         Highest derivative, to 30 [default: 4, or what is needed].
     out
@@ -72,15 +72,15 @@ def plot(
     instant
         Time that a sketch shows, s.
     names
-        Written in a sketch or film.
+        Written in a sketch or animation.
     azimuth
         Around a spatial mechanism, degrees.
     elevation
         Above it, degrees.
     speed
-        Seconds of motion in a second of film.
+        Seconds of motion in a second of the animation.
     fps
-        Frames in a second of film.
+        Frames in a second of the animation.
     set_
         NAME=VALUE of a parameter, with a unit; repeatable.
     import_
@@ -119,7 +119,7 @@ def plot(
 
 
 def _kind(kind: Kind | None, out: Path | None) -> str:
-    """Return what is drawn; the ending of a film tells it too."""
+    """Return what is drawn; the ending of an animation tells it too."""
     film = out is not None and out.suffix.lower() in FILMS
     if kind is None:
         return "animation" if film else "outputs"
@@ -191,7 +191,8 @@ def _portrayed(motion: Motion, kind: str, output: list[str] | None) -> str:
     """Return the output of a portrait: the first that fits unless one is named."""
     if output or kind not in PORTRAITS:
         return output[0] if output else ""
-    vectors = [name for name, values in motion.outputs.items() if values.ndim == 3 or kind == "phase"]
+    known = motion.mechanism.outputs
+    vectors = [n for n, values in motion.outputs.items() if kind == "phase" or (values.ndim == 3 and not known[n].axes)]
     return (vectors or list(motion.outputs))[0]
 
 

@@ -1,4 +1,4 @@
-"""The command that makes the figures and tables of papers again."""
+"""The command that reproduces the figures and tables of papers."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ PAPERS = {"sommer-2024": "jounce.papers.sommer_2024", "negrean-2025": "jounce.pa
 
 
 def reproduce(paper: str, /, *, out: Path) -> int:
-    """Make the figures and tables of a paper again.
+    """Reproduce the figures and tables of a paper.
 
     Parameters
     ----------

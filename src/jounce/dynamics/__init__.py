@@ -5,6 +5,7 @@ from jounce.dynamics.balances import (
     newton_euler as newton_euler,
     virtual_work as virtual_work,
 )
+from jounce.dynamics.constraint_equations import constraint_equations as constraint_equations
 from jounce.dynamics.energies import (
     Energy as Energy,
     acceleration_energy as acceleration_energy,

@@ -56,6 +56,16 @@ def places(model: Model) -> dict[str, Place]:
     return found
 
 
+def in_chunks(function: Callable[[np.ndarray], Any], count: int) -> Any:
+    """Return what a function of indices of instants gives, for all of them: arrays with the time last."""
+    width = SMALL_BATCH if count <= SMALL_BATCH else LARGE_BATCH
+    parts = []
+    for first in range(0, count, width):
+        lanes = np.minimum(np.arange(first, first + width), count - 1)
+        parts.append(jax.tree.map(np.asarray, function(lanes)))
+    return jax.tree.map(lambda *xs: np.concatenate(xs, axis=-1)[..., :count], *parts)
+
+
 class MotionForces:
     """The forces in a motion, computed when they are asked for and kept. Sommer 2024, section 7.
 
@@ -209,13 +219,7 @@ class MotionForces:
 
     def in_chunks(self, function: Callable[[np.ndarray], Any]) -> Any:
         """Return what a function of indices of instants gives, for all of them: arrays with the time last."""
-        count = len(self.motion.time)
-        width = SMALL_BATCH if count <= SMALL_BATCH else LARGE_BATCH
-        parts = []
-        for first in range(0, count, width):
-            lanes = np.minimum(np.arange(first, first + width), count - 1)
-            parts.append(jax.tree.map(np.asarray, function(lanes)))
-        return jax.tree.map(lambda *xs: np.concatenate(xs, axis=-1)[..., :count], *parts)
+        return in_chunks(function, len(self.motion.time))
 
     def taken(self, bodies: tuple[int, ...] | None, lanes: np.ndarray, levels: int) -> dict[str, Any]:
         """Return coordinates at some instants; of the ground alone it is the place only, as it never moves."""

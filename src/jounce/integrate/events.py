@@ -69,6 +69,11 @@ class Event:
         if not isinstance(self.output, AbstractOutput):
             message = "an event watches an output of the poses of bodies, such as AngleOutput"
             raise MechanismError(message, name="output", value=self.output)
+        if self.output.wraps:
+            message = (
+                "Euler angles jump by whole turns; watch an entry of the rotation matrix, or a RelativeAngleOutput"
+            )
+            raise MechanismError(message, name="output", value=type(self.output).__name__)
         if not (isinstance(self.value, int | float) and math.isfinite(self.value)):
             raise MechanismError("must be a finite number", name="value", value=self.value)
         for name in ("derivative", "component"):

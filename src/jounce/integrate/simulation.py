@@ -27,6 +27,7 @@ SMALL_BATCH, LARGE_BATCH = 16, 64  # instants expanded together
 MUCH_LONGER = (
     1e3  # than the step over a jump or a kink are one of those before and the next; a steep force takes several
 )
+PLACES = 16  # in each step at which attitudes are looked at for turns
 APPROACH = 4  # steps to such a place, each much shorter than the one before
 
 
@@ -102,6 +103,9 @@ class Simulation(Motion):
         status = np.where(reached, int(Status.OK), int(Status.NOT_REACHED))
         culprits = {}
         lost = reached & ~np.all([np.isfinite(p).all(axis=tuple(range(p.ndim - 1))) for p in state], axis=0)
+        undefined = _undefined(groups, order) & reached & ~lost
+        if undefined.any():
+            status[undefined] = int(Status.UNDEFINED)
         if lost.any():  # the state is known there, but not its derivatives
             status[lost], culprits[int(np.argmax(lost))] = int(Status.INADMISSIBLE), ending[1]
         beyond = np.flatnonzero(~reached & (np.abs(instants - track.start[0]) > abs(track.end - track.start[0])))
@@ -174,6 +178,18 @@ class Simulation(Motion):
         """The applied forces, in the groups of the model, with the turns of angles about axes at every instant."""
         return with_turns(self.model.system.forces, self._angles)
 
+    def _attitudes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return instants along the steps, and the Euler parameters of all bodies there, (4, bodies, places)."""
+        track, series = self.track, self.track.polynomial.attitude
+        since = track.length[:, None] * (np.arange(PLACES) / PLACES)
+        place = np.zeros((*series.shape[:1], *series.shape[2:], PLACES))
+        for k in range(series.shape[1])[::-1]:
+            place = place * since[:, None, None] + series[:, k, ..., None]
+        place = np.moveaxis(place, 0, -2).reshape(*series.shape[2:], -1)
+        ground = np.zeros((4, 1, place.shape[-1]))
+        ground[0] = 1.0
+        return (track.start[:, None] + since).ravel(), np.concatenate([ground, place], axis=1)
+
     def _coefficients(self, group: Group) -> np.ndarray:
         pose_type, coordinates = self.poses
         return self._series(group, coordinates, pose_type, self.time)
@@ -198,6 +214,12 @@ class Simulation(Motion):
         equations = self._start.equations.near(self._angles)
         found = np.asarray(_checks(equations, low, self.time[None], pose_type)[which])
         return np.where(self.status == Status.OK, found, np.nan)
+
+
+def _undefined(groups: tuple[np.ndarray, ...], order: int) -> np.ndarray:
+    """Return at which instants an output, or a derivative of it, is not a finite number, (time,)."""
+    bad = [~np.isfinite(series[: order + 1]).all(axis=(0, 1, 2)) for series in groups]
+    return np.any(bad, axis=0) if bad else np.zeros(1, bool)
 
 
 def _steps_of(track: Track, instants: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -15,11 +15,17 @@ import numpy as np
 from jounce.errors import OutputError
 from jounce.io.files.reading import known_name, read_file, written_name
 from jounce.io.files.writing import check_target, reason_of, replacing
+from jounce.mechanism import EulerAnglesOutput, EulerParametersOutput, RotationMatrixOutput
 
 __all__ = ["check_writable", "columns", "read", "write"]
 
 SUFFIXES = (".csv", ".nc")
-COMPONENTS = ("x", "y", "z")
+AXES = {  # of outputs that are more than one number, and the labels along them
+    ("component",): ("x", "y", "z"),
+    ("euler_parameter",): EulerParametersOutput.labels,
+    ("euler_angle",): EulerAnglesOutput.labels,
+    ("row_axis", "column_axis"): RotationMatrixOutput.labels,
+}
 
 
 def check_writable(path: str | PathLike[str], *, overwrite: bool = False) -> None:
@@ -44,14 +50,16 @@ def write(dataset: Any, path: str | PathLike[str], *, overwrite: bool = False) -
     """Write the dataset of a motion to a .csv or .nc file, whole or not at all.
 
     A CSV file has the columns ``time``, then for each output ``NAME, NAME_d1, NAME_d2, ...``, and for a vector
-    ``NAME_x, NAME_x_d1, ..., NAME_y, ...``; numbers have 17 significant digits, so that they read back to the bit, and
-    a missing value is ``nan``. A name that spreadsheets would take for a formula, as ``=A1``, has an apostrophe in
-    front, which `read` takes away. A NetCDF 4 file holds the dataset as it is, by the CF conventions.
+    ``NAME_x, NAME_x_d1, ..., NAME_y, ...``: ``_e0`` to ``_e3`` for Euler parameters, ``_alpha``, ``_beta``, ``_gamma``
+    for Euler angles, ``_xx``, ``_xy``, ... row by row for a rotation matrix. Numbers have 17 significant digits, so
+    that they read back to the bit, and a missing value is ``nan``. A name that spreadsheets would take for a formula,
+    as ``=A1``, has an apostrophe in front, which `read` takes away. A NetCDF 4 file holds the dataset as it is, by the
+    CF conventions.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        With dimensions time, derivative and component, as ``Motion.dataset``.
+        With dimensions time, derivative, and those of components, as ``Motion.dataset``.
     path
         The file; one of that name is replaced.
     overwrite
@@ -89,14 +97,20 @@ def columns(dataset: Any) -> dict[str, np.ndarray]:
     OutputError
         Two columns would have the same name.
     """
+    from xarray import Variable
+
     found = {"time": np.asarray(dataset["time"], float)}
     for name, variable in dataset.data_vars.items():
-        if not {"time", "derivative"} <= set(variable.dims) <= {"time", "derivative", "component"}:
+        axes = tuple(dim for dim in variable.dims if dim not in ("time", "derivative"))
+        if not {"time", "derivative"} <= set(variable.dims) or (axes and axes not in AXES):
             continue
         parts: list[tuple[str, Any]] = [(str(name), variable)]
-        if "component" in variable.dims:
-            labels = [str(label) for label in variable["component"].values]
-            parts = [(f"{name}_{label}", variable.isel(component=k)) for k, label in enumerate(labels)]
+        if axes:
+            labels = ["".join(map(str, found)) for found in itertools.product(*(variable[a].values for a in axes))]
+            flat = variable.transpose(*axes, "derivative", "time")
+            whole = flat.values.reshape(-1, *flat.shape[-2:])
+            dims = ("derivative", "time")
+            parts = [(f"{name}_{label}", Variable(dims, part)) for label, part in zip(labels, whole, strict=True)]
         for stem, part in parts:
             values = part.transpose("derivative", "time").values
             for order, row in zip(dataset["derivative"].values, values, strict=True):
@@ -151,12 +165,12 @@ def read(path: str | PathLike[str]) -> Any:
     """Read a file that `write` wrote back into a dataset; values come back to the bit.
 
     A CSV file has no units, and does not say what is a vector: neighbouring columns ``NAME_x, NAME_y`` (and
-    ``NAME_z``) become the vector NAME.
+    ``NAME_z``) become the vector NAME, and those of Euler parameters, Euler angles and rotation matrices likewise.
 
     Returns
     -------
     xarray.Dataset
-        In memory, with dimensions time, derivative and component.
+        In memory, with dimensions time, derivative, and those of components.
 
     Raises
     ------
@@ -194,16 +208,26 @@ def _from_columns(header: list[str], table: np.ndarray) -> Any:
     for column, values in zip(header[1:], table.T[1:], strict=True):
         stems.setdefault(re.sub(r"_d[0-9]+$", "", column), []).append(values)
     variables: dict[str, Any] = {}
-    for name, group in itertools.groupby(stems, lambda stem: stem[:-2] if stem[-2:] in ("_x", "_y", "_z") else stem):
-        members = list(group)
-        if members in ([f"{name}_{c}" for c in COMPONENTS[:2]], [f"{name}_{c}" for c in COMPONENTS]):
-            values = np.stack([np.stack(stems[member], axis=1) for member in members], axis=2)
-            variables[name] = (("time", "derivative", "component"), values)
-        else:
-            variables |= {member: (("time", "derivative"), np.stack(stems[member], axis=1)) for member in members}
     coordinates: dict[str, Any] = {"time": ("time", table[:, 0], {"units": "s"})}
     coordinates["derivative"] = np.arange(max(map(len, stems.values()), default=0))
-    sizes = {values.shape[2] for dims, values in variables.values() if len(dims) == 3}
-    if sizes:
-        coordinates["component"] = list(COMPONENTS[: max(sizes)])
+    for name, group in itertools.groupby(stems, _name_of):
+        members = list(group)
+        for axes, labels in AXES.items():
+            counts = (2, 3) if axes == ("component",) else (len(labels),)
+            if members in ([f"{name}_{label}" for label in labels[:count]] for count in counts):
+                sizes = (len(members),) if len(axes) == 1 else (3, 3)
+                values = np.stack([np.stack(stems[member], axis=1) for member in members], axis=2)
+                variables[name] = (("time", "derivative", *axes), values.reshape(*values.shape[:2], *sizes))
+                for axis in axes:
+                    known = labels[: sizes[0]] if len(axes) == 1 else AXES[("component",)]
+                    coordinates[axis] = list(max(known, tuple(coordinates.get(axis, ())), key=len))
+                break
+        else:
+            variables |= {member: (("time", "derivative"), np.stack(stems[member], axis=1)) for member in members}
     return xarray.Dataset(variables, coords=coordinates)
+
+
+def _name_of(column: str) -> str:
+    """Return the name of the output that a column may be a component of."""
+    stem, _, label = column.rpartition("_")
+    return stem if stem and any(label in labels for labels in AXES.values()) else column

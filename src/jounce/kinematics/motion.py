@@ -21,12 +21,13 @@ from jounce.mechanism import (
     Model,
     PointOutput,
 )
+from jounce.mechanism.attitude_outputs import continued
 from jounce.mechanism.builder import placed
-from jounce.mechanism.datums import Way
+from jounce.mechanism.datums import Way, attitudes_of
 from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.system import POSITION_COMPONENTS, Group, group_elements
 
-COMPONENTS = ("x", "y", "z")
+_UNDEFINED = Status.UNDEFINED.advice.partition(": ")[2]
 
 
 @compiled("pose_type")
@@ -107,6 +108,11 @@ class Motion(Displayed):
         return self._model
 
     @property
+    def way(self) -> Way | None:
+        """Attitudes that all bodies in space went through, by which turns are counted; None where none are kept."""
+        return self._way
+
+    @property
     def poses(self) -> tuple[type, dict[str, Any]]:
         """Type of the poses of all bodies, the ground first, and Taylor coefficients of their coordinates by name."""
         return self._model.pose_type, self._coordinates
@@ -123,9 +129,13 @@ class Motion(Displayed):
 
     @cached_property
     def outputs(self) -> dict[str, np.ndarray]:
-        """Outputs by name: arrays of shape (time, order + 1) or (time, order + 1, component), SI."""
+        """Outputs by name: arrays of shape (time, order + 1) or (time, order + 1, component), SI.
+
+        The nine components of a rotation matrix stand row by row.
+        """
         found = {}
-        for names, coefficients in self._groups.items():
+        for (names, coefficients), group in zip(self._groups.items(), self._model.system.outputs, strict=True):
+            coefficients = self._continued(group, coefficients)
             for k, name in enumerate(names):
                 found[name] = self._derivatives(coefficients[:, :, k])
         for name, output in self.mechanism.outputs.items():
@@ -137,13 +147,15 @@ class Motion(Displayed):
     def dataset(self) -> Any:
         """Outputs as an `xarray.Dataset` with dimensions time, derivative and component; units in the attributes.
 
+        Euler parameters have the dimension euler_parameter instead of component, Euler angles euler_angle, and rotation
+        matrices row_axis and column_axis.
+
         The unit of a variable is that of its derivative 0; each derivative adds ``/s``.
         """
         import xarray
 
         variables = {
-            name: self._labelled(name, values, self.mechanism.outputs[name].unit)
-            for name, values in self.outputs.items()
+            name: self._labelled(name, values, self.mechanism.outputs[name]) for name, values in self.outputs.items()
         }
         attributes: dict[str, Any] = {"title": self.mechanism.title or "motion of a mechanism", "source": "jounce"}
         if self.change_points.size:
@@ -191,9 +203,40 @@ class Motion(Displayed):
         """
         check_output(output, self.mechanism, name)
         if isinstance(output, AbstractMotionOutput):
-            return self._labelled(name, self._derivatives(output.coefficients(self)), output.unit)
-        values = self._coefficients(output_group(output, self.mechanism, self._model, name))[:, :, 0]
-        return self._labelled(name, self._derivatives(values), output.unit)
+            return self._labelled(name, self._derivatives(output.coefficients(self)), output)
+        group = output_group(output, self.mechanism, self._model, name)
+        values = self._derivatives(self._continued(group, self._coefficients(group))[:, :, 0])
+        self._check_finite(values, name)
+        return self._labelled(name, values, output)
+
+    def _check_finite(self, values: np.ndarray, name: str) -> None:
+        """Raise MechanismError for the first instant that was solved and at which an output is not finite."""
+        finite = np.isfinite(values).all(axis=tuple(range(2, values.ndim)))
+        bad = ~finite & (self.status == Status.OK)[:, None]
+        if bad.any():
+            lane, level = (int(k) for k in np.argwhere(bad)[0])
+            what = f"its derivative {level}" if level else "it"
+            at = f"{what} has no finite value at t = {self.time[lane]:g} s"
+            raise MechanismError(f"{at}; {_UNDEFINED}", name=name)
+
+    def _continued(self, group: Group, coefficients: Any) -> Any:
+        """Return the Taylor coefficients of outputs, of which angles in a range are made continuous."""
+        element = group.element
+        if not getattr(element, "wraps", ()):
+            return coefficients
+        coefficients = np.array(coefficients)
+        instants, quaternion = self._attitudes()
+        for k, bodies in enumerate(zip(*group.bodies, strict=True)):
+            angles = np.where(self.status == Status.OK, coefficients[0, :, k], np.nan)
+            way = instants, attitudes_of(bodies, quaternion)
+            coefficients[0, :, k] += continued(element, angles, self.time, way)
+        return coefficients
+
+    def _attitudes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return instants along the motion, and the Euler parameters of all bodies there, (4, bodies, places)."""
+        if self._way is None:
+            return np.zeros(0), np.zeros((4, len(self.mechanism.bodies) + 1, 0))
+        return self._way.time, self._way.quaternion
 
     def _coefficients(self, group: Group) -> np.ndarray:
         """Return the Taylor coefficients of outputs, (order + 1, components, instances, time)."""
@@ -211,14 +254,16 @@ class Motion(Displayed):
         values = np.where((self.status == Status.OK)[:, None, None], values, np.nan)
         return values[..., 0] if values.shape[-1] == 1 else values
 
-    def _labelled(self, name: str, values: np.ndarray, unit: str) -> Any:
+    def _labelled(self, name: str, values: np.ndarray, output: Any) -> Any:
         import xarray
 
-        dims = ("time", "derivative", "component")[: values.ndim]
         coordinates = {"time": self.time, "derivative": np.arange(values.shape[1])}
         if values.ndim == 3:
-            coordinates["component"] = list(COMPONENTS[: values.shape[2]])
-        attributes = {"units": unit, "long_name": name}
+            axes = output.axes or (("component", output.labels[: values.shape[2]]),)
+            coordinates |= {axis: list(labels) for axis, labels in axes}
+            values = values.reshape(*values.shape[:2], *(len(labels) for _, labels in axes))
+        dims = tuple(coordinates)
+        attributes = {"units": output.unit, "long_name": name}
         return xarray.DataArray(values, dims=dims, coords=coordinates, name=name, attrs=attributes)
 
     def _axes(self) -> dict[str, Any]:

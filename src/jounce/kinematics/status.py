@@ -36,6 +36,7 @@ _ADVICE = {
     Status.COLLAPSED: "the steps of the integration became too small to move on: the motion runs into a singular "
     "position, or a force grows beyond all bounds or jumps; check the mechanism and its forces here",
     Status.UNDEFINED: "a quantity or a derivative of it is not a finite number here: a distance that is zero has no "
-    "rate, and a motion law such as t**2.5 no third derivative at t = 0; ask for a lower order, or leave it out",
+    "rate, a motion law such as t**2.5 no third derivative at t = 0, and Euler angles are none where their first and "
+    "last axes are parallel; ask for a lower order, for another sequence, or leave it out",
     Status.NOT_REACHED: "not computed, because the motion could not be followed up to here",
 }

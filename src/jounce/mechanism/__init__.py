@@ -1,5 +1,13 @@
 """Mechanisms: named bodies, joints, drivers, outputs and parameters, and their numeric model."""
 
+from jounce.mechanism.attitude_outputs import (
+    EulerAnglesOutput as EulerAnglesOutput,
+    EulerParametersOutput as EulerParametersOutput,
+    RelativeEulerAnglesOutput as RelativeEulerAnglesOutput,
+    RelativeEulerParametersOutput as RelativeEulerParametersOutput,
+    RelativeRotationMatrixOutput as RelativeRotationMatrixOutput,
+    RotationMatrixOutput as RotationMatrixOutput,
+)
 from jounce.mechanism.builder import Model as Model, build as build
 from jounce.mechanism.mechanism import Body as Body, Mechanism as Mechanism, check_mechanism as check_mechanism
 from jounce.mechanism.outputs import (

@@ -221,6 +221,20 @@ def relative_attitude(group: Group, coordinates: dict[str, Any]) -> np.ndarray:
     return _product(_inverse(first), second)
 
 
+def attitudes_of(bodies: Sequence[int], quaternion: np.ndarray) -> np.ndarray:
+    """Return the Euler parameters, (4, places), of a body, or of the second body relative to the first.
+
+    Parameters
+    ----------
+    bodies : sequence of int
+        One or two indices of bodies.
+    quaternion : array of shape (4, bodies, places)
+        Of all bodies, the ground first.
+    """
+    *base, body = (quaternion[:, k] for k in bodies)
+    return _product(_inverse(base[0]), body) if base else body
+
+
 def since(datum: Datum, attitude: np.ndarray, axis: np.ndarray) -> np.ndarray:
     """Return the angle of an attitude, within half a turn of that of a datum."""
     return np.asarray(datum.angle) + angle_of(_product(attitude, _inverse(np.asarray(datum.attitude))), axis)[0]

@@ -19,7 +19,15 @@ from jounce.trajectory.units import parse_value
 GROUND = "ground"
 RESERVED = ("t", "pi", "deg")
 CLASSES = {"outputs": AbstractQuantity, "forces": AbstractForce}  # constraints otherwise
-RESERVED_OUTPUTS = ("time", "derivative", "component")  # the axes of a result
+RESERVED_OUTPUTS = (  # the axes of a result
+    "time",
+    "derivative",
+    "component",
+    "euler_parameter",
+    "euler_angle",
+    "row_axis",
+    "column_axis",
+)
 
 
 @dataclasses.dataclass(frozen=True)

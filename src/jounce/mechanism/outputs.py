@@ -21,6 +21,8 @@ class AbstractQuantity(eqx.Module):
     lost_orders: ClassVar[int] = 0  # derivatives by which it is shorter than the motion
     rate_names: ClassVar[tuple[str, ...]] = ()  # of the quantity and its rates, where they are no velocities
     body_count: ClassVar[int] = 0
+    labels: ClassVar[tuple[str, ...]] = ("x", "y", "z")  # of the components, where there are some
+    axes: ClassVar[tuple[tuple[str, tuple[str, ...]], ...]] = ()  # of components that are those of no vector
 
     def check(self, mechanism: Any) -> None:
         """Raise MechanismError unless the quantity exists in a mechanism; names of bodies are checked elsewhere."""
@@ -48,6 +50,7 @@ class AbstractOutput(AbstractQuantity):
     bodies: tuple[str, ...] = eqx.field(static=True, converter=lambda b: (b,) if isinstance(b, str) else tuple(b))
 
     turning: ClassVar[bool] = False  # an angle known up to whole turns, made continuous along the motion
+    wraps: ClassVar[tuple[bool, ...]] = ()  # which components are angles in a range, continued once all are known
     body_count: ClassVar[int] = 1
 
     def __check_init__(self):

@@ -1,1 +1,1 @@
-"""The papers whose methods this package implements, with their figures and tables made again."""
+"""The papers whose methods this package implements, with their figures and tables reproduced."""

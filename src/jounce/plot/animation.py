@@ -24,7 +24,7 @@ __all__ = ["ANIMATION_SUFFIXES", "animate", "check_animation", "frame_instants"]
 
 ANIMATION_SUFFIXES = (".gif", ".mp4")
 FRAMES_PER_SECOND = 25  # a GIF counts in hundredths of a second
-LONGEST, SHORTEST = 20.0, 2.0  # s, of a film whose speed is not told
+LONGEST, SHORTEST = 20.0, 2.0  # s, of an animation whose speed is not told
 MOST_FRAMES = 3000
 RESOLUTION = 110  # dots per inch
 
@@ -55,15 +55,15 @@ def _ffmpeg() -> str | None:
 
 
 def frame_instants(time: Any, *, speed: float | None = None, fps: int = FRAMES_PER_SECOND) -> np.ndarray:
-    """Return the times that the frames of a film show.
+    """Return the times that the frames of an animation show.
 
     Parameters
     ----------
     time : array_like of shape (time,)
         Instants of a motion, s.
     speed : float, optional
-        Seconds of motion in a second of film. Real time unless given, or where that would be very short or long, such
-        that the film takes 2 s or 20 s.
+        Seconds of motion in a second of the animation. Real time unless given, or where that would be very short or
+        long, such that it takes 2 s or 20 s.
     fps : int, default 25
         Frames in a second.
 
@@ -75,7 +75,7 @@ def frame_instants(time: Any, *, speed: float | None = None, fps: int = FRAMES_P
     Raises
     ------
     MechanismError
-        The speed or the rate is not above zero, or the film would have more than 3000 frames.
+        The speed or the rate is not above zero, or the animation would have more than 3000 frames.
 
     Examples
     --------
@@ -91,7 +91,9 @@ def frame_instants(time: Any, *, speed: float | None = None, fps: int = FRAMES_P
         length = float(np.clip(length, SHORTEST, LONGEST))
     count = round(length * rate) + 1
     if count > MOST_FRAMES:
-        message = f"the film would have {count} frames, of at most {MOST_FRAMES}; choose a higher speed or fewer fps"
+        message = (
+            f"the animation would have {count} frames, of at most {MOST_FRAMES}; choose a higher speed or fewer fps"
+        )
         raise MechanismError(message, name="speed", value=speed)
     return np.linspace(time[0], time[-1], count)
 
@@ -124,7 +126,7 @@ def animate(
     path : str or path
         The ending tells the kind; .mp4 needs ffmpeg, of the system or of the extra ``viewer``.
     speed : float, optional
-        Seconds of motion in a second of film; see `frame_instants`.
+        Seconds of motion in a second of the animation; see `frame_instants`.
     fps : int, default 25
         Frames in a second; a GIF rounds their time to hundredths of a second.
     names : str, default "bodies"
@@ -134,7 +136,7 @@ def animate(
     progress : callable, optional
         Called with the number of frames done and their total.
     overwrite : bool, default False
-        Whether the film may replace a file that this process has read as an input.
+        Whether the animation may replace a file that this process has read as an input.
 
     Raises
     ------
@@ -151,7 +153,7 @@ def animate(
     >>> animate(motion, "four_bar.gif", fps=10)  # doctest: +SKIP
     """
     import matplotlib as mpl
-    import matplotlib.animation as films
+    import matplotlib.animation as writers
 
     if names not in NAMES:
         raise MechanismError(f"unknown choice; {did_you_mean(names, NAMES)}", name="names", value=names)
@@ -170,9 +172,9 @@ def animate(
     mechanism = motion.mechanism
     kind = Path(fspath(path)).suffix.lower()
     writer = (
-        films.PillowWriter(fps=fps)
+        writers.PillowWriter(fps=fps)
         if kind == ".gif"
-        else films.FFMpegWriter(fps=fps, extra_args=["-pix_fmt", "yuv420p"])
+        else writers.FFMpegWriter(fps=fps, extra_args=["-pix_fmt", "yuv420p"])
     )
     program: dict[Any, Any] = {"animation.ffmpeg_path": _ffmpeg()} if kind == ".mp4" else {}
     with style(), mpl.rc_context(program), replacing(path, overwrite=overwrite) as beside:

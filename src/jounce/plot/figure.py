@@ -13,7 +13,7 @@ from jounce.errors import MechanismError, did_you_mean
 from jounce.io.files.writing import check_target, replacing
 from jounce.plot.labels import scale_of, symbol, unit_label
 from jounce.plot.style import COLOURS, PALE_GREY, RESOLUTION, blank_figure, shown_name, style
-from jounce.reporting.peaks import COMPONENTS, rate_name
+from jounce.reporting.peaks import rate_name
 
 __all__ = ["check_figure", "draw", "finish", "save", "shade_unsolved"]
 
@@ -21,6 +21,7 @@ SUFFIXES = (".png", ".svg", ".pdf")
 COLUMNS = 5  # of outputs beside each other, at most
 PANEL, SINGLE_PANEL = (3.5, 1.25), (4.8, 1.25)  # inches
 LEGEND = {"borderaxespad": 0.1, "handlelength": 1.2, "handletextpad": 0.5, "columnspacing": 1.2}
+STROKES = ("-", "--", ":")  # of more components than there are colours
 
 
 def draw(motion: Any, outputs: Sequence[str] | None = None) -> Any:
@@ -102,10 +103,11 @@ def _draw_column(motion: Any, name: str, panels: Any, first: int) -> None:
             axes.plot(
                 motion.time,
                 scaled[:, c],
-                color=COLOURS[c],
+                color=COLOURS[c % len(COLOURS)],
+                linestyle=STROKES[c // len(COLOURS)],
                 marker="o" if len(motion.time) == 1 else None,
                 markersize=3,
-                label=symbol(name, component=COMPONENTS[c]) if vector else None,
+                label=symbol(name, component=output.labels[c]) if vector else None,
             )
         shade_unsolved(axes, motion)
         finish(axes, motion.time, scaled)

@@ -10,7 +10,7 @@ import numpy as np
 from jounce.errors import MechanismError, did_you_mean
 from jounce.plot.labels import scale_of, symbol, unit_label
 from jounce.plot.style import COLOURS, GREY, PALE_GREY, blank_figure, style
-from jounce.reporting.peaks import COMPONENTS, rate_name
+from jounce.reporting.peaks import rate_name
 
 __all__ = ["hodograph", "phase_portrait"]
 
@@ -50,8 +50,9 @@ def hodograph(motion: Any, output: str, order: int = 1) -> Any:
     '$\\ddot{C}_{x}$  (m/s$^2$)'
     """
     values = _values(motion, output, (order,))[0]
-    if values.ndim != 2:
-        vectors = [name for name, found in motion.outputs.items() if found.ndim == 3]
+    outputs = motion.mechanism.outputs
+    if values.ndim != 2 or outputs[output].axes:
+        vectors = [name for name, found in motion.outputs.items() if found.ndim == 3 and not outputs[name].axes]
         message = f"a hodograph needs an output with components; {did_you_mean(output, vectors)}"
         raise MechanismError(message, name="output", value=output)
     pairs = PROJECTIONS if values.shape[1] == 3 else PROJECTIONS[:1]
@@ -68,7 +69,7 @@ def hodograph(motion: Any, output: str, order: int = 1) -> Any:
             axes.plot([0], [0], marker="+", color=GREY, markersize=7, linestyle="")
             _mark_start(axes, scaled[:, i], scaled[:, j])
             for label, k in ((axes.set_xlabel, i), (axes.set_ylabel, j)):
-                label(f"{symbol(output, order, COMPONENTS[k])}  ({unit})")
+                label(f"{symbol(output, order, its_output.labels[k])}  ({unit})")
             axes.set_aspect("equal", adjustable="datalim")
             _few_ticks(axes)
     return figure
@@ -112,10 +113,10 @@ def phase_portrait(motion: Any, output: str, orders: tuple[int, int] = (0, 1)) -
         figure = blank_figure(SIDE * count + 0.5 * (count == 1), SIDE, _title(motion, output, pair))
         for k, axes in enumerate(np.atleast_1d(figure.subplots(1, count))):
             x, y = first[:, k] * 10.0 ** -exponents[0], second[:, k] * 10.0 ** -exponents[1]
-            axes.plot(x, y, color=COLOURS[k])
+            axes.plot(x, y, color=COLOURS[k % len(COLOURS)])
             axes.axhline(0.0, color=PALE_GREY, linewidth=0.7, zorder=1)
             _mark_start(axes, x, y)
-            component = COMPONENTS[k] if count > 1 else ""
+            component = its_output.labels[k] if count > 1 else ""
             for label, order, exponent in zip((axes.set_xlabel, axes.set_ylabel), pair, exponents, strict=True):
                 mark = symbol(output, order, component) or rate_name(its_output, order)
                 label(f"{mark}  ({unit_label(its_output.unit, order, exponent)})")

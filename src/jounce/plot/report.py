@@ -22,7 +22,7 @@ from jounce.plot.scene import scene_of
 from jounce.plot.sketch import length_text, paths_of, round_length
 from jounce.plot.style import BODY_COLOURS
 from jounce.reporting.motion_facts import motion_facts
-from jounce.reporting.peaks import COMPONENTS, derivative_name, derivative_unit, peaks, rate_name
+from jounce.reporting.peaks import derivative_name, derivative_unit, peaks, rate_name
 from jounce.reporting.summaries import motion_summary
 
 __all__ = ["check_report", "report"]
@@ -164,7 +164,7 @@ def _output(name: str, output: Any, values: np.ndarray) -> dict[str, Any]:
         "name": name,
         "words": ["angle" if word == "position" and output.unit == "rad" else word for word in words],
         "units": [derivative_unit(output.unit, k) for k in orders],
-        "components": list(COMPONENTS[:components]) if components > 1 else [""],
+        "components": list(output.labels[:components]) if components > 1 else [""],
         "values": [[[_number(v) for v in columns[:, k, c]] for c in range(components)] for k in orders],
     }
 

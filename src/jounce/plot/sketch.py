@@ -92,18 +92,19 @@ class Drawing:
         Above it.
     view : tuple of float, or None
         Of a spatial mechanism, for its axes.
+    axes : matplotlib.axes.Axes, optional
+        Where to draw; a figure of its own unless given.
     """
 
-    def __init__(self, scene: Scene, paths: Paths | None, title: str, view: tuple[float, float] | None):
+    def __init__(
+        self, scene: Scene, paths: Paths | None, title: str, view: tuple[float, float] | None, axes: Any = None
+    ):
         self.scene = scene
         left, right, lower, upper = self._limits(scene, paths)
-        wide, tall = right - left, upper - lower
-        scale = min((WIDEST - 0.3) / wide, (TALLEST - 0.3) / tall)
-        bar = 0.9 if paths is not None and paths.order and paths.names else 0.0
-        least = max(LEAST, min(LETTER * len(title), WIDEST_TITLE))
-        size = max(least, wide * scale + 0.3 + bar), max(LEAST, tall * scale + 0.3 + 0.35 * bool(title))
-        self.figure = blank_figure(*size, title)
-        self.axes = axes = self.figure.add_subplot()
+        if axes is None:
+            bar = 0.9 if paths is not None and paths.order and paths.names else 0.0
+            axes = self._blank(right - left, upper - lower, bar, title)
+        self.axes, self.figure = axes, axes.figure
         axes.set_aspect("equal")
         axes.set_axis_off()
         axes.set_xlim(left, right)
@@ -114,6 +115,14 @@ class Drawing:
         self.texts: list[tuple[Any, Any]] = []
         self.clock: Any = None
         draw_scale(axes, view)
+
+    @staticmethod
+    def _blank(wide: float, tall: float, bar: float, title: str) -> Any:
+        """Return the axes of an empty figure for what is wide and tall, m, with a bar of colours, inches, beside it."""
+        scale = min((WIDEST - 0.3) / wide, (TALLEST - 0.3) / tall)
+        least = max(LEAST, min(LETTER * len(title), WIDEST_TITLE))
+        size = max(least, wide * scale + 0.3 + bar), max(LEAST, tall * scale + 0.3 + 0.35 * bool(title))
+        return blank_figure(*size, title).add_subplot()
 
     @staticmethod
     def _limits(scene: Scene, paths: Paths | None) -> tuple[float, float, float, float]:
@@ -279,9 +288,9 @@ def draw_scale(axes: Any, view: tuple[float, float] | None = None) -> None:
     for name, direction in zip("xyz", screen[:2].T, strict=True):
         tip = origin + arm * direction
         look = {"arrowstyle": "-|>", "color": GREY, "linewidth": 0.9, "shrinkA": 0, "shrinkB": 0, "mutation_scale": 6}
-        axes.annotate("", tip, origin, arrowprops=look, zorder=8)
+        axes.annotate("", tip, origin, arrowprops=look, zorder=8, gid="scale")
         far = origin + 1.3 * arm * direction
-        axes.text(*far, name, color=GREY, fontsize=7.5, ha="center", va="center")
+        axes.text(*far, name, color=GREY, fontsize=7.5, ha="center", va="center", gid="scale")
 
 
 def round_length(length: float) -> float:

@@ -16,7 +16,6 @@ from jounce.kinematics import solve
 __all__ = ["Peak", "derivative_name", "derivative_unit", "peaks", "rate_name", "scalar_outputs"]
 
 NAMES = ("position", "velocity", "acceleration", "jerk", "jounce")
-COMPONENTS = ("x", "y", "z")
 LEAST = 200  # instants that are looked at, at least
 PEAKS, POINTS, ROUNDS = 2, 7, 3  # highest maxima of each curve, instants around each, and how often these close in
 CHUNK = 1000  # instants solved together
@@ -125,7 +124,8 @@ def scalar_outputs(motion: Any) -> dict[str, tuple[str, np.ndarray]]:
         if values.ndim == 2:
             found[name] = name, values
         else:
-            found |= {f"{name}_{COMPONENTS[c]}": (name, values[..., c]) for c in range(values.shape[2])}
+            labels = motion.mechanism.outputs[name].labels
+            found |= {f"{name}_{labels[c]}": (name, values[..., c]) for c in range(values.shape[2])}
     return found
 
 

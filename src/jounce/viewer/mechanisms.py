@@ -200,7 +200,7 @@ def _quantities(motion: Any, good: np.ndarray) -> dict[str, Quantity]:
         words = tuple(rate_name(output, k) for k in range(values.shape[1]))
         if output.unit == "rad" and words[:1] == ("position",):
             words = ("angle", *words[1:])
-        found[name] = Quantity(output.unit, values, words)
+        found[name] = Quantity(output.unit, values, words, output.labels)
     if found:
         return found
     for body in motion.mechanism.bodies:

@@ -9,7 +9,7 @@ import numpy as np
 
 from jounce.errors import JounceError
 from jounce.plot.labels import scale_of
-from jounce.reporting.peaks import COMPONENTS, derivative_unit
+from jounce.reporting.peaks import derivative_unit
 from jounce.viewer.legend import legend
 from jounce.viewer.take import Quantity, Take
 
@@ -127,7 +127,7 @@ class Chart:
     def _drawn(self, take: Take) -> Any:
         values = self._values(take)
         count = values.shape[1]
-        labels = [f"{self.name} {c}" for c in COMPONENTS[:count]] if count > 1 else [self.name]
+        labels = [f"{self.name} {c}" for c in self._quantity(take).labels[:count]] if count > 1 else [self.name]
         series = (
             {"label": "time"},
             *(

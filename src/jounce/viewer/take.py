@@ -49,11 +49,14 @@ class Quantity:
     values : array of shape (time, orders, components)
     words : tuple of str
         What each derivative is called.
+    labels : tuple of str
+        What each component is called, where there are several.
     """
 
     unit: str
     values: np.ndarray
     words: tuple[str, ...]
+    labels: tuple[str, ...] = ("x", "y", "z")
 
 
 @dataclasses.dataclass(frozen=True)

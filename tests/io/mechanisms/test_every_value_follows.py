@@ -179,7 +179,19 @@ def test_the_walk_meets_every_key_of_the_schema():
     for space in COMPONENTS:
         for _, part in sections(space):
             met |= {step for slot in slots(part) for step in slot if isinstance(step, str)}
-    worded |= {"coordinate", "roles", "kinds", "solid", "euler", "samples", "expression", "degree", "value", "beyond"}
+    worded |= {
+        "coordinate",
+        "roles",
+        "kinds",
+        "solid",
+        "euler",
+        "sequence",
+        "samples",
+        "expression",
+        "degree",
+        "value",
+        "beyond",
+    }
     named = {"planar": set(), "spatial": set()}
     for space, found in named.items():
 

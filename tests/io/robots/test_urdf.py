@@ -1,6 +1,5 @@
 """Robots from URDF files against Pinocchio, entry by entry, and what the format leaves open."""
 
-
 import numpy as np
 import pinocchio
 import pytest
@@ -86,7 +85,7 @@ FEATURES = """\
   <transmission name="t"><joint name="turn"/></transmission>
 </robot>
 """
-PEERS = ("panda", "ur5", "solo12", "scara", "features")
+PEERS = ("panda", "ur5", "solo12", "scara", "lr_mate", "features")
 INERTIAL = '<inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>'
 
 

@@ -25,9 +25,15 @@ from jounce.mechanism import (
     AngleOutput,
     AngularVelocityOutput,
     DistanceOutput,
+    EulerAnglesOutput,
+    EulerParametersOutput,
     PlanarRelativeAngleOutput,
     PointOutput,
     RelativeAngleOutput,
+    RelativeEulerAnglesOutput,
+    RelativeEulerParametersOutput,
+    RelativeRotationMatrixOutput,
+    RotationMatrixOutput,
 )
 from jounce.robot.coupling import SlideOutput
 
@@ -122,6 +128,12 @@ OUTPUTS: tuple[tuple[str | None, type[AbstractQuantity]], ...] = (
     ("angle", RelativeAngleOutput),
     ("angular_velocity", AngularVelocityOutput),
     ("distance", DistanceOutput),
+    ("euler_parameters", EulerParametersOutput),
+    ("euler_parameters", RelativeEulerParametersOutput),
+    ("rotation_matrix", RotationMatrixOutput),
+    ("rotation_matrix", RelativeRotationMatrixOutput),
+    ("euler_angles", EulerAnglesOutput),
+    ("euler_angles", RelativeEulerAnglesOutput),
     ("slide", SlideOutput),
     ("force", DriverForceOutput),
     ("torque", DriverTorqueOutput),

@@ -267,16 +267,17 @@ def _check_columns(source: Source, mechanism: Mechanism) -> None:
     """Refuse outputs whose columns in a table would have the same name: a point C and an angle C_x."""
     for name in mechanism.outputs:
         stem, _, component = name.rpartition("_")
-        if component in ("x", "y", "z") and _has_components(mechanism, mechanism.outputs.get(stem)):
+        output = mechanism.outputs.get(stem)
+        if output is not None and component in output.labels and _has_components(mechanism, output):
             raise source.error(f"this name is taken by a component of the output '{stem}'", ("outputs", name))
 
 
 def _has_components(mechanism: Mechanism, output: Any) -> bool:
-    """Tell whether an output is a vector."""
+    """Tell whether an output is more than one number."""
     if isinstance(output, AppliedForceOutput | AppliedTorqueOutput):
         return len(mechanism.forces[output.force].velocity_names) > 1
     turning = isinstance(output, AngularVelocityOutput | JointTorqueOutput) and mechanism.space == "spatial"
-    return turning or isinstance(output, PointOutput | JointForceOutput)
+    return turning or bool(output.axes) or isinstance(output, PointOutput | JointForceOutput)
 
 
 def _check_values(mechanism: Mechanism) -> None:

@@ -19,7 +19,9 @@ from jounce.errors import did_you_mean
 from jounce.io.mechanisms.keys import HOLDERS, FileKey, file_keys, output_holder, output_tag, output_types
 from jounce.io.mechanisms.masses import inertia
 from jounce.io.mechanisms.values import Checked, laws, motion, orientation, problem, scalar, vector, vectors, wrenches
+from jounce.mechanism.mechanism import RESERVED_OUTPUTS
 from jounce.mechanism.outputs import FRAMES
+from jounce.rigid.rotations import SEQUENCES
 from jounce.trajectory.dimensions import variables_of
 from jounce.trajectory.expression import CONSTANTS, FUNCTIONS
 
@@ -27,7 +29,7 @@ __all__ = ["file_model", "output_form"]
 
 COMPONENTS = {"planar": 2, "spatial": 3}
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]{0,99}")
-_CHOICES = {"coordinate": COORDINATES, "frame": FRAMES}
+_CHOICES = {"coordinate": COORDINATES, "frame": FRAMES, "sequence": SEQUENCES}
 _Types = tuple[tuple[str, type[Any]], ...]
 _PARAMETER = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,99}")
 
@@ -92,7 +94,7 @@ def _parameter_name(name: str) -> str | None:
 
 
 def _output_name(name: str) -> str | None:
-    if name in ("time", "derivative", "component") or re.search(r"_d[0-9]+$", name):
+    if name in RESERVED_OUTPUTS or re.search(r"_d[0-9]+$", name):
         return f"the name '{name}' is reserved for columns of the results"
     return None
 

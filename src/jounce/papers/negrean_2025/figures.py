@@ -20,11 +20,16 @@ TORQUES = (
     ("torque rate", "First rate of the driving torque", "N m/s"),
     ("second rate", "Second rate of the driving torque", r"N m/s$^2$"),
 )
+STAND_IN = "stand-in data: samples, masses and lengths are not those of the paper"
 ENERGY_COLOURS = (BLUE, VERMILION, GREEN)
 
 
-def _figure(rows: int, columns: int, size: tuple[float, float], title: str) -> tuple[Figure, np.ndarray]:
+def _figure(
+    rows: int, columns: int, size: tuple[float, float], title: str, note: str = STAND_IN
+) -> tuple[Figure, np.ndarray]:
     figure = blank_figure(*size, title)
+    if note:
+        figure.supxlabel(note, fontsize=7.5, color=GREY)
     panels = figure.subplots(rows, columns, squeeze=False, sharex=True)
     for panel in panels.flat:
         panel.axhline(0.0, color=PALE_GREY, linewidth=0.7, zorder=1)
@@ -54,18 +59,19 @@ def accelerations(histories: Mapping[str, History], *, radius: float | None, num
 def torque(histories: Mapping[str, History], *, rate: int, number: int) -> Figure:
     """Draw the driving torque or one of its rates, and the part of inertia in it (figures 7 to 9)."""
     name, title, unit = TORQUES[rate]
-    figure, panels = _figure(len(histories), 1, (6.0, 4.8), f"{title} (figure {number} of Negrean 2025)")
+    figure, panels = _figure(len(histories), 1, (6.0, 4.8), f"{title} (figure {number} of Negrean 2025)", note="")
     for panel, history in zip(panels[:, 0], histories.values(), strict=True):
         whole = history.torques[:, rate]
         panel.plot(history.time, whole, color=BLUE, label="driving torque", zorder=3)
         inertial = whole - history.gravity[:, rate]
-        panel.plot(history.time, inertial, color=VERMILION, linestyle="--", linewidth=1.1, label="of that, inertia")
+        panel.plot(history.time, inertial, color=VERMILION, linestyle="--", linewidth=1.1, label="share of inertia")
         panel.plot(
-            history.time, history.gravity[:, rate], color=GREEN, linestyle=":", linewidth=1.3, label="of that, gravity"
+            history.time, history.gravity[:, rate], color=GREEN, linestyle=":", linewidth=1.3, label="share of gravity"
         )
         panel.set_title(history.case.title)
         panel.set_ylabel(f"{name} / ({unit})")
-    figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    handles = panels[0, 0].get_legend_handles_labels()
+    figure.legend(*handles, loc="outside lower center", ncols=3, title=STAND_IN, title_fontsize=7.5)
     figure.align_ylabels()
     return figure
 

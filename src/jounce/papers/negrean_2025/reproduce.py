@@ -1,4 +1,4 @@
-"""The figures and comparisons of section 4, made again into one directory."""
+"""The figures and comparisons of section 4, written into one directory."""
 
 import os
 from collections.abc import Callable, Mapping

@@ -4,14 +4,17 @@ H. J. Sommer III, Kinematic jerk and jounce for multibody dynamics with joint co
 196 (2024) 105613.
 """
 
-from jounce.papers.sommer_2024.differences import central_difference as central_difference
+from jounce.papers.sommer_2024.differences import (
+    backward_difference as backward_difference,
+    central_difference as central_difference,
+)
+from jounce.papers.sommer_2024.lag import Lag as Lag, lags as lags
+from jounce.papers.sommer_2024.measure import Results as Results, measure as measure
 from jounce.papers.sommer_2024.reproduce import reproduce as reproduce
 from jounce.papers.sommer_2024.simulations import (
     QUANTITIES as QUANTITIES,
     SIMULATIONS as SIMULATIONS,
     Cycle as Cycle,
-    Results as Results,
     Simulation as Simulation,
-    measure as measure,
     nominal_cycle as nominal_cycle,
 )

@@ -1,4 +1,4 @@
-"""Central finite differences, what jerk and jounce were taken from before (Sommer 2024, 57-58)."""
+"""Finite differences, what jerk and jounce were taken from before: central (Sommer 2024, 57-58) and backward."""
 
 import numpy as np
 
@@ -45,3 +45,29 @@ def central_difference(
     weights = WEIGHTS[accuracy, derivative]
     terms = [weight * samples[centres + k - REACH] for k, weight in enumerate(weights) if weight]
     return np.sum(terms, axis=0) / step**derivative
+
+
+def backward_difference(samples: np.ndarray, step: float, *, derivative: int) -> np.ndarray:
+    """Return the first or second derivative of evenly spaced samples from those of the past alone.
+
+    Parameters
+    ----------
+    samples : array of shape (time,)
+        Values `step` apart.
+    step : float
+        Time step, s.
+    derivative : int
+        1 or 2.
+
+    Returns
+    -------
+    numpy.ndarray of shape (time - derivative,)
+        At each instant that has as many samples before it.
+
+    Examples
+    --------
+    >>> t = np.arange(4) * 0.5
+    >>> backward_difference(t**2, 0.5, derivative=1).tolist()  # 2 t, half a step late
+    [0.5, 1.5, 2.5]
+    """
+    return np.diff(np.asarray(samples, float), derivative) / step**derivative

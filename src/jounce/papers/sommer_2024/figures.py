@@ -1,4 +1,4 @@
-"""Figures 2-7 and 10-13 of Sommer 2024, drawn from measured results.
+"""Figures 2-7 and 10-13 of Sommer 2024 and one of its section 7, drawn from measured results.
 
 This module imports matplotlib, and is imported only when figures are drawn. Figures are objects of their own with the
 Agg canvas; the state of `matplotlib.pyplot` is not touched.
@@ -13,7 +13,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from jounce.papers.sommer_2024.simulations import QUANTITIES, SIMULATIONS, STEPS, TOLERANCES, Results
+from jounce.papers.sommer_2024 import drawings
+from jounce.papers.sommer_2024.comparison import STANDS_IN
+from jounce.papers.sommer_2024.measure import Results
+from jounce.papers.sommer_2024.simulations import QUANTITIES, SIMULATIONS, STEPS, TOLERANCES
 from jounce.plot.style import BLUE, GREEN, GREY, PURPLE, VERMILION, blank_figure, style as style
 
 LOOKS = {
@@ -36,6 +39,12 @@ RATE_UNITS = {"jerk": r"rad/s$^3$", "jounce": r"rad/s$^4$"}
 def _figure(rows: int, columns: int, size: tuple[float, float], title: str, **shared: Any) -> tuple[Figure, np.ndarray]:
     figure = blank_figure(*size, title)
     return figure, figure.subplots(rows, columns, squeeze=False, **shared)
+
+
+def _note(names: Sequence[str]) -> str:
+    """Return what is written in the picture of a stand-in."""
+    chosen = sorted({STANDS_IN[name] for name in names} - {""})
+    return f"stand-in data: {', '.join(chosen)} chosen, lengths as printed" if chosen else ""
 
 
 def time_history(results: Mapping[str, Results], *, name: str, quantity: str, number: int) -> Figure:
@@ -76,6 +85,8 @@ def tolerance_sweep(results: Mapping[str, Results], *, names: Sequence[str], num
         _decades(panel.yaxis, 2)
     axes[0, 0].set_ylabel("normalised RMSE")
     axes[0, 0].legend(loc="upper left")
+    if _note(names):
+        figure.supxlabel(_note(names), fontsize=7.5, color=GREY)
     return figure
 
 
@@ -95,8 +106,34 @@ def step_sweep(results: Mapping[str, Results], *, names: Sequence[str], number: 
         panel.set_xlabel("time step h / s")
     for panel in axes[:, 0]:
         panel.set_ylabel("normalised RMSE")
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=min(len(names) + 1, 3))
+    look = {"title": _note(names) or None, "title_fontsize": 7.5, "ncols": min(len(names) + 1, 3)}
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", **look)
     return figure
+
+
+def phase_lag(results: Mapping[str, Results], *, name: str, step: float) -> Figure:
+    """Draw jerk and jounce by backward differences beside the simulation and the explicit solution (section 7)."""
+    title = f"{SIMULATIONS[name].title}: lag of backward differences, h = {step:g} s (section 7 of Sommer 2024)"
+    figure, axes = _figure(2, 1, (6.0, 5.0), title, sharex=True)
+    chosen = [lag for lag in results[name].lags if lag.step == step]
+    for panel, lag in zip(axes[:, 0], chosen, strict=True):
+        panel.plot(lag.time, lag.explicit, color=GREY, linewidth=1.0, label="explicit solution")
+        panel.plot(lag.time, lag.simulated, **LOOKS["simulation"] | {"linestyle": ""}, label="jounce")
+        panel.plot(lag.time, lag.difference, **LOOKS["second order"], label="backward differences of acceleration")
+        panel.set_ylabel(f"{lag.quantity} / ({RATE_UNITS[lag.quantity]})")
+        panel.set_title(
+            f"{lag.quantity}: late by {1e3 * lag.late(lag.difference):.4g} ms,"
+            f" in closed form {1e3 * lag.expected:.4g} ms; RMSE {100 * lag.measured_error(lag.difference):.2g} %"
+        )
+    axes[-1, 0].set_xlabel("time / s")
+    axes[-1, 0].set_xlim(0.0, chosen[0].time[-1])
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    figure.align_ylabels()
+    return figure
+
+
+def _drawing(_: Mapping[str, Results], *, number: int) -> Figure:
+    return drawings.FIGURES[number]()
 
 
 def _decades(axis: Any, every: int) -> None:
@@ -107,15 +144,19 @@ def _decades(axis: Any, every: int) -> None:
 
 
 _CRANKS = ("inverted_slider_crank_slide", "inverted_slider_crank_distance")
-FIGURES = {
-    2: partial(time_history, name="four_bar", quantity="jerk", number=2),
-    3: partial(time_history, name="four_bar", quantity="jounce", number=3),
-    4: partial(tolerance_sweep, names=("four_bar",), number=4),
-    5: partial(step_sweep, names=("four_bar",), number=5),
-    6: partial(tolerance_sweep, names=_CRANKS, number=6),
-    7: partial(step_sweep, names=_CRANKS, number=7),
-    10: partial(tolerance_sweep, names=("rsur", "rssr"), number=10),
-    11: partial(step_sweep, names=("rsur", "rssr"), number=11),
-    12: partial(tolerance_sweep, names=("rspu_distance", "rspu_slide"), number=12),
-    13: partial(step_sweep, names=("rspu_distance", "rspu_slide"), number=13),
+FIGURES = {  # by the name of their files
+    "figure_01": partial(_drawing, number=1),
+    "figure_02": partial(time_history, name="four_bar", quantity="jerk", number=2),
+    "figure_03": partial(time_history, name="four_bar", quantity="jounce", number=3),
+    "figure_04": partial(tolerance_sweep, names=("four_bar",), number=4),
+    "figure_05": partial(step_sweep, names=("four_bar",), number=5),
+    "figure_06": partial(tolerance_sweep, names=_CRANKS, number=6),
+    "figure_07": partial(step_sweep, names=_CRANKS, number=7),
+    "figure_08": partial(_drawing, number=8),
+    "figure_09": partial(_drawing, number=9),
+    "figure_10": partial(tolerance_sweep, names=("rsur", "rssr"), number=10),
+    "figure_11": partial(step_sweep, names=("rsur", "rssr"), number=11),
+    "figure_12": partial(tolerance_sweep, names=("rspu_distance", "rspu_slide"), number=12),
+    "figure_13": partial(step_sweep, names=("rspu_distance", "rspu_slide"), number=13),
+    "phase_lag": partial(phase_lag, name="four_bar", step=0.05),
 }

@@ -1,23 +1,18 @@
-"""All figures and errors of the paper, made again into one directory."""
+"""All figures and errors of the paper, written into one directory."""
 
 import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from jounce.papers.files import FORMATS, rendered, writable, write
-from jounce.papers.sommer_2024.simulations import QUANTITIES, RUNS, SIMULATIONS, STEP, TOLERANCE, Cycle, measure
-
-PRINTED = {  # root-mean-square errors in the text of the paper, sections 4 and 6
-    ("four_bar", "jerk"): 1.07e-13,
-    ("four_bar", "jounce"): 9.7e-13,
-    ("rsur", "jerk"): 2.17e-14,
-    ("rsur", "jounce"): 3.81e-13,
-}
-UNITS = ("rad/s", "rad/s^2", "rad/s^3", "rad/s^4")
+from jounce.papers.sommer_2024.comparison import comparison
+from jounce.papers.sommer_2024.measure import RUNS, measure
+from jounce.papers.sommer_2024.simulations import QUANTITIES, SIMULATIONS, Cycle
 
 
 def reproduce(out_directory: str | os.PathLike[str], progress: Callable[[int, int], None] | None = None) -> list[Path]:
-    """Run the seven simulations of Sommer 2024 and write figures 2-7 and 10-13, `errors.csv` and `comparison.md`.
+    """Run the seven simulations of Sommer 2024 and write figures 1-13, one of the phase lag of section 7,
+    `errors.csv` and `comparison.md`.
 
     Parameters
     ----------
@@ -56,13 +51,13 @@ def reproduce(out_directory: str | os.PathLike[str], progress: Callable[[int, in
     results = {name: measure(simulation, advanced) for name, simulation in SIMULATIONS.items()}
     cycles = {name: result.cycle for name, result in results.items()}
     paths = [
-        write(directory / "comparison.md", comparison(cycles).encode("ascii")),
+        write(directory / "comparison.md", comparison(results).encode("ascii")),
         write(directory / "errors.csv", errors_csv(cycles).encode("ascii")),
     ]
-    for number, draw in figures.FIGURES.items():
+    for name, draw in figures.FIGURES.items():
         with figures.style():
             figure = draw(results)
-            paths += [write(directory / f"figure_{number:02d}.{kind}", rendered(figure, kind)) for kind in FORMATS]
+            paths += [write(directory / f"{name}.{kind}", rendered(figure, kind)) for kind in FORMATS]
         advanced()
     return paths
 
@@ -74,24 +69,3 @@ def errors_csv(cycles: Mapping[str, Cycle]) -> str:
         columns = zip(QUANTITIES, cycle.rmse, cycle.normalised_rmse, strict=True)
         rows += [f"{name},{quantity},{error:.16e},{normalised:.16e}" for quantity, error, normalised in columns]
     return "\n".join(rows) + "\n"
-
-
-def comparison(cycles: Mapping[str, Cycle]) -> str:
-    """Return the errors at nominal settings beside the printed ones, as a page in Markdown."""
-    lines = [
-        "# Sommer 2024: errors of the output angle against explicit geometric solutions",
-        "",
-        f"One cycle of 2 s, time step {STEP:g} s, assembly tolerance {TOLERANCE:g}. Printed: the root-mean-square",
-        "errors (RMSE) that the text of the paper states, computed there in MATLAB. Normalised: RMSE divided by the",
-        "largest absolute value of the quantity over the cycle.",
-        "",
-        "| simulation | quantity | unit | largest value | RMSE | printed RMSE | normalised RMSE |",
-        "|---|---|---|---|---|---|---|",
-    ]
-    for name, cycle in cycles.items():
-        columns = zip(QUANTITIES, UNITS, cycle.peak, cycle.rmse, cycle.normalised_rmse, strict=True)
-        for quantity, unit, peak, error, normalised in columns:
-            printed = PRINTED.get((name, quantity))
-            beside = "" if printed is None else f"{printed:.3g}"
-            lines.append(f"| {name} | {quantity} | {unit} | {peak:.4g} | {error:.2e} | {beside} | {normalised:.1e} |")
-    return "\n".join(lines) + "\n"

@@ -1,7 +1,6 @@
 """The seven simulations: their mechanisms, their explicit solutions, and the errors between the two."""
 
 import dataclasses
-from collections.abc import Callable
 from importlib.resources import as_file, files
 from typing import Any
 
@@ -20,7 +19,6 @@ STEP = 0.01  # s
 TOLERANCE = 1e-12
 TOLERANCES = tuple(float(f"1e{k}") for k in range(-14, -3))
 STEPS = (1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, 1e-1)  # s, each a whole part of the cycle
-RUNS = 1 + len(TOLERANCES) + len(STEPS)  # of each simulation
 
 
 @dataclasses.dataclass(frozen=True)
@@ -111,26 +109,6 @@ class Cycle:
         return normalised_rmse(self.simulated, self.explicit)[1:]
 
 
-@dataclasses.dataclass(frozen=True)
-class Results:
-    """All that is measured of one simulation.
-
-    Attributes
-    ----------
-    cycle : Cycle
-        At nominal settings.
-    by_tolerance : array of shape (tolerances, 4)
-        Normalised RMSE of velocity to jounce for each of `TOLERANCES`.
-    by_step : dict of str to array of shape (steps, 2)
-        Normalised RMSE of jerk and jounce for each of `STEPS`: of the simulation, and of the differences of second
-        and fourth order of its acceleration.
-    """
-
-    cycle: Cycle
-    by_tolerance: np.ndarray
-    by_step: dict[str, np.ndarray]
-
-
 def rmse(found: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Return the root-mean-square error over time, the first axis."""
     return np.sqrt(np.mean((found - right) ** 2, axis=0))
@@ -190,28 +168,3 @@ def stencil_instants(step: float) -> tuple[np.ndarray, np.ndarray]:
         return time, np.arange(REACH, len(time), 2 * REACH + 1)
     count = round(CYCLE / step) + 1
     return step * np.arange(count + 2 * REACH), np.arange(REACH, REACH + count)
-
-
-def measure(simulation: Simulation, advanced: Callable[[], None] = lambda: None) -> Results:
-    """Run a simulation at nominal settings, over all tolerances and over all time steps.
-
-    Parameters
-    ----------
-    simulation : Simulation
-        What to run.
-    advanced : callable, optional
-        Called after each of the `RUNS` runs.
-    """
-    mechanism = simulation.load()
-    cycle = nominal_cycle(simulation, mechanism)
-    advanced()
-    by_tolerance = []
-    for tolerance in TOLERANCES:
-        by_tolerance.append(tolerance_error(simulation, mechanism, tolerance))
-        advanced()
-    by_step = []
-    for step in STEPS:
-        by_step.append(step_errors(simulation, mechanism, step))
-        advanced()
-    methods = {name: np.stack([errors[name] for errors in by_step]) for name in by_step[0]}
-    return Results(cycle, np.stack(by_tolerance), methods)

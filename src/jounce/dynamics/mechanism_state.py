@@ -1,0 +1,134 @@
+"""One state of a mechanism as a user gives it, which need not fulfil its joints."""
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from jounce.errors import MechanismError
+from jounce.kinematics import Motion, Status
+from jounce.kinematics.solve import HIGHEST_ORDER
+from jounce.mechanism import Mechanism, Model, build
+from jounce.mechanism.builder import referred
+from jounce.mechanism.laws import check_laws
+from jounce.rigid import SpatialPose
+from jounce.rigid.euler_parameters import euler_parameters
+
+
+class State(Motion):
+    """One state of a mechanism, consistent or not, as a motion of one instant: `at_state` makes it."""
+
+
+def at_state(given: Any, state: Any, time: Any) -> tuple[Motion, int]:
+    """Return a state as a motion of one instant, and how many derivatives are known of it."""
+    if not isinstance(given, Motion | Mechanism):
+        raise MechanismError("must be a jn.Motion or a jn.Mechanism", name="motion", value=given)
+    mechanism = dataclasses.replace(given if isinstance(given, Mechanism) else given.mechanism, outputs={})
+    instant = _array("time", time, ())
+    model = build(mechanism)
+    coordinates = _guessed(model) if state is None else _coordinates(mechanism, model, state)
+    order = len(coordinates["position"]) - 1
+    check_laws(mechanism, instant[None], order + 1, forces=order > 1)
+    if isinstance(given, Motion):  # angles about axes are counted as along it
+        system = dataclasses.replace(given.model.system, outputs=())
+        model = dataclasses.replace(given.model, system=system, outputs=())
+    else:
+        model, _ = referred(model, {name: values[0] for name, values in _still(coordinates).items()}, float(instant))
+    way = given.way if isinstance(given, Motion) else None
+    status = np.array([int(Status.OK)])
+    return State(mechanism, model, instant[None], order, (coordinates, ()), status, {}, way=way), order
+
+
+def _still(coordinates: dict[str, Any]) -> dict[str, Any]:
+    return {name: values for name, values in coordinates.items() if name != "angular_velocity"}
+
+
+def _guessed(model: Model) -> dict[str, Any]:
+    found = {name: np.asarray(value)[None] for name, value in model.guess.items()}
+    return found | ({} if "angle" in found else {"angular_velocity": np.zeros((0, *found["position"].shape[1:]))})
+
+
+def _coordinates(mechanism: Mechanism, model: Model, state: Any) -> dict[str, Any]:
+    """Return the Taylor coefficients of the coordinates of all bodies, the ground first, from a state as given."""
+    if not isinstance(state, Mapping):
+        raise MechanismError(
+            "must be a mapping of bodies to where they are and how they move", name="state", value=state
+        )
+    for name in state:
+        if name not in mechanism.bodies:
+            raise MechanismError(
+                f"no moving body has this name; there are {', '.join(mechanism.bodies)}", name="state", value=name
+            )
+    missing = [name for name in mechanism.bodies if name not in state]
+    if missing:
+        raise MechanismError("is missing: a state tells of every moving body", name=f"state.{missing[0]}")
+    read = [_body_state(f"state.{name}", state[name], model.pose_type) for name in mechanism.bodies]
+    orders = {len(body["position"]) - 1: name for body, name in zip(read, mechanism.bodies, strict=True)}
+    if len(orders) > 1:
+        told = ", ".join(f"'{name}' has {order}" for order, name in sorted(orders.items()))
+        raise MechanismError(f"all bodies need derivatives to the same order; {told}", name="state")
+    (order,) = orders
+    if order >= HIGHEST_ORDER:
+        raise MechanismError(f"derivatives are taken to order {HIGHEST_ORDER - 1}", name="state", value=order)
+    found = {}
+    for name in read[0]:
+        whole = np.stack([np.zeros_like(read[0][name]), *(body[name] for body in read)], axis=-1)[..., None]
+        if name == "quaternion":
+            whole[0, 0, 0] = 1.0
+        factorials = np.array([math.factorial(k) for k in range(len(whole))], float)
+        found[name] = whole / factorials.reshape(-1, *[1] * (whole.ndim - 1))
+    return found
+
+
+def _body_state(place: str, given: Any, pose_type: Any) -> dict[str, np.ndarray]:
+    """Return the plain derivatives of the coordinates of one body."""
+    spatial = pose_type is SpatialPose
+    keys = ("position", "orientation", "angular_velocity") if spatial else ("position", "angle")
+    if not isinstance(given, Mapping):
+        raise MechanismError(f"must be a mapping with {', '.join(keys)}", name=place, value=given)
+    for key in given:
+        if key not in keys:
+            raise MechanismError(f"unknown key; valid: {', '.join(keys)}", name=place, value=key)
+    for key in keys[:2]:
+        if key not in given:
+            raise MechanismError("is missing", name=f"{place}.{key}")
+    position = _array(f"{place}.position", given["position"], (pose_type.shifts,))
+    order = len(position) - 1
+    if not spatial:
+        angle = _array(f"{place}.angle", given["angle"], (1,))[:, 0]
+        _check_order(f"{place}.angle", len(angle) - 1, order)
+        return {"position": position, "angle": angle}
+    try:
+        quaternion = np.array([euler_parameters(given["orientation"])])
+    except MechanismError as error:
+        raise error.located(name=f"{place}.orientation") from None
+    spin = _array(f"{place}.angular_velocity", given.get("angular_velocity", np.zeros((0, 3))), (3,))
+    _check_order(f"{place}.angular_velocity", len(spin), order)
+    return {"position": position, "quaternion": quaternion, "angular_velocity": spin}
+
+
+def _check_order(name: str, found: int, order: int) -> None:
+    if found != order:
+        message = f"goes with a position and {order} {'derivative' if order == 1 else 'derivatives'} of it"
+        raise MechanismError(f"{message}; give as many here", name=name, value=found)
+
+
+def _array(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
+    """Return finite numbers: of a shape, or where it is not empty, one of them or a list of them."""
+    try:
+        found = np.array(value, float)
+    except (TypeError, ValueError):
+        raise MechanismError("must be numbers", name=name, value=value) from None
+    if shape:
+        scalar = shape == (1,)
+        if found.ndim == len(shape) - scalar:
+            found = found[None]
+        found = found[:, None] if scalar and found.ndim == 1 else found
+    if found.ndim != len(shape) + bool(shape) or found.shape[1:] != shape:
+        wanted = "one number" if not shape else f"a list of {shape[0]} numbers, or one such list for each derivative"
+        raise MechanismError(f"must be {wanted}", name=name, value=value)
+    if not np.isfinite(found).all():
+        raise MechanismError("must be finite", name=name, value=value)
+    return found

@@ -1,0 +1,164 @@
+"""Figures 1, 8 and 9 of Sommer 2024: the mechanisms, drawn from the files that are solved, with the paper's letters.
+
+The drawings of the paper are not in the text that this was made from. Lengths are the printed ones; where the files
+choose directions of axes and a motion, the pictures say so. This module is imported only when figures are drawn.
+"""
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from jounce.papers.sommer_2024.simulations import SIMULATIONS
+from jounce.plot.canvas import Label, Shape, screen_of
+from jounce.plot.frames import assembled
+from jounce.plot.scene import scene_of
+from jounce.plot.sketch import Drawing, draw_scale
+from jounce.plot.style import GREY, PALE_GREY, blank_figure
+
+ARC = 7.0  # radius of the arc of an angle, in halves of a pin
+VIEW = (-130.0, 25.0)  # degrees, of the spatial ones
+X, Y, Z = np.eye(3)
+LENGTHS_ONLY = "lengths as printed; the paper does not print the drive of the slider-crank"
+CHOSEN = "lengths as printed; directions of the axes, reference of the angle{} and drive chosen (stand-in)"
+
+
+@dataclasses.dataclass(frozen=True)
+class Drawn:
+    """What a drawing of the paper shows of a mechanism besides its links and joints.
+
+    Parameters
+    ----------
+    simulation : str
+        Name of the simulation whose mechanism is drawn.
+    points : dict of str to tuple
+        Letter: body, and place in its frame, numbers or names of parameters, m.
+    lengths : sequence of str
+        Pairs of letters; a pair that names a parameter is written with its length, another one is driven.
+    angles : dict of str to tuple
+        Symbol: the letter of its vertex, the direction from which it counts, that a quarter turn on, and the letter
+        to which it reaches.
+    fixed : sequence of str
+        Pairs of letters on the ground, drawn as dashed lines.
+    """
+
+    simulation: str
+    points: Mapping[str, tuple[str, Sequence[Any]]]
+    lengths: Sequence[str]
+    angles: Mapping[str, tuple[str, np.ndarray, np.ndarray, str]]
+    fixed: Sequence[str]
+
+
+FOUR_BAR = Drawn(
+    "four_bar",
+    {"A": ("ground", (0, 0)), "B": ("crank", ("AB", 0)), "C": ("rocker", ("CD", 0)), "D": ("ground", ("AD", 0))},
+    ("AD", "AB", "BC", "CD"),
+    {"\u03b8": ("A", X[:2], Y[:2], "B"), "\u03c8": ("D", X[:2], Y[:2], "C")},
+    ("AD",),
+)
+SLIDER_CRANK = Drawn(
+    "inverted_slider_crank_slide",
+    {"E": ("ground", (0, 0)), "F": ("ground", ("EF", 0)), "G": ("rocker", ("FG", 0))},
+    ("EF", "FG", "EG"),
+    {"\u03c8": ("F", X[:2], Y[:2], "G")},
+    ("EF",),
+)
+CRANK = {"A": ("ground", ("OA", 0, 0)), "B": ("crank", (0, "AB", 0)), "D": ("ground", (0, "OD", 0))}
+RSUR = Drawn(
+    "rsur",
+    {"O": ("ground", (0, 0, 0)), "C": ("follower", (0, 0, "CD"))} | CRANK,
+    ("OA", "OD", "AB", "BC", "CD"),
+    {"\u03b8": ("A", Y, Z, "B"), "\u03c8": ("D", Z, X, "C")},
+    ("OA", "OD"),
+)
+RSPU = Drawn(
+    "rspu_distance",
+    {"O": ("ground", (0, 0, 0))} | CRANK,
+    ("OA", "OD", "AB", "BD"),
+    {"\u03b8": ("A", Y, Z, "B")},
+    ("OA", "OD"),
+)
+
+
+def draw(
+    panels: Mapping[str, Drawn],
+    *,
+    title: str,
+    note: str,
+    size: tuple[float, float],
+    view: tuple[float, float] = VIEW,
+) -> Figure:
+    """Draw one figure of the paper, a panel with a title for each mechanism."""
+    figure = blank_figure(*size, title)
+    axes = figure.subplots(1, len(panels), squeeze=False)[0]
+    figure.supxlabel(note, fontsize=7.5, color=GREY)
+    drawings = []
+    for panel, (name, drawn) in zip(axes, panels.items(), strict=True):
+        panel.set_title(name)
+        drawings.append(_panel(panel, drawn, view))
+    for drawing in drawings:  # once all panels have their places
+        drawing.write_names(0, "all")
+    return figure
+
+
+def _panel(axes: Any, drawn: Drawn, view: tuple[float, float]) -> Drawing:
+    """Return a mechanism, put together at the start of its cycle, in a panel; its names are not yet written."""
+    mechanism = SIMULATIONS[drawn.simulation].load()
+    values, frames = mechanism.parameter_values, assembled(mechanism)
+    scene = scene_of(mechanism, view=view)
+    planar = mechanism.space == "planar"
+    screen = np.eye(2) if planar else screen_of(view)[:2]
+    places = {}
+    for letter, (body, local) in drawn.points.items():
+        frame = frames[body][0]
+        places[letter] = frame[:, 0] + frame[:, 1:] @ [float(values.get(c, c)) for c in local]
+    shapes, labels = list(scene.shapes), []
+
+    def line(points: Any, **look: Any) -> None:
+        shapes.append(Shape("line", (np.asarray(points) @ screen.T)[None], stroke=PALE_GREY, layer=2, **look))
+
+    def name(text: str, place: np.ndarray, colour: str, owner: str) -> None:
+        labels.append(Label(text, (place @ screen.T)[None], colour, owner))
+
+    for pair in drawn.fixed:
+        line([places[letter] for letter in pair], width=0.9, dashes=(5.0, 4.0))
+    for letter, place in places.items():
+        name(letter, place, "black", f"bodies.{letter}")
+    for symbol, (vertex, start, quarter, arm) in drawn.angles.items():
+        reach = places[arm] - places[vertex]
+        angle, radius = np.arctan2(reach @ quarter, reach @ start), ARC * scene.unit
+        turns = np.linspace(0.0, angle, 31)[:, None]
+        arc = places[vertex] + radius * (np.cos(turns) * start + np.sin(turns) * quarter)
+        line(arc, width=0.9)
+        line([places[vertex], places[vertex] + 1.5 * radius * start], width=0.7)
+        name(symbol, arc[len(arc) // 2], "black", f"joints.{symbol}")
+    for pair in drawn.lengths:
+        text = f"{pair} = {100 * values[pair]:.2f} cm" if pair in values else f"d = {pair}, driven"
+        name(text, (places[pair[0]] + places[pair[1]]) / 2, GREY, f"joints.{pair}")
+    seen_from = None if planar else view
+    drawing = Drawing(dataclasses.replace(scene, shapes=shapes, labels=labels), None, "", seen_from, axes)
+    left, right = axes.get_xlim()
+    axes.set_xlim(left - 0.15 * (right - left), right)  # room for lengths on the left
+    draw_scale(axes, seen_from)
+    drawing.show(0)
+    return drawing
+
+
+FIGURES = {
+    1: partial(
+        draw,
+        {"Four-bar": FOUR_BAR, "Inverted slider-crank": SLIDER_CRANK},
+        title="Planar mechanisms (figure 1 of Sommer 2024)",
+        note=LENGTHS_ONLY,
+        size=(8.0, 4.0),
+    ),
+    8: partial(
+        draw, {"": RSUR}, title="RSUR mechanism (figure 8 of Sommer 2024)", note=CHOSEN.format("s"), size=(5.6, 3.6)
+    ),
+    9: partial(
+        draw, {"": RSPU}, title="RSPU mechanism (figure 9 of Sommer 2024)", note=CHOSEN.format(""), size=(5.6, 3.2)
+    ),
+}
