@@ -6,12 +6,12 @@ import jax.numpy as jnp
 
 from jounce.dynamics.equations import checked_levels
 from jounce.jet import Jet, components, cross, dot
-from jounce.jet.algebra import total
+from jounce.jet.algebra import stacked, total
 from jounce.robot.batches import Batched
 from jounce.robot.inverse_dynamics import inverse_dynamics
 from jounce.robot.kinematics import body_frames
 from jounce.robot.robot import Robot
-from jounce.robot.scan import stacked, to_coordinates
+from jounce.robot.scan import to_coordinates
 from jounce.robot.tree import Tree
 
 

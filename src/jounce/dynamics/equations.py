@@ -18,11 +18,10 @@ import numpy as np
 from jounce.dynamics.energies import robot_energy
 from jounce.errors import RobotError
 from jounce.jet import components
-from jounce.jet.algebra import total
+from jounce.jet.algebra import stacked, total
 from jounce.robot.batches import Batched, checked
 from jounce.robot.kinematics import body_frames
 from jounce.robot.robot import Robot
-from jounce.robot.scan import stacked
 from jounce.robot.tree import Tree
 
 
