@@ -69,6 +69,23 @@ def test_files_of_one_name_are_two_files(tmp_path):
     assert (caught.value.path, caught.value.line) == (str(paths[1]), 2)
 
 
+def test_annotations_may_be_strings(tmp_path):
+    path = tmp_path / "postponed.py"
+    path.write_text(
+        "from __future__ import annotations\n"
+        "import jounce as jn\nfrom jounce import Vector\n"
+        'class Postponed(jn.AbstractConstraint, type="postponed", space="planar"):\n'
+        "    point_i: Vector\n    length: jn.Scalar\n    word: str = 'x'\n"
+    )
+    import_file(str(path))
+    fields = value_fields(catalogue("planar", "joint")["postponed"])
+    assert {name: field_kind(field) for name, field in fields.items()} == {
+        "point_i": "vector",
+        "length": "scalar",
+        "word": "text",
+    }
+
+
 def test_a_class_whose_definition_fails_is_not_in_the_catalogue():
     before = catalogue("planar", "joint")
     with pytest.raises(TypeError, match="default"):
@@ -93,20 +110,3 @@ def test_a_field_that_would_break_all_files_is_refused(field):
 def test_a_joint_is_no_force():
     with pytest.raises(jn.MechanismError, match="role"):
         own(role="force")
-
-
-def test_annotations_may_be_strings(tmp_path):
-    path = tmp_path / "postponed.py"
-    path.write_text(
-        "from __future__ import annotations\n"
-        "import jounce as jn\nfrom jounce import Vector\n"
-        'class Postponed(jn.AbstractConstraint, type="postponed", space="planar"):\n'
-        "    point_i: Vector\n    length: jn.Scalar\n    word: str = 'x'\n"
-    )
-    import_file(str(path))
-    fields = value_fields(catalogue("planar", "joint")["postponed"])
-    assert {name: field_kind(field) for name, field in fields.items()} == {
-        "point_i": "vector",
-        "length": "scalar",
-        "word": "text",
-    }

@@ -128,18 +128,23 @@ def test_operational_accelerations_are_sums_of_jacobian_rates(robot, data):
 @hypothesis.given(data=strategies.data())
 @hypothesis.settings(max_examples=4)
 def test_the_mass_matrix_is_symmetric_and_positive(robot, data):
-    n = len(robot.joint_names)
-    weightless = robot.with_gravity([0, 0, 0])
-    q = np.zeros((n, ORDER + 1, n))
-    q[:, 0] = data.draw(states(robot))[0, 0]
-    q[:, 2] = np.eye(n)
-    matrix = np.concatenate([jn.inverse_dynamics(weightless, q[k : k + 2])[:, 0] for k in range(0, n, 2)])
+    q = data.draw(states(robot))
+    matrix = jn.mass_matrix(robot, q, rates=True)[0, 0]
     near(matrix, matrix.T, 1e-13)
     assert np.linalg.eigvalsh(matrix).min() > 0
-    speed = np.zeros((1, ORDER + 1, n))
-    speed[0, :2] = q[0, 0], data.draw(states(robot))[0, 1]
-    energy = jn.kinetic_energy(robot, np.repeat(speed, 2, axis=0)).total[0, 0]
-    near(energy, speed[0, 1] @ matrix @ speed[0, 1] / 2, 1e-13)
+    energy = jn.kinetic_energy(robot, q).total[0, 0]
+    near(energy, q[0, 1] @ matrix @ q[0, 1] / 2, 1e-13)
+
+
+@hypothesis.given(data=strategies.data())
+@hypothesis.settings(max_examples=4)
+def test_torques_are_of_the_mass_matrix_and_the_bias_with_rates(robot, data):
+    q = data.draw(states(robot))
+    torque = jn.inverse_dynamics(robot, q)
+    matrix, bias = jn.mass_matrix(robot, q, rates=True), jn.bias_forces(robot, q, rates=True)
+    for k in range(ORDER - 1):
+        terms = (math.comb(k, j) * np.einsum("sij,sj->si", matrix[:, j], q[:, 2 + k - j]) for j in range(k + 1))
+        near(sum(terms) + bias[:, k], torque[:, k])
 
 
 def test_the_arrays_of_the_tree_give_the_poses_of_the_links(robot):

@@ -8,7 +8,8 @@ from scipy.interpolate import make_interp_spline
 from scipy.optimize import minimize_scalar
 
 import jounce as jn
-from jounce.dynamics.limits import BLOCK, check_limits
+from jounce.dynamics.limits import check_limits
+from jounce.dynamics.trajectories import BLOCK
 from jounce.trajectory import JointTrajectory, motion_profile
 
 GRAVITY, LENGTH, MASS = 9.81, 0.5, 2.0

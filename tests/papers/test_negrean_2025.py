@@ -129,6 +129,63 @@ def test_reproduction_writes_its_files(histories, tmp_path, monkeypatch):
     np.testing.assert_array_equal(torques, np.concatenate([h.torques for h in histories.values()]))
 
 
+LINK = "mass: 4 kg\ncenter_x: 200 mm\ncenter_z: 0\ninertia_y: 0.05 kg*m^2\n"
+
+
+def test_measurements_of_ones_own(tmp_path, run):
+    """A constant acceleration: the angle, torques and energies in closed form."""
+    t = np.linspace(0.2, 1.2, 11)
+    samples, link, out = tmp_path / "mine.csv", tmp_path / "link.yaml", tmp_path / "out"
+    samples.write_text("time,slow\n" + "".join(f"{x!r},1.5\n" for x in t.tolist()))
+    link.write_text(LINK)
+    status, _, _ = run("reproduce", "negrean-2025", "--out", out, "--samples", samples, "--masses", link)
+    assert status == 0
+    rows = list(csv.DictReader((out / "torques.csv").read_text().splitlines()))
+    since = np.array([float(row["time"]) for row in rows]) - 0.2
+    q, w = 0.75 * since**2, 1.5 * since
+    torque = (4 * 0.2**2 + 0.05) * 1.5 - 4 * 9.81 * 0.2 * np.cos(q)
+    np.testing.assert_allclose([float(row["torque"]) for row in rows], torque, rtol=0, atol=1e-10)
+    rows = list(csv.DictReader((out / "energies.csv").read_text().splitlines()))
+    energy = (4 * 0.2**2 + 0.05) / 2 * (1.5**2 + w**4)
+    np.testing.assert_allclose([float(row["E_1"]) for row in rows], energy, rtol=0, atol=1e-9)
+    text = (out / "comparison.md").read_text()
+    assert all(word in text for word in ("mine.csv", "link.yaml", "M = 4 kg"))
+    assert "not those of the" not in text
+
+
+@pytest.mark.parametrize(
+    "samples, link, words",
+    [
+        ("time,a\n0,1\n1,x\n", None, ("mine.csv", "line 3", "a", "x")),
+        ("time,a\n0,1\n", None, ("mine.csv", "a")),
+        ("t,a\n0,1\n1,2\n", None, ("mine.csv", "time")),
+        (None, LINK.replace("mass: 4 kg\n", ""), ("link.yaml", "mass", "missing")),
+        (None, LINK.replace("4 kg", "4 m"), ("link.yaml", "line 1", "mass", "4 m")),
+        (None, LINK.replace("4 kg", "-4 kg"), ("link.yaml", "mass", "-4")),
+        (None, LINK + "centre_y: 0\n", ("link.yaml", "line 5", "centre_y", "center_x")),
+    ],
+)
+def test_bad_measurements(tmp_path, run, monkeypatch, samples, link, words):
+    monkeypatch.setattr(
+        sys.modules["jounce.papers.negrean_2025.reproduce"], "history", lambda *_: pytest.fail("computed")
+    )
+    given = []
+    for option, name, text in (("--samples", "mine.csv", samples), ("--masses", "link.yaml", link)):
+        if text is not None:
+            (tmp_path / name).write_text(text)
+            given += [option, tmp_path / name]
+    status, _, complaint = run("reproduce", "negrean-2025", "--out", tmp_path / "out", *given)
+    assert status == 2
+    assert all(word in complaint for word in words), complaint
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_other_paper_takes_no_measurements(tmp_path, run):
+    status, _, complaint = run("reproduce", "sommer-2024", "--out", tmp_path, "--masses", tmp_path / "link.yaml")
+    assert status == 2
+    assert "--masses" in complaint
+
+
 FIGURES = tuple(f"figure_{k:02d}" for k in (4, 5, 7, 8, 9))
 
 

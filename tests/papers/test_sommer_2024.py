@@ -168,7 +168,7 @@ def check_errors(path, names):
 
 def test_reproduction_writes_its_files(small_run):
     directory, paths, calls, _ = small_run
-    names = ["comparison.md", "errors.csv"]
+    names = ["comparison.md", "errors.csv", "errors_by_tolerance.csv", "errors_by_step.csv"]
     names += [f"{name}.{kind}" for name in DRAWN for kind in ("png", "svg")]
     assert [path.name for path in paths] == names
     assert sorted(path.name for path in directory.iterdir()) == sorted(names), "nothing else is left behind"
@@ -181,6 +181,19 @@ def test_reproduction_writes_its_files(small_run):
         if path.suffix == ".svg":
             assert b"</svg>" in content
     assert [done for done, _ in calls] == list(range(1, calls[-1][1] + 1))
+
+
+def test_sweeps_are_tables_too(small_run):
+    directory, _, _, results = small_run
+    rows = list(csv.DictReader((directory / "errors_by_tolerance.csv").read_text().splitlines()))
+    assert [float(row["tolerance"]) for row in rows] == list(TOLERANCES)
+    found = np.array([[float(row[quantity]) for quantity in QUANTITIES] for row in rows])
+    np.testing.assert_array_equal(found, results.by_tolerance)
+    rows = list(csv.DictReader((directory / "errors_by_step.csv").read_text().splitlines()))
+    for method, errors in results.by_step.items():
+        chosen = [row for row in rows if row["method"] == method]
+        assert [float(row["step"]) for row in chosen] == list(STEPS)
+        np.testing.assert_array_equal([[float(row["jerk"]), float(row["jounce"])] for row in chosen], errors)
 
 
 def test_comparison_puts_printed_errors_beside_ours(small_run):

@@ -1,5 +1,8 @@
 """Peaks between the instants of a motion."""
 
+import dataclasses
+import json
+
 import numpy as np
 import pytest
 
@@ -67,3 +70,18 @@ def test_peaks_of_a_simulation():
     (angle, rate) = peaks(jn.simulate(free, [0.0, 1.0, 2.0], order=1))
     assert angle.minimum == pytest.approx(-np.pi, abs=1e-8)  # it swings from one side to the other
     assert -rate.minimum == pytest.approx(np.sqrt(2 * 9.81 * 2.0 / 2.5), rel=1e-8)  # energy, at the lowest point
+
+
+def test_peaks_at_the_instants_only(run, tmp_path):
+    time = np.linspace(0.0, 4.0, 8)
+    found = peaks(jn.solve(CRANK, time, order=2), refine=False)
+    for order, peak in enumerate(found):
+        shift = order * np.pi / 2
+        law = 3.0**order * np.sin(3 * time + shift) + 0.25 * 6.0**order * np.sin(6 * time + shift)
+        assert peak.maximum == pytest.approx(law.max(), rel=1e-12)
+        assert peak.maximum_at == time[law.argmax()]
+    path = tmp_path / "crank.yaml"
+    jn.write_mechanism(dataclasses.replace(CRANK, time=jn.TimeGrid(start=0.0, stop=4.0, count=8)), path)
+    status, told, _ = run("run", path, "--order", 2, "--no-refine", "--json")
+    assert status == 0
+    assert [row["maximum"] for row in json.loads(told)["peaks"]] == [peak.maximum for peak in found]

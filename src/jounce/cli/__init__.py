@@ -24,7 +24,7 @@ from jounce.cli.figures import plot, report
 from jounce.cli.inspection import inspect
 from jounce.cli.mechanisms import run, schema, simulate
 from jounce.cli.papers import reproduce
-from jounce.cli.robots import check
+from jounce.cli.robots import check, torques
 from jounce.cli.starters import new
 from jounce.cli.streams import lasting_streams
 from jounce.cli.views import view
@@ -87,6 +87,11 @@ EXAMPLES = {
     --limits examples/limits/franka_panda.yaml
   jounce check examples/robots/panda.urdf \\
     examples/trajectories/panda_wave.yaml --payload "panda_hand=3 kg\"""",
+    torques: """\
+  jounce torques examples/robots/panda.urdf \\
+    examples/trajectories/panda_good.csv --rates 2 --out tau.csv
+  jounce torques examples/robots/panda.urdf \\
+    examples/trajectories/panda_wave.yaml --payload "panda_hand=3 kg\"""",
     convert: """\
   jounce convert examples/four_bar.yaml four_bar.toml
   jounce convert examples/robots/ur5.urdf ur5.yaml --hold \\
@@ -95,7 +100,8 @@ EXAMPLES = {
     --start "panda_joint4=-90 deg\"""",
     reproduce: """\
   jounce reproduce sommer-2024 --out out
-  jounce reproduce negrean-2025 --out out""",
+  jounce reproduce negrean-2025 --out out
+  jounce reproduce negrean-2025 --out out --samples a.csv --masses link.yaml""",
     schema: """\
   jounce schema > mechanism.schema.json
   jounce schema results""",

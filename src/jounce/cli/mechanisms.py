@@ -30,6 +30,7 @@ def run(
     import_: list[Path] | None = None,
     allow: list[Path] | None = None,
     overwrite: bool = False,
+    no_refine: bool = False,
     json: bool = False,
 ) -> int:
     """Solve a mechanism file and print peak values, position to jounce.
@@ -52,6 +53,8 @@ def run(
         Folder whose files it may name, besides its own; repeatable.
     overwrite
         Let --out replace a file that is read here.
+    no_refine
+        Take peaks at the instants only, not between them.
     json
         Print the result as JSON.
     """
@@ -66,8 +69,8 @@ def run(
     motion = solved(mechanism, file, order, tolerance)
     if not json:
         say(motion_summary(motion_facts(motion), file.name))
-        show_peaks(peaks(motion))
-    return _finished("run", motion, file, out, overwrite, json)
+        show_peaks(peaks(motion, refine=not no_refine))
+    return _finished("run", motion, file, out, overwrite, json, not no_refine)
 
 
 def simulate(
@@ -84,6 +87,7 @@ def simulate(
     import_: list[Path] | None = None,
     allow: list[Path] | None = None,
     overwrite: bool = False,
+    no_refine: bool = False,
     json: bool = False,
 ) -> int:
     """Move a mechanism by its forces and print peak values, energy, drift.
@@ -112,6 +116,8 @@ def simulate(
         Folder whose files it may name, besides its own; repeatable.
     overwrite
         Let --out replace a file that is read here.
+    no_refine
+        Take peaks at the instants only, not between them.
     json
         Print the result as JSON.
     """
@@ -140,11 +146,13 @@ def simulate(
         raise of_option(error, file) from None
     if not json:
         say(motion_summary(motion_facts(motion), file.name))
-        show_peaks(peaks(motion))
-    return _finished("simulate", motion, file, out, overwrite, json)
+        show_peaks(peaks(motion, refine=not no_refine))
+    return _finished("simulate", motion, file, out, overwrite, json, not no_refine)
 
 
-def _finished(command: str, motion: Motion, file: Path, out: Path | None, overwrite: bool, json: bool) -> int:
+def _finished(
+    command: str, motion: Motion, file: Path, out: Path | None, overwrite: bool, json: bool, refine: bool
+) -> int:
     """Write the results of a motion where they are wanted, and return the exit status."""
     from jounce import io
 
@@ -153,7 +161,7 @@ def _finished(command: str, motion: Motion, file: Path, out: Path | None, overwr
     if json:
         from jounce.reporting.records import motion_record
 
-        say_json(command, motion_record(motion, file, out))
+        say_json(command, motion_record(motion, file, out, refine))
     elif out is not None:
         say(f"\nWritten to {out}")
     return outcome(motion, file)

@@ -11,7 +11,7 @@ from jounce.reporting.terminal import Bar, say
 PAPERS = {"sommer-2024": "jounce.papers.sommer_2024", "negrean-2025": "jounce.papers.negrean_2025"}
 
 
-def reproduce(paper: str, /, *, out: Path) -> int:
+def reproduce(paper: str, /, *, out: Path, samples: Path | None = None, masses: Path | None = None) -> int:
     """Reproduce the figures and tables of a paper.
 
     Parameters
@@ -20,6 +20,11 @@ def reproduce(paper: str, /, *, out: Path) -> int:
         sommer-2024 or negrean-2025.
     out
         Folder for figures and tables; made if it does not exist.
+    samples
+        Your own accelerations (.csv: time, then a column for each motion, rad/s^2) in the place of stand-ins;
+        negrean-2025 only.
+    masses
+        Your own link (.yaml, .toml, .json: mass, center_x, center_z, inertia_y); negrean-2025 only.
     """
     import importlib
 
@@ -27,9 +32,13 @@ def reproduce(paper: str, /, *, out: Path) -> int:
         from jounce.errors import did_you_mean
 
         raise JounceError(f"no paper has this name; {did_you_mean(paper, PAPERS)}", value=paper)
+    given = {name: path for name, path in (("samples", samples), ("masses", masses)) if path is not None}
+    if given and paper != "negrean-2025":
+        message = f"{paper} needs no data of yours; negrean-2025 takes samples and masses"
+        raise JounceError(message, name=f"--{next(iter(given))}", value=str(next(iter(given.values()))))
     make = importlib.import_module(PAPERS[paper]).reproduce
     with Bar("reproducing") as bar:
-        paths = make(out, progress=bar)
+        paths = make(out, progress=bar, **given)
     say(paths[0].read_text(encoding="utf-8"))
     say(f"Written to {out}: {count(len(paths), 'file')}")
     return 0

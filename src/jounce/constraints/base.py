@@ -14,6 +14,7 @@ Scalar = Annotated[Any, "scalar"]
 Vector = Annotated[Any, "vector"]
 Motion = Annotated[Any, "motion"]
 Wrenches = Annotated[Any, "wrenches"]
+Whole = Annotated[int, "whole"]
 
 SPACES = ("planar", "spatial")
 ROLES = ("joint", "driver", "force")
@@ -144,10 +145,10 @@ def value_fields(kind: type[Any]) -> dict[str, dataclasses.Field]:
 
 
 def field_kind(field: dataclasses.Field) -> str:
-    """Return ``scalar``, ``vector``, ``motion``, ``law``, ``laws``, ``wrenches`` or ``text``, by the annotation."""
+    """Return ``scalar``, ``vector``, ``motion``, ``law``, ``laws``, ``wrenches``, ``whole`` or ``text``."""
     if isinstance(field.type, str):  # under ``from __future__ import annotations``
         word = field.type.rpartition(".")[2].strip()
-        return word.lower() if word in ("Scalar", "Vector", "Motion", "Law", "Laws", "Wrenches") else "text"
+        return word.lower() if word in ("Scalar", "Vector", "Motion", "Law", "Laws", "Wrenches", "Whole") else "text"
     return next(iter(getattr(field.type, "__metadata__", ())), "text")
 
 

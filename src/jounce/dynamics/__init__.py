@@ -14,8 +14,18 @@ from jounce.dynamics.energies import (
     potential_energy as potential_energy,
     stored_energy as stored_energy,
 )
+from jounce.dynamics.energy_outputs import (
+    AccelerationEnergyOutput as AccelerationEnergyOutput,
+    BodyAccelerationEnergyOutput as BodyAccelerationEnergyOutput,
+    BodyKineticEnergyOutput as BodyKineticEnergyOutput,
+    BodyPotentialEnergyOutput as BodyPotentialEnergyOutput,
+    KineticEnergyOutput as KineticEnergyOutput,
+    PotentialEnergyOutput as PotentialEnergyOutput,
+)
+from jounce.dynamics.energy_terms import EnergyTerms as EnergyTerms, energy_terms as energy_terms
 from jounce.dynamics.equations import (
     catalan as catalan,
+    energy_slope as energy_slope,
     gibbs_appell as gibbs_appell,
     higher_order as higher_order,
     lagrange as lagrange,
@@ -38,3 +48,4 @@ from jounce.dynamics.reactions import (
     driver_force as driver_force,
     joint_reaction as joint_reaction,
 )
+from jounce.dynamics.trajectories import trajectory_torques as trajectory_torques

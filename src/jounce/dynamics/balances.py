@@ -4,10 +4,10 @@ from typing import Any
 
 import jax.numpy as jnp
 
-from jounce.dynamics.equations import checked_levels
-from jounce.jet import Jet, components, cross, dot
-from jounce.jet.algebra import stacked, total
+from jounce.dynamics.energies import whole_number
+from jounce.dynamics.equations import checked_order
 from jounce.robot.batches import Batched
+from jounce.robot.equations_of_motion import centers_of, partial_velocities, times_inertia, work, work_of_weight
 from jounce.robot.inverse_dynamics import inverse_dynamics
 from jounce.robot.kinematics import body_frames
 from jounce.robot.robot import Robot
@@ -19,27 +19,11 @@ from jounce.robot.tree import Tree
 def _virtual_work(tree: Tree, arrays: Any, _: Any, inertial: bool) -> Any:
     """Return the work of inertia, or of weight, along each coordinate."""
     frames = body_frames(tree, arrays[0]).without_base()
-    center = frames.point(jnp.swapaxes(jnp.asarray(tree.center), 0, 1)[:, :, None])
-    mass = jnp.asarray(tree.mass)[:, None]
-    if inertial:
-        force = center.differentiate().differentiate() * mass
-        spin = frames.to_body(frames.angular_velocity)
-        tensor = jnp.moveaxis(jnp.asarray(tree.inertia), 0, -1)[..., None]
-        momentum = total(tensor[:, i] * part for i, part in enumerate(components(spin)))
-        moment = frames.direction(momentum).differentiate()
-    else:
-        force = Jet.constant(-jnp.asarray(tree.gravity)[:, None, None] * mass[None], center.order)
-        moment = None
-    # axes and origins of joints stand along a new axis before the bodies
-    axis, origin = (jet.map(lambda c: c[:, :, None]) for jet in (frames.axes[2], frames.position))
-    center, force = (jet.map(lambda c: c[:, None]) for jet in (center, force))
-    turning = jnp.asarray(tree.turning)[:, None, None]
-    partial = cross(axis, center - origin) * turning + axis * (1 - turning)
-    work = dot(partial, force)
-    if moment is not None:
-        work = work + dot(axis * turning, moment.map(lambda c: c[:, None]))
-    moved = jnp.swapaxes(jnp.asarray(tree.ancestors)[:-1], 0, 1)[:, :, None]
-    return to_coordinates(tree, stacked(work.map(lambda c: jnp.sum(c * moved, axis=1))))
+    if not inertial:
+        return to_coordinates(tree, work_of_weight(tree, frames))
+    force = centers_of(tree, frames).differentiate().differentiate() * jnp.asarray(tree.mass)[:, None]
+    moment = times_inertia(tree, frames, frames.angular_velocity).differentiate()
+    return to_coordinates(tree, work(partial_velocities(tree, frames), force, moment))
 
 
 def newton_euler(robot: Robot, q: Any, rates: int = 0) -> Any:
@@ -67,7 +51,7 @@ def newton_euler(robot: Robot, q: Any, rates: int = 0) -> Any:
     >>> newton_euler(jn.robot.from_screws([slide]), [[0.0], [3.0], [5.0], [7.0]], rates=1).round(12).tolist()
     [[10.0], [14.0]]
     """
-    q, _ = checked_levels(robot, q, rates, rates + 2)
+    q = checked_order(robot, q, whole_number("rates", rates, 0) + 2)
     return inverse_dynamics(robot.with_gravity((0.0, 0.0, 0.0)), q)
 
 
@@ -98,7 +82,7 @@ def virtual_work(robot: Robot, q: Any, rates: int = 0) -> Any:
     >>> virtual_work(jn.robot.from_screws([slide]), [[0.0], [3.0], [5.0], [7.0]], rates=1).round(12).tolist()
     [[10.0], [14.0]]
     """
-    q, _ = checked_levels(robot, q, rates, rates + 2)
+    q = checked_order(robot, q, whole_number("rates", rates, 0) + 2)
     return _virtual_work(robot, (q,), (), (True,))
 
 
@@ -129,5 +113,5 @@ def gravity_forces(robot: Robot, q: Any, rates: int = 0) -> Any:
     >>> gravity_forces(jn.robot.from_screws([lift]), [[0.0]]).tolist()
     [[19.62]]
     """
-    q, _ = checked_levels(robot, q, rates, rates)
+    q = checked_order(robot, q, whole_number("rates", rates, 0))
     return _virtual_work(robot, (q,), (), (False,))

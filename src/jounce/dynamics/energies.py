@@ -89,8 +89,8 @@ def body_energy(pose: Any, mass: Any, center_of_mass: Any, second_moments: Any, 
     >>> float(rotation.coefficients[0])  # (3^2 + 2^4) / 2
     12.5
     """
-    velocity = _differentiated(pose.point(center_of_mass), order + 1)
-    rates = [_differentiated(axis, order + 1) for axis in _axes(pose)]
+    velocity = differentiated(pose.point(center_of_mass), order + 1)
+    rates = [differentiated(axis, order + 1) for axis in body_axes(pose)]
     translation = dot(velocity, velocity) * (0.5 * mass)
     size = range(len(rates))
     rotation = total(
@@ -102,13 +102,21 @@ def body_energy(pose: Any, mass: Any, center_of_mass: Any, second_moments: Any, 
     return translation, rotation
 
 
-def _axes(pose: Any) -> tuple[Jet, ...]:
+def body_axes(pose: Any) -> tuple[Jet, ...]:
+    """Return the axes of bodies, two in the plane, in components of the base."""
     if hasattr(pose, "axes"):
         return pose.axes
     return tuple(pose.direction(unit) for unit in np.eye(2))  # a planar body
 
 
-def _differentiated(jet: Jet, times: int) -> Jet:
+def differentiated(jet: Jet, times: int) -> Jet:
+    """Return a derivative of a jet.
+
+    Raises
+    ------
+    ValueError
+        If the jet is too short.
+    """
     if jet.order < times:
         raise ValueError(f"the pose has derivatives to order {jet.order}, this energy needs order {times}")
     for _ in range(times):
@@ -149,17 +157,43 @@ def acceleration_energy(system: Robot | Motion, q: Any = None, *, order: int = 1
     >>> float(jn.acceleration_energy(robot, [[0.0], [2.0], [3.0]]).total[0].round(12))  # (3^2 + 2^4) / 3 / 2
     4.166666666667
     """
-    if isinstance(order, bool) or not isinstance(order, int | np.integer) or order < 0:
-        raise RobotError("must be a whole number, 0 or greater", name="order", value=order)
-    order = int(order)
+    (translation, rotation), bodies, order = evaluated(system, q, order, body_energy)
+    return Energy(translation, rotation, bodies, order)
+
+
+def evaluated(
+    system: Robot | Motion, q: Any, order: int, function: Any
+) -> tuple[tuple[Any, ...], tuple[str, ...], int]:
+    """Return what `body_energy`, or a function like it, gives for the bodies of a system, their names, and the order.
+
+    Arrays are of shape (..., rates + 1, bodies): plain derivatives.
+
+    Raises
+    ------
+    RobotError, MechanismError
+        As for `acceleration_energy`.
+    """
+    order = whole_number("order", order, 0)
     if isinstance(system, Motion):
-        return _of_motion(system, order)
+        return _of_motion(system, order, function), tuple(system.mechanism.bodies), order
     q = checked(system, q, 0)
     if q.shape[-2] < order + 2:
         message = f"an energy of order {order} needs derivatives of q to order {order + 1}"
         raise RobotError(message, name="q", value=q.shape)
-    translation, rotation = _of_robot(system, (q,), (), (order,))
-    return Energy(translation, rotation, system.moving_links, order)
+    return _of_robot(system, (q,), (), (order, function)), system.moving_links, order
+
+
+def whole_number(name: str, value: Any, least: int) -> int:
+    """Return a whole number that is large enough.
+
+    Raises
+    ------
+    RobotError
+        If it is not.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+        raise RobotError(f"must be a whole number, {least} or greater", name=name, value=value)
+    return int(value)
 
 
 def kinetic_energy(system: Robot | Motion, q: Any = None) -> Energy:
@@ -177,27 +211,27 @@ def kinetic_energy(system: Robot | Motion, q: Any = None) -> Energy:
     return acceleration_energy(system, q, order=0)
 
 
-def robot_energy(tree: Tree, frames: Frames, order: int) -> tuple[Jet, Jet]:
+def robot_energy(tree: Tree, frames: Frames, order: int, function: Any = body_energy) -> tuple[Jet, ...]:
     """Return the energy of the bodies of a robot as jets of shape (bodies, batch), from the frames of the bodies."""
     tensor = jnp.moveaxis(jnp.asarray(tree.inertia), 0, -1)[..., None]
     spread = 0.5 * (tensor[0, 0] + tensor[1, 1] + tensor[2, 2])
     moments = [[(spread if i == k else 0.0) - tensor[i, k] for k in range(3)] for i in range(3)]
     center = jnp.swapaxes(jnp.asarray(tree.center), 0, 1)[:, :, None]
-    return body_energy(frames, jnp.asarray(tree.mass)[:, None], center, moments, order)
+    return function(frames, jnp.asarray(tree.mass)[:, None], center, moments, order)
 
 
 @Batched
-def _of_robot(tree: Tree, arrays: Any, _: Any, order: int) -> Any:
+def _of_robot(tree: Tree, arrays: Any, _: Any, order: int, function: Any) -> Any:
     frames = body_frames(tree, arrays[0]).without_base()
-    return tuple(stacked(part) for part in robot_energy(tree, frames, order))
+    return tuple(stacked(part) for part in robot_energy(tree, frames, order, function))
 
 
-def _of_motion(motion: Motion, order: int) -> Energy:
+def _of_motion(motion: Motion, order: int, function: Any) -> tuple[np.ndarray, ...]:
     if motion.order < order + 1:
         message = f"an energy of order {order} needs a motion solved to order {order + 1}"
         raise MechanismError(message, name="order", value=motion.order)
     pose_type, coordinates = motion.poses
-    parts = _evaluated(coordinates, *mechanism_masses(motion), pose_type, order)
+    parts = _evaluated(coordinates, *mechanism_masses(motion), pose_type, order, function)
     bad = (motion.status != Status.OK)[:, None, None]
 
     def derivatives(coefficients: Any) -> np.ndarray:
@@ -205,14 +239,15 @@ def _of_motion(motion: Motion, order: int) -> Energy:
         values = np.asarray(coefficients) * factorials[:, None, None]  # order, body, time
         return np.where(bad, np.nan, np.moveaxis(values[:, 1:], -1, 0))  # without the ground
 
-    translation, rotation = (derivatives(part[: motion.order - order]) for part in parts)
-    return Energy(translation, rotation, tuple(motion.mechanism.bodies), order)
+    return tuple(derivatives(part[: motion.order - order]) for part in parts)
 
 
-@compiled("pose_type", "order")
-def _evaluated(coordinates: Any, mass: Any, center: Any, moments: Any, pose_type: Any, order: int) -> Any:
+@compiled("pose_type", "order", "function")
+def _evaluated(
+    coordinates: Any, mass: Any, center: Any, moments: Any, pose_type: Any, order: int, function: Any
+) -> Any:
     pose = pose_type.from_coordinates({name: Jet(tuple(c)) for name, c in coordinates.items()})
-    return tuple(stacked(part) for part in body_energy(pose, mass, center, moments, order))
+    return tuple(stacked(part) for part in function(pose, mass, center, moments, order))
 
 
 def potential_energy(motion: Motion) -> Any:
@@ -246,12 +281,32 @@ def potential_energy(motion: Motion) -> Any:
     >>> jn.dynamics.potential_energy(jn.solve(lift, [0.0, 1.0], order=1))[1].round(9).tolist()  # energy and power
     [60.0, 60.0]
     """
+    found = potential_coefficients(motion)[: motion.order + 1].sum(axis=1)
+    values = found * np.array([float(math.factorial(k)) for k in range(len(found))])[:, None]
+    return np.where((motion.status == Status.OK)[:, None], values.T, np.nan)
+
+
+def potential_coefficients(motion: Motion) -> np.ndarray:
+    """Return the potential energies of bodies as Taylor coefficients, (levels, bodies, time), the ground first."""
     mass, center, _ = mechanism_masses(motion)
     pose_type, coordinates = motion.poses
-    heights = _heights(coordinates, center, gravity_of(motion.mechanism), pose_type)[: motion.order + 1]
-    factorials = np.array([float(math.factorial(k)) for k in range(len(heights))])
-    values = -np.sum(np.asarray(heights) * mass, axis=1) * factorials[:, None]
-    return np.where((motion.status == Status.OK)[:, None], values.T, np.nan)
+    return -np.asarray(_heights(coordinates, center, gravity_of(motion.mechanism), pose_type)) * mass
+
+
+def energy_coefficients(motion: Motion, order: int) -> np.ndarray:
+    """Return the energies of order p of bodies as Taylor coefficients, (levels, bodies, time), the ground first.
+
+    Raises
+    ------
+    MechanismError
+        If no body has a mass, or the motion has too few derivatives.
+    """
+    pose_type, coordinates = motion.poses
+    if len(coordinates["position"]) < order + 2:
+        message = f"an energy of order {order} needs a motion solved to order {order + 1}"
+        raise MechanismError(message, name="order", value=motion.order)
+    parts = _evaluated(coordinates, *mechanism_masses(motion), pose_type, order, body_energy)
+    return np.asarray(parts[0]) + np.asarray(parts[1])
 
 
 @compiled("pose_type")

@@ -4,7 +4,8 @@ All give the generalised inertia forces Q_i of a robot and their rates, and agre
 `virtual_work` and `newton_euler`; for work, `jounce.inverse_dynamics` is the one to use. They rest on the partial
 derivatives of energies with respect to ``q^(m)``. As a jet has no separate velocity, the series in time of such a
 partial derivative is found from perturbations ``s^r / r!`` of the motion itself: to first order they change an energy
-by ``sum_r s^(m-r) / (m-r)! dE/dq^(r)``, which is solved for the last term.
+by ``sum_r s^(m-r) / (m-r)! dE/dq^(r)``, which is solved for the last term. The coordinates are those of a robot, or the
+laws of the drivers of a mechanism (`driver_coordinates`).
 """
 
 import math
@@ -15,10 +16,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jounce.dynamics.energies import robot_energy
+from jounce.dynamics.driver_coordinates import of_drivers
+from jounce.dynamics.energies import differentiated, robot_energy, whole_number
 from jounce.errors import RobotError
-from jounce.jet import components
+from jounce.jet import Jet, components
 from jounce.jet.algebra import stacked, total
+from jounce.kinematics import Motion
 from jounce.robot.batches import Batched, checked
 from jounce.robot.kinematics import body_frames
 from jounce.robot.robot import Robot
@@ -47,123 +50,189 @@ def printed_coefficient(p: int) -> int:
     return p * (p + 1) // 2 - (p > 1)
 
 
-def energy_slope(tree: Tree, q: Any, order: int, rate: int, m: int, levels: int) -> Any:
-    """Return the series in time of ``dE_p^(n) / dq^(m)``, as Taylor coefficients (levels, coordinates, batch).
+Energies = Callable[[Any, int], Jet]
+"""What maps Taylor coefficients of coordinates, (K + 1, coordinates, batch), and p to the energy E_p, (batch,)."""
+
+
+def slope_series(energy: Callable[[Any], Any], q: Any, m: int, levels: int) -> Any:
+    """Return the series in time of the derivative of a quantity with respect to ``q^(m)``.
 
     Parameters
     ----------
-    tree : Tree
-        Arrays of the robot.
+    energy : callable
+        Maps Taylor coefficients of the coordinates to those of the quantity, (levels, batch).
     q : array of shape (K + 1, coordinates, batch)
-        Taylor coefficients of the coordinates; K at least order + rate + levels.
-    order, rate : int
-        Order p of the energy, and the number n of its time derivatives.
+        Taylor coefficients of the coordinates.
     m : int
         Which derivative of the coordinates it is differentiated by.
     levels : int
         How many coefficients are wanted; one is the value.
+
+    Returns
+    -------
+    array of shape (levels, coordinates, batch)
+        Taylor coefficients.
     """
-    coordinates = tree.shape.coordinates
-    least = max(order + 1 + rate + levels - 1, m)
-    q = jnp.concatenate([q, jnp.zeros((max(0, least + 1 - q.shape[0]), *q.shape[1:]))])[: least + 1]
+    lowest, coordinates = max(0, m + 1 - levels), q.shape[1]  # terms below vanish at the instant itself
+    q = jnp.concatenate([q, jnp.zeros((max(0, m + 1 - q.shape[0]), *q.shape[1:]))])
+    below, varied, above = q[:lowest], q[lowest : m + 1], q[m + 1 :]
+    _, slope = jax.linearize(lambda part: energy(jnp.concatenate([below, part, above])), varied)
+    series = []
+    for row in range(len(varied)):
+        shift = m - lowest - row
+        directions = np.zeros((coordinates, *varied.shape[:2], 1))
+        directions[np.arange(coordinates), row, np.arange(coordinates)] = 1 / math.factorial(lowest + row)
+        changes = jax.vmap(slope, out_axes=1)(jnp.broadcast_to(directions, (coordinates, *varied.shape)))
+        changes = changes * ((-1) ** shift / math.factorial(shift))
+        series.append(jnp.concatenate([jnp.zeros((shift, *changes.shape[1:])), changes[: levels - shift]]))
+    return total(series)
+
+
+def _slope(energies: Energies, q: Any, levels: int, order: int, rate: int, m: int) -> Any:
+    """Return the series of ``dE_p^(n) / dq^(m)`` for order p and rate n, (levels, coordinates, batch)."""
 
     def energy(q: Any) -> Any:
-        frames = body_frames(tree, q).without_base()
-        jet = total(total(components(part)) for part in robot_energy(tree, frames, order))
-        for _ in range(rate):
-            jet = jet.differentiate()
-        return stacked(jet.truncate(levels - 1))[:, 0]
+        return stacked(differentiated(energies(q, order), rate).truncate(levels - 1))
 
-    _, slope = jax.linearize(energy, q)
-    series = []
-    for r in range(m + 1):
-        shift = m - r
-        if shift >= levels:  # these terms vanish at the instant itself
-            continue
-        directions = np.zeros((coordinates, *q.shape[:2], 1))
-        directions[np.arange(coordinates), r, np.arange(coordinates)] = 1 / math.factorial(r)
-        changes = jax.vmap(slope, out_axes=1)(jnp.broadcast_to(directions, (coordinates, *q.shape)))
-        series.append((shift, (-1) ** shift / math.factorial(shift) * changes))
-    pads = (jnp.concatenate([jnp.zeros((shift, *c.shape[1:])), c[: levels - shift]]) for shift, c in series)
-    return total(pads)
+    return slope_series(energy, q[: max(order + rate + levels, m) + 1], m, levels)
 
 
-@Batched
-def _lagrange(tree: Tree, arrays: Any, _: Any, levels: int) -> Any:
-    momentum = energy_slope(tree, arrays[0], 0, 0, 1, levels + 1)
+def _lagrange(energies: Energies, q: Any, levels: int) -> Any:
+    momentum = _slope(energies, q, levels + 1, 0, 0, 1)
     rate = momentum[1:] * np.arange(1.0, levels + 1)[:, None, None]
-    return rate - energy_slope(tree, arrays[0], 0, 0, 0, levels)
+    return rate - _slope(energies, q, levels, 0, 0, 0)
 
 
-@Batched
-def _mangeron(tree: Tree, arrays: Any, _: Any, levels: int, m: int) -> Any:
-    slope = energy_slope(tree, arrays[0], 0, m, m, levels)
-    return (slope - (m + 1) * energy_slope(tree, arrays[0], 0, 0, 0, levels)) / m
+def _mangeron(energies: Energies, q: Any, levels: int, m: int) -> Any:
+    return (_slope(energies, q, levels, 0, m, m) - (m + 1) * _slope(energies, q, levels, 0, 0, 0)) / m
 
 
-@Batched
-def _gibbs_appell(tree: Tree, arrays: Any, _: Any, levels: int, m: int) -> Any:
-    return energy_slope(tree, arrays[0], 1, m - 2, m, levels)
+def _gibbs_appell(energies: Energies, q: Any, levels: int, m: int) -> Any:
+    return _slope(energies, q, levels, 1, m - 2, m)
 
 
-@Batched
-def _higher_order(tree: Tree, arrays: Any, _: Any, k: int, m: int, weights: tuple[float, ...]) -> Any:
-    q = arrays[0]
-
-    def weighted(highest: Any) -> Any:
-        """Return the weighted sum of the rates of energies, as it depends on the m-th coefficients alone."""
-        frames = body_frames(tree, jnp.concatenate([q[:m], highest[None], q[m + 1 :]])).without_base()
+def _higher_order(energies: Energies, q: Any, k: int, m: int, weights: tuple[float, ...]) -> Any:
+    def weighted(q: Any) -> Any:
         terms = []
         for p, weight in enumerate(weights, 1):
             rate = m + k - 2 * p - 1
-            scale = weight * math.factorial(rate)
-            terms += [scale * part.coefficients[rate] for part in robot_energy(tree, frames, p)]
-        return total(components(total(terms)))[0]
+            terms.append(weight * math.factorial(rate) * energies(q, p).dense().coefficients[rate])
+        return total(terms)[None]
 
-    _, slope = jax.linearize(weighted, q[m])
-    directions = np.eye(tree.shape.coordinates)[:, :, None] * np.ones(q.shape[-1])
-    return (math.factorial(k - 1) / math.factorial(m + k - 1)) * jax.vmap(slope)(directions)[None]
+    return (math.factorial(k - 1) * math.factorial(m) / math.factorial(m + k - 1)) * slope_series(weighted, q, m, 1)
 
 
-def checked_levels(robot: Robot, q: Any, rates: int, least: int) -> tuple[Any, int]:
-    """Return the derivatives of q to order `least`, and how many forces and rates are wanted.
+@Batched
+def _of_robot(tree: Tree, arrays: Any, _: Any, form: Callable[..., Any], static: tuple[Any, ...]) -> Any:
+    def energies(q: Any, order: int) -> Jet:
+        frames = body_frames(tree, q).without_base()
+        return total(total(components(part)) for part in robot_energy(tree, frames, order))[0]
+
+    return form(energies, arrays[0], *static)
+
+
+def _evaluated(system: Robot | Motion, q: Any, least: int, form: Callable[..., Any], *static: Any) -> Any:
+    """Return what a form gives for a robot, (..., levels, n), or for the drivers of a motion, labelled.
+
+    Raises
+    ------
+    RobotError, MechanismError
+        If q does not fit the robot or has too few derivatives, or the motion is not that of a driven mechanism.
+    """
+    if isinstance(system, Motion):
+        return of_drivers(system, q, least, form, static)
+    return _of_robot(system, (checked_order(system, q, least),), (), (form, static))
+
+
+def checked_order(robot: Robot, q: Any, least: int) -> Any:
+    """Return the derivatives of q to order `least`.
 
     Raises
     ------
     RobotError
         If q does not fit the robot or has too few derivatives.
     """
-    rates = _whole("rates", rates, 0)
     q = checked(robot, q, 0)
     if q.shape[-2] < least + 1:
-        message = f"{rates} {'rate' if rates == 1 else 'rates'} in this form need derivatives of q to order {least}"
-        raise RobotError(message, name="q", value=q.shape)
-    return q[..., : least + 1, :], rates + 1
+        raise RobotError(f"this needs derivatives of q to order {least}", name="q", value=q.shape)
+    return q[..., : least + 1, :]
 
 
-def lagrange(robot: Robot, q: Any, rates: int = 0) -> Any:
+def energy_slope(
+    system: Robot | Motion, q: Any = None, *, m: int, order: int = 1, rate: int = 0, rates: int = 0
+) -> Any:
+    """Return the derivative of a rate of an energy with respect to ``q^(m)``: the terms of Negrean 2025, 126-134.
+
+    ``dE_p^(n) / dq^(m)``, where ``E_p^(n)`` is a function of ``q, q', ..., q^(p + 1 + n)`` and all but one of them are
+    held.
+
+    Parameters
+    ----------
+    system : Robot or Motion
+        A robot; gravity does not count. Or the motion of a mechanism whose bodies have masses: its coordinates are the
+        laws of its drivers.
+    q : array_like of shape (..., K + 1, n), optional
+        Coordinates of a robot and their derivatives, K at least order + rate + rates + 1.
+    m : int
+        Which derivative of the coordinates it is differentiated by; beyond order + rate + 1 all slopes are zero.
+    order : int, default 1
+        The order p of the energy; 0 is the kinetic energy.
+    rate : int, default 0
+        The number n of time derivatives of the energy.
+    rates : int, default 0
+        How many rates in time of the slope itself are wanted.
+
+    Returns
+    -------
+    array of shape (..., rates + 1, n)
+        For a motion an `xarray.DataArray` of dimensions time, derivative and driver.
+
+    Raises
+    ------
+    RobotError, MechanismError
+        If q does not fit the robot or has too few derivatives, the mechanism is not driven in all that can move, or a
+        number is none.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> slide = jn.robot.Screw([1, 0, 0], type="prismatic", inertia=jn.Inertia(2.0))
+    >>> robot, q = jn.robot.from_screws([slide]), [[0.0], [3.0], [5.0], [7.0]]
+    >>> jn.energy_slope(robot, q, m=2).tolist()  # of half the mass times the square of the acceleration
+    [[10.0]]
+    >>> jn.energy_slope(robot, q, m=2, rate=1).round(12).tolist()  # of the mass times acceleration and jerk
+    [[14.0]]
+    """
+    numbers = {"m": m, "order": order, "rate": rate, "rates": rates}
+    m, order, rate, rates = (whole_number(name, value, 0) for name, value in numbers.items())
+    return _evaluated(system, q, order + rate + rates + 1, _slope, rates + 1, order, rate, m)
+
+
+def lagrange(system: Robot | Motion, q: Any = None, rates: int = 0) -> Any:
     """Return the generalised inertia forces by Lagrange's equations: Negrean 2025, equation 126.
 
     ``Q_i = d/dt (dE_0 / dq') - dE_0 / dq`` with the kinetic energy E_0.
 
     Parameters
     ----------
-    robot : Robot
-        The robot; gravity does not count.
-    q : array_like of shape (..., K + 1, n)
-        Coordinates and their derivatives, K at least rates + 2.
+    system : Robot or Motion
+        A robot; gravity does not count. Or the motion of a mechanism whose bodies have masses: its coordinates are the
+        laws of its drivers, and the forces are those that the inertia of all bodies asks of the drivers.
+    q : array_like of shape (..., K + 1, n), optional
+        Coordinates of a robot and their derivatives, K at least rates + 2.
     rates : int, default 0
         How many rates are wanted.
 
     Returns
     -------
     array of shape (..., rates + 1, n)
-        Forces and their rates, N m or N by s.
+        Forces and their rates, N m or N by s. For a motion an `xarray.DataArray` of dimensions time, derivative and
+        driver.
 
     Raises
     ------
-    RobotError
-        If q does not fit the robot or has too few derivatives.
+    RobotError, MechanismError
+        If q does not fit the robot or has too few derivatives, or the motion is not that of a driven mechanism.
 
     Examples
     --------
@@ -172,18 +241,18 @@ def lagrange(robot: Robot, q: Any, rates: int = 0) -> Any:
     >>> lagrange(jn.robot.from_screws([slide]), [[0.0], [3.0], [5.0], [7.0]], rates=1).round(12).tolist()
     [[10.0], [14.0]]
     """
-    q, levels = checked_levels(robot, q, rates, rates + 2)
-    return _lagrange(robot, (q,), (), (levels,))
+    rates = whole_number("rates", rates, 0)
+    return _evaluated(system, q, rates + 2, _lagrange, rates + 1)
 
 
-def mangeron_nielsen(robot: Robot, q: Any, rates: int = 0, m: int = 1) -> Any:
+def mangeron_nielsen(system: Robot | Motion, q: Any = None, rates: int = 0, m: int = 1) -> Any:
     """Return the generalised inertia forces by Mangeron's equations: Negrean 2025, equation 127.
 
     ``Q_i = 1/m (dE_0^(m) / dq^(m) - (m + 1) dE_0 / dq)``; m = 1 are Nielsen's equations.
 
     Parameters
     ----------
-    robot, q, rates
+    system, q, rates
         As for `lagrange`, with K at least rates + m + 1.
     m : int, default 1
         Order of the derivatives, 1 or more.
@@ -191,12 +260,13 @@ def mangeron_nielsen(robot: Robot, q: Any, rates: int = 0, m: int = 1) -> Any:
     Returns
     -------
     array of shape (..., rates + 1, n)
-        Forces and their rates, N m or N by s.
+        Forces and their rates, N m or N by s. For a motion an `xarray.DataArray` of dimensions time, derivative and
+        driver.
 
     Raises
     ------
-    RobotError
-        If q does not fit the robot or has too few derivatives.
+    RobotError, MechanismError
+        If q does not fit the robot or has too few derivatives, or the motion is not that of a driven mechanism.
 
     Examples
     --------
@@ -205,19 +275,18 @@ def mangeron_nielsen(robot: Robot, q: Any, rates: int = 0, m: int = 1) -> Any:
     >>> mangeron_nielsen(jn.robot.from_screws([slide]), [[0.0], [3.0], [5.0], [7.0]], m=2).tolist()
     [[10.0]]
     """
-    m = _whole("m", m, 1)
-    q, levels = checked_levels(robot, q, rates, rates + m + 1)
-    return _mangeron(robot, (q,), (), (levels, m))
+    m, rates = whole_number("m", m, 1), whole_number("rates", rates, 0)
+    return _evaluated(system, q, rates + m + 1, _mangeron, rates + 1, m)
 
 
-def gibbs_appell(robot: Robot, q: Any, rates: int = 0, m: int = 2) -> Any:
+def gibbs_appell(system: Robot | Motion, q: Any = None, rates: int = 0, m: int = 2) -> Any:
     """Return the generalised inertia forces by the Gibbs-Appell equations: Negrean 2025, equation 128.
 
     ``Q_i = dE_1^(m-2) / dq^(m)`` with the acceleration energy E_1 of first order.
 
     Parameters
     ----------
-    robot, q, rates
+    system, q, rates
         As for `lagrange`, with K at least rates + m.
     m : int, default 2
         Order of the derivatives, 2 or more.
@@ -225,12 +294,13 @@ def gibbs_appell(robot: Robot, q: Any, rates: int = 0, m: int = 2) -> Any:
     Returns
     -------
     array of shape (..., rates + 1, n)
-        Forces and their rates, N m or N by s.
+        Forces and their rates, N m or N by s. For a motion an `xarray.DataArray` of dimensions time, derivative and
+        driver.
 
     Raises
     ------
-    RobotError
-        If q does not fit the robot or has too few derivatives.
+    RobotError, MechanismError
+        If q does not fit the robot or has too few derivatives, or the motion is not that of a driven mechanism.
 
     Examples
     --------
@@ -239,13 +309,16 @@ def gibbs_appell(robot: Robot, q: Any, rates: int = 0, m: int = 2) -> Any:
     >>> gibbs_appell(jn.robot.from_screws([slide]), [[0.0], [3.0], [5.0], [7.0]], rates=1).round(12).tolist()
     [[10.0], [14.0]]
     """
-    m = _whole("m", m, 2)
-    q, levels = checked_levels(robot, q, rates, rates + m)
-    return _gibbs_appell(robot, (q,), (), (levels, m))
+    m, rates = whole_number("m", m, 2), whole_number("rates", rates, 0)
+    return _evaluated(system, q, rates + m, _gibbs_appell, rates + 1, m)
 
 
 def higher_order(
-    robot: Robot, q: Any, k: int, m: int | None = None, coefficients: Callable[[int], float] = catalan
+    system: Robot | Motion,
+    q: Any = None,
+    k: int = 1,
+    m: int | None = None,
+    coefficients: Callable[[int], float] = catalan,
 ) -> Any:
     """Return the (k - 1)-th rate of the generalised inertia forces by the higher-order equations.
 
@@ -254,11 +327,9 @@ def higher_order(
 
     Parameters
     ----------
-    robot : Robot
-        The robot; gravity does not count.
-    q : array_like of shape (..., K + 1, n)
-        Coordinates and their derivatives, K at least m + k - 1.
-    k : int
+    system, q
+        As for `lagrange`, with K at least m + k - 1.
+    k : int, default 1
         1 gives the forces, 2 their first rate, and so on.
     m : int, optional
         Order of the derivatives, k + 1 or more; k + 1 unless given.
@@ -268,12 +339,13 @@ def higher_order(
     Returns
     -------
     array of shape (..., n)
-        N m or N by s^(k - 1).
+        N m or N by s^(k - 1). For a motion an `xarray.DataArray` of dimensions time and driver.
 
     Raises
     ------
-    RobotError
-        If q does not fit the robot or has too few derivatives, or m is too small.
+    RobotError, MechanismError
+        If q does not fit the robot or has too few derivatives, the motion is not that of a driven mechanism, or m is
+        too small.
 
     Examples
     --------
@@ -283,14 +355,8 @@ def higher_order(
     >>> higher_order(jn.robot.from_screws([slide]), q, k=2).round(12).tolist()
     [14.0]
     """
-    k = _whole("k", k, 1)
-    m = k + 1 if m is None else _whole("m", m, k + 1)
-    q, _ = checked_levels(robot, q, k - 1, m + k - 1)
+    k = whole_number("k", k, 1)
+    m = k + 1 if m is None else whole_number("m", m, k + 1)
     weights = tuple(float(coefficients(p)) for p in range(1, k + 1))
-    return _higher_order(robot, (q,), (), (k, m, weights))[..., 0, :]
-
-
-def _whole(name: str, value: Any, least: int) -> int:
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
-        raise RobotError(f"must be a whole number, {least} or greater", name=name, value=value)
-    return int(value)
+    found = _evaluated(system, q, m + k - 1, _higher_order, k, m, weights)
+    return found[:, 0] if isinstance(system, Motion) else found[..., 0, :]

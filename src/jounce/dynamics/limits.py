@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from jounce.errors import RobotError, SampleWarning, TrajectoryError, did_you_mean
-from jounce.robot.inverse_dynamics import inverse_dynamics
+from jounce.dynamics.trajectories import FollowedTrajectory, why_not
+from jounce.errors import RobotError, SampleWarning, TrajectoryError
 from jounce.robot.model import Limits
 from jounce.robot.robot import Robot
 from jounce.trajectory.joint_trajectory import JointTrajectory
@@ -24,7 +24,6 @@ REST = 1e-9  # of the largest velocity of a joint, below which it is at rest
 ROUNDING = 1e-9  # by which a ratio may exceed 1
 INSTANTS = 2000  # at least, over the trajectory
 BETWEEN = 4  # intervals at least, from one instant of the trajectory to the next
-BLOCK = 2048  # instants evaluated at once, always as many, so that all is compiled once
 PEAKS = 3  # of each curve that are searched
 POINTS = 9  # instants around each
 ROUNDS = 8  # times the step is divided
@@ -180,6 +179,7 @@ def check_limits(
     (False, [('velocity', 0.5, 0.0), ('torque', 1.2263, 0.0)])
     """
     curves = _Curves(robot, trajectory, drives)
+    held = curves.followed.held
     merged = _merged(robot, limits)
     grid = _grid(trajectory) if times is None else _checked_times(times)
     values = curves(grid)
@@ -188,64 +188,28 @@ def check_limits(
         (quantity, joint)
         for joint, name in enumerate(robot.joint_names)
         for quantity in range(len(FIELDS))
-        if quantity in EFFORTS or name not in curves.held
+        if quantity in EFFORTS or name not in held
     ]
     at, found, shown = _worst(curves, bounds, grid, values, np.array(wanted))
     rows = tuple(
         _row(robot, bounds, quantity, joint, *worst)
         for (quantity, joint), *worst in zip(wanted, at.tolist(), found.tolist(), shown.tolist(), strict=True)
     )
-    for message in curves.doubts:
+    for message in curves.followed.doubts:
         warnings.warn(SampleWarning(message), stacklevel=2)
-    return LimitReport(robot.name, robot.joint_names, rows, curves.held, grid, values, bounds.shares(values))
+    return LimitReport(robot.name, robot.joint_names, rows, held, grid, values, bounds.shares(values))
 
 
 class _Curves:
     """All quantities of all joints as functions of time."""
 
     def __init__(self, robot: Robot, trajectory: JointTrajectory, drives: bool):
-        if not robot.joint_names:
-            raise RobotError("the robot has no moving joint; there is nothing to check", name="joints")
-        for name in trajectory.names:
-            if name not in robot.joint_names:
-                raise TrajectoryError(_why_not(robot, name), name="joint", value=name)
-        self.robot, self.trajectory, self.drives = robot, trajectory, drives
-        self.columns = [robot.joint_names.index(name) for name in trajectory.names]
-        self.held = {name: _rest(robot.limits[name]) for name in robot.joint_names if name not in trajectory.names}
-        self.doubts: list[str] = []
+        self.followed, self.drives = FollowedTrajectory(robot, trajectory), drives
 
     def __call__(self, times: np.ndarray) -> np.ndarray:
         """Return values of shape (time, 6, joints)."""
-        found = []
-        for start in range(0, len(times), BLOCK):
-            block = times[start : start + BLOCK]
-            whole = np.concatenate([block, np.full(BLOCK - len(block), block[-1])])
-            found.append(self._block(whole)[: len(block)])
-        return np.concatenate(found)
-
-    def _block(self, times: np.ndarray) -> np.ndarray:
-        q = np.zeros((len(times), ORDER + 1, len(self.robot.joint_names)))
-        for name, value in self.held.items():
-            q[:, 0, self.robot.joint_names.index(name)] = value
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always", SampleWarning)
-            q[:, :, self.columns] = self.trajectory.derivatives(times, ORDER)
-        for warning in caught:
-            if str(warning.message) not in self.doubts:
-                self.doubts.append(str(warning.message))
-        self._check_finite(q, times)
-        found = np.concatenate([q, inverse_dynamics(self.robot, q, drives=self.drives)], axis=1)
-        self._check_finite(found, times)
-        return found
-
-    def _check_finite(self, values: np.ndarray, times: np.ndarray) -> None:
-        bad = np.argwhere(~np.isfinite(values))
-        if len(bad):
-            instant, quantity, joint = bad[0]
-            message = (
-                f"the {FIELDS[quantity].replace('_', ' ')} of this joint is not finite at t = {times[instant]:g} s"
-            )
-            raise TrajectoryError(f"{message}; choose another law there", name=self.robot.joint_names[joint])
+        q = self.followed.coordinates(times, ORDER)
+        return np.concatenate([q, self.followed.torques(q, times, self.drives)], axis=1)
 
 
 class _Bounds:
@@ -361,26 +325,10 @@ def _merged(robot: Robot, limits: Mapping[str, Limits] | None) -> dict[str, Limi
     given = dict(limits or {})
     for name, entry in given.items():
         if name not in robot.joint_names:
-            raise RobotError(_why_not(robot, name), name="limits", value=name)
+            raise RobotError(why_not(robot, name), name="limits", value=name)
         if not isinstance(entry, Limits):
             raise RobotError("must be Limits", name=f"limits.{name}", value=entry)
     return robot.limits | given
-
-
-def _why_not(robot: Robot, name: str) -> str:
-    """Say why a name is not that of a joint that can be moved."""
-    joint = robot.joints.get(name)
-    if joint is None:
-        return f"{robot.name} has no moving joint of this name; {did_you_mean(name, robot.joint_names)}"
-    if joint.mimic is not None:
-        return f"this joint follows {joint.mimic.joint}; leave it out"
-    return "this joint is fixed; leave it out"
-
-
-def _rest(limits: Limits) -> float:
-    """Return zero, or what is nearest to it in the range of a joint."""
-    low = 0.0 if limits.lower is None else max(limits.lower, 0.0)
-    return low if limits.upper is None else min(limits.upper, low)
 
 
 def _or_infinite(bound: float | None, sign: float = 1.0) -> float:

@@ -30,6 +30,7 @@ class AbstractForceOutput(AbstractMotionOutput):
     """A force or torque in a mechanism: two derivatives shorter than the motion, as accelerations are."""
 
     lost_orders = 2
+    of_forces = True
     source: ClassVar[str] = ""  # the field that names what exerts it: driver, joint or force
 
     def check(self, mechanism: Mechanism) -> None:

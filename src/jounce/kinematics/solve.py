@@ -20,7 +20,6 @@ from jounce.mechanism.system import Group
 
 LOWEST_ORDER = 4  # of the jets inside: predictions need some, also where the user wants positions only
 HIGHEST_ORDER = 30
-FORCES_LOSE = 2  # derivatives of the motion are used up by outputs of forces
 LARGEST_TOLERANCE = 1e-2
 
 
@@ -87,7 +86,7 @@ def solve(
         raise MechanismError(message, name="tolerance", value=tolerance)
     instants = time_grid(mechanism.time if time is None else time, mechanism.parameter_values)
     lost = max((output.lost_orders for output in mechanism.outputs.values()), default=0)
-    check_laws(mechanism, instants, order + lost, forces=lost >= FORCES_LOSE)
+    check_laws(mechanism, instants, order + lost, forces=any(output.of_forces for output in mechanism.outputs.values()))
     model, coordinates = assemble(build(mechanism), instants[0], tolerance)
     solver = Solver(model, max(order + lost, LOWEST_ORDER), float(tolerance), refine, order)
     first = _first(solver, coordinates, instants[:1])

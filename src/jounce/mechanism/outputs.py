@@ -23,6 +23,7 @@ class AbstractQuantity(eqx.Module):
     body_count: ClassVar[int] = 0
     labels: ClassVar[tuple[str, ...]] = ("x", "y", "z")  # of the components, where there are some
     axes: ClassVar[tuple[tuple[str, tuple[str, ...]], ...]] = ()  # of components that are those of no vector
+    of_forces: ClassVar[bool] = False  # whether applied forces bear on it
 
     def check(self, mechanism: Any) -> None:
         """Raise MechanismError unless the quantity exists in a mechanism; names of bodies are checked elsewhere."""

@@ -13,7 +13,7 @@ from jounce.dynamics.limits import local_maxima
 from jounce.errors import SampleWarning
 from jounce.kinematics import solve
 
-__all__ = ["Peak", "derivative_name", "derivative_unit", "peaks", "rate_name", "scalar_outputs"]
+__all__ = ["Peak", "derivative_name", "derivative_unit", "peaks", "rate_name", "scalar_outputs", "table_peaks"]
 
 NAMES = ("position", "velocity", "acceleration", "jerk", "jounce")
 LEAST = 200  # instants that are looked at, at least
@@ -129,14 +129,16 @@ def scalar_outputs(motion: Any) -> dict[str, tuple[str, np.ndarray]]:
     return found
 
 
-def peaks(motion: Any) -> list[Peak]:
+def peaks(motion: Any, *, refine: bool = True) -> list[Peak]:
     """Return the peak values of each output, component by component, and of each derivative.
 
     Parameters
     ----------
     motion : Motion
-        Peaks between its instants are found too: the motion is solved at more instants where it has few, and then, as
-        often as it takes, around the highest of them.
+        What was solved.
+    refine : bool, default True
+        Find peaks between its instants too: the motion is solved at more instants where it has few, and then, as often
+        as it takes, around the highest of them. Otherwise only its own instants count.
 
     Returns
     -------
@@ -150,17 +152,52 @@ def peaks(motion: Any) -> list[Peak]:
     >>> [(p.output, p.derivative, p.unit, round(p.maximum, 4), round(p.maximum_at, 3)) for p in peaks(motion)][:2]
     [('psi', 'position', 'rad', 2.6436, 1.5), ('psi', 'velocity', 'rad/s', 1.5179, 1.069)]
     """
-    if "peaks" not in motion.derived:
-        motion.derived["peaks"] = _found(motion)
-    return motion.derived["peaks"]
+    name = "peaks" if refine else "peaks at the instants"
+    if name not in motion.derived:
+        motion.derived[name] = _found(motion, refine)
+    return motion.derived[name]
 
 
-def _found(motion: Any) -> list[Peak]:
+def table_peaks(dataset: Any) -> list[Peak]:
+    """Return the peak values of torques and their rates, at the instants of a dataset only.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Of variables of dimensions time and derivative, with the attribute ``units``: N or N*m.
+    """
+    found = []
+    for name, variable in dataset.data_vars.items():
+        unit = variable.attrs["units"]
+        for order, values in enumerate(variable.transpose("derivative", "time").values):
+            low, high = int(np.argmin(values)), int(np.argmax(values))
+            extremes = [(float(values[k]), float(dataset["time"][k])) for k in (low, high)]
+            (least, least_at), (most, most_at) = extremes
+            told = effort_name(unit, order)
+            size = float(np.abs(values).max())
+            found.append(Peak(str(name), told, derivative_unit(unit, order), least, least_at, most, most_at, size))
+    return found
+
+
+def effort_name(unit: str, order: int) -> str:
+    """Name a torque or a force, or one of its rates.
+
+    Examples
+    --------
+    >>> [effort_name("N*m", k) for k in (0, 1, 2, 3, 5)]
+    ['torque', 'torque rate', 'second rate', 'third rate', '5th rate']
+    """
+    kind = "force" if unit == "N" else "torque"
+    first = (kind, f"{kind} rate", "second rate", "third rate", "fourth rate")
+    return first[order] if order < len(first) else f"{derivative_name(order)} rate"
+
+
+def _found(motion: Any, refine: bool) -> list[Peak]:
     scalars = scalar_outputs(motion)
     rows = [(column, name, order) for column, (name, values) in scalars.items() for order in range(values.shape[1])]
     if not rows:
         return []
-    times, values = _extremes(motion)
+    times, values = _extremes(motion, refine)
     extremes = [(-values[k], times[k], values[len(rows) + k], times[len(rows) + k]) for k in range(len(rows))]
     sizes: dict[tuple[str, int], float] = {}
     for (_, name, order), (low, _, high, _) in zip(rows, extremes, strict=True):
@@ -173,7 +210,7 @@ def _found(motion: Any) -> list[Peak]:
     return found
 
 
-def _extremes(motion: Any) -> tuple[np.ndarray, np.ndarray]:
+def _extremes(motion: Any, refine: bool) -> tuple[np.ndarray, np.ndarray]:
     """Return where each curve is largest and how large, (2 curves,): all curves upside down, then as they are.
 
     Around the highest instants, the best of a few becomes the middle of a shorter interval, again and again; the last
@@ -184,7 +221,7 @@ def _extremes(motion: Any) -> tuple[np.ndarray, np.ndarray]:
     every = np.arange(values.shape[1])
     times, sizes = time[best], values[best, every]
     rounding = ROUNDING * _scales(motion)
-    if len(time) > 1:
+    if refine and len(time) > 1:
         time, values = _denser(motion, time, values)
         middle = local_maxima(values, PEAKS)
         low, high = time[np.maximum(middle - 1, 0)], time[np.minimum(middle + 1, len(time) - 1)]

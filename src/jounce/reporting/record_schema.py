@@ -94,6 +94,32 @@ class CheckRecord(Record):
     written: str | None
 
 
+class TorquePeak(TypedDict):
+    """Extreme values, at the instants of the trajectory, of a torque or force of a joint, or of one of its rates."""
+
+    joint: str
+    derivative: str
+    unit: str
+    minimum: float | None
+    minimum_at: float | None
+    maximum: float | None
+    maximum_at: float | None
+
+
+class TorquesRecord(Record):
+    """jounce torques --json."""
+
+    command: Literal["torques"]
+    robot: str
+    file: str
+    trajectory: str
+    rates: int
+    time: Grid
+    held: list[str]
+    peaks: list[TorquePeak]
+    written: str | None
+
+
 class Starter(TypedDict):
     """A mechanism to begin from, and the command that writes it."""
 
@@ -148,6 +174,7 @@ RECORDS: dict[str, Any] = {
     "inspect_mechanism": InspectMechanismRecord,
     "inspect_robot": InspectRobotRecord,
     "check": CheckRecord,
+    "torques": TorquesRecord,
     "new_list": NewListRecord,
     "new": NewRecord,
 }
@@ -166,7 +193,7 @@ def record_schema() -> dict[str, Any]:
     Examples
     --------
     >>> sorted(record_schema()["$defs"])
-    ['check', 'complaint', 'inspect_mechanism', 'inspect_robot', 'new', 'new_list', 'run', 'simulate']
+    ['check', 'complaint', 'inspect_mechanism', 'inspect_robot', 'new', 'new_list', 'run', 'simulate', 'torques']
     """
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from jounce.dynamics.limits import LimitReport
     from jounce.kinematics import Motion
 
-__all__ = ["complaint", "limits_record", "motion_record", "plain", "record"]
+__all__ = ["complaint", "limits_record", "motion_record", "plain", "record", "torques_record"]
 
 VERSION = 1
 """Number of the form of the records; it grows where a key changes or goes."""
@@ -67,15 +67,19 @@ def complaint(kind: str, problem: object) -> str:
     return json.dumps({kind: told}, allow_nan=False)
 
 
-def motion_record(motion: Motion, file: Any, written: Any) -> dict[str, Any]:
+def motion_record(motion: Motion, file: Any, written: Any, refine: bool = True) -> dict[str, Any]:
     """Return what `jounce run` and `jounce simulate` tell of a motion."""
     from jounce.reporting.motion_facts import motion_facts
     from jounce.reporting.peaks import peaks
 
-    found = [dataclasses.asdict(peak) for peak in peaks(motion)]
-    for peak in found:
-        del peak["size"]
-    return {"file": file, **motion_facts(motion), "peaks": found, "written": written}
+    told = [_peak(peak) for peak in peaks(motion, refine=refine)]
+    return {"file": file, **motion_facts(motion), "peaks": told, "written": written}
+
+
+def _peak(peak: Any) -> dict[str, Any]:
+    told = dataclasses.asdict(peak)
+    del told["size"]
+    return told
 
 
 def limits_record(report: LimitReport, robot: Any, trajectory: Any, written: Any) -> dict[str, Any]:
@@ -91,5 +95,23 @@ def limits_record(report: LimitReport, robot: Any, trajectory: Any, written: Any
         "time": {"start": report.times[0], "stop": report.times[-1], "count": len(report.times)},
         "held": dict(report.held),
         "limits": [{key: getattr(row, names.get(key, key)) for key in keys} for row in report.rows],
+        "written": written,
+    }
+
+
+def torques_record(dataset: Any, motion: Any, robot: Any, trajectory: Any, written: Any) -> dict[str, Any]:
+    """Return what `jounce torques` tells of a robot on a trajectory."""
+    from jounce.reporting.peaks import table_peaks
+
+    times = dataset["time"].values
+    peaks = [_peak(peak) for peak in table_peaks(dataset)]
+    return {
+        "robot": dataset.attrs["title"],
+        "file": robot,
+        "trajectory": trajectory,
+        "rates": dataset.sizes["derivative"] - 1,
+        "time": {"start": times[0], "stop": times[-1], "count": len(times)},
+        "held": [name for name in dataset.data_vars if name not in motion.names],
+        "peaks": [{"joint": peak.pop("output"), **peak} for peak in peaks],
         "written": written,
     }

@@ -18,6 +18,7 @@ __all__ = [
     "motion_summary",
     "start_heading",
     "start_summary",
+    "torques_summary",
     "verdict",
 ]
 
@@ -140,6 +141,21 @@ def limits_summary(report: LimitReport, motion: JointTrajectory, robot: Path, tr
         limited = {row.quantity for row in report.limited}
         told = [f"{word} of {', '.join(names)}" if word in limited else word for word, names in free.items()]
         lines.append(f"without a limit: {', '.join(told)}")
+    return "\n".join(_wrapped(line) for line in lines)
+
+
+def torques_summary(dataset: Any, motion: JointTrajectory, robot: Path, trajectory: Path) -> str:
+    """Word of which joints torques were computed, when, and which stand still."""
+    rates, instants = dataset.sizes["derivative"] - 1, dataset["time"].values
+    told = f", with {count(rates, 'rate')}" if rates else ""
+    lines = [
+        f"{dataset.attrs['title']}: torques of {count(len(dataset.data_vars), 'moving joint')}{told} "
+        f"({robot.name}, {trajectory.name})",
+        f"t = {instants[0]:g} s to {instants[-1]:g} s, {count(len(instants), 'instant')}",
+    ]
+    still = [str(name) for name in dataset.data_vars if name not in motion.names]
+    if still:
+        lines.append(f"not in the trajectory, held still: {', '.join(still)}")
     return "\n".join(_wrapped(line) for line in lines)
 
 

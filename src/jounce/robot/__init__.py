@@ -10,6 +10,7 @@ from jounce.robot.construct import (
     from_screws as from_screws,
 )
 from jounce.robot.coupling import CoupledJoints as CoupledJoints, SlideOutput as SlideOutput
+from jounce.robot.equations_of_motion import bias_forces as bias_forces, mass_matrix as mass_matrix
 from jounce.robot.inverse_dynamics import inverse_dynamics as inverse_dynamics, joint_wrenches as joint_wrenches
 from jounce.robot.jacobian import (
     jacobian as jacobian,

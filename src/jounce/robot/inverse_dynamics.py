@@ -11,6 +11,7 @@ from jounce.jet import Jet, concatenate, cross, matvec
 from jounce.jet.algebra import stacked
 from jounce.rigid.frames import Frames
 from jounce.robot.batches import Batched, checked
+from jounce.robot.equations_of_motion import drive_forces
 from jounce.robot.kinematics import body_frames
 from jounce.robot.newton_euler import newton_euler
 from jounce.robot.robot import Robot
@@ -154,12 +155,8 @@ def _generalised_forces(tree: Tree, arrays: Any, constants: Any, global_axes: tu
     forces = to_coordinates(tree, newton_euler(tree, q, applied)[0])
     if drives:
         levels = q.shape[0] - 2
-        armature, damping, friction = (jnp.asarray(x)[:, None] for x in (tree.armature, tree.damping, tree.friction))
-        motion = Jet(tuple(q))
-        velocity = motion.differentiate()
-        acceleration = velocity.differentiate()
-        forces = forces + stacked(acceleration * armature) + stacked((velocity * damping).truncate(levels - 1))
-        forces = forces.at[0].add(friction * jnp.sign(q[1]))
+        acceleration = Jet(tuple(q)).differentiate().differentiate()
+        forces = forces + stacked(acceleration * jnp.asarray(tree.armature)[:, None]) + drive_forces(tree, q, levels)
     return forces
 
 

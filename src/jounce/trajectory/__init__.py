@@ -2,6 +2,7 @@
 
 from jounce.trajectory.expression import Expression as Expression
 from jounce.trajectory.joint_trajectory import JointTrajectory as JointTrajectory
+from jounce.trajectory.measured import MeasuredMotion as MeasuredMotion
 from jounce.trajectory.motion import (
     AbstractMotion as AbstractMotion,
     ExpressionMotion as ExpressionMotion,

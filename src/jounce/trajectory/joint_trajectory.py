@@ -12,7 +12,7 @@ from jounce.display import Displayed
 from jounce.errors import JounceError, SampleWarning, TrajectoryError, did_you_mean
 from jounce.jet import Jet
 from jounce.trajectory.expression import Expression
-from jounce.trajectory.motion import AbstractMotion, ExpressionMotion
+from jounce.trajectory.motion import AbstractMotion, ExpressionMotion, SplineMotion
 from jounce.trajectory.polynomial import MAX_CONTINUITY, PolynomialMotion
 from jounce.trajectory.profiles import motion_profile
 from jounce.trajectory.sampling import TOLERANCE, check_samples, derivative_errors, finite_numbers, words_of_doubt
@@ -290,7 +290,7 @@ class JointTrajectory(Displayed):
         chosen = self._chosen(names)
         errors = np.zeros((order + 1, len(chosen)))
         for column, name in enumerate(chosen):
-            if name in self._samples:
+            if self._sampled(name):
                 known = self._errors(name)[: order + 1]
                 errors[:, column] = 1.0 if known.any() else 0.0  # above the degree nothing is known
                 errors[: len(known), column] = known
@@ -316,10 +316,17 @@ class JointTrajectory(Displayed):
 
     def _errors(self, name: str) -> np.ndarray:
         """Return the estimated errors of a joint to its degree; computed once."""
+        if name not in self._samples:
+            return self.laws[name].errors  # type: ignore[attr-defined]
         if name not in self._estimates:
             times, values, degree = self._samples[name]
             self._estimates[name] = derivative_errors(times, values, degree)
         return self._estimates[name]
+
+    def _sampled(self, name: str) -> bool:
+        """Tell whether a law goes through samples."""
+        law = self.laws[name]
+        return name in self._samples or (isinstance(law, SplineMotion) and law.samples.value is not None)
 
     def _warn(self, order: int, names: Sequence[str]) -> None:
         errors = self.estimate_error(order, names)
@@ -327,7 +334,7 @@ class JointTrajectory(Displayed):
             return
         worst = int(np.argmax((errors > TOLERANCE).any(axis=1)))
         joint = int(np.argmax(errors[worst]))
-        degree = self._samples[names[joint]][2]
+        degree = self.laws[names[joint]].degree  # type: ignore[attr-defined]
         message = words_of_doubt(names[joint], worst, float(errors[worst, joint]), degree)
         warnings.warn(SampleWarning(message), stacklevel=3)
 

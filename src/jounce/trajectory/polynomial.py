@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from jounce.errors import TrajectoryError, did_you_mean
+from jounce.trajectory.measured import integrated
 from jounce.trajectory.motion import SplineMotion
 from jounce.trajectory.sampling import check_samples
 
@@ -98,7 +99,7 @@ class PolynomialMotion(SplineMotion):
         pieces = _spline(knots, values, continuity + 1 - derivative, _above(conditions, derivative, step), ends)
         pieces = pieces * step**derivative
         for _ in range(derivative):
-            pieces = _integrated(pieces, np.diff(knots))
+            pieces = integrated(pieces, np.diff(knots), 0.0)
         if derivative:
             pieces = pieces + _closing(pieces, knots, constants, times[-1] - times[0])
         with np.errstate(over="ignore", invalid="ignore"):
@@ -305,14 +306,6 @@ def _spline(knots: np.ndarray, values: np.ndarray, degree: int, conditions: _End
             raise TrajectoryError(message, value=orders) from None
     powers = [spline(knots[:-1], nu=k) / math.factorial(k) for k in range(degree + 1)]
     return np.stack(powers)
-
-
-def _integrated(pieces: np.ndarray, lengths: np.ndarray) -> np.ndarray:
-    """Return the local Taylor coefficients of the integral from the first knot."""
-    raised = pieces / np.arange(1, len(pieces) + 1)[:, None]
-    gains = sum(c * lengths ** (k + 1) for k, c in enumerate(raised))
-    constants = np.concatenate([[0.0], np.cumsum(gains)[:-1]])
-    return np.concatenate([constants[None], raised])
 
 
 def _closing(pieces: np.ndarray, knots: np.ndarray, constants: _Ends, duration: float) -> np.ndarray:

@@ -150,7 +150,7 @@ def test_json_and_toml(tmp_path):
 @pytest.mark.parametrize(
     "text, message",
     [
-        (GRID, "has either 'joints' or 'point_to_point', got"),
+        (GRID, "has either 'joints', 'point_to_point' or 'motion', got"),
         ("jonts: {a: t}\n" + GRID, "motion.yaml, line 1, jonts: unknown key; did you mean 'joints'"),
         ("[1, 2]\n", "must be a mapping with at least one entry"),
         ("joints: {}\n" + GRID, "line 1, joints: must be a mapping"),

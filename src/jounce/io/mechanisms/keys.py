@@ -20,6 +20,7 @@ from jounce.dynamics import (
     JointForceOutput,
     JointTorqueOutput,
 )
+from jounce.dynamics.energy_outputs import ENERGY_OUTPUTS
 from jounce.mechanism import (
     AbstractQuantity,
     AngleOutput,
@@ -62,7 +63,7 @@ class FileKey:
     fields : tuple of str
         Fields of the class that it fills; more than one when the key holds a list with an entry for each body.
     kind : str
-        ``scalar``, ``vector``, ``motion``, ``law``, ``laws``, ``wrenches`` or ``text``.
+        ``scalar``, ``vector``, ``motion``, ``law``, ``laws``, ``wrenches``, ``whole`` or ``text``.
     quantity : str
         Kind of unit, one of ``units.KINDS``; or ``direction`` (any unit, the same in all components), or ``of
         coordinate`` and ``per angle``, which follow the key ``coordinate`` beside it.
@@ -142,10 +143,18 @@ OUTPUTS: tuple[tuple[str | None, type[AbstractQuantity]], ...] = (
     ("torque", JointTorqueOutput),
     ("force", AppliedForceOutput),
     ("torque", AppliedTorqueOutput),
+    *ENERGY_OUTPUTS,
 )
 """The word for ``quantity`` in a file (None when there is none) and the class of each output."""
 
-HOLDERS = {"driver": "a driver", "joint": "a joint", "force": "a force", "bodies": "bodies", "body": "a body"}
+HOLDERS = {
+    "driver": "a driver",
+    "joint": "a joint",
+    "force": "a force",
+    "bodies": "bodies",
+    "body": "a body",
+    "mechanism": "the mechanism",
+}
 """The keys that say what an output is of, and their words; the first that is there counts."""
 
 

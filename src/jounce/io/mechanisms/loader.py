@@ -21,7 +21,7 @@ from jounce.mechanism.builder import check_body
 from jounce.mechanism.masses import body_mass
 from jounce.mechanism.resolve import resolve, resolve_element
 from jounce.rigid.euler_parameters import euler_parameters
-from jounce.trajectory import Expression, SplineMotion
+from jounce.trajectory import Expression, MeasuredMotion, SplineMotion
 
 __all__ = ["load"]
 
@@ -232,13 +232,15 @@ def _splines(source: Source, location: Location, value: Any) -> Any:
 
 
 def _spline(source: Source, location: Location, samples: Any) -> SplineMotion:
-    from jounce.io.mechanisms.samples import read_samples
+    from jounce.io.files.samples import read_samples
 
     path = source.named_file(samples.samples, location)
     try:
-        return SplineMotion(
-            *read_samples(path, samples.time, samples.value), degree=samples.degree, beyond=samples.beyond
-        )
+        table = read_samples(path, samples.time, samples.value)
+        given = {"degree": samples.degree, "beyond": samples.beyond}
+        if samples.derivative:
+            return MeasuredMotion(*table, samples.derivative, samples.initial, **given)
+        return SplineMotion(*table, **given)
     except JounceError as error:
         if error.path == path:  # as the user knows it
             error.path = Path(source.path).parent / samples.samples

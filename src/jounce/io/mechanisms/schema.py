@@ -40,6 +40,18 @@ def _text(raw: Any, _info: Any) -> str:
     return raw
 
 
+def _whole(raw: Any, _info: Any) -> int:
+    if isinstance(raw, bool) or not isinstance(raw, int | float) or raw != raw // 1 or raw < 0:
+        raise problem("must be a whole number, 0 or greater")
+    return int(raw)
+
+
+def _all(raw: Any, _info: Any) -> bool:
+    if raw not in (None, True, "all"):
+        raise problem("an energy of the mechanism is that of all its bodies: write true; for one body, body: NAME")
+    return True
+
+
 def _names(*counts: int) -> Any:
     """Return the annotation of a list of names of bodies, as many as one of the counts."""
 
@@ -122,6 +134,8 @@ def _annotation(kind: type[Any], key: FileKey, size: int, choices: dict[str, tup
         return vector(size, key.quantity) if len(key.fields) == 1 else vectors(len(key.fields), size, key.quantity)
     if key.kind == "wrenches":
         return wrenches()
+    if key.kind == "whole":
+        return Annotated[Any, Checked(_whole, {"type": "integer", "minimum": 0})]
     words = {"enum": list(choices[key.key])} if key.key in choices else {"type": "string"}
     return Annotated[Any, Checked(_text, words)]
 
@@ -161,7 +175,9 @@ def _output_union(space: str) -> Any:
     """Return the union of all outputs of a space."""
     models = []
     for tag, (quantity, kind) in output_types(space).items():
-        fields: dict[str, tuple[Any, Any]] = _bodies(kind) if output_holder(kind) in ("body", "bodies") else {}
+        fields: dict[str, tuple[Any, Any]] = _bodies(kind) if kind.body_count else {}
+        if output_holder(kind) == "mechanism":
+            fields["mechanism"] = (Annotated[Any, Checked(_all, {"enum": [True, "all", None]})], ...)
         if quantity is not None:
             fields["quantity"] = (Literal[quantity], ...)
         fields |= _values(kind, COMPONENTS[space])

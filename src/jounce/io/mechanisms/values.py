@@ -17,6 +17,7 @@ from jounce.io.files.units import KINDS, Dimension, Value, parse_value
 from jounce.rigid.euler_parameters import form_of
 from jounce.trajectory.dimensions import TIME
 from jounce.trajectory.expression import Expression
+from jounce.trajectory.measured import MOST
 
 __all__ = [
     "Checked",
@@ -159,7 +160,9 @@ def wrenches() -> Any:
 class Samples(BaseModel):
     """A motion law through samples: a CSV file, the degree of the spline, and the columns of time and value.
 
-    Beyond the samples there is no law, unless it is to hold the value at the end, or to repeat them as one period.
+    Beyond the samples there is no law, unless it is to hold the value at the end, or to repeat them as one period. Of a
+    law whose derivative was measured, such as 2, the acceleration, initial holds the value, the velocity and so on at
+    the first sample, zero unless given.
     """
 
     model_config = ConfigDict(extra="forbid", strict=True)
@@ -168,6 +171,8 @@ class Samples(BaseModel):
     time: str | None = None
     value: str | None = None
     beyond: Literal["refuse", "hold", "repeat"] = "refuse"
+    derivative: int = Field(default=0, ge=0, le=MOST)
+    initial: tuple[float, ...] = ()
 
 
 def motion(quantity: str, variables: dict[str, Dimension | None] | None = None) -> Any:
@@ -195,7 +200,7 @@ def motion(quantity: str, variables: dict[str, Dimension | None] | None = None) 
             raise problem(f"no such way; {did_you_mean(raw['beyond'], WAYS)}", "beyond", value=raw["beyond"])
         if not 1 <= raw.get("degree", 5) <= 11:
             raise problem("the degree of a spline is from 1 to 11", "degree", value=raw["degree"])
-        return Samples(**raw)
+        return Samples(**raw | _measured(raw, quantity, info))
 
     others = [name for name in variables if name != "t"]
     named = f", {', '.join(others[:-1])} and {others[-1]}" if len(others) > 1 else ""
@@ -203,6 +208,8 @@ def motion(quantity: str, variables: dict[str, Dimension | None] | None = None) 
     law = scalar_schema(quantity, described)
     formula = {"type": "object", "properties": {"expression": law}, "required": ["expression"]}
     spline = Samples.model_json_schema()
+    values = {"anyOf": [{"type": "number"}, {"type": "string", "minLength": 1}]}
+    spline["properties"]["initial"] = {"type": "array", "items": values, "maxItems": MOST}
     for entry in (spline["properties"]["time"], spline["properties"]["value"]):
         entry.pop("anyOf")
         entry |= {"type": "string", "description": "name of a column; by default time, and the only other one"}
@@ -212,6 +219,44 @@ def motion(quantity: str, variables: dict[str, Dimension | None] | None = None) 
         "anyOf": [*law["anyOf"], formula | {"additionalProperties": False}, spline],
     }
     return Annotated[Any, Checked(check, schema)]
+
+
+def _measured(raw: dict[str, Any], quantity: str, info: Any) -> dict[str, Any]:
+    """Return which derivative of a law was measured, and the numbers that it begins with, in SI units."""
+    derivative, initial = raw.get("derivative", 0), raw.get("initial", [])
+    if isinstance(derivative, bool) or not isinstance(derivative, int) or not 0 <= derivative <= MOST:
+        message = f"must be a whole number from 0 to {MOST}: 0 the value itself, 2 the acceleration"
+        raise problem(message, "derivative", value=derivative)
+    if derivative and raw.get("beyond") == "repeat":
+        raise problem("samples of a derivative cannot repeat; valid: refuse, hold", "beyond", value=raw["beyond"])
+    if not isinstance(initial, list | tuple) or len(initial) > derivative:
+        message = f"must be a list of at most {derivative} values: the law and its derivatives below the measured one"
+        raise problem(message, "initial", value=initial)
+    found = [_initial(entry, order, quantity, info) for order, entry in enumerate(initial)]
+    return {"derivative": derivative, "initial": tuple(found)}
+
+
+def _initial(raw: Any, order: int, quantity: str, info: Any) -> float:
+    """Return a number in SI units: of a driven quantity, per s to the power of an order."""
+    try:
+        value = parse(raw, quantity if order == 0 else "any", info)
+    except PydanticCustomError as error:
+        raise below(error, "initial", order) from None
+    if not isinstance(value.value, float | int):
+        raise problem("must be a number, with or without a unit", "initial", order, value=raw)
+    if order and value.dimension:
+        wanted = [tuple(sorted(((base, 1), ("time", -order)))) for base in _bases(quantity, info)]
+        if value.dimension not in wanted:
+            message = f"must be {' or '.join(_bases(quantity, info))} per s{f'^{order}' if order > 1 else ''}"
+            raise problem(message, "initial", order, value=raw)
+    return float(value.value)
+
+
+def _bases(quantity: str, info: Any) -> list[str]:
+    """Return the dimensions that a driven quantity may have."""
+    if quantity == "of coordinate":
+        return ["angle" if info.data.get("coordinate") == "angle" else "length"]
+    return [quantity] if quantity in ("length", "angle") else ["length", "angle"]
 
 
 def laws(size: int, quantity: str, variables: dict[str, Dimension | None]) -> Any:

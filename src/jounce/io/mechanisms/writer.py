@@ -19,7 +19,7 @@ from jounce.errors import JounceError, MechanismError
 from jounce.forces import ExpressionLaw, TimeLaw, VectorLaw
 from jounce.io.mechanisms.keys import OUTPUTS, file_keys, output_holder
 from jounce.mechanism import Body, Mechanism, TimeGrid
-from jounce.trajectory import Expression, ExpressionMotion, SplineMotion, TrapezoidalMotion
+from jounce.trajectory import Expression, ExpressionMotion, MeasuredMotion, SplineMotion, TrapezoidalMotion
 from jounce.trajectory.expression import CONSTANTS, FUNCTIONS
 
 __all__ = ["mechanism_data", "write_mechanism"]
@@ -164,10 +164,10 @@ class _Writer:
             raise MechanismError(f"the output {kind.__name__} has no form in a file", name=place)
         holder = output_holder(kind)
         found: dict[str, Any] = {}
-        if holder == "body":
-            found["body"] = output.bodies[0]
-        elif holder == "bodies":
-            found["bodies"] = list(output.bodies)
+        if kind.body_count:
+            found[holder] = output.bodies[0] if holder == "body" else list(output.bodies)
+        elif holder == "mechanism":
+            found["mechanism"] = True
         values = self._values(place, output)
         if holder in values:
             found[holder] = values.pop(holder)
@@ -212,7 +212,7 @@ class _Writer:
 
     def _spline(self, place: str, law: SplineMotion) -> dict[str, Any]:
         """Return a spline as its samples, or as samples through which there is no other with the same breakpoints."""
-        if law.degree % 2 == 0:
+        if law.degree % 2 == 0 and not isinstance(law, MeasuredMotion):
             message = f"a spline of even degree ({law.degree}) has no form in a file; use an odd degree"
             raise MechanismError(message, name=place)
         name = f"{self.stem}_{re.sub(r'[^A-Za-z0-9_]+', '_', place)}.csv"
@@ -222,7 +222,10 @@ class _Writer:
         if beyond == "continue":
             message = "a law that goes on beyond its data has no form in a file; choose hold, or more data"
             raise MechanismError(message, name=place, value=beyond)
-        found = {"samples": name, "degree": law.degree}
+        found: dict[str, Any] = {"samples": name, "degree": law.degree}
+        if isinstance(law, MeasuredMotion):
+            found |= {"degree": law.degree - law.derivative, "derivative": law.derivative}
+            found["initial"] = list(law.initial.value)
         return found if beyond == "refuse" else found | {"beyond": beyond}
 
 

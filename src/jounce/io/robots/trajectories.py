@@ -14,8 +14,9 @@ import numpy as np
 from jounce.errors import JounceError, MechanismFileError, TrajectoryError, did_you_mean, show_value
 from jounce.io.files.entries import Location, Source, dotted
 from jounce.io.files.reading import fault_of_number, known_name, read_rows
+from jounce.io.files.samples import read_columns, read_samples
 from jounce.io.files.source import SUFFIXES, read_source
-from jounce.trajectory import Expression, ExpressionMotion, JointTrajectory
+from jounce.trajectory import Expression, ExpressionMotion, JointTrajectory, MeasuredMotion, SplineMotion
 
 __all__ = ["load_trajectory"]
 
@@ -31,7 +32,10 @@ def load_trajectory(path: str | PathLike[str], degree: int = 5) -> JointTrajecto
     A YAML, TOML or JSON file has either ``joints``, a law for each joint, or ``point_to_point`` with the keys
     ``profile``, ``duration``, ``start_time``, ``from``, ``to`` and ``limits``. Laws are expressions of ``t`` and
     of ``parameters``; ``time`` has the keys ``start``, ``stop`` and ``step`` or ``count``, and may be left out for
-    ``point_to_point``.
+    ``point_to_point``. A law may also go through samples, ``{samples: FILE.csv, value: COLUMN}``, of the coordinate or,
+    with ``derivative: 2``, of its acceleration; ``initial`` holds the coordinate and the velocity at the first sample.
+    In the place of ``joints``, ``motion: {samples: FILE.csv, derivative: 2}`` gives each column to the joint of its
+    name, ``initial`` then being a list for each joint, and ``time`` may be left out.
 
     Parameters
     ----------
@@ -146,7 +150,10 @@ def _number(path: str, line: int, column: str, text: str) -> float:
     return number
 
 
-_KEYS = ("title", "parameters", "joints", "point_to_point", "time")
+_KEYS = ("title", "parameters", "joints", "point_to_point", "motion", "time")
+_KINDS = ("joints", "point_to_point", "motion")
+_SAMPLE_KEYS = ("samples", "degree", "derivative", "initial", "time", "value")
+_ORDERS = (("degree", 5), ("derivative", 0))
 _MOTION_KEYS = ("profile", "duration", "start_time", "from", "to", "limits")
 
 
@@ -156,8 +163,9 @@ class _Laws:
     def __init__(self, source: Source) -> None:
         self.source = source
         data = self._mapping((), _KEYS, source.data)
-        if ("joints" in data) == ("point_to_point" in data):
-            raise self.error("a trajectory file has either 'joints' or 'point_to_point'", value=list(data))
+        if sum(kind in data for kind in _KINDS) != 1:
+            message = "a trajectory file has either 'joints', 'point_to_point' or 'motion'"
+            raise self.error(message, value=list(data))
         self.data = data
         self.parameters: dict[str, float] = {}
         self.dimensions: dict[str, Any] = {}
@@ -167,13 +175,89 @@ class _Laws:
         """Return the trajectory of the file."""
         if "point_to_point" in self.data:
             return self._point_to_point()
+        if "motion" in self.data:
+            return self._sampled_motion()
         laws = {}
         for name, raw in self._mapping(("joints",)).items():
             at = ("joints", name)
+            if isinstance(raw, dict):
+                laws[name] = self._sampled_law(at)
+                continue
             value = self._value(raw, "any", ("t",), at)
             laws[name] = ExpressionMotion(value, self.parameters) if isinstance(value, Expression) else value
         times = self._times()
         return self._guard(("time",), lambda: JointTrajectory(laws, times[0], times[-1], times))
+
+    def _sampled_law(self, at: Location) -> SplineMotion:
+        """Return a law through the samples of a column of a file."""
+        data = self._mapping(at, _SAMPLE_KEYS)
+        path = self._samples_file(at, data)
+        columns = {key: self._text(data[key], (*at, key)) for key in ("time", "value") if key in data}
+        times, values = self._of_file(at, data["samples"], path, lambda: read_samples(path, **columns))
+        initial = data.get("initial", [])
+        return self._spline(at, data, times, values, initial, (*at, "initial"))
+
+    def _sampled_motion(self) -> JointTrajectory:
+        """Return the trajectory whose joints are the columns of a file of samples."""
+        at: Location = ("motion",)
+        data = self._mapping(at, [key for key in _SAMPLE_KEYS if key not in ("time", "value")])
+        path = self._samples_file(at, data)
+        times, columns = self._of_file(at, data["samples"], path, lambda: read_columns(path))
+        initial = self._mapping((*at, "initial")) if "initial" in data else {}
+        for name in initial:
+            if name not in columns:
+                raise self.error(f"no column has this name; {did_you_mean(name, columns)}", (*at, "initial", name))
+        laws = {
+            name: self._spline(at, data, times, values, initial.get(name, []), (*at, "initial", name))
+            for name, values in columns.items()
+        }
+        grid = self._times() if "time" in self.data else times
+        return self._guard(("time",), lambda: JointTrajectory(laws, grid[0], grid[-1], grid))
+
+    def _samples_file(self, at: Location, data: Mapping[str, Any]) -> str:
+        if "samples" not in data:
+            raise self.error("is missing; give the name of a CSV file", (*at, "samples"))
+        name = self._text(data["samples"], (*at, "samples"))
+        try:
+            return self.source.named_file(name, (*at, "samples"))
+        except MechanismFileError as error:
+            raise self.error(error.message, (*at, "samples"), value=error.value) from None
+
+    def _of_file(self, at: Location, name: str, path: str, read: Callable[[], Any]) -> Any:
+        """Return what is read from a file; its path is then told as the user knows it."""
+        try:
+            return read()
+        except JounceError as error:
+            if error.path == path:
+                error.path = Path(self.source.path).parent / name
+            raise self.error(str(error), (*at, "samples")) from None
+
+    def _spline(
+        self, at: Location, data: Mapping[str, Any], times: Any, values: Any, initial: Any, place: Location
+    ) -> SplineMotion:
+        """Return the spline through samples of a coordinate, or the integral of one through those of a derivative."""
+        degree, derivative = (self._whole(data.get(key, usual), (*at, key)) for key, usual in _ORDERS)
+        if not isinstance(initial, list):
+            raise self.error("must be a list: the coordinate, its velocity and so on", place, value=initial)
+        if len(initial) > derivative:
+            message = (
+                f"must have at most {derivative} values: the coordinate and its derivatives below the measured one"
+            )
+            raise self.error(message, place, value=initial)
+        known = [self._number(raw, "any", (*place, k), k) for k, raw in enumerate(initial)]
+        if derivative:
+            return self._guard(at, lambda: MeasuredMotion(times, values, derivative, known, degree))
+        return self._guard(at, lambda: SplineMotion(times, values, degree))
+
+    def _whole(self, raw: Any, at: Location) -> int:
+        if isinstance(raw, bool) or not isinstance(raw, int) or raw < 0:
+            raise self.error("must be a whole number, 0 or greater", at, value=raw)
+        return raw
+
+    def _text(self, raw: Any, at: Location) -> str:
+        if not isinstance(raw, str):
+            raise self.error("must be a name", at, value=raw)
+        return raw
 
     def _point_to_point(self) -> JointTrajectory:
         at = ("point_to_point",)

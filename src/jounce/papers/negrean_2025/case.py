@@ -34,15 +34,53 @@ BRAKING = 0.2  # s, how long it lasts
 RINGING = (6.0, 32.0, 8.0)  # rad/s^2, rad/s, 1/s: how the arm rings after it
 
 
+@dataclasses.dataclass(frozen=True)
+class Link:
+    """The link that turns: what figure 6 of the paper holds of it, and where the accelerometer is.
+
+    Parameters
+    ----------
+    mass : float
+        kg.
+    center_x, center_z : float
+        Of the centre of mass from the axis, m; x and z are those of the link.
+    inertia_x, inertia_y, inertia_z : float
+        About the centre of mass, kg m^2; y is along the axis.
+    radius : float
+        From the axis to the accelerometer, m.
+    """
+
+    mass: float
+    center_x: float
+    center_z: float
+    inertia_x: float
+    inertia_y: float
+    inertia_z: float
+    radius: float
+
+    def robot(self) -> Robot:
+        """Return the robot of one joint: the link on its axis, y, horizontal."""
+        moments = (self.inertia_x, self.inertia_y, self.inertia_z)
+        link = Inertia(self.mass, (self.center_x, 0.0, self.center_z), moments)
+        return from_screws([Screw((0.0, 1.0, 0.0), inertia=link)], name="arm")
+
+    @property
+    def inertia_about_axis(self) -> float:
+        """``M (x_C^2 + z_C^2) + I_y`` of equations 141-146, kg m^2."""
+        return self.mass * (self.center_x**2 + self.center_z**2) + self.inertia_y
+
+
+STAND_IN = Link(MASS, CENTER_X, CENTER_Z, INERTIA_X, INERTIA_Y, INERTIA_Z, RADIUS)
+
+
 def arm() -> Robot:
-    """Return the robot of one joint: the third link on its axis, y, horizontal; x and z are those of the link."""
-    link = Inertia(MASS, (CENTER_X, 0.0, CENTER_Z), (INERTIA_X, INERTIA_Y, INERTIA_Z))
-    return from_screws([Screw((0.0, 1.0, 0.0), inertia=link)], name="arm")
+    """Return the robot of one joint with stand-ins for its masses: the third link on its axis, y, horizontal."""
+    return STAND_IN.robot()
 
 
 def inertia_about_axis() -> float:
-    """Return ``M (x_C^2 + z_C^2) + I_y`` of equations 141-146, kg m^2."""
-    return MASS * (CENTER_X**2 + CENTER_Z**2) + INERTIA_Y
+    """Return ``M (x_C^2 + z_C^2) + I_y`` of equations 141-146 with the stand-ins, kg m^2."""
+    return STAND_IN.inertia_about_axis
 
 
 def rest_to_rest(time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -75,10 +113,10 @@ def ripple(time: np.ndarray) -> np.ndarray:
     return np.sum(list(parts), axis=0)
 
 
-def law(accelerations: np.ndarray) -> PolynomialMotion:
+def law(accelerations: np.ndarray, knots: np.ndarray = KNOTS) -> PolynomialMotion:
     """Return the quintic segments through samples of the acceleration, from rest at zero, without jerk at the ends."""
     start = {0: 0.0, 1: 0.0}
-    return PolynomialMotion.from_accelerations(KNOTS, accelerations, CONTINUITY, start=start, ends="clamped")
+    return PolynomialMotion.from_accelerations(knots, accelerations, CONTINUITY, start=start, ends="clamped")
 
 
 def end_of(motion: PolynomialMotion) -> np.ndarray:
@@ -120,22 +158,31 @@ class Case:
         Returns the samples of the angular acceleration, rad/s^2, one for each of `KNOTS`.
     angle : float or None
         Where the motion ends, rad, if that is known.
+    link : Link, default the stand-in
+        What moves so.
+    knots : array of shape (knots,), default those of the paper
+        Instants of the samples, s.
+    measured : bool, default False
+        Whether the samples are someone's own, and taken as they are.
     """
 
     name: str
     title: str
     samples: Callable[[], np.ndarray]
     angle: float | None
+    link: Link = STAND_IN
+    knots: np.ndarray = dataclasses.field(default_factory=lambda: KNOTS)
+    measured: bool = False
 
     @property
     def accelerations(self) -> np.ndarray:
         """Samples less bias and drift, rad/s^2: what the law goes through."""
-        return at_rest(self.samples(), self.angle)
+        return self.samples() if self.measured else at_rest(self.samples(), self.angle)
 
     @property
     def motion(self) -> PolynomialMotion:
         """The law of the angle."""
-        return law(self.accelerations)
+        return law(self.accelerations, self.knots)
 
 
 CASES = {

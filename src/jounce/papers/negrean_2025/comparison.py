@@ -21,12 +21,12 @@ NAMES = ("angle", "speed", "acceleration", "jerk", "jounce")
 UNITS = ("rad", "rad/s", "rad/s^2", "rad/s^3", "rad/s^4")
 
 
-def comparison(histories: Mapping[str, History]) -> str:
-    """Return the page in Markdown."""
+def comparison(histories: Mapping[str, History], data: list[str] | None = None) -> str:
+    """Return the page in Markdown; `data` says what was given in the place of the stand-ins."""
     lines = [
         "# Negrean 2025, section 4: energies, torque and its rates for one arm of a robot",
         "",
-        *_chosen(),
+        *(_chosen() if data is None else data),
         "",
         "## Closed forms of the paper beside the library",
         "",
@@ -104,10 +104,12 @@ def jumps(history: History) -> np.ndarray:
 
 
 def _laws(histories: Mapping[str, History]) -> list[str]:
+    inner = len(next(iter(histories.values())).case.knots) - 2
     lines = [
         "## The segments",
         "",
-        "Largest jumps at the 50 inner knots; the fifth derivative is a step function, the lower ones are continuous.",
+        f"Largest jumps at the {inner} inner knots; the fifth derivative is a step function, the lower ones are"
+        " continuous.",
         "",
         "| motion | angle | speed | acceleration | jerk | jounce | fifth | end of the angle / rad |",
         "|---|---|---|---|---|---|---|---|",

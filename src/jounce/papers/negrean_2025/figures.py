@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from jounce.papers.negrean_2025.case import DURATION, KNOTS, RADIUS
 from jounce.papers.negrean_2025.history import STEPS, History
 from jounce.plot.style import BLUE, GREEN, GREY, PALE_GREY, VERMILION, blank_figure, style as style
 
@@ -33,22 +32,23 @@ def _figure(
     panels = figure.subplots(rows, columns, squeeze=False, sharex=True)
     for panel in panels.flat:
         panel.axhline(0.0, color=PALE_GREY, linewidth=0.7, zorder=1)
-        panel.set_xlim(0.0, DURATION)
+        panel.margins(x=0.0)
     for panel in panels[-1]:
         panel.set_xlabel("time / s")
     return figure, panels
 
 
-def accelerations(histories: Mapping[str, History], *, radius: float | None, number: int) -> Figure:
+def accelerations(histories: Mapping[str, History], *, tangential: bool, number: int) -> Figure:
     """Draw the samples and the law through them, one panel for each motion (figures 4 and 5)."""
-    what = "Generalised angular acceleration" if radius is None else "Tangential acceleration"
-    unit = r"rad/s$^2$" if radius is None else r"m/s$^2$"
-    factor = 1.0 if radius is None else radius
+    what = "Tangential acceleration" if tangential else "Generalised angular acceleration"
+    unit = r"m/s$^2$" if tangential else r"rad/s$^2$"
     figure, panels = _figure(len(histories), 1, (6.0, 4.8), f"{what} (figure {number} of Negrean 2025)")
     for panel, history in zip(panels[:, 0], histories.values(), strict=True):
+        factor = history.case.link.radius if tangential else 1.0
         panel.plot(history.time, factor * history.motion[:, 2], color=BLUE, label="quintic segments")
         samples = factor * history.case.accelerations
-        panel.plot(KNOTS, samples, color=VERMILION, marker="o", linestyle="", label="synthetic samples, every 0.033 s")
+        label = "samples" if history.case.measured else "synthetic samples, every 0.033 s"
+        panel.plot(history.case.knots, samples, color=VERMILION, marker="o", linestyle="", label=label)
         panel.set_title(history.case.title)
         panel.set_ylabel(f"acceleration / ({unit})")
     panels[0, 0].legend(loc="upper right")
@@ -99,8 +99,8 @@ def energies(histories: Mapping[str, History]) -> Figure:
 
 
 FIGURES: dict[str, Any] = {
-    "figure_04": partial(accelerations, radius=RADIUS, number=4),
-    "figure_05": partial(accelerations, radius=None, number=5),
+    "figure_04": partial(accelerations, tangential=True, number=4),
+    "figure_05": partial(accelerations, tangential=False, number=5),
     "figure_07": partial(torque, rate=0, number=7),
     "figure_08": partial(torque, rate=1, number=8),
     "figure_09": partial(torque, rate=2, number=9),

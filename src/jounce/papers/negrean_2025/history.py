@@ -8,7 +8,7 @@ import numpy as np
 from jounce.dynamics import acceleration_energy, gravity_forces, higher_order
 from jounce.jet import Jet
 from jounce.papers.negrean_2025 import closed_forms
-from jounce.papers.negrean_2025.case import CENTER_X, CENTER_Z, DURATION, MASS, SEGMENTS, Case, arm, inertia_about_axis
+from jounce.papers.negrean_2025.case import Case
 from jounce.robot import inverse_dynamics
 
 ORDER = 6  # of the derivatives of the angle: equation 131 with m = 4 needs as many
@@ -60,15 +60,16 @@ def history(case: Case) -> History:
     History
         Where a knot stands, derivatives above the fourth are those of the segment that begins there.
     """
-    robot, inertia = arm(), inertia_about_axis()
-    time = np.linspace(0.0, DURATION, SEGMENTS * STEPS + 1)
+    link, knots = case.link, case.knots
+    robot, inertia = link.robot(), link.inertia_about_axis
+    time = np.interp(np.arange(STEPS * (len(knots) - 1) + 1) / STEPS, np.arange(len(knots)), knots)
     motion = np.asarray(case.motion(Jet.variable(jnp.asarray(time), ORDER)).derivatives()).T
     q = motion[:, :, None]
     energies = [acceleration_energy(robot, q[:, : p + 2], order=p).total[..., 0] for p in (1, 2, 3)]
     against = np.asarray(gravity_forces(robot, q, rates=2))[..., 0]
     inertial = [np.asarray(higher_order(robot, q, k))[..., 0] for k in (1, 2, 3)]
     weight = -float(robot.gravity[2])
-    closed_gravity = closed_forms.gravity_torques(MASS, (CENTER_X, CENTER_Z), weight, motion)
+    closed_gravity = closed_forms.gravity_torques(link.mass, (link.center_x, link.center_z), weight, motion)
     return History(
         case,
         time,

@@ -9,10 +9,17 @@ import numpy as np
 from jounce.papers.files import FORMATS, rendered, writable, write
 from jounce.papers.negrean_2025.case import CASES
 from jounce.papers.negrean_2025.comparison import comparison
+from jounce.papers.negrean_2025.given import given_cases, told
 from jounce.papers.negrean_2025.history import History, history
 
 
-def reproduce(out_directory: str | os.PathLike[str], progress: Callable[[int, int], None] | None = None) -> list[Path]:
+def reproduce(
+    out_directory: str | os.PathLike[str],
+    progress: Callable[[int, int], None] | None = None,
+    *,
+    samples: str | os.PathLike[str] | None = None,
+    masses: str | os.PathLike[str] | None = None,
+) -> list[Path]:
     """Compute the motions of section 4 of Negrean 2025 and write figures, `comparison.md`, energies and torques.
 
     Parameters
@@ -21,6 +28,12 @@ def reproduce(out_directory: str | os.PathLike[str], progress: Callable[[int, in
         Where to write; made if it does not exist. Files of the same names are replaced.
     progress : callable, optional
         Called with the number of motions and figures done and their total.
+    samples : path, optional
+        One's own measurements in the place of the stand-ins: a CSV file with ``time``, s, and for each motion a column
+        of angular accelerations, rad/s^2.
+    masses : path, optional
+        The link: a YAML, TOML or JSON file with mass, center_x, center_z and inertia_y, with units, and what else
+        `Link` has.
 
     Returns
     -------
@@ -31,16 +44,21 @@ def reproduce(out_directory: str | os.PathLike[str], progress: Callable[[int, in
     ------
     OutputError
         If the directory cannot be made or written to; raised before any computing.
+    JounceError
+        If samples or masses cannot be read.
 
     Examples
     --------
     >>> from jounce.papers.negrean_2025 import reproduce
     >>> paths = reproduce("out")  # doctest: +SKIP
     """
+    files = [None if path is None else Path(path) for path in (samples, masses)]
+    cases = CASES if files == [None, None] else given_cases(*files)
+    data = None if cases is CASES else told(cases, *files)
     directory = writable(Path(out_directory))
     from jounce.papers.negrean_2025 import figures  # imports matplotlib
 
-    total = len(CASES) + len(figures.FIGURES)
+    total = len(cases) + len(figures.FIGURES)
     done = 0
 
     def advanced() -> None:
@@ -50,11 +68,11 @@ def reproduce(out_directory: str | os.PathLike[str], progress: Callable[[int, in
             progress(done, total)
 
     histories: dict[str, History] = {}
-    for name, case in CASES.items():
+    for name, case in cases.items():
         histories[name] = history(case)
         advanced()
     paths = [
-        write(directory / "comparison.md", comparison(histories).encode("ascii")),
+        write(directory / "comparison.md", comparison(histories, data).encode("ascii")),
         write(directory / "energies.csv", energies_csv(histories).encode("ascii")),
         write(directory / "torques.csv", torques_csv(histories).encode("ascii")),
     ]

@@ -8,7 +8,7 @@ from pathlib import Path
 from jounce.errors import MechanismFileError, did_you_mean
 from jounce.io.files.reading import fault_of_number, read_rows
 
-__all__ = ["read_samples"]
+__all__ = ["read_columns", "read_samples"]
 
 
 def read_samples(
@@ -37,15 +37,41 @@ def read_samples(
         The file cannot be read, a column does not exist, or an entry is not a finite number.
     """
     name = str(path)
-    rows = [(line, row) for line, row in read_rows(path, MechanismFileError) if row]
-    if not rows:
-        raise MechanismFileError("the file of samples is empty", path=name)
-    header = [f"column {k + 1}" for k in range(len(rows[0][1]))]
-    if not all(map(_is_number, rows[0][1])):
-        header = rows.pop(0)[1]
+    header, rows = _table(name)
     columns = _columns(name, header, time, value)
     samples = [[_number(name, line, header, row, column) for line, row in rows] for column in columns]
     return samples[0], samples[1]
+
+
+def read_columns(path: str | Path) -> tuple[list[float], dict[str, list[float]]]:
+    """Read the column ``time`` and all others from a CSV file, whose first row names them.
+
+    Raises
+    ------
+    MechanismFileError
+        The file cannot be read, names repeat or there is no ``time``, or an entry is not a finite number.
+    """
+    name = str(path)
+    header, rows = _table(name)
+    for k, column in enumerate(header):
+        if column in header[:k] or not column:
+            raise MechanismFileError("each column needs a name of its own", path=name, line=1, value=column)
+    time = _find(name, header, "time")
+    found = {column: [_number(name, line, header, row, k) for line, row in rows] for k, column in enumerate(header)}
+    if len(found) < 2:
+        raise MechanismFileError("there is no column besides 'time'", path=name, line=1)
+    return found.pop(header[time]), found
+
+
+def _table(path: str) -> tuple[list[str], list[tuple[int, list[str]]]]:
+    """Return the names of the columns, made up where there are none, and the rows with their lines."""
+    rows = [(line, row) for line, row in read_rows(path, MechanismFileError) if row]
+    if not rows:
+        raise MechanismFileError("the file of samples is empty", path=path)
+    header = [f"column {k + 1}" for k in range(len(rows[0][1]))]
+    if not all(map(_is_number, rows[0][1])):
+        header = rows.pop(0)[1]
+    return header, rows
 
 
 def _columns(path: str, header: list[str], time: str | None, value: str | None) -> tuple[int, int]:

@@ -3,7 +3,7 @@
 import pytest
 
 from jounce.errors import MechanismFileError
-from jounce.io.mechanisms.samples import read_samples
+from jounce.io.files.samples import read_samples
 
 
 def write(folder, text):

@@ -1,0 +1,146 @@
+"""A driven mechanism in the coordinates of its drivers: how its energies follow from changes of their laws.
+
+The laws of the drivers are generalised coordinates: with them, joints and loops determine all bodies. A law is changed
+by a jet, and all poses follow from it to first order by the factored Jacobian, order after order, as in a solve.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jounce.dynamics.energies import body_energy, mechanism_masses
+from jounce.dynamics.inverse import in_chunks, places
+from jounce.errors import MechanismError
+from jounce.jet import Jet
+from jounce.jet.algebra import total
+from jounce.kinematics import Motion, Status
+from jounce.kinematics.compilation import compiled
+from jounce.kinematics.linear import DenseFactor
+from jounce.mechanism.system import System
+
+
+class ChangedLaw(eqx.Module):
+    """The laws of a group of drivers, changed by jets."""
+
+    law: Any
+    change: Any  # Taylor coefficients, (levels, instances, batch)
+
+    def __call__(self, time: Jet) -> Jet:
+        """Return the law at the instants of a jet."""
+        return self.law(time) + Jet(tuple(self.change[: time.order + 1]))
+
+
+def of_drivers(motion: Motion, q: Any, least: int, form: Callable[..., Any], static: tuple[Any, ...]) -> Any:
+    """Return what a form of the equations of motion gives in the coordinates of the drivers.
+
+    Parameters
+    ----------
+    motion : Motion
+        Of a mechanism whose bodies have masses.
+    q : None
+        The motion has its own coordinates.
+    least : int
+        Highest derivative of the laws that counts.
+    form : callable
+        Maps energies, as a function of coefficients of the coordinates and of an order, those coefficients, and
+        `static` to coefficients of shape (levels, coordinates, batch).
+    static : tuple
+        What else the form takes.
+
+    Returns
+    -------
+    xarray.DataArray
+        Dimensions time, derivative and driver; NaN at instants that were not solved.
+
+    Raises
+    ------
+    MechanismError
+        If coordinates are given, no body has a mass, or something moves that no driver prescribes.
+    """
+    if q is not None:
+        raise MechanismError("a motion has its coordinates already, the laws of its drivers", name="q", value=q)
+    model, names = motion.model, tuple(motion.mechanism.drivers)
+    rows, columns = model.system.cells.shape if model.system.groups else (0, 1)
+    if rows != columns or not names:
+        message = "the coordinates here are the laws of the drivers, and they do not prescribe all that can move"
+        raise MechanismError(message, name="drivers", value=list(names))
+    found = places(model)
+    order = tuple((found[name].group, found[name].instance) for name in names)
+    pose_type, coordinates = motion.poses
+    masses = mechanism_masses(motion)
+    start = {name: values[:1] for name, values in coordinates.items() if name != "angular_velocity"}
+
+    def chunk(lanes: np.ndarray) -> Any:
+        still = {name: values[..., lanes] for name, values in start.items()}
+        return _evaluated(model.system, still, motion.time[lanes], masses, pose_type, order, least, form, static)
+
+    values = np.moveaxis(in_chunks(chunk, len(motion.time)), -1, 0)
+    values = values * np.array([float(math.factorial(k)) for k in range(values.shape[1])])[:, None]
+    return _labelled(motion, np.where((motion.status == Status.OK)[:, None, None], values, np.nan), names)
+
+
+def _labelled(motion: Motion, values: np.ndarray, names: tuple[str, ...]) -> Any:
+    import xarray
+
+    axes = {"time": motion.time, "derivative": np.arange(values.shape[1]), "driver": list(names)}
+    return xarray.DataArray(values, dims=("time", "derivative", "driver"), coords=axes)
+
+
+@compiled("pose_type", "order", "least", "form", "static")
+def _evaluated(
+    system: System,
+    still: dict[str, Any],
+    instants: Any,
+    masses: Any,
+    pose_type: Any,
+    order: tuple[tuple[int, int], ...],
+    least: int,
+    form: Callable[..., Any],
+    static: tuple[Any, ...],
+) -> Any:
+    place = pose_type.from_coordinates({name: Jet(tuple(c)) for name, c in still.items()})
+    factor = DenseFactor.of(system.jacobian(place, Jet([instants[None]])))
+
+    def energies(changes: Any, p: int) -> Jet:
+        time = Jet.variable(instants[None], changes.shape[0] - 1)
+        pose = followed(with_changes(system, order, changes), place, factor, time)
+        parts = body_energy(pose, *masses, p)
+        return total(part.map(lambda c: jnp.sum(c, axis=0)) for part in parts)
+
+    return form(energies, jnp.zeros((least + 1, len(order), len(instants))), *static)
+
+
+def with_changes(system: System, order: tuple[tuple[int, int], ...], changes: Any) -> System:
+    """Return a system whose drivers, by group and instance, have laws that are changed, (levels, drivers, batch)."""
+    groups = list(system.groups)
+    for index in {group for group, _ in order}:
+        members = [order.index((index, instance)) for instance in range(groups[index].instances)]
+        law = ChangedLaw(groups[index].element.motion, changes[:, np.array(members)])
+        groups[index] = eqx.tree_at(lambda g: g.element.motion, groups[index], law)
+    return eqx.tree_at(lambda s: s.groups, system, tuple(groups))
+
+
+def followed(system: System, place: Any, factor: DenseFactor, time: Jet) -> Any:
+    """Return the pose with all derivatives that the time jet has, right to first order in changes of the system.
+
+    The factors are those of the system without changes. What they leave of the residual is corrected by them once more,
+    which is all of it to first order: no derivative is taken of a factorisation.
+    """
+
+    def solved(pose: Any, solution: Any) -> Any:
+        return pose.extended(*system.coordinates(solution, pose.shifts))
+
+    def left(pose: Any) -> Any:
+        return system.residual(pose, time.truncate(pose.order)).dense().coefficients[pose.order]
+
+    pose = place.displaced(*system.coordinates(factor.solve(-left(place)), place.shifts))
+    for _ in range(time.order):
+        solution = factor.solve(-left(pose.extended(None, None)))
+        solution = solution - factor.solve(left(solved(pose, solution)))
+        pose = jax.lax.optimization_barrier(solved(pose, solution))  # or XLA computes it again in all that uses it
+    return pose

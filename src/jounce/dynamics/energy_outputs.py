@@ -1,0 +1,116 @@
+"""Energies as outputs: kinetic, of accelerations of any order, and potential, of a body or of the whole mechanism."""
+
+from typing import Any, ClassVar
+
+import equinox as eqx
+import numpy as np
+
+from jounce.constraints.base import Whole
+from jounce.dynamics.energies import energy_coefficients, potential_coefficients
+from jounce.errors import MechanismError, did_you_mean
+from jounce.mechanism import AbstractMotionOutput, Mechanism
+
+
+class AbstractEnergyOutput(AbstractMotionOutput):
+    """An energy of all bodies of a mechanism, J; of accelerations of order p, J/s^(2 p)."""
+
+    unit = "J"
+    rate_names = ("energy", "first rate", "second rate", "third rate", "fourth rate")
+    source: ClassVar[str] = "mechanism"  # the key of a file that says what it is of
+    body: ClassVar[str | None] = None  # the body alone whose energy it is
+
+    def check(self, mechanism: Mechanism) -> None:
+        """Raise MechanismError unless the body exists and there are masses."""
+        bodies = mechanism.bodies
+        if self.body is not None and self.body not in bodies:
+            message = f"no moving body has this name; {did_you_mean(self.body, bodies)}"
+            raise MechanismError(message, name="body", value=self.body)
+        if all(body.mass is None for name, body in bodies.items() if self.body in (None, name)):
+            which = "no body has a mass" if self.body is None else "this body has no mass"
+            raise MechanismError(f"{which}, and an energy needs one", name=self.source, value=self.body)
+
+    def coefficients(self, motion: Any) -> np.ndarray:
+        """Return the Taylor coefficients of the energy, (levels, 1, time)."""
+        parts = self._of_bodies(motion)
+        if self.body is None:
+            return parts.sum(axis=1, keepdims=True)
+        index = 1 + list(motion.mechanism.bodies).index(self.body)  # the ground first
+        return parts[:, index : index + 1]
+
+    def _of_bodies(self, motion: Any) -> np.ndarray:
+        """Return the Taylor coefficients of all bodies, (levels, bodies, time)."""
+        raise NotImplementedError
+
+
+class KineticEnergyOutput(AbstractEnergyOutput):
+    """Kinetic energy of all bodies, J. Negrean 2025, equations 65-78."""
+
+    lost_orders = 1
+
+    def _of_bodies(self, motion):
+        return energy_coefficients(motion, 0)
+
+
+class AccelerationEnergyOutput(AbstractEnergyOutput):
+    """Acceleration energy of order p of all bodies, J/s^(2 p). Negrean 2025, equations 82-122."""
+
+    order: Whole = eqx.field(static=True, default=1)
+
+    def __check_init__(self):
+        if isinstance(self.order, bool) or not isinstance(self.order, int | np.integer) or self.order < 0:
+            raise MechanismError("must be a whole number, 0 or greater", name="order", value=self.order)
+
+    @property
+    def lost_orders(self) -> int:
+        """Derivatives by which it is shorter than the motion."""
+        return int(self.order) + 1
+
+    @property
+    def unit(self) -> str:
+        """Unit of the energy."""
+        return f"J/s^{2 * self.order}" if self.order else "J"
+
+    def _of_bodies(self, motion):
+        return energy_coefficients(motion, int(self.order))
+
+
+class PotentialEnergyOutput(AbstractEnergyOutput):
+    """Potential energy of all bodies in gravity, J; zero at the origin."""
+
+    def _of_bodies(self, motion):
+        return potential_coefficients(motion)
+
+
+class BodyKineticEnergyOutput(KineticEnergyOutput):
+    """Kinetic energy of a body, J. Negrean 2025, equations 65-72."""
+
+    body: str = eqx.field(static=True, kw_only=True)
+
+    source = "body"
+
+
+class BodyAccelerationEnergyOutput(AccelerationEnergyOutput):
+    """Acceleration energy of order p of a body, J/s^(2 p). Negrean 2025, equations 82-106."""
+
+    body: str = eqx.field(static=True, kw_only=True)
+
+    source = "body"
+
+
+class BodyPotentialEnergyOutput(PotentialEnergyOutput):
+    """Potential energy of a body in gravity, J; zero at the origin."""
+
+    body: str = eqx.field(static=True, kw_only=True)
+
+    source = "body"
+
+
+ENERGY_OUTPUTS: tuple[tuple[str, type[AbstractEnergyOutput]], ...] = (
+    ("kinetic_energy", KineticEnergyOutput),
+    ("kinetic_energy", BodyKineticEnergyOutput),
+    ("acceleration_energy", AccelerationEnergyOutput),
+    ("acceleration_energy", BodyAccelerationEnergyOutput),
+    ("potential_energy", PotentialEnergyOutput),
+    ("potential_energy", BodyPotentialEnergyOutput),
+)
+"""The word for ``quantity`` in a file and the class of each energy as an output."""

@@ -1,0 +1,179 @@
+"""A robot on a trajectory: its coordinates with derivatives, and the torques and rates that they need."""
+
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from jounce.dynamics.energies import whole_number
+from jounce.errors import RobotError, SampleWarning, TrajectoryError, did_you_mean
+from jounce.robot.inverse_dynamics import inverse_dynamics
+from jounce.robot.model import Limits
+from jounce.robot.robot import Robot
+from jounce.trajectory.joint_trajectory import JointTrajectory
+
+BLOCK = 2048  # instants evaluated at once, always as many, so that all is compiled once
+QUANTITIES = ("position", "velocity", "acceleration", "jerk")
+EFFORTS = ("effort", "effort rate")
+
+
+class FollowedTrajectory:
+    """The coordinates of a robot that follows a trajectory; joints that it does not name stand still.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    trajectory : JointTrajectory
+        Of some or all of its joints.
+
+    Attributes
+    ----------
+    held : dict of str to float
+        Joints that the trajectory does not name, and where they stand: at zero, or at the end of their range that is
+        nearest to it.
+    doubts : list of str
+        Warnings about samples that do not support derivatives that were asked for.
+
+    Raises
+    ------
+    RobotError, TrajectoryError
+        If the robot has no joints, or the trajectory names one that it does not have.
+    """
+
+    def __init__(self, robot: Robot, trajectory: JointTrajectory):
+        if not robot.joint_names:
+            raise RobotError("the robot has no moving joint; nothing can follow the trajectory", name="joints")
+        for name in trajectory.names:
+            if name not in robot.joint_names:
+                raise TrajectoryError(why_not(robot, name), name="joint", value=name)
+        self.robot, self.trajectory = robot, trajectory
+        self.columns = [robot.joint_names.index(name) for name in trajectory.names]
+        self.held = {name: _rest(robot.limits[name]) for name in robot.joint_names if name not in trajectory.names}
+        self.doubts: list[str] = []
+
+    def coordinates(self, times: np.ndarray, order: int) -> np.ndarray:
+        """Return coordinates and derivatives, (time, order + 1, joints).
+
+        Raises
+        ------
+        TrajectoryError
+            If one is not finite.
+        """
+        q = np.zeros((len(times), order + 1, len(self.robot.joint_names)))
+        for name, value in self.held.items():
+            q[:, 0, self.robot.joint_names.index(name)] = value
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always", SampleWarning)
+            q[:, :, self.columns] = _in_blocks(lambda block: self.trajectory.derivatives(block, order), times)
+        self.doubts += [str(w.message) for w in caught if str(w.message) not in self.doubts]
+        self._check_finite(q, times, QUANTITIES)
+        return q
+
+    def torques(self, q: np.ndarray, times: np.ndarray, drives: bool) -> np.ndarray:
+        """Return torques and rates, (time, order - 1, joints), for coordinates that `coordinates` gave.
+
+        Raises
+        ------
+        TrajectoryError
+            If one is not finite.
+        """
+        torques = _in_blocks(lambda block: inverse_dynamics(self.robot, block, drives=drives), q)
+        self._check_finite(torques, times, EFFORTS)
+        return torques
+
+    def _check_finite(self, values: np.ndarray, times: np.ndarray, names: tuple[str, ...]) -> None:
+        bad = np.argwhere(~np.isfinite(values))
+        if len(bad):
+            instant, level, joint = bad[0]
+            quantity = names[level] if level < len(names) else f"derivative {level} of the {names[0]}"
+            message = f"the {quantity} of this joint is not finite at t = {times[instant]:g} s"
+            raise TrajectoryError(f"{message}; choose another law there", name=self.robot.joint_names[joint])
+
+
+def trajectory_torques(
+    robot: Robot, trajectory: JointTrajectory, rates: int = 0, *, times: Any = None, drives: bool = True
+) -> Any:
+    """Return the torques and forces that a trajectory needs of the joints of a robot, with rates, labelled.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot, with what it holds.
+    trajectory : JointTrajectory
+        Joints that it does not name stand still at zero, or at the end of their range that is nearest to it.
+    rates : int, default 0
+        How many rates of the torques are wanted.
+    times : array_like of shape (time,), optional
+        Instants, s; those of the trajectory unless given.
+    drives : bool, default True
+        Whether torques contain armature inertia, damping and friction of the drives.
+
+    Returns
+    -------
+    xarray.Dataset
+        One variable for each joint, of dimensions time and derivative; N m, or N for prismatic joints, by s.
+
+    Raises
+    ------
+    RobotError, TrajectoryError
+        If the robot has no joints or closed loops, it does not have a joint of the trajectory, or a value is not
+        finite.
+
+    Warns
+    -----
+    SampleWarning
+        If the samples of the trajectory do not support the derivatives that are needed.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> rod = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0], tensor=[0, 1 / 12, 1 / 12])
+    >>> pin = jn.Joint("pin", "base", "rod", axis=[0, -1, 0])
+    >>> pendulum = jn.Robot("pendulum", [jn.Link("base"), jn.Link("rod", rod)], [pin], gravity=[0, 0, 0])
+    >>> trajectory = jn.JointTrajectory({"pin": "t**3"}, start=0.0, stop=2.0)
+    >>> torques = jn.dynamics.trajectory_torques(pendulum, trajectory, rates=1, times=[0.0, 1.0])
+    >>> torques["pin"].values.round(12).tolist()  # 6 t / 3 N m, and its rate
+    [[0.0, 2.0], [2.0, 2.0]]
+    """
+    import xarray
+
+    rates = whole_number("rates", rates, 0)
+    followed = FollowedTrajectory(robot, trajectory)
+    instants = trajectory.times if times is None else np.atleast_1d(np.asarray(times, float))
+    values = followed.torques(followed.coordinates(instants, rates + 2), instants, drives)
+    for message in followed.doubts:
+        warnings.warn(SampleWarning(message), stacklevel=2)
+    variables = {
+        name: (("time", "derivative"), values[..., k], {"units": "N*m" if robot.joints[name].turning else "N"})
+        for k, name in enumerate(robot.joint_names)
+    }
+    axes = {"time": ("time", instants, {"units": "s", "long_name": "time"}), "derivative": np.arange(rates + 1)}
+    return xarray.Dataset(variables, coords=axes, attrs={"title": robot.name, "source": "jounce"})
+
+
+def _in_blocks(function: Callable[[np.ndarray], np.ndarray], values: np.ndarray) -> np.ndarray:
+    """Return what a function gives for values along their first axis, the last block filled up."""
+    found = []
+    for start in range(0, len(values), BLOCK):
+        block = values[start : start + BLOCK]
+        whole = np.concatenate([block, np.repeat(block[-1:], BLOCK - len(block), axis=0)])
+        found.append(function(whole)[: len(block)])
+    return np.concatenate(found)
+
+
+def why_not(robot: Robot, name: str) -> str:
+    """Say why a name is not that of a joint that can be moved."""
+    joint = robot.joints.get(name)
+    if joint is None:
+        return f"{robot.name} has no moving joint of this name; {did_you_mean(name, robot.joint_names)}"
+    if joint.mimic is not None:
+        return f"this joint follows {joint.mimic.joint}; leave it out"
+    return "this joint is fixed; leave it out"
+
+
+def _rest(limits: Limits) -> float:
+    """Return zero, or what is nearest to it in the range of a joint."""
+    low = 0.0 if limits.lower is None else max(limits.lower, 0.0)
+    return low if limits.upper is None else min(limits.upper, low)

@@ -1,0 +1,115 @@
+"""One's own samples and masses in the place of the stand-ins: files, and what the page says of them."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from jounce.errors import JounceError, MechanismFileError, did_you_mean
+from jounce.io.files.samples import read_columns
+from jounce.io.files.source import Source, read_source
+from jounce.papers.negrean_2025.case import CASES, STAND_IN, Case, Link, law
+
+MASS_KEYS = {  # the field of `Link` and the kind of unit of each key of a file of masses
+    "mass": ("mass", "mass"),
+    "center_x": ("center_x", "length"),
+    "center_z": ("center_z", "length"),
+    "inertia_x": ("inertia_x", "inertia"),
+    "inertia_y": ("inertia_y", "inertia"),
+    "inertia_z": ("inertia_z", "inertia"),
+    "radius": ("radius", "length"),
+}
+NEEDED = ("mass", "center_x", "center_z", "inertia_y")
+
+
+def given_cases(samples: Path | None, masses: Path | None) -> dict[str, Case]:
+    """Return the motions of a file of samples on an arm of a file of masses, stand-ins for what is not given.
+
+    Parameters
+    ----------
+    samples : path, optional
+        CSV: ``time`` in s, and for each motion a column of its name with angular accelerations, rad/s^2.
+    masses : path, optional
+        YAML, TOML or JSON: mass, center_x, center_z and inertia_y, with units; inertia_x, inertia_z and the radius of
+        the accelerometer have no part in the torques.
+
+    Raises
+    ------
+    JounceError
+        If a file cannot be read, or what it says makes no motion or no link.
+    """
+    link = STAND_IN if masses is None else read_link(masses)
+    if samples is None:
+        return {name: Case(case.name, case.title, case.samples, case.angle, link) for name, case in CASES.items()}
+    times, columns = read_columns(samples)
+    found = {}
+    for name, values in columns.items():
+        accelerations = np.array(values)
+        try:
+            law(accelerations, np.array(times))
+        except JounceError as error:
+            raise error.located(path=samples, name=name) from None
+        found[name] = Case(name, name, lambda a=accelerations: a, None, link, np.array(times), measured=True)
+    return found
+
+
+def read_link(path: Path) -> Link:
+    """Return the link of a file of masses.
+
+    Raises
+    ------
+    JounceError
+        If the file cannot be read, a value is missing, is none or has another unit, or no body has these moments.
+    """
+    source = read_source(str(path))
+    data = source.data
+    if not isinstance(data, dict):
+        raise MechanismFileError(f"must hold {', '.join(NEEDED)}", path=path, line=1)
+    for key in data:
+        if key not in MASS_KEYS:
+            raise source.error(f"unknown key; {did_you_mean(str(key), MASS_KEYS)}", (str(key),))
+    for key in NEEDED:
+        if key not in data:
+            raise source.error("is missing", (key,))
+    values = {MASS_KEYS[key][0]: _number(source, key, raw) for key, raw in data.items()}
+    for name in ("inertia_x", "inertia_z"):  # they have no part in it, and any body may have those of a thin rod
+        values.setdefault(name, values["inertia_y"])
+    link = Link(**{"radius": STAND_IN.radius} | values)
+    try:
+        link.robot()
+    except JounceError as error:
+        raise error.located(path=path) from None
+    return link
+
+
+def _number(source: Source, key: str, raw: Any) -> float:
+    from jounce.io.files.units import parse_value
+
+    try:
+        value = parse_value(raw, MASS_KEYS[key][1]).value
+    except JounceError as error:
+        raise source.error(error.message, (key,), value=raw) from None
+    if not isinstance(value, float | int):
+        raise source.error("must be a number, with or without a unit", (key,), value=raw)
+    return float(value)
+
+
+def told(cases: dict[str, Case], samples: Path | None, masses: Path | None) -> list[str]:
+    """Return what the page says of data that are not the stand-ins of all of it."""
+    link = next(iter(cases.values())).link
+    first = f"`{samples.name}`" if samples else "stand-ins, as without --samples"
+    second = f"`{masses.name}`" if masses else "stand-ins, as without --masses"
+    instants = next(iter(cases.values())).knots
+    return [
+        "Made from data that were given, not from those of the paper:",
+        "",
+        f"- Samples of the angular acceleration: {first}; {len(instants)} instants from {instants[0]:g} s to "
+        f"{instants[-1]:g} s.",
+        "  The law is made of quintic segments through them, as they are: from angle and speed zero, jerk zero at both"
+        " ends."
+        if samples
+        else "  Bias and drift are taken off them.",
+        f"- Masses: {second}; M = {link.mass:g} kg, x_C = {link.center_x:g} m, z_C = {link.center_z:g} m, "
+        f"I_y = {link.inertia_y:g} kg m^2.",
+        "- The axis is horizontal, gravity is 9.81 m/s^2. At angle zero x is level and z up, and the link turns down.",
+    ]

@@ -1,0 +1,122 @@
+"""The forms of the equations of motion of a driven mechanism, in the coordinates of its drivers."""
+
+import functools
+
+import numpy as np
+import pytest
+
+import jounce as jn
+from jounce.dynamics import gibbs_appell, higher_order, lagrange, mangeron_nielsen
+
+TIMES = np.array([0.1, 0.7])
+PIN = ("ground", "arm")
+
+
+def arm_on_a_sled(push="0.3 + 0.2*t**2", turn="0.5*t + 0.1*t**3"):
+    """Return a sled with an arm on it, both driven; nothing weighs."""
+    return jn.Mechanism(
+        space="planar",
+        bodies={
+            "sled": jn.Body([0, 0], mass=2.0, inertia=0.1),
+            "arm": jn.Body([0, 0], mass=0.7, inertia=0.05, center_of_mass=[0.4, 0.1]),
+        },
+        joints={
+            "rail": jn.planar.Prismatic(("ground", "sled"), [0, 0], [0, 0], [1, 0], [1, 0]),
+            "pin": jn.planar.Revolute(("sled", "arm"), [0, 0], [0, 0]),
+        },
+        drivers={
+            "push": jn.drivers.SlideDriver(("ground", "sled"), [0, 0], [0, 0], [1, 0], push),
+            "turn": jn.drivers.CoordinateDriver(("sled", "arm"), "angle", motion=turn),
+        },
+    )
+
+
+@functools.cache
+def sled():
+    return jn.solve(arm_on_a_sled(), TIMES, order=5)
+
+
+def robot():
+    """Return the same in joint coordinates."""
+    load = jn.Inertia(0.7, [0.4, 0.1, 0.0], [0.03, 0.03, 0.05])
+    links = [jn.Link("base"), jn.Link("sled", jn.Inertia(2.0)), jn.Link("arm", load)]
+    joints = [jn.Joint("push", "base", "sled", "prismatic", axis=[1, 0, 0]), jn.Joint("turn", "sled", "arm")]
+    return jn.Robot("sled", links, joints, gravity=[0, 0, 0])
+
+
+def laws():
+    t = TIMES
+    push = [0.3 + 0.2 * t**2, 0.4 * t, 0.4 + 0 * t, 0 * t, 0 * t, 0 * t]
+    turn = [0.5 * t + 0.1 * t**3, 0.5 + 0.3 * t**2, 0.6 * t, 0.6 + 0 * t, 0 * t, 0 * t]
+    return np.moveaxis(np.array([push, turn]), (0, 1, 2), (2, 1, 0))
+
+
+FORMS = {
+    "lagrange": lambda system, *q: lagrange(system, *q, rates=1),
+    "mangeron": lambda system, *q: mangeron_nielsen(system, *q),
+    "gibbs_appell": lambda system, *q: gibbs_appell(system, *q, m=3),
+    "higher_order": lambda system, *q: higher_order(system, *q, k=2),
+    "energy_slope": lambda system, *q: jn.energy_slope(system, *q, m=1, order=2),
+}
+
+
+QUICK = ("energy_slope",)  # every form takes seconds to compile
+
+
+@pytest.mark.parametrize("form", [f if f in QUICK else pytest.param(f, marks=pytest.mark.slow) for f in FORMS])
+def test_an_open_chain_agrees_with_the_robot(form):
+    found, right = FORMS[form](sled()), FORMS[form](robot(), laws())
+    assert found.coords["driver"].values.tolist() == ["push", "turn"]
+    np.testing.assert_allclose(found.values, right, rtol=0, atol=1e-12 * np.abs(right).max())
+
+
+def four_bar():
+    """Return the linkage of Sommer's first problem with masses that weigh nothing."""
+    return jn.Mechanism(
+        space="planar",
+        bodies={
+            "crank": jn.Body([0, 0], angle=0.5, mass=0.4, inertia=0.02, center_of_mass=[0.02, 0.01]),
+            "rocker": jn.Body([0.1321, 0], angle=1.7, mass=1.5, inertia=0.09, center_of_mass=[0.1, -0.02]),
+        },
+        joints={
+            "A": jn.planar.Revolute(("ground", "crank"), [0, 0], [0, 0]),
+            "D": jn.planar.Revolute(("ground", "rocker"), [0.1321, 0], [0, 0]),
+            "BC": jn.planar.DoubleRevolute(("crank", "rocker"), [0.04, 0], [0.2031, 0], 0.1423),
+        },
+        drivers={"theta": jn.drivers.CoordinateDriver(("ground", "crank"), "angle", motion="0.6 + sin(3*t)")},
+    )
+
+
+@pytest.mark.parametrize("rates", [0, pytest.param(2, marks=pytest.mark.slow)])
+def test_a_closed_loop_agrees_with_the_force_of_its_driver(rates):
+    motion = jn.solve(four_bar(), TIMES, order=4)
+    force = jn.driver_force(motion, "theta").values[:, : rates + 1]  # by multipliers
+    bound = 1e-12 * np.abs(force).max(axis=0)
+    assert (np.abs(lagrange(motion, rates=rates)[..., 0] - force) <= bound).all()
+    if rates:
+        assert (np.abs(gibbs_appell(motion)[..., 0] - force[:, :1]) <= bound[:1]).all()
+        assert (np.abs(higher_order(motion, k=rates + 1)[:, 0] - force[:, rates]) <= 10 * bound[rates]).all()
+
+
+@pytest.mark.slow
+def test_a_loop_in_space_agrees_with_the_force_of_its_driver():
+    from tests.dynamics.test_energies import with_masses
+
+    masses = {"coupler": {"mass": 0.8, "inertia": [0.02, 0.03, 0.04], "center_of_mass": [0.02, 0.05, 0.01]}}
+    masses["rocker"] = {"mass": 0.6, "inertia": 0.03, "center_of_mass": [0.05, 0.0, 0.01]}
+    motion = jn.solve(with_masses("rsur", masses), TIMES, order=4)
+    (name,) = motion.mechanism.drivers
+    force = jn.driver_force(motion, name).values
+    scale = np.abs(force).max(axis=0)
+    assert (np.abs(lagrange(motion)[..., 0] - force[:, :1]) <= 1e-11 * scale[:1]).all()
+    assert (np.abs(higher_order(motion, k=2)[:, 0] - force[:, 1]) <= 1e-11 * scale[1]).all()
+
+
+def test_what_is_refused():
+    free = jn.Mechanism(space="planar", bodies={"puck": jn.Body([0, 0], mass=1.0, inertia=1.0)}, joints={})
+    with pytest.raises(jn.MechanismError, match="do not prescribe all"):
+        lagrange(jn.simulate(free, [0.0, 0.1], order=2))
+    with pytest.raises(jn.MechanismError, match="coordinates already"):
+        lagrange(sled(), np.zeros((3, 2)))
+    with pytest.raises(jn.RobotError, match="q"):
+        lagrange(robot())
