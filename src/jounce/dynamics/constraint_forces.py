@@ -17,9 +17,9 @@ import numpy as np
 
 from jounce.dynamics.loads import inertia_forces as inertia_forces
 from jounce.jet import Jet
+from jounce.jet.algebra import stacked
 from jounce.kinematics.linear import DenseFactor
 from jounce.mechanism.system import System
-from jounce.robot.scan import stacked
 from jounce.trajectory import AbstractMotion
 
 

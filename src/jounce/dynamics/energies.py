@@ -16,7 +16,7 @@ from jax.core import Tracer
 
 from jounce.errors import MechanismError, RobotError
 from jounce.jet import Jet, dot
-from jounce.jet.algebra import total
+from jounce.jet.algebra import stacked, total
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.compilation import compiled
 from jounce.mechanism import Mechanism
@@ -26,7 +26,6 @@ from jounce.rigid.frames import Frames
 from jounce.robot.batches import Batched, checked
 from jounce.robot.kinematics import body_frames
 from jounce.robot.robot import Robot
-from jounce.robot.scan import stacked
 from jounce.robot.tree import Tree
 
 

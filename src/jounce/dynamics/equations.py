@@ -20,12 +20,11 @@ from jounce.dynamics.driver_coordinates import of_drivers
 from jounce.dynamics.energies import differentiated, robot_energy, whole_number
 from jounce.errors import RobotError
 from jounce.jet import Jet, components
-from jounce.jet.algebra import total
+from jounce.jet.algebra import stacked, total
 from jounce.kinematics import Motion
 from jounce.robot.batches import Batched, checked
 from jounce.robot.kinematics import body_frames
 from jounce.robot.robot import Robot
-from jounce.robot.scan import stacked
 from jounce.robot.tree import Tree
 
 

@@ -17,12 +17,12 @@ from jounce.dynamics.energies import gravity_of, masses_of
 from jounce.dynamics.loads import loads, mass_matrices
 from jounce.errors import MechanismError
 from jounce.jet import Jet, cross
+from jounce.jet.algebra import stacked
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.compilation import compiled
 from jounce.mechanism import Mechanism, Model
 from jounce.mechanism.datums import at_lanes
 from jounce.mechanism.system import System
-from jounce.robot.scan import stacked
 
 SMALL_BATCH, LARGE_BATCH = 64, 512  # instants; a short motion compiles for one width only, and fills less of it
 

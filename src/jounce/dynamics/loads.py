@@ -10,9 +10,8 @@ import jax
 import jax.numpy as jnp
 
 from jounce.jet import Jet, components, cross
-from jounce.jet.algebra import total
+from jounce.jet.algebra import stacked, total
 from jounce.mechanism.system import System
-from jounce.robot.scan import stacked
 
 
 def inertia_forces(pose: Any, mass: Any, center: Any, moments: Any, gravity: Any) -> tuple[Jet, Jet]:

@@ -8,11 +8,10 @@ import numpy as np
 
 from jounce.dynamics.inverse import MotionForces, pose_of
 from jounce.jet import Jet, dot
-from jounce.jet.algebra import total
+from jounce.jet.algebra import stacked, total
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.compilation import compiled
 from jounce.mechanism.datums import at_lanes
-from jounce.robot.scan import stacked
 
 FAINT = 1e-3  # of what turning bodies would move: coefficients that vanish have its rounding, 1e-12 of this or less
 

@@ -5,12 +5,12 @@ import itertools
 import math
 from typing import Any
 
-import jax.numpy as jnp
 import numpy as np
 
 from jounce.dynamics.forward import State
 from jounce.errors import MechanismError
 from jounce.jet import Jet
+from jounce.jet.algebra import stacked
 from jounce.kinematics.compilation import compiled
 from jounce.mechanism import AbstractOutput
 from jounce.mechanism.system import Group
@@ -88,7 +88,7 @@ class Event:
 def output_series(group: Group, coordinates: dict[str, Any], pose_type: type) -> Any:
     """Return the Taylor coefficients of outputs, (order + 1, components, instances, batch)."""
     pose = pose_type.from_coordinates({name: Jet(tuple(c)) for name, c in coordinates.items()})
-    return jnp.stack(group.evaluate(pose).dense().coefficients)
+    return stacked(group.evaluate(pose))
 
 
 def pose_coordinates(state: State) -> dict[str, np.ndarray]:

@@ -10,6 +10,7 @@ from jounce.jet.algebra import (
     log as log,
     power as power,
     sqrt as sqrt,
+    stacked as stacked,
 )
 from jounce.jet.compose import compose as compose
 from jounce.jet.elementary import (

@@ -217,6 +217,11 @@ def _checked(order: int) -> int:
     return order
 
 
+def stacked(jet: Jet) -> Any:
+    """Return the coefficients of a jet as one array, order first."""
+    return jnp.stack(jet.dense().coefficients)
+
+
 def bilinear(product: Callable[[Any, Any], Any], a: Any, b: Any) -> Any:
     """Extend a bilinear `product` of arrays to jets: the Cauchy convolution of their coefficients."""
     if isinstance(a, Jet) and isinstance(b, Jet):

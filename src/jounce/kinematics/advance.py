@@ -15,7 +15,7 @@ import numpy as np
 
 from jounce.constraints.angles import brought_near
 from jounce.jet import Jet
-from jounce.jet.algebra import total
+from jounce.jet.algebra import stacked, total
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.linear import DenseFactor
 from jounce.kinematics.status import Status
@@ -288,7 +288,7 @@ def advance(
             expected = next(known)
             expected = Jet(tuple(jnp.where(jnp.isfinite(expected), expected, 0.0)))
             result = brought_near(result, expected.evaluate(step))
-        results.append(jnp.stack(result.dense().coefficients))
+        results.append(stacked(result))
     reached = pose.coordinates()
     departures = _departures(system, pose, predicted)
     departure = jnp.max(departures, axis=0)
@@ -298,7 +298,7 @@ def advance(
     predictable &= correction.contracts() & ((sign == 0) | (found == sign))
     admissible = system.admissible(time)
     pivot_ratio = factor.pivot_ratio()
-    coordinates = {name: jnp.stack(jet.dense().coefficients) for name, jet in reached.items()}
+    coordinates = {name: stacked(jet) for name, jet in reached.items()}
     posed = [jnp.max(coordinates[name], axis=-2, keepdims=True) for name in pose_type.predictor]
     finite = _finite([*(x.reshape(x.shape[0], -1, 1, x.shape[-1]) for x in posed), *results], wanted)
     finite = jnp.concatenate([jnp.all(finite[: len(posed)], axis=0, keepdims=True), finite[len(posed) :]])

@@ -5,12 +5,12 @@ from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
-import jax.numpy as jnp
 import numpy as np
 
 from jounce.display import Displayed
 from jounce.errors import MechanismError, did_you_mean
 from jounce.jet import Jet
+from jounce.jet.algebra import stacked
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.status import Status
 from jounce.mechanism import (
@@ -33,7 +33,7 @@ _UNDEFINED = Status.UNDEFINED.advice.partition(": ")[2]
 @compiled("pose_type")
 def _evaluated(group: Group, coordinates: dict[str, Any], pose_type: type) -> Any:
     pose = pose_type.from_coordinates({name: Jet(tuple(c)) for name, c in coordinates.items()})
-    return jnp.stack(group.evaluate(pose).dense().coefficients)
+    return stacked(group.evaluate(pose))
 
 
 def check_output(output: Any, mechanism: Mechanism, name: str = "output") -> None:

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jounce.jet import Jet, concatenate
+from jounce.jet.algebra import stacked
 from jounce.mechanism.resolve import group_key, resolve_element, stack_elements
 
 POSITION_COMPONENTS = {"planar": 2, "spatial": 3}
@@ -194,13 +195,13 @@ class System(eqx.Module):
         shape = (count, *pose.position.shape[1:])
         if not self.forces:
             return Jet.constant(jnp.zeros(shape), order)
-        sizes = [jnp.stack(group.force(pose, time).dense().coefficients) for group in self.forces]
+        sizes = [stacked(group.force(pose, time)) for group in self.forces]
         still, now = _movable(pose.truncate(order)), time.truncate(order)
 
         def along(velocity: Any) -> list[Any]:
             shift, turn = (Jet(tuple(part)) for part in (velocity[:, : pose.shifts], velocity[:, pose.shifts :]))
             change = _movable(still.varied(shift, turn).truncate(order))
-            return [jnp.stack(group.variation(still, change, now).dense().coefficients) for group in self.forces]
+            return [stacked(group.variation(still, change, now)) for group in self.forces]
 
         transposed = jax.linear_transpose(along, jax.ShapeDtypeStruct((order + 1, *shape), jnp.float64))
         # the transpose of a convolution runs backwards in the orders

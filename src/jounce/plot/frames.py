@@ -10,6 +10,7 @@ import numpy as np
 
 from jounce.errors import MechanismError, did_you_mean
 from jounce.jet import Jet
+from jounce.jet.algebra import stacked
 from jounce.kinematics.assembly import assemble
 from jounce.kinematics.compilation import compiled
 from jounce.mechanism import build, time_grid
@@ -81,7 +82,7 @@ def _frames(pose_type: Any, coordinates: Mapping[str, Any]) -> Any:
 
     pose = pose_type.from_coordinates({name: Jet(tuple(c)) for name, c in coordinates.items()})
     columns = [pose.position, *(pose.direction(unit) for unit in np.eye(pose_type.shifts))]
-    return jnp.stack([jnp.stack(column.dense().coefficients) for column in columns], axis=2)
+    return jnp.stack([stacked(column) for column in columns], axis=2)
 
 
 def placed(motion: Any, body: str, points: Any, order: int = 0) -> np.ndarray:

@@ -7,6 +7,7 @@ import numpy as np
 
 from jounce.errors import JounceError, TrajectoryError
 from jounce.jet import Jet, cross, dot, sqrt, stack, transpose
+from jounce.rigid.euler_parameters import from_rotation_matrices
 from jounce.rigid.orientation import angular_velocity, check_rotation
 from jounce.rigid.rotations import is_traced, rotation_matrix
 
@@ -87,7 +88,7 @@ class AttitudeSamples:
             check_rotation(np.moveaxis(matrices, 0, -1), "matrices")
         except JounceError as error:
             raise TrajectoryError(error.message, name=error.name, value=error.value) from None
-        return cls(times, _quaternions(matrices), degree)
+        return cls(times, from_rotation_matrices(matrices), degree)
 
     @classmethod
     def from_euler_angles(cls, times: Any, angles: Any, sequence: str, degree: int = 5) -> "AttitudeSamples":
@@ -102,7 +103,9 @@ class AttitudeSamples:
         """
         times, angles = np.asarray(times, float), np.asarray(angles, float)
         _check_times(times, angles, "angles", (3,), degree)
-        return cls(times, _quaternions(np.moveaxis(np.asarray(rotation_matrix(sequence, angles.T)), -1, 0)), degree)
+        return cls(
+            times, from_rotation_matrices(np.moveaxis(np.asarray(rotation_matrix(sequence, angles.T)), -1, 0)), degree
+        )
 
     def quaternion(self, time: Jet) -> Jet:
         """Return the unit quaternion (e0, e1, e2, e3) at the instants of a time jet.
@@ -235,19 +238,3 @@ def _continuous(times: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
         raise TrajectoryError(message, name="times", value=times[first : first + 2].tolist())
     signs = np.concatenate([[1.0], np.cumprod(np.sign(along))])
     return quaternions * signs[:, None]
-
-
-def _quaternions(matrices: np.ndarray) -> np.ndarray:
-    """Return unit quaternions of rotation matrices, (samples, 3, 3), each from its largest component."""
-    R, trace = matrices, np.trace(matrices, axis1=1, axis2=2)
-    # row k is 4 e_k times the whole quaternion
-    table = np.empty((len(R), 4, 4))
-    table[:, 0, 0] = 1 + trace
-    for i in range(3):
-        j, k = (i + 1) % 3, (i + 2) % 3
-        table[:, i + 1, i + 1] = 1 + 2 * R[:, i, i] - trace
-        table[:, 0, i + 1] = table[:, i + 1, 0] = R[:, k, j] - R[:, j, k]
-        table[:, i + 1, j + 1] = table[:, j + 1, i + 1] = R[:, i, j] + R[:, j, i]
-    largest = np.argmax(np.diagonal(table, axis1=1, axis2=2), axis=1)
-    rows = table[np.arange(len(R)), largest]
-    return rows / np.linalg.norm(rows, axis=1, keepdims=True)

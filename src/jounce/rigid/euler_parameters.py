@@ -6,9 +6,19 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from jounce.errors import MechanismError, did_you_mean, show_value
 
-__all__ = ["AXES", "FORMS", "euler_parameters", "form_of", "from_axis_angle", "from_euler", "from_quaternion"]
+__all__ = [
+    "FORMS",
+    "euler_parameters",
+    "form_of",
+    "from_axis_angle",
+    "from_euler",
+    "from_quaternion",
+    "from_rotation_matrices",
+]
 
 FORMS: dict[str, tuple[str, ...]] = {
     "quaternion": ("quaternion",),
@@ -16,8 +26,6 @@ FORMS: dict[str, tuple[str, ...]] = {
     "axis": ("axis", "angle"),
 }
 """The forms of an orientation by the key that tells them, and the keys that each of them has."""
-
-AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 Quaternion = tuple[float, float, float, float]
 """Euler parameters (e0, e1, e2, e3), the scalar first, of unit length."""
@@ -123,6 +131,11 @@ def from_quaternion(quaternion: Sequence[float]) -> Quaternion:
     return (e0, e1, e2, e3)
 
 
+def _scalar_first(rotation: Any) -> Quaternion:
+    x, y, z, scalar = rotation.as_quat().tolist()
+    return (scalar, x, y, z)
+
+
 def from_axis_angle(axis: Sequence[float], angle: float) -> Quaternion:
     """Return the Euler parameters of a turn by ``angle`` (rad) about an axis in the global frame.
 
@@ -137,9 +150,17 @@ def from_axis_angle(axis: Sequence[float], angle: float) -> Quaternion:
     >>> [round(e, 12) for e in from_axis_angle([0.0, 0.0, 3.0], pi)]
     [0.0, 0.0, 0.0, 1.0]
     """
-    x, y, z = _unit(axis, "the axis")
-    half = math.sin(angle / 2)
-    return (math.cos(angle / 2), half * x, half * y, half * z)
+    from scipy.spatial.transform import Rotation
+
+    return _scalar_first(Rotation.from_rotvec(angle * np.array(_unit(axis, "the axis"))))
+
+
+def from_rotation_matrices(matrices: Any) -> Any:
+    """Return the Euler parameters of rotation matrices (..., 3, 3), as (..., 4); the largest one is positive."""
+    from scipy.spatial.transform import Rotation
+
+    flat = Rotation.from_matrix(np.reshape(np.asarray(matrices, float), (-1, 3, 3))).as_quat()
+    return np.roll(flat, 1, axis=-1).reshape(*np.shape(matrices)[:-2], 4)
 
 
 def from_euler(sequence: str, angles: Sequence[float]) -> Quaternion:
@@ -167,22 +188,11 @@ def from_euler(sequence: str, angles: Sequence[float]) -> Quaternion:
     """
     letters = sequence.lower() if isinstance(sequence, str) else ""
     same_case = sequence in (letters, letters.upper())
-    if len(letters) != 3 or not same_case or set(letters) - AXES.keys():
+    if len(letters) != 3 or not same_case or set(letters) - set("xyz"):
         message = "a sequence of Euler angles has three letters, such as zxz (fixed axes) or ZXZ (moving axes)"
         raise MechanismError(message, value=sequence)
     if letters[0] == letters[1] or letters[1] == letters[2]:
         raise MechanismError("neighbouring axes of a sequence of Euler angles must differ", value=sequence)
-    whole: Quaternion = (1.0, 0.0, 0.0, 0.0)
-    for letter, angle in zip(letters, angles, strict=True):
-        turn = from_axis_angle(AXES[letter], angle)
-        whole = _product(turn, whole) if sequence.islower() else _product(whole, turn)
-    return whole
+    from scipy.spatial.transform import Rotation
 
-
-def _product(p: Quaternion, q: Quaternion) -> Quaternion:
-    return (
-        p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3],
-        p[0] * q[1] + p[1] * q[0] + p[2] * q[3] - p[3] * q[2],
-        p[0] * q[2] - p[1] * q[3] + p[2] * q[0] + p[3] * q[1],
-        p[0] * q[3] + p[1] * q[2] - p[2] * q[1] + p[3] * q[0],
-    )
+    return _scalar_first(Rotation.from_euler(sequence, list(angles)))

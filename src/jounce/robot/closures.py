@@ -17,13 +17,12 @@ from jounce.constraints import AbstractConstraint, Scalar, Vector
 from jounce.constraints.base import Wrenches
 from jounce.errors import MechanismError, RobotError
 from jounce.jet import Jet, cross, dot, stack
-from jounce.jet.algebra import total
+from jounce.jet.algebra import stacked, total
 from jounce.rigid.inertia import finite_numbers
 from jounce.robot.abstract_robot import AbstractRobot
 from jounce.robot.batches import Batched
 from jounce.robot.kinematics import body_frames
 from jounce.robot.model import Closure
-from jounce.robot.scan import stacked
 from jounce.robot.tree import Tree, axes_with_z_along
 
 RANK_TOLERANCE = 1e-5  # rad, or sizes of the robot: files give axes with six digits

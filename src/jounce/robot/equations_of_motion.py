@@ -14,12 +14,12 @@ import numpy as np
 
 from jounce.errors import RobotError, did_you_mean
 from jounce.jet import Jet, components, cross, dot
-from jounce.jet.algebra import total
+from jounce.jet.algebra import stacked, total
 from jounce.rigid.frames import Frames
 from jounce.robot.batches import Batched, checked, floats
 from jounce.robot.kinematics import body_frames
 from jounce.robot.robot import Robot
-from jounce.robot.scan import joint_coordinates, stacked, to_coordinates
+from jounce.robot.scan import joint_coordinates, to_coordinates
 from jounce.robot.tree import Tree
 
 PARTS = ("coriolis", "centrifugal", "gravity")

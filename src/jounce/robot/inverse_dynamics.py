@@ -8,13 +8,14 @@ import numpy as np
 
 from jounce.errors import RobotError, did_you_mean
 from jounce.jet import Jet, concatenate, cross, matvec
+from jounce.jet.algebra import stacked
 from jounce.rigid.frames import Frames
 from jounce.robot.batches import Batched, checked
 from jounce.robot.equations_of_motion import drive_forces
 from jounce.robot.kinematics import body_frames
 from jounce.robot.newton_euler import newton_euler
 from jounce.robot.robot import Robot
-from jounce.robot.scan import stacked, to_coordinates
+from jounce.robot.scan import to_coordinates
 from jounce.robot.tree import Tree
 from jounce.robot.wrenches import FRAMES, Wrench, wrench_arrays
 

@@ -5,10 +5,10 @@ from typing import Any
 import jax.numpy as jnp
 
 from jounce.jet import Jet, concatenate, cross
+from jounce.jet.algebra import stacked
 from jounce.robot.batches import Batched, checked
 from jounce.robot.kinematics import body_frames, frame_constants, link_frame
 from jounce.robot.robot import Robot
-from jounce.robot.scan import stacked
 from jounce.robot.tree import Tree
 
 

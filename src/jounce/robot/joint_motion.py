@@ -10,13 +10,13 @@ import numpy as np
 from jax.core import Tracer
 
 from jounce.errors import RobotError, SingularityError, did_you_mean
+from jounce.jet.algebra import stacked
 from jounce.kinematics.linear import singular_values
 from jounce.rigid.inertia import finite_numbers
 from jounce.robot.batches import Batched, floats
 from jounce.robot.jacobian import jacobian_jet, twist
 from jounce.robot.kinematics import frame_constants
 from jounce.robot.robot import Robot
-from jounce.robot.scan import stacked
 from jounce.robot.tree import Tree
 
 TASKS = {"pose": (0, 1, 2, 3, 4, 5), "position": (0, 1, 2), "orientation": (3, 4, 5)}

@@ -9,12 +9,12 @@ import numpy as np
 
 from jounce.errors import RobotError, did_you_mean
 from jounce.jet import Jet, sine_cosine
-from jounce.jet.algebra import total
+from jounce.jet.algebra import stacked, total
 from jounce.rigid.frames import Frames
 from jounce.rigid.inertia import finite_numbers
 from jounce.robot.abstract_robot import AbstractRobot
 from jounce.robot.batches import Batched, checked
-from jounce.robot.scan import entries, joint_coordinates, once, places, read, stacked, write
+from jounce.robot.scan import entries, joint_coordinates, once, places, read, write
 from jounce.robot.tree import Tree
 
 

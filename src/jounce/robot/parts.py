@@ -12,6 +12,7 @@ from jounce.forces import AbstractForce
 from jounce.forces.springs import SlideSpring, SpatialTorsionalSpring
 from jounce.mechanism import Body, RelativeAngleOutput
 from jounce.mechanism.mechanism import GROUND
+from jounce.rigid.euler_parameters import from_rotation_matrices
 from jounce.rigid.inertia import Inertia
 from jounce.robot.abstract_robot import AbstractRobot
 from jounce.robot.closures import LinkClosure
@@ -147,7 +148,7 @@ class Parts:
         axes = np.kron(np.eye(2), turned.T)
         attitude = {}
         if np.any(wrenches[:, 3:]):
-            quaternion = _quaternion(turned @ closure.rotation @ other.T)
+            quaternion = from_rotation_matrices(turned @ closure.rotation @ other.T)
             attitude = {"vector_part": quaternion[1:], "scalar_part": float(quaternion[0])}
         return LinkClosure((first, second), points[0], points[1], wrenches @ axes, **attitude)
 
@@ -210,7 +211,7 @@ class Parts:
             whole = Inertia.total(parts) if parts else None
             found[name] = Body(
                 at.position[0].tolist(),
-                orientation=_quaternion(at.rotation[0]).tolist(),
+                orientation=from_rotation_matrices(at.rotation[0]).tolist(),
                 mass=None if whole is None else whole.mass,
                 inertia=None if whole is None else whole.tensor + armature.get(name, 0.0),
                 center_of_mass=None if whole is None else whole.center_of_mass,
@@ -221,14 +222,3 @@ class Parts:
 def inner_names(moving: Sequence[Any], merged: Mapping[int, int]) -> set[str]:
     """Return the names of joints that are merged with their neighbours."""
     return {moving[k].name for last, count in merged.items() for k in range(last - count + 1, last + 1)}
-
-
-def _quaternion(rotation: np.ndarray) -> np.ndarray:
-    """Return the Euler parameters of a rotation matrix, from the largest of their squares, which never vanishes."""
-    r = np.asarray(rotation, float)
-    cross = np.array([r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]])
-    products = np.empty((4, 4))  # 4 p p^T
-    products[0, 0], products[0, 1:], products[1:, 0] = 1 + np.trace(r), cross, cross
-    products[1:, 1:] = r + r.T + (1 - np.trace(r)) * np.eye(3)
-    row = products[int(np.argmax(np.diag(products)))]
-    return row / np.linalg.norm(row)

@@ -6,7 +6,6 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
-from jounce.jet import Jet
 from jounce.robot.tree import Tree
 
 
@@ -52,11 +51,6 @@ def write(tree: Tree, state: Any, slot: Any, value: Any) -> Any:
     if tree.shape.slots == 1:
         return value
     return jax.tree.map(lambda x, y: jax.lax.dynamic_update_index_in_dim(x, y, slot, 0), state, value)
-
-
-def stacked(jet: Jet) -> Any:
-    """Return the coefficients of a jet as one array, order first."""
-    return jnp.stack(jet.dense().coefficients)
 
 
 def once(value: Any) -> Any:

@@ -199,17 +199,16 @@ def axes_with_z_along(axis: np.ndarray) -> np.ndarray:
 
 def turn_about(axis: np.ndarray, angle: float) -> np.ndarray:
     """Return the matrix of a rotation about a unit vector: Negrean 2025, equation 20."""
-    x, y, z = axis
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_rotvec(angle * np.asarray(axis)).as_matrix()
 
 
 def quaternion_matrix(quaternion: Any) -> np.ndarray:
     """Return the rotation matrix of a unit quaternion, scalar first."""
-    w, x, y, z = (float(value) for value in quaternion)
-    vector = np.array([x, y, z])
-    across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return (w * w - vector @ vector) * np.eye(3) + 2 * np.outer(vector, vector) + 2 * w * across
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_quat(np.roll(quaternion, -1)).as_matrix()
 
 
 def _at_coordinates(values: list[float], weights: np.ndarray, coordinate: np.ndarray, count: int) -> np.ndarray:

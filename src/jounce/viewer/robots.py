@@ -10,6 +10,7 @@ import numpy as np
 
 from jounce.errors import RobotError
 from jounce.reporting.peaks import derivative_name
+from jounce.rigid.euler_parameters import from_rotation_matrices
 from jounce.robot.model import Joint
 from jounce.robot.robot import Robot
 from jounce.viewer.take import Exertion, Parameter, Quantity, Take, rotated
@@ -212,14 +213,6 @@ def coordinates(robot: Robot, trajectory: Any, time: np.ndarray, order: int) -> 
     return q
 
 
-def quaternions(matrices: np.ndarray) -> np.ndarray:
-    """Return quaternions, (..., 4), scalar part first, of rotation matrices, (..., 3, 3)."""
-    from scipy.spatial.transform import Rotation
-
-    flat = Rotation.from_matrix(np.asarray(matrices).reshape(-1, 3, 3)).as_quat()
-    return np.roll(flat, 1, axis=-1).reshape(*np.shape(matrices)[:-2], 4)
-
-
 def _poses(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the poses of the base and of the moving links."""
     from jounce.robot import forward_kinematics
@@ -227,7 +220,7 @@ def _poses(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     still = q[:, :1]
     frames = [forward_kinematics(robot, still, link) for link in (robot.base, *robot.moving_links)]
     position = np.stack([np.asarray(frame.position)[:, 0] for frame in frames], axis=1)
-    return position, np.stack([quaternions(np.asarray(frame.rotation)[:, 0]) for frame in frames], axis=1)
+    return position, np.stack([from_rotation_matrices(np.asarray(frame.rotation)[:, 0]) for frame in frames], axis=1)
 
 
 def _torques(robot: Robot, q: np.ndarray) -> np.ndarray | None:
