@@ -290,7 +290,7 @@ def potential_coefficients(motion: Motion) -> np.ndarray:
     """Return the potential energies of bodies as Taylor coefficients, (levels, bodies, time), the ground first."""
     mass, center, _ = mechanism_masses(motion)
     pose_type, coordinates = motion.poses
-    return -np.asarray(_heights(coordinates, center, gravity_of(motion.mechanism), pose_type)) * mass
+    return 0.0 - np.asarray(_heights(coordinates, center, gravity_of(motion.mechanism), pose_type)) * mass  # no -0
 
 
 def energy_coefficients(motion: Motion, order: int) -> np.ndarray:

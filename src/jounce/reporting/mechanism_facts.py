@@ -382,6 +382,6 @@ def _law_words(law: Any) -> str:
 def _output(name: str, output: Any) -> dict[str, Any]:
     words = [word for word, kind in OUTPUTS if kind is type(output)]
     holder = output_holder(type(output))
-    of = list(output.bodies) if holder in ("body", "bodies") else [getattr(output, holder)]
+    of = list(output.bodies) or [getattr(output, holder, holder)]  # an energy may be that of the mechanism
     quantity = (words[-1] if words else type(output).__name__) or "point"
     return {"name": name, "quantity": quantity, "unit": output.unit, "of": of}

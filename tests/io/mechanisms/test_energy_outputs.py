@@ -1,6 +1,8 @@
 """Energies as outputs of files: read, solved, tabulated, written and read back; bad input."""
 
+import json
 import math
+import re
 
 import jsonschema
 import mpmath
@@ -95,6 +97,24 @@ def test_files_written_and_read(path, motion, tmp_path):
     for name, output in motion.mechanism.outputs.items():
         assert type(again.outputs[name]) is type(output)
         assert (again.outputs[name].alone, again.outputs[name].unit) == (output.alone, output.unit)
+
+
+def test_inspection_tells_of_what_they_are(path, run):
+    status, told, _ = run("inspect", path, "--json")
+    assert status == 0
+    found = {row["name"]: (row["quantity"], row["unit"], row["of"]) for row in json.loads(told)["outputs"]}
+    assert found["T"] == ("kinetic_energy", "J", ["mechanism"])
+    assert found["E2"] == ("acceleration_energy", "J/s^4", ["cart"])
+
+
+@pytest.mark.slow
+def test_a_simulation_has_them_too(tmp_path):
+    path = tmp_path / "falling.yaml"
+    text = re.sub(r"drivers:.*?outputs:", "outputs:", FILE, flags=re.DOTALL)
+    path.write_text(text.replace("order: 2}", "order: 1}"))
+    motion = jn.simulate(jn.load(path), order=1)
+    found = motion.outputs
+    assert np.abs(found["T"][:, 1] + found["V"][:, 1]).max() <= 1e-12 * np.abs(found["T"][:, 1]).max()
 
 
 def test_the_json_schema_has_them(path):

@@ -189,6 +189,9 @@ def test_the_walk_meets_every_key_of_the_schema():
         "samples",
         "expression",
         "degree",
+        "derivative",
+        "mechanism",
+        "order",
         "value",
         "beyond",
     }
