@@ -2,6 +2,7 @@
 
 import os
 import pathlib
+import shutil
 import signal
 
 import hypothesis
@@ -9,6 +10,7 @@ import jax
 import pytest
 
 from jounce.cli import main
+from jounce.cli.compiled_programs import keep_programs
 from jounce.constraints import base  # importing jounce switches on double precision
 
 # most of the time of the tests goes into compiling; without XLA's last optimisations it takes a fifth less, and the
@@ -22,7 +24,19 @@ for _name in ("SIGINT", "SIGHUP"):  # ignored in what runs in the background; th
     _number = getattr(signal, _name, None)
     if _number is not None and signal.getsignal(_number) is signal.SIG_IGN:
         signal.signal(_number, signal.default_int_handler if _name == "SIGINT" else signal.SIG_DFL)
+LARGEST_STORE = 2**30  # bytes of compiled programs that are kept between runs
 MEMORY_MAPS = 65530  # of a process, unless the system is set up otherwise
+
+
+def pytest_configure(config):
+    """Keep compiled programs for the other worker and the next run, in files that cannot be read half written."""
+    if config.cache is None or "JAX_COMPILATION_CACHE_DIR" in os.environ:
+        return
+    folder = pathlib.Path(config.cache.mkdir("programs"))
+    if not hasattr(config, "workerinput") and sum(file.stat().st_size for file in folder.iterdir()) > LARGEST_STORE:
+        shutil.rmtree(folder)
+        folder.mkdir()
+    keep_programs(folder)
 
 
 @pytest.fixture(autouse=True, scope="module")

@@ -12,7 +12,7 @@ from typing import Any
 from jounce.errors import OutputError
 from jounce.io.files.writing import replacing
 
-__all__ = ["cache_directory", "use_compilation_cache"]
+__all__ = ["cache_directory", "keep_programs", "use_compilation_cache"]
 
 
 def cache_directory() -> Path | None:
@@ -67,8 +67,9 @@ class CheckedEntries:
         return self._path / f"{key}.program"
 
 
-def _keep_checked() -> None:
+def keep_programs(directory: Path) -> None:
     """Have JAX keep its programs in checked files; a release of JAX that works otherwise keeps them in its own."""
+    import jax
     from jax._src import compilation_cache
 
     def file_cache(path: str) -> Any:
@@ -76,6 +77,10 @@ def _keep_checked() -> None:
 
     if hasattr(compilation_cache, "get_file_cache"):
         compilation_cache.get_file_cache = file_cache
+    jax.config.update("jax_compilation_cache_dir", str(directory))
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.05)
+    jax.config.update("jax_persistent_cache_min_entry_size_bytes", 0)
+    jax.config.update("jax_persistent_cache_enable_xla_caches", "none")  # those are for GPUs
 
 
 def use_compilation_cache() -> None:
@@ -95,9 +100,5 @@ def use_compilation_cache() -> None:
         return
     if not os.access(directory, os.W_OK | os.X_OK):
         return
-    _keep_checked()
-    jax.config.update("jax_compilation_cache_dir", str(directory))
-    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.05)
-    jax.config.update("jax_persistent_cache_min_entry_size_bytes", 0)
-    jax.config.update("jax_persistent_cache_enable_xla_caches", "none")  # those are for GPUs
+    keep_programs(directory)
     warnings.filterwarnings("ignore", message="Error (reading|writing) persistent compilation cache")
