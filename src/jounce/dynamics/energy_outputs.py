@@ -7,7 +7,7 @@ import numpy as np
 
 from jounce.constraints.base import Whole
 from jounce.dynamics.energies import energy_coefficients, potential_coefficients
-from jounce.errors import MechanismError, did_you_mean
+from jounce.errors import MechanismError, no_such
 from jounce.mechanism import AbstractMotionOutput, Mechanism
 
 
@@ -23,7 +23,7 @@ class AbstractEnergyOutput(AbstractMotionOutput):
         """Raise MechanismError unless the body exists and there are masses."""
         bodies = mechanism.bodies
         if self.body is not None and self.body not in bodies:
-            message = f"no moving body has this name; {did_you_mean(self.body, bodies)}"
+            message = no_such("moving body", self.body, bodies)
             raise MechanismError(message, name="body", value=self.body)
         if all(body.mass is None for name, body in bodies.items() if self.body in (None, name)):
             which = "no body has a mass" if self.body is None else "this body has no mass"
