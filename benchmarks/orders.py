@@ -25,7 +25,7 @@ def main() -> None:
     competitors = {
         name: lambda order=order: jn.solve(mechanism, time, order=order).outputs["psi"] for order, name in names.items()
     }
-    report(f"RSUR, {INSTANTS} instants, one core", race(competitors, rounds=9, best=True), INSTANTS, names[2])
+    report(f"RSUR, {INSTANTS} instants, one core", race(competitors, rounds=40, best=True), INSTANTS, names[2])
 
 
 if __name__ == "__main__":

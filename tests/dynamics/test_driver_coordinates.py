@@ -1,12 +1,21 @@
 """The forms of the equations of motion of a driven mechanism, in the coordinates of its drivers."""
 
+import dataclasses
 import functools
 
 import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.dynamics import gibbs_appell, higher_order, lagrange, mangeron_nielsen
+from jounce.dynamics import (
+    gibbs_appell,
+    gravity_forces,
+    higher_order,
+    lagrange,
+    mangeron_nielsen,
+    newton_euler,
+    virtual_work,
+)
 
 TIMES = np.array([0.1, 0.7])
 PIN = ("ground", "arm")
@@ -110,6 +119,24 @@ def test_a_loop_in_space_agrees_with_the_force_of_its_driver():
     scale = np.abs(force).max(axis=0)
     assert (np.abs(lagrange(motion)[..., 0] - force[:, :1]) <= 1e-11 * scale[:1]).all()
     assert (np.abs(higher_order(motion, k=2)[:, 0] - force[:, 1]) <= 1e-11 * scale[1]).all()
+
+
+def test_balances_of_a_closed_loop():
+    mechanism = dataclasses.replace(
+        four_bar(),
+        gravity=[0, -9.81],
+        forces={"spring": jn.forces.Spring(("ground", "rocker"), [0, 0], [0.1, 0], stiffness=50.0, length=0.1)},
+    )
+    heavy, light = jn.solve(mechanism, TIMES, order=4), jn.solve(four_bar(), TIMES, order=4)
+    inertia = jn.driver_force(light, "theta").values
+    scale = np.abs(jn.driver_force(heavy, "theta").values).max(axis=0)
+    for function in (newton_euler, virtual_work):
+        assert (np.abs(function(heavy, rates=2)[..., 0] - inertia) <= 1e-12 * scale).all()
+    weight = gravity_forces(heavy, rates=2)[..., 0]
+    power = jn.potential_energy(heavy)[:, 1]  # gravity takes what the driver gives to lift
+    np.testing.assert_allclose(weight[:, 0] * 3 * np.cos(3 * TIMES), power, rtol=0, atol=1e-12)
+    with pytest.raises(jn.MechanismError, match="order 5"):
+        newton_euler(heavy, rates=3)
 
 
 def test_what_is_refused():

@@ -162,6 +162,40 @@ def off(found, right):
     return np.abs(found - right).max() / np.abs(right).max()
 
 
+def test_equation_130_by_slopes_of_energies():
+    robot, q, right = case(tree)
+    first = jn.energy_slope(robot, q, m=3, order=2) + jn.energy_slope(robot, q, m=1, order=1) / 2
+    agree(first, right[:, 1:2])
+
+
+@pytest.mark.slow
+def test_equation_131_by_slopes_of_energies():
+    robot, q, right = case(tree)
+    third, second, zeroth = (jn.energy_slope(robot, q, m=m, order=p) for p, m in ((3, 4), (2, 2), (1, 0)))
+    agree(third + 2 / 3 * second + zeroth, right[:, 2:3], 1e-12)  # a third is printed
+
+
+def test_slopes_of_energies_against_differences_in_fifty_digits():
+    robot = random_robot(5, 2, tree=False, prismatic=0.0, fixed=0.0)
+    q = np.random.default_rng(2).uniform(-1, 1, (6, 2))
+    with mp.workdps(50):
+        made, rows = in_digits(robot, q)
+        for p, n, m in ((0, 1, 1), (1, 1, 2), (2, 0, 5)):
+            right = negrean_dynamics.slope(made, rows, p, n, m)
+            found = jn.energy_slope(robot, q, m=m, order=p, rate=n)
+            np.testing.assert_allclose(found[0], right, rtol=0, atol=1e-13 * max(1.0, np.abs(right).max()))
+
+
+def test_rates_of_slopes_follow_each_other():
+    robot, q, _ = case(tree)
+    slopes, step = jn.energy_slope(robot, q, m=1, order=0, rates=2), 1e-3
+    count = q.shape[1]
+    later = [sum(q[:, k + j] * step**j / math.factorial(j) for j in range(count - k)) for k in range(count)]
+    moved = jn.energy_slope(robot, np.stack(later, axis=1), m=1, order=0, rates=2)
+    series = slopes[:, 0] + step * slopes[:, 1] + step**2 / 2 * slopes[:, 2]
+    assert np.abs(moved[:, 0] - series).max() <= 1e3 * step**3 * np.abs(slopes).max()
+
+
 @SEEDS
 def test_equation_130_first_rate_by_energies_of_two_orders(seed):
     with mp.workdps(50):

@@ -191,6 +191,7 @@ def test_angles_without_a_value_are_refused_afterwards_too(turning):
     np.testing.assert_allclose(fixed, [derivatives("alpha", t)[:2] for t in turning.time], rtol=0, atol=1e-11)
 
 
+@pytest.mark.slow  # to compile
 def test_simulated_angles_are_continuous_over_turns():
     """A rotor that flies freely, spun about an axis of symmetry, looked at twice in many turns."""
     mechanism = jn.Mechanism(
@@ -209,6 +210,27 @@ def test_simulated_angles_are_continuous_over_turns():
         jn.Event(jn.EulerAnglesOutput("rotor", "ZYX"))
     fixed = motion.evaluate(jn.EulerAnglesOutput("rotor", "xyz"))
     np.testing.assert_allclose(fixed.sel(derivative=0, euler_angle="gamma"), [0.2, 22.2, 55.2], rtol=0, atol=1e-9)
+
+
+@pytest.mark.slow  # to compile
+def test_simulated_angles_without_a_value_are_told():
+    """A rotor that turns about z only has no angles of the sequence ZXZ; of a batch the other numbers stay."""
+    outputs = {"turn": jn.EulerAnglesOutput("rotor", "ZXZ"), "p": jn.EulerParametersOutput("rotor")}
+    mechanism = jn.Mechanism(
+        space="spatial",
+        parameters={"speed": 11.0, "tilt": 0.0},
+        bodies={"rotor": jn.Body([0, 0, 0], orientation=[1, "tilt", 0, 0], mass=1.0, inertia=[1.0, 1.0, 2.0])},
+        joints={},
+        initial={"spin": jn.drivers.RotationDriver(("ground", "rotor"), [0, 0, 1.0], motion="0.2 + speed*t")},
+        outputs=outputs,
+    )
+    with pytest.raises(jn.SolveError, match="output turn") as caught:
+        jn.simulate(mechanism, [0.0, 2.0], order=1)
+    assert (caught.value.motion.status == jn.Status.UNDEFINED).all()
+    batch = jn.simulate_batch(mechanism, {"tilt": [0.0, 0.1]}, [0.0, 0.1], order=1)
+    assert (batch.status[0] == jn.Status.UNDEFINED).all()
+    assert (batch.status[1] == jn.Status.OK).all()
+    assert np.isfinite(batch.outputs["turn"][1]).all()
 
 
 FILE = """\

@@ -15,7 +15,7 @@ __all__ = ["expecting", "kind_of"]
 
 ADVICE = {
     "mechanism": "is a mechanism; run, simulate, plot, report, view and inspect take mechanisms",
-    "robot": "is a robot; check, inspect and view take robots, and this makes it a mechanism: "
+    "robot": "is a robot; check, torques, inspect and view take robots, and this makes it a mechanism: "
     "jounce convert {path} {stem}.yaml --hold",
     "trajectory": "is a trajectory, which goes with its robot; jounce check ROBOT {path}, or jounce view ROBOT {path}",
     "limits": "holds limits, which go with robot and trajectory; jounce check ROBOT TRAJECTORY --limits {path}",
@@ -55,13 +55,13 @@ def _kind_of_data(data: Any) -> str | None:
         return None
     if "bodies" in data or "space" in data:
         return "mechanism"
-    if "point_to_point" in data:
+    if "point_to_point" in data or "motion" in data:
         return "trajectory"
     joints = data.get("joints")
     rows = list(joints.values()) if isinstance(joints, dict) else []
     if rows and all(isinstance(row, dict) and row.keys() <= {*KEYS} for row in rows):
         return "limits"
-    if rows and all(isinstance(row, str | int | float) for row in rows):
+    if rows and all(isinstance(row, str | int | float) or "samples" in row for row in rows):
         return "trajectory"
     return None
 

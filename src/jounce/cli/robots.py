@@ -76,7 +76,7 @@ def check(
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", SampleWarning)
         with expecting(trajectory, "trajectory"):
-            motion = load_trajectory(trajectory, degree)
+            motion = load_trajectory(trajectory, degree, allowed(allow))
         try:
             spared(out, overwrite)
             report = check_limits(model, motion, laid)
@@ -167,7 +167,7 @@ def torques(
 
         model = with_payloads(model, payload)
     with expecting(trajectory, "trajectory"):
-        motion = load_trajectory(trajectory, degree)
+        motion = load_trajectory(trajectory, degree, allowed(allow))
     spared(out, overwrite)
     try:
         found = trajectory_torques(model, motion, rates, drives=not no_drives)

@@ -4,8 +4,10 @@ from typing import Any
 
 import jax.numpy as jnp
 
+from jounce.dynamics.driver_coordinates import balanced
 from jounce.dynamics.energies import whole_number
 from jounce.dynamics.equations import checked_order
+from jounce.kinematics import Motion
 from jounce.robot.batches import Batched
 from jounce.robot.equations_of_motion import centers_of, partial_velocities, times_inertia, work, work_of_weight
 from jounce.robot.inverse_dynamics import inverse_dynamics
@@ -22,27 +24,31 @@ def _virtual_work(tree: Tree, arrays: Any, _: Any, inertial: bool) -> Any:
     if not inertial:
         return to_coordinates(tree, work_of_weight(tree, frames))
     force = centers_of(tree, frames).differentiate().differentiate() * jnp.asarray(tree.mass)[:, None]
-    moment = times_inertia(tree, frames, frames.angular_velocity).differentiate()
+    spin = frames.angular_velocity
+    assert spin is not None  # there are accelerations
+    moment = times_inertia(tree, frames, spin).differentiate()
     return to_coordinates(tree, work(partial_velocities(tree, frames), force, moment))
 
 
-def newton_euler(robot: Robot, q: Any, rates: int = 0) -> Any:
+def newton_euler(system: Robot | Motion, q: Any = None, rates: int = 0) -> Any:
     """Return the generalised inertia forces by recursive Newton-Euler on jets: `inverse_dynamics` without gravity.
+
+    For the motion of a mechanism the balances of momentum are those of all bodies together, by multipliers.
 
     Parameters
     ----------
-    robot, q, rates
+    system, q, rates
         As for `lagrange`.
 
     Returns
     -------
     array of shape (..., rates + 1, n)
-        Forces and their rates, N m or N by s.
+        Forces and their rates, N m or N by s; for a motion as of `lagrange`.
 
     Raises
     ------
-    RobotError
-        If q does not fit the robot or has too few derivatives.
+    RobotError, MechanismError
+        If q does not fit the robot or has too few derivatives, or the motion is not that of a driven mechanism.
 
     Examples
     --------
@@ -51,29 +57,32 @@ def newton_euler(robot: Robot, q: Any, rates: int = 0) -> Any:
     >>> newton_euler(jn.robot.from_screws([slide]), [[0.0], [3.0], [5.0], [7.0]], rates=1).round(12).tolist()
     [[10.0], [14.0]]
     """
-    q = checked_order(robot, q, whole_number("rates", rates, 0) + 2)
-    return inverse_dynamics(robot.with_gravity((0.0, 0.0, 0.0)), q)
+    rates = whole_number("rates", rates, 0)
+    if isinstance(system, Motion):
+        return balanced(system, rates, gravity=False)
+    return inverse_dynamics(system.with_gravity((0.0, 0.0, 0.0)), checked_order(system, q, rates + 2))
 
 
-def virtual_work(robot: Robot, q: Any, rates: int = 0) -> Any:
+def virtual_work(system: Robot | Motion, q: Any = None, rates: int = 0) -> Any:
     """Return the generalised inertia forces by the principle of d'Alembert-Lagrange: Negrean 2025, equations 121-124.
 
-    The work that the inertia forces and moments of all bodies do along each coordinate, ``sum J^T F``.
+    The work that inertia forces and moments of all bodies do along each coordinate, ``sum J^T F``. For the motion of
+    a mechanism, J is how the bodies move with the laws of the drivers: the transposed Jacobian of the constraints.
 
     Parameters
     ----------
-    robot, q, rates
+    system, q, rates
         As for `lagrange`.
 
     Returns
     -------
     array of shape (..., rates + 1, n)
-        Forces and their rates, N m or N by s.
+        Forces and their rates, N m or N by s; for a motion as of `lagrange`.
 
     Raises
     ------
-    RobotError
-        If q does not fit the robot or has too few derivatives.
+    RobotError, MechanismError
+        If q does not fit the robot or has too few derivatives, or the motion is not that of a driven mechanism.
 
     Examples
     --------
@@ -82,29 +91,31 @@ def virtual_work(robot: Robot, q: Any, rates: int = 0) -> Any:
     >>> virtual_work(jn.robot.from_screws([slide]), [[0.0], [3.0], [5.0], [7.0]], rates=1).round(12).tolist()
     [[10.0], [14.0]]
     """
-    q = checked_order(robot, q, whole_number("rates", rates, 0) + 2)
-    return _virtual_work(robot, (q,), (), (True,))
+    rates = whole_number("rates", rates, 0)
+    if isinstance(system, Motion):
+        return balanced(system, rates, gravity=False)
+    return _virtual_work(system, (checked_order(system, q, rates + 2),), (), (True,))
 
 
-def gravity_forces(robot: Robot, q: Any, rates: int = 0) -> Any:
+def gravity_forces(system: Robot | Motion, q: Any = None, rates: int = 0) -> Any:
     """Return the generalised forces that hold the robot against gravity, and their rates: Q_g of Negrean 2025, 125.
 
     With the inertia forces they make the driving forces, ``Q_m = Q_i + Q_g``.
 
     Parameters
     ----------
-    robot, q, rates
+    system, q, rates
         As for `lagrange`, with K at least `rates`.
 
     Returns
     -------
     array of shape (..., rates + 1, n)
-        Forces and their rates, N m or N by s.
+        Forces and their rates, N m or N by s; for a motion as of `lagrange`.
 
     Raises
     ------
-    RobotError
-        If q does not fit the robot or has too few derivatives.
+    RobotError, MechanismError
+        If q does not fit the robot or has too few derivatives, or the motion is not that of a driven mechanism.
 
     Examples
     --------
@@ -113,5 +124,7 @@ def gravity_forces(robot: Robot, q: Any, rates: int = 0) -> Any:
     >>> gravity_forces(jn.robot.from_screws([lift]), [[0.0]]).tolist()
     [[19.62]]
     """
-    q = checked_order(robot, q, whole_number("rates", rates, 0))
-    return _virtual_work(robot, (q,), (), (False,))
+    rates = whole_number("rates", rates, 0)
+    if isinstance(system, Motion):
+        return balanced(system, rates, gravity=True) - balanced(system, rates, gravity=False)
+    return _virtual_work(system, (checked_order(system, q, rates),), (), (False,))

@@ -86,7 +86,7 @@ def constraint_equations(
     --------
     >>> import jounce as jn
     >>> equations = jn.constraint_equations(jn.solve(jn.load("examples/four_bar.yaml"), [0.0, 0.5], order=4))
-    >>> list(equations.row.values), list(equations.column.values)[:3]
+    >>> equations.row.values.tolist(), equations.column.values.tolist()[:3]
     (['A.1', 'A.2', 'D.1', 'D.2', 'BC.1', 'theta.1'], ['crank.x', 'crank.y', 'crank.angle'])
     >>> along = equations.jacobian.dot(equations.velocities, dim="column")  # Phi_q q^(k), at every instant and order
     >>> bool((abs(along - equations.right_side) < 1e-10).all())
@@ -205,7 +205,7 @@ def _numbers(motion: Motion, order: int) -> dict[str, np.ndarray]:
     return {
         "residual": residual[chosen].T,
         "jacobian": np.moveaxis(jacobian[chosen], -1, 0),
-        "right_side": np.moveaxis(right_side[:, chosen], -1, 0),
+        "right_side": np.moveaxis(right_side[:, chosen], -1, 0) + 0.0,  # no zero is negative
     }
 
 
@@ -285,7 +285,8 @@ def _forces(motion: Motion, jacobian: np.ndarray) -> dict[str, Any]:
         return found
     _, coordinates = motion.poses
     levels = min(len(coordinates["position"]) - 2, motion.order + 1)
-    if levels < 1 or not _determined(motion, jacobian):
+    mass = found["mass_matrix"][1] if found else np.zeros((1, _columns(motion), _columns(motion)))
+    if levels < 1 or not jacobian.size or (isinstance(motion, State) and not _determined(motion, jacobian[0], mass[0])):
         return found
     coefficients = MotionForces.of(motion).multipliers[:levels][:, _row_order(motion)]
     factorials = np.array([math.factorial(k) for k in range(levels)], float)
@@ -293,13 +294,16 @@ def _forces(motion: Motion, jacobian: np.ndarray) -> dict[str, Any]:
     return found | {"multipliers": (("time", "derivative", "row"), values, 0)}
 
 
-def _determined(motion: Motion, jacobian: np.ndarray) -> bool:
-    """Tell whether the rows are independent; those of a motion are, a state may be anything."""
-    if not isinstance(motion, State) or not jacobian.size:
-        return bool(jacobian.size)
-    scaled = jacobian[0] * np.tile(motion.model.system.column_scale, len(motion.mechanism.bodies))
-    sizes = np.max(np.abs(scaled), axis=1, keepdims=True)
-    return split(scaled / np.where(sizes > 0, sizes, 1.0))[1] == len(scaled)
+def _determined(motion: Motion, jacobian: np.ndarray, mass: np.ndarray) -> bool:
+    """Tell whether the multipliers are determined at a state: those of a motion are, a state may be anything."""
+    scale = np.tile(motion.model.system.column_scale, len(motion.mechanism.bodies))
+    sizes = np.max(np.abs(jacobian * scale), axis=1, keepdims=True)
+    whole = jacobian * scale / np.where(sizes > 0, sizes, 1.0)
+    if len(whole) != whole.shape[1]:
+        mass = mass * scale[:, None] * scale
+        mass = mass / (np.max(np.abs(mass)) or 1.0)
+        whole = np.block([[mass, whole.T], [whole, np.zeros((len(whole), len(whole)))]])
+    return split(whole)[1] == len(whole)
 
 
 def _mass_matrix(motion: Motion) -> np.ndarray:

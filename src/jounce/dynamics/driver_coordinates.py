@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jounce.dynamics.energies import body_energy, mechanism_masses
-from jounce.dynamics.inverse import in_chunks, places
+from jounce.dynamics.inverse import MotionForces, in_chunks, places
 from jounce.errors import MechanismError
 from jounce.jet import Jet
 from jounce.jet.algebra import total
@@ -64,11 +64,7 @@ def of_drivers(motion: Motion, q: Any, least: int, form: Callable[..., Any], sta
     """
     if q is not None:
         raise MechanismError("a motion has its coordinates already, the laws of its drivers", name="q", value=q)
-    model, names = motion.model, tuple(motion.mechanism.drivers)
-    rows, columns = model.system.cells.shape if model.system.groups else (0, 1)
-    if rows != columns or not names:
-        message = "the coordinates here are the laws of the drivers, and they do not prescribe all that can move"
-        raise MechanismError(message, name="drivers", value=list(names))
+    model, names = motion.model, drivers_of(motion)
     found = places(model)
     order = tuple((found[name].group, found[name].instance) for name in names)
     pose_type, coordinates = motion.poses
@@ -81,6 +77,54 @@ def of_drivers(motion: Motion, q: Any, least: int, form: Callable[..., Any], sta
 
     values = np.moveaxis(in_chunks(chunk, len(motion.time)), -1, 0)
     values = values * np.array([float(math.factorial(k)) for k in range(values.shape[1])])[:, None]
+    return _labelled(motion, np.where((motion.status == Status.OK)[:, None, None], values, np.nan), names)
+
+
+def drivers_of(motion: Motion) -> tuple[str, ...]:
+    """Return the names of the drivers of a motion.
+
+    Raises
+    ------
+    MechanismError
+        If something moves that no driver prescribes.
+    """
+    system, names = motion.model.system, tuple(motion.mechanism.drivers)
+    rows, columns = system.cells.shape if system.groups else (0, 1)
+    if rows != columns or not names:
+        message = "the coordinates here are the laws of the drivers, and they do not prescribe all that can move"
+        raise MechanismError(message, name="drivers", value=list(names))
+    return names
+
+
+def balanced(motion: Motion, rates: int, *, gravity: bool) -> Any:
+    """Return what inertia asks of the drivers, and on request weight too, by multipliers: nothing applied acts.
+
+    Parameters
+    ----------
+    motion : Motion
+        Of a mechanism whose bodies have masses.
+    rates : int
+        How many rates are wanted.
+    gravity : bool
+        Whether the bodies have weight.
+
+    Returns
+    -------
+    xarray.DataArray
+        Dimensions time, derivative and driver; NaN at instants that were not solved.
+
+    Raises
+    ------
+    MechanismError
+        If no body has a mass, the motion has too few derivatives, or something moves that no driver prescribes.
+    """
+    names = drivers_of(motion)
+    mechanism_masses(motion)
+    if motion.order < rates + 2:
+        raise MechanismError(f"this needs a motion solved to order {rates + 2}", name="order", value=motion.order)
+    forces = MotionForces(motion, gravity=gravity, applied=False)
+    values = np.stack([forces.driver_force(name)[: rates + 1, 0] for name in names], axis=-1)  # level, time, driver
+    values = np.moveaxis(values, 0, 1) * np.array([float(math.factorial(k)) for k in range(rates + 1)])[:, None]
     return _labelled(motion, np.where((motion.status == Status.OK)[:, None, None], values, np.nan), names)
 
 
@@ -103,13 +147,14 @@ def _evaluated(
     form: Callable[..., Any],
     static: tuple[Any, ...],
 ) -> Any:
+    mass, center, moments = masses
     place = pose_type.from_coordinates({name: Jet(tuple(c)) for name, c in still.items()})
     factor = DenseFactor.of(system.jacobian(place, Jet([instants[None]])))
 
     def energies(changes: Any, p: int) -> Jet:
         time = Jet.variable(instants[None], changes.shape[0] - 1)
         pose = followed(with_changes(system, order, changes), place, factor, time)
-        parts = body_energy(pose, *masses, p)
+        parts = body_energy(pose, mass, center, moments, p)
         return total(part.map(lambda c: jnp.sum(c, axis=0)) for part in parts)
 
     return form(energies, jnp.zeros((least + 1, len(order), len(instants))), *static)

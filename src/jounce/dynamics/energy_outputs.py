@@ -17,24 +17,28 @@ class AbstractEnergyOutput(AbstractMotionOutput):
     unit = "J"
     rate_names = ("energy", "first rate", "second rate", "third rate", "fourth rate")
     source: ClassVar[str] = "mechanism"  # the key of a file that says what it is of
-    body: ClassVar[str | None] = None  # the body alone whose energy it is
+
+    @property
+    def alone(self) -> str | None:
+        """The body alone whose energy it is; None for all of them."""
+        return getattr(self, "body", None)
 
     def check(self, mechanism: Mechanism) -> None:
         """Raise MechanismError unless the body exists and there are masses."""
-        bodies = mechanism.bodies
-        if self.body is not None and self.body not in bodies:
-            message = no_such("moving body", self.body, bodies)
-            raise MechanismError(message, name="body", value=self.body)
-        if all(body.mass is None for name, body in bodies.items() if self.body in (None, name)):
-            which = "no body has a mass" if self.body is None else "this body has no mass"
-            raise MechanismError(f"{which}, and an energy needs one", name=self.source, value=self.body)
+        bodies, alone = mechanism.bodies, self.alone
+        if alone is not None and alone not in bodies:
+            message = no_such("moving body", alone, bodies)
+            raise MechanismError(message, name="body", value=alone)
+        if all(body.mass is None for name, body in bodies.items() if alone in (None, name)):
+            which = "no body has a mass" if alone is None else "this body has no mass"
+            raise MechanismError(f"{which}, and an energy needs one", name=self.source, value=alone)
 
     def coefficients(self, motion: Any) -> np.ndarray:
         """Return the Taylor coefficients of the energy, (levels, 1, time)."""
         parts = self._of_bodies(motion)
-        if self.body is None:
+        if self.alone is None:
             return parts.sum(axis=1, keepdims=True)
-        index = 1 + list(motion.mechanism.bodies).index(self.body)  # the ground first
+        index = 1 + list(motion.mechanism.bodies).index(self.alone)  # the ground first
         return parts[:, index : index + 1]
 
     def _of_bodies(self, motion: Any) -> np.ndarray:
@@ -61,7 +65,7 @@ class AccelerationEnergyOutput(AbstractEnergyOutput):
             raise MechanismError("must be a whole number, 0 or greater", name="order", value=self.order)
 
     @property
-    def lost_orders(self) -> int:
+    def lost_orders(self) -> int:  # type: ignore[override] - of an instance, as it depends on the order
         """Derivatives by which it is shorter than the motion."""
         return int(self.order) + 1
 

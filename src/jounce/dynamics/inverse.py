@@ -73,6 +73,8 @@ class MotionForces:
     ----------
     motion : Motion
         Of a mechanism with masses or applied forces.
+    gravity, applied : bool, default True
+        Whether the bodies have weight, and whether the applied forces act.
 
     Raises
     ------
@@ -80,7 +82,7 @@ class MotionForces:
         If nothing has a mass and no force is applied, the motion has no accelerations, or the masses are not valid.
     """
 
-    def __init__(self, motion: Motion):
+    def __init__(self, motion: Motion, *, gravity: bool = True, applied: bool = True):
         check_loads(motion.mechanism)
         self.motion, self.model = motion, motion.model
         self.pose_type, self.coordinates = motion.poses
@@ -89,7 +91,8 @@ class MotionForces:
             raise MechanismError("forces need a motion solved to order 2 or higher", name="order", value=motion.order)
         mechanism = motion.mechanism
         self.masses = masses_of(mechanism)
-        self.gravity = gravity_of(mechanism)
+        self.gravity = gravity_of(mechanism) * float(gravity)
+        self.forces = motion.forces if applied else ()
         self.places = places(self.model)
         self._exerted: dict[int, np.ndarray] = {}
         self._applied: dict[int, np.ndarray] = {}
@@ -115,7 +118,7 @@ class MotionForces:
                 for index, group in enumerate(system.groups)
             ]
             bodies, instants = self.taken(None, lanes, self.levels + 2), self.motion.time[lanes]
-            forces = dataclasses.replace(unjoined, forces=at_lanes(self.motion.forces, lanes))
+            forces = dataclasses.replace(unjoined, forces=at_lanes(self.forces, lanes))
             load, finite = _loads(forces, bodies, instants, self.masses, self.gravity, self.pose_type)
             self._check_finite(np.asarray(finite), lanes)
             still = None if square else self.taken(None, lanes, 1)

@@ -103,9 +103,12 @@ class Simulation(Motion):
         status = np.where(reached, int(Status.OK), int(Status.NOT_REACHED))
         culprits = {}
         lost = reached & ~np.all([np.isfinite(p).all(axis=tuple(range(p.ndim - 1))) for p in state], axis=0)
-        undefined = _undefined(groups, order) & reached & ~lost
-        if undefined.any():
-            status[undefined] = int(Status.UNDEFINED)
+        for names, series in zip(start.model.outputs, groups, strict=True):
+            bad = ~np.isfinite(series[: order + 1]).all(axis=(0, 1)) & reached & ~lost  # (outputs, time)
+            status[bad.any(axis=0)] = int(Status.UNDEFINED)
+            culprits |= {
+                int(lane): f"output {names[int(np.argmax(bad[:, lane]))]}" for lane in np.flatnonzero(bad.any(0))
+            }
         if lost.any():  # the state is known there, but not its derivatives
             status[lost], culprits[int(np.argmax(lost))] = int(Status.INADMISSIBLE), ending[1]
         beyond = np.flatnonzero(~reached & (np.abs(instants - track.start[0]) > abs(track.end - track.start[0])))
@@ -214,12 +217,6 @@ class Simulation(Motion):
         equations = self._start.equations.near(self._angles)
         found = np.asarray(_checks(equations, low, self.time[None], pose_type)[which])
         return np.where(self.status == Status.OK, found, np.nan)
-
-
-def _undefined(groups: tuple[np.ndarray, ...], order: int) -> np.ndarray:
-    """Return at which instants an output, or a derivative of it, is not a finite number, (time,)."""
-    bad = [~np.isfinite(series[: order + 1]).all(axis=(0, 1, 2)) for series in groups]
-    return np.any(bad, axis=0) if bad else np.zeros(1, bool)
 
 
 def _steps_of(track: Track, instants: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -12,6 +12,7 @@ from jounce.rigid.orientation import euler_angles
 from jounce.rigid.rotations import check_sequence
 
 LETTERS = ("x", "y", "z")
+RATES = ("value", "rate", "second rate", "third rate", "fourth rate")
 ENTRIES = tuple(row + column for row in LETTERS for column in LETTERS)
 
 
@@ -25,6 +26,7 @@ class EulerParametersOutput(AbstractOutput):
     space = "spatial"
     labels = ("e0", "e1", "e2", "e3")
     axes = (("euler_parameter", labels),)
+    rate_names = RATES
 
     def evaluate(self, *bodies):
         *base, body = bodies
@@ -47,6 +49,7 @@ class RotationMatrixOutput(AbstractOutput):
     space = "spatial"
     labels = ENTRIES
     axes = (("row_axis", LETTERS), ("column_axis", LETTERS))
+    rate_names = RATES
 
     def evaluate(self, *bodies):
         return stack([entry for row in _matrix(bodies) for entry in row])

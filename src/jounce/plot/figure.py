@@ -120,7 +120,12 @@ def _draw_column(motion: Any, name: str, panels: Any, first: int) -> None:
     top.set_title(shown_name(name), loc="left", pad=6)
     if vector:
         lines = panels[-1].get_lines()[: values.shape[2]]
-        top.legend(handles=lines, ncols=len(lines), loc="lower right", bbox_to_anchor=(1.0, 1.0), **LEGEND)
+        beside = len(lines) > len(COLOURS)  # too many for a line above
+        place = {
+            "loc": "upper left" if beside else "lower right",
+            "ncols": -(-len(lines) // 4) if beside else len(lines),
+        }
+        top.legend(handles=lines, bbox_to_anchor=(1.0, 1.0), **place, **LEGEND)
     panels[-1].set_xlabel("time  $t$  (s)")
     panels[-1].tick_params(labelbottom=True)
 

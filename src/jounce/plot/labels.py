@@ -27,6 +27,7 @@ def symbol(name: str, order: int = 0, component: str = "") -> str:
     >>> symbol("psi", 2), symbol("C", component="x"), symbol("psi_1", 5), symbol("piston")
     ('$\\ddot{\\psi}$', '$C_{x}$', '$\\psi_{1}^{(5)}$', '')
     """
+    component = f"\\{component}" if component in GREEK else component
     match = re.fullmatch(r"([A-Za-z]+)_?([0-9A-Za-z]{0,2})", name)
     letter, index = match.groups() if match else ("", "")
     if match and letter in GREEK:

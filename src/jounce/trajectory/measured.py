@@ -93,7 +93,7 @@ class MeasuredMotion(SplineMotion):
 def integrated(pieces: np.ndarray, lengths: np.ndarray, initial: float) -> np.ndarray:
     """Return the integral of piecewise polynomials, as local Taylor coefficients, from a value at the beginning."""
     raised = pieces / np.arange(1, len(pieces) + 1)[:, None]
-    gains = sum(c * lengths ** (k + 1) for k, c in enumerate(raised))
+    gains = (raised * lengths ** np.arange(1, len(raised) + 1)[:, None]).sum(axis=0)
     values = [math.fsum([initial, *gains[:k]]) for k in range(len(gains))]
     return np.concatenate([[values], raised])
 

@@ -94,7 +94,7 @@ def test_files_written_and_read(path, motion, tmp_path):
     again = jn.load(tmp_path / "again.yaml")
     for name, output in motion.mechanism.outputs.items():
         assert type(again.outputs[name]) is type(output)
-        assert (again.outputs[name].body, again.outputs[name].unit) == (output.body, output.unit)
+        assert (again.outputs[name].alone, again.outputs[name].unit) == (output.alone, output.unit)
 
 
 def test_the_json_schema_has_them(path):

@@ -245,18 +245,18 @@ def _initial(raw: Any, order: int, quantity: str, info: Any) -> float:
     if not isinstance(value.value, float | int):
         raise problem("must be a number, with or without a unit", "initial", order, value=raw)
     if order and value.dimension:
-        wanted = [tuple(sorted(((base, 1), ("time", -order)))) for base in _bases(quantity, info)]
-        if value.dimension not in wanted:
-            message = f"must be {' or '.join(_bases(quantity, info))} per s{f'^{order}' if order > 1 else ''}"
-            raise problem(message, "initial", order, value=raw)
+        bases = _bases(quantity, info)
+        if value.dimension not in [tuple(sorted(((base, 1), ("time", -order)))) for base in bases]:
+            rate = f" per s{f'^{order}' if order > 1 else ''}"
+            raise problem(f"must be {' or '.join(bases) or 'a number'}{rate}", "initial", order, value=raw)
     return float(value.value)
 
 
 def _bases(quantity: str, info: Any) -> list[str]:
-    """Return the dimensions that a driven quantity may have."""
+    """Return the dimensions that a driven quantity may have; none of what is no coordinate, such as a force."""
     if quantity == "of coordinate":
         return ["angle" if info.data.get("coordinate") == "angle" else "length"]
-    return [quantity] if quantity in ("length", "angle") else ["length", "angle"]
+    return [quantity] if quantity in ("length", "angle") else ["angle", "length"] if quantity == "any" else []
 
 
 def laws(size: int, quantity: str, variables: dict[str, Dimension | None]) -> Any:

@@ -23,7 +23,9 @@ __all__ = ["load_trajectory"]
 _DERIVATIVE = re.compile(r"(.+)_d[0-9]+")
 
 
-def load_trajectory(path: str | PathLike[str], degree: int = 5) -> JointTrajectory:
+def load_trajectory(
+    path: str | PathLike[str], degree: int = 5, allow: Iterable[str | PathLike[str]] = ()
+) -> JointTrajectory:
     """Read the trajectory of a robot from a CSV file of samples, or from a file of laws.
 
     A CSV file has a row of names, ``time, JOINT, JOINT, ...``, and below it numbers in s, m and rad; splines go through
@@ -43,6 +45,8 @@ def load_trajectory(path: str | PathLike[str], degree: int = 5) -> JointTrajecto
         A file ending in .csv, .yaml, .yml, .toml or .json.
     degree : int, default 5
         Degree of the splines through samples, odd from 3 to 11.
+    allow
+        Folders besides its own that files named in it may be below.
 
     Returns
     -------
@@ -70,7 +74,7 @@ def load_trajectory(path: str | PathLike[str], degree: int = 5) -> JointTrajecto
     if suffix == ".csv":
         return _read_csv(name, degree)
     try:
-        source = read_source(name)
+        source = read_source(name, allow)
     except MechanismFileError as error:
         message = error.message.replace("mechanism file", "trajectory file")
         raise TrajectoryError(message, path=error.path, line=error.line, name=error.name, value=error.value) from None

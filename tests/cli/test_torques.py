@@ -5,11 +5,11 @@ import json
 
 import numpy as np
 import pytest
-from jounce.io.record_schema import record_schema
 from jsonschema import Draft202012Validator
-from tests.test_cli_check import PENDULUM
 
 from jounce import io
+from jounce.reporting.record_schema import record_schema
+from tests.cli.test_check import PENDULUM
 
 LAW = "joints: {pin: 0.5*sin(2*t)}\ntime: {start: 0, stop: 1, step: 0.1}\n"
 MASS, ARM, INERTIA, GRAVITY = 2.0, 0.5, 0.01 + 2.0 * 0.5**2, 9.81
