@@ -30,6 +30,7 @@ __all__ = [
     "UnitWarning",
     "UnsupportedError",
     "did_you_mean",
+    "no_such",
     "show_value",
 ]
 
@@ -97,6 +98,17 @@ def _represent(value: object, limit: int, depth: int = 3) -> str:
 def _printable(text: str) -> str:
     """Return a text with escapes for what no terminal should be given: it may come from anyone's file."""
     return text if text.isprintable() else "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
+def no_such(kind: str, name: object, known: Iterable[str]) -> str:
+    """Word that nothing of a kind has a name, and which names there are.
+
+    Examples
+    --------
+    >>> print(no_such("body", "rokcer", ["crank", "rocker"]))
+    no body has this name; did you mean 'rocker'? valid: crank, rocker
+    """
+    return f"no {kind} has this name; {did_you_mean(name, known)}"
 
 
 def did_you_mean(name: object, valid: Iterable[str], limit: int = 20) -> str:

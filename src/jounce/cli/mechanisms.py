@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from jounce.cli.arguments import named_once
 from jounce.cli.file_kinds import expecting
 from jounce.cli.writing import allowed, spared, written
-from jounce.errors import JounceError, SolveError
+from jounce.errors import JounceError, SolveError, no_such
 from jounce.reporting.summaries import motion_summary
 from jounce.reporting.terminal import Bar, say, say_json, show_peaks
 
@@ -169,13 +169,12 @@ def _finished(
 
 def _method(name: str, step: float | None) -> Any:
     """Return the integration method of a name."""
-    from jounce.errors import did_you_mean
     from jounce.integrate import Obreshkov, Taylor
 
     kinds: dict[str, Any] = {"taylor": lambda: Taylor(step=step)}
     kinds |= {f"obreshkov-{n}": (lambda n=n: Obreshkov(n, step)) for n in (4, 6, 8)}
     if name not in kinds:
-        raise JounceError(f"no method has this name; {did_you_mean(name, kinds)}", name="--method", value=name)
+        raise JounceError(no_such("method", name, kinds), name="--method", value=name)
     try:
         return kinds[name]()
     except JounceError as error:

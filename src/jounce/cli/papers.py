@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from jounce.errors import JounceError
+from jounce.errors import JounceError, no_such
 from jounce.reporting.summaries import count
 from jounce.reporting.terminal import Bar, say
 
@@ -29,9 +29,7 @@ def reproduce(paper: str, /, *, out: Path, samples: Path | None = None, masses: 
     import importlib
 
     if paper not in PAPERS:
-        from jounce.errors import did_you_mean
-
-        raise JounceError(f"no paper has this name; {did_you_mean(paper, PAPERS)}", value=paper)
+        raise JounceError(no_such("paper", paper, PAPERS), value=paper)
     given = {name: path for name, path in (("samples", samples), ("masses", masses)) if path is not None}
     if given and paper != "negrean-2025":
         message = f"{paper} needs no data of yours; negrean-2025 takes samples and masses"

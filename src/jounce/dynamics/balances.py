@@ -13,8 +13,8 @@ from jounce.robot.equations_of_motion import centers_of, partial_velocities, tim
 from jounce.robot.inverse_dynamics import inverse_dynamics
 from jounce.robot.kinematics import body_frames
 from jounce.robot.robot import Robot
-from jounce.robot.scan import to_coordinates
 from jounce.robot.tree import Tree
+from jounce.robot.tree_scan import to_coordinates
 
 
 @Batched

@@ -7,7 +7,7 @@ import numpy as np
 
 from jounce.constraints.base import Whole
 from jounce.dynamics.energies import energy_coefficients, potential_coefficients
-from jounce.errors import MechanismError, did_you_mean
+from jounce.errors import MechanismError, no_such
 from jounce.mechanism import AbstractMotionOutput, Mechanism
 
 
@@ -27,7 +27,7 @@ class AbstractEnergyOutput(AbstractMotionOutput):
         """Raise MechanismError unless the body exists and there are masses."""
         bodies, alone = mechanism.bodies, self.alone
         if alone is not None and alone not in bodies:
-            message = f"no moving body has this name; {did_you_mean(alone, bodies)}"
+            message = no_such("moving body", alone, bodies)
             raise MechanismError(message, name="body", value=alone)
         if all(body.mass is None for name, body in bodies.items() if alone in (None, name)):
             which = "no body has a mass" if alone is None else "this body has no mass"

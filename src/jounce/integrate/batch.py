@@ -12,9 +12,9 @@ import numpy as np
 from jounce.display import Displayed
 from jounce.dynamics.forward import Equations, State
 from jounce.dynamics.start import driven, start
-from jounce.errors import MechanismError, did_you_mean
+from jounce.errors import MechanismError, no_such
+from jounce.integrate.batch_equations import Family, Starts, Turns
 from jounce.integrate.events import output_series, pose_coordinates
-from jounce.integrate.family import Family, Starts, Turns
 from jounce.integrate.marching import Front, Outcome, Steps, departed, march
 from jounce.integrate.methods import AbstractMethod
 from jounce.integrate.simulate import checked, instants_of
@@ -142,7 +142,7 @@ def _checked_parameters(mechanism: Mechanism, parameters: Mapping[str, Any]) -> 
     values, count = {}, None
     for name, given in parameters.items():
         if name not in mechanism.parameters:
-            message = f"no parameter has this name; {did_you_mean(name, mechanism.parameters)}"
+            message = no_such("parameter", name, mechanism.parameters)
             raise MechanismError(message, name="parameters", value=name)
         try:
             array = np.asarray(given, float)

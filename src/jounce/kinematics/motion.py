@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from jounce.display import Displayed
-from jounce.errors import MechanismError, did_you_mean
+from jounce.errors import MechanismError, no_such
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked
 from jounce.kinematics.compilation import compiled
@@ -41,7 +41,7 @@ def check_output(output: Any, mechanism: Mechanism, name: str = "output") -> Non
     names = (GROUND, *mechanism.bodies)
     for body in output.bodies:
         if body not in names:
-            message = f"no body has this name; {did_you_mean(body, names)}"
+            message = no_such("body", body, names)
             raise MechanismError(message, name="body", value=body)
     if output.space and output.space != mechanism.space:
         raise MechanismError(f"this output is {output.space}, the mechanism is {mechanism.space}", name=name)

@@ -7,7 +7,7 @@ from typing import Any
 
 from jounce.constraints import AbstractConstraint
 from jounce.display import Displayed
-from jounce.errors import ExpressionError, JounceError, MechanismError, did_you_mean
+from jounce.errors import ExpressionError, JounceError, MechanismError, no_such
 from jounce.forces import AbstractForce
 from jounce.mechanism.outputs import AbstractQuantity
 from jounce.mechanism.resolve import parameter_value
@@ -191,7 +191,7 @@ class Mechanism(Displayed):
             raise MechanismError(f"is {element.space}, in a {self.space} mechanism", name=place)
         for body in element.bodies:
             if body != GROUND and body not in self.bodies:
-                message = f"no body has this name; {did_you_mean(body, [GROUND, *self.bodies])}"
+                message = no_such("body", body, [GROUND, *self.bodies])
                 raise MechanismError(message, name=f"{place}.bodies", value=body)
         if kind == "outputs":
             try:
@@ -264,7 +264,7 @@ class Mechanism(Displayed):
         """
         for name in values:
             if name not in self.parameters:
-                message = f"no parameter has this name; {did_you_mean(name, self.parameters)}"
+                message = no_such("parameter", name, self.parameters)
                 raise MechanismError(message, name="parameters", value=name)
         read = {name: self._read(name, value) if isinstance(value, str) else value for name, value in values.items()}
         return dataclasses.replace(self, parameters={**self.parameters, **read})

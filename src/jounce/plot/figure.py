@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from jounce.errors import MechanismError, did_you_mean
+from jounce.errors import MechanismError, no_such
 from jounce.io.files.writing import check_target, replacing
 from jounce.plot.labels import scale_of, symbol, unit_label
 from jounce.plot.style import COLOURS, PALE_GREY, RESOLUTION, blank_figure, shown_name, style
@@ -80,7 +80,7 @@ def _chosen(motion: Any, outputs: Sequence[str] | None) -> list[str]:
     valid = motion.outputs
     for name in outputs or ():
         if name not in valid:
-            raise MechanismError(f"no output has this name; {did_you_mean(name, valid)}", name="outputs", value=name)
+            raise MechanismError(no_such("output", name, valid), name="outputs", value=name)
     names = list(dict.fromkeys(outputs or valid))
     if not names:
         raise MechanismError("there is nothing to draw; name some outputs", name="outputs")

@@ -19,7 +19,7 @@ from jounce.dynamics.outputs import (
     JointTorqueOutput,
     is_turning,
 )
-from jounce.errors import MechanismError, did_you_mean
+from jounce.errors import MechanismError, no_such
 from jounce.plot.figure import draw, finish, shade_unsolved
 from jounce.plot.geometry import skeleton
 from jounce.plot.labels import scale_of, unit_label
@@ -90,7 +90,7 @@ def draw_reactions(motion: Any, names: Sequence[str] | None = None) -> Any:
     known = [*mechanism.joints, *mechanism.drivers, *mechanism.forces]
     for name in names or ():
         if name not in known:
-            message = f"no joint, driver or force has this name; {did_you_mean(name, known)}"
+            message = no_such("joint, driver or force", name, known)
             raise MechanismError(message, name="output", value=name)
     wanted = names or known
     found: dict[str, Any] = {name: JointForceOutput(name) for name in mechanism.joints if name in wanted}

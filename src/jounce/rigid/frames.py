@@ -7,7 +7,7 @@ import jax
 
 from jounce.jet import Jet, components, dot, stack, transpose
 from jounce.jet.algebra import total
-from jounce.rigid.selection import body_vector
+from jounce.rigid.body_arrays import body_vector
 
 
 @jax.tree_util.register_dataclass

@@ -8,6 +8,7 @@ import numpy as np
 from jounce.errors import JounceError, SingularityError, did_you_mean
 from jounce.jet import Jet, atan2, cos, cross, dot, matvec, sin, sqrt, stack, transpose
 from jounce.jet.algebra import total
+from jounce.rigid.body_arrays import body_vector
 from jounce.rigid.rotations import (
     AXES,
     check_sequence,
@@ -17,7 +18,6 @@ from jounce.rigid.rotations import (
     simple_rotations,
     uniform,
 )
-from jounce.rigid.selection import body_vector
 
 FRAMES = ("global", "body")
 

@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 
 from jounce.jet import Jet, next_sine_cosine, sine_cosine
-from jounce.rigid.selection import body_vector, take_bodies
+from jounce.rigid.body_arrays import body_vector, take_bodies
 
 
 def perpendicular(vector: Any) -> Any:

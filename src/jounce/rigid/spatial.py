@@ -13,7 +13,7 @@ import jax.numpy as jnp
 
 from jounce.jet import Jet, components, dot, matvec, stack, transpose
 from jounce.jet.algebra import minus, plus, sum_of_products, total
-from jounce.rigid.selection import body_vector, take_bodies
+from jounce.rigid.body_arrays import body_vector, take_bodies
 
 
 def body_axes(quaternion: Any) -> tuple[Any, Any, Any]:

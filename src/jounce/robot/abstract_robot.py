@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from jounce.display import Displayed
-from jounce.errors import RobotError, did_you_mean
+from jounce.errors import RobotError, did_you_mean, no_such
 from jounce.rigid.inertia import Inertia, finite_numbers
 from jounce.robot.floating_base import floating_joints
 from jounce.robot.model import Closure, Joint, Limits, Link
@@ -159,7 +159,7 @@ class AbstractRobot(Displayed, abc.ABC):
         """
         for name, value in positions.items():
             if name not in self.joint_names:
-                message = f"no moving joint has this name; {did_you_mean(name, self.joint_names)}"
+                message = no_such("moving joint", name, self.joint_names)
                 raise RobotError(message, name="locked", value=name)
             finite_numbers(f"locked.{name}", value, ())
         joints = []
@@ -198,7 +198,7 @@ class AbstractRobot(Displayed, abc.ABC):
         """Return an array for q, shape (n,), with the named joints at the given values and the others at zero."""
         for name in values:
             if name not in self.joint_names:
-                message = f"no moving joint has this name; {did_you_mean(name, self.joint_names)}"
+                message = no_such("moving joint", name, self.joint_names)
                 raise RobotError(message, name="joint", value=name)
         return np.array([values.get(name, 0.0) for name in self.joint_names], float)
 
@@ -214,7 +214,7 @@ class AbstractRobot(Displayed, abc.ABC):
             raise RobotError("a joint and a closure have the same name", name=where)
         for link in closure.links:
             if link not in self.links:
-                raise RobotError(f"no link has this name; {did_you_mean(link, self.links)}", name=where, value=link)
+                raise RobotError(no_such("link", link, self.links), name=where, value=link)
         if len({self.frames[link].body for link in closure.links}) == 1:
             message = "these links are fixed to one another already; a closure joins links that move"
             raise RobotError(message, name=f"{where}.links", value=list(closure.links))
@@ -229,7 +229,7 @@ class AbstractRobot(Displayed, abc.ABC):
 
     def _checked_link(self, link: str) -> str:
         if link not in self.links:
-            raise RobotError(f"no link has this name; {did_you_mean(link, self.links)}", name="link", value=link)
+            raise RobotError(no_such("link", link, self.links), name="link", value=link)
         return link
 
     def _check_mimic(self, joint: Joint) -> None:

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from jounce.errors import JounceError, RobotError, did_you_mean
+from jounce.errors import JounceError, RobotError, did_you_mean, no_such
 from jounce.forces import AbstractForce
 from jounce.jet import Jet
 from jounce.mechanism import Body, Mechanism, time_grid
@@ -13,7 +13,7 @@ from jounce.mechanism.resolve import resolve_motion
 from jounce.rigid.inertia import finite_numbers
 from jounce.robot.abstract_robot import AbstractRobot
 from jounce.robot.closures import Loops, given_coordinates, size_of
-from jounce.robot.parts import Parts, on_body
+from jounce.robot.mechanism_parts import Parts, on_body
 
 DRIVE, START = "_drive", "_start"
 
@@ -178,6 +178,6 @@ def body_point(robot: AbstractRobot, link: str, point: Any = (0.0, 0.0, 0.0)) ->
     ('ram', [0.1, 0.0, 0.0])
     """
     if link not in robot.links:
-        raise RobotError(f"no link has this name; {did_you_mean(link, robot.links)}", name="link", value=link)
+        raise RobotError(no_such("link", link, robot.links), name="link", value=link)
     body, position, rotation = on_body(robot, link)
     return body, position + rotation @ finite_numbers("point", point, (3,))

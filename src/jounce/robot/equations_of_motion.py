@@ -19,8 +19,8 @@ from jounce.rigid.frames import Frames
 from jounce.robot.batches import Batched, checked, floats
 from jounce.robot.kinematics import body_frames
 from jounce.robot.robot import Robot
-from jounce.robot.scan import joint_coordinates, to_coordinates
 from jounce.robot.tree import Tree
+from jounce.robot.tree_scan import joint_coordinates, to_coordinates
 
 PARTS = ("coriolis", "centrifugal", "gravity")
 

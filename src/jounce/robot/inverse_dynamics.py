@@ -15,8 +15,8 @@ from jounce.robot.equations_of_motion import drive_forces
 from jounce.robot.kinematics import body_frames
 from jounce.robot.newton_euler import newton_euler
 from jounce.robot.robot import Robot
-from jounce.robot.scan import to_coordinates
 from jounce.robot.tree import Tree
+from jounce.robot.tree_scan import to_coordinates
 from jounce.robot.wrenches import FRAMES, Wrench, wrench_arrays
 
 

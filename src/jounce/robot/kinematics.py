@@ -7,15 +7,15 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jounce.errors import RobotError, did_you_mean
+from jounce.errors import RobotError, no_such
 from jounce.jet import Jet, sine_cosine
 from jounce.jet.algebra import stacked, total
 from jounce.rigid.frames import Frames
 from jounce.rigid.inertia import finite_numbers
 from jounce.robot.abstract_robot import AbstractRobot
 from jounce.robot.batches import Batched, checked
-from jounce.robot.scan import entries, joint_coordinates, once, places, read, write
 from jounce.robot.tree import Tree
+from jounce.robot.tree_scan import entries, joint_coordinates, once, places, read, write
 
 
 def body_frames(tree: Tree, q: Any) -> Frames:
@@ -81,7 +81,7 @@ def frame_constants(robot: AbstractRobot, link: str, point: Any) -> tuple[Any, A
         If there is no such link, or the point is not made of three finite numbers.
     """
     if link not in robot.frames:
-        raise RobotError(f"no link has this name; {did_you_mean(link, robot.frames)}", name="link", value=link)
+        raise RobotError(no_such("link", link, robot.frames), name="link", value=link)
     point = finite_numbers("point", point, (3,))
     frame = robot.frames[link]
     body = frame.body if frame.body >= 0 else len(robot.moving_links)

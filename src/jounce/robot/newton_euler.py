@@ -15,8 +15,8 @@ import numpy as np
 
 from jounce.jet import Jet, components, concatenate, cross, matvec, next_sine_cosine
 from jounce.jet.algebra import bilinear, stacked, total
-from jounce.robot.scan import entries, joint_coordinates, once, places, read, write
 from jounce.robot.tree import Tree
+from jounce.robot.tree_scan import entries, joint_coordinates, once, places, read, write
 
 QUARTER = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])  # a quarter turn about z, of x and y
 

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 
-from jounce.errors import RobotError, did_you_mean
+from jounce.errors import RobotError, no_such
 from jounce.rigid.inertia import Inertia
 from jounce.robot.model import Joint, Link
 
@@ -96,7 +96,7 @@ def ordered(links: Mapping[str, Link], joints: Mapping[str, Joint]) -> list[Join
         for role in ("parent", "child"):
             link = getattr(joint, role)
             if link not in links:
-                message = f"no link has this name; {did_you_mean(link, links)}"
+                message = no_such("link", link, links)
                 raise RobotError(message, name=f"joints.{joint.name}.{role}", value=link)
         if joint.child in parents:
             first = parents[joint.child].name

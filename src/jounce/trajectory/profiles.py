@@ -9,7 +9,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from jounce.errors import TrajectoryError, did_you_mean
+from jounce.errors import TrajectoryError, no_such
 from jounce.jet import Jet, sin
 from jounce.trajectory.motion import AbstractMotion
 from jounce.trajectory.trapezoid import LIMITS, TrapezoidalMotion, finite, positive
@@ -239,7 +239,7 @@ def motion_profile(
     1.0
     """
     if name not in PROFILES:
-        message = f"no profile has this name; {did_you_mean(name, PROFILES)}"
+        message = no_such("profile", name, PROFILES)
         raise TrajectoryError(message, name="profile", value=name)
     if limits is not None and len(limits) != len(LIMITS):
         message = "limits are three numbers, the largest velocity, acceleration and jerk"

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from jounce.errors import RobotError
+from jounce.errors import RobotError, no_such
 from jounce.reporting.peaks import derivative_name
 from jounce.rigid.euler_parameters import from_rotation_matrices
 from jounce.robot.model import Joint
@@ -131,11 +131,9 @@ class RobotSubject:
 
 def _check_joints(robot: Robot, trajectory: Any) -> None:
     """Raise RobotError where a trajectory moves joints that a robot does not have."""
-    from jounce.errors import did_you_mean
-
     for name in trajectory.names:
         if name not in robot.joint_names:
-            message = f"no moving joint has this name; {did_you_mean(name, robot.joint_names)}"
+            message = no_such("moving joint", name, robot.joint_names)
             raise RobotError(message, name="trajectory", value=name)
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from jounce.errors import RobotFileError
-from jounce.robot.parts import on_body
+from jounce.robot.mechanism_parts import on_body
 from jounce.robot.robot import Robot
 from jounce.viewer.looks import BODIES, Looks, up_of
 from jounce.viewer.meshes import Meshes

@@ -9,7 +9,7 @@ import pytest
 
 import jounce as jn
 from jounce.constraints import catalogue
-from jounce.integrate.family import Family
+from jounce.integrate.batch_equations import Family
 from jounce.io.mechanisms.keys import file_keys, output_holder, output_types
 from jounce.io.mechanisms.masses import _solid_keys
 from jounce.io.mechanisms.overrides import override

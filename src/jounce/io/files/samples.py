@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from jounce.errors import MechanismFileError, did_you_mean
+from jounce.errors import MechanismFileError, did_you_mean, no_such
 from jounce.io.files.reading import fault_of_number, read_rows
 
 __all__ = ["read_columns", "read_samples"]
@@ -93,7 +93,7 @@ def _columns(path: str, header: list[str], time: str | None, value: str | None) 
 
 def _find(path: str, header: list[str], column: str) -> int:
     if column not in header:
-        message = f"no column has this name; {did_you_mean(column, header)}"
+        message = no_such("column", column, header)
         raise MechanismFileError(message, path=path, line=1, value=column)
     return header.index(column)
 

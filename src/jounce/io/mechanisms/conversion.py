@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from jounce.dynamics import DriverForceOutput, DriverTorqueOutput
-from jounce.errors import JounceError, RobotError, did_you_mean
+from jounce.errors import JounceError, RobotError, no_such
 from jounce.io.files.reading import named_file
 from jounce.io.files.source import read_source
 from jounce.io.files.units import parse_value
@@ -120,7 +120,7 @@ def assigned(robot: Robot, assignments: Iterable[str], option: str, *, law: bool
                 "a joint is given a value by JOINT=VALUE, such as 'elbow=30 deg'", name=option, value=text
             )
         if name not in robot.joint_names:
-            message = f"no moving joint has this name; {did_you_mean(name, robot.joint_names)}"
+            message = no_such("moving joint", name, robot.joint_names)
             raise JounceError(message, name=option, value=name)
         kind = "angle" if robot.joints[name].turning else "length"
         try:

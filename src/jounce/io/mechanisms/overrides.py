@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from jounce.errors import JounceError, MechanismError, did_you_mean
+from jounce.errors import JounceError, MechanismError, no_such
 from jounce.mechanism import Mechanism
 
 __all__ = ["override"]
@@ -39,7 +39,7 @@ def override(mechanism: Mechanism, assignments: Iterable[str]) -> Mechanism:
         if not equals or not name or not value:
             raise MechanismError("a parameter is set by NAME=VALUE, such as 'BC=15 cm'", name="--set", value=text)
         if name not in mechanism.parameters:
-            message = f"no parameter has this name; {did_you_mean(name, mechanism.parameters)}"
+            message = no_such("parameter", name, mechanism.parameters)
             raise MechanismError(message, name="--set", value=name)
         values[name] = value
     try:

@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, create_mo
 
 from jounce.constraints import catalogue
 from jounce.constraints.planar import COORDINATES
-from jounce.errors import did_you_mean
+from jounce.errors import no_such
 from jounce.io.mechanisms.keys import HOLDERS, FileKey, file_keys, output_holder, output_tag, output_types
 from jounce.io.mechanisms.masses import inertia
 from jounce.io.mechanisms.values import Checked, laws, motion, orientation, problem, scalar, vector, vectors, wrenches
@@ -73,7 +73,7 @@ def _check_body(name: Any, info: Any, *at: int) -> str:
         raise problem("must be the name of a body", *at, value=name)
     known = (info.context or {}).get("bodies", ())
     if name not in known:
-        raise problem(f"no body has this name; {did_you_mean(name, known)}", *at, value=name)
+        raise problem(no_such("body", name, known), *at, value=name)
     return name
 
 

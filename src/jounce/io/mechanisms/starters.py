@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 
-from jounce.errors import JounceError, OutputError, did_you_mean
+from jounce.errors import JounceError, OutputError, no_such
 
 __all__ = ["STARTERS", "Starter", "write_starter"]
 
@@ -84,7 +84,7 @@ def write_starter(name: str, path: str | PathLike[str], *, overwrite: bool = Fal
     from jounce.io.files.writing import check_target, replacing
 
     if name not in STARTERS:
-        raise JounceError(f"no starter has this name; {did_you_mean(name, STARTERS)}", value=name)
+        raise JounceError(no_such("starter", name, STARTERS), value=name)
     starter, suffix = STARTERS[name], Path(path).suffix.lower()
     check_target(path, SUFFIXES, "mechanism file", overwrite=overwrite)
     refuse_existing(path, overwrite=overwrite)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from jounce.errors import JounceError, MechanismFileError, TrajectoryError, did_you_mean, show_value
+from jounce.errors import JounceError, MechanismFileError, TrajectoryError, did_you_mean, no_such, show_value
 from jounce.io.files.entries import Location, Source, dotted
 from jounce.io.files.reading import fault_of_number, known_name, read_rows
 from jounce.io.files.samples import read_columns, read_samples
@@ -210,7 +210,7 @@ class _Laws:
         initial = self._mapping((*at, "initial")) if "initial" in data else {}
         for name in initial:
             if name not in columns:
-                raise self.error(f"no column has this name; {did_you_mean(name, columns)}", (*at, "initial", name))
+                raise self.error(no_such("column", name, columns), (*at, "initial", name))
         laws = {
             name: self._spline(at, data, times, values, initial.get(name, []), (*at, "initial", name))
             for name, values in columns.items()

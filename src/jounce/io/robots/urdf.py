@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from jounce.errors import RobotError, RobotFileError, did_you_mean
+from jounce.errors import RobotError, RobotFileError, did_you_mean, no_such
 from jounce.io.robots.faults import FOLLOWS_NONE, IDLE, MASSLESS, Faults
 from jounce.io.robots.xml_elements import Element
 from jounce.rigid.inertia import Inertia
@@ -180,7 +180,7 @@ def _check_joint(element: Element, name: str, links: dict[str, Element]) -> None
         part = _part(element, role, "", *where)
         link = part.text("link", *where, role)
         if link not in links:
-            raise part.error(f"no link has this name; {did_you_mean(link, links)}", *where, role, value=link)
+            raise part.error(no_such("link", link, links), *where, role, value=link)
     _check_origin(element, *where)
     axis = element.first("axis")
     if axis is not None:

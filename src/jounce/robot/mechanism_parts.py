@@ -7,7 +7,7 @@ import numpy as np
 
 from jounce.constraints import AbstractConstraint, spatial
 from jounce.constraints.drivers import RotationDriver, SpatialSlideDriver
-from jounce.errors import RobotError, did_you_mean
+from jounce.errors import RobotError, no_such
 from jounce.forces import AbstractForce
 from jounce.forces.springs import SlideSpring, SpatialTorsionalSpring
 from jounce.mechanism import Body, RelativeAngleOutput
@@ -162,7 +162,7 @@ class Parts:
     def output(self, name: str, joint: str) -> Any:
         """Return the coordinate of a joint as an output."""
         if joint not in [other.name for other in self.moving]:
-            message = f"no moving joint has this name; {did_you_mean(joint, [j.name for j in self.moving])}"
+            message = no_such("moving joint", joint, [j.name for j in self.moving])
             raise RobotError(message, name=f"outputs.{name}", value=joint)
         at = self._named(joint)
         if at.turning:
