@@ -9,6 +9,7 @@ import hypothesis
 import jax
 import pytest
 
+import tests.type_checks  # isort: skip # noqa: F401 - before jounce
 from jounce.cli import main
 from jounce.cli.compiled_programs import keep_programs
 from jounce.constraints import base  # importing jounce switches on double precision
