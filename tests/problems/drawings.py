@@ -12,12 +12,18 @@ from jounce import drivers, forces
 from jounce.constraints.angles import principal
 from jounce.constraints.base import field_kind, value_fields
 from jounce.dynamics import (
+    AccelerationEnergyOutput,
     AppliedForceOutput,
     AppliedTorqueOutput,
+    BodyAccelerationEnergyOutput,
+    BodyKineticEnergyOutput,
+    BodyPotentialEnergyOutput,
     DriverForceOutput,
     DriverTorqueOutput,
     JointForceOutput,
     JointTorqueOutput,
+    KineticEnergyOutput,
+    PotentialEnergyOutput,
 )
 from jounce.dynamics.outputs import is_turning
 from jounce.forces import AbstractLaw
@@ -305,6 +311,20 @@ def with_all_outputs(mechanism):
                 outputs[f"moment_{name}_on_{body}"] = JointTorqueOutput(name, body, frames[1], point)
     for name, driver in mechanism.drivers.items():
         outputs[f"drive_{name}"] = (DriverTorqueOutput if is_turning(driver) else DriverForceOutput)(name)
+    body = next(iter(mechanism.bodies))
+    outputs |= {f"{kind.__name__}": kind() for kind in ENERGIES} | {
+        f"{kind.__name__}": kind(body=body) for kind in ENERGIES_OF_A_BODY
+    }
+    if mechanism.space == "spatial":
+        pair = ([*mechanism.bodies][-1], body) if len(mechanism.bodies) > 1 else (body, "ground")
+        outputs |= {
+            "parameters": jn.EulerParametersOutput(body),
+            "parameters_between": jn.RelativeEulerParametersOutput(pair),
+            "matrix": jn.RotationMatrixOutput(body),
+            "matrix_between": jn.RelativeRotationMatrixOutput(pair),
+            "angles": jn.EulerAnglesOutput(body, "ZXZ"),
+            "angles_between": jn.RelativeEulerAnglesOutput(pair, "xyz"),
+        }
     for name, force in mechanism.forces.items():
         outputs[f"applied_{name}"] = (AppliedForceOutput if force.unit == "N" else AppliedTorqueOutput)(name)
     return dataclasses.replace(mechanism, outputs=outputs)
@@ -319,7 +339,11 @@ def assert_same(mechanism, kept, found, drawings, moved):
         scales[unit] = np.maximum(scales.get(unit, 0.0), scale)
     for name, values in found.items():
         expected, output = kept[name].copy(), mechanism.outputs[name]
-        if expected.ndim == 3:
+        if isinstance(output, ATTITUDES):
+            expected, values = attitudes(output, expected, values, drawings)
+        elif isinstance(output, PotentialEnergyOutput):  # from another origin
+            expected[:, 0] += weight(mechanism, output.alone) @ world.origin
+        elif expected.ndim == 3:
             expected = expected @ drawings[frame_of(mechanism, output)].axes
         if isinstance(output, jn.PointOutput):
             expected[:, 0] -= world.axes.T @ world.origin
@@ -332,6 +356,44 @@ def assert_same(mechanism, kept, found, drawings, moved):
     assert all((part <= 1e-11).all() for part in parts.values()), {n: p for n, p in parts.items() if (p > 1e-11).any()}
 
 
+def attitudes(output, kept, found, drawings):
+    """Return the attitude matrix as it must be with other frames, and as an output has it, (time, derivative, 9)."""
+    bodies = output.bodies if output.body_count == 2 else ("ground", *output.bodies)
+    first, second = (drawings[body].axes for body in bodies)
+    expected = first.T @ matrices(output, kept) @ second
+    return (x.reshape(*x.shape[:2], 9) for x in (expected, matrices(output, found)))
+
+
+def matrices(output, values):
+    """Return attitude matrices with their derivatives from those of an output, (time, derivative, 3, 3)."""
+    if isinstance(output, jn.RotationMatrixOutput):
+        return values.reshape(*values.shape[:2], 3, 3)
+    factorials = np.cumprod([1.0, *range(1, values.shape[1])])
+    parts = jn.Jet(np.moveaxis(values / factorials[:, None], (1, 2), (0, 1)))
+    if isinstance(output, jn.EulerAnglesOutput):
+        found = jn.rigid.rotation_matrix(output.sequence, parts)
+    else:
+        e0, x, y, z = _parts(parts)
+        found = stack(
+            [
+                stack([1 - 2 * (y * y + z * z), 2 * (x * y - e0 * z), 2 * (x * z + e0 * y)]),
+                stack([2 * (x * y + e0 * z), 1 - 2 * (x * x + z * z), 2 * (y * z - e0 * x)]),
+                stack([2 * (x * z - e0 * y), 2 * (y * z + e0 * x), 1 - 2 * (x * x + y * y)]),
+            ]
+        )
+    return np.moveaxis(np.array(found.derivatives()), (0, 1, 2, 3), (1, 2, 3, 0))
+
+
+def weight(mechanism, alone):
+    """Return the weight of one body, or of all, N, which is what potential energy changes by with the origin."""
+    values = mechanism.parameter_values
+    masses = [body.mass for name, body in mechanism.bodies.items() if alone in (None, name) and body.mass is not None]
+    return sum(resolve(mass, values) for mass in masses) * np.asarray(resolve(mechanism.gravity, values))
+
+
+ENERGIES = (KineticEnergyOutput, AccelerationEnergyOutput, PotentialEnergyOutput)
+ENERGIES_OF_A_BODY = (BodyKineticEnergyOutput, BodyAccelerationEnergyOutput, BodyPotentialEnergyOutput)
+ATTITUDES = (jn.EulerParametersOutput, jn.RotationMatrixOutput, jn.EulerAnglesOutput)
 PLANAR_ANGLES = (
     drivers.CoordinateDriver,
     forces.Torque,
