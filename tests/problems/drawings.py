@@ -322,7 +322,7 @@ def with_all_outputs(mechanism):
             "parameters_between": jn.RelativeEulerParametersOutput(pair),
             "matrix": jn.RotationMatrixOutput(body),
             "matrix_between": jn.RelativeRotationMatrixOutput(pair),
-            "angles": jn.EulerAnglesOutput(body, "ZXZ"),
+            "angles": jn.EulerAnglesOutput(body, "XYZ"),  # of which none is undefined where the frames are parallel
             "angles_between": jn.RelativeEulerAnglesOutput(pair, "xyz"),
         }
     for name, force in mechanism.forces.items():
@@ -353,7 +353,10 @@ def assert_same(mechanism, kept, found, drawings, moved):
             expected[:, 0] += values[0, 0] - expected[0, 0]
         error = np.abs(values - expected).reshape(*values.shape[:2], -1).max(axis=(0, 2))
         parts[name] = error / scales[output.unit]
-    assert all((part <= 1e-11).all() for part in parts.values()), {n: p for n, p in parts.items() if (p > 1e-11).any()}
+    # terms of higher rates of energies and of Euler angles cancel: they are larger than what is left
+    lost = {name: 10 if isinstance(mechanism.outputs[name], CANCELLING) else 1 for name in parts}
+    wrong = {name: part for name, part in parts.items() if (part > 1e-11 * lost[name]).any()}
+    assert not wrong
 
 
 def attitudes(output, kept, found, drawings):
@@ -393,6 +396,7 @@ def weight(mechanism, alone):
 
 ENERGIES = (KineticEnergyOutput, AccelerationEnergyOutput, PotentialEnergyOutput)
 ENERGIES_OF_A_BODY = (BodyKineticEnergyOutput, BodyAccelerationEnergyOutput, BodyPotentialEnergyOutput)
+CANCELLING = (AccelerationEnergyOutput, jn.EulerAnglesOutput)
 ATTITUDES = (jn.EulerParametersOutput, jn.RotationMatrixOutput, jn.EulerAnglesOutput)
 PLANAR_ANGLES = (
     drivers.CoordinateDriver,
