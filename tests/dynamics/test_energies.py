@@ -216,7 +216,7 @@ def test_equations_073_to_075_and_109_factor_of_translation():
 
 
 def arm(tensor=(0.02, 0.06, 0.055)):
-    return jn.robot.from_screws([jn.robot.Screw([0, 1, 0], inertia=jn.Inertia(2.0, [0.3, 0.4, 0.1], tensor))])
+    return jn.robot.from_screws([jn.robot.JointAxis([0, 1, 0], inertia=jn.Inertia(2.0, [0.3, 0.4, 0.1], tensor))])
 
 
 @SEEDS

@@ -10,7 +10,7 @@ import pytest
 
 import jounce as jn
 from jounce.robot.batches import coefficients
-from jounce.robot.newton_euler import newton_euler
+from jounce.robot.newton_euler import recursive_newton_euler
 from tests.problems.robots import random_inertia, random_robot, robot_named
 
 ROBOT = random_robot(2, 7)  # a tree with slides and fixed links
@@ -224,7 +224,7 @@ def test_slopes_in_masses_and_centers():
 
     @jax.jit
     def torque(mass, center):
-        return newton_euler(dataclasses.replace(tree, mass=mass, center=center), q)[0][0, :, 0]
+        return recursive_newton_euler(dataclasses.replace(tree, mass=mass, center=center), q)[0][0, :, 0]
 
     whole = torque(tree.mass, tree.center)
     near(whole, jn.inverse_dynamics(ROBOT, Q[0, :3])[0])

@@ -53,7 +53,7 @@ def newton_euler(system: Robot | Motion, q: Any = None, rates: int = 0) -> Any:
     Examples
     --------
     >>> import jounce as jn
-    >>> slide = jn.robot.Screw([1, 0, 0], type="prismatic", inertia=jn.Inertia(2.0))
+    >>> slide = jn.robot.JointAxis([1, 0, 0], type="prismatic", inertia=jn.Inertia(2.0))
     >>> newton_euler(jn.robot.from_screws([slide]), [[0.0], [3.0], [5.0], [7.0]], rates=1).round(12).tolist()
     [[10.0], [14.0]]
     """
@@ -87,7 +87,7 @@ def virtual_work(system: Robot | Motion, q: Any = None, rates: int = 0) -> Any:
     Examples
     --------
     >>> import jounce as jn
-    >>> slide = jn.robot.Screw([1, 0, 0], type="prismatic", inertia=jn.Inertia(2.0))
+    >>> slide = jn.robot.JointAxis([1, 0, 0], type="prismatic", inertia=jn.Inertia(2.0))
     >>> virtual_work(jn.robot.from_screws([slide]), [[0.0], [3.0], [5.0], [7.0]], rates=1).round(12).tolist()
     [[10.0], [14.0]]
     """
@@ -120,7 +120,7 @@ def gravity_forces(system: Robot | Motion, q: Any = None, rates: int = 0) -> Any
     Examples
     --------
     >>> import jounce as jn
-    >>> lift = jn.robot.Screw([0, 0, 1], type="prismatic", inertia=jn.Inertia(2.0))
+    >>> lift = jn.robot.JointAxis([0, 0, 1], type="prismatic", inertia=jn.Inertia(2.0))
     >>> gravity_forces(jn.robot.from_screws([lift]), [[0.0]]).tolist()
     [[19.62]]
     """

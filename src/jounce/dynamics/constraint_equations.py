@@ -13,9 +13,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from jounce.dynamics.energies import masses_of
-from jounce.dynamics.inverse import MotionForces, in_chunks, places, pose_of
+from jounce.dynamics.inverse import MotionForces, element_indices, in_chunks, pose_of
 from jounce.dynamics.loads import mass_matrices
-from jounce.dynamics.mechanism_state import State, at_state
+from jounce.dynamics.mechanism_state import MotionAtState, at_state
 from jounce.errors import MechanismError
 from jounce.jet import Jet
 from jounce.kinematics import Motion, Status
@@ -117,7 +117,7 @@ def constraint_equations(
         raise MechanismError("must be a jn.Motion, or a jn.Mechanism with a state", name="motion", value=motion)
     labels = _labels(motion)
     numbers = _numbers(motion, order)
-    if isinstance(motion, State):
+    if isinstance(motion, MotionAtState):
         _check_finite(numbers, labels["row"], float(motion.time[0]))
     found = {
         "residual": (("time", "row"), numbers["residual"]),
@@ -143,7 +143,7 @@ def constraint_equations(
 
 def _labels(motion: Motion) -> dict[str, Any]:
     """Return the labels of all axes, rows in the order of the mechanism."""
-    mechanism, found = motion.mechanism, places(motion.model)
+    mechanism, found = motion.mechanism, element_indices(motion.model)
     shifts = motion.model.pose_type.shifts
     columns = [f"{body}.{name}" for body in mechanism.bodies for name in COLUMNS[mechanism.space]]
     return {
@@ -173,7 +173,7 @@ def _rows(model: Model, place: Any) -> int:
 
 def _row_order(motion: Motion) -> np.ndarray:
     """Return which row of the system each row is, in the order of the mechanism."""
-    model, found = motion.model, places(motion.model)
+    model, found = motion.model, element_indices(motion.model)
     rows = [
         place.rows.start + k * model.system.groups[place.group].instances + place.instance
         for place in (found[name] for name in _elements(motion.mechanism))
@@ -286,7 +286,11 @@ def _forces(motion: Motion, jacobian: np.ndarray) -> dict[str, Any]:
     _, coordinates = motion.poses
     levels = min(len(coordinates["position"]) - 2, motion.order + 1)
     mass = found["mass_matrix"][1] if found else np.zeros((1, _columns(motion), _columns(motion)))
-    if levels < 1 or not jacobian.size or (isinstance(motion, State) and not _determined(motion, jacobian[0], mass[0])):
+    if (
+        levels < 1
+        or not jacobian.size
+        or (isinstance(motion, MotionAtState) and not _determined(motion, jacobian[0], mass[0]))
+    ):
         return found
     coefficients = MotionForces.of(motion).multipliers[:levels][:, _row_order(motion)]
     factorials = np.array([math.factorial(k) for k in range(levels)], float)

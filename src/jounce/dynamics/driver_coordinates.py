@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jounce.dynamics.energies import body_energy, mechanism_masses
-from jounce.dynamics.inverse import MotionForces, in_chunks, places
+from jounce.dynamics.inverse import MotionForces, element_indices, in_chunks
 from jounce.errors import MechanismError
 from jounce.jet import Jet
 from jounce.jet.algebra import total
@@ -35,7 +35,7 @@ class ChangedLaw(eqx.Module):
         return self.law(time) + Jet(tuple(self.change[: time.order + 1]))
 
 
-def of_drivers(motion: Motion, q: Any, least: int, form: Callable[..., Any], static: tuple[Any, ...]) -> Any:
+def in_driver_coordinates(motion: Motion, q: Any, least: int, form: Callable[..., Any], static: tuple[Any, ...]) -> Any:
     """Return what a form of the equations of motion gives in the coordinates of the drivers.
 
     Parameters
@@ -65,7 +65,7 @@ def of_drivers(motion: Motion, q: Any, least: int, form: Callable[..., Any], sta
     if q is not None:
         raise MechanismError("a motion has its coordinates already, the laws of its drivers", name="q", value=q)
     model, names = motion.model, drivers_of(motion)
-    found = places(model)
+    found = element_indices(model)
     order = tuple((found[name].group, found[name].instance) for name in names)
     pose_type, coordinates = motion.poses
     masses = mechanism_masses(motion)

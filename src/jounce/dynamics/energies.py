@@ -23,7 +23,7 @@ from jounce.mechanism import Mechanism
 from jounce.mechanism.masses import body_mass
 from jounce.mechanism.resolve import resolve
 from jounce.rigid.frames import Frames
-from jounce.robot.batches import Batched, checked
+from jounce.robot.batches import Batched, checked_coordinates
 from jounce.robot.kinematics import body_frames
 from jounce.robot.robot import Robot
 from jounce.robot.tree import Tree
@@ -176,7 +176,7 @@ def evaluated(
     order = whole_number("order", order, 0)
     if isinstance(system, Motion):
         return _of_motion(system, order, function), tuple(system.mechanism.bodies), order
-    q = checked(system, q, 0)
+    q = checked_coordinates(system, q, 0)
     if q.shape[-2] < order + 2:
         message = f"an energy of order {order} needs derivatives of q to order {order + 1}"
         raise RobotError(message, name="q", value=q.shape)
@@ -204,7 +204,7 @@ def kinetic_energy(system: Robot | Motion, q: Any = None) -> Energy:
     Examples
     --------
     >>> import jounce as jn
-    >>> slide = jn.robot.Screw([1, 0, 0], type="prismatic", inertia=jn.Inertia(2.0))
+    >>> slide = jn.robot.JointAxis([1, 0, 0], type="prismatic", inertia=jn.Inertia(2.0))
     >>> jn.kinetic_energy(jn.robot.from_screws([slide]), [[0.0], [3.0], [1.0]]).total.tolist()  # energy and power
     [9.0, 6.0]
     """

@@ -16,13 +16,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jounce.dynamics.driver_coordinates import of_drivers
+from jounce.dynamics.driver_coordinates import in_driver_coordinates
 from jounce.dynamics.energies import differentiated, robot_energy, whole_number
 from jounce.errors import RobotError
 from jounce.jet import Jet, components
 from jounce.jet.algebra import stacked, total
 from jounce.kinematics import Motion
-from jounce.robot.batches import Batched, checked
+from jounce.robot.batches import Batched, checked_coordinates
 from jounce.robot.kinematics import body_frames
 from jounce.robot.robot import Robot
 from jounce.robot.tree import Tree
@@ -140,7 +140,7 @@ def _evaluated(system: Robot | Motion, q: Any, least: int, form: Callable[..., A
         If q does not fit the robot or has too few derivatives, or the motion is not that of a driven mechanism.
     """
     if isinstance(system, Motion):
-        return of_drivers(system, q, least, form, static)
+        return in_driver_coordinates(system, q, least, form, static)
     return _of_robot(system, (checked_order(system, q, least),), (), (form, static))
 
 
@@ -152,7 +152,7 @@ def checked_order(robot: Robot, q: Any, least: int) -> Any:
     RobotError
         If q does not fit the robot or has too few derivatives.
     """
-    q = checked(robot, q, 0)
+    q = checked_coordinates(robot, q, 0)
     if q.shape[-2] < least + 1:
         raise RobotError(f"this needs derivatives of q to order {least}", name="q", value=q.shape)
     return q[..., : least + 1, :]
@@ -196,7 +196,7 @@ def energy_slope(
     Examples
     --------
     >>> import jounce as jn
-    >>> slide = jn.robot.Screw([1, 0, 0], type="prismatic", inertia=jn.Inertia(2.0))
+    >>> slide = jn.robot.JointAxis([1, 0, 0], type="prismatic", inertia=jn.Inertia(2.0))
     >>> robot, q = jn.robot.from_screws([slide]), [[0.0], [3.0], [5.0], [7.0]]
     >>> jn.energy_slope(robot, q, m=2).tolist()  # of half the mass times the square of the acceleration
     [[10.0]]
@@ -237,7 +237,7 @@ def lagrange(system: Robot | Motion, q: Any = None, rates: int = 0) -> Any:
     Examples
     --------
     >>> import jounce as jn
-    >>> slide = jn.robot.Screw([1, 0, 0], type="prismatic", inertia=jn.Inertia(2.0))
+    >>> slide = jn.robot.JointAxis([1, 0, 0], type="prismatic", inertia=jn.Inertia(2.0))
     >>> lagrange(jn.robot.from_screws([slide]), [[0.0], [3.0], [5.0], [7.0]], rates=1).round(12).tolist()
     [[10.0], [14.0]]
     """
@@ -271,7 +271,7 @@ def mangeron_nielsen(system: Robot | Motion, q: Any = None, rates: int = 0, m: i
     Examples
     --------
     >>> import jounce as jn
-    >>> slide = jn.robot.Screw([1, 0, 0], type="prismatic", inertia=jn.Inertia(2.0))
+    >>> slide = jn.robot.JointAxis([1, 0, 0], type="prismatic", inertia=jn.Inertia(2.0))
     >>> mangeron_nielsen(jn.robot.from_screws([slide]), [[0.0], [3.0], [5.0], [7.0]], m=2).tolist()
     [[10.0]]
     """
@@ -305,7 +305,7 @@ def gibbs_appell(system: Robot | Motion, q: Any = None, rates: int = 0, m: int =
     Examples
     --------
     >>> import jounce as jn
-    >>> slide = jn.robot.Screw([1, 0, 0], type="prismatic", inertia=jn.Inertia(2.0))
+    >>> slide = jn.robot.JointAxis([1, 0, 0], type="prismatic", inertia=jn.Inertia(2.0))
     >>> gibbs_appell(jn.robot.from_screws([slide]), [[0.0], [3.0], [5.0], [7.0]], rates=1).round(12).tolist()
     [[10.0], [14.0]]
     """
@@ -350,7 +350,7 @@ def higher_order(
     Examples
     --------
     >>> import jounce as jn
-    >>> slide = jn.robot.Screw([1, 0, 0], type="prismatic", inertia=jn.Inertia(2.0))
+    >>> slide = jn.robot.JointAxis([1, 0, 0], type="prismatic", inertia=jn.Inertia(2.0))
     >>> q = [[0.0], [3.0], [5.0], [7.0], [11.0]]
     >>> higher_order(jn.robot.from_screws([slide]), q, k=2).round(12).tolist()
     [14.0]

@@ -100,13 +100,13 @@ class Equations(eqx.Module):
 
     def extended(self, pose: Any, shift: Any, turn: Any) -> Any:
         """Return a pose with one more Taylor coefficient of the moving bodies."""
-        return pose.extended(grounded(shift), grounded(turn))
+        return pose.extended(with_ground(shift), with_ground(turn))
 
     def still(self, position: Any, attitude: Any) -> Any:
         """Return the pose of order zero of all bodies, the ground first."""
-        position = Jet([grounded(position)])
+        position = Jet([with_ground(position)])
         if self.pose_type is PlanarPose:
-            return PlanarPose.from_jets(position, Jet([grounded(attitude)[0]]))
+            return PlanarPose.from_jets(position, Jet([with_ground(attitude)[0]]))
         fixed = jnp.zeros_like(attitude[:, :1]).at[0].set(1.0)
         quaternion = jnp.concatenate([fixed, attitude], axis=1)  # of unit length already: it is kept so
         spins, axes = (tuple(Jet([x]) for x in f(quaternion)) for f in (quaternion_spins, body_axes))
@@ -184,7 +184,7 @@ class Equations(eqx.Module):
         return jnp.swapaxes(column.reshape(-1, self.coordinates, column.shape[-1]), 0, 1) * scale[:, None, None]
 
 
-def grounded(moving: Any) -> Any:
+def with_ground(moving: Any) -> Any:
     """Put the ground, which has none of a quantity, before the moving bodies."""
     return jnp.concatenate([jnp.zeros_like(moving[:, :1]), moving], axis=1)
 

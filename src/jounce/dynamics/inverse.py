@@ -34,7 +34,7 @@ def check_loads(mechanism: Mechanism, name: str = "bodies") -> None:
 
 
 @dataclasses.dataclass(frozen=True)
-class Place:
+class ElementIndex:
     """Where a joint or driver is among the groups of a system, and its group among the rows."""
 
     group: int
@@ -42,7 +42,7 @@ class Place:
     rows: slice
 
 
-def places(model: Model) -> dict[str, Place]:
+def element_indices(model: Model) -> dict[str, ElementIndex]:
     """Return the places of all joints and drivers, by name."""
     found, first = {}, 0
     for index, group in enumerate(model.system.groups):
@@ -51,7 +51,7 @@ def places(model: Model) -> dict[str, Place]:
         while model.rows[last : last + group.instances] == names:
             last += group.instances
         for instance, name in enumerate(names):
-            found[name.partition(".")[2]] = Place(index, instance, slice(first, last))
+            found[name.partition(".")[2]] = ElementIndex(index, instance, slice(first, last))
         first = last
     return found
 
@@ -93,7 +93,7 @@ class MotionForces:
         self.masses = masses_of(mechanism)
         self.gravity = gravity_of(mechanism) * float(gravity)
         self.forces = motion.forces if applied else ()
-        self.places = places(self.model)
+        self.indices = element_indices(self.model)
         self._exerted: dict[int, np.ndarray] = {}
         self._applied: dict[int, np.ndarray] = {}
         self._wrenches: dict[tuple[int, int], np.ndarray] = {}
@@ -117,11 +117,11 @@ class MotionForces:
                 [self._slopes(index, slot, lanes) for slot in group.moving_slots]
                 for index, group in enumerate(system.groups)
             ]
-            bodies, instants = self.taken(None, lanes, self.levels + 2), self.motion.time[lanes]
+            bodies, instants = self.coordinates_at(None, lanes, self.levels + 2), self.motion.time[lanes]
             forces = dataclasses.replace(unjoined, forces=at_lanes(self.forces, lanes))
             load, finite = _loads(forces, bodies, instants, self.masses, self.gravity, self.pose_type)
             self._check_finite(np.asarray(finite), lanes)
-            still = None if square else self.taken(None, lanes, 1)
+            still = None if square else self.coordinates_at(None, lanes, 1)
             return _multipliers(system, blocks, load, still, self.masses, self.pose_type)
 
         found = self.in_chunks(chunk)
@@ -130,7 +130,7 @@ class MotionForces:
 
     def driver_force(self, name: str) -> np.ndarray:
         """Return what a driver exerts along what it prescribes, as Taylor coefficients, (levels, 1, time)."""
-        place = self.places[name]
+        place = self.indices[name]
         if place.group not in self._exerted:
             group = self.model.system.groups[place.group]
             found = self._by_instance(place)
@@ -147,7 +147,7 @@ class MotionForces:
 
         Force, global, and moment about the origin of the body, in its axes.
         """
-        place = self.places[name]
+        place = self.indices[name]
         if (place.group, slot) not in self._wrenches:
             found = self._by_instance(place)
 
@@ -195,7 +195,7 @@ class MotionForces:
 
             def chunk(lanes: np.ndarray) -> Any:
                 (group,) = at_lanes((whole,), lanes)
-                poses = tuple(self.taken(slot, lanes, self.levels + 1) for slot in group.bodies)
+                poses = tuple(self.coordinates_at(slot, lanes, self.levels + 1) for slot in group.bodies)
                 return _applied(group.element, poses, self.motion.time[lanes], self.pose_type, self.levels)
 
             self._applied[index] = self.in_chunks(chunk)
@@ -215,7 +215,9 @@ class MotionForces:
         """
 
         def chunk(lanes: np.ndarray) -> Any:
-            taken = [self.taken((b,), lanes, self.levels) for b in ((body,) if frame is None else (body, frame))]
+            taken = [
+                self.coordinates_at((b,), lanes, self.levels) for b in ((body,) if frame is None else (body, frame))
+            ]
             return _expressed(work[:, :, lanes], taken, point[:, None, None], self.pose_type)
 
         return self.in_chunks(chunk)
@@ -224,7 +226,7 @@ class MotionForces:
         """Return what a function of indices of instants gives, for all of them: arrays with the time last."""
         return in_chunks(function, len(self.motion.time))
 
-    def taken(self, bodies: tuple[int, ...] | None, lanes: np.ndarray, levels: int) -> dict[str, Any]:
+    def coordinates_at(self, bodies: tuple[int, ...] | None, lanes: np.ndarray, levels: int) -> dict[str, Any]:
         """Return coordinates at some instants; of the ground alone it is the place only, as it never moves."""
         if bodies is not None and not any(bodies):
             levels = 1
@@ -247,14 +249,14 @@ class MotionForces:
 
     def _poses(self, index: int, lanes: np.ndarray) -> tuple[dict[str, Any], ...]:
         bodies = self.model.system.groups[index].bodies
-        return tuple(self.taken(slot, lanes, self.levels) for slot in bodies)
+        return tuple(self.coordinates_at(slot, lanes, self.levels) for slot in bodies)
 
     def _slopes(self, index: int, slot: int, lanes: np.ndarray) -> Any:
         element = self.model.system.groups[index].element
         poses, instants = self._poses(index, lanes), self.motion.time[lanes]
         return _slopes(element, poses, instants, self.pose_type, slot, self.levels)
 
-    def _by_instance(self, place: Place) -> np.ndarray:
+    def _by_instance(self, place: ElementIndex) -> np.ndarray:
         """Return the multipliers of a group, (levels, rows, instances, time)."""
         found = self.multipliers[:, place.rows]
         instances = self.model.system.groups[place.group].instances

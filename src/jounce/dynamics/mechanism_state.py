@@ -17,7 +17,7 @@ from jounce.rigid import SpatialPose
 from jounce.rigid.euler_parameters import euler_parameters
 
 
-class State(Motion):
+class MotionAtState(Motion):
     """One state of a mechanism, consistent or not, as a motion of one instant: `at_state` makes it."""
 
 
@@ -38,7 +38,7 @@ def at_state(given: Any, state: Any, time: Any) -> tuple[Motion, int]:
         model, _ = referred(model, {name: values[0] for name, values in _still(coordinates).items()}, float(instant))
     way = given.way if isinstance(given, Motion) else None
     status = np.array([int(Status.OK)])
-    return State(mechanism, model, instant[None], order, (coordinates, ()), status, {}, way=way), order
+    return MotionAtState(mechanism, model, instant[None], order, (coordinates, ()), status, {}, way=way), order
 
 
 def _still(coordinates: dict[str, Any]) -> dict[str, Any]:

@@ -106,7 +106,7 @@ class _JointOutput(AbstractForceOutput):
         index = [GROUND, *mechanism.bodies].index
         frame = {"global": None, "body": body}.get(self.frame, self.frame)
         if point is None:
-            place = forces.places[self.joint]
+            place = forces.indices[self.joint]
             fixed = getattr(forces.model.system.groups[place.group].element, f"point_{'ijmn'[slot : slot + 1]}", None)
             size = forces.pose_type.shifts
             point = np.zeros(size) if fixed is None else np.asarray(fixed).reshape(size, -1)[:, place.instance]

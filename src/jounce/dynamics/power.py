@@ -85,7 +85,7 @@ def power_balance(motion: Motion) -> Any:
 
 def _driver_power(forces: MotionForces, name: str) -> tuple[np.ndarray, np.ndarray]:
     """Return the power of a driver and the size of its products, as Taylor coefficients, (levels, time)."""
-    place = forces.places[name]
+    place = forces.indices[name]
     element = forces.model.system.groups[place.group].element
     law = forces.in_chunks(lambda lanes: _law(element, forces.motion.time[lanes], forces.levels))[:, place.instance]
     rate, force = Jet(tuple(law)).differentiate(), Jet(tuple(forces.driver_force(name)[:, 0]))
@@ -100,7 +100,7 @@ def _law(driver: Any, instants: Any, levels: int) -> Any:
 
 
 def _of_chunk(forces: MotionForces, lanes: np.ndarray) -> tuple[Any, ...]:
-    bodies = forces.taken(None, lanes, forces.levels + 2)
+    bodies = forces.coordinates_at(None, lanes, forces.levels + 2)
     applied, instants = at_lanes(forces.motion.forces, lanes), forces.motion.time[lanes]
     return applied, bodies, instants, forces.masses, forces.gravity, forces.model.length
 

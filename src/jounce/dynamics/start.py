@@ -18,7 +18,7 @@ from jounce.mechanism.builder import pose_at
 TOLERANCE = 1e-12  # of the assembled positions, rad or sizes of the mechanism
 
 
-class Start(NamedTuple):
+class ConsistentStart(NamedTuple):
     """A mechanism ready to move.
 
     Attributes
@@ -39,7 +39,7 @@ class Start(NamedTuple):
     mobility: str
 
 
-def start(mechanism: Mechanism, instant: float) -> Start:
+def consistent_start(mechanism: Mechanism, instant: float) -> ConsistentStart:
     """Return a consistent state at an instant, from the starting guess and the initial conditions.
 
     Initial conditions are drivers: each fixes one coordinate and its rate, as its law gives them at the instant. What
@@ -77,7 +77,7 @@ def start(mechanism: Mechanism, instant: float) -> Start:
     state = jax.tree.map(np.asarray, with_rates(equations, state, np.array([[instant]])))
     if not all(np.isfinite(part).all() for part in state):
         _explain(equations, model, state, instant, masses)
-    return Start(model, equations, state, _explain(equations, model, state, instant, masses))
+    return ConsistentStart(model, equations, state, _explain(equations, model, state, instant, masses))
 
 
 def equations_of(mechanism: Mechanism, model: Model) -> Equations:
@@ -91,7 +91,7 @@ def equations_of(mechanism: Mechanism, model: Model) -> Equations:
 def _assembled(mechanism: Mechanism, instant: float) -> tuple[Model, dict[str, np.ndarray]]:
     """Return the mechanism with its initial conditions as drivers, assembled."""
     try:
-        model = build(driven(mechanism))
+        model = build(initial_as_drivers(mechanism))
     except JounceError as error:
         error.name = _renamed(error.name or "", mechanism) or None
         raise
@@ -106,7 +106,7 @@ def _assembled(mechanism: Mechanism, instant: float) -> tuple[Model, dict[str, n
         raise MobilityError(message) from None
 
 
-def driven(mechanism: Mechanism) -> Mechanism:
+def initial_as_drivers(mechanism: Mechanism) -> Mechanism:
     """Return the mechanism with its initial conditions as drivers."""
     return dataclasses.replace(mechanism, drivers={**mechanism.drivers, **mechanism.initial}, initial={})
 

@@ -9,10 +9,10 @@ import jax.numpy as jnp
 import numpy as np
 
 from jounce.dynamics.forward import Equations, State
-from jounce.dynamics.start import Start, start as consistent_start
+from jounce.dynamics.start import ConsistentStart, consistent_start
 from jounce.errors import MechanismError
 from jounce.integrate.projection import normalised
-from jounce.integrate.simulation import Simulation, Track
+from jounce.integrate.simulation import DenseOutput, Simulation
 from jounce.integrate.turns import measured
 from jounce.jet import Jet
 from jounce.kinematics.linear import DenseFactor
@@ -117,7 +117,7 @@ class OrdinaryEquation:
     state: State | CountedState
     equations: Equations
     mechanism: Mechanism
-    start: Start
+    start: ConsistentStart
 
     def motion(self, time: Any, states: State | CountedState, order: int = 4) -> Simulation:
         """Return what a solver gives at instants as a motion, with derivatives of any order.
@@ -136,8 +136,8 @@ class OrdinaryEquation:
         instants = np.asarray(time, float)
         polynomial = State(*(np.asarray(part)[:, None] for part in states[:4]))
         angles = tuple(np.asarray(part) for part in states.angles) if isinstance(states, CountedState) else ()
-        track = Track(instants, np.zeros_like(instants), polynomial, np.full(len(instants), -1), angles)
-        return Simulation(self.mechanism, self.start, track, instants, order)
+        dense = DenseOutput(instants, np.zeros_like(instants), polynomial, np.full(len(instants), -1), angles)
+        return Simulation(self.mechanism, self.start, dense, instants, order)
 
 
 def state_rates(time: Any, state: Any, equations: Equations) -> Any:

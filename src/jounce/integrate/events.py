@@ -95,14 +95,14 @@ def pose_coordinates(state: State) -> dict[str, np.ndarray]:
     """Return Taylor coefficients of states, order first, as those of the pose of all bodies, the ground first."""
     position, attitude, _, spin = (np.asarray(part) for part in state)
 
-    def grounded(part: np.ndarray) -> np.ndarray:
+    def with_ground(part: np.ndarray) -> np.ndarray:
         return np.concatenate([np.zeros_like(part[:, :, :1]), part], axis=2)
 
     if attitude.shape[1] == 1:
-        return {"position": grounded(position), "angle": grounded(attitude)[:, 0]}
-    quaternion = grounded(attitude)
+        return {"position": with_ground(position), "angle": with_ground(attitude)[:, 0]}
+    quaternion = with_ground(attitude)
     quaternion[0, 0, 0] = 1.0
-    return {"position": grounded(position), "quaternion": quaternion, "angular_velocity": grounded(spin)[:-1]}
+    return {"position": with_ground(position), "quaternion": quaternion, "angular_velocity": with_ground(spin)[:-1]}
 
 
 def series_of(group: Group, coordinates: dict[str, Any], pose_type: type) -> np.ndarray:
@@ -156,7 +156,7 @@ def counted_on(values: np.ndarray, rates: np.ndarray, time: np.ndarray) -> np.nd
     return found
 
 
-class Watch:
+class EventDetector:
     """The crossings of one event along a run, of which the steps come piece by piece.
 
     Parameters
@@ -175,7 +175,7 @@ class Watch:
         self._last = math.nan, 0.0  # time and sense of the last crossing in either direction
         self._begun = False
 
-    def look(self, start: np.ndarray, length: np.ndarray, polynomial: Any) -> list[tuple[int, float]]:
+    def detect(self, start: np.ndarray, length: np.ndarray, polynomial: Any) -> list[tuple[int, float]]:
         """Return the crossings in the next steps, each as the number of the step and the time from its beginning.
 
         Parameters

@@ -12,7 +12,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jounce.dynamics.forward import Equations, State, grounded
+from jounce.dynamics.forward import Equations, State, with_ground
 from jounce.dynamics.outputs import is_turning
 from jounce.integrate.events import INTERPOLATION, NODES
 from jounce.integrate.methods import evaluated
@@ -33,15 +33,15 @@ JUMP = 1e-6  # rad or sizes of the mechanism: no motion law jumps by more in suc
 NEAR = 1.0 / 16.0  # of the way to where forces and laws are no longer known: a step ends that close
 
 
-class Look(NamedTuple):
+class Lookahead(NamedTuple):
     """What was seen ahead; arrays of shape (batch,)."""
 
     step: Any  # s, shortened where needed
-    clear: Any  # whether forces and laws are known over it
-    rough: (
+    resolved: Any  # whether forces and laws are known over it
+    kink: (
         Any  # index of one that is not resolved over the step, which is too short to matter, or -1; see `watched_names`
     )
-    worst: Any  # index of the one for which it was shortened
+    limiting: Any  # index of the one for which it was shortened
 
 
 def mobility_of(equations: Equations, inverse: Any) -> Any:
@@ -59,7 +59,7 @@ def mobility_of(equations: Equations, inverse: Any) -> Any:
     """
     columns, count = equations.system.cells.shape[1], equations.coordinates
     responses = jnp.max(jnp.abs(inverse[:columns, :columns]), axis=0).reshape(-1, count, inverse.shape[-1])
-    return grounded(jnp.max(responses, axis=1)[None])[0] / equations.scale
+    return with_ground(jnp.max(responses, axis=1)[None])[0] / equations.scale
 
 
 def watched_names(model: Any) -> list[str]:
@@ -67,9 +67,9 @@ def watched_names(model: Any) -> list[str]:
     return [f"forces.{name}" for members in model.forces for name in members] + list(model.drivers)
 
 
-def looked_ahead(
+def look_ahead(
     equations: Equations, path: State, angles: Angles, mobility: Any, time: Any, step: Any, span: Any, bound: Any
-) -> Look:
+) -> Lookahead:
     """Return how far a step may go so that no force and no motion law on its way stays unseen.
 
     Parameters
@@ -92,17 +92,17 @@ def looked_ahead(
     groups = tuple(group for group in equations.system.groups if group.is_driver)
     blank = jnp.full(step.shape, -1)
     if not equations.system.forces and not groups:
-        return Look(step, jnp.ones(step.shape, bool), blank, blank)
+        return Lookahead(step, jnp.ones(step.shape, bool), blank, blank)
     signals = _Signals(equations, path, angles, time, groups)
     bound, shortest = jnp.maximum(bound, HARMLESS), SHORTEST * jnp.maximum(span, jnp.abs(time))
 
-    def seen(part: Any) -> Look:
+    def seen(part: Any) -> Lookahead:
         away, moved = signals.departure(part * step, span, mobility)
         short = jnp.abs(part * step) <= shortest
         allowed = jnp.where(short[None], signals.at_a_jump(bound), bound[None])
         over = jnp.where(jnp.isfinite(moved), moved / allowed, jnp.inf)
-        clear, index = jnp.all(over <= 1.0, axis=0), jnp.argmax(over, axis=0)
-        return Look(part, clear, jnp.where(jnp.any(away > 0, axis=0), index, -1), index)
+        resolved, index = jnp.all(over <= 1.0, axis=0), jnp.argmax(over, axis=0)
+        return Lookahead(part, resolved, jnp.where(jnp.any(away > 0, axis=0), index, -1), index)
 
     def open_(low: Any, high: Any) -> Any:
         return jnp.where(low > 0, high - low > NEAR * low, high * jnp.abs(step) > 0.25 * shortest)
@@ -111,19 +111,19 @@ def looked_ahead(
         low, high, best = carry
         trial = jnp.where(open_(low, high), jnp.where(low > 0, 0.5 * (low + high), 0.5 * high), low)
         look = seen(trial)
-        better = look.clear & (trial > low)
+        better = look.resolved & (trial > low)
         best = jax.tree.map(lambda new, old: jnp.where(better, new, old), look, best)
-        worst = jnp.where(look.clear, best.worst, look.worst)
-        return jnp.where(better, trial, low), jnp.where(look.clear, high, trial), best._replace(worst=worst)
+        limiting = jnp.where(look.resolved, best.limiting, look.limiting)
+        return jnp.where(better, trial, low), jnp.where(look.resolved, high, trial), best._replace(limiting=limiting)
 
     def unfinished(carry: Any) -> Any:
         return jnp.any(open_(*carry[:2]))
 
     one = jnp.ones(step.shape)
     whole = seen(one)
-    low, high, best = jax.lax.while_loop(unfinished, narrowed, (jnp.where(whole.clear, one, 0.0), one, whole))
-    rough = jnp.where(best.clear, best.rough, -1)
-    return Look(step * jnp.where(low > 0, low, high), low > 0, rough, best.worst)
+    low, high, best = jax.lax.while_loop(unfinished, narrowed, (jnp.where(whole.resolved, one, 0.0), one, whole))
+    kink = jnp.where(best.resolved, best.kink, -1)
+    return Lookahead(step * jnp.where(low > 0, low, high), low > 0, kink, best.limiting)
 
 
 class _Signals:

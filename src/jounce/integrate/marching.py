@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 
 from jounce.dynamics.forward import Equations, Expansion, State, expand
-from jounce.integrate.lookahead import HARMLESS, SHORTEST, Look, looked_ahead, mobility_of
+from jounce.integrate.lookahead import HARMLESS, SHORTEST, Lookahead, look_ahead, mobility_of
 from jounce.integrate.methods import AbstractMethod, near_singular
 from jounce.integrate.projection import projected
 from jounce.integrate.turns import followed, measured
@@ -28,7 +28,7 @@ class Outcome(enum.IntEnum):
     LOST = 3  # the motion is not finite from the start
 
 
-class Front(NamedTuple):
+class IntegratorState(NamedTuple):
     """How far a batch of runs has come."""
 
     time: Any  # s, shape (batch,)
@@ -49,13 +49,13 @@ class Steps(NamedTuple):
     start: Any  # s
     length: Any  # s, negative backward in time
     taken: Any  # whether it was accepted
-    rough: Any  # index of a force or law that is not resolved over it, which is too short to matter, or -1
+    kink: Any  # index of a force or law that is not resolved over it, which is too short to matter, or -1
     polynomial: State  # coefficients in the time from the start, (steps, order + 1, components, bodies, batch)
     angles: tuple[Any, ...]  # about axes, that forces measure at the start, (steps, instances, batch) each
 
 
 @compiled("order")
-def departed(equations: Equations, state: State, time: Any, *, order: int) -> Front:
+def begin_march(equations: Equations, state: State, time: Any, *, order: int) -> IntegratorState:
     """Return the start of runs from states on the constraints; `time` has the shape (batch,).
 
     Angles about axes have the turns of what they are near to in the equations.
@@ -67,13 +67,13 @@ def departed(equations: Equations, state: State, time: Any, *, order: int) -> Fr
     outcome = jnp.where(_finite(expansion), int(Outcome.RUNNING), int(Outcome.LOST))
     none, nothing = jnp.full(time.shape, -1), jnp.zeros(time.shape)
     known = mobility_of(equations, inverse), near_singular(equations, inverse)
-    return Front(time, expansion, jnp.zeros(time.shape, int), outcome, nothing, time, *known, none, angles)
+    return IntegratorState(time, expansion, jnp.zeros(time.shape, int), outcome, nothing, time, *known, none, angles)
 
 
 @compiled("count", "keep")
 def march(
     equations: Equations,
-    front: Front,
+    current: IntegratorState,
     stop: Any,
     tolerance: Any,
     longest: Any,
@@ -81,14 +81,14 @@ def march(
     method: AbstractMethod,
     count: int,
     keep: bool = True,
-) -> tuple[Front, Steps | None, Any]:
+) -> tuple[IntegratorState, Steps | None, Any]:
     """Take up to `count` steps towards a time, all runs of a batch side by side.
 
     Parameters
     ----------
     equations : Equations
         Of the mechanism.
-    front : Front
+    current : IntegratorState
         Where to go on from.
     stop : float
         Where to go, s; steps end there exactly.
@@ -105,71 +105,71 @@ def march(
 
     Returns
     -------
-    front : Front
+    current : IntegratorState
     steps : Steps or None
     tried : int
         How many of them there are.
     """
     length = equations.system.column_scale[0]
-    order = len(front.expansion.state.position) - 1
+    order = len(current.expansion.state.position) - 1
 
-    def attempt(front: Front) -> tuple[Front, Steps]:
-        left = stop - front.time
-        start, reach, allowed = method.prepared(front.expansion, length, tolerance, front.singular)
-        step = jnp.minimum(reach, jnp.minimum(longest, jnp.abs(left))) * 0.5 ** front.refused.astype(float)
-        look = Look(jnp.sign(left) * step, jnp.ones(step.shape, bool), jnp.full(step.shape, -1), front.blocked)
-        angles = followed(equations, front.angles, start.state, look.step)
+    def attempt(current: IntegratorState) -> tuple[IntegratorState, Steps]:
+        left = stop - current.time
+        start, reach, allowed = method.prepared(current.expansion, length, tolerance, current.singular)
+        step = jnp.minimum(reach, jnp.minimum(longest, jnp.abs(left))) * 0.5 ** current.refused.astype(float)
+        look = Lookahead(jnp.sign(left) * step, jnp.ones(step.shape, bool), jnp.full(step.shape, -1), current.blocked)
+        angles = followed(equations, current.angles, start.state, look.step)
         if method.controlled:
-            span, bound = jnp.abs(stop - front.begun), MARGIN * allowed
-            look = looked_ahead(equations, start.state, angles, front.mobility, front.time, look.step, span, bound)
-        suspect = (look.rough >= 0) & (jnp.abs(look.step) < step) | (front.refused >= STUBBORN)
+            span, bound = jnp.abs(stop - current.begun), MARGIN * allowed
+            look = look_ahead(equations, start.state, angles, current.mobility, current.time, look.step, span, bound)
+        suspect = (look.kink >= 0) & (jnp.abs(look.step) < step) | (current.refused >= STUBBORN)
         step = jnp.abs(look.step)
         last = step >= 0.999 * jnp.abs(left)  # no sliver of a step at the end
         step = jnp.where(last, left, jnp.sign(left) * step)
-        time = jnp.where(last, stop, front.time + step)
-        running = front.outcome == Outcome.RUNNING
+        time = jnp.where(last, stop, current.time + step)
+        running = current.outcome == Outcome.RUNNING
         step = jnp.where(running, step, 0.0)
-        time = jnp.where(running, time, front.time)
+        time = jnp.where(running, time, current.time)
 
         there = equations.near(angles.at(step))
-        state = method.arrive(there, start, front.time, step)
+        state = method.arrive(there, start, current.time, step)
         state, distance, inverse = projected(there, state, time[None])
         expansion = _kept(expand(there, state, time[None], order, inverse))
         error = method.error(start, expansion, step, length)
-        good = _finite(expansion) & jnp.isfinite(distance) & (error <= MARGIN * allowed) & running & look.clear
+        good = _finite(expansion) & jnp.isfinite(distance) & (error <= MARGIN * allowed) & running & look.resolved
         if method.controlled:
             kick = 0.5 * order * (order + 1) * error
-            good = good & ~(suspect & _lasting(kick, step, jnp.abs(stop - front.begun), MARGIN * allowed, front))
-        tiny = jnp.abs(step) < SMALLEST_STEP * jnp.maximum(jnp.abs(front.time), jnp.abs(stop - front.time))
+            good = good & ~(suspect & _lasting(kick, step, jnp.abs(stop - current.begun), MARGIN * allowed, current))
+        tiny = jnp.abs(step) < SMALLEST_STEP * jnp.maximum(jnp.abs(current.time), jnp.abs(stop - current.time))
         polynomial = method.polynomial(start, expansion, step)
-        steps = Steps(front.time, step, good, look.rough, polynomial, front.angles)
-        outcome = jnp.where(good & last, int(Outcome.ARRIVED), front.outcome)
+        steps = Steps(current.time, step, good, look.kink, polynomial, current.angles)
+        outcome = jnp.where(good & last, int(Outcome.ARRIVED), current.outcome)
         outcome = jnp.where(running & ~good & tiny, int(Outcome.COLLAPSED), outcome)
-        drift, none = jnp.maximum(front.drift, distance), jnp.full(step.shape, -1)
+        drift, none = jnp.maximum(current.drift, distance), jnp.full(step.shape, -1)
         known = mobility_of(equations, inverse), near_singular(equations, inverse)
-        fresh, reached = jnp.zeros_like(front.refused), measured(there, state)
-        onwards = Front(time, expansion, fresh, outcome, drift, front.begun, *known, none, reached)
-        blocked = jnp.where(look.clear, front.blocked, look.worst)
-        refused = front._replace(refused=front.refused + 1, outcome=outcome, blocked=blocked)
+        fresh, reached = jnp.zeros_like(current.refused), measured(there, state)
+        onwards = IntegratorState(time, expansion, fresh, outcome, drift, current.begun, *known, none, reached)
+        blocked = jnp.where(look.resolved, current.blocked, look.limiting)
+        refused = current._replace(refused=current.refused + 1, outcome=outcome, blocked=blocked)
         return jax.tree.map(lambda a, b: jnp.where(good, a, b), onwards, refused), steps
 
     def unfinished(carry: Any) -> Any:
-        front, _, tried = carry
-        return jnp.any(front.outcome == Outcome.RUNNING) & (tried < count)
+        current, _, tried = carry
+        return jnp.any(current.outcome == Outcome.RUNNING) & (tried < count)
 
     def iterate(carry: Any) -> Any:
-        front, kept, tried = carry
-        front, steps = attempt(front)
+        current, kept, tried = carry
+        current, steps = attempt(current)
         if keep:
             kept = jax.tree.map(lambda k, s: jax.lax.dynamic_update_index_in_dim(k, s, tried, 0), kept, steps)
-        return front, kept, tried + 1
+        return current, kept, tried + 1
 
-    shapes = jax.eval_shape(lambda f: attempt(f)[1], front)
+    shapes = jax.eval_shape(lambda f: attempt(f)[1], current)
     kept = jax.tree.map(lambda s: jnp.zeros((count, *s.shape), s.dtype), shapes) if keep else None
-    return jax.lax.while_loop(unfinished, iterate, (front, kept, 0))
+    return jax.lax.while_loop(unfinished, iterate, (current, kept, 0))
 
 
-def _lasting(kick: Any, step: Any, span: Any, bound: Any, front: Front) -> Any:
+def _lasting(kick: Any, step: Any, span: Any, bound: Any, current: IntegratorState) -> Any:
     """Tell where a kink at the beginning of a step kicks bodies so that they move by more than is harmless in the run.
 
     What is left of it in the accelerations at the end is no next term of a series there: `kick` is the displacement
@@ -177,7 +177,7 @@ def _lasting(kick: Any, step: Any, span: Any, bound: Any, front: Front) -> Any:
     """
     span = jnp.maximum(span, jnp.abs(step))
     moved = kick * span / jnp.maximum(jnp.abs(step), SHORTEST * span)
-    return (moved > jnp.maximum(bound, HARMLESS)) & (jnp.abs(step) > SHORTEST * span) & ~front.singular
+    return (moved > jnp.maximum(bound, HARMLESS)) & (jnp.abs(step) > SHORTEST * span) & ~current.singular
 
 
 def _kept(expansion: Expansion) -> Expansion:

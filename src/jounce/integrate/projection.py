@@ -5,7 +5,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
-from jounce.dynamics.forward import Equations, State, grounded
+from jounce.dynamics.forward import Equations, State, with_ground
 from jounce.jet import Jet
 from jounce.kinematics.linear import DenseFactor
 
@@ -48,7 +48,7 @@ def projected(equations: Equations, state: State, time: Any) -> tuple[State, Any
     def moved(position: Any, attitude: Any, column: Any) -> tuple[Any, Any]:
         change = equations.bodies(column)
         shifts = equations.pose_type.shifts
-        pose = equations.still(position, attitude).displaced(grounded(change[:shifts]), grounded(change[shifts:]))
+        pose = equations.still(position, attitude).displaced(with_ground(change[:shifts]), with_ground(change[shifts:]))
         return pose.position.coefficients[0][:, 1:], equations.attitude_of(pose)
 
     def iterate(carry: Any) -> Any:

@@ -10,7 +10,7 @@ import numpy as np
 
 from jounce.dynamics.energies import body_energy
 from jounce.dynamics.forward import Equations, State, expand
-from jounce.dynamics.start import Start
+from jounce.dynamics.start import ConsistentStart
 from jounce.integrate.events import NODES, at_nodes, counted_on, pose_coordinates, series_of
 from jounce.integrate.lookahead import watched_names
 from jounce.integrate.methods import evaluated
@@ -32,7 +32,7 @@ APPROACH = 4  # steps to such a place, each much shorter than the one before
 
 
 @dataclasses.dataclass(frozen=True)
-class Track:
+class DenseOutput:
     """Steps taken, in order.
 
     Parameters
@@ -41,7 +41,7 @@ class Track:
         s; lengths are negative backward in time.
     polynomial : State
         Coefficients in the time from the start, (steps, order + 1, components, bodies).
-    rough : array of int, shape (steps,)
+    kink : array of int, shape (steps,)
         Index of a force or law that is not resolved over a step, which is too short to matter, or -1: `watched_names`.
     angles : tuple of array of shape (steps, instances)
         About axes at the start, rad, for each group of forces that measures some.
@@ -50,7 +50,7 @@ class Track:
     start: np.ndarray
     length: np.ndarray
     polynomial: State
-    rough: np.ndarray
+    kink: np.ndarray
     angles: tuple[np.ndarray, ...] = ()
 
     @property
@@ -77,26 +77,26 @@ class Simulation(Motion):
         For each event asked for, the times at which it happened, s.
     kinks : list of tuple of float and str
         When a force or a motion law had a jump or a kink, s, and which.
-    track : Track
+    dense : DenseOutput
         The steps, as polynomials.
     """
 
     def __init__(
         self,
         mechanism: Mechanism,
-        start: Start,
-        track: Track,
+        start: ConsistentStart,
+        dense: DenseOutput,
         instants: np.ndarray,
         order: int,
         ending: tuple[Status, str] = (Status.OK, ""),
         events: list[list[float]] | None = None,
     ):
-        self.track, self._start = track, start
+        self.dense_output, self._start = dense, start
         self.events = [] if events is None else events
         self._ending = ending
         lost = max((output.lost_orders for output in mechanism.outputs.values()), default=0)
-        reached, chosen = _steps_of(track, instants)
-        state, self._angles = _at(start.equations, track, instants, chosen, order + max(lost, 1))
+        reached, chosen = _steps_of(dense, instants)
+        state, self._angles = _at(start.equations, dense, instants, chosen, order + max(lost, 1))
         pose_type = start.model.pose_type
         coordinates = pose_coordinates(state)
         groups = tuple(self._series(group, coordinates, pose_type, instants) for group in start.model.system.outputs)
@@ -111,7 +111,7 @@ class Simulation(Motion):
             }
         if lost.any():  # the state is known there, but not its derivatives
             status[lost], culprits[int(np.argmax(lost))] = int(Status.INADMISSIBLE), ending[1]
-        beyond = np.flatnonzero(~reached & (np.abs(instants - track.start[0]) > abs(track.end - track.start[0])))
+        beyond = np.flatnonzero(~reached & (np.abs(instants - dense.start[0]) > abs(dense.end - dense.start[0])))
         if ending[0] != Status.OK and beyond.size:
             status[beyond[0]], culprits[int(beyond[0])] = int(ending[0]), ending[1]
         super().__init__(mechanism, start.model, instants, order, (coordinates, groups), status, culprits)
@@ -127,7 +127,7 @@ class Simulation(Motion):
     @property
     def steps(self) -> int:
         """Number of steps taken."""
-        return len(self.track.start)
+        return len(self.dense_output.start)
 
     @property
     def kinks(self) -> list[tuple[float, str]]:
@@ -135,17 +135,17 @@ class Simulation(Motion):
 
         A step over such a place is made so short that it costs no digits, and the next may be long again.
         """
-        rough, length = self.track.rough, np.abs(self.track.length)
+        kink, length = self.dense_output.kink, np.abs(self.dense_output.length)
         names = watched_names(self._start.model)
         before = [length[max(k - APPROACH, 0) : k].max(initial=0.0) for k in range(len(length) - 1)]
         short = MUCH_LONGER * length[:-1]
-        places = np.flatnonzero((rough[:-1] >= 0) & (length[1:] > short) & (np.array(before) > short))
-        return [(float(self.track.start[k] + self.track.length[k]), names[rough[k]]) for k in places]
+        places = np.flatnonzero((kink[:-1] >= 0) & (length[1:] > short) & (np.array(before) > short))
+        return [(float(self.dense_output.start[k] + self.dense_output.length[k]), names[kink[k]]) for k in places]
 
     @property
     def ended_at(self) -> float:
         """Time to which the motion was followed, s."""
-        return self.track.end
+        return self.dense_output.end
 
     def at(self, time: Any, order: int | None = None) -> "Simulation":
         """Return the same simulation at other instants, without integrating again.
@@ -159,7 +159,7 @@ class Simulation(Motion):
         """
         instants = np.atleast_1d(np.asarray(time, float))
         order = self.order if order is None else order
-        return Simulation(self.mechanism, self._start, self.track, instants, order, self._ending, self.events)
+        return Simulation(self.mechanism, self._start, self.dense_output, instants, order, self._ending, self.events)
 
     @cached_property
     def energy(self) -> np.ndarray:
@@ -183,15 +183,15 @@ class Simulation(Motion):
 
     def _attitudes(self) -> tuple[np.ndarray, np.ndarray]:
         """Return instants along the steps, and the Euler parameters of all bodies there, (4, bodies, places)."""
-        track, series = self.track, self.track.polynomial.attitude
-        since = track.length[:, None] * (np.arange(PLACES) / PLACES)
+        dense, series = self.dense_output, self.dense_output.polynomial.attitude
+        since = dense.length[:, None] * (np.arange(PLACES) / PLACES)
         place = np.zeros((*series.shape[:1], *series.shape[2:], PLACES))
         for k in range(series.shape[1])[::-1]:
             place = place * since[:, None, None] + series[:, k, ..., None]
         place = np.moveaxis(place, 0, -2).reshape(*series.shape[2:], -1)
         ground = np.zeros((4, 1, place.shape[-1]))
         ground[0] = 1.0
-        return (track.start[:, None] + since).ravel(), np.concatenate([ground, place], axis=1)
+        return (dense.start[:, None] + since).ravel(), np.concatenate([ground, place], axis=1)
 
     def _coefficients(self, group: Group) -> np.ndarray:
         pose_type, coordinates = self.poses
@@ -199,11 +199,11 @@ class Simulation(Motion):
 
     def _series(self, group: Group, coordinates: dict[str, Any], pose_type: type, instants: np.ndarray) -> np.ndarray:
         """Return the series of outputs at instants; angles known up to whole turns go on from step to step."""
-        series, track = series_of(group, coordinates, pose_type), self.track
-        if not group.element.turning or not track.length.any():  # no steps: states that another solver gave
+        series, dense = series_of(group, coordinates, pose_type), self.dense_output
+        if not group.element.turning or not dense.length.any():  # no steps: states that another solver gave
             return continuous(group, series, instants)
-        nodes = (track.start[:, None] + track.length[:, None] * NODES).ravel()
-        known = at_nodes(group, track.polynomial, track.length, 1, self._start.model.pose_type)[:2]
+        nodes = (dense.start[:, None] + dense.length[:, None] * NODES).ravel()
+        known = at_nodes(group, dense.polynomial, dense.length, 1, self._start.model.pose_type)[:2]
         known = known.reshape(*known.shape[:3], -1)
         counted = counted_on(known[0], known[1], nodes)
         near = np.abs(nodes[None] - instants[:, None]).argmin(axis=1)
@@ -219,16 +219,16 @@ class Simulation(Motion):
         return np.where(self.status == Status.OK, found, np.nan)
 
 
-def _steps_of(track: Track, instants: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _steps_of(dense: DenseOutput, instants: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return which instants the steps reach, and the step in which each of them is."""
-    sense = 1.0 if track.length[0] >= 0 else -1.0
-    rounding = 1e-14 * max(abs(track.start[0]), abs(track.end))
-    reached = (sense * (instants - track.start[0]) >= -rounding) & (sense * (instants - track.end) <= rounding)
-    chosen = np.searchsorted(sense * track.start, sense * instants, side="right") - 1
-    return reached, np.clip(chosen, 0, len(track.start) - 1)
+    sense = 1.0 if dense.length[0] >= 0 else -1.0
+    rounding = 1e-14 * max(abs(dense.start[0]), abs(dense.end))
+    reached = (sense * (instants - dense.start[0]) >= -rounding) & (sense * (instants - dense.end) <= rounding)
+    chosen = np.searchsorted(sense * dense.start, sense * instants, side="right") - 1
+    return reached, np.clip(chosen, 0, len(dense.start) - 1)
 
 
-def _at(equations: Equations, track: Track, instants: np.ndarray, chosen: np.ndarray, order: int) -> Any:
+def _at(equations: Equations, dense: DenseOutput, instants: np.ndarray, chosen: np.ndarray, order: int) -> Any:
     """Return the Taylor coefficients of the motion at instants, order first and the instants last, and its angles."""
     count = len(instants)
     width = SMALL_BATCH if count <= SMALL_BATCH else LARGE_BATCH
@@ -236,9 +236,9 @@ def _at(equations: Equations, track: Track, instants: np.ndarray, chosen: np.nda
     for first in range(0, count, width):
         lanes = np.minimum(np.arange(first, first + width), count - 1)
         steps = chosen[lanes]
-        polynomial = State(*(np.moveaxis(part[steps], 0, -1) for part in track.polynomial))
-        begun = equations.near(tuple(part[steps].T for part in track.angles))
-        found = expanded(begun, polynomial, instants[lanes] - track.start[steps], instants[lanes], order=order)
+        polynomial = State(*(np.moveaxis(part[steps], 0, -1) for part in dense.polynomial))
+        begun = equations.near(tuple(part[steps].T for part in dense.angles))
+        found = expanded(begun, polynomial, instants[lanes] - dense.start[steps], instants[lanes], order=order)
         parts.append(jax.tree.map(np.asarray, found))
     return jax.tree.map(lambda *xs: np.concatenate(xs, axis=-1)[..., :count], *parts)
 

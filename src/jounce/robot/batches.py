@@ -51,7 +51,7 @@ def floats(name: str, values: Any) -> Any:
     raise RobotError("must be an array of real numbers", name=name, value=type(values).__name__)
 
 
-def checked(robot: AbstractRobot, q: Any, least: int) -> Any:
+def checked_coordinates(robot: AbstractRobot, q: Any, least: int) -> Any:
     """Return q as an array of shape (..., order + 1, n) with at least so many derivatives.
 
     Raises

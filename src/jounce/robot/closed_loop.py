@@ -13,7 +13,7 @@ from jounce.mechanism.resolve import resolve_motion
 from jounce.rigid.inertia import finite_numbers
 from jounce.robot.abstract_robot import AbstractRobot
 from jounce.robot.closures import Loops, given_coordinates, size_of
-from jounce.robot.mechanism_parts import Parts, on_body
+from jounce.robot.mechanism_parts import RobotParts, on_body
 
 DRIVE, START = "_drive", "_start"
 
@@ -93,7 +93,9 @@ def mechanism(
             if name not in robot.joint_names:
                 message = f"no moving joint that follows no other has this name; {_known(robot, name)}"
                 raise RobotError(message, name=kind, value=name)
-    parts = Parts(robot, {*driven, *(x for x in (outputs or {}).values() if isinstance(x, str))}, forces, outputs)
+    parts = RobotParts(
+        robot, {*driven, *(x for x in (outputs or {}).values() if isinstance(x, str))}, forces, outputs
+    )
     wanted = {name: name for name in parts.coordinates} if outputs is None else outputs
     start = _start(robot, q, driven, parameters or {}, time)
     joints = parts.joints()

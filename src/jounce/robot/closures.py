@@ -83,7 +83,7 @@ def _relative_attitude(body_i: Any, body_j: Any) -> tuple[Jet, Jet]:
     return body_i.quaternion.dot(body_j.quaternion), stack([s.dot(body_j.quaternion) for s in body_i.spins])
 
 
-def borne(closure: Closure) -> np.ndarray:
+def constraint_wrenches(closure: Closure) -> np.ndarray:
     """Return the wrenches that a closure can bear, (rows, 6): force and moment in the frame of its first link."""
     everything = np.eye(6)
     if closure.type == "connect":
@@ -127,7 +127,7 @@ class Loops:
         self.wrenches = []
         places: list[list[Any]] = [[], []]
         for closure in robot.closures.values():
-            wrenches = borne(closure)
+            wrenches = constraint_wrenches(closure)
             self.wrenches.append(wrenches)
             for k, link in enumerate(closure.links):
                 frame = robot.frames[link]

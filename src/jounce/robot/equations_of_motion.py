@@ -16,7 +16,7 @@ from jounce.errors import RobotError, did_you_mean
 from jounce.jet import Jet, components, cross, dot
 from jounce.jet.algebra import stacked, total
 from jounce.rigid.frames import Frames
-from jounce.robot.batches import Batched, checked, floats
+from jounce.robot.batches import Batched, checked_coordinates, floats
 from jounce.robot.kinematics import body_frames
 from jounce.robot.robot import Robot
 from jounce.robot.tree import Tree
@@ -206,7 +206,7 @@ def mass_matrix(robot: Robot, q: Any, *, rates: bool = False, drives: bool = Fal
             joints = f"{robot.name} has {n} {'joint' if n == 1 else 'joints'}"
             raise RobotError(f"must have the shape (..., n), not {q.shape}; {joints}: n = {n}", name="q")
         q = q[..., None, :]
-    found = _mass_matrix(robot, (checked(robot, q, 0),), (), (bool(drives),))
+    found = _mass_matrix(robot, (checked_coordinates(robot, q, 0),), (), (bool(drives),))
     return found if rates else found[..., 0, :, :]
 
 
@@ -263,6 +263,6 @@ def bias_forces(
     for part in chosen:
         if part not in PARTS:
             raise RobotError(f"no such part; {did_you_mean(str(part), PARTS)}", name="parts", value=part)
-    q = checked(robot, q, 1)
+    q = checked_coordinates(robot, q, 1)
     found = _bias(robot, (q if rates else q[..., :2, :],), (), (frozenset(chosen), bool(drives)))
     return found if rates else found[..., 0, :]

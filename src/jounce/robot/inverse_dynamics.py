@@ -10,10 +10,10 @@ from jounce.errors import RobotError, did_you_mean
 from jounce.jet import Jet, concatenate, cross, matvec
 from jounce.jet.algebra import stacked
 from jounce.rigid.frames import Frames
-from jounce.robot.batches import Batched, checked
+from jounce.robot.batches import Batched, checked_coordinates
 from jounce.robot.equations_of_motion import drive_forces
 from jounce.robot.kinematics import body_frames
-from jounce.robot.newton_euler import newton_euler
+from jounce.robot.newton_euler import recursive_newton_euler
 from jounce.robot.robot import Robot
 from jounce.robot.tree import Tree
 from jounce.robot.tree_scan import to_coordinates
@@ -66,7 +66,7 @@ def inverse_dynamics(
     >>> jn.inverse_dynamics(pendulum, [[0.0], [1.0], [3.0], [6.0]]).round(12).tolist()  # torque and torque rate
     [[5.905], [2.0]]
     """
-    q = checked(robot, q, 2)
+    q = checked_coordinates(robot, q, 2)
     arrays, static = _applied(robot, q, wrenches, time)
     return _generalised_forces(robot, arrays[0], arrays[1], (*static, drives))
 
@@ -105,7 +105,7 @@ def joint_wrenches(
     """
     if frame not in FRAMES:
         raise RobotError(f"no such frame; {did_you_mean(frame, FRAMES)}", name="frame", value=frame)
-    q = checked(robot, q, 2)
+    q = checked_coordinates(robot, q, 2)
     arrays, static = _applied(robot, q, wrenches, time)
     turned = [robot.frames[link].rotation for link in robot.moving_links]
     aligned = np.moveaxis(np.array(turned).reshape(-1, 3, 3), 0, -1)
@@ -152,7 +152,7 @@ def _frame(frames: Frames | None, body: Any) -> Frames:
 def _generalised_forces(tree: Tree, arrays: Any, constants: Any, global_axes: tuple[bool, ...], drives: bool) -> Any:
     q = arrays[0]
     applied, _ = _on_bodies(tree, arrays, constants, global_axes)
-    forces = to_coordinates(tree, newton_euler(tree, q, applied)[0])
+    forces = to_coordinates(tree, recursive_newton_euler(tree, q, applied)[0])
     if drives:
         levels = q.shape[0] - 2
         acceleration = Jet(tuple(q)).differentiate().differentiate()
@@ -165,7 +165,7 @@ def _carried(tree: Tree, arrays: Any, constants: Any, global_axes: tuple[bool, .
     q = arrays[0]
     given, aligned = constants
     applied, _ = _on_bodies(tree, arrays, given, global_axes)
-    _, force, moment = newton_euler(tree, q, applied)
+    _, force, moment = recursive_newton_euler(tree, q, applied)
     parts = [Jet(tuple(jnp.swapaxes(x, 1, 2))) for x in (force, moment)]  # components, bodies, batch
     if in_base:
         frames = body_frames(tree, q[:-2])

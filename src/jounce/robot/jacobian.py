@@ -6,7 +6,7 @@ import jax.numpy as jnp
 
 from jounce.jet import Jet, concatenate, cross
 from jounce.jet.algebra import stacked
-from jounce.robot.batches import Batched, checked
+from jounce.robot.batches import Batched, checked_coordinates
 from jounce.robot.kinematics import body_frames, frame_constants, link_frame
 from jounce.robot.robot import Robot
 from jounce.robot.tree import Tree
@@ -67,7 +67,7 @@ def jacobian(robot: Robot, q: Any, link: str, point: Any = (0.0, 0.0, 0.0)) -> A
     >>> jn.jacobian(jn.Robot("one", links, [pin]), [[0.0]], "rod", [2, 0, 0])[0, :, 0].tolist()
     [0.0, 2.0, 0.0, 0.0, 0.0, 1.0]
     """
-    return _jacobian(robot, (checked(robot, q, 0),), frame_constants(robot, link, point))
+    return _jacobian(robot, (checked_coordinates(robot, q, 0),), frame_constants(robot, link, point))
 
 
 def twist(tree: Tree, q: Any, constants: Any) -> Jet:
@@ -109,4 +109,4 @@ def operational_accelerations(robot: Robot, q: Any, link: str, point: Any = (0.0
     >>> jn.operational_accelerations(robot, [[0.0], [2.0], [0.0]], "rod", [1, 0, 0]).tolist()
     [[0.0, 2.0, 0.0, 0.0, 0.0, 2.0], [-4.0, 0.0, 0.0, 0.0, 0.0, 0.0]]
     """
-    return _operational(robot, (checked(robot, q, 1),), frame_constants(robot, link, point))
+    return _operational(robot, (checked_coordinates(robot, q, 1),), frame_constants(robot, link, point))

@@ -13,9 +13,9 @@ from jounce.jet.algebra import stacked, total
 from jounce.rigid.frames import Frames
 from jounce.rigid.inertia import finite_numbers
 from jounce.robot.abstract_robot import AbstractRobot
-from jounce.robot.batches import Batched, checked
+from jounce.robot.batches import Batched, checked_coordinates
 from jounce.robot.tree import Tree
-from jounce.robot.tree_scan import entries, joint_coordinates, once, places, read, write
+from jounce.robot.tree_scan import entries, fill_slots, joint_coordinates, materialised, read_slot, write_slot
 
 
 def body_frames(tree: Tree, q: Any) -> Frames:
@@ -35,26 +35,26 @@ def body_frames(tree: Tree, q: Any) -> Frames:
 
     def outward(state: Any, entry: Any) -> tuple[Any, Any]:
         body, coordinate, turn = entry
-        *placed, spin = read(tree, state, body.parent_slot)
+        *placed, spin = read_slot(tree, state, body.parent_slot)
         position, *axes = (Jet(tuple(c)) for c in placed)
         position = position + _combined(axes, body.position)
         x, y, z = (_combined(axes, body.rotation[:, i]) for i in range(3))
         if tree.shape.turning:
             angle, sine, cosine = turn
-            x, y, z = once((x, y, z))
+            x, y, z = materialised((x, y, z))
             x, y = x * cosine + y * sine, y * cosine - x * sine
             if levels > 1:
                 spin = spin + stacked(z * angle.differentiate())
         if tree.shape.sliding:
             position = position + z * (coordinate * (1 - body.turning))
         found = (*(stacked(jet) for jet in (position, x, y, z)), spin)
-        return write(tree, state, body.slot, found), found
+        return write_slot(tree, state, body.slot, found), found
 
     coordinates = Jet(tuple(joint_coordinates(tree, q)[:, :, None]))
     angles = coordinates * jnp.asarray(tree.turning)[:, None, None] if tree.shape.sliding else coordinates
     # made before the scan, in which XLA would take sine and cosine again for each use of them
     turns = (angles, *sine_cosine(angles)) if tree.shape.turning else None
-    _, found = jax.lax.scan(outward, places(tree, base), (entries(tree), coordinates, turns))
+    _, found = jax.lax.scan(outward, fill_slots(tree, base), (entries(tree), coordinates, turns))
     arrays = [jnp.moveaxis(jnp.concatenate([x, fixed[None]]), 0, 2) for x, fixed in zip(found, base, strict=True)]
     position, *axes = (Jet(tuple(x)) for x in arrays[:4])
     return Frames(position, tuple(axes), Jet(tuple(arrays[4])) if levels > 1 else None)
@@ -151,7 +151,7 @@ def forward_kinematics(robot: AbstractRobot, q: Any, link: str, point: Any = (0.
     >>> motion.position.tolist()
     [[1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [-4.0, 0.0, 0.0]]
     """
-    q = checked(robot, q, 0)
+    q = checked_coordinates(robot, q, 0)
     return FrameMotion(*_frame_motion(robot, (q,), frame_constants(robot, link, point)))
 
 
@@ -192,7 +192,7 @@ def center_of_mass(robot: AbstractRobot, q: Any) -> Any:
     >>> jn.center_of_mass(jn.Robot("one", links, [pin]), [[0.0], [2.0]]).tolist()
     [[0.5, 0.0, 0.0], [0.0, 1.0, 0.0]]
     """
-    q = checked(robot, q, 0)
+    q = checked_coordinates(robot, q, 0)
     base = robot.base_inertia
     if base is None and not robot.moving_links:
         raise RobotError("no link has a mass", name="robot", value=robot.name)

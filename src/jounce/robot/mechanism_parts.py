@@ -16,7 +16,7 @@ from jounce.rigid.euler_parameters import from_rotation_matrices
 from jounce.rigid.inertia import Inertia
 from jounce.robot.abstract_robot import AbstractRobot
 from jounce.robot.closures import LinkClosure
-from jounce.robot.coupling import Placed, SlideOutput, coupled
+from jounce.robot.coupling import JointPlacement, SlideOutput, coupled
 from jounce.robot.kinematics import forward_kinematics
 from jounce.robot.model import Closure
 from jounce.robot.tree import axes_with_z_along
@@ -36,7 +36,7 @@ def on_body(robot: AbstractRobot, link: str) -> tuple[str, np.ndarray, np.ndarra
     return name, turned @ position, turned @ rotation
 
 
-class Parts:
+class RobotParts:
     """The bodies, joints and drives of a robot, in the frames of its moving links.
 
     Parameters
@@ -96,17 +96,17 @@ class Parts:
         axes.append(tree.rotation[slides[1]] @ tree.rotation[slides[2]] @ np.eye(3)[2])
         return bool(abs(np.linalg.det(np.array(axes))) > 1e-3)
 
-    def placed(self, index: int) -> Placed:
+    def placed(self, index: int) -> JointPlacement:
         """Return a moving joint in the frames of the two bodies."""
         joint = self.moving[index]
         parent, position, rotation = on_body(self.robot, joint.parent)
         point, rotation = position + rotation @ joint.position, rotation @ joint.rotation
         side = axes_with_z_along(joint.axis)[:, 0]
-        return Placed(
+        return JointPlacement(
             (parent, joint.child), joint.turning, point, rotation @ joint.axis, joint.axis, rotation @ side, side
         )
 
-    def _named(self, name: str) -> Placed:
+    def _named(self, name: str) -> JointPlacement:
         return self.placed([joint.name for joint in self.moving].index(name))
 
     def joints(self) -> dict[str, AbstractConstraint]:

@@ -32,27 +32,27 @@ def entries(tree: Tree) -> Tree:
     return dataclasses.replace(jax.tree.map(jnp.asarray, tree), **dict.fromkeys(fields))
 
 
-def places(tree: Tree, state: Any) -> Any:
+def fill_slots(tree: Tree, state: Any) -> Any:
     """Return the places where states of parents are kept, all holding the given one."""
     if tree.shape.slots == 1:
         return state
     return jax.tree.map(lambda x: jnp.broadcast_to(x, (tree.shape.slots, *x.shape)), state)
 
 
-def read(tree: Tree, state: Any, slot: Any) -> Any:
+def read_slot(tree: Tree, state: Any, slot: Any) -> Any:
     """Return the state kept in a place; a chain has one place only."""
     if tree.shape.slots == 1:
         return state
     return jax.tree.map(lambda x: jax.lax.dynamic_index_in_dim(x, slot, keepdims=False), state)
 
 
-def write(tree: Tree, state: Any, slot: Any, value: Any) -> Any:
+def write_slot(tree: Tree, state: Any, slot: Any, value: Any) -> Any:
     """Return the places with a new state in one of them."""
     if tree.shape.slots == 1:
         return value
     return jax.tree.map(lambda x, y: jax.lax.dynamic_update_index_in_dim(x, y, slot, 0), state, value)
 
 
-def once(value: Any) -> Any:
+def materialised(value: Any) -> Any:
     """Return a value as it is, kept by XLA, which otherwise computes it again for every use: this halves the time."""
     return jax.lax.optimization_barrier(value)
