@@ -3,12 +3,11 @@
 from typing import Any
 
 import jax.numpy as jnp
+from numpy.typing import ArrayLike
 
 from jounce.dynamics.driver_coordinates import balanced
-from jounce.dynamics.energies import whole_number
-from jounce.dynamics.equations import checked_order
 from jounce.kinematics import Motion
-from jounce.robot.batches import Batched
+from jounce.robot.batches import Batched, checked_coordinates, whole_number
 from jounce.robot.equations_of_motion import centers_of, partial_velocities, times_inertia, work, work_of_weight
 from jounce.robot.inverse_dynamics import inverse_dynamics
 from jounce.robot.kinematics import body_frames
@@ -30,7 +29,7 @@ def _virtual_work(tree: Tree, arrays: Any, _: Any, inertial: bool) -> Any:
     return to_coordinates(tree, work(partial_velocities(tree, frames), force, moment))
 
 
-def newton_euler(system: Robot | Motion, q: Any = None, rates: int = 0) -> Any:
+def newton_euler(system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0) -> Any:
     """Return the generalised inertia forces by recursive Newton-Euler on jets: `inverse_dynamics` without gravity.
 
     For the motion of a mechanism the balances of momentum are those of all bodies together, by multipliers.
@@ -57,13 +56,13 @@ def newton_euler(system: Robot | Motion, q: Any = None, rates: int = 0) -> Any:
     >>> newton_euler(jn.robot.from_screws([slide]), [[0.0], [3.0], [5.0], [7.0]], rates=1).round(12).tolist()
     [[10.0], [14.0]]
     """
-    rates = whole_number("rates", rates, 0)
+    rates = whole_number("rates", rates)
     if isinstance(system, Motion):
         return balanced(system, rates, gravity=False)
-    return inverse_dynamics(system.with_gravity((0.0, 0.0, 0.0)), checked_order(system, q, rates + 2))
+    return inverse_dynamics(system.with_gravity((0.0, 0.0, 0.0)), checked_coordinates(system, q, rates + 2, rates + 2))
 
 
-def virtual_work(system: Robot | Motion, q: Any = None, rates: int = 0) -> Any:
+def virtual_work(system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0) -> Any:
     """Return the generalised inertia forces by the principle of d'Alembert-Lagrange: Negrean 2025, equations 121-124.
 
     The work that inertia forces and moments of all bodies do along each coordinate, ``sum J^T F``. For the motion of
@@ -91,13 +90,13 @@ def virtual_work(system: Robot | Motion, q: Any = None, rates: int = 0) -> Any:
     >>> virtual_work(jn.robot.from_screws([slide]), [[0.0], [3.0], [5.0], [7.0]], rates=1).round(12).tolist()
     [[10.0], [14.0]]
     """
-    rates = whole_number("rates", rates, 0)
+    rates = whole_number("rates", rates)
     if isinstance(system, Motion):
         return balanced(system, rates, gravity=False)
-    return _virtual_work(system, (checked_order(system, q, rates + 2),), (), (True,))
+    return _virtual_work(system, (checked_coordinates(system, q, rates + 2, rates + 2),), (), (True,))
 
 
-def gravity_forces(system: Robot | Motion, q: Any = None, rates: int = 0) -> Any:
+def gravity_forces(system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0) -> Any:
     """Return the generalised forces that hold the robot against gravity, and their rates: Q_g of Negrean 2025, 125.
 
     With the inertia forces they make the driving forces, ``Q_m = Q_i + Q_g``.
@@ -124,7 +123,7 @@ def gravity_forces(system: Robot | Motion, q: Any = None, rates: int = 0) -> Any
     >>> gravity_forces(jn.robot.from_screws([lift]), [[0.0]]).tolist()
     [[19.62]]
     """
-    rates = whole_number("rates", rates, 0)
+    rates = whole_number("rates", rates)
     if isinstance(system, Motion):
         return balanced(system, rates, gravity=True) - balanced(system, rates, gravity=False)
-    return _virtual_work(system, (checked_order(system, q, rates),), (), (False,))
+    return _virtual_work(system, (checked_coordinates(system, q, rates, rates),), (), (False,))

@@ -12,10 +12,12 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
-from jounce.dynamics.energies import masses_of
-from jounce.dynamics.inverse import MotionForces, element_indices, in_chunks, pose_of
+from jounce.dynamics.inverse import MotionForces, element_indices
 from jounce.dynamics.loads import mass_matrices
+from jounce.dynamics.masses import masses_of
 from jounce.dynamics.mechanism_state import MotionAtState, at_state
+from jounce.dynamics.motion_values import in_chunks, pose_of
+from jounce.dynamics.saddle_point import block_diagonal, saddle_point
 from jounce.errors import MechanismError
 from jounce.jet import Jet
 from jounce.kinematics import Motion, Status
@@ -306,7 +308,7 @@ def _determined(motion: Motion, jacobian: np.ndarray, mass: np.ndarray) -> bool:
     if len(whole) != whole.shape[1]:
         mass = mass * scale[:, None] * scale
         mass = mass / (np.max(np.abs(mass)) or 1.0)
-        whole = np.block([[mass, whole.T], [whole, np.zeros((len(whole), len(whole)))]])
+        whole = np.asarray(saddle_point(mass[..., None], whole[..., None]))[..., 0]
     return split(whole)[1] == len(whole)
 
 
@@ -319,14 +321,13 @@ def _mass_matrix(motion: Motion) -> np.ndarray:
         bodies = {name: values[:1][..., lanes] for name, values in coordinates.items() if name in pose_type.predictor}
         return _body_masses(bodies, masses, pose_type)
 
-    blocks = np.moveaxis(in_chunks(chunk, len(motion.time)), (3, 2), (0, 1))[:, 1:]
-    count, columns = len(motion.mechanism.bodies), _columns(motion)
-    return np.einsum("ab,tacd->tacbd", np.eye(count), blocks).reshape(len(motion.time), columns, columns)
+    return np.moveaxis(in_chunks(chunk, len(motion.time)), -1, 0)
 
 
 @compiled("pose_type")
 def _body_masses(bodies: dict[str, Any], masses: Any, pose_type: Any) -> Any:
-    return mass_matrices(pose_of(bodies, pose_type, 0), *masses)
+    blocks = mass_matrices(pose_of(bodies, pose_type, 0), masses)[:, :, 1:]
+    return block_diagonal(blocks, np.ones(len(blocks)))
 
 
 def _check_finite(numbers: dict[str, np.ndarray], rows: np.ndarray, instant: float) -> None:

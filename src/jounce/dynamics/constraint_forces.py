@@ -7,20 +7,31 @@ virtual displacements of the bodies: none is written anywhere, and a joint of on
 """
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
-from jounce.dynamics.loads import inertia_forces as inertia_forces
+from jounce.dynamics.saddle_point import as_column, block_diagonal, saddle_point
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked
 from jounce.kinematics.linear import DenseFactor
 from jounce.mechanism.system import System
+from jounce.shapes import Numbers
 from jounce.trajectory import AbstractMotion
+
+Slope = Float[Numbers, "order coordinate row instance batch"]
+"""Taylor coefficients of how the residuals of a group change with the coordinates of the bodies in a slot."""
+
+Slopes = Sequence[Sequence[Slope]]
+"""For each group, those of each of its moving slots."""
+
+Multipliers = Float[Numbers, "order row instance batch"]
+"""Taylor coefficients of the multipliers of a group."""
 
 
 def truncated(pose: Any, order: int) -> Any:
@@ -92,24 +103,22 @@ def work_along(slope: Any, forces: Any, level: int, lowest: int = 0) -> Any:
     return sum(jnp.sum(slope[j] * forces[level - j][None], axis=1) for j in range(lowest, level + 1))
 
 
-class FreeFactor(eqx.Module):
-    """The factored matrix ``[[M, J^T], [J, 0]]`` of a mechanism that has degrees of freedom left."""
+def balancing(
+    mass: Float[Numbers, "column column batch"] | None, jacobian: Float[Numbers, "row column batch"]
+) -> Callable[[Float[Numbers, "column batch"]], Float[Numbers, "row batch"]]:
+    """Return what solves for the multipliers that balance loads.
 
-    factor: DenseFactor
-    rows: int = eqx.field(static=True)
+    Where there is no mass matrix, the Jacobian is square and balances all; with one, what accelerates the bodies freely
+    is left out.
+    """
+    if mass is None:
+        return DenseFactor.of(jacobian).solve_transposed
+    factor, rows = DenseFactor.of(saddle_point(mass, jacobian)), len(jacobian)
 
-    @classmethod
-    def of(cls, mass: Any, jacobian: Any) -> "FreeFactor":
-        """Factor from mass matrices, (columns, columns, batch), and Jacobians, (rows, columns, batch)."""
-        rows = jacobian.shape[0]
-        above = jnp.concatenate([mass, jnp.swapaxes(jacobian, 0, 1)], axis=1)
-        below = jnp.concatenate([jacobian, jnp.zeros((rows, rows, jacobian.shape[-1]))], axis=1)
-        return cls(DenseFactor.of(jnp.concatenate([above, below])), rows)
+    def solve(load: Any) -> Any:
+        return factor.solve(jnp.concatenate([load, jnp.zeros((rows, load.shape[-1]))]))[-rows:]
 
-    def solve_transposed(self, right: Any) -> Any:
-        """Return the multipliers that balance loads, (columns, batch), but for what accelerates the bodies freely."""
-        whole = jnp.concatenate([right, jnp.zeros((self.rows, right.shape[-1]))])
-        return self.factor.solve(whole)[-self.rows :]
+    return solve
 
 
 def multipliers(system: System, blocks: Sequence[Sequence[Any]], load: Any, mass: Any = None) -> Any:
@@ -129,31 +138,26 @@ def multipliers(system: System, blocks: Sequence[Sequence[Any]], load: Any, mass
     if not blocks:
         return jnp.zeros((load.shape[0], 0, load.shape[-1]))
     scale = jnp.asarray(system.column_scale)
-    factor = _factor(system, blocks, mass)
+    solve = _solver(system, blocks, mass)
     found: list[Any] = []
     for k in range(len(load)):
         missing = load[k]
         for group, parts, forces in _by_group(system, blocks, found):
             for slot, slope in zip(group.moving_slots, parts, strict=True):
                 missing -= _onto_bodies(work_along(slope, forces, k, 1), group.bodies[slot], system.body_count)
-        right = jnp.swapaxes(missing * scale[:, None, None], 0, 1).reshape(-1, missing.shape[-1])
-        found.append(factor.solve_transposed(right) * system.row_scale)
+        found.append(solve(as_column(missing, scale)) * system.row_scale)
     return jnp.stack(found)
 
 
-def _factor(system: System, blocks: Sequence[Sequence[Any]], mass: Any) -> Any:
-    """Return the factor that solves for multipliers: of the Jacobian alone where it is square."""
+def _solver(system: System, blocks: Slopes, mass: Any) -> Callable[[Any], Any]:
+    """Return what solves for the multipliers of scaled rows: by the Jacobian alone where it is square."""
     scale = jnp.asarray(system.column_scale)
     flat = [(slope[0] * scale[:, None, None, None]).reshape(-1, slope.shape[-1]) for parts in blocks for slope in parts]
-    lanes = flat[0].shape[-1]
-    jacobian = jnp.concatenate([*flat, jnp.zeros((1, lanes))])[system.cells] * system.row_scale[:, :, None]
-    rows, columns, _ = jacobian.shape
-    if rows == columns:
-        return DenseFactor.of(jacobian)
-    scaled = mass * (scale[:, None] * scale[None])[:, :, None, None]
-    scaled = scaled / jnp.max(jnp.abs(scaled))  # their size does not matter to the multipliers
-    whole = jnp.eye(system.body_count)[:, None, :, None, None] * jnp.moveaxis(scaled, 2, 0)[:, :, None]
-    return FreeFactor.of(whole.reshape(columns, columns, lanes), jacobian)
+    jacobian = jnp.concatenate([*flat, jnp.zeros((1, flat[0].shape[-1]))])[system.cells] * system.row_scale[:, :, None]
+    if jacobian.shape[0] == jacobian.shape[1]:
+        return balancing(None, jacobian)
+    whole = block_diagonal(mass, scale)
+    return balancing(whole / jnp.max(jnp.abs(whole)), jacobian)  # their size does not matter to the multipliers
 
 
 def _by_group(system: System, blocks: Sequence[Sequence[Any]], found: list[Any]) -> list[Any]:

@@ -4,7 +4,6 @@ The laws of the drivers are generalised coordinates: with them, joints and loops
 by a jet, and all poses follow from it to first order by the factored Jacobian, order after order, as in a solve.
 """
 
-import math
 from collections.abc import Callable
 from typing import Any
 
@@ -13,12 +12,14 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jounce.dynamics.energies import body_energy, mechanism_masses
-from jounce.dynamics.inverse import MotionForces, element_indices, in_chunks
+from jounce.dynamics.energies import body_energy
+from jounce.dynamics.inverse import MotionForces, element_indices
+from jounce.dynamics.masses import required_masses
+from jounce.dynamics.motion_values import in_chunks, labelled, pose_of
 from jounce.errors import MechanismError
 from jounce.jet import Jet
 from jounce.jet.algebra import total
-from jounce.kinematics import Motion, Status
+from jounce.kinematics import Motion
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.linear import DenseFactor
 from jounce.mechanism.system import System
@@ -68,16 +69,14 @@ def in_driver_coordinates(motion: Motion, q: Any, least: int, form: Callable[...
     found = element_indices(model)
     order = tuple((found[name].group, found[name].instance) for name in names)
     pose_type, coordinates = motion.poses
-    masses = mechanism_masses(motion)
+    masses = required_masses(motion.mechanism)
     start = {name: values[:1] for name, values in coordinates.items() if name != "angular_velocity"}
 
     def chunk(lanes: np.ndarray) -> Any:
         still = {name: values[..., lanes] for name, values in start.items()}
         return _evaluated(model.system, still, motion.time[lanes], masses, pose_type, order, least, form, static)
 
-    values = np.moveaxis(in_chunks(chunk, len(motion.time)), -1, 0)
-    values = values * np.array([float(math.factorial(k)) for k in range(values.shape[1])])[:, None]
-    return _labelled(motion, np.where((motion.status == Status.OK)[:, None, None], values, np.nan), names)
+    return labelled(motion, in_chunks(chunk, len(motion.time)), driver=names)
 
 
 def drivers_of(motion: Motion) -> tuple[str, ...]:
@@ -119,20 +118,12 @@ def balanced(motion: Motion, rates: int, *, gravity: bool) -> Any:
         If no body has a mass, the motion has too few derivatives, or something moves that no driver prescribes.
     """
     names = drivers_of(motion)
-    mechanism_masses(motion)
+    required_masses(motion.mechanism)
     if motion.order < rates + 2:
         raise MechanismError(f"this needs a motion solved to order {rates + 2}", name="order", value=motion.order)
     forces = MotionForces(motion, gravity=gravity, applied=False)
-    values = np.stack([forces.driver_force(name)[: rates + 1, 0] for name in names], axis=-1)  # level, time, driver
-    values = np.moveaxis(values, 0, 1) * np.array([float(math.factorial(k)) for k in range(rates + 1)])[:, None]
-    return _labelled(motion, np.where((motion.status == Status.OK)[:, None, None], values, np.nan), names)
-
-
-def _labelled(motion: Motion, values: np.ndarray, names: tuple[str, ...]) -> Any:
-    import xarray
-
-    axes = {"time": motion.time, "derivative": np.arange(values.shape[1]), "driver": list(names)}
-    return xarray.DataArray(values, dims=("time", "derivative", "driver"), coords=axes)
+    values = np.stack([forces.driver_force(name)[: rates + 1, 0] for name in names], axis=1)
+    return labelled(motion, values, driver=names)
 
 
 @compiled("pose_type", "order", "least", "form", "static")
@@ -147,14 +138,13 @@ def _evaluated(
     form: Callable[..., Any],
     static: tuple[Any, ...],
 ) -> Any:
-    mass, center, moments = masses
-    place = pose_type.from_coordinates({name: Jet(tuple(c)) for name, c in still.items()})
+    place = pose_of(still, pose_type)
     factor = DenseFactor.of(system.jacobian(place, Jet([instants[None]])))
 
     def energies(changes: Any, p: int) -> Jet:
         time = Jet.variable(instants[None], changes.shape[0] - 1)
         pose = followed(with_changes(system, order, changes), place, factor, time)
-        parts = body_energy(pose, mass, center, moments, p)
+        parts = body_energy(pose, *masses, p)
         return total(part.map(lambda c: jnp.sum(c, axis=0)) for part in parts)
 
     return form(energies, jnp.zeros((least + 1, len(order), len(instants))), *static)

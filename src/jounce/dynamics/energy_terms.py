@@ -9,7 +9,9 @@ import dataclasses
 import math
 from typing import Any
 
-from jounce.dynamics.energies import body_axes, differentiated, evaluated
+from numpy.typing import ArrayLike
+
+from jounce.dynamics.energies import axes_of, differentiated, energies_of, summed
 from jounce.errors import RobotError, did_you_mean
 from jounce.jet import Jet, cross, dot
 from jounce.jet.algebra import total
@@ -65,11 +67,11 @@ class EnergyTerms:
     @property
     def total(self) -> Any:
         """Energy of all bodies and its rates, shape (..., rates + 1)."""
-        return (self.translation + self.coupling + self.coupling_remaining + self.rotation).sum(axis=-1)
+        return summed(self.translation + self.coupling + self.coupling_remaining + self.rotation)
 
 
 def energy_terms(
-    system: Robot | Motion, q: Any = None, *, order: int = 1, about: str = "center_of_mass"
+    system: Robot | Motion, q: ArrayLike | None = None, *, order: int = 1, about: str = "center_of_mass"
 ) -> EnergyTerms:
     """Return the terms of the acceleration energy of order p apart: translation, and the three of rotation; with rates.
 
@@ -113,8 +115,7 @@ def energy_terms(
     if about not in POINTS:
         raise RobotError(f"no such point; {did_you_mean(about, POINTS)}", name="about", value=about)
     function = terms_about_center if about == "center_of_mass" else terms_about_origin
-    parts, bodies, order = evaluated(system, q, order, function)
-    return EnergyTerms(*parts, bodies=bodies, order=order)
+    return EnergyTerms(*energies_of(system, q, order, function))
 
 
 def terms_about_center(pose: Any, mass: Any, center: Any, moments: Any, order: int) -> tuple[Jet, ...]:
@@ -135,7 +136,7 @@ def terms_about_origin(pose: Any, mass: Any, center: Any, moments: Any, order: i
 
 def _rates(pose: Any, order: int) -> tuple[list[Jet], list[Jet]]:
     """Return the derivatives of the axes: what the last rate of the angular velocity adds, and what is left."""
-    axes = body_axes(pose)
+    axes = axes_of(pose)
     if len(axes) == 2:
         spin = pose.angle.differentiate()
     elif hasattr(pose, "global_angular_velocity"):

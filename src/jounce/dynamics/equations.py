@@ -15,14 +15,14 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+from numpy.typing import ArrayLike
 
 from jounce.dynamics.driver_coordinates import in_driver_coordinates
-from jounce.dynamics.energies import differentiated, robot_energy, whole_number
-from jounce.errors import RobotError
+from jounce.dynamics.energies import differentiated, robot_energy
 from jounce.jet import Jet, components
 from jounce.jet.algebra import stacked, total
 from jounce.kinematics import Motion
-from jounce.robot.batches import Batched, checked_coordinates
+from jounce.robot.batches import Batched, checked_coordinates, whole_number
 from jounce.robot.kinematics import body_frames
 from jounce.robot.robot import Robot
 from jounce.robot.tree import Tree
@@ -141,25 +141,11 @@ def _evaluated(system: Robot | Motion, q: Any, least: int, form: Callable[..., A
     """
     if isinstance(system, Motion):
         return in_driver_coordinates(system, q, least, form, static)
-    return _of_robot(system, (checked_order(system, q, least),), (), (form, static))
-
-
-def checked_order(robot: Robot, q: Any, least: int) -> Any:
-    """Return the derivatives of q to order `least`.
-
-    Raises
-    ------
-    RobotError
-        If q does not fit the robot or has too few derivatives.
-    """
-    q = checked_coordinates(robot, q, 0)
-    if q.shape[-2] < least + 1:
-        raise RobotError(f"this needs derivatives of q to order {least}", name="q", value=q.shape)
-    return q[..., : least + 1, :]
+    return _of_robot(system, (checked_coordinates(system, q, least, least),), (), (form, static))
 
 
 def energy_slope(
-    system: Robot | Motion, q: Any = None, *, m: int, order: int = 1, rate: int = 0, rates: int = 0
+    system: Robot | Motion, q: ArrayLike | None = None, *, m: int, order: int = 1, rate: int = 0, rates: int = 0
 ) -> Any:
     """Return the derivative of a rate of an energy with respect to ``q^(m)``: the terms of Negrean 2025, 126-134.
 
@@ -204,11 +190,11 @@ def energy_slope(
     [[14.0]]
     """
     numbers = {"m": m, "order": order, "rate": rate, "rates": rates}
-    m, order, rate, rates = (whole_number(name, value, 0) for name, value in numbers.items())
+    m, order, rate, rates = (whole_number(name, value) for name, value in numbers.items())
     return _evaluated(system, q, order + rate + rates + 1, _slope, rates + 1, order, rate, m)
 
 
-def lagrange(system: Robot | Motion, q: Any = None, rates: int = 0) -> Any:
+def lagrange(system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0) -> Any:
     """Return the generalised inertia forces by Lagrange's equations: Negrean 2025, equation 126.
 
     ``Q_i = d/dt (dE_0 / dq') - dE_0 / dq`` with the kinetic energy E_0.
@@ -241,11 +227,11 @@ def lagrange(system: Robot | Motion, q: Any = None, rates: int = 0) -> Any:
     >>> lagrange(jn.robot.from_screws([slide]), [[0.0], [3.0], [5.0], [7.0]], rates=1).round(12).tolist()
     [[10.0], [14.0]]
     """
-    rates = whole_number("rates", rates, 0)
+    rates = whole_number("rates", rates)
     return _evaluated(system, q, rates + 2, _lagrange, rates + 1)
 
 
-def mangeron_nielsen(system: Robot | Motion, q: Any = None, rates: int = 0, m: int = 1) -> Any:
+def mangeron_nielsen(system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0, m: int = 1) -> Any:
     """Return the generalised inertia forces by Mangeron's equations: Negrean 2025, equation 127.
 
     ``Q_i = 1/m (dE_0^(m) / dq^(m) - (m + 1) dE_0 / dq)``; m = 1 are Nielsen's equations.
@@ -275,11 +261,11 @@ def mangeron_nielsen(system: Robot | Motion, q: Any = None, rates: int = 0, m: i
     >>> mangeron_nielsen(jn.robot.from_screws([slide]), [[0.0], [3.0], [5.0], [7.0]], m=2).tolist()
     [[10.0]]
     """
-    m, rates = whole_number("m", m, 1), whole_number("rates", rates, 0)
+    m, rates = whole_number("m", m, 1), whole_number("rates", rates)
     return _evaluated(system, q, rates + m + 1, _mangeron, rates + 1, m)
 
 
-def gibbs_appell(system: Robot | Motion, q: Any = None, rates: int = 0, m: int = 2) -> Any:
+def gibbs_appell(system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0, m: int = 2) -> Any:
     """Return the generalised inertia forces by the Gibbs-Appell equations: Negrean 2025, equation 128.
 
     ``Q_i = dE_1^(m-2) / dq^(m)`` with the acceleration energy E_1 of first order.
@@ -309,7 +295,7 @@ def gibbs_appell(system: Robot | Motion, q: Any = None, rates: int = 0, m: int =
     >>> gibbs_appell(jn.robot.from_screws([slide]), [[0.0], [3.0], [5.0], [7.0]], rates=1).round(12).tolist()
     [[10.0], [14.0]]
     """
-    m, rates = whole_number("m", m, 2), whole_number("rates", rates, 0)
+    m, rates = whole_number("m", m, 2), whole_number("rates", rates)
     return _evaluated(system, q, rates + m, _gibbs_appell, rates + 1, m)
 
 

@@ -9,28 +9,20 @@ from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
-import jax
 import numpy as np
 
 from jounce.dynamics import constraint_forces
-from jounce.dynamics.energies import gravity_of, masses_of
 from jounce.dynamics.loads import loads, mass_matrices
+from jounce.dynamics.masses import check_loads, gravity_of, masses_of
+from jounce.dynamics.motion_values import in_chunks, pose_of
 from jounce.errors import MechanismError
 from jounce.jet import Jet, cross
 from jounce.jet.algebra import stacked
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.compilation import compiled
-from jounce.mechanism import Mechanism, Model
+from jounce.mechanism import Model
 from jounce.mechanism.datums import at_lanes
 from jounce.mechanism.system import System
-
-SMALL_BATCH, LARGE_BATCH = 64, 512  # instants; a short motion compiles for one width only, and fills less of it
-
-
-def check_loads(mechanism: Mechanism, name: str = "bodies") -> None:
-    """Raise MechanismError unless a body has a mass or a force is applied."""
-    if not mechanism.forces and all(body.mass is None for body in mechanism.bodies.values()):
-        raise MechanismError("forces need masses, and no body has one; give the bodies mass and inertia", name=name)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -54,16 +46,6 @@ def element_indices(model: Model) -> dict[str, ElementIndex]:
             found[name.partition(".")[2]] = ElementIndex(index, instance, slice(first, last))
         first = last
     return found
-
-
-def in_chunks(function: Callable[[np.ndarray], Any], count: int) -> Any:
-    """Return what a function of indices of instants gives, for all of them: arrays with the time last."""
-    width = SMALL_BATCH if count <= SMALL_BATCH else LARGE_BATCH
-    parts = []
-    for first in range(0, count, width):
-        lanes = np.minimum(np.arange(first, first + width), count - 1)
-        parts.append(jax.tree.map(np.asarray, function(lanes)))
-    return jax.tree.map(lambda *xs: np.concatenate(xs, axis=-1)[..., :count], *parts)
 
 
 class MotionForces:
@@ -263,16 +245,6 @@ class MotionForces:
         return found.reshape(len(found), -1, instances, found.shape[-1])
 
 
-def pose_of(coordinates: dict[str, Any], pose_type: Any, order: int) -> Any:
-    """Return the pose of bodies from Taylor coefficients of their coordinates; a place alone is one at rest."""
-    pose = pose_type.from_coordinates({name: Jet(tuple(c)) for name, c in coordinates.items()})
-    if pose.order < order:
-        return jax.tree.map(
-            lambda j: Jet.constant(j.coefficients[0], order), pose, is_leaf=lambda x: isinstance(x, Jet)
-        )
-    return jax.lax.optimization_barrier(pose)  # or XLA computes it again in everything that uses it
-
-
 @compiled("pose_type", "slot", "levels")
 def _slopes(element: Any, poses: Any, instants: Any, pose_type: Any, slot: int, levels: int) -> Any:
     time = Jet.variable(instants[None], levels - 1)
@@ -289,7 +261,7 @@ def _loads(system: System, bodies: Any, instants: Any, masses: Any, gravity: Any
 
 @compiled("pose_type")
 def _multipliers(system: System, blocks: Any, load: Any, still: Any, masses: Any, pose_type: Any) -> Any:
-    mass = None if still is None else mass_matrices(pose_of(still, pose_type, 0), *masses)[:, :, 1:]
+    mass = None if still is None else mass_matrices(pose_of(still, pose_type, 0), masses)[:, :, 1:]
     return constraint_forces.multipliers(system, blocks, load, mass)
 
 

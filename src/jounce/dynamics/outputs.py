@@ -6,7 +6,8 @@ import equinox as eqx
 import numpy as np
 
 from jounce.constraints.base import Vector, value_fields
-from jounce.dynamics.inverse import MotionForces, check_loads
+from jounce.dynamics.inverse import MotionForces
+from jounce.dynamics.masses import check_loads
 from jounce.errors import MechanismError, did_you_mean, no_such
 from jounce.mechanism import AbstractMotionOutput, Mechanism
 from jounce.mechanism.mechanism import GROUND

@@ -6,7 +6,8 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
-from jounce.dynamics.inverse import MotionForces, pose_of
+from jounce.dynamics.inverse import MotionForces
+from jounce.dynamics.motion_values import pose_of
 from jounce.jet import Jet, dot
 from jounce.jet.algebra import stacked, total
 from jounce.kinematics import Motion, Status

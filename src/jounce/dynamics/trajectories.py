@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from jounce.dynamics.energies import whole_number
 from jounce.errors import RobotError, SampleWarning, TrajectoryError, did_you_mean
+from jounce.robot.batches import whole_number
 from jounce.robot.inverse_dynamics import inverse_dynamics
 from jounce.robot.model import Limits
 from jounce.robot.robot import Robot
@@ -139,7 +139,7 @@ def trajectory_torques(
     """
     import xarray
 
-    rates = whole_number("rates", rates, 0)
+    rates = whole_number("rates", rates)
     followed = FollowedTrajectory(robot, trajectory)
     instants = trajectory.times if times is None else np.atleast_1d(np.asarray(times, float))
     values = followed.torques(followed.coordinates(instants, rates + 2), instants, drives)

@@ -168,11 +168,9 @@ def _rates(time: Any, state: State, equations: Equations) -> tuple[State, State]
     state = state.map(lambda part: part[..., None])
     state = state._replace(attitude=normalised(state.attitude))
     clock = jnp.reshape(jnp.asarray(time, float), (1, 1))
-    columns, rows = equations.system.cells.shape[1], equations.system.cells.shape[0]
-    trial = jnp.zeros((equations.coordinates, *state.position.shape[1:])), jnp.zeros((rows, 1))
+    trial = jnp.zeros((equations.coordinates, *state.position.shape[1:])), jnp.zeros((len(equations.system.cells), 1))
     forces, second, attitude_rate = equations.balance(state, *trial, clock)
-    factor = DenseFactor.of(equations.matrix(state, clock))
-    column = -factor.solve(jnp.concatenate([equations.flat(forces), second]))[:columns]
-    acceleration, shifts = equations.bodies(column), equations.pose_type.shifts
+    factor, shifts = DenseFactor.of(equations.matrix(state, clock)), equations.pose_type.shifts
+    acceleration, _ = equations.unknowns(factor.solve, forces, second)
     rate = State(state.velocity, attitude_rate, acceleration[:shifts], acceleration[shifts:])
     return jax.tree.map(lambda part: part[..., 0], rate), state

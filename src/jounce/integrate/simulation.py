@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jounce.dynamics.energies import body_energy
+from jounce.dynamics.energies import body_energy, energy_of_forces
 from jounce.dynamics.forward import Equations, State, expand
 from jounce.dynamics.start import ConsistentStart
 from jounce.integrate.events import NODES, at_nodes, counted_on, pose_coordinates, series_of
@@ -271,12 +271,11 @@ def _checks(equations: Equations, coordinates: dict[str, Any], time: Any, pose_t
     """Return the energy, the largest residual and the kinetic energy, all of shape (batch,)."""
     pose = pose_type.from_coordinates({name: Jet(tuple(c)) for name, c in coordinates.items()})
     clock = Jet.variable(time, 1)
-    translation, rotation = body_energy(pose, equations.mass, equations.center, equations.moments, 0)
-    height = dot(pose.point(equations.center), equations.gravity).coefficients[0]
+    masses = equations.masses
+    translation, rotation = body_energy(pose, *masses, 0)
+    height = dot(pose.point(masses.center), equations.gravity).coefficients[0]
     kinetic = jnp.sum(translation.coefficients[0] + rotation.coefficients[0], axis=0)
-    energy = kinetic - jnp.sum(equations.mass * height, axis=0)
-    for group in equations.system.forces:
-        stored = jnp.broadcast_to(group.energy(pose, clock).coefficients[0], (group.instances, time.shape[-1]))
-        energy = energy + jnp.sum(stored, axis=0)
+    stored = energy_of_forces(equations.system.forces, pose, clock)
+    energy = kinetic - jnp.sum(masses.mass * height, axis=0) + stored
     gaps = equations.system.residual(pose, clock).coefficients[0]
     return energy, jnp.max(jnp.abs(gaps), axis=0, initial=0.0), kinetic

@@ -93,9 +93,7 @@ def mechanism(
             if name not in robot.joint_names:
                 message = f"no moving joint that follows no other has this name; {_known(robot, name)}"
                 raise RobotError(message, name=kind, value=name)
-    parts = RobotParts(
-        robot, {*driven, *(x for x in (outputs or {}).values() if isinstance(x, str))}, forces, outputs
-    )
+    parts = RobotParts(robot, {*driven, *(x for x in (outputs or {}).values() if isinstance(x, str))}, forces, outputs)
     wanted = {name: name for name in parts.coordinates} if outputs is None else outputs
     start = _start(robot, q, driven, parameters or {}, time)
     joints = parts.joints()

@@ -16,7 +16,7 @@ from jounce.errors import RobotError, did_you_mean
 from jounce.jet import Jet, components, cross, dot
 from jounce.jet.algebra import stacked, total
 from jounce.rigid.frames import Frames
-from jounce.robot.batches import Batched, checked_coordinates, floats
+from jounce.robot.batches import Batched, checked_coordinates, checked_position
 from jounce.robot.kinematics import body_frames
 from jounce.robot.robot import Robot
 from jounce.robot.tree import Tree
@@ -199,14 +199,8 @@ def mass_matrix(robot: Robot, q: Any, *, rates: bool = False, drives: bool = Fal
     >>> jn.mass_matrix(robot, [[0.3, 0.5], [0.0, 2.0]], rates=True)[1].round(12).tolist()  # 2 * 1 * 2
     [[4.0, 0.0], [0.0, 0.0]]
     """
-    q = floats("q", q)
-    if not rates:
-        n = len(robot.joint_names)
-        if q.ndim < 1 or q.shape[-1] != n:
-            joints = f"{robot.name} has {n} {'joint' if n == 1 else 'joints'}"
-            raise RobotError(f"must have the shape (..., n), not {q.shape}; {joints}: n = {n}", name="q")
-        q = q[..., None, :]
-    found = _mass_matrix(robot, (checked_coordinates(robot, q, 0),), (), (bool(drives),))
+    q = checked_coordinates(robot, q) if rates else checked_position(robot, q)
+    found = _mass_matrix(robot, (q,), (), (bool(drives),))
     return found if rates else found[..., 0, :, :]
 
 
@@ -263,6 +257,6 @@ def bias_forces(
     for part in chosen:
         if part not in PARTS:
             raise RobotError(f"no such part; {did_you_mean(str(part), PARTS)}", name="parts", value=part)
-    q = checked_coordinates(robot, q, 1)
-    found = _bias(robot, (q if rates else q[..., :2, :],), (), (frozenset(chosen), bool(drives)))
+    q = checked_coordinates(robot, q, 1, most=None if rates else 1)
+    found = _bias(robot, (q,), (), (frozenset(chosen), bool(drives)))
     return found if rates else found[..., 0, :]

@@ -13,7 +13,7 @@ from jounce.errors import RobotError, SingularityError, did_you_mean
 from jounce.jet.algebra import stacked
 from jounce.kinematics.linear import singular_values
 from jounce.rigid.inertia import finite_numbers
-from jounce.robot.batches import Batched, floats
+from jounce.robot.batches import Batched, checked_position, floats
 from jounce.robot.jacobian import jacobian_jet, twist
 from jounce.robot.kinematics import frame_constants
 from jounce.robot.robot import Robot
@@ -132,10 +132,7 @@ def joint_motion(
     for name, value, least in (("damping", damping, 0.0), ("threshold", threshold, 1e-15)):
         if finite_numbers(name, value, ()) < least:
             raise RobotError(f"must be {least:g} or greater", name=name, value=value)
-    start, n = floats("position", position), len(robot.joint_names)
-    if start.ndim < 1 or start.shape[-1] != n:
-        raise RobotError(f"must have the shape (..., n) with n = {n}, not {start.shape}", name="position")
-    start, wanted = start[..., None, :], floats("operational", operational)
+    start, wanted = checked_position(robot, position, "position"), floats("operational", operational)
     lead = start.shape[:-2]
     if wanted.ndim < 2 or wanted.shape[:-2] != lead or wanted.shape[-1] not in (6, len(rows)) or wanted.shape[-2] < 1:
         shape = f"{(*lead, 'order', len(rows))}".replace("'", "")
