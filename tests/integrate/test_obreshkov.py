@@ -37,9 +37,7 @@ def pade(p, z):
 @pytest.mark.parametrize("order", [2, 4, 6, 8])
 def test_one_step_of_an_oscillator_is_the_diagonal_approximation_of_its_exponential(order):
     method = jn.Obreshkov(order, step=1.0)
-    expansion = begin_march(
-        disc().equations, widened(disc().state, 3), jnp.zeros(3), order=order // 2
-    ).expansion
+    expansion = begin_march(disc().equations, widened(disc().state, 3), jnp.zeros(3), order=order // 2).expansion
     end = method.arrive(disc().equations, expansion, jnp.zeros(3), jnp.asarray(STEPS))
     before = 0.4 + 0.7j / -FREQUENCY  # x' is the imaginary part times minus the frequency: z = exp(i w t)
     after = pade(order // 2, 1j * FREQUENCY * STEPS) * before

@@ -19,14 +19,12 @@ def widened(state, lanes):
 def marched(ready, method, stop, tolerance, longest=np.inf, *, lanes=1, instant=0.0):
     """Run from the start of a mechanism to a time; `longest` holds the largest steps of the runs side by side."""
     order = method.expansion_order(tolerance)
-    current = begin_march(
-        ready.equations, widened(ready.state, lanes), jnp.full(lanes, instant), order=order
-    )
+    current = begin_march(ready.equations, widened(ready.state, lanes), jnp.full(lanes, instant), order=order)
     return onwards(ready, method, current, stop, tolerance, longest)
 
 
 def onwards(ready, method, current, stop, tolerance, longest=np.inf):
-    """Go on from the current of other runs to a time; return the current and the number of steps tried."""
+    """Go on from where other runs are to a time; return where they then are and the number of steps tried."""
     running = jnp.full(current.time.shape, int(Outcome.RUNNING))
     current, _, tried = march(
         ready.equations,

@@ -14,12 +14,13 @@ from jounce.dynamics.forward import Equations, State
 from jounce.dynamics.start import consistent_start, initial_as_drivers
 from jounce.errors import MechanismError, no_such
 from jounce.integrate.batch_equations import BatchStart, ParametricMechanism, Turns
-from jounce.integrate.events import output_series, pose_coordinates
-from jounce.integrate.marching import IntegratorState, Outcome, Steps, begin_march, march
+from jounce.integrate.events import pose_coordinates
+from jounce.integrate.marching import DenseOutput, IntegratorState, Outcome, begin_march, march
 from jounce.integrate.methods import AbstractMethod
 from jounce.integrate.simulate import checked, instants_of
 from jounce.integrate.simulation import expanded
 from jounce.kinematics import Status
+from jounce.kinematics.motion import output_series
 from jounce.mechanism import Mechanism, build, check_mechanism
 from jounce.mechanism.builder import referred
 from jounce.mechanism.datums import with_turns
@@ -244,18 +245,18 @@ class _Runs:
         tolerance, longest, method = self.settings
         current = jax.tree.map(lambda x: x[..., runs], self._current)
         found = march(equations, current, self.instants[-1], tolerance, longest, method=method, count=STEPS)
-        current, steps, tried = jax.tree.map(np.asarray, found)
+        current, (steps, taken), tried = jax.tree.map(np.asarray, found)
         self._put(runs, current)
-        self.steps[runs] += steps.taken.sum(axis=0)
+        self.steps[runs] += taken.sum(axis=0)
         angles = self._counted(runs, steps, int(tried))
         begin, now = self._sense * steps.start, self._sense * self.instants
         end = self._sense * current.time + 1e-14 * np.abs(current.time)
         near = np.flatnonzero((now >= begin[0].min()) & (now <= end.max()))
-        passed = steps.taken & (begin <= now[near, None, None])  # instants, steps, runs
+        passed = taken & (begin <= now[near, None, None])  # instants, steps, runs
         step = passed.shape[1] - 1 - np.argmax(passed[:, ::-1], axis=1)
         instant, lane = np.nonzero(passed.any(axis=1) & (now[near, None] <= end))
         step = step[instant, lane]
-        polynomial = State(*(np.moveaxis(part[step, ..., lane], 0, -1) for part in steps.polynomial))
+        polynomial = steps.polynomial.map(lambda part: np.moveaxis(part[step, ..., lane], 0, -1))
         before = {which: series[..., step, lane] for which, series in angles.items()}
         known = tuple(part[step, :, lane].T for part in steps.angles)
         self._note(runs[lane], near[instant], polynomial, steps.start[step, lane], known, before)
@@ -273,7 +274,7 @@ class _Runs:
         for whole, part in zip(jax.tree.leaves(self._current), jax.tree.leaves(current), strict=True):
             whole[..., runs] = part
 
-    def _counted(self, runs: np.ndarray, steps: Steps, tried: int) -> dict[int, np.ndarray]:
+    def _counted(self, runs: np.ndarray, steps: DenseOutput, tried: int) -> dict[int, np.ndarray]:
         """Return the series of turning outputs where steps begin, turns counted on, steps and runs last."""
         found = {}
         time = np.concatenate([self._begun[runs][None], steps.start[:tried]])
@@ -282,8 +283,8 @@ class _Runs:
         _, outputs = self._picked(every, Turns((), self._begun_with(every)))
         for which, group in enumerate(outputs):
             if group.element.turning:
-                parts = (np.moveaxis(part[:, :3], 0, -2) for part in steps.polynomial)
-                state = State(*(part.reshape(*part.shape[:-2], -1) for part in parts))
+                state = steps.polynomial.map(lambda part: np.moveaxis(part[:, :3], 0, -2))
+                state = state.map(lambda part: part.reshape(*part.shape[:-2], -1))
                 series = np.array(output_series(group, pose_coordinates(state), self.parametric.model.pose_type))
                 series = series.reshape(*series.shape[:-1], *steps.start.shape)[..., :tried, :]
                 last = self._angles.setdefault(which, np.full((*series.shape[:-2], len(self.steps)), np.nan))
@@ -311,7 +312,7 @@ class _Runs:
             equations, outputs = self._picked(runs[lanes], known)
             time = self.instants[at[lanes]]
             since = time - begin[lanes]
-            started = State(*(part[..., lanes] for part in polynomial))
+            started = polynomial.map(lambda part, lanes=lanes: part[..., lanes])
             coordinates = pose_coordinates(expanded(equations, started, since, time, order=self._expansion)[0])
             for which, group in enumerate(outputs):
                 series = np.array(output_series(group, coordinates, self.parametric.model.pose_type))

@@ -168,18 +168,18 @@ class BatchStart:
     def of(self, runs: np.ndarray) -> tuple[State, Turns]:
         """Return the states of some runs, and the angles about axes there."""
         if self._own is not None:
-            return State(*(part[..., runs] for part in self._own)), jax.tree.map(lambda x: x[..., runs], self._turns)
+            return jax.tree.map(lambda x: x[..., runs], (self._own, self._turns))
         equations, outputs = self._parametric.picked(self._made, runs)
         measuring = [group for group in (*equations.system.forces, *outputs) if measures_angle(group)]
         angles = [np.asarray(group.element.datum.near) for group in measuring]
         clock = np.full((1, len(runs)), self._instant)
         still = self._state._replace(velocity=np.zeros_like(self._state.velocity), spin=np.zeros_like(self._state.spin))
-        state = State(*(np.repeat(np.asarray(part), len(runs), axis=-1) for part in still))
+        state = still.map(lambda part: np.repeat(np.asarray(part), len(runs), axis=-1))
         stages = [self._begun.picked(made, runs)[0] for made in self._stages]
         for stage in stages:
             state = _followed(stage, state, clock)
             if measuring:
-                coordinates = pose_coordinates(State(*(np.asarray(part)[None] for part in state)))
+                coordinates = pose_coordinates(state.map(lambda part: np.asarray(part)[None]))
                 raw = raw_angles(measuring, {"quaternion": coordinates["quaternion"][0]})
                 angles = [counted_on(near, angle[..., None])[..., 0] for near, angle in zip(angles, raw, strict=True)]
         count = len([group for group in equations.system.forces if measures_angle(group)])

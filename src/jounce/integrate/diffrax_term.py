@@ -11,8 +11,9 @@ import numpy as np
 from jounce.dynamics.forward import Equations, State
 from jounce.dynamics.start import ConsistentStart, consistent_start
 from jounce.errors import MechanismError
+from jounce.integrate.marching import DenseOutput
 from jounce.integrate.projection import normalised
-from jounce.integrate.simulation import DenseOutput, Simulation
+from jounce.integrate.simulation import Simulation
 from jounce.integrate.turns import measured
 from jounce.jet import Jet
 from jounce.kinematics.linear import DenseFactor
@@ -134,7 +135,7 @@ class OrdinaryEquation:
             Highest derivative of the outputs.
         """
         instants = np.asarray(time, float)
-        polynomial = State(*(np.asarray(part)[:, None] for part in states[:4]))
+        polynomial = State(*states[:4]).map(lambda part: np.asarray(part)[:, None])
         angles = tuple(np.asarray(part) for part in states.angles) if isinstance(states, CountedState) else ()
         dense = DenseOutput(instants, np.zeros_like(instants), polynomial, np.full(len(instants), -1), angles)
         return Simulation(self.mechanism, self.start, dense, instants, order)

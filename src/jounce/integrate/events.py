@@ -8,17 +8,17 @@ from typing import Any
 import numpy as np
 
 from jounce.dynamics.forward import State
+from jounce.dynamics.motion_values import in_chunks
 from jounce.errors import MechanismError
-from jounce.jet import Jet
-from jounce.jet.algebra import stacked
-from jounce.kinematics.compilation import compiled
+from jounce.kinematics.motion import output_series
 from jounce.mechanism import AbstractOutput
 from jounce.mechanism.system import Group
+from jounce.robot.batches import whole_number
 
 _ANGLES = np.pi * (np.arange(20)[::-1] + 0.5) / 20
 NODES = 0.5 + 0.5 * np.cos(_ANGLES)  # of Chebyshev, in a step: steps reach a small part of where their series converge
 INTERPOLATION = np.cos(np.arange(20)[:, None] * _ANGLES) * np.where(np.arange(20) == 0, 0.05, 0.1)[:, None]
-SMALL_BATCH, LARGE_BATCH = 16, 64  # evaluated together
+WIDTHS = 16, 64  # instants evaluated together
 REAL = 1e-4  # of a step: an imaginary part below may be that of a real root of several, blurred by rounding
 FAINT = 1e-14  # of a polynomial's coefficients: values below are rounding
 BESIDE = 1e-3  # of a step: where the sign is looked at beside a root
@@ -77,18 +77,9 @@ class Event:
         if not (isinstance(self.value, int | float) and math.isfinite(self.value)):
             raise MechanismError("must be a finite number", name="value", value=self.value)
         for name in ("derivative", "component"):
-            number = getattr(self, name)
-            if isinstance(number, bool) or not isinstance(number, int) or not 0 <= number <= 4:
-                raise MechanismError("must be a whole number from 0 to 4", name=name, value=number)
+            whole_number(name, getattr(self, name), most=4, error=MechanismError)
         if self.direction not in (-1, 0, 1):
             raise MechanismError("must be -1, 0 or 1", name="direction", value=self.direction)
-
-
-@compiled("pose_type")
-def output_series(group: Group, coordinates: dict[str, Any], pose_type: type) -> Any:
-    """Return the Taylor coefficients of outputs, (order + 1, components, instances, batch)."""
-    pose = pose_type.from_coordinates({name: Jet(tuple(c)) for name, c in coordinates.items()})
-    return stacked(group.evaluate(pose))
 
 
 def pose_coordinates(state: State) -> dict[str, np.ndarray]:
@@ -106,15 +97,12 @@ def pose_coordinates(state: State) -> dict[str, np.ndarray]:
 
 
 def series_of(group: Group, coordinates: dict[str, Any], pose_type: type) -> np.ndarray:
-    """Return `output_series` of a batch of any size, (order + 1, components, batch), compiled for two sizes only."""
-    count = coordinates["position"].shape[-1]
-    width = SMALL_BATCH if count <= SMALL_BATCH else LARGE_BATCH
-    parts = []
-    for first in range(0, count, width):
-        lanes = np.minimum(np.arange(first, first + width), count - 1)
-        taken = {name: part[..., lanes] for name, part in coordinates.items()}
-        parts.append(np.asarray(output_series(group, taken, pose_type)))
-    return np.concatenate(parts, axis=-1)[..., :count]
+    """Return `output_series` of a batch of any size, compiled for two sizes only."""
+
+    def chunk(lanes: np.ndarray) -> Any:
+        return output_series(group, {name: part[..., lanes] for name, part in coordinates.items()}, pose_type)
+
+    return in_chunks(chunk, coordinates["position"].shape[-1], WIDTHS)
 
 
 def at_nodes(group: Group, polynomial: Any, length: np.ndarray, order: int, pose_type: type) -> np.ndarray:

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+from jaxtyping import Bool, Float, Int
 
 from jounce.dynamics.forward import Equations, Expansion, State, expand
 from jounce.integrate.lookahead import HARMLESS, SHORTEST, Lookahead, look_ahead, mobility_of
@@ -13,6 +14,7 @@ from jounce.integrate.projection import projected
 from jounce.integrate.turns import followed, measured
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.linear import DenseFactor
+from jounce.shapes import Numbers
 
 SMALLEST_STEP = 1e-13  # of the span, or of the time itself
 MARGIN = 10.0  # an estimate of the error that is so many times the tolerance is still accepted: estimates are rough
@@ -43,15 +45,31 @@ class IntegratorState(NamedTuple):
     angles: tuple[Any, ...]  # about axes, that forces measure here, with their turns, rad, as `measured` gives them
 
 
-class Steps(NamedTuple):
-    """Steps tried, in the order of trial, first axis; the batch last."""
+class DenseOutput(NamedTuple):
+    """Steps one after the other, as polynomials; while they are taken, the batch is the last axis.
 
-    start: Any  # s
-    length: Any  # s, negative backward in time
-    taken: Any  # whether it was accepted
-    kink: Any  # index of a force or law that is not resolved over it, which is too short to matter, or -1
-    polynomial: State  # coefficients in the time from the start, (steps, order + 1, components, bodies, batch)
-    angles: tuple[Any, ...]  # about axes, that forces measure at the start, (steps, instances, batch) each
+    Attributes
+    ----------
+    start, length : array of shape (steps,)
+        s; lengths are negative backward in time.
+    polynomial : State
+        Coefficients in the time from the start, (steps, order + 1, components, bodies).
+    kink : array of int, shape (steps,)
+        Index of a force or law that is not resolved over a step, which is too short to matter, or -1: `watched_names`.
+    angles : tuple of array of shape (steps, instances)
+        About axes at the start, rad, for each group of forces that measures some.
+    """
+
+    start: Float[Numbers, "steps *batch"]
+    length: Float[Numbers, "steps *batch"]
+    polynomial: State
+    kink: Int[Numbers, "steps *batch"]
+    angles: tuple[Float[Numbers, "steps instance *batch"], ...]
+
+    @property
+    def end(self) -> float:
+        """Where the last step ends, s."""
+        return float(self.start[-1] + self.length[-1])
 
 
 @compiled("order")
@@ -81,7 +99,7 @@ def march(
     method: AbstractMethod,
     count: int,
     keep: bool = True,
-) -> tuple[IntegratorState, Steps | None, Any]:
+) -> tuple[IntegratorState, tuple[DenseOutput, Bool[Numbers, "steps batch"]] | None, Int[Numbers, ""]]:
     """Take up to `count` steps towards a time, all runs of a batch side by side.
 
     Parameters
@@ -106,14 +124,15 @@ def march(
     Returns
     -------
     current : IntegratorState
-    steps : Steps or None
+    steps : tuple of DenseOutput and array of bool, shape (steps, batch), or None
+        Steps tried, in the order of trial, and whether they were taken.
     tried : int
         How many of them there are.
     """
     length = equations.system.column_scale[0]
     order = len(current.expansion.state.position) - 1
 
-    def attempt(current: IntegratorState) -> tuple[IntegratorState, Steps]:
+    def attempt(current: IntegratorState) -> tuple[IntegratorState, tuple[DenseOutput, Any]]:
         left = stop - current.time
         start, reach, allowed = method.prepared(current.expansion, length, tolerance, current.singular)
         step = jnp.minimum(reach, jnp.minimum(longest, jnp.abs(left))) * 0.5 ** current.refused.astype(float)
@@ -142,7 +161,7 @@ def march(
             good = good & ~(suspect & _lasting(kick, step, jnp.abs(stop - current.begun), MARGIN * allowed, current))
         tiny = jnp.abs(step) < SMALLEST_STEP * jnp.maximum(jnp.abs(current.time), jnp.abs(stop - current.time))
         polynomial = method.polynomial(start, expansion, step)
-        steps = Steps(current.time, step, good, look.kink, polynomial, current.angles)
+        steps = DenseOutput(current.time, step, polynomial, look.kink, current.angles), good
         outcome = jnp.where(good & last, int(Outcome.ARRIVED), current.outcome)
         outcome = jnp.where(running & ~good & tiny, int(Outcome.COLLAPSED), outcome)
         drift, none = jnp.maximum(current.drift, distance), jnp.full(step.shape, -1)

@@ -86,7 +86,7 @@ class AbstractMethod(eqx.Module):
 
 def evaluated(polynomial: State, step: Any) -> State:
     """Return the values of the polynomials of a state a time `step` away, shape (batch,)."""
-    return State(*(_horner(c, step) for c in polynomial))
+    return polynomial.map(lambda c: _horner(c, step))
 
 
 def _horner(coefficients: Any, step: Any) -> Any:

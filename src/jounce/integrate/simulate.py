@@ -12,9 +12,9 @@ from jounce.dynamics.start import ConsistentStart, consistent_start
 from jounce.errors import MechanismError, SolveError
 from jounce.integrate.events import Event, EventDetector, pose_coordinates
 from jounce.integrate.lookahead import watched_names
-from jounce.integrate.marching import IntegratorState, Outcome, begin_march, march
+from jounce.integrate.marching import DenseOutput, IntegratorState, Outcome, begin_march, march
 from jounce.integrate.methods import AbstractMethod, Taylor, evaluated
-from jounce.integrate.simulation import DenseOutput, Simulation
+from jounce.integrate.simulation import Simulation
 from jounce.jet import Jet
 from jounce.kinematics import Status, raise_for_status
 from jounce.kinematics.motion import check_output, output_group
@@ -242,11 +242,7 @@ class _Run:
     @property
     def dense_output(self) -> DenseOutput:
         """All steps taken."""
-        whole = self.parts
-        polynomial = State(*(np.concatenate(part) for part in zip(*(p.polynomial for p in whole), strict=True)))
-        start, length = (np.concatenate(part) for part in ([p.start for p in whole], [p.length for p in whole]))
-        angles = tuple(np.concatenate(part) for part in zip(*(p.angles for p in whole), strict=True))
-        return DenseOutput(start, length, polynomial, np.concatenate([p.kink for p in whole]), angles)
+        return jax.tree.map(lambda *parts: np.concatenate(parts), *self.parts)
 
     def go(self, instants: np.ndarray, progress: Callable[[int, int], None] | None) -> None:
         """March from the first to the last instant."""
@@ -260,12 +256,10 @@ class _Run:
             current, steps, tried = march(
                 equations, current, stop, self.tolerance, self.longest, method=self.method, count=STEPS
             )
-            taken = np.flatnonzero(np.asarray(steps.taken)[: int(tried), 0])
+            found, taken = steps
+            taken = np.flatnonzero(np.asarray(taken)[: int(tried), 0])
             if len(taken):
-                some = jax.tree.map(lambda x, k=taken: np.asarray(x)[k][..., 0], steps)
-                self.parts.append(
-                    self._watch(DenseOutput(some.start, some.length, some.polynomial, some.kink, some.angles))
-                )
+                self.parts.append(self._watch(jax.tree.map(lambda x, k=taken: np.asarray(x)[k][..., 0], found)))
             if progress is not None:
                 progress(int(np.sum(sense * instants <= sense * float(current.time[0]))), len(instants))
         if not self.parts:
@@ -275,7 +269,7 @@ class _Run:
 
     def _stand(self, current: IntegratorState) -> None:
         """Keep the start as a step of no length."""
-        polynomial = State(*(np.asarray(part)[None, ..., 0] for part in current.expansion.state))
+        polynomial = current.expansion.state.map(lambda part: np.asarray(part)[None, ..., 0])
         angles = tuple(np.asarray(part).T for part in current.angles)
         self.parts.append(DenseOutput(np.asarray(current.time), np.zeros(1), polynomial, np.full(1, -1), angles))
 
@@ -291,11 +285,8 @@ class _Run:
             self.happened[which].append(instant)
             if self.detectors[which].event.terminal:
                 self.stopped_at = instant
-                length = np.append(part.length[:step], after)
-                start, polynomial, kink, angles = jax.tree.map(
-                    lambda x, count=step + 1: x[:count], (part.start, part.polynomial, part.kink, part.angles)
-                )
-                return DenseOutput(start, length, polynomial, kink, angles)
+                kept = jax.tree.map(lambda x, count=step + 1: x[:count], part)
+                return kept._replace(length=np.append(part.length[:step], after))
         return part
 
     def _explained(self, current: IntegratorState) -> tuple[Status, str]:
@@ -304,7 +295,7 @@ class _Run:
         here = self.start._replace(equations=self.start.equations.near(current.angles))
         onwards = self.sense * AHEAD * max(abs(time), abs(time - float(current.begun[0])))
         ahead = evaluated(series, np.array([onwards]))
-        for state, instant in ((State(*(part[0] for part in series)), time), (ahead, time + onwards)):
+        for state, instant in ((series.map(lambda part: part[0]), time), (ahead, time + onwards)):
             finite = all(np.isfinite(part).all() for part in state)
             if finite and (names := _unfit(here, state, instant)):
                 return Status.INADMISSIBLE, f"{names} at t = {instant:g} s"

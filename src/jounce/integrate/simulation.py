@@ -1,18 +1,19 @@
 """The result of a simulation: a motion with dense output, energy, drift and events."""
 
-import dataclasses
 from functools import cached_property
 from typing import Any
 
-import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from jounce.dynamics.energies import body_energy, energy_of_forces
 from jounce.dynamics.forward import Equations, State, expand
+from jounce.dynamics.motion_values import in_chunks, pose_of
 from jounce.dynamics.start import ConsistentStart
-from jounce.integrate.events import NODES, at_nodes, counted_on, pose_coordinates, series_of
+from jounce.integrate.events import NODES, WIDTHS, at_nodes, counted_on, pose_coordinates, series_of
 from jounce.integrate.lookahead import watched_names
+from jounce.integrate.marching import DenseOutput
 from jounce.integrate.methods import evaluated
 from jounce.integrate.projection import projected
 from jounce.integrate.turns import followed, measured
@@ -23,40 +24,11 @@ from jounce.mechanism import Mechanism
 from jounce.mechanism.datums import with_turns
 from jounce.mechanism.system import Group
 
-SMALL_BATCH, LARGE_BATCH = 16, 64  # instants expanded together
 MUCH_LONGER = (
     1e3  # than the step over a jump or a kink are one of those before and the next; a steep force takes several
 )
 PLACES = 16  # in each step at which attitudes are looked at for turns
 APPROACH = 4  # steps to such a place, each much shorter than the one before
-
-
-@dataclasses.dataclass(frozen=True)
-class DenseOutput:
-    """Steps taken, in order.
-
-    Parameters
-    ----------
-    start, length : array of shape (steps,)
-        s; lengths are negative backward in time.
-    polynomial : State
-        Coefficients in the time from the start, (steps, order + 1, components, bodies).
-    kink : array of int, shape (steps,)
-        Index of a force or law that is not resolved over a step, which is too short to matter, or -1: `watched_names`.
-    angles : tuple of array of shape (steps, instances)
-        About axes at the start, rad, for each group of forces that measures some.
-    """
-
-    start: np.ndarray
-    length: np.ndarray
-    polynomial: State
-    kink: np.ndarray
-    angles: tuple[np.ndarray, ...] = ()
-
-    @property
-    def end(self) -> float:
-        """Where the last step ends, s."""
-        return float(self.start[-1] + self.length[-1])
 
 
 class Simulation(Motion):
@@ -161,20 +133,20 @@ class Simulation(Motion):
         order = self.order if order is None else order
         return Simulation(self.mechanism, self._start, self.dense_output, instants, order, self._ending, self.events)
 
-    @cached_property
-    def energy(self) -> np.ndarray:
+    @property
+    def energy(self) -> Float[np.ndarray, " time"]:
         """Kinetic energy, potential energy in gravity, and what springs have stored, J, shape (time,)."""
-        return self._checked(0)
-
-    @cached_property
-    def drift(self) -> np.ndarray:
-        """Largest residual of joints and drivers, rad or sizes of the mechanism, shape (time,)."""
-        return self._checked(1)
+        return self._checked[0]
 
     @property
-    def kinetic_energy(self) -> np.ndarray:
+    def drift(self) -> Float[np.ndarray, " time"]:
+        """Largest residual of joints and drivers, rad or sizes of the mechanism, shape (time,)."""
+        return self._checked[1]
+
+    @property
+    def kinetic_energy(self) -> Float[np.ndarray, " time"]:
         """Kinetic energy, J, shape (time,)."""
-        return self._checked(2)
+        return self._checked[2]
 
     @cached_property
     def forces(self) -> tuple[Group, ...]:
@@ -211,12 +183,14 @@ class Simulation(Motion):
         series[0] += 2 * np.pi * np.round((expected - series[0]) / (2 * np.pi))
         return series
 
-    def _checked(self, which: int) -> np.ndarray:
+    @cached_property
+    def _checked(self) -> list[np.ndarray]:
+        """Energy, drift and kinetic energy."""
         pose_type, coordinates = self.poses
         low = {name: values[: 2 - (name == "angular_velocity")] for name, values in coordinates.items()}
         equations = self._start.equations.near(self._angles)
-        found = np.asarray(_checks(equations, low, self.time[None], pose_type)[which])
-        return np.where(self.status == Status.OK, found, np.nan)
+        found = _checks(equations, low, self.time[None], pose_type)
+        return [np.where(self.status == Status.OK, part, np.nan) for part in found]
 
 
 def _steps_of(dense: DenseOutput, instants: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -230,17 +204,14 @@ def _steps_of(dense: DenseOutput, instants: np.ndarray) -> tuple[np.ndarray, np.
 
 def _at(equations: Equations, dense: DenseOutput, instants: np.ndarray, chosen: np.ndarray, order: int) -> Any:
     """Return the Taylor coefficients of the motion at instants, order first and the instants last, and its angles."""
-    count = len(instants)
-    width = SMALL_BATCH if count <= SMALL_BATCH else LARGE_BATCH
-    parts = []
-    for first in range(0, count, width):
-        lanes = np.minimum(np.arange(first, first + width), count - 1)
-        steps = chosen[lanes]
-        polynomial = State(*(np.moveaxis(part[steps], 0, -1) for part in dense.polynomial))
+
+    def chunk(lanes: np.ndarray) -> Any:
+        steps, now = chosen[lanes], instants[lanes]
+        polynomial = dense.polynomial.map(lambda part: np.moveaxis(part[steps], 0, -1))
         begun = equations.near(tuple(part[steps].T for part in dense.angles))
-        found = expanded(begun, polynomial, instants[lanes] - dense.start[steps], instants[lanes], order=order)
-        parts.append(jax.tree.map(np.asarray, found))
-    return jax.tree.map(lambda *xs: np.concatenate(xs, axis=-1)[..., :count], *parts)
+        return expanded(begun, polynomial, now - dense.start[steps], now, order=order)
+
+    return in_chunks(chunk, len(instants), WIDTHS)
 
 
 @compiled("order")
@@ -250,7 +221,7 @@ def expanded(equations: Equations, polynomial: State, step: Any, instants: Any, 
     Angles about axes that forces measure are, in the equations, those at the beginnings of the steps; those at the
     instants are returned too, (instances, batch) for each group.
     """
-    begun = measured(equations, State(*(part[0] for part in polynomial)))
+    begun = measured(equations, polynomial.map(lambda part: part[0]))
     there = equations.near(followed(equations, begun, polynomial, step).at(step))
     state, _, inverse = projected(there, evaluated(polynomial, step), instants[None])
     return expand(there, state, instants[None], order, inverse).state, measured(there, state)
@@ -269,8 +240,7 @@ def continuous(group: Any, series: np.ndarray, instants: np.ndarray) -> np.ndarr
 @compiled("pose_type")
 def _checks(equations: Equations, coordinates: dict[str, Any], time: Any, pose_type: type) -> tuple[Any, Any, Any]:
     """Return the energy, the largest residual and the kinetic energy, all of shape (batch,)."""
-    pose = pose_type.from_coordinates({name: Jet(tuple(c)) for name, c in coordinates.items()})
-    clock = Jet.variable(time, 1)
+    pose, clock = pose_of(coordinates, pose_type), Jet.variable(time, 1)
     masses = equations.masses
     translation, rotation = body_energy(pose, *masses, 0)
     height = dot(pose.point(masses.center), equations.gravity).coefficients[0]

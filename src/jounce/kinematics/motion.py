@@ -31,7 +31,8 @@ _UNDEFINED = Status.UNDEFINED.advice.partition(": ")[2]
 
 
 @compiled("pose_type")
-def _evaluated(group: Group, coordinates: dict[str, Any], pose_type: type) -> Any:
+def output_series(group: Group, coordinates: dict[str, Any], pose_type: type) -> Any:
+    """Return the Taylor coefficients of outputs, (order + 1, components, instances, batch)."""
     pose = pose_type.from_coordinates({name: Jet(tuple(c)) for name, c in coordinates.items()})
     return stacked(group.evaluate(pose))
 
@@ -241,7 +242,7 @@ class Motion(Displayed):
     def _coefficients(self, group: Group) -> np.ndarray:
         """Return the Taylor coefficients of outputs, (order + 1, components, instances, time)."""
         (group,) = self._counting((group,))
-        return np.asarray(_evaluated(group, self._coordinates, self._model.pose_type))
+        return np.asarray(output_series(group, self._coordinates, self._model.pose_type))
 
     def _counting(self, groups: tuple[Group, ...]) -> tuple[Group, ...]:
         return groups if self._way is None else self._way.counting(groups, self.time)
