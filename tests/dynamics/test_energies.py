@@ -423,7 +423,7 @@ def test_an_order_that_is_none(order):
 
 
 def test_too_few_derivatives():
-    with pytest.raises(jn.RobotError, match=r"must hold q, .*q\^\(3\)"):
+    with pytest.raises(jn.RobotError, match="needs derivatives of q to order 3"):
         acceleration_energy(arm(), [[0.0], [1.0], [2.0]], order=2)
     with pytest.raises(jn.RobotError, match="shape"):
         acceleration_energy(arm(), [0.0, 1.0, 2.0])

@@ -11,21 +11,23 @@ from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
-from jounce.dynamics.inverse import MotionForces, element_indices
+from jounce.dynamics.inverse import ElementIndex, MotionForces, element_indices
 from jounce.dynamics.loads import mass_matrices
 from jounce.dynamics.masses import masses_of
 from jounce.dynamics.mechanism_state import MotionAtState, at_state
-from jounce.dynamics.motion_values import in_chunks, pose_of
+from jounce.dynamics.motion_values import in_chunks, plain_derivatives, pose_of
 from jounce.dynamics.saddle_point import block_diagonal, saddle_point
 from jounce.errors import MechanismError
 from jounce.jet import Jet
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.assembly import split
 from jounce.kinematics.compilation import compiled
-from jounce.mechanism import Mechanism, Model
+from jounce.mechanism import Mechanism
 from jounce.mechanism.doors import concrete
 from jounce.mechanism.system import System
+from jounce.robot.batches import derivatives
 
 COLUMNS = {"planar": ("x", "y", "angle"), "spatial": ("x", "y", "z", "wx", "wy", "wz")}
 
@@ -145,43 +147,29 @@ def constraint_equations(
 
 def _labels(motion: Motion) -> dict[str, Any]:
     """Return the labels of all axes, rows in the order of the mechanism."""
-    mechanism, found = motion.mechanism, element_indices(motion.model)
-    shifts = motion.model.pose_type.shifts
+    mechanism = motion.mechanism
     columns = [f"{body}.{name}" for body in mechanism.bodies for name in COLUMNS[mechanism.space]]
-    return {
-        "time": motion.time,
-        "row": _text(
-            f"{name}.{k + 1}" for name in _elements(mechanism) for k in range(_rows(motion.model, found[name]))
-        ),
-        "column": _text(columns),
-        "other_column": _text(columns),
-        "body": _text(mechanism.bodies),
-        "component": _text("xyz"[:shifts]),
-        "euler_parameter": _text(["e0", "e1", "e2", "e3"]),
+    rows = [f"{name}.{k + 1}" for name, found in _in_order(motion) for k in range(len(found.own_rows))]
+    labels = {
+        "row": rows,
+        "column": columns,
+        "other_column": columns,
+        "body": list(mechanism.bodies),
+        "component": list("xyz"[: motion.model.pose_type.shifts]),
+        "euler_parameter": ["e0", "e1", "e2", "e3"],
     }
+    return {"time": motion.time} | {axis: np.array(names, dtype=str) for axis, names in labels.items()}
 
 
-def _text(names: Any) -> np.ndarray:
-    return np.array(list(names), dtype=str)
-
-
-def _elements(mechanism: Mechanism) -> list[str]:
-    return [*mechanism.joints, *mechanism.drivers]
-
-
-def _rows(model: Model, place: Any) -> int:
-    return (place.rows.stop - place.rows.start) // model.system.groups[place.group].instances
+def _in_order(motion: Motion) -> list[tuple[str, ElementIndex]]:
+    """Return joints and drivers in the order of the mechanism, by name."""
+    found = element_indices(motion.model)
+    return [(name, found[name]) for name in (*motion.mechanism.joints, *motion.mechanism.drivers)]
 
 
 def _row_order(motion: Motion) -> np.ndarray:
     """Return which row of the system each row is, in the order of the mechanism."""
-    model, found = motion.model, element_indices(motion.model)
-    rows = [
-        place.rows.start + k * model.system.groups[place.group].instances + place.instance
-        for place in (found[name] for name in _elements(motion.mechanism))
-        for k in range(_rows(model, place))
-    ]
-    return np.array(rows, int)
+    return np.array([row for _, found in _in_order(motion) for row in found.own_rows], int)
 
 
 def _numbers(motion: Motion, order: int) -> dict[str, np.ndarray]:
@@ -247,25 +235,14 @@ def _right_sides(system: System, bodies: dict[str, Any], instants: Any, pose_typ
     return -factorials[:, None, None] * jnp.stack(parts)
 
 
-def _unknowns(coordinates: dict[str, Any], k: int) -> tuple[Any, Any]:
-    """Return the k-th coefficients that `extended` takes: of positions, and of angles or w'[k-1] / k."""
-    if "angle" in coordinates:
-        return coordinates["position"][k], coordinates["angle"][k][None]
-    return coordinates["position"][k], coordinates["angular_velocity"][k - 1] / k
-
-
-def _velocities(motion: Motion, order: int) -> np.ndarray:
-    """Return the derivatives of the coordinates, (time, order, columns), from the first on."""
+def _velocities(motion: Motion, order: int) -> Float[np.ndarray, "time derivative column"]:
+    """Return the derivatives of the coordinates from the first on."""
     _, coordinates = motion.poses
-    found = [np.zeros((0, _columns(motion), len(motion.time)))]
-    for k in range(1, order + 1):
-        parts = np.concatenate(list(map(np.asarray, _unknowns(coordinates, k))))[:, 1:]
-        found.append(math.factorial(k) * np.swapaxes(parts, 0, 1).reshape(1, -1, parts.shape[-1]))
-    return np.moveaxis(np.concatenate(found), -1, 0)
-
-
-def _columns(motion: Motion) -> int:
-    return len(motion.mechanism.bodies) * len(COLUMNS[motion.mechanism.space])
+    plain = {name: derivatives(np.asarray(c))[..., 1:, :] for name, c in coordinates.items()}  # without the ground
+    turns = plain["angle"][1:, None] if "angle" in plain else plain["angular_velocity"]
+    parts = np.concatenate([plain["position"][1 : order + 1], turns[:order]], axis=1)
+    columns = motion.model.system.cells.shape[1]
+    return np.transpose(parts, (3, 0, 2, 1)).reshape(len(motion.time), order, columns)
 
 
 def _places(motion: Motion) -> dict[str, Any]:
@@ -287,16 +264,15 @@ def _forces(motion: Motion, jacobian: np.ndarray) -> dict[str, Any]:
         return found
     _, coordinates = motion.poses
     levels = min(len(coordinates["position"]) - 2, motion.order + 1)
-    mass = found["mass_matrix"][1] if found else np.zeros((1, _columns(motion), _columns(motion)))
+    columns = jacobian.shape[-1]
+    mass = found["mass_matrix"][1] if found else np.zeros((1, columns, columns))
     if (
         levels < 1
         or not jacobian.size
         or (isinstance(motion, MotionAtState) and not _determined(motion, jacobian[0], mass[0]))
     ):
         return found
-    coefficients = MotionForces.of(motion).multipliers[:levels][:, _row_order(motion)]
-    factorials = np.array([math.factorial(k) for k in range(levels)], float)
-    values = np.moveaxis(coefficients * factorials[:, None, None], -1, 0)
+    values = plain_derivatives(motion, MotionForces.of(motion).multipliers[:levels][:, _row_order(motion)])
     return found | {"multipliers": (("time", "derivative", "row"), values, 0)}
 
 

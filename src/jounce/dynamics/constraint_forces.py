@@ -27,7 +27,7 @@ from jounce.trajectory import AbstractMotion
 Slope = Float[Numbers, "order coordinate row instance batch"]
 """Taylor coefficients of how the residuals of a group change with the coordinates of the bodies in a slot."""
 
-Slopes = Sequence[Sequence[Slope]]
+Slopes = Sequence[Sequence[Float[Numbers, "order coordinate _ _ batch"]]]
 """For each group, those of each of its moving slots."""
 
 Multipliers = Float[Numbers, "order row instance batch"]

@@ -98,7 +98,7 @@ class Equations(eqx.Module):
         """Number of coordinates of a body."""
         return self.pose_type.shifts + self.pose_type.turns
 
-    def near(self, angles: tuple[Float[Numbers, "instance batch"], ...]) -> "Equations":
+    def near(self, angles: tuple[Float[Numbers, "_ batch"], ...]) -> "Equations":
         """Return the equations where the angles about axes that forces measure have the turns of these.
 
         There is one array of shape (instances, batch) for each group of such forces, rad.

@@ -27,15 +27,16 @@ from jounce.mechanism.system import System
 
 @dataclasses.dataclass(frozen=True)
 class ElementIndex:
-    """Where a joint or driver is among the groups of a system, and its group among the rows."""
+    """Where a joint or driver is among the groups of a system, and its group and itself among the rows."""
 
     group: int
     instance: int
     rows: slice
+    own_rows: range
 
 
 def element_indices(model: Model) -> dict[str, ElementIndex]:
-    """Return the places of all joints and drivers, by name."""
+    """Return the indices of all joints and drivers, by name."""
     found, first = {}, 0
     for index, group in enumerate(model.system.groups):
         names = model.rows[first : first + group.instances]
@@ -43,7 +44,8 @@ def element_indices(model: Model) -> dict[str, ElementIndex]:
         while model.rows[last : last + group.instances] == names:
             last += group.instances
         for instance, name in enumerate(names):
-            found[name.partition(".")[2]] = ElementIndex(index, instance, slice(first, last))
+            own = range(first + instance, last, group.instances)
+            found[name.partition(".")[2]] = ElementIndex(index, instance, slice(first, last), own)
         first = last
     return found
 

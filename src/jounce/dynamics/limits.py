@@ -2,7 +2,7 @@
 
 import dataclasses
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -178,8 +178,14 @@ def check_limits(
     >>> report.kept, [(row.quantity, round(row.ratio, 4), round(row.time, 4)) for row in report.limited]
     (False, [('velocity', 0.5, 0.0), ('torque', 1.2263, 0.0)])
     """
-    curves = _Curves(robot, trajectory, drives)
-    held = curves.followed.held
+    followed = FollowedTrajectory(robot, trajectory)
+    held = followed.held
+
+    def curves(times: np.ndarray) -> np.ndarray:
+        """Return all quantities of all joints, (time, 6, joints)."""
+        q = followed.coordinates(times, ORDER)
+        return np.concatenate([q, followed.torques(q, times, drives)], axis=1)
+
     merged = _merged(robot, limits)
     grid = _grid(trajectory) if times is None else _checked_times(times)
     values = curves(grid)
@@ -195,21 +201,9 @@ def check_limits(
         _row(robot, bounds, quantity, joint, *worst)
         for (quantity, joint), *worst in zip(wanted, at.tolist(), found.tolist(), shown.tolist(), strict=True)
     )
-    for message in curves.followed.doubts:
+    for message in followed.doubts:
         warnings.warn(SampleWarning(message), stacklevel=2)
     return LimitReport(robot.name, robot.joint_names, rows, held, grid, values, bounds.shares(values))
-
-
-class _Curves:
-    """All quantities of all joints as functions of time."""
-
-    def __init__(self, robot: Robot, trajectory: JointTrajectory, drives: bool):
-        self.followed, self.drives = FollowedTrajectory(robot, trajectory), drives
-
-    def __call__(self, times: np.ndarray) -> np.ndarray:
-        """Return values of shape (time, 6, joints)."""
-        q = self.followed.coordinates(times, ORDER)
-        return np.concatenate([q, self.followed.torques(q, times, self.drives)], axis=1)
 
 
 class _Bounds:
@@ -262,7 +256,11 @@ class _Bounds:
 
 
 def _worst(
-    curves: _Curves, bounds: _Bounds, grid: np.ndarray, values: np.ndarray, wanted: np.ndarray
+    curves: Callable[[np.ndarray], np.ndarray],
+    bounds: _Bounds,
+    grid: np.ndarray,
+    values: np.ndarray,
+    wanted: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the worst instant of each wanted curve, its value there and the weight of that.
 

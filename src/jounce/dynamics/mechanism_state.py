@@ -1,7 +1,6 @@
 """One state of a mechanism as a user gives it, which need not fulfil its joints."""
 
 import dataclasses
-import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -15,6 +14,7 @@ from jounce.mechanism.builder import referred
 from jounce.mechanism.laws import check_laws
 from jounce.rigid import SpatialPose
 from jounce.rigid.euler_parameters import euler_parameters
+from jounce.robot.batches import coefficients
 
 
 class MotionAtState(Motion):
@@ -77,8 +77,7 @@ def _coordinates(mechanism: Mechanism, model: Model, state: Any) -> dict[str, An
         whole = np.stack([np.zeros_like(read[0][name]), *(body[name] for body in read)], axis=-1)[..., None]
         if name == "quaternion":
             whole[0, 0, 0] = 1.0
-        factorials = np.array([math.factorial(k) for k in range(len(whole))], float)
-        found[name] = whole / factorials.reshape(-1, *[1] * (whole.ndim - 1))
+        found[name] = coefficients(whole)
     return found
 
 

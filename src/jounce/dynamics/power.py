@@ -1,16 +1,15 @@
 """The power balance of a mechanism in motion: a check of all forces that needs no second solver."""
 
-import math
 from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
 
 from jounce.dynamics.inverse import MotionForces
-from jounce.dynamics.motion_values import pose_of
+from jounce.dynamics.motion_values import labelled, pose_of
 from jounce.jet import Jet, dot
 from jounce.jet.algebra import stacked, total
-from jounce.kinematics import Motion, Status
+from jounce.kinematics import Motion
 from jounce.kinematics.compilation import compiled
 from jounce.mechanism.datums import at_lanes
 
@@ -59,29 +58,19 @@ def power_balance(motion: Motion) -> Any:
     import xarray
 
     forces = MotionForces.of(motion)
-    driven = [_driver_power(forces, name) for name in motion.mechanism.drivers]
+    nothing = np.zeros((forces.levels, len(motion.time)))
+    driven = [(nothing, nothing), *(_driver_power(forces, name) for name in motion.mechanism.drivers)]
     rest = forces.in_chunks(lambda lanes: _powers(*_of_chunk(forces, lanes), forces.pose_type, forces.levels))
     applied, kinetic, potential, sizes = (np.asarray(part) for part in rest)
     forces.check_finite(applied)
-    factorials = np.array([math.factorial(k) for k in range(forces.levels)], float)[:, None]
-    bad = (motion.status != Status.OK)[:, None]
-
-    def derivatives(parts: Any) -> np.ndarray:
-        values = np.asarray(parts).reshape(-1, forces.levels, len(motion.time)) * factorials
-        return np.where(bad, np.nan, np.swapaxes(values, 1, 2))[..., : motion.order + 1]
-
-    terms = {
-        "drivers": derivatives([power for power, _ in driven]),
-        "forces": derivatives(np.moveaxis(applied, 1, 0)),
-        "kinetic": derivatives(np.moveaxis(kinetic, 1, 0)),
-        "potential": derivatives(np.moveaxis(potential, 1, 0)),
-    }
-    found = {name: part.sum(axis=0) for name, part in terms.items()}
-    found["residual"] = found["drivers"] + found["forces"] - found["kinetic"] - found["potential"]
-    found["scale"] = derivatives([*(size for _, size in driven), np.sum(sizes, axis=1)]).sum(axis=0)
-    axes = {"time": motion.time, "derivative": np.arange(found["scale"].shape[1])}
-    variables = {name: (("time", "derivative"), values, {"units": "W"}) for name, values in found.items()}
-    return xarray.Dataset(variables, coords=axes)
+    power, size = np.sum(driven, axis=0)
+    terms = {"drivers": power, "forces": applied.sum(axis=1)}
+    terms |= {"kinetic": kinetic.sum(axis=1), "potential": potential.sum(axis=1)}
+    found = {name: labelled(motion, part[: motion.order + 1], "W") for name, part in terms.items()}
+    residual = found["drivers"] + found["forces"] - found["kinetic"] - found["potential"]
+    found["residual"] = residual.assign_attrs(units="W")
+    found["scale"] = labelled(motion, (size + sizes.sum(axis=1))[: motion.order + 1], "W")
+    return xarray.Dataset(found)
 
 
 def _driver_power(forces: MotionForces, name: str) -> tuple[np.ndarray, np.ndarray]:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from jounce.dynamics.motion_values import in_chunks
 from jounce.errors import RobotError, SampleWarning, TrajectoryError, did_you_mean
 from jounce.robot.batches import whole_number
 from jounce.robot.inverse_dynamics import inverse_dynamics
@@ -155,12 +156,7 @@ def trajectory_torques(
 
 def _in_blocks(function: Callable[[np.ndarray], np.ndarray], values: np.ndarray) -> np.ndarray:
     """Return what a function gives for values along their first axis, the last block filled up."""
-    found = []
-    for start in range(0, len(values), BLOCK):
-        block = values[start : start + BLOCK]
-        whole = np.concatenate([block, np.repeat(block[-1:], BLOCK - len(block), axis=0)])
-        found.append(function(whole)[: len(block)])
-    return np.concatenate(found)
+    return in_chunks(lambda some: function(values[some]), len(values), (BLOCK,), axis=0)
 
 
 def why_not(robot: Robot, name: str) -> str:

@@ -13,7 +13,7 @@ from jounce.errors import RobotError, did_you_mean, no_such
 from jounce.rigid.inertia import Inertia, finite_numbers
 from jounce.robot.floating_base import floating_joints
 from jounce.robot.model import Closure, Joint, Limits, Link
-from jounce.robot.tree import Tree, arrange, ordered
+from jounce.robot.tree import Tree, arrange, ordered, turn_about
 
 Made = TypeVar("Made", bound="AbstractRobot")
 
@@ -266,8 +266,6 @@ def _poses_at_zero(joints: Mapping[str, Joint]) -> dict[str, tuple[np.ndarray, n
 
 def _held(joint: Joint, coordinate: float) -> Joint:
     """Return the fixed joint that holds a moving one at a coordinate."""
-    from jounce.robot.tree import turn_about
-
     position, rotation = joint.position, joint.rotation
     if joint.turning:
         rotation = rotation @ turn_about(joint.axis, coordinate)

@@ -100,8 +100,9 @@ def checked_coordinates(
         joints = f"{robot.name} has {n} {'joint' if n == 1 else 'joints'}"
         raise RobotError(f"must have the shape (..., order + 1, n), not {q.shape}; {joints}: n = {n}", name="q")
     if q.shape[-2] < least + 1:
-        names = ", ".join(["q", "q'", "q''"][: least + 1]) if least < 3 else f"q, q', ..., q^({least})"
-        message = f"must hold {names} along its last axis but one: the shape (..., order + 1, n), not {q.shape}"
+        names = ", ".join(["q", "q'", "q''"][: least + 1])
+        lacks = f"must hold {names}" if least < 3 else f"needs derivatives of q to order {least}"
+        message = f"{lacks} along its last axis but one: the shape (..., order + 1, n), not {q.shape}"
         raise RobotError(message, name="q")
     return q if most is None else q[..., : most + 1, :]
 

@@ -12,18 +12,26 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
+from numpy.typing import ArrayLike
 
 from jounce.constraints import AbstractConstraint, Scalar, Vector
 from jounce.constraints.base import Wrenches
 from jounce.errors import MechanismError, RobotError
 from jounce.jet import Jet, cross, dot, stack
 from jounce.jet.algebra import stacked, total
+from jounce.rigid import SpatialPose
 from jounce.rigid.inertia import finite_numbers
 from jounce.robot.abstract_robot import AbstractRobot
 from jounce.robot.batches import Batched
-from jounce.robot.kinematics import body_frames
+from jounce.robot.kinematics import body_frames, place_of
 from jounce.robot.model import Closure
 from jounce.robot.tree import Tree, axes_with_z_along
+from jounce.robot.tree_scan import Series
+from jounce.shapes import Numbers
+
+GivenCoordinates = Mapping[str, float] | ArrayLike | None
+"""Coordinates in order, or by name of the joint; those not given are zero."""
 
 RANK_TOLERANCE = 1e-5  # rad, or sizes of the robot: files give axes with six digits
 MAX_STEPS = 100
@@ -78,7 +86,7 @@ class LinkClosure(AbstractConstraint, type="closure", space="spatial"):
         return jnp.where(along.coefficients[0] < 0, -1.0, 1.0)
 
 
-def _relative_attitude(body_i: Any, body_j: Any) -> tuple[Jet, Jet]:
+def _relative_attitude(body_i: SpatialPose, body_j: SpatialPose) -> tuple[Jet, Jet]:
     """Return the Euler parameters of body j relative to body i: scalar and vector part."""
     return body_i.quaternion.dot(body_j.quaternion), stack([s.dot(body_j.quaternion) for s in body_i.spins])
 
@@ -95,7 +103,7 @@ def constraint_wrenches(closure: Closure) -> np.ndarray:
 
 
 @Batched
-def _gaps(tree: Tree, arrays: Any, constants: Any) -> Any:
+def _gaps(tree: Tree, arrays: tuple[Series], constants: Any) -> Float[Numbers, "order 2 3 closure batch"]:
     """Return offset of the points and missing turn of each closure, in axes of its first link: (2, 3, closures)."""
     frames = body_frames(tree, arrays[0])
     bodies, points, rotations = constants
@@ -130,10 +138,9 @@ class Loops:
             wrenches = constraint_wrenches(closure)
             self.wrenches.append(wrenches)
             for k, link in enumerate(closure.links):
-                frame = robot.frames[link]
-                body = frame.body if frame.body >= 0 else len(robot.moving_links)
-                turned = frame.rotation if k == 0 else frame.rotation @ closure.rotation.T
-                places[k].append((body, frame.position + frame.rotation @ closure.points[k], turned))
+                place = place_of(robot, link, closure.points[k])
+                turned = place.rotation if k == 0 else place.rotation @ closure.rotation.T
+                places[k].append((place.body, place.position, turned))
         columns = [[np.array(x) for x in zip(*side, strict=True)] for side in places]
         self.constants = tuple((first, second) for first, second in zip(*columns, strict=True))
 
@@ -249,7 +256,7 @@ def _null_space(matrix: np.ndarray) -> np.ndarray:
     return right[int(np.sum(sizes > RANK_TOLERANCE)) :].T
 
 
-def given_coordinates(robot: AbstractRobot, q: Any) -> np.ndarray:
+def given_coordinates(robot: AbstractRobot, q: GivenCoordinates) -> Float[np.ndarray, " joint"]:
     """Return coordinates from an array, or from values by name of the joint; zero where none are given."""
     if q is None or isinstance(q, Mapping):
         return robot.coordinates(**(q or {}))
@@ -263,7 +270,9 @@ def size_of(robot: AbstractRobot) -> float:
     return max(lengths, default=0.0) or 1.0
 
 
-def closure_wrenches(robot: AbstractRobot, q: Any = None) -> Mapping[str, tuple[np.ndarray, np.ndarray]]:
+def closure_wrenches(
+    robot: AbstractRobot, q: GivenCoordinates = None
+) -> dict[str, tuple[Float[np.ndarray, "wrench 6"], Float[np.ndarray, "redundant 6"]]]:
     """Return what each closure of a robot bears, and what of it is redundant, as the joints of the tree bear it too.
 
     A mechanism of the robot has one equation for each wrench of the first kind. Those of the second kind hold by

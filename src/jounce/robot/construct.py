@@ -8,7 +8,6 @@ import numpy as np
 
 from jounce.errors import RobotError, did_you_mean
 from jounce.rigid.inertia import Inertia, finite_numbers
-from jounce.robot.floating_base import floating_joints as floating_joints
 from jounce.robot.model import UNLIMITED, Joint, Limits, Link
 from jounce.robot.robot import Robot
 from jounce.robot.tree import turn_about

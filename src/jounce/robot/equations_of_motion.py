@@ -11,6 +11,8 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
+from numpy.typing import ArrayLike
 
 from jounce.errors import RobotError, did_you_mean
 from jounce.jet import Jet, components, cross, dot
@@ -20,7 +22,8 @@ from jounce.robot.batches import Batched, checked_coordinates, checked_position
 from jounce.robot.kinematics import body_frames
 from jounce.robot.robot import Robot
 from jounce.robot.tree import Tree
-from jounce.robot.tree_scan import joint_coordinates, to_coordinates
+from jounce.robot.tree_scan import BodySeries, Series, joint_coordinates, to_coordinates
+from jounce.shapes import Numbers
 
 PARTS = ("coriolis", "centrifugal", "gravity")
 
@@ -53,8 +56,8 @@ def partial_velocities(tree: Tree, frames: Frames) -> tuple[Jet, Jet]:
     return linear * moved, axis * (turning * moved)
 
 
-def work(partial: tuple[Jet, Jet], force: Jet, moment: Jet | None = None) -> Any:
-    """Return the forces of the joints, (levels, joints, batch), that do the work of forces on all bodies.
+def work(partial: tuple[Jet, Jet], force: Jet, moment: Jet | None = None) -> BodySeries:
+    """Return the forces of the joints that do the work of forces on all bodies.
 
     Forces at the centres of mass, and moments, are of shape (3, bodies, batch), in the axes of the base.
     """
@@ -62,14 +65,14 @@ def work(partial: tuple[Jet, Jet], force: Jet, moment: Jet | None = None) -> Any
     return stacked(total(done).map(lambda c: jnp.sum(c, axis=1)))
 
 
-def work_of_weight(tree: Tree, frames: Frames) -> Any:
-    """Return the forces of the joints that hold the bodies against gravity, (levels, joints, batch)."""
+def work_of_weight(tree: Tree, frames: Frames) -> BodySeries:
+    """Return the forces of the joints that hold the bodies against gravity."""
     weight = jnp.asarray(tree.gravity)[:, None, None] * jnp.asarray(tree.mass)[None, :, None]
     return work(partial_velocities(tree, frames), Jet.constant(-weight, frames.position.order))
 
 
-def work_of_motion(tree: Tree, q: Any, frames: Frames) -> Any:
-    """Return the forces of the joints that velocities alone need, (levels, joints, batch), one level less than q has.
+def work_of_motion(tree: Tree, q: Series, frames: Frames) -> Float[Numbers, "order-1 body batch"]:
+    """Return the forces of the joints that velocities alone need.
 
     They are those of the inertia of bodies that move while the rates of the joints do not change.
     """
@@ -82,8 +85,8 @@ def work_of_motion(tree: Tree, q: Any, frames: Frames) -> Any:
     return work(partial, left[0] * jnp.asarray(tree.mass)[:, None], moment)
 
 
-def mass_jet(tree: Tree, q: Any) -> Any:
-    """Return the mass matrix as Taylor coefficients, (levels, coordinates, coordinates, batch).
+def mass_jet(tree: Tree, q: Series) -> Float[Numbers, "order coordinate coordinate batch"]:
+    """Return the mass matrix as Taylor coefficients.
 
     The element of two joints is the work, along the one nearer to the base, of the momentum of all that the other moves
     at a rate of one (composite bodies: Featherstone 2008, Rigid Body Dynamics Algorithms, section 6.2).
@@ -109,8 +112,8 @@ def mass_jet(tree: Tree, q: Any) -> Any:
     return jnp.einsum("lijs,ia,jb->labs", matrix, weights, weights)
 
 
-def centrifugal(tree: Tree, q: Any) -> Any:
-    """Return the part of the forces with squares of rates of single coordinates, (levels, coordinates, batch).
+def centrifugal(tree: Tree, q: Series) -> Float[Numbers, "order-1 coordinate batch"]:
+    """Return the part of the forces with squares of rates of single coordinates.
 
     By Christoffel's symbols: ``(dM_ij/dq_j - 1/2 dM_jj/dq_i) q_j'^2``, summed over j.
     """
@@ -127,13 +130,13 @@ def centrifugal(tree: Tree, q: Any) -> Any:
 
 
 @Batched
-def _mass_matrix(tree: Tree, arrays: Any, _: Any, drives: bool) -> Any:
+def _mass_matrix(tree: Tree, arrays: tuple[Series], _: Any, drives: bool) -> Any:
     matrix = mass_jet(tree, arrays[0])
     return matrix.at[0].add(jnp.diag(jnp.asarray(tree.armature))[:, :, None]) if drives else matrix
 
 
 @Batched
-def _bias(tree: Tree, arrays: Any, _: Any, parts: frozenset[str], drives: bool) -> Any:
+def _bias(tree: Tree, arrays: tuple[Series], _: Any, parts: frozenset[str], drives: bool) -> Series:
     (q,) = arrays
     levels = q.shape[0] - 1
     frames = body_frames(tree, q).without_base()
@@ -148,14 +151,16 @@ def _bias(tree: Tree, arrays: Any, _: Any, parts: frozenset[str], drives: bool) 
     return forces + drive_forces(tree, q, levels) if drives else forces
 
 
-def drive_forces(tree: Tree, q: Any, levels: int) -> Any:
-    """Return what viscous damping and Coulomb friction take, (levels, coordinates, batch)."""
+def drive_forces(tree: Tree, q: Series, levels: int) -> Float[Numbers, "{levels} coordinate batch"]:
+    """Return what viscous damping and Coulomb friction take."""
     damping, friction = (jnp.asarray(x)[:, None] for x in (tree.damping, tree.friction))
     forces = stacked((Jet(tuple(q)).differentiate() * damping).truncate(levels - 1))
     return forces.at[0].add(friction * jnp.sign(q[1]))
 
 
-def mass_matrix(robot: Robot, q: Any, *, rates: bool = False, drives: bool = False) -> Any:
+def mass_matrix(
+    robot: Robot, q: ArrayLike, *, rates: bool = False, drives: bool = False
+) -> Float[Numbers, "*batch joint joint"]:
     """Return the mass matrix of a robot, and on request its time derivatives to any order, exact to rounding.
 
     ``tau = M q'' + bias``, with `bias_forces`; and by Leibniz's rule ``tau^(k) = sum_j C(k, j) M^(j) q^(2 + k - j) +
@@ -205,8 +210,8 @@ def mass_matrix(robot: Robot, q: Any, *, rates: bool = False, drives: bool = Fal
 
 
 def bias_forces(
-    robot: Robot, q: Any, *, rates: bool = False, parts: str | Sequence[str] = PARTS, drives: bool = False
-) -> Any:
+    robot: Robot, q: ArrayLike, *, rates: bool = False, parts: str | Sequence[str] = PARTS, drives: bool = False
+) -> Float[Numbers, "*batch joint"]:
     """Return the joint torques or forces that velocities and gravity need, and on request their rates.
 
     What `inverse_dynamics` gives where all accelerations are zero: ``tau = M q'' + bias``, with `mass_matrix`.

@@ -5,29 +5,31 @@ from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
+from numpy.typing import ArrayLike
 
 from jounce.errors import RobotError, did_you_mean
 from jounce.jet import Jet, concatenate, cross, matvec
 from jounce.jet.algebra import stacked
-from jounce.rigid.frames import Frames
 from jounce.robot.batches import Batched, checked_coordinates
 from jounce.robot.equations_of_motion import drive_forces
-from jounce.robot.kinematics import body_frames
-from jounce.robot.newton_euler import recursive_newton_euler
+from jounce.robot.kinematics import body_frames, place_of
+from jounce.robot.newton_euler import BodyWrenches, recursive_newton_euler
 from jounce.robot.robot import Robot
-from jounce.robot.tree import Tree
-from jounce.robot.tree_scan import to_coordinates
+from jounce.robot.tree import Frame, Tree
+from jounce.robot.tree_scan import Series, to_coordinates
 from jounce.robot.wrenches import FRAMES, Wrench, wrench_arrays
+from jounce.shapes import Numbers
 
 
 def inverse_dynamics(
     robot: Robot,
-    q: Any,
+    q: ArrayLike,
     *,
     wrenches: Sequence[Wrench] = (),
-    time: Any = None,
+    time: ArrayLike | None = None,
     drives: bool = False,
-) -> Any:
+) -> Float[Numbers, "*batch derivative joint"]:
     """Return the joint torques or forces that a motion needs, and their rates, exact to rounding.
 
     Recursive Newton-Euler on jets: Negrean 2025, equations 123-125 and 144-146, to any order.
@@ -72,8 +74,8 @@ def inverse_dynamics(
 
 
 def joint_wrenches(
-    robot: Robot, q: Any, *, wrenches: Sequence[Wrench] = (), time: Any = None, frame: str = "link"
-) -> Any:
+    robot: Robot, q: ArrayLike, *, wrenches: Sequence[Wrench] = (), time: ArrayLike | None = None, frame: str = "link"
+) -> Float[Numbers, "*batch derivative body 6"]:
     """Return the forces and moments that the joints carry, and their rates: what bearings and flanges feel.
 
     Parameters
@@ -112,46 +114,41 @@ def joint_wrenches(
     return _carried(robot, arrays[0], (arrays[1], aligned), (*static, frame == "base"))
 
 
-def _applied(robot: Robot, q: Any, wrenches: Sequence[Wrench], time: Any) -> tuple[Any, Any]:
+def _applied(robot: Robot, q: Any, wrenches: Sequence[Wrench], time: ArrayLike | None) -> tuple[Any, Any]:
     """Return the arrays, the constants and what is static of the wrenches."""
     given = wrench_arrays(robot, wrenches, q.shape[:-2], q.shape[-2] - 2, time)
-    frames = [robot.frames[wrench.link] for wrench in wrenches]
-    constants = tuple(
-        (np.int64(frame.body), frame.position + frame.rotation @ wrench.point, frame.rotation)
-        for frame, wrench in zip(frames, wrenches, strict=True)
-    )
-    return ((q, *given), constants), (tuple(wrench.frame == "base" for wrench in wrenches),)
+    places = tuple(place_of(robot, wrench.link, wrench.point) for wrench in wrenches)
+    return ((q, *given), places), (tuple(wrench.frame == "base" for wrench in wrenches),)
 
 
-def _on_bodies(tree: Tree, arrays: Any, constants: Any, global_axes: tuple[bool, ...]) -> tuple[Any, Any]:
-    """Return external wrenches about the origins of bodies, in their frames, (levels, bodies, 6, batch); and frames."""
+def _on_bodies(
+    tree: Tree, arrays: tuple[Any, ...], places: tuple[Frame, ...], global_axes: tuple[bool, ...]
+) -> BodyWrenches | None:
+    """Return external wrenches about the origins of bodies, in their frames; None without any."""
     q, *wrenches = arrays
     if not wrenches:
-        return None, None
+        return None
     levels = q.shape[0] - 2
-    frames = body_frames(tree, q[:levels]) if any(global_axes) else None
+    frames: Any = body_frames(tree, q[:levels]) if any(global_axes) else None
     whole = jnp.zeros((levels, tree.shape.bodies, 6, q.shape[-1]))
-    for values, (body, point, rotation), in_base in zip(wrenches, constants, global_axes, strict=True):
+    for values, (body, point, rotation), in_base in zip(wrenches, places, global_axes, strict=True):
         force, torque = Jet(tuple(values[:, :3])), Jet(tuple(values[:, 3:]))
         if in_base:
-            frame = _frame(frames, body)
+            frame = frames.take(body)
             force, torque = frame.to_body(force), frame.to_body(torque)
         else:
             force, torque = (matvec(rotation[:, :, None], part) for part in (force, torque))
         moment = torque + cross(point[:, None], force)
         whole = whole.at[:, body].add(stacked(concatenate([force, moment])))
-    return whole, frames
-
-
-def _frame(frames: Frames | None, body: Any) -> Frames:
-    assert frames is not None
-    return frames.take(body)
+    return whole
 
 
 @Batched
-def _generalised_forces(tree: Tree, arrays: Any, constants: Any, global_axes: tuple[bool, ...], drives: bool) -> Any:
+def _generalised_forces(
+    tree: Tree, arrays: tuple[Any, ...], places: tuple[Frame, ...], global_axes: tuple[bool, ...], drives: bool
+) -> Series:
     q = arrays[0]
-    applied, _ = _on_bodies(tree, arrays, constants, global_axes)
+    applied = _on_bodies(tree, arrays, places, global_axes)
     forces = to_coordinates(tree, recursive_newton_euler(tree, q, applied)[0])
     if drives:
         levels = q.shape[0] - 2
@@ -161,11 +158,12 @@ def _generalised_forces(tree: Tree, arrays: Any, constants: Any, global_axes: tu
 
 
 @Batched
-def _carried(tree: Tree, arrays: Any, constants: Any, global_axes: tuple[bool, ...], in_base: bool) -> Any:
+def _carried(
+    tree: Tree, arrays: tuple[Any, ...], constants: Any, global_axes: tuple[bool, ...], in_base: bool
+) -> BodyWrenches:
     q = arrays[0]
-    given, aligned = constants
-    applied, _ = _on_bodies(tree, arrays, given, global_axes)
-    _, force, moment = recursive_newton_euler(tree, q, applied)
+    places, aligned = constants
+    _, force, moment = recursive_newton_euler(tree, q, _on_bodies(tree, arrays, places, global_axes))
     parts = [Jet(tuple(jnp.swapaxes(x, 1, 2))) for x in (force, moment)]  # components, bodies, batch
     if in_base:
         frames = body_frames(tree, q[:-2])

@@ -1,6 +1,5 @@
 """The bodies, joints, closures and drives that a robot becomes as a mechanism, in the frames of its moving links."""
 
-from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -65,9 +64,8 @@ class RobotParts:
                     self.merged[k] = count
                     break
         inner = self._inner()
-        self.coordinates = tuple(
-            name for name in robot.joint_names if name not in inner_names(self.moving, self.merged)
-        )
+        merged = {self.moving[k].name for k in inner.union(self.merged)}
+        self.coordinates = tuple(name for name in robot.joint_names if name not in merged)
         self.links = [joint.child for k, joint in enumerate(self.moving) if k not in inner]
 
     def _inner(self) -> set[int]:
@@ -217,8 +215,3 @@ class RobotParts:
                 center_of_mass=None if whole is None else whole.center_of_mass,
             )
         return found
-
-
-def inner_names(moving: Sequence[Any], merged: Mapping[int, int]) -> set[str]:
-    """Return the names of joints that are merged with their neighbours."""
-    return {moving[k].name for last, count in merged.items() for k in range(last - count + 1, last + 1)}

@@ -12,11 +12,18 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from jounce.jet import Jet, components, concatenate, cross, matvec, next_sine_cosine
 from jounce.jet.algebra import bilinear, stacked, total
 from jounce.robot.tree import Tree
-from jounce.robot.tree_scan import entries, fill_slots, joint_coordinates, materialised, read_slot, write_slot
+from jounce.robot.tree_scan import Series, entries, fill_slots, joint_coordinates, materialised, read_slot, write_slot
+from jounce.shapes import Numbers
+
+BodyWrenches = Float[Numbers, "levels body 6 batch"]
+"""Taylor coefficients of a force and a moment about the origin of each body, in its frame."""
+Rates = Float[Numbers, "order-2 body batch"]
+RatesOfVectors = Float[Numbers, "order-2 body 3 batch"]
 
 QUARTER = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])  # a quarter turn about z, of x and y
 
@@ -31,7 +38,7 @@ class Turn:
     use. The matrix is cheaper made than kept.
     """
 
-    still: Any  # the matrix is still + across cosine + quarter sine
+    still: Any  # the matrix is still + across cosine + quarter sine, each (..., 3, 3, batch or 1)
     across: Any = None
     quarter: Any = None
     start: tuple[Any, Any] | None = None  # cosine and sine of the value
@@ -87,7 +94,9 @@ def _constant(value: Any) -> Any:
     return value[:, None]
 
 
-def recursive_newton_euler(tree: Tree, q: Any, wrenches: Any = None) -> tuple[Any, Any, Any]:
+def recursive_newton_euler(
+    tree: Tree, q: Series, wrenches: BodyWrenches | None = None
+) -> tuple[Rates, RatesOfVectors, RatesOfVectors]:
     """Return generalised forces at the joints and the wrenches that they carry.
 
     Parameters
@@ -101,9 +110,9 @@ def recursive_newton_euler(tree: Tree, q: Any, wrenches: Any = None) -> tuple[An
 
     Returns
     -------
-    force : array of shape (order - 1, bodies, batch)
+    along : array of shape (order - 1, bodies, batch)
         Taylor coefficients of the force or torque along the axis of each joint.
-    carried : tuple of array of shape (order - 1, bodies, 3, batch)
+    force, moment : array of shape (order - 1, bodies, 3, batch)
         Force and moment about the origin of the body that it gets through its joint, in its own frame.
     """
     order = q.shape[0] - 1

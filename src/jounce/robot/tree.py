@@ -6,10 +6,12 @@ from typing import Any, NamedTuple
 
 import jax
 import numpy as np
+from jaxtyping import Float, Int
 
 from jounce.errors import RobotError, no_such
 from jounce.rigid.inertia import Inertia
 from jounce.robot.model import Joint, Link
+from jounce.shapes import Numbers
 
 
 @dataclasses.dataclass(frozen=True)
@@ -83,9 +85,9 @@ class Tree:
 class Frame(NamedTuple):
     """Where a link is: the body that it moves with (-1 is the base), and its pose in the frame of that body."""
 
-    body: int
-    position: np.ndarray
-    rotation: np.ndarray
+    body: int | Int[Numbers, ""]
+    position: Float[Numbers, " 3"]
+    rotation: Float[Numbers, "3 3"]
 
 
 def ordered(links: Mapping[str, Link], joints: Mapping[str, Joint]) -> list[Joint]:
@@ -188,7 +190,7 @@ def arrange(
     return tree, frames
 
 
-def axes_with_z_along(axis: np.ndarray) -> np.ndarray:
+def axes_with_z_along(axis: Float[np.ndarray, " 3"]) -> Float[np.ndarray, "3 3"]:
     """Return a rotation matrix whose third column is the given unit vector; exact for the axes of a frame."""
     third = int(np.argmax(np.abs(axis)))
     first = np.eye(3)[(third + 1) % 3]
@@ -197,14 +199,14 @@ def axes_with_z_along(axis: np.ndarray) -> np.ndarray:
     return np.column_stack([first, np.cross(axis, first), axis])
 
 
-def turn_about(axis: np.ndarray, angle: float) -> np.ndarray:
+def turn_about(axis: Float[np.ndarray, " 3"], angle: float) -> Float[np.ndarray, "3 3"]:
     """Return the matrix of a rotation about a unit vector: Negrean 2025, equation 20."""
     from scipy.spatial.transform import Rotation
 
     return Rotation.from_rotvec(angle * np.asarray(axis)).as_matrix()
 
 
-def quaternion_matrix(quaternion: Any) -> np.ndarray:
+def quaternion_matrix(quaternion: Float[np.ndarray, " 4"]) -> Float[np.ndarray, "3 3"]:
     """Return the rotation matrix of a unit quaternion, scalar first."""
     from scipy.spatial.transform import Rotation
 

@@ -5,20 +5,28 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+from jaxtyping import Float
 
 from jounce.robot.tree import Tree
+from jounce.shapes import Numbers
+
+Series = Float[Numbers, "order coordinate batch"]
+"""Taylor coefficients of the coordinates of a robot, or of what belongs to them."""
+
+BodySeries = Float[Numbers, "order body batch"]
+"""Taylor coefficients of one number for each moving body, or for its joint."""
 
 
-def joint_coordinates(tree: Tree, q: Any) -> Any:
-    """Return the coordinates of the bodies, (order + 1, bodies, batch), from q; both as Taylor coefficients."""
+def joint_coordinates(tree: Tree, q: Series) -> BodySeries:
+    """Return the coordinates of the joints of the bodies."""
     if tree.shape.direct:
         return q
     q = jnp.take(q, jnp.asarray(tree.coordinate), axis=1) * jnp.asarray(tree.multiplier)[None, :, None]
     return jnp.concatenate([q[:1] + jnp.asarray(tree.offset)[None, :, None], q[1:]])
 
 
-def to_coordinates(tree: Tree, forces: Any) -> Any:
-    """Return generalised forces (order + 1, coordinates, batch) from those at the joints of the bodies."""
+def to_coordinates(tree: Tree, forces: BodySeries) -> Series:
+    """Return generalised forces from those at the joints of the bodies."""
     if tree.shape.direct:
         return forces
     shape = (forces.shape[0], tree.shape.coordinates, forces.shape[2])
