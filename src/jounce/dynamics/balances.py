@@ -3,7 +3,6 @@
 from typing import Any
 
 import jax.numpy as jnp
-from numpy.typing import ArrayLike
 
 from jounce.dynamics.driver_coordinates import balanced
 from jounce.kinematics import Motion
@@ -14,6 +13,7 @@ from jounce.robot.kinematics import body_frames
 from jounce.robot.robot import Robot
 from jounce.robot.tree import Tree
 from jounce.robot.tree_scan import to_coordinates
+from jounce.shapes import ArrayLike
 
 
 @Batched

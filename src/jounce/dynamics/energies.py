@@ -13,7 +13,6 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
-from numpy.typing import ArrayLike
 
 from jounce.dynamics.masses import Masses, gravity_of, required_masses
 from jounce.dynamics.motion_values import Pose, labelled, pose_of
@@ -28,7 +27,7 @@ from jounce.robot.batches import Batched, checked_coordinates, whole_number
 from jounce.robot.kinematics import body_frames
 from jounce.robot.robot import Robot
 from jounce.robot.tree import Tree
-from jounce.shapes import Numbers
+from jounce.shapes import ArrayLike, Numbers
 
 Energies = Float[Numbers, "order body time"]
 """Taylor coefficients of energies of bodies along a motion."""

@@ -9,8 +9,6 @@ import dataclasses
 import math
 from typing import Any
 
-from numpy.typing import ArrayLike
-
 from jounce.dynamics.energies import axes_of, differentiated, energies_of, summed
 from jounce.errors import RobotError, did_you_mean
 from jounce.jet import Jet, cross, dot
@@ -18,6 +16,7 @@ from jounce.jet.algebra import total
 from jounce.kinematics import Motion
 from jounce.rigid.planar import perpendicular
 from jounce.robot.robot import Robot
+from jounce.shapes import ArrayLike
 
 POINTS = ("center_of_mass", "origin")
 

@@ -15,7 +15,6 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from numpy.typing import ArrayLike
 
 from jounce.dynamics.driver_coordinates import in_driver_coordinates
 from jounce.dynamics.energies import differentiated, robot_energy
@@ -26,6 +25,7 @@ from jounce.robot.batches import Batched, checked_coordinates, whole_number
 from jounce.robot.kinematics import body_frames
 from jounce.robot.robot import Robot
 from jounce.robot.tree import Tree
+from jounce.shapes import ArrayLike
 
 
 def catalan(p: int) -> int:

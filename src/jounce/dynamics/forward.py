@@ -30,6 +30,8 @@ from jounce.rigid.spatial import body_axes, quaternion_spins
 from jounce.shapes import Numbers
 
 Instants = Float[Numbers, "1 batch"]
+Lanes = Float[Numbers, " batch"]
+"""One number for each run of a batch."""
 Rows = Float[Numbers, "row batch"]
 Shifts = Float[Numbers, "shift body batch"]
 """One vector for each body, such as a position or a velocity."""
@@ -52,12 +54,12 @@ class State(NamedTuple):
         Rate of the angle, or angular velocity in the axes of the body, rad/s.
     """
 
-    position: Any
-    attitude: Any
-    velocity: Any
-    spin: Any
+    position: Numbers
+    attitude: Numbers
+    velocity: Numbers
+    spin: Numbers
 
-    def map(self, function: Any) -> "State":
+    def map(self, function: Callable[[Numbers], Any]) -> "State":
         """Apply a function to each array."""
         return State(*map(function, self))
 
@@ -66,8 +68,8 @@ class Expansion(NamedTuple):
     """Taylor coefficients of a motion about an instant: what a step of an integrator needs, and leaves behind."""
 
     state: State  # arrays of shape (order + 1, components, bodies, batch)
-    acceleration: Any  # (order, coordinates of a body, bodies, batch)
-    multipliers: Any  # (order, rows, batch), of the scaled rows, over the scale of the masses
+    acceleration: Float[Numbers, "order coordinate body batch"]
+    multipliers: Float[Numbers, "order row batch"]  # of the scaled rows, over the scale of the masses
 
 
 class Equations(eqx.Module):
@@ -132,7 +134,9 @@ class Equations(eqx.Module):
             return pose.angle.coefficients[0][None, 1:]
         return pose.quaternion.coefficients[0][:, 1:]
 
-    def balance(self, state: State, acceleration: Any, multipliers: Any, time: Any) -> tuple[Any, Any, Any]:
+    def balance(
+        self, state: State, acceleration: ByBody, multipliers: Rows, time: Instants
+    ) -> tuple[ByBody, Rows, Attitudes]:
         """Return what must vanish, and how the attitude moves.
 
         Returns

@@ -8,6 +8,7 @@ from typing import Any
 
 import jax
 import numpy as np
+from jaxtyping import Float, Int
 
 from jounce.display import Displayed
 from jounce.dynamics.forward import Equations, State
@@ -17,15 +18,16 @@ from jounce.integrate.batch_equations import BatchStart, ParametricMechanism, Tu
 from jounce.integrate.events import pose_coordinates
 from jounce.integrate.marching import DenseOutput, IntegratorState, Outcome, begin_march, march
 from jounce.integrate.methods import AbstractMethod
-from jounce.integrate.simulate import checked, instants_of
+from jounce.integrate.simulate import checked_options, instants_of
 from jounce.integrate.simulation import expanded
 from jounce.kinematics import Status
 from jounce.kinematics.motion import output_series
-from jounce.mechanism import Mechanism, build, check_mechanism
+from jounce.mechanism import Mechanism, TimeGrid, build, check_mechanism
 from jounce.mechanism.builder import referred
 from jounce.mechanism.datums import with_turns
 from jounce.mechanism.doors import concrete
 from jounce.mechanism.laws import check_laws
+from jounce.shapes import ArrayLike
 
 LANES = 64  # runs marched together: more fall out of the cache
 STEPS = 16  # tried before runs that have ended make room for others
@@ -50,19 +52,19 @@ class Batch(Displayed):
         Steps taken.
     """
 
-    time: np.ndarray
-    parameters: dict[str, np.ndarray]
-    outputs: dict[str, np.ndarray]
-    status: np.ndarray
-    steps: np.ndarray
+    time: Float[np.ndarray, " time"]
+    parameters: dict[str, Float[np.ndarray, " run"]]
+    outputs: dict[str, Float[np.ndarray, "run time derivative *component"]]
+    status: Int[np.ndarray, "run time"]
+    steps: Int[np.ndarray, " run"]
 
 
 @concrete
 def simulate_batch(
     mechanism: Mechanism,
-    parameters: Mapping[str, Any],
-    time: Any = None,
-    order: int = 2,
+    parameters: Mapping[str, ArrayLike],
+    time: ArrayLike | TimeGrid | None = None,
+    order: int = 4,
     *,
     method: AbstractMethod | None = None,
     tolerance: float = 1e-15,
@@ -104,13 +106,13 @@ def simulate_batch(
     ...     outputs={"angle": jn.AngleOutput("rod")},
     ... )
     >>> jn.simulate_batch(pendulum, {"lift": [0.1, 0.2, 0.3]}, [0.0, 0.5]).outputs["angle"].shape
-    (3, 2, 3)
+    (3, 2, 5)
     """
     check_mechanism(mechanism)
     values = _checked_parameters(mechanism, parameters)
     names, rows = tuple(values), np.stack(list(values.values()), axis=-1)
     first = mechanism.with_parameters(**dict(zip(names, rows[0].tolist(), strict=True)))
-    order, method = checked(order, method, tolerance, longest_step)
+    order, method = checked_options(order, method, tolerance, longest_step)
     instants = instants_of(mechanism.time if time is None else time, first.parameter_values)
     check_laws(mechanism, instants, order, forces=True)
     nominal = consistent_start(first, float(instants[0]))
@@ -137,7 +139,7 @@ def simulate_batch(
     return Batch(instants, values, runs.outputs, runs.status, runs.steps)
 
 
-def _checked_parameters(mechanism: Mechanism, parameters: Mapping[str, Any]) -> dict[str, np.ndarray]:
+def _checked_parameters(mechanism: Mechanism, parameters: Mapping[str, Any]) -> dict[str, Float[np.ndarray, " run"]]:
     if not parameters:
         raise MechanismError("a batch differs in at least one parameter", name="parameters", value=dict(parameters))
     values, count = {}, None

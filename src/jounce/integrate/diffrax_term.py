@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from jounce.dynamics.forward import Equations, State
 from jounce.dynamics.start import ConsistentStart, consistent_start
@@ -19,6 +20,7 @@ from jounce.jet import Jet
 from jounce.kinematics.linear import DenseFactor
 from jounce.mechanism import Mechanism
 from jounce.mechanism.datums import measures_angle
+from jounce.shapes import ArrayLike, Numbers
 
 
 def ode_term(mechanism: Mechanism, time: float = 0.0) -> "OrdinaryEquation":
@@ -91,11 +93,11 @@ class CountedState(NamedTuple):
         rad; carried along by their rates, they need to be right to within half a turn only.
     """
 
-    position: Any
-    attitude: Any
-    velocity: Any
-    spin: Any
-    angles: tuple[Any, ...]
+    position: Numbers
+    attitude: Numbers
+    velocity: Numbers
+    spin: Numbers
+    angles: tuple[Float[Numbers, " instance"], ...]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -120,7 +122,7 @@ class OrdinaryEquation:
     mechanism: Mechanism
     start: ConsistentStart
 
-    def motion(self, time: Any, states: State | CountedState, order: int = 4) -> Simulation:
+    def motion(self, time: ArrayLike, states: State | CountedState, order: int = 4) -> Simulation:
         """Return what a solver gives at instants as a motion, with derivatives of any order.
 
         They follow from the equations of motion at the states, which are put back onto the constraints.
@@ -141,7 +143,7 @@ class OrdinaryEquation:
         return Simulation(self.mechanism, self.start, dense, instants, order)
 
 
-def state_rates(time: Any, state: Any, equations: Equations) -> Any:
+def state_rates(time: Any, state: State | CountedState, equations: Equations) -> State | CountedState:
     """Return the rate of a state, arrays of shape (components, bodies): ``f(t, y, args)``.
 
     Parameters

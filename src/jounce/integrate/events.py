@@ -6,9 +6,10 @@ import math
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from jounce.dynamics.forward import State
-from jounce.dynamics.motion_values import in_chunks
+from jounce.dynamics.motion_values import Coordinates, in_chunks
 from jounce.errors import MechanismError
 from jounce.kinematics.motion import output_series
 from jounce.mechanism import AbstractOutput
@@ -96,7 +97,9 @@ def pose_coordinates(state: State) -> dict[str, np.ndarray]:
     return {"position": with_ground(position), "quaternion": quaternion, "angular_velocity": with_ground(spin)[:-1]}
 
 
-def series_of(group: Group, coordinates: dict[str, Any], pose_type: type) -> np.ndarray:
+def series_of(
+    group: Group, coordinates: Coordinates, pose_type: type
+) -> Float[np.ndarray, "order component instance batch"]:
     """Return `output_series` of a batch of any size, compiled for two sizes only."""
 
     def chunk(lanes: np.ndarray) -> Any:
@@ -105,8 +108,10 @@ def series_of(group: Group, coordinates: dict[str, Any], pose_type: type) -> np.
     return in_chunks(chunk, coordinates["position"].shape[-1], WIDTHS)
 
 
-def at_nodes(group: Group, polynomial: Any, length: np.ndarray, order: int, pose_type: type) -> np.ndarray:
-    """Return outputs at the nodes of steps, (order + 1, components, instances, steps, nodes): Taylor coefficients.
+def at_nodes(
+    group: Group, polynomial: State, length: Float[np.ndarray, " step"], order: int, pose_type: type
+) -> Float[np.ndarray, "levels component instance step node"]:
+    """Return outputs at the nodes of steps as Taylor coefficients.
 
     A few at many places cost less than many at one: the program for high orders of an angle takes minutes to compile.
 
@@ -163,15 +168,15 @@ class EventDetector:
         self._last = math.nan, 0.0  # time and sense of the last crossing in either direction
         self._begun = False
 
-    def detect(self, start: np.ndarray, length: np.ndarray, polynomial: Any) -> list[tuple[int, float]]:
+    def detect(
+        self, start: Float[np.ndarray, " step"], length: Float[np.ndarray, " step"], polynomial: State
+    ) -> list[tuple[int, float]]:
         """Return the crossings in the next steps, each as the number of the step and the time from its beginning.
 
         Parameters
         ----------
-        start, length : array of shape (steps,)
-            s; lengths are negative backward in time.
-        polynomial : State
-            Coefficients in the time from the start, (steps, order + 1, components, bodies).
+        start, length, polynomial
+            As in `DenseOutput`.
         """
         derivative, element = self.event.derivative, self._group.element
         order = derivative + element.lost_orders + 1
@@ -197,7 +202,7 @@ class EventDetector:
         return found
 
 
-def crossings(coefficients: np.ndarray, *, first: bool = False) -> list[tuple[float, float]]:
+def crossings(coefficients: Float[np.ndarray, " order"], *, first: bool = False) -> list[tuple[float, float]]:
     """Return where a polynomial changes its sign in [0, 1], and the sense: 1 where it rises through zero.
 
     Places at which it touches zero and turns back do not count.
@@ -240,7 +245,7 @@ def crossings(coefficients: np.ndarray, *, first: bool = False) -> list[tuple[fl
     return found
 
 
-def _real_roots(polynomial: Any) -> np.ndarray:
+def _real_roots(polynomial: np.polynomial.Chebyshev) -> Float[np.ndarray, " root"]:
     """Return the roots of a polynomial that may be real, in and about [0, 1], each corrected by Newton's method."""
     sizes = np.abs(polynomial.coef)
     last = np.flatnonzero(sizes > 1e-17 * sizes.max())[-1]  # what is below rounding has no root near

@@ -7,11 +7,11 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Bool, Float, Int
 
-from jounce.dynamics.forward import Equations, Expansion, State, expand
+from jounce.dynamics.forward import Equations, Expansion, Lanes, State, expand
 from jounce.integrate.lookahead import HARMLESS, SHORTEST, Lookahead, look_ahead, mobility_of
-from jounce.integrate.methods import AbstractMethod, near_singular
+from jounce.integrate.methods import AbstractMethod, Number, near_singular
 from jounce.integrate.projection import projected
-from jounce.integrate.turns import followed, measured
+from jounce.integrate.turns import AnglesOfForces, followed, measured
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.linear import DenseFactor
 from jounce.shapes import Numbers
@@ -33,16 +33,16 @@ class Outcome(enum.IntEnum):
 class IntegratorState(NamedTuple):
     """How far a batch of runs has come."""
 
-    time: Any  # s, shape (batch,)
+    time: Lanes  # s
     expansion: Expansion
-    refused: Any  # number of steps refused from here, one after the other
-    outcome: Any  # see Outcome
-    drift: Any  # largest distance from the constraints before a projection, rad or sizes of the mechanism
-    begun: Any  # when the runs began, s
-    mobility: Any  # how readily forces move the bodies here, as `mobility_of` gives it
-    singular: Any  # whether the equations of motion are near to singular here
-    blocked: Any  # index of the force or law over which no step is possible from here, or -1
-    angles: tuple[Any, ...]  # about axes, that forces measure here, with their turns, rad, as `measured` gives them
+    refused: Int[Numbers, " batch"]  # number of steps refused from here, one after the other
+    outcome: Int[Numbers, " batch"]  # see Outcome
+    drift: Lanes  # largest distance from the constraints before a projection, rad or sizes of the mechanism
+    begun: Lanes  # when the runs began, s
+    mobility: Float[Numbers, "body batch"]  # how readily forces move the bodies here, as `mobility_of` gives it
+    singular: Bool[Numbers, " batch"]  # whether the equations of motion are near to singular here
+    blocked: Int[Numbers, " batch"]  # index of the force or law over which no step is possible from here, or -1
+    angles: AnglesOfForces  # about axes, that forces measure here, with their turns, rad, as `measured` gives them
 
 
 class DenseOutput(NamedTuple):
@@ -73,8 +73,8 @@ class DenseOutput(NamedTuple):
 
 
 @compiled("order")
-def begin_march(equations: Equations, state: State, time: Any, *, order: int) -> IntegratorState:
-    """Return the start of runs from states on the constraints; `time` has the shape (batch,).
+def begin_march(equations: Equations, state: State, time: Lanes, *, order: int) -> IntegratorState:
+    """Return the start of runs from states on the constraints.
 
     Angles about axes have the turns of what they are near to in the equations.
     """
@@ -92,9 +92,9 @@ def begin_march(equations: Equations, state: State, time: Any, *, order: int) ->
 def march(
     equations: Equations,
     current: IntegratorState,
-    stop: Any,
-    tolerance: Any,
-    longest: Any,
+    stop: Number,
+    tolerance: Number,
+    longest: Float[Numbers, "*batch"],
     *,
     method: AbstractMethod,
     count: int,
@@ -188,7 +188,7 @@ def march(
     return jax.lax.while_loop(unfinished, iterate, (current, kept, 0))
 
 
-def _lasting(kick: Any, step: Any, span: Any, bound: Any, current: IntegratorState) -> Any:
+def _lasting(kick: Lanes, step: Lanes, span: Lanes, bound: Lanes, current: IntegratorState) -> Bool[Numbers, " batch"]:
     """Tell where a kink at the beginning of a step kicks bodies so that they move by more than is harmless in the run.
 
     What is left of it in the accelerations at the end is no next term of a series there: `kick` is the displacement
@@ -204,6 +204,6 @@ def _kept(expansion: Expansion) -> Expansion:
     return expansion._replace(acceleration=expansion.acceleration[:1], multipliers=expansion.multipliers[:1])
 
 
-def _finite(expansion: Expansion) -> Any:
+def _finite(expansion: Expansion) -> Bool[Numbers, " batch"]:
     parts = [jnp.all(jnp.isfinite(x.reshape(-1, x.shape[-1])), axis=0) for x in jax.tree.leaves(expansion)]
     return jnp.all(jnp.stack(parts), axis=0)

@@ -6,8 +6,11 @@ from typing import Any
 
 import jax
 import numpy as np
+from jaxtyping import Float
 
+from jounce.constraints import AbstractConstraint
 from jounce.dynamics.forward import State
+from jounce.dynamics.motion_values import Coordinates
 from jounce.dynamics.start import ConsistentStart, consistent_start
 from jounce.errors import MechanismError, SolveError
 from jounce.integrate.events import Event, EventDetector, pose_coordinates
@@ -19,9 +22,10 @@ from jounce.jet import Jet
 from jounce.kinematics import Status, raise_for_status
 from jounce.kinematics.motion import check_output, output_group
 from jounce.kinematics.solve import checked_order
-from jounce.mechanism import Mechanism, check_mechanism, time_grid
+from jounce.mechanism import Mechanism, TimeGrid, check_mechanism, time_grid
 from jounce.mechanism.doors import concrete
 from jounce.mechanism.laws import check_laws
+from jounce.shapes import ArrayLike
 
 AHEAD = 1e-9  # of the time so far: where steps collapse, what is not finite lies that close
 FEW = 4  # derivatives that are looked at for one that is not finite
@@ -32,13 +36,13 @@ TOLERANCES = (1e-17, 1e-2)  # below rounding there is still energy to be kept: w
 @concrete
 def simulate(
     mechanism: Mechanism,
-    time: Any = None,
+    time: ArrayLike | TimeGrid | None = None,
     order: int = 4,
     *,
     method: AbstractMethod | None = None,
     tolerance: float = 1e-15,
-    initial: Mapping[str, Any] | None = None,
-    events: Any = (),
+    initial: Mapping[str, AbstractConstraint] | None = None,
+    events: Sequence[Event] = (),
     longest_step: float = np.inf,
     strict: bool = True,
     progress: Callable[[int, int], None] | None = None,
@@ -103,7 +107,7 @@ def simulate(
     True
     """
     check_mechanism(mechanism)
-    order, method = checked(order, method, tolerance, longest_step)
+    order, method = checked_options(order, method, tolerance, longest_step)
     if progress is not None and not callable(progress):
         raise MechanismError("must be a function of two numbers", name="progress", value=progress)
     if not isinstance(events, Sequence):
@@ -127,7 +131,9 @@ def simulate(
     return simulation
 
 
-def checked(order: Any, method: Any, tolerance: Any, longest_step: Any) -> tuple[int, AbstractMethod]:
+def checked_options(
+    order: object, method: object, tolerance: object, longest_step: object
+) -> tuple[int, AbstractMethod]:
     """Return order and method of a simulation, or raise MechanismError for an option that is not valid."""
     order = checked_order(order)
     method = Taylor() if method is None else method
@@ -142,7 +148,7 @@ def checked(order: Any, method: Any, tolerance: Any, longest_step: Any) -> tuple
     return order, method
 
 
-def instants_of(time: Any, parameters: Mapping[str, Any]) -> np.ndarray:
+def instants_of(time: Any, parameters: Mapping[str, Any]) -> Float[np.ndarray, " time"]:
     """Return the instants of a run, which may go backward."""
     if not isinstance(time, (list, tuple, np.ndarray)) or np.ndim(time) != 1 or len(time) < 2:
         return time_grid(time, parameters)
@@ -154,7 +160,7 @@ def instants_of(time: Any, parameters: Mapping[str, Any]) -> np.ndarray:
     return instants[::-1] if backward else instants
 
 
-def _check_event(event: Any, mechanism: Mechanism) -> None:
+def _check_event(event: object, mechanism: Mechanism) -> None:
     """Raise MechanismError unless an event looks at an output that the mechanism can have."""
     if not isinstance(event, Event):
         raise MechanismError("must be a jn.Event", name="events", value=event)
@@ -193,7 +199,7 @@ def _unfit(start: ConsistentStart, state: State, instant: float) -> str:
     return ", ".join(f"forces.{name}" for name, good in zip(names, fit, strict=True) if not good)
 
 
-def unfit_rates(start: ConsistentStart, coordinates: Mapping[str, Any], instant: float) -> str:
+def unfit_rates(start: ConsistentStart, coordinates: Coordinates, instant: float) -> str:
     """Name the applied forces of which a low derivative is not finite at an instant, where their values may be.
 
     Parameters

@@ -8,21 +8,22 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.dynamics.energies import body_energy, energy_of_forces
-from jounce.dynamics.forward import Equations, State, expand
-from jounce.dynamics.motion_values import in_chunks, pose_of
+from jounce.dynamics.forward import Equations, Instants, Lanes, State, expand
+from jounce.dynamics.motion_values import Coordinates, in_chunks, pose_of
 from jounce.dynamics.start import ConsistentStart
 from jounce.integrate.events import NODES, WIDTHS, at_nodes, counted_on, pose_coordinates, series_of
 from jounce.integrate.lookahead import watched_names
 from jounce.integrate.marching import DenseOutput
 from jounce.integrate.methods import evaluated
 from jounce.integrate.projection import projected
-from jounce.integrate.turns import followed, measured
+from jounce.integrate.turns import AnglesOfForces, followed, measured
 from jounce.jet import Jet, dot
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.compilation import compiled
 from jounce.mechanism import Mechanism
 from jounce.mechanism.datums import with_turns
 from jounce.mechanism.system import Group
+from jounce.shapes import ArrayLike
 
 MUCH_LONGER = (
     1e3  # than the step over a jump or a kink are one of those before and the next; a steep force takes several
@@ -119,7 +120,7 @@ class Simulation(Motion):
         """Time to which the motion was followed, s."""
         return self.dense_output.end
 
-    def at(self, time: Any, order: int | None = None) -> "Simulation":
+    def at(self, time: ArrayLike, order: int | None = None) -> "Simulation":
         """Return the same simulation at other instants, without integrating again.
 
         Parameters
@@ -169,7 +170,9 @@ class Simulation(Motion):
         pose_type, coordinates = self.poses
         return self._series(group, coordinates, pose_type, self.time)
 
-    def _series(self, group: Group, coordinates: dict[str, Any], pose_type: type, instants: np.ndarray) -> np.ndarray:
+    def _series(
+        self, group: Group, coordinates: Coordinates, pose_type: type, instants: np.ndarray
+    ) -> Float[np.ndarray, "order component instance time"]:
         """Return the series of outputs at instants; angles known up to whole turns go on from step to step."""
         series, dense = series_of(group, coordinates, pose_type), self.dense_output
         if not group.element.turning or not dense.length.any():  # no steps: states that another solver gave
@@ -215,11 +218,13 @@ def _at(equations: Equations, dense: DenseOutput, instants: np.ndarray, chosen: 
 
 
 @compiled("order")
-def expanded(equations: Equations, polynomial: State, step: Any, instants: Any, *, order: int) -> Any:
+def expanded(
+    equations: Equations, polynomial: State, step: Lanes, instants: Lanes, *, order: int
+) -> tuple[State, AnglesOfForces]:
     """Return the Taylor coefficients of the motion at instants a time `step` into steps, from the equations there.
 
     Angles about axes that forces measure are, in the equations, those at the beginnings of the steps; those at the
-    instants are returned too, (instances, batch) for each group.
+    instants are returned too.
     """
     begun = measured(equations, polynomial.map(lambda part: part[0]))
     there = equations.near(followed(equations, begun, polynomial, step).at(step))
@@ -238,8 +243,10 @@ def continuous(group: Any, series: np.ndarray, instants: np.ndarray) -> np.ndarr
 
 
 @compiled("pose_type")
-def _checks(equations: Equations, coordinates: dict[str, Any], time: Any, pose_type: type) -> tuple[Any, Any, Any]:
-    """Return the energy, the largest residual and the kinetic energy, all of shape (batch,)."""
+def _checks(
+    equations: Equations, coordinates: Coordinates, time: Instants, pose_type: type
+) -> tuple[Lanes, Lanes, Lanes]:
+    """Return the energy, the largest residual and the kinetic energy."""
     pose, clock = pose_of(coordinates, pose_type), Jet.variable(time, 1)
     masses = equations.masses
     translation, rotation = body_energy(pose, *masses, 0)

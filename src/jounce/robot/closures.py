@@ -13,7 +13,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
-from numpy.typing import ArrayLike
 
 from jounce.constraints import AbstractConstraint, Scalar, Vector
 from jounce.constraints.base import Wrenches
@@ -28,7 +27,7 @@ from jounce.robot.kinematics import body_frames, place_of
 from jounce.robot.model import Closure
 from jounce.robot.tree import Tree, axes_with_z_along
 from jounce.robot.tree_scan import Series
-from jounce.shapes import Numbers
+from jounce.shapes import ArrayLike, Numbers
 
 GivenCoordinates = Mapping[str, float] | ArrayLike | None
 """Coordinates in order, or by name of the joint; those not given are zero."""

@@ -12,7 +12,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
-from numpy.typing import ArrayLike
 
 from jounce.errors import RobotError, did_you_mean
 from jounce.jet import Jet, components, cross, dot
@@ -23,7 +22,7 @@ from jounce.robot.kinematics import body_frames
 from jounce.robot.robot import Robot
 from jounce.robot.tree import Tree
 from jounce.robot.tree_scan import BodySeries, Series, joint_coordinates, to_coordinates
-from jounce.shapes import Numbers
+from jounce.shapes import ArrayLike, Numbers
 
 PARTS = ("coriolis", "centrifugal", "gravity")
 

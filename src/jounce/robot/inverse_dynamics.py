@@ -6,7 +6,6 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
-from numpy.typing import ArrayLike
 
 from jounce.errors import RobotError, did_you_mean
 from jounce.jet import Jet, concatenate, cross, matvec
@@ -19,7 +18,7 @@ from jounce.robot.robot import Robot
 from jounce.robot.tree import Frame, Tree
 from jounce.robot.tree_scan import Series, to_coordinates
 from jounce.robot.wrenches import FRAMES, Wrench, wrench_arrays
-from jounce.shapes import Numbers
+from jounce.shapes import ArrayLike, Numbers
 
 
 def inverse_dynamics(

@@ -4,7 +4,6 @@ from typing import Any
 
 import jax.numpy as jnp
 from jaxtyping import Float
-from numpy.typing import ArrayLike
 
 from jounce.jet import Jet, concatenate, cross
 from jounce.jet.algebra import stacked
@@ -13,7 +12,7 @@ from jounce.robot.kinematics import body_frames, link_frame, place_of
 from jounce.robot.robot import Robot
 from jounce.robot.tree import Frame, Tree
 from jounce.robot.tree_scan import Series
-from jounce.shapes import Numbers
+from jounce.shapes import ArrayLike, Numbers
 
 
 def jacobian_jet(tree: Tree, q: Series, place: Frame) -> Jet:

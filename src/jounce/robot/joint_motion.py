@@ -9,7 +9,6 @@ import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
 from jaxtyping import Bool, Float
-from numpy.typing import ArrayLike
 
 from jounce.errors import RobotError, SingularityError, did_you_mean
 from jounce.jet.algebra import stacked
@@ -21,7 +20,7 @@ from jounce.robot.kinematics import place_of
 from jounce.robot.robot import Robot
 from jounce.robot.tree import Tree
 from jounce.robot.tree_scan import Series
-from jounce.shapes import Numbers
+from jounce.shapes import ArrayLike, Numbers
 
 TASKS = {"pose": (0, 1, 2, 3, 4, 5), "position": (0, 1, 2), "orientation": (3, 4, 5)}
 

@@ -7,7 +7,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
-from numpy.typing import ArrayLike
 
 from jounce.errors import RobotError, no_such
 from jounce.jet import Jet, sine_cosine
@@ -18,7 +17,7 @@ from jounce.robot.abstract_robot import AbstractRobot
 from jounce.robot.batches import Batched, checked_coordinates
 from jounce.robot.tree import Frame, Tree
 from jounce.robot.tree_scan import Series, entries, fill_slots, joint_coordinates, materialised, read_slot, write_slot
-from jounce.shapes import Numbers
+from jounce.shapes import ArrayLike, Numbers
 
 
 def body_frames(tree: Tree, q: Series) -> Frames:
