@@ -12,9 +12,10 @@ from importlib.util import decode_source
 from typing import get_args
 
 import jaxtyping
-from beartype import beartype
+from beartype import BeartypeConf, beartype
 
 PACKAGE = "jounce"
+bare = beartype(conf=BeartypeConf(violation_type=TypeError))  # as Python itself says it
 
 
 def checked(thing):
@@ -23,8 +24,8 @@ def checked(thing):
     Axes of one name are compared in functions whose annotations hold shapes; the others go without the cost of that.
     """
     if isinstance(thing, type) or any(map(_holds_shape, getattr(thing, "__annotations__", {}).values())):
-        return jaxtyping.jaxtyped(thing, typechecker=beartype)
-    return beartype(thing)
+        return jaxtyping.jaxtyped(thing, typechecker=bare)
+    return bare(thing)
 
 
 def _holds_shape(annotation):
