@@ -135,7 +135,7 @@ def _mass_matrix(tree: Tree, arrays: tuple[Series], _: Any, drives: bool) -> Any
 
 
 @Batched
-def _bias(tree: Tree, arrays: tuple[Series], _: Any, parts: frozenset[str], drives: bool) -> Series:
+def _bias(tree: Tree, arrays: tuple[Series], _: Any, parts: frozenset[str], drives: bool) -> Any:
     (q,) = arrays
     levels = q.shape[0] - 1
     frames = body_frames(tree, q).without_base()

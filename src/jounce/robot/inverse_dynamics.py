@@ -16,7 +16,7 @@ from jounce.robot.kinematics import body_frames, place_of
 from jounce.robot.newton_euler import BodyWrenches, recursive_newton_euler
 from jounce.robot.robot import Robot
 from jounce.robot.tree import Frame, Tree
-from jounce.robot.tree_scan import Series, to_coordinates
+from jounce.robot.tree_scan import to_coordinates
 from jounce.robot.wrenches import FRAMES, Wrench, wrench_arrays
 from jounce.shapes import ArrayLike, Numbers
 
@@ -145,7 +145,7 @@ def _on_bodies(
 @Batched
 def _generalised_forces(
     tree: Tree, arrays: tuple[Any, ...], places: tuple[Frame, ...], global_axes: tuple[bool, ...], drives: bool
-) -> Series:
+) -> Float[Numbers, "levels coordinate batch"]:
     q = arrays[0]
     applied = _on_bodies(tree, arrays, places, global_axes)
     forces = to_coordinates(tree, recursive_newton_euler(tree, q, applied)[0])
