@@ -12,12 +12,12 @@ from jounce.robot.inverse_dynamics import inverse_dynamics
 from jounce.robot.kinematics import body_frames
 from jounce.robot.robot import Robot
 from jounce.robot.tree import Tree
-from jounce.robot.tree_scan import to_coordinates
+from jounce.robot.tree_scan import Series, to_coordinates
 from jounce.shapes import ArrayLike
 
 
 @Batched
-def _virtual_work(tree: Tree, arrays: Any, _: Any, inertial: bool) -> Any:
+def _virtual_work(tree: Tree, arrays: tuple[Series], _: Any, inertial: bool) -> Any:
     """Return the work of inertia, or of weight, along each coordinate."""
     frames = body_frames(tree, arrays[0]).without_base()
     if not inertial:

@@ -13,11 +13,12 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.dynamics.forward import Lanes, Rows
 from jounce.dynamics.inverse import ElementIndex, MotionForces, element_indices
 from jounce.dynamics.loads import mass_matrices
-from jounce.dynamics.masses import masses_of
+from jounce.dynamics.masses import Masses, masses_of
 from jounce.dynamics.mechanism_state import MotionAtState, at_state
-from jounce.dynamics.motion_values import in_chunks, plain_derivatives, pose_of
+from jounce.dynamics.motion_values import Coordinates, Pose, in_chunks, plain_derivatives, pose_of
 from jounce.dynamics.saddle_point import block_diagonal, saddle_point
 from jounce.errors import MechanismError
 from jounce.jet import Jet
@@ -28,6 +29,7 @@ from jounce.mechanism import Mechanism
 from jounce.mechanism.doors import concrete
 from jounce.mechanism.system import System
 from jounce.robot.batches import derivatives
+from jounce.shapes import Numbers
 
 COLUMNS = {"planar": ("x", "y", "angle"), "spatial": ("x", "y", "z", "wx", "wy", "wz")}
 
@@ -199,7 +201,7 @@ def _numbers(motion: Motion, order: int) -> dict[str, np.ndarray]:
     }
 
 
-def _without_unknowns(coordinates: dict[str, Any], order: int) -> dict[str, np.ndarray]:
+def _without_unknowns(coordinates: Coordinates, order: int) -> Coordinates:
     """Return coordinates once for each order from 1 on, one after the other, with those of that order set to zero."""
     found = {}
     for name, values in coordinates.items():
@@ -215,15 +217,19 @@ def _without_unknowns(coordinates: dict[str, Any], order: int) -> dict[str, np.n
 
 
 @compiled("pose_type")
-def _position_equations(system: System, bodies: dict[str, Any], instants: Any, pose_type: Any) -> tuple[Any, Any]:
-    """Return the residual, (rows, batch), and the Jacobian, (rows, columns, batch)."""
+def _position_equations(
+    system: System, bodies: Coordinates, instants: Lanes, pose_type: type[Pose]
+) -> tuple[Rows, Float[Numbers, "row column batch"]]:
+    """Return the residual and the Jacobian."""
     pose, time = pose_of(bodies, pose_type, 0), Jet([instants[None]])
     return system.residual(pose, time).coefficients[0], system.jacobian(pose, time)
 
 
 @compiled("pose_type")
-def _right_sides(system: System, bodies: dict[str, Any], instants: Any, pose_type: Any) -> Any:
-    """Return the right sides, (order, rows, batch), from the states of `_without_unknowns`.
+def _right_sides(
+    system: System, bodies: Coordinates, instants: Lanes, pose_type: type[Pose]
+) -> Float[Numbers, "derivative row instant"]:
+    """Return the right sides from the states of `_without_unknowns`.
 
     The coefficient of order k of the residual is affine in that of the coordinates, with the Jacobian as its slope:
     what it is where that is zero is minus the right side, up to k!.
@@ -255,7 +261,7 @@ def _places(motion: Motion) -> dict[str, Any]:
     return found | {"attitude": (("time", "body", "euler_parameter"), np.swapaxes(first["quaternion"], 1, 2))}
 
 
-def _forces(motion: Motion, jacobian: np.ndarray) -> dict[str, Any]:
+def _forces(motion: Motion, jacobian: Float[np.ndarray, "time row column"]) -> dict[str, Any]:
     """Return the mass matrix and the multipliers, where there are some."""
     mechanism, found = motion.mechanism, {}
     if any(body.mass is not None for body in mechanism.bodies.values()):
@@ -276,7 +282,9 @@ def _forces(motion: Motion, jacobian: np.ndarray) -> dict[str, Any]:
     return found | {"multipliers": (("time", "derivative", "row"), values, 0)}
 
 
-def _determined(motion: Motion, jacobian: np.ndarray, mass: np.ndarray) -> bool:
+def _determined(
+    motion: Motion, jacobian: Float[np.ndarray, "row column"], mass: Float[np.ndarray, "column column"]
+) -> bool:
     """Tell whether the multipliers are determined at a state: those of a motion are, a state may be anything."""
     scale = np.tile(motion.model.system.column_scale, len(motion.mechanism.bodies))
     sizes = np.max(np.abs(jacobian * scale), axis=1, keepdims=True)
@@ -288,8 +296,8 @@ def _determined(motion: Motion, jacobian: np.ndarray, mass: np.ndarray) -> bool:
     return split(whole)[1] == len(whole)
 
 
-def _mass_matrix(motion: Motion) -> np.ndarray:
-    """Return the mass matrix at all instants, (time, columns, columns)."""
+def _mass_matrix(motion: Motion) -> Float[np.ndarray, "time column column"]:
+    """Return the mass matrix at all instants."""
     pose_type, coordinates = motion.poses
     masses = masses_of(motion.mechanism)
 
@@ -301,7 +309,7 @@ def _mass_matrix(motion: Motion) -> np.ndarray:
 
 
 @compiled("pose_type")
-def _body_masses(bodies: dict[str, Any], masses: Any, pose_type: Any) -> Any:
+def _body_masses(bodies: Coordinates, masses: Masses, pose_type: type[Pose]) -> Float[Numbers, "column column batch"]:
     blocks = mass_matrices(pose_of(bodies, pose_type, 0), masses)[:, :, 1:]
     return block_diagonal(blocks, np.ones(len(blocks)))
 

@@ -16,6 +16,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.constraints import AbstractConstraint
+from jounce.dynamics.motion_values import Pose
 from jounce.dynamics.saddle_point import as_column, block_diagonal, saddle_point
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked
@@ -34,7 +36,7 @@ Multipliers = Float[Numbers, "order row instance batch"]
 """Taylor coefficients of the multipliers of a group."""
 
 
-def truncated(pose: Any, order: int) -> Any:
+def truncated(pose: Pose, order: int) -> Pose:
     """Return a pose with the jets cut to an order, and none of them a certain zero, so that it may be displaced."""
     pose = jax.tree.map(lambda jet: jet.dense(), pose.truncate(order), is_leaf=lambda x: isinstance(x, Jet))
     if pose.turns == 3 and order and pose.angular_velocity is None:
@@ -43,7 +45,7 @@ def truncated(pose: Any, order: int) -> Any:
     return pose
 
 
-def slopes(element: Any, poses: Sequence[Any], time: Jet, slot: int) -> Any:
+def slopes(element: AbstractConstraint, poses: Sequence[Pose], time: Jet, slot: int) -> Slope:
     """Return how the residual of a joint or driver changes as the body in a slot is displaced: Jacobian, as jets.
 
     Parameters
@@ -82,7 +84,12 @@ def with_rows(jet: Jet) -> Jet:
     return jet.map(lambda c: c[None]) if len(jet.shape) == 2 else jet
 
 
-def work_along(slope: Any, forces: Any, level: int, lowest: int = 0) -> Any:
+def work_along(
+    slope: Slope,
+    forces: Sequence[Float[Numbers, "row instance batch"]] | Multipliers,
+    level: int,
+    lowest: int = 0,
+) -> Float[Numbers, "coordinate instance batch"]:
     """Return the Taylor coefficient of what multipliers do along the coordinates of the bodies: slope times them.
 
     Parameters
@@ -95,10 +102,6 @@ def work_along(slope: Any, forces: Any, level: int, lowest: int = 0) -> Any:
         Which coefficient of the product.
     lowest : int
         The coefficients of the slope below this one are left out.
-
-    Returns
-    -------
-    array of shape (coordinates, instances, batch)
     """
     return sum(jnp.sum(slope[j] * forces[level - j][None], axis=1) for j in range(lowest, level + 1))
 
@@ -121,8 +124,13 @@ def balancing(
     return solve
 
 
-def multipliers(system: System, blocks: Sequence[Sequence[Any]], load: Any, mass: Any = None) -> Any:
-    """Return the multipliers of all rows, not scaled, as Taylor coefficients, (levels, rows, batch).
+def multipliers(
+    system: System,
+    blocks: Slopes,
+    load: Float[Numbers, "levels coordinate body batch"],
+    mass: Float[Numbers, "coordinate coordinate body batch"] | None = None,
+) -> Float[Numbers, "levels row batch"]:
+    """Return the multipliers of all rows, not scaled, as Taylor coefficients.
 
     Parameters
     ----------
@@ -149,7 +157,9 @@ def multipliers(system: System, blocks: Sequence[Sequence[Any]], load: Any, mass
     return jnp.stack(found)
 
 
-def _solver(system: System, blocks: Slopes, mass: Any) -> Callable[[Any], Any]:
+def _solver(
+    system: System, blocks: Slopes, mass: Float[Numbers, "coordinate coordinate body batch"] | None
+) -> Callable[[Any], Any]:
     """Return what solves for the multipliers of scaled rows: by the Jacobian alone where it is square."""
     scale = jnp.asarray(system.column_scale)
     flat = [(slope[0] * scale[:, None, None, None]).reshape(-1, slope.shape[-1]) for parts in blocks for slope in parts]
@@ -160,7 +170,7 @@ def _solver(system: System, blocks: Slopes, mass: Any) -> Callable[[Any], Any]:
     return balancing(whole / jnp.max(jnp.abs(whole)), jacobian)  # their size does not matter to the multipliers
 
 
-def _by_group(system: System, blocks: Sequence[Sequence[Any]], found: list[Any]) -> list[Any]:
+def _by_group(system: System, blocks: Slopes, found: list[Float[Numbers, "row batch"]]) -> list[Any]:
     """Return groups with their blocks and those of the multipliers found so far, each (rows, instances, batch)."""
     if not found:
         return []
@@ -174,7 +184,9 @@ def _by_group(system: System, blocks: Sequence[Sequence[Any]], found: list[Any])
     return results
 
 
-def _onto_bodies(work: Any, bodies: tuple[int, ...], count: int) -> Any:
+def _onto_bodies(
+    work: Float[Numbers, "coordinate instance batch"], bodies: tuple[int, ...], count: int
+) -> Float[Numbers, "coordinate {count} batch"]:
     """Return what acts on each moving body from what acts on the bodies of the instances."""
     return jnp.zeros((work.shape[0], count + 1, work.shape[-1])).at[:, np.array(bodies)].add(work)[:, 1:]
 
@@ -189,8 +201,10 @@ class _Shifted(AbstractMotion):
         return self.law(time) + self.shift
 
 
-def exerted(driver: Any, poses: Sequence[Any], time: Jet, forces: Any) -> Any:
-    """Return the forces that drivers exert along what they prescribe, with rates, (levels, instances, batch).
+def exerted(
+    driver: AbstractConstraint, poses: Sequence[Pose], time: Jet, forces: Multipliers
+) -> Float[Numbers, "order instance batch"]:
+    """Return the forces that drivers exert along what they prescribe, with rates.
 
     Conjugate to the law f: ``lambda^T dPhi/df``, whose product with f' is the power that goes into the mechanism.
 
@@ -213,18 +227,6 @@ def exerted(driver: Any, poses: Sequence[Any], time: Jet, forces: Any) -> Any:
     return jnp.stack([work_along(slope[:, None], forces, k)[0] for k in range(len(forces))])
 
 
-def wrench(slope: Any, forces: Any) -> Any:
-    """Return what joints do to the bodies of one slot: force, global, and moment about the origin, in axes of the body.
-
-    Parameters
-    ----------
-    slope : array of shape (levels, coordinates, rows, instances, batch)
-        As `slopes` gives it.
-    forces : array of shape (levels, rows, instances, batch)
-        Coefficients of the multipliers.
-
-    Returns
-    -------
-    array of shape (levels, coordinates, instances, batch)
-    """
+def wrench(slope: Slope, forces: Multipliers) -> Float[Numbers, "order coordinate instance batch"]:
+    """Return what joints do to the bodies of one slot: global force, and moment about its origin in its axes."""
     return jnp.stack([-work_along(slope, forces, k) for k in range(len(forces))])

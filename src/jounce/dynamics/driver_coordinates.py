@@ -11,11 +11,13 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from jounce.dynamics.energies import body_energy
+from jounce.dynamics.forward import Lanes
 from jounce.dynamics.inverse import MotionForces, element_indices
-from jounce.dynamics.masses import required_masses
-from jounce.dynamics.motion_values import in_chunks, labelled, pose_of
+from jounce.dynamics.masses import Masses, required_masses
+from jounce.dynamics.motion_values import Coordinates, Pose, in_chunks, labelled, pose_of
 from jounce.errors import MechanismError
 from jounce.jet import Jet
 from jounce.jet.algebra import total
@@ -23,20 +25,23 @@ from jounce.kinematics import Motion
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.linear import DenseFactor
 from jounce.mechanism.system import System
+from jounce.shapes import ArrayLike, Numbers
 
 
 class ChangedLaw(eqx.Module):
     """The laws of a group of drivers, changed by jets."""
 
     law: Any
-    change: Any  # Taylor coefficients, (levels, instances, batch)
+    change: Float[Numbers, "levels instance batch"]  # Taylor coefficients
 
     def __call__(self, time: Jet) -> Jet:
         """Return the law at the instants of a jet."""
         return self.law(time) + Jet(tuple(self.change[: time.order + 1]))
 
 
-def in_driver_coordinates(motion: Motion, q: Any, least: int, form: Callable[..., Any], static: tuple[Any, ...]) -> Any:
+def in_driver_coordinates(
+    motion: Motion, q: ArrayLike | None, least: int, form: Callable[..., Any], static: tuple[Any, ...]
+) -> Any:
     """Return what a form of the equations of motion gives in the coordinates of the drivers.
 
     Parameters
@@ -129,10 +134,10 @@ def balanced(motion: Motion, rates: int, *, gravity: bool) -> Any:
 @compiled("pose_type", "order", "least", "form", "static")
 def _evaluated(
     system: System,
-    still: dict[str, Any],
-    instants: Any,
-    masses: Any,
-    pose_type: Any,
+    still: Coordinates,
+    instants: Lanes,
+    masses: Masses,
+    pose_type: type[Pose],
     order: tuple[tuple[int, int], ...],
     least: int,
     form: Callable[..., Any],
@@ -150,8 +155,10 @@ def _evaluated(
     return form(energies, jnp.zeros((least + 1, len(order), len(instants))), *static)
 
 
-def with_changes(system: System, order: tuple[tuple[int, int], ...], changes: Any) -> System:
-    """Return a system whose drivers, by group and instance, have laws that are changed, (levels, drivers, batch)."""
+def with_changes(
+    system: System, order: tuple[tuple[int, int], ...], changes: Float[Numbers, "levels driver batch"]
+) -> System:
+    """Return a system whose drivers, by group and instance, have laws that are changed."""
     groups = list(system.groups)
     for index in {group for group, _ in order}:
         members = [order.index((index, instance)) for instance in range(groups[index].instances)]
@@ -160,7 +167,7 @@ def with_changes(system: System, order: tuple[tuple[int, int], ...], changes: An
     return eqx.tree_at(lambda s: s.groups, system, tuple(groups))
 
 
-def followed(system: System, place: Any, factor: DenseFactor, time: Jet) -> Any:
+def followed(system: System, place: Pose, factor: DenseFactor, time: Jet) -> Pose:
     """Return the pose with all derivatives that the time jet has, right to first order in changes of the system.
 
     The factors are those of the system without changes. What they leave of the residual is corrected by them once more,

@@ -14,8 +14,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.dynamics.masses import Masses, gravity_of, required_masses
-from jounce.dynamics.motion_values import Pose, labelled, pose_of
+from jounce.dynamics.masses import Gravity, Masses, gravity_of, required_masses
+from jounce.dynamics.motion_values import Coordinates, Pose, labelled, pose_of
 from jounce.errors import MechanismError
 from jounce.jet import Jet, dot
 from jounce.jet.algebra import stacked, total
@@ -27,6 +27,7 @@ from jounce.robot.batches import Batched, checked_coordinates, whole_number
 from jounce.robot.kinematics import body_frames
 from jounce.robot.robot import Robot
 from jounce.robot.tree import Tree
+from jounce.robot.tree_scan import Series
 from jounce.shapes import ArrayLike, Numbers
 
 Energies = Float[Numbers, "order body time"]
@@ -115,7 +116,7 @@ def body_energy(
     return translation, rotation
 
 
-def axes_of(pose: Any) -> tuple[Jet, ...]:
+def axes_of(pose: Pose | Frames) -> tuple[Jet, ...]:
     """Return the axes of bodies, two in the plane, in components of the base."""
     if hasattr(pose, "axes"):
         return pose.axes
@@ -211,7 +212,9 @@ def kinetic_energy(system: Robot | Motion, q: ArrayLike | None = None) -> Energy
     return acceleration_energy(system, q, order=0)
 
 
-def robot_energy(tree: Tree, frames: Frames, order: int, function: Any = body_energy) -> tuple[Jet, ...]:
+def robot_energy(
+    tree: Tree, frames: Frames, order: int, function: Callable[..., tuple[Jet, ...]] = body_energy
+) -> tuple[Jet, ...]:
     """Return the energy of the bodies of a robot as jets of shape (bodies, batch), from the frames of the bodies."""
     tensor = jnp.moveaxis(jnp.asarray(tree.inertia), 0, -1)[..., None]
     spread = 0.5 * (tensor[0, 0] + tensor[1, 1] + tensor[2, 2])
@@ -221,7 +224,9 @@ def robot_energy(tree: Tree, frames: Frames, order: int, function: Any = body_en
 
 
 @Batched
-def _of_robot(tree: Tree, arrays: Any, _: Any, order: int, function: Any) -> Any:
+def _of_robot(
+    tree: Tree, arrays: tuple[Series], _: Any, order: int, function: Callable[..., tuple[Jet, ...]]
+) -> tuple[Float[Numbers, "levels body batch"], ...]:
     frames = body_frames(tree, arrays[0]).without_base()
     return tuple(stacked(part) for part in robot_energy(tree, frames, order, function))
 
@@ -248,7 +253,13 @@ def _check_known(motion: Motion, order: int, known: int) -> None:
 
 
 @compiled("pose_type", "order", "function")
-def _of_bodies(coordinates: Any, masses: Masses, pose_type: Any, order: int, function: Any) -> Any:
+def _of_bodies(
+    coordinates: Coordinates,
+    masses: Masses,
+    pose_type: type[Pose],
+    order: int,
+    function: Callable[..., tuple[Jet, ...]],
+) -> tuple[Energies, ...]:
     return tuple(stacked(part) for part in function(pose_of(coordinates, pose_type), *masses, order))
 
 
@@ -295,7 +306,9 @@ def potential_coefficients(motion: Motion) -> Energies:
 
 
 @compiled("pose_type")
-def _heights(coordinates: Any, center: Any, gravity: Any, pose_type: Any) -> Any:
+def _heights(
+    coordinates: Coordinates, center: Float[Numbers, "component body 1"], gravity: Gravity, pose_type: type[Pose]
+) -> Energies:
     return stacked(dot(pose_of(coordinates, pose_type).point(center), gravity))
 
 
@@ -332,7 +345,7 @@ def stored_energy(motion: Motion) -> Any:
 
 
 @compiled("pose_type")
-def _stored(groups: Any, coordinates: Any, time: Any, pose_type: Any) -> Any:
+def _stored(groups: tuple[Group, ...], coordinates: Coordinates, time: Any, pose_type: type[Pose]) -> Any:
     return energy_of_forces(groups, pose_of(coordinates, pose_type), Jet.variable(time, 1))
 
 

@@ -10,10 +10,12 @@ import math
 from typing import Any
 
 from jounce.dynamics.energies import axes_of, differentiated, energies_of, summed
+from jounce.dynamics.motion_values import Pose
 from jounce.errors import RobotError, did_you_mean
 from jounce.jet import Jet, cross, dot
 from jounce.jet.algebra import total
 from jounce.kinematics import Motion
+from jounce.rigid.frames import Frames
 from jounce.rigid.planar import perpendicular
 from jounce.robot.robot import Robot
 from jounce.shapes import ArrayLike
@@ -117,14 +119,14 @@ def energy_terms(
     return EnergyTerms(*energies_of(system, q, order, function))
 
 
-def terms_about_center(pose: Any, mass: Any, center: Any, moments: Any, order: int) -> tuple[Jet, ...]:
+def terms_about_center(pose: Pose | Frames, mass: Any, center: Any, moments: Any, order: int) -> tuple[Jet, ...]:
     """Return the terms of `body_energy` about the centre of mass, as jets: Negrean 2025, equation 106."""
     linear = differentiated(pose.point(center), order + 1)
     nothing = dot(linear, linear) * (0.0 * mass)
     return dot(linear, linear) * (0.5 * mass), nothing, nothing, *_rotation(*_rates(pose, order), moments)
 
 
-def terms_about_origin(pose: Any, mass: Any, center: Any, moments: Any, order: int) -> tuple[Jet, ...]:
+def terms_about_origin(pose: Pose | Frames, mass: Any, center: Any, moments: Any, order: int) -> tuple[Jet, ...]:
     """Return the terms of `body_energy` about the origin of the frame, as jets: Negrean 2025, equation 105."""
     linear, rates = differentiated(pose.position, order + 1), _rates(pose, order)
     couplings = (dot(linear, total(r * c for r, c in zip(part, center, strict=True))) * mass for part in rates)
@@ -133,7 +135,7 @@ def terms_about_origin(pose: Any, mass: Any, center: Any, moments: Any, order: i
     return dot(linear, linear) * (0.5 * mass), *couplings, *_rotation(*rates, about)
 
 
-def _rates(pose: Any, order: int) -> tuple[list[Jet], list[Jet]]:
+def _rates(pose: Pose | Frames, order: int) -> tuple[list[Jet], list[Jet]]:
     """Return the derivatives of the axes: what the last rate of the angular velocity adds, and what is left."""
     axes = axes_of(pose)
     if len(axes) == 2:

@@ -15,6 +15,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from jounce.dynamics.driver_coordinates import in_driver_coordinates
 from jounce.dynamics.energies import differentiated, robot_energy
@@ -25,7 +26,8 @@ from jounce.robot.batches import Batched, checked_coordinates, whole_number
 from jounce.robot.kinematics import body_frames
 from jounce.robot.robot import Robot
 from jounce.robot.tree import Tree
-from jounce.shapes import ArrayLike
+from jounce.robot.tree_scan import Series
+from jounce.shapes import ArrayLike, Numbers
 
 
 def catalan(p: int) -> int:
@@ -50,11 +52,14 @@ def printed_coefficient(p: int) -> int:
     return p * (p + 1) // 2 - (p > 1)
 
 
-Energies = Callable[[Any, int], Jet]
-"""What maps Taylor coefficients of coordinates, (K + 1, coordinates, batch), and p to the energy E_p, (batch,)."""
+Energies = Callable[[Series, int], Jet]
+"""What maps Taylor coefficients of coordinates and p to the energy E_p, (batch,)."""
+
+Slope = Float[Numbers, "{levels} coordinate batch"]
+"""Taylor coefficients of a derivative with respect to the coordinates."""
 
 
-def slope_series(energy: Callable[[Any], Any], q: Any, m: int, levels: int) -> Any:
+def slope_series(energy: Callable[[Series], Float[Numbers, "levels batch"]], q: Series, m: int, levels: int) -> Slope:
     """Return the series in time of the derivative of a quantity with respect to ``q^(m)``.
 
     Parameters
@@ -88,8 +93,8 @@ def slope_series(energy: Callable[[Any], Any], q: Any, m: int, levels: int) -> A
     return total(series)
 
 
-def _slope(energies: Energies, q: Any, levels: int, order: int, rate: int, m: int) -> Any:
-    """Return the series of ``dE_p^(n) / dq^(m)`` for order p and rate n, (levels, coordinates, batch)."""
+def _slope(energies: Energies, q: Series, levels: int, order: int, rate: int, m: int) -> Slope:
+    """Return the series of ``dE_p^(n) / dq^(m)`` for order p and rate n."""
 
     def energy(q: Any) -> Any:
         return stacked(differentiated(energies(q, order), rate).truncate(levels - 1))
@@ -97,21 +102,23 @@ def _slope(energies: Energies, q: Any, levels: int, order: int, rate: int, m: in
     return slope_series(energy, q[: max(order + rate + levels, m) + 1], m, levels)
 
 
-def _lagrange(energies: Energies, q: Any, levels: int) -> Any:
+def _lagrange(energies: Energies, q: Series, levels: int) -> Slope:
     momentum = _slope(energies, q, levels + 1, 0, 0, 1)
     rate = momentum[1:] * np.arange(1.0, levels + 1)[:, None, None]
     return rate - _slope(energies, q, levels, 0, 0, 0)
 
 
-def _mangeron(energies: Energies, q: Any, levels: int, m: int) -> Any:
+def _mangeron(energies: Energies, q: Series, levels: int, m: int) -> Slope:
     return (_slope(energies, q, levels, 0, m, m) - (m + 1) * _slope(energies, q, levels, 0, 0, 0)) / m
 
 
-def _gibbs_appell(energies: Energies, q: Any, levels: int, m: int) -> Any:
+def _gibbs_appell(energies: Energies, q: Series, levels: int, m: int) -> Slope:
     return _slope(energies, q, levels, 1, m - 2, m)
 
 
-def _higher_order(energies: Energies, q: Any, k: int, m: int, weights: tuple[float, ...]) -> Any:
+def _higher_order(
+    energies: Energies, q: Series, k: int, m: int, weights: tuple[float, ...]
+) -> Float[Numbers, "1 coordinate batch"]:
     def weighted(q: Any) -> Any:
         terms = []
         for p, weight in enumerate(weights, 1):
@@ -123,7 +130,7 @@ def _higher_order(energies: Energies, q: Any, k: int, m: int, weights: tuple[flo
 
 
 @Batched
-def _of_robot(tree: Tree, arrays: Any, _: Any, form: Callable[..., Any], static: tuple[Any, ...]) -> Any:
+def _of_robot(tree: Tree, arrays: tuple[Series], _: Any, form: Callable[..., Any], static: tuple[Any, ...]) -> Any:
     def energies(q: Any, order: int) -> Jet:
         frames = body_frames(tree, q).without_base()
         return total(total(components(part)) for part in robot_energy(tree, frames, order))[0]
@@ -131,7 +138,7 @@ def _of_robot(tree: Tree, arrays: Any, _: Any, form: Callable[..., Any], static:
     return form(energies, arrays[0], *static)
 
 
-def _evaluated(system: Robot | Motion, q: Any, least: int, form: Callable[..., Any], *static: Any) -> Any:
+def _evaluated(system: Robot | Motion, q: ArrayLike | None, least: int, form: Callable[..., Any], *static: Any) -> Any:
     """Return what a form gives for a robot, (..., levels, n), or for the drivers of a motion, labelled.
 
     Raises
@@ -301,7 +308,7 @@ def gibbs_appell(system: Robot | Motion, q: ArrayLike | None = None, rates: int 
 
 def higher_order(
     system: Robot | Motion,
-    q: Any = None,
+    q: ArrayLike | None = None,
     k: int = 1,
     m: int | None = None,
     coefficients: Callable[[int], float] = catalan,

@@ -6,11 +6,13 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float, Int
 
 from jounce.dynamics.trajectories import FollowedTrajectory, why_not
 from jounce.errors import RobotError, SampleWarning, TrajectoryError
 from jounce.robot.model import Limits
 from jounce.robot.robot import Robot
+from jounce.shapes import ArrayLike
 from jounce.trajectory.joint_trajectory import JointTrajectory
 
 FIELDS = ("position", "velocity", "acceleration", "jerk", "effort", "effort_rate")
@@ -94,9 +96,9 @@ class LimitReport:
     joint_names: tuple[str, ...]
     rows: tuple[LimitRow, ...]
     held: Mapping[str, float]
-    times: np.ndarray
-    values: np.ndarray
-    shares: np.ndarray
+    times: Float[np.ndarray, " time"]
+    values: Float[np.ndarray, "time 6 joint"]
+    shares: Float[np.ndarray, "time 6 joint"]
 
     @property
     def limited(self) -> tuple[LimitRow, ...]:
@@ -124,7 +126,7 @@ def check_limits(
     trajectory: JointTrajectory,
     limits: Mapping[str, Limits] | None = None,
     *,
-    times: Any = None,
+    times: ArrayLike | None = None,
     drives: bool = True,
 ) -> LimitReport:
     """Compare a trajectory, and the torques and torque rates that it needs, with the limits of the joints.
@@ -294,8 +296,8 @@ def _worst(
     return times, found, weight
 
 
-def local_maxima(measures: np.ndarray, count: int) -> np.ndarray:
-    """Return the indices of the highest local maxima of curves, (time, curves), as (count, curves); best first."""
+def local_maxima(measures: Float[np.ndarray, "time curve"], count: int) -> Int[np.ndarray, "{count} curve"]:
+    """Return the indices of the highest local maxima of curves, the best first."""
     edge = np.full((1, measures.shape[1]), -np.inf)
     before, after = np.concatenate([edge, measures[:-1]]), np.concatenate([measures[1:], edge])
     height = np.where((measures > before) & (measures >= after), measures, -np.inf)
@@ -333,7 +335,7 @@ def _or_infinite(bound: float | None, sign: float = 1.0) -> float:
     return np.inf if bound is None else sign * float(bound)
 
 
-def _grid(trajectory: JointTrajectory) -> np.ndarray:
+def _grid(trajectory: JointTrajectory) -> Float[np.ndarray, " time"]:
     """Return the instants of a trajectory, its ends, and more between each two."""
     own = np.unique(np.concatenate([[trajectory.start], trajectory.times, [trajectory.stop]]))
     steps = max(BETWEEN, -(-INSTANTS // (len(own) - 1)))
@@ -341,7 +343,7 @@ def _grid(trajectory: JointTrajectory) -> np.ndarray:
     return np.append(between.reshape(-1), own[-1])
 
 
-def _checked_times(times: Any) -> np.ndarray:
+def _checked_times(times: ArrayLike) -> Float[np.ndarray, " time"]:
     try:
         found = np.array(times, float)
     except (TypeError, ValueError):

@@ -5,7 +5,9 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
+from jounce.dynamics.motion_values import Coordinates, Pose
 from jounce.errors import MechanismError
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.solve import HIGHEST_ORDER
@@ -21,7 +23,7 @@ class MotionAtState(Motion):
     """One state of a mechanism, consistent or not, as a motion of one instant: `at_state` makes it."""
 
 
-def at_state(given: Any, state: Any, time: Any) -> tuple[Motion, int]:
+def at_state(given: object, state: object, time: object) -> tuple[Motion, int]:
     """Return a state as a motion of one instant, and how many derivatives are known of it."""
     if not isinstance(given, Motion | Mechanism):
         raise MechanismError("must be a jn.Motion or a jn.Mechanism", name="motion", value=given)
@@ -41,16 +43,16 @@ def at_state(given: Any, state: Any, time: Any) -> tuple[Motion, int]:
     return MotionAtState(mechanism, model, instant[None], order, (coordinates, ()), status, {}, way=way), order
 
 
-def _still(coordinates: dict[str, Any]) -> dict[str, Any]:
+def _still(coordinates: Coordinates) -> Coordinates:
     return {name: values for name, values in coordinates.items() if name != "angular_velocity"}
 
 
-def _guessed(model: Model) -> dict[str, Any]:
+def _guessed(model: Model) -> Coordinates:
     found = {name: np.asarray(value)[None] for name, value in model.guess.items()}
     return found | ({} if "angle" in found else {"angular_velocity": np.zeros((0, *found["position"].shape[1:]))})
 
 
-def _coordinates(mechanism: Mechanism, model: Model, state: Any) -> dict[str, Any]:
+def _coordinates(mechanism: Mechanism, model: Model, state: object) -> Coordinates:
     """Return the Taylor coefficients of the coordinates of all bodies, the ground first, from a state as given."""
     if not isinstance(state, Mapping):
         raise MechanismError(
@@ -81,7 +83,7 @@ def _coordinates(mechanism: Mechanism, model: Model, state: Any) -> dict[str, An
     return found
 
 
-def _body_state(place: str, given: Any, pose_type: Any) -> dict[str, np.ndarray]:
+def _body_state(place: str, given: object, pose_type: type[Pose]) -> dict[str, Float[np.ndarray, "_ *component"]]:
     """Return the plain derivatives of the coordinates of one body."""
     spatial = pose_type is SpatialPose
     keys = ("position", "orientation", "angular_velocity") if spatial else ("position", "angle")
@@ -114,7 +116,7 @@ def _check_order(name: str, found: int, order: int) -> None:
         raise MechanismError(f"{message}; give as many here", name=name, value=found)
 
 
-def _array(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
+def _array(name: str, value: Any, shape: tuple[int, ...]) -> Float[np.ndarray, "..."]:
     """Return finite numbers: of a shape, or where it is not empty, one of them or a list of them."""
     try:
         found = np.array(value, float)

@@ -1,17 +1,24 @@
 """The power balance of a mechanism in motion: a check of all forces that needs no second solver."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
+from jounce.constraints import AbstractConstraint
+from jounce.dynamics.forward import Lanes
 from jounce.dynamics.inverse import MotionForces
-from jounce.dynamics.motion_values import labelled, pose_of
+from jounce.dynamics.masses import Gravity, Masses
+from jounce.dynamics.motion_values import Coordinates, Pose, labelled, pose_of
 from jounce.jet import Jet, dot
 from jounce.jet.algebra import stacked, total
 from jounce.kinematics import Motion
 from jounce.kinematics.compilation import compiled
 from jounce.mechanism.datums import at_lanes
+from jounce.mechanism.system import Group
+from jounce.shapes import Numbers
 
 FAINT = 1e-3  # of what turning bodies would move: coefficients that vanish have its rounding, 1e-12 of this or less
 
@@ -84,7 +91,7 @@ def _driver_power(forces: MotionForces, name: str) -> tuple[np.ndarray, np.ndarr
 
 
 @compiled("levels")
-def _law(driver: Any, instants: Any, levels: int) -> Any:
+def _law(driver: AbstractConstraint, instants: Lanes, levels: int) -> Float[Numbers, "_ instance batch"]:
     law = stacked(driver.motion(Jet.variable(instants[None], levels)))
     return law.reshape(levels + 1, -1, len(instants))
 
@@ -97,8 +104,15 @@ def _of_chunk(forces: MotionForces, lanes: np.ndarray) -> tuple[Any, ...]:
 
 @compiled("pose_type", "levels")
 def _powers(
-    groups: Any, bodies: Any, instants: Any, masses: Any, gravity: Any, length: Any, pose_type: Any, levels: int
-) -> Any:
+    groups: tuple[Group, ...],
+    bodies: Coordinates,
+    instants: Lanes,
+    masses: Masses,
+    gravity: Gravity,
+    length: float | Float[Numbers, ""],
+    pose_type: type[Pose],
+    levels: int,
+) -> tuple[Float[Numbers, "{levels} _ batch"], ...]:
     """Return the power of each force, the rates of both energies of each body, and the sizes of all their products."""
     order = levels + 1  # energies have one less, and their rates one less again
     pose, time = pose_of(bodies, pose_type, order), Jet.variable(instants[None], order)
@@ -122,27 +136,29 @@ def _powers(
     return powers, stacked(kinetic.differentiate()), stacked(potential), products
 
 
-def _spin(pose: Any) -> tuple[Jet, ...]:
+def _spin(pose: Pose) -> tuple[Jet, ...]:
     """Return the components of the angular velocities of bodies, in their axes."""
     return (pose.angle.differentiate(),) if pose.turns == 1 else tuple(pose.angular_velocity[k] for k in range(3))
 
 
-def _inertia(moments: Any, turns: int) -> Any:
-    """Return the tensors of inertia about the centres of mass, (turns, turns, bodies, 1), from the second moments."""
+def _inertia(
+    moments: Float[Numbers, "component component body 1"], turns: int
+) -> Float[Numbers, "{turns} {turns} body 1"]:
+    """Return the tensors of inertia about the centres of mass from the second moments."""
     spread = total(moments[k][k] for k in range(len(moments)))
     if turns == 1:
         return spread[None, None]
     return spread[None, None] * jnp.eye(3)[:, :, None, None] - moments
 
 
-def _applied(group: Any, pose: Any, time: Jet, turning: Jet, length: Any) -> tuple[Jet, Jet]:
+def _applied(group: Group, pose: Pose, time: Jet, turning: Jet, length: float | Float[Numbers, ""]) -> tuple[Jet, Jet]:
     """Return the power of forces, (instances, batch), and the size of its products."""
     lever = length if group.element.unit == "N" else 1.0
     rates = group.velocity(pose, time).map(jnp.abs) + turning * (FAINT * lever)
     return group.power(pose, time), group.force(pose, time).map(jnp.abs).dot(rates)
 
 
-def _largest(jets: Any) -> Jet:
+def _largest(jets: Sequence[Jet]) -> Jet:
     """Return the largest component of vectors, coefficient by coefficient, (bodies, batch)."""
     levels = zip(*(jet.dense().coefficients for jet in jets), strict=True)
     return Jet(tuple(jnp.max(jnp.abs(jnp.concatenate(level)), axis=0) for level in levels))

@@ -1,10 +1,11 @@
 """The state a simulation starts from: consistent positions and velocities from partial ones, and what can move."""
 
 import dataclasses
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax
 import numpy as np
+from jaxtyping import Float
 
 from jounce.dynamics.forward import Equations, Instants, State
 from jounce.dynamics.masses import gravity_of, masses_of, required_masses
@@ -15,6 +16,7 @@ from jounce.kinematics.compilation import compiled
 from jounce.kinematics.linear import DenseFactor
 from jounce.mechanism import Mechanism, Model, build
 from jounce.mechanism.builder import pose_at
+from jounce.shapes import Numbers
 
 TOLERANCE = 1e-12  # of the assembled positions, rad or sizes of the mechanism
 
@@ -132,7 +134,9 @@ def with_rates(equations: Equations, state: State, time: Instants) -> State:
 
 
 @compiled()
-def _matrices(equations: Equations, state: State, time: Any) -> tuple[Any, Any]:
+def _matrices(
+    equations: Equations, state: State, time: Instants
+) -> tuple[Float[Numbers, "size size"], Float[Numbers, "row column"]]:
     pose = equations.still(state.position, state.attitude)
     return equations.matrix(state, time)[..., 0], equations.system.jacobian(pose, Jet([time]))[..., 0]
 

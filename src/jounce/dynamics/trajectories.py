@@ -5,6 +5,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from jounce.dynamics.motion_values import in_chunks
 from jounce.errors import RobotError, SampleWarning, TrajectoryError, did_you_mean
@@ -12,6 +13,7 @@ from jounce.robot.batches import whole_number
 from jounce.robot.inverse_dynamics import inverse_dynamics
 from jounce.robot.model import Limits
 from jounce.robot.robot import Robot
+from jounce.shapes import ArrayLike
 from jounce.trajectory.joint_trajectory import JointTrajectory
 
 BLOCK = 2048  # instants evaluated at once, always as many, so that all is compiled once
@@ -54,8 +56,8 @@ class FollowedTrajectory:
         self.held = {name: _rest(robot.limits[name]) for name in robot.joint_names if name not in trajectory.names}
         self.doubts: list[str] = []
 
-    def coordinates(self, times: np.ndarray, order: int) -> np.ndarray:
-        """Return coordinates and derivatives, (time, order + 1, joints).
+    def coordinates(self, times: Float[np.ndarray, " time"], order: int) -> Float[np.ndarray, "time {order}+1 joint"]:
+        """Return coordinates and derivatives.
 
         Raises
         ------
@@ -72,8 +74,10 @@ class FollowedTrajectory:
         self._check_finite(q, times, QUANTITIES)
         return q
 
-    def torques(self, q: np.ndarray, times: np.ndarray, drives: bool) -> np.ndarray:
-        """Return torques and rates, (time, order - 1, joints), for coordinates that `coordinates` gave.
+    def torques(
+        self, q: Float[np.ndarray, "time derivative joint"], times: Float[np.ndarray, " time"], drives: bool
+    ) -> Float[np.ndarray, "time derivative-2 joint"]:
+        """Return torques and rates for coordinates that `coordinates` gave.
 
         Raises
         ------
@@ -94,7 +98,7 @@ class FollowedTrajectory:
 
 
 def trajectory_torques(
-    robot: Robot, trajectory: JointTrajectory, rates: int = 0, *, times: Any = None, drives: bool = True
+    robot: Robot, trajectory: JointTrajectory, rates: int = 0, *, times: ArrayLike | None = None, drives: bool = True
 ) -> Any:
     """Return the torques and forces that a trajectory needs of the joints of a robot, with rates, labelled.
 
