@@ -19,7 +19,6 @@ from jounce.robot.jacobian import jacobian_jet, twist
 from jounce.robot.kinematics import place_of
 from jounce.robot.robot import Robot
 from jounce.robot.tree import Tree
-from jounce.robot.tree_scan import Series
 from jounce.shapes import ArrayLike, Numbers
 
 TASKS = {"pose": (0, 1, 2, 3, 4, 5), "position": (0, 1, 2), "orientation": (3, 4, 5)}
@@ -50,7 +49,10 @@ class JointMotion:
 
 @Batched
 def _solved(
-    tree: Tree, arrays: tuple[Series, Float[Numbers, "order row batch"]], constants: Any, rows: tuple[int, ...]
+    tree: Tree,
+    arrays: tuple[Float[Numbers, "1 coordinate batch"], Float[Numbers, "order row batch"]],
+    constants: Any,
+    rows: tuple[int, ...],
 ) -> Any:
     position, wanted = arrays
     frame, damping, threshold = constants
