@@ -20,9 +20,10 @@ from jounce.constraints import AbstractConstraint
 from jounce.dynamics.motion_values import Pose
 from jounce.dynamics.saddle_point import as_column, block_diagonal, saddle_point
 from jounce.jet import Jet
-from jounce.jet.algebra import stacked
+from jounce.jet.algebra import stacked, total
 from jounce.kinematics.linear import DenseFactor
 from jounce.mechanism.system import System
+from jounce.rigid import SpatialPose
 from jounce.shapes import Numbers
 from jounce.trajectory import AbstractMotion
 
@@ -39,7 +40,7 @@ Multipliers = Float[Numbers, "order row instance batch"]
 def truncated(pose: Pose, order: int) -> Pose:
     """Return a pose with the jets cut to an order, and none of them a certain zero, so that it may be displaced."""
     pose = jax.tree.map(lambda jet: jet.dense(), pose.truncate(order), is_leaf=lambda x: isinstance(x, Jet))
-    if pose.turns == 3 and order and pose.angular_velocity is None:
+    if isinstance(pose, SpatialPose) and order and pose.angular_velocity is None:
         rest = Jet.constant(jnp.zeros_like(pose.position.coefficients[0]), order - 1).dense()
         return dataclasses.replace(pose, angular_velocity=rest)
     return pose
@@ -103,7 +104,7 @@ def work_along(
     lowest : int
         The coefficients of the slope below this one are left out.
     """
-    return sum(jnp.sum(slope[j] * forces[level - j][None], axis=1) for j in range(lowest, level + 1))
+    return total(jnp.sum(slope[j] * forces[level - j][None], axis=1) for j in range(lowest, level + 1))
 
 
 def balancing(
@@ -160,11 +161,11 @@ def multipliers(
 def _solver(
     system: System, blocks: Slopes, mass: Float[Numbers, "coordinate coordinate body batch"] | None
 ) -> Callable[[Any], Any]:
-    """Return what solves for the multipliers of scaled rows: by the Jacobian alone where it is square."""
+    """Return what solves for the multipliers of scaled rows: by the Jacobian alone where there are no masses."""
     scale = jnp.asarray(system.column_scale)
     flat = [(slope[0] * scale[:, None, None, None]).reshape(-1, slope.shape[-1]) for parts in blocks for slope in parts]
     jacobian = jnp.concatenate([*flat, jnp.zeros((1, flat[0].shape[-1]))])[system.cells] * system.row_scale[:, :, None]
-    if jacobian.shape[0] == jacobian.shape[1]:
+    if mass is None:
         return balancing(None, jacobian)
     whole = block_diagonal(mass, scale)
     return balancing(whole / jnp.max(jnp.abs(whole)), jacobian)  # their size does not matter to the multipliers
@@ -202,7 +203,7 @@ class _Shifted(AbstractMotion):
 
 
 def exerted(
-    driver: AbstractConstraint, poses: Sequence[Pose], time: Jet, forces: Multipliers
+    driver: Any, poses: Sequence[Pose], time: Jet, forces: Multipliers
 ) -> Float[Numbers, "order instance batch"]:
     """Return the forces that drivers exert along what they prescribe, with rates.
 

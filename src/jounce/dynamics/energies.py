@@ -22,6 +22,7 @@ from jounce.jet.algebra import stacked, total
 from jounce.kinematics import Motion
 from jounce.kinematics.compilation import compiled
 from jounce.mechanism.system import Group
+from jounce.rigid import PlanarPose
 from jounce.rigid.frames import Frames
 from jounce.robot.batches import Batched, checked_coordinates, whole_number
 from jounce.robot.kinematics import body_frames
@@ -118,9 +119,7 @@ def body_energy(
 
 def axes_of(pose: Pose | Frames) -> tuple[Jet, ...]:
     """Return the axes of bodies, two in the plane, in components of the base."""
-    if hasattr(pose, "axes"):
-        return pose.axes
-    return tuple(pose.direction(unit) for unit in np.eye(2))  # a planar body
+    return tuple(pose.direction(unit) for unit in np.eye(2)) if isinstance(pose, PlanarPose) else pose.axes
 
 
 def differentiated(jet: Jet, times: int) -> Jet:

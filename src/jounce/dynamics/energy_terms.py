@@ -15,6 +15,7 @@ from jounce.errors import RobotError, did_you_mean
 from jounce.jet import Jet, cross, dot
 from jounce.jet.algebra import total
 from jounce.kinematics import Motion
+from jounce.rigid import PlanarPose
 from jounce.rigid.frames import Frames
 from jounce.rigid.planar import perpendicular
 from jounce.robot.robot import Robot
@@ -138,12 +139,11 @@ def terms_about_origin(pose: Pose | Frames, mass: Any, center: Any, moments: Any
 def _rates(pose: Pose | Frames, order: int) -> tuple[list[Jet], list[Jet]]:
     """Return the derivatives of the axes: what the last rate of the angular velocity adds, and what is left."""
     axes = axes_of(pose)
-    if len(axes) == 2:
+    if isinstance(pose, PlanarPose):
         spin = pose.angle.differentiate()
-    elif hasattr(pose, "global_angular_velocity"):
-        spin = pose.global_angular_velocity()
     else:
-        spin = pose.angular_velocity
+        spin = pose.angular_velocity if isinstance(pose, Frames) else pose.global_angular_velocity()
+    assert spin is not None  # there are velocities
     spins = [differentiated(spin, j) for j in range(order + 1)]
 
     def turned(j: int, axis: Jet) -> Jet:

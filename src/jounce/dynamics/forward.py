@@ -59,7 +59,7 @@ class State(NamedTuple):
     velocity: Numbers
     spin: Numbers
 
-    def map(self, function: Callable[[Numbers], Any]) -> "State":
+    def map(self, function: Callable[[Any], Any]) -> "State":
         """Apply a function to each array."""
         return State(*map(function, self))
 
@@ -120,17 +120,17 @@ class Equations(eqx.Module):
 
     def still(self, position: Shifts, attitude: Attitudes) -> Pose:
         """Return the pose of order zero of all bodies, the ground first."""
-        position = Jet([with_ground(position)])
+        origins = Jet([with_ground(position)])
         if self.pose_type is PlanarPose:
-            return PlanarPose.from_jets(position, Jet([with_ground(attitude)[0]]))
+            return PlanarPose.from_jets(origins, Jet([with_ground(attitude)[0]]))
         fixed = jnp.zeros_like(attitude[:, :1]).at[0].set(1.0)
         quaternion = jnp.concatenate([fixed, attitude], axis=1)  # of unit length already: it is kept so
         spins, axes = (tuple(Jet([x]) for x in f(quaternion)) for f in (quaternion_spins, body_axes))
-        return SpatialPose(position, Jet([quaternion]), spins, axes, None)
+        return SpatialPose(origins, Jet([quaternion]), spins, axes, None)
 
     def attitude_of(self, pose: Pose) -> Attitudes:
         """Return the attitude of the moving bodies, as a state has it, from a pose of order zero."""
-        if self.pose_type is PlanarPose:
+        if isinstance(pose, PlanarPose):
             return pose.angle.coefficients[0][None, 1:]
         return pose.quaternion.coefficients[0][:, 1:]
 
@@ -170,7 +170,7 @@ class Equations(eqx.Module):
         if self.pose_type is PlanarPose:
             return state.spin
         spins = quaternion_spins(state.attitude)
-        return 0.5 * sum(spin * part for spin, part in zip(spins, jnp.split(state.spin, 3), strict=True))
+        return 0.5 * total(spin * part for spin, part in zip(spins, jnp.split(state.spin, 3), strict=True))
 
     def matrix(self, state: State, time: Instants) -> Float[Numbers, "size size batch"]:
         """Return the matrix of the unknown accelerations and multipliers, scaled."""
@@ -275,16 +275,13 @@ def expand(
         Of the equations' matrix at this state, where it is known.
     """
     count, bodies, lanes = equations.coordinates, *state.position.shape[1:]
-    if inverse is None:
-        inverse = DenseFactor.of(equations.matrix(state, time)).inverse()
+    known = DenseFactor.of(equations.matrix(state, time)).inverse() if inverse is None else inverse
     rows = equations.system.row_scale.shape[0]
+    solved = partial(equations.unknowns, partial(multiplied, known))
 
     def program(*leaves: Any) -> Any:
         position, attitude, velocity, spin, acceleration, multipliers, clock = leaves
         return equations.balance(State(position, attitude, velocity, spin), acceleration, multipliers, clock)
-
-    def solved(forces: Any, second: Any) -> tuple[Any, Any]:
-        return equations.unknowns(partial(multiplied, inverse), forces, second)
 
     trial = jnp.zeros((count, bodies, lanes)), jnp.zeros((rows, lanes))
     forces, second, _ = program(*state, *trial, time)

@@ -15,6 +15,7 @@ from jounce.dynamics.motion_values import Pose
 from jounce.jet import Jet, components, cross
 from jounce.jet.algebra import stacked, total
 from jounce.mechanism.system import System
+from jounce.rigid import PlanarPose
 from jounce.shapes import Numbers
 
 
@@ -35,12 +36,13 @@ def inertia_forces(pose: Pose, masses: Masses, gravity: Gravity | float) -> tupl
     mass, center, moments = masses
     acceleration = pose.point(center).differentiate().differentiate()
     force = (acceleration - gravity) * mass
-    if pose.turns == 1:
+    if isinstance(pose, PlanarPose):
         about = moments[0][0] + moments[1][1]
         moment = pose.angle.differentiate().differentiate() * about + cross(pose.direction(center), force)
         return force, moment[None]
     spread = moments[0][0] + moments[1][1] + moments[2][2]
     spin = pose.angular_velocity
+    assert spin is not None  # there are accelerations
     momentum = spin * spread - total(moments[:, i] * part for i, part in enumerate(components(spin)))
     local = pose.to_body(force)
     return force, momentum.differentiate() + cross(spin, momentum) + cross(center, local)

@@ -40,7 +40,7 @@ def at_state(given: object, state: object, time: object) -> tuple[Motion, int]:
         model, _ = referred(model, {name: values[0] for name, values in _still(coordinates).items()}, float(instant))
     way = given.way if isinstance(given, Motion) else None
     status = np.array([int(Status.OK)])
-    return MotionAtState(mechanism, model, instant[None], order, (coordinates, ()), status, {}, way=way), order
+    return MotionAtState(mechanism, model, instant[None], order, (dict(coordinates), ()), status, {}, way=way), order
 
 
 def _still(coordinates: Coordinates) -> Coordinates:

@@ -60,7 +60,7 @@ def pose_of(coordinates: Coordinates, pose_type: type[Pose], order: int | None =
 
 def plain_derivatives(motion: Motion, coefficients: Float[Numbers, "order *shape time"]) -> np.ndarray:
     """Return plain derivatives, the time first, from Taylor coefficients; NaN at instants that were not solved."""
-    values = np.moveaxis(derivatives(np.asarray(coefficients)), -1, 0)
+    values = np.moveaxis(np.asarray(derivatives(np.asarray(coefficients))), -1, 0)
     values[motion.status != Status.OK] = np.nan
     return values
 

@@ -7,7 +7,6 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.constraints import AbstractConstraint
 from jounce.dynamics.forward import Lanes
 from jounce.dynamics.inverse import MotionForces
 from jounce.dynamics.masses import Gravity, Masses
@@ -18,6 +17,7 @@ from jounce.kinematics import Motion
 from jounce.kinematics.compilation import compiled
 from jounce.mechanism.datums import at_lanes
 from jounce.mechanism.system import Group
+from jounce.rigid import PlanarPose
 from jounce.shapes import Numbers
 
 FAINT = 1e-3  # of what turning bodies would move: coefficients that vanish have its rounding, 1e-12 of this or less
@@ -91,7 +91,7 @@ def _driver_power(forces: MotionForces, name: str) -> tuple[np.ndarray, np.ndarr
 
 
 @compiled("levels")
-def _law(driver: AbstractConstraint, instants: Lanes, levels: int) -> Float[Numbers, "_ instance batch"]:
+def _law(driver: Any, instants: Lanes, levels: int) -> Float[Numbers, "_ instance batch"]:
     law = stacked(driver.motion(Jet.variable(instants[None], levels)))
     return law.reshape(levels + 1, -1, len(instants))
 
@@ -138,7 +138,10 @@ def _powers(
 
 def _spin(pose: Pose) -> tuple[Jet, ...]:
     """Return the components of the angular velocities of bodies, in their axes."""
-    return (pose.angle.differentiate(),) if pose.turns == 1 else tuple(pose.angular_velocity[k] for k in range(3))
+    if isinstance(pose, PlanarPose):
+        return (pose.angle.differentiate(),)
+    assert pose.angular_velocity is not None  # there are accelerations
+    return tuple(pose.angular_velocity)
 
 
 def _inertia(

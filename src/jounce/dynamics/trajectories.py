@@ -158,7 +158,7 @@ def trajectory_torques(
     return xarray.Dataset(variables, coords=axes, attrs={"title": robot.name, "source": "jounce"})
 
 
-def _in_blocks(function: Callable[[np.ndarray], np.ndarray], values: np.ndarray) -> np.ndarray:
+def _in_blocks(function: Callable[[np.ndarray], Any], values: np.ndarray) -> np.ndarray:
     """Return what a function gives for values along their first axis, the last block filled up."""
     return in_chunks(lambda some: function(values[some]), len(values), (BLOCK,), axis=0)
 

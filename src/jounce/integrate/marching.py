@@ -60,11 +60,11 @@ class DenseOutput(NamedTuple):
         About axes at the start, rad, for each group of forces that measures some.
     """
 
-    start: Float[Numbers, "steps *batch"]
-    length: Float[Numbers, "steps *batch"]
+    start: Float[Any, "steps *batch"]
+    length: Float[Any, "steps *batch"]
     polynomial: State
-    kink: Int[Numbers, "steps *batch"]
-    angles: tuple[Float[Numbers, "steps instance *batch"], ...]
+    kink: Int[Any, "steps *batch"]
+    angles: tuple[Float[Any, "steps instance *batch"], ...]
 
     @property
     def end(self) -> float:

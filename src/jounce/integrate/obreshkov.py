@@ -20,6 +20,7 @@ from jaxtyping import Bool, Float
 from jounce.dynamics.forward import Equations, Expansion, Lanes, State, expand
 from jounce.errors import JounceError
 from jounce.integrate.methods import ROUNDING, AbstractMethod, Number, Sizes, check_step, evaluated, reach
+from jounce.jet.algebra import total
 from jounce.shapes import Numbers
 
 MOST_ITERATIONS = 80
@@ -139,7 +140,7 @@ def _terms(
 ) -> Float[Numbers, "component body batch"]:
     """Return what the formula adds for the derivatives of one end; seen from the other end, the step is negative."""
     weights = _weights(highest)
-    return sum(float(w) * step[None, None] ** j * coefficients[j] for j, w in enumerate(weights, 1))
+    return total(float(w) * step[None, None] ** j * coefficients[j] for j, w in enumerate(weights, 1))
 
 
 @lru_cache(maxsize=8)

@@ -84,7 +84,7 @@ def work_of_motion(tree: Tree, q: Series, frames: Frames) -> Float[Numbers, "ord
     return work(partial, left[0] * jnp.asarray(tree.mass)[:, None], moment)
 
 
-def mass_jet(tree: Tree, q: Series) -> Float[Numbers, "order coordinate coordinate batch"]:
+def mass_jet(tree: Tree, q: Series) -> Float[jax.Array, "order coordinate coordinate batch"]:
     """Return the mass matrix as Taylor coefficients.
 
     The element of two joints is the work, along the one nearer to the base, of the momentum of all that the other moves

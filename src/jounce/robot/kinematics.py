@@ -78,7 +78,7 @@ def place_of(robot: AbstractRobot, link: str, point: ArrayLike) -> Frame:
     point = finite_numbers("point", point, (3,))
     frame = robot.frames[link]
     body = frame.body if frame.body >= 0 else len(robot.moving_links)
-    return Frame(np.int64(body), frame.position + frame.rotation @ point, frame.rotation)
+    return Frame(body, frame.position + frame.rotation @ point, frame.rotation)
 
 
 @jax.tree_util.register_dataclass

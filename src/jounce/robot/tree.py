@@ -6,12 +6,11 @@ from typing import Any, NamedTuple
 
 import jax
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 from jounce.errors import RobotError, no_such
 from jounce.rigid.inertia import Inertia
 from jounce.robot.model import Joint, Link
-from jounce.shapes import Numbers
 
 
 @dataclasses.dataclass(frozen=True)
@@ -85,9 +84,9 @@ class Tree:
 class Frame(NamedTuple):
     """Where a link is: the body that it moves with (-1 is the base), and its pose in the frame of that body."""
 
-    body: int | Int[Numbers, ""]
-    position: Float[Numbers, " 3"]
-    rotation: Float[Numbers, "3 3"]
+    body: int
+    position: Float[np.ndarray, " 3"]
+    rotation: Float[np.ndarray, "3 3"]
 
 
 def ordered(links: Mapping[str, Link], joints: Mapping[str, Joint]) -> list[Joint]:
