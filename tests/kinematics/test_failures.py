@@ -40,7 +40,7 @@ def test_without_strict_good_instants_are_kept_and_the_rest_is_nan():
     assert motion.status[:10].tolist() == [Status.OK] * 10
     assert motion.status[10] == Status.BRANCH_JUMP
     assert motion.status[11:].tolist() == [Status.NOT_REACHED] * 10
-    assert motion.culprits[10] == "body crank"
+    assert motion.faults[10] == "body crank"
     np.testing.assert_allclose(motion.outputs["angle"][:10, 0], GRID[:10], atol=1e-14)
     assert np.isnan(motion.outputs["angle"][10:]).all()
     assert np.isnan(motion.dataset["tip"].values[10:]).all()

@@ -10,12 +10,14 @@ where the mechanism is put together, its `Datum`.
 from typing import Any
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 
 from jounce.constraints.planar import length_of
 from jounce.jet import Jet, components, cross, dot, stack, wrap
 from jounce.jet.algebra import total
+from jounce.jet.turns import brought_near, principal
 from jounce.rigid.spatial import body_axes
 
 SMALLEST_COSINE = 1e-6  # of half the tilt of the axis: below it the tilt is half a turn, and no angle is told
@@ -72,12 +74,7 @@ def relative_angle(
         angle = _between(body_i, body_j, axis, vector_i, second)
         return angle if datum is None else brought_near(angle, datum.near)
     turn = _turn(body_i, body_j, axis, datum)
-    return wrap(turn, 2 * jnp.pi) if datum is None else brought_near(turn, datum.near - datum.angle) + datum.angle
-
-
-def brought_near(angle: Jet, expected: Any) -> Jet:
-    """Return an angle shifted by the whole turns that bring it nearest to the one expected."""
-    return angle - 2 * jnp.pi * jnp.round((angle.coefficients[0] - expected) / (2 * jnp.pi))
+    return wrap(turn) if datum is None else brought_near(turn, datum.near - datum.angle) + datum.angle
 
 
 # The rate of the angle is the angular velocity along the axis, but for terms that vanish while the bodies turn about
@@ -133,21 +130,16 @@ def coaxial(axis_i: Any, axis_j: Any) -> Datum:
     e0, e = attitude[:1], attitude[1:]
     flipped = jnp.concatenate([-dot(side, e)[None], e0 * side + cross(side, e)])
     attitude = jnp.where(opposite[None], flipped, attitude)
-    angle, known = angle_of(attitude, u, jnp)
+    angle, known = angle_of(attitude, u)
     angle = jnp.where(known, angle, 0.0)
     return Datum(attitude, angle, angle)
 
 
-def angle_of(attitude: Any, axis: Any, namespace: Any = np) -> tuple[Any, Any]:
+def angle_of(attitude: Any, axis: Any) -> tuple[Any, Any]:
     """Return the angle about a unit axis, in (-pi, pi], of Euler parameters, and where there is one.
 
     There is none where the attitude turns the axis to its opposite.
     """
     along, e0 = (axis * attitude[1:]).sum(axis=0), attitude[0]
-    return principal(2.0 * namespace.arctan2(along, e0), namespace), namespace.hypot(along, e0) > SMALLEST_COSINE
-
-
-def principal(angle: Any, namespace: Any = np) -> Any:
-    """Return an angle shifted by whole turns to (-pi, pi]; half a turn is pi, whatever its last digits say."""
-    turns = namespace.ceil((angle - np.pi) / (2 * np.pi) - 1e-9)
-    return angle - 2 * np.pi * turns
+    namespace = jnp if isinstance(along, jax.Array) else np
+    return principal(2.0 * namespace.arctan2(along, e0)), namespace.hypot(along, e0) > SMALLEST_COSINE

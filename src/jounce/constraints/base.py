@@ -12,9 +12,10 @@ from jounce.jet import Jet, concatenate
 
 Scalar = Annotated[Any, "scalar"]
 Vector = Annotated[Any, "vector"]
-Motion = Annotated[Any, "motion"]
+MotionLaw = Annotated[Any, "motion"]
 Wrenches = Annotated[Any, "wrenches"]
 Whole = Annotated[int, "whole"]
+WORDS = ("Scalar", "Vector", "Law", "Laws", "Wrenches", "Whole")  # annotations that say what kind of value a field has
 
 SPACES = ("planar", "spatial")
 ROLES = ("joint", "driver", "force")
@@ -55,9 +56,9 @@ class AbstractConstraint(eqx.Module):
     """A joint or driver: one residual, written on the jets of its bodies, that vanishes when it holds.
 
     A subclass lists its values as fields and defines `residual`; nothing else. Jacobian, right-hand sides of every
-    order, forces and files follow. Fields are annotated `Scalar`, `Vector`, `Motion` or ``str``; the fields ``point_i``
-    and ``point_j`` are the key ``points`` of a mechanism file, and likewise vectors, axes and normals. Given a `type`,
-    the subclass can be used in files by that name.
+    order, forces and files follow. Fields are annotated `Scalar`, `Vector`, `MotionLaw` or ``str``; the fields
+    ``point_i`` and ``point_j`` are the key ``points`` of a mechanism file, and likewise vectors, axes and normals.
+    Given a `type`, the subclass can be used in files by that name.
 
     Parameters
     ----------
@@ -148,7 +149,7 @@ def field_kind(field: dataclasses.Field) -> str:
     """Return ``scalar``, ``vector``, ``motion``, ``law``, ``laws``, ``wrenches``, ``whole`` or ``text``."""
     if isinstance(field.type, str):  # under ``from __future__ import annotations``
         word = field.type.rpartition(".")[2].strip()
-        return word.lower() if word in ("Scalar", "Vector", "Motion", "Law", "Laws", "Wrenches", "Whole") else "text"
+        return "motion" if word == "MotionLaw" else word.lower() if word in WORDS else "text"
     return next(iter(getattr(field.type, "__metadata__", ())), "text")
 
 

@@ -6,7 +6,7 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from jounce.constraints.angles import relative_angle
-from jounce.constraints.base import AbstractConstraint, Motion, Scalar, Vector, check_text
+from jounce.constraints.base import AbstractConstraint, MotionLaw, Scalar, Vector, check_text
 from jounce.constraints.planar import COORDINATES, coordinate_of, slide
 from jounce.errors import MechanismError
 from jounce.jet import wrap
@@ -19,7 +19,7 @@ class CoordinateDriver(AbstractConstraint, type="coordinate", space="planar", ro
     """
 
     coordinate: str = eqx.field(static=True)  # angle, x or y of body j
-    motion: Motion  # rad or m
+    motion: MotionLaw  # rad or m
     ratio: Scalar = None
     offset: Scalar = 0.0  # rad or m
 
@@ -38,7 +38,7 @@ class SlideDriver(AbstractConstraint, type="slide", space="planar", role="driver
     point_i: Vector  # m, in the frame of body i
     point_j: Vector
     vector_i: Vector  # direction of travel
-    motion: Motion  # m
+    motion: MotionLaw  # m
 
     def residual(self, body_i, body_j, time):
         return slide(body_i, body_j, self.point_i, self.point_j, self.vector_i) - self.motion(time)
@@ -49,7 +49,7 @@ class DistanceDriver(AbstractConstraint, type="distance", space="planar", role="
 
     point_i: Vector  # m, in the frame of body i
     point_j: Vector
-    motion: Motion  # m
+    motion: MotionLaw  # m
 
     def residual(self, body_i, body_j, time):
         d = body_j.point(self.point_j) - body_i.point(self.point_i)
@@ -77,7 +77,7 @@ class RotationDriver(AbstractConstraint, type="rotation", space="spatial", role=
     """
 
     axis_i: Vector
-    motion: Motion  # rad
+    motion: MotionLaw  # rad
     vector_i: Vector = None
     vector_j: Vector = None
     datum: Any = eqx.field(default=None, init=False)  # found when the mechanism is put together
@@ -90,4 +90,4 @@ class RotationDriver(AbstractConstraint, type="rotation", space="spatial", role=
 
     def residual(self, body_i, body_j, time):
         angle = relative_angle(body_i, body_j, self.axis_i, self.vector_i, self.vector_j, self.datum)
-        return wrap(angle - self.motion(time), 2 * jnp.pi)
+        return wrap(angle - self.motion(time))

@@ -19,12 +19,13 @@ from jounce.integrate.marching import Front, Outcome, Steps, departed, march
 from jounce.integrate.methods import AbstractMethod
 from jounce.integrate.simulate import checked, instants_of
 from jounce.integrate.simulation import expanded
+from jounce.jet.turns import whole_periods
 from jounce.kinematics import Status
 from jounce.mechanism import Mechanism, build, check_mechanism
+from jounce.mechanism.axis_angles import with_turns
 from jounce.mechanism.builder import referred
-from jounce.mechanism.datums import with_turns
-from jounce.mechanism.doors import concrete
-from jounce.mechanism.laws import check_laws
+from jounce.mechanism.law_checks import check_laws
+from jounce.mechanism.preconditions import concrete
 
 LANES = 64  # runs marched together: more fall out of the cache
 STEPS = 16  # tried before runs that have ended make room for others
@@ -335,4 +336,4 @@ def turned(before: np.ndarray, after: np.ndarray, since: np.ndarray) -> np.ndarr
         Time from the one to the other, s.
     """
     rise = since / 2 * (before[1] + after[1]) + since**2 / 6 * (before[2] - after[2])
-    return 2 * np.pi * np.nan_to_num(np.round((after[0] - before[0] - rise) / (2 * np.pi)))
+    return np.nan_to_num(whole_periods(after[0] - before[0] - rise))

@@ -6,6 +6,7 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+from jax.typing import ArrayLike
 
 from jounce.jet.coefficients import elementwise, minus, plus, ranked, sum_of_products, total
 
@@ -209,6 +210,10 @@ class Jet:
 
     def __rpow__(self, base: Any) -> "Jet":
         return power(base, self)
+
+
+Quantity = Jet | ArrayLike
+"""A jet, or what does not change in time: an array or a number."""
 
 
 def _checked(order: int) -> int:

@@ -214,12 +214,6 @@ def absolute(x: Any) -> Any:
     return x.map(lambda c: sign * c)
 
 
-def wrap(x: Any, period: Any) -> Any:
-    """Shift by whole periods into ``[-period/2, period/2]``: what is left of an angle or a screw's advance."""
-    value = x.coefficients[0] if isinstance(x, Jet) else x
-    return x - period * jnp.round(value / period)
-
-
 FUNCTIONS: dict[str, Callable[..., Any]] = {
     function.__name__: function
     for function in (

@@ -13,9 +13,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jounce.constraints.angles import brought_near
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked, total
+from jounce.jet.turns import brought_near
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.linear import DenseFactor
 from jounce.kinematics.status import Status

@@ -11,8 +11,16 @@ from typing import Any
 import jax
 import numpy as np
 
-from jounce.kinematics.bridge import LARGEST_DISAGREEMENT, bridged, half_width, spoiled_width
-from jounce.kinematics.path import LARGE_BATCH, PASSABLE, SMALL_BATCH, ChangePoint, Solver, Track, follow
+from jounce.kinematics.change_points import LARGEST_DISAGREEMENT, bridged, half_width, spoiled_width
+from jounce.kinematics.path_following import (
+    LARGE_BATCH,
+    PASSABLE,
+    SMALL_BATCH,
+    ChangePoint,
+    FollowedPath,
+    Solver,
+    follow,
+)
 from jounce.kinematics.status import Status
 
 LONG_GRID = 1024  # instants: from here on in large batches
@@ -20,27 +28,27 @@ FEW_BATCHES = 4  # of instants: no level of its own for each halving of the spac
 
 
 class Grid:
-    """All instants of a time grid, solved from the anchors of a track.
+    """All instants of a time grid, solved from the anchors of a path.
 
     Attributes
     ----------
     status : array of int, shape (time,)
-    culprits : dict of int to str
+    faults : dict of int to str
         For instants that failed, the body farthest from its prediction, or the driver without a permitted value.
     """
 
-    def __init__(self, solver: Solver, track: Track, time: np.ndarray):
-        self.solver, self.track, self.time = solver, track, time
+    def __init__(self, solver: Solver, path: FollowedPath, time: np.ndarray):
+        self.solver, self.path, self.time = solver, path, time
         self.status = np.full(len(time), int(Status.NOT_REACHED))
-        self.culprits: dict[int, str] = {}
-        anchors = np.array([anchor.instant for anchor in track.anchors])
+        self.faults: dict[int, str] = {}
+        anchors = np.array([anchor.instant for anchor in path.anchors])
         self._instants = np.concatenate([time, anchors])
         self._nearest = len(time) + _nearest(anchors, time)
         self._store = jax.tree.map(
             lambda *xs: np.concatenate([np.zeros((*xs[0].shape[:-1], len(time))), *xs], axis=-1),
-            *(anchor.state for anchor in track.anchors),
+            *(anchor.state for anchor in path.anchors),
         )
-        for lanes, arrival in track.on_the_way:
+        for lanes, arrival in path.on_the_way:
             solved = arrival.status[1:] == Status.OK
             self._keep(lanes[solved], arrival.state(np.flatnonzero(solved) + 1))
             self.status[lanes[solved]] = Status.OK
@@ -54,11 +62,11 @@ class Grid:
     def solve(self, progress: Callable[[int, int], None] | None) -> None:
         """Solve level after level; an instant that its neighbour cannot predict is followed to from an anchor."""
         count = len(self.time)
-        reached = self.time < self.track.ended_at
+        reached = self.time < self.path.ended_at
         width = LARGE_BATCH if count > LONG_GRID else SMALL_BATCH
         left = reached & (self.status != Status.OK)
         done = count - int(np.count_nonzero(left))
-        for lanes, distance in _levels(left, len(self.track.anchors), width):
+        for lanes, distance in _levels(left, len(self.path.anchors), width):
             source = self._nearest[lanes]
             if distance is not None:
                 neighbour = lanes - distance
@@ -69,9 +77,9 @@ class Grid:
                 done += min(width, len(lanes) - first)
                 if progress is not None:
                     progress(done, count)
-        for point in self.track.change_points:
+        for point in self.path.change_points:
             self._bridge(point)
-        for point in self.track.singular_positions_outside():
+        for point in self.path.singular_positions_outside():
             self._refuse(np.abs(self.time - point.instant) < spoiled_width(point, self.solver.order))
         if not reached.all():
             self._explain_end(int(np.argmin(reached)))
@@ -85,7 +93,7 @@ class Grid:
         self.status[lanes] = arrival.status
         self._keep(_slice_of(lanes), arrival.state(slice(None)))
         for k in np.flatnonzero(arrival.status != Status.OK).tolist():
-            self.culprits[int(lanes[k])] = self.solver.culprit(arrival, k)
+            self.faults[int(lanes[k])] = self.solver.fault(arrival, k)
             if arrival.status[k] not in PASSABLE:
                 self._rescue(int(lanes[k]))
 
@@ -100,24 +108,24 @@ class Grid:
 
     def _rescue(self, lane: int) -> None:
         """Follow the motion to one instant from the anchor before it."""
-        anchors, instant = self.track.anchors, float(self.time[lane])
+        anchors, instant = self.path.anchors, float(self.time[lane])
         before = int(np.searchsorted([a.instant for a in anchors], instant, side="right")) - 1
         start = anchors[before]
         local = follow(self.solver, start, instant, self.time[-1] - self.time[0], (instant - start.instant) / 2)
         if local.status != Status.OK:
-            self.status[lane], self.culprits[lane] = local.status, local.culprit
+            self.status[lane], self.faults[lane] = local.status, local.fault
         elif len(local.anchors) > 1:
             self.status[lane] = local.anchors[-1].status
-            self.culprits.pop(lane)
+            self.faults.pop(lane)
             self._keep(slice(lane, lane + 1), local.anchors[-1].state)
 
     def _bridge(self, point: ChangePoint) -> None:
         """Replace the instants next to a change point, and the one at it, by what the motion on both sides gives."""
         away = np.abs(self.time - point.instant)
-        lanes = np.flatnonzero((away < half_width(point, self.solver.order)) & (self.time < self.track.ended_at))
+        lanes = np.flatnonzero((away < half_width(point, self.solver.order)) & (self.time < self.path.ended_at))
         if not lanes.size:
             return
-        state = bridged(self.solver, self.track, point, self.time[lanes])
+        state = bridged(self.solver, self.path, point, self.time[lanes])
         if state is None:
             self._refuse(away < spoiled_width(point, self.solver.order))
             return
@@ -129,7 +137,7 @@ class Grid:
             return
         self.status[lanes] = Status.OK
         for lane in lanes.tolist():
-            self.culprits.pop(lane, None)
+            self.faults.pop(lane, None)
         self._keep(lanes, (*state, self._store[2][lanes]))
 
     def _refuse(self, lanes: np.ndarray) -> None:
@@ -137,12 +145,12 @@ class Grid:
 
     def _explain_end(self, lost: int) -> None:
         """Say at the first instant that was not reached why the motion could not be followed to it."""
-        track, instant = self.track, self.time[lost : lost + 1]
-        self.status[lost], self.culprits[lost] = track.status, track.culprit
-        last = track.anchors[-1]
+        path, instant = self.path, self.time[lost : lost + 1]
+        self.status[lost], self.faults[lost] = path.status, path.fault
+        last = path.anchors[-1]
         arrival = self.solver(last.state, instant - last.instant, instant)
         if arrival.status[0] == Status.INADMISSIBLE:  # the fault is the law's, not that of the position before
-            self.status[lost], self.culprits[lost] = Status.INADMISSIBLE, self.solver.culprit(arrival, 0)
+            self.status[lost], self.faults[lost] = Status.INADMISSIBLE, self.solver.fault(arrival, 0)
 
 
 def _slice_of(indices: np.ndarray) -> Any:

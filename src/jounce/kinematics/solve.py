@@ -10,12 +10,12 @@ from jounce.errors import MechanismError, SolveError
 from jounce.kinematics.assembly import assemble
 from jounce.kinematics.grid import Grid
 from jounce.kinematics.motion import Motion
-from jounce.kinematics.path import PASSABLE, Anchor, Solver, follow
+from jounce.kinematics.path_following import PASSABLE, Anchor, Solver, follow
 from jounce.kinematics.status import Status
 from jounce.mechanism import Mechanism, build, check_mechanism, time_grid
-from jounce.mechanism.datums import measures_angle
-from jounce.mechanism.doors import concrete
-from jounce.mechanism.laws import check_laws
+from jounce.mechanism.axis_angles import measures_angle
+from jounce.mechanism.law_checks import check_laws
+from jounce.mechanism.preconditions import concrete
 from jounce.mechanism.system import Group
 
 LOWEST_ORDER = 4  # of the jets inside: predictions need some, also where the user wants positions only
@@ -90,12 +90,12 @@ def solve(
     model, coordinates = assemble(build(mechanism), instants[0], tolerance)
     solver = Solver(model, max(order + lost, LOWEST_ORDER), float(tolerance), refine, order)
     first = _first(solver, coordinates, instants[:1])
-    track = follow(solver, first, instants[-1], instants[-1] - instants[0], grid=instants)
-    grid = Grid(solver, track, instants)
+    path = follow(solver, first, instants[-1], instants[-1] - instants[0], grid=instants)
+    grid = Grid(solver, path, instants)
     grid.solve(progress)
-    change_points = np.array([point.instant for point in track.change_points])
-    found = (grid.state, grid.status, grid.culprits)
-    motion = Motion(mechanism, model, instants, order, *found, change_points, track.way())
+    change_points = np.array([point.instant for point in path.change_points])
+    found = (grid.state, grid.status, grid.faults)
+    motion = Motion(mechanism, model, instants, order, *found, change_points, path.history())
     if strict:
         raise_for_status(motion)
     return motion
@@ -108,8 +108,8 @@ def raise_for_status(motion: Motion) -> None:
         return
     first = int(failed[0])
     status = Status(int(motion.status[first]))
-    culprit = motion.culprits.get(first, "")
-    where = f"t = {motion.time[first]:g} s" + (f", {culprit}" if culprit else "")
+    fault = motion.faults.get(first, "")
+    where = f"t = {motion.time[first]:g} s" + (f", {fault}" if fault else "")
     total = len(motion.time)
     message = f"{where}: {_words(status)}: {status.advice}"
     solved = f"{total - failed.size} of {total} instants were solved"
@@ -133,7 +133,7 @@ def _first(solver: Solver, coordinates: dict[str, np.ndarray], instant: np.ndarr
     arrival = solver((still, angles, np.zeros(1)), np.zeros(1), instant, survey=True)
     status = Status(int(arrival.status[0]))
     if status not in PASSABLE:
-        where = f"t = {instant[0]:g} s, {solver.culprit(arrival, 0)}"
+        where = f"t = {instant[0]:g} s, {solver.fault(arrival, 0)}"
         raise SolveError(f"{where}: {_words(status)}: {status.advice}", status=status)
     return Anchor.of(arrival, instant[0])
 

@@ -14,12 +14,12 @@ from jax.core import Tracer
 from jounce.constraints.base import field_kind, value_fields
 from jounce.errors import JounceError
 from jounce.jet import Jet
-from jounce.mechanism.datums import (
-    Turning,
-    Way,
+from jounce.mechanism.axis_angles import (
+    AttitudeHistory,
+    PrescribedAngle,
     departure,
     measures_angle,
-    turnings_of,
+    prescribed_angles,
     with_angles,
     with_datum_of,
     with_datums,
@@ -64,9 +64,9 @@ class Model:
         Size of the mechanism, by which positions are scaled, m.
     reference : dict of str to array
         Coordinates from which angles about axes are counted: those of the starting guess, until put together.
-    turnings : tuple of Turning
+    prescribed : tuple of PrescribedAngle
         Angles that drivers prescribe there, with their whole turns.
-    way : Way, optional
+    history : AttitudeHistory, optional
         In space, from the starting guess to where the drivers fulfil their laws, where that is more than half a turn.
     """
 
@@ -80,8 +80,8 @@ class Model:
     outputs: tuple[tuple[str, ...], ...]
     length: float
     reference: dict[str, Any]
-    turnings: tuple[Turning, ...] = ()
-    way: Way | None = None
+    prescribed: tuple[PrescribedAngle, ...] = ()
+    history: AttitudeHistory | None = None
 
 
 def build(mechanism: Mechanism, like: Model | None = None) -> Model:
@@ -149,13 +149,18 @@ def build(mechanism: Mechanism, like: Model | None = None) -> Model:
         _plain(output_names),
         length,
         guess if like is None else like.reference,
-        () if like is None else like.turnings,
-        _way_of(guess) if like is None else like.way,
+        () if like is None else like.prescribed,
+        _history_of(guess) if like is None else like.history,
     )
 
 
 def referred(
-    model: Model, coordinates: dict[str, Any], instant: float, told: tuple[Turning, ...] = (), *, keep: bool = False
+    model: Model,
+    coordinates: dict[str, Any],
+    instant: float,
+    told: tuple[PrescribedAngle, ...] = (),
+    *,
+    keep: bool = False,
 ) -> tuple[Model, float]:
     """Return the model with angles about axes counted from a position, and how far off those of drivers were, rad.
 
@@ -167,36 +172,36 @@ def referred(
         Of all bodies, the ground first, put together.
     instant : float
         At which they are there, s.
-    told : tuple of Turning
+    told : tuple of PrescribedAngle
         Angles that are prescribed there by others than the drivers, such as initial conditions.
     keep : bool, default False
         Whether angles go on from those counted so far, instead of those that the frames of the bodies have.
     """
     system = model.system
     if not any(map(measures_angle, (*system.groups, *system.forces, *system.outputs))):
-        return dataclasses.replace(model, reference=coordinates, turnings=told), 0.0
+        return dataclasses.replace(model, reference=coordinates, prescribed=told), 0.0
     groups = with_datums(system.groups, coordinates, keep=keep)
     motions = [group.element.motion for group in groups if measures_angle(group)]
     values = [np.asarray(value) for value in _law_values(motions, np.full((1, 1), instant))]
-    turnings = (*turnings_of(groups, coordinates, values), *told)
-    forces, outputs = (with_datums(part, coordinates, turnings) for part in (system.forces, system.outputs))
+    prescribed = (*prescribed_angles(groups, coordinates, values), *told)
+    forces, outputs = (with_datums(part, coordinates, prescribed) for part in (system.forces, system.outputs))
     system = dataclasses.replace(system, groups=groups, forces=forces, outputs=outputs)
     away = departure(model.system.groups, groups)
-    return dataclasses.replace(model, system=system, reference=coordinates, turnings=turnings), away
+    return dataclasses.replace(model, system=system, reference=coordinates, prescribed=prescribed), away
 
 
-def _way_of(guess: dict[str, Any]) -> Way | None:
-    return Way(guess["quaternion"], np.zeros(1)) if "quaternion" in guess else None
+def _history_of(guess: dict[str, Any]) -> AttitudeHistory | None:
+    return AttitudeHistory(guess["quaternion"], np.zeros(1)) if "quaternion" in guess else None
 
 
 def placed(groups: tuple[Group, ...], model: Model) -> tuple[Group, ...]:
     """Return groups with angles about axes counted as if they had been in the model when it was put together."""
-    if model.way is None or not any(map(measures_angle, groups)):
+    if model.history is None or not any(map(measures_angle, groups)):
         return groups
-    first, last = ({"quaternion": model.way.quaternion[..., place]} for place in (slice(1), slice(-1, None)))
+    first, last = ({"quaternion": model.history.quaternion[..., place]} for place in (slice(1), slice(-1, None)))
     groups = with_datums(groups, first)
-    groups = with_angles(with_datums(groups, last), model.way.last_angles(groups))
-    return with_datums(groups, model.reference, model.turnings)
+    groups = with_angles(with_datums(groups, last), model.history.last_angles(groups))
+    return with_datums(groups, model.reference, model.prescribed)
 
 
 @jax.jit

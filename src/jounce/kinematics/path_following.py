@@ -17,7 +17,7 @@ import numpy as np
 from jounce.kinematics.advance import SAFE_FRACTION, Arrival, advance
 from jounce.kinematics.status import Status
 from jounce.mechanism import Model
-from jounce.mechanism.datums import Way
+from jounce.mechanism.axis_angles import AttitudeHistory
 
 PASSABLE = (Status.OK, Status.UNDEFINED)
 SMALLEST_STEP = 1e-10  # of the span
@@ -58,7 +58,7 @@ class Solver:
         )
         return jax.tree.map(lambda x: np.asarray(x)[..., :lanes], arrival)
 
-    def culprit(self, arrival: Arrival, lane: int) -> str:
+    def fault(self, arrival: Arrival, lane: int) -> str:
         """Return where to look for the fault: a driver without a permitted value, an output, the farthest body."""
         refused = np.flatnonzero(~arrival.admissible[:, lane])
         if refused.size:
@@ -136,7 +136,7 @@ class ChangePoint:
 
 
 @dataclasses.dataclass
-class Track:
+class FollowedPath:
     """Anchors in order of time, the change points passed, and where and why following the motion ended, if it did.
 
     Instants of a grid that were solved on the way are told by their indices, each with the batch that it was solved in.
@@ -147,9 +147,9 @@ class Track:
     change_points: list[ChangePoint] = dataclasses.field(default_factory=list)
     status: Status = Status.OK
     ended_at: float = np.inf
-    culprit: str = ""
+    fault: str = ""
 
-    def way(self) -> Way | None:
+    def history(self) -> AttitudeHistory | None:
         """Return the attitudes of all bodies in space along the motion: at the anchors, and by their series beyond."""
         if "quaternion" not in self.anchors[0].state[0]:
             return None
@@ -162,7 +162,7 @@ class Track:
             place = place * since + coefficient
         count = (len(times) - 1) * PLACES + 1  # the last anchor is the end
         place = place.reshape(*place.shape[:2], -1)[..., :count]
-        return Way(place, (times[:, None] + since).ravel()[:count])
+        return AttitudeHistory(place, (times[:, None] + since).ravel()[:count])
 
     def singular_positions_outside(self) -> list[ChangePoint]:
         """Return where the motion would be singular just before its start or after its end, and smooth all the same."""
@@ -180,7 +180,7 @@ NO_GRID = np.empty(0)
 
 def follow(
     solver: Solver, start: Anchor, stop: float, span: float, first_step: float = np.inf, grid: np.ndarray = NO_GRID
-) -> Track:
+) -> FollowedPath:
     """Follow the motion from an anchor to another instant, in steps checked one by one.
 
     A step that is refused is halved until it is not, or is too small to be halved. The lanes of a batch that a step
@@ -201,14 +201,14 @@ def follow(
     grid : array of shape (time,), optional
         Instants to be solved on the way, s.
     """
-    track, largest = Track([start]), first_step
-    while track.anchors[-1].instant < stop:
-        here = track.anchors[-1]
+    path, largest = FollowedPath([start]), first_step
+    while path.anchors[-1].instant < stop:
+        here = path.anchors[-1]
         passed = _passed(solver, here, stop)
         if passed is not None:
             far_side, change_point = passed
-            track.anchors.append(far_side)
-            track.change_points.append(change_point)
+            path.anchors.append(far_side)
+            path.change_points.append(change_point)
             continue
         left = stop - here.instant
         step = min(here.longest_step, largest, left)
@@ -227,17 +227,17 @@ def follow(
                 refused = refused or (arrival, target)
             if step < SMALLEST_STEP * span or target <= here.instant:
                 arrival, target = refused or (arrival, target)
-                track.status, track.ended_at = Status(int(arrival.status[0])), target
-                track.culprit = solver.culprit(arrival, 0)
+                path.status, path.ended_at = Status(int(arrival.status[0])), target
+                path.fault = solver.fault(arrival, 0)
                 if refused is None and here.reach < NEARLY_SINGULAR * span:
-                    track.status = Status.SINGULAR  # the range of the motion ends at a dead point
-                return track
+                    path.status = Status.SINGULAR  # the range of the motion ends at a dead point
+                return path
             step *= 0.5
         largest = 4 * step
-        track.anchors.append(Anchor.of(arrival, target))
+        path.anchors.append(Anchor.of(arrival, target))
         if way.size:
-            track.on_the_way.append((way, arrival))
-    return track
+            path.on_the_way.append((way, arrival))
+    return path
 
 
 def _passed(solver: Solver, here: Anchor, stop: float) -> tuple[Anchor, ChangePoint] | None:

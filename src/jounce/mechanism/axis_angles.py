@@ -5,14 +5,16 @@ from typing import Any, NamedTuple
 
 import equinox as eqx
 import numpy as np
+from jaxtyping import Float
 
-from jounce.constraints.angles import Datum, angle_of, principal
+from jounce.constraints.angles import Datum, angle_of
+from jounce.jet.turns import counted_on, principal, whole_periods
 from jounce.mechanism.system import Group
 
 PARALLEL = 1e-9  # largest sine between axes that are one
 
 
-class Turning(NamedTuple):
+class PrescribedAngle(NamedTuple):
     """An angle that a driver prescribes.
 
     Attributes
@@ -30,7 +32,7 @@ class Turning(NamedTuple):
     angle: float
 
 
-class Way(NamedTuple):
+class AttitudeHistory(NamedTuple):
     """Attitudes that all bodies went through, so close to each other that no turn in between is lost.
 
     Attributes
@@ -53,15 +55,15 @@ class Way(NamedTuple):
         measuring = [group for group in groups if measures_angle(group)]
         raw = raw_angles(measuring, {"quaternion": self.quaternion})
         begun = [np.asarray(group.element.datum.near)[..., 0] for group in measuring]
-        return [counted_on(near, angle) for near, angle in zip(begun, raw, strict=True)]
+        return [counted_on(np.column_stack(pair))[:, 1:] for pair in zip(begun, raw, strict=True)]
 
     def last_angles(self, groups: Sequence[Group]) -> list[np.ndarray]:
         """Return the angles at the end of the way, (instances, 1) each, with the turns that are repeated."""
         found = self.angles(groups)
         if not self.repeated:
             return [angle[:, -1:] for angle in found]
-        turns = [np.round((angle[:, -1:] - angle[:, -1 - self.period, None]) / (2 * np.pi)) for angle in found]
-        return [angle[:, -1:] + 2 * np.pi * self.repeated * n for angle, n in zip(found, turns, strict=True)]
+        ends = [(angle[:, -1:], angle[:, -1 - self.period, None]) for angle in found]
+        return [last + self.repeated * whole_periods(last - before) for last, before in ends]
 
     def counting(self, groups: Sequence[Group], instants: np.ndarray) -> tuple[Group, ...]:
         """Return groups that have the turns of each instant, from the place nearest to it in time."""
@@ -74,19 +76,17 @@ class Way(NamedTuple):
         return with_turns(groups, [angle[:, nearest] for angle in self.angles(groups)])
 
 
-def counted_on(near: np.ndarray, angles: np.ndarray) -> np.ndarray:
-    """Return angles known up to whole turns, (..., places), counted on from one that is near to the first."""
-    steps = np.diff(angles, axis=-1, prepend=np.broadcast_to(near, angles.shape[:-1])[..., None])
-    return angles - 2 * np.pi * np.cumsum(np.round(steps / (2 * np.pi)), axis=-1)
-
-
 def measures_angle(group: Group) -> bool:
     """Tell whether the elements of a group measure an angle about an axis."""
     return hasattr(group.element, "datum")
 
 
 def with_datums(
-    groups: Sequence[Group], coordinates: dict[str, Any], turnings: Sequence[Turning] = (), *, keep: bool = False
+    groups: Sequence[Group],
+    coordinates: dict[str, Any],
+    prescribed: Sequence[PrescribedAngle] = (),
+    *,
+    keep: bool = False,
 ) -> tuple[Group, ...]:
     """Return groups with the angles about axes counted from a position.
 
@@ -96,13 +96,13 @@ def with_datums(
         Those that measure no such angle stay as they are.
     coordinates : dict of str to array
         Of all bodies, the ground first, shape (..., bodies, 1).
-    turnings : sequence of Turning, optional
+    prescribed : sequence of PrescribedAngle, optional
         Angles known with their turns: one about the same axis between the same bodies has as many.
     keep : bool, default False
         Whether angles go on from the datum of now, instead of those that the frames of the bodies have.
     """
     return tuple(
-        _with_datum(group, coordinates, turnings, keep=keep) if measures_angle(group) else group for group in groups
+        _with_datum(group, coordinates, prescribed, keep=keep) if measures_angle(group) else group for group in groups
     )
 
 
@@ -152,7 +152,9 @@ def at_lanes(groups: Sequence[Group], lanes: np.ndarray) -> tuple[Group, ...]:
     return with_turns(groups, [g.element.datum.near[..., lanes] for g in groups if measures_angle(g)])
 
 
-def _with_datum(group: Group, coordinates: dict[str, Any], turnings: Sequence[Turning], *, keep: bool) -> Group:
+def _with_datum(
+    group: Group, coordinates: dict[str, Any], prescribed: Sequence[PrescribedAngle], *, keep: bool
+) -> Group:
     element, attitude = group.element, relative_attitude(group, coordinates)
     axis, known = axis_of(group), element.datum
     before = np.zeros(attitude.shape[1:]) if known is None else since(known, attitude, axis)
@@ -165,10 +167,10 @@ def _with_datum(group: Group, coordinates: dict[str, Any], turnings: Sequence[Tu
         angle = np.where(told, angle, before)
     angle = before + principal(angle - before) if known is not None else principal(angle)
     for k, bodies in enumerate(zip(*group.bodies, strict=True)):
-        for turning in turnings:
-            sense = _sense(bodies, _turned(coordinates["quaternion"][:, bodies[0], 0], axis[:, k, 0]), turning)
+        for given in prescribed:
+            sense = _sense(bodies, _turned(coordinates["quaternion"][:, bodies[0], 0], axis[:, k, 0]), given)
             if sense:
-                expected = sense * turning.angle
+                expected = sense * given.angle
                 angle[k] = expected + principal(angle[k] - expected)
     # a driver or a force acts about the axis, wherever its vector on body j points beside it
     acts = element.vector_i is not None and hasattr(element, "role")
@@ -198,14 +200,16 @@ def departure(before: Sequence[Group], after: Sequence[Group]) -> float:
     return float(largest)
 
 
-def turnings_of(groups: Sequence[Group], coordinates: dict[str, Any], laws: Sequence[np.ndarray]) -> list[Turning]:
+def prescribed_angles(
+    groups: Sequence[Group], coordinates: dict[str, Any], laws: Sequence[np.ndarray]
+) -> list[PrescribedAngle]:
     """Return the angles that drivers prescribe at a position, in space; `laws` holds the values for each such group."""
     found = []
     for group, values in zip((g for g in groups if measures_angle(g)), laws, strict=True):
         for k, bodies in enumerate(zip(*group.bodies, strict=True)):
             axis = _turned(coordinates["quaternion"][:, bodies[0], 0], axis_of(group)[:, k, 0])
-            found.append(Turning(bodies, axis, float(np.broadcast_to(values, (group.instances, 1))[k, 0])))
-    return [turning for turning in found if np.isfinite(turning.angle)]
+            found.append(PrescribedAngle(bodies, axis, float(np.broadcast_to(values, (group.instances, 1))[k, 0])))
+    return [given for given in found if np.isfinite(given.angle)]
 
 
 def axis_of(group: Group) -> np.ndarray:
@@ -253,11 +257,11 @@ def _across(second: Any, attitude: np.ndarray, axis: np.ndarray) -> Any:
     return second - (second * along).sum(axis=0) * along
 
 
-def _sense(bodies: tuple[int, ...], axis: np.ndarray, turning: Turning) -> int:
+def _sense(bodies: tuple[int, ...], axis: Float[np.ndarray, " 3"], given: PrescribedAngle) -> int:
     """Return 1 where an angle follows that of a driver, -1 where it runs against it, else 0."""
-    if sorted(bodies) != sorted(turning.bodies) or np.linalg.norm(np.cross(axis, turning.axis)) > PARALLEL:
+    if sorted(bodies) != sorted(given.bodies) or np.linalg.norm(np.cross(axis, given.axis)) > PARALLEL:
         return 0
-    return int(np.sign(axis @ turning.axis)) * (1 if bodies == turning.bodies else -1)
+    return int(np.sign(axis @ given.axis)) * (1 if bodies == given.bodies else -1)
 
 
 def _put(group: Group, name: str, value: Any) -> Group:
