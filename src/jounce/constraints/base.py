@@ -123,8 +123,8 @@ def _is_whole(kind: type[Any]) -> bool:
 
 
 def check_bodies(element: Any, counts: tuple[int, ...], does: str = "joins", must: str = "join") -> None:
-    """Raise MechanismError unless a joint, driver or force has as many bodies as it needs, all different."""
-    name = element.type_name or type(element).__name__
+    """Raise MechanismError unless a joint, driver, force or output has as many bodies as it needs, all different."""
+    name = getattr(element, "type_name", "") or type(element).__name__
     if len(element.bodies) not in counts:
         noun = "body" if counts == (1,) else "bodies"
         message = f"{name} {does} {' or '.join(map(str, counts))} {noun}"

@@ -13,8 +13,6 @@ from jounce.jet import Jet
 Law = Annotated[Any, "law"]
 Laws = Annotated[Any, "laws"]
 
-FRAMES = ("global", "body")
-
 
 class AbstractForce(eqx.Module):
     """An applied force or torque: a displacement on which it does work, and its size.

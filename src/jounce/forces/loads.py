@@ -6,8 +6,9 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from jounce.constraints.base import Vector, check_text
-from jounce.forces.base import FRAMES, AbstractForce, Law, Laws
+from jounce.forces.base import AbstractForce, Law, Laws
 from jounce.jet import Jet
+from jounce.rigid.orientation import FRAMES
 
 
 class PointForce(AbstractForce, type="point_force", space="planar"):

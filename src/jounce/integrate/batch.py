@@ -12,7 +12,7 @@ import numpy as np
 from jounce.display import Displayed
 from jounce.dynamics.forward import Equations, State
 from jounce.dynamics.start import driven, start
-from jounce.errors import MechanismError, no_such
+from jounce.errors import MechanismError, check_name
 from jounce.integrate.batch_equations import Family, Starts, Turns
 from jounce.integrate.events import output_series, pose_coordinates
 from jounce.integrate.marching import Front, Outcome, Steps, departed, march
@@ -142,9 +142,7 @@ def _checked_parameters(mechanism: Mechanism, parameters: Mapping[str, Any]) -> 
         raise MechanismError("a batch differs in at least one parameter", name="parameters", value=dict(parameters))
     values, count = {}, None
     for name, given in parameters.items():
-        if name not in mechanism.parameters:
-            message = no_such("parameter", name, mechanism.parameters)
-            raise MechanismError(message, name="parameters", value=name)
+        check_name("parameter", name, mechanism.parameters, MechanismError, name="parameters")
         try:
             array = np.asarray(given, float)
         except (TypeError, ValueError):

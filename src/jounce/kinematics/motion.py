@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from jounce.display import Displayed
-from jounce.errors import MechanismError, no_such
+from jounce.errors import MechanismError, check_name
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked
 from jounce.kinematics.compilation import compiled
@@ -40,9 +40,7 @@ def check_output(output: Any, mechanism: Mechanism, name: str = "output") -> Non
     """Raise MechanismError unless an output names what the mechanism has, and exists in its space."""
     names = (GROUND, *mechanism.bodies)
     for body in output.bodies:
-        if body not in names:
-            message = no_such("body", body, names)
-            raise MechanismError(message, name="body", value=body)
+        check_name("body", body, names, MechanismError, name="body")
     if output.space and output.space != mechanism.space:
         raise MechanismError(f"this output is {output.space}, the mechanism is {mechanism.space}", name=name)
     output.check(mechanism)

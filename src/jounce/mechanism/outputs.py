@@ -6,11 +6,9 @@ from typing import Any, ClassVar
 import equinox as eqx
 
 from jounce.constraints.angles import relative_angle
-from jounce.constraints.base import Vector, check_text
-from jounce.errors import MechanismError
+from jounce.constraints.base import Vector, check_bodies, check_text
 from jounce.jet import Jet, sqrt
-
-FRAMES = ("global", "body")
+from jounce.rigid.orientation import FRAMES
 
 
 class AbstractQuantity(eqx.Module):
@@ -55,9 +53,7 @@ class AbstractOutput(AbstractQuantity):
     body_count: ClassVar[int] = 1
 
     def __check_init__(self):
-        if len(self.bodies) != self.body_count:
-            message = f"this output takes {self.body_count} bodies"
-            raise MechanismError(message, name="bodies", value=list(self.bodies))
+        check_bodies(self, (self.body_count,), "takes", "be of")
 
     @abc.abstractmethod
     def evaluate(self, *bodies: Any) -> Jet:
