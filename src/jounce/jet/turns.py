@@ -9,30 +9,31 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.jet.algebra import Jet, Quantity
+from jounce.shapes import Real
 
 WHOLE_TURN = 2 * math.pi
 
 
-def whole_periods(value: Any, period: Any = WHOLE_TURN) -> Any:
+def whole_periods(value: Real, period: Real = WHOLE_TURN) -> Any:
     """Return the whole number of periods (turns unless told) nearest to a value, in the unit of the value."""
-    count = value / period
+    count: Any = value / period
     return period * (jnp if isinstance(count, jax.Array) else np).round(count)
 
 
-def wrap(x: Quantity, period: Quantity = WHOLE_TURN) -> Any:
+def wrap(x: Quantity, period: Real = WHOLE_TURN) -> Any:
     """Shift by whole periods into ``[-period/2, period/2]``: what is left of an angle or a screw's advance."""
     return x - whole_periods(x.coefficients[0] if isinstance(x, Jet) else x, period)
 
 
-def brought_near(angle: Quantity, expected: Quantity) -> Any:
+def brought_near(angle: Quantity, expected: Real) -> Any:
     """Return an angle shifted by the whole turns that bring it nearest to the one expected."""
     return angle - whole_periods((angle.coefficients[0] if isinstance(angle, Jet) else angle) - expected)
 
 
-def principal(angle: Quantity) -> Any:
+def principal(angle: Real) -> Any:
     """Return an angle shifted by whole turns to (-pi, pi]; half a turn is pi, whatever its last digits say."""
-    turns = (angle - np.pi) / WHOLE_TURN - 1e-9
-    return angle - WHOLE_TURN * (jnp if isinstance(turns, jax.Array) else np).ceil(turns)
+    namespace = jnp if isinstance(angle, jax.Array) else np
+    return angle - WHOLE_TURN * namespace.ceil((angle - np.pi) / WHOLE_TURN - 1e-9)
 
 
 def counted_on(

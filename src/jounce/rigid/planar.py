@@ -76,7 +76,7 @@ class PlanarPose:
         What is None is zero.
         """
         angle = self.angle.append(None if turn is None else turn[0])
-        sine, cosine = next_sine_cosine(list(self.sine.coefficients), list(self.cosine.coefficients), angle)
+        sine, cosine = next_sine_cosine(self.sine.coefficients, self.cosine.coefficients, angle)
         return PlanarPose(self.position.append(shift), angle, self.sine.append(sine), self.cosine.append(cosine))
 
     def varied(self, shift: Jet, turn: Jet) -> "PlanarPose":

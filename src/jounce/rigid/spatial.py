@@ -12,7 +12,7 @@ import jax
 import jax.numpy as jnp
 
 from jounce.jet import Jet, components, dot, matvec, stack, transpose
-from jounce.jet.algebra import minus, plus, sum_of_products, total
+from jounce.jet.coefficients import minus, plus, sum_of_products, total
 from jounce.rigid.body_arrays import body_vector, take_bodies
 
 
