@@ -205,7 +205,7 @@ class Scope(ast.NodeVisitor):
     def returned(self, func, depth):
         called = self.value(func)
         if called is not MISSING:
-            return self.result(plain(called), None, depth)
+            return self.result(called if inspect.ismethod(called) else plain(called), None, depth)
         if isinstance(func, ast.Attribute):
             before = self.kinds(func.value, depth + 1)
             return set().union(*(self.result(getattr(kind, func.attr, MISSING), kind, depth) for kind in before))
@@ -224,6 +224,8 @@ class Scope(ast.NodeVisitor):
             values = [n.value for n in ast.walk(node) if isinstance(n, ast.Return) and n.value is not None]
             return set().union(*(scope.kinds(v, depth + 1) for v in values))
         hint = getattr(function, "__annotations__", {}).get("return")
+        if type(hint).__module__.startswith("beartype"):  # its stand-in for a name that was not yet known
+            hint = hint.__name__
         if isinstance(hint, str):
             hint = getattr(inspect.getmodule(function), hint, getattr(kind, "__name__", None) == hint and kind)
         owner = getattr(called, "__self__", kind)

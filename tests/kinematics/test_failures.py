@@ -175,6 +175,29 @@ def test_redundant_hinges_are_refused_by_name():
     assert all(f"joints.{name}" in str(caught.value) for name in "ABCD")
 
 
+@pytest.mark.parametrize("count", [9, 201])
+@pytest.mark.parametrize(
+    "law, stop, end, status",
+    [
+        ("sqrt(1 - t)", 2, 1, {Status.UNDEFINED, Status.INADMISSIBLE}),  # its rate at the end, and what is beyond
+        ("log(1 - t)", 2, 1, {Status.INADMISSIBLE}),
+        ("1/(t - 1)", 2, 1, {Status.INADMISSIBLE}),
+        ("log(abs(1 - t))", 1.9, 1, {Status.COLLAPSED}),  # no instant of the grid is the pole
+        ("tan(2*t)", 0.9, np.pi / 4, {Status.COLLAPSED}),
+    ],
+)
+def test_a_law_that_ends_or_grows_beyond_all_bounds(law, stop, end, status, count):
+    """It is told, at once and where, though nothing but the steps may tell that there is a pole."""
+    time = np.linspace(0, stop, count)
+    motion = jn.solve(crank(law), time, order=2, strict=False)
+    before = time < end
+    assert (motion.status[before] == Status.OK).all()
+    assert set(motion.status[~before].tolist()) == status | {Status.NOT_REACHED}
+    assert np.isnan(motion.outputs["angle"][~before, 1]).all()
+    told = motion.faults.get(int(np.argmin(before)) + (law == "sqrt(1 - t)"), "")
+    assert "turn" in told
+
+
 @pytest.mark.parametrize("order", [-1, 1.5, "4", None, True, 31])
 def test_order_that_is_none(order):
     with pytest.raises((jn.MechanismError, TypeError), match="order"):  # TypeError by the checker of the tests

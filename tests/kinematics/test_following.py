@@ -90,6 +90,19 @@ def test_change_point_is_passed_at_any_instant_and_told(order, tolerance):
         np.testing.assert_allclose(motion.outputs["psi"][:, k], truth, atol=limit * 10)
 
 
+def test_where_both_sides_disagree_only_what_rounding_spoils_is_refused(monkeypatch):
+    """No motion is known on which they disagree, so they are made to."""
+    away = np.geomspace(1e-6, 0.5, 40)
+    time = np.r_[0.5, np.pi - away[::-1], np.pi + away]
+    monkeypatch.setattr("jounce.kinematics.grid.LARGEST_DISAGREEMENT", -1.0)
+    motion = jn.solve(PARALLELOGRAM, time, order=4, strict=False)
+    refused = motion.status == Status.SINGULAR
+    width = np.max(np.abs(time - np.pi)[refused])
+    assert 1e-3 < width < 0.2
+    np.testing.assert_array_equal(refused, np.abs(time - np.pi) <= width)
+    assert (motion.status[~refused] == Status.OK).all()
+
+
 def test_change_point_at_the_end_of_a_grid():
     motion = jn.solve(PARALLELOGRAM, [0.5, 2.0, np.pi + 1e-4], order=1, strict=False)
     assert motion.status[:2].tolist() == [Status.OK] * 2

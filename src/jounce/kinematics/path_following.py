@@ -25,6 +25,8 @@ LARGEST_TURNOVER = 1.0  # of the Jacobian over a step, seen from its end; from i
 PASSAGE = 3e-3  # of the radius of the series: so near a singular position it is seen whether the motion is smooth there
 PASSAGE_ORDER = 4  # of the series that leads through: rounding spoils higher derivatives near a singular position
 PASSAGE_DEVIATION = 1e-8  # from that series, as a part of the way: two branches a gap of g apart deviate by (g / way)^2
+CRAWLING = 1e-6  # of what is left of the motion: steps this short, and for so many anchors,
+LONGEST_CRAWL = 300  # are no sharp turn, which takes a few dozen, but a law that grows beyond all bounds
 NEARLY_SINGULAR = 1e-6  # of the span: a motion that ends so short before a singular position ends at it
 NEARBY = 0.1  # radii: a singular position nearer than this spoils high derivatives, if the motion is smooth there
 PLACES = 8  # in each step at which attitudes are looked at for turns: nowhere between them a body turns by half a turn
@@ -201,7 +203,7 @@ def follow(
     grid : array of shape (time,), optional
         Instants to be solved on the way, s.
     """
-    path, largest = FollowedPath([start]), first_step
+    path, largest, crawled = FollowedPath([start]), first_step, 0
     while path.anchors[-1].instant < stop:
         here = path.anchors[-1]
         passed = _passed(solver, here, stop)
@@ -212,6 +214,11 @@ def follow(
             continue
         left = stop - here.instant
         step = min(here.longest_step, largest, left)
+        crawled = crawled + 1 if step < CRAWLING * left else 0
+        if crawled > LONGEST_CRAWL or here.instant + step == here.instant:
+            path.status, path.ended_at = Status.COLLAPSED, float(np.nextafter(here.instant, np.inf))
+            path.fault = ", ".join(solver.model.drivers)
+            return path
         if left - step < 0.1 * step:
             step = left  # no sliver of a step at the end
         refused = None
