@@ -29,6 +29,7 @@ __all__ = [
     "UnitError",
     "UnitWarning",
     "UnsupportedError",
+    "check_choice",
     "check_name",
     "did_you_mean",
     "no_such",
@@ -116,6 +117,12 @@ def check_name(kind: str, given: object, known: Collection[str], error: type[Jou
     """Raise an error unless something of a kind has the name given; `place` says where it was given."""
     if given not in known:
         raise error(no_such(kind, given, known), value=given, **place)
+
+
+def check_choice(field: str, value: object, valid: Collection[str], error: type[JounceError]) -> None:
+    """Raise an error unless a word, such as the name of a frame, is one of those valid."""
+    if value not in valid:
+        raise error(f"unknown {field}; {did_you_mean(value, valid)}", name=field, value=value)
 
 
 def did_you_mean(name: object, valid: Iterable[str], limit: int = 20) -> str:

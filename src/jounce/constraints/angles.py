@@ -90,8 +90,7 @@ def _turn(body_i: Any, body_j: Any, axis: Any, datum: Datum | None) -> Jet:
         back = [part * sign for part, sign in zip(components(datum.attitude), (1.0, -1.0, -1.0, -1.0), strict=True)]
         quaternion = total(part * x for part, x in zip((quaternion, *body_j.spins), back, strict=True))
         w = None if w is None else stack([dot(side, w) for side in body_axes(jnp.concatenate(back))])
-    e0 = body_i.quaternion.dot(quaternion)
-    e = stack([spin.dot(quaternion) for spin in body_i.spins])
+    e0, e = body_i.relative_quaternion(quaternion)
     along = dot(axis, e)
     value = 2.0 * jnp.arctan2(along.coefficients[0], e0.coefficients[0])
     if w is None:

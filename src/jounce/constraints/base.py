@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar
 import equinox as eqx
 import jax.numpy as jnp
 
-from jounce.errors import MechanismError, did_you_mean
+from jounce.errors import MechanismError, check_choice
 from jounce.jet import Jet, concatenate
 
 Scalar = Annotated[Any, "scalar"]
@@ -32,9 +32,9 @@ def register(kind: type[Any], type: str, space: str, role: str) -> None:  # noqa
         If another class has this type: files would silently mean the new one. The same class defined again, as in a
         cell of a notebook that is run again, takes its own place. If a field has a name that files use otherwise.
     """
-    check_text("role", role, ROLES)
+    check_choice("role", role, ROLES, MechanismError)
     if space:
-        check_text("space", space, SPACES)
+        check_choice("space", space, SPACES, MechanismError)
     for field in vars(kind).get("__annotations__", {}):
         if field in RESERVED:
             message = f"no field of {kind.__qualname__} may have this name, which files use otherwise; rename it"
@@ -83,7 +83,7 @@ class AbstractConstraint(eqx.Module):
     def __init_subclass__(cls, type: str = "", space: str = "", role: str = "joint", **keywords: Any):  # noqa: A002
         super().__init_subclass__(**keywords)
         if type:
-            check_text("role", role, ("joint", "driver"))
+            check_choice("role", role, ("joint", "driver"), MechanismError)
             register(cls, type, space, role)
 
     def __check_init__(self):
@@ -151,9 +151,3 @@ def field_kind(field: dataclasses.Field) -> str:
         word = field.type.rpartition(".")[2].strip()
         return "motion" if word == "MotionLaw" else word.lower() if word in WORDS else "text"
     return next(iter(getattr(field.type, "__metadata__", ())), "text")
-
-
-def check_text(field: str, value: Any, valid: tuple[str, ...]) -> None:
-    """Raise MechanismError unless a word, such as a coordinate, is one of those valid."""
-    if value not in valid:
-        raise MechanismError(f"unknown {field}; {did_you_mean(value, valid)}", name=field, value=value)

@@ -6,9 +6,9 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from jounce.constraints.angles import relative_angle
-from jounce.constraints.base import AbstractConstraint, MotionLaw, Scalar, Vector, check_text
+from jounce.constraints.base import AbstractConstraint, MotionLaw, Scalar, Vector
 from jounce.constraints.planar import COORDINATES, coordinate_of, slide
-from jounce.errors import MechanismError
+from jounce.errors import MechanismError, check_choice
 from jounce.jet import wrap
 
 
@@ -24,7 +24,7 @@ class CoordinateDriver(AbstractConstraint, type="coordinate", space="planar", ro
     offset: Scalar = 0.0  # rad or m
 
     def __check_init__(self):
-        check_text("coordinate", self.coordinate, COORDINATES)
+        check_choice("coordinate", self.coordinate, COORDINATES, MechanismError)
 
     def residual(self, body_i, body_j, time):
         ratio = 1.0 if self.ratio is None else self.ratio

@@ -8,7 +8,8 @@ from typing import Any
 
 import equinox as eqx
 
-from jounce.constraints.base import AbstractConstraint, Scalar, Vector, check_text, rows
+from jounce.constraints.base import AbstractConstraint, Scalar, Vector, rows
+from jounce.errors import MechanismError, check_choice
 from jounce.jet import Jet, cross, dot, sqrt
 
 COORDINATES = ("angle", "x", "y")
@@ -100,7 +101,7 @@ class Coordinate(AbstractConstraint, type="coordinate", space="planar"):
     offset: Scalar = None  # rad or m
 
     def __check_init__(self):
-        check_text("coordinate", self.coordinate, COORDINATES)
+        check_choice("coordinate", self.coordinate, COORDINATES, MechanismError)
 
     def residual(self, body_i, body_j, time):
         ratio = 1.0 if self.ratio is None else self.ratio

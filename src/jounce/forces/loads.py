@@ -5,7 +5,8 @@ from typing import Any
 import equinox as eqx
 import jax.numpy as jnp
 
-from jounce.constraints.base import Vector, check_text
+from jounce.constraints.base import Vector
+from jounce.errors import MechanismError, check_choice
 from jounce.forces.base import AbstractForce, Law, Laws
 from jounce.jet import Jet
 from jounce.rigid.orientation import FRAMES
@@ -28,7 +29,7 @@ class PointForce(AbstractForce, type="point_force", space="planar"):
     velocity_names = ("vx", "vy")
 
     def __check_init__(self):
-        check_text("frame", self.frame, FRAMES)
+        check_choice("frame", self.frame, FRAMES, MechanismError)
 
     def displacement(self, body, time):
         return body.point(self.point)
@@ -89,7 +90,7 @@ class SpatialMoment(AbstractForce, type="moment", space="spatial"):
     velocity_names = ("wx", "wy", "wz")
 
     def __check_init__(self):
-        check_text("frame", self.frame, FRAMES)
+        check_choice("frame", self.frame, FRAMES, MechanismError)
 
     def displacement(self, body, time):
         # no vector changes at the rate of the angular velocity: what the moment works on is told by the rates below

@@ -2,6 +2,7 @@
 
 from jounce.jet.algebra import (
     Jet as Jet,
+    JetLike as JetLike,
     components as components,
     concatenate as concatenate,
     cross as cross,

@@ -229,6 +229,9 @@ class Jet:
 Quantity = Jet | Real
 """A jet, or what does not change in time: an array or a number."""
 
+JetLike = Quantity | Sequence[Any]
+"""A jet, or what becomes one: an array, a number, or a sequence of them."""
+
 
 def _checked(order: int) -> int:
     if order < 0:

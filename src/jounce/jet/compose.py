@@ -13,7 +13,7 @@ import jax
 import jax.numpy as jnp
 from jax.extend.core import Literal
 
-from jounce.jet.algebra import Jet, bilinear, power
+from jounce.jet.algebra import Jet, bilinear
 from jounce.jet.elementary import FUNCTIONS, erf, tanh
 from jounce.jet.operations import COMPOSED, REARRANGING, STEPWISE
 from jounce.jet.vectors import stack
@@ -195,7 +195,6 @@ _RULES: dict[str, Callable[..., Any]] = {name: _without_parameters(f) for name, 
     "mul": lambda a, b, **_: a * b,
     "div": lambda a, b, **_: a / b,
     "neg": lambda a, **_: -a,
-    "integer_pow": lambda a, *, y, **_: power(a, y),
     "erfc": lambda a, **_: 1.0 - erf(a),
     "logistic": lambda a, **_: 0.5 * (1.0 + tanh(0.5 * a)),
     "select_n": _select,

@@ -1,5 +1,6 @@
-"""How the operations of JAX programs act on Taylor series: tables that `jounce.jet.series` reads."""
+"""How the operations of JAX programs act on Taylor series: tables that `jounce.jet.compose` and `jounce.jet.series` read."""
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -42,7 +43,6 @@ def _of_argument(slope: Callable[[Any], Any]) -> Callable[[Any, Any], Any]:
     return lambda x, _y: slope(x)
 
 
-_ROOT_OF_PI = 1.7724538509055160273
 # a function and its partial derivatives, which may use its value, the last argument
 SLOPES: dict[str, tuple[Callable[..., Any], tuple[Callable[..., Any], ...]]] = {
     "exp": (jnp.exp, (lambda _x, y: y,)),
@@ -54,7 +54,7 @@ SLOPES: dict[str, tuple[Callable[..., Any], tuple[Callable[..., Any], ...]]] = {
     "tan": (jnp.tan, (lambda _x, y: 1.0 + y * y,)),
     "tanh": (jnp.tanh, (lambda _x, y: 1.0 - y * y,)),
     "atan2": (jnp.arctan2, (lambda y, x, _z: x / (x * x + y * y), lambda y, x, _z: -y / (x * x + y * y))),
-    "erfc": (jax.lax.erfc, (lambda x, _y: -2.0 / _ROOT_OF_PI * jnp.exp(-x * x),)),
+    "erfc": (jax.lax.erfc, (lambda x, _y: -2.0 / math.sqrt(math.pi) * jnp.exp(-x * x),)),
     "logistic": (jax.lax.logistic, (lambda _x, y: y * (1.0 - y),)),
 } | {name: (function, (_of_argument(slope),)) for name, (function, slope) in BY_SLOPE.items()}
 COMPOSED: dict[str, Callable[..., Any]] = {
@@ -62,7 +62,7 @@ COMPOSED: dict[str, Callable[..., Any]] = {
     "square": lambda x: x * x,
     "integer_pow": lambda x, *, y: whole_power(x, y),
     "rsqrt": lambda x, **_: 1.0 / jnp.sqrt(x),
-    "exp2": lambda x, **_: jnp.exp(x * 0.69314718055994530942),
+    "exp2": lambda x, **_: jnp.exp(x * math.log(2.0)),
     "abs": lambda x: jnp.where(x < 0, -x, x),
     "max": lambda a, b: jnp.where(a >= b, a, b),
     "min": lambda a, b: jnp.where(a <= b, a, b),

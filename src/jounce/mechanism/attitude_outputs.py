@@ -6,8 +6,8 @@ import equinox as eqx
 import numpy as np
 from jaxtyping import Float
 
-from jounce.errors import JounceError, MechanismError
-from jounce.jet import Jet, stack
+from jounce.errors import MechanismError
+from jounce.jet import Jet, concatenate, stack
 from jounce.jet.turns import counted_on
 from jounce.mechanism.outputs import AbstractOutput
 from jounce.rigid.orientation import euler_angles
@@ -35,7 +35,8 @@ class EulerParametersOutput(AbstractOutput):
         if not base:
             return body.quaternion
         (base,) = base  # of conj(p_i) o p_j
-        return stack([base.quaternion.dot(body.quaternion), *(spin.dot(body.quaternion) for spin in base.spins)])
+        e0, e = base.relative_quaternion(body.quaternion)
+        return concatenate([e0[None], e])
 
 
 class RelativeEulerParametersOutput(EulerParametersOutput):
@@ -82,10 +83,7 @@ class EulerAnglesOutput(AbstractOutput):
     wraps = (True, False, True)
 
     def __check_init__(self):
-        try:
-            check_sequence(self.sequence)
-        except JounceError as error:
-            raise MechanismError(error.message, name="sequence", value=self.sequence) from None
+        check_sequence(self.sequence, MechanismError)
 
     def evaluate(self, *bodies):
         return euler_angles(self.sequence, stack([stack(row) for row in _matrix(bodies)]))

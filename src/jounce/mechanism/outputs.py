@@ -6,7 +6,8 @@ from typing import Any, ClassVar
 import equinox as eqx
 
 from jounce.constraints.angles import relative_angle
-from jounce.constraints.base import Vector, check_bodies, check_text
+from jounce.constraints.base import Vector, check_bodies
+from jounce.errors import MechanismError, check_choice
 from jounce.jet import Jet, sqrt
 from jounce.rigid.orientation import FRAMES
 
@@ -119,7 +120,7 @@ class AngularVelocityOutput(AbstractOutput):
     lost_orders = 1
 
     def __check_init__(self):
-        check_text("frame", self.frame, FRAMES)
+        check_choice("frame", self.frame, FRAMES, MechanismError)
 
     def evaluate(self, body):
         if hasattr(body, "angle"):
