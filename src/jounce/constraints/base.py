@@ -134,7 +134,7 @@ def check_bodies(element: Any, counts: tuple[int, ...], does: str = "joins", mus
         raise MechanismError(message, name="bodies", value=list(element.bodies))
 
 
-def rows(*parts: Any) -> Jet:
+def rows(*parts: Jet) -> Jet:
     """Join scalar residuals, of shape (...), and vector ones, of shape (rows, ...), into one of shape (rows, ...)."""
     whole = [part if len(part.shape) == 3 else part.map(lambda c: c[None]) for part in parts]
     return concatenate(whole)

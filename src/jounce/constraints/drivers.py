@@ -1,11 +1,9 @@
 """Drivers: constraints with a motion law ``f(t)``. Sommer 2024, equations 39-40, 44-49, 53-55 and 101-111."""
 
-from typing import Any
-
 import equinox as eqx
 import jax.numpy as jnp
 
-from jounce.constraints.angles import relative_angle
+from jounce.constraints.angles import Datum, check_vectors, relative_angle
 from jounce.constraints.base import AbstractConstraint, MotionLaw, Scalar, Vector
 from jounce.constraints.planar import COORDINATES, coordinate_of, slide
 from jounce.errors import MechanismError, check_choice
@@ -80,13 +78,11 @@ class RotationDriver(AbstractConstraint, type="rotation", space="spatial", role=
     motion: MotionLaw  # rad
     vector_i: Vector = None
     vector_j: Vector = None
-    datum: Any = eqx.field(default=None, init=False)  # found when the mechanism is put together
+    datum: Datum | None = eqx.field(default=None, init=False)  # found when the mechanism is put together
 
     periodic = True
 
-    def __check_init__(self):
-        if (self.vector_i is None) != (self.vector_j is None):
-            raise MechanismError("a rotation driver takes two vectors, one on each body, or none", name="vectors")
+    __check_init__ = check_vectors
 
     def residual(self, body_i, body_j, time):
         angle = relative_angle(body_i, body_j, self.axis_i, self.vector_i, self.vector_j, self.datum)

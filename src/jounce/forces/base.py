@@ -113,6 +113,11 @@ class AbstractForce(eqx.Module):
         return Jet.constant(zero, displacement.order)
 
 
+def by_law(self: Any, displacement: Jet, velocity: Jet, time: Jet) -> Jet:
+    """Return the jet of a force that is given by a law: the method `force` of its class."""
+    return self.law(displacement, velocity, time)
+
+
 def force_catalogue(space: str) -> dict[str, type[AbstractForce]]:
     """Return the classes of forces that files may name, by their type, for planar or spatial mechanisms.
 

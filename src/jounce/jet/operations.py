@@ -1,4 +1,4 @@
-"""How the operations of JAX programs act on Taylor series: tables that `jounce.jet.compose` and `jounce.jet.series` read."""
+"""How the operations of JAX programs act on Taylor series: tables of `jounce.jet.compose` and `jounce.jet.series`."""
 
 import math
 from collections.abc import Callable
