@@ -10,6 +10,7 @@ from typing import Any
 
 import jax
 import numpy as np
+from jaxtyping import Float
 
 from jounce.kinematics.path_following import Anchor, ChangePoint, FollowedPath, Solver, follow
 from jounce.kinematics.status import Status
@@ -32,7 +33,9 @@ def spoiled_width(point: ChangePoint, order: int) -> float:
     return point.radius * (ROUNDING * math.factorial(order) / LARGEST_NOISE) ** (1 / (order + 1))
 
 
-def bridged(solver: Solver, path: FollowedPath, point: ChangePoint, instants: np.ndarray) -> Any:
+def bridged(
+    solver: Solver, path: FollowedPath, point: ChangePoint, instants: Float[np.ndarray, " time"]
+) -> tuple[dict[str, np.ndarray], tuple[np.ndarray, ...]] | None:
     """Return the jets of coordinates and outputs next to a change point, time last; None where they cannot be had.
 
     Parameters
@@ -62,7 +65,7 @@ def bridged(solver: Solver, path: FollowedPath, point: ChangePoint, instants: np
     return _interpolated(before, after, instants)
 
 
-def _interpolated(before: Anchor, after: Anchor, instants: np.ndarray) -> Any:
+def _interpolated(before: Anchor, after: Anchor, instants: Float[np.ndarray, " time"]) -> Any:
     """Return the jets of the state at instants between two anchors, by Hermite interpolation of both their jets."""
     from scipy.interpolate import BPoly  # here, since importing SciPy takes half a second
 

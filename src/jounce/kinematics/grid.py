@@ -10,7 +10,9 @@ from typing import Any
 
 import jax
 import numpy as np
+from jaxtyping import Bool, Float, Int
 
+from jounce.kinematics.advance import State
 from jounce.kinematics.change_points import LARGEST_DISAGREEMENT, bridged, half_width, spoiled_width
 from jounce.kinematics.path_following import (
     LARGE_BATCH,
@@ -23,6 +25,7 @@ from jounce.kinematics.path_following import (
 )
 from jounce.kinematics.status import Status
 
+Indices = Int[np.ndarray, " lane"]
 LONG_GRID = 1024  # instants: from here on in large batches
 FEW_BATCHES = 4  # of instants: no level of its own for each halving of the spacing
 
@@ -37,7 +40,7 @@ class Grid:
         For instants that failed, the body farthest from its prediction, or the driver without a permitted value.
     """
 
-    def __init__(self, solver: Solver, path: FollowedPath, time: np.ndarray):
+    def __init__(self, solver: Solver, path: FollowedPath, time: Float[np.ndarray, " time"]):
         self.solver, self.path, self.time = solver, path, time
         self.status = np.full(len(time), int(Status.NOT_REACHED))
         self.faults: dict[int, str] = {}
@@ -86,7 +89,7 @@ class Grid:
         if progress is not None and done < count:
             progress(count, count)
 
-    def _solve_batch(self, lanes: np.ndarray, source: np.ndarray) -> None:
+    def _solve_batch(self, lanes: Indices, source: Indices) -> None:
         chosen = _slice_of(source)
         known = jax.tree.map(lambda x: x[..., chosen], self._store)
         arrival = self.solver(known, self.time[lanes] - self._instants[source], self.time[lanes])
@@ -97,10 +100,10 @@ class Grid:
             if arrival.status[k] not in PASSABLE:
                 self._rescue(int(lanes[k]))
 
-    def _away(self, lanes: np.ndarray, source: np.ndarray) -> np.ndarray:
+    def _away(self, lanes: Indices, source: Indices) -> Float[np.ndarray, " lane"]:
         return np.abs(self.time[lanes] - self._instants[source])
 
-    def _keep(self, lanes: Any, state: Any) -> None:
+    def _keep(self, lanes: slice | Indices, state: State) -> None:
         def put(whole: np.ndarray, part: np.ndarray) -> None:
             whole[..., lanes] = part
 
@@ -140,7 +143,7 @@ class Grid:
             self.faults.pop(lane, None)
         self._keep(lanes, (*state, self._store[2][lanes]))
 
-    def _refuse(self, lanes: np.ndarray) -> None:
+    def _refuse(self, lanes: Bool[np.ndarray, " time"]) -> None:
         self.status[lanes & (self.status == Status.OK)] = Status.SINGULAR
 
     def _explain_end(self, lost: int) -> None:
@@ -153,7 +156,7 @@ class Grid:
             self.status[lost], self.faults[lost] = Status.INADMISSIBLE, self.solver.fault(arrival, 0)
 
 
-def _slice_of(indices: np.ndarray) -> Any:
+def _slice_of(indices: Indices) -> slice | Indices:
     """Return evenly spaced indices as a slice, with which NumPy copies several times faster."""
     first, last = int(indices[0]), int(indices[-1])
     step = (last - first) // (len(indices) - 1) if len(indices) > 1 else 1
@@ -162,14 +165,14 @@ def _slice_of(indices: np.ndarray) -> Any:
     return indices
 
 
-def _nearest(anchors: np.ndarray, time: np.ndarray) -> np.ndarray:
+def _nearest(anchors: Float[np.ndarray, " anchor"], time: Float[np.ndarray, " time"]) -> Int[np.ndarray, " time"]:
     after = np.clip(np.searchsorted(anchors, time), 1, max(len(anchors) - 1, 1))
     if len(anchors) == 1:
         return np.zeros(len(time), int)
     return np.where(time - anchors[after - 1] <= anchors[after] - time, after - 1, after)
 
 
-def _levels(left: np.ndarray, anchors: int, width: int) -> list[tuple[np.ndarray, int | None]]:
+def _levels(left: Bool[np.ndarray, " time"], anchors: int, width: int) -> list[tuple[Indices, int | None]]:
     """Return the instants of each level, with the distance in the grid of the neighbour that each is predicted from.
 
     The first level starts from the anchors, and fills at least one batch. Where few instants are left, it is the only
@@ -180,7 +183,7 @@ def _levels(left: np.ndarray, anchors: int, width: int) -> list[tuple[np.ndarray
         return [(np.flatnonzero(left), None)]
     while count // (2 * stride) >= max(2 * anchors, width):
         stride *= 2
-    levels: list[tuple[np.ndarray, int | None]] = [(np.arange(0, count, stride), None)]
+    levels: list[tuple[Indices, int | None]] = [(np.arange(0, count, stride), None)]
     while stride > 1:
         half = stride // 2
         levels.append((np.arange(half, count, stride), half))

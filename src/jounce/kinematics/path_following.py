@@ -9,12 +9,12 @@ through it, if that arrives on the other side to rounding, and is told.
 """
 
 import dataclasses
-from typing import Any
 
 import jax
 import numpy as np
+from jaxtyping import Float, Int, Shaped
 
-from jounce.kinematics.advance import SAFE_FRACTION, Arrival, advance
+from jounce.kinematics.advance import SAFE_FRACTION, Arrival, State, advance
 from jounce.kinematics.status import Status
 from jounce.mechanism import Model
 from jounce.mechanism.axis_angles import AttitudeHistory
@@ -43,7 +43,14 @@ class Solver:
     refine: bool = True
     wanted: int = 0  # highest derivative that must be finite
 
-    def __call__(self, known: Any, step: np.ndarray, instant: np.ndarray, *, survey: bool = False) -> Arrival:
+    def __call__(
+        self,
+        known: State,
+        step: Float[np.ndarray, " batch"],
+        instant: Float[np.ndarray, " batch"],
+        *,
+        survey: bool = False,
+    ) -> Arrival:
         """Solve instants from known neighbours, as many as fit into a batch; `survey` looks for singular positions."""
         lanes = len(instant)
         width = SMALL_BATCH if lanes <= SMALL_BATCH else LARGE_BATCH
@@ -70,14 +77,14 @@ class Solver:
             return f"output {names[int(np.argmin(arrival.finite[1:, lane]))]}"
         return f"body {self.model.bodies[int(arrival.body[lane])]}"
 
-    def _predictor(self, known: Any) -> tuple[dict[str, Any], tuple[Any, ...], Any]:
+    def _predictor(self, known: State) -> State:
         """Return what a prediction needs of solved instants: jets of the pose and of turning angles, and the sign."""
         coordinates, outputs, sign = known
         angles = [o for o, g in zip(outputs, self.model.system.outputs, strict=True) if g.element.turning]
         return {name: coordinates[name] for name in self.model.pose_type.predictor}, tuple(angles), sign
 
 
-def _filled(x: np.ndarray, width: int) -> np.ndarray:
+def _filled(x: Shaped[np.ndarray, "*rest batch"], width: int) -> Shaped[np.ndarray, "*rest width"]:
     """Repeat the last lane up to the width of a batch."""
     lanes = x.shape[-1]
     if lanes == width:
@@ -106,7 +113,7 @@ class Anchor:
     """
 
     instant: float
-    state: Any
+    state: State
     safe_step: float
     radius: float
     turnover: float
@@ -145,7 +152,7 @@ class FollowedPath:
     """
 
     anchors: list[Anchor]
-    on_the_way: list[tuple[np.ndarray, Arrival]] = dataclasses.field(default_factory=list)
+    on_the_way: list[tuple[Int[np.ndarray, " lane"], Arrival]] = dataclasses.field(default_factory=list)
     change_points: list[ChangePoint] = dataclasses.field(default_factory=list)
     status: Status = Status.OK
     ended_at: float = np.inf
@@ -181,7 +188,12 @@ NO_GRID = np.empty(0)
 
 
 def follow(
-    solver: Solver, start: Anchor, stop: float, span: float, first_step: float = np.inf, grid: np.ndarray = NO_GRID
+    solver: Solver,
+    start: Anchor,
+    stop: float,
+    span: float,
+    first_step: float = np.inf,
+    grid: Float[np.ndarray, " time"] = NO_GRID,
 ) -> FollowedPath:
     """Follow the motion from an anchor to another instant, in steps checked one by one.
 
@@ -272,7 +284,7 @@ def _passed(solver: Solver, here: Anchor, stop: float) -> tuple[Anchor, ChangePo
     return beyond, ChangePoint(located, min(here.radius, beyond.radius))
 
 
-def _shortened(jet: np.ndarray) -> np.ndarray:
+def _shortened(jet: Float[np.ndarray, "order *rest"]) -> Float[np.ndarray, "order *rest"]:
     """Return Taylor coefficients with those above a low order set to zero."""
     low = jet.copy()
     low[PASSAGE_ORDER + 1 :] = 0

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from jounce.errors import MechanismError, SolveError
 from jounce.kinematics.assembly import assemble
@@ -125,7 +126,7 @@ def checked_order(order: Any) -> int:
     return int(order)
 
 
-def _first(solver: Solver, coordinates: dict[str, np.ndarray], instant: np.ndarray) -> Anchor:
+def _first(solver: Solver, coordinates: dict[str, np.ndarray], instant: Float[np.ndarray, " 1"]) -> Anchor:
     """Solve the first instant with its derivatives, from its assembled position."""
     levels = solver.order + 1
     still = {name: np.stack([x, *[np.zeros_like(x)] * (levels - 1)]) for name, x in coordinates.items()}
@@ -138,7 +139,7 @@ def _first(solver: Solver, coordinates: dict[str, np.ndarray], instant: np.ndarr
     return Anchor.of(arrival, instant[0])
 
 
-def _known_angles(group: Group, levels: int) -> np.ndarray:
+def _known_angles(group: Group, levels: int) -> Float[np.ndarray, "order 1 instance 1"]:
     """Return what is known of angles at the first instant: whole turns, where the assembly counted them."""
     known = np.zeros((levels, 1, group.instances, 1))
     if measures_angle(group):

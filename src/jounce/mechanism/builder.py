@@ -5,7 +5,6 @@ from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -24,7 +23,7 @@ from jounce.mechanism.axis_angles import (
     with_datum_of,
     with_datums,
 )
-from jounce.mechanism.mechanism import GROUND, Body, Mechanism
+from jounce.mechanism.mechanism import GROUND, Mechanism
 from jounce.mechanism.outputs import AbstractOutput
 from jounce.mechanism.resolve import check_value, resolve
 from jounce.mechanism.system import (
@@ -34,7 +33,7 @@ from jounce.mechanism.system import (
     group_elements,
     jacobian_cells,
 )
-from jounce.rigid import PlanarPose, SpatialPose
+from jounce.rigid import PlanarPose, Pose, SpatialPose
 from jounce.rigid.euler_parameters import euler_parameters
 
 
@@ -71,7 +70,7 @@ class Model:
     """
 
     system: System
-    pose_type: type
+    pose_type: type[Pose]
     guess: dict[str, Any]
     rows: tuple[str, ...]
     drivers: tuple[str, ...]
@@ -158,7 +157,7 @@ def referred(
     model: Model,
     coordinates: dict[str, Any],
     instant: float,
-    told: tuple[PrescribedAngle, ...] = (),
+    prescribed: tuple[PrescribedAngle, ...] = (),
     *,
     keep: bool = False,
 ) -> tuple[Model, float]:
@@ -172,18 +171,18 @@ def referred(
         Of all bodies, the ground first, put together.
     instant : float
         At which they are there, s.
-    told : tuple of PrescribedAngle
+    prescribed : tuple of PrescribedAngle
         Angles that are prescribed there by others than the drivers, such as initial conditions.
     keep : bool, default False
         Whether angles go on from those counted so far, instead of those that the frames of the bodies have.
     """
     system = model.system
     if not any(map(measures_angle, (*system.groups, *system.forces, *system.outputs))):
-        return dataclasses.replace(model, reference=coordinates, prescribed=told), 0.0
+        return dataclasses.replace(model, reference=coordinates, prescribed=prescribed), 0.0
     groups = with_datums(system.groups, coordinates, keep=keep)
     motions = [group.element.motion for group in groups if measures_angle(group)]
     values = [np.asarray(value) for value in _law_values(motions, np.full((1, 1), instant))]
-    prescribed = (*prescribed_angles(groups, coordinates, values), *told)
+    prescribed = (*prescribed_angles(groups, coordinates, values), *prescribed)
     forces, outputs = (with_datums(part, coordinates, prescribed) for part in (system.forces, system.outputs))
     system = dataclasses.replace(system, groups=groups, forces=forces, outputs=outputs)
     away = departure(model.system.groups, groups)
@@ -228,16 +227,6 @@ def starting_guess(mechanism: Mechanism, parameters: dict[str, Any], components:
     return {"position": position, "angle" if components == 2 else "quaternion": attitude}
 
 
-def check_body(name: str, body: Body, parameters: dict[str, Any], components: int) -> None:
-    """Raise a JounceError unless the starting guess of a body is one, in all that the space has."""
-    place = f"bodies.{name}"
-    _guess(body.position, f"{place}.position", "vector", components, parameters)
-    if components == 2:
-        _guess(body.angle, f"{place}.angle", "scalar", components, parameters)
-    else:
-        _attitude(body.orientation, f"{place}.orientation", parameters)
-
-
 def _attitude(orientation: Any, name: str, parameters: dict[str, Any]) -> np.ndarray:
     """Return the Euler parameters of an orientation whose numbers may be expressions of the parameters."""
     if orientation is None:
@@ -262,13 +251,13 @@ def _guess(value: Any, name: str, kind: str, components: int, parameters: dict[s
     return value
 
 
-def _row_count(group: Group, pose_type: type, guess: dict[str, Any]) -> int:
+def _row_count(group: Group, pose_type: type[Pose], guess: dict[str, Any]) -> int:
     leaves, structure = jax.tree.flatten((group, guess))
     return _row_count_of(structure, tuple(jax.ShapeDtypeStruct(np.shape(x), np.float64) for x in leaves), pose_type)
 
 
 @lru_cache(maxsize=1000)
-def _row_count_of(structure: Any, leaves: tuple[Any, ...], pose_type: type) -> int:
+def _row_count_of(structure: Any, leaves: tuple[Any, ...], pose_type: type[Pose]) -> int:
     """Read the number of rows off the shape of the residual; it depends on the structure only, so is kept."""
 
     def residual(leaves: tuple[Any, ...], time: Any) -> Any:
@@ -278,19 +267,19 @@ def _row_count_of(structure: Any, leaves: tuple[Any, ...], pose_type: type) -> i
     return jax.eval_shape(residual, leaves, np.zeros((1, 1))).shape[0]
 
 
-def pose_at(coordinates: dict[str, Any], pose_type: type) -> Any:
+def pose_at(coordinates: Mapping[str, Any], pose_type: type[Pose]) -> Any:
     """Return the pose of order zero that has the given coordinates."""
     return pose_type.from_coordinates({name: Jet([value]) for name, value in coordinates.items()})
 
 
-def _with_offsets(group: Group, pose_type: type, guess: dict[str, Any]) -> Group:
+def _with_offsets(group: Group, pose_type: type[Pose], guess: dict[str, Any]) -> Group:
     """Fill in the offsets that were not given: those with which the starting guess fulfils the joint."""
     fields = value_fields(type(group.element))
     if "offset" not in fields or group.element.offset is not None:
         return group
 
     def residual(offset: Any) -> Any:
-        trial = eqx.tree_at(lambda g: g.element.offset, group, offset, is_leaf=lambda x: x is None)
+        trial = group.holding("offset", offset)
         return trial.residual(pose_at(guess, pose_type), Jet([jnp.zeros((1, 1))])).coefficients[0]
 
     def fulfilling() -> Any:
@@ -298,21 +287,16 @@ def _with_offsets(group: Group, pose_type: type, guess: dict[str, Any]) -> Group
         value, slope = jax.jvp(residual, (zero,), (jnp.ones_like(zero),))
         return -jnp.sum(value * slope, axis=0)  # the slope is -1 in the row that holds the offset, else 0
 
-    offset = np.asarray(jax.jit(fulfilling)())
-    return eqx.tree_at(lambda g: g.element.offset, group, offset, is_leaf=lambda x: x is None)
+    return group.holding("offset", np.asarray(jax.jit(fulfilling)()))
 
 
-def _with_sense(group: Group, pose_type: type, guess: dict[str, Any]) -> Group:
+def _with_sense(group: Group, pose_type: type[Pose], guess: dict[str, Any]) -> Group:
     """Fill in with which sign of the Euler parameters an attitude is compared: that of the starting guess."""
     if not hasattr(group.element, "sense"):
         return group
     pose = pose_at(guess, pose_type)
     sense = group.element.sense_at(*(pose.take(indices) for indices in group.bodies))
-    return _put_sense(group, None if sense is None else np.asarray(sense))
-
-
-def _put_sense(group: Group, sense: Any) -> Group:
-    return eqx.tree_at(lambda g: g.element.sense, group, sense, is_leaf=lambda x: x is None)
+    return group.holding("sense", None if sense is None else np.asarray(sense))
 
 
 def _with_found_of(group: Group, known: Group) -> Group:
@@ -320,10 +304,10 @@ def _with_found_of(group: Group, known: Group) -> Group:
     if measures_angle(group):
         return with_datum_of(group, known)
     if hasattr(group.element, "sense"):
-        return _put_sense(group, known.element.sense)
+        return group.holding("sense", known.element.sense)
     if "offset" not in value_fields(type(group.element)) or group.element.offset is not None:
         return group
-    return eqx.tree_at(lambda g: g.element.offset, group, known.element.offset, is_leaf=lambda x: x is None)
+    return group.holding("offset", known.element.offset)
 
 
 def _size(groups: tuple[Group, ...], guess: dict[str, Any]) -> float:

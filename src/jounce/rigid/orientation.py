@@ -109,7 +109,7 @@ def angular_velocity_from_angles(sequence: str, angles: JetLike, frame: str = "g
     return matvec(transfer_matrix(sequence, angles.truncate(angles.order - 1), frame), angles.differentiate())
 
 
-def angular_velocity(attitude: Float[Jet, "3 3 *batch"], frame: str = "global") -> Float[Jet, "3 *batch"]:
+def angular_velocity(attitude: Float[Jet | Numbers, "3 3 *batch"], frame: str = "global") -> Float[Jet, "3 *batch"]:
     """Return the angular velocity of a rotation matrix that moves, ``[w]x = R' R^T``. Negrean 2025, equation 36.
 
     Parameters
@@ -366,7 +366,7 @@ def _marked(vector: Float[Jet, "3 *batch"], regular: Numbers) -> Float[Jet, "3 *
     return vector.dense().map(lambda c: jnp.where(mask, c, jnp.nan))
 
 
-def _solved(matrix: Float[Jet, "3 3 *batch"], vector: Float[Jet, "3 *rest"]) -> Float[Jet, "3 *batch"]:
+def _solved(matrix: Float[Jet, "3 3 *#batch"], vector: Float[Jet, "3 *#batch"]) -> Float[Jet, "3 *#batch"]:
     """Return ``matrix^-1 vector`` by Cramer's rule: three columns, whose determinant is the singularity distance."""
     a, b, c = transpose(matrix)
     normals = cross(b, c), cross(c, a), cross(a, b)
