@@ -15,3 +15,6 @@ Numbers = jax.Array | np.ndarray
 
 ArrayLike = Numbers | Sequence | float | int
 """What becomes an array of numbers: an array, lists or tuples of numbers in any nesting, a number."""
+
+Real = Numbers | np.floating | np.integer | float | int
+"""Real numbers: an array or one number."""

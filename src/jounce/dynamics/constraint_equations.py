@@ -26,7 +26,7 @@ from jounce.kinematics import Motion, Status
 from jounce.kinematics.assembly import split
 from jounce.kinematics.compilation import compiled
 from jounce.mechanism import Mechanism
-from jounce.mechanism.doors import concrete
+from jounce.mechanism.preconditions import concrete
 from jounce.mechanism.system import System
 from jounce.robot.batches import derivatives
 from jounce.shapes import Numbers

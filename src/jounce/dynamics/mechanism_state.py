@@ -13,7 +13,7 @@ from jounce.kinematics import Motion, Status
 from jounce.kinematics.solve import HIGHEST_ORDER
 from jounce.mechanism import Mechanism, Model, build
 from jounce.mechanism.builder import referred
-from jounce.mechanism.laws import check_laws
+from jounce.mechanism.law_checks import check_laws
 from jounce.rigid import SpatialPose
 from jounce.rigid.euler_parameters import euler_parameters
 from jounce.robot.batches import coefficients
@@ -38,9 +38,11 @@ def at_state(given: object, state: object, time: object) -> tuple[Motion, int]:
         model = dataclasses.replace(given.model, system=system, outputs=())
     else:
         model, _ = referred(model, {name: values[0] for name, values in _still(coordinates).items()}, float(instant))
-    way = given.way if isinstance(given, Motion) else None
+    history = given.history if isinstance(given, Motion) else None
     status = np.array([int(Status.OK)])
-    return MotionAtState(mechanism, model, instant[None], order, (dict(coordinates), ()), status, {}, way=way), order
+    return MotionAtState(
+        mechanism, model, instant[None], order, (dict(coordinates), ()), status, {}, history=history
+    ), order
 
 
 def _still(coordinates: Coordinates) -> Coordinates:

@@ -15,7 +15,7 @@ from jounce.jet import Jet, dot
 from jounce.jet.algebra import stacked, total
 from jounce.kinematics import Motion
 from jounce.kinematics.compilation import compiled
-from jounce.mechanism.datums import at_lanes
+from jounce.mechanism.axis_angles import at_lanes
 from jounce.mechanism.system import Group
 from jounce.rigid import PlanarPose
 from jounce.shapes import Numbers

@@ -13,20 +13,21 @@ from jaxtyping import Float, Int
 from jounce.display import Displayed
 from jounce.dynamics.forward import Equations, State
 from jounce.dynamics.start import consistent_start, initial_as_drivers
-from jounce.errors import MechanismError, no_such
+from jounce.errors import MechanismError, check_name
 from jounce.integrate.batch_equations import BatchStart, ParametricMechanism, Turns
 from jounce.integrate.events import pose_coordinates
 from jounce.integrate.marching import DenseOutput, IntegratorState, Outcome, begin_march, march
 from jounce.integrate.methods import AbstractMethod
 from jounce.integrate.simulate import checked_options, instants_of
 from jounce.integrate.simulation import expanded
+from jounce.jet.turns import whole_periods
 from jounce.kinematics import Status
 from jounce.kinematics.motion import output_series
 from jounce.mechanism import Mechanism, TimeGrid, build, check_mechanism
+from jounce.mechanism.axis_angles import with_turns
 from jounce.mechanism.builder import referred
-from jounce.mechanism.datums import with_turns
-from jounce.mechanism.doors import concrete
-from jounce.mechanism.laws import check_laws
+from jounce.mechanism.law_checks import check_laws
+from jounce.mechanism.preconditions import concrete
 from jounce.shapes import ArrayLike
 
 LANES = 64  # runs marched together: more fall out of the cache
@@ -144,9 +145,7 @@ def _checked_parameters(mechanism: Mechanism, parameters: Mapping[str, Any]) -> 
         raise MechanismError("a batch differs in at least one parameter", name="parameters", value=dict(parameters))
     values, count = {}, None
     for name, given in parameters.items():
-        if name not in mechanism.parameters:
-            message = no_such("parameter", name, mechanism.parameters)
-            raise MechanismError(message, name="parameters", value=name)
+        check_name("parameter", name, mechanism.parameters, MechanismError, name="parameters")
         try:
             array = np.asarray(given, float)
         except (TypeError, ValueError):
@@ -338,4 +337,4 @@ def turned(before: np.ndarray, after: np.ndarray, since: np.ndarray) -> np.ndarr
         Time from the one to the other, s.
     """
     rise = since / 2 * (before[1] + after[1]) + since**2 / 6 * (before[2] - after[2])
-    return 2 * np.pi * np.nan_to_num(np.round((after[0] - before[0] - rise) / (2 * np.pi)))
+    return np.nan_to_num(whole_periods(after[0] - before[0] - rise))

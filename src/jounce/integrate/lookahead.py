@@ -20,7 +20,7 @@ from jounce.integrate.methods import evaluated
 from jounce.integrate.turns import Angles
 from jounce.jet import Jet
 from jounce.mechanism import Model
-from jounce.mechanism.datums import with_turns
+from jounce.mechanism.axis_angles import with_turns
 from jounce.mechanism.system import Group
 from jounce.shapes import Numbers
 

@@ -13,7 +13,7 @@ from jaxtyping import Float
 from jounce.dynamics.forward import Equations, Lanes, State
 from jounce.integrate.methods import evaluated
 from jounce.jet import Jet
-from jounce.mechanism.datums import measures_angle
+from jounce.mechanism.axis_angles import measures_angle
 from jounce.shapes import Numbers
 
 PLACES = 16  # in a step: series carry over about one turn in it at most

@@ -2,6 +2,7 @@
 
 from jounce.jet.algebra import (
     Jet as Jet,
+    JetLike as JetLike,
     components as components,
     concatenate as concatenate,
     cross as cross,
@@ -34,8 +35,8 @@ from jounce.jet.elementary import (
     sinh as sinh,
     tan as tan,
     tanh as tanh,
-    wrap as wrap,
 )
+from jounce.jet.turns import wrap as wrap
 from jounce.jet.vectors import (
     matmul as matmul,
     matvec as matvec,

@@ -13,8 +13,9 @@ import jax
 import jax.numpy as jnp
 from jax.extend.core import Literal
 
-from jounce.jet.algebra import Jet, bilinear, exp, power, sqrt
+from jounce.jet.algebra import Jet, bilinear
 from jounce.jet.elementary import FUNCTIONS, erf, tanh
+from jounce.jet.operations import COMPOSED, REARRANGING, STEPWISE
 from jounce.jet.vectors import stack
 
 
@@ -146,10 +147,13 @@ def _apply(primitive: Any, parameters: dict, operands: list[Any]) -> Any:
     name = primitive.name
     if name in _RULES:
         return _RULES[name](*operands, **parameters)
-    if name in _LINEAR:
+    if name in REARRANGING:
         return _along_coefficients(primitive, parameters, operands)
     if name in _BILINEAR:
         return bilinear(lambda a, b: primitive.bind(a, b, **parameters), *operands)
+    if name in COMPOSED:
+        program = jax.make_jaxpr(lambda *xs: COMPOSED[name](*xs, **parameters))(*map(_value, operands))
+        return _run(program, None, *operands)
     return primitive.bind(*map(_value, operands), **parameters)  # piecewise constant in time
 
 
@@ -180,15 +184,6 @@ def _select(which: Any, *cases: Any, **_) -> Any:
     return Jet(jax.lax.select_n(_value(which), *column) for column in columns)
 
 
-def _remainder(x: Any, y: Any, **_) -> Any:
-    return x - y * jnp.trunc(_value(x) / _value(y))
-
-
-def _clamp(low: Any, x: Any, high: Any, **_) -> Any:
-    inside = _select(_value(x) < _value(low), x, low)
-    return _select(_value(inside) > _value(high), inside, high)
-
-
 def _without_parameters(function: Callable[..., Any]) -> Callable[..., Any]:
     return lambda *operands, **_: function(*operands)
 
@@ -200,28 +195,16 @@ _RULES: dict[str, Callable[..., Any]] = {name: _without_parameters(f) for name, 
     "mul": lambda a, b, **_: a * b,
     "div": lambda a, b, **_: a / b,
     "neg": lambda a, **_: -a,
-    "integer_pow": lambda a, *, y, **_: power(a, y),
-    "rsqrt": lambda a, **_: 1.0 / sqrt(a),
-    "exp2": lambda a, **_: exp(a * jnp.log(2.0)),
     "erfc": lambda a, **_: 1.0 - erf(a),
     "logistic": lambda a, **_: 0.5 * (1.0 + tanh(0.5 * a)),
-    "max": lambda a, b, **_: _select(_value(a) >= _value(b), b, a),
-    "min": lambda a, b, **_: _select(_value(a) <= _value(b), b, a),
-    "clamp": _clamp,
-    "rem": _remainder,
     "select_n": _select,
 }
-_LINEAR = frozenset(
-    "broadcast_in_dim concatenate convert_element_type copy cumsum dynamic_slice gather pad reduce_sum reshape rev"
-    " slice squeeze stack transpose".split()
-)
 _BILINEAR = frozenset(("dot_general",))
-_PIECEWISE_CONSTANT = frozenset("ceil eq floor ge gt is_finite le lt ne round sign stop_gradient".split())
-_WITHOUT_TIME = frozenset("and iota not or xor".split())  # never see a jet
+_WITHOUT_RATES = STEPWISE | frozenset("and eq ge gt iota is_finite le lt ne not or xor".split())
 
 
 def _has_rule(name: str) -> bool:
-    return name in _RULES or name in _LINEAR or name in _BILINEAR or name in _PIECEWISE_CONSTANT | _WITHOUT_TIME
+    return any(name in known for known in (_RULES, COMPOSED, REARRANGING, _BILINEAR, _WITHOUT_RATES))
 
 
 def _inner_program(parameters: dict) -> Any:

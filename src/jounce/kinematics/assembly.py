@@ -1,7 +1,6 @@
 """The first assembly: bodies put together from the starting guess, and degrees of freedom counted and explained."""
 
 import dataclasses
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import jax
@@ -13,11 +12,20 @@ from jounce.constraints.spatial import DoubleSpherical
 from jounce.errors import AssemblyError, MobilityError
 from jounce.jet import Jet
 from jounce.kinematics.compilation import compiled
+from jounce.kinematics.initial_turns import (
+    Coordinates,
+    DriverLag,
+    Mover,
+    driver_lag,
+    nearest_turns,
+    newton_step,
+    row_scale,
+    turned_to_laws,
+)
 from jounce.kinematics.status import Status
-from jounce.kinematics.turns import Lag, course, lag_of, nearest_turns
 from jounce.mechanism import Model
+from jounce.mechanism.axis_angles import measures_angle, with_angles, with_datums
 from jounce.mechanism.builder import pose_at, referred
-from jounce.mechanism.datums import measures_angle, with_angles, with_datums
 
 MAX_STEPS = 100
 RANK_TOLERANCE = 1e-9
@@ -50,15 +58,13 @@ class Trial(NamedTuple):
         Scaled, there.
     """
 
-    coordinates: dict[str, np.ndarray]
+    coordinates: Coordinates
     scale: np.ndarray
     gaps: np.ndarray
     jacobian: np.ndarray
 
 
-def assemble(
-    model: Model, instant: float, tolerance: float, *, free: bool = False
-) -> tuple[Model, dict[str, np.ndarray]]:
+def assemble(model: Model, instant: float, tolerance: float, *, free: bool = False) -> tuple[Model, Coordinates]:
     """Put the bodies together at one instant, from the starting guess, by damped Gauss-Newton.
 
     Parameters
@@ -91,7 +97,7 @@ def assemble(
         noun = "degree of freedom" if columns == 1 else "degrees of freedom"
         raise MobilityError(f"the mechanism has no joints and no drivers: {columns} {noun} are left")
     if not model.rows:  # bodies that fly freely are together as they are
-        model, _ = referred(model, model.guess, instant, model.turnings)
+        model, _ = referred(model, model.guess, instant, model.prescribed)
         return dataclasses.replace(model, system=jax.device_put(model.system)), model.guess
     model, found = _settled(model, instant, tolerance)
     check_assembled(model, found, instant, tolerance, free=free)
@@ -107,7 +113,7 @@ def _settled(model: Model, instant: float, tolerance: float) -> tuple[Model, Tri
     than those counted from the guess, and it takes another turn to get to those that the drivers prescribe.
     """
     model, start = _turned(model, instant, tolerance)
-    found, told = put_together(model, instant, tolerance, start), model.turnings
+    found, told = put_together(model, instant, tolerance, start), model.prescribed
     if not closed(found.gaps, tolerance) and any(map(measures_angle, model.system.groups)):
         # angles counted from a tilted guess may be far off: first the joints alone, with the drivers as they are
         lag = _lag(model, instant)
@@ -127,7 +133,7 @@ def _settled(model: Model, instant: float, tolerance: float) -> tuple[Model, Tri
     return referred(model, found.coordinates, instant, told, keep=True)[0], found
 
 
-def _turned(model: Model, instant: float, tolerance: float) -> tuple[Model, dict[str, np.ndarray] | None]:
+def _turned(model: Model, instant: float, tolerance: float) -> tuple[Model, Coordinates | None]:
     """Return the model and the coordinates to start from where laws begin more than half a turn from the guess.
 
     The drivers are turned from the guess to their laws then, and all angles count their turns; None where none is so
@@ -139,24 +145,24 @@ def _turned(model: Model, instant: float, tolerance: float) -> tuple[Model, dict
     begin = put_together(model, instant, tolerance, lag=lag)
     if not closed(begin.gaps, tolerance):
         return model, None
-    found = course(model, lag, begin.coordinates, moved, _row_scale)
+    found = turned_to_laws(model, lag, begin.coordinates, moved)
     if found is None:
         return model, None
-    if found.way is not None:
+    coordinates, history = found
+    if history is not None:
         forces, outputs = (
-            with_angles(with_datums(part, found.coordinates), found.way.last_angles(part))
+            with_angles(with_datums(part, coordinates), history.last_angles(part))
             for part in (model.system.forces, model.system.outputs)
         )
-        model = dataclasses.replace(
-            model, system=dataclasses.replace(model.system, forces=forces, outputs=outputs), way=found.way
-        )
-    return model, found.coordinates
+        system = dataclasses.replace(model.system, forces=forces, outputs=outputs)
+        model = dataclasses.replace(model, system=system, history=history)
+    return model, coordinates
 
 
-def _lag(model: Model, instant: float) -> Lag | None:
+def _lag(model: Model, instant: float) -> DriverLag | None:
     """Return what the drivers lack at the guess."""
     still = np.zeros(model.system.cells.shape[1])
-    return lag_of(model, instant, _mover(model, instant)(model.guess, still)[1])
+    return driver_lag(model, instant, _mover(model, instant)(model.guess, still)[1])
 
 
 def _nearest(model: Model, found: Trial, instant: float) -> Trial:
@@ -169,7 +175,7 @@ def _nearest(model: Model, found: Trial, instant: float) -> Trial:
     return found._replace(coordinates=nearest_turns(model.guess, found.coordinates, residual_at))
 
 
-def _mover(model: Model, instant: float) -> Callable[[dict[str, Any], np.ndarray], Any]:
+def _mover(model: Model, instant: float) -> Mover:
     """Return what takes coordinates and an increment to coordinates, residual and Jacobian, all NumPy arrays."""
 
     def moved(coordinates: dict[str, Any], increment: np.ndarray) -> Any:
@@ -183,9 +189,9 @@ def put_together(
     model: Model,
     instant: float,
     tolerance: float,
-    start: dict[str, np.ndarray] | None = None,
+    start: Coordinates | None = None,
     *,
-    lag: Lag | None = None,
+    lag: DriverLag | None = None,
 ) -> Trial:
     """Return how far the bodies can be put together at one instant; nothing is refused.
 
@@ -199,7 +205,7 @@ def put_together(
         Of the last correction, rad or sizes of the mechanism.
     start : dict of str to array, optional
         Coordinates to start from instead of the guess.
-    lag : Lag, optional
+    lag : DriverLag, optional
         What drivers may still lack.
     """
     still, free = np.zeros(model.system.cells.shape[1]), _mover(model, instant)
@@ -209,14 +215,12 @@ def put_together(
         return moved_to, residual if lag is None else lag.open(residual, 1.0), jacobian
 
     coordinates, residual, jacobian = moved(model.guess if start is None else start, still)
-    scale = _row_scale(jacobian)
+    scale = row_scale(jacobian)
     for _ in range(MAX_STEPS):
-        if not (np.isfinite(residual).all() and np.isfinite(jacobian).all()):
-            break  # told by name; what factors a matrix may never end on one that is not finite
-        step = np.linalg.lstsq(scale[:, None] * jacobian, -scale * residual, rcond=1e-10)[0]
+        step = newton_step(residual, jacobian)
+        if step is None:
+            break  # told by name
         size = np.max(np.abs(step), initial=0.0)
-        if not np.isfinite(size):
-            break
         step *= min(1.0, 0.5 / max(size, 1e-300))  # at most half a radian, or half the mechanism, at a time
         now = np.linalg.norm(scale * residual)
         for _halving in range(12):
@@ -227,16 +231,11 @@ def put_together(
         else:
             break
         coordinates, residual, jacobian = trial
-        scale = _row_scale(jacobian)
+        scale = row_scale(jacobian)
         if size <= tolerance:
             break
     gaps = np.where(np.isfinite(jacobian).all(axis=1), scale * residual, np.nan)
     return Trial(coordinates, scale, gaps, scale[:, None] * jacobian)
-
-
-def _row_scale(jacobian: np.ndarray) -> np.ndarray:
-    largest = np.max(np.abs(jacobian), axis=1)
-    return 1 / np.where((largest > 0) & np.isfinite(largest), largest, 1.0)
 
 
 def closed(gaps: np.ndarray, tolerance: float) -> bool:

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from jounce.errors import RobotError, did_you_mean
+from jounce.errors import RobotError, check_choice, did_you_mean
 from jounce.rigid.solids import SOLIDS, pseudo_parts, solid_moments
 
 ROUNDING = 1e-5  # of the largest principal moment: what files with six digits may miss a possible tensor by
@@ -226,8 +226,7 @@ def check_solid(kind: str, axis: str, given: dict[str, Any]) -> str:
     RobotError
         What does not fit.
     """
-    if kind not in SOLIDS:
-        raise RobotError(f"unknown solid; {did_you_mean(kind, SOLIDS)}", name="solid", value=kind)
+    check_choice("solid", kind, SOLIDS, RobotError)
     solid = SOLIDS[kind]
     valid = (*solid.sizes, "mass", "density")
     for name in given:

@@ -13,7 +13,7 @@ from jaxtyping import Float
 
 from jounce.errors import JounceError, RobotError
 from jounce.kinematics.compilation import compiler_options
-from jounce.mechanism.doors import check_process
+from jounce.mechanism.preconditions import check_process
 from jounce.robot.abstract_robot import AbstractRobot
 from jounce.shapes import Numbers
 

@@ -17,9 +17,8 @@ from jaxtyping import Float
 from jounce.constraints import AbstractConstraint, Scalar, Vector
 from jounce.constraints.base import Wrenches
 from jounce.errors import MechanismError, RobotError
-from jounce.jet import Jet, cross, dot, stack
+from jounce.jet import cross, dot, stack
 from jounce.jet.algebra import stacked, total
-from jounce.rigid import SpatialPose
 from jounce.rigid.inertia import finite_numbers
 from jounce.robot.abstract_robot import AbstractRobot
 from jounce.robot.batches import Batched
@@ -67,7 +66,7 @@ class LinkClosure(AbstractConstraint, type="closure", space="spatial"):
         rows = offset.map(lambda d: jnp.sum(force * d[None], axis=1))
         if self.vector_part is None:
             return rows
-        e0, e = _relative_attitude(body_i, body_j)
+        e0, e = body_i.relative_quaternion(body_j.quaternion)
         turn = 2.0 * (self.scalar_part * e - e0 * self.vector_part - cross(e, self.vector_part))
         turn = turn if self.sense is None else turn * self.sense
         return rows + turn.map(lambda x: jnp.sum(moment * x[None], axis=1))
@@ -80,14 +79,9 @@ class LinkClosure(AbstractConstraint, type="closure", space="spatial"):
         """
         if self.vector_part is None:
             return None
-        e0, e = _relative_attitude(body_i, body_j)
+        e0, e = body_i.relative_quaternion(body_j.quaternion)
         along = self.scalar_part * e0 + dot(self.vector_part, e)
         return jnp.where(along.coefficients[0] < 0, -1.0, 1.0)
-
-
-def _relative_attitude(body_i: SpatialPose, body_j: SpatialPose) -> tuple[Jet, Jet]:
-    """Return the Euler parameters of body j relative to body i: scalar and vector part."""
-    return body_i.quaternion.dot(body_j.quaternion), stack([s.dot(body_j.quaternion) for s in body_i.spins])
 
 
 def constraint_wrenches(closure: Closure) -> np.ndarray:

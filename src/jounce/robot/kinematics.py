@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.errors import RobotError, no_such
+from jounce.errors import RobotError, check_name
 from jounce.jet import Jet, sine_cosine
 from jounce.jet.algebra import stacked, total
 from jounce.rigid.frames import Frames
@@ -73,8 +73,7 @@ def place_of(robot: AbstractRobot, link: str, point: ArrayLike) -> Frame:
     RobotError
         If there is no such link, or the point is not made of three finite numbers.
     """
-    if link not in robot.frames:
-        raise RobotError(no_such("link", link, robot.frames), name="link", value=link)
+    check_name("link", link, robot.frames, RobotError, name="link")
     point = finite_numbers("point", point, (3,))
     frame = robot.frames[link]
     body = frame.body if frame.body >= 0 else len(robot.moving_links)

@@ -8,7 +8,7 @@ import jax
 import numpy as np
 from jaxtyping import Float
 
-from jounce.errors import RobotError, no_such
+from jounce.errors import RobotError, check_name
 from jounce.rigid.inertia import Inertia
 from jounce.robot.model import Joint, Link
 
@@ -96,9 +96,7 @@ def ordered(links: Mapping[str, Link], joints: Mapping[str, Joint]) -> list[Join
     for joint in joints.values():
         for role in ("parent", "child"):
             link = getattr(joint, role)
-            if link not in links:
-                message = no_such("link", link, links)
-                raise RobotError(message, name=f"joints.{joint.name}.{role}", value=link)
+            check_name("link", link, links, RobotError, name=f"joints.{joint.name}.{role}")
         if joint.child in parents:
             first = parents[joint.child].name
             message = (
