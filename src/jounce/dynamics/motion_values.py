@@ -14,7 +14,7 @@ from jounce.robot.batches import derivatives
 from jounce.shapes import Numbers
 
 Pose = PlanarPose | SpatialPose
-Coordinates = Mapping[str, Float[Numbers, "_ *shape batch"]]
+Coordinates = Mapping[str, Float[Numbers, "_ ... _"]]
 """Taylor coefficients of the coordinates of poses, by name: as `Motion.poses` has them."""
 
 Found = TypeVar("Found")

@@ -42,7 +42,7 @@ def simulate(
     method: AbstractMethod | None = None,
     tolerance: float = 1e-15,
     initial: Mapping[str, AbstractConstraint] | None = None,
-    events: Sequence[Event] = (),
+    events: object = (),
     longest_step: float = np.inf,
     strict: bool = True,
     progress: Callable[[int, int], None] | None = None,
