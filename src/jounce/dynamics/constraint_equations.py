@@ -18,7 +18,7 @@ from jounce.dynamics.inverse import ElementIndex, MotionForces, element_indices
 from jounce.dynamics.loads import mass_matrices
 from jounce.dynamics.masses import Masses, masses_of
 from jounce.dynamics.mechanism_state import MotionAtState, at_state
-from jounce.dynamics.motion_values import Coordinates, Pose, in_chunks, plain_derivatives, pose_of
+from jounce.dynamics.motion_values import Coordinates, cut, in_chunks, plain_derivatives, pose_of
 from jounce.dynamics.saddle_point import block_diagonal, saddle_point
 from jounce.errors import MechanismError
 from jounce.jet import Jet
@@ -28,6 +28,7 @@ from jounce.kinematics.compilation import compiled
 from jounce.mechanism import Mechanism
 from jounce.mechanism.preconditions import concrete
 from jounce.mechanism.system import System
+from jounce.rigid import Pose
 from jounce.robot.batches import derivatives
 from jounce.shapes import Numbers
 
@@ -184,8 +185,7 @@ def _numbers(motion: Motion, order: int) -> dict[str, np.ndarray]:
 
     def chunk(lanes: np.ndarray) -> Any:
         bodies = {name: values[..., lanes] for name, values in coordinates.items()}
-        still = {name: bodies[name][:1] for name in pose_type.predictor}
-        residual, jacobian = _position_equations(plain, still, motion.time[lanes], pose_type)
+        residual, jacobian = _position_equations(plain, cut(bodies, 0), motion.time[lanes], pose_type)
         if not order:
             return residual, jacobian, np.zeros((0, *residual.shape))
         instants = np.tile(motion.time[lanes], order)
@@ -253,8 +253,8 @@ def _velocities(motion: Motion, order: int) -> Float[np.ndarray, "time derivativ
 
 def _places(motion: Motion) -> dict[str, Any]:
     """Return where the bodies are at all instants."""
-    pose_type, coordinates = motion.poses
-    first = {name: np.moveaxis(np.asarray(coordinates[name][0])[..., 1:, :], -1, 0) for name in pose_type.predictor}
+    still = cut(motion.poses[1], 0)
+    first = {name: np.moveaxis(np.asarray(values[0])[..., 1:, :], -1, 0) for name, values in still.items()}
     found = {"position": (("time", "body", "component"), np.swapaxes(first["position"], 1, 2))}
     if "angle" in first:
         return found | {"angle": (("time", "body"), first["angle"])}
@@ -302,7 +302,7 @@ def _mass_matrix(motion: Motion) -> Float[np.ndarray, "time column column"]:
     masses = masses_of(motion.mechanism)
 
     def chunk(lanes: np.ndarray) -> Any:
-        bodies = {name: values[:1][..., lanes] for name, values in coordinates.items() if name in pose_type.predictor}
+        bodies = {name: values[..., lanes] for name, values in cut(coordinates, 0).items()}
         return _body_masses(bodies, masses, pose_type)
 
     return np.moveaxis(in_chunks(chunk, len(motion.time)), -1, 0)

@@ -6,7 +6,6 @@ directions, from the matrix of masses and Jacobian together. The jets of the Jac
 virtual displacements of the bodies: none is written anywhere, and a joint of one's own has its reactions.
 """
 
-import dataclasses
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -17,13 +16,12 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.constraints import AbstractConstraint
-from jounce.dynamics.motion_values import Pose
 from jounce.dynamics.saddle_point import as_column, block_diagonal, saddle_point
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked, total
 from jounce.kinematics.linear import DenseFactor
-from jounce.mechanism.system import System
-from jounce.rigid import SpatialPose
+from jounce.mechanism.system import System, movable, with_rows
+from jounce.rigid import Pose
 from jounce.shapes import Numbers
 from jounce.trajectory import AbstractMotion
 
@@ -35,15 +33,6 @@ Slopes = Sequence[Sequence[Float[Numbers, "order coordinate _ _ batch"]]]
 
 Multipliers = Float[Numbers, "order row instance batch"]
 """Taylor coefficients of the multipliers of a group."""
-
-
-def truncated(pose: Pose, order: int) -> Pose:
-    """Return a pose with the jets cut to an order, and none of them a certain zero, so that it may be displaced."""
-    pose = jax.tree.map(lambda jet: jet.dense(), pose.truncate(order), is_leaf=lambda x: isinstance(x, Jet))
-    if isinstance(pose, SpatialPose) and order and pose.angular_velocity is None:
-        rest = Jet.constant(jnp.zeros_like(pose.position.coefficients[0]), order - 1).dense()
-        return dataclasses.replace(pose, angular_velocity=rest)
-    return pose
 
 
 def slopes(element: AbstractConstraint, poses: Sequence[Pose], time: Jet, slot: int) -> Slope:
@@ -65,7 +54,7 @@ def slopes(element: AbstractConstraint, poses: Sequence[Pose], time: Jet, slot: 
     array of shape (order + 1, coordinates, rows, instances, batch)
         Taylor coefficients of the derivatives by a shift in global axes, m, and by a turn in axes of the body, rad.
     """
-    body = truncated(poses[slot], time.order)
+    body = movable(poses[slot].truncate(time.order))
     shape, size = body.position.shape[1:], body.shifts + body.turns
 
     def residual(pose: Any) -> Any:
@@ -74,15 +63,10 @@ def slopes(element: AbstractConstraint, poses: Sequence[Pose], time: Jet, slot: 
     def along(direction: Any) -> Any:
         unit = jnp.broadcast_to(direction[:, None, None], (size, *shape))
         shift, turn = (Jet.constant(part, time.order).dense() for part in (unit[: body.shifts], unit[body.shifts :]))
-        change = truncated(body.varied(shift, turn), time.order)
+        change = movable(body.varied(shift, turn).truncate(time.order))
         return jax.jvp(residual, (body,), (jax.lax.optimization_barrier(change),))[1]
 
     return jnp.moveaxis(jax.vmap(along)(jnp.eye(size)), 0, 1)
-
-
-def with_rows(jet: Jet) -> Jet:
-    """Return a jet of shape (instances, batch) as one of shape (1, instances, batch)."""
-    return jet.map(lambda c: c[None]) if len(jet.shape) == 2 else jet
 
 
 def work_along(

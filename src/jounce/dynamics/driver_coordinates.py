@@ -17,7 +17,7 @@ from jounce.dynamics.energies import body_energy
 from jounce.dynamics.forward import Lanes
 from jounce.dynamics.inverse import MotionForces, element_indices
 from jounce.dynamics.masses import Masses, required_masses
-from jounce.dynamics.motion_values import Coordinates, Pose, in_chunks, labelled, pose_of
+from jounce.dynamics.motion_values import Coordinates, cut, in_chunks, labelled, pose_of
 from jounce.errors import MechanismError
 from jounce.jet import Jet
 from jounce.jet.algebra import total
@@ -25,6 +25,7 @@ from jounce.kinematics import Motion
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.linear import DenseFactor
 from jounce.mechanism.system import System
+from jounce.rigid import Pose
 from jounce.shapes import ArrayLike, Numbers
 
 
@@ -75,7 +76,7 @@ def in_driver_coordinates(
     order = tuple((found[name].group, found[name].instance) for name in names)
     pose_type, coordinates = motion.poses
     masses = required_masses(motion.mechanism)
-    start = {name: values[:1] for name, values in coordinates.items() if name != "angular_velocity"}
+    start = cut(coordinates, 0)
 
     def chunk(lanes: np.ndarray) -> Any:
         still = {name: values[..., lanes] for name, values in start.items()}

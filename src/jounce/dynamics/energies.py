@@ -15,14 +15,14 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.dynamics.masses import Gravity, Masses, gravity_of, required_masses
-from jounce.dynamics.motion_values import Coordinates, Pose, labelled, pose_of
+from jounce.dynamics.motion_values import Coordinates, cut, labelled, pose_of
 from jounce.errors import MechanismError
 from jounce.jet import Jet, dot
 from jounce.jet.algebra import stacked, total
 from jounce.kinematics import Motion
 from jounce.kinematics.compilation import compiled
 from jounce.mechanism.system import Group
-from jounce.rigid import PlanarPose
+from jounce.rigid import PlanarPose, Pose
 from jounce.rigid.frames import Frames
 from jounce.robot.batches import Batched, checked_coordinates, whole_number
 from jounce.robot.kinematics import body_frames
@@ -338,8 +338,7 @@ def stored_energy(motion: Motion) -> Any:
     [0.0, 40.0]
     """
     pose_type, coordinates = motion.poses
-    low = {name: values[: 2 - (name == "angular_velocity")] for name, values in coordinates.items()}
-    stored = _stored(motion.forces, low, motion.time[None], pose_type)
+    stored = _stored(motion.forces, cut(coordinates, 1), motion.time[None], pose_type)
     return labelled(motion, np.asarray(stored)[None], "J")[:, 0].drop_vars("derivative")
 
 

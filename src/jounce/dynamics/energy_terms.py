@@ -10,12 +10,11 @@ import math
 from typing import Any
 
 from jounce.dynamics.energies import axes_of, differentiated, energies_of, summed
-from jounce.dynamics.motion_values import Pose
 from jounce.errors import RobotError, did_you_mean
 from jounce.jet import Jet, cross, dot
 from jounce.jet.algebra import total
 from jounce.kinematics import Motion
-from jounce.rigid import PlanarPose
+from jounce.rigid import PlanarPose, Pose
 from jounce.rigid.frames import Frames
 from jounce.rigid.planar import perpendicular
 from jounce.robot.robot import Robot

@@ -17,7 +17,6 @@ from jaxtyping import Float
 
 from jounce.dynamics.loads import inertia_forces, mass_matrices
 from jounce.dynamics.masses import Gravity, Masses
-from jounce.dynamics.motion_values import Pose
 from jounce.dynamics.saddle_point import ByBody, as_column, block_diagonal, by_body, saddle_point
 from jounce.jet import Jet
 from jounce.jet.algebra import total
@@ -25,7 +24,7 @@ from jounce.jet.series import Recursion
 from jounce.kinematics.linear import DenseFactor
 from jounce.mechanism.axis_angles import with_turns
 from jounce.mechanism.system import System
-from jounce.rigid import PlanarPose, SpatialPose
+from jounce.rigid import PlanarPose, Pose, SpatialPose
 from jounce.rigid.spatial import body_axes, quaternion_spins
 from jounce.shapes import Numbers
 

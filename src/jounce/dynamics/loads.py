@@ -11,11 +11,10 @@ import jax.numpy as jnp
 from jaxtyping import Float
 
 from jounce.dynamics.masses import Gravity, Masses
-from jounce.dynamics.motion_values import Pose
 from jounce.jet import Jet, components, cross
 from jounce.jet.algebra import stacked, total
 from jounce.mechanism.system import System
-from jounce.rigid import PlanarPose
+from jounce.rigid import PlanarPose, Pose
 from jounce.shapes import Numbers
 
 

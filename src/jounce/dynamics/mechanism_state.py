@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from jounce.dynamics.motion_values import Coordinates, Pose
+from jounce.dynamics.motion_values import Coordinates, cut
 from jounce.errors import MechanismError
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.solve import HIGHEST_ORDER
 from jounce.mechanism import Mechanism, Model, build
 from jounce.mechanism.builder import referred
 from jounce.mechanism.law_checks import check_laws
-from jounce.rigid import SpatialPose
+from jounce.rigid import Pose, SpatialPose
 from jounce.rigid.euler_parameters import euler_parameters
 from jounce.robot.batches import coefficients
 
@@ -37,16 +37,12 @@ def at_state(given: object, state: object, time: object) -> tuple[Motion, int]:
         system = dataclasses.replace(given.model.system, outputs=())
         model = dataclasses.replace(given.model, system=system, outputs=())
     else:
-        model, _ = referred(model, {name: values[0] for name, values in _still(coordinates).items()}, float(instant))
+        model, _ = referred(model, {name: values[0] for name, values in cut(coordinates, 0).items()}, float(instant))
     history = given.history if isinstance(given, Motion) else None
     status = np.array([int(Status.OK)])
     return MotionAtState(
         mechanism, model, instant[None], order, (dict(coordinates), ()), status, {}, history=history
     ), order
-
-
-def _still(coordinates: Coordinates) -> Coordinates:
-    return {name: values for name, values in coordinates.items() if name != "angular_velocity"}
 
 
 def _guessed(model: Model) -> Coordinates:

@@ -9,11 +9,10 @@ from jaxtyping import Float, Int
 
 from jounce.jet import Jet
 from jounce.kinematics import Motion, Status
-from jounce.rigid import PlanarPose, SpatialPose
+from jounce.rigid import Pose
 from jounce.robot.batches import derivatives
 from jounce.shapes import Numbers
 
-Pose = PlanarPose | SpatialPose
 Coordinates = Mapping[str, Float[Numbers, "_ ... _"]]
 """Taylor coefficients of the coordinates of poses, by name: as `Motion.poses` has them."""
 
@@ -56,6 +55,12 @@ def pose_of(coordinates: Coordinates, pose_type: type[Pose], order: int | None =
             lambda j: Jet.constant(j.coefficients[0], order), pose, is_leaf=lambda x: isinstance(x, Jet)
         )
     return jax.lax.optimization_barrier(pose)  # or XLA computes it again in everything that uses it
+
+
+def cut(coordinates: Coordinates, order: int) -> dict[str, Any]:
+    """Return coordinates to an order of the pose; angular velocities have one coefficient less, and none at order 0."""
+    counts = {name: order + 1 - (name == "angular_velocity") for name in coordinates}
+    return {name: values[: counts[name]] for name, values in coordinates.items() if counts[name]}
 
 
 def plain_derivatives(motion: Motion, coefficients: Float[Numbers, "order *shape time"]) -> np.ndarray:

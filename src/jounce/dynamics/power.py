@@ -10,14 +10,14 @@ from jaxtyping import Float
 from jounce.dynamics.forward import Lanes
 from jounce.dynamics.inverse import MotionForces
 from jounce.dynamics.masses import Gravity, Masses
-from jounce.dynamics.motion_values import Coordinates, Pose, labelled, pose_of
+from jounce.dynamics.motion_values import Coordinates, labelled, pose_of
 from jounce.jet import Jet, dot
 from jounce.jet.algebra import stacked, total
 from jounce.kinematics import Motion
 from jounce.kinematics.compilation import compiled
 from jounce.mechanism.axis_angles import at_lanes
 from jounce.mechanism.system import Group
-from jounce.rigid import PlanarPose
+from jounce.rigid import PlanarPose, Pose
 from jounce.shapes import Numbers
 
 FAINT = 1e-3  # of what turning bodies would move: coefficients that vanish have its rounding, 1e-12 of this or less

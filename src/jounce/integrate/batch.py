@@ -28,6 +28,7 @@ from jounce.mechanism.axis_angles import with_turns
 from jounce.mechanism.builder import referred
 from jounce.mechanism.law_checks import check_laws
 from jounce.mechanism.preconditions import concrete
+from jounce.robot.batches import derivatives
 from jounce.shapes import ArrayLike
 
 LANES = 64  # runs marched together: more fall out of the cache
@@ -208,12 +209,11 @@ class _Runs:
     @property
     def outputs(self) -> dict[str, np.ndarray]:
         """See `Batch`."""
-        factorials = np.cumprod([1.0, *range(1, self.order + 1)])[:, None]
         found = {}
         for which, values in self._values.items():
             for k, name in enumerate(self.parametric.model.outputs[which]):
-                derivatives = values[..., k] * factorials[: values.shape[2]]
-                found[name] = derivatives[..., 0] if derivatives.shape[-1] == 1 else derivatives
+                plain = np.moveaxis(np.asarray(derivatives(np.moveaxis(values[..., k], 2, 0))), 0, 2)
+                found[name] = plain[..., 0] if plain.shape[-1] == 1 else plain
         return {name: found[name] for name in self.parametric.mechanism.outputs if name in found}
 
     def lots(self, runs: np.ndarray) -> list[np.ndarray]:

@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from jounce.dynamics.forward import Equations, Lanes, State, with_ground
+from jounce.dynamics.inverse import force_names
 from jounce.dynamics.outputs import is_turning
 from jounce.integrate.events import INTERPOLATION, NODES
 from jounce.integrate.methods import evaluated
@@ -65,7 +66,7 @@ def mobility_of(equations: Equations, inverse: Float[Numbers, "size size batch"]
 
 def watched_names(model: Model) -> list[str]:
     """Return the names of the forces and drivers of a model, in the order in which they are looked at."""
-    return [f"forces.{name}" for members in model.forces for name in members] + list(model.drivers)
+    return [f"forces.{name}" for name in force_names(model)] + list(model.drivers)
 
 
 def look_ahead(

@@ -10,7 +10,8 @@ from jaxtyping import Float
 
 from jounce.constraints import AbstractConstraint
 from jounce.dynamics.forward import State
-from jounce.dynamics.motion_values import Coordinates
+from jounce.dynamics.inverse import force_names
+from jounce.dynamics.motion_values import Coordinates, cut, pose_of
 from jounce.dynamics.start import ConsistentStart, consistent_start
 from jounce.errors import MechanismError, SolveError
 from jounce.integrate.events import Event, EventDetector, pose_coordinates
@@ -195,8 +196,7 @@ def _unfit(start: ConsistentStart, state: State, instant: float) -> str:
         return ""
     pose = start.equations.pose(state)
     fit = np.asarray(system.finite_forces(pose, Jet.variable(np.array([[instant]]), 1)))[:, 0]
-    names = [name for members in start.model.forces for name in members]
-    return ", ".join(f"forces.{name}" for name, good in zip(names, fit, strict=True) if not good)
+    return ", ".join(f"forces.{n}" for n, good in zip(force_names(start.model), fit, strict=True) if not good)
 
 
 def unfit_rates(start: ConsistentStart, coordinates: Coordinates, instant: float) -> str:
@@ -215,8 +215,7 @@ def unfit_rates(start: ConsistentStart, coordinates: Coordinates, instant: float
     order = min(int(np.argmin(np.append(known, False))) - 1, FEW)
     if order < 1:
         return ""
-    levels = {name: part[: order + 1 - (name == "angular_velocity")] for name, part in coordinates.items()}
-    pose = start.model.pose_type.from_coordinates({name: Jet(tuple(part)) for name, part in levels.items()})
+    pose = pose_of(cut(coordinates, order), start.model.pose_type)
     clock, found = Jet.variable(np.array([[instant]]), order), []
     for group, members in zip(start.equations.system.forces, start.model.forces, strict=True):
         sizes = np.stack([np.asarray(c) for c in group.force(pose, clock).dense().coefficients])

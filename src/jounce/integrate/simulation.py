@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from jounce.dynamics.energies import body_energy, energy_of_forces
 from jounce.dynamics.forward import Equations, Instants, Lanes, State, expand
-from jounce.dynamics.motion_values import Coordinates, in_chunks, pose_of
+from jounce.dynamics.motion_values import Coordinates, cut, in_chunks, pose_of
 from jounce.dynamics.start import ConsistentStart
 from jounce.integrate.events import NODES, WIDTHS, at_nodes, pose_coordinates, series_of
 from jounce.integrate.lookahead import watched_names
@@ -191,9 +191,8 @@ class Simulation(Motion):
     def _checked(self) -> list[np.ndarray]:
         """Energy, drift and kinetic energy."""
         pose_type, coordinates = self.poses
-        low = {name: values[: 2 - (name == "angular_velocity")] for name, values in coordinates.items()}
         equations = self._start.equations.near(self._angles)
-        found = _checks(equations, low, self.time[None], pose_type)
+        found = _checks(equations, cut(coordinates, 1), self.time[None], pose_type)
         return [np.where(self.status == Status.OK, part, np.nan) for part in found]
 
 

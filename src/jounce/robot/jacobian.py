@@ -77,6 +77,7 @@ def jacobian(
 def twist(tree: Tree, q: Series, place: Frame) -> Jet:
     """Return the velocity of a point and the angular velocity of its link, (6, batch), one order shorter than q."""
     frame = link_frame(tree, q, place)
+    assert frame.angular_velocity is not None  # there are velocities
     return concatenate([frame.position.differentiate(), frame.angular_velocity])
 
 

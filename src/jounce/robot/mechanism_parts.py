@@ -207,7 +207,7 @@ class RobotParts:
             whole = Inertia.total(parts) if parts else None
             found[name] = Body(
                 at.position[0].tolist(),
-                orientation=from_rotation_matrices(at.rotation[0]).tolist(),
+                orientation=from_rotation_matrices(np.asarray(at.rotation[0])).tolist(),
                 mass=None if whole is None else whole.mass,
                 inertia=None if whole is None else whole.tensor + armature.get(name, 0.0),
                 center_of_mass=None if whole is None else whole.center_of_mass,
