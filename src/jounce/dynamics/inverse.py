@@ -97,7 +97,8 @@ class MotionForces:
     def multipliers(self) -> np.ndarray:
         """Multipliers of the rows of all residuals, as Taylor coefficients, (levels, rows, time)."""
         system = dataclasses.replace(self.model.system, outputs=())
-        unjoined = dataclasses.replace(system, groups=(), cells=None, row_scale=None)
+        nothing = np.zeros((0, 0), np.int32)
+        unjoined = dataclasses.replace(system, groups=(), cells=nothing, row_scale=np.zeros((0, 1)))
         square = system.cells.shape[0] == system.cells.shape[1]
 
         def chunk(lanes: np.ndarray) -> Any:
