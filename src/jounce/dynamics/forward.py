@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Float
+from jaxtyping import Bool, Float, Int
 
 from jounce.dynamics.loads import inertia_forces, mass_matrices
 from jounce.dynamics.masses import Gravity, Masses
@@ -30,7 +30,11 @@ from jounce.shapes import Numbers
 
 Instants = Float[Numbers, "1 batch"]
 Lanes = Float[Numbers, " batch"]
-"""One number for each run of a batch."""
+"""One number for each run of a batch; of `Flags` and `Indices` alike."""
+Flags = Bool[Numbers, " batch"]
+Indices = Int[Numbers, " batch"]
+Matrices = Float[Numbers, "size size batch"]
+"""Of the equations of motion, or their inverses."""
 Rows = Float[Numbers, "row batch"]
 Shifts = Float[Numbers, "shift body batch"]
 """One vector for each body, such as a position or a velocity."""
@@ -171,7 +175,7 @@ class Equations(eqx.Module):
         spins = quaternion_spins(state.attitude)
         return 0.5 * total(spin * part for spin, part in zip(spins, jnp.split(state.spin, 3), strict=True))
 
-    def matrix(self, state: State, time: Instants) -> Float[Numbers, "size size batch"]:
+    def matrix(self, state: State, time: Instants) -> Matrices:
         """Return the matrix of the unknown accelerations and multipliers, scaled."""
         jacobian = self.system.jacobian(self.still(state.position, state.attitude), Jet([time]))
         return saddle_point(self.mass_matrix(state), jacobian)
@@ -256,7 +260,7 @@ def expand(
     state: State,
     time: Instants,
     order: int,
-    inverse: Float[Numbers, "size size batch"] | None = None,
+    inverse: Matrices | None = None,
 ) -> Expansion:
     """Return the Taylor coefficients of the motion through a state, to an order.
 

@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float
 
-from jounce.dynamics.forward import Equations, Lanes, State, with_ground
+from jounce.dynamics.forward import Equations, Flags, Indices, Lanes, Matrices, State, with_ground
 from jounce.dynamics.inverse import force_names
 from jounce.dynamics.outputs import is_turning
 from jounce.integrate.events import INTERPOLATION, NODES
@@ -48,12 +48,12 @@ class Lookahead(NamedTuple):
     """What was seen ahead; arrays of shape (batch,)."""
 
     step: Lanes  # s, shortened where needed
-    resolved: Bool[Numbers, " batch"]  # whether forces and laws are known over it
-    kink: Int[Numbers, " batch"]  # index in `watched_names` of one that is not, over a step too short to matter, or -1
-    limiting: Int[Numbers, " batch"]  # index of the one for which it was shortened
+    resolved: Flags  # whether forces and laws are known over it
+    kink: Indices  # index in `watched_names` of one that is not, over a step too short to matter, or -1
+    limiting: Indices  # index of the one for which it was shortened
 
 
-def mobility_of(equations: Equations, inverse: Float[Numbers, "size size batch"]) -> Mobility:
+def mobility_of(equations: Equations, inverse: Matrices) -> Mobility:
     """Return how readily generalised forces on each body move the mechanism, from the inverse of the matrix.
 
     The largest acceleration, in rad or sizes of the mechanism by s^2, by a force of one on one of the scaled

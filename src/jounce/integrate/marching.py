@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Bool, Float, Int
 
-from jounce.dynamics.forward import Equations, Expansion, Lanes, State, expand
+from jounce.dynamics.forward import Equations, Expansion, Flags, Indices, Lanes, State, expand
 from jounce.integrate.lookahead import HARMLESS, SHORTEST, Lookahead, look_ahead, mobility_of
 from jounce.integrate.methods import AbstractMethod, Number, near_singular
 from jounce.integrate.projection import projected
@@ -35,13 +35,13 @@ class IntegratorState(NamedTuple):
 
     time: Lanes  # s
     expansion: Expansion
-    refused: Int[Numbers, " batch"]  # number of steps refused from here, one after the other
-    outcome: Int[Numbers, " batch"]  # see Outcome
+    refused: Indices  # number of steps refused from here, one after the other
+    outcome: Indices  # see Outcome
     drift: Lanes  # largest distance from the constraints before a projection, rad or sizes of the mechanism
     begun: Lanes  # when the runs began, s
     mobility: Float[Numbers, "body batch"]  # how readily forces move the bodies here, as `mobility_of` gives it
-    singular: Bool[Numbers, " batch"]  # whether the equations of motion are near to singular here
-    blocked: Int[Numbers, " batch"]  # index of the force or law over which no step is possible from here, or -1
+    singular: Flags  # whether the equations of motion are near to singular here
+    blocked: Indices  # index of the force or law over which no step is possible from here, or -1
     angles: AnglesOfForces  # about axes, that forces measure here, with their turns, rad, as `measured` gives them
 
 
@@ -188,7 +188,7 @@ def march(
     return jax.lax.while_loop(unfinished, iterate, (current, kept, 0))
 
 
-def _lasting(kick: Lanes, step: Lanes, span: Lanes, bound: Lanes, current: IntegratorState) -> Bool[Numbers, " batch"]:
+def _lasting(kick: Lanes, step: Lanes, span: Lanes, bound: Lanes, current: IntegratorState) -> Flags:
     """Tell where a kink at the beginning of a step kicks bodies so that they move by more than is harmless in the run.
 
     What is left of it in the accelerations at the end is no next term of a series there: `kick` is the displacement
@@ -204,6 +204,6 @@ def _kept(expansion: Expansion) -> Expansion:
     return expansion._replace(acceleration=expansion.acceleration[:1], multipliers=expansion.multipliers[:1])
 
 
-def _finite(expansion: Expansion) -> Bool[Numbers, " batch"]:
+def _finite(expansion: Expansion) -> Flags:
     parts = [jnp.all(jnp.isfinite(x.reshape(-1, x.shape[-1])), axis=0) for x in jax.tree.leaves(expansion)]
     return jnp.all(jnp.stack(parts), axis=0)

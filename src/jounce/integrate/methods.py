@@ -8,9 +8,9 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
-from jounce.dynamics.forward import Equations, Expansion, Lanes, State
+from jounce.dynamics.forward import Equations, Expansion, Flags, Lanes, Matrices, State
 from jounce.errors import JounceError
 from jounce.shapes import Numbers
 
@@ -55,7 +55,7 @@ class AbstractMethod(eqx.Module):
         """
 
     def prepared(
-        self, expansion: Expansion, length: Number, tolerance: Number, singular: Bool[Numbers, " batch"]
+        self, expansion: Expansion, length: Number, tolerance: Number, singular: Flags
     ) -> tuple[Expansion, Lanes, Lanes]:
         """Return the expansion as the step shall use it, how far that may go, s, and by which tolerance to judge it.
 
@@ -103,13 +103,13 @@ def _horner(
     return value
 
 
-def near_singular(equations: Equations, inverse: Float[Numbers, "size size batch"]) -> Bool[Numbers, " batch"]:
+def near_singular(equations: Equations, inverse: Matrices) -> Flags:
     """Tell where rows of the constraints are about to depend on each other, from the inverse of the matrix."""
     columns = equations.system.cells.shape[1]
     return jnp.max(jnp.abs(inverse[columns:, columns:]), axis=(0, 1), initial=0.0) > BRACED
 
 
-def _drowned(sizes: Sizes) -> Bool[Numbers, " batch"]:
+def _drowned(sizes: Sizes) -> Flags:
     """Tell where the upper coefficients may be rounding that grows geometrically.
 
     A force of which only the foot has been met grows so too: near a singular position alone is it rounding.
@@ -184,7 +184,7 @@ class Taylor(AbstractMethod):
         return reach(sizes, count // 2) * tolerance ** (1.0 / count)
 
     def prepared(
-        self, expansion: Expansion, length: Number, tolerance: Number, singular: Bool[Numbers, " batch"]
+        self, expansion: Expansion, length: Number, tolerance: Number, singular: Flags
     ) -> tuple[Expansion, Lanes, Lanes]:
         """Return the series cut where it carries furthest, and how far that is.
 

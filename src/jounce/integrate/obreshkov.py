@@ -15,9 +15,9 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
-from jounce.dynamics.forward import Equations, Expansion, Lanes, State, expand
+from jounce.dynamics.forward import Equations, Expansion, Flags, Lanes, State, expand
 from jounce.errors import JounceError
 from jounce.integrate.methods import ROUNDING, AbstractMethod, Number, Sizes, check_step, evaluated, reach
 from jounce.jet.algebra import total
@@ -181,7 +181,7 @@ def _size(change: State, measure: tuple[Any, ...], *, signed: bool = False) -> L
     return jnp.max(jnp.stack([jnp.max(x, axis=(0, 1)) for x in sizes]), axis=0)
 
 
-def _settled(change: Lanes, before: Lanes) -> Bool[Numbers, " batch"]:
+def _settled(change: Lanes, before: Lanes) -> Flags:
     """Tell where an iteration has come to its end, or can come to none."""
     return (
         (change <= CONVERGED) | ((change <= STALLED) & (change >= before)) | ~jnp.isfinite(change) & (change != jnp.inf)

@@ -4,21 +4,17 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Float
 
-from jounce.dynamics.forward import Attitudes, Equations, Instants, State
+from jounce.dynamics.forward import Attitudes, Equations, Instants, Lanes, Matrices, State
 from jounce.jet import Jet
 from jounce.kinematics.linear import DenseFactor
-from jounce.shapes import Numbers
 
 MOST_ITERATIONS = 10
 CLOSE = 4e-15  # so near to where the matrix was inverted, in the same unit, the inverse is the same but for rounding
 ROUNDING = 1e-15  # a correction this small, in rad or sizes of the mechanism, leaves nothing to correct
 
 
-def projected(
-    equations: Equations, state: State, time: Instants
-) -> tuple[State, Float[Numbers, " batch"], Float[Numbers, "size size batch"]]:
+def projected(equations: Equations, state: State, time: Instants) -> tuple[State, Lanes, Matrices]:
     """Return the nearest state that fulfils the constraints and their rates, and how far positions moved.
 
     The correction of positions is that of least kinetic energy, were it a velocity; that of velocities likewise.

@@ -50,7 +50,7 @@ class RobotParts:
 
     def __init__(self, robot: AbstractRobot, kept: set[str], forces: Any, outputs: Any):
         self.robot, self.tree = robot, robot.opened().tree
-        self.moving = [joint for joint in robot.joints.values() if joint.moving]
+        self.moving = robot.moving_joints
         if GROUND in robot.moving_links:
             raise RobotError("a link of this name moves; rename it, it stands for the base", name="links", value=GROUND)
         elements = [*(forces or {}).values(), *(x for x in (outputs or {}).values() if not isinstance(x, str))]
