@@ -142,6 +142,7 @@ def shell(script, cwd=None, **environment):
     return subprocess.run(["bash", "-c", line], check=False, **given)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "redirection, reason", [(">/dev/full", "No space left on device"), (">&-", "Bad file descriptor")]
 )
@@ -203,6 +204,7 @@ def on_terminal(columns, *arguments, **environment):
     return shown.decode()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "columns, environment", [(80, {"COLUMNS": "0"}), (40, {}), (80, {"TERM": "dumb"}), (0, {"COLUMNS": "\u00b2"})]
 )

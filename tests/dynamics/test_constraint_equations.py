@@ -575,6 +575,7 @@ def flap():
     )
 
 
+@pytest.mark.slow
 def test_equations_of_motion_in_space_with_frames_drawn_anyhow():
     """Newton and Euler about the origin of the body, by NumPy; the first rates by differences of order eight."""
     mechanism, h = flap(), 1e-2

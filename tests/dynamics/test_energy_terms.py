@@ -65,6 +65,7 @@ def found_terms(terms, sample, body=-1):
     return np.array([part[sample, 0, body] for part in parts])
 
 
+@pytest.mark.slow
 @ABOUT
 @pytest.mark.parametrize("p", range(3))
 def test_equations_082_to_106_each_term_is_its_integral(p, about):

@@ -90,6 +90,7 @@ def test_steps_over_a_jump_and_a_kink_cost_no_digits_and_are_told():
     assert max(jump.steps, kink.steps) < 20
 
 
+@pytest.mark.slow
 def test_a_force_that_ends_is_named_with_the_time():
     motion = jn.simulate(sled(N=1.0, end=1.0), [0.0, 0.5, 1.5, 2.0], 1, strict=False)
     assert [jn.Status(s).name for s in motion.status] == ["OK", "OK", "INADMISSIBLE", "NOT_REACHED"]

@@ -54,6 +54,7 @@ def closed_form(time, orders=5, wound=WOUND):
 KINDS = ["spring", pytest.param("torque", marks=pytest.mark.slow)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_spring_wound_up_by_three_turns_swings_three_turns_to_either_side(kind):
     found = released("spatial", kind)

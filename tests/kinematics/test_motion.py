@@ -62,6 +62,7 @@ def test_a_point_of_the_ground_stands_still(planar):
     np.testing.assert_array_equal(planar.point("ground", [1.0, 2.0]).values[:, 1:], 0)
 
 
+@pytest.mark.slow
 def test_spatial_angular_velocity_in_both_frames(spatial):
     axis = np.array([1.0, 2.0, 2.0]) / 3
     rate = np.pi * np.cos(np.pi * TIME)

@@ -52,6 +52,7 @@ def test_rotation_about_an_oblique_axis():
     np.testing.assert_allclose(motion.outputs["angle"][:, 0], 3 * TURN * np.array([0, 0.5, 1]), atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lead", [0.01, -0.01])
 def test_screw_keeps_count_of_its_turns(lead):
     time = np.array([0.0, 0.4, 1.0])
@@ -60,6 +61,7 @@ def test_screw_keeps_count_of_its_turns(lead):
     np.testing.assert_allclose(motion.outputs["p"][:, 1, 2], 30 * lead, rtol=1e-13)
 
 
+@pytest.mark.slow
 def test_screw_driven_by_its_slide_turns():
     time = np.array([0.0, 0.4, 1.0])
     motion = jn.solve(screw(0.01, law(rate=0.2), driven="slide"), time, order=1)

@@ -29,6 +29,7 @@ def printed_screw(distance_driver):
     )
 
 
+@pytest.mark.slow
 def test_screw_as_printed_turns_without_advancing():
     motion = jn.solve(printed_screw(drivers.SpatialSlideDriver(BODIES, ORIGIN, ORIGIN, Z, 0.0)), TIME, order=4)
     np.testing.assert_allclose(motion.outputs["angle"][:, 0], 3 * TIME, atol=1e-12)

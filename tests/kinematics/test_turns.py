@@ -179,6 +179,7 @@ def angles_of_law(start, rate, wave, time):
     ) * np.sin(phase)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("start, rate", LAWS.values(), ids=LAWS)
 def test_springs_in_space_count_turns_on_any_grid_as_in_the_plane(start, rate):
     plane = jn.solve(wound(start, rate, "planar"), GRIDS[1]).outputs
@@ -208,6 +209,7 @@ def test_energies_and_powers_have_the_turns_of_the_forces():
     assert float((abs(balance["residual"]) / balance["scale"]).max()) < 1e-13
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rule, turn", [("t", 0.0), ("7.5 + t", 7.5), ("-100 + t", -100.0)])
 def test_about_axes_that_tilt_too_and_for_outputs_asked_for_later(rule, turn):
     mechanism = shafts(rule)
@@ -226,6 +228,7 @@ def test_about_axes_that_tilt_too_and_for_outputs_asked_for_later(rule, turn):
         assert np.abs(motion.outputs["second"][:, 0] - turn - np.array(grid)).max() < 0.1
 
 
+@pytest.mark.slow
 def test_instants_that_failed_have_no_torque():
     mechanism = wound(0.5, 1.0)
     motors = {**mechanism.drivers, "motor_first": drivers.RotationDriver(("ground", "first"), Z, "7*t + sqrt(4 - t)")}

@@ -103,6 +103,7 @@ def turning():
     return jn.solve(gimbal(), [0.0, 0.7, 1.0, 2.9, 3.1], order=ORDER)
 
 
+@pytest.mark.slow
 def test_angles_are_the_laws_of_the_drivers_over_turns_between_instants(turning):
     """Steps of up to two turns: instants alone would not tell how many."""
     assert turning.outputs["angles"].shape == (5, ORDER + 1, 3)
@@ -251,6 +252,7 @@ outputs:
 """
 
 
+@pytest.mark.slow
 def test_files_hold_every_form(tmp_path):
     path = tmp_path / "rotor.yaml"
     path.write_text(FILE)

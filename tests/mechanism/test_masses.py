@@ -112,6 +112,7 @@ def test_what_no_initial_condition_is(initial, message):
         with_initial(**initial)
 
 
+@pytest.mark.slow
 def test_forces_do_not_bear_on_prescribed_motion_and_joint_names_may_be_used_again():
     brake = jn.forces.Torque(("ground", "crank"), "-v")
     given = dataclasses.replace(crank("t"), forces=dict.fromkeys(crank("t").joints, brake))

@@ -30,6 +30,7 @@ def attitude_series(body):
     return table
 
 
+@pytest.mark.slow
 @SEEDS
 def test_mixed_time_terms_of_jerk_and_jounce_in_body_axes(seed):
     """A constraint on attitude in which time and turning mix, against its derivatives along a motion."""

@@ -80,6 +80,7 @@ def test_general_equations_give_the_planar_slide_driver(seed):
     assert general.equation_005_body_axes(D, rates) == pytest.approx(planar.equation_049(*five, drive), abs=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rheonomic", [False, True])
 def test_general_equations_with_mixed_derivatives(rheonomic):
     """A constraint where time and coordinates mix, against the derivatives along a polynomial motion."""

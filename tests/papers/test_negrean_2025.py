@@ -23,6 +23,7 @@ def histories():
     return {name: history(motion) for name, motion in CASES.items()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_equations_141_to_146_beside_the_library(histories, name):
     found = histories[name]

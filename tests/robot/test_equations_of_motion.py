@@ -98,6 +98,7 @@ def test_parts():
     assert not jn.bias_forces(pair.robot, q, parts=()).any()
 
 
+@pytest.mark.slow
 def test_parts_with_rates_of_joints_that_follow():
     robot = random_robot(12, 4, tree=False, prismatic=0.4, mimic=0.5, fixed=0.0)
     assert len(robot.joint_names) < len(robot.moving_links)

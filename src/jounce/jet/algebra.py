@@ -175,23 +175,21 @@ class Jet:
         return self
 
     def __add__(self, other: "Quantity") -> "Jet":
-        if isinstance(other, Jet):
-            return Jet(map(plus, self.coefficients, other.coefficients))._filled()
-        return self._shift(plus(self.coefficients[0], other))
+        return self._combined(plus, other)
 
     __radd__ = __add__
 
     def __sub__(self, other: "Quantity") -> "Jet":
-        if isinstance(other, Jet):
-            return Jet(map(minus, self.coefficients, other.coefficients))._filled()
-        return self._shift(minus(self.coefficients[0], other))
+        return self._combined(minus, other)
 
     def __rsub__(self, other: "Quantity") -> "Jet":
         return -self + other
 
-    def _shift(self, first: Real) -> "Jet":
-        """Replace the value; a constant of larger shape than the jet makes the other coefficients follow."""
-        return Jet((first, *self.coefficients[1:]))._filled()
+    def _combined(self, combine: Product, other: "Quantity") -> "Jet":
+        """Add or subtract; a constant of larger shape than the jet makes the other coefficients follow."""
+        if isinstance(other, Jet):
+            return Jet(map(combine, self.coefficients, other.coefficients))._filled()
+        return Jet((combine(self.coefficients[0], other), *self.coefficients[1:]))._filled()
 
     def _filled(self) -> "Jet":
         """Give all coefficients the shape of the first, where a sum of unequal shapes left some as they were."""
@@ -240,13 +238,7 @@ def _checked(order: int) -> int:
 
 
 def stacked(jet: Jet) -> Any:
-    """Return the Taylor coefficients of a jet as one array, order first.
-
-    Examples
-    --------
-    >>> stacked(Jet.variable(3.0, 2)).tolist()
-    [3.0, 1.0, 0.0]
-    """
+    """Return the Taylor coefficients of a jet as one array, order first."""
     return jnp.stack(jet.dense().coefficients)
 
 

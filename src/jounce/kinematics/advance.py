@@ -8,7 +8,7 @@ nearest zero of that determinant is told, real or complex, beyond which no step 
 """
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -22,10 +22,9 @@ from jounce.kinematics.compilation import compiled
 from jounce.kinematics.linear import DenseFactor
 from jounce.kinematics.status import Status
 from jounce.mechanism.system import System
-from jounce.rigid import PlanarPose, Pose, SpatialPose
+from jounce.rigid import Pose
 from jounce.shapes import Numbers
 
-OfOneSpace = TypeVar("OfOneSpace", PlanarPose, SpatialPose)
 Lanes = Float[Numbers, " batch"]
 Truths = Bool[Numbers, " batch"]
 State = tuple[Mapping[str, Numbers], tuple[Numbers, ...], Numbers]
@@ -53,9 +52,7 @@ class Arrival(NamedTuple):
     radius: Lanes  # s, the same by the first three Taylor terms only, which rounding spoils least
     deviation: Lanes  # departure from the prediction, over how far that moves
     sign: Lanes  # of the determinant of the Jacobian
-    turnover: Float[
-        Numbers, " 1"
-    ]  # 1/s, how fast the first lane nears (< 0) or leaves a singular position; 0 unless surveyed
+    turnover: Lanes  # 1/s, how fast the first lane nears (< 0) or leaves a singular position; 0 unless surveyed; (1,)
     pivot_ratio: Lanes  # smallest pivot of the Jacobian over the largest
     admissible: Bool[Numbers, "driver batch"]  # whether each driver has a permitted value
     finite: Bool[Numbers, "1+outputs batch"]  # whether all derivatives wanted are, of the pose and of each output
@@ -141,7 +138,7 @@ def differentiated(system: System, pose: Pose, factor: DenseFactor, time: Float[
     return pose
 
 
-def _departures(system: System, pose: OfOneSpace, predicted: OfOneSpace) -> Float[Numbers, "body batch"]:
+def _departures(system: System, pose: Pose, predicted: Any) -> Float[Numbers, "body batch"]:
     """Return how far each moving body is from its prediction, rad or sizes of the mechanism: (bodies, batch)."""
     shift, turn = pose.separation(predicted)
     return jnp.maximum(_size(shift) / system.column_scale[0], _size(turn))[1:]

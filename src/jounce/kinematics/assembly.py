@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 import jax
 import numpy as np
+from jaxtyping import Float
 
 from jounce.constraints.drivers import DistanceDriver
 from jounce.constraints.planar import DoubleRevolute
@@ -26,6 +27,9 @@ from jounce.kinematics.status import Status
 from jounce.mechanism import Model
 from jounce.mechanism.axis_angles import measures_angle, with_angles, with_datums
 from jounce.mechanism.builder import pose_at, referred
+from jounce.mechanism.system import System
+from jounce.rigid import Pose
+from jounce.shapes import Numbers
 
 MAX_STEPS = 100
 RANK_TOLERANCE = 1e-9
@@ -34,7 +38,13 @@ SETTLED = 1e-12  # rad, by which the angles of drivers may be counted otherwise
 
 
 @compiled("pose_type")
-def _moved(system: Any, coordinates: dict[str, Any], increment: Any, instant: Any, pose_type: type) -> Any:
+def _moved(
+    system: System,
+    coordinates: dict[str, Numbers],
+    increment: Float[Numbers, " column"],
+    instant: Float[Numbers, ""],
+    pose_type: type[Pose],
+) -> Any:
     """Return the coordinates after an increment, with residual and Jacobian there, for one instant."""
     pose = pose_at(coordinates, pose_type)
     pose = pose.displaced(*system.coordinates(increment[:, None], pose.shifts))
@@ -56,12 +66,15 @@ class Trial(NamedTuple):
         By how much each row is open, rad or sizes of the mechanism.
     jacobian : array of shape (rows, columns)
         Scaled, there.
+    closed : bool
+        Whether all gaps are closed, to the tolerance of the last correction.
     """
 
     coordinates: Coordinates
-    scale: np.ndarray
-    gaps: np.ndarray
-    jacobian: np.ndarray
+    scale: Float[np.ndarray, " row"]
+    gaps: Float[np.ndarray, " row"]
+    jacobian: Float[np.ndarray, "row column"]
+    closed: bool
 
 
 def assemble(model: Model, instant: float, tolerance: float, *, free: bool = False) -> tuple[Model, Coordinates]:
@@ -100,7 +113,7 @@ def assemble(model: Model, instant: float, tolerance: float, *, free: bool = Fal
         model, _ = referred(model, model.guess, instant, model.prescribed)
         return dataclasses.replace(model, system=jax.device_put(model.system)), model.guess
     model, found = _settled(model, instant, tolerance)
-    check_assembled(model, found, instant, tolerance, free=free)
+    check_assembled(model, found, instant, free=free)
     check_mobility(model, found.jacobian, free=free)
     system = jax.device_put(dataclasses.replace(model.system, row_scale=found.scale[:, None]))
     return dataclasses.replace(model, system=system), found.coordinates
@@ -114,17 +127,17 @@ def _settled(model: Model, instant: float, tolerance: float) -> tuple[Model, Tri
     """
     model, start = _turned(model, instant, tolerance)
     found, told = put_together(model, instant, tolerance, start), model.prescribed
-    if not closed(found.gaps, tolerance) and any(map(measures_angle, model.system.groups)):
+    if not found.closed and any(map(measures_angle, model.system.groups)):
         # angles counted from a tilted guess may be far off: first the joints alone, with the drivers as they are
         lag = _lag(model, instant)
         begin = found if lag is None else put_together(model, instant, tolerance, lag=lag)
-        if closed(begin.gaps, tolerance):
+        if begin.closed:
             model, _ = referred(model, begin.coordinates, instant, told)
             found = put_together(model, instant, tolerance, begin.coordinates)
-    if "angle" in found.coordinates and start is None and closed(found.gaps, tolerance):
+    if "angle" in found.coordinates and start is None and found.closed:
         found = _nearest(model, found, instant)
     for _ in range(MAX_DATUMS):
-        if not closed(found.gaps, tolerance):
+        if not found.closed:
             return model, found
         model, away = referred(model, found.coordinates, instant, told)
         if away <= SETTLED:
@@ -143,7 +156,7 @@ def _turned(model: Model, instant: float, tolerance: float) -> tuple[Model, Coor
     if lag is None or not np.pi < lag.angle < np.inf:
         return model, None
     begin = put_together(model, instant, tolerance, lag=lag)
-    if not closed(begin.gaps, tolerance):
+    if not begin.closed:
         return model, None
     found = turned_to_laws(model, lag, begin.coordinates, moved)
     if found is None:
@@ -235,15 +248,11 @@ def put_together(
         if size <= tolerance:
             break
     gaps = np.where(np.isfinite(jacobian).all(axis=1), scale * residual, np.nan)
-    return Trial(coordinates, scale, gaps, scale[:, None] * jacobian)
+    closed = bool(np.all(np.abs(gaps) <= max(1e3 * tolerance, 1e-9)))
+    return Trial(coordinates, scale, gaps, scale[:, None] * jacobian, closed)
 
 
-def closed(gaps: np.ndarray, tolerance: float) -> bool:
-    """Tell whether all gaps are closed, to a tolerance of the last correction."""
-    return bool(np.all(np.abs(gaps) <= max(1e3 * tolerance, 1e-9)))
-
-
-def check_assembled(model: Model, found: Trial, instant: float, tolerance: float, *, free: bool = False) -> None:
+def check_assembled(model: Model, found: Trial, instant: float, *, free: bool = False) -> None:
     """Raise AssemblyError, with the joints concerned and by how much they stay open, where gaps are not closed.
 
     What is missing for every motion to be prescribed is told too, unless degrees of freedom may be left (`free`).
@@ -254,7 +263,7 @@ def check_assembled(model: Model, found: Trial, instant: float, tolerance: float
         named = ", ".join(unknown)
         message = f"no finite value at t = {instant:g} s: {named}; check motion laws and the starting guess"
         raise AssemblyError(message, status=Status.INADMISSIBLE)
-    if closed(gaps, tolerance):
+    if found.closed:
         return
     gaps = np.abs(gaps)
     worst = np.argsort(-gaps)
@@ -313,7 +322,7 @@ def _squared_lengths(model: Model, instant: float) -> dict[str, float]:
     return found
 
 
-def check_mobility(model: Model, jacobian: np.ndarray, *, free: bool = False) -> None:
+def check_mobility(model: Model, jacobian: Float[np.ndarray, "row column"], *, free: bool = False) -> None:
     """Raise MobilityError, with the bodies and joints concerned, unless the Jacobian is square and regular.
 
     Where degrees of freedom may be left, it is enough that no constraint is redundant.
@@ -343,13 +352,15 @@ def check_mobility(model: Model, jacobian: np.ndarray, *, free: bool = False) ->
     raise MobilityError("; ".join(parts))
 
 
-def split(jacobian: np.ndarray) -> tuple[np.ndarray, int, np.ndarray]:
+def split(
+    jacobian: Float[np.ndarray, "row column"],
+) -> tuple[Float[np.ndarray, "row row"], int, Float[np.ndarray, "column column"]]:
     """Return the left vectors, the rank and the right vectors of a scaled Jacobian."""
     left, sizes, right = np.linalg.svd(jacobian)
     return left, int(np.sum(sizes > RANK_TOLERANCE * sizes.max(initial=0.0))), right
 
 
-def redundant_rows(model: Model, combinations: np.ndarray) -> str:
+def redundant_rows(model: Model, combinations: Float[np.ndarray, "row combination"]) -> str:
     """Name the joints and drivers in combinations of rows that vanish, shape (rows, combinations)."""
     names = tuple(dict.fromkeys(model.rows))
     weights = np.linalg.norm(combinations, axis=1)
@@ -357,13 +368,13 @@ def redundant_rows(model: Model, combinations: np.ndarray) -> str:
     return _concerned(by_name, names)
 
 
-def freely_moving(model: Model, directions: np.ndarray) -> str:
+def freely_moving(model: Model, directions: Float[np.ndarray, "direction column"]) -> str:
     """Name the bodies that move along directions of the coordinates, shape (directions, columns)."""
     sizes = np.linalg.norm(directions.reshape(len(directions), len(model.bodies), -1), axis=(0, 2))
     return _concerned(sizes, model.bodies)
 
 
-def _concerned(weights: np.ndarray, names: tuple[str, ...]) -> str:
+def _concerned(weights: Float[np.ndarray, " name"], names: tuple[str, ...]) -> str:
     order = np.argsort(-weights, kind="stable")
     chosen = [names[k] for k in order if weights[k] > 0.05 * weights[order[0]]]
     shown = ", ".join(chosen[:6])

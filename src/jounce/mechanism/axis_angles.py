@@ -13,7 +13,7 @@ from jounce.mechanism.system import Group
 from jounce.shapes import Numbers
 
 Coordinates = Mapping[str, Any]  # of all bodies, the ground first, by name: (..., bodies, batch)
-Quaternions = Float[np.ndarray, "4 *rest"]
+Quaternions = Float[np.ndarray, "4 *#rest"]
 Vectors = Float[np.ndarray, "3 *_"]
 Angles = Float[np.ndarray, "instance batch"]
 PARALLEL = 1e-9  # largest sine between axes that are one

@@ -24,7 +24,7 @@ from jounce.mechanism.axis_angles import (
     with_datums,
 )
 from jounce.mechanism.mechanism import GROUND, Mechanism
-from jounce.mechanism.outputs import AbstractOutput
+from jounce.mechanism.outputs import AbstractMotionOutput
 from jounce.mechanism.resolve import check_value, resolve
 from jounce.mechanism.system import (
     POSITION_COMPONENTS,
@@ -101,55 +101,45 @@ def build(mechanism: Mechanism, like: Model | None = None) -> Model:
     ExpressionError
         If an expression uses a name that is not a parameter.
     """
-    parameters = mechanism.parameter_values
-    components = POSITION_COMPONENTS[mechanism.space]
+    parameters, components = mechanism.parameter_values, POSITION_COMPONENTS[mechanism.space]
     body_index = {name: k for k, name in enumerate((GROUND, *mechanism.bodies))}
+
+    def grouped(*kinds: str) -> tuple[tuple[Group, ...], tuple[tuple[str, ...], ...]]:
+        elements = {f"{kind}.{k}": v for kind in kinds for k, v in mechanism.elements[kind].items()}
+        posed = {name: v for name, v in elements.items() if not isinstance(v, AbstractMotionOutput)}
+        return group_elements(posed, parameters, body_index, components)
+
+    groups, names = grouped("joints", "drivers")
+    forces, force_names = grouped("forces")
+    outputs, output_names = grouped("outputs")
+    if like is not None:
+        parts = {"groups": groups, "forces": forces, "outputs": outputs}
+        known = {name: tuple(map(_with_found_of, part, getattr(like.system, name))) for name, part in parts.items()}
+        return dataclasses.replace(like, system=dataclasses.replace(like.system, **known))
+
     pose_type = PlanarPose if components == 2 else SpatialPose
-    guess = starting_guess(mechanism, parameters, components) if like is None else like.guess
-
-    elements = {f"joints.{k}": v for k, v in mechanism.joints.items()}
-    elements |= {f"drivers.{k}": v for k, v in mechanism.drivers.items()}
-    groups, names = group_elements(elements, parameters, body_index, components)
-    if like is None:
-        groups = tuple(_with_sense(_with_offsets(group, pose_type, guess), pose_type, guess) for group in groups)
-    applied = {f"forces.{k}": v for k, v in mechanism.forces.items()}
-    forces, force_names = group_elements(applied, parameters, body_index, components)
-    wanted = {f"outputs.{k}": v for k, v in mechanism.outputs.items() if isinstance(v, AbstractOutput)}
-    outputs, output_names = group_elements(wanted, parameters, body_index, components)
-
-    if like is None:
-        groups, forces, outputs = (with_datums(part, guess) for part in (groups, forces, outputs))
-    else:
-        known = like.system
-        pairs = ((groups, known.groups), (forces, known.forces), (outputs, known.outputs))
-        groups, forces, outputs = (tuple(map(_with_found_of, part, its)) for part, its in pairs)
-
+    guess = starting_guess(mechanism, parameters, components)
+    groups = tuple(_with_sense(_with_offsets(group, pose_type, guess), pose_type, guess) for group in groups)
+    groups, forces, outputs = (with_datums(part, guess) for part in (groups, forces, outputs))
     row_counts = [_row_count(group, pose_type, guess) for group in groups]
-    row_names = [n for members, count in zip(names, row_counts, strict=True) for _ in range(count) for n in members]
+    rows = [n for members, count in zip(names, row_counts, strict=True) for _ in range(count) for n in members]
     drivers = tuple(n for group, members in zip(groups, names, strict=True) if group.is_driver for n in members)
-    length = _size(groups, guess) if like is None else like.length
-    system = System(
-        groups,
-        outputs,
-        jacobian_cells(groups, row_counts, components + pose_type.turns, len(mechanism.bodies)),
-        np.ones((len(row_names), 1)) if like is None else like.system.row_scale,
-        np.array([length] * components + [1.0] * pose_type.turns),
-        len(mechanism.bodies),
-        forces,
-    )
+    length, count = _size(groups, guess), len(mechanism.bodies)
+    cells = jacobian_cells(groups, row_counts, components + pose_type.turns, count)
+    scale = np.array([length] * components + [1.0] * pose_type.turns)
+    history = AttitudeHistory(guess["quaternion"], np.zeros(1)) if components == 3 else None
     return Model(
-        system,
+        System(groups, outputs, cells, np.ones((len(rows), 1)), scale, count, forces),
         pose_type,
         guess,
-        tuple(row_names),
+        tuple(rows),
         drivers,
         _plain(force_names),
         tuple(mechanism.bodies),
         _plain(output_names),
         length,
-        guess if like is None else like.reference,
-        () if like is None else like.prescribed,
-        _history_of(guess) if like is None else like.history,
+        reference=guess,
+        history=history,
     )
 
 
@@ -187,10 +177,6 @@ def referred(
     system = dataclasses.replace(system, groups=groups, forces=forces, outputs=outputs)
     away = departure(model.system.groups, groups)
     return dataclasses.replace(model, system=system, reference=coordinates, prescribed=prescribed), away
-
-
-def _history_of(guess: dict[str, Any]) -> AttitudeHistory | None:
-    return AttitudeHistory(guess["quaternion"], np.zeros(1)) if "quaternion" in guess else None
 
 
 def placed(groups: tuple[Group, ...], model: Model) -> tuple[Group, ...]:

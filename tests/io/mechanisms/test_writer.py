@@ -26,6 +26,7 @@ def bar(motion, **parts):
     return jn.Mechanism(space="planar", **{**settings, **parts})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", [".yaml", ".toml", ".json"])
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda p: p.stem)
 def test_every_example_is_the_same_after_it_was_written(path, suffix, tmp_path):
