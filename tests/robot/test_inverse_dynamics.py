@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.robot.batches import coefficients
+from jounce.jet.derivatives import taylor_coefficients
 from jounce.robot.newton_euler import recursive_newton_euler
 from tests.problems.robots import random_inertia, random_robot, robot_named
 
@@ -220,7 +220,7 @@ def test_jit_vmap_and_two_ways_of_differentiation_agree(torque):
 
 def test_slopes_in_masses_and_centers():
     """Torque is linear in each mass and quadratic in each centre, so that differences of any step are exact."""
-    tree, q = ROBOT.tree, coefficients(jnp.asarray(Q[0, :3])[:, :, None])
+    tree, q = ROBOT.tree, taylor_coefficients(jnp.asarray(Q[0, :3])[:, :, None])
 
     @jax.jit
     def torque(mass, center):

@@ -6,7 +6,8 @@ import jax.numpy as jnp
 
 from jounce.dynamics.driver_coordinates import balanced
 from jounce.kinematics import Motion
-from jounce.robot.batches import Batched, checked_coordinates, whole_number
+from jounce.robot.arguments import checked_coordinates, whole_number
+from jounce.robot.batches import Batched
 from jounce.robot.equations_of_motion import centers_of, partial_velocities, times_inertia, work, work_of_weight
 from jounce.robot.inverse_dynamics import inverse_dynamics
 from jounce.robot.kinematics import body_frames

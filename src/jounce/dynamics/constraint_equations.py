@@ -18,10 +18,11 @@ from jounce.dynamics.inverse import ElementIndex, MotionForces, element_indices
 from jounce.dynamics.loads import mass_matrices
 from jounce.dynamics.masses import Masses, masses_of
 from jounce.dynamics.mechanism_state import MotionAtState, at_state
-from jounce.dynamics.motion_values import Coordinates, cut, in_chunks, plain_derivatives, pose_of
+from jounce.dynamics.motion_values import Coordinates, cut, derivatives_along, in_chunks, pose_of
 from jounce.dynamics.saddle_point import block_diagonal, saddle_point
 from jounce.errors import MechanismError
 from jounce.jet import Jet
+from jounce.jet.derivatives import plain_derivatives
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.assembly import split
 from jounce.kinematics.compilation import compiled
@@ -29,7 +30,6 @@ from jounce.mechanism import Mechanism
 from jounce.mechanism.preconditions import concrete
 from jounce.mechanism.system import System
 from jounce.rigid import Pose
-from jounce.robot.batches import derivatives
 from jounce.shapes import Numbers
 
 COLUMNS = {"planar": ("x", "y", "angle"), "spatial": ("x", "y", "z", "wx", "wy", "wz")}
@@ -244,7 +244,8 @@ def _right_sides(
 def _velocities(motion: Motion, order: int) -> Float[np.ndarray, "time derivative column"]:
     """Return the derivatives of the coordinates from the first on."""
     _, coordinates = motion.poses
-    plain = {name: derivatives(np.asarray(c))[..., 1:, :] for name, c in coordinates.items()}  # without the ground
+    moving = {name: np.asarray(values)[..., 1:, :] for name, values in coordinates.items()}  # without the ground
+    plain = {name: plain_derivatives(values) for name, values in moving.items()}
     turns = plain["angle"][1:, None] if "angle" in plain else plain["angular_velocity"]
     parts = np.concatenate([plain["position"][1 : order + 1], turns[:order]], axis=1)
     columns = motion.model.system.cells.shape[1]
@@ -278,7 +279,7 @@ def _forces(motion: Motion, jacobian: Float[np.ndarray, "time row column"]) -> d
         or (isinstance(motion, MotionAtState) and not _determined(motion, jacobian[0], mass[0]))
     ):
         return found
-    values = plain_derivatives(motion, MotionForces.of(motion).multipliers[:levels][:, _row_order(motion)])
+    values = derivatives_along(motion, MotionForces.of(motion).multipliers[:levels][:, _row_order(motion)])
     return found | {"multipliers": (("time", "derivative", "row"), values, 0)}
 
 

@@ -24,7 +24,8 @@ from jounce.kinematics.compilation import compiled
 from jounce.mechanism.system import Group
 from jounce.rigid import PlanarPose, Pose
 from jounce.rigid.frames import Frames
-from jounce.robot.batches import Batched, checked_coordinates, whole_number
+from jounce.robot.arguments import checked_coordinates, whole_number
+from jounce.robot.batches import Batched
 from jounce.robot.kinematics import body_frames
 from jounce.robot.robot import Robot
 from jounce.robot.tree import Tree

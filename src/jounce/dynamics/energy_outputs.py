@@ -9,7 +9,7 @@ from jounce.constraints.base import Whole
 from jounce.dynamics.energies import energy_coefficients, potential_coefficients
 from jounce.errors import MechanismError, check_name
 from jounce.mechanism import AbstractMotionOutput, Mechanism
-from jounce.robot.batches import whole_number
+from jounce.robot.arguments import whole_number
 
 
 class AbstractEnergyOutput(AbstractMotionOutput):

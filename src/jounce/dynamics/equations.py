@@ -22,7 +22,8 @@ from jounce.dynamics.energies import differentiated, robot_energy
 from jounce.jet import Jet, components
 from jounce.jet.algebra import stacked, total
 from jounce.kinematics import Motion
-from jounce.robot.batches import Batched, checked_coordinates, whole_number
+from jounce.robot.arguments import checked_coordinates, whole_number
+from jounce.robot.batches import Batched
 from jounce.robot.kinematics import body_frames
 from jounce.robot.robot import Robot
 from jounce.robot.tree import Tree

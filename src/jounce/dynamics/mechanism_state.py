@@ -9,6 +9,7 @@ from jaxtyping import Float
 
 from jounce.dynamics.motion_values import Coordinates, cut
 from jounce.errors import MechanismError
+from jounce.jet.derivatives import taylor_coefficients
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.solve import HIGHEST_ORDER
 from jounce.mechanism import Mechanism, Model, build
@@ -16,7 +17,6 @@ from jounce.mechanism.builder import referred
 from jounce.mechanism.law_checks import check_laws
 from jounce.rigid import Pose, SpatialPose
 from jounce.rigid.euler_parameters import euler_parameters
-from jounce.robot.batches import coefficients
 
 
 class MotionAtState(Motion):
@@ -77,7 +77,7 @@ def _coordinates(mechanism: Mechanism, model: Model, state: object) -> Coordinat
         whole = np.stack([np.zeros_like(read[0][name]), *(body[name] for body in read)], axis=-1)[..., None]
         if name == "quaternion":
             whole[0, 0, 0] = 1.0
-        found[name] = coefficients(whole)
+        found[name] = taylor_coefficients(whole)
     return found
 
 

@@ -8,9 +8,9 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from jounce.jet import Jet
+from jounce.jet.derivatives import plain_derivatives
 from jounce.kinematics import Motion, Status
 from jounce.rigid import Pose
-from jounce.robot.batches import derivatives
 from jounce.shapes import Numbers
 
 Coordinates = Mapping[str, Float[Numbers, "_ ... _"]]
@@ -63,9 +63,9 @@ def cut(coordinates: Coordinates, order: int) -> dict[str, Any]:
     return {name: values[: counts[name]] for name, values in coordinates.items() if counts[name]}
 
 
-def plain_derivatives(motion: Motion, coefficients: Float[Numbers, "order *shape time"]) -> np.ndarray:
+def derivatives_along(motion: Motion, coefficients: Float[Numbers, "order *shape time"]) -> np.ndarray:
     """Return plain derivatives, the time first, from Taylor coefficients; NaN at instants that were not solved."""
-    values = np.moveaxis(np.asarray(derivatives(np.asarray(coefficients))), -1, 0)
+    values = np.moveaxis(np.asarray(plain_derivatives(np.asarray(coefficients))), -1, 0)
     values[motion.status != Status.OK] = np.nan
     return values
 
@@ -79,7 +79,7 @@ def labelled(
     """Return plain derivatives as an xarray.DataArray of dimensions time, derivative, and those that are named."""
     import xarray
 
-    values = plain_derivatives(motion, coefficients)
+    values = derivatives_along(motion, coefficients)
     coordinates = {"time": motion.time, "derivative": np.arange(values.shape[1])}
     coordinates |= {axis: list(labels) for axis, labels in axes.items()}
     return xarray.DataArray(values, coordinates, tuple(coordinates), attrs={"units": units} if units else None)

@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from jounce.dynamics.motion_values import in_chunks
 from jounce.errors import RobotError, SampleWarning, TrajectoryError, did_you_mean
-from jounce.robot.batches import whole_number
+from jounce.robot.arguments import whole_number
 from jounce.robot.inverse_dynamics import inverse_dynamics
 from jounce.robot.model import Limits
 from jounce.robot.robot import Robot

@@ -20,6 +20,7 @@ from jounce.integrate.marching import DenseOutput, IntegratorState, Outcome, beg
 from jounce.integrate.methods import AbstractMethod
 from jounce.integrate.simulate import checked_options, instants_of
 from jounce.integrate.simulation import expanded
+from jounce.jet.derivatives import plain_derivatives
 from jounce.jet.turns import whole_periods
 from jounce.kinematics import Status
 from jounce.kinematics.motion import output_series
@@ -28,7 +29,6 @@ from jounce.mechanism.axis_angles import with_turns
 from jounce.mechanism.builder import referred
 from jounce.mechanism.law_checks import check_laws
 from jounce.mechanism.preconditions import concrete
-from jounce.robot.batches import derivatives
 from jounce.shapes import ArrayLike
 
 LANES = 64  # runs marched together: more fall out of the cache
@@ -212,7 +212,7 @@ class _Runs:
         found = {}
         for which, values in self._values.items():
             for k, name in enumerate(self.parametric.model.outputs[which]):
-                plain = np.moveaxis(np.asarray(derivatives(np.moveaxis(values[..., k], 2, 0))), 0, 2)
+                plain = np.moveaxis(np.asarray(plain_derivatives(np.moveaxis(values[..., k], 2, 0))), 0, 2)
                 found[name] = plain[..., 0] if plain.shape[-1] == 1 else plain
         return {name: found[name] for name in self.parametric.mechanism.outputs if name in found}
 

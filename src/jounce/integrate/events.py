@@ -15,7 +15,7 @@ from jounce.jet.turns import counted_by_rates
 from jounce.kinematics.motion import output_series
 from jounce.mechanism import AbstractOutput
 from jounce.mechanism.system import Group
-from jounce.robot.batches import whole_number
+from jounce.robot.arguments import whole_number
 
 _ANGLES = np.pi * (np.arange(20)[::-1] + 0.5) / 20
 NODES = 0.5 + 0.5 * np.cos(_ANGLES)  # of Chebyshev, in a step: steps reach a small part of where their series converge

@@ -1,6 +1,5 @@
 """The result of a solve: outputs and any point of any body, with their derivatives, at every instant."""
 
-import math
 from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
@@ -11,6 +10,7 @@ from jounce.display import Displayed
 from jounce.errors import MechanismError, check_name
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked
+from jounce.jet.derivatives import plain_derivatives
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.status import Status
 from jounce.mechanism import (
@@ -242,8 +242,7 @@ class Motion(Displayed):
     def _derivatives(self, coefficients: np.ndarray) -> np.ndarray:
         """Turn Taylor coefficients (order, component, time) into derivatives (time, derivative[, component])."""
         coefficients = coefficients[: self.order + 1]
-        factorials = np.array([math.factorial(k) for k in range(len(coefficients))], float)
-        values = np.moveaxis(coefficients * factorials[:, None, None], (2, 0, 1), (0, 1, 2))
+        values = np.moveaxis(np.asarray(plain_derivatives(coefficients)), -1, 0)
         values = np.where((self.status == Status.OK)[:, None, None], values, np.nan)
         return values[..., 0] if values.shape[-1] == 1 else values
 

@@ -17,7 +17,8 @@ from jounce.errors import RobotError, did_you_mean
 from jounce.jet import Jet, components, cross, dot
 from jounce.jet.algebra import stacked, total
 from jounce.rigid.frames import Frames
-from jounce.robot.batches import Batched, checked_coordinates, checked_position
+from jounce.robot.arguments import checked_coordinates, checked_position
+from jounce.robot.batches import Batched
 from jounce.robot.kinematics import body_frames
 from jounce.robot.robot import Robot
 from jounce.robot.tree import Tree

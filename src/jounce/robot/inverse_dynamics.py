@@ -10,7 +10,8 @@ from jaxtyping import Float
 from jounce.errors import RobotError, did_you_mean
 from jounce.jet import Jet, concatenate, cross, matvec
 from jounce.jet.algebra import stacked
-from jounce.robot.batches import Batched, checked_coordinates
+from jounce.robot.arguments import checked_coordinates
+from jounce.robot.batches import Batched
 from jounce.robot.equations_of_motion import drive_forces
 from jounce.robot.kinematics import body_frames, place_of
 from jounce.robot.newton_euler import BodyWrenches, recursive_newton_euler

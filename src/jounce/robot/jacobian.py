@@ -7,7 +7,8 @@ from jaxtyping import Float
 
 from jounce.jet import Jet, concatenate, cross
 from jounce.jet.algebra import stacked
-from jounce.robot.batches import Batched, checked_coordinates
+from jounce.robot.arguments import checked_coordinates
+from jounce.robot.batches import Batched
 from jounce.robot.kinematics import body_frames, link_frame, place_of
 from jounce.robot.robot import Robot
 from jounce.robot.tree import Frame, Tree

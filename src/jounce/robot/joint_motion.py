@@ -14,7 +14,8 @@ from jounce.errors import RobotError, SingularityError, did_you_mean
 from jounce.jet.algebra import stacked
 from jounce.kinematics.linear import singular_values
 from jounce.rigid.inertia import finite_numbers
-from jounce.robot.batches import Batched, checked_position, floats
+from jounce.robot.arguments import checked_position, floats
+from jounce.robot.batches import Batched
 from jounce.robot.jacobian import jacobian_jet, twist
 from jounce.robot.kinematics import place_of
 from jounce.robot.robot import Robot

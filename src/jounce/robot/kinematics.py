@@ -14,7 +14,8 @@ from jounce.jet.algebra import stacked, total
 from jounce.rigid.frames import Frames
 from jounce.rigid.inertia import finite_numbers
 from jounce.robot.abstract_robot import AbstractRobot
-from jounce.robot.batches import Batched, checked_coordinates
+from jounce.robot.arguments import checked_coordinates
+from jounce.robot.batches import Batched
 from jounce.robot.tree import Frame, Tree
 from jounce.robot.tree_scan import Series, entries, fill_slots, joint_coordinates, materialised, read_slot, write_slot
 from jounce.shapes import ArrayLike, Numbers
