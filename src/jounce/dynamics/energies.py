@@ -99,9 +99,10 @@ def body_energy(
     Examples
     --------
     >>> import jounce as jn
+    >>> import numpy as np
     >>> angle = jn.Jet([0.0, 2.0, 1.5])  # a disc of 1 kg m^2 that turns in the plane, at 2 rad/s and 3 rad/s^2
-    >>> pose = jn.rigid.PlanarPose.from_jets(jn.Jet.constant([0.0, 0.0], 2), angle)
-    >>> _, rotation = jn.dynamics.body_energy(pose, 1.0, [0.0, 0.0], [[0.5, 0.0], [0.0, 0.5]])
+    >>> pose = jn.rigid.PlanarPose.from_jets(jn.Jet.constant(np.zeros(2), 2), angle)
+    >>> _, rotation = jn.dynamics.body_energy(pose, 1.0, np.zeros(2), 0.5 * np.eye(2))
     >>> float(rotation.coefficients[0])  # (3^2 + 2^4) / 2
     12.5
     """
