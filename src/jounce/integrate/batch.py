@@ -23,7 +23,7 @@ from jounce.jet.turns import whole_periods
 from jounce.kinematics import Status
 from jounce.mechanism import Mechanism, build, check_mechanism
 from jounce.mechanism.axis_angles import with_turns
-from jounce.mechanism.builder import referred
+from jounce.mechanism.builder import with_reference
 from jounce.mechanism.law_checks import check_laws
 from jounce.mechanism.preconditions import concrete
 
@@ -117,7 +117,7 @@ def simulate_batch(
     family = Family(first, nominal.model, names)
     begun = family
     if first.initial:
-        model, _ = referred(build(driven(first)), nominal.model.reference, float(instants[0]))
+        model, _ = with_reference(build(driven(first)), nominal.model.reference, float(instants[0]))
         begun = Family(driven(first), model, names)
     runs = _Runs(family, rows, instants, order, (float(tolerance), float(longest_step), method))
 
