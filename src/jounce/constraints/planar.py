@@ -10,7 +10,8 @@ from jaxtyping import Float
 from jounce.constraints.base import AbstractConstraint, Scalar, Vector, rows
 from jounce.errors import MechanismError, check_choice
 from jounce.jet import Jet, cross, dot, sqrt
-from jounce.rigid import PlanarPose, Pose
+from jounce.rigid import PlanarPose
+from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
 
 COORDINATES = ("angle", "x", "y")

@@ -29,7 +29,7 @@ from jounce.kinematics.compilation import compiled
 from jounce.mechanism import Mechanism
 from jounce.mechanism.preconditions import concrete
 from jounce.mechanism.system import System
-from jounce.rigid import Pose
+from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
 
 COLUMNS = {"planar": ("x", "y", "angle"), "spatial": ("x", "y", "z", "wx", "wy", "wz")}

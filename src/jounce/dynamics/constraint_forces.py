@@ -21,7 +21,7 @@ from jounce.jet import Jet
 from jounce.jet.algebra import stacked, total
 from jounce.kinematics.linear import DenseFactor
 from jounce.mechanism.system import System, movable, with_rows
-from jounce.rigid import Pose
+from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
 from jounce.trajectory import AbstractMotion
 

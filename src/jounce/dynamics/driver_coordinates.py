@@ -25,7 +25,7 @@ from jounce.kinematics import Motion
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.linear import DenseFactor
 from jounce.mechanism.system import System
-from jounce.rigid import Pose
+from jounce.rigid.pose import Pose
 from jounce.shapes import ArrayLike, Numbers
 
 

@@ -22,8 +22,9 @@ from jounce.jet.algebra import stacked, total
 from jounce.kinematics import Motion
 from jounce.kinematics.compilation import compiled
 from jounce.mechanism.system import Group
-from jounce.rigid import PlanarPose, Pose
+from jounce.rigid import PlanarPose
 from jounce.rigid.frames import Frames
+from jounce.rigid.pose import Pose
 from jounce.robot.arguments import checked_coordinates, whole_number
 from jounce.robot.batches import Batched
 from jounce.robot.kinematics import body_frames

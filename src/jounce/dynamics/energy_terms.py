@@ -14,9 +14,10 @@ from jounce.errors import RobotError, did_you_mean
 from jounce.jet import Jet, cross, dot
 from jounce.jet.algebra import total
 from jounce.kinematics import Motion
-from jounce.rigid import PlanarPose, Pose
+from jounce.rigid import PlanarPose
 from jounce.rigid.frames import Frames
 from jounce.rigid.planar import perpendicular
+from jounce.rigid.pose import Pose
 from jounce.robot.robot import Robot
 from jounce.shapes import ArrayLike
 

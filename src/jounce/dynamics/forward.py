@@ -24,7 +24,8 @@ from jounce.jet.series import Recursion
 from jounce.kinematics.linear import DenseFactor
 from jounce.mechanism.axis_angles import with_turns
 from jounce.mechanism.system import System
-from jounce.rigid import PlanarPose, Pose, SpatialPose
+from jounce.rigid import PlanarPose, SpatialPose
+from jounce.rigid.pose import Pose
 from jounce.rigid.spatial import body_axes, quaternion_spins
 from jounce.shapes import Numbers
 

@@ -14,7 +14,8 @@ from jounce.dynamics.masses import Gravity, Masses
 from jounce.jet import Jet, components, cross
 from jounce.jet.algebra import stacked, total
 from jounce.mechanism.system import System
-from jounce.rigid import PlanarPose, Pose
+from jounce.rigid import PlanarPose
+from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
 
 

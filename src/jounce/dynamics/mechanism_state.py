@@ -13,10 +13,11 @@ from jounce.jet.derivatives import taylor_coefficients
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.solve import HIGHEST_ORDER
 from jounce.mechanism import Mechanism, Model, build
-from jounce.mechanism.builder import referred
+from jounce.mechanism.builder import with_reference
 from jounce.mechanism.law_checks import check_laws
-from jounce.rigid import Pose, SpatialPose
+from jounce.rigid import SpatialPose
 from jounce.rigid.euler_parameters import euler_parameters
+from jounce.rigid.pose import Pose
 
 
 class MotionAtState(Motion):
@@ -37,7 +38,8 @@ def at_state(given: object, state: object, time: object) -> tuple[Motion, int]:
         system = dataclasses.replace(given.model.system, outputs=())
         model = dataclasses.replace(given.model, system=system, outputs=())
     else:
-        model, _ = referred(model, {name: values[0] for name, values in cut(coordinates, 0).items()}, float(instant))
+        reference = {name: values[0] for name, values in cut(coordinates, 0).items()}
+        model, _ = with_reference(model, reference, float(instant))
     history = given.history if isinstance(given, Motion) else None
     status = np.array([int(Status.OK)])
     return MotionAtState(

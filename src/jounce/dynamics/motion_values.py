@@ -10,7 +10,7 @@ from jaxtyping import Float, Int
 from jounce.jet import Jet
 from jounce.jet.derivatives import plain_derivatives
 from jounce.kinematics import Motion, Status
-from jounce.rigid import Pose
+from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
 
 Coordinates = Mapping[str, Float[Numbers, "_ ... _"]]

@@ -17,7 +17,8 @@ from jounce.kinematics import Motion
 from jounce.kinematics.compilation import compiled
 from jounce.mechanism.axis_angles import at_lanes
 from jounce.mechanism.system import Group
-from jounce.rigid import PlanarPose, Pose
+from jounce.rigid import PlanarPose
+from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
 
 FAINT = 1e-3  # of what turning bodies would move: coefficients that vanish have its rounding, 1e-12 of this or less

@@ -7,7 +7,7 @@ from jounce.constraints.base import Vector
 from jounce.constraints.planar import slide
 from jounce.forces.base import AbstractForce, Law, by_law
 from jounce.jet import Jet, sqrt
-from jounce.rigid import Pose
+from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
 
 

@@ -7,8 +7,8 @@ from jounce.constraints.base import Vector
 from jounce.errors import MechanismError, check_choice
 from jounce.forces.base import AbstractForce, Law, Laws, by_law
 from jounce.jet import Jet
-from jounce.rigid import Pose
 from jounce.rigid.orientation import FRAMES
+from jounce.rigid.pose import Pose
 
 
 class PointForce(AbstractForce, type="point_force", space="planar"):

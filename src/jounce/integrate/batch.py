@@ -26,7 +26,7 @@ from jounce.kinematics import Status
 from jounce.kinematics.motion import output_series
 from jounce.mechanism import Mechanism, TimeGrid, build, check_mechanism
 from jounce.mechanism.axis_angles import with_turns
-from jounce.mechanism.builder import referred
+from jounce.mechanism.builder import with_reference
 from jounce.mechanism.law_checks import check_laws
 from jounce.mechanism.preconditions import concrete
 from jounce.shapes import ArrayLike
@@ -121,7 +121,7 @@ def simulate_batch(
     parametric = ParametricMechanism(first, nominal.model, names)
     begun = parametric
     if first.initial:
-        model, _ = referred(build(initial_as_drivers(first)), nominal.model.reference, float(instants[0]))
+        model, _ = with_reference(build(initial_as_drivers(first)), nominal.model.reference, float(instants[0]))
         begun = ParametricMechanism(initial_as_drivers(first), model, names)
     runs = _Runs(parametric, rows, instants, order, (float(tolerance), float(longest_step), method))
 

@@ -2,7 +2,6 @@
 
 from jounce.jet.algebra import (
     Jet as Jet,
-    JetLike as JetLike,
     components as components,
     concatenate as concatenate,
     cross as cross,

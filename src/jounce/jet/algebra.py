@@ -238,7 +238,13 @@ def _checked(order: int) -> int:
 
 
 def stacked(jet: Jet) -> Any:
-    """Return the Taylor coefficients of a jet as one array, order first."""
+    """Return the Taylor coefficients of a jet as one array, order first.
+
+    Examples
+    --------
+    >>> stacked(Jet.variable(3.0, 2)).tolist()
+    [3.0, 1.0, 0.0]
+    """
     return jnp.stack(jet.dense().coefficients)
 
 

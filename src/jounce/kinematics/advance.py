@@ -22,7 +22,7 @@ from jounce.kinematics.compilation import compiled
 from jounce.kinematics.linear import DenseFactor
 from jounce.kinematics.status import Status
 from jounce.mechanism.system import System
-from jounce.rigid import Pose
+from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
 
 Lanes = Float[Numbers, " batch"]
@@ -199,6 +199,19 @@ def _turnover(
     return jnp.where(leads, eigenvalue, jnp.where(along < 0, -size, size))[None]
 
 
+def _outputs(system: System, pose: Pose, angles: Sequence[Numbers], step: Lanes) -> tuple[Numbers, ...]:
+    """Return the jets of the outputs, angles with the turns that the jets of a neighbour give them."""
+    results, known = [], iter(angles)
+    for group in system.outputs:
+        result = group.evaluate(pose)
+        if group.element.turning:
+            expected = next(known)
+            expected = Jet(tuple(jnp.where(jnp.isfinite(expected), expected, 0.0)))
+            result = brought_near(result, expected.evaluate(step))
+        results.append(stacked(result))
+    return tuple(results)
+
+
 def _predictable(departure: Float[Numbers, "*batch"], travel: Float[Numbers, "*batch"]) -> Bool[Numbers, "*batch"]:
     """Tell whether a departure from a prediction is small enough, for how far the prediction moves."""
     return departure <= jnp.minimum(LARGEST_DEPARTURE, jnp.maximum(0.2 * travel, SMALLEST_DEPARTURE))
@@ -226,6 +239,15 @@ def _finite(jets: Sequence[Numbers], wanted: Int[Numbers, ""]) -> Bool[Numbers, 
         above = (np.arange(jet.shape[0]) > wanted).reshape(-1, *[1] * (jet.ndim - 1))
         found.append(jnp.all(jnp.isfinite(jet) | above, axis=(0, 1)))
     return jnp.concatenate(found)
+
+
+def _finite_results(
+    coordinates: Sequence[Numbers], outputs: Sequence[Numbers], wanted: Int[Numbers, ""]
+) -> Bool[Numbers, "1+outputs batch"]:
+    """Tell where the pose and each output are finite up to the order wanted."""
+    posed = [jnp.max(part, axis=-2, keepdims=True) for part in coordinates]
+    finite = _finite([*(x.reshape(x.shape[0], -1, 1, x.shape[-1]) for x in posed), *outputs], wanted)
+    return jnp.concatenate([jnp.all(finite[: len(posed)], axis=0, keepdims=True), finite[len(posed) :]])
 
 
 def _status(
@@ -293,35 +315,24 @@ def advance(
     pose, factor, correction = newton_raphson(system, predicted, time.truncate(0), tolerance, refine)
     pose = differentiated(system, pose, factor, time)
 
-    results = []
-    known = iter(angles)
-    for group in system.outputs:
-        result = group.evaluate(pose)
-        if group.element.turning:
-            expected = next(known)
-            expected = Jet(tuple(jnp.where(jnp.isfinite(expected), expected, 0.0)))
-            result = brought_near(result, expected.evaluate(step))
-        results.append(stacked(result))
+    outputs = _outputs(system, pose, angles, step)
     reached = pose.coordinates()
+    coordinates = {name: stacked(jet) for name, jet in reached.items()}
     departures = _departures(system, pose, predicted)
     departure = jnp.max(departures, axis=0)
     travel = _travel(_terms(system, moving, pose_type.predictor), step)
     found = factor.sign()
     predictable = _predictable(departure, travel) & _laws_predictable(system, instant, step, order)
     predictable &= correction.contracts() & ((sign == 0) | (found == sign))
-    admissible = system.admissible(time)
-    pivot_ratio = factor.pivot_ratio()
-    coordinates = {name: stacked(jet) for name, jet in reached.items()}
-    posed = [jnp.max(coordinates[name], axis=-2, keepdims=True) for name in pose_type.predictor]
-    finite = _finite([*(x.reshape(x.shape[0], -1, 1, x.shape[-1]) for x in posed), *results], wanted)
-    finite = jnp.concatenate([jnp.all(finite[: len(posed)], axis=0, keepdims=True), finite[len(posed) :]])
+    admissible, pivot_ratio = system.admissible(time), factor.pivot_ratio()
+    finite = _finite_results([coordinates[name] for name in pose_type.predictor], outputs, wanted)
     admitted, defined = jnp.all(admissible, axis=0), jnp.all(finite, axis=0)
     status = _status(correction.last, predictable, pivot_ratio, admitted, defined, tolerance)
     terms = _terms(system, reached, pose_type.predictor)
     turnover = jax.lax.cond(survey, lambda: _turnover(system, pose_type, reached, factor, instant), lambda: np.zeros(1))
     return Arrival(
         coordinates,
-        tuple(results),
+        outputs,
         status,
         jnp.argmax(departures, axis=0),
         _safe_step(terms),

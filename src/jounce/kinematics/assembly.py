@@ -26,9 +26,9 @@ from jounce.kinematics.initial_turns import (
 from jounce.kinematics.status import Status
 from jounce.mechanism import Model
 from jounce.mechanism.axis_angles import measures_angle, with_angles, with_datums
-from jounce.mechanism.builder import pose_at, referred
+from jounce.mechanism.builder import pose_at, with_reference
 from jounce.mechanism.system import System
-from jounce.rigid import Pose
+from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
 
 MAX_STEPS = 100
@@ -110,7 +110,7 @@ def assemble(model: Model, instant: float, tolerance: float, *, free: bool = Fal
         noun = "degree of freedom" if columns == 1 else "degrees of freedom"
         raise MobilityError(f"the mechanism has no joints and no drivers: {columns} {noun} are left")
     if not model.rows:  # bodies that fly freely are together as they are
-        model, _ = referred(model, model.guess, instant, model.prescribed)
+        model, _ = with_reference(model, model.guess, instant, model.prescribed)
         return dataclasses.replace(model, system=jax.device_put(model.system)), model.guess
     model, found = _settled(model, instant, tolerance)
     check_assembled(model, found, instant, free=free)
@@ -132,18 +132,18 @@ def _settled(model: Model, instant: float, tolerance: float) -> tuple[Model, Tri
         lag = _lag(model, instant)
         begin = found if lag is None else put_together(model, instant, tolerance, lag=lag)
         if begin.closed:
-            model, _ = referred(model, begin.coordinates, instant, told)
+            model, _ = with_reference(model, begin.coordinates, instant, told)
             found = put_together(model, instant, tolerance, begin.coordinates)
     if "angle" in found.coordinates and start is None and found.closed:
         found = _nearest(model, found, instant)
     for _ in range(MAX_DATUMS):
         if not found.closed:
             return model, found
-        model, away = referred(model, found.coordinates, instant, told)
+        model, away = with_reference(model, found.coordinates, instant, told)
         if away <= SETTLED:
             return model, found
         found = put_together(model, instant, tolerance, found.coordinates)
-    return referred(model, found.coordinates, instant, told, keep=True)[0], found
+    return with_reference(model, found.coordinates, instant, told, keep=True)[0], found
 
 
 def _turned(model: Model, instant: float, tolerance: float) -> tuple[Model, Coordinates | None]:

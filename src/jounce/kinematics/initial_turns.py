@@ -15,7 +15,7 @@ from jaxtyping import Bool, Float
 from jounce.jet.turns import WHOLE_TURN, principal, whole_periods
 from jounce.mechanism import Model
 from jounce.mechanism.axis_angles import AttitudeHistory, measures_angle
-from jounce.mechanism.builder import referred
+from jounce.mechanism.builder import with_reference
 
 STEPS_A_TURN = 64
 MOST_TURNS = 4  # followed one by one; beyond, each further turn does what the last one did
@@ -65,7 +65,7 @@ def driver_lag(model: Model, instant: float, residual: Float[np.ndarray, " row"]
         return None
     size = np.zeros(len(model.rows))
     turning, periodic = np.zeros(len(size), bool), np.zeros(len(size), bool)
-    told = iter(referred(model, model.guess, instant, keep=True)[0].prescribed)
+    told = iter(with_reference(model, model.guess, instant, keep=True)[0].prescribed)
     first = 0
     for group in groups:
         its = rows[first : first + group.instances]

@@ -5,9 +5,10 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from jounce.display import Displayed
-from jounce.errors import MechanismError, check_name
+from jounce.errors import MechanismError
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked
 from jounce.jet.derivatives import plain_derivatives
@@ -15,6 +16,8 @@ from jounce.kinematics.compilation import compiled
 from jounce.kinematics.status import Status
 from jounce.mechanism import (
     AbstractMotionOutput,
+    AbstractOutput,
+    AbstractQuantity,
     AngleOutput,
     AngularVelocityOutput,
     Mechanism,
@@ -23,9 +26,10 @@ from jounce.mechanism import (
 )
 from jounce.mechanism.attitude_outputs import continued
 from jounce.mechanism.axis_angles import AttitudeHistory, attitudes_of
-from jounce.mechanism.builder import placed
+from jounce.mechanism.builder import counted_as_in
 from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.system import POSITION_COMPONENTS, Group, group_elements
+from jounce.shapes import Numbers
 
 _UNDEFINED = Status.UNDEFINED.advice.partition(": ")[2]
 
@@ -37,17 +41,15 @@ def output_series(group: Group, coordinates: dict[str, Any], pose_type: type) ->
     return stacked(group.evaluate(pose))
 
 
-def check_output(output: Any, mechanism: Mechanism, name: str = "output") -> None:
+def check_output(output: AbstractQuantity, mechanism: Mechanism, name: str = "output") -> None:
     """Raise MechanismError unless an output names what the mechanism has, and exists in its space."""
-    names = (GROUND, *mechanism.bodies)
-    for body in output.bodies:
-        check_name("body", body, names, MechanismError, name="body")
-    if output.space and output.space != mechanism.space:
-        raise MechanismError(f"this output is {output.space}, the mechanism is {mechanism.space}", name=name)
+    mechanism.check_fit(output, name)
     output.check(mechanism)
 
 
-def output_group(output: Any, mechanism: Mechanism, model: Model | None = None, name: str = "output") -> Group:
+def output_group(
+    output: AbstractOutput, mechanism: Mechanism, model: Model | None = None, name: str = "output"
+) -> Group:
     """Return an output of poses as a group of one, which acts on the pose of all bodies.
 
     With a model, angles about axes are counted as those of the outputs that it was put together with.
@@ -55,7 +57,7 @@ def output_group(output: Any, mechanism: Mechanism, model: Model | None = None, 
     index = {body: k for k, body in enumerate((GROUND, *mechanism.bodies))}
     components = POSITION_COMPONENTS[mechanism.space]
     groups, _ = group_elements({name: output}, mechanism.parameter_values, index, components)
-    (group,) = groups if model is None else placed(groups, model)
+    (group,) = groups if model is None else counted_as_in(groups, model)
     return group
 
 
@@ -186,7 +188,7 @@ class Motion(Displayed):
         """
         return self.evaluate(AngularVelocityOutput(body, frame), name="angular_velocity")
 
-    def evaluate(self, output: Any, name: str = "output") -> Any:
+    def evaluate(self, output: AbstractOutput | AbstractMotionOutput, name: str = "output") -> Any:
         """Return any output, as an `xarray.DataArray`, without solving again.
 
         Raises
@@ -202,7 +204,7 @@ class Motion(Displayed):
         self._check_finite(values, name)
         return self._labelled(name, values, output)
 
-    def _check_finite(self, values: np.ndarray, name: str) -> None:
+    def _check_finite(self, values: Float[np.ndarray, "time derivative *component"], name: str) -> None:
         """Raise MechanismError for the first instant that was solved and at which an output is not finite."""
         finite = np.isfinite(values).all(axis=tuple(range(2, values.ndim)))
         bad = ~finite & (self.status == Status.OK)[:, None]
@@ -212,7 +214,9 @@ class Motion(Displayed):
             at = f"{what} has no finite value at t = {self.time[lane]:g} s"
             raise MechanismError(f"{at}; {_UNDEFINED}", name=name)
 
-    def _continued(self, group: Group, coefficients: Any) -> Any:
+    def _continued(
+        self, group: Group, coefficients: Float[Numbers, "order component instance time"]
+    ) -> Float[Numbers, "order component instance time"]:
         """Return the Taylor coefficients of outputs, of which angles in a range are made continuous."""
         element = group.element
         if not getattr(element, "wraps", ()):
@@ -231,7 +235,7 @@ class Motion(Displayed):
             return np.zeros(0), np.zeros((4, len(self.mechanism.bodies) + 1, 0))
         return self.history.time, self.history.quaternion
 
-    def _coefficients(self, group: Group) -> np.ndarray:
+    def _coefficients(self, group: Group) -> Float[np.ndarray, "order component instance time"]:
         """Return the Taylor coefficients of outputs, (order + 1, components, instances, time)."""
         (group,) = self._counting((group,))
         return np.asarray(output_series(group, self._coordinates, self.model.pose_type))
@@ -239,14 +243,18 @@ class Motion(Displayed):
     def _counting(self, groups: tuple[Group, ...]) -> tuple[Group, ...]:
         return groups if self.history is None else self.history.counting(groups, self.time)
 
-    def _derivatives(self, coefficients: np.ndarray) -> np.ndarray:
+    def _derivatives(
+        self, coefficients: Float[Numbers, "order component time"]
+    ) -> Float[np.ndarray, "time derivative *component"]:
         """Turn Taylor coefficients (order, component, time) into derivatives (time, derivative[, component])."""
         coefficients = coefficients[: self.order + 1]
         values = np.moveaxis(np.asarray(plain_derivatives(coefficients)), -1, 0)
         values = np.where((self.status == Status.OK)[:, None, None], values, np.nan)
         return values[..., 0] if values.shape[-1] == 1 else values
 
-    def _labelled(self, name: str, values: np.ndarray, output: Any) -> Any:
+    def _labelled(
+        self, name: str, values: Float[np.ndarray, "time derivative *component"], output: AbstractQuantity
+    ) -> Any:
         import xarray
 
         coordinates = {"time": self.time, "derivative": np.arange(values.shape[1])}

@@ -9,6 +9,7 @@ through it, if that arrives on the other side to rounding, and is told.
 """
 
 import dataclasses
+from typing import NamedTuple
 
 import jax
 import numpy as np
@@ -173,6 +174,11 @@ class FollowedPath:
         place = place.reshape(*place.shape[:2], -1)[..., :count]
         return AttitudeHistory(place, (times[:, None] + since).ravel()[:count])
 
+    def ended(self, status: Status, instant: float, fault: str) -> "FollowedPath":
+        """Return the path, with where and why it could not be followed any further."""
+        self.status, self.ended_at, self.fault = status, instant, fault
+        return self
+
     def singular_positions_outside(self) -> list[ChangePoint]:
         """Return where the motion would be singular just before its start or after its end, and smooth all the same."""
         first, last = self.anchors[0], self.anchors[-1]
@@ -228,35 +234,54 @@ def follow(
         step = min(here.longest_step, largest, left)
         crawled = crawled + 1 if step < CRAWLING * left else 0
         if crawled > LONGEST_CRAWL or here.instant + step == here.instant:
-            path.status, path.ended_at = Status.COLLAPSED, float(np.nextafter(here.instant, np.inf))
-            path.fault = ", ".join(solver.model.drivers)
-            return path
+            beyond = float(np.nextafter(here.instant, np.inf))
+            return path.ended(Status.COLLAPSED, beyond, ", ".join(solver.model.drivers))
         if left - step < 0.1 * step:
             step = left  # no sliver of a step at the end
-        refused = None
-        while True:
-            target = stop if step == left else here.instant + step
-            first, end = np.searchsorted(grid, (here.instant, target), side="right")
-            way = np.arange(first, min(end, first + SMALL_BATCH - 1))
-            instants = np.concatenate([[target], grid[way]])
-            arrival = solver(here.state, instants - here.instant, instants, survey=True)
-            if arrival.status[0] in PASSABLE and step * abs(arrival.turnover[0]) <= LARGEST_TURNOVER:
-                break
-            if arrival.status[0] == Status.INADMISSIBLE:
-                refused = refused or (arrival, target)
-            if step < SMALLEST_STEP * span or target <= here.instant:
-                arrival, target = refused or (arrival, target)
-                path.status, path.ended_at = Status(int(arrival.status[0])), target
-                path.fault = solver.fault(arrival, 0)
-                if refused is None and here.reach < NEARLY_SINGULAR * span:
-                    path.status = Status.SINGULAR  # the range of the motion ends at a dead point
-                return path
-            step *= 0.5
-        largest = 4 * step
-        path.anchors.append(Anchor.of(arrival, target))
-        if way.size:
-            path.on_the_way.append((way, arrival))
+        taken = _taken(solver, here, stop, step, SMALLEST_STEP * span, grid)
+        status = Status(int(taken.arrival.status[0]))
+        if not taken.accepted:
+            if status != Status.INADMISSIBLE and here.reach < NEARLY_SINGULAR * span:
+                status = Status.SINGULAR  # the range of the motion ends at a dead point
+            return path.ended(status, taken.target, solver.fault(taken.arrival, 0))
+        largest = 4 * taken.step
+        path.anchors.append(Anchor.of(taken.arrival, taken.target))
+        if taken.lanes.size:
+            path.on_the_way.append((taken.lanes, taken.arrival))
     return path
+
+
+class _Step(NamedTuple):
+    """A step from an anchor: where it led, how long it was, which instants of the grid were solved beside it."""
+
+    arrival: Arrival
+    target: float
+    step: float
+    lanes: np.ndarray
+    accepted: bool
+
+
+def _taken(
+    solver: Solver, here: Anchor, stop: float, step: float, smallest: float, grid: Float[np.ndarray, " time"]
+) -> _Step:
+    """Return the step from an anchor, halved until it is accepted, or too small to be halved.
+
+    Of one that is not accepted, what is told is where a law was first refused, if it was.
+    """
+    refused, left = None, stop - here.instant
+    while True:
+        target = stop if step == left else here.instant + step
+        first, end = np.searchsorted(grid, (here.instant, target), side="right")
+        lanes = np.arange(first, min(end, first + SMALL_BATCH - 1))
+        instants = np.concatenate([[target], grid[lanes]])
+        arrival = solver(here.state, instants - here.instant, instants, survey=True)
+        if arrival.status[0] in PASSABLE and step * abs(arrival.turnover[0]) <= LARGEST_TURNOVER:
+            return _Step(arrival, target, step, lanes, accepted=True)
+        if arrival.status[0] == Status.INADMISSIBLE:
+            refused = refused or (arrival, target)
+        if step < smallest or target <= here.instant:
+            return _Step(*(refused or (arrival, target)), step, lanes, accepted=False)
+        step *= 0.5
 
 
 def _passed(solver: Solver, here: Anchor, stop: float) -> tuple[Anchor, ChangePoint] | None:

@@ -9,6 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
+from jaxtyping import Float
 
 from jounce.constraints.base import field_kind, value_fields
 from jounce.errors import JounceError
@@ -33,8 +34,11 @@ from jounce.mechanism.system import (
     group_elements,
     jacobian_cells,
 )
-from jounce.rigid import PlanarPose, Pose, SpatialPose
+from jounce.rigid import PlanarPose, SpatialPose
 from jounce.rigid.euler_parameters import euler_parameters
+from jounce.rigid.pose import Pose
+from jounce.shapes import Numbers
+from jounce.trajectory import AbstractMotion
 
 
 @dataclasses.dataclass(frozen=True)
@@ -143,7 +147,7 @@ def build(mechanism: Mechanism, like: Model | None = None) -> Model:
     )
 
 
-def referred(
+def with_reference(
     model: Model,
     coordinates: dict[str, Any],
     instant: float,
@@ -179,7 +183,7 @@ def referred(
     return dataclasses.replace(model, system=system, reference=coordinates, prescribed=prescribed), away
 
 
-def placed(groups: tuple[Group, ...], model: Model) -> tuple[Group, ...]:
+def counted_as_in(groups: tuple[Group, ...], model: Model) -> tuple[Group, ...]:
     """Return groups with angles about axes counted as if they had been in the model when it was put together."""
     if model.history is None or not any(map(measures_angle, groups)):
         return groups
@@ -190,7 +194,7 @@ def placed(groups: tuple[Group, ...], model: Model) -> tuple[Group, ...]:
 
 
 @jax.jit
-def _law_values(motions: list[Any], instant: Any) -> list[Any]:
+def _law_values(motions: list[AbstractMotion], instant: Float[Numbers, "1 1"]) -> list[Numbers]:
     return [motion(Jet([instant])).coefficients[0] for motion in motions]
 
 

@@ -187,16 +187,20 @@ class Mechanism(Displayed):
             raise MechanismError(message, name=place, value=element.type_name or type(element).__name__)
         if kind == "forces" and not set(element.bodies) - {GROUND}:
             raise MechanismError("acts on the ground alone, which never moves", name=f"{place}.bodies")
-        if element.space and element.space != self.space:
-            raise MechanismError(f"is {element.space}, in a {self.space} mechanism", name=place)
-        for body in element.bodies:
-            check_name("body", body, (GROUND, *self.bodies), MechanismError, name=f"{place}.bodies")
+        self.check_fit(element, place)
         if kind == "outputs":
             try:
                 element.check(self)
             except MechanismError as error:
                 error.name = f"{place}.{error.name}"  # it knows its fields only
                 raise
+
+    def check_fit(self, element: AbstractConstraint | AbstractForce | AbstractQuantity, place: str) -> None:
+        """Raise MechanismError unless an element exists in this space and names bodies that there are."""
+        if element.space and element.space != self.space:
+            raise MechanismError(f"is {element.space}, in a {self.space} mechanism", name=place)
+        for body in getattr(element, "bodies", ()):
+            check_name("body", body, (GROUND, *self.bodies), MechanismError, name=f"{place}.bodies")
 
     @property
     def elements(self) -> dict[str, Mapping[str, Any]]:

@@ -13,8 +13,9 @@ from jaxtyping import Bool, Float, Int
 from jounce.jet import Jet, concatenate
 from jounce.jet.algebra import stacked
 from jounce.mechanism.resolve import group_key, resolve_element, stack_elements
-from jounce.rigid import Pose, SpatialPose
+from jounce.rigid import SpatialPose
 from jounce.rigid.body_arrays import each_jet
+from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
 
 POSITION_COMPONENTS = {"planar": 2, "spatial": 3}

@@ -30,5 +30,3 @@ from jounce.rigid.spatial import (
     to_body as to_body,
     to_global as to_global,
 )
-
-Pose = PlanarPose | SpatialPose

@@ -8,7 +8,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.jet import Jet, JetLike
+from jounce.jet import Jet
+from jounce.jet.algebra import JetLike
 from jounce.shapes import Numbers
 
 

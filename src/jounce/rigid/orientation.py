@@ -7,8 +7,8 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.errors import JounceError, SingularityError, check_choice
-from jounce.jet import Jet, JetLike, atan2, cos, cross, dot, matvec, sin, sqrt, stack, transpose
-from jounce.jet.algebra import total
+from jounce.jet import Jet, atan2, cos, cross, dot, matvec, sin, sqrt, stack, transpose
+from jounce.jet.algebra import JetLike, total
 from jounce.rigid.body_arrays import body_vector
 from jounce.rigid.rotations import (
     AXES,

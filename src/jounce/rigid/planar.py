@@ -7,7 +7,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Float
 
-from jounce.jet import Jet, JetLike, next_sine_cosine, sine_cosine
+from jounce.jet import Jet, next_sine_cosine, sine_cosine
+from jounce.jet.algebra import JetLike
 from jounce.rigid.body_arrays import body_vector, each_jet, take_bodies
 from jounce.shapes import Numbers, Real
 

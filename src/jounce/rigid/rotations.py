@@ -9,8 +9,8 @@ import numpy as np
 from jax.core import Tracer
 
 from jounce.errors import JounceError, check_choice
-from jounce.jet import Jet, JetLike, components, cos, matmul, sin, sqrt, stack
-from jounce.jet.algebra import total
+from jounce.jet import Jet, components, cos, matmul, sin, sqrt, stack
+from jounce.jet.algebra import JetLike, total
 
 AXES = "xyz"
 
