@@ -19,7 +19,7 @@ from jounce.dynamics.loads import mass_matrices
 from jounce.dynamics.masses import Masses, masses_of
 from jounce.dynamics.mechanism_state import MotionAtState, at_state
 from jounce.dynamics.motion_values import Coordinates, cut, derivatives_along, in_chunks, pose_of
-from jounce.dynamics.saddle_point import block_diagonal, saddle_point
+from jounce.dynamics.saddle_point import Jacobian, MassMatrix, block_diagonal, saddle_point
 from jounce.errors import MechanismError
 from jounce.jet import Jet
 from jounce.jet.derivatives import plain_derivatives
@@ -219,7 +219,7 @@ def _without_unknowns(coordinates: Coordinates, order: int) -> Coordinates:
 @compiled("pose_type")
 def _position_equations(
     system: System, bodies: Coordinates, instants: Lanes, pose_type: type[Pose]
-) -> tuple[Rows, Float[Numbers, "row column batch"]]:
+) -> tuple[Rows, Jacobian]:
     """Return the residual and the Jacobian."""
     pose, time = pose_of(bodies, pose_type, 0), Jet([instants[None]])
     return system.residual(pose, time).coefficients[0], system.jacobian(pose, time)
@@ -310,7 +310,7 @@ def _mass_matrix(motion: Motion) -> Float[np.ndarray, "time column column"]:
 
 
 @compiled("pose_type")
-def _body_masses(bodies: Coordinates, masses: Masses, pose_type: type[Pose]) -> Float[Numbers, "column column batch"]:
+def _body_masses(bodies: Coordinates, masses: Masses, pose_type: type[Pose]) -> MassMatrix:
     blocks = mass_matrices(pose_of(bodies, pose_type, 0), masses)[:, :, 1:]
     return block_diagonal(blocks, np.ones(len(blocks)))
 

@@ -16,7 +16,15 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.constraints import AbstractConstraint
-from jounce.dynamics.saddle_point import as_column, block_diagonal, saddle_point
+from jounce.dynamics.saddle_point import (
+    BodyMatrices,
+    Column,
+    Jacobian,
+    MassMatrix,
+    as_column,
+    block_diagonal,
+    saddle_point,
+)
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked, total
 from jounce.kinematics.linear import DenseFactor
@@ -91,9 +99,7 @@ def work_along(
     return total(jnp.sum(slope[j] * forces[level - j][None], axis=1) for j in range(lowest, level + 1))
 
 
-def balancing(
-    mass: Float[Numbers, "column column batch"] | None, jacobian: Float[Numbers, "row column batch"]
-) -> Callable[[Float[Numbers, "column batch"]], Float[Numbers, "row batch"]]:
+def balancing(mass: MassMatrix | None, jacobian: Jacobian) -> Callable[[Column], Float[Numbers, "row batch"]]:
     """Return what solves for the multipliers that balance loads.
 
     Where there is no mass matrix, the Jacobian is square and balances all; with one, what accelerates the bodies freely
@@ -113,7 +119,7 @@ def multipliers(
     system: System,
     blocks: Slopes,
     load: Float[Numbers, "levels coordinate body batch"],
-    mass: Float[Numbers, "coordinate coordinate body batch"] | None = None,
+    mass: BodyMatrices | None = None,
 ) -> Float[Numbers, "levels row batch"]:
     """Return the multipliers of all rows, not scaled, as Taylor coefficients.
 
@@ -142,9 +148,7 @@ def multipliers(
     return jnp.stack(found)
 
 
-def _solver(
-    system: System, blocks: Slopes, mass: Float[Numbers, "coordinate coordinate body batch"] | None
-) -> Callable[[Any], Any]:
+def _solver(system: System, blocks: Slopes, mass: BodyMatrices | None) -> Callable[[Any], Any]:
     """Return what solves for the multipliers of scaled rows: by the Jacobian alone where there are no masses."""
     scale = jnp.asarray(system.column_scale)
     flat = [(slope[0] * scale[:, None, None, None]).reshape(-1, slope.shape[-1]) for parts in blocks for slope in parts]

@@ -36,6 +36,9 @@ from jounce.shapes import ArrayLike, Numbers
 Energies = Float[Numbers, "order body time"]
 """Taylor coefficients of energies of bodies along a motion."""
 
+EnergyFunction = Callable[..., tuple[Jet, ...]]
+"""What maps a pose, masses, centres, second moments and an order to energies, as `body_energy` does."""
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Energy:
@@ -176,9 +179,7 @@ def acceleration_energy(system: Robot | Motion, q: ArrayLike | None = None, *, o
     return Energy(*energies_of(system, q, order, body_energy))
 
 
-def energies_of(
-    system: Robot | Motion, q: ArrayLike | None, order: int, function: Callable[..., tuple[Jet, ...]]
-) -> tuple[Any, ...]:
+def energies_of(system: Robot | Motion, q: ArrayLike | None, order: int, function: EnergyFunction) -> tuple[Any, ...]:
     """Return what `body_energy`, or a function like it, gives for the bodies of a system, their names, and the order.
 
     Raises
@@ -214,9 +215,7 @@ def kinetic_energy(system: Robot | Motion, q: ArrayLike | None = None) -> Energy
     return acceleration_energy(system, q, order=0)
 
 
-def robot_energy(
-    tree: Tree, frames: Frames, order: int, function: Callable[..., tuple[Jet, ...]] = body_energy
-) -> tuple[Jet, ...]:
+def robot_energy(tree: Tree, frames: Frames, order: int, function: EnergyFunction = body_energy) -> tuple[Jet, ...]:
     """Return the energy of the bodies of a robot as jets of shape (bodies, batch), from the frames of the bodies."""
     tensor = jnp.moveaxis(jnp.asarray(tree.inertia), 0, -1)[..., None]
     spread = 0.5 * (tensor[0, 0] + tensor[1, 1] + tensor[2, 2])
@@ -227,15 +226,13 @@ def robot_energy(
 
 @Batched
 def _of_robot(
-    tree: Tree, arrays: tuple[Series], _: Any, order: int, function: Callable[..., tuple[Jet, ...]]
+    tree: Tree, arrays: tuple[Series], _: Any, order: int, function: EnergyFunction
 ) -> tuple[Float[Numbers, "levels body batch"], ...]:
     frames = body_frames(tree, arrays[0]).without_base()
     return tuple(stacked(part) for part in robot_energy(tree, frames, order, function))
 
 
-def energy_coefficients(
-    motion: Motion, order: int, function: Callable[..., tuple[Jet, ...]] = body_energy
-) -> tuple[Energies, ...]:
+def energy_coefficients(motion: Motion, order: int, function: EnergyFunction = body_energy) -> tuple[Energies, ...]:
     """Return what `body_energy`, or a function like it, gives for bodies as Taylor coefficients, the ground first.
 
     Raises
@@ -256,11 +253,7 @@ def _check_known(motion: Motion, order: int, known: int) -> None:
 
 @compiled("pose_type", "order", "function")
 def _of_bodies(
-    coordinates: Coordinates,
-    masses: Masses,
-    pose_type: type[Pose],
-    order: int,
-    function: Callable[..., tuple[Jet, ...]],
+    coordinates: Coordinates, masses: Masses, pose_type: type[Pose], order: int, function: EnergyFunction
 ) -> tuple[Energies, ...]:
     return tuple(stacked(part) for part in function(pose_of(coordinates, pose_type), *masses, order))
 

@@ -17,7 +17,7 @@ from jaxtyping import Bool, Float, Int
 
 from jounce.dynamics.loads import inertia_forces, mass_matrices
 from jounce.dynamics.masses import Gravity, Masses
-from jounce.dynamics.saddle_point import ByBody, as_column, block_diagonal, by_body, saddle_point
+from jounce.dynamics.saddle_point import ByBody, Column, MassMatrix, as_column, block_diagonal, by_body, saddle_point
 from jounce.jet import Jet
 from jounce.jet.algebra import total
 from jounce.jet.series import Recursion
@@ -181,7 +181,7 @@ class Equations(eqx.Module):
         jacobian = self.system.jacobian(self.still(state.position, state.attitude), Jet([time]))
         return saddle_point(self.mass_matrix(state), jacobian)
 
-    def mass_matrix(self, state: State) -> Float[Numbers, "column column batch"]:
+    def mass_matrix(self, state: State) -> MassMatrix:
         """Return the mass matrix over the scale of the masses, scaled."""
         blocks = mass_matrices(self.still(state.position, state.attitude), self.masses)[:, :, 1:]
         return block_diagonal(blocks / self.scale, self.system.column_scale)
@@ -201,7 +201,7 @@ class Equations(eqx.Module):
         solution = -solve(jnp.concatenate([as_column(forces, scale), second]))
         return by_body(solution[:columns], scale), solution[columns:]
 
-    def least_change(self, factor: DenseFactor, gap: Rows) -> Float[Numbers, "column batch"]:
+    def least_change(self, factor: DenseFactor, gap: Rows) -> Column:
         """Return the change of coordinates of least kinetic energy that closes a gap of the scaled rows, scaled."""
         columns = self.system.cells.shape[1]
         return factor.solve(-jnp.concatenate([jnp.zeros((columns, gap.shape[-1])), gap]))[:columns]

@@ -11,6 +11,7 @@ import jax.numpy as jnp
 from jaxtyping import Float
 
 from jounce.dynamics.masses import Gravity, Masses
+from jounce.dynamics.saddle_point import BodyMatrices
 from jounce.jet import Jet, components, cross
 from jounce.jet.algebra import stacked, total
 from jounce.mechanism.system import System
@@ -48,7 +49,7 @@ def inertia_forces(pose: Pose, masses: Masses, gravity: Gravity | float) -> tupl
     return force, momentum.differentiate() + cross(spin, momentum) + cross(center, local)
 
 
-def mass_matrices(pose: Pose, masses: Masses) -> Float[Numbers, "coordinate coordinate body batch"]:
+def mass_matrices(pose: Pose, masses: Masses) -> BodyMatrices:
     """Return the mass matrix of each body at a pose of order zero.
 
     It is the map from accelerations to the forces of inertia of bodies that do not move yet.

@@ -11,10 +11,13 @@ from jounce.shapes import Numbers
 ByBody = Float[Numbers, "coordinate body batch"]
 """One number for each coordinate of each body."""
 
+BodyMatrices = Float[Numbers, "coordinate coordinate body batch"]
+MassMatrix = Float[Numbers, "column column #batch"]
+Jacobian = Float[Numbers, "row column batch"]
+Column = Float[Numbers, "column batch"]
 
-def saddle_point(
-    mass: Float[Numbers, "column column #batch"], jacobian: Float[Numbers, "row column batch"]
-) -> Float[Numbers, "size size batch"]:
+
+def saddle_point(mass: MassMatrix, jacobian: Jacobian) -> Float[Numbers, "size size batch"]:
     """Return the mass matrix bordered by the Jacobian and its transpose."""
     rows, columns, lanes = jacobian.shape
     mass = jnp.broadcast_to(mass, (columns, columns, lanes))
@@ -23,9 +26,7 @@ def saddle_point(
     return jnp.concatenate([above, below])
 
 
-def block_diagonal(
-    blocks: Float[Numbers, "coordinate coordinate body batch"], scale: Float[Numbers, " coordinate"]
-) -> Float[Numbers, "column column batch"]:
+def block_diagonal(blocks: BodyMatrices, scale: Float[Numbers, " coordinate"]) -> MassMatrix:
     """Return the mass matrix of all bodies from those of each, both its rows and its columns scaled."""
     size, _, bodies, lanes = blocks.shape
     blocks = blocks * (scale[:, None] * scale[None])[:, :, None, None]
@@ -33,11 +34,11 @@ def block_diagonal(
     return whole.reshape(bodies * size, bodies * size, lanes)
 
 
-def as_column(forces: ByBody, scale: Float[Numbers, " coordinate"]) -> Float[Numbers, "column batch"]:
+def as_column(forces: ByBody, scale: Float[Numbers, " coordinate"]) -> Column:
     """Return what acts on the coordinates of bodies as a scaled column."""
     return jnp.swapaxes(forces * scale[:, None, None], 0, 1).reshape(-1, forces.shape[-1])
 
 
-def by_body(column: Float[Numbers, "column batch"], scale: Float[Numbers, " coordinate"]) -> ByBody:
+def by_body(column: Column, scale: Float[Numbers, " coordinate"]) -> ByBody:
     """Return a scaled column of unknown coordinates by body."""
     return jnp.swapaxes(column.reshape(-1, len(scale), column.shape[-1]), 0, 1) * scale[:, None, None]
