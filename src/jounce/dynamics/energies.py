@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.dynamics.masses import Gravity, Masses, gravity_of, required_masses
+from jounce.dynamics.masses import Gravity, Masses, gravity_of, required_masses, second_moments
 from jounce.dynamics.motion_values import Coordinates, cut, labelled, pose_of
 from jounce.errors import MechanismError
 from jounce.jet import Jet, dot
@@ -218,10 +218,8 @@ def kinetic_energy(system: Robot | Motion, q: ArrayLike | None = None) -> Energy
 def robot_energy(tree: Tree, frames: Frames, order: int, function: EnergyFunction = body_energy) -> tuple[Jet, ...]:
     """Return the energy of the bodies of a robot as jets of shape (bodies, batch), from the frames of the bodies."""
     tensor = jnp.moveaxis(jnp.asarray(tree.inertia), 0, -1)[..., None]
-    spread = 0.5 * (tensor[0, 0] + tensor[1, 1] + tensor[2, 2])
-    moments = [[(spread if i == k else 0.0) - tensor[i, k] for k in range(3)] for i in range(3)]
     center = jnp.swapaxes(jnp.asarray(tree.center), 0, 1)[:, :, None]
-    return function(frames, jnp.asarray(tree.mass)[:, None], center, moments, order)
+    return function(frames, jnp.asarray(tree.mass)[:, None], center, second_moments(tensor), order)
 
 
 @Batched

@@ -47,13 +47,19 @@ def masses_of(mechanism: Mechanism) -> Masses:
             moments = np.eye(2) * 0.5 * inertia
         else:
             tensor = inertia * np.eye(3) if np.ndim(inertia) < 2 else inertia
-            moments = (tensor[0, 0] + tensor[1, 1] + tensor[2, 2]) / 2 * np.eye(3) - tensor
+            moments = second_moments(tensor)
         columns.append((mass, center, moments))
     traced = any(isinstance(value, Tracer) for column in columns for value in column)
     library = jnp if traced else np
     return Masses(
         *(library.stack([library.asarray(x) for x in part], -1)[..., None] for part in zip(*columns, strict=True))
     )
+
+
+def second_moments(tensor: Float[Numbers, "3 3 *batch"]) -> Float[Numbers, "3 3 *batch"]:
+    """Return the second moments about the centre of mass from the inertia tensor: Negrean 2025, equation 108."""
+    unit = np.eye(3).reshape(3, 3, *[1] * (tensor.ndim - 2))
+    return (tensor[0, 0] + tensor[1, 1] + tensor[2, 2]) / 2 * unit - tensor
 
 
 def required_masses(mechanism: Mechanism, what: str = "energies") -> Masses:

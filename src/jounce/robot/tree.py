@@ -10,7 +10,9 @@ from jaxtyping import Float
 
 from jounce.errors import RobotError, check_name
 from jounce.rigid.inertia import Inertia
-from jounce.robot.model import Joint, Link
+from jounce.robot.model import Joint, Link, Mimic
+
+MASSLESS = Inertia(0.0, strict=False)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -151,29 +153,32 @@ def arrange(
         inertia = links[joint.child].inertia
         if inertia is not None and body >= 0:
             masses[body].append(inertia.moved(position, rotation))
-    whole = [Inertia.total(parts) if parts else None for parts in masses]
+    whole = [Inertia.total(parts) if parts else MASSLESS for parts in masses]
     slots, parent_slots, count = _slots(parents)
     bodies, order = len(moving), [joint.name for joint in moving if joint.mimic is None]
-    follows = [joint.name if joint.mimic is None else joint.mimic.joint for joint in moving]
-    coordinate = np.array([order.index(name) for name in follows], int)
-    multiplier = np.array([1.0 if joint.mimic is None else joint.mimic.multiplier for joint in moving], float)
+    mimics = [joint.mimic or Mimic(joint.name) for joint in moving]  # each follows another, or itself
+    coordinate = np.array([order.index(mimic.joint) for mimic in mimics], int)
+    multiplier = np.array([mimic.multiplier for mimic in mimics], float)
+    weights = {"armature": multiplier**2, "damping": multiplier**2, "friction": np.abs(multiplier)}
+    drives = {  # what those of all joints make together at each coordinate, by virtual work
+        field: np.bincount(coordinate, weight * [getattr(joint, field) for joint in moving], len(order)).astype(float)
+        for field, weight in weights.items()
+    }
     turning = np.array([joint.turning for joint in moving], float)
     tree = Tree(
         rotation=np.array([rotation for _, rotation in places]).reshape(bodies, 3, 3),
         position=np.array([position for position, _ in places]).reshape(bodies, 3),
-        mass=np.array([0.0 if one is None else one.mass for one in whole]),
-        center=np.array([zero if one is None else one.center_of_mass for one in whole]).reshape(bodies, 3),
-        inertia=np.array([0 * identity if one is None else one.tensor for one in whole]).reshape(bodies, 3, 3),
+        mass=np.array([one.mass for one in whole]),
+        center=np.array([one.center_of_mass for one in whole]).reshape(bodies, 3),
+        inertia=np.array([one.tensor for one in whole]).reshape(bodies, 3, 3),
         turning=turning,
         coordinate=coordinate,
         multiplier=multiplier,
-        offset=np.array([0.0 if joint.mimic is None else joint.mimic.offset for joint in moving], float),
+        offset=np.array([mimic.offset for mimic in mimics], float),
         slot=np.array(slots, int),
         parent_slot=np.array(parent_slots, int),
         ancestors=_ancestors(parents),
-        armature=_at_coordinates([joint.armature for joint in moving], multiplier**2, coordinate, len(order)),
-        damping=_at_coordinates([joint.damping for joint in moving], multiplier**2, coordinate, len(order)),
-        friction=_at_coordinates([joint.friction for joint in moving], np.abs(multiplier), coordinate, len(order)),
+        **drives,
         gravity=gravity,
         shape=Shape(
             bodies=bodies,
@@ -181,7 +186,7 @@ def arrange(
             slots=count,
             turning=bool(turning.any()),
             sliding=bool((turning == 0).any()),
-            direct=follows == order and all(joint.mimic is None for joint in moving),
+            direct=len(order) == bodies,
         ),
     )
     return tree, frames
@@ -208,11 +213,6 @@ def quaternion_matrix(quaternion: Float[np.ndarray, " 4"]) -> Float[np.ndarray, 
     from scipy.spatial.transform import Rotation
 
     return Rotation.from_quat(np.roll(quaternion, -1)).as_matrix()
-
-
-def _at_coordinates(values: list[float], weights: np.ndarray, coordinate: np.ndarray, count: int) -> np.ndarray:
-    """Return what the drives of joints make together at each coordinate, by virtual work."""
-    return np.bincount(coordinate, weights * values, count) if values else np.zeros(count)
 
 
 def _slots(parents: list[int]) -> tuple[list[int], list[int], int]:
