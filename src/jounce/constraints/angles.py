@@ -153,8 +153,8 @@ def coaxial(axis_i: Vectors, axis_j: Vectors) -> Datum:
 
 
 def angle_of(
-    attitude: Float[Numbers, "4 *batch"], axis: Float[Numbers, "3 *batch"]
-) -> tuple[Float[Numbers, "*batch"], Bool[Numbers, "*batch"]]:
+    attitude: Float[Numbers, "4 *#batch"], axis: Float[Numbers, "3 *#batch"]
+) -> tuple[Float[Numbers, "*#batch"], Bool[Numbers, "*#batch"]]:
     """Return the angle about a unit axis, in (-pi, pi], of Euler parameters, and where there is one.
 
     There is none where the attitude turns the axis to its opposite.

@@ -23,7 +23,7 @@ from jounce.kinematics.linear import DenseFactor
 from jounce.kinematics.status import Status
 from jounce.mechanism.system import System
 from jounce.rigid.pose import Pose
-from jounce.shapes import Numbers
+from jounce.shapes import Numbers, Real
 
 Lanes = Float[Numbers, " batch"]
 Truths = Bool[Numbers, " batch"]
@@ -251,7 +251,7 @@ def _finite_results(
 
 
 def _status(
-    correction: Lanes, predictable: Truths, pivot_ratio: Lanes, admissible: Truths, finite: Truths, tolerance: Numbers
+    correction: Lanes, predictable: Truths, pivot_ratio: Lanes, admissible: Truths, finite: Truths, tolerance: Real
 ) -> Int[Numbers, " batch"]:
     """Return the outcome at each instant, the gravest last."""
     outcomes = (
