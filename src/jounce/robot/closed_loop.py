@@ -12,7 +12,7 @@ from jounce.mechanism import Body, Mechanism, time_grid
 from jounce.mechanism.resolve import resolve_motion
 from jounce.rigid.inertia import finite_numbers
 from jounce.robot.abstract_robot import AbstractRobot
-from jounce.robot.closures import Loops, given_coordinates, size_of
+from jounce.robot.closures import Loops, given_coordinates
 from jounce.robot.mechanism_parts import RobotParts, on_body
 
 DRIVE, START = "_drive", "_start"
@@ -98,7 +98,7 @@ def mechanism(
     start = _start(robot, q, driven, parameters or {}, time)
     joints = parts.joints()
     if robot.closures:
-        loops = Loops(robot, size_of(robot))
+        loops = Loops(robot)
         free = np.array([name not in driven for name in robot.joint_names], bool)
         start = loops.closed(start, free)
         found = zip(robot.closures.values(), loops.independent(start), strict=True)
