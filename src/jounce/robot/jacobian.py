@@ -73,7 +73,6 @@ def jacobian(robot: Robot, q: Any, link: str, point: Any = (0.0, 0.0, 0.0)) -> A
 def twist(tree: Tree, q: Any, constants: Any) -> Jet:
     """Return the velocity of a point and the angular velocity of its link, (6, batch), one order shorter than q."""
     frame = link_frame(tree, q, constants)
-    assert frame.angular_velocity is not None  # there are velocities
     return concatenate([frame.position.differentiate(), frame.angular_velocity])
 
 
