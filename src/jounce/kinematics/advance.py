@@ -55,7 +55,7 @@ class Arrival(NamedTuple):
     turnover: Lanes  # 1/s, how fast the first lane nears (< 0) or leaves a singular position; 0 unless surveyed; (1,)
     pivot_ratio: Lanes  # smallest pivot of the Jacobian over the largest
     admissible: Bool[Numbers, "driver batch"]  # whether each driver has a permitted value
-    finite: Bool[Numbers, "1+outputs batch"]  # whether all derivatives wanted are, of the pose and of each output
+    finite: Bool[Numbers, "result batch"]  # whether all derivatives wanted are, of the pose and of each output
 
     def state(self, lanes: slice | np.ndarray) -> State:
         """Return what the neighbours of some lanes start from: jets of coordinates and outputs, and the sign."""
@@ -243,7 +243,7 @@ def _finite(jets: Sequence[Numbers], wanted: Int[Numbers, ""]) -> Bool[Numbers, 
 
 def _finite_results(
     coordinates: Sequence[Numbers], outputs: Sequence[Numbers], wanted: Int[Numbers, ""]
-) -> Bool[Numbers, "1+outputs batch"]:
+) -> Bool[Numbers, "result batch"]:
     """Tell where the pose and each output are finite up to the order wanted."""
     posed = [jnp.max(part, axis=-2, keepdims=True) for part in coordinates]
     finite = _finite([*(x.reshape(x.shape[0], -1, 1, x.shape[-1]) for x in posed), *outputs], wanted)

@@ -24,6 +24,7 @@ from jounce.kinematics.path_following import (
     follow,
 )
 from jounce.kinematics.status import Status
+from jounce.mechanism.time import nearest_instants
 
 Indices = Int[np.ndarray, " lane"]
 LONG_GRID = 1024  # instants: from here on in large batches
@@ -46,7 +47,7 @@ class Grid:
         self.faults: dict[int, str] = {}
         anchors = np.array([anchor.instant for anchor in path.anchors])
         self._instants = np.concatenate([time, anchors])
-        self._nearest = len(time) + _nearest(anchors, time)
+        self._nearest = len(time) + nearest_instants(anchors, time)
         self._store = jax.tree.map(
             lambda *xs: np.concatenate([np.zeros((*xs[0].shape[:-1], len(time))), *xs], axis=-1),
             *(anchor.state for anchor in path.anchors),
@@ -163,13 +164,6 @@ def _slice_of(indices: Indices) -> slice | Indices:
     if step > 0 and np.array_equal(indices, np.arange(first, last + 1, step)):
         return slice(first, last + 1, step)
     return indices
-
-
-def _nearest(anchors: Float[np.ndarray, " anchor"], time: Float[np.ndarray, " time"]) -> Int[np.ndarray, " time"]:
-    after = np.clip(np.searchsorted(anchors, time), 1, max(len(anchors) - 1, 1))
-    if len(anchors) == 1:
-        return np.zeros(len(time), int)
-    return np.where(time - anchors[after - 1] <= anchors[after] - time, after - 1, after)
 
 
 def _levels(left: Bool[np.ndarray, " time"], anchors: int, width: int) -> list[tuple[Indices, int | None]]:

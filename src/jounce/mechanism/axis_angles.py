@@ -10,11 +10,12 @@ from jaxtyping import Float, Int
 from jounce.constraints.angles import Datum, angle_of
 from jounce.jet.turns import counted_on, principal, whole_periods
 from jounce.mechanism.system import Group
+from jounce.mechanism.time import nearest_instants
 from jounce.shapes import Numbers
 
 Coordinates = Mapping[str, Any]  # of all bodies, the ground first, by name: (..., bodies, batch)
 Quaternions = Float[np.ndarray, "4 *#rest"]
-Vectors = Float[np.ndarray, "3 *_"]
+Vectors = Float[np.ndarray, "3 *#rest"]
 Angles = Float[np.ndarray, "instance batch"]
 PARALLEL = 1e-9  # largest sine between axes that are one
 
@@ -63,7 +64,7 @@ class AttitudeHistory(NamedTuple):
         return [counted_on(np.column_stack(pair))[:, 1:] for pair in zip(begun, raw, strict=True)]
 
     def last_angles(self, groups: Sequence[Group]) -> list[np.ndarray]:
-        """Return the angles at the end of the way, (instances, 1) each, with the turns that are repeated."""
+        """Return the angles at the end, (instances, 1) each, with the turns that are repeated."""
         found = self.angles(groups)
         if not self.repeated:
             return [angle[:, -1:] for angle in found]
@@ -74,10 +75,7 @@ class AttitudeHistory(NamedTuple):
         """Return groups that have the turns of each instant, from the place nearest to it in time."""
         if not any(map(measures_angle, groups)):
             return tuple(groups)
-        after = np.clip(np.searchsorted(self.time, instants), 1, max(len(self.time) - 1, 1))
-        before = np.minimum(after - 1, len(self.time) - 1)
-        after = np.minimum(after, len(self.time) - 1)
-        nearest = np.where(instants - self.time[before] <= self.time[after] - instants, before, after)
+        nearest = nearest_instants(self.time, instants)
         return with_turns(groups, [angle[:, nearest] for angle in self.angles(groups)])
 
 
