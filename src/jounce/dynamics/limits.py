@@ -217,16 +217,19 @@ class _Bounds:
 
     def __init__(self, robot: Robot, limits: Mapping[str, Limits], rest: np.ndarray):
         every = [limits[name] for name in robot.joint_names]
-        largest = np.array([[_or_infinite(getattr(x, field)) for x in every] for field in FIELDS[1:]])
-        faster = largest[ACCELERATION - 1].copy()
-        slower = np.array([_or_infinite(x.deceleration) for x in every])
-        given = np.isfinite(slower)
+
+        def table(*fields: str, missing: float = np.inf) -> np.ndarray:
+            found = np.array([[getattr(x, field) for x in every] for field in fields], float)  # None becomes NaN
+            return np.where(np.isnan(found), missing, found)
+
+        largest, (slower,) = table(*FIELDS[1:]), table("deceleration")
+        faster, given = largest[ACCELERATION - 1].copy(), np.isfinite(slower)
         bound = np.where(np.isfinite(faster), faster, slower)
         largest[ACCELERATION - 1], self.rest = bound, rest
         self.speeding = np.where(given & ~np.isfinite(faster), 0.0, 1.0)
         self.slowing = np.divide(bound, slower, out=np.ones(len(every)), where=given)
-        self.upper = np.concatenate([[[_or_infinite(x.upper) for x in every]], largest])
-        self.lower = np.concatenate([[[-_or_infinite(x.lower, -1.0) for x in every]], -largest])
+        self.upper = np.concatenate([table("upper"), largest])
+        self.lower = np.concatenate([table("lower", missing=-np.inf), -largest])
         self.limited = np.isfinite(self.upper) | np.isfinite(self.lower)
         with np.errstate(invalid="ignore"):
             half = (self.upper - self.lower) / 2
@@ -329,10 +332,6 @@ def _merged(robot: Robot, limits: Mapping[str, Limits] | None) -> dict[str, Limi
         if not isinstance(entry, Limits):
             raise RobotError("must be Limits", name=f"limits.{name}", value=entry)
     return robot.limits | given
-
-
-def _or_infinite(bound: float | None, sign: float = 1.0) -> float:
-    return np.inf if bound is None else sign * float(bound)
 
 
 def _grid(trajectory: JointTrajectory) -> Float[np.ndarray, " time"]:
