@@ -448,3 +448,26 @@ def test_a_mechanism_without_masses_or_with_half_of_them():
     half = jn.solve(with_masses("four_bar", {"crank": {"inertia": 0.1}}), TIMES[:1], order=2)
     with pytest.raises(jn.MechanismError, match="an inertia needs a mass beside it"):
         kinetic_energy(half)
+
+
+def test_energies_of_a_motion_are_labelled():
+    _, motion = four_bar()
+    energy, potential = kinetic_energy(motion), jn.potential_energy(motion)
+    assert energy.total.dims == potential.dims == ("time", "derivative")
+    assert energy.translation.dims == ("time", "derivative", "body")
+    assert energy.rotation.body.values.tolist() == list(motion.mechanism.bodies)
+    np.testing.assert_array_equal(energy.total.time, motion.time)
+    assert jn.dynamics.stored_energy(motion).dims == ("time",)
+
+
+def test_total_energy_is_nan_where_the_motion_was_not_solved():
+    motion = jn.solve(with_masses("four_bar", {"crank": {"mass": 1.0}}), TIMES, order=2)
+    motion.status[1] = jn.Status.SINGULAR
+    total = kinetic_energy(motion).total
+    assert np.isnan(total[1]).all()
+    assert np.isfinite(total[[0]]).all()
+
+
+def test_a_motion_has_coordinates_of_its_own():
+    with pytest.raises(jn.MechanismError, match="has its coordinates already"):
+        kinetic_energy(four_bar()[1], [[0.0], [1.0]])
