@@ -1,6 +1,6 @@
 """Energies as outputs: kinetic, of accelerations of any order, and potential, of a body or of the whole mechanism."""
 
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import equinox as eqx
 import numpy as np
@@ -8,6 +8,7 @@ import numpy as np
 from jounce.constraints.base import Whole
 from jounce.dynamics.energies import energy_coefficients, potential_coefficients
 from jounce.errors import MechanismError, check_name
+from jounce.kinematics import Motion
 from jounce.mechanism import AbstractMotionOutput, Mechanism
 from jounce.robot.arguments import whole_number
 
@@ -33,7 +34,7 @@ class AbstractEnergyOutput(AbstractMotionOutput):
             which = "no body has a mass" if alone is None else "this body has no mass"
             raise MechanismError(f"{which}, and an energy needs one", name=self.source, value=alone)
 
-    def coefficients(self, motion: Any) -> np.ndarray:
+    def coefficients(self, motion: Motion) -> np.ndarray:
         """Return the Taylor coefficients of the energy, (levels, 1, time)."""
         parts = np.asarray(self._of_bodies(motion))
         if self.alone is None:
@@ -41,7 +42,7 @@ class AbstractEnergyOutput(AbstractMotionOutput):
         index = 1 + list(motion.mechanism.bodies).index(self.alone)  # the ground first
         return parts[:, index : index + 1]
 
-    def _of_bodies(self, motion: Any) -> np.ndarray:
+    def _of_bodies(self, motion: Motion) -> np.ndarray:
         """Return the Taylor coefficients of all bodies, (levels, bodies, time)."""
         raise NotImplementedError
 

@@ -5,7 +5,7 @@ on the poses of the bodies that it joins, so that all mechanisms share it.
 """
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -13,9 +13,11 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.dynamics import constraint_forces
+from jounce.dynamics.constraint_forces import Multipliers, Slope, Slopes
+from jounce.dynamics.forward import Lanes
 from jounce.dynamics.loads import loads, mass_matrices
-from jounce.dynamics.masses import check_loads, gravity_of, masses_of
-from jounce.dynamics.motion_values import cut, in_chunks, pose_of
+from jounce.dynamics.masses import Gravity, Masses, check_loads, gravity_of, masses_of
+from jounce.dynamics.motion_values import Coordinates, cut, in_chunks, pose_of
 from jounce.errors import MechanismError
 from jounce.jet import Jet, cross
 from jounce.jet.algebra import stacked
@@ -24,6 +26,8 @@ from jounce.kinematics.compilation import compiled
 from jounce.mechanism import Model
 from jounce.mechanism.axis_angles import at_lanes
 from jounce.mechanism.system import System, with_rows
+from jounce.rigid.pose import Pose
+from jounce.shapes import Numbers
 
 
 @dataclasses.dataclass(frozen=True)
@@ -244,13 +248,17 @@ class MotionForces:
 
 
 @compiled("pose_type", "slot", "levels")
-def _slopes(element: Any, poses: Any, instants: Any, pose_type: Any, slot: int, levels: int) -> Any:
+def _slopes(
+    element: Any, poses: Sequence[Coordinates], instants: Lanes, pose_type: type[Pose], slot: int, levels: int
+) -> Any:
     time = Jet.variable(instants[None], levels - 1)
     return constraint_forces.slopes(element, [pose_of(pose, pose_type, levels - 1) for pose in poses], time, slot)
 
 
 @compiled("pose_type")
-def _loads(system: System, bodies: Any, instants: Any, masses: Any, gravity: Any, pose_type: Any) -> tuple[Any, Any]:
+def _loads(
+    system: System, bodies: Coordinates, instants: Lanes, masses: Masses, gravity: Gravity, pose_type: type[Pose]
+) -> tuple[Any, Any]:
     order = len(bodies["position"]) - 1
     pose = pose_of(bodies, pose_type, order)
     time = Jet.variable(instants[None], order)
@@ -258,20 +266,29 @@ def _loads(system: System, bodies: Any, instants: Any, masses: Any, gravity: Any
 
 
 @compiled("pose_type")
-def _multipliers(system: System, blocks: Any, load: Any, still: Any, masses: Any, pose_type: Any) -> Any:
+def _multipliers(
+    system: System,
+    blocks: Slopes,
+    load: Float[Numbers, "levels coordinate body batch"],
+    still: Coordinates | None,
+    masses: Masses,
+    pose_type: type[Pose],
+) -> Any:
     mass = None if still is None else mass_matrices(pose_of(still, pose_type, 0), masses)[:, :, 1:]
     return constraint_forces.multipliers(system, blocks, load, mass)
 
 
 @compiled("pose_type")
-def _exerted(driver: Any, poses: Any, instants: Any, forces: Any, pose_type: Any) -> Any:
+def _exerted(
+    driver: Any, poses: Sequence[Coordinates], instants: Lanes, forces: Multipliers, pose_type: type[Pose]
+) -> Any:
     order = len(forces) - 1
     built = [pose_of(pose, pose_type, order) for pose in poses]
     return constraint_forces.exerted(driver, built, Jet.variable(instants[None], order), forces)
 
 
 @compiled("pose_type", "levels")
-def _applied(force: Any, poses: Any, instants: Any, pose_type: Any, levels: int) -> Any:
+def _applied(force: Any, poses: Sequence[Coordinates], instants: Lanes, pose_type: type[Pose], levels: int) -> Any:
     built = [pose_of(pose, pose_type, levels) for pose in poses]
     time = Jet.variable(instants[None], levels)
     found = force.force(force.displacement(*built, time), force.velocity(*built, time), time).truncate(levels - 1)
@@ -279,12 +296,17 @@ def _applied(force: Any, poses: Any, instants: Any, pose_type: Any, levels: int)
 
 
 @compiled()
-def _wrenches(slope: Any, forces: Any) -> Any:
+def _wrenches(slope: Slope, forces: Multipliers) -> Any:
     return constraint_forces.wrench(slope, forces)
 
 
 @compiled("pose_type")
-def _expressed(work: Any, bodies: Any, point: Any, pose_type: Any) -> tuple[Any, Any]:
+def _expressed(
+    work: Float[Numbers, "levels coordinate batch"],
+    bodies: Sequence[Coordinates],
+    point: Float[Numbers, "component 1 1"],
+    pose_type: type[Pose],
+) -> tuple[Any, Any]:
     order = len(work) - 1
     pose, *frame = (pose_of(body, pose_type, order) for body in bodies)
     force, moment = (Jet(tuple(part[:, :, None])) for part in (work[:, : pose.shifts], work[:, pose.shifts :]))
