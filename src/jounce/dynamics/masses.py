@@ -1,6 +1,6 @@
 """The masses of all bodies of a mechanism as arrays, and the gravity that it feels."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -38,7 +38,7 @@ def masses_of(mechanism: Mechanism) -> Masses:
         If a body has an inertia without a mass, or a value is not valid.
     """
     size = POSITION_COMPONENTS[mechanism.space]
-    columns = [(0.0, np.zeros(size), np.zeros((size, size)))]
+    columns: list[tuple[Any, ...]] = [(0.0, np.zeros(size), np.zeros((size, size)))]
     for name, body in mechanism.bodies.items():
         if body.mass is None and body.inertia is not None:
             raise MechanismError("an inertia needs a mass beside it", name=f"bodies.{name}.mass")

@@ -112,7 +112,7 @@ class _JointOutput(AbstractForceOutput):
             size = forces.pose_type.shifts
             point = np.zeros(size) if fixed is None else np.asarray(fixed).reshape(size, -1)[:, place.instance]
         work = forces.wrench(self.joint, slot)
-        return forces.expressed(work, index(body), None if frame is None else index(frame), point)
+        return forces.expressed(work, index(body), None if frame is None else index(frame), np.asarray(point))
 
 
 class JointForceOutput(_JointOutput):
