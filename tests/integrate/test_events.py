@@ -6,7 +6,7 @@ import pytest
 import jounce as jn
 from jounce import drivers, jet, spatial
 from jounce.dynamics.forward import State
-from jounce.integrate.events import Watch, crossings
+from jounce.integrate.events import EventDetector, crossings
 from jounce.kinematics.motion import output_group
 from jounce.rigid.planar import PlanarPose
 
@@ -125,12 +125,14 @@ def flight(start, speed, length):
 def test_a_crossing_where_two_steps_meet_is_one(beyond):
     """Found at the very end of one step, and again at the beginning of the next."""
     event = height(1.0 + beyond, direction=1)
-    watch = Watch(event, output_group(event.output, stone()), PlanarPose)
-    first = watch.look(np.array([0.0]), *flight(0.0, 1.0, 1.0))
-    second = watch.look(np.array([1.0]), *flight(1.0, 1.0, 1.0))
+    detector = EventDetector(event, output_group(event.output, stone()), PlanarPose)
+    first = detector.detect(np.array([0.0]), *flight(0.0, 1.0, 1.0))
+    second = detector.detect(np.array([1.0]), *flight(1.0, 1.0, 1.0))
     assert [when for _, when in first] == pytest.approx([1.0], abs=1e-9)
     assert second == []
-    assert [when for _, when in watch.look(np.array([2.0]), *flight(0.5, 1.0, 1.0))] == pytest.approx([0.5 + beyond])
+    assert [when for _, when in detector.detect(np.array([2.0]), *flight(0.5, 1.0, 1.0))] == pytest.approx(
+        [0.5 + beyond]
+    )
 
 
 def chebyshev(*roots, lead=1.0):

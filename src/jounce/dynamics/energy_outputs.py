@@ -9,6 +9,7 @@ from jounce.constraints.base import Whole
 from jounce.dynamics.energies import energy_coefficients, potential_coefficients
 from jounce.errors import MechanismError, check_name
 from jounce.mechanism import AbstractMotionOutput, Mechanism
+from jounce.robot.arguments import whole_number
 
 
 class AbstractEnergyOutput(AbstractMotionOutput):
@@ -34,7 +35,7 @@ class AbstractEnergyOutput(AbstractMotionOutput):
 
     def coefficients(self, motion: Any) -> np.ndarray:
         """Return the Taylor coefficients of the energy, (levels, 1, time)."""
-        parts = self._of_bodies(motion)
+        parts = np.asarray(self._of_bodies(motion))
         if self.alone is None:
             return parts.sum(axis=1, keepdims=True)
         index = 1 + list(motion.mechanism.bodies).index(self.alone)  # the ground first
@@ -51,7 +52,7 @@ class KineticEnergyOutput(AbstractEnergyOutput):
     lost_orders = 1
 
     def _of_bodies(self, motion):
-        return energy_coefficients(motion, 0)
+        return sum(energy_coefficients(motion, 0))
 
 
 class AccelerationEnergyOutput(AbstractEnergyOutput):
@@ -60,8 +61,7 @@ class AccelerationEnergyOutput(AbstractEnergyOutput):
     order: Whole = eqx.field(static=True, default=1)
 
     def __check_init__(self):
-        if isinstance(self.order, bool) or not isinstance(self.order, int | np.integer) or self.order < 0:
-            raise MechanismError("must be a whole number, 0 or greater", name="order", value=self.order)
+        whole_number("order", self.order, error=MechanismError)
 
     @property
     def lost_orders(self) -> int:  # type: ignore[override] - of an instance, as it depends on the order
@@ -74,7 +74,7 @@ class AccelerationEnergyOutput(AbstractEnergyOutput):
         return f"J/s^{2 * self.order}" if self.order else "J"
 
     def _of_bodies(self, motion):
-        return energy_coefficients(motion, int(self.order))
+        return sum(energy_coefficients(motion, int(self.order)))
 
 
 class PotentialEnergyOutput(AbstractEnergyOutput):

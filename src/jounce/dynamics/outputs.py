@@ -6,7 +6,8 @@ import equinox as eqx
 import numpy as np
 
 from jounce.constraints.base import Vector, value_fields
-from jounce.dynamics.inverse import MotionForces, check_loads
+from jounce.dynamics.inverse import MotionForces
+from jounce.dynamics.masses import check_loads
 from jounce.errors import MechanismError, check_name, did_you_mean
 from jounce.mechanism import AbstractMotionOutput, Mechanism
 from jounce.mechanism.mechanism import GROUND
@@ -104,7 +105,7 @@ class _JointOutput(AbstractForceOutput):
         index = [GROUND, *mechanism.bodies].index
         frame = {"global": None, "body": body}.get(self.frame, self.frame)
         if point is None:
-            place = forces.places[self.joint]
+            place = forces.indices[self.joint]
             fixed = getattr(forces.model.system.groups[place.group].element, f"point_{'ijmn'[slot : slot + 1]}", None)
             size = forces.pose_type.shifts
             point = np.zeros(size) if fixed is None else np.asarray(fixed).reshape(size, -1)[:, place.instance]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from jounce.dynamics import kinetic_energy, potential_energy, power_balance, stored_energy
-from jounce.dynamics.inverse import check_loads
+from jounce.dynamics.masses import check_loads
 from jounce.dynamics.outputs import (
     AppliedForceOutput,
     AppliedTorqueOutput,
@@ -138,8 +138,8 @@ def draw_energy(motion: Any) -> Any:
     >>> [line.get_label() for line in draw_energy(press).axes[0].get_lines()][:2]
     ['kinetic', 'potential']
     """
-    found = {"kinetic": kinetic_energy(motion).total[:, 0], "potential": potential_energy(motion)[:, 0]}
-    stored = stored_energy(motion)
+    found = {"kinetic": kinetic_energy(motion).total.values[:, 0], "potential": potential_energy(motion).values[:, 0]}
+    stored = stored_energy(motion).values
     if _largest(stored):
         found["springs"] = stored
     found["total"] = np.sum(list(found.values()), axis=0)

@@ -10,7 +10,7 @@ import numpy as np
 from typing_extensions import TypedDict
 
 from jounce.constraints.base import value_fields
-from jounce.dynamics.start import driven
+from jounce.dynamics.start import initial_as_drivers
 from jounce.errors import JounceError, MobilityError
 from jounce.io.files.source import read_source
 from jounce.io.files.units import parse_value
@@ -227,7 +227,7 @@ class _State:
 
     def _assembled(self) -> tuple[dict[str, Any] | None, dict[str, Any]]:
         told = {"status": "assembled", "message": None, "at": self.instant, "open": None}
-        model = build(driven(self.mechanism)) if self.mechanism.initial else self.model
+        model = build(initial_as_drivers(self.mechanism)) if self.mechanism.initial else self.model
         trial = self._trial(model)
         if trial is None:
             return model.guess, told

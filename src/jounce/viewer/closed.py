@@ -74,9 +74,9 @@ def independent(robot: Robot) -> tuple[str, ...]:
         If there are none.
     """
     from jounce.kinematics import solve
-    from jounce.robot.closures import Loops, size_of
+    from jounce.robot.closures import Loops
 
-    loops = Loops(robot, size_of(robot))
+    loops = Loops(robot)
     start = loops.closed(np.zeros(len(robot.joint_names)), np.ones(len(robot.joint_names), bool))
     freedom = len(start) - sum(len(kept) for kept, _ in loops.independent(start))
     names = sorted(robot.joint_names, key=lambda name: (robot.limits[name].effort is None, _depth(robot, name)))
