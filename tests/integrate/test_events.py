@@ -7,7 +7,6 @@ import jounce as jn
 from jounce import drivers, jet, spatial
 from jounce.dynamics.forward import State
 from jounce.integrate.events import EventDetector, crossings
-from jounce.jet.turns import counted_by_rates
 from jounce.kinematics.motion import output_group
 from jounce.rigid.planar import PlanarPose
 
@@ -113,16 +112,6 @@ def test_turns_of_an_angle_in_space_count():
     assert motion.events == [pytest.approx([2.5], abs=1e-13), pytest.approx([np.pi / 20], abs=1e-13), []]
     assert np.allclose(motion.outputs["angle"], [[0, 20], [200, 20]], rtol=1e-13)
     assert np.allclose(motion.at([7.0]).outputs["angle"], [[140, 20]], rtol=1e-13)  # also where asked for alone
-
-
-def test_turns_between_samples_are_counted_by_the_rates():
-    """A constant acceleration, through more than a turn from one node of a step to the next."""
-    time = np.cumsum(0.5 + 0.2 * np.cos(np.arange(40)))
-    angle, rate = 3.0 + 20.0 * time - 0.4 * time**2, 20.0 - 0.8 * time
-    assert np.abs(np.diff(angle)).max() > 2 * np.pi
-    principal = np.angle(np.exp(1j * angle))
-    counted = counted_by_rates(principal, rate, time)
-    np.testing.assert_allclose(counted, angle - angle[0] + principal[0], atol=1e-10)
 
 
 def flight(start, speed, length):

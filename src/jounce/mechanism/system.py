@@ -63,25 +63,21 @@ class Group(eqx.Module):
 
     def force(self, pose: Pose, time: Jet) -> Float[Jet, "component instance batch"]:
         """Return the forces, shape (components, instances, batch), one order shorter than the pose."""
-        displacement, velocity = self._motion(pose, time)
-        return with_rows(self.element.force(displacement, velocity, time)).truncate(pose.order - 1)
+        return self._acting(pose, time)[1].truncate(pose.order - 1)
 
     def finite(self, pose: Pose, time: Jet) -> Bool[Numbers, "instance batch"]:
         """Tell where forces and the velocities they work on are finite numbers, shape (instances, batch)."""
-        displacement, velocity = self._motion(pose, time)
-        force = self.element.force(displacement, velocity, time)
-        parts = [with_rows(jet).coefficients[0] for jet in (velocity, force)]
-        return jnp.isfinite(parts[0]).all(axis=0) & jnp.isfinite(parts[1]).all(axis=0)
+        velocity, force = (jnp.isfinite(jet.coefficients[0]).all(axis=0) for jet in self._acting(pose, time))
+        return velocity & force
 
     def power(self, pose: Pose, time: Jet) -> Float[Jet, "instance batch"]:
         """Return the power that forces put into the mechanism, shape (instances, batch), W."""
-        displacement, velocity = self._motion(pose, time)
-        force = self.element.force(displacement, velocity, time)
-        return force.dot(velocity) if len(force.shape) == 3 else force * velocity
+        velocity, force = self._acting(pose, time)
+        return force.dot(velocity)
 
     def velocity(self, pose: Pose, time: Jet) -> Float[Jet, "component instance batch"]:
         """Return the velocities that forces work on, shape (components, instances, batch)."""
-        return with_rows(self._motion(pose, time)[1])
+        return with_rows(self.element.velocity(*self._poses(pose), time))
 
     def energy(self, pose: Pose, time: Jet) -> Float[Jet, "instance batch"]:
         """Return the energy that forces have stored, shape (instances, batch), J."""
@@ -91,9 +87,11 @@ class Group(eqx.Module):
         """Return how far forces act along as all bodies move by a change, shape (components, instances, batch)."""
         return with_rows(self.element.variation(tuple(self._poses(pose)), tuple(self._poses(change)), time))
 
-    def _motion(self, pose: Pose, time: Jet) -> tuple[Jet, Jet]:
+    def _acting(self, pose: Pose, time: Jet) -> tuple[Jet, Jet]:
+        """Return the velocities that forces work on, and the forces."""
         poses = self._poses(pose)
-        return self.element.displacement(*poses, time), self.element.velocity(*poses, time)
+        displacement, velocity = self.element.displacement(*poses, time), self.element.velocity(*poses, time)
+        return with_rows(velocity), with_rows(self.element.force(displacement, velocity, time))
 
     def derivative_blocks(self, pose: Pose, time: Jet, scale: Float[Numbers, " coordinate"]) -> list[Any]:
         """Return the derivatives of the residuals by the coordinates of the bodies in each slot that may move.
