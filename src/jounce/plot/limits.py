@@ -8,6 +8,7 @@ import numpy as np
 
 from jounce.dynamics.limits import FIELDS, LimitReport, LimitRow
 from jounce.errors import RobotError
+from jounce.plot.instants import evenly_chosen
 from jounce.plot.labels import unit_label
 from jounce.plot.style import GREY, LINE_COLOURS, PALE_GREY, blank_figure, shown_name, style
 
@@ -92,15 +93,13 @@ def _line_style(joint: int) -> dict[str, Any]:
 def _draw_panel(report: LimitReport, quantity: int, joints: list[int], axes: Any) -> None:
     from matplotlib.ticker import MaxNLocator
 
-    step = -(-len(report.times) // DRAWN)
-    chosen = np.unique(np.append(np.arange(0, len(report.times), step), len(report.times) - 1))
+    chosen = evenly_chosen(np.arange(len(report.times)), DRAWN)
     shares = report.shares[chosen, quantity]
     for joint in joints:
         axes.plot(report.times[chosen], shares[:, joint], **_line_style(joint))
     worst = max(_rows_of(report, quantity), key=lambda row: row.ratio or 0.0)
-    low, high = min(-1.0, float(np.nanmin(shares))), max(1.0, float(np.nanmax(shares)))
     at = (worst.ratio or 0.0) * (1 if _is_upper(report, worst) else -1)
-    low, high = min(low, at), max(high, at)
+    low, high = min(-1.0, at, float(np.nanmin(shares))), max(1.0, at, float(np.nanmax(shares)))
     margin = 0.08 * (high - low)
     axes.set_ylim(low - margin, high + margin)
     axes.set_xlim(report.times[0], report.times[-1])
@@ -136,17 +135,7 @@ def _is_upper(report: LimitReport, row: LimitRow) -> bool:
 def _draw_legend(report: LimitReport, joints: list[int], figure: Any) -> None:
     from matplotlib.lines import Line2D
 
-    names = [shown_name(report.joint_names[joint]) for joint in joints]
-    handles = [
-        Line2D([], [], linewidth=1.6, label=name, **_line_style(joint))
-        for joint, name in zip(joints, names, strict=True)
-    ]
-    figure.legend(
-        handles=handles,
-        loc="outside lower center",
-        ncols=_per_line(report, joints),
-        handlelength=1.8,
-        handletextpad=0.5,
-        columnspacing=1.4,
-        borderaxespad=0.1,
-    )
+    names = {joint: shown_name(report.joint_names[joint]) for joint in joints}
+    handles = [Line2D([], [], linewidth=1.6, label=name, **_line_style(joint)) for joint, name in names.items()]
+    spacing = {"handlelength": 1.8, "handletextpad": 0.5, "columnspacing": 1.4, "borderaxespad": 0.1}
+    figure.legend(handles=handles, loc="outside lower center", ncols=_per_line(report, joints), **spacing)

@@ -13,10 +13,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from jounce.papers.sommer_2024.simulations import SIMULATIONS
-from jounce.plot.canvas import Label, Shape, screen_of
+from jounce.plot.drawing import Label, Shape, View, screen_of
 from jounce.plot.frames import assembled
 from jounce.plot.scene import scene_of
-from jounce.plot.sketch import Drawing, draw_scale
+from jounce.plot.sketch import SketchFigure, draw_scale
 from jounce.plot.style import GREY, PALE_GREY, blank_figure
 
 ARC = 7.0  # radius of the arc of an angle, in halves of a pin
@@ -89,7 +89,7 @@ def draw(
     title: str,
     note: str,
     size: tuple[float, float],
-    view: tuple[float, float] = VIEW,
+    view: View = VIEW,
 ) -> Figure:
     """Draw one figure of the paper, a panel with a title for each mechanism."""
     figure = blank_figure(*size, title)
@@ -104,7 +104,7 @@ def draw(
     return figure
 
 
-def _panel(axes: Any, drawn: Drawn, view: tuple[float, float]) -> Drawing:
+def _panel(axes: Any, drawn: Drawn, view: View) -> SketchFigure:
     """Return a mechanism, put together at the start of its cycle, in a panel; its names are not yet written."""
     mechanism = SIMULATIONS[drawn.simulation].load()
     values, frames = mechanism.parameter_values, assembled(mechanism)
@@ -139,7 +139,7 @@ def _panel(axes: Any, drawn: Drawn, view: tuple[float, float]) -> Drawing:
         text = f"{pair} = {100 * values[pair]:.2f} cm" if pair in values else f"d = {pair}, driven"
         name(text, (places[pair[0]] + places[pair[1]]) / 2, GREY, f"joints.{pair}")
     seen_from = None if planar else view
-    drawing = Drawing(dataclasses.replace(scene, shapes=shapes, labels=labels), None, "", seen_from, axes)
+    drawing = SketchFigure(dataclasses.replace(scene, shapes=shapes, labels=labels), None, "", seen_from, axes)
     left, right = axes.get_xlim()
     axes.set_xlim(left - 0.15 * (right - left), right)  # room for lengths on the left
     draw_scale(axes, seen_from)
