@@ -144,5 +144,5 @@ def test_instants_that_failed_are_nowhere():
     mechanism = jn.load(ROOT / "examples" / "four_bar.yaml").with_parameters(BC=0.11)
     motion = jn.solve(mechanism, np.linspace(0.0, 2.0, 21), order=1, strict=False)
     assert np.any(motion.status != 0)
-    found = points_at(frames(motion)["crank"], [0.04, 0.0])
+    found = points_at(frames(motion)["crank"], np.array([0.04, 0.0]))
     np.testing.assert_array_equal(np.isnan(found).any(axis=1), motion.status != 0)

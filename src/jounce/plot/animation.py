@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 from jaxtyping import Float
-from numpy.typing import ArrayLike
 
 from jounce.errors import MechanismError, OutputError
 from jounce.interrupts import undoing
@@ -59,7 +58,7 @@ def _ffmpeg() -> str | None:
 
 
 def frame_instants(
-    time: ArrayLike, *, speed: float | None = None, fps: int = FRAMES_PER_SECOND
+    time: Sequence[float] | Float[np.ndarray, " time"], *, speed: float | None = None, fps: int = FRAMES_PER_SECOND
 ) -> Float[np.ndarray, " frames"]:
     """Return the times that the frames of an animation show.
 

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 from jaxtyping import Float
-from numpy.typing import ArrayLike
 
 from jounce.mechanism.mechanism import GROUND
 from jounce.plot.frames import Frame, points_at, within
@@ -146,7 +145,9 @@ class Drawing:
         extent = np.linalg.norm(np.ptp(everywhere, axis=0)) if len(everywhere) else 0.0
         return UNIT * float(extent or self.skeleton.size)
 
-    def at(self, body: str, points: ArrayLike) -> Float[np.ndarray, "time *points components"]:
+    def at(
+        self, body: str, points: Float[np.ndarray, "*points components"]
+    ) -> Float[np.ndarray, "time *points components"]:
         """Return points of a body, (..., components), in the global frame."""
         return points_at(self.frames[body], points)
 

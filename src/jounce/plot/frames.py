@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 from jaxtyping import Float
-from numpy.typing import ArrayLike
 
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked
@@ -95,11 +94,12 @@ def _frames(pose_type: Any, coordinates: Mapping[str, Any]) -> Any:
     return jnp.stack([stacked(column)[0] for column in columns], axis=1)
 
 
-def points_at(frame: Frame, points: ArrayLike) -> Float[np.ndarray, "time *points components"]:
-    """Return points of a body, (..., components), in the global frame, (time, ..., components)."""
-    local = np.asarray(points, float)
-    turned = np.einsum("tck,...k->t...c", frame[:, :, 1:], local)
-    return turned + frame[:, :, 0].reshape(len(frame), *[1] * (local.ndim - 1), -1)
+def points_at(
+    frame: Frame, points: Float[np.ndarray, "*points components"]
+) -> Float[np.ndarray, "time *points components"]:
+    """Return points of a body in the global frame."""
+    turned = np.einsum("tck,...k->t...c", frame[:, :, 1:], points)
+    return turned + frame[:, :, 0].reshape(len(frame), *[1] * (points.ndim - 1), -1)
 
 
 def within(frame: Frame, places: Float[np.ndarray, "time components"]) -> Float[np.ndarray, "time components"]:

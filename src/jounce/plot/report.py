@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
-from numpy.typing import ArrayLike
 
 from jounce.io.files.writing import check_target, replacing
 from jounce.kinematics import Motion, Status
@@ -154,7 +153,7 @@ def _speed(span: float) -> float:
     return min(SPEEDS, key=lambda speed: abs(math.log(speed / wanted)))
 
 
-def _number(value: ArrayLike) -> float | None:
+def _number(value: float | np.ndarray) -> float | None:
     """Return a number that JSON can hold: to some digits, nothing where it is not finite."""
     return float(f"{value:.{DIGITS}g}") if np.isfinite(value) else None
 

@@ -5,17 +5,21 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from functools import cached_property
-from typing import Any
+from itertools import combinations, islice
 
 import numpy as np
 
 from jounce.errors import JounceError, RobotError
+from jounce.kinematics import solve
+from jounce.robot.closures import Loops, size_of
 from jounce.robot.robot import Robot
-from jounce.viewer.mechanisms import take_of
-from jounce.viewer.robots import FRAMES, RobotSubject, swing_parameters, swinging
-from jounce.viewer.take import Parameter, Take
+from jounce.viewer.mechanisms import recorded
+from jounce.viewer.recording import Parameter, Recording
+from jounce.viewer.robots import RobotSubject, swing_parameters
 
-__all__ = ["ClosedRobotSubject"]
+__all__ = ["ClosedRobotSubject", "independent"]
+
+MOST_TRIED = 60  # choices of driven joints, which take a few seconds
 
 
 class ClosedRobotSubject(RobotSubject):
@@ -32,23 +36,14 @@ class ClosedRobotSubject(RobotSubject):
     @cached_property
     def driven(self) -> tuple[str, ...]:
         """Joints that drive all others."""
-        if self.trajectory is not None:
-            return self.trajectory.names
-        return independent(self.robot)
+        return independent(self.robot) if self.trajectory is None else self.trajectory.names
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """How the driven joints swing; none with a trajectory."""
-        if self.trajectory is not None:
-            return ()
-        found = []
-        for parameter in swing_parameters(self.robot, self.driven):
-            if parameter.name.endswith(" swing"):  # loops leave less room than the limits
-                parameter = dataclasses.replace(parameter, value=0.5 * parameter.value)
-            found.append(parameter)
-        return tuple(found)
+        """How the driven joints swing, less far as loops leave less room than the limits; none with a trajectory."""
+        return () if self.trajectory is not None else swing_parameters(self.robot, self.driven, share=0.5)
 
-    def solve(self, values: Mapping[str, float], order: int) -> Take:
+    def solve(self, values: Mapping[str, float], order: int) -> Recording:
         """Return the motion for some swings.
 
         Raises
@@ -56,13 +51,9 @@ class ClosedRobotSubject(RobotSubject):
         JounceError
             If the loops cannot be closed.
         """
-        from jounce.kinematics import solve
-
-        robot = self.robot
-        laws = self.trajectory if self.trajectory is not None else swinging(robot, values, self.driven)
-        times = laws.times if self.trajectory is not None else np.linspace(laws.start, laws.stop, FRAMES)
+        robot, (laws, times) = self.robot, self.laws(values, self.driven)
         motion = solve(robot.mechanism(drivers=laws, time=times), order=order, strict=False)
-        return dataclasses.replace(take_of(motion, self.looks, robot.name, robot.base), values=dict(values))
+        return dataclasses.replace(recorded(motion, self.appearance, robot.name, robot.base), values=dict(values))
 
 
 def independent(robot: Robot) -> tuple[str, ...]:
@@ -73,16 +64,14 @@ def independent(robot: Robot) -> tuple[str, ...]:
     RobotError
         If there are none.
     """
-    from jounce.kinematics import solve
-    from jounce.robot.closures import Loops, size_of
-
     loops = Loops(robot, size_of(robot))
     start = loops.closed(np.zeros(len(robot.joint_names)), np.ones(len(robot.joint_names), bool))
     freedom = len(start) - sum(len(kept) for kept, _ in loops.independent(start))
     names = sorted(robot.joint_names, key=lambda name: (robot.limits[name].effort is None, _depth(robot, name)))
-    for chosen in _choices(tuple(names), freedom):
+    for chosen in islice(combinations(names, freedom), MOST_TRIED):
+        still = {name: float(start[robot.joint_names.index(name)]) for name in chosen}
         try:
-            solve(robot.mechanism(start, drivers=_still(robot, chosen, start), time=[0.0]), order=0)
+            solve(robot.mechanism(start, drivers=still, time=[0.0]), order=0)
         except JounceError:
             continue
         return tuple(name for name in robot.joint_names if name in chosen)
@@ -96,14 +85,3 @@ def _depth(robot: Robot, name: str) -> int:
     while link in parents:
         count, link = count + parents[link].moving, parents[link].parent
     return count
-
-
-def _still(robot: Robot, names: tuple[str, ...], start: np.ndarray) -> dict[str, float]:
-    return {name: float(start[robot.joint_names.index(name)]) for name in names}
-
-
-def _choices(names: tuple[str, ...], count: int) -> Any:
-    """Give the choices of some joints in the order of the tree; not more than are tried in a few seconds."""
-    from itertools import combinations, islice
-
-    return islice(combinations(names, count), 60)
