@@ -80,8 +80,8 @@ def frames(motion: Motion) -> dict[str, Frame]:
 
 
 def _by_body(mechanism: Mechanism, whole: Any) -> dict[str, Frame]:
-    names = (GROUND, *mechanism.bodies)
-    return {body: np.moveaxis(np.asarray(whole[:, :, k]), -1, 0) for k, body in enumerate(names)}
+    by_time, names = np.moveaxis(np.asarray(whole), -1, 0), (GROUND, *mechanism.bodies)
+    return {body: by_time[..., k] for k, body in enumerate(names)}
 
 
 @compiled("pose_type")

@@ -36,7 +36,6 @@ __all__ = [
 ]
 
 AROUND = 24  # corners of a circle
-SHARP = np.radians(30)  # edges at larger angles than this are sharp
 Z, ORIGIN = (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
 Vector = Float[np.ndarray, "3"]
 Rotation = Float[np.ndarray, "3 3"]
@@ -55,11 +54,9 @@ def rotation_to(axis: Place) -> Rotation:
 
 
 def placed(mesh: Trimesh, center: Place = ORIGIN, rotation: Rotation | None = None) -> Trimesh:
-    """Turn a mesh, then move it, and return it."""
-    transform = np.eye(4)
-    transform[:3, :3] = np.eye(3) if rotation is None else rotation
-    transform[:3, 3] = center
-    return mesh.apply_transform(transform)
+    """Return a mesh that is turned, then moved."""
+    turned = mesh.vertices if rotation is None else mesh.vertices @ rotation.T
+    return Trimesh(turned + np.asarray(center), mesh.faces, process=False)
 
 
 def merged(meshes: Sequence[Trimesh]) -> Trimesh:
@@ -69,23 +66,41 @@ def merged(meshes: Sequence[Trimesh]) -> Trimesh:
 
 def cylinder(radius: float, length: float, axis: Place = Z, center: Place = ORIGIN) -> Trimesh:
     """Return a cylinder about an axis, its middle in a centre."""
-    return placed(_unit_cylinder().copy().apply_scale((radius, radius, length)), center, rotation_to(axis))
+    return placed(_unit_cylinder(), center, rotation_to(axis) * (radius, radius, length))
 
 
 @cache
 def _unit_cylinder() -> Trimesh:
-    return trimesh.graph.smooth_shade(creation.cylinder(1.0, 1.0, sections=AROUND), angle=SHARP)
+    return _round_walls(creation.cylinder(1.0, 1.0, sections=AROUND))
 
 
 def sleeve(inside: float, outside: float, length: float, axis: Place = Z, center: Place = ORIGIN) -> Trimesh:
     """Return a hollow cylinder about an axis, its middle in a centre."""
     ring = creation.annulus(inside, outside, length, sections=AROUND)
-    return placed(trimesh.graph.smooth_shade(ring, angle=SHARP), center, rotation_to(axis))
+    return placed(_round_walls(ring), center, rotation_to(axis))
+
+
+def _round_walls(mesh: Trimesh) -> Trimesh:
+    """Return a mesh whose caps, across z, share no vertices with its walls."""
+    caps, count = np.abs(mesh.face_normals[:, 2]) > 0.5, len(mesh.vertices)
+    faces = np.concatenate([mesh.faces[caps], mesh.faces[~caps] + count])
+    return Trimesh(np.tile(mesh.vertices, (2, 1)), faces, process=False)
+
+
+def _flat_walls(mesh: Trimesh) -> Trimesh:
+    """Return a mesh none of whose faces share vertices."""
+    mesh.unmerge_vertices()
+    return mesh
 
 
 def sphere(radius: float, center: Place = ORIGIN) -> Trimesh:
     """Return a sphere."""
-    return placed(creation.uv_sphere(radius, count=(AROUND // 2, AROUND)), center)
+    return placed(_unit_sphere(), center, radius * np.eye(3))
+
+
+@cache
+def _unit_sphere() -> Trimesh:
+    return creation.uv_sphere(1.0, count=(AROUND // 2, AROUND))
 
 
 def capsule(start: Place, end: Place, radius: float) -> Trimesh:
@@ -100,18 +115,13 @@ def capsule(start: Place, end: Place, radius: float) -> Trimesh:
 
 def box(size: Place, center: Place = ORIGIN, rotation: Rotation | None = None) -> Trimesh:
     """Return a box of three edges about a centre."""
-    return _faceted(placed(creation.box(np.asarray(size, float)), center, rotation))
-
-
-def _faceted(mesh: Trimesh) -> Trimesh:
-    mesh.unmerge_vertices()
-    return mesh
+    return _flat_walls(placed(creation.box(np.asarray(size, float)), center, rotation))
 
 
 def extruded(outline: Polygon, low: float, high: float, *, sharp: bool = True) -> Trimesh:
-    """Return a flat shape drawn out along z; its walls meet in sharp edges, or look round where they nearly are."""
+    """Return a flat shape drawn out along z; its walls meet in sharp edges, or look round."""
     mesh = placed(creation.extrude_polygon(outline, high - low), (0.0, 0.0, low))
-    return _faceted(mesh) if sharp else trimesh.graph.smooth_shade(mesh, angle=SHARP)
+    return _flat_walls(mesh) if sharp else _round_walls(mesh)
 
 
 def plate(points: FlatPoints, radius: float, low: float, high: float) -> Trimesh:
@@ -161,4 +171,4 @@ def arc_arrow() -> Trimesh:
     line = np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
     ahead = np.array([-line[-1, 1], line[-1, 0], 0.0])
     head = creation.cone(0.22, 0.55, sections=AROUND)
-    return merged([tube(line, 0.08), placed(_faceted(head), line[-1] - 0.05 * ahead, rotation_to(ahead))])
+    return merged([tube(line, 0.08), placed(_flat_walls(head), line[-1] - 0.05 * ahead, rotation_to(ahead))])
