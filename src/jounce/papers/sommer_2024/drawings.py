@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from jounce.papers.sommer_2024.simulations import SIMULATIONS
+from jounce.papers.figures import panels
+from jounce.papers.sommer_2024.cases import VALIDATION_CASES
 from jounce.plot.drawing import Label, Shape, View, screen_of
 from jounce.plot.frames import assembled
 from jounce.plot.scene import scene_of
 from jounce.plot.sketch import SketchFigure, draw_scale
-from jounce.plot.style import GREY, PALE_GREY, blank_figure
+from jounce.plot.style import GREY, PALE_GREY
 
 ARC = 7.0  # radius of the arc of an angle, in halves of a pin
 VIEW = (-130.0, 25.0)  # degrees, of the spatial ones
@@ -84,7 +85,7 @@ RSPU = Drawn(
 
 
 def draw(
-    panels: Mapping[str, Drawn],
+    drawn: Mapping[str, Drawn],
     *,
     title: str,
     note: str,
@@ -92,13 +93,11 @@ def draw(
     view: View = VIEW,
 ) -> Figure:
     """Draw one figure of the paper, a panel with a title for each mechanism."""
-    figure = blank_figure(*size, title)
-    axes = figure.subplots(1, len(panels), squeeze=False)[0]
-    figure.supxlabel(note, fontsize=7.5, color=GREY)
+    figure, axes = panels(1, len(drawn), size, title, note)
     drawings = []
-    for panel, (name, drawn) in zip(axes, panels.items(), strict=True):
+    for panel, (name, its) in zip(axes[0], drawn.items(), strict=True):
         panel.set_title(name)
-        drawings.append(_panel(panel, drawn, view))
+        drawings.append(_panel(panel, its, view))
     for drawing in drawings:  # once all panels have their places
         drawing.write_names(0, "all")
     return figure
@@ -106,7 +105,7 @@ def draw(
 
 def _panel(axes: Any, drawn: Drawn, view: View) -> SketchFigure:
     """Return a mechanism, put together at the start of its cycle, in a panel; its names are not yet written."""
-    mechanism = SIMULATIONS[drawn.simulation].load()
+    mechanism = VALIDATION_CASES[drawn.simulation].load()
     values, frames = mechanism.parameter_values, assembled(mechanism)
     scene = scene_of(mechanism, view=view)
     planar = mechanism.space == "planar"

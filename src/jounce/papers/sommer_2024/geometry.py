@@ -12,6 +12,7 @@ from typing import Any
 
 import jax
 import numpy as np
+from jaxtyping import Float
 
 from jounce import jet
 from jounce.jet import Jet
@@ -91,7 +92,9 @@ def rspu(time: Jet, p: Mapping[str, Any]) -> Jet:
     return opening_angle(distance, nearest, farthest)
 
 
-def evaluate(form: Form, time: Any, parameters: Mapping[str, float], order: int = 4) -> np.ndarray:
+def evaluate(
+    form: Form, time: Float[np.ndarray, " time"], parameters: Mapping[str, float], order: int = 4
+) -> Float[np.ndarray, "time {order}+1"]:
     """Return an output angle and its time derivatives from its explicit solution.
 
     Parameters
@@ -113,11 +116,10 @@ def evaluate(form: Form, time: Any, parameters: Mapping[str, float], order: int 
     Examples
     --------
     >>> sides = {"EF": 0.07, "FG": 0.02, "d_start": 0.07, "d_delta": 0.01, "tau": 2.0}
-    >>> psi = evaluate(inverted_slider_crank, [0.0, 0.5], sides, order=1)
+    >>> psi = evaluate(inverted_slider_crank, np.array([0.0, 0.5]), sides, order=1)
     >>> psi.shape, f"{np.cos(psi[0, 0]):.12f}"
     ((2, 2), '-0.142857142857')
     """
-    time = np.asarray(time, float)
     whole = np.pad(time, (0, -len(time) % LANES), mode="edge").reshape(-1, LANES)
     values = {name: float(value) for name, value in parameters.items()}
     parts = [np.asarray(_derivatives(form, part, values, order)) for part in whole]
