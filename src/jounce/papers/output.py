@@ -104,7 +104,7 @@ def markdown_table(columns: str, rows: Iterable[Iterable[str]]) -> str:
     | a | 0.5 |
     """
     lines = [f"| {columns} |", "|" + "---|" * (1 + columns.count("|"))]
-    return "\n".join([*lines, *(f"| {' | '.join(row)} |".replace("|  |", "| |") for row in rows)])
+    return "\n".join([*lines, *(f"| {' | '.join(row)} |" for row in rows)])
 
 
 def page(package: str, name: str, **values: Any) -> str:

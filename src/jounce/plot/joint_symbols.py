@@ -10,23 +10,10 @@ from jaxtyping import Float
 
 from jounce.mechanism import Mechanism
 from jounce.mechanism.mechanism import GROUND
+from jounce.plot import symbol_parts as parts
 from jounce.plot.drawing import BARS, GUIDES, INK, MARKS, SYMBOLS, WHEELS, Drawing, Flat, tinted
 from jounce.plot.driver_symbols import DRIVERS_AND_FORCES
 from jounce.plot.geometry import Symbol, Wheel, frame_along
-from jounce.plot.symbol_parts import (
-    CORNERS,
-    DASH_DOT,
-    DASHES,
-    PAPER,
-    ball,
-    box,
-    cylinder,
-    normal_of,
-    pin,
-    rail,
-    stand,
-    unit_vector,
-)
 
 __all__ = ["draw_symbols"]
 
@@ -71,43 +58,43 @@ def _draw_wheel(drawing: Drawing, wheel: Wheel) -> None:
 
 
 def _revolute(drawing: Drawing, symbol: Symbol) -> None:
-    stand(drawing, symbol)
-    pin(drawing, drawing.place(symbol))
+    parts.stand(drawing, symbol)
+    parts.pin(drawing, drawing.place(symbol))
 
 
 def _rod(drawing: Drawing, symbol: Symbol) -> None:
-    stand(drawing, symbol)
+    parts.stand(drawing, symbol)
     ends = drawing.ends(symbol)
     drawing.line(*ends, width=2.6, stroke="#666666", layer=BARS)
     for place in ends:
-        (ball if symbol.kind == "double_spherical" else pin)(drawing, place)
+        (parts.ball if symbol.kind == "double_spherical" else parts.pin)(drawing, place)
 
 
 def _slide(drawing: Drawing, symbol: Symbol, beyond: float) -> tuple[int, str]:
     """Draw the rail of a joint; return the slot and the body of what slides on it."""
     block, guide = symbol.block_and_rail
     place, start = drawing.global_place(symbol, block), symbol.points[guide]
-    rail(drawing, symbol.bodies[guide], place, symbol.axis_on(guide), beyond=beyond, start=start)
+    parts.rail(drawing, symbol.bodies[guide], place, symbol.axis_on(guide), beyond=beyond, start=start)
     return block, symbol.bodies[block]
 
 
 def _prismatic(drawing: Drawing, symbol: Symbol) -> None:
     block, body = _slide(drawing, symbol, 2.6)
-    along = unit_vector(drawing.toward(body, symbol.axis_on(block)))
+    along = parts.unit_vector(drawing.toward(body, symbol.axis_on(block)))
     _draw_block(drawing, body, drawing.place(symbol, block), along)
 
 
 def _draw_block(drawing: Drawing, body: str, place: Flat, along: Flat) -> None:
-    u, side = drawing.unit, normal_of(along)
-    corners = [place + a * 1.7 * u * along + b * 0.9 * u * side for a, b in CORNERS]
+    u, side = drawing.unit, parts.normal_of(along)
+    corners = [place + a * 1.7 * u * along + b * 0.9 * u * side for a, b in parts.CORNERS]
     colour = drawing.colours.get(body, INK)
     drawing.area(*corners, stroke=colour, fill=tinted(colour, 0.35), width=1.6, layer=BARS)
 
 
 def _pin_in_slot(drawing: Drawing, symbol: Symbol) -> None:
     held = drawing.global_place(symbol, 1)
-    rail(drawing, symbol.bodies[0], held, symbol.axis_on(0), start=symbol.points[0])
-    pin(drawing, drawing.flat(held))
+    parts.rail(drawing, symbol.bodies[0], held, symbol.axis_on(0), start=symbol.points[0])
+    parts.pin(drawing, drawing.flat(held))
 
 
 def _coordinate(drawing: Drawing, symbol: Symbol) -> None:
@@ -116,14 +103,14 @@ def _coordinate(drawing: Drawing, symbol: Symbol) -> None:
     if direction is None or symbol.bodies[0] != GROUND:
         return
     free, place = direction[::-1].copy(), drawing.place(symbol, 1)
-    rail(drawing, GROUND, place, free)
+    parts.rail(drawing, GROUND, place, free)
     _draw_block(drawing, symbol.bodies[1], place, np.broadcast_to(free, place.shape))
 
 
 def _rack(drawing: Drawing, symbol: Symbol) -> None:
     wheel, rack = symbol.bodies[:2]
     touch = drawing.at(wheel, symbol.points[0]) + symbol.axis_on(0)
-    rail(drawing, rack, touch, symbol.axis_on(1))
+    parts.rail(drawing, rack, touch, symbol.axis_on(1))
 
 
 def _rolling(drawing: Drawing, symbol: Symbol) -> None:
@@ -132,25 +119,25 @@ def _rolling(drawing: Drawing, symbol: Symbol) -> None:
     travel = (drawing.within(body, drawing.global_place(symbol, 1)) - start) @ along
     frame = drawing.frames[body]
     touch = frame[:, :, 0] + np.einsum("tck,tk->tc", frame[:, :, 1:], start + travel[:, None] * along)
-    rail(drawing, body, touch, axis, start=start)
+    parts.rail(drawing, body, touch, axis, start=start)
 
 
 def _spherical(drawing: Drawing, symbol: Symbol) -> None:
-    stand(drawing, symbol)
+    parts.stand(drawing, symbol)
     place = drawing.place(symbol)
     angle = np.radians(np.linspace(150.0, 390.0, 20))
     socket = 1.3 * drawing.unit * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     drawing.curve(place[:, None] + socket, width=1.2, layer=SYMBOLS)
-    ball(drawing, place)
+    parts.ball(drawing, place)
 
 
 def _hinge(drawing: Drawing, symbol: Symbol) -> None:
-    stand(drawing, symbol)
+    parts.stand(drawing, symbol)
     slot = symbol.moving_slot
     axes = drawing.frame_along(symbol.bodies[slot], symbol.axis_on(slot))
     place, reach = drawing.place(symbol, slot), 3.2 * drawing.unit * drawing.flat(axes[:, 0])
-    drawing.line(place - reach, place + reach, width=0.7, dashes=DASH_DOT, layer=SYMBOLS)
-    cylinder(drawing, place, axes, (1.5, 0.75), fill=PAPER, width=1.1, layer=SYMBOLS)
+    drawing.line(place - reach, place + reach, width=0.7, dashes=parts.DASH_DOT, layer=SYMBOLS)
+    parts.cylinder(drawing, place, axes, (1.5, 0.75), fill=parts.PAPER, width=1.1, layer=SYMBOLS)
 
 
 def _sliding_body(drawing: Drawing, symbol: Symbol, block: int) -> tuple[Flat, Float[np.ndarray, "time 3 3"], Any]:
@@ -170,24 +157,24 @@ def _sleeve(drawing: Drawing, symbol: Symbol) -> None:
         helix = np.array([turns, 0.45 * np.cos(5 * turns), 0.45 * np.sin(5 * turns)])
         points = place[:, None] + drawing.unit * np.einsum("kn,tkc->tnc", helix, shaft)
         drawing.curve(points, width=0.9, layer=SYMBOLS)
-    cylinder(drawing, place, axes, (1.9, 0.9), layer=SYMBOLS, **look)
+    parts.cylinder(drawing, place, axes, (1.9, 0.9), layer=SYMBOLS, **look)
 
 
 def _slider(drawing: Drawing, symbol: Symbol) -> None:
     block, _ = _slide(drawing, symbol, 3.0)
     place, axes, look = _sliding_body(drawing, symbol, block)
-    box(drawing, place, axes, (1.7, 0.9, 0.9), layer=SYMBOLS, **look)
+    parts.box(drawing, place, axes, (1.7, 0.9, 0.9), layer=SYMBOLS, **look)
 
 
 def _universal(drawing: Drawing, symbol: Symbol) -> None:
-    stand(drawing, symbol)
+    parts.stand(drawing, symbol)
     place, u = drawing.place(symbol), drawing.unit
     for slot, body in enumerate(symbol.bodies):
         colour = drawing.colours.get(body, INK)
         arm = drawing.flat(drawing.toward(body, symbol.axis_on(slot))) * 1.7 * u
         drawing.line(place - arm, place + arm, stroke=colour, width=2.4, layer=SYMBOLS)
         for end in (place - arm, place + arm):
-            drawing.disc(end, 0.4 * u, stroke=colour, fill=PAPER, width=1.2, layer=SYMBOLS)
+            drawing.disc(end, 0.4 * u, stroke=colour, fill=parts.PAPER, width=1.2, layer=SYMBOLS)
 
 
 def _plane(drawing: Drawing, symbol: Symbol) -> None:
@@ -199,10 +186,10 @@ def _plane(drawing: Drawing, symbol: Symbol) -> None:
     middle = np.nanmean(local - spread @ across, axis=0)
     low, high = np.nanmin(spread, axis=0) - 3 * drawing.unit, np.nanmax(spread, axis=0) + 3 * drawing.unit
     center, half = 0.5 * (low + high), 0.5 * (high - low)
-    corners = [middle + (center + half * np.array(corner)) @ across for corner in CORNERS]
+    corners = [middle + (center + half * np.array(corner)) @ across for corner in parts.CORNERS]
     flat = [drawing.flat(drawing.at(body, corner)) for corner in corners]
     drawing.area(*flat, fill="#F2F2F2", stroke="#888888", width=0.8, layer=GUIDES - 1)
-    ball(drawing, drawing.flat(place))
+    parts.ball(drawing, drawing.flat(place))
 
 
 def _nothing(drawing: Drawing, symbol: Symbol) -> None:
@@ -213,10 +200,10 @@ def _unknown(drawing: Drawing, symbol: Symbol) -> None:
     """Draw a square at each point, and a dotted line between them: what a type of one's own is, nobody else knows."""
     places = [drawing.place(symbol, slot) for slot in range(len(symbol.bodies))]
     for place in places:
-        corners = [place + 0.7 * drawing.unit * np.array(corner) for corner in CORNERS]
-        drawing.area(*corners, fill=PAPER, width=1.2, layer=SYMBOLS)
+        corners = [place + 0.7 * drawing.unit * np.array(corner) for corner in parts.CORNERS]
+        drawing.area(*corners, fill=parts.PAPER, width=1.2, layer=SYMBOLS)
     if len(places) > 1:
-        drawing.line(*places, width=1.0, dashes=DASHES, layer=GUIDES)
+        drawing.line(*places, width=1.0, dashes=parts.DASHES, layer=GUIDES)
 
 
 _UNNAMED = ("dot1", "parallel1", "coordinate", "gear", "rack", "rolling")

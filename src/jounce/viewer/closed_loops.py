@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from functools import cached_property
 from itertools import combinations, islice
 
 import numpy as np
@@ -14,8 +13,8 @@ from jounce.kinematics import solve
 from jounce.robot.closures import Loops, size_of
 from jounce.robot.robot import Robot
 from jounce.viewer.mechanisms import recorded
-from jounce.viewer.recording import Parameter, Recording
-from jounce.viewer.robots import RobotSubject, swing_parameters
+from jounce.viewer.recording import Recording
+from jounce.viewer.robots import RobotSubject
 
 __all__ = ["ClosedRobotSubject", "independent"]
 
@@ -33,15 +32,9 @@ class ClosedRobotSubject(RobotSubject):
         If the trajectory names joints that the robot does not have, or no joints drive all others.
     """
 
-    @cached_property
-    def driven(self) -> tuple[str, ...]:
-        """Joints that drive all others."""
-        return independent(self.robot) if self.trajectory is None else self.trajectory.names
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """How the driven joints swing, less far as loops leave less room than the limits; none with a trajectory."""
-        return () if self.trajectory is not None else swing_parameters(self.robot, self.driven, share=0.5)
+    def joints_driven(self) -> tuple[tuple[str, ...], float]:
+        """Return the joints that drive all others; loops leave less room than the limits of joints."""
+        return (independent(self.robot) if self.trajectory is None else self.trajectory.names), 0.5
 
     def solve(self, values: Mapping[str, float], order: int) -> Recording:
         """Return the motion for some swings.
@@ -51,7 +44,7 @@ class ClosedRobotSubject(RobotSubject):
         JounceError
             If the loops cannot be closed.
         """
-        robot, (laws, times) = self.robot, self.laws(values, self.driven)
+        robot, (laws, times) = self.robot, self.laws(values)
         motion = solve(robot.mechanism(drivers=laws, time=times), order=order, strict=False)
         return dataclasses.replace(recorded(motion, self.appearance, robot.name, robot.base), values=dict(values))
 

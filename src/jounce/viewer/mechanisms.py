@@ -43,27 +43,13 @@ class MechanismSubject:
     no_sliders = "There are no parameters. Name values under `parameters:` in the file to get sliders here."
 
     def __init__(self, mechanism: Mechanism):
-        self.mechanism = mechanism
         instants_shown(mechanism)
-
-    @property
-    def name(self) -> str:
-        """The title."""
-        return self.mechanism.title or "mechanism"
-
-    @property
-    def loaded(self) -> bool:
-        """Whether anything has a mass, or forces are applied, so that joints carry something."""
-        return has_loads(self.mechanism)
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """Those that are numbers, with sensible ranges, and those that follow from them."""
-        found = []
-        for name, value in self.mechanism.parameter_values.items():
-            derived = isinstance(self.mechanism.parameters[name], str | Expression)
-            found.append(Parameter(name, float(value), *parameter_range(float(value)), derived=derived))
-        return tuple(found)
+        self.mechanism, self.name, self.loaded = mechanism, mechanism.title or "mechanism", has_loads(mechanism)
+        given, values = mechanism.parameters, {k: float(v) for k, v in mechanism.parameter_values.items()}
+        self.parameters = tuple(
+            Parameter(name, value, *parameter_range(value), derived=isinstance(given[name], str | Expression))
+            for name, value in values.items()
+        )
 
     def solve(self, values: Mapping[str, float], order: int) -> Recording:
         """Return the motion for some values of the parameters.

@@ -127,27 +127,19 @@ class RobotSubject:
                 message = no_such("moving joint", name, robot.joint_names)
                 raise RobotError(message, name="trajectory", value=name)
         self.robot, self.appearance, self.trajectory = robot, appearance, trajectory
+        self.name, self.loaded = robot.name, has_masses(robot)
+        self.driven, share = self.joints_driven()
+        self.parameters = () if trajectory is not None else swing_parameters(robot, self.driven, share)
 
-    @property
-    def name(self) -> str:
-        """The name of the robot."""
-        return self.robot.name
+    def joints_driven(self) -> tuple[tuple[str, ...], float]:
+        """Return the joints that move by themselves, and the share of their swings that there is room for."""
+        return self.robot.joint_names, 1.0
 
-    @property
-    def loaded(self) -> bool:
-        """Whether links have a mass."""
-        return has_masses(self.robot)
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """How the joints swing; none with a trajectory."""
-        return () if self.trajectory is not None else swing_parameters(self.robot, self.robot.joint_names)
-
-    def laws(self, values: Mapping[str, float], names: tuple[str, ...]) -> tuple[JointTrajectory, Times]:
-        """Return the trajectory, or that on which some joints swing, and the instants that are shown."""
+    def laws(self, values: Mapping[str, float]) -> tuple[JointTrajectory, Times]:
+        """Return the trajectory, or that on which joints swing, and the instants that are shown."""
         if self.trajectory is not None:
             return self.trajectory, np.asarray(self.trajectory.times)
-        laws = swinging(values, names)
+        laws = swinging(values, self.driven)
         return laws, np.linspace(laws.start, laws.stop, FRAMES)
 
     def solve(self, values: Mapping[str, float], order: int) -> Recording:
@@ -158,7 +150,7 @@ class RobotSubject:
         JounceError
             If the trajectory does not fit, or the period is not above zero.
         """
-        robot, (laws, time) = self.robot, self.laws(values, self.robot.joint_names)
+        robot, (laws, time) = self.robot, self.laws(values)
         q = coordinates(robot, laws, time, max(order, 1))
         links = (robot.base, *robot.moving_links)
         frames = [forward_kinematics(robot, q[:, :1], link) for link in links]
@@ -193,7 +185,7 @@ def swing_of(joint: Joint) -> tuple[float, float, float]:
     return low, high, 0.5 * (low + high)
 
 
-def swing_parameters(robot: Robot, names: tuple[str, ...], share: float = 1.0) -> tuple[Parameter, ...]:
+def swing_parameters(robot: Robot, names: tuple[str, ...], share: float) -> tuple[Parameter, ...]:
     """Return the period, and the swing, or a share of it, and the middle of each joint."""
     swings, middles = [], []
     for joint in (robot.joints[name] for name in names):

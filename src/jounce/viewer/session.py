@@ -15,27 +15,24 @@ __all__ = ["Session", "Subject"]
 
 @runtime_checkable
 class Subject(Protocol):
-    """What is looked at: something with parameters that has a motion."""
+    """What is looked at: something with parameters that has a motion.
 
-    @property
-    def name(self) -> str:
-        """What it is called."""
-        ...
+    Attributes
+    ----------
+    name : str
+        What it is called.
+    loaded : bool
+        Whether there are forces to be shown.
+    parameters : tuple of Parameter
+        What sliders may set.
+    no_sliders : str
+        What is said where there are none.
+    """
 
-    @property
-    def loaded(self) -> bool:
-        """Whether there are forces to be shown."""
-        ...
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """What sliders may set."""
-        ...
-
-    @property
-    def no_sliders(self) -> str:
-        """What is said where there are no parameters."""
-        ...
+    name: str
+    loaded: bool
+    parameters: tuple[Parameter, ...]
+    no_sliders: str
 
     def solve(self, values: Mapping[str, float], order: int) -> Recording:
         """Return the motion for some values, or raise JounceError."""
