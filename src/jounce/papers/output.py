@@ -107,6 +107,6 @@ def markdown_table(columns: str, rows: Iterable[Iterable[str]]) -> str:
     return "\n".join([*lines, *(f"| {' | '.join(row)} |" for row in rows)])
 
 
-def page(package: str, name: str, **values: Any) -> str:
+def page(package: str | None, name: str, **values: Any) -> str:
     """Return a text of a package with values in the place of names in braces."""
-    return (files(package) / name).read_text(encoding="ascii").format(**values)
+    return (files(str(package)) / name).read_text(encoding="ascii").format(**values)

@@ -178,14 +178,14 @@ def animate(
         drawing.show(0)
         drawing.write_names(0, names, still=False)
         at_the_corner = {"transform": drawing.axes.transAxes, "ha": "right", "va": "bottom", "color": GREY}
-        clock = drawing.axes.text(0.99, 0.01, _clock_text(motion.time, motion.time[0]), **at_the_corner)
+        clock = drawing.axes.text(0.99, 0.01, _clock_text(motion.time, float(motion.time[0])), **at_the_corner)
         drawing.figure.set_layout_engine("none")
         _even_pixels(drawing.figure)
         with writer.saving(drawing.figure, str(beside), dpi=RESOLUTION), undoing(lambda: _stop(writer)):
             for done, place in enumerate(places.tolist(), 1):
                 drawing.show(place)
                 drawing.move_names(place)
-                clock.set_text(_clock_text(motion.time, motion.time[instants[place]]))
+                clock.set_text(_clock_text(motion.time, float(motion.time[instants[place]])))
                 writer.grab_frame()
                 if progress is not None:
                     progress(done, len(places))

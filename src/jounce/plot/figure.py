@@ -89,7 +89,7 @@ def draw_columns(motion: Motion, columns: Columns) -> Any:
     return figure
 
 
-def _draw_column(motion: Motion, name: str, output: Any, values: np.ndarray, panels: np.ndarray, first: int) -> None:
+def _draw_column(motion: Motion, name: str, output: Any, values: np.ndarray, panels: Any, first: int) -> None:
     """Draw one output: panel by panel its derivatives, with its components over each other."""
     values = values[:, :, None] if values.ndim == 2 else values
     vector = values.shape[2] > 1

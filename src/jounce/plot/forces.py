@@ -8,17 +8,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from jounce.dynamics import kinetic_energy, potential_energy, power_balance, stored_energy
+from jounce.dynamics import kinetic_energy, outputs as loads, potential_energy, power_balance, stored_energy
 from jounce.dynamics.inverse import check_loads
-from jounce.dynamics.outputs import (
-    AppliedForceOutput,
-    AppliedTorqueOutput,
-    DriverForceOutput,
-    DriverTorqueOutput,
-    JointForceOutput,
-    JointTorqueOutput,
-    is_turning,
-)
 from jounce.errors import MechanismError, no_such
 from jounce.kinematics import Motion
 from jounce.plot.figure import draw_columns, finish
@@ -86,16 +77,20 @@ def draw_reactions(motion: Motion, names: Sequence[str] | None = None) -> Any:
     found: dict[str, Any] = {}
     for name in mechanism.joints:
         if name in wanted:
-            found |= {name: JointForceOutput(name), f"{name} (moment)": JointTorqueOutput(name)}
+            found |= {name: loads.JointForceOutput(name), f"{name} (moment)": loads.JointTorqueOutput(name)}
     for name, driver in mechanism.drivers.items():
         if name in wanted:
-            found[f"{name} (driver)"] = (DriverTorqueOutput if is_turning(driver) else DriverForceOutput)(name)
+            found[f"{name} (driver)"] = (
+                loads.DriverTorqueOutput if loads.is_turning(driver) else loads.DriverForceOutput
+            )(name)
     for name, force in mechanism.forces.items():
         if name in wanted:
-            found[f"{name} (applied)"] = (AppliedForceOutput if force.unit == "N" else AppliedTorqueOutput)(name)
+            found[f"{name} (applied)"] = (loads.AppliedForceOutput if force.unit == "N" else loads.AppliedTorqueOutput)(
+                name
+            )
     columns = {name: (output, motion.evaluate(output).values) for name, output in found.items()}
     sizes = {name: _largest(values[:, 0]) for name, (_, values) in columns.items()}
-    moments = {name for name, output in found.items() if isinstance(output, JointTorqueOutput)}
+    moments = {name for name, output in found.items() if isinstance(output, loads.JointTorqueOutput)}
     least = NOTHING * skeleton(mechanism).size * max(size for name, size in sizes.items() if name not in moments)
     felt = {name: column for name, column in columns.items() if name not in moments or sizes[name] > least}
     return draw_columns(motion, felt)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from jaxtyping import Float
 
@@ -58,7 +60,7 @@ def pitch_radii(
     return centers, (abs(ratio) * second, second)
 
 
-def _pins(mechanism: Mechanism) -> Pins:
+def _pins(mechanism: Any) -> Pins:
     """Return the points of all revolute joints by body."""
     parameters = mechanism.parameter_values
     return [

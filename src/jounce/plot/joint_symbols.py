@@ -34,8 +34,9 @@ def draw_symbols(drawing: Drawing, mechanism: Mechanism) -> None:
             drawing.owner = f"{kind}.{symbol.name}"
             DRIVERS_AND_FORCES.get(symbol.kind, _unknown)(drawing, symbol)
     for name, output in mechanism.outputs.items():
-        if getattr(output, "point", None) is not None and len(output.bodies) == 1:
-            link = seen.links[output.bodies[0]]
+        bodies = getattr(output, "bodies", ())
+        if getattr(output, "point", None) is not None and len(bodies) == 1:
+            link = seen.links[bodies[0]]
             for place in (point for point, names in zip(link.points, link.names, strict=True) if name in names):
                 drawing.owner, flat = f"outputs.{name}", drawing.flat(drawing.at(link.body, place))
                 drawing.disc(flat, 0.3 * drawing.unit, stroke="", fill=INK, layer=MARKS)

@@ -19,7 +19,9 @@ from jounce.plot.frames import assembled, frames
 from jounce.plot.geometry import Link, skeleton
 from jounce.plot.joint_symbols import draw_symbols
 
-__all__ = ["Scene", "outline", "scene_of"]
+__all__ = ["Scene", "drawing_of", "outline", "scene_of"]
+
+Instants = Int[np.ndarray, " time"]
 
 
 @dataclass(frozen=True)
@@ -39,6 +41,11 @@ class Scene:
     shapes: list[Shape]
     labels: list[Label]
     unit: float
+
+    @classmethod
+    def of(cls, drawing: Drawing) -> Scene:
+        """Return what was drawn, lower layers first."""
+        return cls(sorted(drawing.shapes, key=lambda shape: shape.layer), drawing.labels, drawing.unit)
 
     @cached_property
     def limits(self) -> tuple[float, float, float, float]:
@@ -62,10 +69,22 @@ class Scene:
         return Scene(shapes, labels, self.unit)
 
 
-def scene_of(
-    moving: Motion | Mechanism, *, view: View = VIEW, instants: Int[np.ndarray, " time"] | None = None
-) -> Scene:
-    """Return the shapes of a mechanism, at the instants of a motion or as it is put together at the start.
+def scene_of(moving: Motion | Mechanism, *, view: View = VIEW, instants: Instants | None = None) -> Scene:
+    """Return the shapes of a mechanism; the arguments are those of `drawing_of`.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> from jounce.plot.scene import scene_of
+    >>> scene = scene_of(jn.load("examples/four_bar.yaml"))
+    >>> [label.text for label in scene.labels]
+    ['crank', 'rocker', 'A', 'D', 'BC']
+    """
+    return Scene.of(drawing_of(moving, view=view, instants=instants))
+
+
+def drawing_of(moving: Motion | Mechanism, *, view: View = VIEW, instants: Instants | None = None) -> Drawing:
+    """Return a mechanism as it is drawn, at the instants of a motion or as it is put together at the start.
 
     Parameters
     ----------
@@ -75,14 +94,6 @@ def scene_of(
         Azimuth and elevation from which a spatial mechanism is seen, degrees.
     instants : array_like of int, optional
         Indices of the instants of a motion; all unless given.
-
-    Examples
-    --------
-    >>> import jounce as jn
-    >>> from jounce.plot.scene import scene_of
-    >>> scene = scene_of(jn.load("examples/four_bar.yaml"))
-    >>> [label.text for label in scene.labels]
-    ['crank', 'rocker', 'A', 'D', 'BC']
     """
     mechanism = moving if isinstance(moving, Mechanism) else moving.mechanism
     places = assembled(moving) if isinstance(moving, Mechanism) else frames(moving)
@@ -93,7 +104,7 @@ def scene_of(
         if link.body != GROUND:
             _draw_link(drawing, link)
     draw_symbols(drawing, mechanism)
-    return Scene(sorted(drawing.shapes, key=lambda shape: shape.layer), drawing.labels, drawing.unit)
+    return drawing
 
 
 def _draw_link(drawing: Drawing, link: Link) -> None:

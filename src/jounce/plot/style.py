@@ -62,8 +62,8 @@ def style(**changes: Any) -> Iterator[None]:
     with as_file(files("jounce.plot") / "jounce.mplstyle") as path:
         settings = mpl.rc_params_from_file(path, use_default_template=False)
     settings["axes.prop_cycle"] = cycler(color=LINE_COLOURS)
-    changed = {name.replace("_", "."): value for name, value in changes.items()}
-    with mpl.rc_context({**settings, **changed}), warnings.catch_warnings():
+    changed: dict[Any, Any] = {name.replace("_", "."): value for name, value in changes.items()}
+    with mpl.rc_context(dict(settings) | changed), warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing", category=UserWarning)
         yield
 

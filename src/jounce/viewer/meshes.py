@@ -61,7 +61,8 @@ def placed(mesh: Trimesh, center: Place = ORIGIN, rotation: Rotation | None = No
 
 def merged(meshes: Sequence[Trimesh]) -> Trimesh:
     """Return several meshes as one."""
-    return trimesh.util.concatenate(list(meshes))
+    vertices, faces = trimesh.util.append_faces([mesh.vertices for mesh in meshes], [mesh.faces for mesh in meshes])
+    return Trimesh(vertices, faces, process=False)
 
 
 def cylinder(radius: float, length: float, axis: Place = Z, center: Place = ORIGIN) -> Trimesh:
@@ -134,10 +135,10 @@ def wheel(
     radius: float, low: float, high: float, center: Place, *, module: float = 0.0, outside: float = 0.0
 ) -> Trimesh:
     """Return a wheel of a pitch radius with teeth of a module, smooth where that is zero; a ring with an outside."""
-    outline = Polygon(_toothed(radius, -module if outside else module))
-    if outside:
-        outline = Polygon(_toothed(outside, 0.0)).difference(outline)
-    return extruded(shapely.affinity.translate(outline, *np.asarray(center, float)), low, high)
+    middle = np.asarray(center, float)
+    outline = _toothed(radius, -module if outside else module) + middle
+    polygon = Polygon(_toothed(outside, 0.0) + middle, [outline]) if outside else Polygon(outline)
+    return extruded(polygon, low, high)
 
 
 def _toothed(radius: float, module: float) -> FlatPoints:

@@ -13,7 +13,7 @@ from jounce.plot.style import COLOURS
 from jounce.reporting.peaks import derivative_unit
 from jounce.viewer.legend import legend
 from jounce.viewer.page import Observer, Page
-from jounce.viewer.recording import Quantity, Recording
+from jounce.viewer.recording import Recording
 
 __all__ = ["Chart", "Plots", "cursor_data", "default_charts"]
 
@@ -98,64 +98,44 @@ class Chart:
     """
 
     def __init__(self, gui: Any, recording: Recording, name: str, order: int):
-        self.gui, self.name, self.order = gui, name, order
-        self.handle = self._drawn(recording)
-
-    def _scaled(self, recording: Recording) -> tuple[Quantity, np.ndarray, int]:
-        """Return the quantity, what is drawn, short numbers with zeros for rounding errors, and their power of ten."""
-        quantity = recording.outputs[self.name]
-        values = cleaned(recording.time, quantity.values, self.order)
-        exponent = scale_of(values)
-        return quantity, values * 10.0**-exponent, exponent
-
-    def title(self, recording: Recording) -> str:
-        """Name, derivative and unit."""
-        quantity, _, exponent = self._scaled(recording)
-        unit = derivative_unit(quantity.unit.replace("*", " "), self.order)
-        unit = f"10^{exponent} {unit}" if exponent else unit
-        return f"{self.name}: {quantity.words[self.order]} ({unit})"
-
-    def _drawn(self, recording: Recording) -> Any:
-        quantity, values, _ = self._scaled(recording)
-        count = values.shape[1]
-        labels = [f"{self.name} {c}" for c in quantity.labels[:count]] if count > 1 else [self.name]
-        series = (
-            {"label": "time"},
-            *(
-                {"label": label, "stroke": COLOURS[k % 3], "width": 1.6, "points": {"show": False}}
-                for k, label in enumerate(labels)
-            ),
-            {"label": "now", "stroke": CURSOR, "width": 1.2, "dash": (4, 3), "points": {"show": False}},
-        )
-        return self.gui.add_uplot(
-            cursor_data(recording.time, values, 0),
-            series,
-            title=self.title(recording),
-            scales=self._scales(recording),
-            axes=(
-                {"label": "time (s)", "labelFont": "11px sans-serif", "labelSize": 15, "size": 28, "ticks": TICKS},
-                {"size": 58, "ticks": TICKS},
-            ),
+        self.name, self.order = name, order
+        title, scales = self._read(recording)
+        count, plain = self.values.shape[1], {"show": False}
+        labels = [f"{name} {c}" for c in recording.outputs[name].labels[:count]] if count > 1 else [name]
+        looks = {"width": 1.6, "points": plain}
+        lines = [{"label": label, "stroke": COLOURS[k % 3], **looks} for k, label in enumerate(labels)]
+        now = {"label": "now", "stroke": CURSOR, "width": 1.2, "dash": (4, 3), "points": plain}
+        below = {"label": "time (s)", "labelFont": "11px sans-serif", "labelSize": 15, "size": 28, "ticks": TICKS}
+        self.handle = gui.add_uplot(
+            cursor_data(self.time, self.values, 0),
+            ({"label": "time"}, *lines, now),
+            title=title,
+            scales=scales,
+            axes=(below, {"size": 58, "ticks": TICKS}),
             legend={"show": count > 1},
             height=180,
             padding=(6, 14, 0, 0),
         )
 
-    def _scales(self, recording: Recording) -> Any:
-        ends = float(recording.time[0]), float(recording.time[-1])
-        return {
-            "x": {"time": False, "range": ends},
-            "y": {"auto": False, "range": axis_range(self._scaled(recording)[1], 0.06)},
-        }
+    def _read(self, recording: Recording) -> tuple[str, dict[str, Any]]:
+        """Take what is drawn of a motion, short numbers with zeros for rounding errors; return title and scales."""
+        quantity = recording.outputs[self.name]
+        values = cleaned(recording.time, quantity.values, self.order)
+        exponent = scale_of(values)
+        self.time, self.values = recording.time, values * 10.0**-exponent
+        unit = derivative_unit(quantity.unit.replace("*", " "), self.order)
+        unit = f"10^{exponent} {unit}" if exponent else unit
+        across = {"time": False, "range": (float(self.time[0]), float(self.time[-1]))}
+        upward = {"auto": False, "range": axis_range(self.values, 0.06)}
+        return f"{self.name}: {quantity.words[self.order]} ({unit})", {"x": across, "y": upward}
 
     def renew(self, recording: Recording) -> None:
         """Fit the axes to another motion."""
-        self.handle.title = self.title(recording)
-        self.handle.scales = self._scales(recording)
+        self.handle.title, self.handle.scales = self._read(recording)
 
-    def show(self, recording: Recording, frame: int) -> None:
+    def show(self, frame: int) -> None:
         """Put the cursor at an instant."""
-        self.handle.data = cursor_data(recording.time, self._scaled(recording)[1], frame)
+        self.handle.data = cursor_data(self.time, self.values, frame)
 
     def fits(self, recording: Recording) -> bool:
         """Whether a recording has the quantity and the derivative."""
@@ -215,7 +195,7 @@ class Plots(Observer):
         with self.page.lock:
             for chart in self.charts:
                 chart.renew(self.page.recording)
-                chart.show(self.page.recording, self.page.frame)
+                chart.show(self.page.frame)
 
     def _words(self, recording: Recording, name: str) -> tuple[str, ...]:
         if name not in recording.outputs:
@@ -240,7 +220,7 @@ class Plots(Observer):
         with page.lock, self.space:
             if name in page.recording.outputs:
                 self.charts.append(Chart(self.gui, page.recording, name, order))
-                self.charts[-1].show(page.recording, page.frame)
+                self.charts[-1].show(page.frame)
 
     def remove(self) -> None:
         """Take the last plot away."""
@@ -265,5 +245,5 @@ class Plots(Observer):
         """Move the cursors, and renew the legend."""
         if time.monotonic() >= self._still_until:
             for chart in self.charts:
-                chart.show(self.page.recording, frame)
+                chart.show(frame)
         self.legend.content = legend(self.page.overlay, frame)

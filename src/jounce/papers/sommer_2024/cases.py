@@ -21,8 +21,8 @@ TOLERANCE = 1e-12
 TOLERANCES = tuple(float(f"1e{k}") for k in range(-14, -3))
 Times = Float[np.ndarray, " time"]
 Derivatives = Float[np.ndarray, "time 5"]
-Table = Float[np.ndarray, "time *column"]
-Columns = Float[np.ndarray, "*column"] | np.floating
+Table = Float[np.ndarray, "time column"]
+Columns = Float[np.ndarray, " column"]
 STEPS = (1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, 1e-1)  # s, each a whole part of the cycle
 
 
@@ -76,6 +76,16 @@ VALIDATION_CASES = {
         ValidationCase("rspu_slide", "RSPU, slide driver", "theta", geometry.rspu),
     )
 }
+
+
+HISTORIES = {2: "jerk", 3: "jounce"}  # figures and what of the four-bar they show
+TOLERANCE_SWEEPS = {  # figures and the cases in them; those of time steps come next
+    4: ("four_bar",),
+    6: ("inverted_slider_crank_slide", "inverted_slider_crank_distance"),
+    10: ("rsur", "rssr"),
+    12: ("rspu_distance", "rspu_slide"),
+}
+STEP_SWEEPS = {figure + 1: names for figure, names in TOLERANCE_SWEEPS.items()}
 
 
 @dataclasses.dataclass(frozen=True)

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from jounce.papers.output import markdown_table, page
-from jounce.papers.sommer_2024.cases import QUANTITIES, STEP, STEPS, TOLERANCE, TOLERANCES, VALIDATION_CASES
+from jounce.papers.sommer_2024 import cases
 from jounce.papers.sommer_2024.measure import Results
 
 PRINTED = {  # root-mean-square errors in the text of the paper, sections 4 and 6
@@ -35,8 +35,8 @@ def comparison(results: Mapping[str, Results]) -> str:
         __package__,
         "comparison.md",
         verdicts=markdown_table("figure | here | verdict", _verdicts(results)),
-        step=STEP,
-        tolerance=TOLERANCE,
+        step=cases.STEP,
+        tolerance=cases.TOLERANCE,
         errors=markdown_table(
             "simulation | chosen | quantity | unit | largest value | RMSE | printed RMSE | normalised RMSE",
             _errors(results),
@@ -50,16 +50,21 @@ def comparison(results: Mapping[str, Results]) -> str:
 
 def _verdicts(results: Mapping[str, Results]) -> Iterator[tuple[str, ...]]:
     """Yield a row for each figure whose simulations were run."""
-    cranks = ("inverted_slider_crank_slide", "inverted_slider_crank_distance")
-    rspu, spatial = ("rspu_distance", "rspu_slide"), ("rsur", "rssr")
-    shown = {2: ("four_bar",), 3: ("four_bar",), 4: ("four_bar",), 5: ("four_bar",), 6: cranks, 7: cranks}
-    shown |= {8: (), 9: (), 10: spatial, 11: spatial, 12: rspu, 13: rspu}
-    yield "1", "drawn from the mechanism files, lengths as printed", "redrawn"
-    for figure, names in shown.items():
-        if figure in (8, 9):
+    figures = (
+        dict.fromkeys(cases.HISTORIES, ("four_bar",))
+        | cases.TOLERANCE_SWEEPS
+        | cases.STEP_SWEEPS
+        | {1: (), 8: (), 9: ()}
+    )
+    for figure, names in sorted(figures.items()):
+        if figure == 1:
+            yield "1", "drawn from the mechanism files, lengths as printed", "redrawn"
+        elif not names:
             yield str(figure), "drawn from the mechanism file, lengths as printed, axes chosen", "redrawn, stand-in"
         elif set(names) <= set(results):
-            judge = _history if figure in (2, 3) else _tolerances if figure in (4, 6, 10, 12) else _steps
+            judge = (
+                _history if figure in cases.HISTORIES else _tolerances if figure in cases.TOLERANCE_SWEEPS else _steps
+            )
             found, holds, but = judge([results[name] for name in names], figure)
             chosen = {STANDS_IN[name] for name in names} - {""}
             verdict = ("reproduced" if holds else "NOT reproduced") + but
@@ -69,8 +74,8 @@ def _verdicts(results: Mapping[str, Results]) -> Iterator[tuple[str, ...]]:
 
 def _history(results: Sequence[Results], figure: int) -> tuple[str, bool, str]:
     """Judge figures 2 and 3: the error of the four-bar's jerk or jounce is no larger than the printed one."""
-    quantity = "jerk" if figure == 2 else "jounce"
-    found, printed = results[0].cycle.rmse[QUANTITIES.index(quantity)], PRINTED["four_bar", quantity]
+    quantity = cases.HISTORIES[figure]
+    found, printed = results[0].cycle.rmse[cases.QUANTITIES.index(quantity)], PRINTED["four_bar", quantity]
     return f"RMSE of {quantity} {found:.2g}, printed {printed:.3g}", bool(found <= printed), ", error smaller"
 
 
@@ -78,7 +83,9 @@ def _tolerances(results: Sequence[Results], _: int) -> tuple[str, bool, str]:
     """Judge a sweep of tolerances: errors of all quantities fall together, to rounding."""
     errors = np.stack([result.by_tolerance for result in results])
     spread = float((errors.max(axis=2) / errors.min(axis=2)).max())
-    reached = [tolerance for tolerance, row in zip(TOLERANCES, errors.max(axis=(0, 2)), strict=True) if row <= FLOOR]
+    reached = [
+        tolerance for tolerance, row in zip(cases.TOLERANCES, errors.max(axis=(0, 2)), strict=True) if row <= FLOOR
+    ]
     floor = float(errors[:, 0].max())
     text = f"velocity to jounce within a factor of {spread:.2g} of each other; floor {floor:.1g}"
     text += f", reached at tolerances to {max(reached):.0e}" if reached else ""
@@ -87,7 +94,7 @@ def _tolerances(results: Sequence[Results], _: int) -> tuple[str, bool, str]:
 
 def _steps(results: Sequence[Results], _: int) -> tuple[str, bool, str]:
     """Judge a sweep of steps: differences converge at their orders, the simulation does not depend on the step."""
-    steps = np.array(STEPS)
+    steps = np.array(cases.STEPS)
     between = (steps > CONVERGING[0]) & (steps < CONVERGING[1])
     slopes = {}
     for method in ("second order", "fourth order"):
@@ -103,7 +110,7 @@ def _steps(results: Sequence[Results], _: int) -> tuple[str, bool, str]:
 def _errors(results: Mapping[str, Results]) -> Iterator[tuple[str, ...]]:
     for name, result in results.items():
         cycle = result.cycle
-        columns = zip(QUANTITIES, UNITS, cycle.peak, cycle.rmse, cycle.normalised_rmse, strict=True)
+        columns = zip(cases.QUANTITIES, UNITS, cycle.peak, cycle.rmse, cycle.normalised_rmse, strict=True)
         for quantity, unit, peak, error, normalised in columns:
             printed = PRINTED.get((name, quantity))
             beside = "" if printed is None else f"{printed:.3g}"
@@ -117,4 +124,4 @@ def _lags(results: Mapping[str, Results]) -> Iterator[tuple[str, ...]]:
             late, wrong = lag.late(lag.difference), lag.measured_error(lag.difference)
             there = f"{late:.6g}", f"{lag.expected:g}", f"{wrong:.4g}", f"{lag.error:.4g}"
             ours = f"{abs(lag.late(lag.simulated)):.0e}", f"{lag.measured_error(lag.simulated):.1e}"
-            yield VALIDATION_CASES[name].title, lag.quantity, f"{lag.step:g}", *there, *ours
+            yield cases.VALIDATION_CASES[name].title, lag.quantity, f"{lag.step:g}", *there, *ours

@@ -59,7 +59,7 @@ class Lag:
 
     def measured_error(self, found: Series) -> float:
         """Return the normalised RMSE of a quantity."""
-        return float(normalised_rmse(found, self.explicit))
+        return float(normalised_rmse(found[:, None], self.explicit[:, None])[0])
 
 
 def lags(case: ValidationCase, mechanism: Mechanism, step: float) -> list[Lag]:
