@@ -13,14 +13,15 @@ from jaxtyping import Float
 from jounce.errors import MechanismError, no_such
 from jounce.io.files.writing import check_target, replacing
 from jounce.kinematics import Motion
+from jounce.mechanism.outputs import AbstractQuantity
 from jounce.plot.instants import unsolved_runs
 from jounce.plot.labels import axis_range, quantity_word, scale_of, symbol, unit_label
 from jounce.plot.style import COLOURS, PALE_GREY, RESOLUTION, blank_figure, shown_name, style
 
 __all__ = ["check_figure", "draw", "draw_columns", "finish", "save"]
 
-Columns = Mapping[str, tuple[Any, Float[np.ndarray, "time derivative *component"]]]
-"""Outputs by name, with their values."""
+Column = tuple[AbstractQuantity, Float[np.ndarray, "time derivative *component"]]
+"""An output with its values."""
 
 
 SUFFIXES = (".png", ".svg", ".pdf")
@@ -68,7 +69,7 @@ def draw(motion: Motion, outputs: Sequence[str] | None = None) -> Any:
     return draw_columns(motion, {name: (motion.mechanism.outputs[name], motion.outputs[name]) for name in names})
 
 
-def draw_columns(motion: Motion, columns: Columns) -> Any:
+def draw_columns(motion: Motion, columns: Mapping[str, Column]) -> Any:
     """Draw outputs of a motion beside each other, each in a column with its derivatives below each other."""
     lost = [output.lost_orders for output, _ in columns.values()]
     first = min(lost)
@@ -82,15 +83,16 @@ def draw_columns(motion: Motion, columns: Columns) -> Any:
         grid = figure.subplots(rows * blocks, wide, sharex=True, squeeze=False)
         places = grid.reshape(blocks, rows, wide).swapaxes(1, 2).reshape(-1, rows)
         for panels, name in zip(places, columns, strict=False):
-            _draw_column(motion, name, *columns[name], panels, first)
+            _draw_column(motion, name, columns[name], panels, first)
         for axes in places[len(columns) :].flat:
             axes.set_axis_off()
         figure.align_ylabels()
     return figure
 
 
-def _draw_column(motion: Motion, name: str, output: Any, values: np.ndarray, panels: Any, first: int) -> None:
+def _draw_column(motion: Motion, name: str, column: Column, panels: Any, first: int) -> None:
     """Draw one output: panel by panel its derivatives, with its components over each other."""
+    output, values = column
     values = values[:, :, None] if values.ndim == 2 else values
     vector = values.shape[2] > 1
     for row, axes in enumerate(panels):

@@ -15,8 +15,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from jounce.constraints.base import field_kind, value_fields
+from jounce.constraints.base import AbstractConstraint, field_kind, value_fields
 from jounce.errors import JounceError
+from jounce.forces.base import AbstractForce
 from jounce.mechanism import Mechanism
 from jounce.mechanism.mechanism import GROUND, check_mechanism
 from jounce.mechanism.resolve import check_value, resolve
@@ -28,6 +29,7 @@ __all__ = ["Link", "Point", "Points", "Skeleton", "Symbol", "Wheel", "frame_alon
 
 Point = Float[np.ndarray, " components"]
 Points = Float[np.ndarray, "points components"]
+Element = AbstractConstraint | AbstractForce
 Values = Mapping[str, Mapping[str, np.ndarray]]  # numbers and vectors by element and field
 
 SLOTS = {"_i": 0, "_j": 1, "_m": 2}  # endings of fields, and the body that each is fixed to
@@ -246,7 +248,7 @@ def skeleton(mechanism: Mechanism) -> Skeleton:
     return Skeleton(links, joints, drivers, forces, size)
 
 
-def _values(element: Any, parameters: Mapping[str, Any], components: int, name: str) -> dict[str, Any]:
+def _values(element: Any, parameters: Mapping[str, Any], components: int, name: str) -> dict[str, np.ndarray]:
     """Return the numbers and vectors of an element by field; laws and words are left out."""
     values = {}
     for field_name, its_field in value_fields(type(element)).items():
@@ -322,7 +324,9 @@ def _bars(points: Points, near: float, held: list[bool]) -> tuple[tuple[int, int
     return tuple(sorted((min(i, j), max(i, j)) for i, j in zip(tree.row.tolist(), tree.col.tolist(), strict=True)))
 
 
-def _symbol(mechanism: Any, name: str, element: Any, values: Mapping[str, Any], components: int) -> Symbol:
+def _symbol(
+    mechanism: Mechanism, name: str, element: Element, values: Mapping[str, np.ndarray], components: int
+) -> Symbol:
     bodies, kind = element.bodies, element.type_name or type(element).__name__
     points: list[np.ndarray] = [np.zeros(components)] * len(bodies)
     axes: list[np.ndarray | None] = [None] * len(bodies)
@@ -340,7 +344,7 @@ def _symbol(mechanism: Any, name: str, element: Any, values: Mapping[str, Any], 
     if coordinate != "angle":
         axes[0] = np.array([1.0, 0.0]) if coordinate == "x" else np.array([0.0, 1.0])
     symbol = Symbol(name, kind, bodies, tuple(points), tuple(axes), tuple(radii))
-    if element.role == "joint" and kind in ("gear", "coordinate") and mechanism.space == "planar":
+    if getattr(element, "role", "") == "joint" and kind in ("gear", "coordinate") and mechanism.space == "planar":
         return _geared(mechanism, symbol, coordinate, float(values.get("ratio", 1.0)))
     return symbol
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 import re
-from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
+from jounce.mechanism.outputs import AbstractQuantity
 from jounce.reporting.peaks import derivative_unit, rate_name
 
 __all__ = ["axis_range", "quantity_word", "rounded_down", "scale_of", "symbol", "unit_label"]
@@ -45,7 +45,7 @@ def symbol(name: str, order: int = 0, component: str = "") -> str:
     return f"${letter}{subscript}^{{({order})}}$"
 
 
-def quantity_word(output: Any, order: int) -> str:
+def quantity_word(output: AbstractQuantity, order: int) -> str:
     """Name a derivative of an output: as `rate_name`, but what is an angle is called so.
 
     Examples

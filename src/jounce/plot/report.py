@@ -17,6 +17,7 @@ from jounce.io.files.writing import check_target, replacing
 from jounce.kinematics import Motion, Status
 from jounce.mechanism import Mechanism
 from jounce.mechanism.mechanism import GROUND
+from jounce.mechanism.outputs import AbstractQuantity
 from jounce.mechanism.resolve import resolve
 from jounce.plot.animation import LONGEST, SHORTEST
 from jounce.plot.drawing import VIEW, View
@@ -158,7 +159,9 @@ def _number(value: float | np.ndarray) -> float | None:
     return float(f"{value:.{DIGITS}g}") if np.isfinite(value) else None
 
 
-def _output(name: str, output: Any, values: Float[np.ndarray, "time derivative *component"]) -> dict[str, Any]:
+def _output(
+    name: str, output: AbstractQuantity, values: Float[np.ndarray, "time derivative *component"]
+) -> dict[str, Any]:
     """Return the values of an output by derivative and component, with words and units."""
     columns = values[..., None] if values.ndim == 2 else values
     orders, components = range(columns.shape[1]), columns.shape[2]

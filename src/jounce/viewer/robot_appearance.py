@@ -18,7 +18,7 @@ from trimesh import Trimesh
 from jounce.errors import RobotFileError
 from jounce.io.robots.mjcf import names_of_bodies
 from jounce.io.robots.mjcf_files import check_assets, included, quiet_mujoco
-from jounce.io.robots.xml_elements import read_markup
+from jounce.io.robots.xml_elements import Element, read_markup
 from jounce.robot.mechanism_parts import on_body
 from jounce.robot.robot import Robot
 from jounce.viewer.appearance import BODY_COLOURS, DARK, GREY, Appearance, BodyPoint, ColouredMesh, upward
@@ -147,12 +147,12 @@ def file_shapes(path: Path, allow: Iterable[str | PathLike[str]] = ()) -> Shapes
     return _of_urdf(root, MeshFiles(path, allow)) if root.tag == "robot" else _of_mjcf(root, path, allow)
 
 
-def _of_urdf(root: Any, files: MeshFiles) -> Shapes:
+def _of_urdf(root: Element, files: MeshFiles) -> Shapes:
     """Return what the elements ``<visual>`` show."""
     materials = {}
     for material in root.every("material"):
         with suppress(ValueError):
-            materials[material.attributes.get("name")] = _rgba(material)
+            materials[material.attributes.get("name", "")] = _rgba(material)
     found: Shapes = {}
     for link in root.every("link"):
         meshes = found.setdefault(link.attributes["name"], [])
@@ -162,18 +162,18 @@ def _of_urdf(root: Any, files: MeshFiles) -> Shapes:
     return found
 
 
-def _visual(visual: Any, materials: dict[str, Rgba | None], files: MeshFiles) -> list[ColouredMesh]:
+def _visual(visual: Element, materials: dict[str, Rgba | None], files: MeshFiles) -> list[ColouredMesh]:
     geometry = visual.first("geometry")
     shape = geometry.children[0] if geometry is not None and geometry.children else None
     if shape is None:
         return []
     own = visual.first("material")
-    rgba = None if own is None else _rgba(own) or materials.get(own.attributes.get("name"))
+    rgba = None if own is None else _rgba(own) or materials.get(own.attributes.get("name", ""))
     position, rotation = _origin(visual.first("origin"))
     return [_coloured(placed(mesh, position, rotation), rgba or colour) for mesh, colour in _urdf_shape(shape, files)]
 
 
-def _rgba(material: Any) -> Rgba | None:
+def _rgba(material: Element) -> Rgba | None:
     colour = material.first("color")
     return None if colour is None else tuple(_numbers(colour.attributes.get("rgba", ""))) or None
 
@@ -189,7 +189,7 @@ def _coloured(mesh: Trimesh, rgba: Rgba | None) -> ColouredMesh:
     return ColouredMesh(mesh, (red, green, blue), float(rgba[3]) if len(rgba) > 3 else 1.0)
 
 
-def _origin(element: Any) -> tuple[list[float], Rotation]:
+def _origin(element: Element | None) -> tuple[list[float], Rotation]:
     from scipy.spatial.transform import Rotation as Attitude
 
     given = {} if element is None else element.attributes
@@ -197,7 +197,7 @@ def _origin(element: Any) -> tuple[list[float], Rotation]:
     return _numbers(given.get("xyz", "0 0 0")), Attitude.from_euler("xyz", angles).as_matrix()
 
 
-def _urdf_shape(shape: Any, files: MeshFiles) -> list[tuple[Trimesh, Rgba | None]]:
+def _urdf_shape(shape: Element, files: MeshFiles) -> list[tuple[Trimesh, Rgba | None]]:
     """Return the meshes of a shape of a URDF, with a colour where a mesh brings its own."""
     given, kind = shape.attributes, shape.tag
     if kind == "mesh":
@@ -217,7 +217,7 @@ def _upright(radius: float, length: float) -> Trimesh:
     return capsule([0, 0, -0.5 * length], [0, 0, 0.5 * length], radius)
 
 
-def _of_mjcf(root: Any, path: Path, allow: Iterable[str | PathLike[str]]) -> Shapes:
+def _of_mjcf(root: Element, path: Path, allow: Iterable[str | PathLike[str]]) -> Shapes:
     """Return the geoms that MuJoCo shows: groups 0 to 2."""
     mujoco: Any = importlib.import_module("mujoco")
     if not any(element.tag == "geom" for element in root.walk()):

@@ -20,15 +20,16 @@ from jounce.jet import Jet
 THETA_START, THETA_DELTA = math.radians(30), math.radians(60)
 LANES = 1024  # instants evaluated together; one width, so that each form compiles once
 
+Number = Jet | jax.Array | float
 Form = Callable[[Jet, Mapping[str, Any]], Jet]
 
 
-def swing(time: Jet, period: Any) -> Jet:
+def swing(time: Jet, period: Number) -> Jet:
     """Return the sine of the phase of a cycle, the time-dependent part of all driver motions (Sommer 2024, 56)."""
     return jet.sin(2 * math.pi * time / period)
 
 
-def balanced_angle(x: Any, y: Any, z: Any, side: int) -> Any:
+def balanced_angle(x: Number, y: Number, z: Number, side: int) -> Jet:
     """Return the angle phi for which ``x cos(phi) + y sin(phi) = z``.
 
     Of the two solutions, `side` +1 is the one ahead of the direction (x, y), -1 the one behind it.
@@ -37,7 +38,7 @@ def balanced_angle(x: Any, y: Any, z: Any, side: int) -> Any:
     return jet.atan2(y * z + x * root, x * z - y * root)
 
 
-def opening_angle(distance: Any, nearest: Any, farthest: Any) -> Any:
+def opening_angle(distance: Jet, nearest: Number, farthest: Number) -> Jet:
     """Return the angle between 0 and pi at which two points are `distance` apart.
 
     One point turns about a fixed axis; the other is fixed. The angle is counted from the place where they are
