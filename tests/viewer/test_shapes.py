@@ -14,7 +14,7 @@ from jounce.viewer.robots import swing_of
 from jounce.viewer.server import robot_subject
 
 CIRCLE = 24 / 2 * math.sin(2 * math.pi / 24)  # area of the polygon that stands for a circle of radius one
-WHEEL = 48 / 2 * math.sin(2 * math.pi / 48)
+WHEEL = 96 / 2 * math.sin(2 * math.pi / 96)
 TRIANGLE = meshes.Polygon([[0, 0], [2, 0], [0, 2]])
 
 

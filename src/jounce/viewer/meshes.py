@@ -144,7 +144,7 @@ def wheel(
 def _toothed(radius: float, module: float) -> FlatPoints:
     """Return the outline of a wheel with teeth outward, inward where the module is negative."""
     if module == 0:
-        teeth, corners = 2 * AROUND, np.zeros(1)
+        teeth, corners = 4 * AROUND, np.zeros(1)
     else:
         teeth, corners = max(8, round(2 * radius / abs(module))), module * np.array([-0.55, -0.55, 0.45, 0.45])
     steps = np.arange(teeth * len(corners)) / len(corners)
