@@ -78,7 +78,7 @@ def test_joints_swing_within_their_limits():
     subject = robot_subject(robot)
     recording = subject.solve({p.name: p.value for p in subject.parameters}, 2)
     for name in robot.joint_names:
-        low, high, _ = swing_of(robot.joints[name])
+        low, high, _, _ = swing_of(robot.joints[name])
         values = recording.outputs[name].values[:, 0]
         assert low <= values.min() < values.max() <= high
         limit = robot.limits[name].velocity

@@ -16,7 +16,7 @@ from jounce.kinematics import Motion
 from jounce.mechanism.outputs import AbstractQuantity
 from jounce.plot.instants import unsolved_runs
 from jounce.plot.labels import axis_range, quantity_word, scale_of, symbol, unit_label
-from jounce.plot.style import COLOURS, PALE_GREY, RESOLUTION, blank_figure, shown_name, style
+from jounce.plot.style import COLOURS, PALE_GREY, RESOLUTION, blank_figure, set_ticks, shown_name, style
 
 __all__ = ["check_figure", "draw", "draw_columns", "finish", "save"]
 
@@ -131,11 +131,9 @@ def _draw_column(motion: Motion, name: str, column: Column, panels: Any, first: 
 
 def finish(axes: Any, motion: Motion, scaled: Float[np.ndarray, "time *lines"]) -> None:
     """Set limits, ticks and grid, and shade the time that no solved instant borders."""
-    from matplotlib.ticker import MaxNLocator
-
-    axes.yaxis.set_major_locator(MaxNLocator(nbins=4, steps=[1, 2, 2.5, 5, 10], min_n_ticks=3))
+    set_ticks(axes.yaxis, 4, least=3)
     axes.ticklabel_format(axis="y", useOffset=False, style="plain")
-    axes.xaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 2.5, 5, 10]))
+    set_ticks(axes.xaxis, 6)
     axes.ticklabel_format(axis="x", useOffset=False)
     low, high = axis_range(scaled, 0.08)
     axes.set_ylim(low, high)

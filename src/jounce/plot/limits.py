@@ -10,7 +10,7 @@ from jounce.dynamics.limits import FIELDS, LimitReport, LimitRow
 from jounce.errors import RobotError
 from jounce.plot.instants import evenly_chosen
 from jounce.plot.labels import unit_label
-from jounce.plot.style import GREY, LINE_COLOURS, PALE_GREY, blank_figure, shown_name, style
+from jounce.plot.style import GREY, LINE_COLOURS, PALE_GREY, blank_figure, set_ticks, shown_name, style
 
 __all__ = ["draw_limits"]
 
@@ -91,8 +91,6 @@ def _line_style(joint: int) -> dict[str, Any]:
 
 
 def _draw_panel(report: LimitReport, quantity: int, joints: list[int], axes: Any) -> None:
-    from matplotlib.ticker import MaxNLocator
-
     chosen = evenly_chosen(np.arange(len(report.times)), DRAWN)
     shares = report.shares[chosen, quantity]
     for joint in joints:
@@ -108,8 +106,8 @@ def _draw_panel(report: LimitReport, quantity: int, joints: list[int], axes: Any
         axes.axhspan(sign, sign * (abs(low) + abs(high) + margin), color=FORBIDDEN, linewidth=0, zorder=0)
     axes.axhline(0.0, color=PALE_GREY, linewidth=0.7, zorder=1)
     axes.plot([worst.time], [at], marker="o", markersize=4, color="black", fillstyle="none", zorder=5, clip_on=False)
-    axes.yaxis.set_major_locator(MaxNLocator(nbins=5, steps=[1, 2, 2.5, 5, 10], min_n_ticks=3))
-    axes.xaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 2.5, 5, 10]))
+    set_ticks(axes.yaxis, 5, least=3)
+    set_ticks(axes.xaxis, 6)
     words = " / ".join(dict.fromkeys(row.quantity for row in _rows_of(report, quantity)))
     axes.set_ylabel(f"{words}\n(share of limit)")
     name = shown_name(worst.joint)

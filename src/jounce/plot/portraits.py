@@ -11,7 +11,7 @@ from jounce.errors import MechanismError, did_you_mean, no_such
 from jounce.kinematics import Motion
 from jounce.plot.instants import evenly_chosen
 from jounce.plot.labels import axis_range, quantity_word, scale_of, symbol, unit_label
-from jounce.plot.style import COLOURS, GREY, PALE_GREY, blank_figure, style
+from jounce.plot.style import COLOURS, GREY, PALE_GREY, blank_figure, set_ticks, style
 from jounce.reporting.peaks import rate_name
 
 __all__ = ["hodograph", "phase_portrait"]
@@ -166,9 +166,7 @@ def _mark_start(axes: Any, x: Float[np.ndarray, " time"], y: Float[np.ndarray, "
 
 
 def _few_ticks(axes: Any) -> None:
-    from matplotlib.ticker import MaxNLocator
-
     for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_locator(MaxNLocator(nbins=5, steps=[1, 2, 2.5, 5, 10]))
+        set_ticks(axis, 5)
     axes.ticklabel_format(useOffset=False)
     axes.margins(0.06)

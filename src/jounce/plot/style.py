@@ -22,6 +22,7 @@ __all__ = [
     "VERMILION",
     "blank_figure",
     "printable",
+    "set_ticks",
     "shown_name",
     "style",
 ]
@@ -86,6 +87,13 @@ def blank_figure(width: float, height: float, title: str = "", **pads: float) ->
         size = min(TITLE_SIZE, (width - 0.2) / (LETTER * len(title)))
         figure.suptitle(printable(title).replace("$", r"\$"), fontsize=size)
     return figure
+
+
+def set_ticks(axis: Any, most: int, least: int = 2) -> None:
+    """Put few ticks, at round numbers, on an axis."""
+    from matplotlib.ticker import MaxNLocator
+
+    axis.set_major_locator(MaxNLocator(nbins=most, steps=[1, 2, 2.5, 5, 10], min_n_ticks=least))
 
 
 def printable(text: str) -> str:

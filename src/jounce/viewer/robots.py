@@ -175,24 +175,21 @@ def has_masses(robot: Robot) -> bool:
     return any(link.inertia is not None for link in robot.links.values())
 
 
-def swing_of(joint: Joint) -> tuple[float, float, float]:
-    """Return the limits of a joint and the middle of its swing, rad or m; of joints without limits some near zero."""
-    low, high = joint.limits.lower, joint.limits.upper
+def swing_of(joint: Joint) -> tuple[float, float, float, float]:
+    """Return limits of a joint, the middle of its swing and its size, rad or m; without limits, some near zero."""
+    low, high, reach = joint.limits.lower, joint.limits.upper, REACH[joint.turning]
     if low is None or high is None or not high > low:
-        reach = REACH[joint.turning]
         middle = low if low is not None and low == high else 0.0
-        return middle - 2 * reach, middle + 2 * reach, middle
-    return low, high, 0.5 * (low + high)
+        low, high = middle - 2 * reach, middle + 2 * reach
+    return low, high, 0.5 * (low + high), min(0.2 * (high - low), reach)
 
 
 def swing_parameters(robot: Robot, names: tuple[str, ...], share: float) -> tuple[Parameter, ...]:
     """Return the period, and the swing, or a share of it, and the middle of each joint."""
     swings, middles = [], []
     for joint in (robot.joints[name] for name in names):
-        low, high, middle = swing_of(joint)
-        half = 0.5 * (high - low)
-        start = share * min(0.4 * half, REACH[joint.turning])
-        swings.append(Parameter(f"{joint.name} swing", start, 0.0, half, "Swings (rad or m)"))
+        low, high, middle, swing = swing_of(joint)
+        swings.append(Parameter(f"{joint.name} swing", share * swing, 0.0, 0.5 * (high - low), "Swings (rad or m)"))
         middles.append(Parameter(f"{joint.name} middle", middle, low, high, "Middles (rad or m)"))
     return (Parameter("period", _period(robot), 1.0, 20.0), *swings, *middles)
 
@@ -200,12 +197,9 @@ def swing_parameters(robot: Robot, names: tuple[str, ...], share: float) -> tupl
 def _period(robot: Robot) -> float:
     """Return a period at which no joint has to be faster than it can."""
     slowest = SWING
-    for name in robot.joint_names:
-        joint = robot.joints[name]
-        low, high, _ = swing_of(joint)
+    for joint in (robot.joints[name] for name in robot.joint_names):
         if joint.limits.velocity:
-            swing = min(0.2 * (high - low), REACH[joint.turning])
-            slowest = max(slowest, 2 * np.pi * swing / joint.limits.velocity)
+            slowest = max(slowest, 2 * np.pi * swing_of(joint)[3] / joint.limits.velocity)
     return float(np.ceil(slowest))
 
 
