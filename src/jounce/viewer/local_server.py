@@ -137,7 +137,7 @@ def check_installed() -> None:
     """Raise JounceError unless the packages of the extra ``viewer`` are there."""
     from importlib.util import find_spec
 
-    if find_spec("viser") is None or find_spec("trimesh") is None:
+    if any(find_spec(name) is None for name in ("viser", "trimesh", "shapely")):
         message = 'the view needs the package viser, which is not installed: pip install "jounce[viewer]"'
         raise JounceError(message)
 
