@@ -52,7 +52,7 @@ def view(
     from jounce.io.robots.loader import ENDINGS
     from jounce.kinematics.solve import checked_order
     from jounce.viewer import view as show
-    from jounce.viewer.exports import check_installed
+    from jounce.viewer.local_server import check_installed
     from jounce.viewer.server import MECHANISM_FILES
 
     check_installed()
@@ -73,7 +73,7 @@ def view(
             error.name = f"--{error.name}"
             raise
         raise error.located(path=file) from None
-    say(f"{page.page.take.title or file.name}: {page.url} (Ctrl-C ends)")
+    say(f"{page.page.recording.title or file.name}: {page.url} (Ctrl-C ends)")
     with raising():
         page.wait()
     return 0

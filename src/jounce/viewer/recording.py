@@ -1,4 +1,4 @@
-"""What the view shows of one motion, in arrays: poses of all bodies at all instants, quantities over time, forces."""
+"""A solved motion prepared for display: poses of all bodies at all instants, quantities over time, loads."""
 
 from __future__ import annotations
 
@@ -6,11 +6,20 @@ import abc
 import dataclasses
 from collections.abc import Mapping
 from functools import cached_property
-from typing import Any
 
 import numpy as np
+from jaxtyping import Float
+from xarray import Dataset
 
-__all__ = ["Exertion", "Parameter", "Quantity", "Spot", "Take", "poses", "rotated", "spatial_vectors"]
+from jounce.kinematics import Motion
+from jounce.plot.instants import nearest_instants
+from jounce.viewer.appearance import Appearance, BodyPoint, Place
+
+__all__ = ["Load", "Parameter", "Quantity", "Recording", "Vectors", "poses", "rotated", "spatial_vectors"]
+
+Vectors = Float[np.ndarray, "time 3"]
+Positions = Float[np.ndarray, "time body 3"]
+Quaternions = Float[np.ndarray, "time body 4"]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -46,7 +55,7 @@ class Quantity:
     ----------
     unit : str
         Of derivative 0.
-    values : array of shape (time, orders, components)
+    values : numpy.ndarray of shape (time, order, component)
     words : tuple of str
         What each derivative is called.
     labels : tuple of str
@@ -54,87 +63,69 @@ class Quantity:
     """
 
     unit: str
-    values: np.ndarray
+    values: Float[np.ndarray, "time order component"]
     words: tuple[str, ...]
     labels: tuple[str, ...] = ("x", "y", "z")
 
 
 @dataclasses.dataclass(frozen=True)
-class Spot:
-    """A point of a body.
-
-    Parameters
-    ----------
-    body : str
-    point : tuple of float
-        In the frame of the body, m; two or three components.
-    name : str
-        What it is called on the page.
-    """
-
-    body: str
-    point: tuple[float, ...]
-    name: str
-
-
-@dataclasses.dataclass(frozen=True)
-class Exertion:
+class Load:
     """What a joint, a driver or an applied force does to a body, over time.
 
     Parameters
     ----------
     name : str
     kind : {"reaction", "driver", "applied"}
-    place : array of shape (time, 3)
+    place : numpy.ndarray of shape (time, 3)
         Where it acts, m.
-    force : array of shape (time, 3) or None
+    force : numpy.ndarray of shape (time, 3) or None
         N, global.
-    torque : array of shape (time, 3) or None
+    torque : numpy.ndarray of shape (time, 3) or None
         N m, global.
     """
 
     name: str
     kind: str
-    place: np.ndarray
-    force: np.ndarray | None
-    torque: np.ndarray | None
+    place: Vectors
+    force: Vectors | None = None
+    torque: Vectors | None = None
 
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
-class Take(abc.ABC):
+class Recording(abc.ABC):
     """One solved motion as the page shows it; everything in three components, planar ones with zero z.
 
     Parameters
     ----------
     title : str
     planar : bool
-    time : array of shape (time,)
+    time : numpy.ndarray of shape (time,)
         s; only instants that were solved.
     order : int
         Highest derivative.
     bodies : tuple of str
         Names, ``ground`` or the base of a robot first.
-    position : array of shape (time, bodies, 3)
+    position : numpy.ndarray of shape (time, body, 3)
         Origins of the bodies, m.
-    quaternion : array of shape (time, bodies, 4)
+    quaternion : numpy.ndarray of shape (time, body, 4)
         Their attitudes, scalar part first.
     values : mapping
         Values of the parameters that it was solved with.
-    looks : object
-        Shapes of the bodies, see `jounce.viewer.looks.Looks`.
+    appearance : Appearance
+        Shapes of the bodies.
     notice : str, default ""
         What is to be said of it: instants that could not be solved.
     """
 
     title: str
     planar: bool
-    time: np.ndarray
+    time: Float[np.ndarray, " time"]
     order: int
     bodies: tuple[str, ...]
-    position: np.ndarray
-    quaternion: np.ndarray
+    position: Positions
+    quaternion: Quaternions
     values: Mapping[str, float]
-    looks: Any
+    appearance: Appearance
     notice: str = ""
 
     @abc.abstractmethod
@@ -142,57 +133,51 @@ class Take(abc.ABC):
         """Return what is plotted, by name."""
 
     @abc.abstractmethod
-    def motion_of(self, body: str, point: Any) -> np.ndarray:
-        """Return position and derivatives, (time, order + 1, 3), of a point of a body."""
+    def derivatives(self, body: str, point: Place) -> Float[np.ndarray, "time derivative 3"]:
+        """Return position and derivatives of a point of a body."""
 
     @abc.abstractmethod
-    def exertions_of(self) -> list[Exertion]:
+    def all_loads(self) -> list[Load]:
         """Return what joints, drivers and applied forces do to the bodies; empty where nothing has a mass."""
 
     @abc.abstractmethod
-    def dataset(self) -> Any:
-        """Return the xarray.Dataset that an export writes."""
+    def dataset(self) -> Dataset | None:
+        """Return what an export writes."""
 
     @cached_property
     def outputs(self) -> Mapping[str, Quantity]:
-        """Quantities by name."""
+        """What is plotted, by name; computed once."""
         return self.quantities()
 
     @cached_property
-    def exertions(self) -> list[Exertion]:
-        """What joints, drivers and applied forces do to the bodies."""
-        return self.exertions_of()
+    def loads(self) -> list[Load]:
+        """What joints, drivers and applied forces do to the bodies; computed once."""
+        return self.all_loads()
 
     @cached_property
-    def _spots(self) -> dict[Spot, np.ndarray]:
+    def _motions(self) -> dict[BodyPoint, np.ndarray]:
         return {}
 
-    def motion(self, spot: Spot) -> np.ndarray:
-        """Return the position of a point and its derivatives, (time, order + 1, 3), m by s; computed once."""
-        if spot not in self._spots:
-            self._spots[spot] = self.motion_of(spot.body, spot.point)
-        return self._spots[spot]
+    def motion(self, point: BodyPoint) -> Float[np.ndarray, "time derivative 3"]:
+        """Return the position of a point and its derivatives, m by s; computed once."""
+        if point not in self._motions:
+            self._motions[point] = self.derivatives(point.body, point.point)
+        return self._motions[point]
 
     def frame_at(self, instant: float) -> int:
         """Return the index of the instant nearest to a time."""
-        after = int(np.clip(np.searchsorted(self.time, instant), 1, max(len(self.time) - 1, 1)))
-        if len(self.time) == 1:
-            return 0
-        return after - 1 if instant - self.time[after - 1] <= self.time[after] - instant else after
+        return int(nearest_instants(self.time, np.array([instant]))[0])
 
-    def placed(self, body: str, point: Any) -> np.ndarray:
-        """Return where a point of a body is at all instants, (time, 3), m."""
+    def placed(self, body: str, point: Place) -> Vectors:
+        """Return where a point of a body is at all instants, m."""
         index = self.bodies.index(body)
-        local = spatial_vectors(np.asarray(point, float))
-        return self.position[:, index] + rotated(self.quaternion[:, index], local)
+        return self.position[:, index] + rotated(self.quaternion[:, index], spatial_vectors(np.asarray(point, float)))
 
     @cached_property
-    def box(self) -> tuple[np.ndarray, np.ndarray]:
+    def box(self) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
         """Corners of the box that holds all that moves, at all instants, m."""
-        points = [self.position.reshape(-1, 3)]
-        for name, extent in self.looks.extents().items():
-            points += [self.placed(name, point) for point in extent]
-        every = np.concatenate(points)
+        corners = [self.placed(body, corner) for body, box in self.appearance.corners().items() for corner in box]
+        every = np.concatenate([self.position.reshape(-1, 3), *corners])
         return every.min(axis=0), every.max(axis=0)
 
     @cached_property
@@ -202,23 +187,25 @@ class Take(abc.ABC):
         return float(np.linalg.norm(high - low)) or 1.0
 
 
-def poses(motion: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Return origins, (time, bodies, 3), and quaternions, (time, bodies, 4), of all bodies, the ground first."""
+def poses(motion: Motion) -> tuple[Positions, Quaternions]:
+    """Return origins and quaternions of all bodies, the ground first."""
     _, coordinates = motion.poses
-    position = spatial_vectors(np.moveaxis(np.asarray(coordinates["position"][0]), (2, 1, 0), (0, 1, 2)))
-    if "angle" in coordinates:
-        half = 0.5 * np.asarray(coordinates["angle"][0]).T
+    values = {name: np.asarray(derivatives[0]).T for name, derivatives in coordinates.items()}  # time, body, component
+    position = spatial_vectors(values["position"])
+    if "angle" in values:
+        half = 0.5 * values["angle"]
         zero = np.zeros_like(half)
         quaternion = np.stack([np.cos(half), zero, zero, np.sin(half)], axis=-1)
     else:
-        quaternion = np.moveaxis(np.asarray(coordinates["quaternion"][0]), (2, 1, 0), (0, 1, 2))
-    bodies = max(position.shape[1], quaternion.shape[1])
-    shape = (len(motion.time), bodies)
+        quaternion = values["quaternion"]
+    shape = (len(motion.time), max(position.shape[1], quaternion.shape[1]))
     return np.broadcast_to(position, (*shape, 3)), np.broadcast_to(quaternion, (*shape, 4))
 
 
-def rotated(quaternion: np.ndarray, vector: np.ndarray) -> np.ndarray:
-    """Turn vectors by quaternions, scalar part first; shapes (..., 4) and (..., 3).
+def rotated(
+    quaternion: Float[np.ndarray, "*batch 4"], vector: Float[np.ndarray, "*local 3"]
+) -> Float[np.ndarray, "*batch 3"]:
+    """Turn vectors by quaternions, scalar part first.
 
     Examples
     --------
@@ -232,7 +219,7 @@ def rotated(quaternion: np.ndarray, vector: np.ndarray) -> np.ndarray:
     return vector + 2 * (scalar * once + np.cross(axis, once))
 
 
-def spatial_vectors(values: np.ndarray) -> np.ndarray:
+def spatial_vectors(values: Float[np.ndarray, "*batch components"]) -> Float[np.ndarray, "*batch 3"]:
     """Return vectors, components last, with a third component, zero where there are only two."""
     missing = 3 - values.shape[-1]
     return np.concatenate([values, np.zeros((*values.shape[:-1], missing))], axis=-1) if missing else values

@@ -1,4 +1,4 @@
-"""Who may see and move a page: whoever has its address, with the token that is in it, and no page of another origin.
+"""The server of a page: on this machine only, for whoever has its address, with the token, and for no other origin.
 
 A server that listens on this machine only can still be reached from it by every program, and by every page that is open
 in a browser here: scripts may open a WebSocket to any port (only its Origin says whose script it is), and a name of an
@@ -9,17 +9,19 @@ the token.
 
 from __future__ import annotations
 
+import io
 import re
 import secrets
+import socket
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
 from jounce.errors import JounceError
 
-__all__ = ["Guard", "refuse_uploads"]
+__all__ = ["AccessControl", "check_installed", "check_port", "quiet_server", "quiet_stop"]
 
 HOSTS = ("127.0.0.1", "localhost", "[::1]")  # of any port, as a tunnel may have another one at its other end
 REFUSED = "This page is opened by the whole address that jounce view prints, with its token.\n"
@@ -35,7 +37,7 @@ if (!given.has("websocket")) {
 _starting = threading.Lock()
 
 
-class Guard:
+class AccessControl:
     """Lets requests pass that hold a token of its own.
 
     Attributes
@@ -104,7 +106,7 @@ class Guard:
         return guarded
 
 
-def refuse_uploads(server: Any) -> None:
+def _refuse_uploads(server: Any) -> None:
     """Take no files: no control of the page asks for any, but viser would keep what is sent for a slider.
 
     Parameters
@@ -129,3 +131,62 @@ def _complete(response: Any) -> None:
         response.body = response.body.replace(head, head + CONNECT, 1)
         del response.headers["Content-Length"]
         response.headers["Content-Length"] = str(len(response.body))
+
+
+def check_installed() -> None:
+    """Raise JounceError unless the packages of the extra ``viewer`` are there."""
+    from importlib.util import find_spec
+
+    if any(find_spec(name) is None for name in ("viser", "trimesh", "shapely")):
+        message = 'the view needs the package viser, which is not installed: pip install "jounce[viewer]"'
+        raise JounceError(message)
+
+
+def quiet_server(port: int = 0, label: str | None = None, access: AccessControl | None = None) -> Any:
+    """Return a viser server that listens on this machine only, answers whom it is told to, and prints nothing.
+
+    Raises
+    ------
+    JounceError
+        If viser is not installed or cannot be guarded, or the port is taken.
+    """
+    check_installed()
+    import viser
+
+    server = None
+    try:
+        with redirect_stdout(io.StringIO()), (access or AccessControl()).starting():
+            server = viser.ViserServer(host="127.0.0.1", port=port or _free_port(), label=label, verbose=False)
+        _refuse_uploads(server)
+    except BaseException:
+        if server is not None:
+            quiet_stop(server)
+        raise
+    return server
+
+
+def quiet_stop(server: Any) -> None:
+    """End a viser server without a word."""
+    with redirect_stdout(io.StringIO()):
+        server.stop()
+
+
+def _free_port() -> int:
+    """Return a port of this machine that nobody listens on."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def check_port(port: Any) -> None:
+    """Raise JounceError unless a port can be listened on."""
+    if isinstance(port, bool) or not isinstance(port, int) or not 0 <= port <= 65535:
+        raise JounceError("must be a whole number from 0 to 65535; 0 takes a free one", name="port", value=port)
+    if port:
+        with socket.socket() as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            try:
+                probe.bind(("127.0.0.1", port))
+            except OSError as error:
+                message = f"cannot be used: {error.strerror}; 0 takes a free one"
+                raise JounceError(message, name="port", value=port) from None

@@ -7,25 +7,30 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
+from jounce.plot.drawing import Label
 from jounce.plot.style import printable, shown_name
 
 __all__ = ["place_names"]
 
 DIRECTIONS = 16
 DISTANCES = (1.7, 2.6, 3.8, 5.5, 8.0)  # of the nearest edge of a name, in units of the drawing
+Pixels = Float[np.ndarray, "2"]
+Points = Float[np.ndarray, "points 2"]
+Boxes = Float[np.ndarray, "boxes 4"]
 LEADER = 3.0  # units, from which on a thin line leads from a name to its place
 
 
 def place_names(
     figure: Any,
     axes: Any,
-    labels: Sequence[Any],
+    labels: Sequence[Label],
     instant: int,
-    obstacles: Sequence[np.ndarray],
+    obstacles: Sequence[Points],
     unit: float,
     still: bool = True,
-) -> list[tuple[Any, Any]]:
+) -> list[tuple[Label, Any]]:
     """Write names of a scene; each takes the free place that is nearest.
 
     Parameters
@@ -56,8 +61,8 @@ def place_names(
     points = [_along(to_pixels(corners)) for corners in obstacles if len(corners) and np.isfinite(corners).all()]
     taken = np.concatenate(points) if points else np.zeros((0, 2))
     pixels = float(np.diff(to_pixels([[0.0, 0.0], [unit, 0.0]]), axis=0)[0, 0])
-    frame = axes.get_window_extent(renderer)
-    boxes: list[np.ndarray] = [_box(text.get_window_extent(renderer)) for text in axes.texts]
+    frame = _box(axes, renderer)
+    boxes = np.array([_box(text, renderer) for text in axes.texts]).reshape(-1, 4)
     texts = []
     for label in labels:
         place = label.anchor[min(instant, len(label.anchor) - 1)]
@@ -68,10 +73,10 @@ def place_names(
         text.set_gid(printable(f"name.{label.owner}"))
         if label.owner.startswith("bodies."):
             text.set_fontweight("bold")
-        extent = text.get_window_extent(renderer)
-        half = np.array([extent.width, extent.height]) / 2 + 1.0
+        edges = _box(text, renderer)
+        half = (edges[2:] - edges[:2]) / 2 + 1.0
         center, distance = _best(to_pixels(place), half, pixels, taken, boxes, frame)
-        boxes.append(np.array([*(center - half), *(center + half)]))
+        boxes = np.vstack([boxes, [*(center - half), *(center + half)]])
         at = axes.transData.inverted().transform(center)
         text.set_position(at)
         texts.append((label, text))
@@ -81,36 +86,29 @@ def place_names(
 
 
 def _best(
-    place: np.ndarray, half: np.ndarray, pixels: float, taken: np.ndarray, boxes: list[np.ndarray], frame: Any
-) -> tuple[np.ndarray, float]:
+    place: Pixels, half: Pixels, pixels: float, taken: Points, boxes: Boxes, frame: Float[np.ndarray, "4"]
+) -> tuple[Pixels, float]:
     """Return the centre of a name in pixels, and how far it is from its place in units, by the least cost."""
-    best, found = np.inf, (place, 0.0)
-    for distance in DISTANCES:
-        for k in range(DIRECTIONS):
-            angle = 2 * np.pi * (k + 1) / DIRECTIONS
-            way = np.array([np.cos(angle), np.sin(angle)])
-            reach = min(h / max(abs(w), 1e-9) for h, w in zip(half, way, strict=True))
-            center = place + way * (distance * pixels + min(reach, half.max()))
-            low, high = center - half, center + half
-            covered = np.sum(np.all((taken > low - 1.5) & (taken < high + 1.5), axis=1))
-            clash = sum(
-                max(0.0, min(high[0], b[2]) - max(low[0], b[0])) * max(0.0, min(high[1], b[3]) - max(low[1], b[1]))
-                for b in boxes
-            )
-            outside = np.sum(
-                np.maximum(0.0, [frame.x0 - low[0], frame.y0 - low[1], high[0] - frame.x1, high[1] - frame.y1])
-            )
-            cost = 3.0 * distance + 1.5 * covered + 4.0 * clash + 5.0 * outside
-            if cost < best:
-                best, found = cost, (center, distance)
-    return found
+    angle = 2 * np.pi * np.arange(1, DIRECTIONS + 1) / DIRECTIONS
+    way = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    reach = np.minimum((half / np.maximum(np.abs(way), 1e-9)).min(axis=1), half.max())  # to the edge of the name
+    distance = np.repeat(DISTANCES, DIRECTIONS)
+    center = place + np.tile(way, (len(DISTANCES), 1)) * (distance * pixels + np.tile(reach, len(DISTANCES)))[:, None]
+    low, high = center - half, center + half
+    covered = ((taken > low[:, None] - 1.5) & (taken < high[:, None] + 1.5)).all(axis=2).sum(axis=1)
+    overlap = np.minimum(high[:, None], boxes[:, 2:]) - np.maximum(low[:, None], boxes[:, :2])
+    clash = np.maximum(0.0, overlap).prod(axis=2).sum(axis=1)
+    outside = (np.maximum(0.0, frame[:2] - low) + np.maximum(0.0, high - frame[2:])).sum(axis=1)
+    best = int(np.argmin(3.0 * distance + 1.5 * covered + 4.0 * clash + 5.0 * outside))
+    return center[best], float(distance[best])
 
 
-def _box(extent: Any) -> np.ndarray:
-    return np.array([extent.x0, extent.y0, extent.x1, extent.y1])
+def _box(artist: Any, renderer: Any) -> Float[np.ndarray, "4"]:
+    """Return left, lower, right and upper edge of what is drawn, in pixels."""
+    return artist.get_window_extent(renderer).extents
 
 
-def _along(corners: np.ndarray, step: float = 4.0) -> np.ndarray:
+def _along(corners: Points, step: float = 4.0) -> Points:
     """Return places along a line of corners, no farther apart than some pixels."""
     parts = [corners[:1]]
     for first, second in pairwise(corners):

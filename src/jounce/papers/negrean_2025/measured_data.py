@@ -1,5 +1,6 @@
 """One's own samples and masses in the place of the stand-ins: files, and what the page says of them."""
 
+import dataclasses
 from pathlib import Path
 from typing import Any
 
@@ -9,16 +10,10 @@ from jounce.errors import JounceError, MechanismFileError, did_you_mean
 from jounce.io.files.samples import read_columns
 from jounce.io.files.source import Source, read_source
 from jounce.papers.negrean_2025.case import CASES, STAND_IN, Case, Link, law
+from jounce.papers.output import page
 
-MASS_KEYS = {  # the field of `Link` and the kind of unit of each key of a file of masses
-    "mass": ("mass", "mass"),
-    "center_x": ("center_x", "length"),
-    "center_z": ("center_z", "length"),
-    "inertia_x": ("inertia_x", "inertia"),
-    "inertia_y": ("inertia_y", "inertia"),
-    "inertia_z": ("inertia_z", "inertia"),
-    "radius": ("radius", "length"),
-}
+UNITS = {field.name: field.name.partition("_")[0] for field in dataclasses.fields(Link)}  # kinds of units
+UNITS |= dict.fromkeys(("center_x", "center_z", "radius"), "length")
 NEEDED = ("mass", "center_x", "center_z", "inertia_y")
 
 
@@ -40,7 +35,7 @@ def given_cases(samples: Path | None, masses: Path | None) -> dict[str, Case]:
     """
     link = STAND_IN if masses is None else read_link(masses)
     if samples is None:
-        return {name: Case(case.name, case.title, case.samples, case.angle, link) for name, case in CASES.items()}
+        return {name: dataclasses.replace(case, link=link) for name, case in CASES.items()}
     times, columns = read_columns(samples)
     found = {}
     for name, values in columns.items():
@@ -66,12 +61,12 @@ def read_link(path: Path) -> Link:
     if not isinstance(data, dict):
         raise MechanismFileError(f"must hold {', '.join(NEEDED)}", path=path, line=1)
     for key in data:
-        if key not in MASS_KEYS:
-            raise source.error(f"unknown key; {did_you_mean(str(key), MASS_KEYS)}", (str(key),))
+        if key not in UNITS:
+            raise source.error(f"unknown key; {did_you_mean(str(key), UNITS)}", (str(key),))
     for key in NEEDED:
         if key not in data:
             raise source.error("is missing", (key,))
-    values = {MASS_KEYS[key][0]: _number(source, key, raw) for key, raw in data.items()}
+    values = {str(key): _number(source, key, raw) for key, raw in data.items()}
     for name in ("inertia_x", "inertia_z"):  # they have no part in it, and any body may have those of a thin rod
         values.setdefault(name, values["inertia_y"])
     link = Link(**{"radius": STAND_IN.radius} | values)
@@ -86,7 +81,7 @@ def _number(source: Source, key: str, raw: Any) -> float:
     from jounce.io.files.units import parse_value
 
     try:
-        value = parse_value(raw, MASS_KEYS[key][1]).value
+        value = parse_value(raw, UNITS[key]).value
     except JounceError as error:
         raise source.error(error.message, (key,), value=raw) from None
     if not isinstance(value, float | int):
@@ -94,22 +89,20 @@ def _number(source: Source, key: str, raw: Any) -> float:
     return float(value)
 
 
-def told(cases: dict[str, Case], samples: Path | None, masses: Path | None) -> list[str]:
+def told(cases: dict[str, Case], samples: Path | None, masses: Path | None) -> str:
     """Return what the page says of data that are not the stand-ins of all of it."""
-    link = next(iter(cases.values())).link
-    first = f"`{samples.name}`" if samples else "stand-ins, as without --samples"
-    second = f"`{masses.name}`" if masses else "stand-ins, as without --masses"
-    instants = next(iter(cases.values())).knots
-    return [
-        "Made from data that were given, not from those of the paper:",
-        "",
-        f"- Samples of the angular acceleration: {first}; {len(instants)} instants from {instants[0]:g} s to "
-        f"{instants[-1]:g} s.",
-        "  The law is made of quintic segments through them, as they are: from angle and speed zero, jerk zero at both"
-        " ends."
+    case = next(iter(cases.values()))
+    through = "The law is made of quintic segments through them, as they are: from angle and speed zero, jerk zero at"
+    return page(
+        __package__,
+        "measured_data.md",
+        samples=f"`{samples.name}`" if samples else "stand-ins, as without --samples",
+        masses=f"`{masses.name}`" if masses else "stand-ins, as without --masses",
+        law=f"{through}: from angle and speed zero, jerk zero at both ends."
         if samples
-        else "  Bias and drift are taken off them.",
-        f"- Masses: {second}; M = {link.mass:g} kg, x_C = {link.center_x:g} m, z_C = {link.center_z:g} m, "
-        f"I_y = {link.inertia_y:g} kg m^2.",
-        "- The axis is horizontal, gravity is 9.81 m/s^2. At angle zero x is level and z up, and the link turns down.",
-    ]
+        else "Bias and drift are taken off them.",
+        instants=len(case.knots),
+        first=case.knots[0],
+        last=case.knots[-1],
+        link=case.link,
+    ).rstrip()

@@ -9,12 +9,14 @@ of the motion come late by h / 2 and by h, and smaller.
 import dataclasses
 
 import numpy as np
+from jaxtyping import Float
 
 from jounce.mechanism import Mechanism
+from jounce.papers.sommer_2024.cases import CYCLE, QUANTITIES, STEP, ValidationCase, normalised_rmse
 from jounce.papers.sommer_2024.differences import backward_difference
-from jounce.papers.sommer_2024.simulations import CYCLE, QUANTITIES, STEP, Simulation
 
 STEPS = (STEP, 0.02, 0.05, 0.1)  # s, each a whole part of the cycle
+Series = Float[np.ndarray, " time"]
 FINE = 2000  # instants of the cycle from which the spectrum of the explicit solution is taken
 
 
@@ -38,10 +40,10 @@ class Lag:
 
     quantity: str
     step: float
-    time: np.ndarray
-    explicit: np.ndarray
-    simulated: np.ndarray
-    difference: np.ndarray
+    time: Series
+    explicit: Series
+    simulated: Series
+    difference: Series
     error: float
 
     @property
@@ -49,23 +51,23 @@ class Lag:
         """How late the differences must be, s: h / 2 for the jerk, h for the jounce."""
         return self.step * (0.5 if self.quantity == "jerk" else 1.0)
 
-    def late(self, found: np.ndarray) -> float:
+    def late(self, found: Series) -> float:
         """Return how late a quantity is, s, in the harmonic of the cycle in which the explicit one is largest."""
         right = np.fft.rfft(self.explicit)
         n = 1 + int(np.argmax(np.abs(right[1:])))
         return -float(np.angle(np.fft.rfft(found)[n] / right[n])) * CYCLE / (2 * np.pi * n)
 
-    def measured_error(self, found: np.ndarray) -> float:
+    def measured_error(self, found: Series) -> float:
         """Return the normalised RMSE of a quantity."""
-        return float(np.sqrt(np.mean((found - self.explicit) ** 2)) / np.abs(self.explicit).max())
+        return float(normalised_rmse(found[:, None], self.explicit[:, None])[0])
 
 
-def lags(simulation: Simulation, mechanism: Mechanism, step: float) -> list[Lag]:
+def lags(case: ValidationCase, mechanism: Mechanism, step: float) -> list[Lag]:
     """Return jerk and jounce of one cycle with the lag of their backward differences.
 
     Parameters
     ----------
-    simulation : Simulation
+    case : ValidationCase
         What is driven.
     mechanism : Mechanism
         Its mechanism.
@@ -74,8 +76,8 @@ def lags(simulation: Simulation, mechanism: Mechanism, step: float) -> list[Lag]
     """
     count = round(CYCLE / step)
     time = step * np.arange(count + 2)  # two samples before the first difference
-    found, right = simulation.simulated(mechanism, time), simulation.explicit(mechanism, time)
-    fine = simulation.explicit(mechanism, CYCLE / FINE * np.arange(FINE))
+    found, right = case.simulated(mechanism, time), case.explicit(mechanism, time)
+    fine = case.explicit(mechanism, CYCLE / FINE * np.arange(FINE))
     frequency = 2 * np.pi / CYCLE * np.arange(FINE // 2 + 1)
     transfer = np.sinc(frequency * step / (2 * np.pi)) * np.exp(-0.5j * frequency * step)
     every = []

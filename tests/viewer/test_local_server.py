@@ -11,8 +11,8 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 import jounce as jn
-from jounce.viewer import exports, view
-from jounce.viewer.guard import Guard
+from jounce.viewer import view
+from jounce.viewer.local_server import AccessControl, quiet_server
 from tests.viewer.small import wheel
 
 
@@ -48,7 +48,7 @@ def connected(address, origin=None):
 
 def test_the_address_holds_a_token_of_128_bits_that_is_new_each_time(page):
     token = re.fullmatch(r"http://127\.0\.0\.1:\d+/\?token=([\w-]{22})", page.url)[1]
-    assert token not in {Guard().token for _ in range(10)}
+    assert token not in {AccessControl().token for _ in range(10)}
 
 
 def test_the_right_address_shows_the_page(page, bare):
@@ -130,7 +130,7 @@ def test_what_cannot_be_guarded_is_not_served(monkeypatch):
 
     monkeypatch.setattr(viser, "ViserServer", Unknown)
     with pytest.raises(jn.JounceError, match="guarded"):
-        exports.quiet_server()
+        quiet_server()
     assert not started
 
 
@@ -146,5 +146,5 @@ def test_servers_of_others_are_left_alone():
             async with client.connect(f"ws://127.0.0.1:{port}") as socket:
                 return await socket.recv()
 
-    with pytest.raises(jn.JounceError, match="guarded"), Guard().starting():  # as no page was started
+    with pytest.raises(jn.JounceError, match="guarded"), AccessControl().starting():  # as no page was started
         assert asyncio.run(talk()) == "hello"
