@@ -17,7 +17,7 @@ from jounce.io.files.units import KINDS, Dimension, Value, parse_value
 from jounce.rigid.euler_parameters import form_of
 from jounce.trajectory.dimensions import TIME
 from jounce.trajectory.expression import Expression
-from jounce.trajectory.measured import MOST
+from jounce.trajectory.measured import HIGHEST as MOST
 
 __all__ = [
     "Checked",
@@ -172,7 +172,7 @@ class Samples(BaseModel):
     value: str | None = None
     beyond: Literal["refuse", "hold", "repeat"] = "refuse"
     derivative: int = Field(default=0, ge=0, le=MOST)
-    initial: tuple[float, ...] = ()
+    initial: tuple[Any, ...] = ()
 
 
 def motion(quantity: str, variables: dict[str, Dimension | None] | None = None) -> Any:
@@ -236,20 +236,18 @@ def _measured(raw: dict[str, Any], quantity: str, info: Any) -> dict[str, Any]:
     return {"derivative": derivative, "initial": tuple(found)}
 
 
-def _initial(raw: Any, order: int, quantity: str, info: Any) -> float:
-    """Return a number in SI units: of a driven quantity, per s to the power of an order."""
+def _initial(raw: Any, order: int, quantity: str, info: Any) -> float | Expression:
+    """Return a value of a driven quantity, in SI units per s to the power of an order."""
     try:
         value = parse(raw, quantity if order == 0 else "any", info)
     except PydanticCustomError as error:
         raise below(error, "initial", order) from None
-    if not isinstance(value.value, float | int):
-        raise problem("must be a number, with or without a unit", "initial", order, value=raw)
     if order and value.dimension:
         bases = _bases(quantity, info)
         if value.dimension not in [tuple(sorted(((base, 1), ("time", -order)))) for base in bases]:
             rate = f" per s{f'^{order}' if order > 1 else ''}"
             raise problem(f"must be {' or '.join(bases) or 'a number'}{rate}", "initial", order, value=raw)
-    return float(value.value)
+    return value.value
 
 
 def _bases(quantity: str, info: Any) -> list[str]:

@@ -225,7 +225,7 @@ class _Writer:
         found: dict[str, Any] = {"samples": name, "degree": law.degree}
         if isinstance(law, MeasuredMotion):
             found |= {"degree": law.degree - law.derivative, "derivative": law.derivative}
-            found["initial"] = list(law.initial.value)
+            found["initial"] = _plain(law.initial.value, f"{place}.initial")
         return found if beyond == "refuse" else found | {"beyond": beyond}
 
 
