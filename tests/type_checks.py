@@ -1,7 +1,8 @@
 """Types are checked while tests run: in the functions, methods and dataclasses of jounce, by beartype.
 
-Functions within functions are left out. They would be given checks anew at each call of the function around them, which took
-half of the time of all tests; their values are checked where they are handed on. This is imported before jounce.
+Functions within functions are left out. They would be given checks anew at each call of the function around them,
+which took half of the time of all tests; their values are checked where they are handed on. This is imported before
+anything of jounce.
 """
 
 import ast
@@ -11,9 +12,10 @@ from importlib.util import decode_source
 from typing import get_args
 
 import jaxtyping
-from beartype import beartype
+from beartype import BeartypeConf, beartype
 
 PACKAGE = "jounce"
+bare = beartype(conf=BeartypeConf(violation_type=TypeError))  # as Python itself says it
 
 
 def checked(thing):
@@ -22,8 +24,8 @@ def checked(thing):
     Axes of one name are compared in functions whose annotations hold shapes; the others go without the cost of that.
     """
     if isinstance(thing, type) or any(map(_holds_shape, getattr(thing, "__annotations__", {}).values())):
-        return jaxtyping.jaxtyped(thing, typechecker=beartype)
-    return beartype(thing)
+        return jaxtyping.jaxtyped(thing, typechecker=bare)
+    return bare(thing)
 
 
 def _holds_shape(annotation):
@@ -31,13 +33,13 @@ def _holds_shape(annotation):
 
 
 class Decorated(ast.NodeTransformer):
-    """A module in which outermost functions and methods, before other decorators, and classes, after them, are checked."""
+    """A module whose outermost functions and methods, before other decorators, and classes, after them, are checked."""
 
     def visit_FunctionDef(self, node):
         node.decorator_list.append(_checked(node))
         return node
 
-    visit_AsyncFunctionDef = visit_FunctionDef
+    visit_AsyncFunctionDef = visit_FunctionDef  # noqa: N815 - the name is Python's
 
     def visit_ClassDef(self, node):
         self.generic_visit(node)

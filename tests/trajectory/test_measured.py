@@ -193,12 +193,11 @@ def test_what_is_known_at_the_first_sample_follows_the_parameters(tmp_path):
     assert np.array_equal(jn.solve(again, order=3).outputs["x"], jn.solve(fresh, order=3).outputs["x"])
 
 
-def test_gradients_with_respect_to_what_is_known_at_the_first_sample(tmp_path):
-    mechanism = jn.load(follower(tmp_path))
-    time = np.array([0.5, 1.25])
-    slopes = jax.jacobian(lambda v0: jn.solve(mechanism.with_parameters(v0=v0), time, order=2).outputs["x"])(1.0)
-    right = [[0.0, 0.5, 0.0], [0.375, 0.5, 0.0]]
-    np.testing.assert_allclose(slopes, right, rtol=0, atol=1e-12)
+def test_gradients_with_respect_to_what_is_known_at_the_first_sample():
+    law = jn.MeasuredMotion(T, polynomial(T, 2), initial=["x0", "v0/2"])
+    time = jn.Jet.variable(np.array([0.5, 1.25]), order=2)
+    slopes = jax.jacobian(lambda v0: law.resolved({"x0": 0.1, "v0": v0})(time).derivatives())(1.0)
+    np.testing.assert_allclose(slopes, [[0.0, 0.375], [0.5, 0.5], [0.0, 0.0]], rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize(

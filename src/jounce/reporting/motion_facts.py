@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 from typing_extensions import TypedDict
 
-from jounce.kinematics import Status
+from jounce.kinematics import Motion, Status
 from jounce.mechanism import build
-
-if TYPE_CHECKING:
-    from jounce.kinematics import Motion
 
 __all__ = ["MotionFacts", "SimulationFacts", "motion_facts"]
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from jounce.dynamics.limits import LimitReport
-    from jounce.trajectory import JointTrajectory
+from jounce.dynamics.limits import LimitReport
+from jounce.trajectory import JointTrajectory
 
 __all__ = [
     "count",

@@ -5,11 +5,10 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from jounce.dynamics.limits import LimitReport
-    from jounce.reporting.peaks import Peak
+from jounce.dynamics.limits import LimitReport
+from jounce.reporting.peaks import Peak
 
 __all__ = [
     "Table",

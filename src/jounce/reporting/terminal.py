@@ -168,9 +168,9 @@ def say(text: str) -> None:
 
 def say_json(command: str, data: Mapping[str, Any]) -> None:
     """Print the result of a command as JSON on standard output."""
-    from jounce.reporting.records import record
+    from jounce.reporting.json_results import result_json
 
-    sys.stdout.write(record(command, data) + "\n")
+    sys.stdout.write(result_json(command, data) + "\n")
     sys.stdout.flush()
 
 
@@ -203,7 +203,7 @@ def cautions(*, json: bool = False) -> Iterator[None]:
 
 def _tell(kind: str, style: str, message: object, json: bool) -> None:
     if json:
-        from jounce.reporting.records import complaint
+        from jounce.reporting.json_results import complaint
 
         sys.stderr.write(complaint(kind, message) + "\n")
         return

@@ -20,9 +20,7 @@ def check_choice(name: str, value: object, valid: tuple[str, ...], error: type[J
         raise error(f"no such choice; {did_you_mean(value, valid)}", name=name, value=value)
 
 
-def whole_number(
-    name: str, value: object, least: int, most: int, error: type[JounceError] = TrajectoryError
-) -> int:
+def whole_number(name: str, value: object, least: int, most: int, error: type[JounceError] = TrajectoryError) -> int:
     """Return a whole number within bounds."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or not least <= value <= most:
         raise error(f"must be a whole number from {least} to {most}", name=name, value=value)

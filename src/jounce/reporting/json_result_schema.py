@@ -12,7 +12,7 @@ from jounce.reporting.mechanism_facts import Grid, InspectedMechanism
 from jounce.reporting.motion_facts import MotionFacts, SimulationFacts
 from jounce.reporting.robot_facts import InspectedRobot
 
-__all__ = ["record_schema"]
+__all__ = ["result_schema"]
 
 
 class Record(TypedDict):
@@ -187,12 +187,12 @@ class _Closed(GenerateJsonSchema):
         return super().typed_dict_schema(schema) | {"additionalProperties": False}
 
 
-def record_schema() -> dict[str, Any]:
+def result_schema() -> dict[str, Any]:
     """Return the JSON Schema (2020-12) of the results of commands, and of the errors and warnings beside them.
 
     Examples
     --------
-    >>> sorted(record_schema()["$defs"])
+    >>> sorted(result_schema()["$defs"])
     ['check', 'complaint', 'inspect_mechanism', 'inspect_robot', 'new', 'new_list', 'run', 'simulate', 'torques']
     """
     return {

@@ -7,18 +7,16 @@ import json
 import math
 from collections.abc import Mapping
 from pathlib import PurePath
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from jounce.dynamics.limits import LimitReport
 from jounce.errors import UNSET, JounceError, show_value
+from jounce.kinematics import Motion
 
-if TYPE_CHECKING:
-    from jounce.dynamics.limits import LimitReport
-    from jounce.kinematics import Motion
-
-__all__ = ["complaint", "limits_record", "motion_record", "plain", "record", "torques_record"]
+__all__ = ["complaint", "limits_result", "motion_result", "plain", "result_json", "torques_result"]
 
 VERSION = 1
-"""Number of the form of the records; it grows where a key changes or goes."""
+"""Number of the form of the results; it grows where a key changes or goes."""
 
 
 def plain(value: Any) -> Any:
@@ -43,7 +41,7 @@ def plain(value: Any) -> Any:
     return str(value) if isinstance(value, PurePath) else show_value(value, 200)
 
 
-def record(command: str, data: Mapping[str, Any]) -> str:
+def result_json(command: str, data: Mapping[str, Any]) -> str:
     """Return the JSON text of the result of a command."""
     from jounce import __version__
 
@@ -67,7 +65,7 @@ def complaint(kind: str, problem: object) -> str:
     return json.dumps({kind: told}, allow_nan=False)
 
 
-def motion_record(motion: Motion, file: Any, written: Any, refine: bool = True) -> dict[str, Any]:
+def motion_result(motion: Motion, file: Any, written: Any, refine: bool = True) -> dict[str, Any]:
     """Return what `jounce run` and `jounce simulate` tell of a motion."""
     from jounce.reporting.motion_facts import motion_facts
     from jounce.reporting.peaks import peaks
@@ -82,7 +80,7 @@ def _peak(peak: Any) -> dict[str, Any]:
     return told
 
 
-def limits_record(report: LimitReport, robot: Any, trajectory: Any, written: Any) -> dict[str, Any]:
+def limits_result(report: LimitReport, robot: Any, trajectory: Any, written: Any) -> dict[str, Any]:
     """Return what `jounce check` tells of a trajectory and the limits of a robot."""
     names = {"worst": "value", "at": "time"}
     keys = ("joint", "quantity", "unit", "worst", "limit", "ratio", "at", "broken")
@@ -99,7 +97,7 @@ def limits_record(report: LimitReport, robot: Any, trajectory: Any, written: Any
     }
 
 
-def torques_record(dataset: Any, motion: Any, robot: Any, trajectory: Any, written: Any) -> dict[str, Any]:
+def torques_result(dataset: Any, motion: Any, robot: Any, trajectory: Any, written: Any) -> dict[str, Any]:
     """Return what `jounce torques` tells of a robot on a trajectory."""
     from jounce.reporting.peaks import table_peaks
 
