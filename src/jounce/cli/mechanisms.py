@@ -107,7 +107,7 @@ def _finished(command: str, motion: Motion, file: Path, output: TableOutput, *, 
     if not output.json:
         say(motion_summary(motion_facts(motion), file.name))
         show_peaks(peaks(motion, refine=refine))
-    output.write(motion.dataset)
+    output.write(lambda: motion.dataset)
     output.tell(command, lambda: motion_result(motion, file, output.out, refine))
     return outcome(motion, file)
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from cyclopts import Parameter
 
@@ -18,13 +18,10 @@ from jounce.reporting.terminal import say, say_json
 from jounce.robot import Robot
 from jounce.trajectory import JointTrajectory
 
-if TYPE_CHECKING:
-    import xarray
-
 Overwrite = Annotated[bool, Parameter(alias="--force")]
 """The option of commands that replace no file unasked; --force is what it was called first."""
 
-AMONG_THE_OTHERS = Parameter(name="*", converter=None)
+AMONG_THE_OTHERS = Parameter(name="*")
 """The fields of a class are options of the command, beside those that it names itself."""
 
 
@@ -131,12 +128,12 @@ class TableOutput:
         if self.out is not None:
             check_writable(self.out, overwrite=self.overwrite)
 
-    def write(self, dataset: xarray.Dataset) -> None:
-        """Write the values if they are wanted."""
+    def write(self, dataset: Callable[[], Any]) -> None:
+        """Write the values, an xarray.Dataset, if they are wanted."""
         from jounce import io
 
         if (out := self.out) is not None:
-            written(lambda: io.write(dataset, out, overwrite=self.overwrite))
+            written(lambda: io.write(dataset(), out, overwrite=self.overwrite))
 
     def tell(self, command: str, result: Callable[[], Mapping[str, Any]]) -> None:
         """Print the result as JSON, or where it was written."""

@@ -144,6 +144,6 @@ def torques(
     if not output.json:
         say(torques_summary(found, motion, robot, trajectory))
         show_peaks(table_peaks(found))
-    output.write(found)
+    output.write(lambda: found)
     output.tell("torques", lambda: torques_result(found, motion, robot, trajectory, output.out))
     return 0

@@ -78,7 +78,7 @@ def changed(line, text):
         ("", "motion.csv: the file of samples is empty"),
         ("\n\n", "motion.csv: the file of samples is empty"),
         (ROWS[:1], "motion.csv: at least two samples are needed, got 0"),
-        (ROWS[:6], "motion.csv: splines of degree 5 need at least 6 samples, got 5; give more, or choose a lower"),
+        (ROWS[:6], "motion.csv: a spline of degree 5 needs at least 6 samples, got 5; give more, or choose a lower"),
         (
             changed(5, "0.2,0,0"),
             "motion.csv, line 5, time: times must increase, got 0.2; this one repeats that of line 4",
