@@ -11,7 +11,7 @@ from typing import Any
 import jounce as jn
 from jounce.io.files.formats import dumped
 from jounce.io.files.parsers import read_yaml
-from jounce.io.files.units import parse_value
+from jounce.trajectory.units import parse_value
 from jounce.io.mechanisms.conversion import assigned
 from jounce.io.mechanisms.overrides import override
 from jounce.io.robots.limits import load_limits

@@ -13,7 +13,6 @@ from jounce.constraints.base import value_fields
 from jounce.dynamics.start import driven
 from jounce.errors import JounceError, MobilityError
 from jounce.io.files.source import read_source
-from jounce.io.files.units import parse_value
 from jounce.io.mechanisms.keys import OUTPUTS, output_holder
 from jounce.kinematics.assembly import (
     Trial,
@@ -28,6 +27,7 @@ from jounce.mechanism import Mechanism, Model, build, time_grid
 from jounce.mechanism.masses import body_mass
 from jounce.mechanism.system import POSITION_COMPONENTS
 from jounce.reporting.summaries import freedom_words
+from jounce.trajectory.units import parse_value
 
 __all__ = ["InspectedMechanism", "MechanismFacts", "inspected", "mechanism_facts", "unit_of_dimension"]
 

@@ -52,9 +52,7 @@ def spline_through(
         raise MechanismError("samples need one value for each time", name="values", value=f"shape {values.shape}")
     degree = whole_number("degree", degree, 1, HIGHEST_DEGREE, MechanismError)
     if len(times) <= degree:
-        message = (
-            f"a spline of degree {degree} needs at least {degree + 1} samples; give more, or choose a lower degree"
-        )
+        message = f"a spline of degree {degree} needs at least {degree + 1} samples; give more, or lower the degree"
         raise MechanismError(message, value=len(times))
     try:
         found = _periodic(times, values, degree) if repeats else (*_interpolated(times, values, degree), 0.0)

@@ -15,10 +15,10 @@ from jounce.dynamics import DriverForceOutput, DriverTorqueOutput
 from jounce.errors import JounceError, RobotError, no_such
 from jounce.io.files.reading import named_file
 from jounce.io.files.source import read_source
-from jounce.io.files.units import parse_value
 from jounce.mechanism import Mechanism, TimeGrid
 from jounce.robot import Robot
 from jounce.robot.closed_loop import DRIVE
+from jounce.trajectory.units import parse_value
 
 __all__ = ["assigned", "converted", "robot_mechanism", "with_file_names"]
 

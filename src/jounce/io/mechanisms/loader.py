@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from os import PathLike
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,6 +21,7 @@ from jounce.mechanism.masses import body_mass
 from jounce.mechanism.resolve import resolve, resolve_element
 from jounce.rigid.euler_parameters import euler_parameters
 from jounce.trajectory import Expression, MeasuredMotion, SplineMotion
+from jounce.trajectory.units import parse_value
 
 __all__ = ["load"]
 
@@ -121,8 +121,6 @@ def _validate(source: Source, space: str) -> dict[str, Any]:
 
 def _dimensions(parameters: dict[str, Any]) -> dict[str, Any]:
     """Return the dimensions of those parameters that have a unit, or follow from others that have one."""
-    from jounce.io.files.units import parse_value
-
     found: dict[str, Any] = {}
     waiting, count = dict(parameters), -1
     while len(found) > count:
@@ -234,17 +232,14 @@ def _splines(source: Source, location: Location, value: Any) -> Any:
 def _spline(source: Source, location: Location, samples: Any) -> SplineMotion:
     from jounce.io.files.samples import read_samples
 
-    path = source.named_file(samples.samples, location)
-    try:
+    def law(path: str) -> SplineMotion:
         table = read_samples(path, samples.time, samples.value)
         given = {"degree": samples.degree, "beyond": samples.beyond}
         if samples.derivative:
             return MeasuredMotion(*table, samples.derivative, samples.initial, **given)
         return SplineMotion(*table, **given)
-    except JounceError as error:
-        if error.path == path:  # as the user knows it
-            error.path = Path(source.path).parent / samples.samples
-        raise source.error(str(error), location) from None
+
+    return source.read_named(samples.samples, location, law)
 
 
 def _outputs(space: str, models: dict[str, Any], places: dict[str, Any]) -> dict[str, Any]:

@@ -12,12 +12,13 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic_core import PydanticCustomError, core_schema
 
-from jounce.errors import UNSET, ExpressionError, JounceError, MechanismError, did_you_mean, show_value
-from jounce.io.files.units import KINDS, Dimension, Value, parse_value
+from jounce.errors import UNSET, JounceError, MechanismError, did_you_mean, show_value
+from jounce.io.files.entries import shows_value
 from jounce.rigid.euler_parameters import form_of
-from jounce.trajectory.dimensions import TIME
+from jounce.trajectory.dimensions import KINDS, TIME, Dimension, is_rate, per_seconds
 from jounce.trajectory.expression import Expression
 from jounce.trajectory.measured import HIGHEST as MOST
+from jounce.trajectory.units import Value, parse_value
 
 __all__ = [
     "Checked",
@@ -76,8 +77,7 @@ def parse(raw: Any, quantity: str, info: Any, variables: dict[str, Dimension | N
         _note_use(context.get("uses", {}), value.value, quantity)
         return value
     except JounceError as error:
-        quoted = isinstance(error, ExpressionError) and error.column is not None  # the text is in the message
-        raise problem(error.message, value=UNSET if quoted else raw) from None
+        raise problem(error.message, value=UNSET if shows_value(error) else raw) from None
 
 
 def _note_use(uses: dict[str, tuple[Dimension, ...]], value: Any, quantity: str) -> None:
@@ -244,9 +244,9 @@ def _initial(raw: Any, order: int, quantity: str, info: Any) -> float | Expressi
         raise below(error, "initial", order) from None
     if order and value.dimension:
         bases = _bases(quantity, info)
-        if value.dimension not in [tuple(sorted(((base, 1), ("time", -order)))) for base in bases]:
-            rate = f" per s{f'^{order}' if order > 1 else ''}"
-            raise problem(f"must be {' or '.join(bases) or 'a number'}{rate}", "initial", order, value=raw)
+        if not is_rate(value.dimension, bases, order):
+            words = f"must be {' or '.join(bases) or 'a number'}{per_seconds(order)}"
+            raise problem(words, "initial", order, value=raw)
     return value.value
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from jounce.errors import JounceError, RobotError
-from jounce.io.files.units import parse_value
 from jounce.rigid.inertia import Inertia
 from jounce.robot.robot import Robot
+from jounce.trajectory.units import parse_value
 
 __all__ = ["with_payloads"]
 

@@ -1,13 +1,12 @@
 """One's own samples and masses in the place of the stand-ins: files, and what the page says of them."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from jounce.errors import JounceError, MechanismFileError, did_you_mean
+from jounce.errors import JounceError
 from jounce.io.files.samples import read_columns
-from jounce.io.files.source import Source, read_source
+from jounce.io.files.source import read_source
 from jounce.papers.negrean_2025.case import CASES, STAND_IN, Case, Link, law
 
 MASS_KEYS = {  # the field of `Link` and the kind of unit of each key of a file of masses
@@ -61,17 +60,12 @@ def read_link(path: Path) -> Link:
     JounceError
         If the file cannot be read, a value is missing, is none or has another unit, or no body has these moments.
     """
-    source = read_source(str(path))
-    data = source.data
-    if not isinstance(data, dict):
-        raise MechanismFileError(f"must hold {', '.join(NEEDED)}", path=path, line=1)
-    for key in data:
-        if key not in MASS_KEYS:
-            raise source.error(f"unknown key; {did_you_mean(str(key), MASS_KEYS)}", (str(key),))
+    source = read_source(path)
+    data = source.mapping((), MASS_KEYS)
     for key in NEEDED:
         if key not in data:
             raise source.error("is missing", (key,))
-    values = {MASS_KEYS[key][0]: _number(source, key, raw) for key, raw in data.items()}
+    values = {MASS_KEYS[key][0]: source.value((key,), raw, MASS_KEYS[key][1]).value for key, raw in data.items()}
     for name in ("inertia_x", "inertia_z"):  # they have no part in it, and any body may have those of a thin rod
         values.setdefault(name, values["inertia_y"])
     link = Link(**{"radius": STAND_IN.radius} | values)
@@ -80,18 +74,6 @@ def read_link(path: Path) -> Link:
     except JounceError as error:
         raise error.located(path=path) from None
     return link
-
-
-def _number(source: Source, key: str, raw: Any) -> float:
-    from jounce.io.files.units import parse_value
-
-    try:
-        value = parse_value(raw, MASS_KEYS[key][1]).value
-    except JounceError as error:
-        raise source.error(error.message, (key,), value=raw) from None
-    if not isinstance(value, float | int):
-        raise source.error("must be a number, with or without a unit", (key,), value=raw)
-    return float(value)
 
 
 def told(cases: dict[str, Case], samples: Path | None, masses: Path | None) -> list[str]:
