@@ -20,10 +20,9 @@ __all__ = ["CONSTANTS", "FUNCTIONS", "Expression"]
 CONSTANTS: dict[str, float] = {"pi": math.pi, "deg": math.pi / 180.0}
 """Constants that every expression knows."""
 
-_ONE_ARGUMENT = "sin cos tan asin acos atan sinh cosh tanh exp log sqrt abs".split()
+_NAMES = "sin cos tan asin acos atan atan2 sinh cosh tanh exp log sqrt abs".split()
 FUNCTIONS: dict[str, tuple[int, Callable[..., float]]] = {
-    **{name: (1, math.fabs if name == "abs" else getattr(math, name)) for name in _ONE_ARGUMENT},
-    "atan2": (2, math.atan2),
+    name: (2 if name == "atan2" else 1, math.fabs if name == "abs" else getattr(math, name)) for name in _NAMES
 }
 """Functions that every expression knows: number of arguments, and what to call on plain numbers."""
 

@@ -90,6 +90,12 @@ class Source:
         except JounceError as error:
             raise self.error(error.message, location, value=UNSET if shows_value(error) else raw) from None
 
+    def number(self, location: Location, raw: Any, kind: str = "any") -> float:
+        """Return a number in SI units; expressions without names are worked out."""
+        value = self.value(location, raw, kind).value
+        assert isinstance(value, float)
+        return value
+
     def named_file(self, name: str, location: Location) -> str:
         """Return the path of a file that an entry names, below the folder of this one or one that is allowed."""
         try:

@@ -21,6 +21,7 @@ from jounce.dynamics import (
     JointTorqueOutput,
 )
 from jounce.dynamics.energy_outputs import ENERGY_OUTPUTS
+from jounce.io.files.entries import Location
 from jounce.mechanism import (
     AbstractQuantity,
     AngleOutput,
@@ -41,6 +42,7 @@ from jounce.robot.coupling import SlideOutput
 __all__ = [
     "HOLDERS",
     "OUTPUTS",
+    "ROLES",
     "FileKey",
     "file_keys",
     "location_of",
@@ -48,6 +50,9 @@ __all__ = [
     "output_tag",
     "output_types",
 ]
+
+ROLES = {"joints": "joint", "drivers": "driver", "forces": "force", "initial": "driver"}
+"""The sections of a file that hold what is told apart by ``type``, and the role of each."""
 
 _PLURALS = {"point": "points", "vector": "vectors", "axis": "axes", "normal": "normals"}
 
@@ -177,7 +182,7 @@ def output_types(space: str) -> dict[str, tuple[str | None, type[AbstractQuantit
     }
 
 
-def location_of(keys: Iterable[FileKey], field: str) -> tuple[str | int, ...]:
+def location_of(keys: Iterable[FileKey], field: str) -> Location:
     """Return where in a file the value of a field stands, below its joint, driver or output."""
     for key in keys:
         if field in key.fields:

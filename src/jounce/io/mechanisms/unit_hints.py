@@ -11,14 +11,13 @@ from typing import Any
 from jounce.constraints import catalogue
 from jounce.errors import JounceError, UnitWarning
 from jounce.io.files.entries import Location, Source, dotted
-from jounce.io.mechanisms.keys import file_keys
+from jounce.io.mechanisms.keys import ROLES, file_keys
 from jounce.mechanism import Mechanism
 from jounce.trajectory import Expression
 from jounce.trajectory.dimensions import ANGLE, LENGTH
 
 __all__ = ["warn_of_units"]
 
-ROLES = {"joints": "joint", "drivers": "driver", "forces": "force", "initial": "driver"}
 MANY_TURNS = 4 * math.pi
 FAR_OFF = 100.0  # times the other lengths
 ALIKE = 30.0  # within which a thousandth of a length must be to them

@@ -17,14 +17,13 @@ from jounce.constraints import catalogue
 from jounce.constraints.base import value_fields
 from jounce.errors import JounceError, MechanismError
 from jounce.forces import ExpressionLaw, TimeLaw, VectorLaw
-from jounce.io.mechanisms.keys import OUTPUTS, file_keys, output_holder
+from jounce.io.mechanisms.keys import OUTPUTS, ROLES, file_keys, output_holder
 from jounce.mechanism import Body, Mechanism, TimeGrid
 from jounce.trajectory import Expression, ExpressionMotion, MeasuredMotion, SplineMotion, TrapezoidalMotion
 from jounce.trajectory.expression import CONSTANTS, FUNCTIONS
 
 __all__ = ["mechanism_data", "write_mechanism"]
 
-ROLES = {"joints": "joint", "drivers": "driver", "forces": "force", "initial": "driver"}
 _WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 

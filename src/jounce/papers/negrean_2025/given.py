@@ -65,7 +65,7 @@ def read_link(path: Path) -> Link:
     for key in NEEDED:
         if key not in data:
             raise source.error("is missing", (key,))
-    values = {MASS_KEYS[key][0]: source.value((key,), raw, MASS_KEYS[key][1]).value for key, raw in data.items()}
+    values = {MASS_KEYS[key][0]: source.number((key,), raw, MASS_KEYS[key][1]) for key, raw in data.items()}
     for name in ("inertia_x", "inertia_z"):  # they have no part in it, and any body may have those of a thin rod
         values.setdefault(name, values["inertia_y"])
     link = Link(**{"radius": STAND_IN.radius} | values)
