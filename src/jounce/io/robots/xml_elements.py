@@ -56,6 +56,13 @@ class Element:
             raise self.error(f"the attribute {key} of <{self.tag}> is empty", *name, value=value)
         return value
 
+    def number(self, key: str, *name: str, default: float | None = None) -> float:
+        """Return the finite number in an attribute, which must be there unless there is a default."""
+        if default is None:
+            self.text(key, *name)
+        found = self.numbers(key, 1, *name)
+        return found[0] if found else float(default or 0.0)
+
     def numbers(self, key: str, count: int, *name: str, infinite: bool = False) -> list[float] | None:
         """Return the finite numbers in an attribute, None if it is not there."""
         text = self.attributes.get(key)
