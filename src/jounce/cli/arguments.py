@@ -10,8 +10,6 @@ from typing import Any
 
 from jounce.errors import JounceError, MechanismFileError, did_you_mean
 
-__all__ = ["check_ending", "converted", "named_once"]
-
 _WHOLE = re.compile(r"[+-]?[0-9]{1,18}(\.0*)?")
 
 

@@ -11,8 +11,6 @@ from typing import Any
 
 from jounce.errors import JounceError, MechanismFileError, RobotError, TrajectoryError
 
-__all__ = ["expecting", "kind_of"]
-
 ADVICE = {
     "mechanism": "is a mechanism; run, simulate, plot, report, view and inspect take mechanisms",
     "robot": "is a robot; check, torques, inspect and view take robots, and this makes it a mechanism: "

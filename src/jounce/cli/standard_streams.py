@@ -9,8 +9,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
 
-__all__ = ["FailSafeStream", "failsafe_streams"]
-
 
 class FailSafeStream:
     """A stream whose first failure is kept, not raised: what else a command does is done all the same.

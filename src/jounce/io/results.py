@@ -17,8 +17,6 @@ from jounce.io.files.reading import known_name, read_file, written_name
 from jounce.io.files.writing import check_target, reason_of, replacing
 from jounce.mechanism import EulerAnglesOutput, EulerParametersOutput, RotationMatrixOutput
 
-__all__ = ["check_writable", "columns", "read", "write"]
-
 SUFFIXES = (".csv", ".nc")
 AXES = {  # of outputs that are more than one number, and the labels along them
     ("component",): ("x", "y", "z"),

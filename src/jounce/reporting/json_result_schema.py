@@ -12,8 +12,6 @@ from jounce.reporting.mechanism_facts import Grid, InspectedMechanism
 from jounce.reporting.motion_facts import MotionFacts, SimulationFacts
 from jounce.reporting.robot_facts import InspectedRobot
 
-__all__ = ["result_schema"]
-
 
 class Record(TypedDict):
     """What all results begin with."""

@@ -13,8 +13,6 @@ from jounce.dynamics.limits import LimitReport
 from jounce.errors import UNSET, JounceError, show_value
 from jounce.kinematics import Motion
 
-__all__ = ["complaint", "limits_result", "motion_result", "plain", "result_json", "torques_result"]
-
 VERSION = 1
 """Number of the form of the results; it grows where a key changes or goes."""
 

@@ -29,8 +29,6 @@ from jounce.mechanism.system import POSITION_COMPONENTS
 from jounce.reporting.summaries import freedom_words
 from jounce.trajectory.units import parse_value
 
-__all__ = ["InspectedMechanism", "MechanismFacts", "inspected", "mechanism_facts", "unit_of_dimension"]
-
 TOLERANCE = 1e-12
 KINDS = ("joints", "drivers", "forces", "initial")
 BASES = {"mass": "kg", "length": "m", "angle": "rad", "time": "s", "ampere": "A", "kelvin": "K"}

@@ -10,8 +10,6 @@ from typing_extensions import TypedDict
 from jounce.kinematics import Motion, Status
 from jounce.mechanism import build
 
-__all__ = ["MotionFacts", "SimulationFacts", "motion_facts"]
-
 
 class Span(TypedDict):
     """Instants of a motion, s."""

@@ -18,8 +18,6 @@ from jounce.reporting.robot_facts import robot_facts
 from jounce.reporting.summaries import count
 from jounce.reporting.tables import Table, mechanism_tables, number, peaks_table, robot_tables, table
 
-__all__ = ["shown"]
-
 ROWS = 30  # of a table, before the rest is counted
 # Colours are left to the page, so that light and dark themes both fit; lines are see-through grey.
 STYLE = (

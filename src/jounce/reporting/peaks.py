@@ -13,8 +13,6 @@ from jounce.dynamics.limits import local_maxima
 from jounce.errors import SampleWarning
 from jounce.kinematics import solve
 
-__all__ = ["Peak", "derivative_name", "derivative_unit", "peaks", "rate_name", "scalar_outputs", "table_peaks"]
-
 NAMES = ("position", "velocity", "acceleration", "jerk", "jounce")
 LEAST = 200  # instants that are looked at, at least
 PEAKS, POINTS, ROUNDS = 2, 7, 3  # highest maxima of each curve, instants around each, and how often these close in

@@ -13,8 +13,6 @@ from jounce.reporting.summaries import freedom_words
 from jounce.robot import Robot
 from jounce.robot.closures import closure_wrenches
 
-__all__ = ["InspectedRobot", "RobotFacts", "inspected_robot", "robot_facts"]
-
 
 class LinkFacts(TypedDict):
     """A link: mass, and with which link it moves; kg, m, kg m^2."""

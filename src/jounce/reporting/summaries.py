@@ -10,17 +10,6 @@ from typing import Any
 from jounce.dynamics.limits import LimitReport
 from jounce.trajectory import JointTrajectory
 
-__all__ = [
-    "count",
-    "freedom_words",
-    "limits_summary",
-    "motion_summary",
-    "start_heading",
-    "start_summary",
-    "torques_summary",
-    "verdict",
-]
-
 
 def motion_summary(facts: Any, file: str) -> str:
     """Word what was solved or simulated: bodies, degrees of freedom, instants, and how well energy was kept."""

@@ -10,17 +10,6 @@ from typing import Any
 from jounce.dynamics.limits import LimitReport
 from jounce.reporting.peaks import Peak
 
-__all__ = [
-    "Table",
-    "bodies_table",
-    "limits_table",
-    "mechanism_tables",
-    "number",
-    "peaks_table",
-    "robot_tables",
-    "table",
-]
-
 
 @dataclasses.dataclass(frozen=True)
 class Table:

@@ -16,19 +16,6 @@ from jounce.interrupts import undoing
 from jounce.reporting.peaks import Peak
 from jounce.reporting.tables import Table, peaks_table
 
-__all__ = [
-    "Bar",
-    "caution",
-    "cautions",
-    "complain",
-    "say",
-    "say_json",
-    "show_columns",
-    "show_peaks",
-    "show_table",
-    "unexpected",
-]
-
 OURS = (RobotWarning, SampleWarning, UnitWarning)  # warnings of this package, which nobody may turn off by mistake
 WIDTH = 80  # of tables that do not go to a terminal
 WIDEST = 9999

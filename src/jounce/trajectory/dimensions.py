@@ -14,20 +14,6 @@ from typing import Any
 from jounce.errors import UnitError
 from jounce.trajectory.expression import CONSTANTS, Expression
 
-__all__ = [
-    "KINDS",
-    "NUMBER",
-    "Dimension",
-    "check_dimension",
-    "check_one_of",
-    "describe_dimension",
-    "dimension_of",
-    "inferred",
-    "is_rate",
-    "per_seconds",
-    "times",
-]
-
 Dimension = tuple[tuple[str, int | Fraction], ...]
 """Powers of the base quantities, sorted by name; empty for a pure number."""
 

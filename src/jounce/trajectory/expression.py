@@ -15,8 +15,6 @@ from typing import Any, NoReturn
 
 from jounce.errors import ExpressionError, did_you_mean, show_value
 
-__all__ = ["CONSTANTS", "FUNCTIONS", "Expression"]
-
 CONSTANTS: dict[str, float] = {"pi": math.pi, "deg": math.pi / 180.0}
 """Constants that every expression knows."""
 

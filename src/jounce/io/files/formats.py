@@ -9,8 +9,6 @@ from typing import Any
 
 from jounce.errors import OutputError
 
-__all__ = ["SUFFIXES", "dumped"]
-
 SUFFIXES = (".yaml", ".yml", ".toml", ".json")
 BLOCKS = ("parameters", "bodies", "joints", "drivers", "forces", "initial", "outputs")  # one line for each entry
 WIDTH = 110  # of an entry in one line

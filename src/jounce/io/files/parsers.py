@@ -13,8 +13,6 @@ from typing import Any
 from jounce.errors import MechanismFileError
 from jounce.io.files.entries import MAX_DEPTH, TOO_DEEP, Builder, Location, Source
 
-__all__ = ["plain_scalar", "read_json", "read_toml", "read_yaml"]
-
 # The core schema of YAML 1.2 (section 10.3.2 of its specification).
 _NULL = {"", "~", "null", "Null", "NULL"}
 _BOOLEANS = {"true": True, "True": True, "TRUE": True, "false": False, "False": False, "FALSE": False}

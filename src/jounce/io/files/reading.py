@@ -16,19 +16,6 @@ from pathlib import Path
 
 from jounce.errors import JounceError, MechanismFileError, did_you_mean
 
-__all__ = [
-    "MAX_BYTES",
-    "MAX_SAMPLES",
-    "check_allowed",
-    "is_input",
-    "known_name",
-    "named_file",
-    "note_result",
-    "read_file",
-    "read_rows",
-    "written_name",
-]
-
 MAX_BYTES = 10_000_000
 MAX_SAMPLES = 100_000_000
 """Bytes of a table of samples."""

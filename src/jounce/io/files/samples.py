@@ -11,8 +11,6 @@ from jaxtyping import Float
 from jounce.errors import JounceError, MechanismFileError, did_you_mean, no_such
 from jounce.io.files.reading import fault_of_number, known_name, read_rows
 
-__all__ = ["read_columns", "read_samples"]
-
 
 def read_samples(
     path: str | Path,

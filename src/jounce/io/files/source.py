@@ -11,8 +11,6 @@ from jounce.io.files import parsers
 from jounce.io.files.entries import Source
 from jounce.io.files.reading import check_allowed, read_file
 
-__all__ = ["SUFFIXES", "read_source"]
-
 MAX_LINES = 200_000
 MAX_LINE_LENGTH = 100_000
 SUFFIXES = (".yaml", ".yml", ".toml", ".json")

@@ -10,8 +10,6 @@ from jounce.errors import UnitError
 from jounce.trajectory.dimensions import NUMBER, Dimension, dimension_of
 from jounce.trajectory.units import nearest_unit
 
-__all__ = ["ask_pint"]
-
 _BASES = {"meter": "length", "radian": "angle", "second": "time", "kilogram": "mass"}
 
 _PREFIXABLE = frozenset("newton pascal joule watt hertz bar watt_hour liter force_gram".split())

@@ -19,8 +19,6 @@ from jounce.errors import OutputError
 from jounce.interrupts import undoing
 from jounce.io.files.reading import is_input, note_result
 
-__all__ = ["check_target", "reason_of", "replacing"]
-
 _scratches: set[Path] = set()
 """Files that are not yet in their places."""
 

@@ -20,8 +20,6 @@ from jounce.robot import Robot
 from jounce.robot.closed_loop import DRIVE
 from jounce.trajectory.units import parse_value
 
-__all__ = ["assigned", "converted", "robot_mechanism", "with_file_names"]
-
 RESERVED = ("ground", "time", "derivative", "component")
 
 

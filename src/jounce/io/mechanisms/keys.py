@@ -39,18 +39,6 @@ from jounce.mechanism import (
 )
 from jounce.robot.coupling import SlideOutput
 
-__all__ = [
-    "HOLDERS",
-    "OUTPUTS",
-    "ROLES",
-    "FileKey",
-    "file_keys",
-    "location_of",
-    "output_holder",
-    "output_tag",
-    "output_types",
-]
-
 ROLES = {"joints": "joint", "drivers": "driver", "forces": "force", "initial": "driver"}
 """The sections of a file that hold what is told apart by ``type``, and the role of each."""
 

@@ -24,8 +24,6 @@ from jounce.rigid.euler_parameters import euler_parameters
 from jounce.trajectory import Expression, MeasuredMotion, SplineMotion
 from jounce.trajectory.units import parse_value
 
-__all__ = ["load"]
-
 _Places = dict[str, tuple[Location, tuple[FileKey, ...]]]
 """Where in the file the elements of a mechanism stand, by dotted name, and the keys of each."""
 

@@ -26,8 +26,6 @@ from jounce.rigid.inertia import ADVICE, Inertia, check_solid
 from jounce.rigid.solids import SOLIDS, pseudo_parts, solid_moments
 from jounce.trajectory import Expression
 
-__all__ = ["expanded", "inertia"]
-
 AXES = ("x", "y", "z")
 
 

@@ -8,8 +8,6 @@ from typing import Any
 from jounce.errors import JounceError, MechanismError, no_such
 from jounce.mechanism import Mechanism
 
-__all__ = ["override"]
-
 
 def override(mechanism: Mechanism, assignments: Iterable[str]) -> Mechanism:
     """Return a mechanism with other values of some parameters.

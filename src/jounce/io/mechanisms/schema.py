@@ -26,8 +26,6 @@ from jounce.rigid.rotations import SEQUENCES
 from jounce.trajectory.dimensions import variables_of
 from jounce.trajectory.expression import CONSTANTS, FUNCTIONS
 
-__all__ = ["file_model", "output_form"]
-
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]{0,99}")
 _CHOICES = {"coordinate": COORDINATES, "frame": FRAMES, "sequence": SEQUENCES}
 _Types = tuple[tuple[str, type[Any]], ...]

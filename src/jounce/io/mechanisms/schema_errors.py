@@ -10,8 +10,6 @@ from jounce.io.files.entries import Location, Source
 from jounce.io.mechanisms.keys import ROLES, file_keys, output_holder, output_types
 from jounce.io.mechanisms.schema import file_model, output_form
 
-__all__ = ["first_problem"]
-
 _HINTS = {
     ("planar", "orientation"): "a planar body has an angle",
     ("spatial", "angle"): "a spatial body has an orientation",

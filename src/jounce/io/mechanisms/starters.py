@@ -9,8 +9,6 @@ from pathlib import Path
 
 from jounce.errors import JounceError, OutputError, no_such
 
-__all__ = ["STARTERS", "Starter", "write_starter"]
-
 
 @dataclass(frozen=True)
 class Starter:

@@ -16,8 +16,6 @@ from jounce.mechanism import Mechanism
 from jounce.trajectory import Expression
 from jounce.trajectory.dimensions import ANGLE, LENGTH
 
-__all__ = ["warn_of_units"]
-
 MANY_TURNS = 4 * math.pi
 FAR_OFF = 100.0  # times the other lengths
 ALIKE = 30.0  # within which a thousandth of a length must be to them

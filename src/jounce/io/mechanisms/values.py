@@ -21,19 +21,6 @@ from jounce.trajectory.measured import HIGHEST as MOST
 from jounce.trajectory.splines import HIGHEST_DEGREE
 from jounce.trajectory.units import Value, parse_value
 
-__all__ = [
-    "Checked",
-    "Samples",
-    "laws",
-    "motion",
-    "orientation",
-    "problem",
-    "scalar",
-    "vector",
-    "vectors",
-    "wrenches",
-]
-
 WAYS = ("refuse", "hold", "repeat")
 
 

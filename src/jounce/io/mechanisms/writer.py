@@ -22,8 +22,6 @@ from jounce.mechanism import Body, Mechanism, TimeGrid
 from jounce.trajectory import Expression, ExpressionMotion, MeasuredMotion, SplineMotion, TrapezoidalMotion
 from jounce.trajectory.expression import CONSTANTS, FUNCTIONS
 
-__all__ = ["mechanism_data", "write_mechanism"]
-
 _WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 

@@ -15,8 +15,6 @@ from jounce.robot.model import Joint, Limits
 from jounce.robot.robot import Robot
 from jounce.trajectory.dimensions import Dimension, describe_dimension
 
-__all__ = ["load_limits"]
-
 KEYS = tuple(field.name for field in dataclasses.fields(Limits))
 RANGE = ("lower", "upper")
 POWERS = dict(zip(KEYS, (0, 0, 1, 2, 3, 2, 3, 2), strict=True))

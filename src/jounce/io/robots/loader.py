@@ -15,8 +15,6 @@ from jounce.io.robots.urdf import read_urdf
 from jounce.io.robots.xml_elements import Element, read_markup
 from jounce.robot.robot import Robot
 
-__all__ = ["load_robot"]
-
 ENDINGS = (".urdf", ".xml")
 LOOKS = ("visual", "collision")
 XACRO = "is a xacro file, from which a URDF has yet to be made; run: xacro FILE.urdf.xacro > FILE.urdf"

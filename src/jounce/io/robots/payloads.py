@@ -9,8 +9,6 @@ from jounce.rigid.inertia import Inertia
 from jounce.robot.robot import Robot
 from jounce.trajectory.units import parse_value
 
-__all__ = ["with_payloads"]
-
 
 def with_payloads(robot: Robot, assignments: Iterable[str]) -> Robot:
     """Return a robot that holds point masses in the origins of links.

@@ -28,8 +28,6 @@ from jounce.trajectory.dimensions import Dimension, describe_dimension, is_rate,
 from jounce.trajectory.expression import CONSTANTS, FUNCTIONS
 from jounce.trajectory.trapezoid import LIMITS
 
-__all__ = ["load_trajectory"]
-
 _DERIVATIVE = re.compile(r"_d[0-9]+$")
 _KINDS = ("joints", "point_to_point", "motion")
 _KEYS = ("title", "parameters", "time", *_KINDS)

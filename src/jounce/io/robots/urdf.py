@@ -17,8 +17,6 @@ from jounce.robot.model import Joint, Limits, Link, Mimic, leaders
 from jounce.robot.robot import Robot
 from jounce.robot.tree import axes_with_z_along, ordered
 
-__all__ = ["read_urdf"]
-
 EXPANDED = ("floating", "planar")
 TYPES = ("continuous", "fixed", "prismatic", "revolute", *EXPANDED)
 LINK_PARTS = ("inertial", "visual", "collision", "contact", "material", "sensor")

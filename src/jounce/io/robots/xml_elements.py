@@ -12,8 +12,6 @@ from jounce.errors import RobotFileError, did_you_mean
 from jounce.io.files.entries import dotted
 from jounce.io.files.reading import LARGEST_NUMBER, fault_of_number, read_file
 
-__all__ = ["Element", "read_markup"]
-
 MAX_DEPTH = 2000
 
 
