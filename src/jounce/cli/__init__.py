@@ -102,7 +102,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         output.flush()
         if output.failure is None:
             return status
-        from jounce.io.files.writing import reason_of
+        from jounce.io.files.reading import reason_of
 
         complain(f"standard output cannot be written: {reason_of(output.failure)}", json=as_json)
     return status or 1

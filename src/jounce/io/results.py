@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from jounce.errors import OutputError
-from jounce.io.files.reading import known_name, read_file, written_name
-from jounce.io.files.writing import check_target, reason_of, replacing
+from jounce.io.files.reading import known_name, read_file, reason_of, written_name
+from jounce.io.files.writing import check_target, replacing
 from jounce.mechanism import EulerAnglesOutput, EulerParametersOutput, RotationMatrixOutput
 
 SUFFIXES = (".csv", ".nc")

@@ -102,7 +102,7 @@ def robot_tables(facts: Any) -> list[Table]:
         holder = "" if link["moves_with"] == link["name"] else link["moves_with"]
         links.append([link["name"], number(link["mass"]), vector(link["center_of_mass"]), holder])
     closures = [
-        [x["name"], x["type"], ", ".join(x["links"]), *(str("-" if n is None else n) for n in _counts(x))]
+        [x["name"], x["type"], ", ".join(x["links"]), *(_count(x, key) for key in ("equations", "redundant"))]
         for x in facts["closures"]
     ]
     found = [
@@ -114,8 +114,9 @@ def robot_tables(facts: Any) -> list[Table]:
     return [each for each in found if each.rows]
 
 
-def _counts(closure: Any) -> list[Any]:
-    return [closure.get(key, "") for key in ("equations", "redundant")]
+def _count(closure: Any, key: str) -> str:
+    found = closure.get(key, "")
+    return "-" if found is None else str(found)
 
 
 def peaks_table(found: Sequence[Peak]) -> Table:

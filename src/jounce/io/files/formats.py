@@ -111,14 +111,12 @@ def _toml(data: Mapping[str, Any]) -> str:
     def laid(value: Any) -> Any:
         if isinstance(value, Mapping):
             made = tomlkit.inline_table()
-            for key, entry in value.items():
-                made.append(key, laid(entry))
+            made.update({key: laid(entry) for key, entry in value.items()})
             return made
         if isinstance(value, (list, tuple)):
-            made = tomlkit.array()
-            for entry in value:
-                made.append(laid(entry))
-            return made
+            listed = tomlkit.array()
+            listed.extend(map(laid, value))
+            return listed
         return value
 
     whole = tomlkit.document()
