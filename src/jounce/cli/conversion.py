@@ -115,13 +115,7 @@ def _mechanism(source: Path, target: Path, imports: list[Path] | None, allow: Se
 
 
 def _robot(
-    source: Path,
-    model: Robot,
-    target: Path,
-    drive: list[str] | None,
-    start: list[str] | None,
-    hold: bool,
-    drives: bool,
+    source: Path, model: Robot, target: Path, drive: list[str] | None, start: list[str] | None, hold: bool, drives: bool
 ) -> int:
     from jounce.io.files.formats import dumped
     from jounce.io.mechanisms.conversion import assigned, robot_mechanism, with_file_names

@@ -16,16 +16,7 @@ from jounce.reporting.terminal import Bar, say
 Kind = Literal["outputs", "sketch", "hodograph", "phase", "energy", "power", "reactions", "animation"]
 Names = Literal["all", "bodies", "joints", "none"]
 ANIMATIONS = (".gif", ".mp4")
-ORDERS = {
-    "outputs": 4,
-    "reactions": 4,
-    "power": 4,
-    "energy": 1,
-    "phase": 1,
-    "hodograph": 1,
-    "sketch": 0,
-    "animation": 0,
-}
+ORDERS = {"outputs": 4, "reactions": 4, "power": 4, "energy": 1, "phase": 1, "hodograph": 1}  # unless another is given
 PORTRAITS = ("hodograph", "phase")
 
 
@@ -94,7 +85,7 @@ def plot(
     mechanism = reading.mechanism(file)
     spare_inputs(out, overwrite=overwrite)
     _check_names(mechanism, chosen, output or (), file)
-    least = max(derivative or 0, ORDERS[chosen] if order is None or chosen in PORTRAITS else 0)
+    least = max(derivative or 0, ORDERS.get(chosen, 0) if order is None or chosen in PORTRAITS else 0)
     motion = _moved(mechanism, file, least if order is None else max(order, derivative or 0))
     look: dict[str, Any] = {"paths": output, "order": derivative or 0, "view": (azimuth, elevation)}
     if names is not None:

@@ -15,12 +15,7 @@ from jounce.reporting.terminal import say, say_json, show_table
 
 
 def inspect(
-    file: Path,
-    /,
-    *,
-    reading: MechanismReading = PLAIN_MECHANISM,
-    strict: bool = False,
-    json: bool = False,
+    file: Path, /, *, reading: MechanismReading = PLAIN_MECHANISM, strict: bool = False, json: bool = False
 ) -> int:
     """Tell what is in a mechanism or robot file, and whether it can move.
 

@@ -6,12 +6,18 @@ import dataclasses
 import json
 import math
 from collections.abc import Mapping
-from pathlib import PurePath
-from typing import Any
+from pathlib import Path, PurePath
+from typing import TYPE_CHECKING, Any
 
 from jounce.dynamics.limits import LimitReport
 from jounce.errors import UNSET, JounceError, show_value
 from jounce.kinematics import Motion
+from jounce.reporting.motion_facts import motion_facts
+from jounce.reporting.peaks import Peak, peaks, table_peaks
+from jounce.trajectory import JointTrajectory
+
+if TYPE_CHECKING:
+    import xarray
 
 VERSION = 1
 """Number of the form of the results; it grows where a key changes or goes."""
@@ -63,22 +69,19 @@ def complaint(kind: str, problem: object) -> str:
     return json.dumps({kind: told}, allow_nan=False)
 
 
-def motion_result(motion: Motion, file: Any, written: Any, refine: bool = True) -> dict[str, Any]:
+def motion_result(motion: Motion, file: Path, written: Path | None, refine: bool = True) -> dict[str, Any]:
     """Return what `jounce run` and `jounce simulate` tell of a motion."""
-    from jounce.reporting.motion_facts import motion_facts
-    from jounce.reporting.peaks import peaks
-
     told = [_peak(peak) for peak in peaks(motion, refine=refine)]
     return {"file": file, **motion_facts(motion), "peaks": told, "written": written}
 
 
-def _peak(peak: Any) -> dict[str, Any]:
+def _peak(peak: Peak) -> dict[str, Any]:
     told = dataclasses.asdict(peak)
     del told["size"]
     return told
 
 
-def limits_result(report: LimitReport, robot: Any, trajectory: Any, written: Any) -> dict[str, Any]:
+def limits_result(report: LimitReport, robot: Path, trajectory: Path, written: Path | None) -> dict[str, Any]:
     """Return what `jounce check` tells of a trajectory and the limits of a robot."""
     names = {"worst": "value", "at": "time"}
     keys = ("joint", "quantity", "unit", "worst", "limit", "ratio", "at", "broken")
@@ -95,12 +98,12 @@ def limits_result(report: LimitReport, robot: Any, trajectory: Any, written: Any
     }
 
 
-def torques_result(dataset: Any, motion: Any, robot: Any, trajectory: Any, written: Any) -> dict[str, Any]:
+def torques_result(
+    dataset: xarray.Dataset, motion: JointTrajectory, robot: Path, trajectory: Path, written: Path | None
+) -> dict[str, Any]:
     """Return what `jounce torques` tells of a robot on a trajectory."""
-    from jounce.reporting.peaks import table_peaks
-
     times = dataset["time"].values
-    peaks = [_peak(peak) for peak in table_peaks(dataset)]
+    told = [_peak(peak) for peak in table_peaks(dataset)]
     return {
         "robot": dataset.attrs["title"],
         "file": robot,
@@ -108,6 +111,6 @@ def torques_result(dataset: Any, motion: Any, robot: Any, trajectory: Any, writt
         "rates": dataset.sizes["derivative"] - 1,
         "time": {"start": times[0], "stop": times[-1], "count": len(times)},
         "held": [name for name in dataset.data_vars if name not in motion.names],
-        "peaks": [{"joint": peak.pop("output"), **peak} for peak in peaks],
+        "peaks": [{"joint": peak.pop("output"), **peak} for peak in told],
         "written": written,
     }

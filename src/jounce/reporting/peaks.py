@@ -5,13 +5,18 @@ from __future__ import annotations
 import dataclasses
 import re
 import warnings
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from jounce.dynamics.limits import local_maxima
 from jounce.errors import SampleWarning
-from jounce.kinematics import solve
+from jounce.integrate import Simulation
+from jounce.kinematics import Motion, solve
+from jounce.mechanism import AbstractQuantity
+
+if TYPE_CHECKING:
+    import xarray
 
 NAMES = ("position", "velocity", "acceleration", "jerk", "jounce")
 LEAST = 200  # instants that are looked at, at least
@@ -78,7 +83,7 @@ def derivative_name(order: int) -> str:
     return str(order) + {1: "st", 2: "nd", 3: "rd"}.get(last, "th")
 
 
-def rate_name(output: Any, order: int) -> str:
+def rate_name(output: AbstractQuantity, order: int) -> str:
     """Name a time derivative of an output: velocity, jerk, ..., or for a force yank, second rate, ...
 
     Examples
@@ -109,7 +114,7 @@ def derivative_unit(unit: str, order: int) -> str:
     return base if total == 0 else f"{base}/s" if total == 1 else f"{base}/s^{total}"
 
 
-def scalar_outputs(motion: Any) -> dict[str, tuple[str, np.ndarray]]:
+def scalar_outputs(motion: Motion) -> dict[str, tuple[str, np.ndarray]]:
     """Return the outputs of a motion one component at a time.
 
     Returns
@@ -127,7 +132,7 @@ def scalar_outputs(motion: Any) -> dict[str, tuple[str, np.ndarray]]:
     return found
 
 
-def peaks(motion: Any, *, refine: bool = True) -> list[Peak]:
+def peaks(motion: Motion, *, refine: bool = True) -> list[Peak]:
     """Return the peak values of each output, component by component, and of each derivative.
 
     Parameters
@@ -156,7 +161,7 @@ def peaks(motion: Any, *, refine: bool = True) -> list[Peak]:
     return motion.derived[name]
 
 
-def table_peaks(dataset: Any) -> list[Peak]:
+def table_peaks(dataset: xarray.Dataset) -> list[Peak]:
     """Return the peak values of torques and their rates, at the instants of a dataset only.
 
     Parameters
@@ -190,7 +195,7 @@ def effort_name(unit: str, order: int) -> str:
     return first[order] if order < len(first) else f"{derivative_name(order)} rate"
 
 
-def _found(motion: Any, refine: bool) -> list[Peak]:
+def _found(motion: Motion, refine: bool) -> list[Peak]:
     scalars = scalar_outputs(motion)
     rows = [(column, name, order) for column, (name, values) in scalars.items() for order in range(values.shape[1])]
     if not rows:
@@ -208,7 +213,7 @@ def _found(motion: Any, refine: bool) -> list[Peak]:
     return found
 
 
-def _extremes(motion: Any, refine: bool) -> tuple[np.ndarray, np.ndarray]:
+def _extremes(motion: Motion, refine: bool) -> tuple[np.ndarray, np.ndarray]:
     """Return where each curve is largest and how large, (2 curves,): all curves upside down, then as they are.
 
     Around the highest instants, the best of a few becomes the middle of a shorter interval, again and again; the last
@@ -238,7 +243,7 @@ def _extremes(motion: Any, refine: bool) -> tuple[np.ndarray, np.ndarray]:
     return np.where(solved, times, np.nan), np.where(solved, sizes, np.nan)
 
 
-def _denser(motion: Any, time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _denser(motion: Motion, time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return instants and curves with enough instants for no peak to be missed that is no needle."""
     steps = -(-LEAST // (len(time) - 1))
     if steps == 1:
@@ -249,19 +254,19 @@ def _denser(motion: Any, time: np.ndarray, values: np.ndarray) -> tuple[np.ndarr
     return whole[order], np.concatenate([values, _at(motion, between)])[order]
 
 
-def _own(motion: Any, around: np.ndarray) -> np.ndarray:
+def _own(motion: Motion, around: np.ndarray) -> np.ndarray:
     """Return the values of curves at instants of their own, (points, peaks, curves)."""
     wanted, places = np.unique(around, return_inverse=True)
     values = _at(motion, wanted)
     return values[places.reshape(around.shape), np.arange(around.shape[-1])]
 
 
-def _at(motion: Any, instants: np.ndarray) -> np.ndarray:
+def _at(motion: Motion, instants: np.ndarray) -> np.ndarray:
     """Return the curves of a motion at other instants, -inf where it cannot be solved."""
     parts = []
     for first in range(0, len(instants), CHUNK):
         chunk = instants[first : first + CHUNK]
-        if hasattr(motion, "at"):
+        if isinstance(motion, Simulation):
             parts.append(_curves(motion.at(chunk)))
             continue
         whole = np.unique(np.append(chunk, motion.time[0]))  # from the same start, on the same branch
@@ -272,13 +277,13 @@ def _at(motion: Any, instants: np.ndarray) -> np.ndarray:
     return np.concatenate(parts)
 
 
-def _curves(motion: Any) -> np.ndarray:
+def _curves(motion: Motion) -> np.ndarray:
     """Return all derivatives of all outputs, upside down and as they are, (time, 2 curves); -inf where unknown."""
     whole = np.concatenate([values for _, values in scalar_outputs(motion).values()], axis=1)
     return np.nan_to_num(np.concatenate([-whole, whole], axis=1), nan=-np.inf, posinf=-np.inf, neginf=-np.inf)
 
 
-def _scales(motion: Any) -> np.ndarray:
+def _scales(motion: Motion) -> np.ndarray:
     """Return the largest magnitude that any component of the output of a curve has in its derivative, (2 curves,)."""
     found = []
     for name, values in scalar_outputs(motion).values():

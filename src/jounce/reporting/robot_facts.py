@@ -10,7 +10,7 @@ from typing_extensions import TypedDict
 
 from jounce.errors import RobotError
 from jounce.reporting.summaries import freedom_words
-from jounce.robot import Robot
+from jounce.robot import Joint, Robot
 from jounce.robot.closures import closure_wrenches
 
 
@@ -177,7 +177,7 @@ def _link(robot: Robot, name: str) -> dict[str, Any]:
     }
 
 
-def _joint(joint: Any) -> dict[str, Any]:
+def _joint(joint: Joint) -> dict[str, Any]:
     mimic = None if joint.mimic is None else dataclasses.asdict(joint.mimic)
     return {
         "name": joint.name,

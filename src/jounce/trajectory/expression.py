@@ -158,10 +158,7 @@ class Expression:
         return self._folded(float, named, self._apply)
 
     def folded(
-        self,
-        number: Callable[[float], Any],
-        name: Callable[[str], Any],
-        operation: Callable[[str, list[Any]], Any],
+        self, number: Callable[[float], Any], name: Callable[[str], Any], operation: Callable[[str, list[Any]], Any]
     ) -> Any:
         """Return what comes of the formula when its numbers, names and operations mean something else.
 

@@ -16,7 +16,7 @@ from jounce.trajectory.checks import ArrayLike, check_samples, finite_numbers, w
 from jounce.trajectory.expression import Expression
 from jounce.trajectory.motion import AbstractMotion, ExpressionMotion, SplineMotion
 from jounce.trajectory.profiles import motion_profile
-from jounce.trajectory.sample_errors import TOLERANCE, unsupported_words
+from jounce.trajectory.sample_errors import TOLERANCE, unsupported_derivative, unsupported_words
 from jounce.trajectory.splines import HIGHEST_DEGREE
 from jounce.trajectory.stacking import evaluate_laws, law_derivatives
 from jounce.trajectory.trapezoid import LIMITS
@@ -308,14 +308,14 @@ class JointTrajectory(Displayed):
         return MAX_ORDER if kept.all() else int(np.argmin(kept)) - 1
 
     def _warn(self, order: int, names: Sequence[str]) -> None:
-        errors = self.estimate_error(order, names)
-        if (errors <= TOLERANCE).all():
-            return
-        worst = int(np.argmax((errors > TOLERANCE).any(axis=1)))
-        joint = int(np.argmax(errors[worst]))
-        degree = self.laws[names[joint]].degree  # type: ignore[attr-defined]
-        words = unsupported_words(names[joint], worst, float(errors[worst, joint]), degree)
-        warnings.warn(SampleWarning(words), stacklevel=3)
+        found = []
+        for name in names:
+            law = self.laws[name]
+            if isinstance(law, SplineMotion) and (doubt := unsupported_derivative(law.errors, order)):
+                found.append((doubt[0], -doubt[1], name, law.degree))
+        if found:
+            worst, error, name, degree = min(found)
+            warnings.warn(SampleWarning(unsupported_words(name, worst, -error, degree)), stacklevel=3)
 
     def _chosen(self, names: Iterable[str] | None) -> tuple[str, ...]:
         chosen = self.names if names is None else _names(names)

@@ -99,12 +99,7 @@ class RestToRestMotion(AbstractProfile):
     rest: int = eqx.field(static=True)
 
     def __init__(
-        self,
-        start: float = 0.0,
-        end: float = 1.0,
-        duration: float = 1.0,
-        start_time: float = 0.0,
-        rest: int = 2,
+        self, start: float = 0.0, end: float = 1.0, duration: float = 1.0, start_time: float = 0.0, rest: int = 2
     ):
         super().__init__(start, end, duration, start_time)
         self.rest = whole_number("rest", rest, 1, MAX_REST)

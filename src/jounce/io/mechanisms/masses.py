@@ -33,7 +33,7 @@ def inertia(space: str) -> Any:
     """Return the annotation of the inertia of a body."""
     planar = space == "planar"
 
-    def check(raw: Any, info: Any) -> Any:
+    def check(raw: object, info: Any) -> Any:
         if isinstance(raw, dict):
             return _pseudo(raw, 3 if planar else 4, info) if "pseudo" in raw else _solid(raw, info)
         return parse(raw, "inertia", info).value if planar else _tensor(raw, info)
@@ -51,7 +51,7 @@ def inertia(space: str) -> Any:
     return Annotated[Any, Checked(check, schema)]
 
 
-def _tensor(raw: Any, info: Any) -> tuple[Any, ...]:
+def _tensor(raw: object, info: Any) -> tuple[Any, ...]:
     if not isinstance(raw, (list, tuple)) or len(raw) != 3:
         raise problem("must be a list of 3 principal moments, or 3 rows of 3")
     if not all(isinstance(row, (list, tuple)) for row in raw):

@@ -32,19 +32,19 @@ _Types = tuple[tuple[str, type[Any]], ...]
 _PARAMETER = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,99}")
 
 
-def _text(raw: Any, _info: Any) -> str:
+def _text(raw: object, _info: Any) -> str:
     if not isinstance(raw, str):
         raise problem("must be text")
     return raw
 
 
-def _whole(raw: Any, _info: Any) -> int:
+def _whole(raw: object, _info: Any) -> int:
     if isinstance(raw, bool) or not isinstance(raw, int | float) or raw != raw // 1 or raw < 0:
         raise problem("must be a whole number, 0 or greater")
     return int(raw)
 
 
-def _all(raw: Any, _info: Any) -> bool:
+def _all(raw: object, _info: Any) -> bool:
     if raw not in (None, True, "all"):
         raise problem("an energy of the mechanism is that of all its bodies: write true; for one body, body: NAME")
     return True
@@ -53,7 +53,7 @@ def _all(raw: Any, _info: Any) -> bool:
 def _names(*counts: int) -> Any:
     """Return the annotation of a list of names of bodies, as many as one of the counts."""
 
-    def check(raw: Any, info: Any) -> tuple[str, ...]:
+    def check(raw: object, info: Any) -> tuple[str, ...]:
         if not isinstance(raw, (list, tuple)) or len(raw) not in counts:
             raise problem(f"must be a list of {' or '.join(map(str, counts))} names of bodies")
         for index, name in enumerate(raw):
@@ -78,7 +78,7 @@ def _check_body(name: Any, info: Any, *at: int) -> str:
 def _named(item: Any, pattern: re.Pattern[str], check: Callable[[str], str | None] | None = None) -> Any:
     """Return the annotation of a mapping of names to items."""
 
-    def name_of(raw: Any, _info: Any) -> str:
+    def name_of(raw: object, _info: Any) -> str:
         if not isinstance(raw, str) or not pattern.fullmatch(raw):
             allowed = "_ and -" if pattern is _NAME else "_, not starting with a digit"
             raise problem(f"a name is up to 100 letters, digits, {allowed}")
@@ -165,7 +165,7 @@ def _constraint_union(space: str, role: str, types: _Types) -> Any:
     return Annotated[Union[tuple(models)], Discriminator("type")]  # noqa: UP007
 
 
-def output_form(raw: Any) -> Any:
+def output_form(raw: object) -> Any:
     """Return the tag of the form that an output of a file has, None when it is not a mapping."""
     if not isinstance(raw, dict):
         return None

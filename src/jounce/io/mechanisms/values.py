@@ -47,7 +47,7 @@ class Checked:
 
 
 def parse(
-    raw: Any, quantity: str, info: Any, *at: str | int, variables: dict[str, Dimension | None] | None = None
+    raw: object, quantity: str, info: Any, *at: str | int, variables: dict[str, Dimension | None] | None = None
 ) -> Value:
     """Read one value of a kind of ``dimensions.KINDS``; ``at`` leads on from the entry being validated."""
     if quantity in ("of coordinate", "per angle"):
@@ -103,7 +103,7 @@ def scalar(quantity: str) -> Any:
     return Annotated[Any, Checked(lambda raw, info: parse(raw, quantity, info).value, scalar_schema(quantity))]
 
 
-def vector_value(raw: Any, size: int, quantity: str, info: Any, *at: str | int) -> tuple[float | Expression, ...]:
+def vector_value(raw: object, size: int, quantity: str, info: Any, *at: str | int) -> tuple[float | Expression, ...]:
     """Read a list of values of one kind."""
     if not isinstance(raw, (list, tuple)) or len(raw) != size:
         raise problem(f"must be a list of {size} values", *at, value=raw)
@@ -132,7 +132,7 @@ def vector(size: int, quantity: str) -> Any:
 def vectors(count: int, size: int, quantity: str) -> Any:
     """Return the annotation of a list of vectors, one on each body."""
 
-    def check(raw: Any, info: Any) -> tuple[Any, ...]:
+    def check(raw: object, info: Any) -> tuple[Any, ...]:
         if not isinstance(raw, (list, tuple)) or len(raw) != count:
             raise problem(f"must be a list of {count} vectors, one on each body")
         return tuple(vector_value(item, size, quantity, info, index) for index, item in enumerate(raw))
@@ -143,7 +143,7 @@ def vectors(count: int, size: int, quantity: str) -> Any:
 def wrenches() -> Any:
     """Return the annotation of rows of six values: a force and a moment."""
 
-    def check(raw: Any, info: Any) -> tuple[Any, ...]:
+    def check(raw: object, info: Any) -> tuple[Any, ...]:
         if not isinstance(raw, (list, tuple)) or not raw:
             raise problem("must be rows of six values, a force and a moment")
         return tuple(vector_value(row, 6, "any", info, index) for index, row in enumerate(raw))
@@ -173,7 +173,7 @@ def motion(quantity: str, variables: dict[str, Dimension | None] | None = None) 
     """Return the annotation of a law of time, and of other variables where there are some: of motion, or of a force."""
     variables = {"t": TIME} if variables is None else variables
 
-    def check(raw: Any, info: Any) -> Any:
+    def check(raw: object, info: Any) -> Any:
         if not isinstance(raw, dict):
             return parse(raw, quantity, info, variables=variables).value
         if raw.keys() == {"expression"}:
@@ -221,7 +221,7 @@ def _samples(raw: dict[str, Any], quantity: str, info: Any) -> Samples:
     return Samples.model_validate(raw | {"initial": found})
 
 
-def _initial(raw: Any, order: int, quantity: str, info: Any) -> float | Expression:
+def _initial(raw: object, order: int, quantity: str, info: Any) -> float | Expression:
     """Return a value of a driven quantity, in SI units per s to the power of an order."""
     value = parse(raw, quantity if order == 0 else "any", info, "initial", order)
     if order and value.dimension:
@@ -244,7 +244,7 @@ def laws(size: int, quantity: str, variables: dict[str, Dimension | None]) -> An
     one = motion(quantity, variables)
     single: Checked = one.__metadata__[0]
 
-    def check(raw: Any, info: Any) -> tuple[Any, ...]:
+    def check(raw: object, info: Any) -> tuple[Any, ...]:
         if not isinstance(raw, (list, tuple)) or len(raw) != size:
             raise problem(f"must be a list of {size} laws, one for each component")
         found = []
@@ -260,7 +260,7 @@ def laws(size: int, quantity: str, variables: dict[str, Dimension | None]) -> An
     return Annotated[Any, Checked(check, list_schema(single.schema, size))]
 
 
-def _orientation(raw: Any, info: Any) -> dict[str, Any]:
+def _orientation(raw: object, info: Any) -> dict[str, Any]:
     """Read one of the three forms of an orientation; the values stay numbers or expressions."""
     if not isinstance(raw, dict):
         raise problem("must be {quaternion: [e0, e1, e2, e3]}, {axis, angle} or {euler: zxz, angles}")
