@@ -158,7 +158,7 @@ def test_the_degree_of_the_splines_is_an_option(run, files):
     robot, trajectory = files(pendulum_urdf=PENDULUM, motion_csv=samples(lambda t: t / 2, count=5))
     status, _, err = run(robot, trajectory)
     assert status == 2
-    assert "a spline of degree 5 needs at least 6 samples, got 5; give more, or lower degree" in err
+    assert "a spline of degree 5 needs at least 6 samples, got 5; give more, or lower the degree" in err
     assert run(robot, trajectory, "--degree", "3")[0] == 0
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import jounce as jn
-from jounce.io.files.formats import dumped
+from jounce.io.files.dumping import dumped
 from jounce.io.files.parsers import read_yaml
 from jounce.trajectory.units import parse_value
 from jounce.io.mechanisms.conversion import assigned

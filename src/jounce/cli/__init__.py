@@ -29,7 +29,7 @@ from jounce.cli.robots import check, torques
 from jounce.cli.shell_completion import complete
 from jounce.cli.standard_streams import failsafe_streams
 from jounce.cli.starters import new
-from jounce.cli.views import view
+from jounce.cli.viewing import view
 from jounce.errors import JounceError, SolveError
 from jounce.interrupts import end_on_signals
 from jounce.reporting.terminal import cautions, complain, unexpected

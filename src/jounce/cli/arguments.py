@@ -43,16 +43,6 @@ def _number(kind: type, token: Any) -> int | float:
     return number
 
 
-def named_once(assignments: Sequence[str] | None, option: str) -> None:
-    """Raise JounceError where NAME=VALUE is given twice for a name: which of the two is meant, nobody can know."""
-    found: dict[str, str] = {}
-    for text in assignments or ():
-        name, _, value = (part.strip() for part in text.partition("="))
-        if name in found:
-            raise JounceError(f"is given more than once, as {found[name]} and as {value}", name=f"{option} {name}")
-        found[name] = value
-
-
 def check_ending(path: Path, valid: Sequence[str]) -> None:
     """Raise MechanismFileError unless a file has one of the endings; what a folder is, its reader says."""
     suffix = path.suffix.lower()

@@ -6,15 +6,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from jounce.cli.arguments import check_ending, named_once
+from jounce.cli.arguments import check_ending
 from jounce.cli.file_kinds import expecting
 from jounce.cli.options import Overwrite, RobotReading, allowed, errors_about, import_files
 from jounce.errors import JounceError
+from jounce.io.files import DATA_FILES, ROBOT_FILES
 from jounce.reporting.terminal import caution, say
 from jounce.robot import Robot
-
-MECHANISMS = (".yaml", ".yml", ".toml", ".json")
-ROBOTS = (".urdf", ".xml")
 
 
 def convert(
@@ -69,18 +67,15 @@ def convert(
       jounce convert examples/robots/panda.urdf panda.yaml \
         --start "panda_joint4=-90 deg"
     """
-    from jounce.io.files.formats import SUFFIXES
     from jounce.io.files.writing import check_target
     from jounce.io.mechanisms.starters import refuse_existing
 
     suffix = source.suffix.lower()
     with expecting(source, "mechanism", "robot"):
-        check_ending(source, (*MECHANISMS, *ROBOTS))
-    check_target(target, SUFFIXES, "mechanism file", overwrite=overwrite)
+        check_ending(source, (*DATA_FILES, *ROBOT_FILES))
+    check_target(target, DATA_FILES, "mechanism file", overwrite=overwrite)
     refuse_existing(target, overwrite=overwrite)
-    if suffix in ROBOTS:
-        named_once(drive, "--drive")
-        named_once(start, "--start")
+    if suffix in ROBOT_FILES:
         model = RobotReading(strict=strict, allow=allow).robot(source)
         return _robot(source, model, target, drive, start, hold, drives)
     given = {"--drive": drive, "--start": start, "--hold": hold, "--drives": drives, "--strict": strict}
@@ -91,7 +86,7 @@ def convert(
 
 
 def _mechanism(source: Path, target: Path, imports: list[Path] | None, allow: Sequence[Path], overwrite: bool) -> int:
-    from jounce.io.files.formats import dumped
+    from jounce.io.files.dumping import dumped
     from jounce.io.files.reading import MAX_SAMPLES, read_file
     from jounce.io.files.writing import check_target, replacing
     from jounce.io.mechanisms.conversion import converted
@@ -117,7 +112,7 @@ def _mechanism(source: Path, target: Path, imports: list[Path] | None, allow: Se
 def _robot(
     source: Path, model: Robot, target: Path, drive: list[str] | None, start: list[str] | None, hold: bool, drives: bool
 ) -> int:
-    from jounce.io.files.formats import dumped
+    from jounce.io.files.dumping import dumped
     from jounce.io.mechanisms.conversion import assigned, robot_mechanism, with_file_names
     from jounce.io.mechanisms.writer import mechanism_data
     from jounce.mechanism.masses import body_mass

@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from jounce.cli.arguments import check_ending
-from jounce.cli.conversion import MECHANISMS, ROBOTS
 from jounce.cli.file_kinds import expecting
 from jounce.cli.options import PLAIN_MECHANISM, MechanismReading, RobotReading, errors_about
 from jounce.errors import JounceError
+from jounce.io.files import DATA_FILES, ROBOT_FILES
 from jounce.reporting.summaries import start_heading, start_summary
 from jounce.reporting.tables import bodies_table, mechanism_tables, robot_tables
 from jounce.reporting.terminal import say, say_json, show_table
@@ -41,8 +41,8 @@ def inspect(
     """
     suffix = file.suffix.lower()
     with expecting(file, "mechanism", "robot"):
-        check_ending(file, (*MECHANISMS, *ROBOTS))
-    if suffix in ROBOTS:
+        check_ending(file, (*DATA_FILES, *ROBOT_FILES))
+    if suffix in ROBOT_FILES:
         if reading.set_:
             raise JounceError("is for mechanism files; a robot file has no parameters", name="--set", path=file)
         from jounce.reporting.robot_facts import inspected_robot

@@ -10,7 +10,6 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from jounce.cli.arguments import named_once
 from jounce.cli.file_kinds import expecting
 from jounce.errors import JounceError, OutputError, RobotError
 from jounce.mechanism import Mechanism
@@ -59,7 +58,6 @@ class MechanismReading:
             return mechanism
         from jounce.io.mechanisms.overrides import override
 
-        named_once(self.set_, "--set")
         return override(mechanism, self.set_)
 
 

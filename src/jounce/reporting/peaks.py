@@ -8,6 +8,7 @@ import warnings
 from typing import TYPE_CHECKING
 
 import numpy as np
+from jaxtyping import Float
 
 from jounce.dynamics.limits import local_maxima
 from jounce.errors import SampleWarning
@@ -24,6 +25,9 @@ PEAKS, POINTS, ROUNDS = 2, 7, 3  # highest maxima of each curve, instants around
 CHUNK = 1000  # instants solved together
 ROUNDING = 1e-9
 SMALLEST = 1e-15  # share of the size of an output
+_Times = Float[np.ndarray, " time"]
+_Curves = Float[np.ndarray, "time curves"]
+_Around = Float[np.ndarray, "points peaks curves"]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -114,7 +118,7 @@ def derivative_unit(unit: str, order: int) -> str:
     return base if total == 0 else f"{base}/s" if total == 1 else f"{base}/s^{total}"
 
 
-def scalar_outputs(motion: Motion) -> dict[str, tuple[str, np.ndarray]]:
+def scalar_outputs(motion: Motion) -> dict[str, tuple[str, Float[np.ndarray, "time derivative"]]]:
     """Return the outputs of a motion one component at a time.
 
     Returns
@@ -213,7 +217,7 @@ def _found(motion: Motion, refine: bool) -> list[Peak]:
     return found
 
 
-def _extremes(motion: Motion, refine: bool) -> tuple[np.ndarray, np.ndarray]:
+def _extremes(motion: Motion, refine: bool) -> tuple[Float[np.ndarray, " curves"], Float[np.ndarray, " curves"]]:
     """Return where each curve is largest and how large, (2 curves,): all curves upside down, then as they are.
 
     Around the highest instants, the best of a few becomes the middle of a shorter interval, again and again; the last
@@ -243,7 +247,9 @@ def _extremes(motion: Motion, refine: bool) -> tuple[np.ndarray, np.ndarray]:
     return np.where(solved, times, np.nan), np.where(solved, sizes, np.nan)
 
 
-def _denser(motion: Motion, time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _denser(
+    motion: Motion, time: _Times, values: _Curves
+) -> tuple[Float[np.ndarray, " all"], Float[np.ndarray, "all curves"]]:
     """Return instants and curves with enough instants for no peak to be missed that is no needle."""
     steps = -(-LEAST // (len(time) - 1))
     if steps == 1:
@@ -254,14 +260,14 @@ def _denser(motion: Motion, time: np.ndarray, values: np.ndarray) -> tuple[np.nd
     return whole[order], np.concatenate([values, _at(motion, between)])[order]
 
 
-def _own(motion: Motion, around: np.ndarray) -> np.ndarray:
+def _own(motion: Motion, around: _Around) -> _Around:
     """Return the values of curves at instants of their own, (points, peaks, curves)."""
     wanted, places = np.unique(around, return_inverse=True)
     values = _at(motion, wanted)
     return values[places.reshape(around.shape), np.arange(around.shape[-1])]
 
 
-def _at(motion: Motion, instants: np.ndarray) -> np.ndarray:
+def _at(motion: Motion, instants: _Times) -> _Curves:
     """Return the curves of a motion at other instants, -inf where it cannot be solved."""
     parts = []
     for first in range(0, len(instants), CHUNK):
@@ -277,13 +283,13 @@ def _at(motion: Motion, instants: np.ndarray) -> np.ndarray:
     return np.concatenate(parts)
 
 
-def _curves(motion: Motion) -> np.ndarray:
+def _curves(motion: Motion) -> _Curves:
     """Return all derivatives of all outputs, upside down and as they are, (time, 2 curves); -inf where unknown."""
     whole = np.concatenate([values for _, values in scalar_outputs(motion).values()], axis=1)
     return np.nan_to_num(np.concatenate([-whole, whole], axis=1), nan=-np.inf, posinf=-np.inf, neginf=-np.inf)
 
 
-def _scales(motion: Motion) -> np.ndarray:
+def _scales(motion: Motion) -> Float[np.ndarray, " curves"]:
     """Return the largest magnitude that any component of the output of a curve has in its derivative, (2 curves,)."""
     found = []
     for name, values in scalar_outputs(motion).values():
@@ -292,7 +298,13 @@ def _scales(motion: Motion) -> np.ndarray:
     return np.tile(np.concatenate(found), 2)
 
 
-def _keep_best(times: np.ndarray, sizes: np.ndarray, rounding: np.ndarray, around: np.ndarray, own: np.ndarray) -> None:
+def _keep_best(
+    times: Float[np.ndarray, " curves"],
+    sizes: Float[np.ndarray, " curves"],
+    rounding: Float[np.ndarray, " curves"],
+    around: _Around,
+    own: _Around,
+) -> None:
     """Take over what is larger than what was found before, by more than rounding: instants asked for are round."""
     flat = own.reshape(-1, own.shape[-1])
     every = np.arange(own.shape[-1])
@@ -303,7 +315,11 @@ def _keep_best(times: np.ndarray, sizes: np.ndarray, rounding: np.ndarray, aroun
     sizes[better] = flat[top, every][better]
 
 
-def _vertex(low: np.ndarray, high: np.ndarray, *near: np.ndarray) -> np.ndarray:
+def _vertex(
+    low: Float[np.ndarray, "peaks curves"],
+    high: Float[np.ndarray, "peaks curves"],
+    *near: Float[np.ndarray, "peaks curves"],
+) -> Float[np.ndarray, "peaks curves"]:
     """Return where the parabola through three evenly spaced values is largest, between the outer two."""
     left, middle, right = near
     with np.errstate(invalid="ignore", divide="ignore"):

@@ -11,7 +11,7 @@ import re
 from typing import Any
 
 from jounce.errors import MechanismFileError
-from jounce.io.files.entries import MAX_DEPTH, TOO_DEEP, Builder, Location, Source
+from jounce.io.files.located_data import MAX_DEPTH, TOO_DEEP, Builder, Location, Source
 
 # The core schema of YAML 1.2 (section 10.3.2 of its specification).
 _NULL = {"", "~", "null", "Null", "NULL"}

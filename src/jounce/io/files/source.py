@@ -7,13 +7,12 @@ from os import PathLike, fspath
 from pathlib import Path
 
 from jounce.errors import JounceError, MechanismFileError
-from jounce.io.files import parsers
-from jounce.io.files.entries import Source
+from jounce.io.files import DATA_FILES, parsers
+from jounce.io.files.located_data import Source
 from jounce.io.files.reading import check_allowed, read_file
 
 MAX_LINES = 200_000
 MAX_LINE_LENGTH = 100_000
-SUFFIXES = (".yaml", ".yml", ".toml", ".json")
 
 
 def _decode(path: str, content: bytes) -> str:
@@ -71,8 +70,8 @@ def read_source(
     if not name:
         raise error_type("the name of a file is needed", value=name)
     suffix = Path(name).suffix.lower()
-    if suffix not in SUFFIXES and not Path(name).is_dir():
-        raise error_type(f"the kind of a {kind} file is told by its ending; valid: {', '.join(SUFFIXES)}", path=name)
+    if suffix not in DATA_FILES and not Path(name).is_dir():
+        raise error_type(f"the kind of a {kind} file is told by its ending; valid: {', '.join(DATA_FILES)}", path=name)
     reader = {".toml": parsers.read_toml, ".json": parsers.read_json}.get(suffix, parsers.read_yaml)
     try:
         source = reader(name, _decode(name, read_file(name)))

@@ -14,7 +14,7 @@ from typing import Any
 from jounce import dynamics, mechanism
 from jounce.constraints.base import field_kind, value_fields
 from jounce.dynamics.energy_outputs import ENERGY_OUTPUTS
-from jounce.io.files.entries import Location
+from jounce.io.files.located_data import Location
 from jounce.mechanism import AbstractQuantity
 from jounce.robot.coupling import SlideOutput
 

@@ -11,7 +11,7 @@ import numpy as np
 from jounce.constraints import catalogue
 from jounce.dynamics import AppliedForceOutput, AppliedTorqueOutput, JointForceOutput, JointTorqueOutput
 from jounce.errors import JounceError, MechanismFileError, did_you_mean
-from jounce.io.files.entries import Location, Source
+from jounce.io.files.located_data import Location, Source
 from jounce.io.files.source import read_source
 from jounce.io.mechanisms.keys import ROLES, FileKey, file_keys, location_of, output_types
 from jounce.io.mechanisms.unit_hints import warn_of_units
@@ -166,7 +166,7 @@ def _build(source: Source, space: str, model: dict[str, Any], places: _Places) -
 def _body(source: Source, space: str, name: str, given: dict[str, Any], parameters: dict[str, Any]) -> Body:
     """Build a body; values that depend on parameters stay expressions of them."""
     if isinstance(given["inertia"], dict):
-        from jounce.io.mechanisms.masses import expanded
+        from jounce.io.mechanisms.inertia_forms import expanded
 
         try:
             given |= expanded(given, parameters, planar=space == "planar")

@@ -16,8 +16,8 @@ from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, create_mo
 from jounce.constraints import catalogue
 from jounce.constraints.planar import COORDINATES
 from jounce.errors import no_such
+from jounce.io.mechanisms.inertia_forms import inertia
 from jounce.io.mechanisms.keys import HOLDERS, FileKey, file_keys, output_holder, output_tag, output_types
-from jounce.io.mechanisms.masses import inertia
 from jounce.io.mechanisms.values import Checked, laws, motion, orientation, problem, scalar, vector, vectors, wrenches
 from jounce.mechanism.mechanism import RESERVED_OUTPUTS
 from jounce.mechanism.outputs import FRAMES

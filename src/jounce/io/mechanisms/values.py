@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from pydantic_core import PydanticCustomError, core_schema
 
 from jounce.errors import UNSET, JounceError, MechanismError, did_you_mean, show_value
-from jounce.io.files.entries import shows_value
+from jounce.io.files.located_data import shows_value
 from jounce.rigid.euler_parameters import form_of
 from jounce.trajectory.dimensions import KINDS, TIME, Dimension, is_rate, per_seconds
 from jounce.trajectory.expression import Expression

@@ -56,10 +56,11 @@ def write_mechanism(mechanism: Mechanism, path: str | PathLike[str], *, overwrit
     ...     jn.load(path) == jn.load("examples/four_bar.yaml")
     True
     """
-    from jounce.io.files.formats import SUFFIXES, dumped
+    from jounce.io.files import DATA_FILES
+    from jounce.io.files.dumping import dumped
     from jounce.io.files.writing import check_target, replacing
 
-    check_target(path, SUFFIXES, "mechanism file", overwrite=overwrite)
+    check_target(path, DATA_FILES, "mechanism file", overwrite=overwrite)
     data, samples = mechanism_data(mechanism, Path(path).stem)
     text = dumped(data, Path(path).suffix.lower(), str(path))
     tables = {Path(path).parent / name: columns for name, columns in samples.items()}

@@ -9,7 +9,7 @@ from os import PathLike
 from typing import Any
 
 from jounce.errors import RobotError, did_you_mean
-from jounce.io.files.entries import Location, Source
+from jounce.io.files.located_data import Location, Source
 from jounce.io.files.source import read_source
 from jounce.robot.model import Joint, Limits
 from jounce.robot.robot import Robot

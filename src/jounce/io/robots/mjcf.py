@@ -10,6 +10,7 @@ from os import PathLike
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from jounce.errors import JounceError, RobotError, RobotFileError
 from jounce.io.robots.faults import Faults
@@ -21,6 +22,7 @@ from jounce.robot.model import Closure, Joint, Limits, Link, Mimic, leaders
 from jounce.robot.robot import Robot
 from jounce.robot.tree import quaternion_matrix, turn_about
 
+_Vector, _Matrix = Float[np.ndarray, "3"], Float[np.ndarray, "3 3"]
 DEFORMABLE = "has deformable parts (flex), which no rigid body stands for"
 PLACE = ("pos", "quat", "axisangle", "xyaxes", "zaxis", "euler")
 NUMERIC = {  # attributes whose numbers MuJoCo takes even when they are not finite
@@ -277,7 +279,7 @@ class _Reader:
             name += "_"
         return name
 
-    def _single(self, j: int, parent: str, child: str, position: np.ndarray, rotation: np.ndarray) -> None:
+    def _single(self, j: int, parent: str, child: str, position: _Vector, rotation: _Matrix) -> None:
         """Add a hinge or a slide; the pose in the file is that at its reference coordinate."""
         model, dof, name = self.model, self.model.jnt_dofadr[j], self.joint_names[j]
         turning, axis, reference = model.jnt_type[j] == self.kind["hinge"], model.jnt_axis[j], self._reference(j)
@@ -309,7 +311,7 @@ class _Reader:
             damping += gear * float(np.ravel(model.actuator_damping[k])[0])
         return armature, damping
 
-    def _expand(self, j: int, parent: str, child: str, position: np.ndarray, rotation: np.ndarray) -> None:
+    def _expand(self, j: int, parent: str, child: str, position: _Vector, rotation: _Matrix) -> None:
         """Add the slides and turns that a free joint or a ball stands for."""
         model, name, dof = self.model, self.joint_names[j], self.model.jnt_dofadr[j]
         links, joints = floating_joints(child, prefix=name)

@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 
 from jounce.errors import JounceError, TrajectoryError, no_such, show_value
-from jounce.io.files.entries import Location, Source
+from jounce.io.files import DATA_FILES
+from jounce.io.files.located_data import Location, Source
 from jounce.io.files.reading import fault_of_number
 from jounce.io.files.samples import read_columns, read_samples
-from jounce.io.files.source import SUFFIXES, read_source
+from jounce.io.files.source import read_source
 from jounce.trajectory import (
     AbstractMotion,
     Expression,
@@ -81,9 +82,9 @@ def load_trajectory(
     """
     name = str(fspath(path))
     suffix = Path(name).suffix.lower()
-    if suffix not in (".csv", *SUFFIXES):
+    if suffix not in (".csv", *DATA_FILES):
         message = "the kind of a trajectory file is told by its ending"
-        raise TrajectoryError(f"{message}; valid: {', '.join(('.csv', *SUFFIXES))}", path=name)
+        raise TrajectoryError(f"{message}; valid: {', '.join(('.csv', *DATA_FILES))}", path=name)
     if suffix == ".csv":
         return _read_csv(name, degree)
     return _LawFile(read_source(name, allow, kind="trajectory", error_type=TrajectoryError)).trajectory()

@@ -7,6 +7,7 @@ import math
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from jounce.errors import RobotError, RobotFileError, did_you_mean, no_such
 from jounce.io.robots.faults import FOLLOWS_NONE, IDLE, MASSLESS, Faults
@@ -23,6 +24,7 @@ LINK_PARTS = ("inertial", "visual", "collision", "contact", "material", "sensor"
 INERTIAL_PARTS = ("origin", "mass", "inertia")
 JOINT_PARTS = ("origin", "parent", "child", "axis", "limit", "dynamics", "mimic", "calibration", "safety_controller")
 SIZES = ("velocity", "acceleration", "deceleration", "jerk", "effort")
+_Pose = tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3 3"]]
 TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
@@ -166,7 +168,7 @@ def _part(element: Element, tag: str, advice: str, *name: str) -> Element:
     return part
 
 
-def _pose(element: Element, *name: str) -> tuple[np.ndarray, np.ndarray]:
+def _pose(element: Element, *name: str) -> _Pose:
     """Return the pose of an ``<origin>``: turns about fixed axes, or a quaternion of URDF 1.1."""
     from scipy.spatial.transform import Rotation
 
@@ -256,7 +258,7 @@ def _mimics(joints: dict[str, Element], faults: Faults) -> dict[str, Mimic]:
 
 
 def _planar(
-    name: str, ends: tuple[str, str], pose: tuple[np.ndarray, np.ndarray], axis: np.ndarray
+    name: str, ends: tuple[str, str], pose: _Pose, axis: Float[np.ndarray, "3"]
 ) -> tuple[list[Link], list[Joint]]:
     """Return two slides across the axis and a turn about it."""
     axes = axes_with_z_along(axis / np.linalg.norm(axis)).T

@@ -9,7 +9,7 @@ from typing import Any
 from xml.parsers import expat
 
 from jounce.errors import RobotFileError, did_you_mean
-from jounce.io.files.entries import dotted
+from jounce.io.files.located_data import dotted
 from jounce.io.files.reading import LARGEST_NUMBER, fault_of_number, read_file
 
 MAX_DEPTH = 2000

@@ -9,6 +9,7 @@ from jounce.cli.file_kinds import expecting
 from jounce.cli.options import PLAIN_MECHANISM, MechanismReading, allowed, errors_about
 from jounce.errors import JounceError
 from jounce.interrupts import raising
+from jounce.io.files import DATA_FILES, ROBOT_FILES
 from jounce.reporting.terminal import say
 
 
@@ -48,23 +49,21 @@ def view(
       jounce view examples/robots/panda.urdf \
         examples/trajectories/panda_wave.yaml --port 8080 --no-open
     """
-    from jounce.io.robots.loader import ENDINGS
     from jounce.kinematics.solve import checked_order
     from jounce.viewer import view as show
     from jounce.viewer.exports import check_installed
-    from jounce.viewer.server import MECHANISM_FILES
 
     check_installed()
     subject: object = file
     with errors_about(file):
         checked_order(order)
-        if file.suffix.lower() in MECHANISM_FILES:
+        if file.suffix.lower() in DATA_FILES:
             subject = reading.mechanism(file)
         elif reading.set_ or reading.import_:
             option = "--set" if reading.set_ else "--import"
             raise JounceError("is for mechanism files; a robot has no parameters", name=option)
         with expecting(file, "mechanism", "robot"):
-            check_ending(file, (*MECHANISM_FILES, *ENDINGS))
+            check_ending(file, (*DATA_FILES, *ROBOT_FILES))
             folders = allowed(reading.allow)
             page = show(subject, trajectory, port=port, order=order, open_page=not no_open, allow=folders)
     say(f"{page.page.take.title or file.name}: {page.url} (Ctrl-C ends)")
