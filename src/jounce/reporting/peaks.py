@@ -27,6 +27,7 @@ ROUNDING = 1e-9
 SMALLEST = 1e-15  # share of the size of an output
 _Times = Float[np.ndarray, " time"]
 _Curves = Float[np.ndarray, "time curves"]
+_Peaks = Float[np.ndarray, "peaks curves"]
 _Around = Float[np.ndarray, "points peaks curves"]
 
 
@@ -249,7 +250,7 @@ def _extremes(motion: Motion, refine: bool) -> tuple[Float[np.ndarray, " curves"
 
 def _denser(
     motion: Motion, time: _Times, values: _Curves
-) -> tuple[Float[np.ndarray, " all"], Float[np.ndarray, "all curves"]]:
+) -> tuple[Float[np.ndarray, " denser"], Float[np.ndarray, "denser curves"]]:
     """Return instants and curves with enough instants for no peak to be missed that is no needle."""
     steps = -(-LEAST // (len(time) - 1))
     if steps == 1:
@@ -316,10 +317,10 @@ def _keep_best(
 
 
 def _vertex(
-    low: Float[np.ndarray, "peaks curves"],
-    high: Float[np.ndarray, "peaks curves"],
-    *near: Float[np.ndarray, "peaks curves"],
-) -> Float[np.ndarray, "peaks curves"]:
+    low: _Peaks,
+    high: _Peaks,
+    *near: _Peaks,
+) -> _Peaks:
     """Return where the parabola through three evenly spaced values is largest, between the outer two."""
     left, middle, right = near
     with np.errstate(invalid="ignore", divide="ignore"):

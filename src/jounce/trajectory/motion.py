@@ -10,9 +10,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
+from jaxtyping import Float
 
 from jounce.errors import MechanismError
 from jounce.jet import Jet, compose
+from jounce.shapes import Numbers
 from jounce.trajectory.checks import ArrayLike, check_choice
 from jounce.trajectory.expression import Expression
 from jounce.trajectory.sample_errors import derivative_errors
@@ -161,7 +163,13 @@ class SplineMotion(AbstractMotion):
         self._set(ends[:-1], pieces, ends[-1], beyond, advance, samples)
 
     def _set(
-        self, breakpoints: Any, coefficients: Any, stop: Any, beyond: str, advance: float = 0.0, samples: Any = None
+        self,
+        breakpoints: Float[Numbers, " pieces"],
+        coefficients: Float[Numbers, "powers pieces"],
+        stop: float,
+        beyond: str,
+        advance: float = 0.0,
+        samples: tuple[Float[np.ndarray, " samples"], Float[np.ndarray, " samples"]] | None = None,
     ) -> None:
         """Fill in the fields: of the pieces, and of the samples that they go through, if there are any."""
         self.breakpoints, self.coefficients, self.stop, self.advance = breakpoints, coefficients, stop, advance

@@ -22,7 +22,8 @@ from jounce.robot.model import Closure, Joint, Limits, Link, Mimic, leaders
 from jounce.robot.robot import Robot
 from jounce.robot.tree import quaternion_matrix, turn_about
 
-_Vector, _Matrix = Float[np.ndarray, "3"], Float[np.ndarray, "3 3"]
+_Vector = Float[np.ndarray, "3"]
+_Matrix = Float[np.ndarray, "3 3"]
 DEFORMABLE = "has deformable parts (flex), which no rigid body stands for"
 PLACE = ("pos", "quat", "axisangle", "xyaxes", "zaxis", "euler")
 NUMERIC = {  # attributes whose numbers MuJoCo takes even when they are not finite
