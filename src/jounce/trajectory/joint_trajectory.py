@@ -95,8 +95,7 @@ class JointTrajectory(Displayed):
         Examples
         --------
         >>> import numpy as np
-        from jaxtyping import Float
-                >>> import jounce as jn
+        >>> import jounce as jn
         >>> t = np.linspace(0.0, 2.0, 201)
         >>> trajectory = jn.JointTrajectory.from_samples(t, np.stack([np.sin(t), t**3], axis=1), ["a", "b"])
         >>> trajectory.derivatives([1.0], order=3)[0, :, 1].round(6).tolist()
@@ -272,8 +271,7 @@ class JointTrajectory(Displayed):
         Examples
         --------
         >>> import numpy as np
-        from jaxtyping import Float
-                >>> import jounce as jn
+        >>> import jounce as jn
         >>> t = np.linspace(0.0, 2.0, 41)
         >>> trajectory = jn.JointTrajectory.from_samples(t, np.sin(5 * t)[:, None], ["a"])
         >>> bool(trajectory.estimate_error(2)[2, 0] < 0.01 < trajectory.estimate_error(5)[5, 0])
