@@ -51,7 +51,7 @@ def _are_numbers(entries: list[Any]) -> bool:
 def resolve_motion(motion: Any, parameters: Mapping[str, Any]) -> AbstractMotion:
     """Return the motion law that a number, an expression, a Python function or a law stands for."""
     if isinstance(motion, AbstractMotion):
-        return _traceable(motion)
+        return _traceable(motion.resolved(parameters))
     if isinstance(motion, numbers.Real):
         motion = Expression(repr(float(motion)))
     if isinstance(motion, str):
@@ -119,7 +119,7 @@ def _scalar_law(law: Any, force: AbstractForce, parameters: Mapping[str, Any]) -
     if isinstance(law, AbstractLaw):
         return law
     if isinstance(law, AbstractMotion):
-        return TimeLaw(law)
+        return TimeLaw(law.resolved(parameters))
     if isinstance(law, numbers.Real) and not isinstance(law, bool):
         size = float(law)
         if not np.isfinite(size):

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from jounce.errors import MechanismError, no_such
+from jounce.errors import MechanismError, check_name
 from jounce.io.files.writing import check_target, replacing
 from jounce.kinematics import Motion
 from jounce.mechanism.outputs import AbstractQuantity
@@ -61,8 +61,7 @@ def draw(motion: Motion, outputs: Sequence[str] | None = None) -> Any:
     'acceleration\n$\\ddot{\\psi}$  (rad/s$^2$)'
     """
     for name in outputs or ():
-        if name not in motion.outputs:
-            raise MechanismError(no_such("output", name, motion.outputs), name="outputs", value=name)
+        check_name("output", name, motion.outputs, MechanismError, name="outputs")
     names = dict.fromkeys(outputs or motion.outputs)
     if not names:
         raise MechanismError("there is nothing to draw; name some outputs", name="outputs")

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float
 from xarray import Dataset
 
-from jounce.errors import RobotError, SampleWarning, no_such
+from jounce.errors import RobotError, SampleWarning, check_name
 from jounce.reporting.peaks import derivative_name
 from jounce.rigid.euler_parameters import from_rotation_matrices
 from jounce.robot import forward_kinematics, inverse_dynamics, joint_wrenches
@@ -123,9 +123,7 @@ class RobotSubject:
         if not robot.joint_names:
             raise RobotError("nothing moves: the robot has no moving joint", name=robot.name)
         for name in trajectory.names if trajectory is not None else ():
-            if name not in robot.joint_names:
-                message = no_such("moving joint", name, robot.joint_names)
-                raise RobotError(message, name="trajectory", value=name)
+            check_name("moving joint", name, robot.joint_names, RobotError, name="trajectory")
         self.robot, self.appearance, self.trajectory = robot, appearance, trajectory
         self.name, self.loaded = robot.name, has_masses(robot)
         self.driven, share = self.joints_driven()

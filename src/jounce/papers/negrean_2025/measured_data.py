@@ -1,14 +1,13 @@
-"""One's own samples and masses in the place of the stand-ins: files, and what the page says of them."""
+"""Measured samples and masses in the place of the stand-ins: files, and what the page says of them."""
 
 import dataclasses
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from jounce.errors import JounceError, MechanismFileError, did_you_mean
+from jounce.errors import JounceError
 from jounce.io.files.samples import read_columns
-from jounce.io.files.source import Source, read_source
+from jounce.io.files.source import read_source
 from jounce.papers.negrean_2025.case import CASES, STAND_IN, Case, Link, law
 from jounce.papers.output import page
 
@@ -56,17 +55,12 @@ def read_link(path: Path) -> Link:
     JounceError
         If the file cannot be read, a value is missing, is none or has another unit, or no body has these moments.
     """
-    source = read_source(str(path))
-    data = source.data
-    if not isinstance(data, dict):
-        raise MechanismFileError(f"must hold {', '.join(NEEDED)}", path=path, line=1)
-    for key in data:
-        if key not in UNITS:
-            raise source.error(f"unknown key; {did_you_mean(str(key), UNITS)}", (str(key),))
+    source = read_source(path)
+    data = source.mapping((), UNITS)
     for key in NEEDED:
         if key not in data:
             raise source.error("is missing", (key,))
-    values = {str(key): _number(source, key, raw) for key, raw in data.items()}
+    values = {key: source.number((key,), raw, UNITS[key]) for key, raw in data.items()}
     for name in ("inertia_x", "inertia_z"):  # they have no part in it, and any body may have those of a thin rod
         values.setdefault(name, values["inertia_y"])
     link = Link(**{"radius": STAND_IN.radius} | values)
@@ -77,22 +71,10 @@ def read_link(path: Path) -> Link:
     return link
 
 
-def _number(source: Source, key: str, raw: Any) -> float:
-    from jounce.io.files.units import parse_value
-
-    try:
-        value = parse_value(raw, UNITS[key]).value
-    except JounceError as error:
-        raise source.error(error.message, (key,), value=raw) from None
-    if not isinstance(value, float | int):
-        raise source.error("must be a number, with or without a unit", (key,), value=raw)
-    return float(value)
-
-
 def told(cases: dict[str, Case], samples: Path | None, masses: Path | None) -> str:
     """Return what the page says of data that are not the stand-ins of all of it."""
     case = next(iter(cases.values()))
-    through = "The law is made of quintic segments through them, as they are: from angle and speed zero, jerk zero at"
+    through = "The law is made of quintic segments through them, as they are"
     return page(
         __package__,
         "measured_data.md",

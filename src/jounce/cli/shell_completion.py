@@ -11,7 +11,8 @@ from jounce.reporting.terminal import say
 
 def complete(app: Any, shell: str, install: bool, out: Path | None) -> int:
     """Print, write or install the completion script of the command line for a shell."""
-    from jounce.io.files.writing import check_target, reason_of, replacing
+    from jounce.io.files.reading import reason_of
+    from jounce.io.files.writing import check_target, replacing
 
     if install and out is not None:
         raise JounceError("takes a place of its own; give --install or --out", name="--out", value=str(out))

@@ -9,9 +9,6 @@ from typing import Any
 
 from jounce.errors import OutputError
 
-__all__ = ["SUFFIXES", "dumped"]
-
-SUFFIXES = (".yaml", ".yml", ".toml", ".json")
 BLOCKS = ("parameters", "bodies", "joints", "drivers", "forces", "initial", "outputs")  # one line for each entry
 WIDTH = 110  # of an entry in one line
 
@@ -79,11 +76,11 @@ def _yaml(data: Mapping[str, Any]) -> str:
 
     from jounce.io.files.parsers import plain_scalar
 
-    def laid(value: Any, flow: bool) -> Any:
+    def styled(value: Any, flow: bool) -> Any:
         if isinstance(value, Mapping):
-            made = CommentedMap((laid(key, True), laid(entry, True)) for key, entry in value.items())
+            made = CommentedMap((styled(key, True), styled(entry, True)) for key, entry in value.items())
         elif isinstance(value, (list, tuple)):
-            made = CommentedSeq(laid(entry, True) for entry in value)
+            made = CommentedSeq(styled(entry, True) for entry in value)
         elif isinstance(value, str):
             return value if plain_scalar(value) is value else DoubleQuotedScalarString(value)
         else:
@@ -96,7 +93,7 @@ def _yaml(data: Mapping[str, Any]) -> str:
 
     whole = CommentedMap()
     for key, value in data.items():
-        whole[key] = laid(value, key not in BLOCKS)
+        whole[key] = styled(value, key not in BLOCKS)
         if key in BLOCKS and isinstance(value, Mapping):
             for name, entry in value.items():
                 if isinstance(entry, Mapping) and len(str(entry)) + len(str(name)) > WIDTH:
@@ -110,27 +107,25 @@ def _yaml(data: Mapping[str, Any]) -> str:
 def _toml(data: Mapping[str, Any]) -> str:
     import tomlkit
 
-    def laid(value: Any) -> Any:
+    def styled(value: Any) -> Any:
         if isinstance(value, Mapping):
             made = tomlkit.inline_table()
-            for key, entry in value.items():
-                made.append(key, laid(entry))
+            made.update({key: styled(entry) for key, entry in value.items()})
             return made
         if isinstance(value, (list, tuple)):
-            made = tomlkit.array()
-            for entry in value:
-                made.append(laid(entry))
-            return made
+            listed = tomlkit.array()
+            listed.extend(map(styled, value))
+            return listed
         return value
 
     whole = tomlkit.document()
     for key, value in data.items():
         if key not in BLOCKS or not isinstance(value, Mapping):
-            whole.append(key, laid(value))
+            whole.append(key, styled(value))
     for key, value in data.items():  # TOML wants its tables last
         if key in BLOCKS and isinstance(value, Mapping):
             table = tomlkit.table()
             for name, entry in value.items():
-                table.append(name, laid(entry))
+                table.append(name, styled(entry))
             whole.append(key, table)
     return tomlkit.dumps(whole)

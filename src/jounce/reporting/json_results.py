@@ -6,19 +6,21 @@ import dataclasses
 import json
 import math
 from collections.abc import Mapping
-from pathlib import PurePath
+from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 
+from jounce.dynamics.limits import LimitReport
 from jounce.errors import UNSET, JounceError, show_value
+from jounce.kinematics import Motion
+from jounce.reporting.motion_facts import motion_facts
+from jounce.reporting.peaks import Peak, peaks, table_peaks
+from jounce.trajectory import JointTrajectory
 
 if TYPE_CHECKING:
-    from jounce.dynamics.limits import LimitReport
-    from jounce.kinematics import Motion
-
-__all__ = ["complaint", "limits_record", "motion_record", "plain", "record", "torques_record"]
+    import xarray
 
 VERSION = 1
-"""Number of the form of the records; it grows where a key changes or goes."""
+"""Number of the form of the results; it grows where a key changes or goes."""
 
 
 def plain(value: Any) -> Any:
@@ -43,7 +45,7 @@ def plain(value: Any) -> Any:
     return str(value) if isinstance(value, PurePath) else show_value(value, 200)
 
 
-def record(command: str, data: Mapping[str, Any]) -> str:
+def result_json(command: str, data: Mapping[str, Any]) -> str:
     """Return the JSON text of the result of a command."""
     from jounce import __version__
 
@@ -67,22 +69,19 @@ def complaint(kind: str, problem: object) -> str:
     return json.dumps({kind: told}, allow_nan=False)
 
 
-def motion_record(motion: Motion, file: Any, written: Any, refine: bool = True) -> dict[str, Any]:
+def motion_result(motion: Motion, file: Path, written: Path | None, refine: bool = True) -> dict[str, Any]:
     """Return what `jounce run` and `jounce simulate` tell of a motion."""
-    from jounce.reporting.motion_facts import motion_facts
-    from jounce.reporting.peaks import peaks
-
     told = [_peak(peak) for peak in peaks(motion, refine=refine)]
     return {"file": file, **motion_facts(motion), "peaks": told, "written": written}
 
 
-def _peak(peak: Any) -> dict[str, Any]:
+def _peak(peak: Peak) -> dict[str, Any]:
     told = dataclasses.asdict(peak)
     del told["size"]
     return told
 
 
-def limits_record(report: LimitReport, robot: Any, trajectory: Any, written: Any) -> dict[str, Any]:
+def limits_result(report: LimitReport, robot: Path, trajectory: Path, written: Path | None) -> dict[str, Any]:
     """Return what `jounce check` tells of a trajectory and the limits of a robot."""
     names = {"worst": "value", "at": "time"}
     keys = ("joint", "quantity", "unit", "worst", "limit", "ratio", "at", "broken")
@@ -99,12 +98,12 @@ def limits_record(report: LimitReport, robot: Any, trajectory: Any, written: Any
     }
 
 
-def torques_record(dataset: Any, motion: Any, robot: Any, trajectory: Any, written: Any) -> dict[str, Any]:
+def torques_result(
+    dataset: xarray.Dataset, motion: JointTrajectory, robot: Path, trajectory: Path, written: Path | None
+) -> dict[str, Any]:
     """Return what `jounce torques` tells of a robot on a trajectory."""
-    from jounce.reporting.peaks import table_peaks
-
     times = dataset["time"].values
-    peaks = [_peak(peak) for peak in table_peaks(dataset)]
+    told = [_peak(peak) for peak in table_peaks(dataset)]
     return {
         "robot": dataset.attrs["title"],
         "file": robot,
@@ -112,6 +111,6 @@ def torques_record(dataset: Any, motion: Any, robot: Any, trajectory: Any, writt
         "rates": dataset.sizes["derivative"] - 1,
         "time": {"start": times[0], "stop": times[-1], "count": len(times)},
         "held": [name for name in dataset.data_vars if name not in motion.names],
-        "peaks": [{"joint": peak.pop("output"), **peak} for peak in peaks],
+        "peaks": [{"joint": peak.pop("output"), **peak} for peak in told],
         "written": written,
     }

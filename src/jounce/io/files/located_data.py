@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
-from jounce.errors import MechanismFileError
+from jounce.errors import UNSET, ExpressionError, JounceError, MechanismFileError, did_you_mean
 from jounce.io.files.reading import named_file
-
-__all__ = ["Builder", "Location", "Source", "dotted"]
+from jounce.trajectory.dimensions import Dimension
+from jounce.trajectory.units import Value, parse_value
 
 MAX_VALUES = 200_000
 MAX_DEPTH = 50
+TOO_DEEP = f"nested more than {MAX_DEPTH} deep; 6 are enough for any file"
 
 Location = tuple[str | int, ...]
 """Where an entry is: keys and indices from the top, such as ``("joints", "BC", "points", 1)``."""
@@ -34,12 +37,13 @@ def dotted(location: Location) -> str:
 
 @dataclass
 class Source:
-    """Plain data from a file, and the line of every entry."""
+    """Plain data from a file, and the line of every entry; errors about them name the file, the line and the entry."""
 
     path: str
     data: Any
     lines: dict[Location, int] = field(default_factory=dict)
     allow: tuple[str, ...] = ()
+    error_type: type[JounceError] = MechanismFileError
 
     def line(self, location: Location) -> int | None:
         """Return the line of an entry, or of the nearest entry around it whose line is known."""
@@ -48,11 +52,47 @@ class Source:
                 return self.lines[location[:length]]
         return None
 
-    def error(self, message: str, location: Location = (), **value: Any) -> MechanismFileError:
+    def error(self, message: str, location: Location = (), **value: Any) -> JounceError:
         """Return an error that names the file, the line and the dotted name of an entry."""
-        return MechanismFileError(
-            message, path=self.path, line=self.line(location), name=dotted(location) or None, **value
-        )
+        name = dotted(location) or None
+        return self.error_type(message, path=self.path, line=self.line(location), name=name, **value)
+
+    def at(self, location: Location) -> Any:
+        """Return what stands at a location, None where nothing does."""
+        found = self.data
+        for step in location:
+            found = found.get(step) if isinstance(found, dict) else None
+        return found
+
+    def mapping(self, location: Location = (), keys: Iterable[str] | None = None) -> dict[str, Any]:
+        """Return the mapping at a location, which is not empty and has, where they are given, known keys only."""
+        found = self.at(location)
+        if not isinstance(found, dict) or not found:
+            raise self.error("must be a mapping with at least one entry", location, value=found)
+        for key in found:
+            if keys is not None and key not in keys:
+                raise self.error(f"unknown key; {did_you_mean(key, keys)}", (*location, key))
+        return found
+
+    def value(
+        self,
+        location: Location,
+        raw: Any,
+        kind: str = "any",
+        names: Iterable[str] = (),
+        dimensions: Mapping[str, Dimension] | None = None,
+    ) -> Value:
+        """Return a value in SI units with its dimension, as `parse_value` reads it."""
+        try:
+            return parse_value(raw, kind, names, dimensions)
+        except JounceError as error:
+            raise self.error(error.message, location, value=UNSET if shows_value(error) else raw) from None
+
+    def number(self, location: Location, raw: Any, kind: str = "any") -> float:
+        """Return a number in SI units; expressions without names are worked out."""
+        value = self.value(location, raw, kind).value
+        assert isinstance(value, float)
+        return value
 
     def named_file(self, name: str, location: Location) -> str:
         """Return the path of a file that an entry names, below the folder of this one or one that is allowed."""
@@ -60,6 +100,21 @@ class Source:
             return named_file(name, self.path, self.allow)
         except MechanismFileError as error:
             raise self.error(error.message, location, value=name) from None
+
+    def read_named(self, name: str, location: Location, read: Callable[[str], Any]) -> Any:
+        """Return what is read from a file that an entry names; errors tell its path as the entry has it."""
+        path = self.named_file(name, location)
+        try:
+            return read(path)
+        except JounceError as error:
+            if error.path == path:
+                error.path = Path(self.path).parent / name
+            raise self.error(str(error), location) from None
+
+
+def shows_value(error: JounceError) -> bool:
+    """Tell whether the message of an error holds the value itself: that of an expression with the place within it."""
+    return isinstance(error, ExpressionError) and error.column is not None
 
 
 class Builder:
@@ -108,9 +163,7 @@ class Builder:
         """Start a mapping or a list."""
         location = self._here()
         if len(location) >= MAX_DEPTH:
-            raise MechanismFileError(
-                f"nested more than {MAX_DEPTH} deep; a mechanism file needs 6", path=self.source.path, line=line
-            )
+            raise MechanismFileError(TOO_DEEP, path=self.source.path, line=line)
         self._put(container, line)
         self._stack.append((container, location))
 

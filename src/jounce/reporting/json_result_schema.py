@@ -12,20 +12,17 @@ from jounce.reporting.mechanism_facts import Grid, InspectedMechanism
 from jounce.reporting.motion_facts import MotionFacts, SimulationFacts
 from jounce.reporting.robot_facts import InspectedRobot
 
-__all__ = ["record_schema"]
 
-
-class Record(TypedDict):
+class Result(TypedDict):
     """What all results begin with."""
 
     jounce: str
     record: Literal[1]
 
 
-class PeakRecord(TypedDict):
-    """Extreme values of a derivative of an output."""
+class Extremes(TypedDict):
+    """Extreme values, with their times."""
 
-    output: str
     derivative: str
     unit: str
     minimum: float | None
@@ -34,33 +31,45 @@ class PeakRecord(TypedDict):
     maximum_at: float | None
 
 
+class OutputPeak(Extremes):
+    """Extreme values of a derivative of an output."""
+
+    output: str
+
+
+class TorquePeak(Extremes):
+    """Extreme values, at the instants of the trajectory, of a torque or force of a joint, or of one of its rates."""
+
+    joint: str
+
+
 class Written(TypedDict):
     """What a motion is told with."""
 
     file: str
-    peaks: list[PeakRecord]
+    peaks: list[OutputPeak]
     written: str | None
 
 
-class RunRecord(Record, MotionFacts, Written):
+class RunResult(Result, MotionFacts, Written):
     """jounce run --json."""
 
     command: Literal["run"]
 
 
-class SimulateRecord(Record, SimulationFacts, Written):
+class SimulateResult(Result, SimulationFacts, Written):
     """jounce simulate --json."""
 
     command: Literal["simulate"]
 
 
-class InspectMechanismRecord(Record, InspectedMechanism):
+class InspectMechanismResult(Result, InspectedMechanism):
     """jounce inspect --json of a mechanism file."""
 
     command: Literal["inspect"]
 
 
-class InspectRobotRecord(Record, InspectedRobot):
+class InspectRobotResult(Result, InspectedRobot):
     """jounce inspect --json of a robot file."""
 
     command: Literal["inspect"]
@@ -79,45 +88,33 @@ class LimitRow(TypedDict):
     broken: bool
 
 
-class CheckRecord(Record):
+class TrajectoryResult(Result):
+    """What is told of a robot on a trajectory."""
+
+    robot: str
+    file: str
+    trajectory: str
+    time: Grid
+    written: str | None
+
+
+class CheckResult(TrajectoryResult):
     """jounce check --json."""
 
     command: Literal["check"]
-    robot: str
-    file: str
-    trajectory: str
     kept: bool
     broken: int
-    time: Grid
     held: dict[str, float]
     limits: list[LimitRow]
-    written: str | None
 
 
-class TorquePeak(TypedDict):
-    """Extreme values, at the instants of the trajectory, of a torque or force of a joint, or of one of its rates."""
-
-    joint: str
-    derivative: str
-    unit: str
-    minimum: float | None
-    minimum_at: float | None
-    maximum: float | None
-    maximum_at: float | None
-
-
-class TorquesRecord(Record):
+class TorquesResult(TrajectoryResult):
     """jounce torques --json."""
 
     command: Literal["torques"]
-    robot: str
-    file: str
-    trajectory: str
     rates: int
-    time: Grid
     held: list[str]
     peaks: list[TorquePeak]
-    written: str | None
 
 
 class Starter(TypedDict):
@@ -128,14 +125,14 @@ class Starter(TypedDict):
     command: str
 
 
-class NewListRecord(Record):
+class NewListResult(Result):
     """jounce new --json."""
 
     command: Literal["new"]
     starters: list[Starter]
 
 
-class NewRecord(Record):
+class NewResult(Result):
     """jounce new NAME --json."""
 
     command: Literal["new"]
@@ -168,15 +165,15 @@ class WarningLine(TypedDict):
     warning: Problem
 
 
-RECORDS: dict[str, Any] = {
-    "run": RunRecord,
-    "simulate": SimulateRecord,
-    "inspect_mechanism": InspectMechanismRecord,
-    "inspect_robot": InspectRobotRecord,
-    "check": CheckRecord,
-    "torques": TorquesRecord,
-    "new_list": NewListRecord,
-    "new": NewRecord,
+RESULTS: dict[str, Any] = {
+    "run": RunResult,
+    "simulate": SimulateResult,
+    "inspect_mechanism": InspectMechanismResult,
+    "inspect_robot": InspectRobotResult,
+    "check": CheckResult,
+    "torques": TorquesResult,
+    "new_list": NewListResult,
+    "new": NewResult,
 }
 
 
@@ -187,20 +184,20 @@ class _Closed(GenerateJsonSchema):
         return super().typed_dict_schema(schema) | {"additionalProperties": False}
 
 
-def record_schema() -> dict[str, Any]:
+def result_schema() -> dict[str, Any]:
     """Return the JSON Schema (2020-12) of the results of commands, and of the errors and warnings beside them.
 
     Examples
     --------
-    >>> sorted(record_schema()["$defs"])
+    >>> sorted(result_schema()["$defs"])
     ['check', 'complaint', 'inspect_mechanism', 'inspect_robot', 'new', 'new_list', 'run', 'simulate', 'torques']
     """
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "Results of jounce",
         "description": "Numbers are in SI units; null stands for a number that is not known or not finite.",
-        "oneOf": [{"$ref": f"#/$defs/{name}"} for name in RECORDS],
-        "$defs": {name: _schema(kind) for name, kind in (RECORDS | {"complaint": ErrorLine | WarningLine}).items()},
+        "oneOf": [{"$ref": f"#/$defs/{name}"} for name in RESULTS],
+        "$defs": {name: _schema(kind) for name, kind in (RESULTS | {"complaint": ErrorLine | WarningLine}).items()},
     }
 
 

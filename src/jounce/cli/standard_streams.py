@@ -9,10 +9,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
 
-__all__ = ["Lasting", "lasting_streams"]
 
-
-class Lasting:
+class FailSafeStream:
     """A stream whose first failure is kept, not raised: what else a command does is done all the same.
 
     Parameters
@@ -72,13 +70,13 @@ class Lasting:
 
 
 @contextmanager
-def lasting_streams() -> Iterator[Lasting]:
+def failsafe_streams() -> Iterator[FailSafeStream]:
     """Give standard output, which lasts meanwhile; characters that cannot be encoded are written as codes."""
     before: tuple[Any, Any] = (sys.stdout, sys.stderr)
     for stream in before:
         with suppress(AttributeError, ValueError):
             stream.reconfigure(errors="backslashreplace")
-    output, messages = Lasting(before[0]), Lasting(before[1])
+    output, messages = FailSafeStream(before[0]), FailSafeStream(before[1])
     sys.stdout, sys.stderr = output, messages
     try:
         yield output

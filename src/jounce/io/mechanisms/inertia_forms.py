@@ -7,16 +7,24 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from pydantic_core import PydanticCustomError
+import numpy as np
 
 from jounce.errors import UNSET, MechanismError, RobotError, did_you_mean, show_value
-from jounce.io.mechanisms.values import Checked, below, parse, problem, scalar_schema, vector_schema, vector_value
+from jounce.io.mechanisms.values import (
+    ANY_VALUE,
+    Checked,
+    list_schema,
+    object_schema,
+    parse,
+    problem,
+    scalar_schema,
+    vector_schema,
+    vector_value,
+)  # fmt: skip
 from jounce.mechanism.resolve import resolve
 from jounce.rigid.inertia import ADVICE, Inertia, check_solid
 from jounce.rigid.solids import SOLIDS, pseudo_parts, solid_moments
 from jounce.trajectory import Expression
-
-__all__ = ["expanded", "inertia"]
 
 AXES = ("x", "y", "z")
 
@@ -25,7 +33,7 @@ def inertia(space: str) -> Any:
     """Return the annotation of the inertia of a body."""
     planar = space == "planar"
 
-    def check(raw: Any, info: Any) -> Any:
+    def check(raw: object, info: Any) -> Any:
         if isinstance(raw, dict):
             return _pseudo(raw, 3 if planar else 4, info) if "pseudo" in raw else _solid(raw, info)
         return parse(raw, "inertia", info).value if planar else _tensor(raw, info)
@@ -37,13 +45,13 @@ def inertia(space: str) -> Any:
         schema = {"description": f"{plain['description']}; or {solid}", "anyOf": [*plain["anyOf"], *forms]}
     else:
         rows = vector_schema(3, "inertia")
-        matrix = {"type": "array", "items": rows, "minItems": 3, "maxItems": 3}
+        matrix = list_schema(rows, 3)
         words = f"a list of 3 principal moments, or 3 rows of 3, such as 0.1 kg*m^2; or {solid}"
         schema = {"description": words, "anyOf": [rows, matrix, *forms]}
     return Annotated[Any, Checked(check, schema)]
 
 
-def _tensor(raw: Any, info: Any) -> tuple[Any, ...]:
+def _tensor(raw: object, info: Any) -> tuple[Any, ...]:
     if not isinstance(raw, (list, tuple)) or len(raw) != 3:
         raise problem("must be a list of 3 principal moments, or 3 rows of 3")
     if not all(isinstance(row, (list, tuple)) for row in raw):
@@ -67,15 +75,8 @@ def _pseudo(raw: dict[str, Any], size: int, info: Any) -> dict[str, Any]:
             raise problem(f"must be a row of {size} values", "pseudo", i, value=row)
         kinds = ["inertia" if i < size - 1 else "first moment"] * (size - 1)
         kinds.append("first moment" if i < size - 1 else "mass")
-        found.append(tuple(_entry(x, kinds[k], info, "pseudo", i, k) for k, x in enumerate(row)))
+        found.append(tuple(parse(x, kinds[k], info, "pseudo", i, k).value for k, x in enumerate(row)))
     return {"pseudo": tuple(found)}
-
-
-def _entry(raw: Any, quantity: str, info: Any, *at: str | int) -> Any:
-    try:
-        return parse(raw, quantity, info).value
-    except PydanticCustomError as error:
-        raise below(error, *at) from None
 
 
 def _solid(raw: dict[str, Any], info: Any) -> dict[str, Any]:
@@ -98,7 +99,7 @@ def _solid(raw: dict[str, Any], info: Any) -> dict[str, Any]:
         if key == "size":
             found[key] = vector_value(value, 3, "length", info, key)
         elif key not in ("solid", "axis"):
-            found[key] = _entry(value, "density" if key == "density" else "length", info, key)
+            found[key] = parse(value, "density" if key == "density" else "length", info, key).value
     return found
 
 
@@ -112,62 +113,36 @@ def _solid_keys(kind: str) -> tuple[str, ...]:
 def _solid_schemas() -> list[dict[str, Any]]:
     schemas = []
     for kind, solid in SOLIDS.items():
-        keys: dict[str, Any] = {}
-        for key in _solid_keys(kind):
-            keys[key] = scalar_schema("density" if key == "density" else "length")
-        keys["solid"] = {"const": kind}
-        if "axis" in keys:
-            keys["axis"] = {"enum": list(AXES)}
-        if "size" in keys:
-            keys["size"] = vector_schema(3, "length")
-        closed = {"type": "object", "additionalProperties": False}
-        schemas.append(closed | {"properties": keys, "required": ["solid", *solid.sizes]})
+        keys: dict[str, Any] = {key: scalar_schema("length") for key in _solid_keys(kind)}
+        special = {
+            "density": scalar_schema("density"),
+            "solid": {"const": kind},
+            "axis": {"enum": list(AXES)},
+            "size": vector_schema(3, "length"),
+        }
+        keys |= {key: schema for key, schema in special.items() if key in keys}
+        schemas.append(object_schema(keys, ("solid", *solid.sizes)))
     return schemas
 
 
 def _pseudo_schema(size: int) -> dict[str, Any]:
-    items = {"anyOf": [{"type": "number"}, {"type": "string", "minLength": 1}]}
-    row = {"type": "array", "items": items, "minItems": size, "maxItems": size}
-    matrix = {"type": "array", "items": row, "minItems": size, "maxItems": size}
     text = "[[S, m c], [m c^T, m]] about the origin of the body, with S the integral of rho rho^T dm"
-    properties = {"pseudo": matrix | {"description": text}}
-    return {"type": "object", "properties": properties, "required": ["pseudo"], "additionalProperties": False}
+    matrix = list_schema(list_schema({"anyOf": ANY_VALUE}, size), size)
+    return object_schema({"pseudo": matrix | {"description": text}})
 
 
-class _Formula:
+_SIGNS = {np.add: "+", np.subtract: "-", np.multiply: "*", np.true_divide: "/"}
+
+
+class _Formula(np.lib.mixins.NDArrayOperatorsMixin):
     """A formula that grows by arithmetic, as text."""
 
     def __init__(self, text: str):
         self.text = text
 
-    def _joined(self, operator: str, other: Any, *, turned: bool = False) -> _Formula:
-        second = other.text if isinstance(other, _Formula) else repr(float(other))
-        first, second = (second, self.text) if turned else (self.text, second)
-        return _Formula(f"({first} {operator} {second})")
-
-    def __add__(self, other: Any) -> _Formula:
-        return self._joined("+", other)
-
-    def __radd__(self, other: Any) -> _Formula:
-        return self._joined("+", other, turned=True)
-
-    def __sub__(self, other: Any) -> _Formula:
-        return self._joined("-", other)
-
-    def __rsub__(self, other: Any) -> _Formula:
-        return self._joined("-", other, turned=True)
-
-    def __mul__(self, other: Any) -> _Formula:
-        return self._joined("*", other)
-
-    def __rmul__(self, other: Any) -> _Formula:
-        return self._joined("*", other, turned=True)
-
-    def __truediv__(self, other: Any) -> _Formula:
-        return self._joined("/", other)
-
-    def __rtruediv__(self, other: Any) -> _Formula:
-        return self._joined("/", other, turned=True)
+    def __array_ufunc__(self, ufunc: np.ufunc, _method: str, *parts: Any) -> _Formula:
+        first, second = (part.text if isinstance(part, _Formula) else repr(float(part)) for part in parts)
+        return _Formula(f"({first} {_SIGNS[ufunc]} {second})")
 
 
 def _open(value: Any) -> Any:

@@ -1,62 +1,18 @@
-"""What samples of a motion support: checks, and the error of the derivatives of a spline through them."""
+"""What derivatives samples of a motion support: the errors of those of a spline through them."""
 
 import math
-from typing import Any
 
 import numpy as np
-
-from jounce.errors import TrajectoryError
+from jaxtyping import Float
 
 INTERPOLATION_SAFETY, NOISE_SAFETY = 2.0, 3.0
 TOLERANCE = 0.1  # of an error relative to the peak of its derivative
 BLOCKS, BLOCK = 8, 2500  # stretches of very many samples, and samples in each
 
 
-def check_samples(times: Any, values: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Return times, shape (samples,), and values, shape (samples, ...), as arrays of floats.
-
-    Raises
-    ------
-    TrajectoryError
-        If they are no numbers, not finite, of unequal number, fewer than two, or the times do not increase.
-    """
-    try:
-        times, values = np.asarray(times, float), np.asarray(values, float)
-    except (TypeError, ValueError):
-        raise TrajectoryError("times and values must be lists of numbers of equal length") from None
-    if times.ndim != 1 or values.ndim < 1 or len(times) != len(values):
-        shapes = f"shapes {times.shape} and {values.shape}"
-        raise TrajectoryError("samples need one value for each time; give lists of equal length", value=shapes)
-    if len(times) < 2:
-        raise TrajectoryError("at least two samples are needed", value=len(times))
-    for name, entries in (("times", times), ("values", values)):
-        bad = np.argwhere(~np.isfinite(entries))
-        if len(bad):
-            place = "".join(f"[{k}]" for k in bad[0])
-            raise TrajectoryError("samples must be finite", name=f"{name}{place}", value=float(entries[tuple(bad[0])]))
-    if (np.diff(times) <= 0).any():
-        first = int(np.flatnonzero(np.diff(times) <= 0)[0]) + 1
-        what = "repeats the one before" if times[first] == times[first - 1] else "comes before the one before"
-        message = f"times of samples must increase; this one {what}"
-        raise TrajectoryError(message, name=f"times[{first}]", value=float(times[first]))
-    return times, values
-
-
-def finite_numbers(name: str, values: Any, shape: tuple[int, ...] | None) -> np.ndarray:
-    """Return finite numbers of a shape; of any one axis when none is given."""
-    try:
-        array = np.asarray(values, float)
-    except (TypeError, ValueError):
-        raise TrajectoryError("must be numbers", name=name, value=values) from None
-    if (array.ndim != 1 or not array.size) if shape is None else array.shape != shape:
-        wanted = "one axis of at least one number" if shape is None else f"the shape {shape}"
-        raise TrajectoryError(f"must have {wanted}", name=name, value=f"shape {array.shape}")
-    if not np.isfinite(array).all():
-        raise TrajectoryError("must be finite numbers", name=name, value=array[~np.isfinite(array)][0].item())
-    return array
-
-
-def derivative_errors(times: np.ndarray, values: np.ndarray, degree: int) -> np.ndarray:
+def derivative_errors(
+    times: Float[np.ndarray, " samples"], values: Float[np.ndarray, " samples"], degree: int
+) -> Float[np.ndarray, " derivative"]:
     """Estimate the error of the derivatives of a spline through samples, relative to their peaks.
 
     Two errors are added. The one of interpolation is the largest difference between the spline and another through
@@ -120,7 +76,7 @@ def _absolute(times: np.ndarray, values: np.ndarray, degree: int) -> tuple[np.nd
     return errors, peaks
 
 
-def doubtful_order(errors: np.ndarray, order: int) -> tuple[int, float] | None:
+def unsupported_derivative(errors: Float[np.ndarray, " derivative"], order: int) -> tuple[int, float] | None:
     """Return the lowest derivative up to an order whose error is above the tolerance, and that error; None if all are.
 
     Parameters
@@ -137,7 +93,7 @@ def doubtful_order(errors: np.ndarray, order: int) -> tuple[int, float] | None:
     return worst, float(known[worst])
 
 
-def words_of_doubt(name: str, order: int, error: float, degree: int) -> str:
+def unsupported_words(name: str, order: int, error: float, degree: int) -> str:
     """Word why samples do not support a derivative, and what to do."""
     size = "cannot be told from them" if error >= 1 else f"about {100 * error:.0f} %"
     if order >= degree:
@@ -147,7 +103,7 @@ def words_of_doubt(name: str, order: int, error: float, degree: int) -> str:
     return f"samples of '{name}' do not support its derivative of order {order}: its error is {size}; {cause}"
 
 
-def noise(times: np.ndarray, values: np.ndarray) -> float:
+def noise(times: Float[np.ndarray, " samples"], values: Float[np.ndarray, " samples"]) -> float:
     """Estimate the standard deviation of the noise in samples, at least that of their rounding.
 
     The divided differences of order p of a smooth function soon vanish as p grows, while those of independent noise,
@@ -165,7 +121,7 @@ def noise(times: np.ndarray, values: np.ndarray) -> float:
     return max(floor, found) if math.isfinite(found) else floor
 
 
-def amplification(times: np.ndarray, degree: int, order: int) -> np.ndarray:
+def amplification(times: Float[np.ndarray, " samples"], degree: int, order: int) -> Float[np.ndarray, " derivative"]:
     """Return how much the derivatives of a spline amplify independent noise in the samples, in the worst place.
 
     The influence of a sample fades within a few others, so windows tell: one at each end, where the noise is amplified

@@ -6,9 +6,10 @@ from pathlib import Path
 
 from jounce.cli.arguments import check_ending
 from jounce.cli.file_kinds import expecting
-from jounce.cli.writing import allowed
+from jounce.cli.options import PLAIN_MECHANISM, MechanismReading, allowed, errors_about
 from jounce.errors import JounceError
 from jounce.interrupts import raising
+from jounce.io.files import DATA_FILES, ROBOT_FILES
 from jounce.reporting.terminal import say
 
 
@@ -20,11 +21,9 @@ def view(
     port: int = 0,
     no_open: bool = False,
     order: int = 4,
-    set_: list[str] | None = None,
-    import_: list[Path] | None = None,
-    allow: list[Path] | None = None,
+    reading: MechanismReading = PLAIN_MECHANISM,
 ) -> int:
-    """Show a mechanism or a robot in the browser, moving.
+    r"""Show a mechanism or a robot in the browser, moving.
 
     With arrows, paths, plots, forces, and a slider for each parameter.
     The page is served on this machine only, and needs no network. Ctrl-C
@@ -42,37 +41,31 @@ def view(
         Only print the address; do not open the browser.
     order
         Highest derivative of arrows and plots, 0 to 30.
-    set_
-        NAME=VALUE of a parameter, with a unit; repeatable.
-    import_
-        Python file with your own joints and forces; repeatable.
-    allow
-        Folder whose files it may name, besides its own; repeatable.
+
+    Examples
+    --------
+      jounce view examples/four_bar.yaml
+      jounce view examples/press.yaml --order 6 --set "stroke=80 mm"
+      jounce view examples/robots/panda.urdf \
+        examples/trajectories/panda_wave.yaml --port 8080 --no-open
     """
-    from jounce.io.robots.loader import ENDINGS
     from jounce.kinematics.solve import checked_order
     from jounce.viewer import view as show
     from jounce.viewer.local_server import check_installed
-    from jounce.viewer.server import MECHANISM_FILES
 
     check_installed()
     subject: object = file
-    try:
+    with errors_about(file):
         checked_order(order)
-        if file.suffix.lower() in MECHANISM_FILES:
-            from jounce.cli.mechanisms import loaded
-
-            subject = loaded(file, set_, import_, allow)
-        elif set_ or import_:
-            raise JounceError("is for mechanism files; a robot has no parameters", name="--set" if set_ else "--import")
+        if file.suffix.lower() in DATA_FILES:
+            subject = reading.mechanism(file)
+        elif reading.set_ or reading.import_:
+            option = "--set" if reading.set_ else "--import"
+            raise JounceError("is for mechanism files; a robot has no parameters", name=option)
         with expecting(file, "mechanism", "robot"):
-            check_ending(file, (*MECHANISM_FILES, *ENDINGS))
-            page = show(subject, trajectory, port=port, order=order, open_page=not no_open, allow=allowed(allow))
-    except JounceError as error:
-        if error.name in ("port", "order"):
-            error.name = f"--{error.name}"
-            raise
-        raise error.located(path=file) from None
+            check_ending(file, (*DATA_FILES, *ROBOT_FILES))
+            folders = allowed(reading.allow)
+            page = show(subject, trajectory, port=port, order=order, open_page=not no_open, allow=folders)
     say(f"{page.page.recording.title or file.name}: {page.url} (Ctrl-C ends)")
     with raising():
         page.wait()
