@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from jounce.mechanism.laws import check_laws
+from jounce.mechanism.law_checks import check_laws
 
 import jounce as jn
 from jounce.errors import JounceError
