@@ -9,8 +9,8 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.dynamics import kinetic_energy, outputs as loads, potential_energy, power_balance, stored_energy
-from jounce.dynamics.inverse import check_loads
-from jounce.errors import MechanismError, no_such
+from jounce.dynamics.masses import check_loads
+from jounce.errors import MechanismError, check_name
 from jounce.kinematics import Motion
 from jounce.plot.figure import draw_columns, finish
 from jounce.plot.geometry import skeleton
@@ -70,9 +70,7 @@ def draw_reactions(motion: Motion, names: Sequence[str] | None = None) -> Any:
         raise MechanismError(message, name="order", value=motion.order)
     known = [*mechanism.joints, *mechanism.drivers, *mechanism.forces]
     for name in names or ():
-        if name not in known:
-            message = no_such("joint, driver or force", name, known)
-            raise MechanismError(message, name="output", value=name)
+        check_name("joint, driver or force", name, known, MechanismError, name="output")
     wanted = names or known
     found: dict[str, Any] = {}
     for name in mechanism.joints:
@@ -126,8 +124,8 @@ def draw_energy(motion: Motion) -> Any:
     >>> [line.get_label() for line in draw_energy(press).axes[0].get_lines()][:2]
     ['kinetic', 'potential']
     """
-    found = {"kinetic": kinetic_energy(motion).total[:, 0], "potential": potential_energy(motion)[:, 0]}
-    stored = stored_energy(motion)
+    found = {"kinetic": kinetic_energy(motion).total.values[:, 0], "potential": potential_energy(motion).values[:, 0]}
+    stored = stored_energy(motion).values
     if _largest(stored):
         found["springs"] = stored
     found["total"] = np.sum(list(found.values()), axis=0)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from jounce.errors import MechanismError, did_you_mean, no_such
+from jounce.errors import MechanismError, check_name, did_you_mean
 from jounce.kinematics import Motion
 from jounce.plot.instants import evenly_chosen
 from jounce.plot.labels import axis_range, quantity_word, scale_of, symbol, unit_label
@@ -131,9 +131,7 @@ def phase_portrait(motion: Motion, output: str, orders: tuple[int, int] = (0, 1)
 
 def _values(motion: Motion, output: str, orders: tuple[int, ...]) -> list[Float[np.ndarray, "time *component"]]:
     """Return derivatives of an output, or raise for a name or an order that there is not."""
-    if output not in motion.outputs:
-        message = no_such("output", output, motion.outputs)
-        raise MechanismError(message, name="output", value=output)
+    check_name("output", output, motion.outputs, MechanismError, name="output")
     values = motion.outputs[output]
     for order in orders:
         if not 0 <= order < values.shape[1]:

@@ -11,7 +11,7 @@ import numpy as np
 from typing_extensions import TypedDict
 
 from jounce.constraints.base import value_fields
-from jounce.dynamics.start import driven
+from jounce.dynamics.start import initial_as_drivers
 from jounce.errors import JounceError, MobilityError
 from jounce.io.files.source import read_source
 from jounce.io.mechanisms.keys import OUTPUTS, output_holder
@@ -227,13 +227,13 @@ class _State:
 
     def _assembled(self) -> tuple[dict[str, Any] | None, dict[str, Any]]:
         told = {"status": "assembled", "message": None, "at": self.instant, "open": None}
-        model = build(driven(self.mechanism)) if self.mechanism.initial else self.model
+        model = build(initial_as_drivers(self.mechanism)) if self.mechanism.initial else self.model
         trial = self._trial(model)
         if trial is None:
             return model.guess, told
         told["open"] = float(np.max(np.abs(trial.gaps))) if np.isfinite(trial.gaps).all() else None
         try:
-            check_assembled(model, trial, self.instant, TOLERANCE)
+            check_assembled(model, trial, self.instant)
         except JounceError as error:
             return None, told | {"status": "open", "message": error.message}
         return trial.coordinates, told

@@ -9,11 +9,11 @@ from typing import Any, TypeVar
 import numpy as np
 
 from jounce.display import Displayed
-from jounce.errors import RobotError, did_you_mean, no_such
+from jounce.errors import RobotError, check_name, did_you_mean
 from jounce.rigid.inertia import Inertia, finite_numbers
 from jounce.robot.floating_base import floating_joints
 from jounce.robot.model import Closure, Joint, Limits, Link
-from jounce.robot.tree import Tree, arrange, ordered
+from jounce.robot.tree import Tree, arrange, ordered, turn_about
 
 Made = TypeVar("Made", bound="AbstractRobot")
 
@@ -38,9 +38,8 @@ class AbstractRobot(Displayed, abc.ABC):
         in_order = ordered(self.links, _by_name("joints", joints, Joint))
         self.joints: Mapping[str, Joint] = MappingProxyType({joint.name: joint for joint in in_order})
         self.base = ({*self.links} - {joint.child for joint in self.joints.values()}).pop()
-        moving = [joint for joint in self.joints.values() if joint.moving]
-        self.joint_names = tuple(joint.name for joint in moving if joint.mimic is None)
-        for joint in moving:
+        self.joint_names = tuple(joint.name for joint in self.moving_joints if joint.mimic is None)
+        for joint in self.moving_joints:
             self._check_mimic(joint)
         self._tree, self.frames = arrange(self.base, self.links, in_order, self.gravity)
         if strict and (massless := self.massless_joints):
@@ -88,19 +87,24 @@ class AbstractRobot(Displayed, abc.ABC):
         return tuple(self.links)
 
     @property
+    def moving_joints(self) -> tuple[Joint, ...]:
+        """Joints that are not fixed, parents before children; some may follow others."""
+        return tuple(joint for joint in self.joints.values() if joint.moving)
+
+    @property
     def moving_links(self) -> tuple[str, ...]:
         """Names of the links that joints move, one for each, in the order of results for each body.
 
         Links fixed to one of them move with it, and their mass is counted there.
         """
-        return tuple(joint.child for joint in self.joints.values() if joint.moving)
+        return tuple(joint.child for joint in self.moving_joints)
 
     @property
     def massless_joints(self) -> tuple[str, ...]:
         """Joints that move no mass, so that no force is needed for any motion of them."""
-        tree, moving = self._tree, [joint.name for joint in self.joints.values() if joint.moving]
+        tree = self._tree
         moved = ((tree.mass > 0) | tree.inertia.any((1, 2))) @ tree.ancestors[:-1]
-        return tuple(name for name, some in zip(moving, moved, strict=True) if not some)
+        return tuple(joint.name for joint, some in zip(self.moving_joints, moved, strict=True) if not some)
 
     @property
     def limits(self) -> dict[str, Limits]:
@@ -143,7 +147,7 @@ class AbstractRobot(Displayed, abc.ABC):
         RobotError
             If there is no such link.
         """
-        self._checked_link(link)
+        check_name("link", link, self.links, RobotError, name="link")
         held = self.links[link].inertia
         whole = payload if held is None else Inertia.total([held, payload])
         links = {**self.links, link: Link(link, whole)}
@@ -158,9 +162,7 @@ class AbstractRobot(Displayed, abc.ABC):
             If there is no such moving joint, or it follows another.
         """
         for name, value in positions.items():
-            if name not in self.joint_names:
-                message = no_such("moving joint", name, self.joint_names)
-                raise RobotError(message, name="locked", value=name)
+            check_name("moving joint", name, self.joint_names, RobotError, name="locked")
             finite_numbers(f"locked.{name}", value, ())
         joints = []
         for joint in self.joints.values():
@@ -197,9 +199,7 @@ class AbstractRobot(Displayed, abc.ABC):
     def coordinates(self, **values: float) -> np.ndarray:
         """Return an array for q, shape (n,), with the named joints at the given values and the others at zero."""
         for name in values:
-            if name not in self.joint_names:
-                message = no_such("moving joint", name, self.joint_names)
-                raise RobotError(message, name="joint", value=name)
+            check_name("moving joint", name, self.joint_names, RobotError, name="joint")
         return np.array([values.get(name, 0.0) for name in self.joint_names], float)
 
     def _changed(self: Made, **parts: Any) -> Made:
@@ -213,8 +213,7 @@ class AbstractRobot(Displayed, abc.ABC):
         if closure.name in self.joints:
             raise RobotError("a joint and a closure have the same name", name=where)
         for link in closure.links:
-            if link not in self.links:
-                raise RobotError(no_such("link", link, self.links), name=where, value=link)
+            check_name("link", link, self.links, RobotError, name=where)
         if len({self.frames[link].body for link in closure.links}) == 1:
             message = "these links are fixed to one another already; a closure joins links that move"
             raise RobotError(message, name=f"{where}.links", value=list(closure.links))
@@ -226,11 +225,6 @@ class AbstractRobot(Displayed, abc.ABC):
         if rotation is None:
             rotation = turned.T @ other_turned
         return dataclasses.replace(closure, points=points, rotation=rotation)
-
-    def _checked_link(self, link: str) -> str:
-        if link not in self.links:
-            raise RobotError(no_such("link", link, self.links), name="link", value=link)
-        return link
 
     def _check_mimic(self, joint: Joint) -> None:
         if joint.mimic is not None and joint.mimic.joint not in self.joint_names:
@@ -266,8 +260,6 @@ def _poses_at_zero(joints: Mapping[str, Joint]) -> dict[str, tuple[np.ndarray, n
 
 def _held(joint: Joint, coordinate: float) -> Joint:
     """Return the fixed joint that holds a moving one at a coordinate."""
-    from jounce.robot.tree import turn_about
-
     position, rotation = joint.position, joint.rotation
     if joint.turning:
         rotation = rotation @ turn_about(joint.axis, coordinate)

@@ -5,15 +5,15 @@ from typing import Any
 
 import numpy as np
 
-from jounce.errors import JounceError, RobotError, did_you_mean, no_such
+from jounce.errors import JounceError, RobotError, check_name, did_you_mean
 from jounce.forces import AbstractForce
 from jounce.jet import Jet
 from jounce.mechanism import Body, Mechanism, time_grid
 from jounce.mechanism.resolve import resolve_motion
 from jounce.rigid.inertia import finite_numbers
 from jounce.robot.abstract_robot import AbstractRobot
-from jounce.robot.closures import Loops, given_coordinates, size_of
-from jounce.robot.mechanism_parts import Parts, on_body
+from jounce.robot.closures import Loops, given_coordinates
+from jounce.robot.mechanism_parts import RobotParts, on_body
 
 DRIVE, START = "_drive", "_start"
 
@@ -93,12 +93,12 @@ def mechanism(
             if name not in robot.joint_names:
                 message = f"no moving joint that follows no other has this name; {_known(robot, name)}"
                 raise RobotError(message, name=kind, value=name)
-    parts = Parts(robot, {*driven, *(x for x in (outputs or {}).values() if isinstance(x, str))}, forces, outputs)
+    parts = RobotParts(robot, {*driven, *(x for x in (outputs or {}).values() if isinstance(x, str))}, forces, outputs)
     wanted = {name: name for name in parts.coordinates} if outputs is None else outputs
     start = _start(robot, q, driven, parameters or {}, time)
     joints = parts.joints()
     if robot.closures:
-        loops = Loops(robot, size_of(robot))
+        loops = Loops(robot)
         free = np.array([name not in driven for name in robot.joint_names], bool)
         start = loops.closed(start, free)
         found = zip(robot.closures.values(), loops.independent(start), strict=True)
@@ -177,7 +177,6 @@ def body_point(robot: AbstractRobot, link: str, point: Any = (0.0, 0.0, 0.0)) ->
     >>> body, point.tolist()
     ('ram', [0.1, 0.0, 0.0])
     """
-    if link not in robot.links:
-        raise RobotError(no_such("link", link, robot.links), name="link", value=link)
+    check_name("link", link, robot.links, RobotError, name="link")
     body, position, rotation = on_body(robot, link)
     return body, position + rotation @ finite_numbers("point", point, (3,))

@@ -10,9 +10,8 @@ import numpy as np
 
 from jounce.constraints import AbstractConstraint, Scalar, Vector
 from jounce.constraints.angles import relative_angle
-from jounce.constraints.base import check_text
 from jounce.constraints.planar import slide
-from jounce.errors import MechanismError
+from jounce.errors import MechanismError, check_choice
 from jounce.jet import Jet, wrap
 from jounce.mechanism import AbstractOutput
 
@@ -22,7 +21,7 @@ LARGEST_DENOMINATOR = 1000  # of ratios that are taken for those of whole number
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Placed:
+class JointPlacement:
     """A moving joint between two bodies of a mechanism, in the frames of these bodies.
 
     Parameters
@@ -87,7 +86,7 @@ class CoupledJoints(AbstractConstraint, type="coupled", space="spatial"):
     }
 
     def __check_init__(self):
-        check_text("kinds", self.kinds, KINDS)
+        check_choice("kinds", self.kinds, KINDS, MechanismError)
         places = PLACES[: len(self.bodies)]
         pairs = {self.roles[:2], self.roles[2:]}
         if len(self.roles) != 4 or set(self.roles) != set(places) or any(len({*pair}) != 2 for pair in pairs):
@@ -106,7 +105,7 @@ class CoupledJoints(AbstractConstraint, type="coupled", space="spatial"):
         return excess if self.period is None else wrap(excess, self.period)
 
 
-def coupled(leader: Placed, follower: Placed, multiplier: float, offset: float) -> CoupledJoints:
+def coupled(leader: JointPlacement, follower: JointPlacement, multiplier: float, offset: float) -> CoupledJoints:
     """Return the constraint that makes a joint follow another: ``q_2 = multiplier q_1 + offset``.
 
     A turning joint whose multiplier is no ratio of whole numbers below a thousand is followed for half a turn either

@@ -24,6 +24,9 @@ FUNCTIONS: dict[str, tuple[int, Callable[..., float]]] = {
 }
 """Functions that every expression knows: number of arguments, and what to call on plain numbers."""
 
+RESERVED = frozenset({"t", *CONSTANTS, *FUNCTIONS})
+"""Names that no parameter can have."""
+
 MAX_CHARACTERS = 2000
 MAX_NESTING = 50
 

@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.errors import MechanismError
+from jounce.jet.turns import whole_periods
 from jounce.trajectory.checks import ArrayLike, check_samples, whole_number
 
 _Samples = Float[np.ndarray, " samples"]
@@ -102,7 +103,7 @@ def _periodic(times: _Samples, values: _Samples, degree: int) -> tuple[_Breakpoi
     if degree % 2 == 0:
         raise MechanismError("samples that repeat need a spline of odd degree", value=degree)
     difference, span = float(values[-1] - values[0]), float(np.ptp(values)) or 1.0
-    advance = WHOLE_TURN * round(difference / WHOLE_TURN)
+    advance = float(whole_periods(difference))
     if abs(difference - advance) > CLOSED * span:
         message = "samples that repeat must end at the value they begin with, or whole turns (in rad) from it"
         raise MechanismError(f"{message}; the last one differs by", value=difference)

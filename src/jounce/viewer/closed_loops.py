@@ -10,7 +10,7 @@ import numpy as np
 
 from jounce.errors import JounceError, RobotError
 from jounce.kinematics import solve
-from jounce.robot.closures import Loops, size_of
+from jounce.robot.closures import Loops
 from jounce.robot.robot import Robot
 from jounce.viewer.mechanisms import recorded
 from jounce.viewer.recording import Recording
@@ -57,7 +57,7 @@ def independent(robot: Robot) -> tuple[str, ...]:
     RobotError
         If there are none.
     """
-    loops = Loops(robot, size_of(robot))
+    loops = Loops(robot)
     start = loops.closed(np.zeros(len(robot.joint_names)), np.ones(len(robot.joint_names), bool))
     freedom = len(start) - sum(len(kept) for kept, _ in loops.independent(start))
     names = sorted(robot.joint_names, key=lambda name: (robot.limits[name].effort is None, _depth(robot, name)))

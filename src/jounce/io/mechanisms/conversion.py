@@ -17,11 +17,10 @@ from jounce.io.files.assignments import assignments
 from jounce.io.files.reading import named_file
 from jounce.io.files.source import read_source
 from jounce.mechanism import Mechanism, TimeGrid
+from jounce.mechanism.mechanism import GROUND, names_column
 from jounce.robot import Robot
 from jounce.robot.closed_loop import DRIVE
 from jounce.trajectory.units import parse_value
-
-RESERVED = ("ground", "time", "derivative", "component")
 
 
 def converted(
@@ -180,7 +179,7 @@ def _file_names(names: Iterable[str]) -> dict[str, str]:
     for name in names:
         new = re.sub(r"[^A-Za-z0-9_-]", "_", name)[:80] or "part"
         new = f"_{new}" if new.startswith("-") else new
-        if new in RESERVED or re.search(r"_d[0-9]+$", new):
+        if new == GROUND or names_column(new):
             new += "_"
         while new in found.values() or (new != name and new in names):
             new += "_"

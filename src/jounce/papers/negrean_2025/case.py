@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.rigid.inertia import Inertia
-from jounce.robot import Robot, Screw, from_screws
+from jounce.robot import JointAxis, Robot, from_screws
 from jounce.trajectory import PolynomialMotion
 
 Samples = Float[np.ndarray, " instants"]
@@ -57,7 +57,7 @@ class Link:
         """Return the robot of one joint: the link on its axis, y, horizontal."""
         moments = (self.inertia_x, self.inertia_y, self.inertia_z)
         link = Inertia(self.mass, (self.center_x, 0.0, self.center_z), moments)
-        return from_screws([Screw((0.0, 1.0, 0.0), inertia=link)], name="arm")
+        return from_screws([JointAxis((0.0, 1.0, 0.0), inertia=link)], name="arm")
 
     @property
     def inertia_about_axis(self) -> float:
