@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 from jounce.cli.mechanisms import outcome, simulated, solved
 from jounce.cli.options import PLAIN_MECHANISM, MechanismReading, errors_about, spare_inputs, written
-from jounce.errors import JounceError, MechanismError
+from jounce.errors import JounceError, MechanismError, check_name
 from jounce.kinematics import Motion
 from jounce.mechanism import Mechanism
 from jounce.reporting.terminal import Bar, say
