@@ -141,7 +141,7 @@ class Recording(abc.ABC):
         """Return what joints, drivers and applied forces do to the bodies; empty where nothing has a mass."""
 
     @abc.abstractmethod
-    def dataset(self) -> Dataset | None:
+    def dataset(self) -> Dataset:
         """Return what an export writes."""
 
     @cached_property
