@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from jounce.mechanism.law_checks import check_laws
 
 import jounce as jn
 from jounce.errors import JounceError
+from jounce.mechanism.law_checks import check_laws
 from jounce.trajectory.sample_errors import derivative_errors
 
 TIMES = np.linspace(0.0, 2.0, 201)
