@@ -309,7 +309,7 @@ def test_a_result_that_cannot_be_written_after_all_ends_with_1(run, monkeypatch,
     def full(*_, **_options):
         raise jn.OutputError("cannot be written: No space left on device", path="motion.csv")
 
-    monkeypatch.setattr("jounce.io.results.write", full)
+    monkeypatch.setattr("jounce.io.write", full)
     status, out, err = run("run", FOUR_BAR, "--order", "0", "--out", tmp_path / "motion.csv")
     assert status == 1
     assert "psi" in out
