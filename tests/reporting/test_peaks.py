@@ -59,6 +59,7 @@ def test_peaks_of_a_motion_that_ends_early():
         assert 0 <= peak.maximum_at <= reached[-1] + 0.01
 
 
+@pytest.mark.slow
 def test_peaks_of_a_simulation():
     free = jn.Mechanism(
         space="planar",
