@@ -4,6 +4,8 @@ import math
 import pathlib
 import sys
 
+import pytest
+
 import jounce as jn
 from jounce.reporting.peaks import Peak, peaks
 from jounce.reporting.terminal import Bar, show_peaks
