@@ -40,6 +40,14 @@ def test_peaks_do_not_depend_on_the_instants(count):
     assert peaks(motion) is peaks(motion)
 
 
+def test_instants_are_solved_together_or_one_by_one(monkeypatch):
+    motion, again = (jn.solve(CRANK, np.linspace(0.0, 1.0, 3), order=1) for _ in range(2))
+    together = peaks(motion)
+    monkeypatch.setattr("jounce.reporting.peaks.CHUNK", 1)
+    for one, other in zip(together, peaks(again), strict=True):
+        assert one.maximum == pytest.approx(other.maximum, rel=1e-12)
+
+
 def test_a_peak_on_an_instant_keeps_its_time():
     (position, velocity) = peaks(jn.solve(CRANK, [0.0, 0.1], order=1))
     assert (velocity.maximum_at, position.minimum_at, position.minimum) == (0.0, 0.0, 0.0)
