@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.reporting.peaks import peaks
+from jounce.reporting.peaks import Peak, derivative_name, peaks
 
 CRANK = jn.Mechanism(
     space="planar",
@@ -38,6 +38,24 @@ def test_peaks_do_not_depend_on_the_instants(count):
         there = 3.0**order * np.sin(3 * at + shift) + 0.25 * 6.0**order * np.sin(6 * at + shift)
         np.testing.assert_allclose(there, [peak.minimum, peak.maximum], rtol=1e-12)
     assert peaks(motion) is peaks(motion)
+
+
+@pytest.mark.parametrize(
+    "minimum, maximum, largest",
+    [
+        (-1.0, 0.5, (True, False)),
+        (-0.5, 1.0, (False, True)),
+        (-1.0, 1.0, (True, True)),
+        (-1.0 + 1e-14, 1.0, (True, True)),  # they differ by rounding
+        (2.0, 2.0, (False, False)),  # it does not change, and has no peak
+    ],
+)
+def test_the_largest_magnitude_is_marked(minimum, maximum, largest):
+    assert Peak("psi", "velocity", "rad/s", minimum, 0.0, maximum, 1.0, 2.0).largest == largest
+
+
+def test_ordinals_of_derivatives():
+    assert [derivative_name(k) for k in (11, 12, 13, 21, 23)] == ["11th", "12th", "13th", "21st", "23rd"]
 
 
 def test_instants_are_solved_together_or_one_by_one(monkeypatch):
