@@ -71,7 +71,9 @@ def rotor(quaternion, vectors=None, tilt=0.0):
     )
 
 
-@pytest.mark.parametrize("tilt", [0.0, 0.2], ids=["guess assembled", "guess tilted"])
+@pytest.mark.parametrize(
+    "tilt", [pytest.param(0.0, marks=pytest.mark.slow, id="guess assembled"), pytest.param(0.2, id="guess tilted")]
+)
 @pytest.mark.parametrize("quaternion", DRAWINGS.values(), ids=DRAWINGS)
 def test_the_bearing_of_a_driven_rotor_carries_nothing(quaternion, tilt):
     found = jn.solve(rotor(quaternion, tilt=tilt), INSTANTS, order=2).outputs

@@ -59,6 +59,7 @@ def test_a_pulse_in_time_is_seen_from_any_distance_and_of_any_width(stop):
             assert motion.kinks == []  # steep, but smooth
 
 
+@pytest.mark.slow
 def test_a_pulse_in_time_backward_and_before_an_event():
     there = jn.simulate(sled(A=STRENGTH), [0.0, 0.4], 1).outputs["x"][-1, :, 0]
     mechanism = sled(A=STRENGTH, at=there[0] - 0.4 * there[1], rate=there[1])

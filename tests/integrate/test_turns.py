@@ -76,6 +76,7 @@ def test_its_power_balance_closes():
     assert float((abs(balance["residual"]) / balance["scale"]).max()) < 1e-13
 
 
+@pytest.mark.slow
 def test_any_instants_and_outputs_asked_for_later_have_the_same_turns():
     found = released("spatial")
     other = np.array([0.1, 2.9, 3.0, 3.3, 6.7])

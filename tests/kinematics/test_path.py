@@ -31,7 +31,13 @@ def test_fifty_turns_with_three_instants_after_the_first():
     np.testing.assert_allclose(motion.outputs["tip"][:, 0, 0], np.cos(TURN * 50 * time), atol=1e-12)
 
 
-@pytest.mark.parametrize("vectors", [None, ([1.0, 0.0, 0.2], [1.0, 0.0, 0.0])], ids=["euler", "vectors"])
+@pytest.mark.parametrize(
+    "vectors",
+    [
+        pytest.param(None, marks=pytest.mark.slow, id="euler"),
+        pytest.param(([1.0, 0.0, 0.2], [1.0, 0.0, 0.0]), id="vectors"),
+    ],
+)
 def test_rotation_driver_over_turns_and_back(vectors):
     time = np.array([0.0, 0.5, 1.0])
     mechanism = spindle(law(0.3, wave=5 * TURN), vectors=vectors)

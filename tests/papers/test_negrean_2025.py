@@ -135,6 +135,7 @@ def test_reproduction_writes_its_files(histories, tmp_path, monkeypatch):
 LINK = "mass: 4 kg\ncenter_x: 200 mm\ncenter_z: 0\ninertia_y: 0.05 kg*m^2\n"
 
 
+@pytest.mark.slow
 def test_measurements_of_ones_own(tmp_path, run):
     """A constant acceleration: the angle, torques and energies in closed form."""
     t = np.linspace(0.2, 1.2, 11)
