@@ -113,7 +113,7 @@ def test_the_files_without_mistakes_are_read(tmp_path, kind):
         (b"\x89PNG\r\n\x1a\n", ", line 1: is not well-formed XML: not well-formed (invalid token) at column 1"),
         (
             b"<robot>\n\x00\x00\x00</robot>",
-            ", line 2: is not a text file: robots are read from URDF and MJCF, both XML",
+            ", line 2: is not a text file: robots are read from URDF, MJCF and SDF, all XML",
         ),
         (b"<robot>\n<link name='\xff'/></robot>", ", line 2: is not well-formed XML: not well-formed (invalid token)"),
         (b"<?xml version='1.0' encoding='klingon'?><robot/>", ": is in no encoding that can be read: unknown encoding"),
