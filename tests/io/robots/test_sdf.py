@@ -256,6 +256,14 @@ BAD = {
         ),
         "closes a loop",
     ),
+    "a mimic that closes a loop": (
+        model(
+            *map(link, "ab"),
+            joint("j", "a", "b"),
+            joint("k", "a", "b", inside='<axis><xyz>0 0 1</xyz><mimic joint="j"/></axis>'),
+        ),
+        "closes a loop",
+    ),
     "a gearbox without joints": (
         model(
             *map(link, "abc"),
@@ -356,3 +364,17 @@ def test_cassie_moves_as_in_pinocchio():
         np.testing.assert_allclose(jacobian @ state[1], 0, atol=1e-12)
         borne = np.linalg.lstsq(jacobian.T, force - known, rcond=1e-9)[0]
         np.testing.assert_allclose(known + jacobian.T @ borne, force, rtol=0, atol=1e-10 * np.abs(force).max())
+
+
+def test_the_hook_of_the_crane_travels_level():
+    robot = jn.load_robot("examples/robots/luffing_crane.sdf")
+    mechanism = robot.mechanism(drivers={"luff": "0.25*cos(t)"}, time=np.linspace(0, np.pi, 9))
+    motion = jn.solve(mechanism, order=2)
+    hook = motion.point(*jn.robot.body_point(robot, "hook")).values[:, 0]
+    assert np.ptp(hook[:, 0]) > 10.0  # m, as the file says of itself
+    assert np.ptp(hook[:, 2]) < 0.05
+    pin, luff = np.array([-7.6, 0.0, 5.18]), 0.95 + motion.outputs["luff"][:, 0]
+    head = np.stack([14 * np.cos(luff), 0 * luff, 2 + 14 * np.sin(luff)], axis=1)
+    tail = head - 2.94 / 9 * (hook - head)  # the jib is straight: its tail is 17.41 m from the pin of the stay
+    np.testing.assert_allclose(np.linalg.norm(hook - head, axis=1), 9.0, rtol=1e-14)
+    np.testing.assert_allclose(np.linalg.norm(tail - pin, axis=1), 17.41, rtol=1e-14)

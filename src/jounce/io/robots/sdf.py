@@ -58,7 +58,8 @@ def read_sdf(root: Element, faults: Faults) -> Robot:
     that its coordinate stays that of the file. A universal joint becomes two turns, a ball three about moving axes z,
     y, x, with massless links between. A joint whose axis passes beside the origin of its child has a massless link
     there. A gearbox makes the second of its two joints follow the first. A link without ``<inertial>`` weighs 1 kg, as
-    SDF says; there is a warning of it. Springs, shapes, sensors and plugins are left out.
+    SDF says; there is a warning of it. Springs, shapes, sensors and plugins are left out, and limits, damping and
+    friction of a joint that closes a loop.
 
     Parameters
     ----------
@@ -294,6 +295,10 @@ class _Reader:
         if joint.kind not in CLOSED_BY:
             message = f"a {joint.kind} joint closes a loop here; make it two revolute joints with a link between"
             raise joint.element.error(message, "joints", joint.name, value=joint.kind)
+        mimics = [x for axis in joint.element.every("axis") for x in axis.every("mimic")]
+        if mimics:
+            message = "closes a loop, and so has no coordinate that could follow another"
+            raise mimics[0].error(message, "joints", joint.name, "mimic")
         ends = self._place(joint.parent), self._place(joint.child)
         points = [Place(joint.origin, np.eye(3)).seen_from(place).position for place in ends]
         axis = ends[0].rotation.T @ joint.axes[0].direction if joint.axes else None
