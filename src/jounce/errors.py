@@ -261,7 +261,7 @@ class RobotError(JounceError):
 
 
 class RobotFileError(RobotError):
-    """A URDF or MJCF file cannot be read, or describes no possible robot."""
+    """A URDF, MJCF or SDF file cannot be read, or describes no possible robot."""
 
 
 class TrajectoryError(JounceError):

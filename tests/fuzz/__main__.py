@@ -21,7 +21,7 @@ import time
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 MEMORY = 1_000_000_000  # bytes
-WEIGHTS = {"yaml": 3, "toml": 2, "json": 2, "urdf": 3, "mjcf": 3}  # of 1 for the others
+WEIGHTS = {"yaml": 3, "toml": 2, "json": 2, "urdf": 3, "mjcf": 3, "sdf": 3}  # of 1 for the others
 
 
 def main() -> int:

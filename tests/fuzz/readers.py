@@ -107,6 +107,20 @@ INCLUDED = """<mujoco model="m"><include file="part.xml"/><default><joint dampin
 <equality><joint joint1="k" joint2="j" polycoef="0 1 0 0 0"/></equality>
 <actuator><motor joint="j" forcerange="-3 3" ctrlrange="-1 1"/></actuator></mujoco>
 """
+EVERY_JOINT = """<sdf version="1.9"><model name="m"><frame name="f" attached_to="a">
+<pose degrees="true">1 0 0 0 90 0</pose></frame><link name="a"/><link name="b">
+<pose relative_to="f">1 0 0 0 0 0</pose></link><link name="c"><inertial><mass>2</mass><inertia>
+<ixx>1</ixx><ixy>0.1</ixy></inertia></inertial></link><link name="d"/><link name="e"/>
+<joint name="j" type="revolute"><parent>a</parent><child>b</child><axis>
+<xyz expressed_in="f">1 0 0</xyz><limit><lower>-1</lower></limit></axis></joint>
+<joint name="k" type="continuous"><parent>c</parent><child>a</child><axis/></joint>
+<joint name="g" type="gearbox"><parent>b</parent><child>c</child><gearbox_ratio>3</gearbox_ratio>
+<gearbox_reference_body>a</gearbox_reference_body><axis><xyz>0 0 -1</xyz></axis><axis2/></joint>
+<joint name="u" type="universal"><parent>c</parent><child>d</child><axis><xyz>1 0 0</xyz></axis>
+<axis2><xyz>0 1 0</xyz></axis2></joint><joint name="s" type="ball"><parent>d</parent>
+<child>e</child></joint><joint name="loop" type="prismatic"><parent>e</parent><child>a</child>
+<axis/></joint></model></sdf>
+"""
 MJCF_BESIDE = {
     "part.xml": "<mujoco><worldbody><body name='c'><joint name='l'/><geom size='1'/></body></worldbody></mujoco>",
     "part.obj": "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n",
@@ -126,6 +140,7 @@ READERS = {
     "json": Reader(jn.load, _as(".json"), ".json", SAMPLES_BESIDE),
     "samples": Reader(_samples, lambda: [TABLE, TABLE.replace("time,value\n", ""), WIDE], ".csv", CAM_BESIDE),
     "urdf": Reader(jn.load_robot, lambda: _read(ROBOTS / "scara.urdf", ROBOTS / "ur5.urdf"), ".urdf"),
+    "sdf": Reader(jn.load_robot, lambda: [EVERY_JOINT, *_read(ROBOTS / "luffing_crane.sdf")], ".sdf"),
     "mjcf": Reader(
         jn.load_robot,
         lambda: [INCLUDED, *_read(*(ROBOTS / f"{name}.xml" for name in ("planar_arm", "five_bar", "human_arm")))],

@@ -75,7 +75,7 @@ def test_any_value_in_any_place(reader, data):
     check(reader, json.dumps(changed(good, at, data.draw(plain)), ensure_ascii=False).encode("utf-8", "replace"))
 
 
-@pytest.mark.parametrize("reader", ["urdf", "mjcf"])
+@pytest.mark.parametrize("reader", ["urdf", "mjcf", "sdf"])
 @thorough
 @given(data=st.data())
 def test_any_text_in_any_attribute(reader, data):

@@ -16,10 +16,18 @@ NOT_READ = "ur_description/urdf/ur3.urdf"  # holds no robot: Pinocchio refuses i
 
 def files():
     """Return the 68 URDF files that Pinocchio reads, by their place below the folder of robots."""
+    return {name: path for name, path in _files(".urdf").items() if name != NOT_READ}
+
+
+def sdf_files():
+    """Return the five SDF files, all of the robot Cassie, likewise."""
+    return _files(".sdf")
+
+
+def _files(suffix):
     package = importlib.metadata.distribution("example-robot-data")
-    found = [file for file in package.files or () if file.suffix == ".urdf"]
+    found = [file for file in package.files or () if file.suffix == suffix]
     named = {str(file).partition("/robots/")[2]: Path(str(package.locate_file(file))) for file in found}
-    del named[NOT_READ]
     return dict(sorted(named.items()))
 
 

@@ -31,7 +31,7 @@ def convert(
 ) -> int:
     r"""Turn a mechanism file into another format, a robot into a mechanism.
 
-    Mechanism files are YAML, TOML or JSON, robot files URDF or MJCF.
+    Mechanism files are YAML, TOML or JSON, robot files URDF, MJCF or SDF.
 
     Values keep their units and expressions; comments are lost. What is
     written is read back before it takes its place.
@@ -39,7 +39,7 @@ def convert(
     Parameters
     ----------
     source
-        Mechanism file, or robot file: .urdf or .xml.
+        Mechanism file, or robot file: .urdf, .xml or .sdf.
     target
         Mechanism file to write: .yaml, .yml, .toml or .json.
     drive

@@ -28,7 +28,7 @@ def inspect(
     Parameters
     ----------
     file
-        Mechanism file, or robot file: .urdf or .xml.
+        Mechanism file, or robot file: .urdf, .xml or .sdf.
     strict
         Refuse a robot whose links are as those of no real one.
     json

@@ -42,7 +42,7 @@ def check(
     Parameters
     ----------
     robot
-        Robot file: URDF (.urdf) or MJCF (.xml).
+        Robot file: URDF (.urdf), MJCF (.xml) or SDF (.sdf).
     trajectory
         Samples (.csv), laws or a motion (.yaml, .toml, .json).
     limits
@@ -115,7 +115,7 @@ def torques(
     Parameters
     ----------
     robot
-        Robot file: URDF (.urdf) or MJCF (.xml).
+        Robot file: URDF (.urdf), MJCF (.xml) or SDF (.sdf).
     trajectory
         Samples (.csv), laws or a motion (.yaml, .toml, .json).
     rates

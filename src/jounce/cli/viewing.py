@@ -32,7 +32,7 @@ def view(
     Parameters
     ----------
     file
-        Mechanism file, or robot file: .urdf or .xml.
+        Mechanism file, or robot file: .urdf, .xml or .sdf.
     trajectory
         Of a robot (.csv, .yaml, .toml, .json); it swings without.
     port

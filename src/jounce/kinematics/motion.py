@@ -1,6 +1,5 @@
 """The result of a solve: outputs and any point of any body, with their derivatives, at every instant."""
 
-from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
@@ -29,7 +28,7 @@ from jounce.mechanism.axis_angles import AttitudeHistory, attitudes_of
 from jounce.mechanism.builder import counted_as_in
 from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.system import POSITION_COMPONENTS, Group, group_elements
-from jounce.shapes import Numbers
+from jounce.shapes import ArrayLike, Numbers
 
 _UNDEFINED = Status.UNDEFINED.advice.partition(": ")[2]
 
@@ -160,7 +159,7 @@ class Motion(Displayed):
         dataset["derivative"].attrs = {"long_name": "order of the time derivative"}
         return dataset
 
-    def point(self, body: str, point: Sequence[Any]) -> Any:
+    def point(self, body: str, point: ArrayLike) -> Any:
         """Return the position of any point of a body in the global frame and its derivatives.
 
         Parameters

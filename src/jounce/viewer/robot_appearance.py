@@ -139,11 +139,13 @@ def file_shapes(path: Path, allow: Iterable[str | PathLike[str]] = ()) -> Shapes
     Parameters
     ----------
     path : Path
-        URDF or MJCF.
+        URDF, MJCF or SDF; shapes of SDF are not read.
     allow
         Folders besides that of the file that meshes may be below; a warning tells of those that lie elsewhere.
     """
     root = read_markup(str(path))
+    if root.tag == "sdf":
+        return {}
     return _of_urdf(root, MeshFiles(path, allow)) if root.tag == "robot" else _of_mjcf(root, path, allow)
 
 

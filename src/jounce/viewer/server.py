@@ -121,7 +121,7 @@ def view(
     ----------
     subject : Mechanism, Robot, or path of a file
         A mechanism (.yaml, .yml, .toml or .json) with a time grid: it is solved, or simulated if it has initial
-        conditions. A robot (.urdf, or .xml for MJCF): its shapes are shown where the file has some.
+        conditions. A robot (.urdf, .sdf, or .xml for MJCF): its shapes are shown where the file has some.
     trajectory : JointTrajectory, or path of a file, optional
         Of a robot; each joint swings within its limits unless given.
     port : int, default 0

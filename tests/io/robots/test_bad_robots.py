@@ -113,13 +113,13 @@ def test_the_files_without_mistakes_are_read(tmp_path, kind):
         (b"\x89PNG\r\n\x1a\n", ", line 1: is not well-formed XML: not well-formed (invalid token) at column 1"),
         (
             b"<robot>\n\x00\x00\x00</robot>",
-            ", line 2: is not a text file: robots are read from URDF and MJCF, both XML",
+            ", line 2: is not a text file: robots are read from URDF, MJCF and SDF, all XML",
         ),
         (b"<robot>\n<link name='\xff'/></robot>", ", line 2: is not well-formed XML: not well-formed (invalid token)"),
         (b"<?xml version='1.0' encoding='klingon'?><robot/>", ": is in no encoding that can be read: unknown encoding"),
         (
-            b"<sdf/>",
-            ", line 1: is no robot file, got '<sdf>'; the root element of a URDF is <robot>, that of an MJCF file",
+            b"<world/>",
+            ", line 1: is no robot file, got '<world>'; the root element of a URDF is <robot>, of an MJCF file",
         ),
         (b"<robot/>", ", line 1: a robot needs at least one <link>"),
         (b"<a>" * 3000, ", line 1: nested more than 2000 deep"),

@@ -2,5 +2,5 @@
 
 DATA_FILES = (".yaml", ".yml", ".toml", ".json")
 """Endings of files of mechanisms, laws and limits: of data that are read and written alike."""
-ROBOT_FILES = (".urdf", ".xml")
+ROBOT_FILES = (".urdf", ".xml", ".sdf")
 """Endings of files of robots."""

@@ -8,6 +8,7 @@ from jounce.rigid.inertia import ADVICE, NEGATIVE, TRIANGLE, WITHOUT_MASS, Inert
 MASSLESS = "these links move but have no mass"
 IDLE = "these links move and neither have nor carry mass, so that a simulation has no answer unless they are driven"
 FOLLOWS_NONE = "these joints follow one that the file does not have, and are taken as free"
+WITHOUT_INERTIAL = "these links have no inertia of their own, which SDF takes for 1 kg with moments of 1 kg m^2"
 HEADINGS = {
     NEGATIVE: "a principal moment of inertia is negative",
     TRIANGLE: "a principal moment of inertia exceeds the sum of the others",

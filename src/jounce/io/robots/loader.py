@@ -12,6 +12,7 @@ from jounce.io.files import ROBOT_FILES
 from jounce.io.files.reading import check_allowed
 from jounce.io.robots.faults import Faults
 from jounce.io.robots.mjcf import read_mjcf
+from jounce.io.robots.sdf import read_sdf
 from jounce.io.robots.urdf import read_urdf
 from jounce.io.robots.xml_elements import Element, read_markup
 from jounce.robot.robot import Robot
@@ -28,16 +29,16 @@ def load_robot(
     strict: bool = False,
     allow: Iterable[str | PathLike[str]] = (),
 ) -> Robot:
-    """Read a robot from a URDF or MJCF file.
+    """Read a robot from a URDF, MJCF or SDF file.
 
-    Which of the two it is, the root element says. Only what moves is read: links, joints and their limits, masses and
+    Which of them it is, the root element says. Only what moves is read: links, joints and their limits, masses and
     inertias, from MJCF also gravity and the forces of actuators; shapes and meshes need not be there. URDF needs the
     extra ``robots``, MJCF the extra ``mjcf``.
 
     Parameters
     ----------
     path
-        A file ending in .urdf or .xml.
+        A file ending in .urdf, .xml or .sdf.
     floating_base : bool or str, default False
         Set the base free, by three slides and three turns, as `Robot.with_floating_base` does; three letters give the
         sequence of the turns. A base that is only a massless frame with one link fixed to it is left out.
@@ -63,8 +64,8 @@ def load_robot(
     -----
     RobotWarning
         Links are as those of no real robot: negative moments of inertia, one that exceeds the sum of the other two by
-        more than rounding, moments without mass, links that move and have no mass. All is computed with the numbers of
-        the file; one warning names the links.
+        more than rounding, moments without mass, links that move and have no mass, links of SDF without inertia. All is
+        computed with the numbers of the file; one warning names the links.
 
     Examples
     --------
@@ -93,8 +94,10 @@ def load_robot(
         if suffix != ".xml":
             raise RobotFileError("MuJoCo reads MJCF only from files whose names end in .xml; rename it", path=name)
         robot = read_mjcf(root, faults, check_allowed(allow))
+    elif root.tag == "sdf":
+        robot = read_sdf(root, faults)
     else:
-        message = "is no robot file; the root element of a URDF is <robot>, that of an MJCF file is <mujoco>"
+        message = "is no robot file; the root element of a URDF is <robot>, of an MJCF file <mujoco>, of an SDF <sdf>"
         raise root.error(message, value=f"<{root.tag}>")
     if (warning := faults.warning()) is not None:
         warnings.warn(warning, stacklevel=2)

@@ -11,6 +11,7 @@ from jaxtyping import Float
 
 from jounce.errors import RobotError, RobotFileError, did_you_mean, no_such
 from jounce.io.robots.faults import FOLLOWS_NONE, IDLE, MASSLESS, Faults
+from jounce.io.robots.named_elements import NamedElements
 from jounce.io.robots.xml_elements import Element
 from jounce.rigid.inertia import Inertia
 from jounce.robot.floating_base import floating_joints
@@ -59,14 +60,14 @@ def read_urdf(root: Element, faults: Faults, massless: bool = False) -> Robot:
     links, joints = _named(root, "link"), _named(root, "joint")
     if not links:
         raise root.error("a robot needs at least one <link>")
-    lines = _Lines(root)
+    lines = NamedElements(root)
     made = []
     for name, element in links.items():
         lines.add(element, "links", name)
         made.append(_link(name, element, faults))
     for name, element in joints.items():
         _check_joint(element, name, links)
-        lines.add_joint(element, name)
+        _add_joint(lines, element, name)
     parts: list[Joint] = []
     mimics = _mimics(joints, faults)
     try:
@@ -86,34 +87,12 @@ def read_urdf(root: Element, faults: Faults, massless: bool = False) -> Robot:
         raise lines.placed(error) from None
 
 
-class _Lines:
-    """The elements behind the dotted names that the robot's own checks speak of."""
-
-    def __init__(self, root: Element):
-        self.root = root
-        self.elements: dict[str, Element] = {}
-
-    def add(self, element: Element | None, *name: str) -> None:
-        if element is not None:
-            self.elements.setdefault(".".join(name), element)
-
-    def add_joint(self, element: Element, name: str) -> None:
-        self.add(element, "joints", name)
-        for tag in ("parent", "child", "axis", "mimic"):
-            self.add(element.first(tag), "joints", name, tag)
-        for key in ("damping", "friction"):
-            self.add(element.first("dynamics"), "joints", name, key)
-
-    def placed(self, error: RobotError) -> RobotFileError:
-        """Return an error of the robot with the file and the line that it is about."""
-        name = error.name or ""
-        if isinstance(error.value, list) and name in ("links", "joints") and error.value:
-            name = f"{name}.{error.value[-1]}"
-        while name and name not in self.elements:
-            name = name.rpartition(".")[0]
-        element = self.elements.get(name, self.root)
-        shown = None if error.name is None else ascii(error.name)[1:-1]
-        return RobotFileError(error.message, path=element.path, line=element.line, name=shown, value=error.value)
+def _add_joint(lines: NamedElements, element: Element, name: str) -> None:
+    lines.add(element, "joints", name)
+    for tag in ("parent", "child", "axis", "mimic"):
+        lines.add(element.first(tag), "joints", name, tag)
+    for key in ("damping", "friction"):
+        lines.add(element.first("dynamics"), "joints", name, key)
 
 
 def _named(root: Element, tag: str) -> dict[str, Element]:

@@ -17,13 +17,14 @@ MAX_DEPTH = 2000
 
 @dataclass(eq=False)
 class Element:
-    """One element of an XML file: its tag, attributes and children, and the line where it begins."""
+    """One element of an XML file: its tag, attributes, children and text, and the line where it begins."""
 
     tag: str
     attributes: dict[str, str]
     path: str
     line: int
     children: list[Element] = field(default_factory=list)
+    content: str = ""  # the text within, but for that of the children
 
     def first(self, tag: str) -> Element | None:
         """Return the first child of a tag, None if there is none."""
@@ -66,6 +67,13 @@ class Element:
         text = self.attributes.get(key)
         if text is None:
             return None
+        return self._parsed(text, f"{key} must be", count, name, infinite)
+
+    def content_numbers(self, count: int, *name: str, infinite: bool = False) -> list[float]:
+        """Return the finite numbers that an element holds as its text."""
+        return self._parsed(self.content.strip(), f"<{self.tag}> must hold", count, name, infinite)
+
+    def _parsed(self, text: str, words: str, count: int, name: tuple[str, ...], infinite: bool) -> list[float]:
         what = "a finite number" if count == 1 else f"{count} finite numbers"
         try:
             values = [float(word) for word in text.split()]
@@ -76,7 +84,7 @@ class Element:
             most = (
                 f" of at most {LARGEST_NUMBER:g}" if values and all(map(math.isfinite, values)) and not usable else ""
             )
-            raise self.error(f"{key} must be {what}{most}", *name, value=text)
+            raise self.error(f"{words} {what}{most}", *name, value=text)
         return values
 
     def check_children(self, known: Iterable[str], *name: str) -> None:
@@ -112,7 +120,9 @@ def read_markup(path: str) -> Element:
         raise RobotFileError("the file is empty", path=path)
     if b"\0" in content and not content.startswith((b"\xff\xfe", b"\xfe\xff")):
         line = content.count(b"\n", 0, content.index(b"\0")) + 1
-        raise RobotFileError("is not a text file: robots are read from URDF and MJCF, both XML", path=path, line=line)
+        raise RobotFileError(
+            "is not a text file: robots are read from URDF, MJCF and SDF, all XML", path=path, line=line
+        )
     return _Reader(path).read(content)
 
 
@@ -126,6 +136,8 @@ class _Reader:
         self.parser = expat.ParserCreate()
         self.parser.StartElementHandler = self.start
         self.parser.EndElementHandler = self.end
+        self.parser.CharacterDataHandler = self.characters
+        self.parser.buffer_text = True
         self.parser.EntityDeclHandler = self.entity
 
     def read(self, content: bytes) -> Element:
@@ -158,6 +170,9 @@ class _Reader:
 
     def end(self, _tag: str) -> None:
         self.open.pop()
+
+    def characters(self, text: str) -> None:
+        self.open[-1].content += text
 
     def entity(self, name: str, *_rest: object) -> None:
         message = "declares an entity, which robot files have no use for; write its text where it is used"

@@ -1,0 +1,356 @@
+"""Robots from SDF files: loops are native there, so that a tree is chosen and what is left closes it."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.errors import RobotError
+from jounce.io.robots.faults import WITHOUT_INERTIAL, Faults
+from jounce.io.robots.named_elements import NamedElements
+from jounce.io.robots.sdf_joints import SdfJoint, read_joint
+from jounce.io.robots.sdf_poses import (
+    HERE,
+    WORLD,
+    Frames,
+    Place,
+    check_known,
+    flag_of,
+    needed,
+    number_of,
+    only,
+    pose_of,
+    text_of,
+)
+from jounce.io.robots.xml_elements import Element
+from jounce.rigid.inertia import Inertia
+from jounce.robot.floating_base import floating_joints
+from jounce.robot.model import Closure, Joint, Link, Mimic, leaders
+from jounce.robot.robot import Robot
+
+GRAVITY = (0.0, 0.0, -9.81)
+CLOSED_BY = {"fixed": "weld", "revolute": "pin", "continuous": "pin", "prismatic": "slider", "ball": "connect"}
+TREE_FIRST = ("fixed", "revolute", "continuous", "prismatic", "universal", "revolute2", "ball")
+TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+AXIS_TOLERANCE = 1e-5  # files give directions with six digits
+SHOWN = ("visual", "collision", "sensor", "light", "audio_sink", "audio_source", "projector", "particle_emitter")
+LINK = ("pose", "inertial", "gravity", "enable_wind", "self_collide", "kinematic", "must_be_base_link", "battery")
+LINK += ("velocity_decay", "material", "plugin", "frame", *SHOWN)
+MODEL_PARTS = ("static", "self_collide", "allow_auto_disable", "enable_wind", "pose", "link", "joint", "frame")
+MODEL_PARTS += ("plugin", "gripper", "include", "model")
+INERTIAL = ("pose", "mass", "inertia", "density", "auto_inertia_params", "fluid_added_mass", "frame")
+ROOT = ("model", "world")
+
+
+def read_sdf(root: Element, faults: Faults) -> Robot:
+    """Return the robot that an SDF file describes; its loops become closures.
+
+    The file holds one model, alone or in a world. The base is the link ``world`` if a joint holds the model there or it
+    is static, else the model's canonical link; gravity, 9.81 m/s^2, points down in the world where the file puts it.
+    Joints of one axis come into the tree before those of two, and balls last, each kind in the order of the file; what
+    closes a loop then is a closure: a revolute joint a pin, a prismatic one a slider, a ball a point, a fixed one a
+    weld. A joint of the tree whose child is nearer the base is taken the other way round, about the opposite axis, so
+    that its coordinate stays that of the file. A universal joint becomes two turns, a ball three about moving axes z,
+    y, x, with massless links between. A joint whose axis passes beside the origin of its child has a massless link
+    there. A gearbox makes the second of its two joints follow the first. A link without ``<inertial>`` weighs 1 kg, as
+    SDF says; there is a warning of it. Springs, shapes, sensors and plugins are left out, and limits, damping and
+    friction of a joint that closes a loop.
+
+    Parameters
+    ----------
+    root : Element
+        The element ``<sdf>``.
+    faults : Faults
+        Takes what no real robot has.
+
+    Raises
+    ------
+    RobotFileError
+        Something is missing, unknown or impossible; the message has the line.
+    """
+    version = _version(root)
+    model, place = _model(root)
+    check_known(model, MODEL_PARTS)
+    for tag in ("include", "model"):
+        for child in model.every(tag):
+            message = f"<{tag}> within a model is not read; write its links and joints into this model"
+            raise child.error(message, value=child.attributes.get("name"))
+    elements = _named(model)
+    if not any(element.tag == "link" for element in elements.values()):
+        raise model.error("a robot needs at least one <link>")
+    return _Reader(model, place, Frames(model, elements), version, faults).robot()
+
+
+def _model(root: Element) -> tuple[Element, Place]:
+    """Return the model of a file, and its pose in the world."""
+    check_known(root, (*ROOT, "actor", "light"))
+    worlds = root.every("world")
+    models = [model for holder in (root, *worlds) for model in holder.every("model")]
+    if len(models) != 1:
+        message = f"must hold one <model>, it holds {len(models)}"
+        raise (models[1] if models else root).error(message, value=[m.attributes.get("name") for m in models])
+    pose = only(models[0], "pose")
+    relative = "" if pose is None else pose.attributes.get("relative_to", "")
+    if pose is not None and relative not in ("", WORLD):
+        raise pose.error("a model is placed in the world, relative to nothing else", "pose", value=relative)
+    if models[0].attributes.get("placement_frame"):
+        raise models[0].error("placement_frame is not read; place the model by its own frame", "placement_frame")
+    return models[0], pose_of(models[0])
+
+
+def _version(root: Element) -> tuple[int, ...]:
+    text = root.text("version", "version")
+    try:
+        return tuple(int(part) for part in text.split("."))
+    except ValueError:
+        raise root.error(
+            "the version must be numbers with points between, such as 1.7", "version", value=text
+        ) from None
+
+
+def _named(model: Element) -> dict[str, Element]:
+    """Return links, joints and frames by name."""
+    found: dict[str, Element] = {}
+    for tag in ("link", "joint", "frame"):
+        for element in model.every(tag):
+            name = element.text("name", f"{tag}s")
+            if name in found:
+                message = f"this name is given twice, first in line {found[name].line}"
+                raise element.error(message, f"{tag}s", value=name)
+            if name == WORLD or (name.startswith("__") and name.endswith("__")):
+                raise element.error("SDF keeps this name for itself", f"{tag}s", value=name)
+            found[name] = element
+    return found
+
+
+class _Reader:
+    """Turns the links and joints of a model into those of a tree, and closures."""
+
+    def __init__(self, model: Element, place: Place, frames: Frames, version: tuple[int, ...], faults: Faults):
+        self.model, self.place, self.frames, self.version, self.faults = model, place, frames, version, faults
+        self.elements, self.lines = frames.elements, NamedElements(model)
+        self.links: list[Link] = []
+        self.joints: list[Joint] = []
+        self.taken = {WORLD, *self.elements}
+        for name, element in self.elements.items():
+            self.lines.add(element, f"{element.tag}s", name)
+            self.lines.add(element, "closures", name)
+
+    def robot(self) -> Robot:
+        """Return the robot."""
+        inertias = {n: self._inertia(n, x) for n, x in self.elements.items() if x.tag == "link"}
+        every = [
+            read_joint(name, x, self.frames, self.version) for name, x in self.elements.items() if x.tag == "joint"
+        ]
+        gears = [joint for joint in every if joint.kind == "gearbox"]
+        joints = [joint for joint in every if joint.kind != "gearbox"]
+        held = any(WORLD in (joint.parent, joint.child) for joint in joints)
+        fixed = flag_of(self.model, "static", "static")
+        base = WORLD if held or fixed else self.frames.canonical_link()
+        tree, closing = self._divided(joints, base, [*inertias, *([WORLD] if base == WORLD else [])], fixed)
+        self.links += [Link(WORLD)] if base == WORLD else []
+        self.links += [Link(name, inertia) for name, inertia in inertias.items()]
+        mimics = self._mimics(tree, gears)
+        for joint in tree:
+            self._add(joint, mimics)
+        closures = [self._closure(joint) for joint in closing]
+        name = self.model.attributes.get("name", "robot")
+        upright = self.place.then(self._place(base)).rotation if base != WORLD else np.eye(3)
+        try:
+            return Robot(name, self.links, self.joints, upright.T @ GRAVITY, closures, strict=False)
+        except RobotError as error:
+            raise self.lines.placed(error) from None
+
+    def _place(self, link: str) -> Place:
+        """Return where a link is in the model."""
+        return HERE.seen_from(self.place) if link == WORLD else self.frames.place(link)
+
+    def _inertia(self, name: str, element: Element) -> Inertia | None:
+        where = ("links", name)
+        check_known(element, LINK, *where)
+        inertial = only(element, "inertial", *where)
+        if inertial is None:
+            message = "<inertial> is missing: SDF takes the link for 1 kg with moments of 1 kg m^2; give it its own"
+            self.faults.add(WITHOUT_INERTIAL, name, element.error(message, *where))
+            return Inertia(1.0, tensor=np.eye(3))
+        where = (*where, "inertial")
+        check_known(inertial, INERTIAL, *where)
+        if inertial.attributes.get("auto", "false").strip() in ("true", "1"):
+            message = 'auto="true" asks for an inertia from shapes, which are not read; write mass and inertia'
+            raise inertial.error(message, *where)
+        moments = only(inertial, "inertia", *where)
+        if moments is not None:
+            check_known(moments, TENSOR, *where, "inertia")
+        mass = number_of(inertial, "mass", *where, default=1.0)
+        given = (
+            number_of(moments, key, *where, "inertia", default=float(key[1] == key[2]))
+            if moments is not None
+            else float(key[1] == key[2])
+            for key in TENSOR
+        )
+        xx, xy, xz, yy, yz, zz = given
+        if mass < 0:
+            raise inertial.error("must be greater than zero", *where, "mass", value=mass)
+        tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        if mass == 0 and not tensor.any():
+            return None
+        inertia = Inertia(mass, tensor=tensor, strict=False)
+        self.faults.check(inertia, name, (moments or inertial).line)
+        return inertia.moved(*pose_of(inertial, *where))
+
+    def _divided(
+        self, joints: Sequence[SdfJoint], base: str, links: Sequence[str], fixed: bool
+    ) -> tuple[list[SdfJoint], list[SdfJoint]]:
+        """Return the joints of a tree, each away from the base, and those that close its loops."""
+        group = {link: link for link in links}
+
+        def head(link: str) -> str:
+            while group[link] != link:
+                group[link] = link = group[group[link]]
+            return link
+
+        if fixed and not any(WORLD in (joint.parent, joint.child) for joint in joints):
+            link = self.frames.canonical_link()
+            place = self.frames.place(link).position
+            joints = [SdfJoint(self._unused(f"{link}_{WORLD}"), "fixed", WORLD, link, place, (), self.model), *joints]
+        chosen = set()
+        for joint in sorted(joints, key=lambda joint: TREE_FIRST.index(joint.kind)):
+            first, second = head(joint.parent), head(joint.child)
+            if first != second:
+                group[second] = first
+                chosen.add(joint.name)
+        for link in links:
+            if head(link) != head(base):
+                element = self.elements[link]
+                raise element.error(f"is joined to {base} by nothing; give it a joint", "links", link)
+        tree, reached = [], {base}
+        waiting = [joint for joint in joints if joint.name in chosen]
+        while waiting:
+            later = []
+            for joint in waiting:
+                if joint.parent in reached or joint.child in reached:
+                    away = joint if joint.parent in reached else joint.reversed()
+                    tree.append(away)
+                    reached.add(away.child)
+                else:
+                    later.append(joint)
+            waiting = later
+        return tree, [joint for joint in joints if joint.name not in chosen]
+
+    def _unused(self, name: str) -> str:
+        while name in self.taken:
+            name += "_"
+        self.taken.add(name)
+        return name
+
+    def _add(self, joint: SdfJoint, mimics: dict[str, Mimic]) -> None:
+        """Add a joint of the tree, with the massless links that it needs."""
+        parent, child = self._place(joint.parent), self._place(joint.child)
+        here = Place(joint.origin, child.rotation)  # of the joint, with the axes of the child
+        beside = joint.kind != "fixed" and bool(np.any(np.abs(joint.origin - child.position) > 1e-12))
+        held = self._unused(f"{joint.child}_{joint.name}") if beside else joint.child
+        if beside:
+            self.links.append(Link(held))
+        first = (child if joint.kind == "fixed" else here).seen_from(parent)
+        for part in self._parts(joint, held, child.rotation, mimics):
+            self.joints.append(dataclasses.replace(part, position=first.position, rotation=first.rotation))
+            self.lines.add(joint.element, "joints", part.name)
+            first = HERE
+        if beside:
+            offset = child.seen_from(here).position
+            self.joints.append(Joint(self._unused(f"{joint.child}_fixed"), held, joint.child, "fixed", offset))
+
+    def _parts(
+        self, joint: SdfJoint, child: str, rotation: Float[np.ndarray, "3 3"], mimics: dict[str, Mimic]
+    ) -> list[Joint]:
+        """Return the joints that one stands for, from its parent to the link given, all at one place."""
+        if joint.kind == "ball":
+            links, parts = floating_joints(child, prefix=joint.name)
+            self.links += links[4:]
+            return [dataclasses.replace(parts[3], parent=joint.parent), *parts[4:]]
+        if joint.kind == "fixed":
+            return [Joint(joint.name, joint.parent, child, "fixed")]
+        made, single = [], len(joint.axes) == 1
+        for k, axis in enumerate(joint.axes, 1):
+            last = k == len(joint.axes)
+            name = joint.name if single else self._unused(f"{joint.name}_{k}")
+            end = child if last else self._unused(f"{joint.name}_frame")
+            if not last:
+                self.links.append(Link(end))
+            bounded = axis.limits.lower is not None or axis.limits.upper is not None
+            kind = "prismatic" if joint.kind == "prismatic" else "revolute" if bounded else "continuous"
+            start = made[-1].child if made else joint.parent
+            direction = rotation.T @ axis.direction
+            kept: dict[str, Any] = {"axis": direction, "limits": axis.limits, "mimic": mimics.get(name)}
+            made.append(Joint(name, start, end, kind, damping=axis.damping, friction=axis.friction, **kept))
+        return made
+
+    def _closure(self, joint: SdfJoint) -> Closure:
+        """Return what closes a loop."""
+        if joint.kind not in CLOSED_BY:
+            message = f"a {joint.kind} joint closes a loop here; make it two revolute joints with a link between"
+            raise joint.element.error(message, "joints", joint.name, value=joint.kind)
+        mimics = [x for axis in joint.element.every("axis") for x in axis.every("mimic")]
+        if mimics:
+            message = "closes a loop, and so has no coordinate that could follow another"
+            raise mimics[0].error(message, "joints", joint.name, "mimic")
+        ends = self._place(joint.parent), self._place(joint.child)
+        points = [Place(joint.origin, np.eye(3)).seen_from(place).position for place in ends]
+        axis = ends[0].rotation.T @ joint.axes[0].direction if joint.axes else None
+        turn = None if joint.kind == "ball" else ends[1].seen_from(ends[0]).rotation
+        links = (joint.parent, joint.child)
+        try:
+            return Closure(
+                joint.name, links, CLOSED_BY[joint.kind], points, axis, None if joint.kind == "ball" else turn
+            )
+        except RobotError as error:
+            raise self.lines.placed(error) from None
+
+    def _mimics(self, tree: Sequence[SdfJoint], gears: Sequence[SdfJoint]) -> dict[str, Mimic]:
+        """Return what joints follow: by ``<mimic>``, and by gearboxes."""
+        found: dict[str, Mimic] = {}
+        for joint in tree:
+            axis = only(joint.element, "axis") if len(joint.axes) == 1 else None
+            mimic = None if axis is None else only(axis, "mimic", "joints", joint.name)
+            if mimic is not None:
+                where = ("joints", joint.name, "mimic")
+                leader = mimic.text("joint", *where)
+                factor, offset, reference = (
+                    number_of(mimic, key, *where, default=float(key == "multiplier"))
+                    for key in ("multiplier", "offset", "reference")
+                )
+                found[joint.name] = Mimic(leader, factor, offset - factor * reference)
+                self.lines.add(mimic, *where)
+        for gear in gears:
+            name, mimic = self._gearing(gear, tree)
+            if name in found:
+                message = f"{name} follows {found[name].joint} already"
+                raise gear.element.error(message, "joints", gear.name)
+            found[name] = mimic
+        return leaders(found)
+
+    def _gearing(self, gear: SdfJoint, tree: Sequence[SdfJoint]) -> tuple[str, Mimic]:
+        """Return which joint a gearbox makes follow, and how: theta_2 = -ratio theta_1 about its own axes."""
+        where = ("joints", gear.name)
+        place = needed(gear.element, "gearbox_reference_body", *where)
+        reference = self.frames.link(text_of(gear.element, "gearbox_reference_body", *where), place, *where)
+        needed(gear.element, "gearbox_ratio", *where)
+        ratio = number_of(gear.element, "gearbox_ratio", *where, default=1.0)
+        turned = []
+        for link, axis in zip((gear.parent, gear.child), gear.axes, strict=True):
+            joint = next((j for j in tree if {j.parent, j.child} == {reference, link}), None)
+            if joint is None or joint.kind not in ("revolute", "continuous"):
+                message = f"a gearbox needs a revolute joint between {reference} and {link}, which there is not"
+                raise gear.element.error(message, *where, value=[reference, link])
+            along = float(joint.axes[0].direction @ axis.direction) * (1.0 if joint.parent == reference else -1.0)
+            if abs(abs(along) - 1) > AXIS_TOLERANCE:
+                message = f"the axis of a gearbox must be that of {joint.name}"
+                raise gear.element.error(message, *where, value=axis.direction.tolist())
+            turned.append((joint.name, math.copysign(1.0, along)))
+        (first, sense_1), (second, sense_2) = turned
+        return second, Mimic(first, -ratio * sense_1 * sense_2)

@@ -1,0 +1,116 @@
+"""Joints of SDF files: their axes, limits and drives, all in the frame of the model."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.errors import RobotError, did_you_mean, no_such
+from jounce.io.robots.sdf_poses import (
+    MODEL,
+    Frames,
+    Place,
+    check_known,
+    flag_of,
+    needed,
+    number_of,
+    only,
+    text_of,
+    vector_of,
+)
+from jounce.io.robots.xml_elements import Element
+from jounce.robot.model import Limits
+
+AXES = {"revolute": 1, "continuous": 1, "prismatic": 1, "fixed": 0, "universal": 2, "revolute2": 2, "ball": 0}
+UNBOUNDED = 1e16  # SDF writes it for no bound
+JOINT = ("parent", "child", "pose", "axis", "axis2", "physics", "sensor", "plugin", "frame", "thread_pitch")
+JOINT += ("screw_thread_pitch", "gearbox_ratio", "gearbox_reference_body")
+AXIS = ("xyz", "limit", "dynamics", "use_parent_model_frame", "mimic", "initial_position")
+LIMIT = ("lower", "upper", "effort", "velocity", "stiffness", "dissipation")
+DYNAMICS = ("damping", "friction", "spring_reference", "spring_stiffness")
+
+
+@dataclasses.dataclass(frozen=True)
+class JointAxis:
+    """An axis of a joint: its direction in the model, and what goes with it."""
+
+    direction: Float[np.ndarray, "3"]
+    limits: Limits
+    damping: float
+    friction: float
+
+
+@dataclasses.dataclass(frozen=True)
+class SdfJoint:
+    """A joint as the file has it, all in the frame of the model."""
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    origin: Float[np.ndarray, "3"]
+    axes: tuple[JointAxis, ...]
+    element: Element
+
+    def reversed(self) -> SdfJoint:
+        """Return the joint seen from its child: the same coordinates, about the opposite axes."""
+        axes = tuple(dataclasses.replace(axis, direction=-axis.direction) for axis in self.axes[::-1])
+        return dataclasses.replace(self, parent=self.child, child=self.parent, axes=axes)
+
+
+def read_joint(name: str, element: Element, frames: Frames, version: tuple[int, ...]) -> SdfJoint:
+    """Return a joint, all in the frame of the model."""
+    where = ("joints", name)
+    check_known(element, JOINT, *where)
+    kind = element.text("type", *where, "type")
+    valid = (*AXES, "gearbox")
+    if kind == "screw":
+        message = "a screw joint is no joint of a robot; convert the robot to a mechanism and add a screw there"
+        raise element.error(message, *where, "type", value=kind)
+    if kind not in valid:
+        raise element.error(f"no joint has this type; {did_you_mean(kind, valid)}", *where, "type", value=kind)
+    ends = []
+    for role in ("parent", "child"):
+        part = needed(element, role, *where)
+        ends.append(frames.link(text_of(element, role, *where), part, *where, role))
+    if ends[0] == ends[1]:
+        raise element.error("must join two different links", *where, value=ends[0])
+    origin = frames.place(name)
+    tags = ("axis", "axis2")[: 2 if kind == "gearbox" else AXES[kind]]
+    axes = tuple(_axis(needed(element, tag, *where), origin, frames, version, *where, tag) for tag in tags)
+    return SdfJoint(name, kind, ends[0], ends[1], origin.position, axes, element)
+
+
+def _axis(axis: Element, place: Place, frames: Frames, version: tuple[int, ...], *where: str) -> JointAxis:
+    check_known(axis, AXIS, *where)
+    xyz = only(axis, "xyz", *where)
+    direction = np.array([0.0, 0.0, 1.0]) if xyz is None else vector_of(xyz, *where, "xyz")
+    frame = "" if xyz is None else xyz.attributes.get("expressed_in", "")
+    if frame and frame != MODEL and frame not in frames.elements:
+        message = no_such("link, joint or frame", frame, frames.elements)
+        raise (xyz or axis).error(message, *where, "xyz", value=frame)
+    old = version < (1, 7)
+    if old and flag_of(axis, "use_parent_model_frame", *where, default=version < (1, 5)):
+        frame = MODEL
+    rotation = frames.place(frame).rotation if frame else place.rotation
+    limit, dynamics = only(axis, "limit", *where), only(axis, "dynamics", *where)
+    for part, known in ((limit, LIMIT), (dynamics, DYNAMICS)):
+        if part is not None:
+            check_known(part, known, *where, part.tag)
+    damping, friction = (number_of(dynamics, key, *where, "dynamics", default=0.0) for key in ("damping", "friction"))
+    return JointAxis(rotation @ direction, _limits(limit, *where), damping, friction)
+
+
+def _limits(limit: Element | None, *where: str) -> Limits:
+    if limit is None:
+        return Limits()
+    keys = ("lower", "upper", "velocity", "effort")
+    given = {key: number_of(limit, key, *where, "limit", default=math.nan, infinite=True) for key in keys}
+    bounds = {key: x for key, x in given.items() if abs(x) < UNBOUNDED and (key in keys[:2] or x > 0)}
+    try:
+        return Limits(**bounds)
+    except RobotError as error:
+        raise limit.error(error.message, *where, "limit", value=error.value) from None

@@ -1,0 +1,380 @@
+"""Robots from SDF files: the same ones built without a file, in every dialect; loops, gearboxes; Cassie."""
+
+import warnings
+from xml.etree import ElementTree
+
+import numpy as np
+import pinocchio
+import pytest
+from scipy.spatial.transform import Rotation
+
+import jounce as jn
+from jounce.errors import RobotFileError, RobotWarning
+from tests.problems.closed_robots import in_contact, in_pinocchio
+from tests.problems.published_robots import sdf_files
+from tests.problems.robots import coordinates, poses, random_robot
+from tests.problems.sdf_files import NOTHING, sdf
+
+DIALECTS = ("1.4", "1.6", "1.7", "1.11")
+CASSIE = sdf_files()["cassie_description/robots/cassie_v2.sdf"]
+SOME = "<inertial><mass>2</mass><inertia><ixx>.1</ixx><iyy>.2</iyy><izz>.25</izz></inertia></inertial>"
+
+
+def read(tmp_path, text, **settings):
+    (tmp_path / "robot.sdf").write_text(text)
+    return jn.load_robot(tmp_path / "robot.sdf", **settings)
+
+
+def model(*parts, version="1.9", attributes=""):
+    return f'<sdf version="{version}"><model name="m" {attributes}>{"".join(parts)}</model></sdf>'
+
+
+def link(name, pose="0 0 0 0 0 0", body=SOME):
+    return f'<link name="{name}"><pose>{pose}</pose>{body}</link>'
+
+
+def joint(name, parent, child, kind="revolute", inside="<axis><xyz>0 0 1</xyz></axis>"):
+    ends = f"<parent>{parent}</parent><child>{child}</child>"
+    return f'<joint name="{name}" type="{kind}">{ends}{inside}</joint>'
+
+
+def same(robot, expected, gravity, seed=1):
+    """Check that a robot has the poses and the torques, with two rates, of the one expected."""
+    q = coordinates(expected, seed)
+    here, there = poses(robot, q), poses(expected, q)
+    for name in expected.links:
+        np.testing.assert_allclose(here[name], there[name], rtol=0, atol=1e-13)
+    np.testing.assert_allclose(robot.gravity, gravity, rtol=0, atol=1e-14)
+    states = np.random.default_rng(seed).normal(size=(5, len(expected.joint_names)))
+    by_name = [robot.joint_names.index(name) for name in expected.joint_names]
+    states_here = np.empty_like(states)
+    states_here[:, by_name] = states
+    same_gravity = jn.Robot("e", list(expected.links.values()), list(expected.joints.values()), gravity, strict=False)
+    torque = jn.robot.inverse_dynamics(robot, states_here)[:, by_name]
+    wanted = jn.robot.inverse_dynamics(same_gravity, states)
+    np.testing.assert_allclose(torque, wanted, rtol=0, atol=1e-11 * np.abs(wanted).max())
+    for name in expected.joint_names:
+        assert robot.joints[name].damping == expected.joints[name].damping
+        assert robot.joints[name].friction == expected.joints[name].friction
+        assert robot.limits[name] == expected.limits[name]
+
+
+def without_armature(robot):
+    joints = [jn.Joint(**{**vars(joint), "armature": 0.0}) for joint in robot.joints.values()]
+    return jn.Robot(robot.name, list(robot.links.values()), joints, strict=False)
+
+
+@pytest.mark.parametrize("version", DIALECTS)
+@pytest.mark.parametrize("seed", [1, 2])
+def test_random_trees_are_those_built_without_a_file(tmp_path, version, seed):
+    expected = without_armature(random_robot(seed, 6))
+    form = ("euler_rpy", "quat_xyzw", "degrees")[seed % 3] if version == "1.11" else "euler_rpy"
+    text, place = sdf(expected, version, seed, form)
+    robot = read(tmp_path, text)
+    assert robot.base == expected.base
+    base = ElementTree.fromstring(text).find("model/link/pose").text.split()
+    turn = place[:3, :3] @ turned(base, form)
+    same(robot, expected, turn.T @ [0, 0, -9.81])
+
+
+def turned(words, form):
+    if form == "quat_xyzw":
+        return Rotation.from_quat([float(word) for word in words[3:]]).as_matrix()
+    return Rotation.from_euler("xyz", [float(word) for word in words[3:]], degrees=form == "degrees").as_matrix()
+
+
+def test_joints_away_from_the_base_or_toward_it(tmp_path):
+    expected = without_armature(random_robot(4, 5, fixed=0.0))
+    text, place = sdf(expected, "1.7", 4, turned=("joint_0", "joint_2", "joint_3"))
+    robot = read(tmp_path, text)
+    base = ElementTree.fromstring(text).find("model/link/pose").text.split()
+    same(robot, expected, (place[:3, :3] @ turned(base, "euler_rpy")).T @ [0, 0, -9.81])
+
+
+def test_the_world_holds_a_model(tmp_path):
+    text = model(
+        "<pose>1 2 3 0.5 0 0</pose>", link("arm", "0.1 0 0 0 0 0.3"), joint("pin", "world", "arm"), version="1.7"
+    )
+    robot = read(tmp_path, text)
+    assert robot.base == "world"
+    np.testing.assert_array_equal(robot.gravity, [0, 0, -9.81])
+    expected = Rotation.from_euler("x", 0.5).as_matrix()
+    here = poses(robot, {"pin": 0.0})["arm"]
+    np.testing.assert_allclose(here[:3, 3], [1, 2, 3] + expected @ [0.1, 0, 0], rtol=0, atol=1e-15)
+    turn = Rotation.from_euler("x", 0.5) * Rotation.from_euler("z", 0.3 + 0.7)
+    np.testing.assert_allclose(poses(robot, {"pin": 0.7})["arm"][:3, :3], turn.as_matrix(), rtol=0, atol=1e-15)
+
+
+def test_a_static_model_is_fixed_to_the_world(tmp_path):
+    robot = read(tmp_path, model("<static>true</static>", link("a", "1 0 0 0 0 0"), link("b"), joint("j", "a", "b")))
+    assert (robot.base, robot.joint_names) == ("world", ("j",))
+    np.testing.assert_allclose(poses(robot, {"j": 0.0})["a"][:3, 3], [1, 0, 0])
+
+
+def test_the_canonical_link_is_the_base(tmp_path):
+    parts = link("a"), link("b"), joint("j", "a", "b")
+    assert read(tmp_path, model(*parts)).base == "a"
+    assert read(tmp_path, model(*parts, attributes='canonical_link="b"')).base == "b"
+
+
+def test_a_universal_joint_and_a_ball(tmp_path):
+    axes = (
+        "<axis><xyz>1 0 0</xyz></axis><axis2><xyz>0 1 0</xyz><limit><lower>-1</lower><upper>1</upper></limit></axis2>"
+    )
+    text = model(
+        link("a"), link("b"), link("c"), joint("u", "a", "b", "universal", axes), joint("s", "b", "c", "ball", "")
+    )
+    robot = read(tmp_path, text)
+    assert robot.joint_names == ("u_1", "u_2", "s_angle_1", "s_angle_2", "s_angle_3")
+    assert robot.limits["u_2"].upper == 1
+    q = dict(zip(robot.joint_names, (0.3, -0.4, 0.5, 0.6, 0.7), strict=True))
+    turn = Rotation.from_euler("XY", [0.3, -0.4]) * Rotation.from_euler("ZYX", [0.5, 0.6, 0.7])
+    np.testing.assert_allclose(poses(robot, q)["c"][:3, :3], turn.as_matrix(), rtol=0, atol=1e-15)
+
+
+def test_a_gearbox_and_a_mimic(tmp_path):
+    gear = (
+        "<gearbox_reference_body>frame</gearbox_reference_body><gearbox_ratio>0.25</gearbox_ratio>"
+        "<axis><xyz>0 0 1</xyz></axis><axis2><xyz>0 0 -1</xyz></axis2>"
+    )
+    follows = '<axis><xyz>0 0 1</xyz><mimic joint="in"><multiplier>3</multiplier><offset>1</offset>'
+    follows += "<reference>0.5</reference></mimic></axis>"
+    text = model(
+        *map(link, ("frame", "fast", "slow", "hand")),
+        joint("in", "frame", "fast"),
+        joint("out", "slow", "frame"),
+        joint("gear", "fast", "slow", "gearbox", gear),
+        joint("grip", "frame", "hand", inside=follows),
+    )
+    robot = read(tmp_path, text)
+    assert robot.joint_names == ("in",)
+    # slow turns about -z by -0.25 of fast about z; the coordinate of `out` is that of the frame about z seen from slow
+    angle = 0.8
+    here = poses(robot, {"in": angle, "out": robot.joints["out"].mimic.multiplier * angle, "grip": 0.0})
+    turn = Rotation.from_matrix(here["slow"][:3, :3]).as_rotvec()
+    np.testing.assert_allclose(turn, [0, 0, 0.25 * angle], rtol=0, atol=1e-15)
+    mimic = robot.joints["grip"].mimic
+    assert (mimic.joint, mimic.multiplier, mimic.offset) == ("in", 3.0, 1.0 - 3.0 * 0.5)
+
+
+def test_four_bar_with_a_pin_that_closes_it(tmp_path):
+    """Crank 1, coupler 3, rocker 2.5, base 3.2: closed by a revolute joint, against its closed form."""
+    text = model(
+        link("base"),
+        link("crank", "0 0 0 0 0 0"),
+        link("coupler", "1 0 0 0 0 0.7"),
+        link("rocker", "3.2 0 0 0 0 1.5"),
+        joint("A", "base", "crank"),
+        joint("B", "crank", "coupler"),
+        joint("D", "base", "rocker"),
+        joint("C", "coupler", "rocker", inside="<pose>2.5 0 0 0 0 0</pose><axis><xyz>0 0 1</xyz></axis>"),
+    )
+    text = text.replace("1.5</pose>", f"{two_links()}</pose>").replace("0.7</pose>", f"{coupler_angle()}</pose>")
+    robot = read(tmp_path, text)
+    assert {name: closure.type for name, closure in robot.closures.items()} == {"C": "pin"}
+    borne, redundant = jn.robot.closure_wrenches(robot)["C"]
+    assert (len(borne), len(redundant)) == (2, 3)
+    mechanism = robot.mechanism(drivers={"A": "0.4*sin(t)"}, outputs={"D": "D"}, time=[0.0, 0.5, 1.0])
+    found = jn.solve(mechanism, order=0).outputs["D"][:, 0]
+    start = two_links()
+    for t, angle in zip([0.0, 0.5, 1.0], found, strict=True):
+        crank = 0.4 * np.sin(t)
+        tip = np.array([3.2 + 2.5 * np.cos(start + angle), 2.5 * np.sin(start + angle)])
+        assert abs(np.linalg.norm(tip - [np.cos(crank), np.sin(crank)]) - 3.0) < 1e-13
+
+
+def two_links():
+    """Return the angle of the rocker where the crank lies along the base."""
+    reach = 3.2 - 1.0
+    return np.pi - np.arccos((reach**2 + 2.5**2 - 3.0**2) / (2 * reach * 2.5))
+
+
+def coupler_angle():
+    tip = np.array([3.2 + 2.5 * np.cos(two_links()), 2.5 * np.sin(two_links())]) - [1.0, 0.0]
+    return np.arctan2(tip[1], tip[0])
+
+
+def test_a_link_without_inertia_weighs_a_kilogram_and_is_told_of(tmp_path):
+    text = model(link("a"), link("bare", body=""), joint("j", "a", "bare"))
+    with pytest.warns(RobotWarning, match=r"1 kg.*bare \(line 1\)"):
+        robot = read(tmp_path, text)
+    assert (robot.links["bare"].inertia.mass, np.trace(robot.links["bare"].inertia.tensor)) == (1.0, 3.0)
+    with pytest.raises(RobotFileError, match="bare"):
+        read(tmp_path, text, strict=True)
+
+
+def test_a_link_of_no_mass_and_no_moments_is_a_frame(tmp_path):
+    body = "<inertial><mass>0</mass>" + NOTHING
+    robot = read(tmp_path, model(link("a"), link("tip", body=body), joint("j", "a", "tip", "fixed", "")))
+    assert robot.links["tip"].inertia is None
+
+
+BAD = {
+    "no model": ('<sdf version="1.7"/>', "one <model>"),
+    "two models": ('<sdf version="1.7"><model name="a"/><model name="b"/></sdf>', "it holds 2"),
+    "no version": ("<sdf><model/></sdf>", "version"),
+    "a version of letters": ('<sdf version="new"><model/></sdf>', "'new'"),
+    "no links": (model(), "at least one <link>"),
+    "a nested model": (model(link("a"), '<model name="b"/>'), "'b'"),
+    "an include": (model(link("a"), "<include><uri>model://b</uri></include>"), "<include>"),
+    "an unknown element": (model(link("a"), "<lnik/>"), "'<lnik>'"),
+    "an unknown element of a link": (model(link("a", body="<inretial/>")), "'inertial'"),
+    "an unknown element of an axis": (
+        model(link("a"), link("b"), joint("j", "a", "b", inside="<axis><xzy>0 0 1</xzy></axis>")),
+        "'xyz'",
+    ),
+    "an unknown type": (model(link("a"), link("b"), joint("j", "a", "b", "hinge")), "'hinge'"),
+    "a screw": (model(link("a"), link("b"), joint("j", "a", "b", "screw")), "'screw'"),
+    "an unknown link": (model(link("a"), joint("j", "a", "b")), "'b'"),
+    "a joint of one link": (model(link("a"), joint("j", "a", "a")), "two different links"),
+    "a name twice": (model(link("a"), link("a")), "given twice"),
+    "the name of the world": (model(link("world")), "'world'"),
+    "no axis": (model(link("a"), link("b"), joint("j", "a", "b", inside="")), "no <axis>"),
+    "an axis of no length": (
+        model(link("a"), link("b"), joint("j", "a", "b", inside="<axis><xyz>0 0 0</xyz></axis>")),
+        "direction",
+    ),
+    "five numbers of a pose": (model(link("a", "0 0 0 0 0"), link("b"), joint("j", "a", "b")), "6 finite numbers"),
+    "a number that is none": (model(link("a", "0 0 nan 0 0 0")), "finite"),
+    "a mass below zero": (model(link("a", body="<inertial><mass>-1</mass></inertial>")), "greater than zero"),
+    "an inertia of shapes": (model(link("a", body='<inertial auto="true"/>')), "auto"),
+    "a pose in a circle": (
+        model(
+            '<link name="a"><pose relative_to="b">1 0 0 0 0 0</pose></link>',
+            '<link name="b"><pose relative_to="a">1 0 0 0 0 0</pose></link>',
+            joint("j", "a", "b"),
+        ),
+        "relative to itself",
+    ),
+    "a frame that is not there": (model('<link name="a"><pose relative_to="c">1 0 0 0 0 0</pose></link>'), "'c'"),
+    "a link that nothing joins": (model(link("a"), link("b")), "joined to a by nothing"),
+    "a universal joint that closes a loop": (
+        model(
+            *map(link, "ab"),
+            joint("j", "a", "b"),
+            joint("u", "a", "b", "universal", "<axis><xyz>1 0 0</xyz></axis><axis2><xyz>0 1 0</xyz></axis2>"),
+        ),
+        "closes a loop",
+    ),
+    "a mimic that closes a loop": (
+        model(
+            *map(link, "ab"),
+            joint("j", "a", "b"),
+            joint("k", "a", "b", inside='<axis><xyz>0 0 1</xyz><mimic joint="j"/></axis>'),
+        ),
+        "closes a loop",
+    ),
+    "a gearbox without joints": (
+        model(
+            *map(link, "abc"),
+            joint("j", "a", "b"),
+            joint("k", "a", "c", "prismatic"),
+            joint(
+                "g",
+                "b",
+                "c",
+                "gearbox",
+                "<gearbox_reference_body>a</gearbox_reference_body><gearbox_ratio>2</gearbox_ratio>"
+                "<axis><xyz>0 0 1</xyz></axis><axis2><xyz>0 0 1</xyz></axis2>",
+            ),
+        ),
+        "revolute joint between a and c",
+    ),
+    "limits the wrong way round": (
+        model(
+            *map(link, "ab"),
+            joint("j", "a", "b", inside="<axis><limit><lower>1</lower><upper>-1</upper></limit></axis>"),
+        ),
+        "lower limit",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_files_are_refused_with_their_line(tmp_path, case):
+    text, says = BAD[case]
+    with pytest.raises(RobotFileError) as caught:
+        read(tmp_path, text)
+    assert says in str(caught.value)
+    assert "robot.sdf, line 1" in str(caught.value)
+
+
+MOTORS = ("roll-op", "yaw-op", "pitch-op", "knee-op", "knee-shin-joint", "foot-op")
+
+
+def test_cassie_has_the_bodies_of_its_file():
+    """Masses, their centres, and the ends of its rods, from the file by a plain reading of SDF 1.6."""
+    robot = jn.load_robot(CASSIE)
+    here = poses(robot, dict.fromkeys(robot.joints, 0.0))
+    root = ElementTree.parse(CASSIE).getroot().find("model")
+    places = {}
+    for element in root.iterfind("link"):
+        x, y, z, *turns = (float(word) for word in element.find("pose").text.split())
+        places[element.get("name")] = np.eye(4)
+        places[element.get("name")][:3, :3] = Rotation.from_euler("xyz", turns).as_matrix()
+        places[element.get("name")][:3, 3] = x, y, z
+    base = np.linalg.inv(places[robot.base])
+    for element in root.iterfind("link"):
+        name = element.get("name")
+        np.testing.assert_allclose(here[name], base @ places[name], rtol=0, atol=1e-14)
+        assert robot.links[name].inertia.mass == float(element.find("inertial/mass").text)
+    assert {name: closure.type for name, closure in robot.closures.items()} == {
+        f"{side}-{rod}-joint": "connect" for side in ("left", "right") for rod in ("pitch-rod", "plantar-foot")
+    }
+
+
+def test_all_files_of_cassie_are_read():
+    loops = {}
+    for name, path in sdf_files().items():
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RobotWarning)  # of a moment of inertia that no real body has
+            robot = jn.load_robot(path)
+        loops[name.rpartition("/")[2]] = (len(robot.joint_names), len(robot.closures))
+    assert loops == {
+        "cassie.sdf": (24, 6),  # ten gears make as many joints follow the motors; springs of the shins slide
+        "cassie_reduced.sdf": (23, 4),  # with a slide from the world
+        "cassie_simple.sdf": (23, 4),
+        "cassie_v2.sdf": (22, 4),
+        "cassie_wo_gearbox_spring.sdf": (23, 4),
+    }
+
+
+@pytest.mark.slow
+def test_cassie_moves_as_in_pinocchio():
+    """The torques found, with their forces in the rods, make Pinocchio's constrained model accelerate as ours does."""
+    robot = jn.load_robot(CASSIE)
+    drivers = {
+        f"{side}-{name}": f"{0.03 * (k + 1)}*sin({2 + k % 3}*t)"
+        for side in ("left", "right")
+        for k, name in enumerate(MOTORS)
+    }
+    mechanism = robot.mechanism(drivers=drivers, time=[0.0, 0.05, 0.1])
+    motion = jn.solve(mechanism, order=4)
+    model_, frames = in_pinocchio(robot.opened())
+    data = model_.createData()
+    q = np.stack([motion.outputs[name][:, :3] for name in robot.joint_names], axis=2)
+    torque = np.zeros((3, len(robot.joint_names)))
+    for name in drivers:
+        torque[:, robot.joint_names.index(name)] = jn.driver_force(motion, f"{name}_drive").values[:, 0]
+    rods = [in_contact(model_, frames, closure) for closure in robot.closures.values()]
+    for state, known in zip(q, torque, strict=True):
+        force = pinocchio.rnea(model_, data, *state)
+        pinocchio.computeJointJacobians(model_, data, state[0])
+        jacobian = np.vstack([pinocchio.getConstraintJacobian(model_, data, rod, rod.createData()) for rod in rods])
+        np.testing.assert_allclose(jacobian @ state[1], 0, atol=1e-12)
+        borne = np.linalg.lstsq(jacobian.T, force - known, rcond=1e-9)[0]
+        np.testing.assert_allclose(known + jacobian.T @ borne, force, rtol=0, atol=1e-10 * np.abs(force).max())
+
+
+def test_the_hook_of_the_crane_travels_level():
+    robot = jn.load_robot("examples/robots/luffing_crane.sdf")
+    mechanism = robot.mechanism(drivers={"luff": "0.25*cos(t)"}, time=np.linspace(0, np.pi, 9))
+    motion = jn.solve(mechanism, order=2)
+    hook = motion.point(*jn.robot.body_point(robot, "hook")).values[:, 0]
+    assert np.ptp(hook[:, 0]) > 10.0  # m, as the file says of itself
+    assert np.ptp(hook[:, 2]) < 0.05
+    pin, luff = np.array([-7.6, 0.0, 5.18]), 0.95 + motion.outputs["luff"][:, 0]
+    head = np.stack([14 * np.cos(luff), 0 * luff, 2 + 14 * np.sin(luff)], axis=1)
+    tail = head - 2.94 / 9 * (hook - head)  # the jib is straight: its tail is 17.41 m from the pin of the stay
+    np.testing.assert_allclose(np.linalg.norm(hook - head, axis=1), 9.0, rtol=1e-14)
+    np.testing.assert_allclose(np.linalg.norm(tail - pin, axis=1), 17.41, rtol=1e-14)
