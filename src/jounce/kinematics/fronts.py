@@ -35,6 +35,8 @@ class Fronts(eqx.Module):
         Fronts of the bodies that the rest of the columns belong to; one beyond the last where there are fewer.
     of_body : array of int, shape (bodies,)
         The front of each body.
+    row_count : int
+        Rows of the matrix.
     width : int
         Columns of a body.
     """
@@ -45,11 +47,12 @@ class Fronts(eqx.Module):
     left_columns: Any
     neighbours: Any
     of_body: Any
+    row_count: int = eqx.field(static=True)
     width: int = eqx.field(static=True)
 
     @property
     def shape(self) -> tuple[int, int, int]:
-        """Number of fronts, of rows and of columns in each."""
+        """Number of fronts, and of rows and columns of each."""
         return self.entries.shape
 
     @classmethod
@@ -105,7 +108,7 @@ class Fronts(eqx.Module):
                     for k, p in enumerate(ordered[source]):
                         first = block[p] * width
                         left_columns[front, at, first : first + width] = k * width + np.arange(width)
-        return cls(entries, rights, left_rows, left_columns, neighbours, position.astype(np.int32), width)
+        return cls(entries, rights, left_rows, left_columns, neighbours, position.astype(np.int32), len(bodies), width)
 
 
 def _ordered(touched: list[set[int]], count: int) -> tuple[np.ndarray, list[set[int]]]:
@@ -135,12 +138,17 @@ def _ordered(touched: list[set[int]], count: int) -> tuple[np.ndarray, list[set[
 
 
 class FrontalFactor(eqx.Module):
-    """A batch of matrices, factored front by front into reflections and triangles."""
+    """A batch of matrices, factored front by front into reflections and triangles.
+
+    Solutions are as good as substitution makes them, without refinement: reflections keep lengths. Where rows are more
+    than columns the solution is that of least squares.
+    """
 
     fronts: Fronts
     vectors: Any  # (fronts, width, rows, batch): the reflections of each front
-    factors: Any  # (fronts, width, batch)
-    triangle: Any  # (fronts, width, columns, batch): finished rows, the inverse on the diagonal
+    factors: Any  # (fronts, width, batch): two over their squares
+    triangle: Any  # (fronts, width, columns, batch): finished rows
+    inverted: Any  # (fronts, width, batch): inverse of the diagonal, infinite where singular
 
     @classmethod
     def of(cls, fronts: Fronts, entries: Any) -> "FrontalFactor":
@@ -150,64 +158,119 @@ class FrontalFactor(eqx.Module):
         entries = jnp.concatenate([entries, jnp.zeros((1, lanes))])
 
         def step(left: Any, plan: Any) -> Any:
-            k, own, rows, taken = plan
+            front, own, rows, taken = plan
             known = left.reshape(count * (height - width), columns - width, lanes)
-            front = entries[own] + known.at[rows[:, None], taken].get(mode="fill", fill_value=0.0)
-            *found, rest = _eliminated(front, width)
-            return jax.lax.dynamic_update_index_in_dim(left, rest, k, 0), tuple(found)
+            inherited = known.at[rows[:, None], taken].get(mode="fill", fill_value=0.0)
+            *found, rest = _eliminated(entries[own] + inherited, width)
+            return _put(left, rest, front), tuple(found)
 
         left = jnp.zeros((count, height - width, columns - width, lanes))
         plans = (np.arange(count), fronts.entries, fronts.left_rows, fronts.left_columns)
-        _, (vectors, factors, triangle) = jax.lax.scan(step, left, plans)
-        return cls(fronts, vectors, factors, triangle)
+        return cls(fronts, *jax.lax.scan(step, left, plans)[1])
 
     def solve(self, right: Any) -> Any:
         """Return the solutions, shape (columns, batch), for right-hand sides of shape (rows, batch)."""
-        count, height, columns = self.fronts.shape
-        width, lanes = self.fronts.width, right.shape[-1]
+        _, height, columns = self.fronts.shape
+        width, lanes, plan = self.fronts.width, right.shape[-1], self.fronts
         right = jnp.concatenate([right, jnp.zeros((1, lanes))])
 
         def forward(left: Any, level: Any) -> Any:
-            k, own, rows, vectors, factors = level
-            known = left.reshape(-1, lanes)
-            y = right[own] + known.at[rows].get(mode="fill", fill_value=0.0)
-            for vector, factor in zip(vectors, factors, strict=True):
-                y = y - vector * (factor * jnp.sum(vector * y, axis=0))
-                if width > 3:
-                    y = jax.lax.optimization_barrier(y)
-            return jax.lax.dynamic_update_index_in_dim(left, y[width:], k, 0), y[:width]
+            front, own, rows, vectors, factors = level
+            y = right[own] + left.reshape(-1, lanes).at[rows].get(mode="fill", fill_value=0.0)
+            y = _reflected(y, zip(vectors, factors, strict=True))
+            return _put(left, y[width:], front), y[:width]
 
         def backward(known: Any, level: Any) -> Any:
-            k, beside, triangle, y = level
-            following = known[beside].reshape(columns - width, lanes)
-            y = y - jnp.sum(triangle[:, width:] * following[None], axis=1)
+            front, beside, triangle, inverted, y = level
+            y = y - jnp.sum(triangle[:, width:] * known[beside].reshape(1, columns - width, lanes), axis=1)
             x: list[Any] = [None] * width
-            for i in range(width - 1, -1, -1):
-                x[i] = (y[i] - sum(triangle[i, j] * x[j] for j in range(i + 1, width))) * triangle[i, i]
-            return jax.lax.dynamic_update_index_in_dim(known, jnp.stack(x), k, 0), None
+            for i in reversed(range(width)):
+                x[i] = (y[i] - sum(triangle[i, j] * x[j] for j in range(i + 1, width))) * inverted[i]
+            return _put(known, jnp.stack(x), front), None
 
-        left, places = jnp.zeros((count, height - width, lanes)), np.arange(count)
-        _, y = jax.lax.scan(forward, left, (places, self.fronts.rights, self.fronts.left_rows, self.vectors, self.factors))
-        known = jnp.zeros((count + 1, width, lanes))
-        known, _ = jax.lax.scan(backward, known, (places, self.fronts.neighbours, self.triangle, y), reverse=True)
-        return known[self.fronts.of_body].reshape(-1, lanes)
+        count = np.arange(len(plan.entries))
+        left = jnp.zeros((len(count), height - width, lanes))
+        _, y = jax.lax.scan(forward, left, (count, plan.rights, plan.left_rows, self.vectors, self.factors))
+        known = jnp.zeros((len(count) + 1, width, lanes))
+        levels = (count, plan.neighbours, self.triangle, self.inverted, y)
+        known, _ = jax.lax.scan(backward, known, levels, reverse=True)
+        return known[plan.of_body].reshape(-1, lanes)
+
+    def solve_transposed(self, right: Any) -> Any:
+        """Return the solutions with the transposed matrices, shape (rows, batch), of least norm where they are many."""
+        _, height, columns = self.fronts.shape
+        width, lanes, plan = self.fronts.width, right.shape[-1], self.fronts
+        count = np.arange(len(plan.entries))
+        blocks = jnp.asarray(right).reshape(len(count), width, lanes)
+        order = jnp.argsort(plan.of_body)
+
+        def forward(owed: Any, level: Any) -> Any:
+            front, beside, body, triangle, inverted = level
+            w = blocks[body] - owed[front]
+            u: list[Any] = []
+            for i in range(width):
+                u.append((w[i] - sum(triangle[j, i] * u[j] for j in range(i))) * inverted[i])
+            found = jnp.stack(u)
+            share = jnp.sum(triangle[:, width:] * found[:, None], axis=0).reshape(-1, width, lanes)
+            return owed.at[beside].add(share, mode="drop"), found
+
+        owed = jnp.zeros((len(count), width, lanes))
+        _, u = jax.lax.scan(forward, owed, (count, plan.neighbours, order, self.triangle, self.inverted))
+
+        def backward(carry: Any, level: Any) -> Any:
+            left, solution = carry
+            front, own, rows, vectors, factors, top = level
+            y = jnp.concatenate([top, left[front]])
+            y = _reflected(y, zip(vectors[::-1], factors[::-1], strict=True))
+            flat = left.reshape(-1, lanes).at[rows].set(y, mode="drop")
+            return (flat.reshape(left.shape), solution.at[own].set(y, mode="drop")), None
+
+        blank = jnp.zeros((len(count), height - width, lanes)), jnp.zeros((plan.row_count, lanes))
+        levels = (count, plan.rights, plan.left_rows, self.vectors, self.factors, u)
+        return jax.lax.scan(backward, blank, levels, reverse=True)[0][1]
+
+    def pivot_ratio(self) -> Any:
+        """Return the smallest pivot over the largest, shape (batch,): near zero at a singular position."""
+        sizes = 1 / jnp.abs(self.inverted.reshape(-1, self.inverted.shape[-1]))
+        return jnp.min(sizes, axis=0) / jnp.max(sizes, axis=0)
+
+    def sign(self) -> Any:
+        """Return the signs of the determinants, or all of them turned round, shape (batch,): 0 where singular.
+
+        The order of rows and columns, which is the same for all matrices of a pattern, is not counted.
+        """
+        return jnp.prod(jnp.sign(jnp.where(jnp.isinf(self.inverted), 0.0, self.inverted)), axis=(0, 1))
 
 
-def _eliminated(front: Any, width: int) -> tuple[Any, Any, Any, Any]:
-    """Return the reflections that clear the first columns, their factors, the finished rows, and what is left."""
-    vectors, factors, rows = [], [], []
+def _put(whole: Any, part: Any, place: Any) -> Any:
+    return jax.lax.dynamic_update_index_in_dim(whole, part, place, 0)
+
+
+def _reflected(y: Any, reflections: Any) -> Any:
+    for vector, factor in reflections:
+        y = y - vector * (factor * jnp.sum(vector * y, axis=0))
+        y = jax.lax.optimization_barrier(y)  # or XLA computes the chain again for each use
+    return y
+
+
+def _eliminated(front: Any, width: int) -> tuple[Any, Any, Any, Any, Any]:
+    """Return the reflections that clear the first columns, the finished rows, and what is left.
+
+    As in `FrontalFactor`: vectors, factors, triangle and inverted.
+    """
+    vectors, factors, rows, inverted = [], [], [], []
     for k in range(width):
         x = front[:, 0]
         size = jnp.sqrt(jnp.sum(x * x, axis=0))
-        alpha = jnp.where(x[0] > 0, -size, size)
-        vector = jnp.concatenate([(x[0] - alpha)[None], x[1:]])
-        factor = 1.0 / (size * (size + jnp.abs(x[0])))
+        pivot = jnp.where(x[0] > 0, -size, size)
+        vector = jnp.concatenate([(x[0] - pivot)[None], x[1:]])
+        square = size * (size + jnp.abs(x[0]))
+        factor = jnp.where(square == 0, 0.0, 1.0 / jnp.where(square == 0, 1.0, square))
         rest = front[:, 1:] - vector[:, None] * (factor * jnp.sum(vector[:, None] * front[:, 1:], axis=0))[None]
         above = jnp.zeros((k, *x.shape[1:]))
         vectors.append(jnp.concatenate([above, vector]))
         factors.append(factor)
-        rows.append(jnp.concatenate([above, (1.0 / alpha)[None], rest[0]]))
-        front = rest[1:]
-        if width > 3:
-            front = jax.lax.optimization_barrier(front)  # or XLA computes the chain again for each use
-    return jnp.stack(vectors), jnp.stack(factors), jnp.stack(rows), front
+        rows.append(jnp.concatenate([above, pivot[None], rest[0]]))
+        inverted.append(1.0 / pivot)
+        front = jax.lax.optimization_barrier(rest[1:])
+    return jnp.stack(vectors), jnp.stack(factors), jnp.stack(rows), jnp.stack(inverted), front
