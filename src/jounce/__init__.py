@@ -1,7 +1,7 @@
 """Exact time derivatives of any order of mechanisms and robots: jerk, jounce and beyond, torques and their rates.
 
 Importing this package switches JAX to double precision (``jax_enable_x64``); it has no other side effect but a
-mark that a process gets when it is forked, see `jounce.mechanism.doors`.
+mark that a process gets when it is forked, see `jounce.mechanism.preconditions`.
 """
 
 from jounce.interrupts import end_on_signals as _end_on_signals, is_command as _is_command

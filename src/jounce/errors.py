@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import copy
 import difflib
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from typing import Any
 
 __all__ = [
@@ -29,6 +29,8 @@ __all__ = [
     "UnitError",
     "UnitWarning",
     "UnsupportedError",
+    "check_choice",
+    "check_name",
     "did_you_mean",
     "no_such",
     "show_value",
@@ -109,6 +111,18 @@ def no_such(kind: str, name: object, known: Iterable[str]) -> str:
     no body has this name; did you mean 'rocker'? valid: crank, rocker
     """
     return f"no {kind} has this name; {did_you_mean(name, known)}"
+
+
+def check_name(kind: str, given: object, known: Collection[str], error: type[JounceError], **place: Any) -> None:
+    """Raise an error unless something of a kind has the name given; `place` says where it was given."""
+    if given not in known:
+        raise error(no_such(kind, given, known), value=given, **place)
+
+
+def check_choice(field: str, value: object, valid: Collection[str], error: type[JounceError]) -> None:
+    """Raise an error unless a word, such as the name of a frame, is one of those valid."""
+    if value not in valid:
+        raise error(f"unknown {field}; {did_you_mean(value, valid)}", name=field, value=value)
 
 
 def did_you_mean(name: object, valid: Iterable[str], limit: int = 20) -> str:

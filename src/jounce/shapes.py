@@ -10,3 +10,6 @@ import numpy as np
 
 Numbers = jax.Array | np.ndarray
 """An array of JAX or NumPy."""
+
+Real = Numbers | np.floating | np.integer | float | int
+"""Real numbers: an array or one number."""

@@ -149,13 +149,13 @@ def test_bad_set_is_told(run, assignment, part):
 
 OWN_JOINT = '''
 import jounce as jn
-from jounce.constraints.base import Motion
+from jounce.constraints.base import MotionLaw
 
 class Pull(jn.AbstractConstraint, type="test_cli_pull", space="planar", role="driver"):
     """A point of body j at a height over a point of body i."""
     point_i: jn.Vector
     point_j: jn.Vector
-    motion: Motion
+    motion: MotionLaw
 
     def residual(self, body_i, body_j, time):
         d = body_j.point(self.point_j) - body_i.point(self.point_i)

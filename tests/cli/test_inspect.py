@@ -197,7 +197,7 @@ def test_a_solve_that_fails_on_the_way_as_json(facts):
     assert status == 1
     assert 100 < data["time"]["solved"] < 150
     assert data["failures"][0]["status"] != "OK"
-    assert data["failures"][0]["culprit"] == "body rocker"
+    assert data["failures"][0]["fault"] == "body rocker"
     assert json.loads(err)["error"]["kind"] == "SolveError"
 
 

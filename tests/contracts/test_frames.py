@@ -12,8 +12,8 @@ from jounce.constraints.base import ROLES, catalogue, field_kind, value_fields
 from jounce.dynamics import DriverTorqueOutput, JointTorqueOutput
 from jounce.io.mechanisms.keys import output_types
 from jounce.mechanism import build
+from jounce.mechanism.axis_angles import with_datums
 from jounce.mechanism.builder import pose_at
-from jounce.mechanism.datums import with_datums
 from jounce.robot import CoupledJoints, LinkClosure, SlideOutput
 from tests.problems.bank import group_of, pose_of, random_motion
 from tests.problems.drawings import (

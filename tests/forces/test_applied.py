@@ -318,8 +318,9 @@ def test_instants_at_which_a_force_is_no_finite_number():
 
 def test_no_forces_do_nothing():
     system, model = system_of({}, 3)
-    found = applied(system, pose_of(moving_bodies(1, 3), 3))
+    pose = pose_of(moving_bodies(1, 3), 3)
+    found = applied(system, pose)
     assert model.forces == ()
     assert found.shape == (ORDER, 6, 3)
     assert not found.any()
-    assert dataclasses.replace(system, forces=()).finite_forces(None, jn.Jet([jnp.zeros((1, 2))])).shape == (0, 2)
+    assert dataclasses.replace(system, forces=()).finite_forces(pose, jn.Jet([jnp.zeros((1, 2))])).shape == (0, 2)

@@ -6,7 +6,8 @@ import pytest
 import jounce as jn
 from jounce import drivers, jet, spatial
 from jounce.dynamics.forward import State
-from jounce.integrate.events import Watch, counted_on, crossings
+from jounce.integrate.events import Watch, crossings
+from jounce.jet.turns import counted_by_rates
 from jounce.kinematics.motion import output_group
 from jounce.rigid.planar import PlanarPose
 
@@ -120,7 +121,7 @@ def test_turns_between_samples_are_counted_by_the_rates():
     angle, rate = 3.0 + 20.0 * time - 0.4 * time**2, 20.0 - 0.8 * time
     assert np.abs(np.diff(angle)).max() > 2 * np.pi
     principal = np.angle(np.exp(1j * angle))
-    counted = counted_on(principal, rate, time)
+    counted = counted_by_rates(principal, rate, time)
     np.testing.assert_allclose(counted, angle - angle[0] + principal[0], atol=1e-10)
 
 

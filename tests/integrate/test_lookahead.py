@@ -95,7 +95,7 @@ def test_a_force_that_ends_is_named_with_the_time():
     motion = jn.simulate(sled(N=1.0, end=1.0), [0.0, 0.5, 1.5, 2.0], 1, strict=False)
     assert [jn.Status(s).name for s in motion.status] == ["OK", "OK", "INADMISSIBLE", "NOT_REACHED"]
     assert motion.ended_at == pytest.approx(1.0, abs=1e-8)
-    assert motion.culprits == {2: "forces.push at t = 1 s"}
+    assert motion.faults == {2: "forces.push at t = 1 s"}
     assert np.isnan(motion.outputs["x"][2:]).all()
 
 
@@ -158,4 +158,4 @@ def test_a_pulse_of_a_driver():
     torn = jn.simulate(mechanism.with_parameters(rise=0.0, leap=0.1, when=0.3), [0.0, 0.2, 0.4], 1, strict=False)
     assert [jn.Status(s).name for s in torn.status] == ["OK", "OK", "COLLAPSED"]
     assert torn.ended_at == pytest.approx(0.3, abs=1e-9)
-    assert torn.culprits == {2: "drivers.s at t = 0.3 s"}
+    assert torn.faults == {2: "drivers.s at t = 0.3 s"}

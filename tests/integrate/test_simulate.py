@@ -134,7 +134,7 @@ def test_what_was_computed_before_a_singularity_is_kept():
     time = [0.0, 0.6, 0.8, 1.5, 2.0]
     motion = jn.simulate(block("-x**-3"), time, 1, strict=False)
     assert [jn.Status(s).name for s in motion.status] == ["OK"] * 3 + ["COLLAPSED", "NOT_REACHED"]
-    assert motion.culprits == {3: "body block"}
+    assert motion.faults == {3: "body block"}
     assert motion.ended_at == pytest.approx(1.0, abs=1e-9)
     assert np.allclose(motion.outputs["x"][:3, 0, 0], [1.0, 0.8, 0.6], rtol=0, atol=1e-13)
     with pytest.raises(

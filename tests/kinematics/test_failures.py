@@ -40,7 +40,7 @@ def test_without_strict_good_instants_are_kept_and_the_rest_is_nan():
     assert motion.status[:10].tolist() == [Status.OK] * 10
     assert motion.status[10] == Status.BRANCH_JUMP
     assert motion.status[11:].tolist() == [Status.NOT_REACHED] * 10
-    assert motion.culprits[10] == "body crank"
+    assert motion.faults[10] == "body crank"
     np.testing.assert_allclose(motion.outputs["angle"][:10, 0], GRID[:10], atol=1e-14)
     assert np.isnan(motion.outputs["angle"][10:]).all()
     assert np.isnan(motion.dataset["tip"].values[10:]).all()
@@ -194,7 +194,7 @@ def test_a_law_that_ends_or_grows_beyond_all_bounds(law, stop, end, status, coun
     assert (motion.status[before] == Status.OK).all()
     assert set(motion.status[~before].tolist()) == status | {Status.NOT_REACHED}
     assert np.isnan(motion.outputs["angle"][~before, 1]).all()
-    told = motion.culprits.get(int(np.argmin(before)) + (law == "sqrt(1 - t)"), "")
+    told = motion.faults.get(int(np.argmin(before)) + (law == "sqrt(1 - t)"), "")
     assert "turn" in told
 
 

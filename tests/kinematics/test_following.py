@@ -11,7 +11,7 @@ from jounce.kinematics import Status
 from jounce.kinematics.advance import _status
 from jounce.kinematics.assembly import assemble
 from jounce.kinematics.linear import DenseFactor
-from jounce.kinematics.path import Solver
+from jounce.kinematics.path_following import Solver
 from jounce.mechanism import build
 from tests.problems.small import crank, distance_slider, four_bar, slider_crank
 
@@ -154,7 +154,7 @@ def test_output_without_a_rate_is_not_ok_and_the_motion_goes_on():
     np.testing.assert_allclose(jn.solve(mechanism, time, order=0).outputs["gap"][:, 0], abs(0.5 - 0.5 * time))
     motion = jn.solve(mechanism, time, order=1, strict=False)
     assert motion.status.tolist() == [0, 0, Status.UNDEFINED, 0, 0]
-    assert motion.culprits == {2: "output gap"}
+    assert motion.faults == {2: "output gap"}
     np.testing.assert_allclose(motion.outputs["gap"][[1, 3]], [[0.25, -0.5], [0.25, 0.5]], atol=1e-15)
     with pytest.raises(jn.SolveError, match="output gap"):
         jn.solve(mechanism, time, order=1)

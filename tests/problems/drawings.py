@@ -9,7 +9,6 @@ from scipy.spatial.transform import Rotation
 
 import jounce as jn
 from jounce import drivers, forces
-from jounce.constraints.angles import principal
 from jounce.constraints.base import field_kind, value_fields
 from jounce.dynamics import (
     AccelerationEnergyOutput,
@@ -29,6 +28,7 @@ from jounce.dynamics.outputs import is_turning
 from jounce.forces import AbstractLaw
 from jounce.jet import stack
 from jounce.jet.algebra import total
+from jounce.jet.turns import principal
 from jounce.mechanism.resolve import resolve, resolve_law, resolve_motion
 from jounce.robot import CoupledJoints
 from jounce.trajectory import AbstractMotion

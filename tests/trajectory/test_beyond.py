@@ -7,7 +7,7 @@ import pytest
 
 import jounce as jn
 from jounce.errors import JounceError
-from jounce.mechanism.laws import check_laws
+from jounce.mechanism.law_checks import check_laws
 from jounce.trajectory.sampling import derivative_errors
 
 TIMES = np.linspace(0.0, 2.0, 201)

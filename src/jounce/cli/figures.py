@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from jounce.cli.mechanisms import loaded, of_option, outcome, solved
 from jounce.cli.writing import spared, written
-from jounce.errors import JounceError, MechanismError, no_such
+from jounce.errors import JounceError, MechanismError, check_name
 from jounce.reporting.terminal import Bar, say
 
 if TYPE_CHECKING:
@@ -144,9 +144,7 @@ def _check_names(mechanism: Mechanism, kind: str, wanted: Sequence[str], file: P
         raise MechanismError("there is nothing to draw; name some outputs", path=file, name="outputs")
     what = "joint, driver or force" if kind == "reactions" else "output"
     for name in wanted:
-        if name not in known:
-            message = no_such(what, name, known)
-            raise MechanismError(message, path=file, name="joints" if kind == "reactions" else "outputs", value=name)
+        check_name(what, name, known, MechanismError, path=file, name="joints" if kind == "reactions" else "outputs")
     if kind in PORTRAITS and len(wanted) > 1:
         raise MechanismError("one output is drawn at a time", path=file, name="--output", value=list(wanted))
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from jounce.cli.arguments import named_once
 from jounce.cli.file_kinds import expecting
 from jounce.cli.writing import allowed, spared, written
-from jounce.errors import JounceError, SolveError, no_such
+from jounce.errors import JounceError, SolveError, check_name
 from jounce.reporting.summaries import motion_summary
 from jounce.reporting.terminal import Bar, say, say_json, show_peaks
 
@@ -173,8 +173,7 @@ def _method(name: str, step: float | None) -> Any:
 
     kinds: dict[str, Any] = {"taylor": lambda: Taylor(step=step)}
     kinds |= {f"obreshkov-{n}": (lambda n=n: Obreshkov(n, step)) for n in (4, 6, 8)}
-    if name not in kinds:
-        raise JounceError(no_such("method", name, kinds), name="--method", value=name)
+    check_name("method", name, kinds, JounceError, name="--method")
     try:
         return kinds[name]()
     except JounceError as error:

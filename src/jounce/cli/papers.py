@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from jounce.errors import JounceError, no_such
+from jounce.errors import JounceError, check_name
 from jounce.reporting.summaries import count
 from jounce.reporting.terminal import Bar, say
 
@@ -28,8 +28,7 @@ def reproduce(paper: str, /, *, out: Path, samples: Path | None = None, masses: 
     """
     import importlib
 
-    if paper not in PAPERS:
-        raise JounceError(no_such("paper", paper, PAPERS), value=paper)
+    check_name("paper", paper, PAPERS, JounceError)
     given = {name: path for name, path in (("samples", samples), ("masses", masses)) if path is not None}
     if given and paper != "negrean-2025":
         message = f"{paper} needs no data of yours; negrean-2025 takes samples and masses"

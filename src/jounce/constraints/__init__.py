@@ -3,7 +3,7 @@
 from jounce.constraints import drivers as drivers, planar as planar, spatial as spatial
 from jounce.constraints.base import (
     AbstractConstraint as AbstractConstraint,
-    Motion as Motion,
+    MotionLaw as MotionLaw,
     Scalar as Scalar,
     Vector as Vector,
     catalogue as catalogue,

@@ -10,15 +10,24 @@ where the mechanism is put together, its `Datum`.
 from typing import Any
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Bool, Float
 
 from jounce.constraints.planar import length_of
+from jounce.errors import MechanismError
 from jounce.jet import Jet, components, cross, dot, stack, wrap
 from jounce.jet.algebra import total
-from jounce.rigid.spatial import body_axes
+from jounce.jet.turns import brought_near, principal
+from jounce.rigid.spatial import SpatialPose, body_axes
+from jounce.shapes import Numbers
 
 SMALLEST_COSINE = 1e-6  # of half the tilt of the axis: below it the tilt is half a turn, and no angle is told
+
+
+Vectors = Float[Numbers, "3 *batch"]
+"""A vector of each instance, fixed in a body."""
 
 
 class Datum(eqx.Module):
@@ -37,13 +46,19 @@ class Datum(eqx.Module):
         Part of the second vector across the axis there, on body j, for what acts about the axis.
     """
 
-    attitude: Any
-    angle: Any
-    near: Any
-    across: Any = None
+    attitude: Float[Numbers, "4 *batch"]
+    angle: Float[Numbers, "*batch"]
+    near: Float[Numbers, "*lanes"]
+    across: Float[Numbers, "3 *batch"] | None = None
 
 
-def perpendiculars(axis: Any) -> tuple[Any, Any]:
+def check_vectors(self: Any) -> None:
+    """Raise MechanismError unless an angle has a vector on each body or none: `__check_init__` of its class."""
+    if (self.vector_i is None) != (self.vector_j is None):
+        raise MechanismError(f"{self.type_name} takes two vectors, one on each body, or none", name="vectors")
+
+
+def perpendiculars(axis: Vectors) -> tuple[Vectors, Vectors]:
     """Return two unit vectors that complete a constant axis, of shape (3, ...), to a right-handed frame."""
     x, y, z = axis / length_of(axis)[None]
     sign = jnp.where(z < 0, -1.0, 1.0)
@@ -55,7 +70,12 @@ def perpendiculars(axis: Any) -> tuple[Any, Any]:
 
 
 def relative_angle(
-    body_i: Any, body_j: Any, axis_i: Any, vector_i: Any = None, vector_j: Any = None, datum: Datum | None = None
+    body_i: SpatialPose,
+    body_j: SpatialPose,
+    axis_i: Vectors,
+    vector_i: Vectors | None = None,
+    vector_j: Vectors | None = None,
+    datum: Datum | None = None,
 ) -> Jet:
     """Return the angle in rad by which body j is turned about an axis of body i.
 
@@ -67,24 +87,19 @@ def relative_angle(
     to be near to.
     """
     axis = axis_i / length_of(axis_i)[None]
-    if vector_i is not None:
+    if vector_i is not None and vector_j is not None:
         second = vector_j if datum is None or datum.across is None else datum.across
         angle = _between(body_i, body_j, axis, vector_i, second)
         return angle if datum is None else brought_near(angle, datum.near)
     turn = _turn(body_i, body_j, axis, datum)
-    return wrap(turn, 2 * jnp.pi) if datum is None else brought_near(turn, datum.near - datum.angle) + datum.angle
-
-
-def brought_near(angle: Jet, expected: Any) -> Jet:
-    """Return an angle shifted by the whole turns that bring it nearest to the one expected."""
-    return angle - 2 * jnp.pi * jnp.round((angle.coefficients[0] - expected) / (2 * jnp.pi))
+    return wrap(turn) if datum is None else brought_near(turn, datum.near - datum.angle) + datum.angle
 
 
 # The rate of the angle is the angular velocity along the axis, but for terms that vanish while the bodies turn about
 # the axis only: jets of the arctangent would subtract products that are larger by 2^k at order k.
 
 
-def _turn(body_i: Any, body_j: Any, axis: Any, datum: Datum | None) -> Jet:
+def _turn(body_i: SpatialPose, body_j: SpatialPose, axis: Vectors, datum: Datum | None) -> Jet:
     quaternion, w = body_j.quaternion, body_j.angular_velocity  # the latter in the frame of body j
     if body_i.angular_velocity is not None:
         turning = body_j.to_body(body_i.global_angular_velocity())
@@ -93,8 +108,7 @@ def _turn(body_i: Any, body_j: Any, axis: Any, datum: Datum | None) -> Jet:
         back = [part * sign for part, sign in zip(components(datum.attitude), (1.0, -1.0, -1.0, -1.0), strict=True)]
         quaternion = total(part * x for part, x in zip((quaternion, *body_j.spins), back, strict=True))
         w = None if w is None else stack([dot(side, w) for side in body_axes(jnp.concatenate(back))])
-    e0 = body_i.quaternion.dot(quaternion)
-    e = stack([spin.dot(quaternion) for spin in body_i.spins])
+    e0, e = body_i.relative_quaternion(quaternion)
     along = dot(axis, e)
     value = 2.0 * jnp.arctan2(along.coefficients[0], e0.coefficients[0])
     if w is None:
@@ -105,7 +119,7 @@ def _turn(body_i: Any, body_j: Any, axis: Any, datum: Datum | None) -> Jet:
     return rate.integrate(value)
 
 
-def _between(body_i: Any, body_j: Any, axis: Any, vector_i: Any, vector_j: Any) -> Jet:
+def _between(body_i: SpatialPose, body_j: SpatialPose, axis: Vectors, vector_i: Vectors, vector_j: Vectors) -> Jet:
     u, a, b = body_i.direction(axis), body_i.direction(vector_i), body_j.direction(vector_j)
     along = u.dot(b)
     across = b - along * u
@@ -118,7 +132,7 @@ def _between(body_i: Any, body_j: Any, axis: Any, vector_i: Any, vector_j: Any) 
     return rate.integrate(value)
 
 
-def coaxial(axis_i: Any, axis_j: Any) -> Datum:
+def coaxial(axis_i: Vectors, axis_j: Vectors) -> Datum:
     """Return a datum for two bodies that turn about axes, one fixed in each, of shape (3, ...), that coincide.
 
     The angle there is that of ``A_i^T A_j``, as at every other such attitude.
@@ -133,21 +147,18 @@ def coaxial(axis_i: Any, axis_j: Any) -> Datum:
     e0, e = attitude[:1], attitude[1:]
     flipped = jnp.concatenate([-dot(side, e)[None], e0 * side + cross(side, e)])
     attitude = jnp.where(opposite[None], flipped, attitude)
-    angle, known = angle_of(attitude, u, jnp)
+    angle, known = angle_of(attitude, u)
     angle = jnp.where(known, angle, 0.0)
     return Datum(attitude, angle, angle)
 
 
-def angle_of(attitude: Any, axis: Any, namespace: Any = np) -> tuple[Any, Any]:
+def angle_of(
+    attitude: Float[Numbers, "4 *#batch"], axis: Float[Numbers, "3 *#batch"]
+) -> tuple[Float[Numbers, "*#batch"], Bool[Numbers, "*#batch"]]:
     """Return the angle about a unit axis, in (-pi, pi], of Euler parameters, and where there is one.
 
     There is none where the attitude turns the axis to its opposite.
     """
     along, e0 = (axis * attitude[1:]).sum(axis=0), attitude[0]
-    return principal(2.0 * namespace.arctan2(along, e0), namespace), namespace.hypot(along, e0) > SMALLEST_COSINE
-
-
-def principal(angle: Any, namespace: Any = np) -> Any:
-    """Return an angle shifted by whole turns to (-pi, pi]; half a turn is pi, whatever its last digits say."""
-    turns = namespace.ceil((angle - np.pi) / (2 * np.pi) - 1e-9)
-    return angle - 2 * np.pi * turns
+    namespace = jnp if isinstance(along, jax.Array) else np
+    return principal(2.0 * namespace.arctan2(along, e0)), namespace.hypot(along, e0) > SMALLEST_COSINE

@@ -7,14 +7,15 @@ from typing import Annotated, Any, ClassVar
 import equinox as eqx
 import jax.numpy as jnp
 
-from jounce.errors import MechanismError, did_you_mean
+from jounce.errors import MechanismError, check_choice
 from jounce.jet import Jet, concatenate
 
 Scalar = Annotated[Any, "scalar"]
 Vector = Annotated[Any, "vector"]
-Motion = Annotated[Any, "motion"]
+MotionLaw = Annotated[Any, "motion"]
 Wrenches = Annotated[Any, "wrenches"]
 Whole = Annotated[int, "whole"]
+WORDS = ("Scalar", "Vector", "Law", "Laws", "Wrenches", "Whole")  # annotations that say what kind of value a field has
 
 SPACES = ("planar", "spatial")
 ROLES = ("joint", "driver", "force")
@@ -31,9 +32,9 @@ def register(kind: type[Any], type: str, space: str, role: str) -> None:  # noqa
         If another class has this type: files would silently mean the new one. The same class defined again, as in a
         cell of a notebook that is run again, takes its own place. If a field has a name that files use otherwise.
     """
-    check_text("role", role, ROLES)
+    check_choice("role", role, ROLES, MechanismError)
     if space:
-        check_text("space", space, SPACES)
+        check_choice("space", space, SPACES, MechanismError)
     for field in vars(kind).get("__annotations__", {}):
         if field in RESERVED:
             message = f"no field of {kind.__qualname__} may have this name, which files use otherwise; rename it"
@@ -55,9 +56,9 @@ class AbstractConstraint(eqx.Module):
     """A joint or driver: one residual, written on the jets of its bodies, that vanishes when it holds.
 
     A subclass lists its values as fields and defines `residual`; nothing else. Jacobian, right-hand sides of every
-    order, forces and files follow. Fields are annotated `Scalar`, `Vector`, `Motion` or ``str``; the fields ``point_i``
-    and ``point_j`` are the key ``points`` of a mechanism file, and likewise vectors, axes and normals. Given a `type`,
-    the subclass can be used in files by that name.
+    order, forces and files follow. Fields are annotated `Scalar`, `Vector`, `MotionLaw` or ``str``; the fields
+    ``point_i`` and ``point_j`` are the key ``points`` of a mechanism file, and likewise vectors, axes and normals.
+    Given a `type`, the subclass can be used in files by that name.
 
     Parameters
     ----------
@@ -82,7 +83,7 @@ class AbstractConstraint(eqx.Module):
     def __init_subclass__(cls, type: str = "", space: str = "", role: str = "joint", **keywords: Any):  # noqa: A002
         super().__init_subclass__(**keywords)
         if type:
-            check_text("role", role, ("joint", "driver"))
+            check_choice("role", role, ("joint", "driver"), MechanismError)
             register(cls, type, space, role)
 
     def __check_init__(self):
@@ -122,8 +123,8 @@ def _is_whole(kind: type[Any]) -> bool:
 
 
 def check_bodies(element: Any, counts: tuple[int, ...], does: str = "joins", must: str = "join") -> None:
-    """Raise MechanismError unless a joint, driver or force has as many bodies as it needs, all different."""
-    name = element.type_name or type(element).__name__
+    """Raise MechanismError unless a joint, driver, force or output has as many bodies as it needs, all different."""
+    name = getattr(element, "type_name", "") or type(element).__name__
     if len(element.bodies) not in counts:
         noun = "body" if counts == (1,) else "bodies"
         message = f"{name} {does} {' or '.join(map(str, counts))} {noun}"
@@ -133,7 +134,7 @@ def check_bodies(element: Any, counts: tuple[int, ...], does: str = "joins", mus
         raise MechanismError(message, name="bodies", value=list(element.bodies))
 
 
-def rows(*parts: Any) -> Jet:
+def rows(*parts: Jet) -> Jet:
     """Join scalar residuals, of shape (...), and vector ones, of shape (rows, ...), into one of shape (rows, ...)."""
     whole = [part if len(part.shape) == 3 else part.map(lambda c: c[None]) for part in parts]
     return concatenate(whole)
@@ -148,11 +149,5 @@ def field_kind(field: dataclasses.Field) -> str:
     """Return ``scalar``, ``vector``, ``motion``, ``law``, ``laws``, ``wrenches``, ``whole`` or ``text``."""
     if isinstance(field.type, str):  # under ``from __future__ import annotations``
         word = field.type.rpartition(".")[2].strip()
-        return word.lower() if word in ("Scalar", "Vector", "Motion", "Law", "Laws", "Wrenches", "Whole") else "text"
+        return "motion" if word == "MotionLaw" else word.lower() if word in WORDS else "text"
     return next(iter(getattr(field.type, "__metadata__", ())), "text")
-
-
-def check_text(field: str, value: Any, valid: tuple[str, ...]) -> None:
-    """Raise MechanismError unless a word, such as a coordinate, is one of those valid."""
-    if value not in valid:
-        raise MechanismError(f"unknown {field}; {did_you_mean(value, valid)}", name=field, value=value)

@@ -1,14 +1,12 @@
 """Drivers: constraints with a motion law ``f(t)``. Sommer 2024, equations 39-40, 44-49, 53-55 and 101-111."""
 
-from typing import Any
-
 import equinox as eqx
 import jax.numpy as jnp
 
-from jounce.constraints.angles import relative_angle
-from jounce.constraints.base import AbstractConstraint, Motion, Scalar, Vector, check_text
+from jounce.constraints.angles import Datum, check_vectors, relative_angle
+from jounce.constraints.base import AbstractConstraint, MotionLaw, Scalar, Vector
 from jounce.constraints.planar import COORDINATES, coordinate_of, slide
-from jounce.errors import MechanismError
+from jounce.errors import MechanismError, check_choice
 from jounce.jet import wrap
 
 
@@ -19,12 +17,12 @@ class CoordinateDriver(AbstractConstraint, type="coordinate", space="planar", ro
     """
 
     coordinate: str = eqx.field(static=True)  # angle, x or y of body j
-    motion: Motion  # rad or m
+    motion: MotionLaw  # rad or m
     ratio: Scalar = None
     offset: Scalar = 0.0  # rad or m
 
     def __check_init__(self):
-        check_text("coordinate", self.coordinate, COORDINATES)
+        check_choice("coordinate", self.coordinate, COORDINATES, MechanismError)
 
     def residual(self, body_i, body_j, time):
         ratio = 1.0 if self.ratio is None else self.ratio
@@ -38,7 +36,7 @@ class SlideDriver(AbstractConstraint, type="slide", space="planar", role="driver
     point_i: Vector  # m, in the frame of body i
     point_j: Vector
     vector_i: Vector  # direction of travel
-    motion: Motion  # m
+    motion: MotionLaw  # m
 
     def residual(self, body_i, body_j, time):
         return slide(body_i, body_j, self.point_i, self.point_j, self.vector_i) - self.motion(time)
@@ -49,7 +47,7 @@ class DistanceDriver(AbstractConstraint, type="distance", space="planar", role="
 
     point_i: Vector  # m, in the frame of body i
     point_j: Vector
-    motion: Motion  # m
+    motion: MotionLaw  # m
 
     def residual(self, body_i, body_j, time):
         d = body_j.point(self.point_j) - body_i.point(self.point_i)
@@ -77,17 +75,15 @@ class RotationDriver(AbstractConstraint, type="rotation", space="spatial", role=
     """
 
     axis_i: Vector
-    motion: Motion  # rad
+    motion: MotionLaw  # rad
     vector_i: Vector = None
     vector_j: Vector = None
-    datum: Any = eqx.field(default=None, init=False)  # found when the mechanism is put together
+    datum: Datum | None = eqx.field(default=None, init=False)  # found when the mechanism is put together
 
     periodic = True
 
-    def __check_init__(self):
-        if (self.vector_i is None) != (self.vector_j is None):
-            raise MechanismError("a rotation driver takes two vectors, one on each body, or none", name="vectors")
+    __check_init__ = check_vectors
 
     def residual(self, body_i, body_j, time):
         angle = relative_angle(body_i, body_j, self.axis_i, self.vector_i, self.vector_j, self.datum)
-        return wrap(angle - self.motion(time), 2 * jnp.pi)
+        return wrap(angle - self.motion(time))

@@ -4,28 +4,32 @@ In each, ``d = r_j^P - r_i^P`` leads from the joint's point on body i to that on
 a body, seen in the global frame. ``cross(a, b)`` is the paper's ``a^T R^T b``.
 """
 
-from typing import Any
-
 import equinox as eqx
+from jaxtyping import Float
 
-from jounce.constraints.base import AbstractConstraint, Scalar, Vector, check_text, rows
+from jounce.constraints.base import AbstractConstraint, Scalar, Vector, rows
+from jounce.errors import MechanismError, check_choice
 from jounce.jet import Jet, cross, dot, sqrt
+from jounce.rigid import PlanarPose
+from jounce.rigid.pose import Pose
+from jounce.shapes import Numbers
 
 COORDINATES = ("angle", "x", "y")
+Vectors = Float[Numbers, "components *batch"]
 
 
-def length_of(vector: Any) -> Any:
+def length_of(vector: Float[Numbers, "components *batch"]) -> Float[Numbers, "*batch"]:
     """Return the length of a constant vector of shape (components, ...)."""
     return sqrt(dot(vector, vector))
 
 
-def slide(body_i: Any, body_j: Any, point_i: Any, point_j: Any, vector_i: Any) -> Jet:
+def slide(body_i: Pose, body_j: Pose, point_i: Vectors, point_j: Vectors, vector_i: Vectors) -> Jet:
     """Return the distance, in m, from the point on body i to that on body j, along a direction fixed in body i."""
     d = body_j.point(point_j) - body_i.point(point_i)
     return body_i.direction(vector_i).dot(d) / length_of(vector_i)
 
 
-def coordinate_of(body: Any, coordinate: str) -> Jet:
+def coordinate_of(body: PlanarPose, coordinate: str) -> Jet:
     """Return the angle, x or y of a planar body."""
     return body.angle if coordinate == "angle" else body.position[0 if coordinate == "x" else 1]
 
@@ -100,7 +104,7 @@ class Coordinate(AbstractConstraint, type="coordinate", space="planar"):
     offset: Scalar = None  # rad or m
 
     def __check_init__(self):
-        check_text("coordinate", self.coordinate, COORDINATES)
+        check_choice("coordinate", self.coordinate, COORDINATES, MechanismError)
 
     def residual(self, body_i, body_j, time):
         ratio = 1.0 if self.ratio is None else self.ratio

@@ -7,10 +7,11 @@ from typing import Any
 
 import jax.numpy as jnp
 
-from jounce.constraints.angles import coaxial, perpendiculars, relative_angle
+from jounce.constraints.angles import Vectors, coaxial, perpendiculars, relative_angle
 from jounce.constraints.base import AbstractConstraint, Scalar, Vector, rows
 from jounce.constraints.planar import length_of, slide
 from jounce.jet import Jet, cross, wrap
+from jounce.rigid import SpatialPose
 
 
 class Spherical(AbstractConstraint, type="spherical", space="spatial"):
@@ -131,13 +132,13 @@ class Screw(AbstractConstraint, type="screw", space="spatial"):
         return rows(*_collinear(self, body_i, body_j), wrap(excess, self.lead))
 
 
-def _parallel(body_i: Any, body_j: Any, axis_i: Any, axis_j: Any) -> list[Jet]:
+def _parallel(body_i: SpatialPose, body_j: SpatialPose, axis_i: Vectors, axis_j: Vectors) -> list[Jet]:
     """Return the two rows that keep an axis of each body parallel."""
     axis = body_j.direction(axis_j)
     return [body_i.direction(side).dot(axis) for side in perpendiculars(axis_i)]
 
 
-def _collinear(joint: Any, body_i: Any, body_j: Any) -> list[Jet]:
+def _collinear(joint: Any, body_i: SpatialPose, body_j: SpatialPose) -> list[Jet]:
     """Return the four rows that keep the axes of a joint on one line."""
     d = body_j.point(joint.point_j) - body_i.point(joint.point_i)
     on_line = [body_i.direction(side).dot(d) for side in perpendiculars(joint.axis_i)]

@@ -22,7 +22,7 @@ from jounce.kinematics import Motion, Status
 from jounce.kinematics.assembly import split
 from jounce.kinematics.compilation import compiled
 from jounce.mechanism import Mechanism, Model
-from jounce.mechanism.doors import concrete
+from jounce.mechanism.preconditions import concrete
 from jounce.mechanism.system import System
 
 COLUMNS = {"planar": ("x", "y", "angle"), "spatial": ("x", "y", "z", "wx", "wy", "wz")}

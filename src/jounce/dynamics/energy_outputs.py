@@ -7,7 +7,7 @@ import numpy as np
 
 from jounce.constraints.base import Whole
 from jounce.dynamics.energies import energy_coefficients, potential_coefficients
-from jounce.errors import MechanismError, no_such
+from jounce.errors import MechanismError, check_name
 from jounce.mechanism import AbstractMotionOutput, Mechanism
 
 
@@ -26,9 +26,8 @@ class AbstractEnergyOutput(AbstractMotionOutput):
     def check(self, mechanism: Mechanism) -> None:
         """Raise MechanismError unless the body exists and there are masses."""
         bodies, alone = mechanism.bodies, self.alone
-        if alone is not None and alone not in bodies:
-            message = no_such("moving body", alone, bodies)
-            raise MechanismError(message, name="body", value=alone)
+        if alone is not None:
+            check_name("moving body", alone, bodies, MechanismError, name="body")
         if all(body.mass is None for name, body in bodies.items() if alone in (None, name)):
             which = "no body has a mass" if alone is None else "this body has no mass"
             raise MechanismError(f"{which}, and an energy needs one", name=self.source, value=alone)

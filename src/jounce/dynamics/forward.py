@@ -17,7 +17,7 @@ from jounce.jet import Jet
 from jounce.jet.algebra import total
 from jounce.jet.series import Recursion
 from jounce.kinematics.linear import DenseFactor
-from jounce.mechanism.datums import with_turns
+from jounce.mechanism.axis_angles import with_turns
 from jounce.mechanism.system import System
 from jounce.rigid import PlanarPose, SpatialPose
 from jounce.rigid.spatial import body_axes, quaternion_spins

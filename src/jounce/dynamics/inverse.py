@@ -21,7 +21,7 @@ from jounce.jet.algebra import stacked
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.compilation import compiled
 from jounce.mechanism import Mechanism, Model
-from jounce.mechanism.datums import at_lanes
+from jounce.mechanism.axis_angles import at_lanes
 from jounce.mechanism.system import System
 
 SMALL_BATCH, LARGE_BATCH = 64, 512  # instants; a short motion compiles for one width only, and fills less of it

@@ -11,8 +11,8 @@ from jounce.errors import MechanismError
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.solve import HIGHEST_ORDER
 from jounce.mechanism import Mechanism, Model, build
-from jounce.mechanism.builder import referred
-from jounce.mechanism.laws import check_laws
+from jounce.mechanism.builder import with_reference
+from jounce.mechanism.law_checks import check_laws
 from jounce.rigid import SpatialPose
 from jounce.rigid.euler_parameters import euler_parameters
 
@@ -35,10 +35,12 @@ def at_state(given: Any, state: Any, time: Any) -> tuple[Motion, int]:
         system = dataclasses.replace(given.model.system, outputs=())
         model = dataclasses.replace(given.model, system=system, outputs=())
     else:
-        model, _ = referred(model, {name: values[0] for name, values in _still(coordinates).items()}, float(instant))
-    way = given.way if isinstance(given, Motion) else None
+        model, _ = with_reference(
+            model, {name: values[0] for name, values in _still(coordinates).items()}, float(instant)
+        )
+    history = given.history if isinstance(given, Motion) else None
     status = np.array([int(Status.OK)])
-    return State(mechanism, model, instant[None], order, (coordinates, ()), status, {}, way=way), order
+    return State(mechanism, model, instant[None], order, (coordinates, ()), status, {}, history=history), order
 
 
 def _still(coordinates: dict[str, Any]) -> dict[str, Any]:

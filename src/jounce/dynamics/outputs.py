@@ -7,7 +7,7 @@ import numpy as np
 
 from jounce.constraints.base import Vector, value_fields
 from jounce.dynamics.inverse import MotionForces, check_loads
-from jounce.errors import MechanismError, did_you_mean, no_such
+from jounce.errors import MechanismError, check_name, did_you_mean
 from jounce.mechanism import AbstractMotionOutput, Mechanism
 from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.resolve import resolve_element
@@ -38,9 +38,7 @@ class AbstractForceOutput(AbstractMotionOutput):
         kinds = {"driver": ("drivers",), "joint": ("joints", "drivers"), "force": ("forces",)}[self.source]
         known = {name: element for kind in kinds for name, element in getattr(mechanism, kind).items()}
         name = getattr(self, self.source)
-        if name not in known:
-            message = no_such(self.source, name, known)
-            raise MechanismError(message, name=self.source, value=name)
+        check_name(self.source, name, known, MechanismError, name=self.source)
         check_loads(mechanism, self.source)
         self._check_named(known[name])
 

@@ -11,7 +11,7 @@ from jounce.jet import Jet, dot
 from jounce.jet.algebra import stacked, total
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.compilation import compiled
-from jounce.mechanism.datums import at_lanes
+from jounce.mechanism.axis_angles import at_lanes
 
 FAINT = 1e-3  # of what turning bodies would move: coefficients that vanish have its rounding, 1e-12 of this or less
 

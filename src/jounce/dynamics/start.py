@@ -70,7 +70,9 @@ def start(mechanism: Mechanism, instant: float) -> Start:
         whole, coordinates = _assembled(mechanism, instant)
         state = with_rates(equations_of(mechanism, whole), at_rest(whole, coordinates), np.array([[instant]]))
         system = dataclasses.replace(model.system, forces=whole.system.forces, outputs=whole.system.outputs)
-        model = dataclasses.replace(model, guess=coordinates, system=system, turnings=whole.turnings, way=whole.way)
+        model = dataclasses.replace(
+            model, guess=coordinates, system=system, prescribed=whole.prescribed, history=whole.history
+        )
     model, coordinates = assemble(model, instant, TOLERANCE, free=True)
     equations = equations_of(mechanism, model)
     state = at_rest(model, coordinates) if state is None else state

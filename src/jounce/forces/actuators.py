@@ -1,27 +1,20 @@
 """Forces and torques between two bodies by a law of their displacement, its rate and time: actuators, bumpers."""
 
-from typing import Any
-
 import equinox as eqx
 
-from jounce.constraints.angles import relative_angle
+from jounce.constraints.angles import Datum, check_vectors, relative_angle
 from jounce.constraints.base import Vector
 from jounce.constraints.planar import slide
-from jounce.errors import MechanismError
-from jounce.forces.base import AbstractForce, Law
+from jounce.forces.base import AbstractForce, Law, by_law
 from jounce.jet import Jet, sqrt
+from jounce.rigid.pose import Pose
+from jounce.shapes import Numbers
 
 
-def distance(body_i: Any, body_j: Any, point_i: Any, point_j: Any) -> Jet:
+def distance(body_i: Pose, body_j: Pose, point_i: Numbers, point_j: Numbers) -> Jet:
     """Return the distance of two points, m."""
     d = body_j.point(point_j) - body_i.point(point_i)
     return sqrt(d.dot(d))
-
-
-def check_vectors(force: Any) -> None:
-    """Raise MechanismError unless an angle in space is measured with a vector on each body, or with none."""
-    if (force.vector_i is None) != (force.vector_j is None):
-        raise MechanismError(f"{force.type_name} takes two vectors, one on each body, or none", name="vectors")
 
 
 class DistanceForce(AbstractForce, type="distance_force"):
@@ -36,8 +29,7 @@ class DistanceForce(AbstractForce, type="distance_force"):
     def displacement(self, body_i, body_j, time):
         return distance(body_i, body_j, self.point_i, self.point_j)
 
-    def force(self, displacement, velocity, time):
-        return self.law(displacement, velocity, time)
+    force = by_law
 
 
 class SlideForce(AbstractForce, type="slide_force"):
@@ -56,8 +48,7 @@ class SlideForce(AbstractForce, type="slide_force"):
     def displacement(self, body_i, body_j, time):
         return slide(body_i, body_j, self.point_i, self.point_j, self.vector_i)
 
-    def force(self, displacement, velocity, time):
-        return self.law(displacement, velocity, time)
+    force = by_law
 
 
 class Torque(AbstractForce, type="torque", space="planar"):
@@ -71,8 +62,7 @@ class Torque(AbstractForce, type="torque", space="planar"):
     def displacement(self, body_i, body_j, time):
         return body_j.angle - body_i.angle
 
-    def force(self, displacement, velocity, time):
-        return self.law(displacement, velocity, time)
+    force = by_law
 
 
 class SpatialTorque(AbstractForce, type="torque", space="spatial"):
@@ -85,16 +75,14 @@ class SpatialTorque(AbstractForce, type="torque", space="spatial"):
     law: Law  # N m
     vector_i: Vector = None
     vector_j: Vector = None
-    datum: Any = eqx.field(default=None, init=False)  # found when the mechanism is put together
+    datum: Datum | None = eqx.field(default=None, init=False)  # found when the mechanism is put together
 
     unit = "N*m"
     dimensions = {"law": "torque"}
 
-    def __check_init__(self):
-        check_vectors(self)
+    __check_init__ = check_vectors
 
     def displacement(self, body_i, body_j, time):
         return relative_angle(body_i, body_j, self.axis_i, self.vector_i, self.vector_j, self.datum)
 
-    def force(self, displacement, velocity, time):
-        return self.law(displacement, velocity, time)
+    force = by_law

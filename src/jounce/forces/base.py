@@ -13,8 +13,6 @@ from jounce.jet import Jet
 Law = Annotated[Any, "law"]
 Laws = Annotated[Any, "laws"]
 
-FRAMES = ("global", "body")
-
 
 class AbstractForce(eqx.Module):
     """An applied force or torque: a displacement on which it does work, and its size.
@@ -113,6 +111,11 @@ class AbstractForce(eqx.Module):
         first = displacement.coefficients[0]
         zero = jnp.zeros_like(first if jnp.ndim(first) < 3 else first[0])  # instances and batch stand last
         return Jet.constant(zero, displacement.order)
+
+
+def by_law(self: Any, displacement: Jet, velocity: Jet, time: Jet) -> Jet:
+    """Return the jet of a force that is given by a law: the method `force` of its class."""
+    return self.law(displacement, velocity, time)
 
 
 def force_catalogue(space: str) -> dict[str, type[AbstractForce]]:

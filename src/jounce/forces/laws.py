@@ -8,6 +8,7 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from jounce.jet import Jet, stack
+from jounce.jet.algebra import Quantity
 from jounce.trajectory import AbstractMotion, Expression
 
 
@@ -144,7 +145,7 @@ def _named(names: tuple[str, ...], jet: Jet) -> dict[str, Jet]:
     return {name: jet[k] for k, name in enumerate(names)}
 
 
-def _spread(value: Any, like: Jet, time: Jet) -> Jet:
+def _spread(value: Quantity, like: Jet, time: Jet) -> Jet:
     """Return a value as a jet of the shape of another: a law of time alone is the same for all instances."""
     shape = jnp.shape(like.coefficients[0])
     if not isinstance(value, Jet):

@@ -1,13 +1,14 @@
 """Loads on one body: a force at a point and a moment, by laws of place, velocity and time, global or in the body."""
 
-from typing import Any
-
 import equinox as eqx
 import jax.numpy as jnp
 
-from jounce.constraints.base import Vector, check_text
-from jounce.forces.base import FRAMES, AbstractForce, Law, Laws
+from jounce.constraints.base import Vector
+from jounce.errors import MechanismError, check_choice
+from jounce.forces.base import AbstractForce, Law, Laws, by_law
 from jounce.jet import Jet
+from jounce.rigid.orientation import FRAMES
+from jounce.rigid.pose import Pose
 
 
 class PointForce(AbstractForce, type="point_force", space="planar"):
@@ -27,7 +28,7 @@ class PointForce(AbstractForce, type="point_force", space="planar"):
     velocity_names = ("vx", "vy")
 
     def __check_init__(self):
-        check_text("frame", self.frame, FRAMES)
+        check_choice("frame", self.frame, FRAMES, MechanismError)
 
     def displacement(self, body, time):
         return body.point(self.point)
@@ -38,11 +39,10 @@ class PointForce(AbstractForce, type="point_force", space="planar"):
     def variation(self, bodies, changes, time):
         return self._components(bodies[0], super().variation(bodies, changes, time))
 
-    def _components(self, body: Any, vector: Jet) -> Jet:
+    def _components(self, body: Pose, vector: Jet) -> Jet:
         return vector if self.frame == "global" else body.to_body(vector)
 
-    def force(self, displacement, velocity, time):
-        return self.law(displacement, velocity, time)
+    force = by_law
 
 
 class SpatialPointForce(PointForce, type="point_force", space="spatial"):
@@ -68,8 +68,7 @@ class Moment(AbstractForce, type="moment", space="planar"):
     def displacement(self, body, time):
         return body.angle
 
-    def force(self, displacement, velocity, time):
-        return self.law(displacement, velocity, time)
+    force = by_law
 
 
 class SpatialMoment(AbstractForce, type="moment", space="spatial"):
@@ -88,7 +87,7 @@ class SpatialMoment(AbstractForce, type="moment", space="spatial"):
     velocity_names = ("wx", "wy", "wz")
 
     def __check_init__(self):
-        check_text("frame", self.frame, FRAMES)
+        check_choice("frame", self.frame, FRAMES, MechanismError)
 
     def displacement(self, body, time):
         # no vector changes at the rate of the angular velocity: what the moment works on is told by the rates below
@@ -103,5 +102,4 @@ class SpatialMoment(AbstractForce, type="moment", space="spatial"):
         turn = bodies[0].turning(changes[0])
         return turn if self.frame == "body" else bodies[0].direction(turn)
 
-    def force(self, displacement, velocity, time):
-        return self.law(displacement, velocity, time)
+    force = by_law

@@ -4,11 +4,26 @@ from typing import Any
 
 import equinox as eqx
 
-from jounce.constraints.angles import relative_angle
+from jounce.constraints.angles import Datum, check_vectors, relative_angle
 from jounce.constraints.base import Scalar, Vector
 from jounce.constraints.planar import slide
-from jounce.forces.actuators import check_vectors, distance
+from jounce.forces.actuators import distance
 from jounce.forces.base import AbstractForce
+from jounce.jet import Jet
+
+
+def linear_force(self: Any, displacement: Jet, velocity: Jet, time: Jet) -> Jet:  # noqa: ARG001
+    """Return the jet of the force of a linear spring with a damper: the method `force` of its class."""
+    return -_stretch(self, displacement) * self.stiffness - velocity * self.damping
+
+
+def stored_energy(self: Any, displacement: Jet) -> Jet:
+    """Return the energy that a linear spring has stored, J: the method `energy` of its class."""
+    return _stretch(self, displacement).square() * (0.5 * self.stiffness)
+
+
+def _stretch(spring: Any, displacement: Jet) -> Jet:
+    return displacement - (spring.angle if hasattr(spring, "angle") else spring.length)
 
 
 class Spring(AbstractForce, type="spring"):
@@ -29,11 +44,7 @@ class Spring(AbstractForce, type="spring"):
     def displacement(self, body_i, body_j, time):
         return distance(body_i, body_j, self.point_i, self.point_j)
 
-    def force(self, displacement, velocity, time):
-        return -(displacement - self.length) * self.stiffness - velocity * self.damping
-
-    def energy(self, displacement):
-        return (displacement - self.length).square() * (0.5 * self.stiffness)
+    force, energy = linear_force, stored_energy
 
 
 class SlideSpring(AbstractForce, type="slide_spring"):
@@ -52,11 +63,7 @@ class SlideSpring(AbstractForce, type="slide_spring"):
     def displacement(self, body_i, body_j, time):
         return slide(body_i, body_j, self.point_i, self.point_j, self.vector_i)
 
-    def force(self, displacement, velocity, time):
-        return -(displacement - self.length) * self.stiffness - velocity * self.damping
-
-    def energy(self, displacement):
-        return (displacement - self.length).square() * (0.5 * self.stiffness)
+    force, energy = linear_force, stored_energy
 
 
 class TorsionalSpring(AbstractForce, type="torsional_spring", space="planar"):
@@ -72,11 +79,7 @@ class TorsionalSpring(AbstractForce, type="torsional_spring", space="planar"):
     def displacement(self, body_i, body_j, time):
         return body_j.angle - body_i.angle
 
-    def force(self, displacement, velocity, time):
-        return -(displacement - self.angle) * self.stiffness - velocity * self.damping
-
-    def energy(self, displacement):
-        return (displacement - self.angle).square() * (0.5 * self.stiffness)
+    force, energy = linear_force, stored_energy
 
 
 class SpatialTorsionalSpring(AbstractForce, type="torsional_spring", space="spatial"):
@@ -91,19 +94,14 @@ class SpatialTorsionalSpring(AbstractForce, type="torsional_spring", space="spat
     damping: Scalar = 0.0  # N m s/rad
     vector_i: Vector = None
     vector_j: Vector = None
-    datum: Any = eqx.field(default=None, init=False)  # found when the mechanism is put together
+    datum: Datum | None = eqx.field(default=None, init=False)  # found when the mechanism is put together
 
     unit = "N*m"
     dimensions = {"stiffness": "torsional stiffness", "damping": "torsional damping", "angle": "angle"}
 
-    def __check_init__(self):
-        check_vectors(self)
+    __check_init__ = check_vectors
 
     def displacement(self, body_i, body_j, time):
         return relative_angle(body_i, body_j, self.axis_i, self.vector_i, self.vector_j, self.datum)
 
-    def force(self, displacement, velocity, time):
-        return -(displacement - self.angle) * self.stiffness - velocity * self.damping
-
-    def energy(self, displacement):
-        return (displacement - self.angle).square() * (0.5 * self.stiffness)
+    force, energy = linear_force, stored_energy

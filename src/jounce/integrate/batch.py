@@ -12,19 +12,20 @@ import numpy as np
 from jounce.display import Displayed
 from jounce.dynamics.forward import Equations, State
 from jounce.dynamics.start import driven, start
-from jounce.errors import MechanismError, no_such
+from jounce.errors import MechanismError, check_name
 from jounce.integrate.batch_equations import Family, Starts, Turns
 from jounce.integrate.events import output_series, pose_coordinates
 from jounce.integrate.marching import Front, Outcome, Steps, departed, march
 from jounce.integrate.methods import AbstractMethod
 from jounce.integrate.simulate import checked, instants_of
 from jounce.integrate.simulation import expanded
+from jounce.jet.turns import whole_periods
 from jounce.kinematics import Status
 from jounce.mechanism import Mechanism, build, check_mechanism
-from jounce.mechanism.builder import referred
-from jounce.mechanism.datums import with_turns
-from jounce.mechanism.doors import concrete
-from jounce.mechanism.laws import check_laws
+from jounce.mechanism.axis_angles import with_turns
+from jounce.mechanism.builder import with_reference
+from jounce.mechanism.law_checks import check_laws
+from jounce.mechanism.preconditions import concrete
 
 LANES = 64  # runs marched together: more fall out of the cache
 STEPS = 16  # tried before runs that have ended make room for others
@@ -116,7 +117,7 @@ def simulate_batch(
     family = Family(first, nominal.model, names)
     begun = family
     if first.initial:
-        model, _ = referred(build(driven(first)), nominal.model.reference, float(instants[0]))
+        model, _ = with_reference(build(driven(first)), nominal.model.reference, float(instants[0]))
         begun = Family(driven(first), model, names)
     runs = _Runs(family, rows, instants, order, (float(tolerance), float(longest_step), method))
 
@@ -141,9 +142,7 @@ def _checked_parameters(mechanism: Mechanism, parameters: Mapping[str, Any]) -> 
         raise MechanismError("a batch differs in at least one parameter", name="parameters", value=dict(parameters))
     values, count = {}, None
     for name, given in parameters.items():
-        if name not in mechanism.parameters:
-            message = no_such("parameter", name, mechanism.parameters)
-            raise MechanismError(message, name="parameters", value=name)
+        check_name("parameter", name, mechanism.parameters, MechanismError, name="parameters")
         try:
             array = np.asarray(given, float)
         except (TypeError, ValueError):
@@ -335,4 +334,4 @@ def turned(before: np.ndarray, after: np.ndarray, since: np.ndarray) -> np.ndarr
         Time from the one to the other, s.
     """
     rise = since / 2 * (before[1] + after[1]) + since**2 / 6 * (before[2] - after[2])
-    return 2 * np.pi * np.nan_to_num(np.round((after[0] - before[0] - rise) / (2 * np.pi)))
+    return np.nan_to_num(whole_periods(after[0] - before[0] - rise))

@@ -16,10 +16,11 @@ from jounce.dynamics.start import start, with_rates
 from jounce.integrate.events import pose_coordinates
 from jounce.integrate.projection import projected
 from jounce.jet import Jet
+from jounce.jet.turns import brought_near
 from jounce.kinematics.compilation import compiled
 from jounce.mechanism import Mechanism, Model, build
+from jounce.mechanism.axis_angles import measures_angle, raw_angles
 from jounce.mechanism.builder import starting_guess
-from jounce.mechanism.datums import counted_on, measures_angle, raw_angles
 from jounce.mechanism.system import POSITION_COMPONENTS, Group
 
 STAGES = 8  # in which parameters go from those of the first run to their own, so that positions follow
@@ -174,7 +175,7 @@ class Starts:
             if measuring:
                 coordinates = pose_coordinates(State(*(np.asarray(part)[None] for part in state)))
                 raw = raw_angles(measuring, {"quaternion": coordinates["quaternion"][0]})
-                angles = [counted_on(near, angle[..., None])[..., 0] for near, angle in zip(angles, raw, strict=True)]
+                angles = [brought_near(angle, near) for near, angle in zip(angles, raw, strict=True)]
         count = len([group for group in equations.system.forces if measures_angle(group)])
         turns = Turns(tuple(angles[:count]), tuple(angles[count:]))
         return jax.tree.map(np.asarray, with_rates(stages[-1], state, clock)), turns

@@ -17,7 +17,7 @@ from jounce.integrate.turns import measured
 from jounce.jet import Jet
 from jounce.kinematics.linear import DenseFactor
 from jounce.mechanism import Mechanism
-from jounce.mechanism.datums import measures_angle
+from jounce.mechanism.axis_angles import measures_angle
 
 
 def ode_term(mechanism: Mechanism, time: float = 0.0) -> "OrdinaryEquation":

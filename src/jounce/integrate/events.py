@@ -11,6 +11,7 @@ from jounce.dynamics.forward import State
 from jounce.errors import MechanismError
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked
+from jounce.jet.turns import counted_by_rates
 from jounce.kinematics.compilation import compiled
 from jounce.mechanism import AbstractOutput
 from jounce.mechanism.system import Group
@@ -147,15 +148,6 @@ def at_nodes(group: Group, polynomial: Any, length: np.ndarray, order: int, pose
     return series.reshape(*series.shape[:3], *since.shape)
 
 
-def counted_on(values: np.ndarray, rates: np.ndarray, time: np.ndarray) -> np.ndarray:
-    """Return angles known up to whole turns, (..., time), counted on from the first by their rates."""
-    rises = 0.5 * np.diff(time) * (rates[..., 1:] + rates[..., :-1])
-    jumps = np.round((np.diff(values, axis=-1) - rises) / (2 * np.pi))
-    found = values.copy()
-    found[..., 1:] -= 2 * np.pi * np.cumsum(jumps, axis=-1)
-    return found
-
-
 class Watch:
     """The crossings of one event along a run, of which the steps come piece by piece.
 
@@ -193,7 +185,7 @@ class Watch:
         if element.turning:
             time = (start[:, None] + length[:, None] * NODES).ravel()
             history = np.concatenate([self._angle, [time, series[0].ravel(), series[1].ravel()]], axis=1)
-            history[1] = counted_on(history[1], history[2], history[0])
+            history[1] = counted_by_rates(history[1], history[2], history[0])
             series[0] = history[1, -len(time) :].reshape(series[0].shape)
             self._angle = history[:, -1:]
         values = series[derivative] * math.factorial(derivative) - self.event.value

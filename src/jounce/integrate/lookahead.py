@@ -18,7 +18,7 @@ from jounce.integrate.events import INTERPOLATION, NODES
 from jounce.integrate.methods import evaluated
 from jounce.integrate.turns import Angles
 from jounce.jet import Jet
-from jounce.mechanism.datums import with_turns
+from jounce.mechanism.axis_angles import with_turns
 from jounce.mechanism.system import Group
 
 POINTS = 32  # at which each step is looked at

@@ -20,8 +20,8 @@ from jounce.kinematics import Status, raise_for_status
 from jounce.kinematics.motion import check_output, output_group
 from jounce.kinematics.solve import checked_order
 from jounce.mechanism import Mechanism, check_mechanism, time_grid
-from jounce.mechanism.doors import concrete
-from jounce.mechanism.laws import check_laws
+from jounce.mechanism.law_checks import check_laws
+from jounce.mechanism.preconditions import concrete
 
 AHEAD = 1e-9  # of the time so far: where steps collapse, what is not finite lies that close
 FEW = 4  # derivatives that are looked at for one that is not finite

@@ -11,16 +11,17 @@ import numpy as np
 from jounce.dynamics.energies import body_energy
 from jounce.dynamics.forward import Equations, State, expand
 from jounce.dynamics.start import Start
-from jounce.integrate.events import NODES, at_nodes, counted_on, pose_coordinates, series_of
+from jounce.integrate.events import NODES, at_nodes, pose_coordinates, series_of
 from jounce.integrate.lookahead import watched_names
 from jounce.integrate.methods import evaluated
 from jounce.integrate.projection import projected
 from jounce.integrate.turns import followed, measured
 from jounce.jet import Jet, dot
+from jounce.jet.turns import brought_near, counted_by_rates
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.compilation import compiled
 from jounce.mechanism import Mechanism
-from jounce.mechanism.datums import with_turns
+from jounce.mechanism.axis_angles import with_turns
 from jounce.mechanism.system import Group
 
 SMALL_BATCH, LARGE_BATCH = 16, 64  # instants expanded together
@@ -101,20 +102,20 @@ class Simulation(Motion):
         coordinates = pose_coordinates(state)
         groups = tuple(self._series(group, coordinates, pose_type, instants) for group in start.model.system.outputs)
         status = np.where(reached, int(Status.OK), int(Status.NOT_REACHED))
-        culprits = {}
+        faults = {}
         lost = reached & ~np.all([np.isfinite(p).all(axis=tuple(range(p.ndim - 1))) for p in state], axis=0)
         for names, series in zip(start.model.outputs, groups, strict=True):
             bad = ~np.isfinite(series[: order + 1]).all(axis=(0, 1)) & reached & ~lost  # (outputs, time)
             status[bad.any(axis=0)] = int(Status.UNDEFINED)
-            culprits |= {
+            faults |= {
                 int(lane): f"output {names[int(np.argmax(bad[:, lane]))]}" for lane in np.flatnonzero(bad.any(0))
             }
         if lost.any():  # the state is known there, but not its derivatives
-            status[lost], culprits[int(np.argmax(lost))] = int(Status.INADMISSIBLE), ending[1]
+            status[lost], faults[int(np.argmax(lost))] = int(Status.INADMISSIBLE), ending[1]
         beyond = np.flatnonzero(~reached & (np.abs(instants - track.start[0]) > abs(track.end - track.start[0])))
         if ending[0] != Status.OK and beyond.size:
-            status[beyond[0]], culprits[int(beyond[0])] = int(ending[0]), ending[1]
-        super().__init__(mechanism, start.model, instants, order, (coordinates, groups), status, culprits)
+            status[beyond[0]], faults[int(beyond[0])] = int(ending[0]), ending[1]
+        super().__init__(mechanism, start.model, instants, order, (coordinates, groups), status, faults)
 
     def __repr__(self) -> str:
         return f"<Simulation{super().__repr__()[7:-1]}, {self.steps} steps>"
@@ -205,10 +206,10 @@ class Simulation(Motion):
         nodes = (track.start[:, None] + track.length[:, None] * NODES).ravel()
         known = at_nodes(group, track.polynomial, track.length, 1, self._start.model.pose_type)[:2]
         known = known.reshape(*known.shape[:3], -1)
-        counted = counted_on(known[0], known[1], nodes)
+        counted = counted_by_rates(known[0], known[1], nodes)
         near = np.abs(nodes[None] - instants[:, None]).argmin(axis=1)
         expected = counted[..., near] + (instants - nodes[near]) * 0.5 * (known[1][..., near] + series[1])
-        series[0] += 2 * np.pi * np.round((expected - series[0]) / (2 * np.pi))
+        series[0] = brought_near(series[0], expected)
         return series
 
     def _checked(self, which: int) -> np.ndarray:
@@ -258,11 +259,8 @@ def expanded(equations: Equations, polynomial: State, step: Any, instants: Any, 
 
 def continuous(group: Any, series: np.ndarray, instants: np.ndarray) -> np.ndarray:
     """Take the whole turns out of angles that are known up to them, from one instant to the next by their rates."""
-    if not group.element.turning or len(instants) < 2:
-        return series
-    expected = np.diff(instants) * 0.5 * (series[1, ..., 1:] + series[1, ..., :-1])
-    jumps = np.round((np.diff(series[0], axis=-1) - expected) / (2 * np.pi))
-    series[0, ..., 1:] -= 2 * np.pi * np.cumsum(jumps, axis=-1)
+    if group.element.turning and len(instants) > 1:
+        series[0] = counted_by_rates(series[0], series[1], instants)
     return series
 
 

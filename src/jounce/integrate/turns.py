@@ -12,7 +12,7 @@ import jax.numpy as jnp
 from jounce.dynamics.forward import Equations, State
 from jounce.integrate.methods import evaluated
 from jounce.jet import Jet
-from jounce.mechanism.datums import measures_angle
+from jounce.mechanism.axis_angles import measures_angle
 
 PLACES = 16  # in a step: series carry over about one turn in it at most
 

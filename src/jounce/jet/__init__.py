@@ -34,8 +34,8 @@ from jounce.jet.elementary import (
     sinh as sinh,
     tan as tan,
     tanh as tanh,
-    wrap as wrap,
 )
+from jounce.jet.turns import wrap as wrap
 from jounce.jet.vectors import (
     matmul as matmul,
     matvec as matvec,

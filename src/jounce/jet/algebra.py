@@ -1,13 +1,30 @@
 """The jet: a truncated Taylor series in time, its arithmetic, powers, and products of vectors."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import wraps
 from typing import Any
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
-from jounce.jet.coefficients import elementwise, minus, plus, ranked, sum_of_products, total
+from jounce.jet.coefficients import (
+    Coefficient,
+    Product,
+    convolution,
+    elementwise,
+    minus,
+    next_of_chain,
+    plus,
+    quotient,
+    raised,
+    ranked,
+    self_convolution,
+    square_root,
+    total,
+)
+from jounce.shapes import Numbers, Real
 
 
 @jax.tree_util.register_pytree_node_class
@@ -40,24 +57,24 @@ class Jet:
     __slots__ = ("coefficients",)
     __array_ufunc__ = None  # NumPy arrays on the left leave the operator to the jet
 
-    def __init__(self, coefficients: Iterable[Any]):
+    def __init__(self, coefficients: Iterable[Any]):  # each a `Coefficient`; JAX puts other things in their place
         self.coefficients = tuple(coefficients)
         if not self.coefficients:
             raise ValueError("a jet needs at least one coefficient, got none")
 
     @classmethod
-    def constant(cls, value: Any, order: int) -> "Jet":
+    def constant(cls, value: Real, order: int) -> "Jet":
         """Return the jet of a quantity that does not change in time."""
         return cls((jnp.asarray(value), *[None] * _checked(order)))
 
     @classmethod
-    def variable(cls, value: Any, order: int) -> "Jet":
+    def variable(cls, value: Real, order: int) -> "Jet":
         """Return the jet of time itself at the instant (or instants) `value`, in seconds."""
         value = jnp.asarray(value)
         return cls((value, jnp.ones_like(value), *[None] * (order - 1))[: _checked(order) + 1])
 
     @classmethod
-    def from_derivatives(cls, derivatives: Any) -> "Jet":
+    def from_derivatives(cls, derivatives: Iterable[Real]) -> "Jet":
         """Return the jet whose plain derivatives ``x, x', x'', ...`` stand along the leading axis."""
         return cls(jnp.asarray(x, float) * (1 / math.factorial(k)) for k, x in enumerate(derivatives))
 
@@ -82,12 +99,17 @@ class Jet:
         """Shape of one coefficient."""
         return jnp.shape(self.coefficients[0])
 
+    @property
+    def dtype(self) -> np.dtype:
+        """Type of the numbers; with the shape, it lets annotations check jets as they check arrays."""
+        return jnp.result_type(self.coefficients[0])
+
     def tree_flatten(self) -> tuple[Any, None]:
         """Tell JAX that the coefficients are what it transforms."""
         return self.coefficients, None
 
     @classmethod
-    def tree_unflatten(cls, _: None, leaves: Any) -> "Jet":
+    def tree_unflatten(cls, _: None, leaves: Iterable[Any]) -> "Jet":
         """Build the jet again from its transformed coefficients."""
         jet = object.__new__(cls)  # transformations pass placeholders that are not arrays
         jet.coefficients = tuple(leaves)
@@ -106,7 +128,7 @@ class Jet:
         """Apply a linear, time-independent `function` to every coefficient."""
         return Jet(None if c is None else function(c) for c in self.coefficients)
 
-    def append(self, coefficient: Any) -> "Jet":
+    def append(self, coefficient: Coefficient) -> "Jet":
         """Return the jet of one order more, with the given highest Taylor coefficient."""
         return Jet((*self.coefficients, coefficient))
 
@@ -127,22 +149,22 @@ class Jet:
         first, *rest = (None if c is None else k * c for k, c in enumerate(self.coefficients) if k)
         return Jet((jnp.zeros_like(self.coefficients[0]) if first is None else first, *rest))
 
-    def integrate(self, initial: Any) -> "Jet":
+    def integrate(self, initial: Real) -> "Jet":
         """Return the jet of the time integral that has the value `initial`, one order longer."""
         return Jet((initial, *[None if c is None else c * (1 / (k + 1)) for k, c in enumerate(self.coefficients)]))
 
-    def evaluate(self, step: Any) -> Any:
+    def evaluate(self, step: Real) -> Any:
         """Return the Taylor prediction a time `step` (in seconds) away."""
         *lower, value = self.coefficients
         for c in reversed(lower):
             value = plus(c, None if value is None else elementwise(jnp.multiply)(value, step))
         return value
 
-    def dot(self, other: Any) -> Any:
+    def dot(self, other: "Jet | Numbers") -> Any:
         """Return the scalar product along the component axis."""
         return dot(self, other)
 
-    def cross(self, other: Any) -> Any:
+    def cross(self, other: "Jet | Numbers") -> Any:
         """Return the vector product along the component axis (a scalar in the plane)."""
         return cross(self, other)
 
@@ -152,24 +174,22 @@ class Jet:
     def __pos__(self) -> "Jet":
         return self
 
-    def __add__(self, other: Any) -> "Jet":
-        if isinstance(other, Jet):
-            return Jet(map(plus, self.coefficients, other.coefficients))._filled()
-        return self._shift(plus(self.coefficients[0], other))
+    def __add__(self, other: "Quantity") -> "Jet":
+        return self._combined(plus, other)
 
     __radd__ = __add__
 
-    def __sub__(self, other: Any) -> "Jet":
-        if isinstance(other, Jet):
-            return Jet(map(minus, self.coefficients, other.coefficients))._filled()
-        return self._shift(minus(self.coefficients[0], other))
+    def __sub__(self, other: "Quantity") -> "Jet":
+        return self._combined(minus, other)
 
-    def __rsub__(self, other: Any) -> "Jet":
+    def __rsub__(self, other: "Quantity") -> "Jet":
         return -self + other
 
-    def _shift(self, first: Any) -> "Jet":
-        """Replace the value; a constant of larger shape than the jet makes the other coefficients follow."""
-        return Jet((first, *self.coefficients[1:]))._filled()
+    def _combined(self, combine: Product, other: "Quantity") -> "Jet":
+        """Add or subtract; a constant of larger shape than the jet makes the other coefficients follow."""
+        if isinstance(other, Jet):
+            return Jet(map(combine, self.coefficients, other.coefficients))._filled()
+        return Jet((combine(self.coefficients[0], other), *self.coefficients[1:]))._filled()
 
     def _filled(self) -> "Jet":
         """Give all coefficients the shape of the first, where a sum of unequal shapes left some as they were."""
@@ -178,7 +198,7 @@ class Jet:
             return self
         return self.map(lambda c: jnp.broadcast_to(ranked(c, len(shape)), shape))
 
-    def __mul__(self, other: Any) -> "Jet":
+    def __mul__(self, other: "Quantity") -> "Jet":
         if other is self:
             return self.square()
         return bilinear(elementwise(jnp.multiply), self, other)
@@ -189,26 +209,26 @@ class Jet:
         """Return the square, with half the products of a general multiplication."""
         return symmetric(jnp.multiply, self)
 
-    def __truediv__(self, other: Any) -> "Jet":
-        divide = elementwise(jnp.divide)
+    def __truediv__(self, other: "Quantity") -> "Jet":
         if not isinstance(other, Jet):
-            return self.map(lambda c: divide(c, other))
-        b0, *b = other.coefficients
-        quotient: list[Any] = []
-        for k in range(min(self.order, other.order) + 1):
-            known = sum_of_products(elementwise(jnp.multiply), b[:k], quotient[::-1])
-            rest = minus(self.coefficients[k], known)
-            quotient.append(None if rest is None else divide(rest, b0))
-        return Jet(quotient)._filled()
+            return self.map(lambda c: elementwise(jnp.divide)(c, other))
+        return Jet(quotient(self.coefficients, other.coefficients))._filled()
 
-    def __rtruediv__(self, other: Any) -> "Jet":
+    def __rtruediv__(self, other: Real) -> "Jet":
         return Jet.constant(other, self.order) / self
 
-    def __pow__(self, exponent: Any) -> "Jet":
+    def __pow__(self, exponent: "Quantity") -> "Jet":
         return power(self, exponent)
 
-    def __rpow__(self, base: Any) -> "Jet":
+    def __rpow__(self, base: Real) -> "Jet":
         return power(base, self)
+
+
+Quantity = Jet | Real
+"""A jet, or what does not change in time: an array or a number."""
+
+JetLike = Quantity | Sequence[Any]
+"""A jet, or what becomes one: an array, a number, or a sequence of them."""
 
 
 def _checked(order: int) -> int:
@@ -228,11 +248,10 @@ def stacked(jet: Jet) -> Any:
     return jnp.stack(jet.dense().coefficients)
 
 
-def bilinear(product: Callable[[Any, Any], Any], a: Any, b: Any) -> Any:
+def bilinear(product: Product, a: Quantity, b: Quantity) -> Any:
     """Extend a bilinear `product` of arrays to jets: the Cauchy convolution of their coefficients."""
     if isinstance(a, Jet) and isinstance(b, Jet):
-        x, y = a.coefficients, b.coefficients
-        return Jet(sum_of_products(product, x[: k + 1], y[k::-1]) for k in range(min(len(x), len(y))))
+        return Jet(convolution(product, a.coefficients, b.coefficients))
     if isinstance(a, Jet):
         return a.map(lambda c: product(c, b))
     if isinstance(b, Jet):
@@ -240,50 +259,40 @@ def bilinear(product: Callable[[Any, Any], Any], a: Any, b: Any) -> Any:
     return product(a, b)
 
 
-def symmetric(product: Callable[[Any, Any], Any], a: Jet) -> Jet:
+def symmetric(product: Product, a: Jet) -> Jet:
     """Extend a symmetric bilinear `product` to a jet with itself: mirrored terms are computed once."""
-    x = a.coefficients
-
-    def coefficient(k: int) -> Any:
-        half = (k + 1) // 2
-        twice = sum_of_products(product, x[:half], x[k : k - half : -1] if half else ())
-        twice = None if twice is None else 2 * twice
-        middle = x[k // 2] if k % 2 == 0 else None
-        return plus(twice, None if middle is None else product(middle, middle))
-
-    return Jet(map(coefficient, range(len(x))))
+    return Jet(self_convolution(product, a.coefficients))
 
 
 # Components are cut out once for each coefficient, as slices that keep their axis, and their products are written out:
 # high orders trace them hundreds of times, and XLA vectorises them along the batch, which it does not do for sums.
 
 
-def components(vector: Any) -> list[Any]:
+def components(vector: Jet | Numbers) -> list[Any]:
     """Return the components of a vector of shape (components, ...), each of shape (1, ...)."""
-    size = vector.shape[0] if isinstance(vector, Jet) else len(vector)
-    return [vector[i : i + 1] for i in range(size)]
+    return [vector[i : i + 1] for i in range(vector.shape[0])]
 
 
-def dot(a: Any, b: Any) -> Any:
+def dot(a: Jet | Numbers, b: Jet | Numbers) -> Any:
     """Return the scalar product of two vectors, of shape (components, ...), as shape (...)."""
     if isinstance(a, Jet) and a is b:
         return total(symmetric(jnp.multiply, x) for x in components(a))[0]
     return total(bilinear(jnp.multiply, x, y) for x, y in zip(components(a), components(b), strict=True))[0]
 
 
-def cross(a: Any, b: Any) -> Any:
+def cross(a: Jet | Numbers, b: Jet | Numbers) -> Any:
     """Return the vector product of two 3-vectors, or the scalar ``a_x b_y - a_y b_x`` of two plane vectors."""
-    a, b = components(a), components(b)
+    x, y = components(a), components(b)
 
     def entry(i: int, j: int) -> Any:
-        return bilinear(jnp.multiply, a[i], b[j]) - bilinear(jnp.multiply, a[j], b[i])
+        return bilinear(jnp.multiply, x[i], y[j]) - bilinear(jnp.multiply, x[j], y[i])
 
-    if len(a) == 2:
+    if len(x) == 2:
         return entry(0, 1)[0]
     return concatenate([entry(1, 2), entry(2, 0), entry(0, 1)])
 
 
-def concatenate(parts: list[Any]) -> Any:
+def concatenate(parts: Sequence[Jet | Numbers]) -> Any:
     """Join vectors, jets or arrays, of shape (components, ...), along the component axis.
 
     Their other axes are broadcast. Jets are joined coefficient by coefficient; None where it is None in all of them.
@@ -306,58 +315,56 @@ def concatenate(parts: list[Any]) -> Any:
     return Jet((jnp.concatenate(first), *map(level, rest)))
 
 
-def _alike(arrays: list[Any]) -> list[Any]:
+def _alike(arrays: Sequence[Any]) -> list[Any]:
     """Broadcast the batch axes, all but the first."""
     batch = jnp.broadcast_shapes(*(jnp.shape(a)[1:] for a in arrays))
     return [jnp.broadcast_to(a, (jnp.shape(a)[0], *batch)) for a in arrays]
 
 
-def next_of_chain(outer: list[Any], inner: Jet, slope: list[Any]) -> Any:
-    """Return the next coefficient of y from ``y' = slope * inner'``."""
-    k = len(outer)
-    rates = [None if c is None else j * c for j, c in enumerate(inner.coefficients[: k + 1])]
-    value = sum_of_products(jnp.multiply, rates[1:], slope[k - 1 :: -1])
-    return None if value is None else value * (1 / k)
+def of_quantities(on_arrays: Callable[[Any], Any]) -> Callable[[Callable[[Jet], Jet]], Callable[[Quantity], Any]]:
+    """Let a function of jets take arrays and numbers too, for which JAX has a function."""
+
+    def decorate(on_jets: Callable[[Jet], Jet]) -> Callable[[Quantity], Any]:
+        @wraps(on_jets)
+        def either(x: Quantity) -> Any:
+            return on_jets(x) if isinstance(x, Jet) else on_arrays(x)
+
+        return either
+
+    return decorate
 
 
-def exp(x: Any) -> Any:
+@of_quantities(jnp.exp)
+def exp(x: Jet) -> Jet:
     """Return the exponential."""
-    if not isinstance(x, Jet):
-        return jnp.exp(x)
     y = [jnp.exp(x.coefficients[0])]
     for _ in range(x.order):
-        y.append(next_of_chain(y, x, y))
+        y.append(next_of_chain(y, x.coefficients, y))
     return Jet(y)
 
 
-def log(x: Any) -> Any:
+@of_quantities(jnp.log)
+def log(x: Jet) -> Jet:
     """Return the natural logarithm."""
-    if not isinstance(x, Jet):
-        return jnp.log(x)
     first, *rest = x.coefficients
     return (x.differentiate() / x.truncate(x.order - 1)).integrate(jnp.log(first)) if rest else Jet([jnp.log(first)])
 
 
-def sqrt(x: Any) -> Any:
+@of_quantities(jnp.sqrt)
+def sqrt(x: Jet) -> Jet:
     """Return the square root."""
-    if not isinstance(x, Jet):
-        return jnp.sqrt(x)
-    y: list[Any] = [jnp.sqrt(x.coefficients[0])]
-    for k in range(1, x.order + 1):
-        rest = minus(x.coefficients[k], sum_of_products(jnp.multiply, y[1:k], y[k - 1 : 0 : -1]))
-        y.append(None if rest is None else rest / (2 * y[0]))
-    return Jet(y)
+    return Jet(square_root(x.coefficients))
 
 
-def power(x: Any, exponent: Any) -> Any:
+def power(x: Quantity, exponent: Quantity) -> Any:
     """Return `x` to the power `exponent`.
 
     A whole exponent multiplies repeatedly: the recurrence for real exponents divides by the base and fails at zero.
     """
-    if isinstance(exponent, Jet) or not isinstance(x, Jet):
-        if not isinstance(exponent, Jet):
-            return jnp.power(x, exponent)
+    if isinstance(exponent, Jet):
         return exp(exponent * log(x))
+    if not isinstance(x, Jet):
+        return jnp.power(x, exponent)
     if isinstance(exponent, float) and exponent.is_integer():
         exponent = int(exponent)
     if isinstance(exponent, int):
@@ -367,18 +374,13 @@ def power(x: Any, exponent: Any) -> Any:
     return real_power(x, jnp.asarray(exponent, float))
 
 
-def real_power(x: Jet, exponent: Any) -> Jet:
+def real_power(x: Jet, exponent: Real) -> Jet:
     """Return a power whose exponent is known at run time only.
 
     The recurrence divides by the base, so a whole exponent up to the order is taken from repeated products instead.
     """
     at_zero = x.coefficients[0] == 0
     c = (jnp.where(at_zero, 1.0, x.coefficients[0]), *x.coefficients[1:])
-    y: list[Any] = [jnp.power(c[0], exponent)]
-    for k in range(1, x.order + 1):
-        weighted = [None if c[j] is None else (exponent * j - (k - j)) * c[j] for j in range(1, k + 1)]
-        value = sum_of_products(jnp.multiply, weighted, y[k - 1 :: -1])
-        y.append(None if value is None else value / (k * c[0]))
     whole = [whole_power(x, m).dense() for m in range(x.order + 1)]
     beyond = exponent > x.order  # at a base of zero, every coefficient vanishes; other exponents have none there
 
@@ -388,15 +390,10 @@ def real_power(x: Jet, exponent: Any) -> Jet:
             value = jnp.where(exponent == m, power_m.coefficients[k], value)
         return value
 
-    return Jet(coefficient(k, value) for k, value in enumerate(Jet(y).dense().coefficients))
+    return Jet(coefficient(k, value) for k, value in enumerate(Jet(raised(c, exponent)).dense().coefficients))
 
 
-def square(x: Any) -> Any:
-    """Return the square of a jet or an array."""
-    return x.square() if isinstance(x, Jet) else x * x
-
-
-def whole_power(x: Any, exponent: int) -> Any:
+def whole_power(x: Quantity, exponent: int) -> Any:
     """Return a power of a jet or an array by repeated products."""
     if exponent < 0:
         return 1.0 / whole_power(x, -exponent)
@@ -406,7 +403,7 @@ def whole_power(x: Any, exponent: int) -> Any:
             result = doubled if result is None else result * doubled
         exponent >>= 1
         if exponent:
-            doubled = square(doubled)
+            doubled = doubled * doubled
     if result is not None:
         return result
     return Jet.constant(jnp.ones_like(x.coefficients[0]), x.order) if isinstance(x, Jet) else jnp.ones_like(x)

@@ -1,11 +1,21 @@
 """Sums and products of Taylor coefficients; None is a coefficient that is zero for certain."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from functools import reduce
 from operator import add
 from typing import Any
 
 import jax.numpy as jnp
+
+from jounce.shapes import Real
+
+Coefficient = Real | None
+"""A Taylor coefficient, of any shape; None is zero for certain."""
+
+Coefficients = Sequence[Any]
+"""Taylor coefficients, the lowest order first."""
+
+Product = Callable[[Any, Any], Any]
 
 
 def total(terms: Iterable[Any]) -> Any:
@@ -13,27 +23,80 @@ def total(terms: Iterable[Any]) -> Any:
     return reduce(add, terms)
 
 
-def plus(a: Any, b: Any) -> Any:
+def plus(a: Coefficient, b: Coefficient) -> Any:
     """Add coefficients; None is zero."""
     if a is None or b is None:
         return b if a is None else a
     return elementwise(jnp.add)(a, b)
 
 
-def minus(a: Any, b: Any) -> Any:
+def minus(a: Coefficient, b: Coefficient) -> Any:
     """Subtract coefficients; None is zero."""
     if a is None or b is None:
         return a if b is None else -b
     return elementwise(jnp.subtract)(a, b)
 
 
-def sum_of_products(product: Callable[[Any, Any], Any], a: Iterable[Any], b: Iterable[Any]) -> Any:
+def sum_of_products(product: Product, a: Iterable[Any], b: Iterable[Any]) -> Any:
     """Return the sum of the products of paired coefficients, None where all of them vanish."""
     terms = [product(x, y) for x, y in zip(a, b, strict=True) if x is not None and y is not None]
     return total(terms) if terms else None
 
 
-def elementwise(operation: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
+def convolution(product: Product, a: Coefficients, b: Coefficients) -> list[Any]:
+    """Return the coefficients of a product of two series, to the order of the shorter one."""
+    return [sum_of_products(product, a[: k + 1], b[k::-1]) for k in range(min(len(a), len(b)))]
+
+
+def self_convolution(product: Product, a: Coefficients) -> list[Any]:
+    """Return the coefficients of a symmetric product of a series with itself, mirrored terms computed once."""
+    found = []
+    for k in range(len(a)):
+        half = (k + 1) // 2
+        twice = sum_of_products(product, a[:half], a[k : k - half : -1] if half else ())
+        middle = sum_of_products(product, a[k // 2 : k // 2 + 1], a[k // 2 : k // 2 + 1]) if k % 2 == 0 else None
+        found.append(plus(None if twice is None else 2 * twice, middle))
+    return found
+
+
+def quotient(a: Coefficients, b: Coefficients) -> list[Any]:
+    """Return the coefficients of the quotient of two series, to the order of the shorter one."""
+    first, *others = b
+    found: list[Any] = []
+    for k in range(min(len(a), len(b))):
+        rest = minus(a[k], sum_of_products(elementwise(jnp.multiply), others[:k], found[::-1]))
+        found.append(None if rest is None else elementwise(jnp.divide)(rest, first))
+    return found
+
+
+def next_of_chain(outer: Coefficients, inner: Coefficients, slope: Coefficients) -> Any:
+    """Return the next coefficient of y from ``y' = slope * inner'``."""
+    k = len(outer)
+    rates = [None if c is None else j * c for j, c in enumerate(inner[: k + 1])]
+    value = sum_of_products(jnp.multiply, rates[1:], slope[k - 1 :: -1])
+    return None if value is None else value * (1 / k)
+
+
+def square_root(x: Coefficients) -> list[Any]:
+    """Return the coefficients of the square root of a series."""
+    y: list[Any] = [jnp.sqrt(x[0])]
+    for k in range(1, len(x)):
+        rest = minus(x[k], sum_of_products(jnp.multiply, y[1:k], y[k - 1 : 0 : -1]))
+        y.append(None if rest is None else rest / (2 * y[0]))
+    return y
+
+
+def raised(x: Coefficients, exponent: Real) -> list[Any]:
+    """Return the coefficients of a power of a series whose first coefficient is not zero."""
+    y: list[Any] = [jnp.power(x[0], exponent)]
+    for k in range(1, len(x)):
+        weighted = [None if x[j] is None else (exponent * j - (k - j)) * x[j] for j in range(1, k + 1)]
+        value = sum_of_products(jnp.multiply, weighted, y[k - 1 :: -1])
+        y.append(None if value is None else value / (k * x[0]))
+    return y
+
+
+def elementwise(operation: Product) -> Product:
     """Let operands of different rank meet at their trailing (batch) axes, said aloud for strict rank promotion."""
 
     def aligned(a: Any, b: Any) -> Any:
@@ -43,7 +106,7 @@ def elementwise(operation: Callable[[Any, Any], Any]) -> Callable[[Any, Any], An
     return aligned
 
 
-def ranked(a: Any, rank: int) -> Any:
+def ranked(a: Real, rank: int) -> Any:
     """Put axes of length one before those of an array; a number stays a number."""
     missing = rank - jnp.ndim(a)
     return jnp.reshape(a, (1,) * missing + jnp.shape(a)) if missing and jnp.ndim(a) else a

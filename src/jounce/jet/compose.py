@@ -11,11 +11,12 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
-from jax.extend.core import Literal
+from jax.extend.core import JaxprEqn
 
-from jounce.jet.algebra import Jet, bilinear, exp, power, sqrt
+from jounce.jet.algebra import Jet, bilinear
 from jounce.jet.elementary import FUNCTIONS, erf, tanh
-from jounce.jet.vectors import stack
+from jounce.jet.operations import COMPOSED, REARRANGING, STEPWISE
+from jounce.jet.programs import ProgramReader, inner_program
 
 
 def compose(function: Callable[[Any], Any], x: Jet) -> Jet:
@@ -50,10 +51,11 @@ def compose(function: Callable[[Any], Any], x: Jet) -> Jet:
     program, result = jax.make_jaxpr(function, return_shape=True)(example)
     if getattr(result, "shape", None) != ():
         raise TypeError(f"a function of time must return one scalar for a scalar, got {result}")
-    run = _run if all(map(_has_rule, _operations(program.jaxpr))) else _nested
+    ruled = all(map(_has_rule, _operations(program.jaxpr)))
 
     def one(*coefficients):
-        result = run(program, function, Jet(coefficients))
+        x = Jet(coefficients)
+        (result,) = _OnJets().read(program.jaxpr, program.consts, [x]) if ruled else [_nested(function, x)]
         if not isinstance(result, Jet):
             result = Jet.constant(jnp.asarray(result, dtype=example.dtype), x.order)
         return result.coefficients
@@ -62,7 +64,7 @@ def compose(function: Callable[[Any], Any], x: Jet) -> Jet:
     return Jet(jax.vmap(one)(*flat)).map(lambda c: jnp.reshape(c, x.shape))
 
 
-def _nested(_, function: Callable[[Any], Any], x: Jet) -> Jet:
+def _nested(function: Callable[[Any], Any], x: Jet) -> Jet:
     """Differentiate ``function`` along the polynomial of `x`, by forward mode within forward mode."""
 
     def along(step):
@@ -79,78 +81,28 @@ def _slope(f: Callable[[Any], Any]) -> Callable[[Any], Any]:
     return lambda step: jax.jvp(f, (step,), (jnp.ones_like(step),))[1]
 
 
-def _run(program: Any, _, *arguments: Any) -> Any:
-    """Run a JAX program on jets (and on arrays, for what does not depend on time)."""
-    values = dict(zip(program.jaxpr.constvars, program.consts, strict=True))
-    values.update(zip(program.jaxpr.invars, arguments, strict=True))
+class _OnJets(ProgramReader):
+    """Runs programs on jets, and on arrays for what does not depend on time."""
 
-    def read(variable):
-        return variable.val if isinstance(variable, Literal) else values[variable]
+    moving = Jet
 
-    for equation in program.jaxpr.eqns:
-        operands = [read(v) for v in equation.invars]
-        name, parameters = equation.primitive.name, equation.params
-        if not any(isinstance(x, Jet) for x in operands):
-            results = equation.primitive.bind(*operands, **parameters)
-            results = results if equation.primitive.multiple_results else [results]
-        elif name in _CONTROL:
-            results = _CONTROL[name](*operands, **parameters)
-        elif inner := _inner_program(parameters):
-            results = _run_all(inner, operands)
-        else:
-            results = [_apply(equation.primitive, parameters, operands)]
-        values.update(zip(equation.outvars, results, strict=True))
-    outputs = [read(v) for v in program.jaxpr.outvars]
-    return outputs[0] if len(outputs) == 1 else outputs
+    def value(self, x: Any) -> Any:
+        return _value(x)
+
+    def applied(self, equation: JaxprEqn, operands: list[Any]) -> list[Any]:
+        primitive, parameters, name = equation.primitive, equation.params, equation.primitive.name
+        if name in _RULES:
+            return [_RULES[name](*operands, **parameters)]
+        if name in REARRANGING:
+            return [_along_coefficients(primitive, parameters, operands)]
+        if name in _BILINEAR:
+            return [bilinear(lambda a, b: primitive.bind(a, b, **parameters), *operands)]
+        if name in COMPOSED:
+            return [self.composed(lambda *xs: COMPOSED[name](*xs, **parameters), operands)]
+        return [primitive.bind(*map(_value, operands), **parameters)]  # piecewise constant in time
 
 
-def _run_all(program: Any, operands: list[Any]) -> list[Any]:
-    results = _run(program, None, *operands)
-    return results if isinstance(results, list) else [results]
-
-
-def _branches(which: Any, *operands: Any, branches: Any, **_) -> list[Any]:
-    """Run every branch of a condition and select from the results."""
-    outcomes = zip(*(_run_all(branch, list(operands)) for branch in branches), strict=True)
-    which = jnp.clip(_value(which), 0, len(branches) - 1)
-    return [_pick(which, outcome) for outcome in outcomes]
-
-
-def _pick(which: Any, cases: tuple[Any, ...]) -> Any:
-    chosen = cases[0]
-    for k, case in enumerate(cases[1:], 1):
-        chosen = _select(jnp.broadcast_to(which == k, jnp.shape(_value(case))), chosen, case)
-    return chosen
-
-
-def _unrolled(
-    *operands: Any, jaxpr: Any, length: int, num_consts: int, num_carry: int, reverse: bool, **_
-) -> list[Any]:
-    """Run a loop of known length step by step."""
-    constants, carry = list(operands[:num_consts]), list(operands[num_consts : num_consts + num_carry])
-    sequences, collected = operands[num_consts + num_carry :], []
-    for step in reversed(range(length)) if reverse else range(length):
-        results = _run_all(jaxpr, [*constants, *carry, *(x[step] for x in sequences)])
-        carry = results[:num_carry]
-        collected.append(results[num_carry:])
-    if reverse:
-        collected.reverse()
-    return [*carry, *(stack(steps) for steps in zip(*collected, strict=True))]
-
-
-_CONTROL: dict[str, Callable[..., list[Any]]] = {"cond": _branches, "scan": _unrolled}
 LONGEST_UNROLLED = 100
-
-
-def _apply(primitive: Any, parameters: dict, operands: list[Any]) -> Any:
-    name = primitive.name
-    if name in _RULES:
-        return _RULES[name](*operands, **parameters)
-    if name in _LINEAR:
-        return _along_coefficients(primitive, parameters, operands)
-    if name in _BILINEAR:
-        return bilinear(lambda a, b: primitive.bind(a, b, **parameters), *operands)
-    return primitive.bind(*map(_value, operands), **parameters)  # piecewise constant in time
 
 
 def _along_coefficients(primitive: Any, parameters: dict, operands: list[Any]) -> Jet:
@@ -180,15 +132,6 @@ def _select(which: Any, *cases: Any, **_) -> Any:
     return Jet(jax.lax.select_n(_value(which), *column) for column in columns)
 
 
-def _remainder(x: Any, y: Any, **_) -> Any:
-    return x - y * jnp.trunc(_value(x) / _value(y))
-
-
-def _clamp(low: Any, x: Any, high: Any, **_) -> Any:
-    inside = _select(_value(x) < _value(low), x, low)
-    return _select(_value(inside) > _value(high), inside, high)
-
-
 def _without_parameters(function: Callable[..., Any]) -> Callable[..., Any]:
     return lambda *operands, **_: function(*operands)
 
@@ -200,34 +143,16 @@ _RULES: dict[str, Callable[..., Any]] = {name: _without_parameters(f) for name, 
     "mul": lambda a, b, **_: a * b,
     "div": lambda a, b, **_: a / b,
     "neg": lambda a, **_: -a,
-    "integer_pow": lambda a, *, y, **_: power(a, y),
-    "rsqrt": lambda a, **_: 1.0 / sqrt(a),
-    "exp2": lambda a, **_: exp(a * jnp.log(2.0)),
     "erfc": lambda a, **_: 1.0 - erf(a),
     "logistic": lambda a, **_: 0.5 * (1.0 + tanh(0.5 * a)),
-    "max": lambda a, b, **_: _select(_value(a) >= _value(b), b, a),
-    "min": lambda a, b, **_: _select(_value(a) <= _value(b), b, a),
-    "clamp": _clamp,
-    "rem": _remainder,
     "select_n": _select,
 }
-_LINEAR = frozenset(
-    "broadcast_in_dim concatenate convert_element_type copy cumsum dynamic_slice gather pad reduce_sum reshape rev"
-    " slice squeeze stack transpose".split()
-)
 _BILINEAR = frozenset(("dot_general",))
-_PIECEWISE_CONSTANT = frozenset("ceil eq floor ge gt is_finite le lt ne round sign stop_gradient".split())
-_WITHOUT_TIME = frozenset("and iota not or xor".split())  # never see a jet
+_WITHOUT_RATES = STEPWISE | frozenset("and eq ge gt iota is_finite le lt ne not or xor".split())
 
 
 def _has_rule(name: str) -> bool:
-    return name in _RULES or name in _LINEAR or name in _BILINEAR or name in _PIECEWISE_CONSTANT | _WITHOUT_TIME
-
-
-def _inner_program(parameters: dict) -> Any:
-    """Return the program inside a call (jit, custom derivative), or None for a plain operation."""
-    inner = parameters.get("jaxpr", parameters.get("call_jaxpr"))
-    return inner if hasattr(inner, "jaxpr") else None
+    return any(name in known for known in (_RULES, COMPOSED, REARRANGING, _BILINEAR, _WITHOUT_RATES))
 
 
 def _operations(jaxpr: Any) -> Any:
@@ -237,7 +162,9 @@ def _operations(jaxpr: Any) -> Any:
         if name == "cond":
             for branch in parameters["branches"]:
                 yield from _operations(branch.jaxpr)
-        elif (inner := _inner_program(parameters)) and (name != "scan" or parameters["length"] <= LONGEST_UNROLLED):
+        elif hasattr(inner := inner_program(parameters), "jaxpr") and (
+            name != "scan" or parameters["length"] <= LONGEST_UNROLLED
+        ):
             yield from _operations(inner.jaxpr)
         else:
             yield name

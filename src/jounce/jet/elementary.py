@@ -11,141 +11,146 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
-from jounce.jet.algebra import Jet, exp, log, next_of_chain, power, real_power, sqrt, square
-from jounce.jet.coefficients import sum_of_products
+from jounce.jet.algebra import Jet, Quantity, exp, log, of_quantities, power, real_power, sqrt
+from jounce.jet.coefficients import Coefficients, next_of_chain, sum_of_products
+from jounce.shapes import Real
 
 
-def next_sine_cosine(sine: list[Any], cosine: list[Any], angle: Jet) -> tuple[Any, Any]:
+def next_sine_cosine(
+    sine: Coefficients,
+    cosine: Coefficients,
+    angle: Jet,
+    *,
+    hyperbolic: bool = False,
+) -> tuple[Any, Any]:
     """Return the next coefficients of sine and cosine, from those before and a jet of the angle that reaches them."""
-    falling = next_of_chain(cosine, angle, sine)
-    return next_of_chain(sine, angle, cosine), None if falling is None else -falling
+    slope = next_of_chain(cosine, angle.coefficients, sine)
+    return next_of_chain(sine, angle.coefficients, cosine), slope if slope is None or hyperbolic else -slope
 
 
-def sine_cosine(x: Jet) -> tuple[Jet, Jet]:
-    """Return sine and cosine of an angle in radians, which share one recurrence."""
-    sine, cosine = [jnp.sin(x.coefficients[0])], [jnp.cos(x.coefficients[0])]
+def _sine_cosine_from(x: Jet, values: tuple[Any, Any], *, hyperbolic: bool) -> tuple[Jet, Jet]:
+    sine, cosine = ([value] for value in values)
     for _ in range(x.order):
-        s, c = next_sine_cosine(sine, cosine, x)
+        s, c = next_sine_cosine(sine, cosine, x, hyperbolic=hyperbolic)
         sine.append(s)
         cosine.append(c)
     return Jet(sine), Jet(cosine)
 
 
-def sin(x: Any) -> Any:
+def sine_cosine(x: Jet) -> tuple[Jet, Jet]:
+    """Return sine and cosine of an angle in radians, which share one recurrence."""
+    values = jnp.sin(x.coefficients[0]), jnp.cos(x.coefficients[0])
+    return _sine_cosine_from(x, values, hyperbolic=False)
+
+
+@of_quantities(jnp.sin)
+def sin(x: Jet) -> Jet:
     """Return the sine of an angle in radians."""
-    return sine_cosine(x)[0] if isinstance(x, Jet) else jnp.sin(x)
+    return sine_cosine(x)[0]
 
 
-def cos(x: Any) -> Any:
+@of_quantities(jnp.cos)
+def cos(x: Jet) -> Jet:
     """Return the cosine of an angle in radians."""
-    return sine_cosine(x)[1] if isinstance(x, Jet) else jnp.cos(x)
+    return sine_cosine(x)[1]
 
 
-def _riccati(x: Jet, value: Any, slope: Any, sign: int) -> Jet:
+def _riccati(x: Jet, value: Real, slope: Real, sign: int) -> Jet:
     """Solve ``y' = s x'``, ``s = constant + sign y^2``, from the value of y and of its slope s."""
-    y, s = [value], [slope]
+    y: list[Any] = [value]
+    s: list[Any] = [slope]
     for _ in range(x.order):
-        y.append(next_of_chain(y, x, s))
+        y.append(next_of_chain(y, x.coefficients, s))
         square = sum_of_products(jnp.multiply, y, y[::-1])
         s.append(None if square is None else sign * square)
     return Jet(y)
 
 
-def tan(x: Any) -> Any:
+@of_quantities(jnp.tan)
+def tan(x: Jet) -> Jet:
     """Return the tangent of an angle in radians."""
-    if not isinstance(x, Jet):
-        return jnp.tan(x)
     value = jnp.tan(x.coefficients[0])
     return _riccati(x, value, 1 + value * value, +1)
 
 
-def tanh(x: Any) -> Any:
+@of_quantities(jnp.tanh)
+def tanh(x: Jet) -> Jet:
     """Return the hyperbolic tangent; its slope is taken as 1 / cosh^2, since 1 - tanh^2 cancels where it saturates."""
-    if not isinstance(x, Jet):
-        return jnp.tanh(x)
     decay = jnp.exp(-2 * jnp.abs(x.coefficients[0]))
     return _riccati(x, jnp.tanh(x.coefficients[0]), 4 * decay / (1 + decay) ** 2, -1)
 
 
 def _hyperbolic(x: Jet) -> tuple[Jet, Jet]:
-    sine, cosine = ([value] for value in _hyperbolic_values(x.coefficients[0]))
-    for _ in range(x.order):
-        s, c = next_of_chain(sine, x, cosine), next_of_chain(cosine, x, sine)
-        sine.append(s)
-        cosine.append(c)
-    return Jet(sine), Jet(cosine)
-
-
-def _hyperbolic_values(x: Any) -> tuple[Any, Any]:
     """Return sinh and cosh; far out by the exponential of half the argument, since XLA's own lose digits there."""
-    half = jnp.exp(jnp.maximum(jnp.abs(x), 1.0) / 2)
+    value = x.coefficients[0]
+    half = jnp.exp(jnp.maximum(jnp.abs(value), 1.0) / 2)
     large = 0.5 * half * half
     small = 0.25 / large
-    far = jnp.abs(x) > 1
-    sine = jnp.where(far, jnp.sign(x) * (large - small), jnp.sinh(x))
-    return sine, jnp.where(far, large + small, jnp.cosh(x))
+    far = jnp.abs(value) > 1
+    sine = jnp.where(far, jnp.sign(value) * (large - small), jnp.sinh(value))
+    return _sine_cosine_from(x, (sine, jnp.where(far, large + small, jnp.cosh(value))), hyperbolic=True)
 
 
-def sinh(x: Any) -> Any:
+@of_quantities(jnp.sinh)
+def sinh(x: Jet) -> Jet:
     """Return the hyperbolic sine."""
-    return _hyperbolic(x)[0] if isinstance(x, Jet) else jnp.sinh(x)
+    return _hyperbolic(x)[0]
 
 
-def cosh(x: Any) -> Any:
+@of_quantities(jnp.cosh)
+def cosh(x: Jet) -> Jet:
     """Return the hyperbolic cosine."""
-    return _hyperbolic(x)[1] if isinstance(x, Jet) else jnp.cosh(x)
+    return _hyperbolic(x)[1]
 
 
-def _one_minus_square(x: Any) -> Any:
+def _one_minus_square(x: Quantity) -> Any:
     """Return 1 - x^2, its value as (1 - x)(1 + x), which keeps the digits of arcsine and arccosine near their ends."""
     if not isinstance(x, Jet):
         return (1.0 - x) * (1.0 + x)
-    return Jet((_one_minus_square(x.coefficients[0]), *(-square(x)).coefficients[1:]))
+    return Jet((_one_minus_square(x.coefficients[0]), *(-(x * x)).coefficients[1:]))
 
 
 BY_SLOPE: dict[str, tuple[Callable[[Any], Any], Callable[[Any], Any]]] = {
     "asin": (jnp.arcsin, lambda x: 1.0 / sqrt(_one_minus_square(x))),
     "acos": (jnp.arccos, lambda x: -1.0 / sqrt(_one_minus_square(x))),
-    "atan": (jnp.arctan, lambda x: 1.0 / (1.0 + square(x))),
-    "asinh": (jnp.arcsinh, lambda x: 1.0 / sqrt(1.0 + square(x))),
+    "atan": (jnp.arctan, lambda x: 1.0 / (1.0 + x * x)),
+    "asinh": (jnp.arcsinh, lambda x: 1.0 / sqrt(1.0 + x * x)),
     "acosh": (jnp.arccosh, lambda x: 1.0 / sqrt((x - 1.0) * (x + 1.0))),
     "atanh": (jnp.arctanh, lambda x: 1.0 / _one_minus_square(x)),
     "log1p": (jnp.log1p, lambda x: 1.0 / (1.0 + x)),
-    "erf": (jax.lax.erf, lambda x: 2.0 / math.sqrt(math.pi) * exp(-square(x))),
+    "erf": (jax.lax.erf, lambda x: 2.0 / math.sqrt(math.pi) * exp(-(x * x))),
 }
 """Functions whose slope is an algebraic or elementary function of the argument: both, the slope of jets and arrays."""
 
 
-def _by_slope(name: str, x: Any) -> Any:
-    """Return a function of an array, or of a jet by integrating its slope."""
-    function, slope = BY_SLOPE[name]
-    if not isinstance(x, Jet):
-        return function(x)
-    return _from_slope(x, function(x.coefficients[0]), slope)
-
-
-def _from_slope(x: Jet, value: Any, slope: Callable[[Jet], Jet]) -> Jet:
+def _from_slope(x: Jet, value: Real, slope: Callable[[Jet], Jet]) -> Jet:
     if x.order == 0:
         return Jet([value])
     return (slope(x.truncate(x.order - 1)) * x.differentiate()).integrate(value)
 
 
-def asin(x: Any) -> Any:
-    """Return the arcsine, in radians."""
-    return _by_slope("asin", x)
+def _by_slope(name: str, meaning: str) -> Callable[[Quantity], Any]:
+    """Return a function of arrays, and of jets by integrating its slope."""
+    function, slope = BY_SLOPE[name]
+
+    def of_jet(x: Jet) -> Jet:
+        return _from_slope(x, function(x.coefficients[0]), slope)
+
+    of_jet.__name__, of_jet.__qualname__, of_jet.__doc__ = name, name, f"Return {meaning}."
+    return of_quantities(function)(of_jet)
 
 
-def acos(x: Any) -> Any:
-    """Return the arccosine, in radians."""
-    return _by_slope("acos", x)
+asin = _by_slope("asin", "the arcsine, in radians")
+acos = _by_slope("acos", "the arccosine, in radians")
+atan = _by_slope("atan", "the arctangent, in radians")
+asinh = _by_slope("asinh", "the inverse hyperbolic sine")
+acosh = _by_slope("acosh", "the inverse hyperbolic cosine")
+atanh = _by_slope("atanh", "the inverse hyperbolic tangent")
+erf = _by_slope("erf", "the error function")
+log1p = _by_slope("log1p", "``log(1 + x)``, exact also where x is tiny")
 
 
-def atan(x: Any) -> Any:
-    """Return the arctangent, in radians."""
-    return _by_slope("atan", x)
-
-
-def atan2(y: Any, x: Any) -> Any:
+def atan2(y: Quantity, x: Quantity) -> Any:
     """Return the angle of the point (x, y), in radians, in (-pi, pi] at order zero.
 
     The point is turned onto the first axis and scaled to unit distance before the recurrence, so that neither
@@ -167,64 +172,30 @@ def atan2(y: Any, x: Any) -> Any:
     return (rate / (along.truncate(order - 1).square() + across.truncate(order - 1).square())).integrate(angle)
 
 
-def log1p(x: Any) -> Any:
-    """Return ``log(1 + x)``, exact also where x is tiny."""
-    return _by_slope("log1p", x)
-
-
-def expm1(x: Any) -> Any:
+@of_quantities(jnp.expm1)
+def expm1(x: Jet) -> Jet:
     """Return ``exp(x) - 1``, exact also where x is tiny."""
-    if not isinstance(x, Jet):
-        return jnp.expm1(x)
     return _from_slope(x, jnp.expm1(x.coefficients[0]), exp)
 
 
-def cbrt(x: Any) -> Any:
+@of_quantities(jnp.cbrt)
+def cbrt(x: Jet) -> Jet:
     """Return the real cube root."""
-    if not isinstance(x, Jet):
-        return jnp.cbrt(x)
     return real_power(absolute(x), jnp.asarray(1 / 3)) * jnp.where(x.coefficients[0] < 0, -1.0, 1.0)
 
 
-def asinh(x: Any) -> Any:
-    """Return the inverse hyperbolic sine."""
-    return _by_slope("asinh", x)
-
-
-def acosh(x: Any) -> Any:
-    """Return the inverse hyperbolic cosine."""
-    return _by_slope("acosh", x)
-
-
-def atanh(x: Any) -> Any:
-    """Return the inverse hyperbolic tangent."""
-    return _by_slope("atanh", x)
-
-
-def erf(x: Any) -> Any:
-    """Return the error function."""
-    return _by_slope("erf", x)
-
-
-def absolute(x: Any) -> Any:
+@of_quantities(jnp.abs)
+def absolute(x: Jet) -> Jet:
     """Return the absolute value; at zero its derivatives do not exist, and are taken from the positive side."""
-    if not isinstance(x, Jet):
-        return jnp.abs(x)
     sign = jnp.where(x.coefficients[0] < 0, -1.0, 1.0)
     return x.map(lambda c: sign * c)
-
-
-def wrap(x: Any, period: Any) -> Any:
-    """Shift by whole periods into ``[-period/2, period/2]``: what is left of an angle or a screw's advance."""
-    value = x.coefficients[0] if isinstance(x, Jet) else x
-    return x - period * jnp.round(value / period)
 
 
 FUNCTIONS: dict[str, Callable[..., Any]] = {
     function.__name__: function
     for function in (
         acos, acosh, asin, asinh, atan, atan2, atanh, cbrt, cos, cosh, erf, exp, expm1, log, log1p, sin, sinh, sqrt,
-        square, tan, tanh,
+        tan, tanh,
     )
-} | {"abs": absolute, "pow": power}  # fmt: skip
+} | {"abs": absolute, "pow": power, "square": lambda x: x * x}  # fmt: skip
 """By the names that JAX gives its operations."""

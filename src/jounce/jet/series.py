@@ -19,10 +19,11 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.extend.core import Literal
+from jax.extend.core import JaxprEqn
 
 from jounce.jet.coefficients import minus, plus, total
 from jounce.jet.operations import ADDITIVE, BROADCASTING, COMPOSED, LINEAR, PAIRS, PLAIN, SLOPES, STEPWISE, times
+from jounce.jet.programs import ProgramReader
 
 _BLOCK = 8  # terms of a sum taken at once
 
@@ -44,7 +45,7 @@ class _Node(NamedTuple):
     result: int
 
 
-class Recursion:
+class Recursion(ProgramReader):
     """A function on series, ready to be run order after order.
 
     Parameters
@@ -70,6 +71,8 @@ class Recursion:
         If the function uses an operation that has no rule.
     """
 
+    moving = int  # the number of a variable
+
     def __init__(self, function: Callable[..., Any], values: Sequence[Any], order: int):
         self.order = order
         self._nodes: list[_Node] = []
@@ -79,8 +82,8 @@ class Recursion:
         self._inputs = [self._variable(value) for value in values]
         program, shape = jax.make_jaxpr(function, return_shape=True)(*values)
         self._structure = jax.tree.structure(shape)
-        self._outputs = self._read(program.jaxpr, program.consts, self._inputs)
-        self.outputs = self._collected([self._value(x) for x in self._outputs])
+        self._outputs = self.read(program.jaxpr, program.consts, self._inputs)
+        self.outputs = self._collected([self.value(x) for x in self._outputs])
         self._nodes = self._needed()
         self._products = list(dict.fromkeys(pair for node in self._nodes for pair in node.pairs))
         self._stored = list(dict.fromkeys(x for pair in self._products for x in pair[:2]))
@@ -106,7 +109,7 @@ class Recursion:
 
         def found(x: Any) -> Any:
             c = now[x] if isinstance(x, int) else None
-            return jnp.zeros_like(self._value(x)) if c is None else c
+            return jnp.zeros_like(self.value(x)) if c is None else c
 
         return self._collected([found(x) for x in self._outputs]), (left, right, tuple(map(found, self._stored)))
 
@@ -139,9 +142,6 @@ class Recursion:
         number = len(self._values)
         self._values[number] = value
         return number
-
-    def _value(self, x: Any) -> Any:
-        return self._values[x] if isinstance(x, int) else x.array
 
     def _collected(self, leaves: list[Any]) -> Any:
         return jax.tree.unflatten(self._structure, leaves)
@@ -192,65 +192,53 @@ class Recursion:
 
     # reading the program
 
-    def _read(self, jaxpr: Any, constants: Sequence[Any], arguments: Sequence[Any]) -> list[Any]:
-        found: dict[Any, Any] = dict(zip(jaxpr.constvars, map(_Constant, constants), strict=True))
-        found.update(zip(jaxpr.invars, arguments, strict=True))
-
-        def look(variable: Any) -> Any:
-            return _Constant(variable.val) if isinstance(variable, Literal) else found[variable]
-
-        for equation in jaxpr.eqns:
-            operands = [look(v) for v in equation.invars]
-            results = self._equation(equation.primitive, equation.params, operands, equation.outvars)
-            found.update(zip(equation.outvars, results, strict=True))
-        return [look(v) for v in jaxpr.outvars]
-
-    def _equation(self, primitive: Any, parameters: dict, operands: list[Any], made: Sequence[Any]) -> list[Any]:
-        key = self._key(primitive, parameters, operands)
+    def results(self, equation: JaxprEqn, operands: list[Any]) -> list[Any]:
+        """Return the results of one operation; what repeats is read once."""
+        key = self._key(equation, operands)
         if key is None:
-            return self._results(primitive, parameters, operands, made)
+            return super().results(equation, operands)
         if key not in self._known:  # the operands stay alive with it, so that no other takes their place in memory
-            self._known[key] = self._results(primitive, parameters, operands, made), operands
+            self._known[key] = super().results(equation, operands), operands
         return self._known[key][0]
 
-    def _key(self, primitive: Any, parameters: dict, operands: list[Any]) -> Any:
+    def _key(self, equation: JaxprEqn, operands: list[Any]) -> Any:
         """Return what tells an operation from others; None where that is not known."""
         names = [x if isinstance(x, int) else x.key() for x in operands]
-        if primitive.name in ("mul", "add", "add_any"):
+        if equation.primitive.name in ("mul", "add", "add_any"):
             names.sort(key=str)
-        key = (primitive.name, *sorted(parameters.items()), *names)
+        key = (equation.primitive.name, *sorted(equation.params.items()), *names)
         try:
             hash(key)
         except TypeError:
             return None
         return key
 
-    def _results(self, primitive: Any, parameters: dict, operands: list[Any], made: Sequence[Any]) -> list[Any]:
-        name = primitive.name
-        still = not any(isinstance(x, int) for x in operands)
-        if still or not any(jnp.issubdtype(v.aval.dtype, jnp.floating) for v in made):  # decisions keep for a step
-            results = primitive.bind(*map(self._value, operands), **parameters)
-            return list(map(_Constant, results if primitive.multiple_results else [results]))
-        inner = parameters.get("jaxpr", parameters.get("call_jaxpr"))
-        if name == "cond":
-            return self._branches(operands, parameters["branches"])
-        if name == "scan":
-            return self._unrolled(operands, parameters)
-        if name != "while" and inner is not None:
-            closed = hasattr(inner, "jaxpr")
-            return self._read(inner.jaxpr if closed else inner, inner.consts if closed else (), operands)
-        return self._elementary(primitive, parameters, operands, made)
+    def constant(self, array: Any) -> "_Constant":
+        """Return what stands for an array that does not change in time."""
+        return _Constant(array)
 
-    def _elementary(self, primitive: Any, parameters: dict, operands: list[Any], made: Sequence[Any]) -> list[Any]:
-        name = primitive.name
+    def value(self, x: Any) -> Any:
+        """Return the coefficient of order zero of a variable, or a constant."""
+        return self._values[x] if isinstance(x, int) else x.array
+
+    def is_constant(self, equation: JaxprEqn, operands: list[Any]) -> bool:
+        """Tell whether nothing changes in time; decisions keep for a step."""
+        made: Any = [variable.aval for variable in equation.outvars]
+        floating = any(jnp.issubdtype(aval.dtype, jnp.floating) for aval in made)
+        return not floating or super().is_constant(equation, operands)
+
+    def applied(self, equation: JaxprEqn, operands: list[Any]) -> list[Any]:
+        """Return the variables that an operation makes."""
+        primitive, parameters, name = equation.primitive, equation.params, equation.primitive.name
         if name == "optimization_barrier":
             return operands
         if name in BROADCASTING:  # numbers and axes of length one, which JAX lets through
-            operands = [self._widened(x, made[0].aval.shape) for x in operands]
+            made: Any = equation.outvars[0].aval
+            operands = [self._widened(x, made.shape) for x in operands]
         if name in STEPWISE:
-            return [_Constant(primitive.bind(*map(self._value, operands), **parameters))]
+            return [_Constant(primitive.bind(*map(self.value, operands), **parameters))]
         if name in COMPOSED:
-            return [self._composed(lambda *xs: COMPOSED[name](*xs, **parameters), operands)]
+            return [self.composed(lambda *xs: COMPOSED[name](*xs, **parameters), operands)]
         if name in SLOPES:
             return [self._by_slope(name, operands)]
         if name in PAIRS:
@@ -265,45 +253,14 @@ class Recursion:
             return [self._linear(primitive, parameters, operands)]
         raise TypeError(f"the operation '{name}' of JAX has no rule for Taylor series")
 
-    def _composed(self, function: Callable[..., Any], operands: list[Any]) -> Any:
-        """Read a function of the operands in the place of an operation."""
-        program = jax.make_jaxpr(function)(*map(self._value, operands))
-        return self._read(program.jaxpr, program.consts, operands)[0]
-
-    def _branches(self, operands: list[Any], branches: Any) -> list[Any]:
-        which, arguments = operands[0], operands[1:]
-        outcomes = [self._read(b.jaxpr, b.consts, arguments) for b in branches]
-        index = jnp.clip(self._value(which), 0, len(branches) - 1)
-        return [
-            self._composed(lambda *cases: jax.lax.select_n(jnp.broadcast_to(index, cases[0].shape), *cases), [*cases])
-            if len(cases) <= 2 or index.dtype != bool
-            else cases[0]
-            for cases in zip(*outcomes, strict=True)
-        ]
-
-    def _unrolled(self, operands: list[Any], parameters: dict) -> list[Any]:
-        inner, constants, carried = parameters["jaxpr"], parameters["num_consts"], parameters["num_carry"]
-        fixed, carry = operands[:constants], operands[constants : constants + carried]
-        sequences, collected = operands[constants + carried :], []
-        steps = range(parameters["length"])
-        for i in reversed(steps) if parameters["reverse"] else steps:
-            here = [self._composed(lambda x, i=i: x[i], [x]) for x in sequences]
-            results = self._read(inner.jaxpr, inner.consts, [*fixed, *carry, *here])
-            carry = results[:carried]
-            collected.append(results[carried:])
-        if parameters["reverse"]:
-            collected.reverse()
-        stacked = [self._composed(lambda *xs: jnp.stack(xs), list(parts)) for parts in zip(*collected, strict=True)]
-        return [*carry, *stacked]
-
     def _widened(self, x: Any, shape: tuple[int, ...]) -> Any:
         if not isinstance(x, int) or jnp.shape(self._values[x]) == shape:
             return x
-        return self._composed(lambda value: jnp.broadcast_to(value, shape), [x])
+        return self.composed(lambda value: jnp.broadcast_to(value, shape), [x])
 
     def _separated(self, name: str, parameters: dict, operands: list[Any]) -> list[Any]:
         axis = parameters["axis"]
-        sizes = parameters["sizes"] if name == "split" else [1] * jnp.shape(self._value(operands[0]))[axis]
+        sizes = parameters["sizes"] if name == "split" else [1] * jnp.shape(self.value(operands[0]))[axis]
         ends = list(accumulate(map(int, sizes)))
 
         def part(x: Any, start: int, stop: int) -> Any:
@@ -311,7 +268,7 @@ class Recursion:
             return cut if name == "split" else jnp.squeeze(cut, axis)
 
         bounds = zip([0, *ends], ends, strict=False)
-        return [self._composed(lambda x, a=start, b=stop: part(x, a, b), operands) for start, stop in bounds]
+        return [self.composed(lambda x, a=start, b=stop: part(x, a, b), operands) for start, stop in bounds]
 
     # nodes
 
@@ -328,15 +285,15 @@ class Recursion:
                 return None
             whole = []
             for x, part in zip(operands, parts, strict=True):
-                fixed = self._value(x)
+                fixed = self.value(x)
                 adds = isinstance(x, int) or (additive and jnp.issubdtype(jnp.result_type(fixed), jnp.floating))
                 whole.append(part if part is not None else jnp.zeros_like(fixed) if adds else fixed)
             return primitive.bind(*whole, **parameters)
 
-        return self._node(rule, primitive.bind(*map(self._value, operands), **parameters), operands)
+        return self._node(rule, primitive.bind(*map(self.value, operands), **parameters), operands)
 
     def _product(self, a: int, b: int) -> int:
-        first, second = self._value(a), self._value(b)
+        first, second = self.value(a), self.value(b)
 
         def rule(parts: list[Any], sums: Any) -> Any:
             return plus(sums, plus(times(parts[0], second), times(first, parts[1])))
@@ -344,7 +301,7 @@ class Recursion:
         return self._node(rule, first * second, [a, b], [_Pair(a, b, False)])
 
     def _quotient(self, a: Any, b: int) -> int:
-        below, value = self._value(b), self._value(a) / self._value(b)
+        below, value = self.value(b), self.value(a) / self.value(b)
         result = len(self._values)  # the node made next
 
         def rule(parts: list[Any], sums: Any) -> Any:
@@ -361,12 +318,12 @@ class Recursion:
         def rule(parts: list[Any], sums: Any) -> Any:
             return reduce(plus, map(times, values, parts), sums)
 
-        result = self._node(rule, function(*map(self._value, operands)), operands)
+        result = self._node(rule, function(*map(self.value, operands)), operands)
         node = self._nodes[-1]
         for i, x in enumerate(operands):  # read at each order after the function itself, and used at the next
             if isinstance(x, int):
-                slope = self._composed(slopes[i], [*operands, result])
-                values[i] = self._value(slope)
+                slope = self.composed(slopes[i], [*operands, result])
+                values[i] = self.value(slope)
                 if isinstance(slope, int):
                     node.pairs.append(_Pair(x, slope, True))
         return result
@@ -376,7 +333,7 @@ class Recursion:
         first, second, sign = PAIRS[name]
         if (x, first) not in self._pairs:
             a, b = len(self._values), len(self._values) + 1
-            values = PLAIN[first](self._value(x)), PLAIN[second](self._value(x))
+            values = PLAIN[first](self.value(x)), PLAIN[second](self.value(x))
 
             def rule(parts: list[Any], sums: Any, slope: Any) -> Any:
                 return plus(sums, times(slope, parts[0]))

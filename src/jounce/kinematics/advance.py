@@ -7,19 +7,28 @@ the branch of its neighbour is not judged by how near the prediction was: the si
 nearest zero of that determinant is told, real or complex, beyond which no step may go.
 """
 
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Bool, Float, Int
 
-from jounce.constraints.angles import brought_near
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked, total
+from jounce.jet.turns import brought_near
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.linear import DenseFactor
 from jounce.kinematics.status import Status
 from jounce.mechanism.system import System
+from jounce.rigid.pose import Pose
+from jounce.shapes import Numbers, Real
+
+Lanes = Float[Numbers, " batch"]
+Truths = Bool[Numbers, " batch"]
+State = tuple[Mapping[str, Numbers], tuple[Numbers, ...], Numbers]
+"""What a solved instant hands on: jets of coordinates, by name, and of outputs, and the sign of the determinant."""
 
 MAX_ITERATIONS = 30
 CONVERGED = 1e-9  # a last correction above this is no convergence, however small the tolerance
@@ -35,43 +44,43 @@ ROUNDING = 4e-15  # a correction this small (in rad, or in sizes of the mechanis
 class Arrival(NamedTuple):
     """What is known of the instants of a batch; every array has the batch last."""
 
-    coordinates: dict[str, Any]  # jets of the pose, by name, shape (order + 1, ...)
-    outputs: tuple[Any, ...]  # jets of each group of outputs
-    status: Any  # see Status
-    body: Any  # index of the moving body that is farthest from its prediction
-    safe_step: Any  # s, over which the motion from here can be predicted
-    radius: Any  # s, the same by the first three Taylor terms only, which rounding spoils least
-    deviation: Any  # departure from the prediction, over how far that moves
-    sign: Any  # of the determinant of the Jacobian
-    turnover: Any  # 1/s, how fast the first lane nears a singular position (below zero) or leaves it; 0 unless surveyed
-    pivot_ratio: Any  # smallest pivot of the Jacobian over the largest
-    admissible: Any  # whether each driver has a permitted value, shape (drivers, batch)
-    finite: Any  # whether all derivatives wanted are finite, of the pose and of each output, shape (1 + outputs, batch)
+    coordinates: dict[str, Numbers]  # jets of the pose, by name, shape (order + 1, ...)
+    outputs: tuple[Numbers, ...]  # jets of each group of outputs
+    status: Int[Numbers, " batch"]  # see Status
+    body: Int[Numbers, " batch"]  # index of the moving body that is farthest from its prediction
+    safe_step: Lanes  # s, over which the motion from here can be predicted
+    radius: Lanes  # s, the same by the first three Taylor terms only, which rounding spoils least
+    deviation: Lanes  # departure from the prediction, over how far that moves
+    sign: Lanes  # of the determinant of the Jacobian
+    turnover: Lanes  # 1/s, how fast the first lane nears (< 0) or leaves a singular position; 0 unless surveyed; (1,)
+    pivot_ratio: Lanes  # smallest pivot of the Jacobian over the largest
+    admissible: Bool[Numbers, "driver batch"]  # whether each driver has a permitted value
+    finite: Bool[Numbers, "result batch"]  # whether all derivatives wanted are, of the pose and of each output
 
-    def state(self, lanes: slice | np.ndarray) -> tuple[dict[str, Any], tuple[Any, ...], Any]:
+    def state(self, lanes: slice | np.ndarray) -> State:
         """Return what the neighbours of some lanes start from: jets of coordinates and outputs, and the sign."""
         return jax.tree.map(lambda x: x[..., lanes], (self.coordinates, self.outputs, self.sign))
 
 
-def _size(increment: Any) -> Any:
+def _size(increment: Float[Numbers, "component body batch"]) -> Float[Numbers, "body batch"]:
     return jnp.max(jnp.abs(increment), axis=0)
 
 
 class Correction(NamedTuple):
-    """How Newton-Raphson went; every array has the shape (batch,)."""
+    """How Newton-Raphson went."""
 
-    last: Any  # size of the last correction, rad or sizes of the mechanism
-    first: Any
-    simplified: Any  # size of the second, with the Jacobian of the first
+    last: Lanes  # size of the last correction, rad or sizes of the mechanism
+    first: Lanes
+    simplified: Lanes  # size of the second, with the Jacobian of the first
 
-    def contracts(self) -> Any:
+    def contracts(self) -> Bool[Numbers, " batch"]:
         """Tell whether the simplified Newton iteration contracts, as it must where one solution only is near."""
         return (self.simplified <= LARGEST_CONTRACTION * self.first) | (self.first <= SMALLEST_DEPARTURE)
 
 
 def newton_raphson(
-    system: System, pose: Any, time: Jet, tolerance: Any, refine: Any
-) -> tuple[Any, DenseFactor, Correction]:
+    system: System, pose: Pose, time: Float[Jet, "1 batch"], tolerance: Float[Numbers, ""], refine: Bool[Numbers, ""]
+) -> tuple[Pose, DenseFactor, Correction]:
     """Return the assembled pose, the factored Jacobian there, and how large the corrections were.
 
     An instant is accepted when its correction is at most the tolerance. With `refine` that correction is still made,
@@ -115,7 +124,7 @@ def newton_raphson(
     return pose, factor, correction
 
 
-def differentiated(system: System, pose: Any, factor: DenseFactor, time: Jet) -> Any:
+def differentiated(system: System, pose: Pose, factor: DenseFactor, time: Float[Jet, "1 batch"]) -> Pose:
     """Return the pose with all derivatives that the time jet has: order after order, one solve each.
 
     The coefficient of order k of the residual is affine in the unknown (r[k], w'[k-1] / k) with the Jacobian as its
@@ -129,13 +138,13 @@ def differentiated(system: System, pose: Any, factor: DenseFactor, time: Jet) ->
     return pose
 
 
-def _departures(system: System, pose: Any, predicted: Any) -> Any:
+def _departures(system: System, pose: Pose, predicted: Any) -> Float[Numbers, "body batch"]:
     """Return how far each moving body is from its prediction, rad or sizes of the mechanism: (bodies, batch)."""
     shift, turn = pose.separation(predicted)
     return jnp.maximum(_size(shift) / system.column_scale[0], _size(turn))[1:]
 
 
-def _terms(system: System, coordinates: dict[str, Jet], predictor: tuple[str, ...]) -> list[Any]:
+def _terms(system: System, coordinates: dict[str, Jet], predictor: tuple[str, ...]) -> list[Lanes]:
     """Return the size of each Taylor coefficient but the first, rad or sizes of the mechanism: order x (batch,)."""
     # a slide that runs away, as towards a dead point of its axes, is measured by where it is
     scales = {"position": jnp.maximum(system.column_scale[0], _largest(coordinates["position"].coefficients[0]))}
@@ -146,11 +155,11 @@ def _terms(system: System, coordinates: dict[str, Jet], predictor: tuple[str, ..
     return [jnp.max(jnp.where(jnp.isfinite(size), size, 0.0), axis=0) for size in sizes]
 
 
-def _largest(coefficient: Any) -> Any:
+def _largest(coefficient: Float[Numbers, "*rest batch"]) -> Lanes:
     return jnp.max(jnp.abs(coefficient.reshape(-1, coefficient.shape[-1])), axis=0)
 
 
-def _safe_step(terms: list[Any]) -> Any:
+def _safe_step(terms: list[Lanes]) -> Lanes:
     """Return the step at which no Taylor term moves a body far.
 
     All terms count, since those of the highest orders may vanish together (a body at rest, or at a turning point).
@@ -159,7 +168,9 @@ def _safe_step(terms: list[Any]) -> Any:
     return SAFE_FRACTION * jnp.min(jnp.stack(steps), axis=0)
 
 
-def _turnover(system: System, pose_type: type, coordinates: dict[str, Jet], factor: DenseFactor, time: Any) -> Any:
+def _turnover(
+    system: System, pose_type: type[Pose], coordinates: dict[str, Jet], factor: DenseFactor, time: Lanes
+) -> Float[Numbers, " 1"]:
     """Return the eigenvalue of ``J^-1 J'`` of largest size with the sign of its real part, 1/s, for the first lane.
 
     To first order in a step s the determinant is ``det(J) det(1 + s J^-1 J')``: minus the inverse of that eigenvalue is
@@ -188,16 +199,29 @@ def _turnover(system: System, pose_type: type, coordinates: dict[str, Jet], fact
     return jnp.where(leads, eigenvalue, jnp.where(along < 0, -size, size))[None]
 
 
-def _predictable(departure: Any, travel: Any) -> Any:
+def _outputs(system: System, pose: Pose, angles: Sequence[Numbers], step: Lanes) -> tuple[Numbers, ...]:
+    """Return the jets of the outputs, angles with the turns that the jets of a neighbour give them."""
+    results, known = [], iter(angles)
+    for group in system.outputs:
+        result = group.evaluate(pose)
+        if group.element.turning:
+            expected = next(known)
+            expected = Jet(tuple(jnp.where(jnp.isfinite(expected), expected, 0.0)))
+            result = brought_near(result, expected.evaluate(step))
+        results.append(stacked(result))
+    return tuple(results)
+
+
+def _predictable(departure: Float[Numbers, "*batch"], travel: Float[Numbers, "*batch"]) -> Bool[Numbers, "*batch"]:
     """Tell whether a departure from a prediction is small enough, for how far the prediction moves."""
     return departure <= jnp.minimum(LARGEST_DEPARTURE, jnp.maximum(0.2 * travel, SMALLEST_DEPARTURE))
 
 
-def _travel(terms: list[Any], step: Any) -> Any:
+def _travel(terms: Sequence[Numbers], step: Numbers) -> Any:
     return total(term * jnp.abs(step) ** k for k, term in enumerate(terms, 1))
 
 
-def _laws_predictable(system: System, instant: Any, step: Any, order: int) -> Any:
+def _laws_predictable(system: System, instant: Lanes, step: Lanes, order: int) -> Bool[Numbers, " batch"]:
     """Tell whether the laws that may skip whole turns unseen keep to their own Taylor series over the step."""
     start, end = Jet.variable((instant - step)[None], order), Jet([instant[None]])
     result = np.ones(step.shape, bool)
@@ -208,7 +232,7 @@ def _laws_predictable(system: System, instant: Any, step: Any, order: int) -> An
     return result
 
 
-def _finite(jets: list[Any], wanted: Any) -> Any:
+def _finite(jets: Sequence[Numbers], wanted: Int[Numbers, ""]) -> Bool[Numbers, "instance batch"]:
     """Tell where the coefficients of jets are finite up to the order wanted, for each instance: (instances, batch)."""
     found = []
     for jet in jets:
@@ -217,7 +241,18 @@ def _finite(jets: list[Any], wanted: Any) -> Any:
     return jnp.concatenate(found)
 
 
-def _status(correction: Any, predictable: Any, pivot_ratio: Any, admissible: Any, finite: Any, tolerance: Any) -> Any:
+def _finite_results(
+    coordinates: Sequence[Numbers], outputs: Sequence[Numbers], wanted: Int[Numbers, ""]
+) -> Bool[Numbers, "result batch"]:
+    """Tell where the pose and each output are finite up to the order wanted."""
+    posed = [jnp.max(part, axis=-2, keepdims=True) for part in coordinates]
+    finite = _finite([*(x.reshape(x.shape[0], -1, 1, x.shape[-1]) for x in posed), *outputs], wanted)
+    return jnp.concatenate([jnp.all(finite[: len(posed)], axis=0, keepdims=True), finite[len(posed) :]])
+
+
+def _status(
+    correction: Lanes, predictable: Truths, pivot_ratio: Lanes, admissible: Truths, finite: Truths, tolerance: Real
+) -> Int[Numbers, " batch"]:
     """Return the outcome at each instant, the gravest last."""
     outcomes = (
         (~finite, Status.UNDEFINED),
@@ -236,17 +271,17 @@ def _status(correction: Any, predictable: Any, pivot_ratio: Any, admissible: Any
 @compiled("pose_type", "order")
 def advance(
     system: System,
-    coordinates: dict[str, Any],
-    angles: tuple[Any, ...],
-    sign: Any,
-    step: Any,
-    instant: Any,
-    tolerance: Any,
-    refine: Any,
-    survey: Any,
-    wanted: Any,
+    coordinates: dict[str, Numbers],
+    angles: tuple[Numbers, ...],
+    sign: Lanes,
+    step: Lanes,
+    instant: Lanes,
+    tolerance: Float[Numbers, ""],
+    refine: Bool[Numbers, ""],
+    survey: Bool[Numbers, ""],
+    wanted: Int[Numbers, ""],
     *,
-    pose_type: type,
+    pose_type: type[Pose],
     order: int,
 ) -> Arrival:
     """Solve a batch of instants, each from a neighbour solved before.
@@ -280,35 +315,24 @@ def advance(
     pose, factor, correction = newton_raphson(system, predicted, time.truncate(0), tolerance, refine)
     pose = differentiated(system, pose, factor, time)
 
-    results = []
-    known = iter(angles)
-    for group in system.outputs:
-        result = group.evaluate(pose)
-        if group.element.turning:
-            expected = next(known)
-            expected = Jet(tuple(jnp.where(jnp.isfinite(expected), expected, 0.0)))
-            result = brought_near(result, expected.evaluate(step))
-        results.append(stacked(result))
+    outputs = _outputs(system, pose, angles, step)
     reached = pose.coordinates()
+    coordinates = {name: stacked(jet) for name, jet in reached.items()}
     departures = _departures(system, pose, predicted)
     departure = jnp.max(departures, axis=0)
     travel = _travel(_terms(system, moving, pose_type.predictor), step)
     found = factor.sign()
     predictable = _predictable(departure, travel) & _laws_predictable(system, instant, step, order)
     predictable &= correction.contracts() & ((sign == 0) | (found == sign))
-    admissible = system.admissible(time)
-    pivot_ratio = factor.pivot_ratio()
-    coordinates = {name: stacked(jet) for name, jet in reached.items()}
-    posed = [jnp.max(coordinates[name], axis=-2, keepdims=True) for name in pose_type.predictor]
-    finite = _finite([*(x.reshape(x.shape[0], -1, 1, x.shape[-1]) for x in posed), *results], wanted)
-    finite = jnp.concatenate([jnp.all(finite[: len(posed)], axis=0, keepdims=True), finite[len(posed) :]])
+    admissible, pivot_ratio = system.admissible(time), factor.pivot_ratio()
+    finite = _finite_results([coordinates[name] for name in pose_type.predictor], outputs, wanted)
     admitted, defined = jnp.all(admissible, axis=0), jnp.all(finite, axis=0)
     status = _status(correction.last, predictable, pivot_ratio, admitted, defined, tolerance)
     terms = _terms(system, reached, pose_type.predictor)
     turnover = jax.lax.cond(survey, lambda: _turnover(system, pose_type, reached, factor, instant), lambda: np.zeros(1))
     return Arrival(
         coordinates,
-        tuple(results),
+        outputs,
         status,
         jnp.argmax(departures, axis=0),
         _safe_step(terms),

@@ -1,11 +1,11 @@
 """The first assembly: bodies put together from the starting guess, and degrees of freedom counted and explained."""
 
 import dataclasses
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import jax
 import numpy as np
+from jaxtyping import Float
 
 from jounce.constraints.drivers import DistanceDriver
 from jounce.constraints.planar import DoubleRevolute
@@ -13,11 +13,23 @@ from jounce.constraints.spatial import DoubleSpherical
 from jounce.errors import AssemblyError, MobilityError
 from jounce.jet import Jet
 from jounce.kinematics.compilation import compiled
+from jounce.kinematics.initial_turns import (
+    Coordinates,
+    DriverLag,
+    Mover,
+    driver_lag,
+    nearest_turns,
+    newton_step,
+    row_scale,
+    turned_to_laws,
+)
 from jounce.kinematics.status import Status
-from jounce.kinematics.turns import Lag, course, lag_of, nearest_turns
 from jounce.mechanism import Model
-from jounce.mechanism.builder import pose_at, referred
-from jounce.mechanism.datums import measures_angle, with_angles, with_datums
+from jounce.mechanism.axis_angles import measures_angle, with_angles, with_datums
+from jounce.mechanism.builder import pose_at, with_reference
+from jounce.mechanism.system import System
+from jounce.rigid.pose import Pose
+from jounce.shapes import Numbers
 
 MAX_STEPS = 100
 RANK_TOLERANCE = 1e-9
@@ -26,7 +38,13 @@ SETTLED = 1e-12  # rad, by which the angles of drivers may be counted otherwise
 
 
 @compiled("pose_type")
-def _moved(system: Any, coordinates: dict[str, Any], increment: Any, instant: Any, pose_type: type) -> Any:
+def _moved(
+    system: System,
+    coordinates: dict[str, Numbers],
+    increment: Float[Numbers, " column"],
+    instant: Float[Numbers, ""],
+    pose_type: type[Pose],
+) -> Any:
     """Return the coordinates after an increment, with residual and Jacobian there, for one instant."""
     pose = pose_at(coordinates, pose_type)
     pose = pose.displaced(*system.coordinates(increment[:, None], pose.shifts))
@@ -48,17 +66,18 @@ class Trial(NamedTuple):
         By how much each row is open, rad or sizes of the mechanism.
     jacobian : array of shape (rows, columns)
         Scaled, there.
+    closed : bool
+        Whether all gaps are closed, to the tolerance of the last correction.
     """
 
-    coordinates: dict[str, np.ndarray]
-    scale: np.ndarray
-    gaps: np.ndarray
-    jacobian: np.ndarray
+    coordinates: Coordinates
+    scale: Float[np.ndarray, " row"]
+    gaps: Float[np.ndarray, " row"]
+    jacobian: Float[np.ndarray, "row column"]
+    closed: bool
 
 
-def assemble(
-    model: Model, instant: float, tolerance: float, *, free: bool = False
-) -> tuple[Model, dict[str, np.ndarray]]:
+def assemble(model: Model, instant: float, tolerance: float, *, free: bool = False) -> tuple[Model, Coordinates]:
     """Put the bodies together at one instant, from the starting guess, by damped Gauss-Newton.
 
     Parameters
@@ -91,10 +110,10 @@ def assemble(
         noun = "degree of freedom" if columns == 1 else "degrees of freedom"
         raise MobilityError(f"the mechanism has no joints and no drivers: {columns} {noun} are left")
     if not model.rows:  # bodies that fly freely are together as they are
-        model, _ = referred(model, model.guess, instant, model.turnings)
+        model, _ = with_reference(model, model.guess, instant, model.prescribed)
         return dataclasses.replace(model, system=jax.device_put(model.system)), model.guess
     model, found = _settled(model, instant, tolerance)
-    check_assembled(model, found, instant, tolerance, free=free)
+    check_assembled(model, found, instant, free=free)
     check_mobility(model, found.jacobian, free=free)
     system = jax.device_put(dataclasses.replace(model.system, row_scale=found.scale[:, None]))
     return dataclasses.replace(model, system=system), found.coordinates
@@ -107,27 +126,27 @@ def _settled(model: Model, instant: float, tolerance: float) -> tuple[Model, Tri
     than those counted from the guess, and it takes another turn to get to those that the drivers prescribe.
     """
     model, start = _turned(model, instant, tolerance)
-    found, told = put_together(model, instant, tolerance, start), model.turnings
-    if not closed(found.gaps, tolerance) and any(map(measures_angle, model.system.groups)):
+    found, told = put_together(model, instant, tolerance, start), model.prescribed
+    if not found.closed and any(map(measures_angle, model.system.groups)):
         # angles counted from a tilted guess may be far off: first the joints alone, with the drivers as they are
         lag = _lag(model, instant)
         begin = found if lag is None else put_together(model, instant, tolerance, lag=lag)
-        if closed(begin.gaps, tolerance):
-            model, _ = referred(model, begin.coordinates, instant, told)
+        if begin.closed:
+            model, _ = with_reference(model, begin.coordinates, instant, told)
             found = put_together(model, instant, tolerance, begin.coordinates)
-    if "angle" in found.coordinates and start is None and closed(found.gaps, tolerance):
+    if "angle" in found.coordinates and start is None and found.closed:
         found = _nearest(model, found, instant)
     for _ in range(MAX_DATUMS):
-        if not closed(found.gaps, tolerance):
+        if not found.closed:
             return model, found
-        model, away = referred(model, found.coordinates, instant, told)
+        model, away = with_reference(model, found.coordinates, instant, told)
         if away <= SETTLED:
             return model, found
         found = put_together(model, instant, tolerance, found.coordinates)
-    return referred(model, found.coordinates, instant, told, keep=True)[0], found
+    return with_reference(model, found.coordinates, instant, told, keep=True)[0], found
 
 
-def _turned(model: Model, instant: float, tolerance: float) -> tuple[Model, dict[str, np.ndarray] | None]:
+def _turned(model: Model, instant: float, tolerance: float) -> tuple[Model, Coordinates | None]:
     """Return the model and the coordinates to start from where laws begin more than half a turn from the guess.
 
     The drivers are turned from the guess to their laws then, and all angles count their turns; None where none is so
@@ -137,26 +156,26 @@ def _turned(model: Model, instant: float, tolerance: float) -> tuple[Model, dict
     if lag is None or not np.pi < lag.angle < np.inf:
         return model, None
     begin = put_together(model, instant, tolerance, lag=lag)
-    if not closed(begin.gaps, tolerance):
+    if not begin.closed:
         return model, None
-    found = course(model, lag, begin.coordinates, moved, _row_scale)
+    found = turned_to_laws(model, lag, begin.coordinates, moved)
     if found is None:
         return model, None
-    if found.way is not None:
+    coordinates, history = found
+    if history is not None:
         forces, outputs = (
-            with_angles(with_datums(part, found.coordinates), found.way.last_angles(part))
+            with_angles(with_datums(part, coordinates), history.last_angles(part))
             for part in (model.system.forces, model.system.outputs)
         )
-        model = dataclasses.replace(
-            model, system=dataclasses.replace(model.system, forces=forces, outputs=outputs), way=found.way
-        )
-    return model, found.coordinates
+        system = dataclasses.replace(model.system, forces=forces, outputs=outputs)
+        model = dataclasses.replace(model, system=system, history=history)
+    return model, coordinates
 
 
-def _lag(model: Model, instant: float) -> Lag | None:
+def _lag(model: Model, instant: float) -> DriverLag | None:
     """Return what the drivers lack at the guess."""
     still = np.zeros(model.system.cells.shape[1])
-    return lag_of(model, instant, _mover(model, instant)(model.guess, still)[1])
+    return driver_lag(model, instant, _mover(model, instant)(model.guess, still)[1])
 
 
 def _nearest(model: Model, found: Trial, instant: float) -> Trial:
@@ -169,7 +188,7 @@ def _nearest(model: Model, found: Trial, instant: float) -> Trial:
     return found._replace(coordinates=nearest_turns(model.guess, found.coordinates, residual_at))
 
 
-def _mover(model: Model, instant: float) -> Callable[[dict[str, Any], np.ndarray], Any]:
+def _mover(model: Model, instant: float) -> Mover:
     """Return what takes coordinates and an increment to coordinates, residual and Jacobian, all NumPy arrays."""
 
     def moved(coordinates: dict[str, Any], increment: np.ndarray) -> Any:
@@ -183,9 +202,9 @@ def put_together(
     model: Model,
     instant: float,
     tolerance: float,
-    start: dict[str, np.ndarray] | None = None,
+    start: Coordinates | None = None,
     *,
-    lag: Lag | None = None,
+    lag: DriverLag | None = None,
 ) -> Trial:
     """Return how far the bodies can be put together at one instant; nothing is refused.
 
@@ -199,7 +218,7 @@ def put_together(
         Of the last correction, rad or sizes of the mechanism.
     start : dict of str to array, optional
         Coordinates to start from instead of the guess.
-    lag : Lag, optional
+    lag : DriverLag, optional
         What drivers may still lack.
     """
     still, free = np.zeros(model.system.cells.shape[1]), _mover(model, instant)
@@ -209,14 +228,12 @@ def put_together(
         return moved_to, residual if lag is None else lag.open(residual, 1.0), jacobian
 
     coordinates, residual, jacobian = moved(model.guess if start is None else start, still)
-    scale = _row_scale(jacobian)
+    scale = row_scale(jacobian)
     for _ in range(MAX_STEPS):
-        if not (np.isfinite(residual).all() and np.isfinite(jacobian).all()):
-            break  # told by name; what factors a matrix may never end on one that is not finite
-        step = np.linalg.lstsq(scale[:, None] * jacobian, -scale * residual, rcond=1e-10)[0]
+        step = newton_step(residual, jacobian)
+        if step is None:
+            break  # told by name
         size = np.max(np.abs(step), initial=0.0)
-        if not np.isfinite(size):
-            break
         step *= min(1.0, 0.5 / max(size, 1e-300))  # at most half a radian, or half the mechanism, at a time
         now = np.linalg.norm(scale * residual)
         for _halving in range(12):
@@ -227,24 +244,15 @@ def put_together(
         else:
             break
         coordinates, residual, jacobian = trial
-        scale = _row_scale(jacobian)
+        scale = row_scale(jacobian)
         if size <= tolerance:
             break
     gaps = np.where(np.isfinite(jacobian).all(axis=1), scale * residual, np.nan)
-    return Trial(coordinates, scale, gaps, scale[:, None] * jacobian)
+    closed = bool(np.all(np.abs(gaps) <= max(1e3 * tolerance, 1e-9)))
+    return Trial(coordinates, scale, gaps, scale[:, None] * jacobian, closed)
 
 
-def _row_scale(jacobian: np.ndarray) -> np.ndarray:
-    largest = np.max(np.abs(jacobian), axis=1)
-    return 1 / np.where((largest > 0) & np.isfinite(largest), largest, 1.0)
-
-
-def closed(gaps: np.ndarray, tolerance: float) -> bool:
-    """Tell whether all gaps are closed, to a tolerance of the last correction."""
-    return bool(np.all(np.abs(gaps) <= max(1e3 * tolerance, 1e-9)))
-
-
-def check_assembled(model: Model, found: Trial, instant: float, tolerance: float, *, free: bool = False) -> None:
+def check_assembled(model: Model, found: Trial, instant: float, *, free: bool = False) -> None:
     """Raise AssemblyError, with the joints concerned and by how much they stay open, where gaps are not closed.
 
     What is missing for every motion to be prescribed is told too, unless degrees of freedom may be left (`free`).
@@ -255,7 +263,7 @@ def check_assembled(model: Model, found: Trial, instant: float, tolerance: float
         named = ", ".join(unknown)
         message = f"no finite value at t = {instant:g} s: {named}; check motion laws and the starting guess"
         raise AssemblyError(message, status=Status.INADMISSIBLE)
-    if closed(gaps, tolerance):
+    if found.closed:
         return
     gaps = np.abs(gaps)
     worst = np.argsort(-gaps)
@@ -314,7 +322,7 @@ def _squared_lengths(model: Model, instant: float) -> dict[str, float]:
     return found
 
 
-def check_mobility(model: Model, jacobian: np.ndarray, *, free: bool = False) -> None:
+def check_mobility(model: Model, jacobian: Float[np.ndarray, "row column"], *, free: bool = False) -> None:
     """Raise MobilityError, with the bodies and joints concerned, unless the Jacobian is square and regular.
 
     Where degrees of freedom may be left, it is enough that no constraint is redundant.
@@ -344,13 +352,15 @@ def check_mobility(model: Model, jacobian: np.ndarray, *, free: bool = False) ->
     raise MobilityError("; ".join(parts))
 
 
-def split(jacobian: np.ndarray) -> tuple[np.ndarray, int, np.ndarray]:
+def split(
+    jacobian: Float[np.ndarray, "row column"],
+) -> tuple[Float[np.ndarray, "row row"], int, Float[np.ndarray, "column column"]]:
     """Return the left vectors, the rank and the right vectors of a scaled Jacobian."""
     left, sizes, right = np.linalg.svd(jacobian)
     return left, int(np.sum(sizes > RANK_TOLERANCE * sizes.max(initial=0.0))), right
 
 
-def redundant_rows(model: Model, combinations: np.ndarray) -> str:
+def redundant_rows(model: Model, combinations: Float[np.ndarray, "row combination"]) -> str:
     """Name the joints and drivers in combinations of rows that vanish, shape (rows, combinations)."""
     names = tuple(dict.fromkeys(model.rows))
     weights = np.linalg.norm(combinations, axis=1)
@@ -358,13 +368,13 @@ def redundant_rows(model: Model, combinations: np.ndarray) -> str:
     return _concerned(by_name, names)
 
 
-def freely_moving(model: Model, directions: np.ndarray) -> str:
+def freely_moving(model: Model, directions: Float[np.ndarray, "direction column"]) -> str:
     """Name the bodies that move along directions of the coordinates, shape (directions, columns)."""
     sizes = np.linalg.norm(directions.reshape(len(directions), len(model.bodies), -1), axis=(0, 2))
     return _concerned(sizes, model.bodies)
 
 
-def _concerned(weights: np.ndarray, names: tuple[str, ...]) -> str:
+def _concerned(weights: Float[np.ndarray, " name"], names: tuple[str, ...]) -> str:
     order = np.argsort(-weights, kind="stable")
     chosen = [names[k] for k in order if weights[k] > 0.05 * weights[order[0]]]
     shown = ", ".join(chosen[:6])

@@ -6,7 +6,7 @@ from typing import Any
 
 import jax
 
-from jounce.mechanism.doors import check_process
+from jounce.mechanism.preconditions import check_process
 
 
 @lru_cache(maxsize=1)

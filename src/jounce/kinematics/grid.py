@@ -10,37 +10,49 @@ from typing import Any
 
 import jax
 import numpy as np
+from jaxtyping import Bool, Float, Int
 
-from jounce.kinematics.bridge import LARGEST_DISAGREEMENT, bridged, half_width, spoiled_width
-from jounce.kinematics.path import LARGE_BATCH, PASSABLE, SMALL_BATCH, ChangePoint, Solver, Track, follow
+from jounce.kinematics.advance import State
+from jounce.kinematics.change_points import LARGEST_DISAGREEMENT, bridged, half_width, spoiled_width
+from jounce.kinematics.path_following import (
+    LARGE_BATCH,
+    PASSABLE,
+    SMALL_BATCH,
+    ChangePoint,
+    FollowedPath,
+    Solver,
+    follow,
+)
 from jounce.kinematics.status import Status
+from jounce.mechanism.time import nearest_instants
 
+Indices = Int[np.ndarray, " lane"]
 LONG_GRID = 1024  # instants: from here on in large batches
 FEW_BATCHES = 4  # of instants: no level of its own for each halving of the spacing
 
 
 class Grid:
-    """All instants of a time grid, solved from the anchors of a track.
+    """All instants of a time grid, solved from the anchors of a path.
 
     Attributes
     ----------
     status : array of int, shape (time,)
-    culprits : dict of int to str
+    faults : dict of int to str
         For instants that failed, the body farthest from its prediction, or the driver without a permitted value.
     """
 
-    def __init__(self, solver: Solver, track: Track, time: np.ndarray):
-        self.solver, self.track, self.time = solver, track, time
+    def __init__(self, solver: Solver, path: FollowedPath, time: Float[np.ndarray, " time"]):
+        self.solver, self.path, self.time = solver, path, time
         self.status = np.full(len(time), int(Status.NOT_REACHED))
-        self.culprits: dict[int, str] = {}
-        anchors = np.array([anchor.instant for anchor in track.anchors])
+        self.faults: dict[int, str] = {}
+        anchors = np.array([anchor.instant for anchor in path.anchors])
         self._instants = np.concatenate([time, anchors])
-        self._nearest = len(time) + _nearest(anchors, time)
+        self._nearest = len(time) + nearest_instants(anchors, time)
         self._store = jax.tree.map(
             lambda *xs: np.concatenate([np.zeros((*xs[0].shape[:-1], len(time))), *xs], axis=-1),
-            *(anchor.state for anchor in track.anchors),
+            *(anchor.state for anchor in path.anchors),
         )
-        for lanes, arrival in track.on_the_way:
+        for lanes, arrival in path.on_the_way:
             solved = arrival.status[1:] == Status.OK
             self._keep(lanes[solved], arrival.state(np.flatnonzero(solved) + 1))
             self.status[lanes[solved]] = Status.OK
@@ -54,11 +66,11 @@ class Grid:
     def solve(self, progress: Callable[[int, int], None] | None) -> None:
         """Solve level after level; an instant that its neighbour cannot predict is followed to from an anchor."""
         count = len(self.time)
-        reached = self.time < self.track.ended_at
+        reached = self.time < self.path.ended_at
         width = LARGE_BATCH if count > LONG_GRID else SMALL_BATCH
         left = reached & (self.status != Status.OK)
         done = count - int(np.count_nonzero(left))
-        for lanes, distance in _levels(left, len(self.track.anchors), width):
+        for lanes, distance in _levels(left, len(self.path.anchors), width):
             source = self._nearest[lanes]
             if distance is not None:
                 neighbour = lanes - distance
@@ -69,30 +81,30 @@ class Grid:
                 done += min(width, len(lanes) - first)
                 if progress is not None:
                     progress(done, count)
-        for point in self.track.change_points:
+        for point in self.path.change_points:
             self._bridge(point)
-        for point in self.track.singular_positions_outside():
+        for point in self.path.singular_positions_outside():
             self._refuse(np.abs(self.time - point.instant) < spoiled_width(point, self.solver.order))
         if not reached.all():
             self._explain_end(int(np.argmin(reached)))
         if progress is not None and done < count:
             progress(count, count)
 
-    def _solve_batch(self, lanes: np.ndarray, source: np.ndarray) -> None:
+    def _solve_batch(self, lanes: Indices, source: Indices) -> None:
         chosen = _slice_of(source)
         known = jax.tree.map(lambda x: x[..., chosen], self._store)
         arrival = self.solver(known, self.time[lanes] - self._instants[source], self.time[lanes])
         self.status[lanes] = arrival.status
         self._keep(_slice_of(lanes), arrival.state(slice(None)))
         for k in np.flatnonzero(arrival.status != Status.OK).tolist():
-            self.culprits[int(lanes[k])] = self.solver.culprit(arrival, k)
+            self.faults[int(lanes[k])] = self.solver.fault(arrival, k)
             if arrival.status[k] not in PASSABLE:
                 self._rescue(int(lanes[k]))
 
-    def _away(self, lanes: np.ndarray, source: np.ndarray) -> np.ndarray:
+    def _away(self, lanes: Indices, source: Indices) -> Float[np.ndarray, " lane"]:
         return np.abs(self.time[lanes] - self._instants[source])
 
-    def _keep(self, lanes: Any, state: Any) -> None:
+    def _keep(self, lanes: slice | Indices, state: State) -> None:
         def put(whole: np.ndarray, part: np.ndarray) -> None:
             whole[..., lanes] = part
 
@@ -100,24 +112,24 @@ class Grid:
 
     def _rescue(self, lane: int) -> None:
         """Follow the motion to one instant from the anchor before it."""
-        anchors, instant = self.track.anchors, float(self.time[lane])
+        anchors, instant = self.path.anchors, float(self.time[lane])
         before = int(np.searchsorted([a.instant for a in anchors], instant, side="right")) - 1
         start = anchors[before]
         local = follow(self.solver, start, instant, self.time[-1] - self.time[0], (instant - start.instant) / 2)
         if local.status != Status.OK:
-            self.status[lane], self.culprits[lane] = local.status, local.culprit
+            self.status[lane], self.faults[lane] = local.status, local.fault
         elif len(local.anchors) > 1:
             self.status[lane] = local.anchors[-1].status
-            self.culprits.pop(lane)
+            self.faults.pop(lane)
             self._keep(slice(lane, lane + 1), local.anchors[-1].state)
 
     def _bridge(self, point: ChangePoint) -> None:
         """Replace the instants next to a change point, and the one at it, by what the motion on both sides gives."""
         away = np.abs(self.time - point.instant)
-        lanes = np.flatnonzero((away < half_width(point, self.solver.order)) & (self.time < self.track.ended_at))
+        lanes = np.flatnonzero((away < half_width(point, self.solver.order)) & (self.time < self.path.ended_at))
         if not lanes.size:
             return
-        state = bridged(self.solver, self.track, point, self.time[lanes])
+        state = bridged(self.solver, self.path, point, self.time[lanes])
         if state is None:
             self._refuse(away < spoiled_width(point, self.solver.order))
             return
@@ -129,23 +141,23 @@ class Grid:
             return
         self.status[lanes] = Status.OK
         for lane in lanes.tolist():
-            self.culprits.pop(lane, None)
+            self.faults.pop(lane, None)
         self._keep(lanes, (*state, self._store[2][lanes]))
 
-    def _refuse(self, lanes: np.ndarray) -> None:
+    def _refuse(self, lanes: Bool[np.ndarray, " time"]) -> None:
         self.status[lanes & (self.status == Status.OK)] = Status.SINGULAR
 
     def _explain_end(self, lost: int) -> None:
         """Say at the first instant that was not reached why the motion could not be followed to it."""
-        track, instant = self.track, self.time[lost : lost + 1]
-        self.status[lost], self.culprits[lost] = track.status, track.culprit
-        last = track.anchors[-1]
+        path, instant = self.path, self.time[lost : lost + 1]
+        self.status[lost], self.faults[lost] = path.status, path.fault
+        last = path.anchors[-1]
         arrival = self.solver(last.state, instant - last.instant, instant)
         if arrival.status[0] == Status.INADMISSIBLE:  # the fault is the law's, not that of the position before
-            self.status[lost], self.culprits[lost] = Status.INADMISSIBLE, self.solver.culprit(arrival, 0)
+            self.status[lost], self.faults[lost] = Status.INADMISSIBLE, self.solver.fault(arrival, 0)
 
 
-def _slice_of(indices: np.ndarray) -> Any:
+def _slice_of(indices: Indices) -> slice | Indices:
     """Return evenly spaced indices as a slice, with which NumPy copies several times faster."""
     first, last = int(indices[0]), int(indices[-1])
     step = (last - first) // (len(indices) - 1) if len(indices) > 1 else 1
@@ -154,14 +166,7 @@ def _slice_of(indices: np.ndarray) -> Any:
     return indices
 
 
-def _nearest(anchors: np.ndarray, time: np.ndarray) -> np.ndarray:
-    after = np.clip(np.searchsorted(anchors, time), 1, max(len(anchors) - 1, 1))
-    if len(anchors) == 1:
-        return np.zeros(len(time), int)
-    return np.where(time - anchors[after - 1] <= anchors[after] - time, after - 1, after)
-
-
-def _levels(left: np.ndarray, anchors: int, width: int) -> list[tuple[np.ndarray, int | None]]:
+def _levels(left: Bool[np.ndarray, " time"], anchors: int, width: int) -> list[tuple[Indices, int | None]]:
     """Return the instants of each level, with the distance in the grid of the neighbour that each is predicted from.
 
     The first level starts from the anchors, and fills at least one batch. Where few instants are left, it is the only
@@ -172,7 +177,7 @@ def _levels(left: np.ndarray, anchors: int, width: int) -> list[tuple[np.ndarray
         return [(np.flatnonzero(left), None)]
     while count // (2 * stride) >= max(2 * anchors, width):
         stride *= 2
-    levels: list[tuple[np.ndarray, int | None]] = [(np.arange(0, count, stride), None)]
+    levels: list[tuple[Indices, int | None]] = [(np.arange(0, count, stride), None)]
     while stride > 1:
         half = stride // 2
         levels.append((np.arange(half, count, stride), half))

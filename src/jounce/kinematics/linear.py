@@ -6,6 +6,12 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float, Int
+
+from jounce.shapes import Numbers
+
+Matrices = Float[Numbers, "row row batch"]
+Columns = Float[Numbers, "row batch"]
 
 
 class DenseFactor(eqx.Module):
@@ -20,13 +26,13 @@ class DenseFactor(eqx.Module):
     2002, Accuracy and Stability of Numerical Algorithms, sections 12.1 and 14.1).
     """
 
-    matrix: Any  # (rows, rows, batch)
-    eliminated: Any  # (rows, rows, batch): element (order[k], j) is element (k, order[j]) of the inverse
-    order: Any  # (rows, batch): the row of each pivot
-    pivots: Any  # (rows, batch)
+    matrix: Matrices
+    eliminated: Matrices  # element (order[k], j) is element (k, order[j]) of the inverse
+    order: Int[Numbers, "row batch"]  # the row of each pivot
+    pivots: Columns
 
     @classmethod
-    def of(cls, matrix: Any) -> "DenseFactor":
+    def of(cls, matrix: Matrices) -> "DenseFactor":
         """Factor matrices of shape (rows, rows, batch)."""
         size, lanes = matrix.shape[0], matrix.shape[-1]
         rows = np.arange(size, dtype=np.int32)[:, None]
@@ -55,7 +61,7 @@ class DenseFactor(eqx.Module):
         matrix, column = np.zeros((*shape, lanes)), np.zeros((shape[0], lanes))
         return cls(matrix, matrix, column.astype(np.int32), column)
 
-    def solve(self, right: Any, *, refined: bool = True) -> Any:
+    def solve(self, right: Columns, *, refined: bool = True) -> Columns:
         """Return the solution for right-hand sides of shape (rows, batch); it is NaN where a matrix is singular.
 
         A correction that is followed by another need not be refined.
@@ -71,7 +77,7 @@ class DenseFactor(eqx.Module):
         rest = right - jnp.sum(self.matrix * solution[None], axis=1)
         return (solution + product(rest)) * self._regular()
 
-    def solve_transposed(self, right: Any) -> Any:
+    def solve_transposed(self, right: Columns) -> Columns:
         """Return the solution with the transposed matrices, for right-hand sides of shape (rows, batch)."""
         rank = jnp.argsort(self.order, axis=0)
 
@@ -83,17 +89,17 @@ class DenseFactor(eqx.Module):
         rest = right - jnp.sum(self.matrix * solution[:, None], axis=0)
         return (solution + product(rest)) * self._regular()
 
-    def inverse(self) -> Any:
+    def inverse(self) -> Matrices:
         """Return the inverse matrices, shape (rows, rows, batch), for many right-hand sides that come one by one."""
         rows = jnp.take_along_axis(self.eliminated, self.order[:, None], axis=0)
         return jnp.take_along_axis(rows, jnp.argsort(self.order, axis=0)[None], axis=1) * self._regular()[None]
 
-    def pivot_ratio(self) -> Any:
+    def pivot_ratio(self) -> Float[Numbers, " batch"]:
         """Return the smallest pivot over the largest, shape (batch,): near zero at a singular position."""
         sizes = jnp.abs(self.pivots)
         return jnp.min(sizes, axis=0) / jnp.max(sizes, axis=0)
 
-    def sign(self) -> Any:
+    def sign(self) -> Float[Numbers, " batch"]:
         """Return the signs of the determinants, shape (batch,): 0 where singular, NaN where not finite."""
         size = len(self.order)
         later = np.triu(np.ones((size, size), bool), 1)[..., None]
@@ -101,11 +107,11 @@ class DenseFactor(eqx.Module):
         odd = jnp.sum(swaps, axis=(0, 1)) % 2 == 1
         return jnp.prod(jnp.sign(self.pivots), axis=0) * jnp.where(odd, -1.0, 1.0)
 
-    def _regular(self) -> Any:
+    def _regular(self) -> Float[Numbers, "1 batch"]:
         return jnp.where(jnp.all(self.pivots != 0, axis=0, keepdims=True), 1.0, jnp.nan)
 
 
-def _largest(sizes: Any, rows: Any) -> Any:
+def _largest(sizes: Columns, rows: Int[Numbers, "row 1"]) -> Int[Numbers, "1 batch"]:
     """Return the row of the largest entry of each lane, the first of equals, shape (1, batch); NaN is the largest.
 
     XLA's argmax goes from entry to entry; two reductions go over all lanes at once.
@@ -117,7 +123,9 @@ def _largest(sizes: Any, rows: Any) -> Any:
 SWEEPS = 10  # a third of them is enough for tasks of robots: convergence is quadratic
 
 
-def singular_values(matrix: Any) -> tuple[Any, Any, Any]:
+def singular_values(
+    matrix: Float[Numbers, "row column batch"],
+) -> tuple[Float[Numbers, "row k batch"], Float[Numbers, "k batch"], Float[Numbers, "column k batch"]]:
     """Return the singular value decomposition of a batch of small matrices, the batch last, without LAPACK.
 
     One-sided Jacobi rotations make the rows orthogonal (Demmel and Veselic 1992, Jacobi's method is more accurate than

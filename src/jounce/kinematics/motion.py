@@ -6,15 +6,18 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from jounce.display import Displayed
-from jounce.errors import MechanismError, no_such
+from jounce.errors import MechanismError
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.status import Status
 from jounce.mechanism import (
     AbstractMotionOutput,
+    AbstractOutput,
+    AbstractQuantity,
     AngleOutput,
     AngularVelocityOutput,
     Mechanism,
@@ -22,10 +25,11 @@ from jounce.mechanism import (
     PointOutput,
 )
 from jounce.mechanism.attitude_outputs import continued
-from jounce.mechanism.builder import placed
-from jounce.mechanism.datums import Way, attitudes_of
+from jounce.mechanism.axis_angles import AttitudeHistory, attitudes_of
+from jounce.mechanism.builder import counted_as_in
 from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.system import POSITION_COMPONENTS, Group, group_elements
+from jounce.shapes import Numbers
 
 _UNDEFINED = Status.UNDEFINED.advice.partition(": ")[2]
 
@@ -36,19 +40,15 @@ def _evaluated(group: Group, coordinates: dict[str, Any], pose_type: type) -> An
     return stacked(group.evaluate(pose))
 
 
-def check_output(output: Any, mechanism: Mechanism, name: str = "output") -> None:
+def check_output(output: AbstractQuantity, mechanism: Mechanism, name: str = "output") -> None:
     """Raise MechanismError unless an output names what the mechanism has, and exists in its space."""
-    names = (GROUND, *mechanism.bodies)
-    for body in output.bodies:
-        if body not in names:
-            message = no_such("body", body, names)
-            raise MechanismError(message, name="body", value=body)
-    if output.space and output.space != mechanism.space:
-        raise MechanismError(f"this output is {output.space}, the mechanism is {mechanism.space}", name=name)
+    mechanism.check_fit(output, name)
     output.check(mechanism)
 
 
-def output_group(output: Any, mechanism: Mechanism, model: Model | None = None, name: str = "output") -> Group:
+def output_group(
+    output: AbstractOutput, mechanism: Mechanism, model: Model | None = None, name: str = "output"
+) -> Group:
     """Return an output of poses as a group of one, which acts on the pose of all bodies.
 
     With a model, angles about axes are counted as those of the outputs that it was put together with.
@@ -56,7 +56,7 @@ def output_group(output: Any, mechanism: Mechanism, model: Model | None = None, 
     index = {body: k for k, body in enumerate((GROUND, *mechanism.bodies))}
     components = POSITION_COMPONENTS[mechanism.space]
     groups, _ = group_elements({name: output}, mechanism.parameter_values, index, components)
-    (group,) = groups if model is None else placed(groups, model)
+    (group,) = groups if model is None else counted_as_in(groups, model)
     return group
 
 
@@ -67,14 +67,18 @@ class Motion(Displayed):
     ----------
     mechanism : Mechanism
         What was solved.
+    model : Model
+        The numeric model that was solved.
     time : numpy.ndarray of shape (time,)
         Instants, s.
     order : int
         Highest derivative of the outputs.
     status : numpy.ndarray of int, shape (time,)
         Outcome at each instant, see `Status`; where it is not 0, all results are NaN.
-    culprits : dict of int to str
+    faults : dict of int to str
         For the instants that failed, by index: the body farthest from its prediction, or the driver at fault.
+    history : AttitudeHistory, optional
+        Attitudes that all bodies in space went through, by which turns are counted; None where none are kept.
     change_points : numpy.ndarray of shape (points,)
         When the motion passed a singular position smoothly, where assembly branches cross, s: there another motion
         could have branched off, and forces are not determined.
@@ -90,37 +94,27 @@ class Motion(Displayed):
         order: int,
         state: tuple[dict[str, Any], tuple[Any, ...]],
         status: np.ndarray,
-        culprits: dict[int, str],
+        faults: dict[int, str],
         change_points: np.ndarray | None = None,
-        way: Way | None = None,
+        history: AttitudeHistory | None = None,
     ):
         self.mechanism, self.time, self.order, self.status = mechanism, time, order, status
-        self.culprits = culprits
+        self.faults = faults
         self.change_points = np.zeros(0) if change_points is None else change_points
         self.derived: dict[str, Any] = {}
-        self._model, self._way = model, way
+        self.model, self.history = model, history
         self._coordinates, groups = state
         self._groups = dict(zip(model.outputs, groups, strict=True))
 
     @property
-    def model(self) -> Model:
-        """The numeric model that was solved."""
-        return self._model
-
-    @property
-    def way(self) -> Way | None:
-        """Attitudes that all bodies in space went through, by which turns are counted; None where none are kept."""
-        return self._way
-
-    @property
     def poses(self) -> tuple[type, dict[str, Any]]:
         """Type of the poses of all bodies, the ground first, and Taylor coefficients of their coordinates by name."""
-        return self._model.pose_type, self._coordinates
+        return self.model.pose_type, self._coordinates
 
     @cached_property
     def forces(self) -> tuple[Group, ...]:
         """The applied forces, in the groups of the model, with the turns of angles about axes at every instant."""
-        return self._counting(self._model.system.forces)
+        return self._counting(self.model.system.forces)
 
     def __repr__(self) -> str:
         solved = int(np.sum(self.status == Status.OK))
@@ -134,7 +128,7 @@ class Motion(Displayed):
         The nine components of a rotation matrix stand row by row.
         """
         found = {}
-        for (names, coefficients), group in zip(self._groups.items(), self._model.system.outputs, strict=True):
+        for (names, coefficients), group in zip(self._groups.items(), self.model.system.outputs, strict=True):
             coefficients = self._continued(group, coefficients)
             for k, name in enumerate(names):
                 found[name] = self._derivatives(coefficients[:, :, k])
@@ -193,7 +187,7 @@ class Motion(Displayed):
         """
         return self.evaluate(AngularVelocityOutput(body, frame), name="angular_velocity")
 
-    def evaluate(self, output: Any, name: str = "output") -> Any:
+    def evaluate(self, output: AbstractOutput | AbstractMotionOutput, name: str = "output") -> Any:
         """Return any output, as an `xarray.DataArray`, without solving again.
 
         Raises
@@ -204,12 +198,12 @@ class Motion(Displayed):
         check_output(output, self.mechanism, name)
         if isinstance(output, AbstractMotionOutput):
             return self._labelled(name, self._derivatives(output.coefficients(self)), output)
-        group = output_group(output, self.mechanism, self._model, name)
+        group = output_group(output, self.mechanism, self.model, name)
         values = self._derivatives(self._continued(group, self._coefficients(group))[:, :, 0])
         self._check_finite(values, name)
         return self._labelled(name, values, output)
 
-    def _check_finite(self, values: np.ndarray, name: str) -> None:
+    def _check_finite(self, values: Float[np.ndarray, "time derivative *component"], name: str) -> None:
         """Raise MechanismError for the first instant that was solved and at which an output is not finite."""
         finite = np.isfinite(values).all(axis=tuple(range(2, values.ndim)))
         bad = ~finite & (self.status == Status.OK)[:, None]
@@ -219,7 +213,9 @@ class Motion(Displayed):
             at = f"{what} has no finite value at t = {self.time[lane]:g} s"
             raise MechanismError(f"{at}; {_UNDEFINED}", name=name)
 
-    def _continued(self, group: Group, coefficients: Any) -> Any:
+    def _continued(
+        self, group: Group, coefficients: Float[Numbers, "order component instance time"]
+    ) -> Float[Numbers, "order component instance time"]:
         """Return the Taylor coefficients of outputs, of which angles in a range are made continuous."""
         element = group.element
         if not getattr(element, "wraps", ()):
@@ -228,33 +224,37 @@ class Motion(Displayed):
         instants, quaternion = self._attitudes()
         for k, bodies in enumerate(zip(*group.bodies, strict=True)):
             angles = np.where(self.status == Status.OK, coefficients[0, :, k], np.nan)
-            way = instants, attitudes_of(bodies, quaternion)
-            coefficients[0, :, k] += continued(element, angles, self.time, way)
+            passed = instants, attitudes_of(bodies, quaternion)
+            coefficients[0, :, k] = continued(element, angles, self.time, passed)
         return coefficients
 
     def _attitudes(self) -> tuple[np.ndarray, np.ndarray]:
         """Return instants along the motion, and the Euler parameters of all bodies there, (4, bodies, places)."""
-        if self._way is None:
+        if self.history is None:
             return np.zeros(0), np.zeros((4, len(self.mechanism.bodies) + 1, 0))
-        return self._way.time, self._way.quaternion
+        return self.history.time, self.history.quaternion
 
-    def _coefficients(self, group: Group) -> np.ndarray:
+    def _coefficients(self, group: Group) -> Float[np.ndarray, "order component instance time"]:
         """Return the Taylor coefficients of outputs, (order + 1, components, instances, time)."""
         (group,) = self._counting((group,))
-        return np.asarray(_evaluated(group, self._coordinates, self._model.pose_type))
+        return np.asarray(_evaluated(group, self._coordinates, self.model.pose_type))
 
     def _counting(self, groups: tuple[Group, ...]) -> tuple[Group, ...]:
-        return groups if self._way is None else self._way.counting(groups, self.time)
+        return groups if self.history is None else self.history.counting(groups, self.time)
 
-    def _derivatives(self, coefficients: np.ndarray) -> np.ndarray:
+    def _derivatives(
+        self, coefficients: Float[Numbers, "order component time"]
+    ) -> Float[np.ndarray, "time derivative *component"]:
         """Turn Taylor coefficients (order, component, time) into derivatives (time, derivative[, component])."""
-        coefficients = coefficients[: self.order + 1]
+        coefficients = np.asarray(coefficients[: self.order + 1])
         factorials = np.array([math.factorial(k) for k in range(len(coefficients))], float)
         values = np.moveaxis(coefficients * factorials[:, None, None], (2, 0, 1), (0, 1, 2))
         values = np.where((self.status == Status.OK)[:, None, None], values, np.nan)
         return values[..., 0] if values.shape[-1] == 1 else values
 
-    def _labelled(self, name: str, values: np.ndarray, output: Any) -> Any:
+    def _labelled(
+        self, name: str, values: Float[np.ndarray, "time derivative *component"], output: AbstractQuantity
+    ) -> Any:
         import xarray
 
         coordinates = {"time": self.time, "derivative": np.arange(values.shape[1])}

@@ -5,17 +5,18 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from jounce.errors import MechanismError, SolveError
 from jounce.kinematics.assembly import assemble
 from jounce.kinematics.grid import Grid
 from jounce.kinematics.motion import Motion
-from jounce.kinematics.path import PASSABLE, Anchor, Solver, follow
+from jounce.kinematics.path_following import PASSABLE, Anchor, Solver, follow
 from jounce.kinematics.status import Status
 from jounce.mechanism import Mechanism, build, check_mechanism, time_grid
-from jounce.mechanism.datums import measures_angle
-from jounce.mechanism.doors import concrete
-from jounce.mechanism.laws import check_laws
+from jounce.mechanism.axis_angles import measures_angle
+from jounce.mechanism.law_checks import check_laws
+from jounce.mechanism.preconditions import concrete
 from jounce.mechanism.system import Group
 
 LOWEST_ORDER = 4  # of the jets inside: predictions need some, also where the user wants positions only
@@ -90,12 +91,12 @@ def solve(
     model, coordinates = assemble(build(mechanism), instants[0], tolerance)
     solver = Solver(model, max(order + lost, LOWEST_ORDER), float(tolerance), refine, order)
     first = _first(solver, coordinates, instants[:1])
-    track = follow(solver, first, instants[-1], instants[-1] - instants[0], grid=instants)
-    grid = Grid(solver, track, instants)
+    path = follow(solver, first, instants[-1], instants[-1] - instants[0], grid=instants)
+    grid = Grid(solver, path, instants)
     grid.solve(progress)
-    change_points = np.array([point.instant for point in track.change_points])
-    found = (grid.state, grid.status, grid.culprits)
-    motion = Motion(mechanism, model, instants, order, *found, change_points, track.way())
+    change_points = np.array([point.instant for point in path.change_points])
+    found = (grid.state, grid.status, grid.faults)
+    motion = Motion(mechanism, model, instants, order, *found, change_points, path.history())
     if strict:
         raise_for_status(motion)
     return motion
@@ -108,8 +109,8 @@ def raise_for_status(motion: Motion) -> None:
         return
     first = int(failed[0])
     status = Status(int(motion.status[first]))
-    culprit = motion.culprits.get(first, "")
-    where = f"t = {motion.time[first]:g} s" + (f", {culprit}" if culprit else "")
+    fault = motion.faults.get(first, "")
+    where = f"t = {motion.time[first]:g} s" + (f", {fault}" if fault else "")
     total = len(motion.time)
     message = f"{where}: {_words(status)}: {status.advice}"
     solved = f"{total - failed.size} of {total} instants were solved"
@@ -125,7 +126,7 @@ def checked_order(order: Any) -> int:
     return int(order)
 
 
-def _first(solver: Solver, coordinates: dict[str, np.ndarray], instant: np.ndarray) -> Anchor:
+def _first(solver: Solver, coordinates: dict[str, np.ndarray], instant: Float[np.ndarray, " 1"]) -> Anchor:
     """Solve the first instant with its derivatives, from its assembled position."""
     levels = solver.order + 1
     still = {name: np.stack([x, *[np.zeros_like(x)] * (levels - 1)]) for name, x in coordinates.items()}
@@ -133,12 +134,12 @@ def _first(solver: Solver, coordinates: dict[str, np.ndarray], instant: np.ndarr
     arrival = solver((still, angles, np.zeros(1)), np.zeros(1), instant, survey=True)
     status = Status(int(arrival.status[0]))
     if status not in PASSABLE:
-        where = f"t = {instant[0]:g} s, {solver.culprit(arrival, 0)}"
+        where = f"t = {instant[0]:g} s, {solver.fault(arrival, 0)}"
         raise SolveError(f"{where}: {_words(status)}: {status.advice}", status=status)
     return Anchor.of(arrival, instant[0])
 
 
-def _known_angles(group: Group, levels: int) -> np.ndarray:
+def _known_angles(group: Group, levels: int) -> Float[np.ndarray, "order 1 instance 1"]:
     """Return what is known of angles at the first instant: whole turns, where the assembly counted them."""
     known = np.zeros((levels, 1, group.instances, 1))
     if measures_angle(group):

@@ -33,9 +33,9 @@ _ADVICE = {
     "the tolerance is too small",
     Status.INADMISSIBLE: "the motion law or the force has no permitted value here: it must be finite, and the distance "
     "of a distance driver above zero",
-    Status.COLLAPSED: "the steps became too small to move on: the motion runs into a singular position, a motion law or a "
-    "force grows beyond all bounds or jumps, or the motion takes more than a million steps; check the mechanism, its "
-    "laws and its forces here, or ask for a shorter motion",
+    Status.COLLAPSED: "the steps became too small to move on: the motion runs into a singular position, a motion law "
+    "or a force grows beyond all bounds or jumps, or the motion takes more than a million steps; check the mechanism, "
+    "its laws and its forces here, or ask for a shorter motion",
     Status.UNDEFINED: "a quantity or a derivative of it is not a finite number here: a distance that is zero has no "
     "rate, a motion law such as t**2.5 no third derivative at t = 0, and Euler angles are none where their first and "
     "last axes are parallel; ask for a lower order, for another sequence, or leave it out",

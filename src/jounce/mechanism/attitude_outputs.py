@@ -4,9 +4,11 @@ from typing import Any
 
 import equinox as eqx
 import numpy as np
+from jaxtyping import Float
 
-from jounce.errors import JounceError, MechanismError
-from jounce.jet import Jet, stack
+from jounce.errors import MechanismError
+from jounce.jet import Jet, concatenate, stack
+from jounce.jet.turns import counted_on
 from jounce.mechanism.outputs import AbstractOutput
 from jounce.rigid.orientation import euler_angles
 from jounce.rigid.rotations import check_sequence
@@ -33,7 +35,8 @@ class EulerParametersOutput(AbstractOutput):
         if not base:
             return body.quaternion
         (base,) = base  # of conj(p_i) o p_j
-        return stack([base.quaternion.dot(body.quaternion), *(spin.dot(body.quaternion) for spin in base.spins)])
+        e0, e = base.relative_quaternion(body.quaternion)
+        return concatenate([e0[None], e])
 
 
 class RelativeEulerParametersOutput(EulerParametersOutput):
@@ -80,10 +83,7 @@ class EulerAnglesOutput(AbstractOutput):
     wraps = (True, False, True)
 
     def __check_init__(self):
-        try:
-            check_sequence(self.sequence)
-        except JounceError as error:
-            raise MechanismError(error.message, name="sequence", value=self.sequence) from None
+        check_sequence(self.sequence, MechanismError)
 
     def evaluate(self, *bodies):
         return euler_angles(self.sequence, stack([stack(row) for row in _matrix(bodies)]))
@@ -103,8 +103,13 @@ def _matrix(bodies: Any) -> list[list[Jet]]:
     return [[axis[k] for axis in body.axes] for k in range(3)]
 
 
-def continued(output: Any, angles: np.ndarray, instants: np.ndarray, way: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-    """Return whole turns, rad, that make angles continuous along a motion, (3, time).
+def continued(
+    output: EulerAnglesOutput,
+    angles: Float[np.ndarray, "3 time"],
+    instants: Float[np.ndarray, " time"],
+    passed: tuple[Float[np.ndarray, " place"], Float[np.ndarray, "4 place"]],
+) -> Float[np.ndarray, "3 time"]:
+    """Return angles made continuous along a motion, rad, (3, time).
 
     Parameters
     ----------
@@ -114,20 +119,19 @@ def continued(output: Any, angles: np.ndarray, instants: np.ndarray, way: tuple[
         Of the output, up to whole turns; those that are not finite count for nothing.
     instants : array of shape (time,)
         s.
-    way : tuple
+    passed : tuple
         Instants in the order of the motion, (places,), and the relative attitude of the bodies there, Euler parameters
         (4, places): near enough to each other that no turn is lost between them.
     """
-    between, attitudes = way
+    between, attitudes = passed
     whole = np.concatenate([_angles_of(output.sequence, attitudes), angles], axis=1)
     times = np.concatenate([between, instants])
     order = np.argsort(-times if between.size > 1 and between[-1] < between[0] else times, kind="stable")
     order = order[np.isfinite(whole[:, order]).all(axis=0)]
-    turns = np.zeros_like(whole)
     for k, wraps in enumerate(output.wraps):
         if wraps:
-            turns[k, order] = np.round((np.unwrap(whole[k, order]) - whole[k, order]) / (2 * np.pi)) * 2 * np.pi
-    return turns[:, between.size :]
+            whole[k, order] = counted_on(whole[k, order])
+    return whole[:, between.size :]
 
 
 def _angles_of(sequence: str, attitudes: np.ndarray) -> np.ndarray:

@@ -5,27 +5,27 @@ from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
+from jaxtyping import Float
 
 from jounce.constraints.base import field_kind, value_fields
 from jounce.errors import JounceError
 from jounce.jet import Jet
-from jounce.mechanism.datums import (
-    Turning,
-    Way,
+from jounce.mechanism.axis_angles import (
+    AttitudeHistory,
+    PrescribedAngle,
     departure,
     measures_angle,
-    turnings_of,
+    prescribed_angles,
     with_angles,
     with_datum_of,
     with_datums,
 )
-from jounce.mechanism.mechanism import GROUND, Body, Mechanism
-from jounce.mechanism.outputs import AbstractOutput
+from jounce.mechanism.mechanism import GROUND, Mechanism
+from jounce.mechanism.outputs import AbstractMotionOutput
 from jounce.mechanism.resolve import check_value, resolve
 from jounce.mechanism.system import (
     POSITION_COMPONENTS,
@@ -36,6 +36,9 @@ from jounce.mechanism.system import (
 )
 from jounce.rigid import PlanarPose, SpatialPose
 from jounce.rigid.euler_parameters import euler_parameters
+from jounce.rigid.pose import Pose
+from jounce.shapes import Numbers
+from jounce.trajectory import AbstractMotion
 
 
 @dataclasses.dataclass(frozen=True)
@@ -64,14 +67,14 @@ class Model:
         Size of the mechanism, by which positions are scaled, m.
     reference : dict of str to array
         Coordinates from which angles about axes are counted: those of the starting guess, until put together.
-    turnings : tuple of Turning
+    prescribed : tuple of PrescribedAngle
         Angles that drivers prescribe there, with their whole turns.
-    way : Way, optional
+    history : AttitudeHistory, optional
         In space, from the starting guess to where the drivers fulfil their laws, where that is more than half a turn.
     """
 
     system: System
-    pose_type: type
+    pose_type: type[Pose]
     guess: dict[str, Any]
     rows: tuple[str, ...]
     drivers: tuple[str, ...]
@@ -80,8 +83,8 @@ class Model:
     outputs: tuple[tuple[str, ...], ...]
     length: float
     reference: dict[str, Any]
-    turnings: tuple[Turning, ...] = ()
-    way: Way | None = None
+    prescribed: tuple[PrescribedAngle, ...] = ()
+    history: AttitudeHistory | None = None
 
 
 def build(mechanism: Mechanism, like: Model | None = None) -> Model:
@@ -102,60 +105,55 @@ def build(mechanism: Mechanism, like: Model | None = None) -> Model:
     ExpressionError
         If an expression uses a name that is not a parameter.
     """
-    parameters = mechanism.parameter_values
-    components = POSITION_COMPONENTS[mechanism.space]
+    parameters, components = mechanism.parameter_values, POSITION_COMPONENTS[mechanism.space]
     body_index = {name: k for k, name in enumerate((GROUND, *mechanism.bodies))}
+
+    def grouped(*kinds: str) -> tuple[tuple[Group, ...], tuple[tuple[str, ...], ...]]:
+        elements = {f"{kind}.{k}": v for kind in kinds for k, v in mechanism.elements[kind].items()}
+        posed = {name: v for name, v in elements.items() if not isinstance(v, AbstractMotionOutput)}
+        return group_elements(posed, parameters, body_index, components)
+
+    groups, names = grouped("joints", "drivers")
+    forces, force_names = grouped("forces")
+    outputs, output_names = grouped("outputs")
+    if like is not None:
+        parts = {"groups": groups, "forces": forces, "outputs": outputs}
+        known = {name: tuple(map(_with_found_of, part, getattr(like.system, name))) for name, part in parts.items()}
+        return dataclasses.replace(like, system=dataclasses.replace(like.system, **known))
+
     pose_type = PlanarPose if components == 2 else SpatialPose
-    guess = starting_guess(mechanism, parameters, components) if like is None else like.guess
-
-    elements = {f"joints.{k}": v for k, v in mechanism.joints.items()}
-    elements |= {f"drivers.{k}": v for k, v in mechanism.drivers.items()}
-    groups, names = group_elements(elements, parameters, body_index, components)
-    if like is None:
-        groups = tuple(_with_sense(_with_offsets(group, pose_type, guess), pose_type, guess) for group in groups)
-    applied = {f"forces.{k}": v for k, v in mechanism.forces.items()}
-    forces, force_names = group_elements(applied, parameters, body_index, components)
-    wanted = {f"outputs.{k}": v for k, v in mechanism.outputs.items() if isinstance(v, AbstractOutput)}
-    outputs, output_names = group_elements(wanted, parameters, body_index, components)
-
-    if like is None:
-        groups, forces, outputs = (with_datums(part, guess) for part in (groups, forces, outputs))
-    else:
-        known = like.system
-        pairs = ((groups, known.groups), (forces, known.forces), (outputs, known.outputs))
-        groups, forces, outputs = (tuple(map(_with_found_of, part, its)) for part, its in pairs)
-
+    guess = starting_guess(mechanism, parameters, components)
+    groups = tuple(_with_sense(_with_offsets(group, pose_type, guess), pose_type, guess) for group in groups)
+    groups, forces, outputs = (with_datums(part, guess) for part in (groups, forces, outputs))
     row_counts = [_row_count(group, pose_type, guess) for group in groups]
-    row_names = [n for members, count in zip(names, row_counts, strict=True) for _ in range(count) for n in members]
+    rows = [n for members, count in zip(names, row_counts, strict=True) for _ in range(count) for n in members]
     drivers = tuple(n for group, members in zip(groups, names, strict=True) if group.is_driver for n in members)
-    length = _size(groups, guess) if like is None else like.length
-    system = System(
-        groups,
-        outputs,
-        jacobian_cells(groups, row_counts, components + pose_type.turns, len(mechanism.bodies)),
-        np.ones((len(row_names), 1)) if like is None else like.system.row_scale,
-        np.array([length] * components + [1.0] * pose_type.turns),
-        len(mechanism.bodies),
-        forces,
-    )
+    length, count = _size(groups, guess), len(mechanism.bodies)
+    cells = jacobian_cells(groups, row_counts, components + pose_type.turns, count)
+    scale = np.array([length] * components + [1.0] * pose_type.turns)
+    history = AttitudeHistory(guess["quaternion"], np.zeros(1)) if components == 3 else None
     return Model(
-        system,
+        System(groups, outputs, cells, np.ones((len(rows), 1)), scale, count, forces),
         pose_type,
         guess,
-        tuple(row_names),
+        tuple(rows),
         drivers,
         _plain(force_names),
         tuple(mechanism.bodies),
         _plain(output_names),
         length,
-        guess if like is None else like.reference,
-        () if like is None else like.turnings,
-        _way_of(guess) if like is None else like.way,
+        reference=guess,
+        history=history,
     )
 
 
-def referred(
-    model: Model, coordinates: dict[str, Any], instant: float, told: tuple[Turning, ...] = (), *, keep: bool = False
+def with_reference(
+    model: Model,
+    coordinates: dict[str, Any],
+    instant: float,
+    prescribed: tuple[PrescribedAngle, ...] = (),
+    *,
+    keep: bool = False,
 ) -> tuple[Model, float]:
     """Return the model with angles about axes counted from a position, and how far off those of drivers were, rad.
 
@@ -167,40 +165,36 @@ def referred(
         Of all bodies, the ground first, put together.
     instant : float
         At which they are there, s.
-    told : tuple of Turning
+    prescribed : tuple of PrescribedAngle
         Angles that are prescribed there by others than the drivers, such as initial conditions.
     keep : bool, default False
         Whether angles go on from those counted so far, instead of those that the frames of the bodies have.
     """
     system = model.system
     if not any(map(measures_angle, (*system.groups, *system.forces, *system.outputs))):
-        return dataclasses.replace(model, reference=coordinates, turnings=told), 0.0
+        return dataclasses.replace(model, reference=coordinates, prescribed=prescribed), 0.0
     groups = with_datums(system.groups, coordinates, keep=keep)
     motions = [group.element.motion for group in groups if measures_angle(group)]
     values = [np.asarray(value) for value in _law_values(motions, np.full((1, 1), instant))]
-    turnings = (*turnings_of(groups, coordinates, values), *told)
-    forces, outputs = (with_datums(part, coordinates, turnings) for part in (system.forces, system.outputs))
+    prescribed = (*prescribed_angles(groups, coordinates, values), *prescribed)
+    forces, outputs = (with_datums(part, coordinates, prescribed) for part in (system.forces, system.outputs))
     system = dataclasses.replace(system, groups=groups, forces=forces, outputs=outputs)
     away = departure(model.system.groups, groups)
-    return dataclasses.replace(model, system=system, reference=coordinates, turnings=turnings), away
+    return dataclasses.replace(model, system=system, reference=coordinates, prescribed=prescribed), away
 
 
-def _way_of(guess: dict[str, Any]) -> Way | None:
-    return Way(guess["quaternion"], np.zeros(1)) if "quaternion" in guess else None
-
-
-def placed(groups: tuple[Group, ...], model: Model) -> tuple[Group, ...]:
+def counted_as_in(groups: tuple[Group, ...], model: Model) -> tuple[Group, ...]:
     """Return groups with angles about axes counted as if they had been in the model when it was put together."""
-    if model.way is None or not any(map(measures_angle, groups)):
+    if model.history is None or not any(map(measures_angle, groups)):
         return groups
-    first, last = ({"quaternion": model.way.quaternion[..., place]} for place in (slice(1), slice(-1, None)))
+    first, last = ({"quaternion": model.history.quaternion[..., place]} for place in (slice(1), slice(-1, None)))
     groups = with_datums(groups, first)
-    groups = with_angles(with_datums(groups, last), model.way.last_angles(groups))
-    return with_datums(groups, model.reference, model.turnings)
+    groups = with_angles(with_datums(groups, last), model.history.last_angles(groups))
+    return with_datums(groups, model.reference, model.prescribed)
 
 
 @jax.jit
-def _law_values(motions: list[Any], instant: Any) -> list[Any]:
+def _law_values(motions: list[AbstractMotion], instant: Float[Numbers, "1 1"]) -> list[Numbers]:
     return [motion(Jet([instant])).coefficients[0] for motion in motions]
 
 
@@ -221,16 +215,6 @@ def starting_guess(mechanism: Mechanism, parameters: dict[str, Any], components:
             attitudes.append(_attitude(body.orientation, f"{place}.orientation", parameters))
     position, attitude = (np.stack([np.asarray(x) for x in xs], axis=-1)[..., None] for xs in (positions, attitudes))
     return {"position": position, "angle" if components == 2 else "quaternion": attitude}
-
-
-def check_body(name: str, body: Body, parameters: dict[str, Any], components: int) -> None:
-    """Raise a JounceError unless the starting guess of a body is one, in all that the space has."""
-    place = f"bodies.{name}"
-    _guess(body.position, f"{place}.position", "vector", components, parameters)
-    if components == 2:
-        _guess(body.angle, f"{place}.angle", "scalar", components, parameters)
-    else:
-        _attitude(body.orientation, f"{place}.orientation", parameters)
 
 
 def _attitude(orientation: Any, name: str, parameters: dict[str, Any]) -> np.ndarray:
@@ -257,13 +241,13 @@ def _guess(value: Any, name: str, kind: str, components: int, parameters: dict[s
     return value
 
 
-def _row_count(group: Group, pose_type: type, guess: dict[str, Any]) -> int:
+def _row_count(group: Group, pose_type: type[Pose], guess: dict[str, Any]) -> int:
     leaves, structure = jax.tree.flatten((group, guess))
     return _row_count_of(structure, tuple(jax.ShapeDtypeStruct(np.shape(x), np.float64) for x in leaves), pose_type)
 
 
 @lru_cache(maxsize=1000)
-def _row_count_of(structure: Any, leaves: tuple[Any, ...], pose_type: type) -> int:
+def _row_count_of(structure: Any, leaves: tuple[Any, ...], pose_type: type[Pose]) -> int:
     """Read the number of rows off the shape of the residual; it depends on the structure only, so is kept."""
 
     def residual(leaves: tuple[Any, ...], time: Any) -> Any:
@@ -273,19 +257,19 @@ def _row_count_of(structure: Any, leaves: tuple[Any, ...], pose_type: type) -> i
     return jax.eval_shape(residual, leaves, np.zeros((1, 1))).shape[0]
 
 
-def pose_at(coordinates: dict[str, Any], pose_type: type) -> Any:
+def pose_at(coordinates: Mapping[str, Any], pose_type: type[Pose]) -> Any:
     """Return the pose of order zero that has the given coordinates."""
     return pose_type.from_coordinates({name: Jet([value]) for name, value in coordinates.items()})
 
 
-def _with_offsets(group: Group, pose_type: type, guess: dict[str, Any]) -> Group:
+def _with_offsets(group: Group, pose_type: type[Pose], guess: dict[str, Any]) -> Group:
     """Fill in the offsets that were not given: those with which the starting guess fulfils the joint."""
     fields = value_fields(type(group.element))
     if "offset" not in fields or group.element.offset is not None:
         return group
 
     def residual(offset: Any) -> Any:
-        trial = eqx.tree_at(lambda g: g.element.offset, group, offset, is_leaf=lambda x: x is None)
+        trial = group.holding("offset", offset)
         return trial.residual(pose_at(guess, pose_type), Jet([jnp.zeros((1, 1))])).coefficients[0]
 
     def fulfilling() -> Any:
@@ -293,21 +277,16 @@ def _with_offsets(group: Group, pose_type: type, guess: dict[str, Any]) -> Group
         value, slope = jax.jvp(residual, (zero,), (jnp.ones_like(zero),))
         return -jnp.sum(value * slope, axis=0)  # the slope is -1 in the row that holds the offset, else 0
 
-    offset = np.asarray(jax.jit(fulfilling)())
-    return eqx.tree_at(lambda g: g.element.offset, group, offset, is_leaf=lambda x: x is None)
+    return group.holding("offset", np.asarray(jax.jit(fulfilling)()))
 
 
-def _with_sense(group: Group, pose_type: type, guess: dict[str, Any]) -> Group:
+def _with_sense(group: Group, pose_type: type[Pose], guess: dict[str, Any]) -> Group:
     """Fill in with which sign of the Euler parameters an attitude is compared: that of the starting guess."""
     if not hasattr(group.element, "sense"):
         return group
     pose = pose_at(guess, pose_type)
     sense = group.element.sense_at(*(pose.take(indices) for indices in group.bodies))
-    return _put_sense(group, None if sense is None else np.asarray(sense))
-
-
-def _put_sense(group: Group, sense: Any) -> Group:
-    return eqx.tree_at(lambda g: g.element.sense, group, sense, is_leaf=lambda x: x is None)
+    return group.holding("sense", None if sense is None else np.asarray(sense))
 
 
 def _with_found_of(group: Group, known: Group) -> Group:
@@ -315,10 +294,10 @@ def _with_found_of(group: Group, known: Group) -> Group:
     if measures_angle(group):
         return with_datum_of(group, known)
     if hasattr(group.element, "sense"):
-        return _put_sense(group, known.element.sense)
+        return group.holding("sense", known.element.sense)
     if "offset" not in value_fields(type(group.element)) or group.element.offset is not None:
         return group
-    return eqx.tree_at(lambda g: g.element.offset, group, known.element.offset, is_leaf=lambda x: x is None)
+    return group.holding("offset", known.element.offset)
 
 
 def _size(groups: tuple[Group, ...], guess: dict[str, Any]) -> float:

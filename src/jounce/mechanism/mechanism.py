@@ -1,23 +1,24 @@
 """The mechanism as its user sees it: named bodies, joints, drivers, outputs and parameters; frozen."""
 
 import dataclasses
+import re
 from collections.abc import Mapping
 from functools import cached_property
 from typing import Any
 
 from jounce.constraints import AbstractConstraint
 from jounce.display import Displayed
-from jounce.errors import ExpressionError, JounceError, MechanismError, no_such
+from jounce.errors import ExpressionError, JounceError, MechanismError, check_name
 from jounce.forces import AbstractForce
 from jounce.mechanism.outputs import AbstractQuantity
 from jounce.mechanism.resolve import parameter_value
 from jounce.rigid.inertia import Inertia
 from jounce.trajectory import Expression
 from jounce.trajectory.dimensions import Dimension, check_one_of
+from jounce.trajectory.expression import RESERVED
 from jounce.trajectory.units import parse_value
 
 GROUND = "ground"
-RESERVED = ("t", "pi", "deg")
 CLASSES = {"outputs": AbstractQuantity, "forces": AbstractForce}  # constraints otherwise
 RESERVED_OUTPUTS = (  # the axes of a result
     "time",
@@ -28,6 +29,7 @@ RESERVED_OUTPUTS = (  # the axes of a result
     "row_axis",
     "column_axis",
 )
+RATE_COLUMN = re.compile(r".*_d[0-9]+")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -164,12 +166,10 @@ class Mechanism(Displayed):
         for name, body in self.bodies.items():
             if not isinstance(body, Body):
                 raise MechanismError("must be a Body", name=f"bodies.{name}", value=body)
-        for name in self.parameters:
-            if name in RESERVED:
-                raise MechanismError(f"the name '{name}' is reserved", name=f"parameters.{name}")
-        for name in RESERVED_OUTPUTS:
-            if name in self.outputs:
-                raise MechanismError(f"the name '{name}' is reserved for an axis of results", name=f"outputs.{name}")
+        for name in self.parameters.keys() & RESERVED:
+            raise MechanismError(f"the name '{name}' is reserved for expressions", name=f"parameters.{name}")
+        for name in self.outputs.keys() & set(RESERVED_OUTPUTS):
+            raise MechanismError(f"the name '{name}' is reserved for an axis of results", name=f"outputs.{name}")
         for name in self.joints.keys() & self.drivers.keys():
             raise MechanismError("a joint and a driver have the same name", name=f"drivers.{name}")
         for kind in ("joints", "drivers"):
@@ -187,18 +187,20 @@ class Mechanism(Displayed):
             raise MechanismError(message, name=place, value=element.type_name or type(element).__name__)
         if kind == "forces" and not set(element.bodies) - {GROUND}:
             raise MechanismError("acts on the ground alone, which never moves", name=f"{place}.bodies")
-        if element.space and element.space != self.space:
-            raise MechanismError(f"is {element.space}, in a {self.space} mechanism", name=place)
-        for body in element.bodies:
-            if body != GROUND and body not in self.bodies:
-                message = no_such("body", body, [GROUND, *self.bodies])
-                raise MechanismError(message, name=f"{place}.bodies", value=body)
+        self.check_fit(element, place)
         if kind == "outputs":
             try:
                 element.check(self)
             except MechanismError as error:
                 error.name = f"{place}.{error.name}"  # it knows its fields only
                 raise
+
+    def check_fit(self, element: AbstractConstraint | AbstractForce | AbstractQuantity, place: str) -> None:
+        """Raise MechanismError unless an element exists in this space and names bodies that there are."""
+        if element.space and element.space != self.space:
+            raise MechanismError(f"is {element.space}, in a {self.space} mechanism", name=place)
+        for body in getattr(element, "bodies", ()):
+            check_name("body", body, (GROUND, *self.bodies), MechanismError, name=f"{place}.bodies")
 
     @property
     def elements(self) -> dict[str, Mapping[str, Any]]:
@@ -263,9 +265,7 @@ class Mechanism(Displayed):
         0.11
         """
         for name in values:
-            if name not in self.parameters:
-                message = no_such("parameter", name, self.parameters)
-                raise MechanismError(message, name="parameters", value=name)
+            check_name("parameter", name, self.parameters, MechanismError, name="parameters")
         read = {name: self._read(name, value) if isinstance(value, str) else value for name, value in values.items()}
         return dataclasses.replace(self, parameters={**self.parameters, **read})
 
@@ -281,6 +281,11 @@ class Mechanism(Displayed):
         except JounceError as error:
             raise error.located(name=f"parameters.{name}", value=text) from None
         return given.value
+
+
+def names_column(name: str) -> bool:
+    """Tell whether a name is that of an axis of results, or of a rate in a table of them: no output may have it."""
+    return name in RESERVED_OUTPUTS or RATE_COLUMN.fullmatch(name) is not None
 
 
 def check_mechanism(given: Any) -> None:

@@ -6,11 +6,10 @@ from typing import Any, ClassVar
 import equinox as eqx
 
 from jounce.constraints.angles import relative_angle
-from jounce.constraints.base import Vector, check_text
-from jounce.errors import MechanismError
+from jounce.constraints.base import Vector, check_bodies
+from jounce.errors import MechanismError, check_choice
 from jounce.jet import Jet, sqrt
-
-FRAMES = ("global", "body")
+from jounce.rigid.orientation import FRAMES
 
 
 class AbstractQuantity(eqx.Module):
@@ -55,9 +54,7 @@ class AbstractOutput(AbstractQuantity):
     body_count: ClassVar[int] = 1
 
     def __check_init__(self):
-        if len(self.bodies) != self.body_count:
-            message = f"this output takes {self.body_count} bodies"
-            raise MechanismError(message, name="bodies", value=list(self.bodies))
+        check_bodies(self, (self.body_count,), "takes", "be of")
 
     @abc.abstractmethod
     def evaluate(self, *bodies: Any) -> Jet:
@@ -123,7 +120,7 @@ class AngularVelocityOutput(AbstractOutput):
     lost_orders = 1
 
     def __check_init__(self):
-        check_text("frame", self.frame, FRAMES)
+        check_choice("frame", self.frame, FRAMES, MechanismError)
 
     def evaluate(self, body):
         if hasattr(body, "angle"):

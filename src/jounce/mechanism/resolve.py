@@ -2,9 +2,10 @@
 
 import dataclasses
 import numbers
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -15,6 +16,9 @@ from jounce.errors import JounceError, MechanismError
 from jounce.forces import AbstractForce, AbstractLaw, ExpressionLaw, FunctionLaw, TimeLaw, VectorLaw
 from jounce.jet import Jet
 from jounce.trajectory import AbstractMotion, Expression, ExpressionMotion, FunctionMotion
+
+Element = eqx.Module
+"""A joint, driver, force or output."""
 
 POSITIVE = ("length", "radius")
 NONZERO = ("axis", "vector", "normal")
@@ -67,7 +71,7 @@ def _traceable(motion: AbstractMotion) -> AbstractMotion:
     return motion
 
 
-def _tried(what: str, advice: str, function: Any, *arguments: Any) -> tuple[int, ...]:
+def _tried(what: str, advice: str, function: Callable[..., Jet], *arguments: np.ndarray) -> tuple[int, ...]:
     """Return the shape of the jet that a function of arrays returns; raise MechanismError where it cannot be used."""
     try:
         return jax.eval_shape(lambda *xs: function(*xs).coefficients[0], *arguments).shape
@@ -182,7 +186,7 @@ def _plain(value: Any) -> Any:
     return np.asarray(value).tolist() if isinstance(value, np.ndarray | jax.Array | np.generic) else value
 
 
-def resolve_element(element: Any, parameters: Mapping[str, Any], components: int, name: str) -> dict[str, Any]:
+def resolve_element(element: Element, parameters: Mapping[str, Any], components: int, name: str) -> dict[str, Any]:
     """Return the values of a joint, driver, force or output as arrays, by field, checked."""
     values, signs = {}, getattr(element, "signs", {})
     for field_name, field in value_fields(type(element)).items():
@@ -190,7 +194,7 @@ def resolve_element(element: Any, parameters: Mapping[str, Any], components: int
         try:
             if kind == "motion":
                 value = resolve_motion(value, parameters)
-            elif kind in ("law", "laws"):
+            elif isinstance(element, AbstractForce) and kind in ("law", "laws"):
                 value = resolve_law(value, element, parameters, None if kind == "law" else components)
             elif kind in ("scalar", "vector") and (value is not None or field.default is not None):
                 value = resolve(value, parameters)
@@ -231,7 +235,7 @@ def _check_sideways(values: Mapping[str, Any], name: str) -> None:
                     raise MechanismError(message, name=f"{name}.{other}", value=_plain(vector))
 
 
-def static_fields(element: Any) -> tuple[str, ...]:
+def static_fields(element: Element) -> tuple[str, ...]:
     """Return the names of the fields that hold no numbers, `bodies` aside."""
     return tuple(
         field.name
@@ -240,7 +244,7 @@ def static_fields(element: Any) -> tuple[str, ...]:
     )
 
 
-def group_key(element: Any, values: Mapping[str, Any]) -> Any:
+def group_key(element: Element, values: Mapping[str, Any]) -> Any:
     """Return what instances must share to be stacked: class, words, and the structure of their values."""
     words = tuple(getattr(element, name) for name in static_fields(element))
     numbers_only = {name: value for name, value in values.items() if name not in static_fields(element)}
@@ -248,7 +252,7 @@ def group_key(element: Any, values: Mapping[str, Any]) -> Any:
     return type(element), words, structure, tuple(np.shape(leaf) for leaf in leaves)
 
 
-def stack_elements(elements: Sequence[Any], values: Sequence[Mapping[str, Any]]) -> Any:
+def stack_elements(elements: Sequence[Element], values: Sequence[Mapping[str, Any]]) -> Any:
     """Return one element whose values hold all instances, along an axis that stands before the batch axis."""
     kind = type(elements[0])
     stacked = object.__new__(kind)  # the checks of __init__ were made for each instance

@@ -8,10 +8,15 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Bool, Float, Int
 
 from jounce.jet import Jet, concatenate
 from jounce.jet.algebra import stacked
 from jounce.mechanism.resolve import group_key, resolve_element, stack_elements
+from jounce.rigid import SpatialPose
+from jounce.rigid.body_arrays import each_jet
+from jounce.rigid.pose import Pose
+from jounce.shapes import Numbers
 
 POSITION_COMPONENTS = {"planar": 2, "spatial": 3}
 
@@ -35,58 +40,62 @@ class Group(eqx.Module):
         """Number of joints, drivers, forces or outputs in the group."""
         return len(self.bodies[0])
 
+    def holding(self, name: str, value: Any) -> "Group":
+        """Return the group with another value in a field of its elements."""
+        return eqx.tree_at(lambda g: getattr(g.element, name), self, value, is_leaf=lambda x: x is None)
+
     @property
     def is_driver(self) -> bool:
         """Whether the group prescribes motion."""
         return self.element.role == "driver"
 
-    def residual(self, pose: Any, time: Jet) -> Jet:
+    def residual(self, pose: Pose, time: Jet) -> Float[Jet, "row instance batch"]:
         """Return the residuals, shape (rows, instances, batch)."""
         return _with_rows(self.element.residual(*self._poses(pose), time))
 
-    def evaluate(self, pose: Any) -> Jet:
+    def evaluate(self, pose: Pose) -> Float[Jet, "component instance batch"]:
         """Return the outputs, shape (components, instances, batch)."""
         return _with_rows(self.element.evaluate(*self._poses(pose)))
 
-    def displacement(self, pose: Any, time: Jet) -> Jet:
+    def displacement(self, pose: Pose, time: Jet) -> Float[Jet, "component instance batch"]:
         """Return the displacements of forces, shape (components, instances, batch)."""
         return _with_rows(self.element.displacement(*self._poses(pose), time))
 
-    def force(self, pose: Any, time: Jet) -> Jet:
+    def force(self, pose: Pose, time: Jet) -> Float[Jet, "component instance batch"]:
         """Return the forces, shape (components, instances, batch), one order shorter than the pose."""
         displacement, velocity = self._motion(pose, time)
         return _with_rows(self.element.force(displacement, velocity, time)).truncate(pose.order - 1)
 
-    def finite(self, pose: Any, time: Jet) -> Any:
+    def finite(self, pose: Pose, time: Jet) -> Bool[Numbers, "instance batch"]:
         """Tell where forces and the velocities they work on are finite numbers, shape (instances, batch)."""
         displacement, velocity = self._motion(pose, time)
         force = self.element.force(displacement, velocity, time)
         parts = [_with_rows(jet).coefficients[0] for jet in (velocity, force)]
         return jnp.isfinite(parts[0]).all(axis=0) & jnp.isfinite(parts[1]).all(axis=0)
 
-    def power(self, pose: Any, time: Jet) -> Jet:
+    def power(self, pose: Pose, time: Jet) -> Float[Jet, "instance batch"]:
         """Return the power that forces put into the mechanism, shape (instances, batch), W."""
         displacement, velocity = self._motion(pose, time)
         force = self.element.force(displacement, velocity, time)
         return force.dot(velocity) if len(force.shape) == 3 else force * velocity
 
-    def velocity(self, pose: Any, time: Jet) -> Jet:
+    def velocity(self, pose: Pose, time: Jet) -> Float[Jet, "component instance batch"]:
         """Return the velocities that forces work on, shape (components, instances, batch)."""
         return _with_rows(self._motion(pose, time)[1])
 
-    def energy(self, pose: Any, time: Jet) -> Jet:
+    def energy(self, pose: Pose, time: Jet) -> Float[Jet, "instance batch"]:
         """Return the energy that forces have stored, shape (instances, batch), J."""
         return self.element.energy(self.element.displacement(*self._poses(pose), time))
 
-    def variation(self, pose: Any, change: Any, time: Jet) -> Jet:
+    def variation(self, pose: Pose, change: Pose, time: Jet) -> Jet:
         """Return how far forces act along as all bodies move by a change, shape (components, instances, batch)."""
         return _with_rows(self.element.variation(tuple(self._poses(pose)), tuple(self._poses(change)), time))
 
-    def _motion(self, pose: Any, time: Jet) -> tuple[Jet, Jet]:
+    def _motion(self, pose: Pose, time: Jet) -> tuple[Jet, Jet]:
         poses = self._poses(pose)
         return self.element.displacement(*poses, time), self.element.velocity(*poses, time)
 
-    def derivative_blocks(self, pose: Any, time: Jet, scale: Any) -> list[Any]:
+    def derivative_blocks(self, pose: Pose, time: Jet, scale: Float[Numbers, " coordinate"]) -> list[Any]:
         """Return the derivatives of the residuals by the coordinates of the bodies in each slot that may move.
 
         They are the linear map from the coefficients of order one of a body to those of the residual. Each block has
@@ -119,7 +128,7 @@ class Group(eqx.Module):
         """Slots that hold a body other than the ground."""
         return tuple(slot for slot, bodies in enumerate(self.bodies) if any(bodies))
 
-    def _poses(self, pose: Any) -> list[Any]:
+    def _poses(self, pose: Pose) -> list[Any]:
         return [pose.take(indices) for indices in self.bodies]
 
 
@@ -153,27 +162,29 @@ class System(eqx.Module):
 
     groups: tuple[Group, ...]
     outputs: tuple[Group, ...]
-    cells: Any  # where each entry of the Jacobian stands among the blocks of the groups, shape (rows, columns)
-    row_scale: Any  # shape (rows, 1)
-    column_scale: Any  # one for each coordinate of a body
+    cells: Int[
+        Numbers, "row column"
+    ]  # where each entry of the Jacobian stands among the blocks of the groups, shape (rows, columns)
+    row_scale: Float[Numbers, "row 1"]
+    column_scale: Float[Numbers, " coordinate"]  # one for each coordinate of a body
     body_count: int = eqx.field(static=True)
     forces: tuple[Group, ...] = ()
 
-    def residual(self, pose: Any, time: Jet) -> Jet:
+    def residual(self, pose: Pose, time: Jet) -> Float[Jet, "row batch"]:
         """Return the residuals of all constraints, shape (rows, batch), scaled."""
         if not self.groups:  # bodies that fly freely
             return Jet.constant(jnp.zeros((0, time.coefficients[0].shape[-1])), pose.order)
         parts = [group.residual(pose, time).map(_flat) for group in self.groups]
         return concatenate(parts) * self.row_scale
 
-    def jacobian(self, pose: Any, time: Jet) -> Any:
+    def jacobian(self, pose: Pose, time: Jet) -> Float[Numbers, "row column batch"]:
         """Return the scaled Jacobian at a pose of order zero, shape (rows, columns, batch)."""
         frozen = Jet.constant(time.coefficients[0], 1)
         blocks = [b for group in self.groups for b in group.derivative_blocks(pose, frozen, self.column_scale)]
         entries = jnp.concatenate([*map(_flat, blocks), jnp.zeros_like(time.coefficients[0])])
         return entries[self.cells] * self.row_scale[:, :, None]
 
-    def admissible(self, time: Jet) -> Any:
+    def admissible(self, time: Jet) -> Bool[Numbers, "driver batch"]:
         """Tell at which instants each driver has a permitted value, shape (drivers, batch)."""
         lanes = time.coefficients[0].shape[-1]
         drivers = [group for group in self.groups if group.is_driver]
@@ -184,7 +195,7 @@ class System(eqx.Module):
         """Return the jets of the motion laws, in rad, whose drivers forget whole turns."""
         return [group.element.motion(time) for group in self.groups if group.element.periodic]
 
-    def applied_forces(self, pose: Any, time: Jet) -> Jet:
+    def applied_forces(self, pose: Pose, time: Jet) -> Float[Jet, "coordinate body batch"]:
         """Return what the applied forces do to all bodies, shape (coordinates, bodies, batch), the ground first.
 
         Forces are in global axes, moments about the origin of each body and in its axes. They are conjugate to the
@@ -207,7 +218,7 @@ class System(eqx.Module):
         # the transpose of a convolution runs backwards in the orders
         return Jet(tuple(transposed([size[::-1] for size in sizes])[0][::-1]))
 
-    def finite_forces(self, pose: Any, time: Jet) -> Any:
+    def finite_forces(self, pose: Pose, time: Jet) -> Bool[Numbers, "force batch"]:
         """Tell where each applied force is a finite number, shape (forces, batch); the pose has velocities.
 
         Where the velocity is not, as for the distance of two points that meet, the force has no direction.
@@ -217,7 +228,9 @@ class System(eqx.Module):
         parts = [jnp.broadcast_to(x, (x.shape[0], lanes)) for x in moving]
         return jnp.concatenate([*parts, jnp.ones((0, lanes), bool)])
 
-    def coordinates(self, solution: Any, shifts: int) -> tuple[Any, Any]:
+    def coordinates(
+        self, solution: Float[Numbers, "column batch"], shifts: int
+    ) -> tuple[Float[Numbers, "shift body batch"], Float[Numbers, "turn body batch"]]:
         """Turn a scaled solution, shape (columns, batch), into shifts and turns of all bodies, (c, bodies, batch)."""
         count = self.column_scale.shape[0]
         parts = jnp.swapaxes(solution.reshape(self.body_count, count, -1), 0, 1)
@@ -225,16 +238,16 @@ class System(eqx.Module):
         return parts[:shifts], parts[shifts:]
 
 
-def _movable(pose: Any) -> Any:
+def _movable(pose: Pose) -> Any:
     """Return a pose without certain zeros, which may be moved in thought."""
-    pose = jax.tree.map(lambda jet: jet.dense(), pose, is_leaf=lambda x: isinstance(x, Jet))
-    if pose.turns == 3 and pose.order and pose.angular_velocity is None:
+    pose = each_jet(Jet.dense, pose)
+    if isinstance(pose, SpatialPose) and pose.order and pose.angular_velocity is None:
         rest = Jet.constant(jnp.zeros_like(pose.position.coefficients[0]), pose.order - 1).dense()
         return dataclasses.replace(pose, angular_velocity=rest)
     return pose
 
 
-def _flat(block: Any) -> Any:
+def _flat(block: Float[Numbers, "*rest batch"]) -> Float[Numbers, "entry batch"]:
     return block.reshape(-1, block.shape[-1])
 
 

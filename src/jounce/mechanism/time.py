@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float, Int
 
 from jounce.errors import MechanismError
 from jounce.mechanism.resolve import resolve
@@ -30,7 +31,7 @@ class TimeGrid:
     count: Any = None
 
 
-def time_grid(time: Any, parameters: Mapping[str, Any]) -> np.ndarray:
+def time_grid(time: Any, parameters: Mapping[str, Any]) -> Float[np.ndarray, " time"]:
     """Return the instants of a grid, shape (time,), s.
 
     Raises
@@ -58,7 +59,7 @@ def time_grid(time: Any, parameters: Mapping[str, Any]) -> np.ndarray:
     return instants
 
 
-def _spaced(grid: TimeGrid, parameters: Mapping[str, Any]) -> np.ndarray:
+def _spaced(grid: TimeGrid, parameters: Mapping[str, Any]) -> Float[np.ndarray, " time"]:
     given = {k: getattr(grid, k) for k in ("start", "stop", "step", "count") if getattr(grid, k) is not None}
     values = {k: float(resolve(v, parameters)) for k, v in given.items()}
     for name, value in values.items():
@@ -83,3 +84,12 @@ def _spaced(grid: TimeGrid, parameters: Mapping[str, Any]) -> np.ndarray:
     if "count" in values:
         return np.linspace(start, stop, int(count))
     return start + values["step"] * np.arange(int(count))
+
+
+def nearest_instants(
+    known: Float[np.ndarray, " known"], instants: Float[np.ndarray, " time"]
+) -> Int[np.ndarray, " time"]:
+    """Return, for each instant, the index of the nearest of some that increase, the earlier one of two."""
+    after = np.clip(np.searchsorted(known, instants), 1, max(len(known) - 1, 1))
+    before, after = after - 1, np.minimum(after, len(known) - 1)
+    return np.where(instants - known[before] <= known[after] - instants, before, after)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from jounce.errors import MechanismError, no_such
+from jounce.errors import MechanismError, check_name
 from jounce.io.files.writing import check_target, replacing
 from jounce.plot.labels import scale_of, symbol, unit_label
 from jounce.plot.style import COLOURS, PALE_GREY, RESOLUTION, blank_figure, shown_name, style
@@ -79,8 +79,7 @@ def draw(motion: Any, outputs: Sequence[str] | None = None) -> Any:
 def _chosen(motion: Any, outputs: Sequence[str] | None) -> list[str]:
     valid = motion.outputs
     for name in outputs or ():
-        if name not in valid:
-            raise MechanismError(no_such("output", name, valid), name="outputs", value=name)
+        check_name("output", name, valid, MechanismError, name="outputs")
     names = list(dict.fromkeys(outputs or valid))
     if not names:
         raise MechanismError("there is nothing to draw; name some outputs", name="outputs")

@@ -19,7 +19,7 @@ from jounce.dynamics.outputs import (
     JointTorqueOutput,
     is_turning,
 )
-from jounce.errors import MechanismError, no_such
+from jounce.errors import MechanismError, check_name
 from jounce.plot.figure import draw, finish, shade_unsolved
 from jounce.plot.geometry import skeleton
 from jounce.plot.labels import scale_of, unit_label
@@ -89,9 +89,7 @@ def draw_reactions(motion: Any, names: Sequence[str] | None = None) -> Any:
         raise MechanismError(message, name="order", value=motion.order)
     known = [*mechanism.joints, *mechanism.drivers, *mechanism.forces]
     for name in names or ():
-        if name not in known:
-            message = no_such("joint, driver or force", name, known)
-            raise MechanismError(message, name="output", value=name)
+        check_name("joint, driver or force", name, known, MechanismError, name="output")
     wanted = names or known
     found: dict[str, Any] = {name: JointForceOutput(name) for name in mechanism.joints if name in wanted}
     moments = {f"{name} (moment)": JointTorqueOutput(name) for name in mechanism.joints if name in wanted}

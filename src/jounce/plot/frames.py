@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from jounce.errors import MechanismError, no_such
+from jounce.errors import MechanismError, check_name
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked
 from jounce.kinematics.assembly import assemble
@@ -118,8 +118,7 @@ def placed(motion: Any, body: str, points: Any, order: int = 0) -> np.ndarray:
     [[0.0, 0.0], [0.03464, 0.02]]
     """
     names, components = (GROUND, *motion.mechanism.bodies), POSITION_COMPONENTS[motion.mechanism.space]
-    if body not in names:
-        raise MechanismError(no_such("body", body, names), name="body", value=body)
+    check_name("body", body, names, MechanismError, name="body")
     local = np.asarray(points, float)
     if local.ndim != 2 or local.shape[1] != components:
         raise MechanismError(f"must be a list of vectors of {components} numbers", name="points", value=local.tolist())

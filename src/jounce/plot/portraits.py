@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from jounce.errors import MechanismError, did_you_mean, no_such
+from jounce.errors import MechanismError, check_name, did_you_mean
 from jounce.plot.labels import scale_of, symbol, unit_label
 from jounce.plot.style import COLOURS, GREY, PALE_GREY, blank_figure, style
 from jounce.reporting.peaks import rate_name
@@ -137,9 +137,7 @@ def _set_limits(axes: Any, *shown: tuple[np.ndarray, np.ndarray, int]) -> None:
 
 def _values(motion: Any, output: str, orders: tuple[int, ...]) -> list[np.ndarray]:
     """Return derivatives of an output, or raise for a name or an order that there is not."""
-    if output not in motion.outputs:
-        message = no_such("output", output, motion.outputs)
-        raise MechanismError(message, name="output", value=output)
+    check_name("output", output, motion.outputs, MechanismError, name="output")
     values = motion.outputs[output]
     for order in orders:
         if not 0 <= order < values.shape[1]:

@@ -185,8 +185,8 @@ def _messages(motion: Any) -> list[str]:
         first, last = motion.time[run[0]], motion.time[run[-1]]
         when = f"t = {first:g} s" if len(run) == 1 else f"t = {first:g} s to {last:g} s"
         known = Status(int(status[run[0]]))
-        culprit = motion.culprits.get(int(run[0]), "")
-        lines.append(f"Not solved at {when}{f' ({culprit})' if culprit else ''}: {known.advice}.")
+        fault = motion.faults.get(int(run[0]), "")
+        lines.append(f"Not solved at {when}{f' ({fault})' if fault else ''}: {known.advice}.")
     return lines
 
 

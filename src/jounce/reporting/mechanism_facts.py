@@ -233,7 +233,7 @@ class _State:
             return model.guess, told
         told["open"] = float(np.max(np.abs(trial.gaps))) if np.isfinite(trial.gaps).all() else None
         try:
-            check_assembled(model, trial, self.instant, TOLERANCE)
+            check_assembled(model, trial, self.instant)
         except JounceError as error:
             return None, told | {"status": "open", "message": error.message}
         return trial.coordinates, told

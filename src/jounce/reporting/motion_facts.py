@@ -31,7 +31,7 @@ class Failure(TypedDict):
     index: int
     time: float
     status: str
-    culprit: str | None
+    fault: str | None
 
 
 class MotionFacts(TypedDict):
@@ -105,7 +105,7 @@ def motion_facts(motion: Motion) -> dict[str, Any]:
         "order": motion.order,
         "time": span | {"count": len(times), "solved": len(times) - len(failed)},
         "failures": [
-            {"index": k, "time": times[k], "status": Status(motion.status[k]).name, "culprit": motion.culprits.get(k)}
+            {"index": k, "time": times[k], "status": Status(motion.status[k]).name, "fault": motion.faults.get(k)}
             for k in failed.tolist()
         ],
         "equations_of_joints": len(rows) - drives,

@@ -120,7 +120,7 @@ def _motion(motion: Any) -> list[str]:
     lines = _title(facts["title"] or "Motion", line)
     if facts["failures"]:
         first = facts["failures"][0]
-        place = f" ({first['culprit']})" if first["culprit"] else ""
+        place = f" ({first['fault']})" if first["fault"] else ""
         word = first["status"].lower().replace("_", " ")
         told = _text(f"t = {first['time']:g} s: {word}{place}")
         lines.append(f'<p class="bad">{told}</p>')

@@ -1,15 +1,16 @@
 """Angular velocity of any order from samples of the attitude: a spline of unit quaternions, evaluated on jets."""
 
-from typing import Any
-
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
+from numpy.typing import ArrayLike
 
 from jounce.errors import JounceError, TrajectoryError
 from jounce.jet import Jet, cross, dot, sqrt, stack, transpose
 from jounce.rigid.euler_parameters import from_rotation_matrices
 from jounce.rigid.orientation import angular_velocity, check_rotation
 from jounce.rigid.rotations import is_traced, rotation_matrix
+from jounce.shapes import Numbers, Real
 
 HIGHEST_DEGREE = 11
 UNIT = 1e-6  # how far the length of a sampled quaternion may be from one: printed digits, single precision
@@ -42,6 +43,8 @@ class AttitudeSamples:
     Examples
     --------
     >>> import numpy as np
+    from jaxtyping import Float
+    from numpy.typing import ArrayLike
     >>> import jounce as jn
     >>> t = np.linspace(0.0, 1.0, 41)
     >>> angles = np.stack([0.5 * t**2, 0 * t, 0 * t], axis=1)
@@ -51,7 +54,7 @@ class AttitudeSamples:
     [0.5, 1.0, 0.0]
     """
 
-    def __init__(self, times: Any, quaternions: Any, degree: int = 5):
+    def __init__(self, times: ArrayLike, quaternions: ArrayLike, degree: int = 5):
         times, quaternions = np.asarray(times, float), np.asarray(quaternions, float)
         _check_times(times, quaternions, "quaternions", (4,), degree)
         length = np.linalg.norm(quaternions, axis=1)
@@ -74,7 +77,7 @@ class AttitudeSamples:
         self._coefficients = np.stack([pieces.c[::-1, inside] for pieces in each], axis=1)
 
     @classmethod
-    def from_rotation_matrices(cls, times: Any, matrices: Any, degree: int = 5) -> "AttitudeSamples":
+    def from_rotation_matrices(cls, times: ArrayLike, matrices: ArrayLike, degree: int = 5) -> "AttitudeSamples":
         """Build the interpolation from rotation matrices from the body to the global frame, (samples, 3, 3).
 
         Raises
@@ -91,7 +94,9 @@ class AttitudeSamples:
         return cls(times, from_rotation_matrices(matrices), degree)
 
     @classmethod
-    def from_euler_angles(cls, times: Any, angles: Any, sequence: str, degree: int = 5) -> "AttitudeSamples":
+    def from_euler_angles(
+        cls, times: ArrayLike, angles: ArrayLike, sequence: str, degree: int = 5
+    ) -> "AttitudeSamples":
         """Build the interpolation from Euler angles, (samples, 3) in rad, of one of `SEQUENCES`.
 
         Raises
@@ -107,7 +112,7 @@ class AttitudeSamples:
             times, from_rotation_matrices(np.moveaxis(np.asarray(rotation_matrix(sequence, angles.T)), -1, 0)), degree
         )
 
-    def quaternion(self, time: Jet) -> Jet:
+    def quaternion(self, time: Float[Jet, "*batch"]) -> Float[Jet, "4 *batch"]:
         """Return the unit quaternion (e0, e1, e2, e3) at the instants of a time jet.
 
         Parameters
@@ -142,7 +147,7 @@ class AttitudeSamples:
             value = value * local + c
         return value / sqrt(dot(value, value))
 
-    def attitude(self, time: Jet) -> Jet:
+    def attitude(self, time: Float[Jet, "*batch"]) -> Float[Jet, "3 3 *batch"]:
         """Return the rotation matrix at the instants of a time jet.
 
         Parameters
@@ -164,12 +169,12 @@ class AttitudeSamples:
         scalar, vector = quaternion[0], quaternion[1:]
         batch = (1,) * (len(quaternion.shape) - 1)
 
-        def turned(axis: Any) -> Jet:
+        def turned(axis: Numbers) -> Jet:
             return 2.0 * cross(vector, cross(vector, axis) + scalar * axis) + axis
 
         return transpose(stack([turned(jnp.reshape(axis, (3, *batch))) for axis in jnp.eye(3)]))
 
-    def angular_velocity(self, time: Jet, frame: str = "global") -> Jet:
+    def angular_velocity(self, time: Float[Jet, "*batch"], frame: str = "global") -> Float[Jet, "3 *batch"]:
         """Return the angular velocity and its derivatives at the instants of a time jet.
 
         Parameters
@@ -192,7 +197,7 @@ class AttitudeSamples:
         """
         return angular_velocity(self.attitude(time), frame)
 
-    def _check_range(self, instants: Any) -> None:
+    def _check_range(self, instants: Real) -> None:
         if is_traced(instants):
             return
         outside = ~((np.asarray(instants) >= self.start) & (np.asarray(instants) <= self.stop))
@@ -225,7 +230,9 @@ def _check_times(times: np.ndarray, samples: np.ndarray, name: str, shape: tuple
         )
 
 
-def _continuous(times: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
+def _continuous(
+    times: Float[np.ndarray, " sample"], quaternions: Float[np.ndarray, "sample 4"]
+) -> Float[np.ndarray, "sample 4"]:
     """Choose the sign of each quaternion so that it is the nearer one to its neighbour: both are the same rotation."""
     along = np.sum(quaternions[1:] * quaternions[:-1], axis=1)
     unknown = np.abs(along) < UNIT

@@ -1,12 +1,21 @@
 """Shapes: bodies selected from arrays whose last two axes are bodies and batch; constants set before batch axes."""
 
+from collections.abc import Callable
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from jounce.jet import Jet
+from jounce.jet.algebra import JetLike
+from jounce.shapes import Numbers
+
+
+def each_jet(function: Callable[[Jet], Any], tree: Any) -> Any:
+    """Apply a function to the jets of a pose, or of another tree of them."""
+    return jax.tree.map(function, tree, is_leaf=lambda x: isinstance(x, Jet))
 
 
 def take_bodies(jet: Jet, bodies: tuple[int, ...]) -> Jet:
@@ -19,7 +28,7 @@ def take_bodies(jet: Jet, bodies: tuple[int, ...]) -> Jet:
     return Jet.constant(_taken(jet.coefficients[0], bodies), jet.order)
 
 
-def _taken(array: Any, bodies: tuple[int, ...]) -> Any:
+def _taken(array: Float[Numbers, "*components bodies batch"], bodies: tuple[int, ...]) -> Any:
     """Select by slices where indices are equal or evenly spaced: XLA merges them into what follows, not a gather."""
     first, *others = bodies
     stride = others[0] - first if others else 1
@@ -31,7 +40,7 @@ def _taken(array: Any, bodies: tuple[int, ...]) -> Any:
     return jnp.asarray(array).at[..., np.array(bodies), :].get(mode="promise_in_bounds")
 
 
-def body_vector(local: Any, batch_axes: int) -> Any:
+def body_vector(local: JetLike, batch_axes: int) -> Any:
     """Return a vector given in a body frame with the batch axes of a pose behind its components; a jet as it is."""
     if isinstance(local, Jet):
         return local

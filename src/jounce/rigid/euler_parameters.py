@@ -7,8 +7,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from jounce.errors import MechanismError, did_you_mean, show_value
+from jounce.rigid.rotations import check_sequence
 
 __all__ = [
     "FORMS",
@@ -131,11 +133,6 @@ def from_quaternion(quaternion: Sequence[float]) -> Quaternion:
     return (e0, e1, e2, e3)
 
 
-def _scalar_first(rotation: Any) -> Quaternion:
-    x, y, z, scalar = rotation.as_quat().tolist()
-    return (scalar, x, y, z)
-
-
 def from_axis_angle(axis: Sequence[float], angle: float) -> Quaternion:
     """Return the Euler parameters of a turn by ``angle`` (rad) about an axis in the global frame.
 
@@ -152,15 +149,17 @@ def from_axis_angle(axis: Sequence[float], angle: float) -> Quaternion:
     """
     from scipy.spatial.transform import Rotation
 
-    return _scalar_first(Rotation.from_rotvec(angle * np.array(_unit(axis, "the axis"))))
+    turn = Rotation.from_rotvec(angle * np.array(_unit(axis, "the axis")))
+    e0, e1, e2, e3 = turn.as_quat(scalar_first=True).tolist()
+    return (e0, e1, e2, e3)
 
 
-def from_rotation_matrices(matrices: Any) -> Any:
+def from_rotation_matrices(matrices: Float[np.ndarray, "*batch 3 3"]) -> Float[np.ndarray, "*batch 4"]:
     """Return the Euler parameters of rotation matrices (..., 3, 3), as (..., 4); the largest one is positive."""
     from scipy.spatial.transform import Rotation
 
-    flat = Rotation.from_matrix(np.reshape(np.asarray(matrices, float), (-1, 3, 3))).as_quat()
-    return np.roll(flat, 1, axis=-1).reshape(*np.shape(matrices)[:-2], 4)
+    flat = Rotation.from_matrix(matrices.reshape(-1, 3, 3)).as_quat(scalar_first=True)
+    return flat.reshape(*matrices.shape[:-2], 4)
 
 
 def from_euler(sequence: str, angles: Sequence[float]) -> Quaternion:
@@ -186,13 +185,8 @@ def from_euler(sequence: str, angles: Sequence[float]) -> Quaternion:
     >>> [round(e, 3) for e in from_euler("ZXZ", [pi / 2, pi / 2, 0.0])]
     [0.5, 0.5, 0.5, 0.5]
     """
-    letters = sequence.lower() if isinstance(sequence, str) else ""
-    same_case = sequence in (letters, letters.upper())
-    if len(letters) != 3 or not same_case or set(letters) - set("xyz"):
-        message = "a sequence of Euler angles has three letters, such as zxz (fixed axes) or ZXZ (moving axes)"
-        raise MechanismError(message, value=sequence)
-    if letters[0] == letters[1] or letters[1] == letters[2]:
-        raise MechanismError("neighbouring axes of a sequence of Euler angles must differ", value=sequence)
+    check_sequence(sequence, MechanismError, name=None)
     from scipy.spatial.transform import Rotation
 
-    return _scalar_first(Rotation.from_euler(sequence, list(angles)))
+    e0, e1, e2, e3 = Rotation.from_euler(sequence, list(angles)).as_quat(scalar_first=True).tolist()
+    return (e0, e1, e2, e3)

@@ -4,15 +4,42 @@ import dataclasses
 from typing import Any
 
 import jax
+from jaxtyping import Float, Int
 
 from jounce.jet import Jet, components, dot, stack, transpose
-from jounce.jet.algebra import total
+from jounce.jet.algebra import JetLike, total
 from jounce.rigid.body_arrays import body_vector
+from jounce.shapes import Numbers
+
+
+class AbstractFrame:
+    """A moving frame: an origin and three axes, in the frame of the base; all batch axes trail."""
+
+    position: Jet  # (3, ...), m
+    axes: tuple[Jet, ...]  # three of shape (3, ...)
+
+    def point(self, local: JetLike) -> Float[Jet, "3 *batch"]:
+        """Return a point of the moving frame, shape (3, ...), m: Sommer 2024, 59-66; Negrean 2025, 23."""
+        return self.position + self.direction(local)
+
+    def direction(self, local: JetLike) -> Float[Jet, "3 *batch"]:
+        """Return a vector of the moving frame in components of the base: Sommer 2024, equations 71-72."""
+        parts = components(body_vector(local, len(self.position.shape) - 1))
+        return total(axis * part for axis, part in zip(self.axes, parts, strict=True))
+
+    def to_body(self, vector: Jet | Numbers) -> Float[Jet, "3 *batch"]:
+        """Return the components, in the moving frame, of a vector given in the frame of the base."""
+        return stack([dot(axis, vector) for axis in self.axes])
+
+    @property
+    def attitude(self) -> Float[Jet, "3 3 *batch"]:
+        """Rotation matrix from the moving frame to the base, shape (3, 3, ...)."""
+        return transpose(stack(self.axes))
 
 
 @jax.tree_util.register_dataclass
 @dataclasses.dataclass(frozen=True)
-class Frames:
+class Frames(AbstractFrame):
     """One or many moving frames; all batch axes trail.
 
     Parameters
@@ -29,25 +56,7 @@ class Frames:
     axes: tuple[Jet, ...]
     angular_velocity: Jet | None
 
-    def point(self, local: Any) -> Jet:
-        """Return a point given in the moving frame, shape (3, ...), m: Negrean 2025, equation 23."""
-        return self.position + self.direction(local)
-
-    def direction(self, local: Any) -> Jet:
-        """Return a vector given in the moving frame, in components of the base."""
-        local = body_vector(local, len(self.position.shape) - 1)
-        return total(axis * part for axis, part in zip(self.axes, components(local), strict=True))
-
-    def to_body(self, vector: Any) -> Jet:
-        """Return the components, in the moving frame, of a vector given in the frame of the base."""
-        return stack([dot(axis, vector) for axis in self.axes])
-
-    @property
-    def attitude(self) -> Jet:
-        """Rotation matrix from the moving frame to the base, shape (3, 3, ...)."""
-        return transpose(stack(self.axes))
-
-    def take(self, index: Any) -> "Frames":
+    def take(self, index: Int[Numbers, ""] | int) -> "Frames":
         """Return one of several frames, by its index along the axis after the components."""
 
         def taken(coefficient: Any) -> Any:

@@ -5,8 +5,9 @@ from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
+from jaxtyping import Float
 
-from jounce.errors import RobotError, did_you_mean
+from jounce.errors import RobotError, check_choice, did_you_mean
 from jounce.rigid.solids import SOLIDS, pseudo_parts, solid_moments
 
 ROUNDING = 1e-5  # of the largest principal moment: what files with six digits may miss a possible tensor by
@@ -88,8 +89,7 @@ class Inertia:
     @property
     def about_origin(self) -> np.ndarray:
         """Inertia tensor about the origin of the frame of the body, (3, 3), kg m^2."""
-        c = self.center_of_mass
-        return self.tensor + self.mass * (c @ c * np.eye(3) - np.outer(c, c))
+        return self.tensor + _of_point(self.mass, self.center_of_mass)
 
     @property
     def second_moments(self) -> np.ndarray:
@@ -211,11 +211,13 @@ class Inertia:
             raise RobotError("the sum of inertias needs at least one", name="parts", value=parts)
         mass = sum(part.mass for part in parts)
         center = sum(part.mass * part.center_of_mass for part in parts) / (mass or 1.0)
-        tensor = np.zeros((3, 3))
-        for part in parts:
-            d = part.center_of_mass - center
-            tensor += part.tensor + part.mass * (d @ d * np.eye(3) - np.outer(d, d))
+        tensor = sum(part.tensor + _of_point(part.mass, part.center_of_mass - center) for part in parts)
         return cls(mass, center, tensor, strict=False)
+
+
+def _of_point(mass: float, place: Float[np.ndarray, " 3"]) -> Float[np.ndarray, "3 3"]:
+    """Return the inertia tensor of a mass at a place: what Steiner's theorem adds."""
+    return mass * (place @ place * np.eye(3) - np.outer(place, place))
 
 
 def check_solid(kind: str, axis: str, given: dict[str, Any]) -> str:
@@ -226,8 +228,7 @@ def check_solid(kind: str, axis: str, given: dict[str, Any]) -> str:
     RobotError
         What does not fit.
     """
-    if kind not in SOLIDS:
-        raise RobotError(f"unknown solid; {did_you_mean(kind, SOLIDS)}", name="solid", value=kind)
+    check_choice("solid", kind, SOLIDS, RobotError)
     solid = SOLIDS[kind]
     valid = (*solid.sizes, "mass", "density")
     for name in given:

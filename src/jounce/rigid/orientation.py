@@ -4,10 +4,11 @@ from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
-from jounce.errors import JounceError, SingularityError, did_you_mean
+from jounce.errors import JounceError, SingularityError, check_choice
 from jounce.jet import Jet, atan2, cos, cross, dot, matvec, sin, sqrt, stack, transpose
-from jounce.jet.algebra import total
+from jounce.jet.algebra import JetLike, total
 from jounce.rigid.body_arrays import body_vector
 from jounce.rigid.rotations import (
     AXES,
@@ -18,6 +19,7 @@ from jounce.rigid.rotations import (
     simple_rotations,
     uniform,
 )
+from jounce.shapes import Numbers
 
 FRAMES = ("global", "body")
 
@@ -28,7 +30,7 @@ ORTHONORMAL = 1e-6
 """Largest entry of ``R^T R - I`` that a rotation matrix may have, to forgive single precision and printed digits."""
 
 
-def transfer_matrix(sequence: str, angles: Any, frame: str = "global") -> Any:
+def transfer_matrix(sequence: str, angles: JetLike, frame: str = "global") -> Any:
     """Return the angular transfer matrix, which takes rates of Euler angles to the angular velocity.
 
     ``J_psi = [u, R(u; a) v, R(u; a) R(v; b) w]`` for moving axes u, v, w. Negrean 2025, equation 30.
@@ -58,7 +60,7 @@ def transfer_matrix(sequence: str, angles: Any, frame: str = "global") -> Any:
     >>> jn.rigid.transfer_matrix("ZYX", [0.0, 0.0, 0.5]).tolist()
     [[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]
     """
-    _check_frame(frame)
+    check_choice("frame", frame, FRAMES, JounceError)
     turns, finish = simple_rotations(sequence, angles)
     axes = [Jet.constant(_basis(letter, turns[0]), turns[0].order) for letter in sequence]
     # seen from the global frame an axis is moved by the turns before it about moving axes, after it about fixed ones;
@@ -74,7 +76,7 @@ def transfer_matrix(sequence: str, angles: Any, frame: str = "global") -> Any:
     return finish(transpose(stack(columns)))
 
 
-def angular_velocity_from_angles(sequence: str, angles: Any, frame: str = "global") -> Jet:
+def angular_velocity_from_angles(sequence: str, angles: JetLike, frame: str = "global") -> Jet:
     """Return the angular velocity of Euler angles that move, with its derivatives. Negrean 2025, equations 41-42.
 
     Parameters
@@ -107,7 +109,7 @@ def angular_velocity_from_angles(sequence: str, angles: Any, frame: str = "globa
     return matvec(transfer_matrix(sequence, angles.truncate(angles.order - 1), frame), angles.differentiate())
 
 
-def angular_velocity(attitude: Any, frame: str = "global") -> Jet:
+def angular_velocity(attitude: Float[Jet | Numbers, "3 3 *batch"], frame: str = "global") -> Float[Jet, "3 *batch"]:
     """Return the angular velocity of a rotation matrix that moves, ``[w]x = R' R^T``. Negrean 2025, equation 36.
 
     Parameters
@@ -134,7 +136,7 @@ def angular_velocity(attitude: Any, frame: str = "global") -> Jet:
     >>> jn.rigid.angular_velocity(jn.rigid.simple_rotation("y", angle)).derivatives().round(12).tolist()
     [[0.0, 2.0, 0.0], [0.0, 0.0, 0.0]]
     """
-    _check_frame(frame)
+    check_choice("frame", frame, FRAMES, JounceError)
     attitude = _moving_jet(attitude, "attitude")
     # every axis of a triad moves as a' = w x a, and the sum of a x (w x a) over the three of them is 2 w
     triad = transpose(attitude) if frame == "global" else attitude
@@ -143,7 +145,7 @@ def angular_velocity(attitude: Any, frame: str = "global") -> Jet:
     return half * total(cross(triad[k], rates[k]) for k in range(3))
 
 
-def angle_rates(sequence: str, angles: Any, angular_velocity: Any, frame: str = "global") -> Any:
+def angle_rates(sequence: str, angles: JetLike, angular_velocity: JetLike, frame: str = "global") -> Any:
     """Return the rates of Euler angles from the angular velocity: the inverse of the transfer matrix.
 
     Parameters
@@ -181,7 +183,7 @@ def angle_rates(sequence: str, angles: Any, angular_velocity: Any, frame: str = 
     ...
     jounce.errors.SingularityError: ZYX: its first and last axes are parallel where the second angle is ...
     """
-    _check_frame(frame)
+    check_choice("frame", frame, FRAMES, JounceError)
     angles = checked_angles(angles)
     value = angles.coefficients[0] if isinstance(angles, Jet) else jnp.asarray(angles, float)
     regular = _regular(sequence, value, singularity_distance(sequence, value))
@@ -201,7 +203,7 @@ def angle_rates(sequence: str, angles: Any, angular_velocity: Any, frame: str = 
         known = rates.integrate(value)
 
 
-def singularity_distance(sequence: str, angles: Any) -> Any:
+def singularity_distance(sequence: str, angles: JetLike) -> Any:
     """Return how far an orientation is from a singular one: the volume that the three axes of rotation span.
 
     Parameters
@@ -234,7 +236,7 @@ def singularity_distance(sequence: str, angles: Any) -> Any:
     return jnp.abs((sin if sequence[0] == sequence[2] else cos)(second))
 
 
-def is_singular_orientation(sequence: str, angles: Any, tolerance: float = SINGULAR) -> Any:
+def is_singular_orientation(sequence: str, angles: JetLike, tolerance: float = SINGULAR) -> Any:
     """Tell where Euler angles are at a singular orientation (gimbal lock).
 
     Parameters
@@ -265,7 +267,7 @@ def is_singular_orientation(sequence: str, angles: Any, tolerance: float = SINGU
     return singularity_distance(sequence, angles) <= tolerance
 
 
-def euler_angles(sequence: str, attitude: Any) -> Any:
+def euler_angles(sequence: str, attitude: JetLike) -> Any:
     """Return the Euler angles of a rotation matrix, with their derivatives where it is a jet.
 
     Parameters
@@ -317,7 +319,7 @@ def euler_angles(sequence: str, attitude: Any) -> Any:
     return finish(_marked(angles, regular))
 
 
-def check_rotation(matrix: Any, name: str = "attitude", tolerance: float = ORTHONORMAL) -> None:
+def check_rotation(matrix: Numbers, name: str = "attitude", tolerance: float = ORTHONORMAL) -> None:
     """Raise a JounceError unless matrices of shape (3, 3, ...) are rotations; those that JAX traces are not seen."""
     if tuple(np.shape(matrix)[:2]) != (3, 3):
         message = "a rotation matrix needs 3 rows and 3 columns on the first axes; batch axes come last"
@@ -340,7 +342,7 @@ def check_rotation(matrix: Any, name: str = "attitude", tolerance: float = ORTHO
         raise JounceError(f"the matrix{which} {what}", name=name, value=found[first].tolist())
 
 
-def _regular(sequence: str, angles: Any, distance: Any) -> Any:
+def _regular(sequence: str, angles: Numbers | None, distance: Numbers) -> Any:
     """Return the mask of regular orientations; a single one that is singular raises."""
     regular = distance > SINGULAR
     if np.ndim(distance) == 0 and not is_traced(regular) and not bool(regular) and not bool(jnp.isnan(distance)):
@@ -356,7 +358,7 @@ def _regular(sequence: str, angles: Any, distance: Any) -> Any:
     return regular
 
 
-def _marked(vector: Jet, regular: Any) -> Jet:
+def _marked(vector: Float[Jet, "3 *batch"], regular: Numbers) -> Float[Jet, "3 *batch"]:
     """Return a vector with NaN at every order where the orientation is singular."""
     if not is_traced(regular) and bool(jnp.all(regular)):
         return vector
@@ -364,7 +366,7 @@ def _marked(vector: Jet, regular: Any) -> Jet:
     return vector.dense().map(lambda c: jnp.where(mask, c, jnp.nan))
 
 
-def _solved(matrix: Jet, vector: Jet) -> Jet:
+def _solved(matrix: Float[Jet, "3 3 *#batch"], vector: Float[Jet, "3 *#batch"]) -> Float[Jet, "3 *#batch"]:
     """Return ``matrix^-1 vector`` by Cramer's rule: three columns, whose determinant is the singularity distance."""
     a, b, c = transpose(matrix)
     normals = cross(b, c), cross(c, a), cross(a, b)
@@ -372,18 +374,13 @@ def _solved(matrix: Jet, vector: Jet) -> Jet:
     return stack([dot(normal, vector) / volume for normal in normals])
 
 
-def _basis(letter: str, turn: Jet) -> Any:
+def _basis(letter: str, turn: Float[Jet, "3 3 *batch"]) -> Float[Numbers, "3 *batch"]:
     """Return a coordinate axis with the batch axes of a turn."""
     one = jnp.ones_like(turn.coefficients[0][0, 0])
     return jnp.stack([one if u == letter.lower() else 0 * one for u in AXES])
 
 
-def _check_frame(frame: str) -> None:
-    if frame not in FRAMES:
-        raise JounceError(f"no such frame; {did_you_mean(frame, FRAMES)}", name="frame", value=frame)
-
-
-def _moving_jet(value: Any, name: str) -> Jet:
+def _moving_jet(value: JetLike, name: str) -> Jet:
     if not isinstance(value, Jet) or value.order == 0:
         message = "carries no derivative, so there is no angular velocity; give a Jet of order 1 or more"
         raise JounceError(message, name=name)

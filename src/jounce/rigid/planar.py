@@ -5,12 +5,15 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+from jaxtyping import Float
 
 from jounce.jet import Jet, next_sine_cosine, sine_cosine
-from jounce.rigid.body_arrays import body_vector, take_bodies
+from jounce.jet.algebra import JetLike
+from jounce.rigid.body_arrays import body_vector, each_jet, take_bodies
+from jounce.shapes import Numbers, Real
 
 
-def perpendicular(vector: Any) -> Any:
+def perpendicular(vector: Jet | Numbers) -> Any:
     """Turn a plane vector by +90 degrees: the matrix R of Sommer 2024, equation 9."""
     return jnp.stack([-vector[1], vector[0]]) if not isinstance(vector, Jet) else vector.map(perpendicular)
 
@@ -48,54 +51,55 @@ class PlanarPose:
         """Highest time derivative that the pose carries."""
         return self.position.order
 
-    def point(self, local: Any) -> Jet:
+    def point(self, local: JetLike) -> Float[Jet, "2 *batch"]:
         """Return the global position of a point of the body frame, shape (2, ...): Sommer 2024, equations 10-14."""
         return self.position + self.direction(local)
 
-    def direction(self, local: Any) -> Jet:
+    def direction(self, local: JetLike) -> Float[Jet, "2 *batch"]:
         """Return the global components of a vector given in the body frame: Sommer 2024, equations 19-20."""
-        local = body_vector(local, len(self.angle.shape))
-        return self.cosine * local + self.sine * perpendicular(local)
+        vector = body_vector(local, len(self.angle.shape))
+        return self.cosine * vector + self.sine * perpendicular(vector)
 
-    def to_body(self, vector: Jet) -> Jet:
+    def to_body(self, vector: Float[Jet, "2 *batch"]) -> Float[Jet, "2 *batch"]:
         """Return the body components, shape (2, ...), of a vector given in the global frame."""
         return self.cosine * vector - self.sine * perpendicular(vector)
 
     def take(self, bodies: tuple[int, ...]) -> "PlanarPose":
         """Return the poses of the given bodies, by index; body 0 is the ground, which never moves."""
-        return jax.tree.map(lambda jet: take_bodies(jet, bodies), self, is_leaf=lambda x: isinstance(x, Jet))
+        return each_jet(lambda jet: take_bodies(jet, bodies), self)
 
-    def displaced(self, shift: Any, turn: Any) -> "PlanarPose":
+    def displaced(self, shift: Float[Numbers, "2 *batch"], turn: Float[Numbers, "1 *batch"]) -> "PlanarPose":
         """Return the pose of order zero moved by a shift, (2, ...) in m, and a turn, (1, ...) in rad."""
         position, angle = self.position.coefficients[0] + shift, self.angle.coefficients[0] + turn[0]
         return PlanarPose.from_jets(Jet([position]), Jet([angle]))
 
-    def extended(self, shift: Any, turn: Any) -> "PlanarPose":
+    def extended(
+        self, shift: Float[Numbers, "2 *batch"] | None, turn: Float[Numbers, "1 *batch"] | None
+    ) -> "PlanarPose":
         """Return the pose one order higher, with new Taylor coefficients r[k], (2, ...), and phi[k], (1, ...).
 
         What is None is zero.
         """
         angle = self.angle.append(None if turn is None else turn[0])
-        sine, cosine = next_sine_cosine(list(self.sine.coefficients), list(self.cosine.coefficients), angle)
+        sine, cosine = next_sine_cosine(self.sine.coefficients, self.cosine.coefficients, angle)
         return PlanarPose(self.position.append(shift), angle, self.sine.append(sine), self.cosine.append(cosine))
 
-    def varied(self, shift: Jet, turn: Jet) -> "PlanarPose":
+    def varied(self, shift: Float[Jet, "2 *batch"], turn: Float[Jet, "1 *batch"]) -> "PlanarPose":
         """Return how the jets change, to first order, as bodies shift, (2, ...) in m, and turn, (1, ...) in rad."""
         turn = turn[0]
         return PlanarPose(shift, turn, self.cosine * turn, -(self.sine * turn))
 
     def truncate(self, order: int) -> "PlanarPose":
         """Return the pose cut to at most `order`."""
-        jets = (self.position, self.angle, self.sine, self.cosine)
-        return PlanarPose(*(jet.truncate(order) for jet in jets))
+        return each_jet(lambda jet: jet.truncate(order), self)
 
     @classmethod
-    def predicted_from(cls, coordinates: dict[str, Jet], step: Any) -> "PlanarPose":
+    def predicted_from(cls, coordinates: dict[str, Jet], step: Real) -> "PlanarPose":
         """Return the pose of order zero that the Taylor series of coordinates give a time `step` away, in s."""
         position, angle = (coordinates[name].evaluate(step) for name in cls.predictor)
         return cls.from_jets(Jet([position]), Jet([angle]))
 
-    def separation(self, other: "PlanarPose") -> tuple[Any, Any]:
+    def separation(self, other: "PlanarPose") -> tuple[Float[Numbers, "2 *batch"], Float[Numbers, "1 *batch"]]:
         """Return the vectors of displacement, (2, ...) in m, and of rotation, (1, ...) in rad, from another pose."""
         turn = self.angle.coefficients[0] - other.angle.coefficients[0]
         return self.position.coefficients[0] - other.position.coefficients[0], turn[None]

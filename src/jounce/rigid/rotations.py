@@ -8,9 +8,9 @@ import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
 
-from jounce.errors import JounceError, did_you_mean
+from jounce.errors import JounceError, check_choice
 from jounce.jet import Jet, components, cos, matmul, sin, sqrt, stack
-from jounce.jet.algebra import total
+from jounce.jet.algebra import JetLike, total
 
 AXES = "xyz"
 
@@ -24,7 +24,7 @@ SEQUENCES = MOVING_SEQUENCES + FIXED_SEQUENCES
 """All Euler sequences: upper-case letters for moving axes, lower-case for fixed ones, as SciPy writes them."""
 
 
-def simple_rotation(axis: str, angle: Any) -> Any:
+def simple_rotation(axis: str, angle: JetLike) -> Any:
     """Return the matrix of a rotation about a coordinate axis. Negrean 2025, equations 11-18.
 
     One formula serves the three axes: a diagonal of cosines, and the skew-symmetric matrix of a vector of sines, in
@@ -58,8 +58,7 @@ def simple_rotation(axis: str, angle: Any) -> Any:
     [0.0, 1.0]
     """
     letter = str(axis).lower()
-    if letter not in tuple(AXES):
-        raise JounceError(f"no such coordinate axis; {did_you_mean(axis, AXES)}", name="axis", value=axis)
+    check_choice("axis", letter, tuple(AXES), JounceError)
     (turn,), finish = uniform(angle)
     delta = [int(letter == u) for u in AXES]  # Delta_u of equation 14; Delta_vw of equation 13 is 1 - Delta_u
     one = Jet.constant(jnp.ones_like(turn.coefficients[0]), turn.order)
@@ -70,7 +69,7 @@ def simple_rotation(axis: str, angle: Any) -> Any:
     return finish(_rows([[c[0], -s[2], s[1]], [s[2], c[1], -s[0]], [-s[1], s[0], c[2]]]))
 
 
-def rotation_about(axis: Any, angle: Any) -> Any:
+def rotation_about(axis: JetLike, angle: JetLike) -> Any:
     """Return the matrix of a rotation about any axis: the exponential of its skew-symmetric matrix times the angle.
 
     ``R = chi chi^T (1 - cos) + I cos + [chi]x sin`` with the unit vector chi of the axis. Negrean 2025, equations
@@ -115,7 +114,7 @@ def rotation_about(axis: Any, angle: Any) -> Any:
     )
 
 
-def rotation_matrix(sequence: str, angles: Any) -> Any:
+def rotation_matrix(sequence: str, angles: JetLike) -> Any:
     """Return the rotation matrix of Euler angles, a product of three exponentials. Negrean 2025, equations 20-22.
 
     Parameters
@@ -151,7 +150,7 @@ def rotation_matrix(sequence: str, angles: Any) -> Any:
     return finish(reduce(matmul, turns if is_moving(sequence) else turns[::-1]))
 
 
-def simple_rotations(sequence: str, angles: Any) -> tuple[list[Jet], Any]:
+def simple_rotations(sequence: str, angles: JetLike) -> tuple[list[Jet], Any]:
     """Return the three turns of a sequence as jets, in the order of its letters, and what `uniform` returns."""
     check_sequence(sequence)
     (angles,), finish = uniform(checked_angles(angles))
@@ -163,20 +162,26 @@ def is_moving(sequence: str) -> bool:
     return sequence.isupper()
 
 
-def check_sequence(sequence: str) -> None:
-    """Raise a JounceError unless the sequence is one of the 24."""
+def check_sequence(sequence: str, error: type[JounceError] = JounceError, name: str | None = "sequence") -> None:
+    """Raise an error unless the sequence is one of the 24."""
     if sequence not in SEQUENCES:
         message = (
             "not an Euler sequence; write three letters with neighbours different, such as ZXZ (moving axes) or zxz "
             "(fixed axes)"
         )
-        raise JounceError(message, name="sequence", value=sequence)
+        raise error(message, name=name, value=sequence)
 
 
-def checked_angles(angles: Any) -> Any:
+def stacked_if_jets(values: JetLike) -> Any:
+    """Return a sequence with jets in it as one jet, what else there is as it is."""
+    if isinstance(values, Sequence) and any(isinstance(value, Jet) for value in values):
+        return stack([value if isinstance(value, Jet) else jnp.asarray(value, float) for value in values])
+    return values
+
+
+def checked_angles(angles: JetLike) -> Any:
     """Return three angles as one jet or array of shape (3, ...)."""
-    if isinstance(angles, Sequence) and any(isinstance(angle, Jet) for angle in angles):
-        angles = stack([angle if isinstance(angle, Jet) else jnp.asarray(angle, float) for angle in angles])
+    angles = stacked_if_jets(angles)
     shape = angles.shape if isinstance(angles, Jet) else np.shape(angles)
     if shape[:1] != (3,):
         message = "needs three angles along the first axis; batch axes come last"
@@ -184,7 +189,7 @@ def checked_angles(angles: Any) -> Any:
     return angles
 
 
-def checked_direction(axis: Any, name: str = "axis") -> Any:
+def checked_direction(axis: JetLike, name: str = "axis") -> Any:
     """Return the direction of an axis, after a check of its size and, where it is known, of its length."""
     shape = axis.shape if isinstance(axis, Jet) else np.shape(axis)
     if shape[:1] != (3,):
@@ -211,7 +216,7 @@ def unit(vector: Jet) -> list[Jet]:
     return [part / length for part in parts]
 
 
-def uniform(*arguments: Any) -> tuple[list[Jet], Any]:
+def uniform(*arguments: JetLike) -> tuple[list[Jet], Any]:
     """Return arguments as jets of one order, and the function that turns the result into what the caller expects.
 
     Where no argument is a jet, the result is the array of its values. Batch axes of all arguments must agree, or be
@@ -220,14 +225,10 @@ def uniform(*arguments: Any) -> tuple[list[Jet], Any]:
     orders = [argument.order for argument in arguments if isinstance(argument, Jet)]
     order = min(orders, default=0)
     jets = [
-        argument.truncate(order) if isinstance(argument, Jet) else Jet.constant(_real(argument), order)
+        argument.truncate(order) if isinstance(argument, Jet) else Jet.constant(jnp.asarray(argument, float), order)
         for argument in arguments
     ]
     return jets, (lambda jet: jet) if orders else (lambda jet: jet.coefficients[0])
-
-
-def _real(value: Any) -> Any:
-    return jnp.asarray(value, float)
 
 
 def _rows(rows: list[list[Jet]]) -> Jet:

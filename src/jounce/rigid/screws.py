@@ -7,10 +7,13 @@ from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
+from numpy.typing import ArrayLike
 
-from jounce.errors import JounceError, did_you_mean
+from jounce.errors import JounceError, check_choice
 from jounce.jet import Jet, concatenate, cross, dot, matmul, sin, stack
-from jounce.rigid.rotations import checked_direction, is_traced, rotation_about, uniform, unit
+from jounce.jet.algebra import JetLike
+from jounce.rigid.rotations import checked_direction, is_traced, rotation_about, stacked_if_jets, uniform, unit
 
 KINDS = ("revolute", "prismatic")
 
@@ -46,8 +49,8 @@ class ScrewAxis:
     [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
     """
 
-    axis: Any
-    point: Any = (0.0, 0.0, 0.0)
+    axis: JetLike
+    point: JetLike = (0.0, 0.0, 0.0)
     kind: str = "revolute"
     pitch: float = 0.0
 
@@ -56,20 +59,21 @@ class ScrewAxis:
         finite = is_traced(self.point) or np.isfinite(np.asarray(self.point, float)).all()
         if np.shape(self.point) != (3,) or not finite:
             raise JounceError("a point needs three finite coordinates", name="point", value=self.point)
-        if self.kind not in KINDS:
-            raise JounceError(f"no such kind of axis; {did_you_mean(self.kind, KINDS)}", name="kind", value=self.kind)
+        check_choice("kind", self.kind, KINDS, JounceError)
         if not np.isfinite(self.pitch):
             raise JounceError("must be a finite number", name="pitch", value=self.pitch)
         if self.kind == "prismatic" and self.pitch != 0:
             message = "a prismatic axis has no pitch; leave it out, or make the axis revolute"
             raise JounceError(message, name="pitch", value=self.pitch)
 
-    def transform(self, coordinate: Any) -> Any:
+    def transform(self, coordinate: JetLike) -> Any:
         """Return the homogeneous transform of this axis at a coordinate: what `screw_transform` returns."""
         return screw_transform(self.axis, self.point, coordinate, self.kind, self.pitch)
 
 
-def screw_transform(axis: Any, point: Any, coordinate: Any, kind: str = "revolute", pitch: float = 0.0) -> Any:
+def screw_transform(
+    axis: JetLike, point: JetLike, coordinate: JetLike, kind: str = "revolute", pitch: float = 0.0
+) -> Any:
     """Return the homogeneous transform of a motion about or along an axis: the exponential of its screw.
 
     The rotation is `rotation_about` the axis, the displacement is the vector b of Negrean 2025, equation 34:
@@ -121,7 +125,7 @@ def screw_transform(axis: Any, point: Any, coordinate: Any, kind: str = "revolut
     return finish(homogeneous(rotation_about(axis, turn), shift))
 
 
-def product_of_exponentials(screws: Sequence[ScrewAxis], coordinates: Any, home: Any = None) -> Any:
+def product_of_exponentials(screws: Sequence[ScrewAxis], coordinates: JetLike, home: ArrayLike | None = None) -> Any:
     """Return the transform of a chain of screw axes, ``exp(S1 q1) exp(S2 q2) ... home``. Negrean 2025, equations 31-32.
 
     Parameters
@@ -152,8 +156,7 @@ def product_of_exponentials(screws: Sequence[ScrewAxis], coordinates: Any, home:
     >>> jn.rigid.product_of_exponentials(arm, [0.0, pi / 2], home)[:3, 3].round().astype(int).tolist()
     [1, 1, 0]
     """
-    if isinstance(coordinates, Sequence) and any(isinstance(q, Jet) for q in coordinates):
-        coordinates = stack([q if isinstance(q, Jet) else jnp.asarray(q, float) for q in coordinates])
+    coordinates = stacked_if_jets(coordinates)
     shape = coordinates.shape if isinstance(coordinates, Jet) else np.shape(coordinates)
     if not screws or shape[:1] != (len(screws),):
         message = (
@@ -170,7 +173,7 @@ def product_of_exponentials(screws: Sequence[ScrewAxis], coordinates: Any, home:
     return finish(reduce(matmul, transforms))
 
 
-def homogeneous(rotation: Jet, position: Jet) -> Jet:
+def homogeneous(rotation: Float[Jet, "3 3 *batch"], position: Float[Jet, "3 *batch"]) -> Float[Jet, "4 4 *batch"]:
     """Return the transform ``[[R, p], [0, 1]]`` of a rotation, (3, 3, ...), and a position, (3, ...): equation 31."""
     upper = [
         concatenate([row, part]) for row, part in zip(rotation, (position[k : k + 1] for k in range(3)), strict=True)

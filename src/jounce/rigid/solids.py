@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 
-class Solid(NamedTuple):
+class HomogeneousSolid(NamedTuple):
     """A kind of solid: its sizes, the axis it stands along unless told, and how volume and moments follow.
 
     Attributes
@@ -56,12 +56,12 @@ def _disc(radius: Any) -> tuple[Any, tuple[Any, ...]]:
 
 
 SOLIDS = {
-    "box": Solid(("size",), "", _box),
-    "sphere": Solid(("radius",), "", _sphere),
-    "cylinder": Solid(("radius", "length"), "z", _cylinder),
-    "tube": Solid(("radius", "inner_radius", "length"), "z", _tube),
-    "rod": Solid(("length",), "x", _rod),
-    "disc": Solid(("radius",), "z", _disc),
+    "box": HomogeneousSolid(("size",), "", _box),
+    "sphere": HomogeneousSolid(("radius",), "", _sphere),
+    "cylinder": HomogeneousSolid(("radius", "length"), "z", _cylinder),
+    "tube": HomogeneousSolid(("radius", "inner_radius", "length"), "z", _tube),
+    "rod": HomogeneousSolid(("length",), "x", _rod),
+    "disc": HomogeneousSolid(("radius",), "z", _disc),
 }
 
 

@@ -10,13 +10,19 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+from jaxtyping import Float
 
 from jounce.jet import Jet, components, dot, matvec, stack, transpose
-from jounce.jet.algebra import minus, plus, sum_of_products, total
-from jounce.rigid.body_arrays import body_vector, take_bodies
+from jounce.jet.coefficients import minus, plus, sum_of_products, total
+from jounce.rigid.body_arrays import each_jet, take_bodies
+from jounce.rigid.frames import AbstractFrame
+from jounce.shapes import Numbers, Real
+
+Triad = tuple[Float[Numbers, "3 *batch"], Float[Numbers, "3 *batch"], Float[Numbers, "3 *batch"]]
+Quadruples = tuple[Float[Numbers, "4 *batch"], Float[Numbers, "4 *batch"], Float[Numbers, "4 *batch"]]
 
 
-def body_axes(quaternion: Any) -> tuple[Any, Any, Any]:
+def body_axes(quaternion: Float[Numbers, "4 *batch"]) -> Triad:
     """Return the axes of the body in the global frame, the columns of the attitude matrix A, each of shape (3, ...).
 
     Parameters
@@ -32,7 +38,7 @@ def body_axes(quaternion: Any) -> tuple[Any, Any, Any]:
     )
 
 
-def quaternion_spins(quaternion: Any) -> tuple[Any, Any, Any]:
+def quaternion_spins(quaternion: Float[Numbers, "4 *batch"]) -> Quadruples:
     """Return the quaternion products of p with i, j and k: how it changes as the body turns about its axes."""
     e0, e1, e2, e3 = components(quaternion)
     return (
@@ -42,13 +48,13 @@ def quaternion_spins(quaternion: Any) -> tuple[Any, Any, Any]:
     )
 
 
-def _normalised(quaternion: Any) -> Any:
+def _normalised(quaternion: Float[Numbers, "4 *batch"]) -> Float[Numbers, "4 *batch"]:
     return quaternion / jnp.sqrt(dot(quaternion, quaternion))[None]
 
 
 @jax.tree_util.register_dataclass
 @dataclasses.dataclass(frozen=True)
-class SpatialPose:
+class SpatialPose(AbstractFrame):
     """Pose of one or many spatial bodies as jets; all batch axes trail.
 
     Parameters
@@ -76,7 +82,7 @@ class SpatialPose:
     predictor = ("position", "quaternion")  # the jets that a prediction needs
 
     @classmethod
-    def at(cls, position: Any, quaternion: Any) -> "SpatialPose":
+    def at(cls, position: Float[Numbers, "3 *batch"], quaternion: Float[Numbers, "4 *batch"]) -> "SpatialPose":
         """Build the pose of order zero; the quaternion is normalised."""
         quaternion = _normalised(quaternion)
         spins, axes = (tuple(Jet([x]) for x in f(quaternion)) for f in (quaternion_spins, body_axes))
@@ -87,25 +93,11 @@ class SpatialPose:
         """Highest time derivative that the pose carries."""
         return self.position.order
 
-    def point(self, local: Any) -> Jet:
-        """Return the global position of a point given in the body frame, (3, ...): Sommer 2024, equations 59-66."""
-        return self.position + self.direction(local)
+    def relative_quaternion(self, quaternion: Jet) -> tuple[Jet, Jet]:
+        """Return the Euler parameters e0, (...), and e, (3, ...), of another attitude relative to this one."""
+        return self.quaternion.dot(quaternion), stack([spin.dot(quaternion) for spin in self.spins])
 
-    def direction(self, local: Any) -> Jet:
-        """Return the global components of a vector given in the body frame: Sommer 2024, equations 71-72."""
-        local = body_vector(local, len(self.position.shape) - 1)
-        return total(axis * part for axis, part in zip(self.axes, components(local), strict=True))
-
-    @property
-    def attitude(self) -> Jet:
-        """Attitude matrix A, which takes body components to global ones, shape (3, 3, ...)."""
-        return transpose(stack(self.axes))
-
-    def to_body(self, vector: Any) -> Jet:
-        """Return the body components of a vector given in the global frame, with their derivatives."""
-        return stack([dot(axis, vector) for axis in self.axes])
-
-    def global_angular_velocity(self) -> Jet:
+    def global_angular_velocity(self) -> Float[Jet, "3 *batch"]:
         """Return the angular velocity in the global frame, to any order: Sommer 2024, equations 73-76."""
         if self.order == 0:
             raise ValueError("a pose of order 0 has no angular velocity; ask for order 1 or more")
@@ -115,10 +107,10 @@ class SpatialPose:
 
     def take(self, bodies: tuple[int, ...]) -> "SpatialPose":
         """Return the poses of the given bodies, by index; body 0 is the ground, which never moves."""
-        taken = jax.tree.map(lambda jet: take_bodies(jet, bodies), self, is_leaf=lambda x: isinstance(x, Jet))
+        taken = each_jet(lambda jet: take_bodies(jet, bodies), self)
         return taken if any(bodies) else dataclasses.replace(taken, angular_velocity=None)
 
-    def displaced(self, shift: Any, turn: Any) -> "SpatialPose":
+    def displaced(self, shift: Float[Numbers, "3 *batch"], turn: Float[Numbers, "3 *batch"]) -> "SpatialPose":
         """Return the pose of order zero moved by a shift, (3, ...) in m, and a turn in body axes, (3, ...) in rad."""
         quaternion = self.quaternion.coefficients[0]
         turned = quaternion + 0.5 * total(
@@ -126,7 +118,9 @@ class SpatialPose:
         )
         return SpatialPose.at(self.position.coefficients[0] + shift, turned)
 
-    def extended(self, shift: Any, turn: Any) -> "SpatialPose":
+    def extended(
+        self, shift: Float[Numbers, "3 *batch"] | None, turn: Float[Numbers, "3 *batch"] | None
+    ) -> "SpatialPose":
         """Return the pose one order higher, with new coefficients r[k] and w'[k-1] / k, both of shape (3, ...).
 
         What is None is zero.
@@ -162,7 +156,7 @@ class SpatialPose:
             velocity,
         )
 
-    def varied(self, shift: Jet, turn: Jet) -> "SpatialPose":
+    def varied(self, shift: Float[Jet, "3 *batch"], turn: Float[Jet, "3 *batch"]) -> "SpatialPose":
         """Return how the jets change, to first order, as bodies shift, (3, ...) in m, and turn, (3, ...) in rad.
 
         The turn is about the body's axes; it need not be small, as the change is linear in it.
@@ -177,7 +171,7 @@ class SpatialPose:
             velocity = turn.differentiate() + self.angular_velocity.cross(turn)
         return SpatialPose(shift, quaternion, tuple(map(Jet, spins)), axes, velocity)
 
-    def turning(self, change: "SpatialPose") -> Jet:
+    def turning(self, change: "SpatialPose") -> Float[Jet, "3 *batch"]:
         """Return the turn, (3, ...) in rad about the axes of the body, of a change that `varied` gave."""
         (x, y, z), (dx, dy, dz) = self.axes, change.axes
         return stack([dot(dy, z), dot(dz, x), dot(dx, y)])
@@ -194,22 +188,14 @@ class SpatialPose:
         )
 
     @classmethod
-    def predicted_from(cls, coordinates: dict[str, Jet], step: Any) -> "SpatialPose":
+    def predicted_from(cls, coordinates: dict[str, Jet], step: Real) -> "SpatialPose":
         """Return the pose of order zero that the Taylor series of coordinates give a time `step` away, in s."""
         return cls.at(*(coordinates[name].evaluate(step) for name in cls.predictor))
 
-    def separation(self, other: "SpatialPose") -> tuple[Any, Any]:
+    def separation(self, other: "SpatialPose") -> tuple[Float[Numbers, "3 *batch"], Float[Numbers, "3 *batch"]]:
         """Return the vectors of displacement, (3, ...) in m, and of rotation, (3, ...) in rad, from another pose."""
-        (e0, *e), (f0, *f) = self.quaternion.coefficients[0], other.quaternion.coefficients[0]
-        (e1, e2, e3), (f1, f2, f3) = e, f
-        turn = jnp.stack(
-            [
-                f0 * e1 - f1 * e0 - f2 * e3 + f3 * e2,
-                f0 * e2 - f2 * e0 - f3 * e1 + f1 * e3,
-                f0 * e3 - f3 * e0 - f1 * e2 + f2 * e1,
-            ]
-        )
-        return self.position.coefficients[0] - other.position.coefficients[0], 2 * turn
+        turn = other.truncate(0).relative_quaternion(self.quaternion.truncate(0))[1]
+        return self.position.coefficients[0] - other.position.coefficients[0], 2 * turn.coefficients[0]
 
     def coordinates(self) -> dict[str, Jet]:
         """Return the jets that describe the motion, by name: what a result stores and `from_coordinates` reads."""
@@ -226,7 +212,7 @@ class SpatialPose:
         return pose
 
 
-def to_global(attitude: Jet, body: Jet) -> Jet:
+def to_global(attitude: Float[Jet, "3 3 *batch"], body: Float[Jet, "3 *batch"]) -> Float[Jet, "3 *batch"]:
     """Return a body-fixed vector, shape (3, ...), in global components, with derivatives: Sommer 2024, equations 73-76.
 
     Applied to the angular velocity w' it gives the angular velocity, acceleration, jerk and jounce in the global
@@ -235,6 +221,6 @@ def to_global(attitude: Jet, body: Jet) -> Jet:
     return matvec(attitude, body)
 
 
-def to_body(attitude: Jet, vector: Jet) -> Jet:
+def to_body(attitude: Float[Jet, "3 3 *batch"], vector: Float[Jet, "3 *batch"]) -> Float[Jet, "3 *batch"]:
     """Return a global vector, shape (3, ...), in body components, with derivatives: Sommer 2024, equations 73-76."""
     return matvec(transpose(attitude), vector)

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from jounce.display import Displayed
-from jounce.errors import RobotError, did_you_mean, no_such
+from jounce.errors import RobotError, check_name, did_you_mean
 from jounce.rigid.inertia import Inertia, finite_numbers
 from jounce.robot.floating_base import floating_joints
 from jounce.robot.model import Closure, Joint, Limits, Link
@@ -158,9 +158,7 @@ class AbstractRobot(Displayed, abc.ABC):
             If there is no such moving joint, or it follows another.
         """
         for name, value in positions.items():
-            if name not in self.joint_names:
-                message = no_such("moving joint", name, self.joint_names)
-                raise RobotError(message, name="locked", value=name)
+            check_name("moving joint", name, self.joint_names, RobotError, name="locked")
             finite_numbers(f"locked.{name}", value, ())
         joints = []
         for joint in self.joints.values():
@@ -197,9 +195,7 @@ class AbstractRobot(Displayed, abc.ABC):
     def coordinates(self, **values: float) -> np.ndarray:
         """Return an array for q, shape (n,), with the named joints at the given values and the others at zero."""
         for name in values:
-            if name not in self.joint_names:
-                message = no_such("moving joint", name, self.joint_names)
-                raise RobotError(message, name="joint", value=name)
+            check_name("moving joint", name, self.joint_names, RobotError, name="joint")
         return np.array([values.get(name, 0.0) for name in self.joint_names], float)
 
     def _changed(self: Made, **parts: Any) -> Made:
@@ -213,8 +209,7 @@ class AbstractRobot(Displayed, abc.ABC):
         if closure.name in self.joints:
             raise RobotError("a joint and a closure have the same name", name=where)
         for link in closure.links:
-            if link not in self.links:
-                raise RobotError(no_such("link", link, self.links), name=where, value=link)
+            check_name("link", link, self.links, RobotError, name=where)
         if len({self.frames[link].body for link in closure.links}) == 1:
             message = "these links are fixed to one another already; a closure joins links that move"
             raise RobotError(message, name=f"{where}.links", value=list(closure.links))
@@ -228,8 +223,7 @@ class AbstractRobot(Displayed, abc.ABC):
         return dataclasses.replace(closure, points=points, rotation=rotation)
 
     def _checked_link(self, link: str) -> str:
-        if link not in self.links:
-            raise RobotError(no_such("link", link, self.links), name="link", value=link)
+        check_name("link", link, self.links, RobotError, name="link")
         return link
 
     def _check_mimic(self, joint: Joint) -> None:

@@ -12,7 +12,7 @@ from jax.core import Tracer
 
 from jounce.errors import RobotError
 from jounce.kinematics.compilation import compiler_options
-from jounce.mechanism.doors import check_process
+from jounce.mechanism.preconditions import check_process
 from jounce.robot.abstract_robot import AbstractRobot
 
 CHUNK = 128  # samples that are computed side by side

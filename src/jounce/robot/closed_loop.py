@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from jounce.errors import JounceError, RobotError, did_you_mean, no_such
+from jounce.errors import JounceError, RobotError, check_name, did_you_mean
 from jounce.forces import AbstractForce
 from jounce.jet import Jet
 from jounce.mechanism import Body, Mechanism, time_grid
@@ -177,7 +177,6 @@ def body_point(robot: AbstractRobot, link: str, point: Any = (0.0, 0.0, 0.0)) ->
     >>> body, point.tolist()
     ('ram', [0.1, 0.0, 0.0])
     """
-    if link not in robot.links:
-        raise RobotError(no_such("link", link, robot.links), name="link", value=link)
+    check_name("link", link, robot.links, RobotError, name="link")
     body, position, rotation = on_body(robot, link)
     return body, position + rotation @ finite_numbers("point", point, (3,))

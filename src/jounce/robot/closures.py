@@ -16,7 +16,7 @@ import numpy as np
 from jounce.constraints import AbstractConstraint, Scalar, Vector
 from jounce.constraints.base import Wrenches
 from jounce.errors import MechanismError, RobotError
-from jounce.jet import Jet, cross, dot, stack
+from jounce.jet import cross, dot, stack
 from jounce.jet.algebra import stacked, total
 from jounce.rigid.inertia import finite_numbers
 from jounce.robot.abstract_robot import AbstractRobot
@@ -60,7 +60,7 @@ class LinkClosure(AbstractConstraint, type="closure", space="spatial"):
         rows = offset.map(lambda d: jnp.sum(force * d[None], axis=1))
         if self.vector_part is None:
             return rows
-        e0, e = _relative_attitude(body_i, body_j)
+        e0, e = body_i.relative_quaternion(body_j.quaternion)
         turn = 2.0 * (self.scalar_part * e - e0 * self.vector_part - cross(e, self.vector_part))
         turn = turn if self.sense is None else turn * self.sense
         return rows + turn.map(lambda x: jnp.sum(moment * x[None], axis=1))
@@ -73,14 +73,9 @@ class LinkClosure(AbstractConstraint, type="closure", space="spatial"):
         """
         if self.vector_part is None:
             return None
-        e0, e = _relative_attitude(body_i, body_j)
+        e0, e = body_i.relative_quaternion(body_j.quaternion)
         along = self.scalar_part * e0 + dot(self.vector_part, e)
         return jnp.where(along.coefficients[0] < 0, -1.0, 1.0)
-
-
-def _relative_attitude(body_i: Any, body_j: Any) -> tuple[Jet, Jet]:
-    """Return the Euler parameters of body j relative to body i: scalar and vector part."""
-    return body_i.quaternion.dot(body_j.quaternion), stack([s.dot(body_j.quaternion) for s in body_i.spins])
 
 
 def borne(closure: Closure) -> np.ndarray:

@@ -10,9 +10,8 @@ import numpy as np
 
 from jounce.constraints import AbstractConstraint, Scalar, Vector
 from jounce.constraints.angles import relative_angle
-from jounce.constraints.base import check_text
 from jounce.constraints.planar import slide
-from jounce.errors import MechanismError
+from jounce.errors import MechanismError, check_choice
 from jounce.jet import Jet, wrap
 from jounce.mechanism import AbstractOutput
 
@@ -87,7 +86,7 @@ class CoupledJoints(AbstractConstraint, type="coupled", space="spatial"):
     }
 
     def __check_init__(self):
-        check_text("kinds", self.kinds, KINDS)
+        check_choice("kinds", self.kinds, KINDS, MechanismError)
         places = PLACES[: len(self.bodies)]
         pairs = {self.roles[:2], self.roles[2:]}
         if len(self.roles) != 4 or set(self.roles) != set(places) or any(len({*pair}) != 2 for pair in pairs):

@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jounce.errors import RobotError, no_such
+from jounce.errors import RobotError, check_name
 from jounce.jet import Jet, sine_cosine
 from jounce.jet.algebra import stacked, total
 from jounce.rigid.frames import Frames
@@ -80,8 +80,7 @@ def frame_constants(robot: AbstractRobot, link: str, point: Any) -> tuple[Any, A
     RobotError
         If there is no such link, or the point is not made of three finite numbers.
     """
-    if link not in robot.frames:
-        raise RobotError(no_such("link", link, robot.frames), name="link", value=link)
+    check_name("link", link, robot.frames, RobotError, name="link")
     point = finite_numbers("point", point, (3,))
     frame = robot.frames[link]
     body = frame.body if frame.body >= 0 else len(robot.moving_links)

@@ -7,7 +7,7 @@ import numpy as np
 
 from jounce.constraints import AbstractConstraint, spatial
 from jounce.constraints.drivers import RotationDriver, SpatialSlideDriver
-from jounce.errors import RobotError, no_such
+from jounce.errors import RobotError, check_name
 from jounce.forces import AbstractForce
 from jounce.forces.springs import SlideSpring, SpatialTorsionalSpring
 from jounce.mechanism import Body, RelativeAngleOutput
@@ -161,9 +161,7 @@ class Parts:
 
     def output(self, name: str, joint: str) -> Any:
         """Return the coordinate of a joint as an output."""
-        if joint not in [other.name for other in self.moving]:
-            message = no_such("moving joint", joint, [j.name for j in self.moving])
-            raise RobotError(message, name=f"outputs.{name}", value=joint)
+        check_name("moving joint", joint, [j.name for j in self.moving], RobotError, name=f"outputs.{name}")
         at = self._named(joint)
         if at.turning:
             return RelativeAngleOutput(at.bodies, at.axis_i, at.vector_i, at.vector_j)

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 
-from jounce.errors import RobotError, no_such
+from jounce.errors import RobotError, check_name
 from jounce.rigid.inertia import Inertia
 from jounce.robot.model import Joint, Link
 
@@ -95,9 +95,7 @@ def ordered(links: Mapping[str, Link], joints: Mapping[str, Joint]) -> list[Join
     for joint in joints.values():
         for role in ("parent", "child"):
             link = getattr(joint, role)
-            if link not in links:
-                message = no_such("link", link, links)
-                raise RobotError(message, name=f"joints.{joint.name}.{role}", value=link)
+            check_name("link", link, links, RobotError, name=f"joints.{joint.name}.{role}")
         if joint.child in parents:
             first = parents[joint.child].name
             message = (

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
 
-from jounce.errors import RobotError, did_you_mean, no_such
+from jounce.errors import RobotError, check_name, did_you_mean
 from jounce.jet import Jet, compose
 from jounce.rigid.inertia import finite_numbers
 from jounce.robot.batches import floats
@@ -67,9 +67,7 @@ def wrench_arrays(
     arrays = []
     for k, wrench in enumerate(wrenches):
         where = f"wrenches[{k}]"
-        if wrench.link not in robot.frames:
-            message = no_such("link", wrench.link, robot.frames)
-            raise RobotError(message, name=f"{where}.link", value=wrench.link)
+        check_name("link", wrench.link, robot.frames, RobotError, name=f"{where}.link")
         if robot.frames[wrench.link].body < 0:
             raise RobotError(
                 "this link is fixed to the base: nothing moves it", name=f"{where}.link", value=wrench.link

@@ -13,7 +13,7 @@ from typing import Any, NoReturn
 
 from jounce.errors import ExpressionError, did_you_mean, show_value
 
-__all__ = ["CONSTANTS", "FUNCTIONS", "Expression"]
+__all__ = ["CONSTANTS", "FUNCTIONS", "RESERVED", "Expression"]
 
 CONSTANTS: dict[str, float] = {"pi": math.pi, "deg": math.pi / 180.0}
 """Constants that every expression knows."""
@@ -35,6 +35,9 @@ FUNCTIONS: dict[str, tuple[int, Callable[..., float]]] = {
     "abs": (1, math.fabs),
 }
 """Functions that every expression knows: number of arguments, and what to call on plain numbers."""
+
+RESERVED = frozenset({"t", *CONSTANTS, *FUNCTIONS})
+"""Names that no parameter can have."""
 
 MAX_CHARACTERS = 2000
 MAX_NESTING = 50

@@ -9,7 +9,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from jounce.errors import TrajectoryError, no_such
+from jounce.errors import TrajectoryError, check_name
 from jounce.jet import Jet, sin
 from jounce.trajectory.motion import AbstractMotion
 from jounce.trajectory.trapezoid import LIMITS, TrapezoidalMotion, finite, positive
@@ -238,9 +238,7 @@ def motion_profile(
     >>> float(law.duration)
     1.0
     """
-    if name not in PROFILES:
-        message = no_such("profile", name, PROFILES)
-        raise TrajectoryError(message, name="profile", value=name)
+    check_name("profile", name, PROFILES, TrajectoryError, name="profile")
     if limits is not None and len(limits) != len(LIMITS):
         message = "limits are three numbers, the largest velocity, acceleration and jerk"
         raise TrajectoryError(message, name="limits", value=list(limits))

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from jounce.errors import MechanismError
+from jounce.jet.turns import whole_periods
 
-WHOLE_TURN = 2 * math.pi
 CLOSED = 1e-9  # how nearly samples that repeat come back to their first value, over their range
 
 
@@ -107,7 +107,7 @@ def periodic(times: np.ndarray, values: np.ndarray, degree: int) -> tuple[np.nda
     if degree % 2 == 0:
         raise MechanismError("samples that repeat need a spline of odd degree", value=degree)
     difference, span = float(values[-1] - values[0]), float(np.ptp(values)) or 1.0
-    advance = WHOLE_TURN * round(difference / WHOLE_TURN)
+    advance = float(whole_periods(difference))
     if abs(difference - advance) > CLOSED * span:
         message = "samples that repeat must end at the value they begin with, or whole turns (in rad) from it"
         raise MechanismError(f"{message}; the last one differs by", value=difference)

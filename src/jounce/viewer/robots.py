@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from jounce.errors import RobotError, no_such
+from jounce.errors import RobotError, check_name
 from jounce.reporting.peaks import derivative_name
 from jounce.rigid.euler_parameters import from_rotation_matrices
 from jounce.robot.model import Joint
@@ -132,9 +132,7 @@ class RobotSubject:
 def _check_joints(robot: Robot, trajectory: Any) -> None:
     """Raise RobotError where a trajectory moves joints that a robot does not have."""
     for name in trajectory.names:
-        if name not in robot.joint_names:
-            message = no_such("moving joint", name, robot.joint_names)
-            raise RobotError(message, name="trajectory", value=name)
+        check_name("moving joint", name, robot.joint_names, RobotError, name="trajectory")
 
 
 def swing_of(joint: Joint) -> tuple[float, float, float]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from jounce.errors import MechanismFileError, did_you_mean, no_such
+from jounce.errors import MechanismFileError, check_name, did_you_mean
 from jounce.io.files.reading import fault_of_number, read_rows
 
 __all__ = ["read_columns", "read_samples"]
@@ -92,9 +92,7 @@ def _columns(path: str, header: list[str], time: str | None, value: str | None) 
 
 
 def _find(path: str, header: list[str], column: str) -> int:
-    if column not in header:
-        message = no_such("column", column, header)
-        raise MechanismFileError(message, path=path, line=1, value=column)
+    check_name("column", column, header, MechanismFileError, path=path, line=1)
     return header.index(column)
 
 

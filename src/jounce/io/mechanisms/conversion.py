@@ -12,17 +12,16 @@ from pathlib import Path
 from typing import Any
 
 from jounce.dynamics import DriverForceOutput, DriverTorqueOutput
-from jounce.errors import JounceError, RobotError, no_such
+from jounce.errors import JounceError, RobotError, check_name
 from jounce.io.files.reading import named_file
 from jounce.io.files.source import read_source
 from jounce.io.files.units import parse_value
 from jounce.mechanism import Mechanism, TimeGrid
+from jounce.mechanism.mechanism import GROUND, names_column
 from jounce.robot import Robot
 from jounce.robot.closed_loop import DRIVE
 
 __all__ = ["assigned", "converted", "robot_mechanism", "with_file_names"]
-
-RESERVED = ("ground", "time", "derivative", "component")
 
 
 def converted(
@@ -119,9 +118,7 @@ def assigned(robot: Robot, assignments: Iterable[str], option: str, *, law: bool
             raise JounceError(
                 "a joint is given a value by JOINT=VALUE, such as 'elbow=30 deg'", name=option, value=text
             )
-        if name not in robot.joint_names:
-            message = no_such("moving joint", name, robot.joint_names)
-            raise JounceError(message, name=option, value=name)
+        check_name("moving joint", name, robot.joint_names, JounceError, name=option)
         kind = "angle" if robot.joints[name].turning else "length"
         try:
             found[name] = parse_value(_number_or_text(value), kind, ("t",) if law else ()).value
@@ -185,7 +182,7 @@ def _file_names(names: Iterable[str]) -> dict[str, str]:
     for name in names:
         new = re.sub(r"[^A-Za-z0-9_-]", "_", name)[:80] or "part"
         new = f"_{new}" if new.startswith("-") else new
-        if new in RESERVED or re.search(r"_d[0-9]+$", new):
+        if new == GROUND or names_column(new):
             new += "_"
         while new in found.values() or (new != name and new in names):
             new += "_"

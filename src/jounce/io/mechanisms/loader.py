@@ -17,7 +17,7 @@ from jounce.io.files.source import read_source
 from jounce.io.mechanisms.keys import FileKey, file_keys, location_of, output_types
 from jounce.io.mechanisms.unit_hints import warn_of_units
 from jounce.mechanism import AngularVelocityOutput, Body, Mechanism, PointOutput, TimeGrid, time_grid
-from jounce.mechanism.builder import check_body
+from jounce.mechanism.builder import starting_guess
 from jounce.mechanism.masses import body_mass
 from jounce.mechanism.resolve import resolve, resolve_element
 from jounce.rigid.euler_parameters import euler_parameters
@@ -288,8 +288,8 @@ def _check_values(mechanism: Mechanism) -> None:
     for kind, elements in mechanism.elements.items():
         for name, element in elements.items():
             resolve_element(element, parameters, components, f"{kind}.{name}")
+    starting_guess(mechanism, parameters, components)
     for name, body in mechanism.bodies.items():
-        check_body(name, body, parameters, components)
         body_mass(name, body, parameters, components)
     _check_expressions("gravity", mechanism.gravity, parameters)
     if mechanism.time is not None:

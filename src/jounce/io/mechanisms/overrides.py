@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from jounce.errors import JounceError, MechanismError, no_such
+from jounce.errors import JounceError, MechanismError, check_name
 from jounce.mechanism import Mechanism
 
 __all__ = ["override"]
@@ -38,9 +38,7 @@ def override(mechanism: Mechanism, assignments: Iterable[str]) -> Mechanism:
         name, equals, value = (part.strip() for part in text.partition("="))
         if not equals or not name or not value:
             raise MechanismError("a parameter is set by NAME=VALUE, such as 'BC=15 cm'", name="--set", value=text)
-        if name not in mechanism.parameters:
-            message = no_such("parameter", name, mechanism.parameters)
-            raise MechanismError(message, name="--set", value=name)
+        check_name("parameter", name, mechanism.parameters, MechanismError, name="--set")
         values[name] = value
     try:
         changed = mechanism.with_parameters(**values) if values else mechanism

@@ -19,11 +19,11 @@ from jounce.errors import no_such
 from jounce.io.mechanisms.keys import HOLDERS, FileKey, file_keys, output_holder, output_tag, output_types
 from jounce.io.mechanisms.masses import inertia
 from jounce.io.mechanisms.values import Checked, laws, motion, orientation, problem, scalar, vector, vectors, wrenches
-from jounce.mechanism.mechanism import RESERVED_OUTPUTS
-from jounce.mechanism.outputs import FRAMES
+from jounce.mechanism.mechanism import names_column
+from jounce.rigid.orientation import FRAMES
 from jounce.rigid.rotations import SEQUENCES
 from jounce.trajectory.dimensions import variables_of
-from jounce.trajectory.expression import CONSTANTS, FUNCTIONS
+from jounce.trajectory.expression import RESERVED
 
 __all__ = ["file_model", "output_form"]
 
@@ -60,8 +60,6 @@ def _names(*counts: int) -> Any:
             raise problem(f"must be a list of {' or '.join(map(str, counts))} names of bodies")
         for index, name in enumerate(raw):
             _check_body(name, info, index)
-        if len(set(raw)) != len(raw):
-            raise problem("the bodies must differ, a body cannot be joined with itself")
         return tuple(raw)
 
     schema = {"type": "array", "items": {"type": "string"}, "minItems": min(counts), "maxItems": max(counts)}
@@ -100,13 +98,13 @@ def _body_name(name: str) -> str | None:
 def _parameter_name(name: str) -> str | None:
     import keyword
 
-    if name in CONSTANTS or name in FUNCTIONS or name == "t":
+    if name in RESERVED:
         return f"the name '{name}' is reserved for expressions"
     return f"the word '{name}' cannot be a name in expressions" if keyword.iskeyword(name) else None
 
 
 def _output_name(name: str) -> str | None:
-    if name in RESERVED_OUTPUTS or re.search(r"_d[0-9]+$", name):
+    if names_column(name):
         return f"the name '{name}' is reserved for columns of the results"
     return None
 

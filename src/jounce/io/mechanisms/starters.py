@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 
-from jounce.errors import JounceError, OutputError, no_such
+from jounce.errors import JounceError, OutputError, check_name
 
 __all__ = ["STARTERS", "Starter", "write_starter"]
 
@@ -83,8 +83,7 @@ def write_starter(name: str, path: str | PathLike[str], *, overwrite: bool = Fal
     from jounce.io.files.parsers import read_yaml
     from jounce.io.files.writing import check_target, replacing
 
-    if name not in STARTERS:
-        raise JounceError(no_such("starter", name, STARTERS), value=name)
+    check_name("starter", name, STARTERS, JounceError)
     starter, suffix = STARTERS[name], Path(path).suffix.lower()
     check_target(path, SUFFIXES, "mechanism file", overwrite=overwrite)
     refuse_existing(path, overwrite=overwrite)

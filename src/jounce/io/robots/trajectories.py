@@ -317,7 +317,7 @@ class _Laws:
         return times
 
     def _read_parameters(self) -> None:
-        from jounce.trajectory.expression import CONSTANTS, FUNCTIONS
+        from jounce.trajectory.expression import RESERVED
 
         if "parameters" not in self.data:
             return
@@ -325,7 +325,7 @@ class _Laws:
             at = ("parameters", name)
             if not re.fullmatch(r"[A-Za-z_][A-Za-z_0-9]{0,99}", name):
                 raise self.error("a name of a parameter is letters, digits and _", at)
-            if name in CONSTANTS or name in FUNCTIONS or name == "t":
+            if name in RESERVED:
                 raise self.error(f"the name '{name}' is reserved for expressions", at)
             value = self._read(raw, "any", (), at)
             if value.dimension is not None:

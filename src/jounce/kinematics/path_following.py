@@ -9,15 +9,16 @@ through it, if that arrives on the other side to rounding, and is told.
 """
 
 import dataclasses
-from typing import Any
+from typing import NamedTuple
 
 import jax
 import numpy as np
+from jaxtyping import Float, Int, Shaped
 
-from jounce.kinematics.advance import SAFE_FRACTION, Arrival, advance
+from jounce.kinematics.advance import SAFE_FRACTION, Arrival, State, advance
 from jounce.kinematics.status import Status
 from jounce.mechanism import Model
-from jounce.mechanism.datums import Way
+from jounce.mechanism.axis_angles import AttitudeHistory
 
 PASSABLE = (Status.OK, Status.UNDEFINED)
 SMALLEST_STEP = 1e-10  # of the span
@@ -43,7 +44,14 @@ class Solver:
     refine: bool = True
     wanted: int = 0  # highest derivative that must be finite
 
-    def __call__(self, known: Any, step: np.ndarray, instant: np.ndarray, *, survey: bool = False) -> Arrival:
+    def __call__(
+        self,
+        known: State,
+        step: Float[np.ndarray, " batch"],
+        instant: Float[np.ndarray, " batch"],
+        *,
+        survey: bool = False,
+    ) -> Arrival:
         """Solve instants from known neighbours, as many as fit into a batch; `survey` looks for singular positions."""
         lanes = len(instant)
         width = SMALL_BATCH if lanes <= SMALL_BATCH else LARGE_BATCH
@@ -60,7 +68,7 @@ class Solver:
         )
         return jax.tree.map(lambda x: np.asarray(x)[..., :lanes], arrival)
 
-    def culprit(self, arrival: Arrival, lane: int) -> str:
+    def fault(self, arrival: Arrival, lane: int) -> str:
         """Return where to look for the fault: a driver without a permitted value, an output, the farthest body."""
         refused = np.flatnonzero(~arrival.admissible[:, lane])
         if refused.size:
@@ -70,14 +78,14 @@ class Solver:
             return f"output {names[int(np.argmin(arrival.finite[1:, lane]))]}"
         return f"body {self.model.bodies[int(arrival.body[lane])]}"
 
-    def _predictor(self, known: Any) -> tuple[dict[str, Any], tuple[Any, ...], Any]:
+    def _predictor(self, known: State) -> State:
         """Return what a prediction needs of solved instants: jets of the pose and of turning angles, and the sign."""
         coordinates, outputs, sign = known
         angles = [o for o, g in zip(outputs, self.model.system.outputs, strict=True) if g.element.turning]
         return {name: coordinates[name] for name in self.model.pose_type.predictor}, tuple(angles), sign
 
 
-def _filled(x: np.ndarray, width: int) -> np.ndarray:
+def _filled(x: Shaped[np.ndarray, "*rest batch"], width: int) -> Shaped[np.ndarray, "*rest width"]:
     """Repeat the last lane up to the width of a batch."""
     lanes = x.shape[-1]
     if lanes == width:
@@ -106,7 +114,7 @@ class Anchor:
     """
 
     instant: float
-    state: Any
+    state: State
     safe_step: float
     radius: float
     turnover: float
@@ -138,20 +146,20 @@ class ChangePoint:
 
 
 @dataclasses.dataclass
-class Track:
+class FollowedPath:
     """Anchors in order of time, the change points passed, and where and why following the motion ended, if it did.
 
     Instants of a grid that were solved on the way are told by their indices, each with the batch that it was solved in.
     """
 
     anchors: list[Anchor]
-    on_the_way: list[tuple[np.ndarray, Arrival]] = dataclasses.field(default_factory=list)
+    on_the_way: list[tuple[Int[np.ndarray, " lane"], Arrival]] = dataclasses.field(default_factory=list)
     change_points: list[ChangePoint] = dataclasses.field(default_factory=list)
     status: Status = Status.OK
     ended_at: float = np.inf
-    culprit: str = ""
+    fault: str = ""
 
-    def way(self) -> Way | None:
+    def history(self) -> AttitudeHistory | None:
         """Return the attitudes of all bodies in space along the motion: at the anchors, and by their series beyond."""
         if "quaternion" not in self.anchors[0].state[0]:
             return None
@@ -164,7 +172,12 @@ class Track:
             place = place * since + coefficient
         count = (len(times) - 1) * PLACES + 1  # the last anchor is the end
         place = place.reshape(*place.shape[:2], -1)[..., :count]
-        return Way(place, (times[:, None] + since).ravel()[:count])
+        return AttitudeHistory(place, (times[:, None] + since).ravel()[:count])
+
+    def ended(self, status: Status, instant: float, fault: str) -> "FollowedPath":
+        """Return the path, with where and why it could not be followed any further."""
+        self.status, self.ended_at, self.fault = status, instant, fault
+        return self
 
     def singular_positions_outside(self) -> list[ChangePoint]:
         """Return where the motion would be singular just before its start or after its end, and smooth all the same."""
@@ -181,8 +194,13 @@ NO_GRID = np.empty(0)
 
 
 def follow(
-    solver: Solver, start: Anchor, stop: float, span: float, first_step: float = np.inf, grid: np.ndarray = NO_GRID
-) -> Track:
+    solver: Solver,
+    start: Anchor,
+    stop: float,
+    span: float,
+    first_step: float = np.inf,
+    grid: Float[np.ndarray, " time"] = NO_GRID,
+) -> FollowedPath:
     """Follow the motion from an anchor to another instant, in steps checked one by one.
 
     A step that is refused is halved until it is not, or is too small to be halved. The lanes of a batch that a step
@@ -203,48 +221,67 @@ def follow(
     grid : array of shape (time,), optional
         Instants to be solved on the way, s.
     """
-    track, largest, crawled = Track([start]), first_step, 0
-    while track.anchors[-1].instant < stop:
-        here = track.anchors[-1]
+    path, largest, crawled = FollowedPath([start]), first_step, 0
+    while path.anchors[-1].instant < stop:
+        here = path.anchors[-1]
         passed = _passed(solver, here, stop)
         if passed is not None:
             far_side, change_point = passed
-            track.anchors.append(far_side)
-            track.change_points.append(change_point)
+            path.anchors.append(far_side)
+            path.change_points.append(change_point)
             continue
         left = stop - here.instant
         step = min(here.longest_step, largest, left)
         crawled = crawled + 1 if step < CRAWLING * left else 0
         if crawled > LONGEST_CRAWL or here.instant + step == here.instant:
-            track.status, track.ended_at = Status.COLLAPSED, float(np.nextafter(here.instant, np.inf))
-            track.culprit = ", ".join(solver.model.drivers)
-            return track
+            beyond = float(np.nextafter(here.instant, np.inf))
+            return path.ended(Status.COLLAPSED, beyond, ", ".join(solver.model.drivers))
         if left - step < 0.1 * step:
             step = left  # no sliver of a step at the end
-        refused = None
-        while True:
-            target = stop if step == left else here.instant + step
-            first, end = np.searchsorted(grid, (here.instant, target), side="right")
-            way = np.arange(first, min(end, first + SMALL_BATCH - 1))
-            instants = np.concatenate([[target], grid[way]])
-            arrival = solver(here.state, instants - here.instant, instants, survey=True)
-            if arrival.status[0] in PASSABLE and step * abs(arrival.turnover[0]) <= LARGEST_TURNOVER:
-                break
-            if arrival.status[0] == Status.INADMISSIBLE:
-                refused = refused or (arrival, target)
-            if step < SMALLEST_STEP * span or target <= here.instant:
-                arrival, target = refused or (arrival, target)
-                track.status, track.ended_at = Status(int(arrival.status[0])), target
-                track.culprit = solver.culprit(arrival, 0)
-                if refused is None and here.reach < NEARLY_SINGULAR * span:
-                    track.status = Status.SINGULAR  # the range of the motion ends at a dead point
-                return track
-            step *= 0.5
-        largest = 4 * step
-        track.anchors.append(Anchor.of(arrival, target))
-        if way.size:
-            track.on_the_way.append((way, arrival))
-    return track
+        taken = _taken(solver, here, stop, step, SMALLEST_STEP * span, grid)
+        status = Status(int(taken.arrival.status[0]))
+        if not taken.accepted:
+            if status != Status.INADMISSIBLE and here.reach < NEARLY_SINGULAR * span:
+                status = Status.SINGULAR  # the range of the motion ends at a dead point
+            return path.ended(status, taken.target, solver.fault(taken.arrival, 0))
+        largest = 4 * taken.step
+        path.anchors.append(Anchor.of(taken.arrival, taken.target))
+        if taken.lanes.size:
+            path.on_the_way.append((taken.lanes, taken.arrival))
+    return path
+
+
+class _Step(NamedTuple):
+    """A step from an anchor: where it led, how long it was, which instants of the grid were solved beside it."""
+
+    arrival: Arrival
+    target: float
+    step: float
+    lanes: np.ndarray
+    accepted: bool
+
+
+def _taken(
+    solver: Solver, here: Anchor, stop: float, step: float, smallest: float, grid: Float[np.ndarray, " time"]
+) -> _Step:
+    """Return the step from an anchor, halved until it is accepted, or too small to be halved.
+
+    Of one that is not accepted, what is told is where a law was first refused, if it was.
+    """
+    refused, left = None, stop - here.instant
+    while True:
+        target = stop if step == left else here.instant + step
+        first, end = np.searchsorted(grid, (here.instant, target), side="right")
+        lanes = np.arange(first, min(end, first + SMALL_BATCH - 1))
+        instants = np.concatenate([[target], grid[lanes]])
+        arrival = solver(here.state, instants - here.instant, instants, survey=True)
+        if arrival.status[0] in PASSABLE and step * abs(arrival.turnover[0]) <= LARGEST_TURNOVER:
+            return _Step(arrival, target, step, lanes, accepted=True)
+        if arrival.status[0] == Status.INADMISSIBLE:
+            refused = refused or (arrival, target)
+        if step < smallest or target <= here.instant:
+            return _Step(*(refused or (arrival, target)), step, lanes, accepted=False)
+        step *= 0.5
 
 
 def _passed(solver: Solver, here: Anchor, stop: float) -> tuple[Anchor, ChangePoint] | None:
@@ -272,7 +309,7 @@ def _passed(solver: Solver, here: Anchor, stop: float) -> tuple[Anchor, ChangePo
     return beyond, ChangePoint(located, min(here.radius, beyond.radius))
 
 
-def _shortened(jet: np.ndarray) -> np.ndarray:
+def _shortened(jet: Float[np.ndarray, "order *rest"]) -> Float[np.ndarray, "order *rest"]:
     """Return Taylor coefficients with those above a low order set to zero."""
     low = jet.copy()
     low[PASSAGE_ORDER + 1 :] = 0

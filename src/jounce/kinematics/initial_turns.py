@@ -10,11 +10,12 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
+from jaxtyping import Bool, Float
 
-from jounce.constraints.angles import principal
+from jounce.jet.turns import WHOLE_TURN, principal, whole_periods
 from jounce.mechanism import Model
-from jounce.mechanism.builder import referred
-from jounce.mechanism.datums import Way, measures_angle
+from jounce.mechanism.axis_angles import AttitudeHistory, measures_angle
+from jounce.mechanism.builder import with_reference
 
 STEPS_A_TURN = 64
 MOST_TURNS = 4  # followed one by one; beyond, each further turn does what the last one did
@@ -23,7 +24,12 @@ MOST_FOLLOWED = 100  # where they do not, as those of drivers that turn unlike e
 SMALLEST_PERIOD, LARGEST_PERIOD = 1, 60  # whole turns, among which those are sought that leave coupled bodies coupled
 
 
-class Lag(NamedTuple):
+Coordinates = dict[str, np.ndarray]
+"""Coordinates of all bodies by name, the ground first, (..., bodies, 1)."""
+Mover = Callable[[Coordinates, np.ndarray], tuple[Coordinates, np.ndarray, np.ndarray]]
+
+
+class DriverLag(NamedTuple):
     """What the drivers still lack at the starting guess, by rows of the residual.
 
     Attributes
@@ -36,22 +42,22 @@ class Lag(NamedTuple):
         Whether the row forgets whole turns.
     """
 
-    size: np.ndarray
-    turning: np.ndarray
-    periodic: np.ndarray
+    size: Float[np.ndarray, " row"]
+    turning: Bool[np.ndarray, " row"]
+    periodic: Bool[np.ndarray, " row"]
 
     @property
     def angle(self) -> float:
         """The largest angle, rad."""
         return float(np.max(np.abs(self.size[self.turning]), initial=0.0))
 
-    def open(self, residual: np.ndarray, part: float) -> np.ndarray:
+    def open(self, residual: Float[np.ndarray, " row"], part: float) -> Float[np.ndarray, " row"]:
         """Return the residual of drivers that lack a part of this still."""
         opened = residual + part * self.size
         return np.where(self.periodic, principal(opened), opened)
 
 
-def lag_of(model: Model, instant: float, residual: np.ndarray) -> Lag | None:
+def driver_lag(model: Model, instant: float, residual: Float[np.ndarray, " row"]) -> DriverLag | None:
     """Return what the drivers lack where the residual is that of the guess; None where a driver has several rows."""
     rows = [k for k, name in enumerate(model.rows) if name.partition(".")[0] in ("drivers", "initial")]
     groups = [group for group in model.system.groups if group.is_driver]
@@ -59,7 +65,7 @@ def lag_of(model: Model, instant: float, residual: np.ndarray) -> Lag | None:
         return None
     size = np.zeros(len(model.rows))
     turning, periodic = np.zeros(len(size), bool), np.zeros(len(size), bool)
-    told = iter(referred(model, model.guess, instant, keep=True)[0].turnings)
+    told = iter(with_reference(model, model.guess, instant, keep=True)[0].prescribed)
     first = 0
     for group in groups:
         its = rows[first : first + group.instances]
@@ -69,43 +75,32 @@ def lag_of(model: Model, instant: float, residual: np.ndarray) -> Lag | None:
         if measures_angle(group):
             turning[its] = periodic[its] = True
             size[its] = [next(told).angle for _ in its] - np.asarray(group.element.datum.angle)[:, 0]
-    return Lag(size, turning, periodic)
+    return DriverLag(size, turning, periodic)
 
 
-class Course(NamedTuple):
-    """Where drivers that turned from the guess to their laws have brought the bodies.
-
-    Attributes
-    ----------
-    coordinates : dict of str to array
-        Of all bodies, with the turns of planar ones.
-    way : Way, optional
-        In space, from the guess to there: angles about axes count their turns along it.
-    """
-
-    coordinates: dict[str, np.ndarray]
-    way: Way | None
-
-
-def course(
-    model: Model, lag: Lag, start: dict[str, np.ndarray], moved: Callable[..., Any], scale_of: Callable[..., Any]
-) -> Course | None:
-    """Follow the mechanism from where drivers are as in the guess to where they fulfil their laws; None if it ends.
+def turned_to_laws(
+    model: Model, lag: DriverLag, start: Coordinates, moved: Mover
+) -> tuple[Coordinates, AttitudeHistory | None] | None:
+    """Follow the mechanism from where drivers are as in the guess to where they fulfil their laws.
 
     Parameters
     ----------
     model : Model
         The mechanism.
-    lag : Lag
+    lag : DriverLag
         At the guess.
     start : dict of str to array
         Coordinates, put together with the drivers as in the guess.
     moved : callable
         Takes coordinates and an increment to coordinates, residual and Jacobian.
-    scale_of : callable
-        Returns the scale of rows of a Jacobian.
+
+    Returns
+    -------
+    tuple or None
+        The coordinates there, with the turns of planar bodies, and in space the history of the attitudes, along which
+        angles about axes count their turns; None if the motion ends on the way.
     """
-    turns, skipped = lag.angle / (2 * np.pi), 0
+    turns, skipped = lag.angle / WHOLE_TURN, 0
     if turns > MOST_TURNS:
         skipped = int(turns) - MOST_TURNS + 1
     left = np.arange(0, turns * STEPS_A_TURN)[::-1] / (STEPS_A_TURN * turns)
@@ -119,30 +114,29 @@ def course(
             if turns > MOST_FOLLOWED:
                 return None
             skipped = 0  # drivers that turn unlike each other: no turn is like the last
-        found = _corrected(states[-1], increment, lambda r, p=part: lag.open(r, p), moved, scale_of)
+        found = _corrected(states[-1], increment, lambda r, p=part: lag.open(r, p), moved)
         if found is None:
             return None
         coordinates, increment = found
         states.append(coordinates)
     last = states[-1] if last is None else last
     if "quaternion" not in last:
-        return Course(last, None)
+        return last, None
     places = [np.asarray(place["quaternion"]) for place in (model.guess, *states)]
-    way = Way(np.concatenate(places, axis=-1), np.zeros(len(places)), STEPS_A_TURN, skipped)
-    return Course(last, way)
+    return last, AttitudeHistory(np.concatenate(places, axis=-1), np.zeros(len(places)), STEPS_A_TURN, skipped)
 
 
-def _corrected(coordinates: Any, increment: Any, opened: Any, moved: Any, scale_of: Any) -> Any:
+def _corrected(
+    coordinates: Coordinates,
+    increment: Float[np.ndarray, " column"],
+    opened: Callable[[np.ndarray], np.ndarray],
+    moved: Mover,
+) -> tuple[Coordinates, Float[np.ndarray, " column"]] | None:
     """Return coordinates a step on, and the step; None where Newton-Raphson does not go there."""
     whole, trial = increment, moved(coordinates, increment)
     for _ in range(CORRECTIONS):
-        residual, jacobian = opened(trial[1]), trial[2]
-        if not (np.isfinite(residual).all() and np.isfinite(jacobian).all()):
-            return None
-        scale = scale_of(jacobian)
-        step = np.linalg.lstsq(scale[:, None] * jacobian, -scale * residual, rcond=1e-10)[0]
-        size = np.max(np.abs(step), initial=0.0)
-        if size > 0.5:
+        step = newton_step(opened(trial[1]), trial[2])
+        if step is None or (size := np.max(np.abs(step), initial=0.0)) > 0.5:
             return None
         whole, trial = whole + step, moved(trial[0], step)
         if size < 1e-9:
@@ -150,7 +144,24 @@ def _corrected(coordinates: Any, increment: Any, opened: Any, moved: Any, scale_
     return None
 
 
-def _repeated(states: list[dict[str, np.ndarray]], turns: int) -> dict[str, np.ndarray] | None:
+def newton_step(
+    residual: Float[np.ndarray, " row"], jacobian: Float[np.ndarray, "row column"]
+) -> Float[np.ndarray, " column"] | None:
+    """Return the shortest step that closes the residual to first order, by rows of one size; None if not finite."""
+    if not (np.isfinite(residual).all() and np.isfinite(jacobian).all()):
+        return None  # what factors a matrix may never end on one that is not finite
+    scale = row_scale(jacobian)
+    step = np.linalg.lstsq(scale[:, None] * jacobian, -scale * residual, rcond=1e-10)[0]
+    return step if np.isfinite(step).all() else None
+
+
+def row_scale(jacobian: Float[np.ndarray, "row column"]) -> Float[np.ndarray, " row"]:
+    """Return what makes the largest entry of each row one."""
+    largest = np.max(np.abs(jacobian), axis=1)
+    return 1 / np.where((largest > 0) & np.isfinite(largest), largest, 1.0)
+
+
+def _repeated(states: list[Coordinates], turns: int) -> Coordinates | None:
     """Return the end of a course after further turns, each like the last; None if that did not lead back."""
     before, after = states[-1 - STEPS_A_TURN], states[-1]
     for name, value in after.items():
@@ -161,11 +172,12 @@ def _repeated(states: list[dict[str, np.ndarray]], turns: int) -> dict[str, np.n
             return None
     if "angle" not in after:
         return after
-    made = np.round((after["angle"] - before["angle"]) / (2 * np.pi))
-    return {**after, "angle": after["angle"] + turns * 2 * np.pi * made}
+    return {**after, "angle": after["angle"] + turns * whole_periods(after["angle"] - before["angle"])}
 
 
-def nearest_turns(guess: dict[str, Any], found: dict[str, Any], residual_at: Callable[[Any], np.ndarray]) -> Any:
+def nearest_turns(
+    guess: dict[str, Any], found: Coordinates, residual_at: Callable[[np.ndarray], np.ndarray]
+) -> Coordinates:
     """Return planar coordinates with every angle shifted by the whole turns that bring it nearest to the guess.
 
     Drivers, gears and rolling discs count turns: what they couple is shifted together, or not at all.
@@ -177,13 +189,13 @@ def nearest_turns(guess: dict[str, Any], found: dict[str, Any], residual_at: Cal
     residual_at : callable
         Returns the scaled residual at some angles, shape (rows,).
     """
-    away = ((np.asarray(guess["angle"]) - found["angle"]) / (2 * np.pi))[1:, 0]
+    away = ((np.asarray(guess["angle"]) - found["angle"]) / WHOLE_TURN)[1:, 0]
     if not np.round(away).any():
         return found
     still = residual_at(found["angle"])
 
     def shifted(turns: np.ndarray) -> np.ndarray:
-        return found["angle"] + 2 * np.pi * np.concatenate([[0.0], turns])[:, None]
+        return found["angle"] + WHOLE_TURN * np.concatenate([[0.0], turns])[:, None]
 
     bodies = np.arange(len(away))
     changes = np.stack([residual_at(shifted((bodies == k) * 1.0)) - still for k in bodies])
@@ -204,7 +216,7 @@ def nearest_turns(guess: dict[str, Any], found: dict[str, Any], residual_at: Cal
     return {**found, "angle": shifted(turns)}
 
 
-def _together(changes: np.ndarray, away: np.ndarray) -> np.ndarray:
+def _together(changes: Float[np.ndarray, "body row"], away: Float[np.ndarray, " body"]) -> Float[np.ndarray, " body"]:
     """Return the whole turns, nearest to those wanted, that change no row; changes of one turn are (bodies, rows)."""
     if np.max(np.abs(np.round(away) @ changes)) < 1e-6:
         return np.round(away)

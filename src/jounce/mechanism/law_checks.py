@@ -2,13 +2,13 @@
 
 import warnings
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
+from jounce.constraints import AbstractConstraint
 from jounce.constraints.base import value_fields
 from jounce.errors import JounceError, SampleWarning
-from jounce.forces import TimeLaw, VectorLaw
+from jounce.forces import AbstractForce, TimeLaw, VectorLaw
 from jounce.mechanism.mechanism import Mechanism
 from jounce.trajectory import AbstractMotion, SplineMotion
 from jounce.trajectory.sampling import doubtful_order, words_of_doubt
@@ -55,7 +55,7 @@ def check_laws(mechanism: Mechanism, instants: np.ndarray, order: int, *, forces
                     _warn(place, law, orders)
 
 
-def _motions(element: Any) -> Iterator[tuple[str, AbstractMotion]]:
+def _motions(element: AbstractConstraint | AbstractForce) -> Iterator[tuple[str, AbstractMotion]]:
     """Return the motion laws among the values of a driver or a force, by field."""
     for field in value_fields(type(element)):
         value = getattr(element, field)

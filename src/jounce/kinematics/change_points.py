@@ -10,8 +10,9 @@ from typing import Any
 
 import jax
 import numpy as np
+from jaxtyping import Float
 
-from jounce.kinematics.path import Anchor, ChangePoint, Solver, Track, follow
+from jounce.kinematics.path_following import Anchor, ChangePoint, FollowedPath, Solver, follow
 from jounce.kinematics.status import Status
 
 ROUNDING = 1e-16
@@ -32,24 +33,26 @@ def spoiled_width(point: ChangePoint, order: int) -> float:
     return point.radius * (ROUNDING * math.factorial(order) / LARGEST_NOISE) ** (1 / (order + 1))
 
 
-def bridged(solver: Solver, track: Track, point: ChangePoint, instants: np.ndarray) -> Any:
+def bridged(
+    solver: Solver, path: FollowedPath, point: ChangePoint, instants: Float[np.ndarray, " time"]
+) -> tuple[dict[str, np.ndarray], tuple[np.ndarray, ...]] | None:
     """Return the jets of coordinates and outputs next to a change point, time last; None where they cannot be had.
 
     Parameters
     ----------
     solver : Solver
-        What solved the track.
-    track : Track
+        What solved the path.
+    path : FollowedPath
         The motion followed, through the change point.
     point : ChangePoint
-        One of the track.
+        One of the path.
     instants : array of shape (time,)
         Within the half width around it, s.
     """
     width = half_width(point, solver.order)
-    first, last = track.anchors[0].instant, track.anchors[-1].instant
-    near = [a for a in track.anchors if a.instant < point.instant]
-    far = [a for a in track.anchors if a.instant > point.instant]
+    first, last = path.anchors[0].instant, path.anchors[-1].instant
+    near = [a for a in path.anchors if a.instant < point.instant]
+    far = [a for a in path.anchors if a.instant > point.instant]
     ends = []
     for anchors, end in ((near, max(point.instant - width, first)), (far, min(point.instant + width, last))):
         if abs(end - point.instant) < spoiled_width(point, solver.order):
@@ -62,7 +65,7 @@ def bridged(solver: Solver, track: Track, point: ChangePoint, instants: np.ndarr
     return _interpolated(before, after, instants)
 
 
-def _interpolated(before: Anchor, after: Anchor, instants: np.ndarray) -> Any:
+def _interpolated(before: Anchor, after: Anchor, instants: Float[np.ndarray, " time"]) -> Any:
     """Return the jets of the state at instants between two anchors, by Hermite interpolation of both their jets."""
     from scipy.interpolate import BPoly  # here, since importing SciPy takes half a second
 

@@ -1,18 +1,26 @@
 """Where angles about axes are counted from: the position in which a mechanism was put together, and its turns."""
 
-from collections.abc import Sequence
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-import equinox as eqx
 import numpy as np
+from jaxtyping import Float, Int
 
-from jounce.constraints.angles import Datum, angle_of, principal
+from jounce.constraints.angles import Datum, angle_of
+from jounce.jet.turns import counted_on, principal, whole_periods
 from jounce.mechanism.system import Group
+from jounce.mechanism.time import nearest_instants
+from jounce.shapes import Numbers
 
+Coordinates = Mapping[str, Any]  # of all bodies, the ground first, by name: (..., bodies, batch)
+Quaternions = Float[np.ndarray, "4 *#rest"]
+Vectors = Float[np.ndarray, "3 *#rest"]
+Angles = Float[np.ndarray, "instance batch"]
 PARALLEL = 1e-9  # largest sine between axes that are one
 
 
-class Turning(NamedTuple):
+class PrescribedAngle(NamedTuple):
     """An angle that a driver prescribes.
 
     Attributes
@@ -26,11 +34,11 @@ class Turning(NamedTuple):
     """
 
     bodies: tuple[int, int]
-    axis: np.ndarray
+    axis: Float[np.ndarray, " 3"]
     angle: float
 
 
-class Way(NamedTuple):
+class AttitudeHistory(NamedTuple):
     """Attitudes that all bodies went through, so close to each other that no turn in between is lost.
 
     Attributes
@@ -43,8 +51,8 @@ class Way(NamedTuple):
         The last places make a turn, of which so many more follow.
     """
 
-    quaternion: np.ndarray
-    time: np.ndarray
+    quaternion: Float[np.ndarray, "4 bodies place"]
+    time: Float[np.ndarray, " place"]
     period: int = 1
     repeated: int = 0
 
@@ -53,31 +61,22 @@ class Way(NamedTuple):
         measuring = [group for group in groups if measures_angle(group)]
         raw = raw_angles(measuring, {"quaternion": self.quaternion})
         begun = [np.asarray(group.element.datum.near)[..., 0] for group in measuring]
-        return [counted_on(near, angle) for near, angle in zip(begun, raw, strict=True)]
+        return [counted_on(np.column_stack(pair))[:, 1:] for pair in zip(begun, raw, strict=True)]
 
     def last_angles(self, groups: Sequence[Group]) -> list[np.ndarray]:
-        """Return the angles at the end of the way, (instances, 1) each, with the turns that are repeated."""
+        """Return the angles at the end, (instances, 1) each, with the turns that are repeated."""
         found = self.angles(groups)
         if not self.repeated:
             return [angle[:, -1:] for angle in found]
-        turns = [np.round((angle[:, -1:] - angle[:, -1 - self.period, None]) / (2 * np.pi)) for angle in found]
-        return [angle[:, -1:] + 2 * np.pi * self.repeated * n for angle, n in zip(found, turns, strict=True)]
+        ends = [(angle[:, -1:], angle[:, -1 - self.period, None]) for angle in found]
+        return [last + self.repeated * whole_periods(last - before) for last, before in ends]
 
-    def counting(self, groups: Sequence[Group], instants: np.ndarray) -> tuple[Group, ...]:
+    def counting(self, groups: Sequence[Group], instants: Float[np.ndarray, " time"]) -> tuple[Group, ...]:
         """Return groups that have the turns of each instant, from the place nearest to it in time."""
         if not any(map(measures_angle, groups)):
             return tuple(groups)
-        after = np.clip(np.searchsorted(self.time, instants), 1, max(len(self.time) - 1, 1))
-        before = np.minimum(after - 1, len(self.time) - 1)
-        after = np.minimum(after, len(self.time) - 1)
-        nearest = np.where(instants - self.time[before] <= self.time[after] - instants, before, after)
+        nearest = nearest_instants(self.time, instants)
         return with_turns(groups, [angle[:, nearest] for angle in self.angles(groups)])
-
-
-def counted_on(near: np.ndarray, angles: np.ndarray) -> np.ndarray:
-    """Return angles known up to whole turns, (..., places), counted on from one that is near to the first."""
-    steps = np.diff(angles, axis=-1, prepend=np.broadcast_to(near, angles.shape[:-1])[..., None])
-    return angles - 2 * np.pi * np.cumsum(np.round(steps / (2 * np.pi)), axis=-1)
 
 
 def measures_angle(group: Group) -> bool:
@@ -86,7 +85,11 @@ def measures_angle(group: Group) -> bool:
 
 
 def with_datums(
-    groups: Sequence[Group], coordinates: dict[str, Any], turnings: Sequence[Turning] = (), *, keep: bool = False
+    groups: Sequence[Group],
+    coordinates: Coordinates,
+    prescribed: Sequence[PrescribedAngle] = (),
+    *,
+    keep: bool = False,
 ) -> tuple[Group, ...]:
     """Return groups with the angles about axes counted from a position.
 
@@ -96,17 +99,17 @@ def with_datums(
         Those that measure no such angle stay as they are.
     coordinates : dict of str to array
         Of all bodies, the ground first, shape (..., bodies, 1).
-    turnings : sequence of Turning, optional
+    prescribed : sequence of PrescribedAngle, optional
         Angles known with their turns: one about the same axis between the same bodies has as many.
     keep : bool, default False
         Whether angles go on from the datum of now, instead of those that the frames of the bodies have.
     """
     return tuple(
-        _with_datum(group, coordinates, turnings, keep=keep) if measures_angle(group) else group for group in groups
+        _with_datum(group, coordinates, prescribed, keep=keep) if measures_angle(group) else group for group in groups
     )
 
 
-def raw_angles(groups: Sequence[Group], coordinates: dict[str, Any]) -> list[np.ndarray]:
+def raw_angles(groups: Sequence[Group], coordinates: Coordinates) -> list[np.ndarray]:
     """Return the angles about axes that groups measure, up to whole turns, (instances, batch) each.
 
     Parameters
@@ -119,7 +122,7 @@ def raw_angles(groups: Sequence[Group], coordinates: dict[str, Any]) -> list[np.
     return [_raw_angle(group, relative_attitude(group, coordinates)) for group in filter(measures_angle, groups)]
 
 
-def _raw_angle(group: Group, attitude: np.ndarray) -> np.ndarray:
+def _raw_angle(group: Group, attitude: Quaternions) -> Angles:
     """Return the angles that a group measures at attitudes of its second bodies relative to the first."""
     element, axis = group.element, axis_of(group)
     if element.vector_i is None:
@@ -130,29 +133,26 @@ def _raw_angle(group: Group, attitude: np.ndarray) -> np.ndarray:
 
 def with_angles(groups: Sequence[Group], angles: Sequence[np.ndarray]) -> tuple[Group, ...]:
     """Return groups of which the data hold other angles, for those that measure one about an axis."""
-    found = iter(angles)
-
-    def counted(group: Group) -> Group:
-        angle = next(found)
-        return _put(group, "datum", Datum(group.element.datum.attitude, angle, angle, group.element.datum.across))
-
-    return tuple(counted(group) if measures_angle(group) else group for group in groups)
+    return _with_data(groups, angles, lambda datum, angle: dataclasses.replace(datum, angle=angle, near=angle))
 
 
 def with_turns(groups: Sequence[Group], near: Sequence[Any]) -> tuple[Group, ...]:
     """Return groups that measure angles about axes with the turns of these, (instances, batch) each; may be traced."""
-    found = iter(near)
-    return tuple(
-        eqx.tree_at(lambda g: g.element.datum.near, g, next(found)) if measures_angle(g) else g for g in groups
-    )
+    return _with_data(groups, near, lambda datum, turns: dataclasses.replace(datum, near=turns))
 
 
-def at_lanes(groups: Sequence[Group], lanes: np.ndarray) -> tuple[Group, ...]:
+def _with_data(groups: Sequence[Group], values: Sequence[Any], put: Callable[[Datum, Any], Datum]) -> tuple[Group, ...]:
+    """Return groups with other data, one value for each that measures an angle about an axis."""
+    found = iter(values)
+    return tuple(g.holding("datum", put(g.element.datum, next(found))) if measures_angle(g) else g for g in groups)
+
+
+def at_lanes(groups: Sequence[Group], lanes: Int[np.ndarray, " lane"]) -> tuple[Group, ...]:
     """Return groups whose angles about axes have the turns of a whole batch, for some of its lanes."""
     return with_turns(groups, [g.element.datum.near[..., lanes] for g in groups if measures_angle(g)])
 
 
-def _with_datum(group: Group, coordinates: dict[str, Any], turnings: Sequence[Turning], *, keep: bool) -> Group:
+def _with_datum(group: Group, coordinates: Coordinates, prescribed: Sequence[PrescribedAngle], *, keep: bool) -> Group:
     element, attitude = group.element, relative_attitude(group, coordinates)
     axis, known = axis_of(group), element.datum
     before = np.zeros(attitude.shape[1:]) if known is None else since(known, attitude, axis)
@@ -165,15 +165,15 @@ def _with_datum(group: Group, coordinates: dict[str, Any], turnings: Sequence[Tu
         angle = np.where(told, angle, before)
     angle = before + principal(angle - before) if known is not None else principal(angle)
     for k, bodies in enumerate(zip(*group.bodies, strict=True)):
-        for turning in turnings:
-            sense = _sense(bodies, _turned(coordinates["quaternion"][:, bodies[0], 0], axis[:, k, 0]), turning)
+        for given in prescribed:
+            sense = _sense(bodies, _turned(coordinates["quaternion"][:, bodies[0], 0], axis[:, k, 0]), given)
             if sense:
-                expected = sense * turning.angle
+                expected = sense * given.angle
                 angle[k] = expected + principal(angle[k] - expected)
     # a driver or a force acts about the axis, wherever its vector on body j points beside it
     acts = element.vector_i is not None and hasattr(element, "role")
     across = _across(np.asarray(element.vector_j), attitude, axis) if acts else None
-    return _put(group, "datum", Datum(attitude, angle, angle, across))
+    return group.holding("datum", Datum(attitude, angle, angle, across))
 
 
 def with_datum_of(group: Group, known: Group) -> Group:
@@ -181,8 +181,8 @@ def with_datum_of(group: Group, known: Group) -> Group:
     datum = known.element.datum
     if datum.across is not None:
         across = _across(group.element.vector_j, np.asarray(datum.attitude), axis_of(known))
-        datum = Datum(datum.attitude, datum.angle, datum.near, across)
-    return _put(group, "datum", datum)
+        datum = dataclasses.replace(datum, across=across)
+    return group.holding("datum", datum)
 
 
 def departure(before: Sequence[Group], after: Sequence[Group]) -> float:
@@ -198,30 +198,34 @@ def departure(before: Sequence[Group], after: Sequence[Group]) -> float:
     return float(largest)
 
 
-def turnings_of(groups: Sequence[Group], coordinates: dict[str, Any], laws: Sequence[np.ndarray]) -> list[Turning]:
+def prescribed_angles(
+    groups: Sequence[Group], coordinates: Coordinates, laws: Sequence[np.ndarray]
+) -> list[PrescribedAngle]:
     """Return the angles that drivers prescribe at a position, in space; `laws` holds the values for each such group."""
     found = []
     for group, values in zip((g for g in groups if measures_angle(g)), laws, strict=True):
         for k, bodies in enumerate(zip(*group.bodies, strict=True)):
             axis = _turned(coordinates["quaternion"][:, bodies[0], 0], axis_of(group)[:, k, 0])
-            found.append(Turning(bodies, axis, float(np.broadcast_to(values, (group.instances, 1))[k, 0])))
-    return [turning for turning in found if np.isfinite(turning.angle)]
+            found.append(PrescribedAngle(bodies, axis, float(np.broadcast_to(values, (group.instances, 1))[k, 0])))
+    return [given for given in found if np.isfinite(given.angle)]
 
 
-def axis_of(group: Group) -> np.ndarray:
+def axis_of(group: Group) -> Float[np.ndarray, "3 instance 1"]:
     """Return the unit axes on body i of the elements of a group, (3, instances, 1)."""
     element = group.element
     axis = np.asarray(element.axis if hasattr(element, "axis") else element.axis_i)
     return axis / np.linalg.norm(axis, axis=0)
 
 
-def relative_attitude(group: Group, coordinates: dict[str, Any]) -> np.ndarray:
+def relative_attitude(group: Group, coordinates: Coordinates) -> Quaternions:
     """Return the Euler parameters of the second bodies of a group relative to the first, (4, instances, 1)."""
     first, second = (np.asarray(coordinates["quaternion"])[:, list(bodies)] for bodies in group.bodies)
     return _product(_inverse(first), second)
 
 
-def attitudes_of(bodies: Sequence[int], quaternion: np.ndarray) -> np.ndarray:
+def attitudes_of(
+    bodies: Sequence[int], quaternion: Float[np.ndarray, "4 bodies place"]
+) -> Float[np.ndarray, "4 place"]:
     """Return the Euler parameters, (4, places), of a body, or of the second body relative to the first.
 
     Parameters
@@ -235,44 +239,40 @@ def attitudes_of(bodies: Sequence[int], quaternion: np.ndarray) -> np.ndarray:
     return _product(_inverse(base[0]), body) if base else body
 
 
-def since(datum: Datum, attitude: np.ndarray, axis: np.ndarray) -> np.ndarray:
+def since(datum: Datum, attitude: Quaternions, axis: Vectors) -> Angles:
     """Return the angle of an attitude, within half a turn of that of a datum."""
     return np.asarray(datum.angle) + angle_of(_product(attitude, _inverse(np.asarray(datum.attitude))), axis)[0]
 
 
-def _between(attitude: np.ndarray, axis: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+def _between(attitude: Quaternions, axis: Vectors, first: Vectors, second: Vectors) -> Angles:
     """Return the signed angle about an axis from a vector of body i to one of body j."""
     b = _turned(attitude, second)
     across = b - (b * axis).sum(axis=0) * axis
     return np.arctan2((np.cross(axis, first, axis=0) * across).sum(axis=0), (first * across).sum(axis=0))
 
 
-def _across(second: Any, attitude: np.ndarray, axis: np.ndarray) -> Any:
+def _across(second: Numbers, attitude: Quaternions, axis: Vectors) -> Numbers:
     """Return the part of vectors of bodies j across axes of bodies i."""
     along = _turned(_inverse(attitude), axis)
     return second - (second * along).sum(axis=0) * along
 
 
-def _sense(bodies: tuple[int, ...], axis: np.ndarray, turning: Turning) -> int:
+def _sense(bodies: tuple[int, ...], axis: Float[np.ndarray, " 3"], given: PrescribedAngle) -> int:
     """Return 1 where an angle follows that of a driver, -1 where it runs against it, else 0."""
-    if sorted(bodies) != sorted(turning.bodies) or np.linalg.norm(np.cross(axis, turning.axis)) > PARALLEL:
+    if sorted(bodies) != sorted(given.bodies) or np.linalg.norm(np.cross(axis, given.axis)) > PARALLEL:
         return 0
-    return int(np.sign(axis @ turning.axis)) * (1 if bodies == turning.bodies else -1)
+    return int(np.sign(axis @ given.axis)) * (1 if bodies == given.bodies else -1)
 
 
-def _put(group: Group, name: str, value: Any) -> Group:
-    return eqx.tree_at(lambda g: getattr(g.element, name), group, value, is_leaf=lambda x: x is None)
-
-
-def _inverse(p: np.ndarray) -> np.ndarray:
+def _inverse(p: Quaternions) -> Quaternions:
     return np.concatenate([p[:1], -p[1:]])
 
 
-def _product(p: np.ndarray, q: np.ndarray) -> np.ndarray:
+def _product(p: Quaternions, q: Quaternions) -> Quaternions:
     e0 = p[:1] * q[:1] - (p[1:] * q[1:]).sum(axis=0, keepdims=True)
     return np.concatenate([e0, p[:1] * q[1:] + q[:1] * p[1:] + np.cross(p[1:], q[1:], axis=0)])
 
 
-def _turned(p: np.ndarray, vector: np.ndarray) -> np.ndarray:
+def _turned(p: Quaternions, vector: Vectors) -> Vectors:
     twice = 2 * np.cross(p[1:], vector, axis=0)
     return vector + p[:1] * twice + np.cross(p[1:], twice, axis=0)

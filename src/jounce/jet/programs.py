@@ -1,0 +1,99 @@
+"""Programs of JAX, run operation after operation on values of another kind, such as jets in place of arrays."""
+
+import abc
+from collections.abc import Callable, Sequence
+from typing import Any, ClassVar
+
+import jax
+import jax.numpy as jnp
+from jax.extend.core import JaxprEqn, Literal
+
+
+class ProgramReader(abc.ABC):
+    """Runs programs on values that change in time and on constants; branches are all run, loops unrolled.
+
+    A subclass says what the values are, and what an operation makes of them.
+    """
+
+    moving: ClassVar[type]  # of the values that change in time
+
+    def constant(self, array: Any) -> Any:
+        """Return what stands for an array that does not change in time."""
+        return array
+
+    @abc.abstractmethod
+    def value(self, x: Any) -> Any:
+        """Return the array that a value or a constant is now."""
+
+    @abc.abstractmethod
+    def applied(self, equation: JaxprEqn, operands: list[Any]) -> list[Any]:
+        """Return what an elementary operation makes of values."""
+
+    def is_constant(self, equation: JaxprEqn, operands: list[Any]) -> bool:  # noqa: ARG002 - of use to others
+        """Tell whether an operation makes constants, so that it may be applied to arrays."""
+        return not any(isinstance(x, self.moving) for x in operands)
+
+    def read(self, jaxpr: Any, constants: Sequence[Any], arguments: Sequence[Any]) -> list[Any]:
+        """Return the results of a program for its arguments."""
+        found: dict[Any, Any] = dict(zip(jaxpr.constvars, map(self.constant, constants), strict=True))
+        found.update(zip(jaxpr.invars, arguments, strict=True))
+
+        def look(variable: Any) -> Any:
+            return self.constant(variable.val) if isinstance(variable, Literal) else found[variable]
+
+        for equation in jaxpr.eqns:
+            operands = [look(v) for v in equation.invars]
+            results = self.results(equation, operands)
+            found.update(zip(equation.outvars, results, strict=True))
+        return [look(v) for v in jaxpr.outvars]
+
+    def composed(self, function: Callable[..., Any], operands: Sequence[Any]) -> Any:
+        """Read a function of the operands in the place of an operation."""
+        program = jax.make_jaxpr(function)(*map(self.value, operands))
+        return self.read(program.jaxpr, program.consts, operands)[0]
+
+    def results(self, equation: JaxprEqn, operands: list[Any]) -> list[Any]:
+        """Return the results of one operation, which may hold programs of its own."""
+        name, parameters = equation.primitive.name, equation.params
+        if self.is_constant(equation, operands):
+            results = equation.primitive.bind(*map(self.value, operands), **parameters)
+            return list(map(self.constant, results if equation.primitive.multiple_results else [results]))
+        if name == "cond":
+            return self._branches(operands[0], operands[1:], parameters["branches"])
+        if name == "scan":
+            return self._unrolled(operands, parameters)
+        inner = inner_program(parameters)
+        if name == "while" or inner is None:
+            return self.applied(equation, operands)
+        closed = hasattr(inner, "jaxpr")
+        return self.read(inner.jaxpr if closed else inner, inner.consts if closed else (), operands)
+
+    def _branches(self, which: Any, operands: list[Any], branches: Sequence[Any]) -> list[Any]:
+        """Run every branch of a condition and select from the results."""
+        outcomes = zip(*(self.read(branch.jaxpr, branch.consts, operands) for branch in branches), strict=True)
+        index = jnp.clip(self.value(which), 0, len(branches) - 1)
+
+        def selected(*cases: Any) -> Any:
+            return jax.lax.select_n(jnp.broadcast_to(index, cases[0].shape), *cases)
+
+        return [self.composed(selected, cases) for cases in outcomes]
+
+    def _unrolled(self, operands: list[Any], parameters: dict[str, Any]) -> list[Any]:
+        """Run a loop of known length step by step."""
+        inner, constants, carried = parameters["jaxpr"], parameters["num_consts"], parameters["num_carry"]
+        fixed, carry = operands[:constants], operands[constants : constants + carried]
+        sequences, collected = operands[constants + carried :], []
+        steps = range(parameters["length"])
+        for i in reversed(steps) if parameters["reverse"] else steps:
+            here = [self.composed(lambda x, i=i: x[i], [x]) for x in sequences]
+            results = self.read(inner.jaxpr, inner.consts, [*fixed, *carry, *here])
+            carry = results[:carried]
+            collected.append(results[carried:])
+        if parameters["reverse"]:
+            collected.reverse()
+        return [*carry, *(self.composed(lambda *xs: jnp.stack(xs), parts) for parts in zip(*collected, strict=True))]
+
+
+def inner_program(parameters: dict[str, Any]) -> Any:
+    """Return the program inside a call (jit, custom derivative) or a loop, or None for a plain operation."""
+    return parameters.get("jaxpr", parameters.get("call_jaxpr"))

@@ -1,0 +1,59 @@
+"""Whole turns of angles: taken out, brought near to what is expected, counted on from place to place."""
+
+import math
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from jounce.jet.algebra import Jet, Quantity
+from jounce.shapes import Real
+
+WHOLE_TURN = 2 * math.pi
+
+
+def whole_periods(value: Real, period: Real = WHOLE_TURN) -> Any:
+    """Return the whole number of periods (turns unless told) nearest to a value, in the unit of the value."""
+    count: Any = value / period
+    return period * (jnp if isinstance(count, jax.Array) else np).round(count)
+
+
+def wrap(x: Quantity, period: Real = WHOLE_TURN) -> Any:
+    """Shift by whole periods into ``[-period/2, period/2]``: what is left of an angle or a screw's advance."""
+    return x - whole_periods(x.coefficients[0] if isinstance(x, Jet) else x, period)
+
+
+def brought_near(angle: Quantity, expected: Real) -> Any:
+    """Return an angle shifted by the whole turns that bring it nearest to the one expected."""
+    return angle - whole_periods((angle.coefficients[0] if isinstance(angle, Jet) else angle) - expected)
+
+
+def principal(angle: Real) -> Any:
+    """Return an angle shifted by whole turns to (-pi, pi]; half a turn is pi, whatever its last digits say."""
+    namespace = jnp if isinstance(angle, jax.Array) else np
+    return angle - WHOLE_TURN * namespace.ceil((angle - np.pi) / WHOLE_TURN - 1e-9)
+
+
+def counted_on(
+    angles: Float[np.ndarray, "*batch place"], rises: Float[np.ndarray, "*batch step"] | float = 0.0
+) -> Float[np.ndarray, "*batch place"]:
+    """Return angles known up to whole turns, counted on from the first.
+
+    Parameters
+    ----------
+    angles : array of shape (..., places)
+        rad.
+    rises : array of shape (..., places - 1), optional
+        By how much each is expected to exceed the one before, to within half a turn; zero unless told.
+    """
+    turns = np.cumsum(whole_periods(np.diff(angles, axis=-1) - rises), axis=-1)
+    return np.concatenate([angles[..., :1], angles[..., 1:] - turns], axis=-1)
+
+
+def counted_by_rates(
+    angles: Float[np.ndarray, "*batch time"], rates: Float[np.ndarray, "*batch time"], time: Float[np.ndarray, " time"]
+) -> Float[np.ndarray, "*batch time"]:
+    """Return angles known up to whole turns, counted on from the first by their rates, rad/s."""
+    return counted_on(angles, 0.5 * np.diff(time) * (rates[..., 1:] + rates[..., :-1]))

@@ -1,0 +1,7 @@
+"""The poses of either space, as one type."""
+
+from jounce.rigid.planar import PlanarPose
+from jounce.rigid.spatial import SpatialPose
+
+Pose = PlanarPose | SpatialPose
+"""Pose of one or many bodies, in the plane or in space."""
