@@ -19,7 +19,7 @@ from jounce.jet import Jet
 from jounce.jet.algebra import stacked, total
 from jounce.jet.turns import brought_near
 from jounce.kinematics.compilation import compiled
-from jounce.kinematics.linear import DenseFactor
+from jounce.kinematics.factors import Factor, blank_factor, factored
 from jounce.kinematics.status import Status
 from jounce.mechanism.system import System
 from jounce.rigid.pose import Pose
@@ -80,7 +80,7 @@ class Correction(NamedTuple):
 
 def newton_raphson(
     system: System, pose: Pose, time: Float[Jet, "1 batch"], tolerance: Float[Numbers, ""], refine: Bool[Numbers, ""]
-) -> tuple[Pose, DenseFactor, Correction]:
+) -> tuple[Pose, Factor, Correction]:
     """Return the assembled pose, the factored Jacobian there, and how large the corrections were.
 
     An instant is accepted when its correction is at most the tolerance. With `refine` that correction is still made,
@@ -108,7 +108,7 @@ def newton_raphson(
         )
         accepted = correction.last <= tolerance
         simplified = jnp.where(refine | ~accepted, again, correction.simplified)  # else the pose was left as it was
-        factor = DenseFactor.of(system.jacobian(pose, time))
+        factor = factored(system, pose, time)
         step = factor.solve(-residual, refined=False)
         size = sized(pose, step)
         step = jnp.where(refine | ~(size <= tolerance), step, 0.0)
@@ -118,13 +118,13 @@ def newton_raphson(
 
     lanes = time.coefficients[0].shape[-1]
     unknown = np.full(lanes, np.inf)
-    blank = DenseFactor.blank(system.cells.shape, lanes)
+    blank = blank_factor(system, lanes)
     state = (pose, blank, Correction(unknown, unknown, np.zeros(lanes)), np.zeros(lanes, bool), 0)
     pose, factor, correction, _, _ = jax.lax.while_loop(unfinished, iterate, state)
     return pose, factor, correction
 
 
-def differentiated(system: System, pose: Pose, factor: DenseFactor, time: Float[Jet, "1 batch"]) -> Pose:
+def differentiated(system: System, pose: Pose, factor: Factor, time: Float[Jet, "1 batch"]) -> Pose:
     """Return the pose with all derivatives that the time jet has: order after order, one solve each.
 
     The coefficient of order k of the residual is affine in the unknown (r[k], w'[k-1] / k) with the Jacobian as its
@@ -169,7 +169,7 @@ def _safe_step(terms: list[Lanes]) -> Lanes:
 
 
 def _turnover(
-    system: System, pose_type: type[Pose], coordinates: dict[str, Jet], factor: DenseFactor, time: Lanes
+    system: System, pose_type: type[Pose], coordinates: dict[str, Jet], factor: Factor, time: Lanes
 ) -> Float[Numbers, " 1"]:
     """Return the eigenvalue of ``J^-1 J'`` of largest size with the sign of its real part, 1/s, for the first lane.
 
@@ -186,8 +186,7 @@ def _turnover(
 
     still = np.zeros(1)
     _, slope = jax.jvp(jacobian, (still,), (np.ones(1),))
-    inverse = jax.tree.map(lambda x: x[..., :1], factor).inverse()
-    relative = inverse[..., 0] @ slope[..., 0]
+    relative = factor.applied_inverse(slope[..., 0])
     power, grown = relative, np.zeros(())
     for k in range(1, SQUARINGS + 1):
         size = jnp.maximum(jnp.sqrt(jnp.sum(power * power)), 1e-300)

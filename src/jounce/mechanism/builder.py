@@ -32,6 +32,7 @@ from jounce.mechanism.system import (
     Group,
     System,
     group_elements,
+    elimination,
     jacobian_cells,
 )
 from jounce.rigid import PlanarPose, SpatialPose
@@ -133,7 +134,7 @@ def build(mechanism: Mechanism, like: Model | None = None) -> Model:
     scale = np.array([length] * components + [1.0] * pose_type.turns)
     history = AttitudeHistory(guess["quaternion"], np.zeros(1)) if components == 3 else None
     return Model(
-        System(groups, outputs, cells, np.ones((len(rows), 1)), scale, count, forces),
+        System(groups, outputs, cells, np.ones((len(rows), 1)), scale, count, forces, elimination(cells, len(scale))),
         pose_type,
         guess,
         tuple(rows),

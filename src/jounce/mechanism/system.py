@@ -12,6 +12,7 @@ from jaxtyping import Bool, Float, Int
 
 from jounce.jet import Jet, concatenate
 from jounce.jet.algebra import stacked
+from jounce.mechanism.fronts import Fronts
 from jounce.mechanism.resolve import group_key, resolve_element, stack_elements
 from jounce.rigid import SpatialPose
 from jounce.rigid.body_arrays import each_jet
@@ -19,6 +20,7 @@ from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
 
 POSITION_COMPONENTS = {"planar": 2, "spatial": 3}
+FRONT_COST = 4.0  # of an operation in fronts, by that of one in dense elimination, as measured
 
 
 class Group(eqx.Module):
@@ -162,13 +164,12 @@ class System(eqx.Module):
 
     groups: tuple[Group, ...]
     outputs: tuple[Group, ...]
-    cells: Int[
-        Numbers, "row column"
-    ]  # where each entry of the Jacobian stands among the blocks of the groups, shape (rows, columns)
+    cells: Int[Numbers, "row column"]  # where each entry of the Jacobian stands among the blocks of the groups
     row_scale: Float[Numbers, "row 1"]
     column_scale: Float[Numbers, " coordinate"]  # one for each coordinate of a body
     body_count: int = eqx.field(static=True)
     forces: tuple[Group, ...] = ()
+    fronts: Fronts | None = None  # how a large Jacobian is eliminated
 
     def residual(self, pose: Pose, time: Jet) -> Float[Jet, "row batch"]:
         """Return the residuals of all constraints, shape (rows, batch), scaled."""
@@ -179,10 +180,14 @@ class System(eqx.Module):
 
     def jacobian(self, pose: Pose, time: Jet) -> Float[Numbers, "row column batch"]:
         """Return the scaled Jacobian at a pose of order zero, shape (rows, columns, batch)."""
+        entries = jnp.concatenate([self.entries(pose, time), jnp.zeros_like(time.coefficients[0])])
+        return entries[self.cells] * self.row_scale[:, :, None]
+
+    def entries(self, pose: Pose, time: Jet) -> Float[Numbers, "entry batch"]:
+        """Return the entries of the Jacobian that are not zero for certain, before rows are scaled."""
         frozen = Jet.constant(time.coefficients[0], 1)
         blocks = [b for group in self.groups for b in group.derivative_blocks(pose, frozen, self.column_scale)]
-        entries = jnp.concatenate([*map(_flat, blocks), jnp.zeros_like(time.coefficients[0])])
-        return entries[self.cells] * self.row_scale[:, :, None]
+        return jnp.concatenate([*map(_flat, blocks)])
 
     def admissible(self, time: Jet) -> Bool[Numbers, "driver batch"]:
         """Tell at which instants each driver has a permitted value, shape (drivers, batch)."""
@@ -269,3 +274,19 @@ def jacobian_cells(groups: tuple[Group, ...], rows: list[int], coordinate_count:
             position += coordinate_count * r * n
         first_row += r * n
     return cells
+
+
+def elimination(cells: np.ndarray, width: int) -> Fronts | None:
+    """Return how a Jacobian is eliminated body by body, where that is less work than as a dense matrix."""
+    (rows, columns), empty = cells.shape, int(cells.max(initial=0))
+    if rows != columns or not rows:
+        return None
+    blocks = cells.reshape(rows, columns // width, width)
+    touched = (blocks < empty).any(axis=2)
+    slots = int(touched.sum(axis=1).max())
+    bodies = np.argsort(~touched, axis=1, kind="stable")[:, :slots]
+    places = np.take_along_axis(blocks, bodies[..., None], axis=1)
+    bodies = np.where(np.take_along_axis(touched, bodies, axis=1), bodies, -1)
+    fronts = Fronts.of(bodies, places, columns // width)
+    count, height, wide = fronts.shape
+    return fronts if FRONT_COST * count * width * height * wide < rows**3 else None
