@@ -78,7 +78,7 @@ class Fronts(eqx.Module):
             left = len(held[front]) - width
             if separators[front]:
                 held[min(position[list(separators[front])])] += [(front, k) for k in range(max(left, 0))]
-        height, beside = max(max(map(len, held)), width), max(map(len, separators))
+        height, beside = max(width + 1, *map(len, held)), max(1, *map(len, separators))  # no empty arrays
         return cls._written(held, order, position, separators, bodies, places, height, beside)
 
     @classmethod
