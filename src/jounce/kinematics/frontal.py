@@ -135,7 +135,7 @@ def _put(whole: Any, part: Any, place: Any) -> Any:
 
 def _reflected(y: Any, reflections: Any) -> Any:
     for vector, factor in reflections:
-        y = y - vector * (factor * jnp.sum(vector * y, axis=0))
+        y = y - vector * (factor[None] * jnp.sum(vector * y, axis=0, keepdims=True))
         y = jax.lax.optimization_barrier(y)  # or XLA computes the chain again for each use
     return y
 
@@ -153,7 +153,8 @@ def _eliminated(front: Any, width: int) -> tuple[Any, Any, Any, Any, Any]:
         vector = jnp.concatenate([(x[0] - pivot)[None], x[1:]])
         square = size * (size + jnp.abs(x[0]))
         factor = jnp.where(square == 0, 0.0, 1.0 / jnp.where(square == 0, 1.0, square))
-        rest = front[:, 1:] - vector[:, None] * (factor * jnp.sum(vector[:, None] * front[:, 1:], axis=0))[None]
+        along = jnp.sum(vector[:, None] * front[:, 1:], axis=0, keepdims=True)
+        rest = front[:, 1:] - vector[:, None] * (factor[None, None] * along)
         above = jnp.zeros((k, *x.shape[1:]))
         vectors.append(jnp.concatenate([above, vector]))
         factors.append(factor)

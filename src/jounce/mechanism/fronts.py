@@ -66,23 +66,14 @@ class Fronts(eqx.Module):
         body_count : int
             Number of bodies.
         """
-        rows, _, width = places.shape
-        order, separators = _ordered([set(row[row >= 0].tolist()) for row in bodies], body_count)
-        position = np.empty(body_count, int)
-        position[order] = np.arange(body_count)
-        held: list[list[tuple[int, int]]] = [[] for _ in order]  # rows of each front: (-1, row), or (front, left row)
-        for row in range(rows):
-            touched = bodies[row][bodies[row] >= 0]
-            held[min(position[touched])].append((-1, row))
-        for front in range(body_count):
-            left = len(held[front]) - width
-            if separators[front]:
-                held[min(position[list(separators[front])])] += [(front, k) for k in range(max(left, 0))]
-        height, beside = max(width + 1, *map(len, held)), max(1, *map(len, separators))  # no empty arrays
-        return cls._written(held, order, position, separators, bodies, places, height, beside)
+        height = places.shape[-1] + 1  # and at least one neighbour: no empty arrays
+        order, separators, held = _ordered(bodies, body_count, places.shape[-1])
+        height, beside = max(height, *map(len, held)), max(1, *map(len, separators))
+        return cls._written(held, order, separators, bodies, places, height, beside)
 
     @classmethod
-    def _written(cls, held, order, position, separators, bodies, places, height, beside) -> "Fronts":
+    def _written(cls, held, order, separators, bodies, places, height, beside) -> "Fronts":
+        position = np.argsort(order)
         count, width = len(order), places.shape[-1]
         columns, entry_count, left_height = width * (1 + beside), int(places.max()) + 1, height - width
         entries = np.full((count, height, columns), entry_count, np.int32)
@@ -109,27 +100,39 @@ class Fronts(eqx.Module):
         return cls(entries, rights, left_rows, left_columns, neighbours, position.astype(np.int32), len(bodies), width)
 
 
-def _ordered(touched: list[set[int]], count: int) -> tuple[np.ndarray, list[set[int]]]:
-    """Return the bodies in the order of their elimination, and the neighbours that each has then."""
+def _ordered(
+    bodies: np.ndarray, count: int, width: int
+) -> tuple[np.ndarray, list[set[int]], list[list[tuple[int, int]]]]:
+    """Return the bodies in the order of their elimination, and the neighbours and rows that each has then.
+
+    A row is told by the front that left it over and its place there; -1 and its number in the matrix if none did. Of
+    bodies with as many neighbours, one with the fewest rows is the first.
+    """
     beside: list[set[int]] = [set() for _ in range(count)]
-    for members in touched:
-        for body in members:
-            beside[body] |= members
-    for body, members in enumerate(beside):
-        members.discard(body)
-    waiting = [(len(members), body) for body, members in enumerate(beside)]
+    rows: list[set[tuple[int, int]]] = [set() for _ in range(count)]
+    for row, slots in enumerate(bodies):
+        touched = {int(body) for body in slots if body >= 0}
+        for body in touched:
+            beside[body] |= touched - {body}
+            rows[body].add((-1, row))
+    waiting = [(len(beside[body]), len(rows[body]), body) for body in range(count)]
     heapq.heapify(waiting)
-    order, separators, done = [], [], np.zeros(count, bool)
+    order: list[int] = []
+    separators, held, done = [], [], np.zeros(count, bool)
     while waiting:
-        degree, body = heapq.heappop(waiting)
-        if done[body] or degree != len(beside[body]):
-            continue
+        *told, body = heapq.heappop(waiting)
+        if done[body] or told != [len(beside[body]), len(rows[body])]:
+            continue  # it was put in again since, with what it has now
         done[body] = True
-        around = beside[body]
+        around, mine = beside[body], sorted(rows[body])
+        left = {(len(order), k) for k in range(len(mine) - width)}
         order.append(body)
         separators.append(set(around))
+        held.append(mine)
         for other in around:
             beside[other] |= around
             beside[other] -= {other, body}
-            heapq.heappush(waiting, (len(beside[other]), other))
-    return np.array(order, int), separators
+            rows[other] -= rows[body]
+            rows[other] |= left
+            heapq.heappush(waiting, (len(beside[other]), len(rows[other]), other))
+    return np.array(order, int), separators, held
