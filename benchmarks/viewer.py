@@ -8,7 +8,7 @@ import time
 import numpy as np
 
 import jounce as jn
-from jounce.viewer.exports import quiet_server
+from jounce.viewer.local_server import quiet_server
 from jounce.viewer.mechanisms import MechanismSubject
 from jounce.viewer.page import Page
 
@@ -31,7 +31,7 @@ def main() -> None:
                 raise page.session.error
             middle, worst = np.median(taken[5:]), np.max(taken[5:])
             aim = f", aim {AIM:.0f} ms" if file == "four_bar" else ""
-            print(f"{file}: {len(page.take.time)} instants, {middle:.1f} ms, worst {worst:.1f} ms{aim}")
+            print(f"{file}: {len(page.recording.time)} instants, {middle:.1f} ms, worst {worst:.1f} ms{aim}")
         finally:
             page.close()
 

@@ -18,7 +18,7 @@ os.environ.setdefault("JAX_DISABLE_MOST_OPTIMIZATIONS", "true")  # each file is 
 
 import jounce as jn
 from jounce import plot
-from jounce.plot.frames import placed
+from jounce.plot.frames import frames, points_at
 from jounce.plot.sketch import draw_scale
 
 ROOT = pathlib.Path(__file__).parents[1]
@@ -191,7 +191,7 @@ def add_outline(figure, moved, picture):
     """Draw the outline of a body behind the sketch, and widen the view to hold it."""
     body, outline = picture.outline
     at = int(np.argmin(np.abs(moved.time - picture.instant)))
-    places = placed(moved, body, outline(moved.mechanism.parameter_values))[at, 0]
+    places = points_at(frames(moved)[body], outline(moved.mechanism.parameter_values))[at]
     axes = figure.axes[0]
     axes.fill(*places.T, facecolor="#cce3f0", edgecolor="#0072B2", linewidth=1.5, zorder=1)
     (left, right), margin = axes.get_xlim(), 0.12 * np.ptp(places[:, 0])

@@ -9,7 +9,7 @@ from pathlib import Path
 from playwright.sync_api import sync_playwright
 
 from jounce.viewer import view
-from jounce.viewer.take import Spot
+from jounce.viewer.appearance import BodyPoint
 
 IMAGES = Path(__file__).parent / "images"
 FLAGS = ["--headless=new", "--no-sandbox", "--enable-unsafe-swiftshader"]
@@ -17,8 +17,7 @@ SIZE = {"width": 1400, "height": 800}
 
 
 def four_bar(shown, page):
-    spot = shown.page.take.looks.spots[0]
-    shown.marks.mark(spot, (1, 2, 3))
+    shown.arrows.trace(shown.page.recording.appearance.points[0], (1, 2, 3))
     shown.page.seek(1.17)
     page.get_by_role("tab", name="Arrows").click()
 
@@ -46,7 +45,7 @@ def spatial(shown, _):
 
 
 def robot(shown, page):
-    shown.marks.mark(Spot("panda_link7", (0.0, 0.0, 0.2), "hand"), (1, 2))
+    shown.arrows.trace(BodyPoint("panda_link7", (0.0, 0.0, 0.2), "hand"), (1, 2))
     forces(shown, page, ["forces of drivers"])
     shown.page.seek(2.6)
 

@@ -1,5 +1,7 @@
 """The regime of all tests: float64, strict promotion of types and ranks; warnings are errors by pyproject.toml."""
 
+import ctypes
+import gc
 import os
 import pathlib
 import shutil
@@ -26,6 +28,7 @@ for _name in ("SIGINT", "SIGHUP"):  # ignored in what runs in the background; th
     if _number is not None and signal.getsignal(_number) is signal.SIG_IGN:
         signal.signal(_number, signal.default_int_handler if _name == "SIGINT" else signal.SIG_DFL)
 LARGEST_STORE = 2**30  # bytes of compiled programs that are kept between runs
+LARGEST_MEMORY = 2**30  # bytes of a worker, after which compiled programs are forgotten
 MEMORY_MAPS = 65530  # of a process, unless the system is set up otherwise
 
 
@@ -42,11 +45,26 @@ def pytest_configure(config):
 
 @pytest.fixture(autouse=True, scope="module")
 def _few_programs():
-    """Forget compiled programs in time: each takes some memory maps, and XLA dies where Linux gives no more."""
+    """Forget compiled programs in time: they take memory, and memory maps, without which XLA dies.
+
+    Those that are needed again are read from their files.
+    """
     yield
-    maps = pathlib.Path("/proc/self/maps")
-    if maps.exists() and maps.read_text().count("\n") > 0.5 * MEMORY_MAPS:
+    if _memory() > LARGEST_MEMORY or _memory_maps() > 0.5 * MEMORY_MAPS:
         jax.clear_caches()
+        gc.collect()
+        getattr(ctypes.CDLL(None), "malloc_trim", lambda _: None)(0)  # glibc keeps what was freed
+
+
+def _memory():
+    """Return how many bytes this process holds, where Linux tells."""
+    told = pathlib.Path("/proc/self/statm")
+    return int(told.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") if told.exists() else 0
+
+
+def _memory_maps():
+    told = pathlib.Path("/proc/self/maps")
+    return told.read_text().count("\n") if told.exists() else 0
 
 
 @pytest.fixture(autouse=True)

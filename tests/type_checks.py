@@ -33,7 +33,17 @@ def _holds_shape(annotation):
 
 
 class Decorated(ast.NodeTransformer):
-    """A module whose outermost functions and methods, before other decorators, and classes, after them, are checked."""
+    """A module whose outermost functions and methods, before other decorators, and classes, after them, are checked.
+
+    What it imports for annotations only is imported too, at its end.
+    """
+
+    def visit_Module(self, node):
+        self.generic_visit(node)
+        for part in list(node.body):
+            if isinstance(part, ast.If) and ast.unparse(part.test) == "TYPE_CHECKING":
+                node.body += part.body
+        return node
 
     def visit_FunctionDef(self, node):
         node.decorator_list.append(_checked(node))

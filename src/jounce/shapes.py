@@ -5,11 +5,16 @@ everywhere: within the library `order` first, components next, `*batch` last; at
 then `derivative`, then `joint`, `row`, `column` or a component. An axis `order` or `derivative` counts from zero.
 """
 
+from collections.abc import Sequence
+
 import jax
 import numpy as np
 
 Numbers = jax.Array | np.ndarray
 """An array of JAX or NumPy."""
+
+ArrayLike = Numbers | Sequence | float | int
+"""What becomes an array of numbers: an array, lists or tuples of numbers in any nesting, a number."""
 
 Real = Numbers | np.floating | np.integer | float | int
 """Real numbers: an array or one number."""

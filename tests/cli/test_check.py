@@ -158,7 +158,7 @@ def test_the_degree_of_the_splines_is_an_option(run, files):
     robot, trajectory = files(pendulum_urdf=PENDULUM, motion_csv=samples(lambda t: t / 2, count=5))
     status, _, err = run(robot, trajectory)
     assert status == 2
-    assert "splines of degree 5 need at least 6 samples, got 5; give more, or choose a lower degree" in err
+    assert "a spline of degree 5 needs at least 6 samples, got 5; give more, or lower the degree" in err
     assert run(robot, trajectory, "--degree", "3")[0] == 0
 
 
@@ -184,7 +184,7 @@ BAD_TRAJECTORIES = {
         "times must increase, got 0.1; this one repeats that of line 2",
     ),
     "NaN": ("csv", f"time,pin\n0,nan\n{LINE}", "motion.csv, line 2, pin: must be a finite number, got 'nan'"),
-    "too few samples": ("csv", "time,pin\n0,0\n1,1\n", "splines of degree 5 need at least 6 samples, got 2"),
+    "too few samples": ("csv", "time,pin\n0,0\n1,1\n", "a spline of degree 5 needs at least 6 samples, got 2"),
     "empty": ("csv", "", "motion.csv: the file of samples is empty"),
     "a law without a value": ("yaml", HOLD.replace("0.5", "1/t"), "the law is not defined or not smooth at 0 s"),
     "unknown key": ("yaml", f"speed: 3\n{HOLD}", "motion.yaml, line 1, speed: unknown key"),

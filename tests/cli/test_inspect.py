@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.reporting.record_schema import record_schema
+from jounce.reporting.json_result_schema import result_schema
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "examples"
@@ -19,8 +19,8 @@ FOUR_BAR = EXAMPLES / "four_bar.yaml"
 def validator():
     from jsonschema import Draft202012Validator
 
-    Draft202012Validator.check_schema(record_schema())
-    return Draft202012Validator(record_schema())
+    Draft202012Validator.check_schema(result_schema())
+    return Draft202012Validator(result_schema())
 
 
 @pytest.fixture
@@ -238,7 +238,7 @@ def test_errors_as_json(run, arguments, expected):
     status, out, err = run(*arguments, "--json")
     assert (status, out) == (2, "")
     found = json.loads(err)
-    Draft202012Validator(record_schema()["$defs"]["complaint"]).validate(found)
+    Draft202012Validator(result_schema()["$defs"]["complaint"]).validate(found)
     for key, value in expected.items():
         actual = found["error"][key]
         assert isinstance(actual, value) if isinstance(value, type) else actual == value
@@ -247,7 +247,7 @@ def test_errors_as_json(run, arguments, expected):
 def test_the_schema_is_printed(run):
     status, out, _ = run("schema", "results")
     assert status == 0
-    assert json.loads(out) == record_schema()
+    assert json.loads(out) == result_schema()
 
 
 @pytest.mark.parametrize(

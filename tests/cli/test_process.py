@@ -10,7 +10,7 @@ import time
 
 import pytest
 
-from jounce.cli.streams import Lasting
+from jounce.cli.standard_streams import FailSafeStream
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 FOUR_BAR = str(ROOT / "examples" / "four_bar.yaml")
@@ -170,7 +170,7 @@ def test_bad_input_is_2_though_nobody_can_be_told():
 
 
 def test_text_goes_through_a_stream_that_lasts(capsys):
-    stream = Lasting(sys.stdout)
+    stream = FailSafeStream(sys.stdout)
     stream.writelines(["a", "b"])
     stream.flush()
     assert (capsys.readouterr().out, stream.failure, stream.isatty()) == ("ab", None, False)

@@ -8,7 +8,7 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from jounce import io
-from jounce.reporting.record_schema import record_schema
+from jounce.reporting.json_result_schema import result_schema
 from tests.cli.test_check import PENDULUM
 
 LAW = "joints: {pin: 0.5*sin(2*t)}\ntime: {start: 0, stop: 1, step: 0.1}\n"
@@ -64,7 +64,7 @@ def test_a_payload_adds_its_weight(run, files, tmp_path):
 def test_json(run, files):
     status, told, _ = run(*files, "--json")
     record = json.loads(told)
-    Draft202012Validator(record_schema()).validate(record)
+    Draft202012Validator(result_schema()).validate(record)
     assert (status, record["command"], record["rates"], record["held"]) == (0, "torques", 2, [])
     first = record["peaks"][0]
     assert (first["joint"], first["derivative"], first["unit"]) == ("pin", "torque", "N*m")

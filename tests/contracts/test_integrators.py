@@ -37,7 +37,7 @@ def test_laws_of_a_simulation(method, name):
     size = np.ptp(0.5 * motion.energy) + np.max(np.abs(motion.energy)) + 1.0
     assert np.ptp(motion.energy) <= (1e-13 + 1e3 * tolerance) * size
     # dense output is continuous where steps meet
-    ends = motion.track.start[1:]
+    ends = motion.dense_output.start[1:]
     gap = 1e-12
     before, after = (motion.at(ends + side * gap, order=1) for side in (-1, 1))
     for output, values in before.outputs.items():

@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.dynamics.constraint_forces import FreeFactor, slopes
+from jounce.dynamics.constraint_forces import balancing, slopes
 from jounce.dynamics.loads import inertia_forces, mass_matrices
+from jounce.dynamics.masses import Masses
 from jounce.jet import Jet
 from tests.problems.bank import cases, group_of, pose_of, random_motion
 
@@ -74,7 +75,7 @@ def test_mass_matrices_give_the_kinetic_energy(space):
     mass, center = random.uniform(1, 2, (bodies, 1)), random.normal(size=(size, bodies, 1))
     root = random.normal(size=(size, size, bodies))
     moments = np.einsum("ikb,jkb->ijb", root, root)[..., None]
-    matrices = np.asarray(mass_matrices(pose.truncate(0), mass, center, moments))
+    matrices = np.asarray(mass_matrices(pose.truncate(0), Masses(mass, center, moments)))
     spin = pose.angle.differentiate()[None] if space == "planar" else pose.angular_velocity
     velocity = np.concatenate([pose.position.coefficients[1], spin.coefficients[0]])
     energy = 0.5 * np.einsum("ibt,ijbt,jbt->bt", velocity, matrices, velocity)
@@ -94,16 +95,16 @@ def test_bodies_at_rest_have_their_weight_for_a_load():
     bodies = still.position.shape[1]
     gravity = np.array([0.0, 0.0, -9.81])[:, None, None]
     mass, center = np.full((bodies, 1), 2.0), np.zeros((3, bodies, 1))
-    force, moment = inertia_forces(still, mass, center, np.zeros((3, 3, bodies, 1)), gravity)
+    force, moment = inertia_forces(still, Masses(mass, center, np.zeros((3, 3, bodies, 1))), gravity)
     np.testing.assert_allclose(force.coefficients[0][2], 2.0 * 9.81, rtol=1e-15)
     assert np.abs(moment.coefficients[0]).max() <= 1e-15
 
 
-def test_free_factor_solves_the_equations_of_motion():
+def test_multipliers_solve_the_equations_of_motion():
     random = np.random.default_rng(5)
     root, jacobian, load = random.normal(size=(7, 7, 3)), random.normal(size=(4, 7, 3)), random.normal(size=(7, 3))
     mass = np.einsum("ikb,jkb->ijb", root, root)
-    found = np.asarray(FreeFactor.of(mass, jacobian).solve_transposed(load))
+    found = np.asarray(balancing(mass, jacobian)(load))
     for k in range(3):
         m, j = np.linalg.inv(mass[..., k]), jacobian[..., k]
         expected = np.linalg.solve(j @ m @ j.T, j @ m @ load[:, k])

@@ -216,7 +216,7 @@ def test_equations_073_to_075_and_109_factor_of_translation():
 
 
 def arm(tensor=(0.02, 0.06, 0.055)):
-    return jn.robot.from_screws([jn.robot.Screw([0, 1, 0], inertia=jn.Inertia(2.0, [0.3, 0.4, 0.1], tensor))])
+    return jn.robot.from_screws([jn.robot.JointAxis([0, 1, 0], inertia=jn.Inertia(2.0, [0.3, 0.4, 0.1], tensor))])
 
 
 @SEEDS
@@ -423,7 +423,7 @@ def test_an_order_that_is_none(order):
 
 
 def test_too_few_derivatives():
-    with pytest.raises(jn.RobotError, match="an energy of order 2 needs derivatives of q to order 3"):
+    with pytest.raises(jn.RobotError, match="needs derivatives of q to order 3"):
         acceleration_energy(arm(), [[0.0], [1.0], [2.0]], order=2)
     with pytest.raises(jn.RobotError, match="shape"):
         acceleration_energy(arm(), [0.0, 1.0, 2.0])
@@ -448,3 +448,26 @@ def test_a_mechanism_without_masses_or_with_half_of_them():
     half = jn.solve(with_masses("four_bar", {"crank": {"inertia": 0.1}}), TIMES[:1], order=2)
     with pytest.raises(jn.MechanismError, match="an inertia needs a mass beside it"):
         kinetic_energy(half)
+
+
+def test_energies_of_a_motion_are_labelled():
+    _, motion = four_bar()
+    energy, potential = kinetic_energy(motion), jn.potential_energy(motion)
+    assert energy.total.dims == potential.dims == ("time", "derivative")
+    assert energy.translation.dims == ("time", "derivative", "body")
+    assert energy.rotation.body.values.tolist() == list(motion.mechanism.bodies)
+    np.testing.assert_array_equal(energy.total.time, motion.time)
+    assert jn.dynamics.stored_energy(motion).dims == ("time",)
+
+
+def test_total_energy_is_nan_where_the_motion_was_not_solved():
+    motion = jn.solve(with_masses("four_bar", {"crank": {"mass": 1.0}}), TIMES, order=2)
+    motion.status[1] = jn.Status.SINGULAR
+    total = kinetic_energy(motion).total
+    assert np.isnan(total[1]).all()
+    assert np.isfinite(total[[0]]).all()
+
+
+def test_a_motion_has_coordinates_of_its_own():
+    with pytest.raises(jn.MechanismError, match="has its coordinates already"):
+        kinetic_energy(four_bar()[1], [[0.0], [1.0]])

@@ -321,7 +321,7 @@ def test_gravity_forces_are_the_slope_of_the_potential_energy():
 
 def test_equations_144_to_146_torques_about_one_axis():
     tensor, q = (0.02, 0.06, 0.055), np.random.default_rng(2).normal(size=(3, 7, 1))
-    arm = jn.robot.from_screws([jn.robot.Screw([0, 1, 0], inertia=jn.Inertia(2.0, [0.3, 0.4, 0.1], tensor))])
+    arm = jn.robot.from_screws([jn.robot.JointAxis([0, 1, 0], inertia=jn.Inertia(2.0, [0.3, 0.4, 0.1], tensor))])
     about_axis = 2.0 * (0.3**2 + 0.1**2) + 0.06
     right = np.stack(negrean_energies.one_axis_torques(about_axis, *(q[:, k, 0] for k in (2, 3, 4))), axis=1)
     np.testing.assert_allclose(newton_euler(arm, q, 2)[..., 0], right, rtol=0, atol=1e-12)

@@ -13,7 +13,7 @@ from scipy.special import factorial
 import jounce as jn
 from jounce import drivers, forces, planar, spatial
 from jounce.dynamics.forward import State, expand
-from jounce.dynamics.start import start
+from jounce.dynamics.start import consistent_start
 from jounce.kinematics.compilation import compiled
 from tests.oracles import mp_benchmarks
 from tests.oracles.mp_dynamics import Problem
@@ -25,7 +25,7 @@ RANDOM = np.random.default_rng(5)
 
 def expansion(mechanism, order, instant=0.0):
     """Return the consistent start of a mechanism and the Taylor coefficients there, as NumPy arrays."""
-    ready = start(mechanism, instant)
+    ready = consistent_start(mechanism, instant)
     found = expanded(ready.equations, ready.state, np.array([[instant]]), order=order)
     return ready, jax.tree.map(np.asarray, found)
 
@@ -121,7 +121,7 @@ def test_multipliers_and_rates_in_space():
         joints={"tip": spatial.Spherical(("ground", "top"), [0.1, 0.2, 0.3], [0.0, 0.0, 0.0])},
         outputs={"centre": jn.PointOutput("top", [0.1, 0.2, -0.3])},
     )
-    ready = start(top, 0.0)
+    ready = consistent_start(top, 0.0)
     state = ready.state._replace(spin=spin[:, None, None])  # a ball lets the body turn as it will
     found = jax.tree.map(np.asarray, expanded(ready.equations, state, np.zeros((1, 1)), order=6))
     with mp.workdps(40):

@@ -8,7 +8,7 @@ import pytest
 
 import jounce as jn
 from jounce import drivers, planar
-from jounce.dynamics.start import start
+from jounce.dynamics.start import consistent_start
 from tests.problems.dynamics import simple_pendulum
 
 
@@ -21,7 +21,7 @@ def with_initial(**initial):
 
 
 def test_a_condition_fixes_the_position_and_the_rate():
-    state = start(simple_pendulum(0.3, 1.5), 0.0)
+    state = consistent_start(simple_pendulum(0.3, 1.5), 0.0)
     assert state.state.attitude[0, 0, 0] == pytest.approx(0.3, abs=1e-14)
     assert state.state.spin[0, 0, 0] == pytest.approx(1.5, abs=1e-14)
     assert np.allclose(state.state.velocity, 0.0, atol=1e-14)
@@ -29,7 +29,7 @@ def test_a_condition_fixes_the_position_and_the_rate():
 
 
 def test_without_a_condition_the_guess_is_kept_and_the_body_rests():
-    state = start(with_initial(), 0.0).state
+    state = consistent_start(with_initial(), 0.0).state
     assert state.attitude[0, 0, 0] == pytest.approx(0.3, abs=1e-14)
     assert np.allclose([*state.spin.ravel(), *state.velocity.ravel()], 0.0, atol=1e-14)
 
@@ -48,7 +48,7 @@ def test_velocities_left_open_are_those_of_least_kinetic_energy():
         },
         initial={"lift": drivers.SlideDriver(("ground", "lower"), [0, 0], [1, 0], [0, 1], "3*t")},
     )
-    spin = start(rods, 0.0).state.spin[0, :, 0]
+    spin = consistent_start(rods, 0.0).state.spin[0, :, 0]
     mass = np.array([[0.5 + 2 * 0.25 + 1.0, 0.5], [0.5, 0.2 + 0.25]])
     wanted = np.linalg.solve(mass, [1.0, 1.0])
     assert np.allclose(spin, 3.0 * wanted / wanted.sum(), rtol=1e-13)
@@ -56,7 +56,7 @@ def test_velocities_left_open_are_those_of_least_kinetic_energy():
 
 def refused(kind, words, mechanism):
     with pytest.raises(kind, match=words):
-        start(mechanism, 0.0)
+        consistent_start(mechanism, 0.0)
 
 
 def body(**changes):
@@ -86,7 +86,7 @@ def turning(moments):
 
 def test_a_body_that_can_move_with_negative_kinetic_energy_is_named():
     refused(jn.MechanismError, r"bodies\.x\.inertia: .* kinetic energy is negative", turning([-0.01, 0.02, 0.02]))
-    assert start(turning([0.01, 0.02, 0.05]), 0.0).mobility  # no real body, but its motion is determined
+    assert consistent_start(turning([0.01, 0.02, 0.05]), 0.0).mobility  # no real body, but its motion is determined
 
 
 @pytest.mark.slow
@@ -96,7 +96,7 @@ def test_a_massless_link_at_the_end_of_a_robot_has_to_be_driven_in_a_simulation(
     joints = [jn.Joint("b", "base", "arm", axis=[0, 1, 0]), jn.Joint("c", "arm", "tip", position=[0.5, 0, 0])]
     robot = jn.Robot("end", links, joints, strict=False)
     refused(jn.MechanismError, r"bodies\.tip\.mass: the body can move but has no mass", robot.mechanism())
-    assert start(robot.mechanism(drivers={"c": 0.3}), 0.0).mobility.startswith("1 degree of freedom")
+    assert consistent_start(robot.mechanism(drivers={"c": 0.3}), 0.0).mobility.startswith("1 degree of freedom")
 
 
 def test_conditions_that_contradict_each_other_or_the_joints():

@@ -25,7 +25,7 @@ TIME_LIMIT = 10.0  # s, for one case; they take milliseconds
 WHOLE = re.compile(
     # what is said of a file as a whole, or by MuJoCo, which names no line then
     r"the file is empty|the file of samples is empty|has \d+ lines, at most|has \d+(\.\d+)? MB|MuJoCo cannot use|"
-    r"is in no encoding|need at least \d+ samples|at least two samples are needed|no spline goes through|"
+    r"is in no encoding|needs? at least \d+ samples|at least two samples are needed|no spline goes through|"
     r"the JSON cannot be read: a number has too many digits|The (YAML|TOML) cannot be read"
 )
 

@@ -9,14 +9,14 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import jounce as jn
-from jounce.io.files.formats import dumped
+from jounce.io.files.dumping import dumped
 from jounce.io.files.parsers import read_yaml
-from jounce.io.files.units import parse_value
 from jounce.io.mechanisms.conversion import assigned
 from jounce.io.mechanisms.overrides import override
 from jounce.io.robots.limits import load_limits
 from jounce.io.robots.payloads import with_payloads
 from jounce.trajectory import Expression
+from jounce.trajectory.units import parse_value
 
 __all__ = ["READERS", "Reader"]
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.dynamics.start import start
+from jounce.dynamics.start import consistent_start
 from tests.problems import dynamics
 from tests.problems.marches import LENIENT, ends, marched, onwards, orders
 
@@ -38,7 +38,7 @@ def ready(space):
     if space not in STARTS:
         moving = {"first": 0.4, "second": 1.3, "first_rate": 1.0, "second_rate": -2.0}
         mechanism = BODIES[space](**moving) if space == "plane" else BODIES[space]()
-        STARTS[space] = start(mechanism, 0.0)
+        STARTS[space] = consistent_start(mechanism, 0.0)
     return STARTS[space]
 
 
@@ -67,7 +67,7 @@ def test_measured_order_is_that_of_theory(name, space):
 
 def test_the_exact_runs_are_exact():
     time, kinds = dynamics.dynamic_reference("double_pendulum")
-    ready = start(dynamics.double_pendulum(), 0.0)
+    ready = consistent_start(dynamics.double_pendulum(), 0.0)
     front, _ = marched(ready, jn.Taylor(20), float(time[0]), 1e-15, longest=0.05)
     found = front.expansion.state.attitude[:, 0, :, 0]
     wanted = np.array([kinds["angles"][name][0] for name in "ab"]).T
@@ -107,7 +107,7 @@ def test_the_trap_of_a_double_pendulum_at_horizontal_rest():
 
 @pytest.mark.slow
 def test_a_polynomial_motion_is_exact_in_one_step():
-    falling = start(dynamics.thrown_stone(), 0.0)
+    falling = consistent_start(dynamics.thrown_stone(), 0.0)
     wanted = [1 + 2 * 3, 2 + 5 * 3 - 9.81 * 9 / 2, 0.5 - 9, 2, 5 - 9.81 * 3, -3]
     for method in (jn.Taylor(), jn.Obreshkov(4)):
         front, tried = marched(falling, method, 3.0, 1e-12)

@@ -6,8 +6,7 @@ import pytest
 import jounce as jn
 from jounce import drivers, jet, spatial
 from jounce.dynamics.forward import State
-from jounce.integrate.events import Watch, crossings
-from jounce.jet.turns import counted_by_rates
+from jounce.integrate.events import EventDetector, crossings
 from jounce.kinematics.motion import output_group
 from jounce.rigid.planar import PlanarPose
 
@@ -115,16 +114,6 @@ def test_turns_of_an_angle_in_space_count():
     assert np.allclose(motion.at([7.0]).outputs["angle"], [[140, 20]], rtol=1e-13)  # also where asked for alone
 
 
-def test_turns_between_samples_are_counted_by_the_rates():
-    """A constant acceleration, through more than a turn from one node of a step to the next."""
-    time = np.cumsum(0.5 + 0.2 * np.cos(np.arange(40)))
-    angle, rate = 3.0 + 20.0 * time - 0.4 * time**2, 20.0 - 0.8 * time
-    assert np.abs(np.diff(angle)).max() > 2 * np.pi
-    principal = np.angle(np.exp(1j * angle))
-    counted = counted_by_rates(principal, rate, time)
-    np.testing.assert_allclose(counted, angle - angle[0] + principal[0], atol=1e-10)
-
-
 def flight(start, speed, length):
     """Length and polynomial of a step of a stone free of forces, that begins at a height and rises with a speed."""
     still = np.zeros((1, 2, 1, 1))
@@ -136,12 +125,14 @@ def flight(start, speed, length):
 def test_a_crossing_where_two_steps_meet_is_one(beyond):
     """Found at the very end of one step, and again at the beginning of the next."""
     event = height(1.0 + beyond, direction=1)
-    watch = Watch(event, output_group(event.output, stone()), PlanarPose)
-    first = watch.look(np.array([0.0]), *flight(0.0, 1.0, 1.0))
-    second = watch.look(np.array([1.0]), *flight(1.0, 1.0, 1.0))
+    detector = EventDetector(event, output_group(event.output, stone()), PlanarPose)
+    first = detector.detect(np.array([0.0]), *flight(0.0, 1.0, 1.0))
+    second = detector.detect(np.array([1.0]), *flight(1.0, 1.0, 1.0))
     assert [when for _, when in first] == pytest.approx([1.0], abs=1e-9)
     assert second == []
-    assert [when for _, when in watch.look(np.array([2.0]), *flight(0.5, 1.0, 1.0))] == pytest.approx([0.5 + beyond])
+    assert [when for _, when in detector.detect(np.array([2.0]), *flight(0.5, 1.0, 1.0))] == pytest.approx(
+        [0.5 + beyond]
+    )
 
 
 def chebyshev(*roots, lead=1.0):

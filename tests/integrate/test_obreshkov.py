@@ -9,9 +9,9 @@ from scipy.interpolate import BPoly
 
 import jounce as jn
 from jounce.dynamics.forward import Expansion, State
-from jounce.dynamics.start import start
+from jounce.dynamics.start import consistent_start
 from jounce.errors import JounceError
-from jounce.integrate.marching import departed
+from jounce.integrate.marching import begin_march
 from tests.problems import dynamics
 from tests.problems.marches import LENIENT, ends, marched, widened
 
@@ -23,7 +23,7 @@ DISC: list = []
 def disc():
     """Return the start of a disc that swings on a spring."""
     if not DISC:
-        DISC.append(start(dynamics.rolling_disc(), 0.0))
+        DISC.append(consistent_start(dynamics.rolling_disc(), 0.0))
     return DISC[0]
 
 
@@ -37,7 +37,7 @@ def pade(p, z):
 @pytest.mark.parametrize("order", [2, 4, 6, 8])
 def test_one_step_of_an_oscillator_is_the_diagonal_approximation_of_its_exponential(order):
     method = jn.Obreshkov(order, step=1.0)
-    expansion = departed(disc().equations, widened(disc().state, 3), jnp.zeros(3), order=order // 2).expansion
+    expansion = begin_march(disc().equations, widened(disc().state, 3), jnp.zeros(3), order=order // 2).expansion
     end = method.arrive(disc().equations, expansion, jnp.zeros(3), jnp.asarray(STEPS))
     before = 0.4 + 0.7j / -FREQUENCY  # x' is the imaginary part times minus the frequency: z = exp(i w t)
     after = pade(order // 2, 1j * FREQUENCY * STEPS) * before
@@ -69,15 +69,15 @@ def test_dense_output_joins_the_derivatives_of_both_ends():
 def test_estimate_of_the_error_is_that_of_one_step():
     method = jn.Obreshkov(4)
     tolerance = 1e-9
-    pendulum = start(dynamics.double_pendulum(0.4, 1.3, 1.0, -2.0), 0.0)
+    pendulum = consistent_start(dynamics.double_pendulum(0.4, 1.3, 1.0, -2.0), 0.0)
     order = method.expansion_order(tolerance)
-    front = departed(pendulum.equations, widened(pendulum.state, 2), jnp.zeros(2), order=order)
+    current = begin_march(pendulum.equations, widened(pendulum.state, 2), jnp.zeros(2), order=order)
     steps = jnp.array([0.01, 0.02])
-    end = method.arrive(pendulum.equations, front.expansion, jnp.zeros(2), steps)
-    later = departed(pendulum.equations, end, steps, order=order).expansion
-    estimate = np.asarray(method.error(front.expansion, later, steps, 1.0))
+    end = method.arrive(pendulum.equations, current.expansion, jnp.zeros(2), steps)
+    later = begin_march(pendulum.equations, end, steps, order=order).expansion
+    estimate = np.asarray(method.error(current.expansion, later, steps, 1.0))
     powers = np.asarray(steps) ** np.arange(order + 1.0)[:, None]
-    exact = [np.sum(np.asarray(c) * powers[:, None, None], axis=0) for c in front.expansion.state]
+    exact = [np.sum(np.asarray(c) * powers[:, None, None], axis=0) for c in current.expansion.state]
     # the series, of order 8, is much better than the formula of order 4
     true = [np.max(np.abs(a - b), axis=(0, 1)) for a, b in zip(end, exact, strict=True)]
     true = np.max([true[0], true[1], true[2] * steps, true[3] * steps], axis=0)
@@ -88,12 +88,12 @@ def test_estimate_of_the_error_is_that_of_one_step():
 @pytest.mark.slow
 def test_steps_of_given_length_are_cut_only_where_the_iteration_does_not_converge():
     swinging = disc()
-    front, tried = marched(swinging, jn.Obreshkov(4, step=0.125), 1.0, LENIENT)
+    current, tried = marched(swinging, jn.Obreshkov(4, step=0.125), 1.0, LENIENT)
     assert tried == 8
     _, tried = marched(swinging, jn.Obreshkov(4, step=4.0), 4.0, LENIENT)
     assert tried > 4
     wanted = dynamics.rolling_motion([1.0], 1)[0]
-    assert np.allclose(ends(front)[[0, 3], 0], wanted, atol=2e-3)
+    assert np.allclose(ends(current)[[0, 3], 0], wanted, atol=2e-3)
 
 
 @pytest.mark.slow

@@ -169,22 +169,6 @@ def test_absolute_value():
     np.testing.assert_array_equal(jet.abs(jet_of([0.0, 1.0])).coefficients, [0.0, 1.0])
 
 
-@pytest.mark.parametrize("turns", [-1e6, -3, 0, 1, 50, 1e6])
-def test_wrap_takes_whole_periods_away(turns):
-    rest = 0.3
-    wrapped = jet.wrap(jet_of([rest + turns * 2 * np.pi, 2.0, 3.0]), 2 * np.pi)
-    np.testing.assert_allclose(
-        wrapped.coefficients, [rest, 2.0, 3.0], rtol=0, atol=4e-16 * (1 + abs(turns) * 2 * np.pi)
-    )
-    assert float(jet.wrap(rest + turns * 2.0, 2.0)) == pytest.approx(rest, abs=4e-16 * (1 + 2 * abs(turns)))
-
-
-@pytest.mark.parametrize("value, rest", [(-0.3, -0.3), (3.0, 3.0), (3.5, 3.5 - 2 * np.pi), (-40.0, -40.0 + 12 * np.pi)])
-def test_wrap_is_to_the_nearest_multiple(value, rest):
-    """A torsional spring a little below its free angle is hardly loaded: not by nearly a whole turn."""
-    assert float(jet.wrap(value, 2 * np.pi)) == pytest.approx(rest, abs=1e-14)
-
-
 UNARY = "sin cos tan asin acos atan sinh cosh tanh asinh exp expm1 log log1p sqrt cbrt erf abs".split()
 
 

@@ -33,6 +33,7 @@ def mechanism(**changes):
         ({"joints": {"O": spatial.Spherical(("ground", "crank"), [0, 0, 0], [0, 0, 0])}}, r"joints\.O.*spatial"),
         ({"parameters": {"t": 1.0}}, r"parameters\.t.*reserved"),
         ({"parameters": {"pi": 3.0}}, r"parameters\.pi.*reserved"),
+        ({"parameters": {"sin": 3.0}}, r"parameters\.sin.*reserved"),
         ({"outputs": {"a": jn.AngleOutput("crunk")}}, r"outputs\.a\.bodies.*did you mean 'crank'"),
         ({"outputs": {"a": jn.RelativeAngleOutput(("ground", "crank"), [0, 0, 1])}}, r"outputs\.a.*spatial"),
         ({"drivers": {"O": jn.drivers.CoordinateDriver(("ground", "crank"), "angle", "t")}}, r"drivers\.O.*same name"),
@@ -45,6 +46,7 @@ def mechanism(**changes):
         "joint_space",
         "reserved_t",
         "reserved_pi",
+        "reserved_function",
         "output_body",
         "output_space",
         "same_name",
@@ -59,6 +61,11 @@ def test_structure(changes, message):
 def test_output_named_like_an_axis_of_the_dataset(name):
     with pytest.raises(jn.MechanismError, match=rf"outputs\.{name}"):
         mechanism(outputs={name: jn.AngleOutput("crank")})
+
+
+def test_an_output_of_two_bodies_is_of_different_ones():
+    with pytest.raises(jn.MechanismError, match="not a body with itself"):
+        jn.DistanceOutput(("crank", "crank"), [0, 0], [1, 0])
 
 
 def joint(kind, *values, space="planar", bodies=("ground", "crank")):

@@ -12,18 +12,18 @@ import numpy as np
 import pytest
 
 from jounce.errors import OutputError
-from jounce.papers import sommer_2024
+from jounce.papers import output, sommer_2024
 from jounce.papers.sommer_2024 import (
     QUANTITIES,
-    SIMULATIONS,
+    VALIDATION_CASES,
     backward_difference,
+    cases,
     central_difference,
     comparison,
     geometry,
-    simulations,
 )
-from jounce.papers.sommer_2024.lag import STEPS as LAG_STEPS
-from jounce.papers.sommer_2024.simulations import STEPS, TOLERANCES, stencil_instants
+from jounce.papers.sommer_2024.cases import STEPS, TOLERANCES, stencil_instants
+from jounce.papers.sommer_2024.phase_lag import STEPS as LAG_STEPS
 
 reproduction = importlib.import_module("jounce.papers.sommer_2024.reproduce")
 ROOT = pathlib.Path(__file__).parents[2]
@@ -93,7 +93,7 @@ def largest_error(found, right):
 
 @pytest.mark.parametrize("name", ["four_bar", "inverted_slider_crank_slide", "rsur", "rspu_slide"])
 def test_explicit_solution_has_the_digits_of_the_textbook_formula(name):
-    simulation = SIMULATIONS[name]
+    simulation = VALIDATION_CASES[name]
     mechanism = simulation.load()
     time = np.array([0.0, 0.17, 0.43, 0.5, 0.87, 1.06, 1.31, 1.5, 1.93])
     found = simulation.explicit(mechanism, time)
@@ -102,7 +102,7 @@ def test_explicit_solution_has_the_digits_of_the_textbook_formula(name):
 
 
 def test_explicit_solutions_reach_higher_orders():
-    simulation = SIMULATIONS["four_bar"]
+    simulation = VALIDATION_CASES["four_bar"]
     parameters = simulation.load().parameter_values
     time = np.array([0.1, 0.9, 1.4])
     found = geometry.evaluate(simulation.form, time, parameters, order=8)
@@ -118,10 +118,12 @@ def test_explicit_solutions_use_neither_solver_nor_constraints():
 LONG = ("rspu_distance", "rspu_slide", "rssr")  # to compile; the other spatial one, rsur, is in the quick suite
 
 
-@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow) if n in LONG else n for n in SIMULATIONS])
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=pytest.mark.slow) if n in LONG else n for n in VALIDATION_CASES]
+)
 def test_simulation_reaches_rounding_from_velocity_to_jounce(name):
-    simulation = SIMULATIONS[name]
-    cycle = simulations.nominal_cycle(simulation, simulation.load())
+    simulation = VALIDATION_CASES[name]
+    cycle = cases.nominal_cycle(simulation, simulation.load())
     assert cycle.time[-1] == 2.0
     assert cycle.time.shape == (201,)
     assert np.abs(cycle.simulated[:, 0] - cycle.explicit[:, 0]).max() <= 1e-14
@@ -132,9 +134,9 @@ def test_simulation_reaches_rounding_from_velocity_to_jounce(name):
             assert cycle.rmse[QUANTITIES.index(quantity)] < printed
 
 
-@pytest.mark.parametrize("name", SIMULATIONS)
+@pytest.mark.parametrize("name", VALIDATION_CASES)
 def test_files_in_the_package_are_those_in_examples(name):
-    inside = simulations.MECHANISMS / f"{name}.yaml"
+    inside = cases.MECHANISMS / f"{name}.yaml"
     assert inside.read_bytes() == (ROOT / "examples" / f"{name}.yaml").read_bytes()
 
 
@@ -148,7 +150,7 @@ def small_run(tmp_path_factory):
     figures = importlib.import_module("jounce.papers.sommer_2024.figures")
     calls, kept = [], {}
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(reproduction, "SIMULATIONS", {"four_bar": SIMULATIONS["four_bar"]})
+        patch.setattr(reproduction, "VALIDATION_CASES", {"four_bar": VALIDATION_CASES["four_bar"]})
         patch.setattr(figures, "FIGURES", {k: figures.FIGURES[k] for k in DRAWN})
         measure = reproduction.measure
         patch.setattr(reproduction, "measure", lambda s, advanced: kept.setdefault(s.name, measure(s, advanced)))
@@ -232,7 +234,7 @@ def plain_newton_raphson(tolerance, unit):
     """The angle of the four-bar's rocker by Haug's textbook iteration on residuals, lengths in m times `unit`."""
     ad, ab, bc, cd = (unit * length for length in (0.1321, 0.04, 0.1423, 0.2031))
     q, found = np.array([0.0, 0.0, np.pi / 6, ad, 0.0, 2.2]), []
-    for t in simulations.nominal_time():
+    for t in cases.nominal_time():
         theta = np.radians(30) + np.radians(60) * np.sin(np.pi * t)
         while True:
             b, c = (length * np.array([np.cos(a), np.sin(a)]) for length, a in ((ab, q[2]), (cd, q[5])))
@@ -340,7 +342,7 @@ def test_a_directory_that_cannot_be_made_is_refused_before_any_computing(tmp_pat
 def test_a_file_that_cannot_be_written_leaves_nothing_behind(tmp_path):
     (tmp_path / "errors.csv" / "inside").mkdir(parents=True)
     with pytest.raises(OutputError, match=r"errors\.csv: is a directory"):
-        reproduction.write(tmp_path / "errors.csv", b"text")
+        output.write(tmp_path / "errors.csv", b"text")
     assert [path.name for path in tmp_path.iterdir()] == ["errors.csv"]
 
 
@@ -355,7 +357,7 @@ def test_drawing_is_imported_late_and_leaves_pyplot_alone():
 @pytest.mark.slow
 def test_the_whole_reproduction(tmp_path):
     paths = sommer_2024.reproduce(tmp_path)
-    check_errors(tmp_path / "errors.csv", SIMULATIONS)
+    check_errors(tmp_path / "errors.csv", VALIDATION_CASES)
     figures = {path.name for path in paths if path.suffix == ".png"}
     assert figures == {f"figure_{k:02d}.png" for k in range(1, 14)} | {"phase_lag.png"}
     assert all(path.stat().st_size > 1000 for path in paths)

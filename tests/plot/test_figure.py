@@ -8,7 +8,7 @@ import pytest
 
 import jounce as jn
 from jounce.plot import check_figure, draw, save
-from jounce.plot.labels import scale_of, symbol, unit_label
+from jounce.plot.labels import axis_range, rounded_down, scale_of, symbol, unit_label
 from jounce.plot.style import blank_figure, style
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -167,3 +167,10 @@ def test_a_long_title_stays_within_the_figure():
         extent = figure._suptitle.get_window_extent()
     assert extent.x0 > 0
     assert extent.x1 < 6.0 * figure.dpi
+
+
+def test_scales_are_round_numbers_and_constants_are_not_magnified():
+    assert [rounded_down(x) for x in (0.0499, 0.05, 1.9e-7, 3e8)] == pytest.approx([0.02, 0.05, 1e-7, 2e8])
+    assert axis_range(np.array([3.0, 3.0])) == pytest.approx((2.7, 3.3))
+    assert axis_range(np.array([3.0, np.nan, 5.0]), 0.1) == pytest.approx((2.8, 5.2))
+    assert axis_range(np.array([1e-17, -1e-17]), size=2.0) == pytest.approx((-0.2, 0.2))

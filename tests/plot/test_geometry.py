@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.plot.frames import assembled, frames, guessed
-from jounce.plot.geometry import placed, skeleton
+from jounce.plot.frames import assembled, frames, guessed, points_at, within
+from jounce.plot.geometry import skeleton
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 FILES = sorted((ROOT / "examples").glob("*.yaml"))
@@ -106,48 +106,43 @@ def test_gears_touch_at_their_pitch_circles():
     (rack,) = (s for s in skeleton(jn.load(ROOT / "examples" / "rack_pinion.yaml")).symbols if s.kind == "rack")
     pinion = jn.load(ROOT / "examples" / "rack_pinion.yaml").parameter_values["R"]
     assert rack.radii == (pinion, None)
-    assert rack.radius == pinion
+    assert [wheel.radius for wheel in skeleton(jn.load(ROOT / "examples" / "rack_pinion.yaml")).wheels] == [pinion]
 
 
 def test_wheels_axes_and_parameters():
     mechanism = jn.load(ROOT / "examples" / "rolling_disc.yaml")
-    (roll,) = (symbol for symbol in skeleton(mechanism).symbols if symbol.kind == "rolling")
-    assert roll.radius == mechanism.parameter_values["R"]
+    seen = skeleton(mechanism)
+    (roll,) = (symbol for symbol in seen.symbols if symbol.kind == "rolling")
+    assert [wheel.radius for wheel in seen.wheels] == [mechanism.parameter_values["R"]]
     np.testing.assert_array_equal(roll.axes[0], [-0.5, 0])
-    other = skeleton(mechanism.with_parameters(R=0.123))
-    assert next(symbol for symbol in other.symbols if symbol.kind == "rolling").radius == 0.123
+    (wheel,) = skeleton(mechanism.with_parameters(R=0.123)).wheels
+    assert (wheel.body, wheel.radius, wheel.internal, wheel.partner) == (roll.bodies[1], 0.123, False, None)
     hooke = skeleton(jn.load(ROOT / "examples" / "hooke_joint.yaml"))
     cross = next(symbol for symbol in hooke.symbols if symbol.kind == "universal")
     np.testing.assert_array_equal(np.array(cross.axes), [[0, 1, 0], [0, 0, 1]])
 
 
 @pytest.mark.parametrize("name", ["four_bar", pytest.param("rssr", marks=pytest.mark.slow)])
-def test_placed_agrees_with_points_of_the_motion(name):
+def test_frames_agree_with_points_of_the_motion(name):
     mechanism = jn.load(ROOT / "examples" / f"{name}.yaml")
     motion = jn.solve(mechanism, np.linspace(0.0, 0.1, 5), order=2)
     body = next(iter(mechanism.bodies))
     points = skeleton(mechanism).links[body].points
-    found = placed(motion, body, points, order=2)
-    assert found.shape == (5, 3, *points.shape)
-    for k, point in enumerate(points):
-        np.testing.assert_allclose(found[:, :, k], motion.point(body, point.tolist()).values, rtol=0, atol=1e-12)
-    still = placed(motion, "ground", points, order=1)
-    np.testing.assert_array_equal(still[:, 0], np.broadcast_to(points, still[:, 0].shape))
-    np.testing.assert_array_equal(still[:, 1], 0.0)
-    with pytest.raises(jn.MechanismError, match=r"up to order 2.*got 3"):
-        placed(motion, body, points, order=3)
-    with pytest.raises(jn.MechanismError, match="no body has this name"):
-        placed(motion, "bodyy", points)
     whole = frames(motion)
-    np.testing.assert_allclose(whole[body][:, :, 0] + whole[body][:, :, 1:] @ points[-1], found[:, 0, -1], atol=1e-15)
+    found = points_at(whole[body], points)
+    assert found.shape == (5, *points.shape)
+    for k, point in enumerate(points):
+        np.testing.assert_allclose(found[:, k], motion.point(body, point.tolist()).values[:, 0], rtol=0, atol=1e-12)
+        np.testing.assert_allclose(within(whole[body], found[:, k]), [point] * 5, rtol=0, atol=1e-15)
+    np.testing.assert_array_equal(points_at(whole["ground"], points), [points] * 5)
     np.testing.assert_allclose(assembled(mechanism)[body][0], whole[body][0], rtol=0, atol=1e-8)
-    start = guessed(mechanism)[body](points)
-    assert np.linalg.norm(start - found[0, 0]) < 0.5 * skeleton(mechanism).size
+    (start,) = points_at(guessed(mechanism)[body], points)
+    assert np.linalg.norm(start - found[0]) < 0.5 * skeleton(mechanism).size
 
 
 def test_instants_that_failed_are_nowhere():
     mechanism = jn.load(ROOT / "examples" / "four_bar.yaml").with_parameters(BC=0.11)
     motion = jn.solve(mechanism, np.linspace(0.0, 2.0, 21), order=1, strict=False)
     assert np.any(motion.status != 0)
-    found = placed(motion, "crank", [[0.04, 0.0]], order=1)
-    np.testing.assert_array_equal(np.isnan(found).any(axis=(1, 2, 3)), motion.status != 0)
+    found = points_at(frames(motion)["crank"], np.array([0.04, 0.0]))
+    np.testing.assert_array_equal(np.isnan(found).any(axis=1), motion.status != 0)

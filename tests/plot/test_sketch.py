@@ -12,7 +12,7 @@ from PIL import Image
 import jounce as jn
 from jounce.plot import animate, check_animation, hodograph, phase_portrait, save, sketch
 from jounce.plot.animation import frame_instants
-from jounce.plot.canvas import screen_of
+from jounce.plot.drawing import screen_of
 from jounce.plot.scene import scene_of
 from jounce.plot.style import BODY_COLOURS
 

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jounce.dynamics.forward import State
-from jounce.integrate.marching import Outcome, departed, march
+from jounce.integrate.marching import Outcome, begin_march, march
 
 COUNT = 4096  # steps tried at most
 LENIENT = 1e-6  # tolerance where the steps are given
@@ -19,30 +19,30 @@ def widened(state, lanes):
 def marched(ready, method, stop, tolerance, longest=np.inf, *, lanes=1, instant=0.0):
     """Run from the start of a mechanism to a time; `longest` holds the largest steps of the runs side by side."""
     order = method.expansion_order(tolerance)
-    front = departed(ready.equations, widened(ready.state, lanes), jnp.full(lanes, instant), order=order)
-    return onwards(ready, method, front, stop, tolerance, longest)
+    current = begin_march(ready.equations, widened(ready.state, lanes), jnp.full(lanes, instant), order=order)
+    return onwards(ready, method, current, stop, tolerance, longest)
 
 
-def onwards(ready, method, front, stop, tolerance, longest=np.inf):
-    """Go on from the front of other runs to a time; return the front and the number of steps tried."""
-    running = jnp.full(front.time.shape, int(Outcome.RUNNING))
-    front, _, tried = march(
+def onwards(ready, method, current, stop, tolerance, longest=np.inf):
+    """Go on from where other runs are to a time; return where they then are and the number of steps tried."""
+    running = jnp.full(current.time.shape, int(Outcome.RUNNING))
+    current, _, tried = march(
         ready.equations,
-        front._replace(outcome=running),
+        current._replace(outcome=running),
         stop,
         tolerance,
-        jnp.broadcast_to(jnp.asarray(longest, float), front.time.shape),
+        jnp.broadcast_to(jnp.asarray(longest, float), current.time.shape),
         method=method,
         count=COUNT,
         keep=False,
     )
-    assert np.all(np.asarray(front.outcome) == Outcome.ARRIVED)
-    return front, int(tried)
+    assert np.all(np.asarray(current.outcome) == Outcome.ARRIVED)
+    return current, int(tried)
 
 
-def ends(front):
+def ends(current):
     """Return the states at which runs have arrived, (components of all, runs)."""
-    parts = [np.asarray(part[0]) for part in jax.tree.leaves(front.expansion.state)]
+    parts = [np.asarray(part[0]) for part in jax.tree.leaves(current.expansion.state)]
     return np.concatenate([part.reshape(-1, part.shape[-1]) for part in parts])
 
 

@@ -227,7 +227,7 @@ def test_spatial_loop_against_pinocchio():
 
 JOINTS = {
     "prismatic": ([jn.Joint("J", "arm", "load", "prismatic", axis=[1, 2, 2])], 1),
-    "ball": (jn.robot.construct.floating_joints("load", prefix="J", world="arm")[1][3:], 3),
+    "ball": (jn.robot.floating_base.floating_joints("load", prefix="J", world="arm")[1][3:], 3),
 }
 
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.linalg import expm
 
 import jounce as jn
-from jounce.robot import DenavitHartenberg, Screw, from_denavit_hartenberg, from_screws
+from jounce.robot import DenavitHartenberg, JointAxis, from_denavit_hartenberg, from_screws
 
 A, ALPHA, D, THETA = np.random.default_rng(6).uniform(-0.8, 0.8, (4, 4))
 TYPES = ("revolute", "revolute", "prismatic", "revolute")
@@ -72,7 +72,7 @@ def three_arms():
         rows.append(DenavitHartenberg(*before, D[k], THETA[k], TYPES[k], inertia))
         axis, point = reach[:3, 2], reach[:3, 3]
         reach = reach @ steps(k, 0.0, "standard")
-        screws.append(Screw(axis, point, TYPES[k], BODY.moved(reach[:3, 3], reach[:3, :3])))
+        screws.append(JointAxis(axis, point, TYPES[k], BODY.moved(reach[:3, 3], reach[:3, :3])))
     return standard, from_denavit_hartenberg(rows, "modified"), from_screws(screws, tool=reach)
 
 
@@ -109,7 +109,7 @@ def test_screws_are_a_product_of_exponentials():
 
 def test_limits_are_kept():
     limits = jn.Limits(velocity=2.0)
-    row, screw = DenavitHartenberg(inertia=BODY, limits=limits), Screw([0, 0, 1], inertia=BODY, limits=limits)
+    row, screw = DenavitHartenberg(inertia=BODY, limits=limits), JointAxis([0, 0, 1], inertia=BODY, limits=limits)
     assert from_denavit_hartenberg([row]).limits == {"joint_1": limits}
     assert from_screws([screw]).limits == {"joint_1": limits}
 
@@ -135,11 +135,11 @@ SKEWED = np.diag([1.0, 1.0, 1.0, 2.0])
             "inertia, or keep it with strict=False, where its torque is zero",
         ),
         (
-            lambda: from_screws([Screw([0, 0, 0], inertia=BODY)]),
+            lambda: from_screws([JointAxis([0, 0, 0], inertia=BODY)]),
             "joints.joint_1.axis: must have a direction, got [0.0, 0.0, 0.0]",
         ),
         (
-            lambda: from_screws([Screw([0, 0, 1], [0, 1], inertia=BODY)]),
+            lambda: from_screws([JointAxis([0, 0, 1], [0, 1], inertia=BODY)]),
             "screw 1.point: must have the shape (3,), not (2,)",
         ),
         (lambda: from_screws([], tool=np.eye(3)), "tool: must have the shape (4, 4), not (3, 3)"),

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.robot.batches import coefficients
-from jounce.robot.newton_euler import newton_euler
+from jounce.jet.derivatives import taylor_coefficients
+from jounce.robot.newton_euler import recursive_newton_euler
 from tests.problems.robots import random_inertia, random_robot, robot_named
 
 ROBOT = random_robot(2, 7)  # a tree with slides and fixed links
@@ -220,11 +220,11 @@ def test_jit_vmap_and_two_ways_of_differentiation_agree(torque):
 
 def test_slopes_in_masses_and_centers():
     """Torque is linear in each mass and quadratic in each centre, so that differences of any step are exact."""
-    tree, q = ROBOT.tree, coefficients(jnp.asarray(Q[0, :3])[:, :, None])
+    tree, q = ROBOT.tree, taylor_coefficients(jnp.asarray(Q[0, :3])[:, :, None])
 
     @jax.jit
     def torque(mass, center):
-        return newton_euler(dataclasses.replace(tree, mass=mass, center=center), q)[0][0, :, 0]
+        return recursive_newton_euler(dataclasses.replace(tree, mass=mass, center=center), q)[0][0, :, 0]
 
     whole = torque(tree.mass, tree.center)
     near(whole, jn.inverse_dynamics(ROBOT, Q[0, :3])[0])

@@ -2,11 +2,13 @@
 
 import math
 
+import jax
 import numpy as np
 import pytest
 
 import jounce as jn
 from jounce.errors import MechanismFileError
+from jounce.io.mechanisms.overrides import override
 
 T = np.linspace(0.5, 2.0, 13)
 
@@ -167,3 +169,49 @@ def test_noisy_accelerations_are_told():
     trajectory = jn.JointTrajectory({"a": jn.MeasuredMotion(T, noisy)}, T[0], T[-1])
     with pytest.warns(jn.SampleWarning, match="'a'"):
         trajectory.derivatives(T, 4)
+
+
+def follower(folder, initial="[x0, v0/2]", x0=-0.075, v0=1.0):
+    path = sled(folder, f"{{samples: a.csv, derivative: 2, initial: {initial}}}")
+    path.write_text(f"parameters: {{x0: {x0} m, v0: {v0} m/s}}\n" + path.read_text())
+    return path
+
+
+def test_what_is_known_at_the_first_sample_follows_the_parameters(tmp_path):
+    first = jn.load(follower(tmp_path))
+    np.testing.assert_allclose(
+        jn.solve(first, order=3).outputs["x"],
+        jn.solve(jn.load(sled(tmp_path)), order=3).outputs["x"],
+        rtol=0,
+        atol=1e-14,
+    )
+    for changed in (first.with_parameters(x0=0.5, v0="-3 m/s"), override(first, ["x0=500 mm", "v0=-3"])):
+        fresh = jn.load(follower(tmp_path, x0=0.5, v0=-3.0))
+        assert np.array_equal(jn.solve(changed, order=3).outputs["x"], jn.solve(fresh, order=3).outputs["x"])
+    jn.write_mechanism(first, tmp_path / "again.yaml")
+    again = jn.load(tmp_path / "again.yaml").with_parameters(x0=0.5, v0=-3.0)
+    assert np.array_equal(jn.solve(again, order=3).outputs["x"], jn.solve(fresh, order=3).outputs["x"])
+
+
+def test_gradients_with_respect_to_what_is_known_at_the_first_sample():
+    law = jn.MeasuredMotion(T, polynomial(T, 2), initial=["x0", "v0/2"])
+    time = jn.Jet.variable(np.array([0.5, 1.25]), order=2)
+    slopes = jax.jacobian(lambda v0: law.resolved({"x0": 0.1, "v0": v0})(time).derivatives())(1.0)
+    np.testing.assert_allclose(slopes, [[0.0, 0.375], [0.5, 0.5], [0.0, 0.0]], rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "initial, words", [("[x0, x0]", "length"), ("[y0]", "y0"), ("[log(-x0*0 - 1)]", "not defined")]
+)
+def test_bad_expressions_of_what_is_known_at_the_first_sample(tmp_path, initial, words):
+    with pytest.raises(MechanismFileError, match=words) as raised:
+        jn.load(follower(tmp_path, initial))
+    assert raised.value.line == 7
+
+
+def test_a_law_that_waits_for_parameters_gives_no_numbers():
+    law = jn.MeasuredMotion(T, T, initial=["x0", "2*pi/3"])
+    with pytest.raises(jn.MechanismError, match="x0"):
+        law(jn.Jet.variable(1.0, order=1))
+    known = law.resolved({"x0": 0.25})(jn.Jet.variable(T[0], order=1)).derivatives()
+    np.testing.assert_allclose(known, [0.25, 2 * math.pi / 3], rtol=1e-15)

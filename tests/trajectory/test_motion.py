@@ -118,11 +118,11 @@ class TestSplineMotion:
         "times, values, degree, message",
         [
             ([0.0, 1.0], [0.0, 1.0], 5, "needs at least 6 samples"),
-            ([0.0, 1.0, 1.0], [0.0, 1.0, 2.0], 1, "sample 2 does not come after"),
-            ([0.0, 1.0, np.nan], [0.0, 1.0, 2.0], 1, "times of samples must be finite"),
-            ([0.0, 1.0, 2.0], [0.0, np.inf, 2.0], 1, "values of samples must be finite"),
+            ([0.0, 1.0, 1.0], [0.0, 1.0, 2.0], 1, r"times\[2\]: .* must increase"),
+            ([0.0, 1.0, np.nan], [0.0, 1.0, 2.0], 1, r"times\[2\]: samples must be finite"),
+            ([0.0, 1.0, 2.0], [0.0, np.inf, 2.0], 1, r"values\[1\]: samples must be finite"),
             ([0.0, 1.0], [0.0, 1.0, 2.0], 1, "equal length"),
-            ([0.0, 1.0, 2.0], [0.0, 1.0, 2.0], 0, "degree of a spline"),
+            ([0.0, 1.0, 2.0], [0.0, 1.0, 2.0], 0, "degree: must be a whole number from 1 to 11"),
             ([], [], 1, "samples"),
         ],
     )

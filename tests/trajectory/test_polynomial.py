@@ -180,7 +180,7 @@ def test_outside_the_knots_the_end_segments_go_on():
         ((KNOTS, VALUES, 4, 0, {0: 0.0}), "start: the knots carry the derivative of order 0"),
         ((KNOTS, VALUES, 4, 2, {0: 0.0}), "2 conditions on the derivatives below order 2 .* got 1"),
         ((KNOTS, VALUES, 4, 2, {1: 0.0}, {1: 0.0}), "one at least must be on the position"),
-        ((KNOTS, VALUES, 4, 0, {5: 0.0}), "from 0 to the continuity, 4, got 5"),
+        ((KNOTS, VALUES, 4, 0, {5: 0.0}), "from 0 to 4, got 5"),
         ((KNOTS, VALUES, 4, 0, {1: math.inf}), r"start\[1\]: the value of a condition must be a finite number"),
         ((KNOTS, VALUES, 4, 0, None, None, "naturel"), "did you mean 'natural'"),
     ],

@@ -6,9 +6,9 @@ import threading
 import numpy as np
 
 import jounce as jn
-from jounce.viewer.looks import Looks
-from jounce.viewer.solids import Solid, box
-from jounce.viewer.take import Parameter, Spot, Take
+from jounce.viewer.appearance import Appearance, BodyPoint, ColouredMesh
+from jounce.viewer.meshes import box
+from jounce.viewer.recording import Parameter, Recording
 
 INERTIA, MASS, RADIUS = 0.5, 2.0, 0.3
 
@@ -40,7 +40,7 @@ def derivatives_of_the_rim(time, c=2.0, radius=RADIUS):
 
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
-class PlainTake(Take):
+class PlainRecording(Recording):
     """One motion of every point, and nothing else."""
 
     motions: np.ndarray
@@ -48,18 +48,18 @@ class PlainTake(Take):
     def quantities(self):
         return {}
 
-    def motion_of(self, body, point):
+    def derivatives(self, body, point):
         return self.motions
 
-    def exertions_of(self):
+    def all_loads(self):
         return []
 
     def dataset(self):
         return None
 
 
-def plain_take(value=1.0, notice=""):
-    """A take of a box that moves by a value along x."""
+def plain_recording(value=1.0, notice=""):
+    """A recording of a box that moves by a value along x."""
     time = np.linspace(0.0, 1.0, 5)
     position = np.zeros((5, 2, 3))
     position[:, 1, 0] = value * time
@@ -67,17 +67,16 @@ def plain_take(value=1.0, notice=""):
     quaternion[..., 0] = 1.0
     motion = np.zeros((5, 2, 3))
     motion[:, 0], motion[:, 1, 0] = position[:, 1], value
-    vertices, faces = box([0.1, 0.1, 0.1])
-    looks = Looks(
-        {"ground": (), "box": (Solid(vertices, faces, (1, 2, 3)),)},
+    appearance = Appearance(
+        {"ground": (), "box": (ColouredMesh(box([0.1, 0.1, 0.1]), (1, 2, 3)),)},
         (),
-        (Spot("box", (0.0, 0.0, 0.0), "box"),),
+        (BodyPoint("box", (0.0, 0.0, 0.0), "box"),),
         1.0,
         (0.0, 0.0, 1.0),
     )
-    return PlainTake(
+    return PlainRecording(
         title="box", planar=False, time=time, order=1, bodies=("ground", "box"), position=position,
-        quaternion=quaternion, values={"value": value}, looks=looks, notice=notice, motions=motion,
+        quaternion=quaternion, values={"value": value}, appearance=appearance, notice=notice, motions=motion,
     )  # fmt: skip
 
 
@@ -99,4 +98,4 @@ class Slow:
         self.solved.append(values["value"])
         if values["value"] < 0:
             raise jn.AssemblyError("the bodies cannot be put together", name="value", value=values["value"])
-        return plain_take(values["value"], "some instants are missing" if values["value"] > 100 else "")
+        return plain_recording(values["value"], "some instants are missing" if values["value"] > 100 else "")

@@ -88,35 +88,35 @@ def test_it_moves_and_stops(opened):
 
 def test_a_slider_changes_the_motion(opened):
     shown, page, _, _ = opened
-    before = shown.page.take
+    before = shown.page.recording
     thumb = page.get_by_role("slider").nth(2)  # after those of the time and of AD
     thumb.focus()
     thumb.press("End")
     page.wait_for_timeout(1000)
     settled(shown, page)
-    take = shown.page.take
-    assert take is not before
-    assert take.values["AB"] == pytest.approx(0.06)
+    recording = shown.page.recording
+    assert recording is not before
+    assert recording.values["AB"] == pytest.approx(0.06)
     expected = jn.solve(jn.load("examples/four_bar.yaml").with_parameters(AB=0.06), order=2).outputs["psi"]
-    np.testing.assert_allclose(take.outputs["psi"].values[:, :3, 0], expected, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(recording.outputs["psi"].values[:, :3, 0], expected, rtol=0, atol=1e-9)
 
 
 def test_an_impossible_value_shows_the_message_and_keeps_the_motion(opened):
     shown, page, _, _ = opened
     page.get_by_text("Exact values").click()
     page.wait_for_timeout(800)
-    good = shown.page.take
+    good = shown.page.recording
     field = page.locator("xpath=(//*[normalize-space(text())='BC'])[last()]/following::input").first
     field.fill("0.03")
     field.press("Enter")
     message = page.get_by_text("No motion for these values")
     message.wait_for(timeout=PATIENCE)
     assert page.get_by_text("cannot be assembled").count() >= 1
-    assert shown.page.take is good
+    assert shown.page.recording is good
     page.get_by_role("button", name="Reset").click()
     message.wait_for(state="hidden", timeout=PATIENCE)
     settled(shown, page)
-    assert shown.page.take.values["BC"] == pytest.approx(0.1423)
+    assert shown.page.recording.values["BC"] == pytest.approx(0.1423)
     page.get_by_text("Exact values").click()
 
 
@@ -133,7 +133,7 @@ def test_exports_arrive(opened, browser, tmp_path):
     assert download.suggested_filename == "planar_four-bar.csv"
     download.save_as(tmp_path / "motion.csv")
     psi = read(tmp_path / "motion.csv")["psi"].values
-    np.testing.assert_allclose(psi, shown.page.take.outputs["psi"].values[..., 0], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(psi, shown.page.recording.outputs["psi"].values[..., 0], rtol=0, atol=1e-12)
 
     from matplotlib.image import imread
 

@@ -12,26 +12,26 @@ import jounce as jn
 from jounce.cli import main
 from jounce.io import read
 from jounce.viewer import view
-from jounce.viewer.arrows import Marked
+from jounce.viewer.arrows import TracedPoint
 from jounce.viewer.exports import animation, file_name, picture, table
 from jounce.viewer.legend import error_box, legend
 from jounce.viewer.mechanisms import MechanismSubject
-from jounce.viewer.prepared import Prepared, Wanted
+from jounce.viewer.overlay import DisplayOptions, Overlay
 from tests.viewer.small import derivatives_of_the_rim, wheel
 
 
 @pytest.fixture(scope="module")
-def take():
+def recording():
     return MechanismSubject(wheel(time=np.linspace(0.0, 1.0, 101))).solve({}, 2)
 
 
-def test_a_table_has_all_outputs_and_derivatives(take, tmp_path):
+def test_a_table_has_all_outputs_and_derivatives(recording, tmp_path):
     path = tmp_path / "motion.csv"
-    path.write_bytes(table(take))
+    path.write_bytes(table(recording))
     found = read(path)
     rim = np.stack([found["rim"].sel(component=c).values for c in "xy"], axis=-1)
-    np.testing.assert_allclose(rim, derivatives_of_the_rim(take.time)[..., :2], rtol=0, atol=1e-11)
-    assert file_name(take.title, ".csv") == "wheel.csv"
+    np.testing.assert_allclose(rim, derivatives_of_the_rim(recording.time)[..., :2], rtol=0, atol=1e-11)
+    assert file_name(recording.title, ".csv") == "wheel.csv"
 
 
 def recorded(html):
@@ -46,9 +46,9 @@ def recorded(html):
     return msgspec.msgpack.decode(inner[8 : 8 + length], strict=False)
 
 
-def test_an_animation_holds_all_instants_and_needs_nothing_else(take):
-    spot = next(s for s in take.looks.spots if s.name == "rim")
-    html = animation(Prepared.of(take, Wanted((Marked(spot, (1,)),), kinds=frozenset({"driver"}))))
+def test_an_animation_holds_all_instants_and_needs_nothing_else(recording):
+    point = next(s for s in recording.appearance.points if s.name == "rim")
+    html = animation(Overlay.of(recording, DisplayOptions((TracedPoint(point, (1,)),), kinds=frozenset({"driver"}))))
     content = recorded(html)
     assert content["durationSeconds"] == pytest.approx(1.0 + 1 / 30)
     turns = [(t, m["wxyz"]) for t, m in content["messages"] if m.get("name") == "/bodies/wheel" and "wxyz" in m]
@@ -93,9 +93,10 @@ def test_a_picture_is_a_png_on_white():
         picture(Silent())
 
 
-def test_the_legend_says_how_large_everything_is(take):
-    spot = next(s for s in take.looks.spots if s.name == "rim")
-    shown = Prepared.of(take, Wanted((Marked(spot, (1, 2)),), kinds=frozenset({"driver", "reaction"})))
+def test_the_legend_says_how_large_everything_is(recording):
+    point = next(s for s in recording.appearance.points if s.name == "rim")
+    options = DisplayOptions((TracedPoint(point, (1, 2)),), kinds=frozenset({"driver", "reaction"}))
+    shown = Overlay.of(recording, options)
     text = legend(shown, 100)
     assert "1.80 m/s<" in text  # r 3 c t^2
     assert "m/s<sup>2</sup>" in text
@@ -124,35 +125,35 @@ def test_a_page_solves_again_and_keeps_its_motion_after_a_failure(page):
     inner.seek(0.5)
     inner.session.request({"r": 0.6})
     assert inner.session.wait(60.0)
-    assert inner.take.values["r"] == 0.6
+    assert inner.recording.values["r"] == 0.6
     assert inner.frame == 50
     assert not page.panel.message.visible
-    good = inner.take
+    good = inner.recording
     inner.session.request({"r": 1e999})
     assert inner.session.wait(60.0)
-    assert inner.take is good
+    assert inner.recording is good
     assert page.panel.message.visible
     assert "finite" in page.panel.message.content
     inner.session.request({"r": 0.3}, order=3)
     assert inner.session.wait(60.0)
     assert not page.panel.message.visible
-    assert inner.take.order == 3
+    assert inner.recording.order == 3
     inner.session.request(order=2)
     assert inner.session.wait(60.0)
 
 
 def test_a_page_marks_points_and_plots(page):
     inner = page.page
-    page.marks.mark(next(s for s in inner.take.looks.spots if s.name == "wheel: O"), (1,))
+    page.arrows.trace(next(s for s in inner.recording.appearance.points if s.name == "wheel: O"), (1,))
     assert inner.session.wait(60.0)
-    assert [mark.spot.name for mark in inner.wanted.marked] == ["rim", "wheel: O"]
+    assert [each.point.name for each in inner.options.traced] == ["rim", "wheel: O"]
     before = len(page.plots.charts)
     page.plots.add("angle", 1)
     inner.seek(0.25)
     chart = page.plots.charts[-1]
     assert len(page.plots.charts) == before + 1
     cursor = chart.handle.data[-1]
-    assert inner.take.time[np.flatnonzero(np.isfinite(cursor))[0]] == pytest.approx(0.25)
+    assert inner.recording.time[np.flatnonzero(np.isfinite(cursor))[0]] == pytest.approx(0.25)
     page.plots.remove()
     assert len(page.plots.charts) == before
 

@@ -19,25 +19,25 @@ def test_the_newest_of_many_requests_wins():
     assert session.wait(20.0)
     session.close()
     assert subject.solved == [1.0, 2.0, 59.0]
-    assert [take.values["value"] for take in arrived] == [2.0, 59.0]
-    assert session.take.values["value"] == 59.0
+    assert [recording.values["value"] for recording in arrived] == [2.0, 59.0]
+    assert session.recording.values["value"] == 59.0
     assert session.error is None
 
 
 def test_a_failure_is_told_and_keeps_the_last_motion():
     subject, errors = Slow(), []
     session = Session(subject, 1, on_failure=errors.append)
-    first = session.take
+    first = session.recording
     session.request({"value": -1.0})
     assert session.wait(20.0)
-    assert session.take is first
+    assert session.recording is first
     assert isinstance(session.error, jn.AssemblyError)
     assert [str(error) for error in errors] == ["value: the bodies cannot be put together, got -1.0"]
     session.request({"value": 4.0})  # and a good value takes over again
     assert session.wait(20.0)
     session.close()
     assert session.error is None
-    assert session.take.values["value"] == 4.0
+    assert session.recording.values["value"] == 4.0
 
 
 def test_a_part_of_a_motion_does_not_take_the_place_of_a_whole_one():
@@ -45,7 +45,7 @@ def test_a_part_of_a_motion_does_not_take_the_place_of_a_whole_one():
     session = Session(subject, 1)
     session.request({"value": 200.0})
     assert session.wait(20.0)
-    assert session.take.values["value"] == 1.0
+    assert session.recording.values["value"] == 1.0
     assert str(session.error) == "some instants are missing"
     session.close()
 
@@ -61,7 +61,7 @@ def test_the_worker_survives_what_nobody_foresaw():
     session.close()
     assert "ZeroDivisionError" in str(errors[0])
     assert done == [True]
-    assert session.take.values["value"] == 3.0
+    assert session.recording.values["value"] == 3.0
 
 
 def test_a_request_may_change_the_order_and_keeps_other_values():

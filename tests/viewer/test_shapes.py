@@ -6,46 +6,51 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.viewer import solids
-from jounce.viewer.closed import independent
-from jounce.viewer.looks import looks_of
+from jounce.viewer import meshes
+from jounce.viewer.closed_loops import independent
+from jounce.viewer.mechanism_appearance import mechanism_appearance
+from jounce.viewer.robot_appearance import file_shapes, robot_appearance
 from jounce.viewer.robots import swing_of
 from jounce.viewer.server import robot_subject
-from jounce.viewer.visuals import file_shapes, robot_looks
-
-
-def volume(mesh):
-    """Signed volume under the faces: positive where they face outward."""
-    vertices, faces = mesh
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    return float(np.einsum("fc,fc->", a, np.cross(b, c)) / 6)
-
 
 CIRCLE = 24 / 2 * math.sin(2 * math.pi / 24)  # area of the polygon that stands for a circle of radius one
+WHEEL = 96 / 2 * math.sin(2 * math.pi / 96)
+TRIANGLE = meshes.Polygon([[0, 0], [2, 0], [0, 2]])
 
 
 @pytest.mark.parametrize(
     "mesh, expected",
     [
-        (solids.box([1, 2, 3], [5, 5, 5]), 6.0),
-        (solids.cylinder(2.0, 3.0, [1, 1, 0], [0, 0, 4]), 12 * CIRCLE),
-        (solids.prism(np.array([[0, 0], [2, 0], [0, 2]]), -1.0, 1.0), 4.0),
-        (solids.prism(np.array([[0, 0], [2, 0], [0, 2]]), -1.0, 1.0, sharp=False), 4.0),
-        (solids.plate(np.array([[0.0, 0], [4, 0]]), 1.0, 0.0, 1.0), CIRCLE + 8),
-        (solids.gear(2.0, 0.0, 1.0), 48 / 2 * math.sin(2 * math.pi / 48) * 4),
-        (solids.annulus(2.0, 3.0, 0.0, 2.0), 48 * math.sin(2 * math.pi / 48) * (9 - 4)),
+        (meshes.box([1, 2, 3], [5, 5, 5]), 6.0),
+        (meshes.cylinder(2.0, 3.0, [1, 1, 0], [0, 0, 4]), 12 * CIRCLE),
+        (meshes.sleeve(1.0, 2.0, 3.0, [1, 1, 0], [0, 0, 4]), 9 * CIRCLE),
+        (meshes.extruded(TRIANGLE, -1.0, 1.0), 4.0),
+        (meshes.extruded(TRIANGLE, -1.0, 1.0, sharp=False), 4.0),
+        (meshes.plate(np.array([[0.0, 0], [4, 0]]), 1.0, 0.0, 1.0), CIRCLE + 8),
+        (meshes.wheel(2.0, 0.0, 1.0, [3, 0]), 4 * WHEEL),
+        (meshes.wheel(2.0, 0.0, 2.0, [3, 0], outside=3.0), 10 * WHEEL),
     ],
 )
 def test_volumes(mesh, expected):
-    assert volume(mesh) == pytest.approx(expected, rel=1e-9)
+    assert mesh.volume == pytest.approx(expected, rel=1e-9)  # positive: the faces face outward
 
 
-def test_round_solids_come_near_to_what_they_stand_for():
-    assert volume(solids.sphere(2.0, [1, 2, 3])) == pytest.approx(32 / 3 * math.pi, rel=0.03)
-    assert volume(solids.bar([0, 0, 0], [0, 3, 4], 0.5)) == pytest.approx(math.pi * (0.25 * 5 + 0.5 / 3), rel=0.03)
-    assert volume(solids.gear(2.0, 0.0, 1.0, module=0.2)) == pytest.approx(4 * math.pi, rel=0.06)
-    assert volume(solids.coil(6, 0.1, 0.02)) > 0
-    assert volume(solids.arc_arrow()) > 0
+def test_round_meshes_come_near_to_what_they_stand_for():
+    assert meshes.sphere(2.0, [1, 2, 3]).volume == pytest.approx(32 / 3 * math.pi, rel=0.03)
+    bar = meshes.capsule([0, 0, 0], [0, 3, 4], 0.5)
+    assert bar.volume == pytest.approx(math.pi * (0.25 * 5 + 0.5 / 3), rel=0.03)
+    assert bar.center_mass == pytest.approx([0, 1.5, 2])
+    assert meshes.wheel(2.0, 0.0, 1.0, [0, 0], module=0.2).volume == pytest.approx(4 * math.pi, rel=0.06)
+    turns = 2 * math.pi * 0.1 * 6 * 0.8 / 0.8
+    assert meshes.coil(6, 0.1, 0.02).volume == pytest.approx(math.pi * 0.02**2 * turns, rel=0.15)
+    assert meshes.arc_arrow().volume > math.pi * 0.08**2 * 1.4 * math.pi
+
+
+def test_edges_are_sharp_where_they_are():
+    for mesh in (meshes.cylinder(1.0, 2.0), meshes.plate(np.array([[0.0, 0], [4, 0]]), 1.0, 0.0, 1.0)):
+        upright = np.abs(mesh.vertex_normals[:, 2])
+        assert ((upright < 1e-6) | (upright > 1 - 1e-6)).all()  # of a cap or of a wall, never between them
+    assert len(meshes.box([1, 2, 3]).vertices) == 36
 
 
 SLOW = [pytest.param(file, marks=pytest.mark.slow) for file in ("rsur", "scotch_yoke", "screw_press")]
@@ -54,42 +59,42 @@ SLOW = [pytest.param(file, marks=pytest.mark.slow) for file in ("rsur", "scotch_
 @pytest.mark.parametrize("file", ["four_bar", "epicyclic", *SLOW])
 def test_every_body_of_an_example_can_be_seen(file):
     mechanism = jn.load(f"examples/{file}.yaml")
-    looks = looks_of(jn.solve(mechanism, np.array([0.0, 0.01]), order=0))
-    rods = {body for stretch in looks.stretches for body in stretch.bodies}
+    appearance = mechanism_appearance(jn.solve(mechanism, np.array([0.0, 0.01]), order=0))
+    rods = {body for stretch in appearance.connectors for body in stretch.bodies}
     for body in mechanism.bodies:
-        assert looks.solids[body] or body in rods
-        assert all(np.isfinite(solid.vertices).all() and len(solid.faces) for solid in looks.solids[body])
-    assert {spot.body for spot in looks.spots} >= set(mechanism.bodies) - rods
+        assert appearance.meshes[body] or body in rods
+        assert all(np.isfinite(each.mesh.vertices).all() and len(each.mesh.faces) for each in appearance.meshes[body])
+    assert {point.body for point in appearance.points} >= set(mechanism.bodies) - rods
 
 
 def test_planar_bodies_lie_in_layers_of_their_own():
-    looks = looks_of(jn.solve(jn.load("examples/four_bar.yaml"), [0.0], order=0))
-    plates = [looks.solids[body][0].vertices[:, 2] for body in ("crank", "rocker")]
-    assert plates[0].max() < plates[1].min() < looks.front
+    appearance = mechanism_appearance(jn.solve(jn.load("examples/four_bar.yaml"), [0.0], order=0))
+    plates = [appearance.meshes[body][0].mesh.vertices[:, 2] for body in ("crank", "rocker")]
+    assert plates[0].max() < plates[1].min() < appearance.front
 
 
 def test_joints_swing_within_their_limits():
     robot = jn.load_robot("examples/robots/panda.urdf")
     subject = robot_subject(robot)
-    take = subject.solve({p.name: p.value for p in subject.parameters}, 2)
+    recording = subject.solve({p.name: p.value for p in subject.parameters}, 2)
     for name in robot.joint_names:
-        low, high, _ = swing_of(robot.joints[name])
-        values = take.outputs[name].values[:, 0]
+        low, high, _, _ = swing_of(robot.joints[name])
+        values = recording.outputs[name].values[:, 0]
         assert low <= values.min() < values.max() <= high
         limit = robot.limits[name].velocity
-        assert limit is None or np.abs(take.outputs[name].values[:, 1]).max() <= limit * (1 + 1e-9)
-    spot = take.looks.spots[0]
-    q = np.stack([take.outputs[name].values[7, :, 0] for name in robot.joint_names], axis=-1)
-    expected = jn.forward_kinematics(robot, q, spot.name)
-    np.testing.assert_allclose(take.motion(spot)[7], expected.position, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(take.placed(spot.body, spot.point)[7], expected.position[0], rtol=0, atol=1e-12)
-    drives = {e.name: e for e in take.exertions if e.kind == "driver"}
+        assert limit is None or np.abs(recording.outputs[name].values[:, 1]).max() <= limit * (1 + 1e-9)
+    point = recording.appearance.points[0]
+    q = np.stack([recording.outputs[name].values[7, :, 0] for name in robot.joint_names], axis=-1)
+    expected = jn.forward_kinematics(robot, q, point.name)
+    np.testing.assert_allclose(recording.motion(point)[7], expected.position, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(recording.placed(point.body, point.point)[7], expected.position[0], rtol=0, atol=1e-12)
+    drives = {e.name: e for e in recording.loads if e.kind == "driver"}
     torque = np.linalg.norm(drives["panda_joint2"].torque, axis=1)
-    np.testing.assert_allclose(torque, np.abs(jn.inverse_dynamics(robot, _coordinates(take, robot))[:, 0, 1]))
+    np.testing.assert_allclose(torque, np.abs(jn.inverse_dynamics(robot, _coordinates(recording, robot))[:, 0, 1]))
 
 
-def _coordinates(take, robot):
-    return np.stack([take.outputs[name].values[..., 0] for name in robot.joint_names], axis=-1)
+def _coordinates(recording, robot):
+    return np.stack([recording.outputs[name].values[..., 0] for name in robot.joint_names], axis=-1)
 
 
 def test_a_trajectory_moves_a_robot_and_must_fit_it():
@@ -97,9 +102,9 @@ def test_a_trajectory_moves_a_robot_and_must_fit_it():
     law = jn.JointTrajectory({"shoulder": "0.3*t"}, 0.0, 1.0)
     subject = robot_subject(robot, law)
     assert subject.parameters == ()
-    take = subject.solve({}, 1)
-    np.testing.assert_allclose(take.outputs["shoulder"].values[:, 0, 0], 0.3 * take.time, atol=1e-14)
-    assert not take.outputs["elbow"].values.any()
+    recording = subject.solve({}, 1)
+    np.testing.assert_allclose(recording.outputs["shoulder"].values[:, 0, 0], 0.3 * recording.time, atol=1e-14)
+    assert not recording.outputs["elbow"].values.any()
     with pytest.raises(jn.RobotError, match="did you mean 'elbow'"):
         robot_subject(robot, jn.JointTrajectory({"elbo": "t"}, 0.0, 1.0))
 
@@ -109,13 +114,13 @@ def test_a_robot_with_closed_loops_moves_as_one():
     robot = jn.load_robot("examples/robots/five_bar.xml")
     assert independent(robot) == ("left_motor", "right_motor")
     subject = robot_subject(robot)
-    take = subject.solve({p.name: p.value for p in subject.parameters}, 2)
-    assert not take.notice
+    recording = subject.solve({p.name: p.value for p in subject.parameters}, 2)
+    assert not recording.notice
     (closure,) = robot.closures.values()
-    ends = [take.placed(link, point) for link, point in zip(closure.links, closure.points, strict=True)]
+    ends = [recording.placed(link, point) for link, point in zip(closure.links, closure.points, strict=True)]
     np.testing.assert_allclose(ends[0], ends[1], rtol=0, atol=1e-9)
     assert np.ptp(ends[0], axis=0).max() > 0.01
-    assert {exertion.kind for exertion in take.exertions} >= {"reaction", "driver"}
+    assert {load.kind for load in recording.loads} >= {"reaction", "driver"}
 
 
 URDF = """<robot name="two">
@@ -145,20 +150,22 @@ def test_shapes_of_a_urdf_are_read_with_places_colours_and_scales(tmp_path):
     (block,), (wedge,) = shapes["base"], shapes["hand"]
     assert block.colour == (255, 0, 0)
     assert block.opacity == 0.5
-    assert np.ptp(block.vertices, axis=0).tolist() == [1, 2, 3]
-    assert volume((wedge.vertices, wedge.faces)) == pytest.approx(8 / 6)
-    assert wedge.vertices.min(axis=0) == pytest.approx([0, 0, -1])  # x turned to -z, then lifted by one
-    looks = robot_looks(jn.load_robot(path), path)
-    assert looks.solids["arm"][0].vertices.min(axis=0) == pytest.approx([5, 0, -1])  # the hand is part of the arm
+    assert np.ptp(block.mesh.vertices, axis=0).tolist() == [1, 2, 3]
+    assert wedge.mesh.volume == pytest.approx(8 / 6)
+    assert wedge.mesh.vertices.min(axis=0) == pytest.approx([0, 0, -1])  # x turned to -z, then lifted by one
+    appearance = robot_appearance(jn.load_robot(path), path)
+    assert appearance.meshes["arm"][0].mesh.vertices.min(axis=0) == pytest.approx(
+        [5, 0, -1]
+    )  # the hand is part of the arm
 
 
 def test_a_link_whose_shape_cannot_be_read_is_a_bar(tmp_path):
     path = tmp_path / "two.urdf"
     path.write_text(URDF.replace('xyz="0 0 1" rpy', 'xyz="0 zero 1" rpy'))
     assert not file_shapes(path)["hand"]
-    looks = robot_looks(jn.load_robot(path), path)
-    assert np.ptp(looks.solids["base"][0].vertices, axis=0).tolist() == [1, 2, 3]  # from the file
-    assert looks.solids["arm"]
+    appearance = robot_appearance(jn.load_robot(path), path)
+    assert np.ptp(appearance.meshes["base"][0].mesh.vertices, axis=0).tolist() == [1, 2, 3]  # from the file
+    assert appearance.meshes["arm"]
 
 
 def test_shapes_of_an_mjcf_are_read(tmp_path):
@@ -168,9 +175,9 @@ def test_shapes_of_an_mjcf_are_read(tmp_path):
       <geom type="box" size="0.1 0.2 0.3" pos="0 0 2" group="3"/></body></worldbody></mujoco>""")
     (capsule,) = file_shapes(path)["arm"]
     assert capsule.colour == (0, 0, 255)
-    assert np.ptp(capsule.vertices, axis=0) == pytest.approx([1.2, 0.2, 0.2], rel=1e-6)
-    take = robot_subject(jn.load_robot(path), path=path).solve(
+    assert np.ptp(capsule.mesh.vertices, axis=0) == pytest.approx([1.2, 0.2, 0.2], rel=1e-6)
+    recording = robot_subject(jn.load_robot(path), path=path).solve(
         {"turn swing": 0.2, "turn middle": 0.0, "period": 1.0}, 1
     )
-    assert take.looks.solids["arm"]
-    assert take.position[0, 1] == pytest.approx([1, 0, 0])
+    assert recording.appearance.meshes["arm"]
+    assert recording.position[0, 1] == pytest.approx([1, 0, 0])

@@ -14,21 +14,22 @@ import re
 import sys
 import warnings
 from collections.abc import Sequence
+from inspect import cleandoc
 from pathlib import Path
 from typing import Any, Literal
 
 from jounce.cli.arguments import converted
-from jounce.cli.completing import complete
 from jounce.cli.conversion import convert
 from jounce.cli.figures import plot, report
 from jounce.cli.inspection import inspect
 from jounce.cli.mechanisms import run, schema, simulate
+from jounce.cli.options import WritingError
 from jounce.cli.papers import reproduce
 from jounce.cli.robots import check, torques
+from jounce.cli.shell_completion import complete
+from jounce.cli.standard_streams import failsafe_streams
 from jounce.cli.starters import new
-from jounce.cli.streams import lasting_streams
-from jounce.cli.views import view
-from jounce.cli.writing import WritingError
+from jounce.cli.viewing import view
 from jounce.errors import JounceError, SolveError
 from jounce.interrupts import end_on_signals
 from jounce.reporting.terminal import cautions, complain, unexpected
@@ -45,70 +46,18 @@ def completion(shell: Literal["bash", "zsh", "fish"], /, *, install: bool = Fals
         Write it where the shell looks for it, and have it read.
     out
         Write the script to this file, and leave start-up files alone.
+
+    Examples
+    --------
+      jounce completion bash --install
+      jounce completion fish
     """
     return complete(application(), shell, install, out)
 
 
-EXAMPLES = {
-    new: """\
-  jounce new
-  jounce new four-bar
-  jounce new slider-crank engine.yaml""",
-    inspect: """\
-  jounce inspect examples/six_bar_watt.yaml
-  jounce inspect examples/robots/panda.urdf --json""",
-    run: """\
-  jounce run examples/four_bar.yaml
-  jounce run examples/rsur.yaml --order 8 --out motion.nc
-  jounce run examples/four_bar.yaml --set "BC=15 cm" --set tau=3""",
-    simulate: """\
-  jounce simulate examples/andrews.yaml
-  jounce simulate examples/double_pendulum.yaml --order 2 --out pendulum.nc
-  jounce simulate examples/flyball_governor.yaml \\
-    --method obreshkov-6 --tolerance 1e-9""",
-    plot: """\
-  jounce plot examples/four_bar.yaml --out four_bar.png
-  jounce plot examples/rsur.yaml --order 6 --output psi --output C
-  jounce plot examples/four_bar.yaml --kind sketch --derivative 3
-  jounce plot examples/press.yaml --kind reactions --output main --output knee
-  jounce plot examples/andrews.yaml --out andrews.gif""",
-    report: """\
-  jounce report examples/four_bar.yaml --out four_bar.html
-  jounce report examples/press.yaml --order 3""",
-    view: """\
-  jounce view examples/four_bar.yaml
-  jounce view examples/press.yaml --order 6 --set "stroke=80 mm"
-  jounce view examples/robots/panda.urdf \\
-    examples/trajectories/panda_wave.yaml --port 8080 --no-open""",
-    check: """\
-  jounce check examples/robots/panda.urdf examples/trajectories/panda_good.csv
-  jounce check examples/robots/panda.urdf \\
-    examples/trajectories/panda_pick.yaml --out pick.png \\
-    --limits examples/limits/franka_panda.yaml
-  jounce check examples/robots/panda.urdf \\
-    examples/trajectories/panda_wave.yaml --payload "panda_hand=3 kg\"""",
-    torques: """\
-  jounce torques examples/robots/panda.urdf \\
-    examples/trajectories/panda_good.csv --rates 2 --out tau.csv
-  jounce torques examples/robots/panda.urdf \\
-    examples/trajectories/panda_wave.yaml --payload "panda_hand=3 kg\"""",
-    convert: """\
-  jounce convert examples/four_bar.yaml four_bar.toml
-  jounce convert examples/robots/ur5.urdf ur5.yaml --hold \\
-    --drive "elbow_joint=45*deg*sin(t)"
-  jounce convert examples/robots/panda.urdf panda.yaml \\
-    --start "panda_joint4=-90 deg\"""",
-    reproduce: """\
-  jounce reproduce sommer-2024 --out out
-  jounce reproduce negrean-2025 --out out
-  jounce reproduce negrean-2025 --out out --samples a.csv --masses link.yaml""",
-    schema: """\
-  jounce schema > mechanism.schema.json
-  jounce schema results""",
-    completion: """\
-  jounce completion bash --install
-  jounce completion fish""",
-}
+COMMANDS = (
+    new, inspect, run, simulate, plot, report, view, check, torques, convert, reproduce, schema, completion
+)  # fmt: skip
 FIRST = """\
   jounce new four-bar                          # a commented starter file
   jounce inspect four-bar.yaml                 # what is in it, can it move?
@@ -148,12 +97,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if not re.fullmatch("[1-9][0-9]{0,3}", os.environ.get(name, "1")):  # 0 is "unknown" to some, nothing to others
             del os.environ[name]
     as_json = "--json" in given
-    with lasting_streams() as output, cautions(json=as_json):
+    with failsafe_streams() as output, cautions(json=as_json):
         status = _status(given, as_json)
         output.flush()
         if output.failure is None:
             return status
-        from jounce.io.files.writing import reason_of
+        from jounce.io.files.reading import reason_of
 
         complain(f"standard output cannot be written: {reason_of(output.failure)}", json=as_json)
     return status or 1
@@ -210,6 +159,7 @@ def application() -> Any:
         result_action="return_value",
         suppress_keyboard_interrupt=False,
     )
-    for place, (command, examples) in enumerate(EXAMPLES.items()):
+    for place, command in enumerate(COMMANDS):
+        _, _, examples = cleandoc(command.__doc__ or "").partition("Examples\n--------\n")
         app.command(command, help_epilogue=f"Examples:\n{examples}", sort_key=place)
     return app

@@ -10,8 +10,6 @@ from typing import Any
 
 from jounce.errors import JounceError, MechanismFileError, did_you_mean
 
-__all__ = ["check_ending", "converted", "named_once"]
-
 _WHOLE = re.compile(r"[+-]?[0-9]{1,18}(\.0*)?")
 
 
@@ -43,16 +41,6 @@ def _number(kind: type, token: Any) -> int | float:
     if not math.isfinite(number):
         raise JounceError("must be a finite number", name=token.keyword, value=token.value)
     return number
-
-
-def named_once(assignments: Sequence[str] | None, option: str) -> None:
-    """Raise JounceError where NAME=VALUE is given twice for a name: which of the two is meant, nobody can know."""
-    found: dict[str, str] = {}
-    for text in assignments or ():
-        name, _, value = (part.strip() for part in text.partition("="))
-        if name in found:
-            raise JounceError(f"is given more than once, as {found[name]} and as {value}", name=f"{option} {name}")
-        found[name] = value
 
 
 def check_ending(path: Path, valid: Sequence[str]) -> None:

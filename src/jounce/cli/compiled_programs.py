@@ -12,8 +12,6 @@ from typing import Any
 from jounce.errors import OutputError
 from jounce.io.files.writing import replacing
 
-__all__ = ["cache_directory", "keep_programs", "use_compilation_cache"]
-
 
 def cache_directory() -> Path | None:
     """Return where compiled programs are kept: JOUNCE_CACHE_DIR, or the user's cache folder; None where nowhere."""

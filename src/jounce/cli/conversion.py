@@ -4,19 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from jounce.cli.arguments import check_ending, named_once
+from jounce.cli.arguments import check_ending
 from jounce.cli.file_kinds import expecting
-from jounce.cli.writing import Overwrite, allowed
+from jounce.cli.options import Overwrite, RobotReading, allowed, errors_about, import_files
 from jounce.errors import JounceError
+from jounce.io.files import DATA_FILES, ROBOT_FILES
 from jounce.reporting.terminal import caution, say
-
-if TYPE_CHECKING:
-    from jounce.robot import Robot
-
-MECHANISMS = (".yaml", ".yml", ".toml", ".json")
-ROBOTS = (".urdf", ".xml")
+from jounce.robot import Robot
 
 
 def convert(
@@ -33,7 +29,7 @@ def convert(
     allow: list[Path] | None = None,
     overwrite: Overwrite = False,
 ) -> int:
-    """Turn a mechanism file into another format, a robot into a mechanism.
+    r"""Turn a mechanism file into another format, a robot into a mechanism.
 
     Mechanism files are YAML, TOML or JSON, robot files URDF or MJCF.
 
@@ -62,23 +58,25 @@ def convert(
         Folder whose files it may name, besides its own; repeatable.
     overwrite
         Replace files that are there.
+
+    Examples
+    --------
+      jounce convert examples/four_bar.yaml four_bar.toml
+      jounce convert examples/robots/ur5.urdf ur5.yaml --hold \
+        --drive "elbow_joint=45*deg*sin(t)"
+      jounce convert examples/robots/panda.urdf panda.yaml \
+        --start "panda_joint4=-90 deg"
     """
-    from jounce.io.files.formats import SUFFIXES
     from jounce.io.files.writing import check_target
     from jounce.io.mechanisms.starters import refuse_existing
 
     suffix = source.suffix.lower()
     with expecting(source, "mechanism", "robot"):
-        check_ending(source, (*MECHANISMS, *ROBOTS))
-    check_target(target, SUFFIXES, "mechanism file", overwrite=overwrite)
+        check_ending(source, (*DATA_FILES, *ROBOT_FILES))
+    check_target(target, DATA_FILES, "mechanism file", overwrite=overwrite)
     refuse_existing(target, overwrite=overwrite)
-    if suffix in ROBOTS:
-        from jounce.io.robots.loader import load_robot
-
-        named_once(drive, "--drive")
-        named_once(start, "--start")
-        with expecting(source, "robot"):
-            model = load_robot(source, strict=strict, allow=allowed(allow))
+    if suffix in ROBOT_FILES:
+        model = RobotReading(strict=strict, allow=allow).robot(source)
         return _robot(source, model, target, drive, start, hold, drives)
     given = {"--drive": drive, "--start": start, "--hold": hold, "--drives": drives, "--strict": strict}
     for option, value in given.items():
@@ -88,17 +86,13 @@ def convert(
 
 
 def _mechanism(source: Path, target: Path, imports: list[Path] | None, allow: Sequence[Path], overwrite: bool) -> int:
-    from jounce.io.files.formats import dumped
+    from jounce.io.files.dumping import dumped
     from jounce.io.files.reading import MAX_SAMPLES, read_file
     from jounce.io.files.writing import check_target, replacing
     from jounce.io.mechanisms.conversion import converted
     from jounce.io.mechanisms.starters import refuse_existing
 
-    if imports:
-        from jounce.io.mechanisms.user_classes import import_file
-
-        for path in imports:
-            import_file(path)
+    import_files(imports)
     with expecting(source, "mechanism"):
         data, samples = converted(source, target, allow)
     text = dumped(data, target.suffix.lower(), str(target))
@@ -116,15 +110,9 @@ def _mechanism(source: Path, target: Path, imports: list[Path] | None, allow: Se
 
 
 def _robot(
-    source: Path,
-    model: Robot,
-    target: Path,
-    drive: list[str] | None,
-    start: list[str] | None,
-    hold: bool,
-    drives: bool,
+    source: Path, model: Robot, target: Path, drive: list[str] | None, start: list[str] | None, hold: bool, drives: bool
 ) -> int:
-    from jounce.io.files.formats import dumped
+    from jounce.io.files.dumping import dumped
     from jounce.io.mechanisms.conversion import assigned, robot_mechanism, with_file_names
     from jounce.io.mechanisms.writer import mechanism_data
     from jounce.mechanism.masses import body_mass
@@ -132,13 +120,11 @@ def _robot(
     robot, renamed = with_file_names(model)
     laws = assigned(robot, drive or (), "--drive", law=True)
     begin: dict[str, Any] = assigned(robot, start or (), "--start", law=False)
-    try:
+    with errors_about(source):
         mechanism = robot_mechanism(robot, begin, laws, hold=hold, drives=drives)
         for name, body in mechanism.bodies.items():
             body_mass(name, body, {}, 3)  # mechanism files hold bodies as real ones only
         data, _ = mechanism_data(mechanism, target.stem)
-    except JounceError as error:
-        raise error.located(path=source) from None
     _put(dumped(data, target.suffix.lower(), str(target)), target, (), True)
     driven = hold or len(laws) == len(robot.joint_names)
     following = [] if robot.closures else [f"jounce {'run' if driven else 'simulate'} {target}"]

@@ -4,30 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
-from jounce.cli.mechanisms import loaded, of_option, outcome, solved
-from jounce.cli.writing import spared, written
+from jounce.cli.mechanisms import outcome, simulated, solved
+from jounce.cli.options import PLAIN_MECHANISM, MechanismReading, errors_about, spare_inputs, written
 from jounce.errors import JounceError, MechanismError, check_name
+from jounce.kinematics import Motion
+from jounce.mechanism import Mechanism
 from jounce.reporting.terminal import Bar, say
-
-if TYPE_CHECKING:
-    from jounce.kinematics import Motion
-    from jounce.mechanism import Mechanism
 
 Kind = Literal["outputs", "sketch", "hodograph", "phase", "energy", "power", "reactions", "animation"]
 Names = Literal["all", "bodies", "joints", "none"]
-FILMS = (".gif", ".mp4")
-ORDERS = {
-    "outputs": 4,
-    "reactions": 4,
-    "power": 4,
-    "energy": 1,
-    "phase": 1,
-    "hodograph": 1,
-    "sketch": 0,
-    "animation": 0,
-}
+ANIMATIONS = (".gif", ".mp4")
+ORDERS = {"outputs": 4, "reactions": 4, "power": 4, "energy": 1, "phase": 1, "hodograph": 1}  # unless another is given
 PORTRAITS = ("hodograph", "phase")
 
 
@@ -46,9 +35,7 @@ def plot(
     elevation: float = 25.0,
     speed: float | None = None,
     fps: int = 25,
-    set_: list[str] | None = None,
-    import_: list[Path] | None = None,
-    allow: list[Path] | None = None,
+    reading: MechanismReading = PLAIN_MECHANISM,
     overwrite: bool = False,
 ) -> int:
     """Draw outputs, a sketch, reactions, energies, or an animation.
@@ -81,50 +68,51 @@ def plot(
         Seconds of motion in a second of the animation.
     fps
         Frames in a second of the animation.
-    set_
-        NAME=VALUE of a parameter, with a unit; repeatable.
-    import_
-        Python file with your own joints; repeatable.
-    allow
-        Folder whose files it may name, besides its own; repeatable.
     overwrite
         Let --out replace a file that is read here.
+
+    Examples
+    --------
+      jounce plot examples/four_bar.yaml --out four_bar.png
+      jounce plot examples/rsur.yaml --order 6 --output psi --output C
+      jounce plot examples/four_bar.yaml --kind sketch --derivative 3
+      jounce plot examples/press.yaml --kind reactions --output main --output knee
+      jounce plot examples/andrews.yaml --out andrews.gif
     """
     chosen = _kind(kind, out)
     out = Path(f"{file.stem}{'.gif' if chosen == 'animation' else '.png'}") if out is None else out
     _check_target(chosen, out, overwrite)
-    mechanism = loaded(file, set_, import_, allow)
-    spared(out, overwrite)
+    mechanism = reading.mechanism(file)
+    spare_inputs(out, overwrite=overwrite)
     _check_names(mechanism, chosen, output or (), file)
-    least = max(derivative or 0, ORDERS[chosen] if order is None or chosen in PORTRAITS else 0)
+    least = max(derivative or 0, ORDERS.get(chosen, 0) if order is None or chosen in PORTRAITS else 0)
     motion = _moved(mechanism, file, least if order is None else max(order, derivative or 0))
-    view = (azimuth, elevation)
-    look: dict[str, Any] = {"paths": output, "order": derivative or 0, "view": view}
+    look: dict[str, Any] = {"paths": output, "order": derivative or 0, "view": (azimuth, elevation)}
     if names is not None:
         look["names"] = names
-    try:
+    with errors_about(file):
         if chosen == "animation":
             from jounce.plot import animate
 
-            film = {"speed": speed, "fps": fps, "overwrite": overwrite}
             with Bar("drawing") as bar:
-                written(lambda: animate(motion, out, progress=bar, **film, **look))
+                written(lambda: animate(motion, out, progress=bar, speed=speed, fps=fps, overwrite=overwrite, **look))
         else:
+            from jounce.plot import save
+
             figure = _drawn(motion, chosen, output, derivative, {"instant": instant, **look})
-            _save(figure, out, overwrite)
-    except JounceError as error:
-        raise of_option(error, file) from None
+            written(lambda: save(figure, out, overwrite=overwrite))
     say(f"Written to {out}")
     return outcome(motion, file)
 
 
 def _kind(kind: Kind | None, out: Path | None) -> str:
     """Return what is drawn; the ending of an animation tells it too."""
-    film = out is not None and out.suffix.lower() in FILMS
+    suffix = "" if out is None else out.suffix
+    moves = suffix.lower() in ANIMATIONS
     if kind is None:
-        return "animation" if film else "outputs"
-    if film and kind != "animation":
-        message = f"a figure of this kind does not move; write a .png, .svg or .pdf instead of a {out.suffix}"  # type: ignore[union-attr]
+        return "animation" if moves else "outputs"
+    if moves and kind != "animation":
+        message = f"a figure of this kind does not move; write a .png, .svg or .pdf instead of a {suffix}"
         raise JounceError(message, name="--kind", value=kind)
     return kind
 
@@ -151,15 +139,7 @@ def _check_names(mechanism: Mechanism, kind: str, wanted: Sequence[str], file: P
 
 def _moved(mechanism: Mechanism, file: Path, order: int) -> Motion:
     """Solve a mechanism that is driven; simulate one that has initial conditions."""
-    if not mechanism.initial:
-        return solved(mechanism, file, order)
-    from jounce.integrate import simulate
-
-    try:
-        with Bar("simulating") as bar:
-            return simulate(mechanism, order=order, strict=False, progress=bar)
-    except JounceError as error:
-        raise of_option(error, file) from None
+    return simulated(mechanism, file, order) if mechanism.initial else solved(mechanism, file, order)
 
 
 def _drawn(motion: Motion, kind: str, output: list[str] | None, derivative: int | None, look: dict[str, Any]) -> Any:
@@ -179,12 +159,6 @@ def _drawn(motion: Motion, kind: str, output: list[str] | None, derivative: int 
     return kinds[kind]()
 
 
-def _save(figure: Any, out: Path, overwrite: bool) -> None:
-    from jounce.plot import save
-
-    written(lambda: save(figure, out, overwrite=overwrite))
-
-
 def _portrayed(motion: Motion, kind: str, output: list[str] | None) -> str:
     """Return the output of a portrait: the first that fits unless one is named."""
     if output or kind not in PORTRAITS:
@@ -202,9 +176,7 @@ def report(
     out: Path | None = None,
     azimuth: float = -60.0,
     elevation: float = 25.0,
-    set_: list[str] | None = None,
-    import_: list[Path] | None = None,
-    allow: list[Path] | None = None,
+    reading: MechanismReading = PLAIN_MECHANISM,
     overwrite: bool = False,
 ) -> int:
     """Write a page to explore a motion in: one HTML file, offline.
@@ -225,26 +197,23 @@ def report(
         Around a spatial mechanism, degrees.
     elevation
         Above it, degrees.
-    set_
-        NAME=VALUE of a parameter, with a unit; repeatable.
-    import_
-        Python file with your own joints; repeatable.
-    allow
-        Folder whose files it may name, besides its own; repeatable.
     overwrite
         Let --out replace a file that is read here.
+
+    Examples
+    --------
+      jounce report examples/four_bar.yaml --out four_bar.html
+      jounce report examples/press.yaml --order 3
     """
     from jounce.plot import check_report, report as write_report
 
     out = Path(f"{file.stem}.html") if out is None else out
     check_report(out, overwrite=overwrite)
-    mechanism = loaded(file, set_, import_, allow)
-    spared(out, overwrite)
+    mechanism = reading.mechanism(file)
+    spare_inputs(out, overwrite=overwrite)
     motion = _moved(mechanism, file, order)
     look: dict[str, Any] = {"view": (azimuth, elevation), "source": file.name, "overwrite": overwrite}
-    try:
+    with errors_about(file):
         written(lambda: write_report(motion, out, **look))
-    except JounceError as error:
-        raise of_option(error, file) from None
     say(f"Written to {out}")
     return outcome(motion, file)

@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from jounce.errors import JounceError, MechanismFileError, RobotError, TrajectoryError
-
-__all__ = ["expecting", "kind_of"]
+from jounce.io.files import DATA_FILES
 
 ADVICE = {
     "mechanism": "is a mechanism; run, simulate, plot, report, view and inspect take mechanisms",
@@ -33,7 +32,7 @@ def kind_of(path: str | PathLike[str]) -> str | None:
     ('robot', 'mechanism', None)
     """
     from jounce.io.files.reading import read_file
-    from jounce.io.files.source import SUFFIXES, read_source
+    from jounce.io.files.source import read_source
 
     name = fspath(path)
     suffix = Path(name).suffix.lower()
@@ -43,7 +42,7 @@ def kind_of(path: str | PathLike[str]) -> str | None:
             return "robot"
         if suffix == ".csv" and content.lstrip(b'\xef\xbb\xbf"').startswith(b"time"):
             return "trajectory"
-        return _kind_of_data(read_source(name).data) if suffix in SUFFIXES else None
+        return _kind_of_data(read_source(name).data) if suffix in DATA_FILES else None
     except JounceError:
         return None
 

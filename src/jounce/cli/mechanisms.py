@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
-from jounce.cli.arguments import named_once
-from jounce.cli.file_kinds import expecting
-from jounce.cli.writing import allowed, spared, written
-from jounce.errors import JounceError, SolveError, check_name
+from jounce.cli.options import NO_TABLE, PLAIN_MECHANISM, MechanismReading, TableOutput, errors_about, spare_inputs
+from jounce.errors import JounceError, check_name
+from jounce.integrate import Obreshkov, Taylor
+from jounce.kinematics import Motion
+from jounce.mechanism import Mechanism
 from jounce.reporting.summaries import motion_summary
-from jounce.reporting.terminal import Bar, say, say_json, show_peaks
-
-if TYPE_CHECKING:
-    from jounce.kinematics import Motion
-    from jounce.mechanism import Mechanism
+from jounce.reporting.terminal import Bar, say, show_peaks
 
 
 def run(
@@ -24,14 +20,10 @@ def run(
     /,
     *,
     order: int = 4,
-    out: Path | None = None,
     tolerance: float = 1e-12,
-    set_: list[str] | None = None,
-    import_: list[Path] | None = None,
-    allow: list[Path] | None = None,
-    overwrite: bool = False,
     no_refine: bool = False,
-    json: bool = False,
+    reading: MechanismReading = PLAIN_MECHANISM,
+    output: TableOutput = NO_TABLE,
 ) -> int:
     """Solve a mechanism file and print peak values, position to jounce.
 
@@ -41,36 +33,22 @@ def run(
         Mechanism file: .yaml, .yml, .toml or .json.
     order
         Highest derivative, 0 to 30; 3 is jerk, 4 jounce.
-    out
-        Write all values to this .csv or .nc (NetCDF) file.
     tolerance
         Of positions, rad or sizes of the mechanism.
-    set_
-        NAME=VALUE of a parameter, with a unit; repeatable.
-    import_
-        Python file with your own joints; repeatable.
-    allow
-        Folder whose files it may name, besides its own; repeatable.
-    overwrite
-        Let --out replace a file that is read here.
     no_refine
         Take peaks at the instants only, not between them.
-    json
-        Print the result as JSON.
-    """
-    from jounce import io
-    from jounce.reporting.motion_facts import motion_facts
-    from jounce.reporting.peaks import peaks
 
-    if out is not None:
-        io.check_writable(out, overwrite=overwrite)
-    mechanism = loaded(file, set_, import_, allow)
-    spared(out, overwrite)
+    Examples
+    --------
+      jounce run examples/four_bar.yaml
+      jounce run examples/rsur.yaml --order 8 --out motion.nc
+      jounce run examples/four_bar.yaml --set "BC=15 cm" --set tau=3
+    """
+    output.check()
+    mechanism = reading.mechanism(file)
+    spare_inputs(output.out, overwrite=output.overwrite)
     motion = solved(mechanism, file, order, tolerance)
-    if not json:
-        say(motion_summary(motion_facts(motion), file.name))
-        show_peaks(peaks(motion, refine=not no_refine))
-    return _finished("run", motion, file, out, overwrite, json, not no_refine)
+    return _finished("run", motion, file, output, refine=not no_refine)
 
 
 def simulate(
@@ -78,19 +56,15 @@ def simulate(
     /,
     *,
     order: int = 4,
-    out: Path | None = None,
     method: str = "taylor",
     tolerance: float = 1e-15,
     step: float | None = None,
-    longest_step: float | None = None,
-    set_: list[str] | None = None,
-    import_: list[Path] | None = None,
-    allow: list[Path] | None = None,
-    overwrite: bool = False,
+    longest_step: float = math.inf,
     no_refine: bool = False,
-    json: bool = False,
+    reading: MechanismReading = PLAIN_MECHANISM,
+    output: TableOutput = NO_TABLE,
 ) -> int:
-    """Move a mechanism by its forces and print peak values, energy, drift.
+    r"""Move a mechanism by its forces and print peak values, energy, drift.
 
     Parameters
     ----------
@@ -98,8 +72,6 @@ def simulate(
         Mechanism file with masses: .yaml, .yml, .toml or .json.
     order
         Highest derivative, 0 to 30; 3 is jerk, 4 jounce.
-    out
-        Write all values to this .csv or .nc (NetCDF) file.
     method
         taylor, obreshkov-4, obreshkov-6 or obreshkov-8.
     tolerance
@@ -108,74 +80,46 @@ def simulate(
         Length of all steps in s, in the place of a control of the error.
     longest_step
         Bound of all steps in s; each is looked at in 32 places or more for what it may miss.
-    set_
-        NAME=VALUE of a parameter, with a unit; repeatable.
-    import_
-        Python file with your own joints and forces; repeatable.
-    allow
-        Folder whose files it may name, besides its own; repeatable.
-    overwrite
-        Let --out replace a file that is read here.
     no_refine
         Take peaks at the instants only, not between them.
-    json
-        Print the result as JSON.
+
+    Examples
+    --------
+      jounce simulate examples/andrews.yaml
+      jounce simulate examples/double_pendulum.yaml --order 2 --out pendulum.nc
+      jounce simulate examples/flyball_governor.yaml \
+        --method obreshkov-6 --tolerance 1e-9
     """
-    from jounce import io
-    from jounce.integrate import simulate as integrate
+    output.check()
+    chosen = _method(method, step)
+    mechanism = reading.mechanism(file)
+    spare_inputs(output.out, overwrite=output.overwrite)
+    motion = simulated(mechanism, file, order, method=chosen, tolerance=tolerance, longest_step=longest_step)
+    return _finished("simulate", motion, file, output, refine=not no_refine)
+
+
+def _finished(command: str, motion: Motion, file: Path, output: TableOutput, *, refine: bool) -> int:
+    """Print and write the results of a motion, and return the exit status."""
+    from jounce.reporting.json_results import motion_result
     from jounce.reporting.motion_facts import motion_facts
     from jounce.reporting.peaks import peaks
 
-    if out is not None:
-        io.check_writable(out, overwrite=overwrite)
-    chosen = _method(method, step)
-    mechanism = loaded(file, set_, import_, allow)
-    spared(out, overwrite)
-    try:
-        with Bar("simulating") as bar:
-            motion = integrate(
-                mechanism,
-                order=order,
-                method=chosen,
-                tolerance=tolerance,
-                longest_step=math.inf if longest_step is None else longest_step,
-                strict=False,
-                progress=bar,
-            )
-    except JounceError as error:
-        raise of_option(error, file) from None
-    if not json:
+    if not output.json:
         say(motion_summary(motion_facts(motion), file.name))
-        show_peaks(peaks(motion, refine=not no_refine))
-    return _finished("simulate", motion, file, out, overwrite, json, not no_refine)
-
-
-def _finished(
-    command: str, motion: Motion, file: Path, out: Path | None, overwrite: bool, json: bool, refine: bool
-) -> int:
-    """Write the results of a motion where they are wanted, and return the exit status."""
-    from jounce import io
-
-    if out is not None:
-        written(lambda: io.write(motion.dataset, out, overwrite=overwrite))
-    if json:
-        from jounce.reporting.records import motion_record
-
-        say_json(command, motion_record(motion, file, out, refine))
-    elif out is not None:
-        say(f"\nWritten to {out}")
+        show_peaks(peaks(motion, refine=refine))
+    output.write(lambda: motion.dataset)
+    output.tell(command, lambda: motion_result(motion, file, output.out, refine))
     return outcome(motion, file)
 
 
-def _method(name: str, step: float | None) -> Any:
+def _method(name: str, step: float | None) -> Taylor | Obreshkov:
     """Return the integration method of a name."""
     from jounce.integrate import Obreshkov, Taylor
 
-    kinds: dict[str, Any] = {"taylor": lambda: Taylor(step=step)}
-    kinds |= {f"obreshkov-{n}": (lambda n=n: Obreshkov(n, step)) for n in (4, 6, 8)}
-    check_name("method", name, kinds, JounceError, name="--method")
+    orders: dict[str, int | None] = {"taylor": None, "obreshkov-4": 4, "obreshkov-6": 6, "obreshkov-8": 8}
+    check_name("method", name, orders, JounceError, name="--method")
     try:
-        return kinds[name]()
+        return Taylor(step=step) if (order := orders[name]) is None else Obreshkov(order, step)
     except JounceError as error:
         error.name = "--step"
         raise
@@ -190,67 +134,43 @@ def schema(of: Literal["mechanism", "results"] = "mechanism", /) -> int:
     ----------
     of
         mechanism: files; results: what the commands print with --json.
+
+    Examples
+    --------
+      jounce schema > mechanism.schema.json
+      jounce schema results
     """
     import json
 
     if of == "results":
-        from jounce.reporting.record_schema import record_schema as made
+        from jounce.reporting.json_result_schema import result_schema as wanted
     else:
-        from jounce.io import json_schema as made
+        from jounce.io import json_schema as wanted
 
-    say(json.dumps(made(), indent=1))
+    say(json.dumps(wanted(), indent=1))
     return 0
-
-
-def loaded(
-    file: Path,
-    assignments: Sequence[str] | None,
-    imports: Sequence[Path] | None,
-    allow: Sequence[Path] | None = None,
-) -> Mechanism:
-    """Return the mechanism of a file, with parameters changed, after files of one's own joints were run."""
-    from jounce.io import load
-
-    if imports:
-        from jounce.io.mechanisms.user_classes import import_file
-
-        for path in imports:
-            import_file(path)
-    with expecting(file, "mechanism"):
-        mechanism = load(file, allow=allowed(allow))
-    if assignments:
-        named_once(assignments, "--set")
-        from jounce.io.mechanisms.overrides import override
-
-        mechanism = override(mechanism, assignments)
-    return mechanism
 
 
 def solved(mechanism: Mechanism, file: Path, order: int, tolerance: float = 1e-12) -> Motion:
     """Solve at all instants of the file; those that fail are NaN."""
     from jounce.kinematics import solve
 
-    try:
-        with Bar("solving") as bar:
-            return solve(mechanism, order=order, tolerance=tolerance, strict=False, progress=bar)
-    except JounceError as error:
-        raise of_option(error, file) from None
+    with errors_about(file), Bar("solving") as bar:
+        return solve(mechanism, order=order, tolerance=tolerance, strict=False, progress=bar)
 
 
-def of_option(error: JounceError, file: Path) -> JounceError:
-    """Return an error with the option, or the file, that it is about."""
-    if error.name in ("order", "tolerance", "longest_step"):
-        error.name = f"--{error.name.replace('_', '-')}"
-        return error
-    return error.located(path=file)
+def simulated(mechanism: Mechanism, file: Path, order: int, **options: Any) -> Motion:
+    """Simulate to all instants of the file; those that are not reached are NaN."""
+    from jounce.integrate import simulate as integrate
+
+    with errors_about(file), Bar("simulating") as bar:
+        return integrate(mechanism, order=order, strict=False, progress=bar, **options)
 
 
 def outcome(motion: Motion, file: Path) -> int:
     """Return 0, or raise for the first instant that failed."""
     from jounce.kinematics import raise_for_status
 
-    try:
+    with errors_about(file):
         raise_for_status(motion)
-    except SolveError as error:
-        raise error.located(path=file) from None
     return 0

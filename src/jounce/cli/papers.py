@@ -25,6 +25,12 @@ def reproduce(paper: str, /, *, out: Path, samples: Path | None = None, masses: 
         negrean-2025 only.
     masses
         Your own link (.yaml, .toml, .json: mass, center_x, center_z, inertia_y); negrean-2025 only.
+
+    Examples
+    --------
+      jounce reproduce sommer-2024 --out out
+      jounce reproduce negrean-2025 --out out
+      jounce reproduce negrean-2025 --out out --samples a.csv --masses link.yaml
     """
     import importlib
 

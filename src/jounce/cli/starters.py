@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 
-from jounce.cli.writing import Overwrite
+from jounce.cli.options import Overwrite
 from jounce.reporting.terminal import say, say_json, show_columns
 
 
 def new(
-    name: str | None = None,
-    file: Path | None = None,
-    /,
-    *,
-    overwrite: Overwrite = False,
-    json: bool = False,
+    name: str | None = None, file: Path | None = None, /, *, overwrite: Overwrite = False, json: bool = False
 ) -> int:
     """Write a commented starter file; without a name, list them.
 
@@ -28,6 +24,12 @@ def new(
         Replace a file that is there.
     json
         Print the result as JSON.
+
+    Examples
+    --------
+      jounce new
+      jounce new four-bar
+      jounce new slider-crank engine.yaml
     """
     from jounce.io.mechanisms.starters import STARTERS, write_starter
 
@@ -41,19 +43,11 @@ def new(
         return 0
     target = Path(f"{name}.yaml") if file is None else file
     starter = write_starter(name, target, overwrite=overwrite)
-    following = [f"jounce {starter.command} {_quoted(target)}"]
-    if starter.command == "run":
-        following.append(f"jounce plot {_quoted(target)} --out {_quoted(target.with_suffix('.png'))}")
-    else:
-        following.append(f"jounce simulate {_quoted(target)} --out {_quoted(target.with_suffix('.csv'))}")
+    second, suffix = ("plot", ".png") if starter.command == "run" else ("simulate", ".csv")
+    paths = [shlex.quote(str(path)) for path in (target, target.with_suffix(suffix))]
+    following = [f"jounce {starter.command} {paths[0]}", f"jounce {second} {paths[0]} --out {paths[1]}"]
     if json:
         say_json("new", {"name": starter.name, "written": str(target), "next": following})
         return 0
     say(f"{starter.about}\nWritten to {target}\n\nTry now:\n  " + "\n  ".join(following))
     return 0
-
-
-def _quoted(path: Path) -> str:
-    import shlex
-
-    return shlex.quote(str(path))

@@ -5,20 +5,20 @@ from typing import Any
 import jax.numpy as jnp
 
 from jounce.dynamics.driver_coordinates import balanced
-from jounce.dynamics.energies import whole_number
-from jounce.dynamics.equations import checked_order
 from jounce.kinematics import Motion
+from jounce.robot.arguments import checked_coordinates, whole_number
 from jounce.robot.batches import Batched
 from jounce.robot.equations_of_motion import centers_of, partial_velocities, times_inertia, work, work_of_weight
 from jounce.robot.inverse_dynamics import inverse_dynamics
 from jounce.robot.kinematics import body_frames
 from jounce.robot.robot import Robot
 from jounce.robot.tree import Tree
-from jounce.robot.tree_scan import to_coordinates
+from jounce.robot.tree_scan import Series, to_coordinates
+from jounce.shapes import ArrayLike
 
 
 @Batched
-def _virtual_work(tree: Tree, arrays: Any, _: Any, inertial: bool) -> Any:
+def _virtual_work(tree: Tree, arrays: tuple[Series], _: Any, inertial: bool) -> Any:
     """Return the work of inertia, or of weight, along each coordinate."""
     frames = body_frames(tree, arrays[0]).without_base()
     if not inertial:
@@ -30,7 +30,7 @@ def _virtual_work(tree: Tree, arrays: Any, _: Any, inertial: bool) -> Any:
     return to_coordinates(tree, work(partial_velocities(tree, frames), force, moment))
 
 
-def newton_euler(system: Robot | Motion, q: Any = None, rates: int = 0) -> Any:
+def newton_euler(system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0) -> Any:
     """Return the generalised inertia forces by recursive Newton-Euler on jets: `inverse_dynamics` without gravity.
 
     For the motion of a mechanism the balances of momentum are those of all bodies together, by multipliers.
@@ -53,17 +53,17 @@ def newton_euler(system: Robot | Motion, q: Any = None, rates: int = 0) -> Any:
     Examples
     --------
     >>> import jounce as jn
-    >>> slide = jn.robot.Screw([1, 0, 0], type="prismatic", inertia=jn.Inertia(2.0))
+    >>> slide = jn.robot.JointAxis([1, 0, 0], type="prismatic", inertia=jn.Inertia(2.0))
     >>> newton_euler(jn.robot.from_screws([slide]), [[0.0], [3.0], [5.0], [7.0]], rates=1).round(12).tolist()
     [[10.0], [14.0]]
     """
-    rates = whole_number("rates", rates, 0)
+    rates = whole_number("rates", rates)
     if isinstance(system, Motion):
         return balanced(system, rates, gravity=False)
-    return inverse_dynamics(system.with_gravity((0.0, 0.0, 0.0)), checked_order(system, q, rates + 2))
+    return inverse_dynamics(system.with_gravity((0.0, 0.0, 0.0)), checked_coordinates(system, q, rates + 2, rates + 2))
 
 
-def virtual_work(system: Robot | Motion, q: Any = None, rates: int = 0) -> Any:
+def virtual_work(system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0) -> Any:
     """Return the generalised inertia forces by the principle of d'Alembert-Lagrange: Negrean 2025, equations 121-124.
 
     The work that inertia forces and moments of all bodies do along each coordinate, ``sum J^T F``. For the motion of
@@ -87,17 +87,17 @@ def virtual_work(system: Robot | Motion, q: Any = None, rates: int = 0) -> Any:
     Examples
     --------
     >>> import jounce as jn
-    >>> slide = jn.robot.Screw([1, 0, 0], type="prismatic", inertia=jn.Inertia(2.0))
+    >>> slide = jn.robot.JointAxis([1, 0, 0], type="prismatic", inertia=jn.Inertia(2.0))
     >>> virtual_work(jn.robot.from_screws([slide]), [[0.0], [3.0], [5.0], [7.0]], rates=1).round(12).tolist()
     [[10.0], [14.0]]
     """
-    rates = whole_number("rates", rates, 0)
+    rates = whole_number("rates", rates)
     if isinstance(system, Motion):
         return balanced(system, rates, gravity=False)
-    return _virtual_work(system, (checked_order(system, q, rates + 2),), (), (True,))
+    return _virtual_work(system, (checked_coordinates(system, q, rates + 2, rates + 2),), (), (True,))
 
 
-def gravity_forces(system: Robot | Motion, q: Any = None, rates: int = 0) -> Any:
+def gravity_forces(system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0) -> Any:
     """Return the generalised forces that hold the robot against gravity, and their rates: Q_g of Negrean 2025, 125.
 
     With the inertia forces they make the driving forces, ``Q_m = Q_i + Q_g``.
@@ -120,11 +120,11 @@ def gravity_forces(system: Robot | Motion, q: Any = None, rates: int = 0) -> Any
     Examples
     --------
     >>> import jounce as jn
-    >>> lift = jn.robot.Screw([0, 0, 1], type="prismatic", inertia=jn.Inertia(2.0))
+    >>> lift = jn.robot.JointAxis([0, 0, 1], type="prismatic", inertia=jn.Inertia(2.0))
     >>> gravity_forces(jn.robot.from_screws([lift]), [[0.0]]).tolist()
     [[19.62]]
     """
-    rates = whole_number("rates", rates, 0)
+    rates = whole_number("rates", rates)
     if isinstance(system, Motion):
         return balanced(system, rates, gravity=True) - balanced(system, rates, gravity=False)
-    return _virtual_work(system, (checked_order(system, q, rates),), (), (False,))
+    return _virtual_work(system, (checked_coordinates(system, q, rates, rates),), (), (False,))

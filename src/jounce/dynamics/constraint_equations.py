@@ -11,19 +11,26 @@ from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
-from jounce.dynamics.energies import masses_of
-from jounce.dynamics.inverse import MotionForces, in_chunks, places, pose_of
+from jounce.dynamics.forward import Lanes, Rows
+from jounce.dynamics.inverse import ElementIndex, MotionForces, element_indices
 from jounce.dynamics.loads import mass_matrices
-from jounce.dynamics.mechanism_state import State, at_state
+from jounce.dynamics.masses import Masses, masses_of
+from jounce.dynamics.mechanism_state import MotionAtState, at_state
+from jounce.dynamics.motion_values import Coordinates, cut, derivatives_along, in_chunks, pose_of
+from jounce.dynamics.saddle_point import Jacobian, MassMatrix, block_diagonal, saddle_point
 from jounce.errors import MechanismError
 from jounce.jet import Jet
+from jounce.jet.derivatives import plain_derivatives
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.assembly import split
 from jounce.kinematics.compilation import compiled
-from jounce.mechanism import Mechanism, Model
+from jounce.mechanism import Mechanism
 from jounce.mechanism.preconditions import concrete
 from jounce.mechanism.system import System
+from jounce.rigid.pose import Pose
+from jounce.shapes import Numbers
 
 COLUMNS = {"planar": ("x", "y", "angle"), "spatial": ("x", "y", "z", "wx", "wy", "wz")}
 
@@ -117,7 +124,7 @@ def constraint_equations(
         raise MechanismError("must be a jn.Motion, or a jn.Mechanism with a state", name="motion", value=motion)
     labels = _labels(motion)
     numbers = _numbers(motion, order)
-    if isinstance(motion, State):
+    if isinstance(motion, MotionAtState):
         _check_finite(numbers, labels["row"], float(motion.time[0]))
     found = {
         "residual": (("time", "row"), numbers["residual"]),
@@ -143,43 +150,29 @@ def constraint_equations(
 
 def _labels(motion: Motion) -> dict[str, Any]:
     """Return the labels of all axes, rows in the order of the mechanism."""
-    mechanism, found = motion.mechanism, places(motion.model)
-    shifts = motion.model.pose_type.shifts
+    mechanism = motion.mechanism
     columns = [f"{body}.{name}" for body in mechanism.bodies for name in COLUMNS[mechanism.space]]
-    return {
-        "time": motion.time,
-        "row": _text(
-            f"{name}.{k + 1}" for name in _elements(mechanism) for k in range(_rows(motion.model, found[name]))
-        ),
-        "column": _text(columns),
-        "other_column": _text(columns),
-        "body": _text(mechanism.bodies),
-        "component": _text("xyz"[:shifts]),
-        "euler_parameter": _text(["e0", "e1", "e2", "e3"]),
+    rows = [f"{name}.{k + 1}" for name, found in _in_order(motion) for k in range(len(found.own_rows))]
+    labels = {
+        "row": rows,
+        "column": columns,
+        "other_column": columns,
+        "body": list(mechanism.bodies),
+        "component": list("xyz"[: motion.model.pose_type.shifts]),
+        "euler_parameter": ["e0", "e1", "e2", "e3"],
     }
+    return {"time": motion.time} | {axis: np.array(names, dtype=str) for axis, names in labels.items()}
 
 
-def _text(names: Any) -> np.ndarray:
-    return np.array(list(names), dtype=str)
-
-
-def _elements(mechanism: Mechanism) -> list[str]:
-    return [*mechanism.joints, *mechanism.drivers]
-
-
-def _rows(model: Model, place: Any) -> int:
-    return (place.rows.stop - place.rows.start) // model.system.groups[place.group].instances
+def _in_order(motion: Motion) -> list[tuple[str, ElementIndex]]:
+    """Return joints and drivers in the order of the mechanism, by name."""
+    found = element_indices(motion.model)
+    return [(name, found[name]) for name in (*motion.mechanism.joints, *motion.mechanism.drivers)]
 
 
 def _row_order(motion: Motion) -> np.ndarray:
     """Return which row of the system each row is, in the order of the mechanism."""
-    model, found = motion.model, places(motion.model)
-    rows = [
-        place.rows.start + k * model.system.groups[place.group].instances + place.instance
-        for place in (found[name] for name in _elements(motion.mechanism))
-        for k in range(_rows(model, place))
-    ]
-    return np.array(rows, int)
+    return np.array([row for _, found in _in_order(motion) for row in found.own_rows], int)
 
 
 def _numbers(motion: Motion, order: int) -> dict[str, np.ndarray]:
@@ -192,8 +185,7 @@ def _numbers(motion: Motion, order: int) -> dict[str, np.ndarray]:
 
     def chunk(lanes: np.ndarray) -> Any:
         bodies = {name: values[..., lanes] for name, values in coordinates.items()}
-        still = {name: bodies[name][:1] for name in pose_type.predictor}
-        residual, jacobian = _position_equations(plain, still, motion.time[lanes], pose_type)
+        residual, jacobian = _position_equations(plain, cut(bodies, 0), motion.time[lanes], pose_type)
         if not order:
             return residual, jacobian, np.zeros((0, *residual.shape))
         instants = np.tile(motion.time[lanes], order)
@@ -209,7 +201,7 @@ def _numbers(motion: Motion, order: int) -> dict[str, np.ndarray]:
     }
 
 
-def _without_unknowns(coordinates: dict[str, Any], order: int) -> dict[str, np.ndarray]:
+def _without_unknowns(coordinates: Coordinates, order: int) -> Coordinates:
     """Return coordinates once for each order from 1 on, one after the other, with those of that order set to zero."""
     found = {}
     for name, values in coordinates.items():
@@ -225,15 +217,19 @@ def _without_unknowns(coordinates: dict[str, Any], order: int) -> dict[str, np.n
 
 
 @compiled("pose_type")
-def _position_equations(system: System, bodies: dict[str, Any], instants: Any, pose_type: Any) -> tuple[Any, Any]:
-    """Return the residual, (rows, batch), and the Jacobian, (rows, columns, batch)."""
+def _position_equations(
+    system: System, bodies: Coordinates, instants: Lanes, pose_type: type[Pose]
+) -> tuple[Rows, Jacobian]:
+    """Return the residual and the Jacobian."""
     pose, time = pose_of(bodies, pose_type, 0), Jet([instants[None]])
     return system.residual(pose, time).coefficients[0], system.jacobian(pose, time)
 
 
 @compiled("pose_type")
-def _right_sides(system: System, bodies: dict[str, Any], instants: Any, pose_type: Any) -> Any:
-    """Return the right sides, (order, rows, batch), from the states of `_without_unknowns`.
+def _right_sides(
+    system: System, bodies: Coordinates, instants: Lanes, pose_type: type[Pose]
+) -> Float[Numbers, "derivative row instant"]:
+    """Return the right sides from the states of `_without_unknowns`.
 
     The coefficient of order k of the residual is affine in that of the coordinates, with the Jacobian as its slope:
     what it is where that is zero is minus the right side, up to k!.
@@ -245,38 +241,28 @@ def _right_sides(system: System, bodies: dict[str, Any], instants: Any, pose_typ
     return -factorials[:, None, None] * jnp.stack(parts)
 
 
-def _unknowns(coordinates: dict[str, Any], k: int) -> tuple[Any, Any]:
-    """Return the k-th coefficients that `extended` takes: of positions, and of angles or w'[k-1] / k."""
-    if "angle" in coordinates:
-        return coordinates["position"][k], coordinates["angle"][k][None]
-    return coordinates["position"][k], coordinates["angular_velocity"][k - 1] / k
-
-
-def _velocities(motion: Motion, order: int) -> np.ndarray:
-    """Return the derivatives of the coordinates, (time, order, columns), from the first on."""
+def _velocities(motion: Motion, order: int) -> Float[np.ndarray, "time derivative column"]:
+    """Return the derivatives of the coordinates from the first on."""
     _, coordinates = motion.poses
-    found = [np.zeros((0, _columns(motion), len(motion.time)))]
-    for k in range(1, order + 1):
-        parts = np.concatenate(list(map(np.asarray, _unknowns(coordinates, k))))[:, 1:]
-        found.append(math.factorial(k) * np.swapaxes(parts, 0, 1).reshape(1, -1, parts.shape[-1]))
-    return np.moveaxis(np.concatenate(found), -1, 0)
-
-
-def _columns(motion: Motion) -> int:
-    return len(motion.mechanism.bodies) * len(COLUMNS[motion.mechanism.space])
+    moving = {name: np.asarray(values)[..., 1:, :] for name, values in coordinates.items()}  # without the ground
+    plain = {name: plain_derivatives(values) for name, values in moving.items()}
+    turns = plain["angle"][1:, None] if "angle" in plain else plain["angular_velocity"]
+    parts = np.concatenate([plain["position"][1 : order + 1], turns[:order]], axis=1)
+    columns = motion.model.system.cells.shape[1]
+    return np.transpose(parts, (3, 0, 2, 1)).reshape(len(motion.time), order, columns)
 
 
 def _places(motion: Motion) -> dict[str, Any]:
     """Return where the bodies are at all instants."""
-    pose_type, coordinates = motion.poses
-    first = {name: np.moveaxis(np.asarray(coordinates[name][0])[..., 1:, :], -1, 0) for name in pose_type.predictor}
+    still = cut(motion.poses[1], 0)
+    first = {name: np.moveaxis(np.asarray(values[0])[..., 1:, :], -1, 0) for name, values in still.items()}
     found = {"position": (("time", "body", "component"), np.swapaxes(first["position"], 1, 2))}
     if "angle" in first:
         return found | {"angle": (("time", "body"), first["angle"])}
     return found | {"attitude": (("time", "body", "euler_parameter"), np.swapaxes(first["quaternion"], 1, 2))}
 
 
-def _forces(motion: Motion, jacobian: np.ndarray) -> dict[str, Any]:
+def _forces(motion: Motion, jacobian: Float[np.ndarray, "time row column"]) -> dict[str, Any]:
     """Return the mass matrix and the multipliers, where there are some."""
     mechanism, found = motion.mechanism, {}
     if any(body.mass is not None for body in mechanism.bodies.values()):
@@ -285,16 +271,21 @@ def _forces(motion: Motion, jacobian: np.ndarray) -> dict[str, Any]:
         return found
     _, coordinates = motion.poses
     levels = min(len(coordinates["position"]) - 2, motion.order + 1)
-    mass = found["mass_matrix"][1] if found else np.zeros((1, _columns(motion), _columns(motion)))
-    if levels < 1 or not jacobian.size or (isinstance(motion, State) and not _determined(motion, jacobian[0], mass[0])):
+    columns = jacobian.shape[-1]
+    mass = found["mass_matrix"][1] if found else np.zeros((1, columns, columns))
+    if (
+        levels < 1
+        or not jacobian.size
+        or (isinstance(motion, MotionAtState) and not _determined(motion, jacobian[0], mass[0]))
+    ):
         return found
-    coefficients = MotionForces.of(motion).multipliers[:levels][:, _row_order(motion)]
-    factorials = np.array([math.factorial(k) for k in range(levels)], float)
-    values = np.moveaxis(coefficients * factorials[:, None, None], -1, 0)
+    values = derivatives_along(motion, MotionForces.of(motion).multipliers[:levels][:, _row_order(motion)])
     return found | {"multipliers": (("time", "derivative", "row"), values, 0)}
 
 
-def _determined(motion: Motion, jacobian: np.ndarray, mass: np.ndarray) -> bool:
+def _determined(
+    motion: Motion, jacobian: Float[np.ndarray, "row column"], mass: Float[np.ndarray, "column column"]
+) -> bool:
     """Tell whether the multipliers are determined at a state: those of a motion are, a state may be anything."""
     scale = np.tile(motion.model.system.column_scale, len(motion.mechanism.bodies))
     sizes = np.max(np.abs(jacobian * scale), axis=1, keepdims=True)
@@ -302,27 +293,26 @@ def _determined(motion: Motion, jacobian: np.ndarray, mass: np.ndarray) -> bool:
     if len(whole) != whole.shape[1]:
         mass = mass * scale[:, None] * scale
         mass = mass / (np.max(np.abs(mass)) or 1.0)
-        whole = np.block([[mass, whole.T], [whole, np.zeros((len(whole), len(whole)))]])
+        whole = np.asarray(saddle_point(mass[..., None], whole[..., None]))[..., 0]
     return split(whole)[1] == len(whole)
 
 
-def _mass_matrix(motion: Motion) -> np.ndarray:
-    """Return the mass matrix at all instants, (time, columns, columns)."""
+def _mass_matrix(motion: Motion) -> Float[np.ndarray, "time column column"]:
+    """Return the mass matrix at all instants."""
     pose_type, coordinates = motion.poses
     masses = masses_of(motion.mechanism)
 
     def chunk(lanes: np.ndarray) -> Any:
-        bodies = {name: values[:1][..., lanes] for name, values in coordinates.items() if name in pose_type.predictor}
+        bodies = {name: values[..., lanes] for name, values in cut(coordinates, 0).items()}
         return _body_masses(bodies, masses, pose_type)
 
-    blocks = np.moveaxis(in_chunks(chunk, len(motion.time)), (3, 2), (0, 1))[:, 1:]
-    count, columns = len(motion.mechanism.bodies), _columns(motion)
-    return np.einsum("ab,tacd->tacbd", np.eye(count), blocks).reshape(len(motion.time), columns, columns)
+    return np.moveaxis(in_chunks(chunk, len(motion.time)), -1, 0)
 
 
 @compiled("pose_type")
-def _body_masses(bodies: dict[str, Any], masses: Any, pose_type: Any) -> Any:
-    return mass_matrices(pose_of(bodies, pose_type, 0), *masses)
+def _body_masses(bodies: Coordinates, masses: Masses, pose_type: type[Pose]) -> MassMatrix:
+    blocks = mass_matrices(pose_of(bodies, pose_type, 0), masses)[:, :, 1:]
+    return block_diagonal(blocks, np.ones(len(blocks)))
 
 
 def _check_finite(numbers: dict[str, np.ndarray], rows: np.ndarray, instant: float) -> None:

@@ -6,33 +6,44 @@ directions, from the matrix of masses and Jacobian together. The jets of the Jac
 virtual displacements of the bodies: none is written anywhere, and a joint of one's own has its reactions.
 """
 
-import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
-from jounce.dynamics.loads import inertia_forces as inertia_forces
+from jounce.constraints import AbstractConstraint
+from jounce.dynamics.saddle_point import (
+    BodyMatrices,
+    Column,
+    Jacobian,
+    MassMatrix,
+    as_column,
+    block_diagonal,
+    saddle_point,
+)
 from jounce.jet import Jet
-from jounce.jet.algebra import stacked
+from jounce.jet.algebra import stacked, total
 from jounce.kinematics.linear import DenseFactor
-from jounce.mechanism.system import System
+from jounce.mechanism.system import System, movable, with_rows
+from jounce.rigid.pose import Pose
+from jounce.shapes import Numbers
 from jounce.trajectory import AbstractMotion
 
+Slope = Float[Numbers, "order coordinate row instance batch"]
+"""Taylor coefficients of how the residuals of a group change with the coordinates of the bodies in a slot."""
 
-def truncated(pose: Any, order: int) -> Any:
-    """Return a pose with the jets cut to an order, and none of them a certain zero, so that it may be displaced."""
-    pose = jax.tree.map(lambda jet: jet.dense(), pose.truncate(order), is_leaf=lambda x: isinstance(x, Jet))
-    if pose.turns == 3 and order and pose.angular_velocity is None:
-        rest = Jet.constant(jnp.zeros_like(pose.position.coefficients[0]), order - 1).dense()
-        return dataclasses.replace(pose, angular_velocity=rest)
-    return pose
+Slopes = Sequence[Sequence[Float[Numbers, "order coordinate _ _ batch"]]]
+"""For each group, those of each of its moving slots."""
+
+Multipliers = Float[Numbers, "order row instance batch"]
+"""Taylor coefficients of the multipliers of a group."""
 
 
-def slopes(element: Any, poses: Sequence[Any], time: Jet, slot: int) -> Any:
+def slopes(element: AbstractConstraint, poses: Sequence[Pose], time: Jet, slot: int) -> Slope:
     """Return how the residual of a joint or driver changes as the body in a slot is displaced: Jacobian, as jets.
 
     Parameters
@@ -51,7 +62,7 @@ def slopes(element: Any, poses: Sequence[Any], time: Jet, slot: int) -> Any:
     array of shape (order + 1, coordinates, rows, instances, batch)
         Taylor coefficients of the derivatives by a shift in global axes, m, and by a turn in axes of the body, rad.
     """
-    body = truncated(poses[slot], time.order)
+    body = movable(poses[slot].truncate(time.order))
     shape, size = body.position.shape[1:], body.shifts + body.turns
 
     def residual(pose: Any) -> Any:
@@ -60,18 +71,18 @@ def slopes(element: Any, poses: Sequence[Any], time: Jet, slot: int) -> Any:
     def along(direction: Any) -> Any:
         unit = jnp.broadcast_to(direction[:, None, None], (size, *shape))
         shift, turn = (Jet.constant(part, time.order).dense() for part in (unit[: body.shifts], unit[body.shifts :]))
-        change = truncated(body.varied(shift, turn), time.order)
+        change = movable(body.varied(shift, turn).truncate(time.order))
         return jax.jvp(residual, (body,), (jax.lax.optimization_barrier(change),))[1]
 
     return jnp.moveaxis(jax.vmap(along)(jnp.eye(size)), 0, 1)
 
 
-def with_rows(jet: Jet) -> Jet:
-    """Return a jet of shape (instances, batch) as one of shape (1, instances, batch)."""
-    return jet.map(lambda c: c[None]) if len(jet.shape) == 2 else jet
-
-
-def work_along(slope: Any, forces: Any, level: int, lowest: int = 0) -> Any:
+def work_along(
+    slope: Slope,
+    forces: Sequence[Float[Numbers, "row instance batch"]] | Multipliers,
+    level: int,
+    lowest: int = 0,
+) -> Float[Numbers, "coordinate instance batch"]:
     """Return the Taylor coefficient of what multipliers do along the coordinates of the bodies: slope times them.
 
     Parameters
@@ -84,36 +95,33 @@ def work_along(slope: Any, forces: Any, level: int, lowest: int = 0) -> Any:
         Which coefficient of the product.
     lowest : int
         The coefficients of the slope below this one are left out.
-
-    Returns
-    -------
-    array of shape (coordinates, instances, batch)
     """
-    return sum(jnp.sum(slope[j] * forces[level - j][None], axis=1) for j in range(lowest, level + 1))
+    return total(jnp.sum(slope[j] * forces[level - j][None], axis=1) for j in range(lowest, level + 1))
 
 
-class FreeFactor(eqx.Module):
-    """The factored matrix ``[[M, J^T], [J, 0]]`` of a mechanism that has degrees of freedom left."""
+def balancing(mass: MassMatrix | None, jacobian: Jacobian) -> Callable[[Column], Float[Numbers, "row batch"]]:
+    """Return what solves for the multipliers that balance loads.
 
-    factor: DenseFactor
-    rows: int = eqx.field(static=True)
+    Where there is no mass matrix, the Jacobian is square and balances all; with one, what accelerates the bodies freely
+    is left out.
+    """
+    if mass is None:
+        return DenseFactor.of(jacobian).solve_transposed
+    factor, rows = DenseFactor.of(saddle_point(mass, jacobian)), len(jacobian)
 
-    @classmethod
-    def of(cls, mass: Any, jacobian: Any) -> "FreeFactor":
-        """Factor from mass matrices, (columns, columns, batch), and Jacobians, (rows, columns, batch)."""
-        rows = jacobian.shape[0]
-        above = jnp.concatenate([mass, jnp.swapaxes(jacobian, 0, 1)], axis=1)
-        below = jnp.concatenate([jacobian, jnp.zeros((rows, rows, jacobian.shape[-1]))], axis=1)
-        return cls(DenseFactor.of(jnp.concatenate([above, below])), rows)
+    def solve(load: Any) -> Any:
+        return factor.solve(jnp.concatenate([load, jnp.zeros((rows, load.shape[-1]))]))[-rows:]
 
-    def solve_transposed(self, right: Any) -> Any:
-        """Return the multipliers that balance loads, (columns, batch), but for what accelerates the bodies freely."""
-        whole = jnp.concatenate([right, jnp.zeros((self.rows, right.shape[-1]))])
-        return self.factor.solve(whole)[-self.rows :]
+    return solve
 
 
-def multipliers(system: System, blocks: Sequence[Sequence[Any]], load: Any, mass: Any = None) -> Any:
-    """Return the multipliers of all rows, not scaled, as Taylor coefficients, (levels, rows, batch).
+def multipliers(
+    system: System,
+    blocks: Slopes,
+    load: Float[Numbers, "levels coordinate body batch"],
+    mass: BodyMatrices | None = None,
+) -> Float[Numbers, "levels row batch"]:
+    """Return the multipliers of all rows, not scaled, as Taylor coefficients.
 
     Parameters
     ----------
@@ -129,34 +137,29 @@ def multipliers(system: System, blocks: Sequence[Sequence[Any]], load: Any, mass
     if not blocks:
         return jnp.zeros((load.shape[0], 0, load.shape[-1]))
     scale = jnp.asarray(system.column_scale)
-    factor = _factor(system, blocks, mass)
+    solve = _solver(system, blocks, mass)
     found: list[Any] = []
     for k in range(len(load)):
         missing = load[k]
         for group, parts, forces in _by_group(system, blocks, found):
             for slot, slope in zip(group.moving_slots, parts, strict=True):
                 missing -= _onto_bodies(work_along(slope, forces, k, 1), group.bodies[slot], system.body_count)
-        right = jnp.swapaxes(missing * scale[:, None, None], 0, 1).reshape(-1, missing.shape[-1])
-        found.append(factor.solve_transposed(right) * system.row_scale)
+        found.append(solve(as_column(missing, scale)) * system.row_scale)
     return jnp.stack(found)
 
 
-def _factor(system: System, blocks: Sequence[Sequence[Any]], mass: Any) -> Any:
-    """Return the factor that solves for multipliers: of the Jacobian alone where it is square."""
+def _solver(system: System, blocks: Slopes, mass: BodyMatrices | None) -> Callable[[Any], Any]:
+    """Return what solves for the multipliers of scaled rows: by the Jacobian alone where there are no masses."""
     scale = jnp.asarray(system.column_scale)
     flat = [(slope[0] * scale[:, None, None, None]).reshape(-1, slope.shape[-1]) for parts in blocks for slope in parts]
-    lanes = flat[0].shape[-1]
-    jacobian = jnp.concatenate([*flat, jnp.zeros((1, lanes))])[system.cells] * system.row_scale[:, :, None]
-    rows, columns, _ = jacobian.shape
-    if rows == columns:
-        return DenseFactor.of(jacobian)
-    scaled = mass * (scale[:, None] * scale[None])[:, :, None, None]
-    scaled = scaled / jnp.max(jnp.abs(scaled))  # their size does not matter to the multipliers
-    whole = jnp.eye(system.body_count)[:, None, :, None, None] * jnp.moveaxis(scaled, 2, 0)[:, :, None]
-    return FreeFactor.of(whole.reshape(columns, columns, lanes), jacobian)
+    jacobian = jnp.concatenate([*flat, jnp.zeros((1, flat[0].shape[-1]))])[system.cells] * system.row_scale[:, :, None]
+    if mass is None:
+        return balancing(None, jacobian)
+    whole = block_diagonal(mass, scale)
+    return balancing(whole / jnp.max(jnp.abs(whole)), jacobian)  # their size does not matter to the multipliers
 
 
-def _by_group(system: System, blocks: Sequence[Sequence[Any]], found: list[Any]) -> list[Any]:
+def _by_group(system: System, blocks: Slopes, found: list[Float[Numbers, "row batch"]]) -> list[Any]:
     """Return groups with their blocks and those of the multipliers found so far, each (rows, instances, batch)."""
     if not found:
         return []
@@ -170,7 +173,9 @@ def _by_group(system: System, blocks: Sequence[Sequence[Any]], found: list[Any])
     return results
 
 
-def _onto_bodies(work: Any, bodies: tuple[int, ...], count: int) -> Any:
+def _onto_bodies(
+    work: Float[Numbers, "coordinate instance batch"], bodies: tuple[int, ...], count: int
+) -> Float[Numbers, "coordinate {count} batch"]:
     """Return what acts on each moving body from what acts on the bodies of the instances."""
     return jnp.zeros((work.shape[0], count + 1, work.shape[-1])).at[:, np.array(bodies)].add(work)[:, 1:]
 
@@ -185,8 +190,10 @@ class _Shifted(AbstractMotion):
         return self.law(time) + self.shift
 
 
-def exerted(driver: Any, poses: Sequence[Any], time: Jet, forces: Any) -> Any:
-    """Return the forces that drivers exert along what they prescribe, with rates, (levels, instances, batch).
+def exerted(
+    driver: Any, poses: Sequence[Pose], time: Jet, forces: Multipliers
+) -> Float[Numbers, "order instance batch"]:
+    """Return the forces that drivers exert along what they prescribe, with rates.
 
     Conjugate to the law f: ``lambda^T dPhi/df``, whose product with f' is the power that goes into the mechanism.
 
@@ -209,18 +216,6 @@ def exerted(driver: Any, poses: Sequence[Any], time: Jet, forces: Any) -> Any:
     return jnp.stack([work_along(slope[:, None], forces, k)[0] for k in range(len(forces))])
 
 
-def wrench(slope: Any, forces: Any) -> Any:
-    """Return what joints do to the bodies of one slot: force, global, and moment about the origin, in axes of the body.
-
-    Parameters
-    ----------
-    slope : array of shape (levels, coordinates, rows, instances, batch)
-        As `slopes` gives it.
-    forces : array of shape (levels, rows, instances, batch)
-        Coefficients of the multipliers.
-
-    Returns
-    -------
-    array of shape (levels, coordinates, instances, batch)
-    """
+def wrench(slope: Slope, forces: Multipliers) -> Float[Numbers, "order coordinate instance batch"]:
+    """Return what joints do to the bodies of one slot: global force, and moment about its origin in its axes."""
     return jnp.stack([-work_along(slope, forces, k) for k in range(len(forces))])

@@ -4,7 +4,6 @@ The laws of the drivers are generalised coordinates: with them, joints and loops
 by a jet, and all poses follow from it to first order by the factored Jacobian, order after order, as in a solve.
 """
 
-import math
 from collections.abc import Callable
 from typing import Any
 
@@ -12,30 +11,38 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
-from jounce.dynamics.energies import body_energy, mechanism_masses
-from jounce.dynamics.inverse import MotionForces, in_chunks, places
+from jounce.dynamics.energies import body_energy
+from jounce.dynamics.forward import Lanes
+from jounce.dynamics.inverse import MotionForces, element_indices
+from jounce.dynamics.masses import Masses, required_masses
+from jounce.dynamics.motion_values import Coordinates, cut, in_chunks, labelled, pose_of
 from jounce.errors import MechanismError
 from jounce.jet import Jet
 from jounce.jet.algebra import total
-from jounce.kinematics import Motion, Status
+from jounce.kinematics import Motion
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.linear import DenseFactor
 from jounce.mechanism.system import System
+from jounce.rigid.pose import Pose
+from jounce.shapes import ArrayLike, Numbers
 
 
 class ChangedLaw(eqx.Module):
     """The laws of a group of drivers, changed by jets."""
 
     law: Any
-    change: Any  # Taylor coefficients, (levels, instances, batch)
+    change: Float[Numbers, "levels instance batch"]  # Taylor coefficients
 
     def __call__(self, time: Jet) -> Jet:
         """Return the law at the instants of a jet."""
         return self.law(time) + Jet(tuple(self.change[: time.order + 1]))
 
 
-def of_drivers(motion: Motion, q: Any, least: int, form: Callable[..., Any], static: tuple[Any, ...]) -> Any:
+def in_driver_coordinates(
+    motion: Motion, q: ArrayLike | None, least: int, form: Callable[..., Any], static: tuple[Any, ...]
+) -> Any:
     """Return what a form of the equations of motion gives in the coordinates of the drivers.
 
     Parameters
@@ -65,19 +72,17 @@ def of_drivers(motion: Motion, q: Any, least: int, form: Callable[..., Any], sta
     if q is not None:
         raise MechanismError("a motion has its coordinates already, the laws of its drivers", name="q", value=q)
     model, names = motion.model, drivers_of(motion)
-    found = places(model)
+    found = element_indices(model)
     order = tuple((found[name].group, found[name].instance) for name in names)
     pose_type, coordinates = motion.poses
-    masses = mechanism_masses(motion)
-    start = {name: values[:1] for name, values in coordinates.items() if name != "angular_velocity"}
+    masses = required_masses(motion.mechanism)
+    start = cut(coordinates, 0)
 
     def chunk(lanes: np.ndarray) -> Any:
         still = {name: values[..., lanes] for name, values in start.items()}
         return _evaluated(model.system, still, motion.time[lanes], masses, pose_type, order, least, form, static)
 
-    values = np.moveaxis(in_chunks(chunk, len(motion.time)), -1, 0)
-    values = values * np.array([float(math.factorial(k)) for k in range(values.shape[1])])[:, None]
-    return _labelled(motion, np.where((motion.status == Status.OK)[:, None, None], values, np.nan), names)
+    return labelled(motion, in_chunks(chunk, len(motion.time)), driver=names)
 
 
 def drivers_of(motion: Motion) -> tuple[str, ...]:
@@ -119,49 +124,42 @@ def balanced(motion: Motion, rates: int, *, gravity: bool) -> Any:
         If no body has a mass, the motion has too few derivatives, or something moves that no driver prescribes.
     """
     names = drivers_of(motion)
-    mechanism_masses(motion)
+    required_masses(motion.mechanism)
     if motion.order < rates + 2:
         raise MechanismError(f"this needs a motion solved to order {rates + 2}", name="order", value=motion.order)
     forces = MotionForces(motion, gravity=gravity, applied=False)
-    values = np.stack([forces.driver_force(name)[: rates + 1, 0] for name in names], axis=-1)  # level, time, driver
-    values = np.moveaxis(values, 0, 1) * np.array([float(math.factorial(k)) for k in range(rates + 1)])[:, None]
-    return _labelled(motion, np.where((motion.status == Status.OK)[:, None, None], values, np.nan), names)
-
-
-def _labelled(motion: Motion, values: np.ndarray, names: tuple[str, ...]) -> Any:
-    import xarray
-
-    axes = {"time": motion.time, "derivative": np.arange(values.shape[1]), "driver": list(names)}
-    return xarray.DataArray(values, dims=("time", "derivative", "driver"), coords=axes)
+    values = np.stack([forces.driver_force(name)[: rates + 1, 0] for name in names], axis=1)
+    return labelled(motion, values, driver=names)
 
 
 @compiled("pose_type", "order", "least", "form", "static")
 def _evaluated(
     system: System,
-    still: dict[str, Any],
-    instants: Any,
-    masses: Any,
-    pose_type: Any,
+    still: Coordinates,
+    instants: Lanes,
+    masses: Masses,
+    pose_type: type[Pose],
     order: tuple[tuple[int, int], ...],
     least: int,
     form: Callable[..., Any],
     static: tuple[Any, ...],
 ) -> Any:
-    mass, center, moments = masses
-    place = pose_type.from_coordinates({name: Jet(tuple(c)) for name, c in still.items()})
+    place = pose_of(still, pose_type)
     factor = DenseFactor.of(system.jacobian(place, Jet([instants[None]])))
 
     def energies(changes: Any, p: int) -> Jet:
         time = Jet.variable(instants[None], changes.shape[0] - 1)
         pose = followed(with_changes(system, order, changes), place, factor, time)
-        parts = body_energy(pose, mass, center, moments, p)
+        parts = body_energy(pose, *masses, p)
         return total(part.map(lambda c: jnp.sum(c, axis=0)) for part in parts)
 
     return form(energies, jnp.zeros((least + 1, len(order), len(instants))), *static)
 
 
-def with_changes(system: System, order: tuple[tuple[int, int], ...], changes: Any) -> System:
-    """Return a system whose drivers, by group and instance, have laws that are changed, (levels, drivers, batch)."""
+def with_changes(
+    system: System, order: tuple[tuple[int, int], ...], changes: Float[Numbers, "levels driver batch"]
+) -> System:
+    """Return a system whose drivers, by group and instance, have laws that are changed."""
     groups = list(system.groups)
     for index in {group for group, _ in order}:
         members = [order.index((index, instance)) for instance in range(groups[index].instances)]
@@ -170,7 +168,7 @@ def with_changes(system: System, order: tuple[tuple[int, int], ...], changes: An
     return eqx.tree_at(lambda s: s.groups, system, tuple(groups))
 
 
-def followed(system: System, place: Any, factor: DenseFactor, time: Jet) -> Any:
+def followed(system: System, place: Pose, factor: DenseFactor, time: Jet) -> Pose:
     """Return the pose with all derivatives that the time jet has, right to first order in changes of the system.
 
     The factors are those of the system without changes. What they leave of the residual is corrected by them once more,

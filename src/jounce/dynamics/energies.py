@@ -7,31 +7,44 @@ for any motion. On jets the same two products give the rates.
 """
 
 import dataclasses
-import math
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
-from jax.core import Tracer
+from jaxtyping import Float
 
-from jounce.errors import MechanismError, RobotError
+from jounce.dynamics.masses import Gravity, Masses, gravity_of, required_masses, second_moments
+from jounce.dynamics.motion_values import Coordinates, cut, labelled, pose_of
+from jounce.errors import MechanismError
 from jounce.jet import Jet, dot
 from jounce.jet.algebra import stacked, total
-from jounce.kinematics import Motion, Status
+from jounce.kinematics import Motion
 from jounce.kinematics.compilation import compiled
-from jounce.mechanism import Mechanism
-from jounce.mechanism.masses import body_mass
-from jounce.mechanism.resolve import resolve
+from jounce.mechanism.system import Group
+from jounce.rigid import PlanarPose
 from jounce.rigid.frames import Frames
-from jounce.robot.batches import Batched, checked
+from jounce.rigid.pose import Pose
+from jounce.robot.arguments import checked_coordinates, whole_number
+from jounce.robot.batches import Batched
 from jounce.robot.kinematics import body_frames
 from jounce.robot.robot import Robot
 from jounce.robot.tree import Tree
+from jounce.robot.tree_scan import Series
+from jounce.shapes import ArrayLike, Numbers
+
+Energies = Float[Numbers, "order body time"]
+"""Taylor coefficients of energies of bodies along a motion."""
+
+EnergyFunction = Callable[..., tuple[Jet, ...]]
+"""What maps a pose, masses, centres, second moments and an order to energies, as `body_energy` does."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Energy:
     """An energy of several bodies, translation and rotation apart, with its rates.
+
+    Of a robot it holds plain arrays, of a motion `xarray.DataArray` of dimensions time, derivative and body.
 
     Parameters
     ----------
@@ -51,10 +64,17 @@ class Energy:
     @property
     def total(self) -> Any:
         """Energy of all bodies and its rates, shape (..., rates + 1)."""
-        return (self.translation + self.rotation).sum(axis=-1)
+        return summed(self.translation + self.rotation)
 
 
-def body_energy(pose: Any, mass: Any, center_of_mass: Any, second_moments: Any, order: int = 1) -> tuple[Jet, Jet]:
+def summed(energies: Any) -> Any:
+    """Return energies of bodies added up; NaN where one of them is."""
+    return energies.sum("body", skipna=False) if hasattr(energies, "dims") else energies.sum(axis=-1)
+
+
+def body_energy(
+    pose: Pose | Frames, mass: Any, center_of_mass: Any, second_moments: Any, order: int = 1
+) -> tuple[Jet, Jet]:
     """Return the acceleration energy of rigid bodies as jets: Negrean 2025, equations 82-113.
 
     Parameters
@@ -83,14 +103,15 @@ def body_energy(pose: Any, mass: Any, center_of_mass: Any, second_moments: Any, 
     Examples
     --------
     >>> import jounce as jn
+    >>> import numpy as np
     >>> angle = jn.Jet([0.0, 2.0, 1.5])  # a disc of 1 kg m^2 that turns in the plane, at 2 rad/s and 3 rad/s^2
-    >>> pose = jn.rigid.PlanarPose.from_jets(jn.Jet.constant([0.0, 0.0], 2), angle)
-    >>> _, rotation = jn.dynamics.body_energy(pose, 1.0, [0.0, 0.0], [[0.5, 0.0], [0.0, 0.5]])
+    >>> pose = jn.rigid.PlanarPose.from_jets(jn.Jet.constant(np.zeros(2), 2), angle)
+    >>> _, rotation = jn.dynamics.body_energy(pose, 1.0, np.zeros(2), 0.5 * np.eye(2))
     >>> float(rotation.coefficients[0])  # (3^2 + 2^4) / 2
     12.5
     """
     velocity = differentiated(pose.point(center_of_mass), order + 1)
-    rates = [differentiated(axis, order + 1) for axis in body_axes(pose)]
+    rates = [differentiated(axis, order + 1) for axis in axes_of(pose)]
     translation = dot(velocity, velocity) * (0.5 * mass)
     size = range(len(rates))
     rotation = total(
@@ -102,11 +123,9 @@ def body_energy(pose: Any, mass: Any, center_of_mass: Any, second_moments: Any, 
     return translation, rotation
 
 
-def body_axes(pose: Any) -> tuple[Jet, ...]:
+def axes_of(pose: Pose | Frames) -> tuple[Jet, ...]:
     """Return the axes of bodies, two in the plane, in components of the base."""
-    if hasattr(pose, "axes"):
-        return pose.axes
-    return tuple(pose.direction(unit) for unit in np.eye(2))  # a planar body
+    return tuple(pose.direction(unit) for unit in np.eye(2)) if isinstance(pose, PlanarPose) else pose.axes
 
 
 def differentiated(jet: Jet, times: int) -> Jet:
@@ -124,7 +143,7 @@ def differentiated(jet: Jet, times: int) -> Jet:
     return jet
 
 
-def acceleration_energy(system: Robot | Motion, q: Any = None, *, order: int = 1) -> Energy:
+def acceleration_energy(system: Robot | Motion, q: ArrayLike | None = None, *, order: int = 1) -> Energy:
     """Return the acceleration energy of order p of a robot or of a moving mechanism, and its rates.
 
     Negrean 2025, equations 73-78 for order 0, 82-113 for order 1, 107 for any order.
@@ -157,46 +176,31 @@ def acceleration_energy(system: Robot | Motion, q: Any = None, *, order: int = 1
     >>> float(jn.acceleration_energy(robot, [[0.0], [2.0], [3.0]]).total[0].round(12))  # (3^2 + 2^4) / 3 / 2
     4.166666666667
     """
-    (translation, rotation), bodies, order = evaluated(system, q, order, body_energy)
-    return Energy(translation, rotation, bodies, order)
+    return Energy(*energies_of(system, q, order, body_energy))
 
 
-def evaluated(
-    system: Robot | Motion, q: Any, order: int, function: Any
-) -> tuple[tuple[Any, ...], tuple[str, ...], int]:
+def energies_of(system: Robot | Motion, q: ArrayLike | None, order: int, function: EnergyFunction) -> tuple[Any, ...]:
     """Return what `body_energy`, or a function like it, gives for the bodies of a system, their names, and the order.
-
-    Arrays are of shape (..., rates + 1, bodies): plain derivatives.
 
     Raises
     ------
     RobotError, MechanismError
         As for `acceleration_energy`.
     """
-    order = whole_number("order", order, 0)
+    order = whole_number("order", order)
     if isinstance(system, Motion):
-        return _of_motion(system, order, function), tuple(system.mechanism.bodies), order
-    q = checked(system, q, 0)
-    if q.shape[-2] < order + 2:
-        message = f"an energy of order {order} needs derivatives of q to order {order + 1}"
-        raise RobotError(message, name="q", value=q.shape)
-    return _of_robot(system, (q,), (), (order, function)), system.moving_links, order
+        if q is not None:
+            raise MechanismError("a motion has its coordinates already", name="q", value=q)
+        _check_known(system, order, system.order)
+        bodies = tuple(system.mechanism.bodies)
+        found = energy_coefficients(system, order, function)
+        parts = tuple(labelled(system, x[: system.order - order, 1:], f"J/s^{2 * order}", body=bodies) for x in found)
+        return *parts, bodies, order
+    parts = _of_robot(system, (checked_coordinates(system, q, order + 1),), (), (order, function))
+    return *parts, system.moving_links, order
 
 
-def whole_number(name: str, value: Any, least: int) -> int:
-    """Return a whole number that is large enough.
-
-    Raises
-    ------
-    RobotError
-        If it is not.
-    """
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
-        raise RobotError(f"must be a whole number, {least} or greater", name=name, value=value)
-    return int(value)
-
-
-def kinetic_energy(system: Robot | Motion, q: Any = None) -> Energy:
+def kinetic_energy(system: Robot | Motion, q: ArrayLike | None = None) -> Energy:
     """Return the kinetic energy of a robot or of a moving mechanism, and its rates: `acceleration_energy` of order 0.
 
     Negrean 2025, equations 65-78 (Koenig's theorem).
@@ -204,50 +208,52 @@ def kinetic_energy(system: Robot | Motion, q: Any = None) -> Energy:
     Examples
     --------
     >>> import jounce as jn
-    >>> slide = jn.robot.Screw([1, 0, 0], type="prismatic", inertia=jn.Inertia(2.0))
+    >>> slide = jn.robot.JointAxis([1, 0, 0], type="prismatic", inertia=jn.Inertia(2.0))
     >>> jn.kinetic_energy(jn.robot.from_screws([slide]), [[0.0], [3.0], [1.0]]).total.tolist()  # energy and power
     [9.0, 6.0]
     """
     return acceleration_energy(system, q, order=0)
 
 
-def robot_energy(tree: Tree, frames: Frames, order: int, function: Any = body_energy) -> tuple[Jet, ...]:
+def robot_energy(tree: Tree, frames: Frames, order: int, function: EnergyFunction = body_energy) -> tuple[Jet, ...]:
     """Return the energy of the bodies of a robot as jets of shape (bodies, batch), from the frames of the bodies."""
     tensor = jnp.moveaxis(jnp.asarray(tree.inertia), 0, -1)[..., None]
-    spread = 0.5 * (tensor[0, 0] + tensor[1, 1] + tensor[2, 2])
-    moments = [[(spread if i == k else 0.0) - tensor[i, k] for k in range(3)] for i in range(3)]
     center = jnp.swapaxes(jnp.asarray(tree.center), 0, 1)[:, :, None]
-    return function(frames, jnp.asarray(tree.mass)[:, None], center, moments, order)
+    return function(frames, jnp.asarray(tree.mass)[:, None], center, second_moments(tensor), order)
 
 
 @Batched
-def _of_robot(tree: Tree, arrays: Any, _: Any, order: int, function: Any) -> Any:
+def _of_robot(
+    tree: Tree, arrays: tuple[Series], _: Any, order: int, function: EnergyFunction
+) -> tuple[Float[Numbers, "levels body batch"], ...]:
     frames = body_frames(tree, arrays[0]).without_base()
     return tuple(stacked(part) for part in robot_energy(tree, frames, order, function))
 
 
-def _of_motion(motion: Motion, order: int, function: Any) -> tuple[np.ndarray, ...]:
-    if motion.order < order + 1:
+def energy_coefficients(motion: Motion, order: int, function: EnergyFunction = body_energy) -> tuple[Energies, ...]:
+    """Return what `body_energy`, or a function like it, gives for bodies as Taylor coefficients, the ground first.
+
+    Raises
+    ------
+    MechanismError
+        If no body has a mass, or the motion has too few derivatives.
+    """
+    pose_type, coordinates = motion.poses
+    _check_known(motion, order, len(coordinates["position"]) - 1)
+    return _of_bodies(coordinates, required_masses(motion.mechanism), pose_type, order, function)
+
+
+def _check_known(motion: Motion, order: int, known: int) -> None:
+    if known < order + 1:
         message = f"an energy of order {order} needs a motion solved to order {order + 1}"
         raise MechanismError(message, name="order", value=motion.order)
-    pose_type, coordinates = motion.poses
-    parts = _evaluated(coordinates, *mechanism_masses(motion), pose_type, order, function)
-    bad = (motion.status != Status.OK)[:, None, None]
-
-    def derivatives(coefficients: Any) -> np.ndarray:
-        factorials = np.array([float(math.factorial(k)) for k in range(len(coefficients))])
-        values = np.asarray(coefficients) * factorials[:, None, None]  # order, body, time
-        return np.where(bad, np.nan, np.moveaxis(values[:, 1:], -1, 0))  # without the ground
-
-    return tuple(derivatives(part[: motion.order - order]) for part in parts)
 
 
 @compiled("pose_type", "order", "function")
-def _evaluated(
-    coordinates: Any, mass: Any, center: Any, moments: Any, pose_type: Any, order: int, function: Any
-) -> Any:
-    pose = pose_type.from_coordinates({name: Jet(tuple(c)) for name, c in coordinates.items()})
-    return tuple(stacked(part) for part in function(pose, mass, center, moments, order))
+def _of_bodies(
+    coordinates: Coordinates, masses: Masses, pose_type: type[Pose], order: int, function: EnergyFunction
+) -> tuple[Energies, ...]:
+    return tuple(stacked(part) for part in function(pose_of(coordinates, pose_type), *masses, order))
 
 
 def potential_energy(motion: Motion) -> Any:
@@ -260,8 +266,8 @@ def potential_energy(motion: Motion) -> Any:
 
     Returns
     -------
-    array of shape (time, order + 1)
-        J, J/s, ...; NaN at instants that were not solved.
+    xarray.DataArray
+        Dimensions time and derivative, J by s; NaN at instants that were not solved.
 
     Raises
     ------
@@ -278,44 +284,28 @@ def potential_energy(motion: Motion) -> Any:
     ...     joints={"rail": jn.planar.Prismatic(("ground", "cage"), [0, 0], [0, 0], [0, 1], [0, 1])},
     ...     drivers={"height": jn.drivers.SlideDriver(("ground", "cage"), [0, 0], [0, 0], [0, 1], "2*t")},
     ... )
-    >>> jn.dynamics.potential_energy(jn.solve(lift, [0.0, 1.0], order=1))[1].round(9).tolist()  # energy and power
+    >>> energy = jn.dynamics.potential_energy(jn.solve(lift, [0.0, 1.0], order=1))
+    >>> energy.values[1].round(9).tolist()  # energy and power
     [60.0, 60.0]
     """
-    found = potential_coefficients(motion)[: motion.order + 1].sum(axis=1)
-    values = found * np.array([float(math.factorial(k)) for k in range(len(found))])[:, None]
-    return np.where((motion.status == Status.OK)[:, None], values.T, np.nan)
+    return labelled(motion, potential_coefficients(motion)[: motion.order + 1].sum(axis=1), "J")
 
 
-def potential_coefficients(motion: Motion) -> np.ndarray:
-    """Return the potential energies of bodies as Taylor coefficients, (levels, bodies, time), the ground first."""
-    mass, center, _ = mechanism_masses(motion)
-    pose_type, coordinates = motion.poses
-    return 0.0 - np.asarray(_heights(coordinates, center, gravity_of(motion.mechanism), pose_type)) * mass  # no -0
-
-
-def energy_coefficients(motion: Motion, order: int) -> np.ndarray:
-    """Return the energies of order p of bodies as Taylor coefficients, (levels, bodies, time), the ground first.
-
-    Raises
-    ------
-    MechanismError
-        If no body has a mass, or the motion has too few derivatives.
-    """
-    pose_type, coordinates = motion.poses
-    if len(coordinates["position"]) < order + 2:
-        message = f"an energy of order {order} needs a motion solved to order {order + 1}"
-        raise MechanismError(message, name="order", value=motion.order)
-    parts = _evaluated(coordinates, *mechanism_masses(motion), pose_type, order, body_energy)
-    return np.asarray(parts[0]) + np.asarray(parts[1])
+def potential_coefficients(motion: Motion) -> Energies:
+    """Return the potential energies of bodies as Taylor coefficients, the ground first."""
+    masses, (pose_type, coordinates) = required_masses(motion.mechanism), motion.poses
+    heights = np.asarray(_heights(coordinates, masses.center, gravity_of(motion.mechanism), pose_type))
+    return 0.0 - heights * masses.mass  # no -0
 
 
 @compiled("pose_type")
-def _heights(coordinates: Any, center: Any, gravity: Any, pose_type: Any) -> Any:
-    pose = pose_type.from_coordinates({name: Jet(tuple(c)) for name, c in coordinates.items()})
-    return stacked(dot(pose.point(center), gravity))
+def _heights(
+    coordinates: Coordinates, center: Float[Numbers, "component body 1"], gravity: Gravity, pose_type: type[Pose]
+) -> Energies:
+    return stacked(dot(pose_of(coordinates, pose_type).point(center), gravity))
 
 
-def stored_energy(motion: Motion) -> np.ndarray:
+def stored_energy(motion: Motion) -> Any:
     """Return the energy that springs, and other forces that give back what they take, have stored.
 
     Parameters
@@ -325,8 +315,8 @@ def stored_energy(motion: Motion) -> np.ndarray:
 
     Returns
     -------
-    array of shape (time,)
-        J; NaN at instants that were not solved.
+    xarray.DataArray
+        Dimension time, J; NaN at instants that were not solved.
 
     Examples
     --------
@@ -338,66 +328,21 @@ def stored_energy(motion: Motion) -> np.ndarray:
     ...     drivers={"push": jn.drivers.SlideDriver(("ground", "sled"), [0, 0], [0, 0], [1, 0], "1 + t**2")},
     ...     forces={"spring": jn.forces.Spring(("ground", "sled"), [0, 0], [0, 0], stiffness=5.0, length=1.0)},
     ... )
-    >>> jn.dynamics.stored_energy(jn.solve(sled, [0.0, 2.0], order=1)).round(12).tolist()  # 5/2 t^4
+    >>> jn.dynamics.stored_energy(jn.solve(sled, [0.0, 2.0], order=1)).values.round(12).tolist()  # 5/2 t^4
     [0.0, 40.0]
     """
     pose_type, coordinates = motion.poses
-    low = {name: values[: 2 - (name == "angular_velocity")] for name, values in coordinates.items()}
-    stored = np.asarray(_stored(motion.forces, low, motion.time[None], pose_type))
-    return np.where(motion.status == Status.OK, stored, np.nan)
+    stored = _stored(motion.forces, cut(coordinates, 1), motion.time[None], pose_type)
+    return labelled(motion, np.asarray(stored)[None], "J")[:, 0].drop_vars("derivative")
 
 
 @compiled("pose_type")
-def _stored(groups: Any, coordinates: Any, time: Any, pose_type: Any) -> Any:
-    pose, clock = (
-        pose_type.from_coordinates({name: Jet(tuple(c)) for name, c in coordinates.items()}),
-        Jet.variable(time, 1),
-    )
-    total_energy = jnp.zeros(time.shape[-1])
-    for group in groups:
-        stored = jnp.broadcast_to(group.energy(pose, clock).coefficients[0], (group.instances, time.shape[-1]))
-        total_energy = total_energy + jnp.sum(stored, axis=0)
-    return total_energy
+def _stored(groups: tuple[Group, ...], coordinates: Coordinates, time: Any, pose_type: type[Pose]) -> Any:
+    return energy_of_forces(groups, pose_of(coordinates, pose_type), Jet.variable(time, 1))
 
 
-def gravity_of(mechanism: Mechanism) -> Any:
-    """Return the acceleration of free fall in a mechanism, shape (k, 1, 1), m/s^2."""
-    given = [0.0] * (2 if mechanism.space == "planar" else 3) if mechanism.gravity is None else mechanism.gravity
-    return resolve(given, mechanism.parameter_values)[:, None, None]
-
-
-def mechanism_masses(motion: Motion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return masses (bodies, 1), centres of mass (k, bodies, 1) and second moments (k, k, bodies, 1), the ground first.
-
-    Raises
-    ------
-    MechanismError
-        If no body has a mass, or a body has an inertia without a mass.
-    """
-    found = masses_of(motion.mechanism)
-    if not found[0].any():
-        raise MechanismError("no body has a mass; energies need some", name="bodies")
-    return found
-
-
-def masses_of(mechanism: Mechanism) -> tuple[Any, Any, Any]:
-    """Return what `mechanism_masses` does, also where no body has a mass; parameters may be traced by JAX."""
-    size = 2 if mechanism.space == "planar" else 3
-    masses, centers, moments = [0.0], [np.zeros(size)], [np.zeros((size, size))]
-    for name, body in mechanism.bodies.items():
-        if body.mass is None and body.inertia is not None:
-            raise MechanismError("an inertia needs a mass beside it", name=f"bodies.{name}.mass")
-        mass, center, inertia = body_mass(name, body, mechanism.parameter_values, size, solid=False)
-        masses.append(mass)
-        centers.append(center)
-        if size == 2:  # the second moments of a plane body about its axes are not known apart; only their sum counts
-            moments.append(np.eye(2) * 0.5 * inertia)
-        else:
-            tensor = inertia * np.eye(3) if np.ndim(inertia) < 2 else inertia
-            moments.append((tensor[0, 0] + tensor[1, 1] + tensor[2, 2]) / 2 * np.eye(3) - tensor)
-    traced = any(isinstance(x, Tracer) for x in (*masses, *centers, *moments))
-    stack = jnp.stack if traced else np.stack
-    mass, center, second = (
-        stack([*map(jnp.asarray if traced else np.asarray, x)], -1) for x in (masses, centers, moments)
-    )
-    return mass[:, None], center[..., None], second[..., None]
+def energy_of_forces(groups: Sequence[Group], pose: Pose, time: Jet) -> Float[Numbers, " batch"]:
+    """Return the energy that forces have stored, J, in a pose with velocities."""
+    lanes = time.shape[-1]
+    parts = [jnp.broadcast_to(g.energy(pose, time).coefficients[0], (g.instances, lanes)) for g in groups]
+    return jnp.sum(jnp.concatenate([*parts, jnp.zeros((1, lanes))]), axis=0)

@@ -9,13 +9,17 @@ import dataclasses
 import math
 from typing import Any
 
-from jounce.dynamics.energies import body_axes, differentiated, evaluated
+from jounce.dynamics.energies import axes_of, differentiated, energies_of, summed
 from jounce.errors import RobotError, did_you_mean
 from jounce.jet import Jet, cross, dot
 from jounce.jet.algebra import total
 from jounce.kinematics import Motion
+from jounce.rigid import PlanarPose
+from jounce.rigid.frames import Frames
 from jounce.rigid.planar import perpendicular
+from jounce.rigid.pose import Pose
 from jounce.robot.robot import Robot
+from jounce.shapes import ArrayLike
 
 POINTS = ("center_of_mass", "origin")
 
@@ -65,11 +69,11 @@ class EnergyTerms:
     @property
     def total(self) -> Any:
         """Energy of all bodies and its rates, shape (..., rates + 1)."""
-        return (self.translation + self.coupling + self.coupling_remaining + self.rotation).sum(axis=-1)
+        return summed(self.translation + self.coupling + self.coupling_remaining + self.rotation)
 
 
 def energy_terms(
-    system: Robot | Motion, q: Any = None, *, order: int = 1, about: str = "center_of_mass"
+    system: Robot | Motion, q: ArrayLike | None = None, *, order: int = 1, about: str = "center_of_mass"
 ) -> EnergyTerms:
     """Return the terms of the acceleration energy of order p apart: translation, and the three of rotation; with rates.
 
@@ -113,18 +117,17 @@ def energy_terms(
     if about not in POINTS:
         raise RobotError(f"no such point; {did_you_mean(about, POINTS)}", name="about", value=about)
     function = terms_about_center if about == "center_of_mass" else terms_about_origin
-    parts, bodies, order = evaluated(system, q, order, function)
-    return EnergyTerms(*parts, bodies=bodies, order=order)
+    return EnergyTerms(*energies_of(system, q, order, function))
 
 
-def terms_about_center(pose: Any, mass: Any, center: Any, moments: Any, order: int) -> tuple[Jet, ...]:
+def terms_about_center(pose: Pose | Frames, mass: Any, center: Any, moments: Any, order: int) -> tuple[Jet, ...]:
     """Return the terms of `body_energy` about the centre of mass, as jets: Negrean 2025, equation 106."""
     linear = differentiated(pose.point(center), order + 1)
     nothing = dot(linear, linear) * (0.0 * mass)
     return dot(linear, linear) * (0.5 * mass), nothing, nothing, *_rotation(*_rates(pose, order), moments)
 
 
-def terms_about_origin(pose: Any, mass: Any, center: Any, moments: Any, order: int) -> tuple[Jet, ...]:
+def terms_about_origin(pose: Pose | Frames, mass: Any, center: Any, moments: Any, order: int) -> tuple[Jet, ...]:
     """Return the terms of `body_energy` about the origin of the frame, as jets: Negrean 2025, equation 105."""
     linear, rates = differentiated(pose.position, order + 1), _rates(pose, order)
     couplings = (dot(linear, total(r * c for r, c in zip(part, center, strict=True))) * mass for part in rates)
@@ -133,15 +136,14 @@ def terms_about_origin(pose: Any, mass: Any, center: Any, moments: Any, order: i
     return dot(linear, linear) * (0.5 * mass), *couplings, *_rotation(*rates, about)
 
 
-def _rates(pose: Any, order: int) -> tuple[list[Jet], list[Jet]]:
+def _rates(pose: Pose | Frames, order: int) -> tuple[list[Jet], list[Jet]]:
     """Return the derivatives of the axes: what the last rate of the angular velocity adds, and what is left."""
-    axes = body_axes(pose)
-    if len(axes) == 2:
+    axes = axes_of(pose)
+    if isinstance(pose, PlanarPose):
         spin = pose.angle.differentiate()
-    elif hasattr(pose, "global_angular_velocity"):
-        spin = pose.global_angular_velocity()
     else:
-        spin = pose.angular_velocity
+        spin = pose.angular_velocity if isinstance(pose, Frames) else pose.global_angular_velocity()
+    assert spin is not None  # there are velocities
     spins = [differentiated(spin, j) for j in range(order + 1)]
 
     def turned(j: int, axis: Jet) -> Jet:

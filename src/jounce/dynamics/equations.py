@@ -15,17 +15,20 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
-from jounce.dynamics.driver_coordinates import of_drivers
-from jounce.dynamics.energies import differentiated, robot_energy, whole_number
-from jounce.errors import RobotError
+from jounce.dynamics.driver_coordinates import in_driver_coordinates
+from jounce.dynamics.energies import differentiated, robot_energy
 from jounce.jet import Jet, components
 from jounce.jet.algebra import stacked, total
 from jounce.kinematics import Motion
-from jounce.robot.batches import Batched, checked
+from jounce.robot.arguments import checked_coordinates, whole_number
+from jounce.robot.batches import Batched
 from jounce.robot.kinematics import body_frames
 from jounce.robot.robot import Robot
 from jounce.robot.tree import Tree
+from jounce.robot.tree_scan import Series
+from jounce.shapes import ArrayLike, Numbers
 
 
 def catalan(p: int) -> int:
@@ -50,11 +53,14 @@ def printed_coefficient(p: int) -> int:
     return p * (p + 1) // 2 - (p > 1)
 
 
-Energies = Callable[[Any, int], Jet]
-"""What maps Taylor coefficients of coordinates, (K + 1, coordinates, batch), and p to the energy E_p, (batch,)."""
+Energies = Callable[[Series, int], Jet]
+"""What maps Taylor coefficients of coordinates and p to the energy E_p, (batch,)."""
+
+Slope = Float[Numbers, "{levels} coordinate batch"]
+"""Taylor coefficients of a derivative with respect to the coordinates."""
 
 
-def slope_series(energy: Callable[[Any], Any], q: Any, m: int, levels: int) -> Any:
+def slope_series(energy: Callable[[Series], Float[Numbers, "levels batch"]], q: Series, m: int, levels: int) -> Slope:
     """Return the series in time of the derivative of a quantity with respect to ``q^(m)``.
 
     Parameters
@@ -88,8 +94,8 @@ def slope_series(energy: Callable[[Any], Any], q: Any, m: int, levels: int) -> A
     return total(series)
 
 
-def _slope(energies: Energies, q: Any, levels: int, order: int, rate: int, m: int) -> Any:
-    """Return the series of ``dE_p^(n) / dq^(m)`` for order p and rate n, (levels, coordinates, batch)."""
+def _slope(energies: Energies, q: Series, levels: int, order: int, rate: int, m: int) -> Slope:
+    """Return the series of ``dE_p^(n) / dq^(m)`` for order p and rate n."""
 
     def energy(q: Any) -> Any:
         return stacked(differentiated(energies(q, order), rate).truncate(levels - 1))
@@ -97,21 +103,23 @@ def _slope(energies: Energies, q: Any, levels: int, order: int, rate: int, m: in
     return slope_series(energy, q[: max(order + rate + levels, m) + 1], m, levels)
 
 
-def _lagrange(energies: Energies, q: Any, levels: int) -> Any:
+def _lagrange(energies: Energies, q: Series, levels: int) -> Slope:
     momentum = _slope(energies, q, levels + 1, 0, 0, 1)
     rate = momentum[1:] * np.arange(1.0, levels + 1)[:, None, None]
     return rate - _slope(energies, q, levels, 0, 0, 0)
 
 
-def _mangeron(energies: Energies, q: Any, levels: int, m: int) -> Any:
+def _mangeron(energies: Energies, q: Series, levels: int, m: int) -> Slope:
     return (_slope(energies, q, levels, 0, m, m) - (m + 1) * _slope(energies, q, levels, 0, 0, 0)) / m
 
 
-def _gibbs_appell(energies: Energies, q: Any, levels: int, m: int) -> Any:
+def _gibbs_appell(energies: Energies, q: Series, levels: int, m: int) -> Slope:
     return _slope(energies, q, levels, 1, m - 2, m)
 
 
-def _higher_order(energies: Energies, q: Any, k: int, m: int, weights: tuple[float, ...]) -> Any:
+def _higher_order(
+    energies: Energies, q: Series, k: int, m: int, weights: tuple[float, ...]
+) -> Float[Numbers, "1 coordinate batch"]:
     def weighted(q: Any) -> Any:
         terms = []
         for p, weight in enumerate(weights, 1):
@@ -123,7 +131,7 @@ def _higher_order(energies: Energies, q: Any, k: int, m: int, weights: tuple[flo
 
 
 @Batched
-def _of_robot(tree: Tree, arrays: Any, _: Any, form: Callable[..., Any], static: tuple[Any, ...]) -> Any:
+def _of_robot(tree: Tree, arrays: tuple[Series], _: Any, form: Callable[..., Any], static: tuple[Any, ...]) -> Any:
     def energies(q: Any, order: int) -> Jet:
         frames = body_frames(tree, q).without_base()
         return total(total(components(part)) for part in robot_energy(tree, frames, order))[0]
@@ -131,7 +139,7 @@ def _of_robot(tree: Tree, arrays: Any, _: Any, form: Callable[..., Any], static:
     return form(energies, arrays[0], *static)
 
 
-def _evaluated(system: Robot | Motion, q: Any, least: int, form: Callable[..., Any], *static: Any) -> Any:
+def _evaluated(system: Robot | Motion, q: ArrayLike | None, least: int, form: Callable[..., Any], *static: Any) -> Any:
     """Return what a form gives for a robot, (..., levels, n), or for the drivers of a motion, labelled.
 
     Raises
@@ -140,26 +148,12 @@ def _evaluated(system: Robot | Motion, q: Any, least: int, form: Callable[..., A
         If q does not fit the robot or has too few derivatives, or the motion is not that of a driven mechanism.
     """
     if isinstance(system, Motion):
-        return of_drivers(system, q, least, form, static)
-    return _of_robot(system, (checked_order(system, q, least),), (), (form, static))
-
-
-def checked_order(robot: Robot, q: Any, least: int) -> Any:
-    """Return the derivatives of q to order `least`.
-
-    Raises
-    ------
-    RobotError
-        If q does not fit the robot or has too few derivatives.
-    """
-    q = checked(robot, q, 0)
-    if q.shape[-2] < least + 1:
-        raise RobotError(f"this needs derivatives of q to order {least}", name="q", value=q.shape)
-    return q[..., : least + 1, :]
+        return in_driver_coordinates(system, q, least, form, static)
+    return _of_robot(system, (checked_coordinates(system, q, least, least),), (), (form, static))
 
 
 def energy_slope(
-    system: Robot | Motion, q: Any = None, *, m: int, order: int = 1, rate: int = 0, rates: int = 0
+    system: Robot | Motion, q: ArrayLike | None = None, *, m: int, order: int = 1, rate: int = 0, rates: int = 0
 ) -> Any:
     """Return the derivative of a rate of an energy with respect to ``q^(m)``: the terms of Negrean 2025, 126-134.
 
@@ -196,7 +190,7 @@ def energy_slope(
     Examples
     --------
     >>> import jounce as jn
-    >>> slide = jn.robot.Screw([1, 0, 0], type="prismatic", inertia=jn.Inertia(2.0))
+    >>> slide = jn.robot.JointAxis([1, 0, 0], type="prismatic", inertia=jn.Inertia(2.0))
     >>> robot, q = jn.robot.from_screws([slide]), [[0.0], [3.0], [5.0], [7.0]]
     >>> jn.energy_slope(robot, q, m=2).tolist()  # of half the mass times the square of the acceleration
     [[10.0]]
@@ -204,11 +198,11 @@ def energy_slope(
     [[14.0]]
     """
     numbers = {"m": m, "order": order, "rate": rate, "rates": rates}
-    m, order, rate, rates = (whole_number(name, value, 0) for name, value in numbers.items())
+    m, order, rate, rates = (whole_number(name, value) for name, value in numbers.items())
     return _evaluated(system, q, order + rate + rates + 1, _slope, rates + 1, order, rate, m)
 
 
-def lagrange(system: Robot | Motion, q: Any = None, rates: int = 0) -> Any:
+def lagrange(system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0) -> Any:
     """Return the generalised inertia forces by Lagrange's equations: Negrean 2025, equation 126.
 
     ``Q_i = d/dt (dE_0 / dq') - dE_0 / dq`` with the kinetic energy E_0.
@@ -237,15 +231,15 @@ def lagrange(system: Robot | Motion, q: Any = None, rates: int = 0) -> Any:
     Examples
     --------
     >>> import jounce as jn
-    >>> slide = jn.robot.Screw([1, 0, 0], type="prismatic", inertia=jn.Inertia(2.0))
+    >>> slide = jn.robot.JointAxis([1, 0, 0], type="prismatic", inertia=jn.Inertia(2.0))
     >>> lagrange(jn.robot.from_screws([slide]), [[0.0], [3.0], [5.0], [7.0]], rates=1).round(12).tolist()
     [[10.0], [14.0]]
     """
-    rates = whole_number("rates", rates, 0)
+    rates = whole_number("rates", rates)
     return _evaluated(system, q, rates + 2, _lagrange, rates + 1)
 
 
-def mangeron_nielsen(system: Robot | Motion, q: Any = None, rates: int = 0, m: int = 1) -> Any:
+def mangeron_nielsen(system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0, m: int = 1) -> Any:
     """Return the generalised inertia forces by Mangeron's equations: Negrean 2025, equation 127.
 
     ``Q_i = 1/m (dE_0^(m) / dq^(m) - (m + 1) dE_0 / dq)``; m = 1 are Nielsen's equations.
@@ -271,15 +265,15 @@ def mangeron_nielsen(system: Robot | Motion, q: Any = None, rates: int = 0, m: i
     Examples
     --------
     >>> import jounce as jn
-    >>> slide = jn.robot.Screw([1, 0, 0], type="prismatic", inertia=jn.Inertia(2.0))
+    >>> slide = jn.robot.JointAxis([1, 0, 0], type="prismatic", inertia=jn.Inertia(2.0))
     >>> mangeron_nielsen(jn.robot.from_screws([slide]), [[0.0], [3.0], [5.0], [7.0]], m=2).tolist()
     [[10.0]]
     """
-    m, rates = whole_number("m", m, 1), whole_number("rates", rates, 0)
+    m, rates = whole_number("m", m, 1), whole_number("rates", rates)
     return _evaluated(system, q, rates + m + 1, _mangeron, rates + 1, m)
 
 
-def gibbs_appell(system: Robot | Motion, q: Any = None, rates: int = 0, m: int = 2) -> Any:
+def gibbs_appell(system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0, m: int = 2) -> Any:
     """Return the generalised inertia forces by the Gibbs-Appell equations: Negrean 2025, equation 128.
 
     ``Q_i = dE_1^(m-2) / dq^(m)`` with the acceleration energy E_1 of first order.
@@ -305,17 +299,17 @@ def gibbs_appell(system: Robot | Motion, q: Any = None, rates: int = 0, m: int =
     Examples
     --------
     >>> import jounce as jn
-    >>> slide = jn.robot.Screw([1, 0, 0], type="prismatic", inertia=jn.Inertia(2.0))
+    >>> slide = jn.robot.JointAxis([1, 0, 0], type="prismatic", inertia=jn.Inertia(2.0))
     >>> gibbs_appell(jn.robot.from_screws([slide]), [[0.0], [3.0], [5.0], [7.0]], rates=1).round(12).tolist()
     [[10.0], [14.0]]
     """
-    m, rates = whole_number("m", m, 2), whole_number("rates", rates, 0)
+    m, rates = whole_number("m", m, 2), whole_number("rates", rates)
     return _evaluated(system, q, rates + m, _gibbs_appell, rates + 1, m)
 
 
 def higher_order(
     system: Robot | Motion,
-    q: Any = None,
+    q: ArrayLike | None = None,
     k: int = 1,
     m: int | None = None,
     coefficients: Callable[[int], float] = catalan,
@@ -350,7 +344,7 @@ def higher_order(
     Examples
     --------
     >>> import jounce as jn
-    >>> slide = jn.robot.Screw([1, 0, 0], type="prismatic", inertia=jn.Inertia(2.0))
+    >>> slide = jn.robot.JointAxis([1, 0, 0], type="prismatic", inertia=jn.Inertia(2.0))
     >>> q = [[0.0], [3.0], [5.0], [7.0], [11.0]]
     >>> higher_order(jn.robot.from_screws([slide]), q, k=2).round(12).tolist()
     [14.0]

@@ -6,13 +6,18 @@ their coefficient k is affine in the unknowns ``(q''[k], lambda[k])``, with the 
 """
 
 import dataclasses
+from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+from jaxtyping import Bool, Float, Int
 
 from jounce.dynamics.loads import inertia_forces, mass_matrices
+from jounce.dynamics.masses import Gravity, Masses
+from jounce.dynamics.saddle_point import ByBody, Column, MassMatrix, as_column, block_diagonal, by_body, saddle_point
 from jounce.jet import Jet
 from jounce.jet.algebra import total
 from jounce.jet.series import Recursion
@@ -20,7 +25,24 @@ from jounce.kinematics.linear import DenseFactor
 from jounce.mechanism.axis_angles import with_turns
 from jounce.mechanism.system import System
 from jounce.rigid import PlanarPose, SpatialPose
+from jounce.rigid.pose import Pose
 from jounce.rigid.spatial import body_axes, quaternion_spins
+from jounce.shapes import Numbers
+
+Instants = Float[Numbers, "1 batch"]
+Lanes = Float[Numbers, " batch"]
+"""One number for each run of a batch; of `Flags` and `Indices` alike."""
+Flags = Bool[Numbers, " batch"]
+Indices = Int[Numbers, " batch"]
+Matrices = Float[Numbers, "size size batch"]
+"""Of the equations of motion, or their inverses."""
+Rows = Float[Numbers, "row batch"]
+Shifts = Float[Numbers, "shift body batch"]
+"""One vector for each body, such as a position or a velocity."""
+Turns = Float[Numbers, "turn body batch"]
+"""One turn, or rate of it, for each body: of one component in the plane, three in space."""
+Attitudes = Float[Numbers, "attitude body batch"]
+"""Angles, of one component, or Euler parameters, of four."""
 
 
 class State(NamedTuple):
@@ -36,12 +58,12 @@ class State(NamedTuple):
         Rate of the angle, or angular velocity in the axes of the body, rad/s.
     """
 
-    position: Any
-    attitude: Any
-    velocity: Any
-    spin: Any
+    position: Numbers
+    attitude: Numbers
+    velocity: Numbers
+    spin: Numbers
 
-    def map(self, function: Any) -> "State":
+    def map(self, function: Callable[[Any], Any]) -> "State":
         """Apply a function to each array."""
         return State(*map(function, self))
 
@@ -50,8 +72,8 @@ class Expansion(NamedTuple):
     """Taylor coefficients of a motion about an instant: what a step of an integrator needs, and leaves behind."""
 
     state: State  # arrays of shape (order + 1, components, bodies, batch)
-    acceleration: Any  # (order, coordinates of a body, bodies, batch)
-    multipliers: Any  # (order, rows, batch), of the scaled rows, over the scale of the masses
+    acceleration: Float[Numbers, "order coordinate body batch"]
+    multipliers: Float[Numbers, "order row batch"]  # of the scaled rows, over the scale of the masses
 
 
 class Equations(eqx.Module):
@@ -61,8 +83,8 @@ class Equations(eqx.Module):
     ----------
     system : System
         Its joints, drivers and forces.
-    mass, center, moments : array
-        As `mechanism_masses` gives them, without the ground.
+    masses : Masses
+        Of all bodies, the ground first.
     gravity : array of shape (components, 1, 1)
         m/s^2.
     scale : float
@@ -72,11 +94,9 @@ class Equations(eqx.Module):
     """
 
     system: System
-    mass: Any
-    center: Any
-    moments: Any
-    gravity: Any
-    scale: Any
+    masses: Masses
+    gravity: Gravity
+    scale: float | Float[Numbers, ""]
     pose_type: type = eqx.field(static=True)
 
     @property
@@ -84,7 +104,7 @@ class Equations(eqx.Module):
         """Number of coordinates of a body."""
         return self.pose_type.shifts + self.pose_type.turns
 
-    def near(self, angles: tuple[Any, ...]) -> "Equations":
+    def near(self, angles: tuple[Float[Numbers, "_ batch"], ...]) -> "Equations":
         """Return the equations where the angles about axes that forces measure have the turns of these.
 
         There is one array of shape (instances, batch) for each group of such forces, rad.
@@ -94,31 +114,33 @@ class Equations(eqx.Module):
         system = dataclasses.replace(self.system, forces=with_turns(self.system.forces, angles))
         return dataclasses.replace(self, system=system)
 
-    def pose(self, state: State) -> Any:
+    def pose(self, state: State) -> Pose:
         """Return the pose of all bodies, the ground first, with velocities."""
         return self.extended(self.still(state.position, state.attitude), state.velocity, state.spin)
 
-    def extended(self, pose: Any, shift: Any, turn: Any) -> Any:
+    def extended(self, pose: Pose, shift: Shifts, turn: Turns) -> Pose:
         """Return a pose with one more Taylor coefficient of the moving bodies."""
-        return pose.extended(grounded(shift), grounded(turn))
+        return pose.extended(with_ground(shift), with_ground(turn))
 
-    def still(self, position: Any, attitude: Any) -> Any:
+    def still(self, position: Shifts, attitude: Attitudes) -> Pose:
         """Return the pose of order zero of all bodies, the ground first."""
-        position = Jet([grounded(position)])
+        origins = Jet([with_ground(position)])
         if self.pose_type is PlanarPose:
-            return PlanarPose.from_jets(position, Jet([grounded(attitude)[0]]))
+            return PlanarPose.from_jets(origins, Jet([with_ground(attitude)[0]]))
         fixed = jnp.zeros_like(attitude[:, :1]).at[0].set(1.0)
         quaternion = jnp.concatenate([fixed, attitude], axis=1)  # of unit length already: it is kept so
         spins, axes = (tuple(Jet([x]) for x in f(quaternion)) for f in (quaternion_spins, body_axes))
-        return SpatialPose(position, Jet([quaternion]), spins, axes, None)
+        return SpatialPose(origins, Jet([quaternion]), spins, axes, None)
 
-    def attitude_of(self, pose: Any) -> Any:
+    def attitude_of(self, pose: Pose) -> Attitudes:
         """Return the attitude of the moving bodies, as a state has it, from a pose of order zero."""
-        if self.pose_type is PlanarPose:
+        if isinstance(pose, PlanarPose):
             return pose.angle.coefficients[0][None, 1:]
         return pose.quaternion.coefficients[0][:, 1:]
 
-    def balance(self, state: State, acceleration: Any, multipliers: Any, time: Any) -> tuple[Any, Any, Any]:
+    def balance(
+        self, state: State, acceleration: ByBody, multipliers: Rows, time: Instants
+    ) -> tuple[ByBody, Rows, Attitudes]:
         """Return what must vanish, and how the attitude moves.
 
         Returns
@@ -136,7 +158,7 @@ class Equations(eqx.Module):
         pose = self.extended(moving, acceleration[:shifts] / 2.0, acceleration[shifts:] / 2.0)
         clock = Jet.variable(time, 2)
         second = 2.0 * self.system.residual(pose, clock).dense().coefficients[2]
-        force, moment = inertia_forces(pose, self.mass, self.center, self.moments, self.gravity)
+        force, moment = inertia_forces(pose, self.masses, self.gravity)
         inertia = jnp.concatenate([force.coefficients[0], moment.coefficients[0]])[:, 1:]
         now = clock.truncate(0)
 
@@ -148,49 +170,57 @@ class Equations(eqx.Module):
         forces = forces - applied[:, 1:] / self.scale
         return forces, second, self._attitude_rate(state)
 
-    def _attitude_rate(self, state: State) -> Any:
+    def _attitude_rate(self, state: State) -> Attitudes:
         if self.pose_type is PlanarPose:
             return state.spin
         spins = quaternion_spins(state.attitude)
-        return 0.5 * sum(spin * part for spin, part in zip(spins, jnp.split(state.spin, 3), strict=True))
+        return 0.5 * total(spin * part for spin, part in zip(spins, jnp.split(state.spin, 3), strict=True))
 
-    def matrix(self, state: State, time: Any) -> Any:
-        """Return the matrix of the unknown accelerations and multipliers, (size, size, batch), scaled."""
+    def matrix(self, state: State, time: Instants) -> Matrices:
+        """Return the matrix of the unknown accelerations and multipliers, scaled."""
         jacobian = self.system.jacobian(self.still(state.position, state.attitude), Jet([time]))
-        mass = self.mass_matrix(state)
-        rows = jacobian.shape[0]
-        above = jnp.concatenate([mass, jnp.swapaxes(jacobian, 0, 1)], axis=1)
-        below = jnp.concatenate([jacobian, jnp.zeros((rows, rows, jacobian.shape[-1]))], axis=1)
-        return jnp.concatenate([above, below])
+        return saddle_point(self.mass_matrix(state), jacobian)
 
-    def mass_matrix(self, state: State) -> Any:
-        """Return the mass matrix over the scale of the masses, scaled, shape (columns, columns, batch)."""
-        count, bodies, lanes = self.coordinates, *state.position.shape[1:]
-        pose = self.still(state.position, state.attitude)
-        blocks = mass_matrices(pose, self.mass, self.center, self.moments)[:, :, 1:]
-        scale = jnp.asarray(self.system.column_scale)
-        blocks = blocks * (scale[:, None] * scale[None] / self.scale)[:, :, None, None]
-        whole = jnp.eye(bodies)[:, None, :, None, None] * jnp.moveaxis(blocks, 2, 0)[:, :, None]
-        return whole.reshape(bodies * count, bodies * count, lanes)
+    def mass_matrix(self, state: State) -> MassMatrix:
+        """Return the mass matrix over the scale of the masses, scaled."""
+        blocks = mass_matrices(self.still(state.position, state.attitude), self.masses)[:, :, 1:]
+        return block_diagonal(blocks / self.scale, self.system.column_scale)
 
-    def flat(self, forces: Any) -> Any:
-        """Return generalised forces of bodies, (coordinates, bodies, batch), as a scaled column."""
-        scaled = forces * jnp.asarray(self.system.column_scale)[:, None, None]
-        return jnp.swapaxes(scaled, 0, 1).reshape(-1, forces.shape[-1])
+    def unknowns(self, solve: Callable[[Rows], Rows], forces: ByBody, second: Rows) -> tuple[ByBody, Rows]:
+        """Return the changes of accelerations and multipliers that make what `balance` returns vanish.
 
-    def bodies(self, column: Any) -> Any:
-        """Return a scaled column of the unknown coordinates by body, (coordinates, bodies, batch)."""
-        scale = jnp.asarray(self.system.column_scale)
-        return jnp.swapaxes(column.reshape(-1, self.coordinates, column.shape[-1]), 0, 1) * scale[:, None, None]
+        Parameters
+        ----------
+        solve : callable
+            Solves for right sides with the matrix of the equations, scaled.
+        forces, second : array
+            As `balance` returns them.
+        """
+        scale = self.system.column_scale
+        columns = self.system.cells.shape[1]
+        solution = -solve(jnp.concatenate([as_column(forces, scale), second]))
+        return by_body(solution[:columns], scale), solution[columns:]
+
+    def least_change(self, factor: DenseFactor, gap: Rows) -> Column:
+        """Return the change of coordinates of least kinetic energy that closes a gap of the scaled rows, scaled."""
+        columns = self.system.cells.shape[1]
+        return factor.solve(-jnp.concatenate([jnp.zeros((columns, gap.shape[-1])), gap]))[:columns]
+
+    def with_rates(self, factor: DenseFactor, state: State, time: Instants) -> State:
+        """Return the state with the least change of its velocities that fulfils the rates of all constraints."""
+        rate = self.system.residual(self.pose(state), Jet.variable(time, 1)).dense().coefficients[1]
+        change = by_body(self.least_change(factor, rate), self.system.column_scale)
+        shifts = self.pose_type.shifts
+        return state._replace(velocity=state.velocity + change[:shifts], spin=state.spin + change[shifts:])
 
 
-def grounded(moving: Any) -> Any:
+def with_ground(moving: Float[Numbers, "component body batch"]) -> Float[Numbers, "component body+1 batch"]:
     """Put the ground, which has none of a quantity, before the moving bodies."""
     return jnp.concatenate([jnp.zeros_like(moving[:, :1]), moving], axis=1)
 
 
-def conjugate(variation: Any, pose: Any, weights: Any) -> Any:
-    """Return the forces by which weights act on the bodies, (coordinates, bodies, batch).
+def conjugate(variation: Callable[[Pose], Any], pose: Pose, weights: Float[Numbers, "*rows batch"]) -> ByBody:
+    """Return the forces by which weights act on the bodies.
 
     Parameters
     ----------
@@ -207,8 +237,8 @@ def conjugate(variation: Any, pose: Any, weights: Any) -> Any:
     return transposed(weights)[0]
 
 
-def multiplied(matrix: Any, column: Any) -> Any:
-    """Return the product of matrices, (rows, size, batch), and columns, (size, batch), in a loop over the size.
+def multiplied(matrix: Float[Numbers, "row size batch"], column: Float[Numbers, "size batch"]) -> Rows:
+    """Return the product of matrices and columns, in a loop over the size.
 
     XLA would otherwise compute the column anew for every row: a loop has its arguments made before it starts.
     """
@@ -226,7 +256,13 @@ def multiplied(matrix: Any, column: Any) -> Any:
     return jax.lax.fori_loop(0, count, added, jnp.zeros((rows, lanes)))
 
 
-def expand(equations: Equations, state: State, time: Any, order: int, inverse: Any = None) -> Expansion:
+def expand(
+    equations: Equations,
+    state: State,
+    time: Instants,
+    order: int,
+    inverse: Matrices | None = None,
+) -> Expansion:
     """Return the Taylor coefficients of the motion through a state, to an order.
 
     Parameters
@@ -239,21 +275,17 @@ def expand(equations: Equations, state: State, time: Any, order: int, inverse: A
         The instant, s.
     order : int
         Highest coefficient of positions and velocities, at least 1.
-    inverse : array of shape (rows, rows, batch), optional
+    inverse : array of shape (size, size, batch), optional
         Of the equations' matrix at this state, where it is known.
     """
     count, bodies, lanes = equations.coordinates, *state.position.shape[1:]
-    if inverse is None:
-        inverse = DenseFactor.of(equations.matrix(state, time)).inverse()
-    columns, rows = count * bodies, equations.system.row_scale.shape[0]
+    known = DenseFactor.of(equations.matrix(state, time)).inverse() if inverse is None else inverse
+    rows = equations.system.row_scale.shape[0]
+    solved = partial(equations.unknowns, partial(multiplied, known))
 
     def program(*leaves: Any) -> Any:
         position, attitude, velocity, spin, acceleration, multipliers, clock = leaves
         return equations.balance(State(position, attitude, velocity, spin), acceleration, multipliers, clock)
-
-    def solved(forces: Any, second: Any) -> tuple[Any, Any]:
-        solution = -multiplied(inverse, jnp.concatenate([equations.flat(forces), second]))
-        return equations.bodies(solution[:columns]), solution[columns:]
 
     trial = jnp.zeros((count, bodies, lanes)), jnp.zeros((rows, lanes))
     forces, second, _ = program(*state, *trial, time)
@@ -286,22 +318,3 @@ def expand(equations: Equations, state: State, time: Any, order: int, inverse: A
     numbers = jnp.arange(1.0, order + 1)[:, None, None, None]
     accelerations = numbers * jnp.concatenate([series.velocity[1:], series.spin[1:]], axis=1)
     return Expansion(series, accelerations, rates)
-
-
-def least_change(equations: Equations, state: State, time: Any, gap: Any) -> Any:
-    """Return the change of coordinates, (coordinates, bodies, batch), of least kinetic energy that closes a gap.
-
-    Parameters
-    ----------
-    equations : Equations
-        Of the mechanism.
-    state : State
-        Where it is.
-    time : array of shape (1, batch)
-        The instant, s.
-    gap : array of shape (rows, batch)
-        Of the scaled rows, to first order.
-    """
-    columns = equations.system.cells.shape[1]
-    factor = DenseFactor.of(equations.matrix(state, time))
-    return equations.bodies(factor.solve(-jnp.concatenate([jnp.zeros((columns, gap.shape[-1])), gap]))[:columns])

@@ -5,45 +5,43 @@ on the poses of the bodies that it joins, so that all mechanisms share it.
 """
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any
 
-import jax
 import numpy as np
+from jaxtyping import Float
 
 from jounce.dynamics import constraint_forces
-from jounce.dynamics.energies import gravity_of, masses_of
+from jounce.dynamics.constraint_forces import Multipliers, Slope, Slopes
+from jounce.dynamics.forward import Lanes
 from jounce.dynamics.loads import loads, mass_matrices
+from jounce.dynamics.masses import Gravity, Masses, check_loads, gravity_of, masses_of
+from jounce.dynamics.motion_values import Coordinates, cut, in_chunks, pose_of
 from jounce.errors import MechanismError
 from jounce.jet import Jet, cross
 from jounce.jet.algebra import stacked
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.compilation import compiled
-from jounce.mechanism import Mechanism, Model
+from jounce.mechanism import Model
 from jounce.mechanism.axis_angles import at_lanes
-from jounce.mechanism.system import System
-
-SMALL_BATCH, LARGE_BATCH = 64, 512  # instants; a short motion compiles for one width only, and fills less of it
-
-
-def check_loads(mechanism: Mechanism, name: str = "bodies") -> None:
-    """Raise MechanismError unless a body has a mass or a force is applied."""
-    if not mechanism.forces and all(body.mass is None for body in mechanism.bodies.values()):
-        raise MechanismError("forces need masses, and no body has one; give the bodies mass and inertia", name=name)
+from jounce.mechanism.system import System, with_rows
+from jounce.rigid.pose import Pose
+from jounce.shapes import Numbers
 
 
 @dataclasses.dataclass(frozen=True)
-class Place:
-    """Where a joint or driver is among the groups of a system, and its group among the rows."""
+class ElementIndex:
+    """Where a joint or driver is among the groups of a system, and its group and itself among the rows."""
 
     group: int
     instance: int
     rows: slice
+    own_rows: range
 
 
-def places(model: Model) -> dict[str, Place]:
-    """Return the places of all joints and drivers, by name."""
+def element_indices(model: Model) -> dict[str, ElementIndex]:
+    """Return the indices of all joints and drivers, by name."""
     found, first = {}, 0
     for index, group in enumerate(model.system.groups):
         names = model.rows[first : first + group.instances]
@@ -51,19 +49,15 @@ def places(model: Model) -> dict[str, Place]:
         while model.rows[last : last + group.instances] == names:
             last += group.instances
         for instance, name in enumerate(names):
-            found[name.partition(".")[2]] = Place(index, instance, slice(first, last))
+            own = range(first + instance, last, group.instances)
+            found[name.partition(".")[2]] = ElementIndex(index, instance, slice(first, last), own)
         first = last
     return found
 
 
-def in_chunks(function: Callable[[np.ndarray], Any], count: int) -> Any:
-    """Return what a function of indices of instants gives, for all of them: arrays with the time last."""
-    width = SMALL_BATCH if count <= SMALL_BATCH else LARGE_BATCH
-    parts = []
-    for first in range(0, count, width):
-        lanes = np.minimum(np.arange(first, first + width), count - 1)
-        parts.append(jax.tree.map(np.asarray, function(lanes)))
-    return jax.tree.map(lambda *xs: np.concatenate(xs, axis=-1)[..., :count], *parts)
+def force_names(model: Model) -> list[str]:
+    """Return the names of the applied forces in the order of the groups of a model."""
+    return [name for members in model.forces for name in members]
 
 
 class MotionForces:
@@ -93,10 +87,8 @@ class MotionForces:
         self.masses = masses_of(mechanism)
         self.gravity = gravity_of(mechanism) * float(gravity)
         self.forces = motion.forces if applied else ()
-        self.places = places(self.model)
-        self._exerted: dict[int, np.ndarray] = {}
-        self._applied: dict[int, np.ndarray] = {}
-        self._wrenches: dict[tuple[int, int], np.ndarray] = {}
+        self.indices = element_indices(self.model)
+        self._kept: dict[tuple[Any, ...], np.ndarray] = {}
 
     @classmethod
     def of(cls, motion: Motion) -> "MotionForces":
@@ -109,7 +101,8 @@ class MotionForces:
     def multipliers(self) -> np.ndarray:
         """Multipliers of the rows of all residuals, as Taylor coefficients, (levels, rows, time)."""
         system = dataclasses.replace(self.model.system, outputs=())
-        unjoined = dataclasses.replace(system, groups=(), cells=None, row_scale=None)
+        nothing = np.zeros((0, 0), np.int32)
+        unjoined = dataclasses.replace(system, groups=(), cells=nothing, row_scale=np.zeros((0, 1)))
         square = system.cells.shape[0] == system.cells.shape[1]
 
         def chunk(lanes: np.ndarray) -> Any:
@@ -117,45 +110,38 @@ class MotionForces:
                 [self._slopes(index, slot, lanes) for slot in group.moving_slots]
                 for index, group in enumerate(system.groups)
             ]
-            bodies, instants = self.taken(None, lanes, self.levels + 2), self.motion.time[lanes]
+            bodies, instants = self.coordinates_at(None, lanes, self.levels + 2), self.motion.time[lanes]
             forces = dataclasses.replace(unjoined, forces=at_lanes(self.forces, lanes))
             load, finite = _loads(forces, bodies, instants, self.masses, self.gravity, self.pose_type)
             self._check_finite(np.asarray(finite), lanes)
-            still = None if square else self.taken(None, lanes, 1)
+            still = None if square else self.coordinates_at(None, lanes, 1)
             return _multipliers(system, blocks, load, still, self.masses, self.pose_type)
 
         found = self.in_chunks(chunk)
         self.check_finite(found)
         return found
 
-    def driver_force(self, name: str) -> np.ndarray:
-        """Return what a driver exerts along what it prescribes, as Taylor coefficients, (levels, 1, time)."""
-        place = self.places[name]
-        if place.group not in self._exerted:
-            group = self.model.system.groups[place.group]
-            found = self._by_instance(place)
+    def driver_force(self, name: str) -> Float[np.ndarray, "order 1 time"]:
+        """Return what a driver exerts along what it prescribes, as Taylor coefficients."""
+        place = self.indices[name]
 
-            def chunk(lanes: np.ndarray) -> Any:
-                poses, instants = self._poses(place.group, lanes), self.motion.time[lanes]
-                return _exerted(group.element, poses, instants, found[..., lanes], self.pose_type)
+        def chunk(lanes: np.ndarray) -> Any:
+            element, poses = self.model.system.groups[place.group].element, self._poses(place.group, lanes)
+            return _exerted(element, poses, self.motion.time[lanes], self._of_group(place)[..., lanes], self.pose_type)
 
-            self._exerted[place.group] = self.in_chunks(chunk)
-        return self._exerted[place.group][:, place.instance : place.instance + 1]
+        return self._once(chunk, "driver", place.group)[:, place.instance : place.instance + 1]
 
-    def wrench(self, name: str, slot: int) -> np.ndarray:
-        """Return what a joint or driver does to the body in a slot: coefficients of shape (levels, coordinates, time).
+    def wrench(self, name: str, slot: int) -> Float[np.ndarray, "order coordinate time"]:
+        """Return what a joint or driver does to the body in a slot, as Taylor coefficients.
 
         Force, global, and moment about the origin of the body, in its axes.
         """
-        place = self.places[name]
-        if (place.group, slot) not in self._wrenches:
-            found = self._by_instance(place)
+        place = self.indices[name]
 
-            def chunk(lanes: np.ndarray) -> Any:
-                return _wrenches(self._slopes(place.group, slot, lanes), found[..., lanes])
+        def chunk(lanes: np.ndarray) -> Any:
+            return _wrenches(self._slopes(place.group, slot, lanes), self._of_group(place)[..., lanes])
 
-            self._wrenches[place.group, slot] = self.in_chunks(chunk)
-        return self._wrenches[place.group, slot][:, :, place.instance]
+        return self._once(chunk, "joint", place.group, slot)[:, :, place.instance]
 
     def applied_force(self, name: str) -> np.ndarray:
         """Return an applied force, as Taylor coefficients, (levels, components, time)."""
@@ -179,27 +165,32 @@ class MotionForces:
         lane = int(np.argmax(bad.any(axis=0)))
         level = int(np.argmax(bad[:, lane]))
         if name is None:
-            names = [name for names in self.model.forces for name in names]
-            unfit = [n for n in names if not np.isfinite(self._applied_force(n)[: level + 1, :, lane]).all()]
+            unfit = [
+                n
+                for n in force_names(self.model)
+                if not np.isfinite(self._applied_force(n)[: level + 1, :, lane]).all()
+            ]
             name = f"forces.{unfit[0]}" if unfit else "joints"
         at, advice = f"no finite value at t = {self.motion.time[lane]:g} s", "check its law there"
         if level:
             raise MechanismError(f"its derivative {level} has {at}; {advice}, or ask for fewer derivatives", name=name)
         raise MechanismError(f"has {at}; {advice}", name=name)
 
-    def _applied_force(self, name: str) -> np.ndarray:
+    def _applied_force(self, name: str) -> Float[np.ndarray, "order component time"]:
         index = next(k for k, names in enumerate(self.model.forces) if name in names)
-        instance = self.model.forces[index].index(name)
-        if index not in self._applied:
-            whole = self.motion.forces[index]
 
-            def chunk(lanes: np.ndarray) -> Any:
-                (group,) = at_lanes((whole,), lanes)
-                poses = tuple(self.taken(slot, lanes, self.levels + 1) for slot in group.bodies)
-                return _applied(group.element, poses, self.motion.time[lanes], self.pose_type, self.levels)
+        def chunk(lanes: np.ndarray) -> Any:
+            (group,) = at_lanes((self.motion.forces[index],), lanes)
+            poses = tuple(self.coordinates_at(slot, lanes, self.levels + 1) for slot in group.bodies)
+            return _applied(group.element, poses, self.motion.time[lanes], self.pose_type, self.levels)
 
-            self._applied[index] = self.in_chunks(chunk)
-        return self._applied[index][:, :, instance]
+        return self._once(chunk, "force", index)[:, :, self.model.forces[index].index(name)]
+
+    def _once(self, chunk: Callable[[np.ndarray], Any], *key: Any) -> np.ndarray:
+        """Return what a function of indices of instants gives for all of them, kept by a key."""
+        if key not in self._kept:
+            self._kept[key] = self.in_chunks(chunk)
+        return self._kept[key]
 
     def expressed(self, work: np.ndarray, body: int, frame: int | None, point: np.ndarray) -> tuple[Any, Any]:
         """Return a wrench on a body as force and moment about a point of it, (levels, components, time).
@@ -215,7 +206,8 @@ class MotionForces:
         """
 
         def chunk(lanes: np.ndarray) -> Any:
-            taken = [self.taken((b,), lanes, self.levels) for b in ((body,) if frame is None else (body, frame))]
+            bodies = (body,) if frame is None else (body, frame)
+            taken = [self.coordinates_at((b,), lanes, self.levels) for b in bodies]
             return _expressed(work[:, :, lanes], taken, point[:, None, None], self.pose_type)
 
         return self.in_chunks(chunk)
@@ -224,61 +216,49 @@ class MotionForces:
         """Return what a function of indices of instants gives, for all of them: arrays with the time last."""
         return in_chunks(function, len(self.motion.time))
 
-    def taken(self, bodies: tuple[int, ...] | None, lanes: np.ndarray, levels: int) -> dict[str, Any]:
+    def coordinates_at(self, bodies: tuple[int, ...] | None, lanes: np.ndarray, levels: int) -> dict[str, Any]:
         """Return coordinates at some instants; of the ground alone it is the place only, as it never moves."""
         if bodies is not None and not any(bodies):
             levels = 1
-        found = {}
-        for name, values in self.coordinates.items():
-            count = levels - (name == "angular_velocity")
-            if count:
-                chosen = values[:count][..., lanes]
-                found[name] = chosen if bodies is None else chosen[..., np.array(bodies), :]
-        return found
+        found = {name: values[..., lanes] for name, values in cut(self.coordinates, levels - 1).items()}
+        return found if bodies is None else {name: values[..., np.array(bodies), :] for name, values in found.items()}
 
     def _check_finite(self, finite: np.ndarray, lanes: np.ndarray) -> None:
         """Raise MechanismError for the first instant that was solved and at which an applied force is not finite."""
         bad = np.argwhere((~finite & (self.motion.status[lanes] == Status.OK)).T)
         if len(bad):
             lane, force = bad[0]
-            name = [name for names in self.model.forces for name in names][force]
             message = f"has no finite value at t = {self.motion.time[lanes[lane]]:g} s; check its law there"
-            raise MechanismError(message, name=f"forces.{name}")
+            raise MechanismError(message, name=f"forces.{force_names(self.model)[force]}")
 
     def _poses(self, index: int, lanes: np.ndarray) -> tuple[dict[str, Any], ...]:
         bodies = self.model.system.groups[index].bodies
-        return tuple(self.taken(slot, lanes, self.levels) for slot in bodies)
+        return tuple(self.coordinates_at(slot, lanes, self.levels) for slot in bodies)
 
     def _slopes(self, index: int, slot: int, lanes: np.ndarray) -> Any:
         element = self.model.system.groups[index].element
         poses, instants = self._poses(index, lanes), self.motion.time[lanes]
         return _slopes(element, poses, instants, self.pose_type, slot, self.levels)
 
-    def _by_instance(self, place: Place) -> np.ndarray:
-        """Return the multipliers of a group, (levels, rows, instances, time)."""
+    def _of_group(self, place: ElementIndex) -> Float[np.ndarray, "order row instance time"]:
+        """Return the multipliers of a group."""
         found = self.multipliers[:, place.rows]
         instances = self.model.system.groups[place.group].instances
         return found.reshape(len(found), -1, instances, found.shape[-1])
 
 
-def pose_of(coordinates: dict[str, Any], pose_type: Any, order: int) -> Any:
-    """Return the pose of bodies from Taylor coefficients of their coordinates; a place alone is one at rest."""
-    pose = pose_type.from_coordinates({name: Jet(tuple(c)) for name, c in coordinates.items()})
-    if pose.order < order:
-        return jax.tree.map(
-            lambda j: Jet.constant(j.coefficients[0], order), pose, is_leaf=lambda x: isinstance(x, Jet)
-        )
-    return jax.lax.optimization_barrier(pose)  # or XLA computes it again in everything that uses it
-
-
 @compiled("pose_type", "slot", "levels")
-def _slopes(element: Any, poses: Any, instants: Any, pose_type: Any, slot: int, levels: int) -> Any:
+def _slopes(
+    element: Any, poses: Sequence[Coordinates], instants: Lanes, pose_type: type[Pose], slot: int, levels: int
+) -> Any:
     time = Jet.variable(instants[None], levels - 1)
     return constraint_forces.slopes(element, [pose_of(pose, pose_type, levels - 1) for pose in poses], time, slot)
 
 
 @compiled("pose_type")
-def _loads(system: System, bodies: Any, instants: Any, masses: Any, gravity: Any, pose_type: Any) -> tuple[Any, Any]:
+def _loads(
+    system: System, bodies: Coordinates, instants: Lanes, masses: Masses, gravity: Gravity, pose_type: type[Pose]
+) -> tuple[Any, Any]:
     order = len(bodies["position"]) - 1
     pose = pose_of(bodies, pose_type, order)
     time = Jet.variable(instants[None], order)
@@ -286,33 +266,47 @@ def _loads(system: System, bodies: Any, instants: Any, masses: Any, gravity: Any
 
 
 @compiled("pose_type")
-def _multipliers(system: System, blocks: Any, load: Any, still: Any, masses: Any, pose_type: Any) -> Any:
-    mass = None if still is None else mass_matrices(pose_of(still, pose_type, 0), *masses)[:, :, 1:]
+def _multipliers(
+    system: System,
+    blocks: Slopes,
+    load: Float[Numbers, "levels coordinate body batch"],
+    still: Coordinates | None,
+    masses: Masses,
+    pose_type: type[Pose],
+) -> Any:
+    mass = None if still is None else mass_matrices(pose_of(still, pose_type, 0), masses)[:, :, 1:]
     return constraint_forces.multipliers(system, blocks, load, mass)
 
 
 @compiled("pose_type")
-def _exerted(driver: Any, poses: Any, instants: Any, forces: Any, pose_type: Any) -> Any:
+def _exerted(
+    driver: Any, poses: Sequence[Coordinates], instants: Lanes, forces: Multipliers, pose_type: type[Pose]
+) -> Any:
     order = len(forces) - 1
     built = [pose_of(pose, pose_type, order) for pose in poses]
     return constraint_forces.exerted(driver, built, Jet.variable(instants[None], order), forces)
 
 
 @compiled("pose_type", "levels")
-def _applied(force: Any, poses: Any, instants: Any, pose_type: Any, levels: int) -> Any:
+def _applied(force: Any, poses: Sequence[Coordinates], instants: Lanes, pose_type: type[Pose], levels: int) -> Any:
     built = [pose_of(pose, pose_type, levels) for pose in poses]
     time = Jet.variable(instants[None], levels)
     found = force.force(force.displacement(*built, time), force.velocity(*built, time), time).truncate(levels - 1)
-    return stacked(constraint_forces.with_rows(found))
+    return stacked(with_rows(found))
 
 
 @compiled()
-def _wrenches(slope: Any, forces: Any) -> Any:
+def _wrenches(slope: Slope, forces: Multipliers) -> Any:
     return constraint_forces.wrench(slope, forces)
 
 
 @compiled("pose_type")
-def _expressed(work: Any, bodies: Any, point: Any, pose_type: Any) -> tuple[Any, Any]:
+def _expressed(
+    work: Float[Numbers, "levels coordinate batch"],
+    bodies: Sequence[Coordinates],
+    point: Float[Numbers, "component 1 1"],
+    pose_type: type[Pose],
+) -> tuple[Any, Any]:
     order = len(work) - 1
     pose, *frame = (pose_of(body, pose_type, order) for body in bodies)
     force, moment = (Jet(tuple(part[:, :, None])) for part in (work[:, : pose.shifts], work[:, pose.shifts :]))

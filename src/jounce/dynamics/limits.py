@@ -2,15 +2,17 @@
 
 import dataclasses
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float, Int
 
 from jounce.dynamics.trajectories import FollowedTrajectory, why_not
 from jounce.errors import RobotError, SampleWarning, TrajectoryError
 from jounce.robot.model import Limits
 from jounce.robot.robot import Robot
+from jounce.shapes import ArrayLike
 from jounce.trajectory.joint_trajectory import JointTrajectory
 
 FIELDS = ("position", "velocity", "acceleration", "jerk", "effort", "effort_rate")
@@ -94,9 +96,9 @@ class LimitReport:
     joint_names: tuple[str, ...]
     rows: tuple[LimitRow, ...]
     held: Mapping[str, float]
-    times: np.ndarray
-    values: np.ndarray
-    shares: np.ndarray
+    times: Float[np.ndarray, " time"]
+    values: Float[np.ndarray, "time 6 joint"]
+    shares: Float[np.ndarray, "time 6 joint"]
 
     @property
     def limited(self) -> tuple[LimitRow, ...]:
@@ -124,7 +126,7 @@ def check_limits(
     trajectory: JointTrajectory,
     limits: Mapping[str, Limits] | None = None,
     *,
-    times: Any = None,
+    times: ArrayLike | None = None,
     drives: bool = True,
 ) -> LimitReport:
     """Compare a trajectory, and the torques and torque rates that it needs, with the limits of the joints.
@@ -178,8 +180,14 @@ def check_limits(
     >>> report.kept, [(row.quantity, round(row.ratio, 4), round(row.time, 4)) for row in report.limited]
     (False, [('velocity', 0.5, 0.0), ('torque', 1.2263, 0.0)])
     """
-    curves = _Curves(robot, trajectory, drives)
-    held = curves.followed.held
+    followed = FollowedTrajectory(robot, trajectory)
+    held = followed.held
+
+    def curves(times: np.ndarray) -> np.ndarray:
+        """Return all quantities of all joints, (time, 6, joints)."""
+        q = followed.coordinates(times, ORDER)
+        return np.concatenate([q, followed.torques(q, times, drives)], axis=1)
+
     merged = _merged(robot, limits)
     grid = _grid(trajectory) if times is None else _checked_times(times)
     values = curves(grid)
@@ -195,21 +203,9 @@ def check_limits(
         _row(robot, bounds, quantity, joint, *worst)
         for (quantity, joint), *worst in zip(wanted, at.tolist(), found.tolist(), shown.tolist(), strict=True)
     )
-    for message in curves.followed.doubts:
+    for message in followed.doubts:
         warnings.warn(SampleWarning(message), stacklevel=2)
     return LimitReport(robot.name, robot.joint_names, rows, held, grid, values, bounds.shares(values))
-
-
-class _Curves:
-    """All quantities of all joints as functions of time."""
-
-    def __init__(self, robot: Robot, trajectory: JointTrajectory, drives: bool):
-        self.followed, self.drives = FollowedTrajectory(robot, trajectory), drives
-
-    def __call__(self, times: np.ndarray) -> np.ndarray:
-        """Return values of shape (time, 6, joints)."""
-        q = self.followed.coordinates(times, ORDER)
-        return np.concatenate([q, self.followed.torques(q, times, self.drives)], axis=1)
 
 
 class _Bounds:
@@ -221,16 +217,19 @@ class _Bounds:
 
     def __init__(self, robot: Robot, limits: Mapping[str, Limits], rest: np.ndarray):
         every = [limits[name] for name in robot.joint_names]
-        largest = np.array([[_or_infinite(getattr(x, field)) for x in every] for field in FIELDS[1:]])
-        faster = largest[ACCELERATION - 1].copy()
-        slower = np.array([_or_infinite(x.deceleration) for x in every])
-        given = np.isfinite(slower)
+
+        def table(*fields: str, missing: float = np.inf) -> np.ndarray:
+            found = np.array([[getattr(x, field) for x in every] for field in fields], float)  # None becomes NaN
+            return np.where(np.isnan(found), missing, found)
+
+        largest, (slower,) = table(*FIELDS[1:]), table("deceleration")
+        faster, given = largest[ACCELERATION - 1].copy(), np.isfinite(slower)
         bound = np.where(np.isfinite(faster), faster, slower)
         largest[ACCELERATION - 1], self.rest = bound, rest
         self.speeding = np.where(given & ~np.isfinite(faster), 0.0, 1.0)
         self.slowing = np.divide(bound, slower, out=np.ones(len(every)), where=given)
-        self.upper = np.concatenate([[[_or_infinite(x.upper) for x in every]], largest])
-        self.lower = np.concatenate([[[-_or_infinite(x.lower, -1.0) for x in every]], -largest])
+        self.upper = np.concatenate([table("upper"), largest])
+        self.lower = np.concatenate([table("lower", missing=-np.inf), -largest])
         self.limited = np.isfinite(self.upper) | np.isfinite(self.lower)
         with np.errstate(invalid="ignore"):
             half = (self.upper - self.lower) / 2
@@ -262,7 +261,11 @@ class _Bounds:
 
 
 def _worst(
-    curves: _Curves, bounds: _Bounds, grid: np.ndarray, values: np.ndarray, wanted: np.ndarray
+    curves: Callable[[np.ndarray], np.ndarray],
+    bounds: _Bounds,
+    grid: np.ndarray,
+    values: np.ndarray,
+    wanted: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the worst instant of each wanted curve, its value there and the weight of that.
 
@@ -296,8 +299,8 @@ def _worst(
     return times, found, weight
 
 
-def local_maxima(measures: np.ndarray, count: int) -> np.ndarray:
-    """Return the indices of the highest local maxima of curves, (time, curves), as (count, curves); best first."""
+def local_maxima(measures: Float[np.ndarray, "time curve"], count: int) -> Int[np.ndarray, "{count} curve"]:
+    """Return the indices of the highest local maxima of curves, the best first."""
     edge = np.full((1, measures.shape[1]), -np.inf)
     before, after = np.concatenate([edge, measures[:-1]]), np.concatenate([measures[1:], edge])
     height = np.where((measures > before) & (measures >= after), measures, -np.inf)
@@ -331,11 +334,7 @@ def _merged(robot: Robot, limits: Mapping[str, Limits] | None) -> dict[str, Limi
     return robot.limits | given
 
 
-def _or_infinite(bound: float | None, sign: float = 1.0) -> float:
-    return np.inf if bound is None else sign * float(bound)
-
-
-def _grid(trajectory: JointTrajectory) -> np.ndarray:
+def _grid(trajectory: JointTrajectory) -> Float[np.ndarray, " time"]:
     """Return the instants of a trajectory, its ends, and more between each two."""
     own = np.unique(np.concatenate([[trajectory.start], trajectory.times, [trajectory.stop]]))
     steps = max(BETWEEN, -(-INSTANTS // (len(own) - 1)))
@@ -343,7 +342,7 @@ def _grid(trajectory: JointTrajectory) -> np.ndarray:
     return np.append(between.reshape(-1), own[-1])
 
 
-def _checked_times(times: Any) -> np.ndarray:
+def _checked_times(times: ArrayLike) -> Float[np.ndarray, " time"]:
     try:
         found = np.array(times, float)
     except (TypeError, ValueError):

@@ -8,13 +8,19 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+from jaxtyping import Float
 
+from jounce.dynamics.masses import Gravity, Masses
+from jounce.dynamics.saddle_point import BodyMatrices
 from jounce.jet import Jet, components, cross
 from jounce.jet.algebra import stacked, total
 from jounce.mechanism.system import System
+from jounce.rigid import PlanarPose
+from jounce.rigid.pose import Pose
+from jounce.shapes import Numbers
 
 
-def inertia_forces(pose: Any, mass: Any, center: Any, moments: Any, gravity: Any) -> tuple[Jet, Jet]:
+def inertia_forces(pose: Pose, masses: Masses, gravity: Gravity | float) -> tuple[Jet, Jet]:
     """Return inertia less weight of all bodies: force, global, and moment about the origin, in axes of the body.
 
     Both are two orders shorter than the pose; shapes (c, bodies, batch) and (turns, bodies, batch).
@@ -23,26 +29,28 @@ def inertia_forces(pose: Any, mass: Any, center: Any, moments: Any, gravity: Any
     ----------
     pose : SpatialPose or PlanarPose
         Jets of all bodies, of shape (..., bodies, batch).
-    mass, center, moments
-        As `mechanism_masses` gives them.
+    masses : Masses
+        Of these bodies.
     gravity : array of shape (c, 1, 1)
         m/s^2.
     """
+    mass, center, moments = masses
     acceleration = pose.point(center).differentiate().differentiate()
     force = (acceleration - gravity) * mass
-    if pose.turns == 1:
+    if isinstance(pose, PlanarPose):
         about = moments[0][0] + moments[1][1]
         moment = pose.angle.differentiate().differentiate() * about + cross(pose.direction(center), force)
         return force, moment[None]
     spread = moments[0][0] + moments[1][1] + moments[2][2]
     spin = pose.angular_velocity
+    assert spin is not None  # there are accelerations
     momentum = spin * spread - total(moments[:, i] * part for i, part in enumerate(components(spin)))
     local = pose.to_body(force)
     return force, momentum.differentiate() + cross(spin, momentum) + cross(center, local)
 
 
-def mass_matrices(pose: Any, mass: Any, center: Any, moments: Any) -> Any:
-    """Return the mass matrix of each body, (coordinates, coordinates, bodies, batch), at a pose of order zero.
+def mass_matrices(pose: Pose, masses: Masses) -> BodyMatrices:
+    """Return the mass matrix of each body at a pose of order zero.
 
     It is the map from accelerations to the forces of inertia of bodies that do not move yet.
     """
@@ -57,13 +65,15 @@ def mass_matrices(pose: Any, mass: Any, center: Any, moments: Any) -> Any:
 
     def along(direction: Any) -> Any:
         accelerated = still.extended(*wide(0.5 * direction))
-        force, moment = inertia_forces(accelerated, mass, center, moments, 0.0)
+        force, moment = inertia_forces(accelerated, masses, 0.0)
         return jnp.concatenate([force.coefficients[0], moment.coefficients[0]])
 
     return jax.vmap(along, out_axes=1)(jnp.eye(size))
 
 
-def loads(system: System, pose: Any, time: Jet, masses: Any, gravity: Any) -> Any:
+def loads(
+    system: System, pose: Pose, time: Jet, masses: Masses, gravity: Gravity
+) -> Float[Numbers, "order coordinate moving batch"]:
     """Return applied forces and weight less inertia of all moving bodies, as Taylor coefficients.
 
     Parameters
@@ -74,18 +84,17 @@ def loads(system: System, pose: Any, time: Jet, masses: Any, gravity: Any) -> An
         Jets of all bodies, the ground first.
     time : Jet
         Of shape (1, batch).
-    masses : tuple of array
-        As `mechanism_masses` gives them.
+    masses : Masses
+        Of all bodies.
     gravity : array of shape (c, 1, 1)
         m/s^2.
 
     Returns
     -------
-    array of shape (order - 1, coordinates, bodies, batch)
+    array of shape (order - 1, coordinates, moving bodies, batch)
         The order is that of the pose; force, global, and moment about the origin, in axes of the body.
     """
-    mass, center, moments = masses
-    load = -jnp.concatenate([stacked(x) for x in inertia_forces(pose, mass, center, moments, gravity)], axis=1)
+    load = -jnp.concatenate([stacked(x) for x in inertia_forces(pose, masses, gravity)], axis=1)
     if system.forces:
         load = load + stacked(system.applied_forces(pose, time))[: len(load)]
     return load[:, :, 1:]

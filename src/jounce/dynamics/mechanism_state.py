@@ -1,13 +1,15 @@
 """One state of a mechanism as a user gives it, which need not fulfil its joints."""
 
 import dataclasses
-import math
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
+from jounce.dynamics.motion_values import Coordinates, cut
 from jounce.errors import MechanismError
+from jounce.jet.derivatives import taylor_coefficients
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.solve import HIGHEST_ORDER
 from jounce.mechanism import Mechanism, Model, build
@@ -15,13 +17,14 @@ from jounce.mechanism.builder import with_reference
 from jounce.mechanism.law_checks import check_laws
 from jounce.rigid import SpatialPose
 from jounce.rigid.euler_parameters import euler_parameters
+from jounce.rigid.pose import Pose
 
 
-class State(Motion):
+class MotionAtState(Motion):
     """One state of a mechanism, consistent or not, as a motion of one instant: `at_state` makes it."""
 
 
-def at_state(given: Any, state: Any, time: Any) -> tuple[Motion, int]:
+def at_state(given: object, state: object, time: object) -> tuple[Motion, int]:
     """Return a state as a motion of one instant, and how many derivatives are known of it."""
     if not isinstance(given, Motion | Mechanism):
         raise MechanismError("must be a jn.Motion or a jn.Mechanism", name="motion", value=given)
@@ -35,24 +38,21 @@ def at_state(given: Any, state: Any, time: Any) -> tuple[Motion, int]:
         system = dataclasses.replace(given.model.system, outputs=())
         model = dataclasses.replace(given.model, system=system, outputs=())
     else:
-        model, _ = with_reference(
-            model, {name: values[0] for name, values in _still(coordinates).items()}, float(instant)
-        )
+        reference = {name: values[0] for name, values in cut(coordinates, 0).items()}
+        model, _ = with_reference(model, reference, float(instant))
     history = given.history if isinstance(given, Motion) else None
     status = np.array([int(Status.OK)])
-    return State(mechanism, model, instant[None], order, (coordinates, ()), status, {}, history=history), order
+    return MotionAtState(
+        mechanism, model, instant[None], order, (dict(coordinates), ()), status, {}, history=history
+    ), order
 
 
-def _still(coordinates: dict[str, Any]) -> dict[str, Any]:
-    return {name: values for name, values in coordinates.items() if name != "angular_velocity"}
-
-
-def _guessed(model: Model) -> dict[str, Any]:
+def _guessed(model: Model) -> Coordinates:
     found = {name: np.asarray(value)[None] for name, value in model.guess.items()}
     return found | ({} if "angle" in found else {"angular_velocity": np.zeros((0, *found["position"].shape[1:]))})
 
 
-def _coordinates(mechanism: Mechanism, model: Model, state: Any) -> dict[str, Any]:
+def _coordinates(mechanism: Mechanism, model: Model, state: object) -> Coordinates:
     """Return the Taylor coefficients of the coordinates of all bodies, the ground first, from a state as given."""
     if not isinstance(state, Mapping):
         raise MechanismError(
@@ -79,12 +79,11 @@ def _coordinates(mechanism: Mechanism, model: Model, state: Any) -> dict[str, An
         whole = np.stack([np.zeros_like(read[0][name]), *(body[name] for body in read)], axis=-1)[..., None]
         if name == "quaternion":
             whole[0, 0, 0] = 1.0
-        factorials = np.array([math.factorial(k) for k in range(len(whole))], float)
-        found[name] = whole / factorials.reshape(-1, *[1] * (whole.ndim - 1))
+        found[name] = taylor_coefficients(whole)
     return found
 
 
-def _body_state(place: str, given: Any, pose_type: Any) -> dict[str, np.ndarray]:
+def _body_state(place: str, given: object, pose_type: type[Pose]) -> dict[str, Float[np.ndarray, "_ *component"]]:
     """Return the plain derivatives of the coordinates of one body."""
     spatial = pose_type is SpatialPose
     keys = ("position", "orientation", "angular_velocity") if spatial else ("position", "angle")
@@ -117,7 +116,7 @@ def _check_order(name: str, found: int, order: int) -> None:
         raise MechanismError(f"{message}; give as many here", name=name, value=found)
 
 
-def _array(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
+def _array(name: str, value: Any, shape: tuple[int, ...]) -> Float[np.ndarray, "..."]:
     """Return finite numbers: of a shape, or where it is not empty, one of them or a list of them."""
     try:
         found = np.array(value, float)

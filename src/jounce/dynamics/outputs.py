@@ -6,11 +6,14 @@ import equinox as eqx
 import numpy as np
 
 from jounce.constraints.base import Vector, value_fields
-from jounce.dynamics.inverse import MotionForces, check_loads
+from jounce.dynamics.inverse import MotionForces
+from jounce.dynamics.masses import check_loads
 from jounce.errors import MechanismError, check_name, did_you_mean
+from jounce.kinematics import Motion
 from jounce.mechanism import AbstractMotionOutput, Mechanism
 from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.resolve import resolve_element
+from jounce.shapes import ArrayLike
 
 RATES = ("yank", "second rate", "third rate", "fourth rate")
 
@@ -51,7 +54,7 @@ class _DriverOutput(AbstractForceOutput):
 
     source = "driver"
 
-    def coefficients(self, motion: Any) -> np.ndarray:
+    def coefficients(self, motion: Motion) -> np.ndarray:
         """Return the Taylor coefficients of what the driver exerts, (levels, 1, time)."""
         return MotionForces.of(motion).driver_force(self.driver)
 
@@ -95,7 +98,7 @@ class _JointOutput(AbstractForceOutput):
             message = f"unknown frame; {did_you_mean(self.frame, ['global', 'body', *element.bodies])}"
             raise MechanismError(message, name="frame", value=self.frame)
 
-    def _wrench(self, motion: Any, point: Any) -> tuple[np.ndarray, np.ndarray]:
+    def _wrench(self, motion: Motion, point: ArrayLike | None) -> tuple[np.ndarray, np.ndarray]:
         """Return force and moment about a point of the body, with rates; about that of the joint unless given."""
         forces, mechanism = MotionForces.of(motion), motion.mechanism
         element = {**mechanism.joints, **mechanism.drivers}[self.joint]
@@ -104,12 +107,12 @@ class _JointOutput(AbstractForceOutput):
         index = [GROUND, *mechanism.bodies].index
         frame = {"global": None, "body": body}.get(self.frame, self.frame)
         if point is None:
-            place = forces.places[self.joint]
+            place = forces.indices[self.joint]
             fixed = getattr(forces.model.system.groups[place.group].element, f"point_{'ijmn'[slot : slot + 1]}", None)
             size = forces.pose_type.shifts
             point = np.zeros(size) if fixed is None else np.asarray(fixed).reshape(size, -1)[:, place.instance]
         work = forces.wrench(self.joint, slot)
-        return forces.expressed(work, index(body), None if frame is None else index(frame), point)
+        return forces.expressed(work, index(body), None if frame is None else index(frame), np.asarray(point))
 
 
 class JointForceOutput(_JointOutput):
@@ -118,7 +121,7 @@ class JointForceOutput(_JointOutput):
     unit = "N"
     rate_names = ("force", *RATES)
 
-    def coefficients(self, motion: Any) -> np.ndarray:
+    def coefficients(self, motion: Motion) -> np.ndarray:
         """Return the Taylor coefficients of the force, (levels, components, time)."""
         return self._wrench(motion, None)[0]
 
@@ -134,7 +137,7 @@ class JointTorqueOutput(_JointOutput):
     unit = "N*m"
     rate_names = ("torque", *RATES)
 
-    def coefficients(self, motion: Any) -> np.ndarray:
+    def coefficients(self, motion: Motion) -> np.ndarray:
         """Return the Taylor coefficients of the torque, (levels, components, time)."""
         mechanism = motion.mechanism
         components = 2 if mechanism.space == "planar" else 3
@@ -147,7 +150,7 @@ class _AppliedOutput(AbstractForceOutput):
 
     source = "force"
 
-    def coefficients(self, motion: Any) -> np.ndarray:
+    def coefficients(self, motion: Motion) -> np.ndarray:
         """Return the Taylor coefficients of the force, (levels, components, time)."""
         return MotionForces.of(motion).applied_force(self.force)
 

@@ -1,17 +1,25 @@
 """The power balance of a mechanism in motion: a check of all forces that needs no second solver."""
 
-import math
+from collections.abc import Sequence
 from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
-from jounce.dynamics.inverse import MotionForces, pose_of
+from jounce.dynamics.forward import Lanes
+from jounce.dynamics.inverse import MotionForces
+from jounce.dynamics.masses import Gravity, Masses
+from jounce.dynamics.motion_values import Coordinates, labelled, pose_of
 from jounce.jet import Jet, dot
 from jounce.jet.algebra import stacked, total
-from jounce.kinematics import Motion, Status
+from jounce.kinematics import Motion
 from jounce.kinematics.compilation import compiled
 from jounce.mechanism.axis_angles import at_lanes
+from jounce.mechanism.system import Group
+from jounce.rigid import PlanarPose
+from jounce.rigid.pose import Pose
+from jounce.shapes import Numbers
 
 FAINT = 1e-3  # of what turning bodies would move: coefficients that vanish have its rounding, 1e-12 of this or less
 
@@ -58,34 +66,24 @@ def power_balance(motion: Motion) -> Any:
     import xarray
 
     forces = MotionForces.of(motion)
-    driven = [_driver_power(forces, name) for name in motion.mechanism.drivers]
+    nothing = np.zeros((forces.levels, len(motion.time)))
+    driven = [(nothing, nothing), *(_driver_power(forces, name) for name in motion.mechanism.drivers)]
     rest = forces.in_chunks(lambda lanes: _powers(*_of_chunk(forces, lanes), forces.pose_type, forces.levels))
     applied, kinetic, potential, sizes = (np.asarray(part) for part in rest)
     forces.check_finite(applied)
-    factorials = np.array([math.factorial(k) for k in range(forces.levels)], float)[:, None]
-    bad = (motion.status != Status.OK)[:, None]
-
-    def derivatives(parts: Any) -> np.ndarray:
-        values = np.asarray(parts).reshape(-1, forces.levels, len(motion.time)) * factorials
-        return np.where(bad, np.nan, np.swapaxes(values, 1, 2))[..., : motion.order + 1]
-
-    terms = {
-        "drivers": derivatives([power for power, _ in driven]),
-        "forces": derivatives(np.moveaxis(applied, 1, 0)),
-        "kinetic": derivatives(np.moveaxis(kinetic, 1, 0)),
-        "potential": derivatives(np.moveaxis(potential, 1, 0)),
-    }
-    found = {name: part.sum(axis=0) for name, part in terms.items()}
-    found["residual"] = found["drivers"] + found["forces"] - found["kinetic"] - found["potential"]
-    found["scale"] = derivatives([*(size for _, size in driven), np.sum(sizes, axis=1)]).sum(axis=0)
-    axes = {"time": motion.time, "derivative": np.arange(found["scale"].shape[1])}
-    variables = {name: (("time", "derivative"), values, {"units": "W"}) for name, values in found.items()}
-    return xarray.Dataset(variables, coords=axes)
+    power, size = np.sum(driven, axis=0)
+    terms = {"drivers": power, "forces": applied.sum(axis=1)}
+    terms |= {"kinetic": kinetic.sum(axis=1), "potential": potential.sum(axis=1)}
+    found = {name: labelled(motion, part[: motion.order + 1], "W") for name, part in terms.items()}
+    residual = found["drivers"] + found["forces"] - found["kinetic"] - found["potential"]
+    found["residual"] = residual.assign_attrs(units="W")
+    found["scale"] = labelled(motion, (size + sizes.sum(axis=1))[: motion.order + 1], "W")
+    return xarray.Dataset(found)
 
 
 def _driver_power(forces: MotionForces, name: str) -> tuple[np.ndarray, np.ndarray]:
     """Return the power of a driver and the size of its products, as Taylor coefficients, (levels, time)."""
-    place = forces.places[name]
+    place = forces.indices[name]
     element = forces.model.system.groups[place.group].element
     law = forces.in_chunks(lambda lanes: _law(element, forces.motion.time[lanes], forces.levels))[:, place.instance]
     rate, force = Jet(tuple(law)).differentiate(), Jet(tuple(forces.driver_force(name)[:, 0]))
@@ -94,21 +92,28 @@ def _driver_power(forces: MotionForces, name: str) -> tuple[np.ndarray, np.ndarr
 
 
 @compiled("levels")
-def _law(driver: Any, instants: Any, levels: int) -> Any:
+def _law(driver: Any, instants: Lanes, levels: int) -> Float[Numbers, "_ instance batch"]:
     law = stacked(driver.motion(Jet.variable(instants[None], levels)))
     return law.reshape(levels + 1, -1, len(instants))
 
 
 def _of_chunk(forces: MotionForces, lanes: np.ndarray) -> tuple[Any, ...]:
-    bodies = forces.taken(None, lanes, forces.levels + 2)
+    bodies = forces.coordinates_at(None, lanes, forces.levels + 2)
     applied, instants = at_lanes(forces.motion.forces, lanes), forces.motion.time[lanes]
     return applied, bodies, instants, forces.masses, forces.gravity, forces.model.length
 
 
 @compiled("pose_type", "levels")
 def _powers(
-    groups: Any, bodies: Any, instants: Any, masses: Any, gravity: Any, length: Any, pose_type: Any, levels: int
-) -> Any:
+    groups: tuple[Group, ...],
+    bodies: Coordinates,
+    instants: Lanes,
+    masses: Masses,
+    gravity: Gravity,
+    length: float | Float[Numbers, ""],
+    pose_type: type[Pose],
+    levels: int,
+) -> tuple[Float[Numbers, "{levels} _ batch"], ...]:
     """Return the power of each force, the rates of both energies of each body, and the sizes of all their products."""
     order = levels + 1  # energies have one less, and their rates one less again
     pose, time = pose_of(bodies, pose_type, order), Jet.variable(instants[None], order)
@@ -132,27 +137,32 @@ def _powers(
     return powers, stacked(kinetic.differentiate()), stacked(potential), products
 
 
-def _spin(pose: Any) -> tuple[Jet, ...]:
+def _spin(pose: Pose) -> tuple[Jet, ...]:
     """Return the components of the angular velocities of bodies, in their axes."""
-    return (pose.angle.differentiate(),) if pose.turns == 1 else tuple(pose.angular_velocity[k] for k in range(3))
+    if isinstance(pose, PlanarPose):
+        return (pose.angle.differentiate(),)
+    assert pose.angular_velocity is not None  # there are accelerations
+    return tuple(pose.angular_velocity)
 
 
-def _inertia(moments: Any, turns: int) -> Any:
-    """Return the tensors of inertia about the centres of mass, (turns, turns, bodies, 1), from the second moments."""
+def _inertia(
+    moments: Float[Numbers, "component component body 1"], turns: int
+) -> Float[Numbers, "{turns} {turns} body 1"]:
+    """Return the tensors of inertia about the centres of mass from the second moments."""
     spread = total(moments[k][k] for k in range(len(moments)))
     if turns == 1:
         return spread[None, None]
     return spread[None, None] * jnp.eye(3)[:, :, None, None] - moments
 
 
-def _applied(group: Any, pose: Any, time: Jet, turning: Jet, length: Any) -> tuple[Jet, Jet]:
+def _applied(group: Group, pose: Pose, time: Jet, turning: Jet, length: float | Float[Numbers, ""]) -> tuple[Jet, Jet]:
     """Return the power of forces, (instances, batch), and the size of its products."""
     lever = length if group.element.unit == "N" else 1.0
     rates = group.velocity(pose, time).map(jnp.abs) + turning * (FAINT * lever)
     return group.power(pose, time), group.force(pose, time).map(jnp.abs).dot(rates)
 
 
-def _largest(jets: Any) -> Jet:
+def _largest(jets: Sequence[Jet]) -> Jet:
     """Return the largest component of vectors, coefficient by coefficient, (bodies, batch)."""
     levels = zip(*(jet.dense().coefficients for jet in jets), strict=True)
     return Jet(tuple(jnp.max(jnp.abs(jnp.concatenate(level)), axis=0) for level in levels))

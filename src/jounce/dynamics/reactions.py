@@ -13,6 +13,7 @@ from jounce.dynamics.outputs import (
     is_turning,
 )
 from jounce.kinematics import Motion
+from jounce.shapes import ArrayLike
 
 
 def driver_force(motion: Motion, name: str) -> Any:
@@ -75,7 +76,7 @@ class Reaction:
 
 
 def joint_reaction(
-    motion: Motion, name: str, body: str | None = None, frame: str = "global", point: Any = None
+    motion: Motion, name: str, body: str | None = None, frame: str = "global", point: ArrayLike | None = None
 ) -> Reaction:
     """Return the force and torque that a joint, or a driver, exerts on one of its bodies, with rates.
 

@@ -1,24 +1,27 @@
 """The state a simulation starts from: consistent positions and velocities from partial ones, and what can move."""
 
 import dataclasses
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax
 import numpy as np
+from jaxtyping import Float
 
-from jounce.dynamics.energies import gravity_of, masses_of
-from jounce.dynamics.forward import Equations, State, least_change
+from jounce.dynamics.forward import Equations, Instants, State
+from jounce.dynamics.masses import gravity_of, masses_of, required_masses
 from jounce.errors import AssemblyError, JounceError, MechanismError, MobilityError
 from jounce.jet import Jet
 from jounce.kinematics.assembly import RANK_TOLERANCE, assemble, freely_moving
 from jounce.kinematics.compilation import compiled
+from jounce.kinematics.linear import DenseFactor
 from jounce.mechanism import Mechanism, Model, build
 from jounce.mechanism.builder import pose_at
+from jounce.shapes import Numbers
 
 TOLERANCE = 1e-12  # of the assembled positions, rad or sizes of the mechanism
 
 
-class Start(NamedTuple):
+class ConsistentStart(NamedTuple):
     """A mechanism ready to move.
 
     Attributes
@@ -39,7 +42,7 @@ class Start(NamedTuple):
     mobility: str
 
 
-def start(mechanism: Mechanism, instant: float) -> Start:
+def consistent_start(mechanism: Mechanism, instant: float) -> ConsistentStart:
     """Return a consistent state at an instant, from the starting guess and the initial conditions.
 
     Initial conditions are drivers: each fixes one coordinate and its rate, as its law gives them at the instant. What
@@ -62,9 +65,7 @@ def start(mechanism: Mechanism, instant: float) -> Start:
     MobilityError
         If constraints or initial conditions are redundant.
     """
-    masses = masses_of(mechanism)
-    if not masses[0].any():
-        raise MechanismError("no body has a mass; the equations of motion need masses", name="bodies")
+    required_masses(mechanism, "the equations of motion")
     model, state = build(mechanism), None
     if mechanism.initial:
         whole, coordinates = _assembled(mechanism, instant)
@@ -78,22 +79,21 @@ def start(mechanism: Mechanism, instant: float) -> Start:
     state = at_rest(model, coordinates) if state is None else state
     state = jax.tree.map(np.asarray, with_rates(equations, state, np.array([[instant]])))
     if not all(np.isfinite(part).all() for part in state):
-        _explain(equations, model, state, instant, masses)
-    return Start(model, equations, state, _explain(equations, model, state, instant, masses))
+        _explain(equations, model, state, instant)
+    return ConsistentStart(model, equations, state, _explain(equations, model, state, instant))
 
 
 def equations_of(mechanism: Mechanism, model: Model) -> Equations:
     """Return the equations of motion of a mechanism."""
     masses = masses_of(mechanism)
-    system = dataclasses.replace(model.system, outputs=())
-    equations = Equations(system, *masses, gravity_of(mechanism), np.float64(np.max(masses[0])), model.pose_type)
-    return jax.device_put(equations)
+    system, scale = dataclasses.replace(model.system, outputs=()), np.float64(np.max(masses.mass))
+    return jax.device_put(Equations(system, masses, gravity_of(mechanism), scale, model.pose_type))
 
 
 def _assembled(mechanism: Mechanism, instant: float) -> tuple[Model, dict[str, np.ndarray]]:
     """Return the mechanism with its initial conditions as drivers, assembled."""
     try:
-        model = build(driven(mechanism))
+        model = build(initial_as_drivers(mechanism))
     except JounceError as error:
         error.name = _renamed(error.name or "", mechanism) or None
         raise
@@ -108,7 +108,7 @@ def _assembled(mechanism: Mechanism, instant: float) -> tuple[Model, dict[str, n
         raise MobilityError(message) from None
 
 
-def driven(mechanism: Mechanism) -> Mechanism:
+def initial_as_drivers(mechanism: Mechanism) -> Mechanism:
     """Return the mechanism with its initial conditions as drivers."""
     return dataclasses.replace(mechanism, drivers={**mechanism.drivers, **mechanism.initial}, initial={})
 
@@ -130,21 +130,20 @@ def at_rest(model: Model, coordinates: dict[str, np.ndarray]) -> State:
 
 
 @compiled()
-def with_rates(equations: Equations, state: State, time: Any) -> State:
+def with_rates(equations: Equations, state: State, time: Instants) -> State:
     """Return the state with the least change of its velocities that fulfils the rates of all constraints."""
-    rate = equations.system.residual(equations.pose(state), Jet.variable(time, 1)).dense().coefficients[1]
-    change = least_change(equations, state, time, rate)
-    shifts = equations.pose_type.shifts
-    return state._replace(velocity=state.velocity + change[:shifts], spin=state.spin + change[shifts:])
+    return equations.with_rates(DenseFactor.of(equations.matrix(state, time)), state, time)
 
 
 @compiled()
-def _matrices(equations: Equations, state: State, time: Any) -> tuple[Any, Any]:
+def _matrices(
+    equations: Equations, state: State, time: Instants
+) -> tuple[Float[Numbers, "size size"], Float[Numbers, "row column"]]:
     pose = equations.still(state.position, state.attitude)
     return equations.matrix(state, time)[..., 0], equations.system.jacobian(pose, Jet([time]))[..., 0]
 
 
-def _explain(equations: Equations, model: Model, state: State, instant: float, masses: Any) -> str:
+def _explain(equations: Equations, model: Model, state: State, instant: float) -> str:
     """Return the mobility in words, or raise for a body whose acceleration nothing determines."""
     state = state._replace(velocity=np.zeros_like(state.velocity), spin=np.zeros_like(state.spin))
     whole, jacobian = (np.asarray(x) for x in _matrices(equations, state, np.array([[instant]])))
@@ -152,7 +151,7 @@ def _explain(equations: Equations, model: Model, state: State, instant: float, m
     _, sizes, right = np.linalg.svd(whole)
     loose = right[sizes <= RANK_TOLERANCE * 1e-3 * sizes.max()]
     if len(loose):
-        mass, _, moments = masses
+        mass, _, moments = map(np.asarray, equations.masses)
         by_body = np.linalg.norm(loose[:, :columns].reshape(len(loose), len(model.bodies), -1), axis=(0, 2))
         for name, size, m, s in zip(
             model.bodies, by_body, mass[1:, 0], np.abs(moments[..., 1:, 0]).sum((0, 1)), strict=True

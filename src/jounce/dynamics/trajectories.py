@@ -5,12 +5,15 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
-from jounce.dynamics.energies import whole_number
+from jounce.dynamics.motion_values import in_chunks
 from jounce.errors import RobotError, SampleWarning, TrajectoryError, did_you_mean
+from jounce.robot.arguments import whole_number
 from jounce.robot.inverse_dynamics import inverse_dynamics
 from jounce.robot.model import Limits
 from jounce.robot.robot import Robot
+from jounce.shapes import ArrayLike
 from jounce.trajectory.joint_trajectory import JointTrajectory
 
 BLOCK = 2048  # instants evaluated at once, always as many, so that all is compiled once
@@ -53,8 +56,8 @@ class FollowedTrajectory:
         self.held = {name: _rest(robot.limits[name]) for name in robot.joint_names if name not in trajectory.names}
         self.doubts: list[str] = []
 
-    def coordinates(self, times: np.ndarray, order: int) -> np.ndarray:
-        """Return coordinates and derivatives, (time, order + 1, joints).
+    def coordinates(self, times: Float[np.ndarray, " time"], order: int) -> Float[np.ndarray, "time {order}+1 joint"]:
+        """Return coordinates and derivatives.
 
         Raises
         ------
@@ -71,8 +74,10 @@ class FollowedTrajectory:
         self._check_finite(q, times, QUANTITIES)
         return q
 
-    def torques(self, q: np.ndarray, times: np.ndarray, drives: bool) -> np.ndarray:
-        """Return torques and rates, (time, order - 1, joints), for coordinates that `coordinates` gave.
+    def torques(
+        self, q: Float[np.ndarray, "time derivative joint"], times: Float[np.ndarray, " time"], drives: bool
+    ) -> Float[np.ndarray, "time derivative-2 joint"]:
+        """Return torques and rates for coordinates that `coordinates` gave.
 
         Raises
         ------
@@ -93,7 +98,7 @@ class FollowedTrajectory:
 
 
 def trajectory_torques(
-    robot: Robot, trajectory: JointTrajectory, rates: int = 0, *, times: Any = None, drives: bool = True
+    robot: Robot, trajectory: JointTrajectory, rates: int = 0, *, times: ArrayLike | None = None, drives: bool = True
 ) -> Any:
     """Return the torques and forces that a trajectory needs of the joints of a robot, with rates, labelled.
 
@@ -139,7 +144,7 @@ def trajectory_torques(
     """
     import xarray
 
-    rates = whole_number("rates", rates, 0)
+    rates = whole_number("rates", rates)
     followed = FollowedTrajectory(robot, trajectory)
     instants = trajectory.times if times is None else np.atleast_1d(np.asarray(times, float))
     values = followed.torques(followed.coordinates(instants, rates + 2), instants, drives)
@@ -153,14 +158,9 @@ def trajectory_torques(
     return xarray.Dataset(variables, coords=axes, attrs={"title": robot.name, "source": "jounce"})
 
 
-def _in_blocks(function: Callable[[np.ndarray], np.ndarray], values: np.ndarray) -> np.ndarray:
+def _in_blocks(function: Callable[[np.ndarray], Any], values: np.ndarray) -> np.ndarray:
     """Return what a function gives for values along their first axis, the last block filled up."""
-    found = []
-    for start in range(0, len(values), BLOCK):
-        block = values[start : start + BLOCK]
-        whole = np.concatenate([block, np.repeat(block[-1:], BLOCK - len(block), axis=0)])
-        found.append(function(whole)[: len(block)])
-    return np.concatenate(found)
+    return in_chunks(lambda some: function(values[some]), len(values), (BLOCK,), axis=0)
 
 
 def why_not(robot: Robot, name: str) -> str:

@@ -8,24 +8,28 @@ from typing import Any
 
 import jax
 import numpy as np
+from jaxtyping import Float, Int
 
 from jounce.display import Displayed
 from jounce.dynamics.forward import Equations, State
-from jounce.dynamics.start import driven, start
+from jounce.dynamics.start import consistent_start, initial_as_drivers
 from jounce.errors import MechanismError, check_name
-from jounce.integrate.batch_equations import Family, Starts, Turns
-from jounce.integrate.events import output_series, pose_coordinates
-from jounce.integrate.marching import Front, Outcome, Steps, departed, march
+from jounce.integrate.batch_equations import BatchStart, ParametricMechanism, Turns
+from jounce.integrate.events import pose_coordinates
+from jounce.integrate.marching import DenseOutput, IntegratorState, Outcome, begin_march, march
 from jounce.integrate.methods import AbstractMethod
-from jounce.integrate.simulate import checked, instants_of
+from jounce.integrate.simulate import checked_options, instants_of
 from jounce.integrate.simulation import expanded
+from jounce.jet.derivatives import plain_derivatives
 from jounce.jet.turns import whole_periods
 from jounce.kinematics import Status
-from jounce.mechanism import Mechanism, build, check_mechanism
+from jounce.kinematics.motion import output_series
+from jounce.mechanism import Mechanism, TimeGrid, build, check_mechanism
 from jounce.mechanism.axis_angles import with_turns
 from jounce.mechanism.builder import with_reference
 from jounce.mechanism.law_checks import check_laws
 from jounce.mechanism.preconditions import concrete
+from jounce.shapes import ArrayLike
 
 LANES = 64  # runs marched together: more fall out of the cache
 STEPS = 16  # tried before runs that have ended make room for others
@@ -50,19 +54,19 @@ class Batch(Displayed):
         Steps taken.
     """
 
-    time: np.ndarray
-    parameters: dict[str, np.ndarray]
-    outputs: dict[str, np.ndarray]
-    status: np.ndarray
-    steps: np.ndarray
+    time: Float[np.ndarray, " time"]
+    parameters: dict[str, Float[np.ndarray, " run"]]
+    outputs: dict[str, Float[np.ndarray, "run time derivative *component"]]
+    status: Int[np.ndarray, "run time"]
+    steps: Int[np.ndarray, " run"]
 
 
 @concrete
 def simulate_batch(
     mechanism: Mechanism,
-    parameters: Mapping[str, Any],
-    time: Any = None,
-    order: int = 2,
+    parameters: Mapping[str, ArrayLike],
+    time: ArrayLike | TimeGrid | None = None,
+    order: int = 4,
     *,
     method: AbstractMethod | None = None,
     tolerance: float = 1e-15,
@@ -104,24 +108,24 @@ def simulate_batch(
     ...     outputs={"angle": jn.AngleOutput("rod")},
     ... )
     >>> jn.simulate_batch(pendulum, {"lift": [0.1, 0.2, 0.3]}, [0.0, 0.5]).outputs["angle"].shape
-    (3, 2, 3)
+    (3, 2, 5)
     """
     check_mechanism(mechanism)
     values = _checked_parameters(mechanism, parameters)
     names, rows = tuple(values), np.stack(list(values.values()), axis=-1)
     first = mechanism.with_parameters(**dict(zip(names, rows[0].tolist(), strict=True)))
-    order, method = checked(order, method, tolerance, longest_step)
+    order, method = checked_options(order, method, tolerance, longest_step)
     instants = instants_of(mechanism.time if time is None else time, first.parameter_values)
     check_laws(mechanism, instants, order, forces=True)
-    nominal = start(first, float(instants[0]))
-    family = Family(first, nominal.model, names)
-    begun = family
+    nominal = consistent_start(first, float(instants[0]))
+    parametric = ParametricMechanism(first, nominal.model, names)
+    begun = parametric
     if first.initial:
-        model, _ = with_reference(build(driven(first)), nominal.model.reference, float(instants[0]))
-        begun = Family(driven(first), model, names)
-    runs = _Runs(family, rows, instants, order, (float(tolerance), float(longest_step), method))
+        model, _ = with_reference(build(initial_as_drivers(first)), nominal.model.reference, float(instants[0]))
+        begun = ParametricMechanism(initial_as_drivers(first), model, names)
+    runs = _Runs(parametric, rows, instants, order, (float(tolerance), float(longest_step), method))
 
-    starts = Starts(family, begun, nominal.state, rows, float(instants[0]))
+    starts = BatchStart(parametric, begun, nominal.state, rows, float(instants[0]))
 
     def depart(some: np.ndarray) -> None:
         runs.depart(some, *starts.of(some))
@@ -137,7 +141,7 @@ def simulate_batch(
     return Batch(instants, values, runs.outputs, runs.status, runs.steps)
 
 
-def _checked_parameters(mechanism: Mechanism, parameters: Mapping[str, Any]) -> dict[str, np.ndarray]:
+def _checked_parameters(mechanism: Mechanism, parameters: Mapping[str, Any]) -> dict[str, Float[np.ndarray, " run"]]:
     if not parameters:
         raise MechanismError("a batch differs in at least one parameter", name="parameters", value=dict(parameters))
     values, count = {}, None
@@ -166,21 +170,21 @@ class _Runs:
 
     def __init__(
         self,
-        family: Family,
+        parametric: ParametricMechanism,
         rows: np.ndarray,
         instants: np.ndarray,
         order: int,
         settings: tuple[float, float, AbstractMethod],
     ):
-        self.family, self.instants, self.order, self.settings = family, instants, order, settings
+        self.parametric, self.instants, self.order, self.settings = parametric, instants, order, settings
         self.width = min(LANES, 1 << (len(rows) - 1).bit_length())
         self.steps = np.zeros(len(rows), int)
-        self._made = family.of(rows)
+        self._made = parametric.of(rows)
         self._reached = np.zeros((len(rows), len(instants)), bool)
         self._sense = 1.0 if instants[-1] >= instants[0] else -1.0
-        lost = max((output.lost_orders for output in family.mechanism.outputs.values()), default=0)
+        lost = max((output.lost_orders for output in parametric.mechanism.outputs.values()), default=0)
         self._expansion = max(order + max(lost, 1), 2)  # turns of angles are counted by two derivatives
-        self._front: Any = None
+        self._current: Any = None
         self._values: dict[int, np.ndarray] = {}  # of each group, (runs, time, order + 1, components, outputs)
         self._begun = np.full(len(rows), instants[0])  # the time at which the last step began
         self._angles: dict[int, np.ndarray] = {}  # the series of turning outputs there
@@ -189,7 +193,7 @@ class _Runs:
     @property
     def moving(self) -> np.ndarray:
         """The runs that are still on their way."""
-        return np.flatnonzero((self._front.outcome == Outcome.RUNNING) & (len(self.instants) > 1))
+        return np.flatnonzero((self._current.outcome == Outcome.RUNNING) & (len(self.instants) > 1))
 
     @property
     def status(self) -> np.ndarray:
@@ -205,13 +209,12 @@ class _Runs:
     @property
     def outputs(self) -> dict[str, np.ndarray]:
         """See `Batch`."""
-        factorials = np.cumprod([1.0, *range(1, self.order + 1)])[:, None]
         found = {}
         for which, values in self._values.items():
-            for k, name in enumerate(self.family.model.outputs[which]):
-                derivatives = values[..., k] * factorials[: values.shape[2]]
-                found[name] = derivatives[..., 0] if derivatives.shape[-1] == 1 else derivatives
-        return {name: found[name] for name in self.family.mechanism.outputs if name in found}
+            for k, name in enumerate(self.parametric.model.outputs[which]):
+                plain = np.moveaxis(np.asarray(plain_derivatives(np.moveaxis(values[..., k], 2, 0))), 0, 2)
+                found[name] = plain[..., 0] if plain.shape[-1] == 1 else plain
+        return {name: found[name] for name in self.parametric.mechanism.outputs if name in found}
 
     def lots(self, runs: np.ndarray) -> list[np.ndarray]:
         """Return runs in lots of one size; the last repeats its last run."""
@@ -222,57 +225,57 @@ class _Runs:
         equations, _ = self._picked(runs, angles)
         tolerance, _, method = self.settings
         time = np.full(len(runs), self.instants[0])
-        front = departed(equations, state, time, order=method.expansion_order(tolerance))
-        front = jax.tree.map(np.asarray, front)
-        if self._front is None:
-            self._front = jax.tree.map(lambda x: np.zeros((*x.shape[:-1], len(self.steps)), x.dtype), front)
-        self._put(runs, front)
+        current = begin_march(equations, state, time, order=method.expansion_order(tolerance))
+        current = jax.tree.map(np.asarray, current)
+        if self._current is None:
+            self._current = jax.tree.map(lambda x: np.zeros((*x.shape[:-1], len(self.steps)), x.dtype), current)
+        self._put(runs, current)
         if not self._turns:
             self._turns = tuple(np.zeros((len(angle), len(self.steps))) for angle in angles.outputs)
         for whole, part in zip(self._turns, angles.outputs, strict=True):
             whole[:, runs] = part
-        self._note(runs, np.zeros(len(runs), int), front.expansion.state, time, front.angles, {})
-        lost = runs[front.outcome == Outcome.LOST]
+        self._note(runs, np.zeros(len(runs), int), current.expansion.state, time, current.angles, {})
+        lost = runs[current.outcome == Outcome.LOST]
         self._reached[lost] = False
         for values in self._values.values():
             values[lost] = np.nan
 
     def advance(self, runs: np.ndarray) -> None:
         """March runs by some steps, and note what they pass."""
-        equations, _ = self.family.picked(self._made, runs)
+        equations, _ = self.parametric.picked(self._made, runs)
         tolerance, longest, method = self.settings
-        front = jax.tree.map(lambda x: x[..., runs], self._front)
-        found = march(equations, front, self.instants[-1], tolerance, longest, method=method, count=STEPS)
-        front, steps, tried = jax.tree.map(np.asarray, found)
-        self._put(runs, front)
-        self.steps[runs] += steps.taken.sum(axis=0)
+        current = jax.tree.map(lambda x: x[..., runs], self._current)
+        found = march(equations, current, self.instants[-1], tolerance, longest, method=method, count=STEPS)
+        current, (steps, taken), tried = jax.tree.map(np.asarray, found)
+        self._put(runs, current)
+        self.steps[runs] += taken.sum(axis=0)
         angles = self._counted(runs, steps, int(tried))
         begin, now = self._sense * steps.start, self._sense * self.instants
-        end = self._sense * front.time + 1e-14 * np.abs(front.time)
+        end = self._sense * current.time + 1e-14 * np.abs(current.time)
         near = np.flatnonzero((now >= begin[0].min()) & (now <= end.max()))
-        passed = steps.taken & (begin <= now[near, None, None])  # instants, steps, runs
+        passed = taken & (begin <= now[near, None, None])  # instants, steps, runs
         step = passed.shape[1] - 1 - np.argmax(passed[:, ::-1], axis=1)
         instant, lane = np.nonzero(passed.any(axis=1) & (now[near, None] <= end))
         step = step[instant, lane]
-        polynomial = State(*(np.moveaxis(part[step, ..., lane], 0, -1) for part in steps.polynomial))
+        polynomial = steps.polynomial.map(lambda part: np.moveaxis(part[step, ..., lane], 0, -1))
         before = {which: series[..., step, lane] for which, series in angles.items()}
         known = tuple(part[step, :, lane].T for part in steps.angles)
         self._note(runs[lane], near[instant], polynomial, steps.start[step, lane], known, before)
 
     def _picked(self, runs: np.ndarray, angles: Turns) -> tuple[Equations, Any]:
         """Return equations of motion and outputs of some runs, whose angles about axes have the turns of these."""
-        equations, outputs = self.family.picked(self._made, runs)
+        equations, outputs = self.parametric.picked(self._made, runs)
         return equations.near(angles.forces), with_turns(outputs, angles.outputs)
 
     def _begun_with(self, runs: np.ndarray) -> tuple[np.ndarray, ...]:
         """Return the angles about axes of outputs at the start, (instances, runs) each."""
         return tuple(angle[:, runs] for angle in self._turns)
 
-    def _put(self, runs: np.ndarray, front: Front) -> None:
-        for whole, part in zip(jax.tree.leaves(self._front), jax.tree.leaves(front), strict=True):
+    def _put(self, runs: np.ndarray, current: IntegratorState) -> None:
+        for whole, part in zip(jax.tree.leaves(self._current), jax.tree.leaves(current), strict=True):
             whole[..., runs] = part
 
-    def _counted(self, runs: np.ndarray, steps: Steps, tried: int) -> dict[int, np.ndarray]:
+    def _counted(self, runs: np.ndarray, steps: DenseOutput, tried: int) -> dict[int, np.ndarray]:
         """Return the series of turning outputs where steps begin, turns counted on, steps and runs last."""
         found = {}
         time = np.concatenate([self._begun[runs][None], steps.start[:tried]])
@@ -281,9 +284,9 @@ class _Runs:
         _, outputs = self._picked(every, Turns((), self._begun_with(every)))
         for which, group in enumerate(outputs):
             if group.element.turning:
-                parts = (np.moveaxis(part[:, :3], 0, -2) for part in steps.polynomial)
-                state = State(*(part.reshape(*part.shape[:-2], -1) for part in parts))
-                series = np.array(output_series(group, pose_coordinates(state), self.family.model.pose_type))
+                state = steps.polynomial.map(lambda part: np.moveaxis(part[:, :3], 0, -2))
+                state = state.map(lambda part: part.reshape(*part.shape[:-2], -1))
+                series = np.array(output_series(group, pose_coordinates(state), self.parametric.model.pose_type))
                 series = series.reshape(*series.shape[:-1], *steps.start.shape)[..., :tried, :]
                 last = self._angles.setdefault(which, np.full((*series.shape[:-2], len(self.steps)), np.nan))
                 whole = np.concatenate([last[..., runs][..., None, :], series], axis=-2)
@@ -310,10 +313,10 @@ class _Runs:
             equations, outputs = self._picked(runs[lanes], known)
             time = self.instants[at[lanes]]
             since = time - begin[lanes]
-            started = State(*(part[..., lanes] for part in polynomial))
+            started = polynomial.map(lambda part, lanes=lanes: part[..., lanes])
             coordinates = pose_coordinates(expanded(equations, started, since, time, order=self._expansion)[0])
             for which, group in enumerate(outputs):
-                series = np.array(output_series(group, coordinates, self.family.model.pose_type))
+                series = np.array(output_series(group, coordinates, self.parametric.model.pose_type))
                 if which in before:
                     series[0] -= turned(before[which][..., lanes], series, since)
                 values = np.moveaxis(series[: self.order + 1], -1, 0)

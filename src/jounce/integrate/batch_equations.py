@@ -10,9 +10,9 @@ import numpy as np
 from jax.core import Tracer
 
 from jounce.constraints.base import value_fields
-from jounce.dynamics.energies import gravity_of, masses_of
 from jounce.dynamics.forward import Equations, State
-from jounce.dynamics.start import start, with_rates
+from jounce.dynamics.masses import gravity_of, masses_of
+from jounce.dynamics.start import consistent_start, with_rates
 from jounce.integrate.events import pose_coordinates
 from jounce.integrate.projection import projected
 from jounce.jet import Jet
@@ -40,7 +40,7 @@ class Turns(NamedTuple):
     outputs: tuple[np.ndarray, ...]
 
 
-class Family:
+class ParametricMechanism:
     """A mechanism whose values follow from parameters: those that do have one entry for each run, last.
 
     Parameters
@@ -55,14 +55,14 @@ class Family:
 
     def __init__(self, mechanism: Mechanism, model: Model, names: tuple[str, ...]):
         self.mechanism, self.model, self.names = mechanism, model, names
-        self.scale = np.float64(np.max(masses_of(mechanism)[0]))
+        self.scale = np.float64(np.max(masses_of(mechanism).mass))
         self._moved: list[bool] = []
         self._leaves, self._structure = jax.tree.flatten(self._made(mechanism, model))
 
     def _made(self, mechanism: Mechanism, model: Model) -> tuple[Equations, Any]:
         system = dataclasses.replace(model.system, outputs=())
         masses, gravity = masses_of(mechanism), gravity_of(mechanism)
-        return Equations(system, *masses, gravity, self.scale, model.pose_type), model.system.outputs
+        return Equations(system, masses, gravity, self.scale, model.pose_type), model.system.outputs
 
     def of(self, rows: np.ndarray) -> tuple[Equations, Any]:
         """Return equations of motion and outputs for values of the parameters, (runs, parameters)."""
@@ -116,16 +116,16 @@ class Family:
         return jax.tree.unflatten(self._structure, [leaf[..., runs] if moved else leaf for leaf, moved in pairs])
 
 
-class Starts:
+class BatchStart:
     """Consistent states of runs at the start: positions followed from those of the first run, least velocities.
 
     Where the starting guess of bodies that are free to move differs, each run is put together from its own guess.
 
     Parameters
     ----------
-    family : Family
+    parametric : ParametricMechanism
         Of the runs.
-    begun : Family
+    begun : ParametricMechanism
         With the initial conditions as drivers.
     state : State
         Of the first run.
@@ -135,17 +135,24 @@ class Starts:
         s.
     """
 
-    def __init__(self, family: Family, begun: Family, state: State, rows: np.ndarray, instant: float):
-        self._family, self._begun, self._state, self._instant = family, begun, state, instant
+    def __init__(
+        self,
+        parametric: ParametricMechanism,
+        begun: ParametricMechanism,
+        state: State,
+        rows: np.ndarray,
+        instant: float,
+    ):
+        self._parametric, self._begun, self._state, self._instant = parametric, begun, state, instant
         self._own: State | None = None
         equations, coordinates = begun.model.system.cells.shape
-        if equations < coordinates and family.guesses_differ(rows):
-            own = [start(family.varied(row), instant) for row in rows.tolist()]
+        if equations < coordinates and parametric.guesses_differ(rows):
+            own = [consistent_start(parametric.varied(row), instant) for row in rows.tolist()]
             self._own = State(*(np.concatenate(parts, axis=-1) for parts in zip(*(s.state for s in own), strict=True)))
             found = [_turns_of(s.model.system.forces, s.model.system.outputs) for s in own]
             self._turns = jax.tree.map(lambda *xs: np.concatenate(xs, axis=-1), *found)
             return
-        self._made, last = family.of(rows), begun.of(rows)
+        self._made, last = parametric.of(rows), begun.of(rows)
         count = max(STAGES, int(np.ceil(self._turned(last, len(rows)) / LARGEST_STAGE)))
         change = (rows - rows[0]) / count
         self._stages = [begun.of(rows[0] + stage * change) for stage in range(1, count)] + [last]
@@ -162,18 +169,18 @@ class Starts:
     def of(self, runs: np.ndarray) -> tuple[State, Turns]:
         """Return the states of some runs, and the angles about axes there."""
         if self._own is not None:
-            return State(*(part[..., runs] for part in self._own)), jax.tree.map(lambda x: x[..., runs], self._turns)
-        equations, outputs = self._family.picked(self._made, runs)
+            return jax.tree.map(lambda x: x[..., runs], (self._own, self._turns))
+        equations, outputs = self._parametric.picked(self._made, runs)
         measuring = [group for group in (*equations.system.forces, *outputs) if measures_angle(group)]
         angles = [np.asarray(group.element.datum.near) for group in measuring]
         clock = np.full((1, len(runs)), self._instant)
         still = self._state._replace(velocity=np.zeros_like(self._state.velocity), spin=np.zeros_like(self._state.spin))
-        state = State(*(np.repeat(np.asarray(part), len(runs), axis=-1) for part in still))
+        state = still.map(lambda part: np.repeat(np.asarray(part), len(runs), axis=-1))
         stages = [self._begun.picked(made, runs)[0] for made in self._stages]
         for stage in stages:
             state = _followed(stage, state, clock)
             if measuring:
-                coordinates = pose_coordinates(State(*(np.asarray(part)[None] for part in state)))
+                coordinates = pose_coordinates(state.map(lambda part: np.asarray(part)[None]))
                 raw = raw_angles(measuring, {"quaternion": coordinates["quaternion"][0]})
                 angles = [brought_near(angle, near) for near, angle in zip(angles, raw, strict=True)]
         count = len([group for group in equations.system.forces if measures_angle(group)])

@@ -7,17 +7,20 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from jounce.dynamics.forward import Equations, State
-from jounce.dynamics.start import Start, start as consistent_start
+from jounce.dynamics.start import ConsistentStart, consistent_start
 from jounce.errors import MechanismError
+from jounce.integrate.marching import DenseOutput
 from jounce.integrate.projection import normalised
-from jounce.integrate.simulation import Simulation, Track
+from jounce.integrate.simulation import Simulation
 from jounce.integrate.turns import measured
 from jounce.jet import Jet
 from jounce.kinematics.linear import DenseFactor
 from jounce.mechanism import Mechanism
 from jounce.mechanism.axis_angles import measures_angle
+from jounce.shapes import ArrayLike, Numbers
 
 
 def ode_term(mechanism: Mechanism, time: float = 0.0) -> "OrdinaryEquation":
@@ -90,11 +93,11 @@ class CountedState(NamedTuple):
         rad; carried along by their rates, they need to be right to within half a turn only.
     """
 
-    position: Any
-    attitude: Any
-    velocity: Any
-    spin: Any
-    angles: tuple[Any, ...]
+    position: Numbers
+    attitude: Numbers
+    velocity: Numbers
+    spin: Numbers
+    angles: tuple[Float[Numbers, " instance"], ...]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -117,9 +120,9 @@ class OrdinaryEquation:
     state: State | CountedState
     equations: Equations
     mechanism: Mechanism
-    start: Start
+    start: ConsistentStart
 
-    def motion(self, time: Any, states: State | CountedState, order: int = 4) -> Simulation:
+    def motion(self, time: ArrayLike, states: State | CountedState, order: int = 4) -> Simulation:
         """Return what a solver gives at instants as a motion, with derivatives of any order.
 
         They follow from the equations of motion at the states, which are put back onto the constraints.
@@ -134,13 +137,13 @@ class OrdinaryEquation:
             Highest derivative of the outputs.
         """
         instants = np.asarray(time, float)
-        polynomial = State(*(np.asarray(part)[:, None] for part in states[:4]))
+        polynomial = State(*states[:4]).map(lambda part: np.asarray(part)[:, None])
         angles = tuple(np.asarray(part) for part in states.angles) if isinstance(states, CountedState) else ()
-        track = Track(instants, np.zeros_like(instants), polynomial, np.full(len(instants), -1), angles)
-        return Simulation(self.mechanism, self.start, track, instants, order)
+        dense = DenseOutput(instants, np.zeros_like(instants), polynomial, np.full(len(instants), -1), angles)
+        return Simulation(self.mechanism, self.start, dense, instants, order)
 
 
-def state_rates(time: Any, state: Any, equations: Equations) -> Any:
+def state_rates(time: Any, state: State | CountedState, equations: Equations) -> State | CountedState:
     """Return the rate of a state, arrays of shape (components, bodies): ``f(t, y, args)``.
 
     Parameters
@@ -168,11 +171,9 @@ def _rates(time: Any, state: State, equations: Equations) -> tuple[State, State]
     state = state.map(lambda part: part[..., None])
     state = state._replace(attitude=normalised(state.attitude))
     clock = jnp.reshape(jnp.asarray(time, float), (1, 1))
-    columns, rows = equations.system.cells.shape[1], equations.system.cells.shape[0]
-    trial = jnp.zeros((equations.coordinates, *state.position.shape[1:])), jnp.zeros((rows, 1))
+    trial = jnp.zeros((equations.coordinates, *state.position.shape[1:])), jnp.zeros((len(equations.system.cells), 1))
     forces, second, attitude_rate = equations.balance(state, *trial, clock)
-    factor = DenseFactor.of(equations.matrix(state, clock))
-    column = -factor.solve(jnp.concatenate([equations.flat(forces), second]))[:columns]
-    acceleration, shifts = equations.bodies(column), equations.pose_type.shifts
+    factor, shifts = DenseFactor.of(equations.matrix(state, clock)), equations.pose_type.shifts
+    acceleration, _ = equations.unknowns(factor.solve, forces, second)
     rate = State(state.velocity, attitude_rate, acceleration[:shifts], acceleration[shifts:])
     return jax.tree.map(lambda part: part[..., 0], rate), state

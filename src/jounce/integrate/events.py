@@ -6,20 +6,21 @@ import math
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from jounce.dynamics.forward import State
+from jounce.dynamics.motion_values import Coordinates, in_chunks
 from jounce.errors import MechanismError
-from jounce.jet import Jet
-from jounce.jet.algebra import stacked
 from jounce.jet.turns import counted_by_rates
-from jounce.kinematics.compilation import compiled
+from jounce.kinematics.motion import output_series
 from jounce.mechanism import AbstractOutput
 from jounce.mechanism.system import Group
+from jounce.robot.arguments import whole_number
 
 _ANGLES = np.pi * (np.arange(20)[::-1] + 0.5) / 20
 NODES = 0.5 + 0.5 * np.cos(_ANGLES)  # of Chebyshev, in a step: steps reach a small part of where their series converge
 INTERPOLATION = np.cos(np.arange(20)[:, None] * _ANGLES) * np.where(np.arange(20) == 0, 0.05, 0.1)[:, None]
-SMALL_BATCH, LARGE_BATCH = 16, 64  # evaluated together
+WIDTHS = 16, 64  # instants evaluated together
 REAL = 1e-4  # of a step: an imaginary part below may be that of a real root of several, blurred by rounding
 FAINT = 1e-14  # of a polynomial's coefficients: values below are rounding
 BESIDE = 1e-3  # of a step: where the sign is looked at beside a root
@@ -78,48 +79,40 @@ class Event:
         if not (isinstance(self.value, int | float) and math.isfinite(self.value)):
             raise MechanismError("must be a finite number", name="value", value=self.value)
         for name in ("derivative", "component"):
-            number = getattr(self, name)
-            if isinstance(number, bool) or not isinstance(number, int) or not 0 <= number <= 4:
-                raise MechanismError("must be a whole number from 0 to 4", name=name, value=number)
+            whole_number(name, getattr(self, name), most=4, error=MechanismError)
         if self.direction not in (-1, 0, 1):
             raise MechanismError("must be -1, 0 or 1", name="direction", value=self.direction)
-
-
-@compiled("pose_type")
-def output_series(group: Group, coordinates: dict[str, Any], pose_type: type) -> Any:
-    """Return the Taylor coefficients of outputs, (order + 1, components, instances, batch)."""
-    pose = pose_type.from_coordinates({name: Jet(tuple(c)) for name, c in coordinates.items()})
-    return stacked(group.evaluate(pose))
 
 
 def pose_coordinates(state: State) -> dict[str, np.ndarray]:
     """Return Taylor coefficients of states, order first, as those of the pose of all bodies, the ground first."""
     position, attitude, _, spin = (np.asarray(part) for part in state)
 
-    def grounded(part: np.ndarray) -> np.ndarray:
+    def with_ground(part: np.ndarray) -> np.ndarray:
         return np.concatenate([np.zeros_like(part[:, :, :1]), part], axis=2)
 
     if attitude.shape[1] == 1:
-        return {"position": grounded(position), "angle": grounded(attitude)[:, 0]}
-    quaternion = grounded(attitude)
+        return {"position": with_ground(position), "angle": with_ground(attitude)[:, 0]}
+    quaternion = with_ground(attitude)
     quaternion[0, 0, 0] = 1.0
-    return {"position": grounded(position), "quaternion": quaternion, "angular_velocity": grounded(spin)[:-1]}
+    return {"position": with_ground(position), "quaternion": quaternion, "angular_velocity": with_ground(spin)[:-1]}
 
 
-def series_of(group: Group, coordinates: dict[str, Any], pose_type: type) -> np.ndarray:
-    """Return `output_series` of a batch of any size, (order + 1, components, batch), compiled for two sizes only."""
-    count = coordinates["position"].shape[-1]
-    width = SMALL_BATCH if count <= SMALL_BATCH else LARGE_BATCH
-    parts = []
-    for first in range(0, count, width):
-        lanes = np.minimum(np.arange(first, first + width), count - 1)
-        taken = {name: part[..., lanes] for name, part in coordinates.items()}
-        parts.append(np.asarray(output_series(group, taken, pose_type)))
-    return np.concatenate(parts, axis=-1)[..., :count]
+def series_of(
+    group: Group, coordinates: Coordinates, pose_type: type
+) -> Float[np.ndarray, "order component instance batch"]:
+    """Return `output_series` of a batch of any size, compiled for two sizes only."""
+
+    def chunk(lanes: np.ndarray) -> Any:
+        return output_series(group, {name: part[..., lanes] for name, part in coordinates.items()}, pose_type)
+
+    return in_chunks(chunk, coordinates["position"].shape[-1], WIDTHS)
 
 
-def at_nodes(group: Group, polynomial: Any, length: np.ndarray, order: int, pose_type: type) -> np.ndarray:
-    """Return outputs at the nodes of steps, (order + 1, components, instances, steps, nodes): Taylor coefficients.
+def at_nodes(
+    group: Group, polynomial: State, length: Float[np.ndarray, " step"], order: int, pose_type: type
+) -> Float[np.ndarray, "levels component instance step node"]:
+    """Return outputs at the nodes of steps as Taylor coefficients.
 
     A few at many places cost less than many at one: the program for high orders of an angle takes minutes to compile.
 
@@ -148,7 +141,7 @@ def at_nodes(group: Group, polynomial: Any, length: np.ndarray, order: int, pose
     return series.reshape(*series.shape[:3], *since.shape)
 
 
-class Watch:
+class EventDetector:
     """The crossings of one event along a run, of which the steps come piece by piece.
 
     Parameters
@@ -167,15 +160,15 @@ class Watch:
         self._last = math.nan, 0.0  # time and sense of the last crossing in either direction
         self._begun = False
 
-    def look(self, start: np.ndarray, length: np.ndarray, polynomial: Any) -> list[tuple[int, float]]:
+    def detect(
+        self, start: Float[np.ndarray, " step"], length: Float[np.ndarray, " step"], polynomial: State
+    ) -> list[tuple[int, float]]:
         """Return the crossings in the next steps, each as the number of the step and the time from its beginning.
 
         Parameters
         ----------
-        start, length : array of shape (steps,)
-            s; lengths are negative backward in time.
-        polynomial : State
-            Coefficients in the time from the start, (steps, order + 1, components, bodies).
+        start, length, polynomial
+            As in `DenseOutput`.
         """
         derivative, element = self.event.derivative, self._group.element
         order = derivative + element.lost_orders + 1
@@ -201,7 +194,7 @@ class Watch:
         return found
 
 
-def crossings(coefficients: np.ndarray, *, first: bool = False) -> list[tuple[float, float]]:
+def crossings(coefficients: Float[np.ndarray, " order"], *, first: bool = False) -> list[tuple[float, float]]:
     """Return where a polynomial changes its sign in [0, 1], and the sense: 1 where it rises through zero.
 
     Places at which it touches zero and turns back do not count.
@@ -244,7 +237,7 @@ def crossings(coefficients: np.ndarray, *, first: bool = False) -> list[tuple[fl
     return found
 
 
-def _real_roots(polynomial: Any) -> np.ndarray:
+def _real_roots(polynomial: np.polynomial.Chebyshev) -> Float[np.ndarray, " root"]:
     """Return the roots of a polynomial that may be real, in and about [0, 1], each corrected by Newton's method."""
     sizes = np.abs(polynomial.coef)
     last = np.flatnonzero(sizes > 1e-17 * sizes.max())[-1]  # what is below rounding has no root near

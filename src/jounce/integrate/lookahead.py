@@ -11,15 +11,19 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
-from jounce.dynamics.forward import Equations, State, grounded
+from jounce.dynamics.forward import Equations, Flags, Indices, Lanes, Matrices, State, with_ground
+from jounce.dynamics.inverse import force_names
 from jounce.dynamics.outputs import is_turning
 from jounce.integrate.events import INTERPOLATION, NODES
 from jounce.integrate.methods import evaluated
 from jounce.integrate.turns import Angles
 from jounce.jet import Jet
+from jounce.mechanism import Model
 from jounce.mechanism.axis_angles import with_turns
 from jounce.mechanism.system import Group
+from jounce.shapes import Numbers
 
 POINTS = 32  # at which each step is looked at
 SPAN_POINTS = 8192  # in the whole run, at least, where steps are few
@@ -33,43 +37,48 @@ JUMP = 1e-6  # rad or sizes of the mechanism: no motion law jumps by more in suc
 NEAR = 1.0 / 16.0  # of the way to where forces and laws are no longer known: a step ends that close
 
 
-class Look(NamedTuple):
+Mobility = Float[Numbers, "body batch"]
+"""How readily each body moves, the ground first, as `mobility_of` gives it."""
+
+Signals = Float[Numbers, "instance batch"]
+"""One number for each force and law."""
+
+
+class Lookahead(NamedTuple):
     """What was seen ahead; arrays of shape (batch,)."""
 
-    step: Any  # s, shortened where needed
-    clear: Any  # whether forces and laws are known over it
-    rough: (
-        Any  # index of one that is not resolved over the step, which is too short to matter, or -1; see `watched_names`
-    )
-    worst: Any  # index of the one for which it was shortened
+    step: Lanes  # s, shortened where needed
+    resolved: Flags  # whether forces and laws are known over it
+    kink: Indices  # index in `watched_names` of one that is not, over a step too short to matter, or -1
+    limiting: Indices  # index of the one for which it was shortened
 
 
-def mobility_of(equations: Equations, inverse: Any) -> Any:
-    """Return how readily generalised forces on each body move the mechanism, (bodies, batch), the ground first.
+def mobility_of(equations: Equations, inverse: Matrices) -> Mobility:
+    """Return how readily generalised forces on each body move the mechanism, from the inverse of the matrix.
 
     The largest acceleration, in rad or sizes of the mechanism by s^2, by a force of one on one of the scaled
     coordinates of the body.
-
-    Parameters
-    ----------
-    equations : Equations
-        Of the mechanism.
-    inverse : array of shape (rows, rows, batch)
-        Of the equations' matrix.
     """
     columns, count = equations.system.cells.shape[1], equations.coordinates
     responses = jnp.max(jnp.abs(inverse[:columns, :columns]), axis=0).reshape(-1, count, inverse.shape[-1])
-    return grounded(jnp.max(responses, axis=1)[None])[0] / equations.scale
+    return with_ground(jnp.max(responses, axis=1)[None])[0] / equations.scale
 
 
-def watched_names(model: Any) -> list[str]:
+def watched_names(model: Model) -> list[str]:
     """Return the names of the forces and drivers of a model, in the order in which they are looked at."""
-    return [f"forces.{name}" for members in model.forces for name in members] + list(model.drivers)
+    return [f"forces.{name}" for name in force_names(model)] + list(model.drivers)
 
 
-def looked_ahead(
-    equations: Equations, path: State, angles: Angles, mobility: Any, time: Any, step: Any, span: Any, bound: Any
-) -> Look:
+def look_ahead(
+    equations: Equations,
+    path: State,
+    angles: Angles,
+    mobility: Mobility,
+    time: Lanes,
+    step: Lanes,
+    span: Lanes,
+    bound: Lanes,
+) -> Lookahead:
     """Return how far a step may go so that no force and no motion law on its way stays unseen.
 
     Parameters
@@ -92,17 +101,17 @@ def looked_ahead(
     groups = tuple(group for group in equations.system.groups if group.is_driver)
     blank = jnp.full(step.shape, -1)
     if not equations.system.forces and not groups:
-        return Look(step, jnp.ones(step.shape, bool), blank, blank)
+        return Lookahead(step, jnp.ones(step.shape, bool), blank, blank)
     signals = _Signals(equations, path, angles, time, groups)
     bound, shortest = jnp.maximum(bound, HARMLESS), SHORTEST * jnp.maximum(span, jnp.abs(time))
 
-    def seen(part: Any) -> Look:
+    def seen(part: Any) -> Lookahead:
         away, moved = signals.departure(part * step, span, mobility)
         short = jnp.abs(part * step) <= shortest
         allowed = jnp.where(short[None], signals.at_a_jump(bound), bound[None])
         over = jnp.where(jnp.isfinite(moved), moved / allowed, jnp.inf)
-        clear, index = jnp.all(over <= 1.0, axis=0), jnp.argmax(over, axis=0)
-        return Look(part, clear, jnp.where(jnp.any(away > 0, axis=0), index, -1), index)
+        resolved, index = jnp.all(over <= 1.0, axis=0), jnp.argmax(over, axis=0)
+        return Lookahead(part, resolved, jnp.where(jnp.any(away > 0, axis=0), index, -1), index)
 
     def open_(low: Any, high: Any) -> Any:
         return jnp.where(low > 0, high - low > NEAR * low, high * jnp.abs(step) > 0.25 * shortest)
@@ -111,25 +120,25 @@ def looked_ahead(
         low, high, best = carry
         trial = jnp.where(open_(low, high), jnp.where(low > 0, 0.5 * (low + high), 0.5 * high), low)
         look = seen(trial)
-        better = look.clear & (trial > low)
+        better = look.resolved & (trial > low)
         best = jax.tree.map(lambda new, old: jnp.where(better, new, old), look, best)
-        worst = jnp.where(look.clear, best.worst, look.worst)
-        return jnp.where(better, trial, low), jnp.where(look.clear, high, trial), best._replace(worst=worst)
+        limiting = jnp.where(look.resolved, best.limiting, look.limiting)
+        return jnp.where(better, trial, low), jnp.where(look.resolved, high, trial), best._replace(limiting=limiting)
 
     def unfinished(carry: Any) -> Any:
         return jnp.any(open_(*carry[:2]))
 
     one = jnp.ones(step.shape)
     whole = seen(one)
-    low, high, best = jax.lax.while_loop(unfinished, narrowed, (jnp.where(whole.clear, one, 0.0), one, whole))
-    rough = jnp.where(best.clear, best.rough, -1)
-    return Look(step * jnp.where(low > 0, low, high), low > 0, rough, best.worst)
+    low, high, best = jax.lax.while_loop(unfinished, narrowed, (jnp.where(whole.resolved, one, 0.0), one, whole))
+    kink = jnp.where(best.resolved, best.kink, -1)
+    return Lookahead(step * jnp.where(low > 0, low, high), low > 0, kink, best.limiting)
 
 
 class _Signals:
     """Forces and motion laws of a mechanism along the path of a step; arrays have the instances and the batch last."""
 
-    def __init__(self, equations: Equations, path: State, angles: Angles, time: Any, drivers: tuple[Group, ...]):
+    def __init__(self, equations: Equations, path: State, angles: Angles, time: Lanes, drivers: tuple[Group, ...]):
         forces = equations.system.forces
         bodies = sorted({body for group in forces for slot in group.bodies for body in slot} - {0})
         places = {body: k for k, body in enumerate([0, *bodies])}
@@ -141,16 +150,16 @@ class _Signals:
         ]
         self._path = path.map(lambda part: part[:, :, np.array(bodies, int) - 1])  # of the bodies that forces act on
 
-    def at_a_jump(self, bound: Any) -> Any:
-        """Return what is allowed over the shortest steps, (instances, batch): forces may jump, laws hardly."""
+    def at_a_jump(self, bound: Lanes) -> Signals:
+        """Return what is allowed over the shortest steps: forces may jump, laws hardly."""
         forces = jnp.full((sum(group.instances for group in self._given), *bound.shape), jnp.finfo(float).max)
         laws = jnp.full((sum(group.instances for group in self._drivers), *bound.shape), JUMP)
         return jnp.concatenate([forces, jnp.maximum(laws, bound[None])])
 
-    def departure(self, step: Any, span: Any, mobility: Any) -> tuple[Any, Any]:
+    def departure(self, step: Lanes, span: Lanes, mobility: Mobility) -> tuple[Signals, Signals]:
         """Return how far forces and laws are from the polynomials through the nodes of a step, and what that moves.
 
-        What may be rounding is taken off; shapes (instances, batch). The second is in rad or sizes of the mechanism:
+        What may be rounding is taken off. The second is in rad or sizes of the mechanism:
         of a force, what its departure over the step moves bodies by in the whole run.
         """
         knots = jax.vmap(lambda s: self._values(s * step, 0.0))(NODES)
@@ -173,7 +182,7 @@ class _Signals:
         largest, mean = jnp.max(largest, axis=0), jnp.max(total, axis=0) / count
         return largest, self._moved(largest, mean * jnp.abs(step * span)[None], mobility)
 
-    def _moved(self, largest: Any, impulse: Any, mobility: Any) -> Any:
+    def _moved(self, largest: Signals, impulse: Signals, mobility: Mobility) -> Signals:
         """Return by how much bodies move for departures of forces, by their impulses in N s^2, and of laws."""
         length, parts, first = self._equations.system.column_scale[0], [], 0
         for group in self._given:
@@ -187,8 +196,8 @@ class _Signals:
             first += group.instances
         return jnp.concatenate(parts)
 
-    def _values(self, since: Any, shake: float) -> Any:
-        """Return forces and laws a time after the beginning of the step, (components, instances, batch).
+    def _values(self, since: Lanes, shake: float) -> Float[Numbers, "component instance batch"]:
+        """Return forces and laws a time after the beginning of the step.
 
         With `shake`, time and all coordinates are changed relatively by so much, this way and that.
         """
@@ -208,14 +217,14 @@ class _Signals:
         return jnp.concatenate([jnp.broadcast_to(p, (*p.shape[:2], lanes)) for p in padded], axis=1)
 
 
-def _signs(shape: tuple[int, ...]) -> Any:
+def _signs(shape: tuple[int, ...]) -> Float[np.ndarray, "component body 1"]:
     """Return signs for components of bodies, without a pattern that a force may be blind to."""
     components, bodies = (np.arange(n) for n in shape)
     return np.where(np.sin(1.0 + 3.0 * components[:, None] + 5.0 * bodies**2) > 0, 1.0, -1.0)[:, :, None]
 
 
-def _chebyshev(x: Any) -> Any:
-    """Return the Chebyshev polynomials at some places, (polynomials, places)."""
+def _chebyshev(x: Float[Numbers, " place"]) -> Float[Numbers, "polynomial place"]:
+    """Return the Chebyshev polynomials at some places."""
     found = [jnp.ones_like(x), x]
     while len(found) < len(INTERPOLATION):
         found.append(2.0 * x * found[-1] - found[-2])

@@ -5,14 +5,16 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+from jaxtyping import Bool, Float, Int
 
-from jounce.dynamics.forward import Equations, Expansion, State, expand
-from jounce.integrate.lookahead import HARMLESS, SHORTEST, Look, looked_ahead, mobility_of
-from jounce.integrate.methods import AbstractMethod, near_singular
+from jounce.dynamics.forward import Equations, Expansion, Flags, Indices, Lanes, State, expand
+from jounce.integrate.lookahead import HARMLESS, SHORTEST, Lookahead, look_ahead, mobility_of
+from jounce.integrate.methods import AbstractMethod, Number, near_singular
 from jounce.integrate.projection import projected
-from jounce.integrate.turns import followed, measured
+from jounce.integrate.turns import AnglesOfForces, followed, measured
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.linear import DenseFactor
+from jounce.shapes import Numbers
 
 SMALLEST_STEP = 1e-13  # of the span, or of the time itself
 MARGIN = 10.0  # an estimate of the error that is so many times the tolerance is still accepted: estimates are rough
@@ -28,35 +30,51 @@ class Outcome(enum.IntEnum):
     LOST = 3  # the motion is not finite from the start
 
 
-class Front(NamedTuple):
+class IntegratorState(NamedTuple):
     """How far a batch of runs has come."""
 
-    time: Any  # s, shape (batch,)
+    time: Lanes  # s
     expansion: Expansion
-    refused: Any  # number of steps refused from here, one after the other
-    outcome: Any  # see Outcome
-    drift: Any  # largest distance from the constraints before a projection, rad or sizes of the mechanism
-    begun: Any  # when the runs began, s
-    mobility: Any  # how readily forces move the bodies here, as `mobility_of` gives it
-    singular: Any  # whether the equations of motion are near to singular here
-    blocked: Any  # index of the force or law over which no step is possible from here, or -1
-    angles: tuple[Any, ...]  # about axes, that forces measure here, with their turns, rad, as `measured` gives them
+    refused: Indices  # number of steps refused from here, one after the other
+    outcome: Indices  # see Outcome
+    drift: Lanes  # largest distance from the constraints before a projection, rad or sizes of the mechanism
+    begun: Lanes  # when the runs began, s
+    mobility: Float[Numbers, "body batch"]  # how readily forces move the bodies here, as `mobility_of` gives it
+    singular: Flags  # whether the equations of motion are near to singular here
+    blocked: Indices  # index of the force or law over which no step is possible from here, or -1
+    angles: AnglesOfForces  # about axes, that forces measure here, with their turns, rad, as `measured` gives them
 
 
-class Steps(NamedTuple):
-    """Steps tried, in the order of trial, first axis; the batch last."""
+class DenseOutput(NamedTuple):
+    """Steps one after the other, as polynomials; while they are taken, the batch is the last axis.
 
-    start: Any  # s
-    length: Any  # s, negative backward in time
-    taken: Any  # whether it was accepted
-    rough: Any  # index of a force or law that is not resolved over it, which is too short to matter, or -1
-    polynomial: State  # coefficients in the time from the start, (steps, order + 1, components, bodies, batch)
-    angles: tuple[Any, ...]  # about axes, that forces measure at the start, (steps, instances, batch) each
+    Attributes
+    ----------
+    start, length : array of shape (steps,)
+        s; lengths are negative backward in time.
+    polynomial : State
+        Coefficients in the time from the start, (steps, order + 1, components, bodies).
+    kink : array of int, shape (steps,)
+        Index of a force or law that is not resolved over a step, which is too short to matter, or -1: `watched_names`.
+    angles : tuple of array of shape (steps, instances)
+        About axes at the start, rad, for each group of forces that measures some.
+    """
+
+    start: Float[Any, "steps *batch"]
+    length: Float[Any, "steps *batch"]
+    polynomial: State
+    kink: Int[Any, "steps *batch"]
+    angles: tuple[Float[Any, "steps instance *batch"], ...]
+
+    @property
+    def end(self) -> float:
+        """Where the last step ends, s."""
+        return float(self.start[-1] + self.length[-1])
 
 
 @compiled("order")
-def departed(equations: Equations, state: State, time: Any, *, order: int) -> Front:
-    """Return the start of runs from states on the constraints; `time` has the shape (batch,).
+def begin_march(equations: Equations, state: State, time: Lanes, *, order: int) -> IntegratorState:
+    """Return the start of runs from states on the constraints.
 
     Angles about axes have the turns of what they are near to in the equations.
     """
@@ -67,28 +85,28 @@ def departed(equations: Equations, state: State, time: Any, *, order: int) -> Fr
     outcome = jnp.where(_finite(expansion), int(Outcome.RUNNING), int(Outcome.LOST))
     none, nothing = jnp.full(time.shape, -1), jnp.zeros(time.shape)
     known = mobility_of(equations, inverse), near_singular(equations, inverse)
-    return Front(time, expansion, jnp.zeros(time.shape, int), outcome, nothing, time, *known, none, angles)
+    return IntegratorState(time, expansion, jnp.zeros(time.shape, int), outcome, nothing, time, *known, none, angles)
 
 
 @compiled("count", "keep")
 def march(
     equations: Equations,
-    front: Front,
-    stop: Any,
-    tolerance: Any,
-    longest: Any,
+    current: IntegratorState,
+    stop: Number,
+    tolerance: Number,
+    longest: Float[Numbers, "*batch"],
     *,
     method: AbstractMethod,
     count: int,
     keep: bool = True,
-) -> tuple[Front, Steps | None, Any]:
+) -> tuple[IntegratorState, tuple[DenseOutput, Bool[Numbers, "steps batch"]] | None, Int[Numbers, ""]]:
     """Take up to `count` steps towards a time, all runs of a batch side by side.
 
     Parameters
     ----------
     equations : Equations
         Of the mechanism.
-    front : Front
+    current : IntegratorState
         Where to go on from.
     stop : float
         Where to go, s; steps end there exactly.
@@ -105,71 +123,72 @@ def march(
 
     Returns
     -------
-    front : Front
-    steps : Steps or None
+    current : IntegratorState
+    steps : tuple of DenseOutput and array of bool, shape (steps, batch), or None
+        Steps tried, in the order of trial, and whether they were taken.
     tried : int
         How many of them there are.
     """
     length = equations.system.column_scale[0]
-    order = len(front.expansion.state.position) - 1
+    order = len(current.expansion.state.position) - 1
 
-    def attempt(front: Front) -> tuple[Front, Steps]:
-        left = stop - front.time
-        start, reach, allowed = method.prepared(front.expansion, length, tolerance, front.singular)
-        step = jnp.minimum(reach, jnp.minimum(longest, jnp.abs(left))) * 0.5 ** front.refused.astype(float)
-        look = Look(jnp.sign(left) * step, jnp.ones(step.shape, bool), jnp.full(step.shape, -1), front.blocked)
-        angles = followed(equations, front.angles, start.state, look.step)
+    def attempt(current: IntegratorState) -> tuple[IntegratorState, tuple[DenseOutput, Any]]:
+        left = stop - current.time
+        start, reach, allowed = method.prepared(current.expansion, length, tolerance, current.singular)
+        step = jnp.minimum(reach, jnp.minimum(longest, jnp.abs(left))) * 0.5 ** current.refused.astype(float)
+        look = Lookahead(jnp.sign(left) * step, jnp.ones(step.shape, bool), jnp.full(step.shape, -1), current.blocked)
+        angles = followed(equations, current.angles, start.state, look.step)
         if method.controlled:
-            span, bound = jnp.abs(stop - front.begun), MARGIN * allowed
-            look = looked_ahead(equations, start.state, angles, front.mobility, front.time, look.step, span, bound)
-        suspect = (look.rough >= 0) & (jnp.abs(look.step) < step) | (front.refused >= STUBBORN)
+            span, bound = jnp.abs(stop - current.begun), MARGIN * allowed
+            look = look_ahead(equations, start.state, angles, current.mobility, current.time, look.step, span, bound)
+        suspect = (look.kink >= 0) & (jnp.abs(look.step) < step) | (current.refused >= STUBBORN)
         step = jnp.abs(look.step)
         last = step >= 0.999 * jnp.abs(left)  # no sliver of a step at the end
         step = jnp.where(last, left, jnp.sign(left) * step)
-        time = jnp.where(last, stop, front.time + step)
-        running = front.outcome == Outcome.RUNNING
+        time = jnp.where(last, stop, current.time + step)
+        running = current.outcome == Outcome.RUNNING
         step = jnp.where(running, step, 0.0)
-        time = jnp.where(running, time, front.time)
+        time = jnp.where(running, time, current.time)
 
         there = equations.near(angles.at(step))
-        state = method.arrive(there, start, front.time, step)
+        state = method.arrive(there, start, current.time, step)
         state, distance, inverse = projected(there, state, time[None])
         expansion = _kept(expand(there, state, time[None], order, inverse))
         error = method.error(start, expansion, step, length)
-        good = _finite(expansion) & jnp.isfinite(distance) & (error <= MARGIN * allowed) & running & look.clear
+        good = _finite(expansion) & jnp.isfinite(distance) & (error <= MARGIN * allowed) & running & look.resolved
         if method.controlled:
             kick = 0.5 * order * (order + 1) * error
-            good = good & ~(suspect & _lasting(kick, step, jnp.abs(stop - front.begun), MARGIN * allowed, front))
-        tiny = jnp.abs(step) < SMALLEST_STEP * jnp.maximum(jnp.abs(front.time), jnp.abs(stop - front.time))
+            good = good & ~(suspect & _lasting(kick, step, jnp.abs(stop - current.begun), MARGIN * allowed, current))
+        tiny = jnp.abs(step) < SMALLEST_STEP * jnp.maximum(jnp.abs(current.time), jnp.abs(stop - current.time))
         polynomial = method.polynomial(start, expansion, step)
-        steps = Steps(front.time, step, good, look.rough, polynomial, front.angles)
-        outcome = jnp.where(good & last, int(Outcome.ARRIVED), front.outcome)
+        steps = DenseOutput(current.time, step, polynomial, look.kink, current.angles), good
+        outcome = jnp.where(good & last, int(Outcome.ARRIVED), current.outcome)
         outcome = jnp.where(running & ~good & tiny, int(Outcome.COLLAPSED), outcome)
-        drift, none = jnp.maximum(front.drift, distance), jnp.full(step.shape, -1)
+        drift, none = jnp.maximum(current.drift, distance), jnp.full(step.shape, -1)
         known = mobility_of(equations, inverse), near_singular(equations, inverse)
-        fresh, reached = jnp.zeros_like(front.refused), measured(there, state)
-        onwards = Front(time, expansion, fresh, outcome, drift, front.begun, *known, none, reached)
-        blocked = jnp.where(look.clear, front.blocked, look.worst)
-        refused = front._replace(refused=front.refused + 1, outcome=outcome, blocked=blocked)
+        fresh, reached = jnp.zeros_like(current.refused), measured(there, state)
+        onwards = IntegratorState(time, expansion, fresh, outcome, drift, current.begun, *known, none, reached)
+        blocked = jnp.where(look.resolved, current.blocked, look.limiting)
+        refused = current._replace(refused=current.refused + 1, outcome=outcome, blocked=blocked)
         return jax.tree.map(lambda a, b: jnp.where(good, a, b), onwards, refused), steps
 
     def unfinished(carry: Any) -> Any:
-        front, _, tried = carry
-        return jnp.any(front.outcome == Outcome.RUNNING) & (tried < count)
+        current, _, tried = carry
+        return jnp.any(current.outcome == Outcome.RUNNING) & (tried < count)
 
     def iterate(carry: Any) -> Any:
-        front, kept, tried = carry
-        front, steps = attempt(front)
+        current, kept, tried = carry
+        current, steps = attempt(current)
         if keep:
             kept = jax.tree.map(lambda k, s: jax.lax.dynamic_update_index_in_dim(k, s, tried, 0), kept, steps)
-        return front, kept, tried + 1
+        return current, kept, tried + 1
 
-    shapes = jax.eval_shape(lambda f: attempt(f)[1], front)
+    shapes = jax.eval_shape(lambda f: attempt(f)[1], current)
     kept = jax.tree.map(lambda s: jnp.zeros((count, *s.shape), s.dtype), shapes) if keep else None
-    return jax.lax.while_loop(unfinished, iterate, (front, kept, 0))
+    return jax.lax.while_loop(unfinished, iterate, (current, kept, 0))
 
 
-def _lasting(kick: Any, step: Any, span: Any, bound: Any, front: Front) -> Any:
+def _lasting(kick: Lanes, step: Lanes, span: Lanes, bound: Lanes, current: IntegratorState) -> Flags:
     """Tell where a kink at the beginning of a step kicks bodies so that they move by more than is harmless in the run.
 
     What is left of it in the accelerations at the end is no next term of a series there: `kick` is the displacement
@@ -177,7 +196,7 @@ def _lasting(kick: Any, step: Any, span: Any, bound: Any, front: Front) -> Any:
     """
     span = jnp.maximum(span, jnp.abs(step))
     moved = kick * span / jnp.maximum(jnp.abs(step), SHORTEST * span)
-    return (moved > jnp.maximum(bound, HARMLESS)) & (jnp.abs(step) > SHORTEST * span) & ~front.singular
+    return (moved > jnp.maximum(bound, HARMLESS)) & (jnp.abs(step) > SHORTEST * span) & ~current.singular
 
 
 def _kept(expansion: Expansion) -> Expansion:
@@ -185,6 +204,6 @@ def _kept(expansion: Expansion) -> Expansion:
     return expansion._replace(acceleration=expansion.acceleration[:1], multipliers=expansion.multipliers[:1])
 
 
-def _finite(expansion: Expansion) -> Any:
+def _finite(expansion: Expansion) -> Flags:
     parts = [jnp.all(jnp.isfinite(x.reshape(-1, x.shape[-1])), axis=0) for x in jax.tree.leaves(expansion)]
     return jnp.all(jnp.stack(parts), axis=0)

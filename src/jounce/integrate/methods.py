@@ -8,9 +8,14 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
-from jounce.dynamics.forward import Equations, Expansion, State
+from jounce.dynamics.forward import Equations, Expansion, Flags, Lanes, Matrices, State
 from jounce.errors import JounceError
+from jounce.shapes import Numbers
+
+Number = float | Float[Numbers, ""]
+Sizes = Float[Numbers, "order batch"]
 
 HIGHEST_ORDER = 40
 LOWEST_ORDER = 4
@@ -38,8 +43,8 @@ class AbstractMethod(eqx.Module):
         """Return the order of the expansions that the method needs."""
 
     @abc.abstractmethod
-    def longest_step(self, sizes: Any, tolerance: Any) -> Any:
-        """Return how far a step may go, s, shape (batch,).
+    def longest_step(self, sizes: Sizes, tolerance: Number) -> Lanes:
+        """Return how far a step may go, s.
 
         Parameters
         ----------
@@ -49,10 +54,10 @@ class AbstractMethod(eqx.Module):
             Of the error of a step, in the same measure.
         """
 
-    def prepared(self, expansion: Expansion, length: Any, tolerance: Any, singular: Any) -> tuple[Expansion, Any, Any]:
+    def prepared(
+        self, expansion: Expansion, length: Number, tolerance: Number, singular: Flags
+    ) -> tuple[Expansion, Lanes, Lanes]:
         """Return the expansion as the step shall use it, how far that may go, s, and by which tolerance to judge it.
-
-        The last two have the shape (batch,).
 
         Parameters
         ----------
@@ -69,49 +74,43 @@ class AbstractMethod(eqx.Module):
         return expansion, step, jnp.full(step.shape, tolerance)
 
     @abc.abstractmethod
-    def arrive(self, equations: Equations, expansion: Expansion, time: Any, step: Any) -> State:
+    def arrive(self, equations: Equations, expansion: Expansion, time: Lanes, step: Lanes) -> State:
         """Return the state at the end of a step, not yet on the constraints; `time` is that of its beginning.
 
         Angles about axes that forces measure have, in the equations, the turns of the end of the step.
         """
 
     @abc.abstractmethod
-    def polynomial(self, start: Expansion, end: Expansion, step: Any) -> State:
+    def polynomial(self, start: Expansion, end: Expansion, step: Lanes) -> State:
         """Return the coefficients of the step's polynomial in the time from its beginning, order first."""
 
     @abc.abstractmethod
-    def error(self, start: Expansion, end: Expansion, step: Any, length: Any) -> Any:
-        """Return an estimate of the error of a step, rad or sizes of the mechanism, shape (batch,)."""
+    def error(self, start: Expansion, end: Expansion, step: Lanes, length: Number) -> Lanes:
+        """Return an estimate of the error of a step, rad or sizes of the mechanism."""
 
 
-def evaluated(polynomial: State, step: Any) -> State:
-    """Return the values of the polynomials of a state a time `step` away, shape (batch,)."""
-    return State(*(_horner(c, step) for c in polynomial))
+def evaluated(polynomial: State, step: Lanes) -> State:
+    """Return the values of the polynomials of a state a time `step` away."""
+    return polynomial.map(lambda c: _horner(c, step))
 
 
-def _horner(coefficients: Any, step: Any) -> Any:
+def _horner(
+    coefficients: Float[Numbers, "order component body #batch"], step: Lanes
+) -> Float[Numbers, "component body batch"]:
     value = coefficients[-1]
     for k in range(len(coefficients) - 2, -1, -1):
         value = value * step[None, None] + coefficients[k]
     return value
 
 
-def near_singular(equations: Equations, inverse: Any) -> Any:
-    """Tell where rows of the constraints are about to depend on each other, shape (batch,).
-
-    Parameters
-    ----------
-    equations : Equations
-        Of the mechanism.
-    inverse : array of shape (rows, rows, batch)
-        Of the equations' matrix.
-    """
+def near_singular(equations: Equations, inverse: Matrices) -> Flags:
+    """Tell where rows of the constraints are about to depend on each other, from the inverse of the matrix."""
     columns = equations.system.cells.shape[1]
     return jnp.max(jnp.abs(inverse[columns:, columns:]), axis=(0, 1), initial=0.0) > BRACED
 
 
-def _drowned(sizes: Any) -> Any:
-    """Tell where the upper coefficients may be rounding that grows geometrically, shape (batch,).
+def _drowned(sizes: Sizes) -> Flags:
+    """Tell where the upper coefficients may be rounding that grows geometrically.
 
     A force of which only the foot has been met grows so too: near a singular position alone is it rounding.
 
@@ -125,8 +124,8 @@ def _drowned(sizes: Any) -> Any:
     return (growth > 0) & faint & (sizes[0] * jnp.exp(-growth) > NEAR)
 
 
-def coefficient_sizes(expansion: Expansion, length: Any) -> Any:
-    """Return the sizes of the Taylor coefficients 1 to order + 1 of positions, shape (order + 1, batch)."""
+def coefficient_sizes(expansion: Expansion, length: Number) -> Sizes:
+    """Return the sizes of the Taylor coefficients 1 to order + 1 of positions, rad or sizes of the mechanism."""
     velocity, spin = (jnp.max(jnp.abs(c), axis=(1, 2)) for c in expansion.state[2:])
     sizes = jnp.maximum(velocity / length, spin) / jnp.arange(1.0, len(velocity) + 1)[:, None]
     attitude = expansion.state.attitude
@@ -137,8 +136,8 @@ def coefficient_sizes(expansion: Expansion, length: Any) -> Any:
     return sizes.at[:-1].max(turned)
 
 
-def reach(sizes: Any, first: int) -> Any:
-    """Return the time in which no Taylor term from the order `first` on exceeds one, shape (batch,).
+def reach(sizes: Sizes, first: int) -> Lanes:
+    """Return the time in which no Taylor term from the order `first` on exceeds one.
 
     All of them count: the last two may vanish together, as those of a body at rest or at a turning point do.
     """
@@ -177,14 +176,16 @@ class Taylor(AbstractMethod):
         """Return the order: of all, the one that takes the fewest terms for a unit of time, at this tolerance."""
         return self.order or min(max(round(-0.75 * math.log(tolerance)), 6), 28)
 
-    def longest_step(self, sizes: Any, tolerance: Any) -> Any:
+    def longest_step(self, sizes: Sizes, tolerance: Number) -> Lanes:
         """Return the step at which the terms of the upper half of the orders point to an error within tolerance."""
         if self.step is not None:
             return jnp.full(sizes.shape[1], self.step, float)
         count = len(sizes)
         return reach(sizes, count // 2) * tolerance ** (1.0 / count)
 
-    def prepared(self, expansion: Expansion, length: Any, tolerance: Any, singular: Any) -> tuple[Expansion, Any, Any]:
+    def prepared(
+        self, expansion: Expansion, length: Number, tolerance: Number, singular: Flags
+    ) -> tuple[Expansion, Lanes, Lanes]:
         """Return the series cut where it carries furthest, and how far that is.
 
         Near a singular position the higher coefficients drown in rounding: the cut series is then much the better one.
@@ -209,15 +210,15 @@ class Taylor(AbstractMethod):
 
         return expansion._replace(state=expansion.state.map(cut)), jnp.exp(jnp.max(steps, axis=0)), allowed
 
-    def arrive(self, equations: Equations, expansion: Expansion, time: Any, step: Any) -> State:
+    def arrive(self, equations: Equations, expansion: Expansion, time: Lanes, step: Lanes) -> State:
         """Return the value of the series."""
         return evaluated(expansion.state, step)
 
-    def polynomial(self, start: Expansion, end: Expansion, step: Any) -> State:
+    def polynomial(self, start: Expansion, end: Expansion, step: Lanes) -> State:
         """Return the series."""
         return start.state
 
-    def error(self, start: Expansion, end: Expansion, step: Any, length: Any) -> Any:
+    def error(self, start: Expansion, end: Expansion, step: Lanes, length: Number) -> Lanes:
         """Return what accelerations at the end depart by from the series, as the displacement that is left out."""
         if self.step is not None:
             return jnp.zeros_like(step)
@@ -231,11 +232,11 @@ class Taylor(AbstractMethod):
         return jnp.maximum(size, 0.0) * step**2 / (order * (order + 1))
 
 
-def _largest(x: Any) -> Any:
+def _largest(x: Float[Numbers, "component body batch"]) -> Lanes:
     return jnp.max(x, axis=(0, 1))
 
 
-def check_step(step: Any) -> None:
+def check_step(step: object) -> None:
     """Refuse a length of steps that is no positive number; None leaves it to the control of the error."""
     if step is None or isinstance(step, jax.Array):
         return

@@ -15,10 +15,13 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
-from jounce.dynamics.forward import Equations, Expansion, State, expand
+from jounce.dynamics.forward import Equations, Expansion, Flags, Lanes, State, expand
 from jounce.errors import JounceError
-from jounce.integrate.methods import ROUNDING, AbstractMethod, check_step, evaluated, reach
+from jounce.integrate.methods import ROUNDING, AbstractMethod, Number, Sizes, check_step, evaluated, reach
+from jounce.jet.algebra import total
+from jounce.shapes import Numbers
 
 MOST_ITERATIONS = 80
 CONVERGED = 1e-15  # change in an iteration, rad or sizes of the mechanism
@@ -67,7 +70,7 @@ class Obreshkov(AbstractMethod):
         """Return the order of the expansions: beyond the formula's own, where the step is to be chosen."""
         return self.highest if self.step is not None else self.order + HIGHER_COEFFICIENTS
 
-    def longest_step(self, sizes: Any, tolerance: Any) -> Any:
+    def longest_step(self, sizes: Sizes, tolerance: Number) -> Lanes:
         """Return the step at which the leading error, or the next where that vanishes, is the tolerance."""
         if self.step is not None:
             return jnp.full(sizes.shape[1], self.step, float)
@@ -75,7 +78,7 @@ class Obreshkov(AbstractMethod):
         constant = (self.order + 2) * math.factorial(self.highest) ** 2 / math.factorial(self.order)
         return reach(sizes, first) * (tolerance / constant) ** (1.0 / first)
 
-    def arrive(self, equations: Equations, expansion: Expansion, time: Any, step: Any) -> State:
+    def arrive(self, equations: Equations, expansion: Expansion, time: Lanes, step: Lanes) -> State:
         """Return the end that fulfils the formula, not finite where the iteration for it does not converge."""
         measure = _measure(equations.system.column_scale[0], step)
         later = (time + step)[None]
@@ -101,7 +104,7 @@ class Obreshkov(AbstractMethod):
         good = _settled(change, before) & jnp.isfinite(change)
         return end.map(lambda x: jnp.where(good, x, jnp.nan))
 
-    def polynomial(self, start: Expansion, end: Expansion, step: Any) -> State:
+    def polynomial(self, start: Expansion, end: Expansion, step: Lanes) -> State:
         """Return the polynomial that has the derivatives of the formula at both ends, of degree order + 1."""
         upper = jnp.asarray(_hermite(self.highest))
         length = jnp.where(step == 0.0, 1.0, step)  # runs that have arrived stand still
@@ -116,7 +119,7 @@ class Obreshkov(AbstractMethod):
 
         return State(*map(joined, start.state, end.state))
 
-    def error(self, start: Expansion, end: Expansion, step: Any, length: Any) -> Any:
+    def error(self, start: Expansion, end: Expansion, step: Lanes, length: Number) -> Lanes:
         """Return how far the end departs from the formula of the next order."""
         if self.step is not None:
             return jnp.zeros_like(step)
@@ -127,15 +130,17 @@ class Obreshkov(AbstractMethod):
         return jnp.maximum(_size(departure, measure, signed=True), 0.0)
 
 
-def _known(expansion: Expansion, step: Any, highest: int) -> State:
+def _known(expansion: Expansion, step: Lanes, highest: int) -> State:
     """Return what the formula takes from the start of a step."""
     return State(*(c[0] + _terms(c, step, highest) for c in expansion.state))
 
 
-def _terms(coefficients: Any, step: Any, highest: int) -> Any:
+def _terms(
+    coefficients: Float[Numbers, "order component body batch"], step: Lanes, highest: int
+) -> Float[Numbers, "component body batch"]:
     """Return what the formula adds for the derivatives of one end; seen from the other end, the step is negative."""
     weights = _weights(highest)
-    return sum(float(w) * step[None, None] ** j * coefficients[j] for j, w in enumerate(weights, 1))
+    return total(float(w) * step[None, None] ** j * coefficients[j] for j, w in enumerate(weights, 1))
 
 
 @lru_cache(maxsize=8)
@@ -164,19 +169,19 @@ def _hermite(p: int) -> np.ndarray:
     return np.concatenate([inverse[:, :1], -start, inverse[:, 1:]], axis=1)
 
 
-def _measure(length: Any, step: Any) -> tuple[Any, ...]:
+def _measure(length: Number, step: Lanes) -> tuple[Any, ...]:
     """Return the factors that turn positions, attitudes, velocities and spins into rad or sizes of the mechanism."""
     lapse = jnp.abs(step)
     return 1.0 / length, 1.0, lapse[None, None] / length, lapse[None, None]
 
 
-def _size(change: State, measure: tuple[Any, ...], *, signed: bool = False) -> Any:
-    """Return the largest component of a change of state, shape (batch,)."""
+def _size(change: State, measure: tuple[Any, ...], *, signed: bool = False) -> Lanes:
+    """Return the largest component of a change of state."""
     sizes = [(x if signed else jnp.abs(x)) * m for x, m in zip(change, measure, strict=True)]
     return jnp.max(jnp.stack([jnp.max(x, axis=(0, 1)) for x in sizes]), axis=0)
 
 
-def _settled(change: Any, before: Any) -> Any:
+def _settled(change: Lanes, before: Lanes) -> Flags:
     """Tell where an iteration has come to its end, or can come to none."""
     return (
         (change <= CONVERGED) | ((change <= STALLED) & (change >= before)) | ~jnp.isfinite(change) & (change != jnp.inf)

@@ -5,7 +5,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
-from jounce.dynamics.forward import Equations, State, grounded
+from jounce.dynamics.forward import Attitudes, Equations, Instants, Lanes, Matrices, State
 from jounce.jet import Jet
 from jounce.kinematics.linear import DenseFactor
 
@@ -14,7 +14,7 @@ CLOSE = 4e-15  # so near to where the matrix was inverted, in the same unit, the
 ROUNDING = 1e-15  # a correction this small, in rad or sizes of the mechanism, leaves nothing to correct
 
 
-def projected(equations: Equations, state: State, time: Any) -> tuple[State, Any, Any]:
+def projected(equations: Equations, state: State, time: Instants) -> tuple[State, Lanes, Matrices]:
     """Return the nearest state that fulfils the constraints and their rates, and how far positions moved.
 
     The correction of positions is that of least kinetic energy, were it a velocity; that of velocities likewise.
@@ -46,15 +46,14 @@ def projected(equations: Equations, state: State, time: Any) -> tuple[State, Any
         return factor, gap
 
     def moved(position: Any, attitude: Any, column: Any) -> tuple[Any, Any]:
-        change = equations.bodies(column)
-        shifts = equations.pose_type.shifts
-        pose = equations.still(position, attitude).displaced(grounded(change[:shifts]), grounded(change[shifts:]))
+        change = equations.system.coordinates(column, equations.pose_type.shifts)
+        pose = equations.still(position, attitude).displaced(*change)
         return pose.position.coefficients[0][:, 1:], equations.attitude_of(pose)
 
     def iterate(carry: Any) -> Any:
         position, attitude, _, _, first, count = carry
         factor, gap = correction(position, attitude)
-        column = solved(factor, equations, gap)
+        column = equations.least_change(factor, gap)
         size = jnp.max(jnp.abs(column), axis=0)
         position, attitude = moved(position, attitude, column)
         return position, attitude, factor, size, jnp.where(count == 0, size, first), count + 1
@@ -67,11 +66,7 @@ def projected(equations: Equations, state: State, time: Any) -> tuple[State, Any
     blank = DenseFactor.blank((sum(size), sum(size)), lanes)
     start = (position, attitude, blank, jnp.full(lanes, jnp.inf), jnp.zeros(lanes), 0)
     position, attitude, factor, last, first, _ = jax.lax.while_loop(unfinished, iterate, start)
-    moving = state._replace(position=position, attitude=attitude)
-    rate = equations.system.residual(equations.pose(moving), Jet.variable(time, 1)).dense().coefficients[1]
-    change = equations.bodies(solved(factor, equations, rate))
-    shifts = equations.pose_type.shifts
-    moving = moving._replace(velocity=state.velocity + change[:shifts], spin=state.spin + change[shifts:])
+    moving = equations.with_rates(factor, state._replace(position=position, attitude=attitude), time)
     inverse = jax.lax.cond(
         jnp.all(last <= CLOSE),
         lambda: factor.inverse(),
@@ -80,13 +75,7 @@ def projected(equations: Equations, state: State, time: Any) -> tuple[State, Any
     return moving, jnp.where(last <= 1e-9, first, jnp.inf), inverse
 
 
-def solved(factor: Any, equations: Equations, gap: Any) -> Any:
-    """Return the least change of coordinates that closes a gap of the rows, as a scaled column."""
-    columns = equations.system.cells.shape[1]
-    return factor.solve(-jnp.concatenate([jnp.zeros((columns, gap.shape[-1])), gap]))[:columns]
-
-
-def normalised(attitude: Any) -> Any:
+def normalised(attitude: Attitudes) -> Attitudes:
     """Return Euler parameters of unit length; angles as they are."""
     if attitude.shape[0] == 1:
         return attitude

@@ -6,22 +6,27 @@ from typing import Any
 
 import jax
 import numpy as np
+from jaxtyping import Float
 
+from jounce.constraints import AbstractConstraint
 from jounce.dynamics.forward import State
-from jounce.dynamics.start import Start, start as consistent_start
+from jounce.dynamics.inverse import force_names
+from jounce.dynamics.motion_values import Coordinates, cut, pose_of
+from jounce.dynamics.start import ConsistentStart, consistent_start
 from jounce.errors import MechanismError, SolveError
-from jounce.integrate.events import Event, Watch, pose_coordinates
+from jounce.integrate.events import Event, EventDetector, pose_coordinates
 from jounce.integrate.lookahead import watched_names
-from jounce.integrate.marching import Front, Outcome, departed, march
+from jounce.integrate.marching import DenseOutput, IntegratorState, Outcome, begin_march, march
 from jounce.integrate.methods import AbstractMethod, Taylor, evaluated
-from jounce.integrate.simulation import Simulation, Track
+from jounce.integrate.simulation import Simulation
 from jounce.jet import Jet
 from jounce.kinematics import Status, raise_for_status
 from jounce.kinematics.motion import check_output, output_group
 from jounce.kinematics.solve import checked_order
-from jounce.mechanism import Mechanism, check_mechanism, time_grid
+from jounce.mechanism import Mechanism, TimeGrid, check_mechanism, time_grid
 from jounce.mechanism.law_checks import check_laws
 from jounce.mechanism.preconditions import concrete
+from jounce.shapes import ArrayLike
 
 AHEAD = 1e-9  # of the time so far: where steps collapse, what is not finite lies that close
 FEW = 4  # derivatives that are looked at for one that is not finite
@@ -32,13 +37,13 @@ TOLERANCES = (1e-17, 1e-2)  # below rounding there is still energy to be kept: w
 @concrete
 def simulate(
     mechanism: Mechanism,
-    time: Any = None,
+    time: ArrayLike | TimeGrid | None = None,
     order: int = 4,
     *,
     method: AbstractMethod | None = None,
     tolerance: float = 1e-15,
-    initial: Mapping[str, Any] | None = None,
-    events: Any = (),
+    initial: Mapping[str, AbstractConstraint] | None = None,
+    events: object = (),
     longest_step: float = np.inf,
     strict: bool = True,
     progress: Callable[[int, int], None] | None = None,
@@ -103,7 +108,7 @@ def simulate(
     True
     """
     check_mechanism(mechanism)
-    order, method = checked(order, method, tolerance, longest_step)
+    order, method = checked_options(order, method, tolerance, longest_step)
     if progress is not None and not callable(progress):
         raise MechanismError("must be a function of two numbers", name="progress", value=progress)
     if not isinstance(events, Sequence):
@@ -118,16 +123,18 @@ def simulate(
         _check_event(event, mechanism)
     start = consistent_start(mechanism, float(instants[0]))
     _check_forces(start, float(instants[0]))
-    watches = [_watch_of(event, mechanism, start) for event in events]
-    run = _Run(start, method, float(tolerance), float(longest_step), watches)
+    detectors = [_detector_of(event, mechanism, start) for event in events]
+    run = _Run(start, method, float(tolerance), float(longest_step), detectors)
     run.go(instants, progress)
-    simulation = Simulation(mechanism, start, run.track, instants, order, run.ending, run.happened)
+    simulation = Simulation(mechanism, start, run.dense_output, instants, order, run.ending, run.happened)
     if strict and run.stopped_at is None:
         raise_for_status(simulation)
     return simulation
 
 
-def checked(order: Any, method: Any, tolerance: Any, longest_step: Any) -> tuple[int, AbstractMethod]:
+def checked_options(
+    order: object, method: object, tolerance: object, longest_step: object
+) -> tuple[int, AbstractMethod]:
     """Return order and method of a simulation, or raise MechanismError for an option that is not valid."""
     order = checked_order(order)
     method = Taylor() if method is None else method
@@ -142,7 +149,7 @@ def checked(order: Any, method: Any, tolerance: Any, longest_step: Any) -> tuple
     return order, method
 
 
-def instants_of(time: Any, parameters: Mapping[str, Any]) -> np.ndarray:
+def instants_of(time: Any, parameters: Mapping[str, Any]) -> Float[np.ndarray, " time"]:
     """Return the instants of a run, which may go backward."""
     if not isinstance(time, (list, tuple, np.ndarray)) or np.ndim(time) != 1 or len(time) < 2:
         return time_grid(time, parameters)
@@ -154,7 +161,7 @@ def instants_of(time: Any, parameters: Mapping[str, Any]) -> np.ndarray:
     return instants[::-1] if backward else instants
 
 
-def _check_event(event: Any, mechanism: Mechanism) -> None:
+def _check_event(event: object, mechanism: Mechanism) -> None:
     """Raise MechanismError unless an event looks at an output that the mechanism can have."""
     if not isinstance(event, Event):
         raise MechanismError("must be a jn.Event", name="events", value=event)
@@ -162,7 +169,7 @@ def _check_event(event: Any, mechanism: Mechanism) -> None:
     output_group(event.output, mechanism)
 
 
-def _watch_of(event: Event, mechanism: Mechanism, start: Start) -> Watch:
+def _detector_of(event: Event, mechanism: Mechanism, start: ConsistentStart) -> EventDetector:
     """Return what looks for an event, or raise if its output has no such component."""
     group = output_group(event.output, mechanism, start.model)
     pose = start.equations.pose(start.state)
@@ -170,10 +177,10 @@ def _watch_of(event: Event, mechanism: Mechanism, start: Start) -> Watch:
     if event.component >= components:
         message = f"the output has {components} component{'s' if components > 1 else ''}, counted from 0"
         raise MechanismError(message, name="events.component", value=event.component)
-    return Watch(event, group, start.model.pose_type)
+    return EventDetector(event, group, start.model.pose_type)
 
 
-def _check_forces(start: Start, instant: float) -> None:
+def _check_forces(start: ConsistentStart, instant: float) -> None:
     """Raise SolveError where an applied force has no finite value at the start."""
     names = _unfit(start, jax.tree.map(np.asarray, start.state), instant)
     if names:
@@ -182,23 +189,22 @@ def _check_forces(start: Start, instant: float) -> None:
         raise SolveError(message, status=status)
 
 
-def _unfit(start: Start, state: State, instant: float) -> str:
+def _unfit(start: ConsistentStart, state: State, instant: float) -> str:
     """Name the applied forces that are not finite in a state."""
     system = start.equations.system
     if not system.forces:
         return ""
     pose = start.equations.pose(state)
     fit = np.asarray(system.finite_forces(pose, Jet.variable(np.array([[instant]]), 1)))[:, 0]
-    names = [name for members in start.model.forces for name in members]
-    return ", ".join(f"forces.{name}" for name, good in zip(names, fit, strict=True) if not good)
+    return ", ".join(f"forces.{n}" for n, good in zip(force_names(start.model), fit, strict=True) if not good)
 
 
-def unfit_rates(start: Start, coordinates: Mapping[str, Any], instant: float) -> str:
+def unfit_rates(start: ConsistentStart, coordinates: Coordinates, instant: float) -> str:
     """Name the applied forces of which a low derivative is not finite at an instant, where their values may be.
 
     Parameters
     ----------
-    start : Start
+    start : ConsistentStart
         The mechanism.
     coordinates : dict of str to array
         Taylor coefficients at the instant, (order + 1, ..., 1); the higher ones need not be finite.
@@ -209,8 +215,7 @@ def unfit_rates(start: Start, coordinates: Mapping[str, Any], instant: float) ->
     order = min(int(np.argmin(np.append(known, False))) - 1, FEW)
     if order < 1:
         return ""
-    levels = {name: part[: order + 1 - (name == "angular_velocity")] for name, part in coordinates.items()}
-    pose = start.model.pose_type.from_coordinates({name: Jet(tuple(part)) for name, part in levels.items()})
+    pose = pose_of(cut(coordinates, order), start.model.pose_type)
     clock, found = Jet.variable(np.array([[instant]]), order), []
     for group, members in zip(start.equations.system.forces, start.model.forces, strict=True):
         sizes = np.stack([np.asarray(c) for c in group.force(pose, clock).dense().coefficients])
@@ -224,88 +229,86 @@ class _Run:
     """One run: its steps so far, the events in them, and how it ended."""
 
     def __init__(
-        self, start: Start, method: AbstractMethod, tolerance: float, longest: float, watches: Sequence[Watch]
+        self,
+        start: ConsistentStart,
+        method: AbstractMethod,
+        tolerance: float,
+        longest: float,
+        detectors: Sequence[EventDetector],
     ):
         self.start, self.method, self.tolerance, self.longest = start, method, tolerance, longest
-        self.watches = watches
-        self.happened: list[list[float]] = [[] for _ in watches]
-        self.parts: list[Track] = []
+        self.detectors = detectors
+        self.happened: list[list[float]] = [[] for _ in detectors]
+        self.parts: list[DenseOutput] = []
         self.ending = (Status.OK, "")
         self.stopped_at: float | None = None  # by a terminal event
         self.sense = 1.0  # of time
 
     @property
-    def track(self) -> Track:
+    def dense_output(self) -> DenseOutput:
         """All steps taken."""
-        whole = self.parts
-        polynomial = State(*(np.concatenate(part) for part in zip(*(p.polynomial for p in whole), strict=True)))
-        start, length = (np.concatenate(part) for part in ([p.start for p in whole], [p.length for p in whole]))
-        angles = tuple(np.concatenate(part) for part in zip(*(p.angles for p in whole), strict=True))
-        return Track(start, length, polynomial, np.concatenate([p.rough for p in whole]), angles)
+        return jax.tree.map(lambda *parts: np.concatenate(parts), *self.parts)
 
     def go(self, instants: np.ndarray, progress: Callable[[int, int], None] | None) -> None:
         """March from the first to the last instant."""
         equations, stop = self.start.equations, instants[-1]
         self.sense = sense = np.sign(instants[-1] - instants[0])
         order = self.method.expansion_order(self.tolerance)
-        front = departed(equations, self.start.state, instants[:1], order=order)
-        if len(instants) == 1 or int(front.outcome[0]) != Outcome.RUNNING:
-            self._stand(front)
-        while int(front.outcome[0]) == Outcome.RUNNING and self.stopped_at is None and len(instants) > 1:
-            front, steps, tried = march(
-                equations, front, stop, self.tolerance, self.longest, method=self.method, count=STEPS
+        current = begin_march(equations, self.start.state, instants[:1], order=order)
+        if len(instants) == 1 or int(current.outcome[0]) != Outcome.RUNNING:
+            self._stand(current)
+        while int(current.outcome[0]) == Outcome.RUNNING and self.stopped_at is None and len(instants) > 1:
+            current, steps, tried = march(
+                equations, current, stop, self.tolerance, self.longest, method=self.method, count=STEPS
             )
-            taken = np.flatnonzero(np.asarray(steps.taken)[: int(tried), 0])
+            found, taken = steps
+            taken = np.flatnonzero(np.asarray(taken)[: int(tried), 0])
             if len(taken):
-                some = jax.tree.map(lambda x, k=taken: np.asarray(x)[k][..., 0], steps)
-                self.parts.append(self._watch(Track(some.start, some.length, some.polynomial, some.rough, some.angles)))
+                self.parts.append(self._watch(jax.tree.map(lambda x, k=taken: np.asarray(x)[k][..., 0], found)))
             if progress is not None:
-                progress(int(np.sum(sense * instants <= sense * float(front.time[0]))), len(instants))
+                progress(int(np.sum(sense * instants <= sense * float(current.time[0]))), len(instants))
         if not self.parts:
-            self._stand(front)
-        if int(front.outcome[0]) in (Outcome.COLLAPSED, Outcome.LOST):
-            self.ending = self._explained(front)
+            self._stand(current)
+        if int(current.outcome[0]) in (Outcome.COLLAPSED, Outcome.LOST):
+            self.ending = self._explained(current)
 
-    def _stand(self, front: Front) -> None:
+    def _stand(self, current: IntegratorState) -> None:
         """Keep the start as a step of no length."""
-        polynomial = State(*(np.asarray(part)[None, ..., 0] for part in front.expansion.state))
-        angles = tuple(np.asarray(part).T for part in front.angles)
-        self.parts.append(Track(np.asarray(front.time), np.zeros(1), polynomial, np.full(1, -1), angles))
+        polynomial = current.expansion.state.map(lambda part: np.asarray(part)[None, ..., 0])
+        angles = tuple(np.asarray(part).T for part in current.angles)
+        self.parts.append(DenseOutput(np.asarray(current.time), np.zeros(1), polynomial, np.full(1, -1), angles))
 
-    def _watch(self, part: Track) -> Track:
+    def _watch(self, part: DenseOutput) -> DenseOutput:
         """Note the events in some steps; cut the steps at the first that is terminal."""
-        if not self.watches:
+        if not self.detectors:
             return part
         found = []
-        for which, watch in enumerate(self.watches):
-            found += [(step, after, which) for step, after in watch.look(part.start, part.length, part.polynomial)]
+        for which, detector in enumerate(self.detectors):
+            found += [(step, after, which) for step, after in detector.detect(part.start, part.length, part.polynomial)]
         for step, after, which in sorted(found, key=lambda x: (x[0], abs(x[1]))):
             instant = float(part.start[step] + after)
             self.happened[which].append(instant)
-            if self.watches[which].event.terminal:
+            if self.detectors[which].event.terminal:
                 self.stopped_at = instant
-                length = np.append(part.length[:step], after)
-                start, polynomial, rough, angles = jax.tree.map(
-                    lambda x, count=step + 1: x[:count], (part.start, part.polynomial, part.rough, part.angles)
-                )
-                return Track(start, length, polynomial, rough, angles)
+                kept = jax.tree.map(lambda x, count=step + 1: x[:count], part)
+                return kept._replace(length=np.append(part.length[:step], after))
         return part
 
-    def _explained(self, front: Front) -> tuple[Status, str]:
+    def _explained(self, current: IntegratorState) -> tuple[Status, str]:
         """Return why steps did not go on, and where to look: a force that is not finite, or the most urgent body."""
-        series, time = front.expansion.state, float(front.time[0])
-        here = self.start._replace(equations=self.start.equations.near(front.angles))
-        onwards = self.sense * AHEAD * max(abs(time), abs(time - float(front.begun[0])))
+        series, time = current.expansion.state, float(current.time[0])
+        here = self.start._replace(equations=self.start.equations.near(current.angles))
+        onwards = self.sense * AHEAD * max(abs(time), abs(time - float(current.begun[0])))
         ahead = evaluated(series, np.array([onwards]))
-        for state, instant in ((State(*(part[0] for part in series)), time), (ahead, time + onwards)):
+        for state, instant in ((series.map(lambda part: part[0]), time), (ahead, time + onwards)):
             finite = all(np.isfinite(part).all() for part in state)
             if finite and (names := _unfit(here, state, instant)):
                 return Status.INADMISSIBLE, f"{names} at t = {instant:g} s"
         if names := unfit_rates(here, pose_coordinates(series), time):
             return Status.INADMISSIBLE, f"a derivative of {names} at t = {time:g} s"
-        if (blocked := int(front.blocked[0])) >= 0:
+        if (blocked := int(current.blocked[0])) >= 0:
             return Status.COLLAPSED, f"{watched_names(self.start.model)[blocked]} at t = {time:g} s"
-        acceleration = np.abs(np.asarray(front.expansion.acceleration[0])[..., 0])
+        acceleration = np.abs(np.asarray(current.expansion.acceleration[0])[..., 0])
         scale = np.asarray(self.start.equations.system.column_scale)[:, None]
         sizes = np.nan_to_num(acceleration / scale, nan=np.inf).max(axis=0)
         return Status.COLLAPSED, f"body {self.start.model.bodies[int(np.argmax(sizes))]}"

@@ -1,21 +1,22 @@
 """The result of a simulation: a motion with dense output, energy, drift and events."""
 
-import dataclasses
 from functools import cached_property
 from typing import Any
 
-import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
-from jounce.dynamics.energies import body_energy
-from jounce.dynamics.forward import Equations, State, expand
-from jounce.dynamics.start import Start
-from jounce.integrate.events import NODES, at_nodes, pose_coordinates, series_of
+from jounce.dynamics.energies import body_energy, energy_of_forces
+from jounce.dynamics.forward import Equations, Instants, Lanes, State, expand
+from jounce.dynamics.motion_values import Coordinates, cut, in_chunks, pose_of
+from jounce.dynamics.start import ConsistentStart
+from jounce.integrate.events import NODES, WIDTHS, at_nodes, pose_coordinates, series_of
 from jounce.integrate.lookahead import watched_names
+from jounce.integrate.marching import DenseOutput
 from jounce.integrate.methods import evaluated
 from jounce.integrate.projection import projected
-from jounce.integrate.turns import followed, measured
+from jounce.integrate.turns import AnglesOfForces, followed, measured
 from jounce.jet import Jet, dot
 from jounce.jet.turns import brought_near, counted_by_rates
 from jounce.kinematics import Motion, Status
@@ -23,41 +24,13 @@ from jounce.kinematics.compilation import compiled
 from jounce.mechanism import Mechanism
 from jounce.mechanism.axis_angles import with_turns
 from jounce.mechanism.system import Group
+from jounce.shapes import ArrayLike
 
-SMALL_BATCH, LARGE_BATCH = 16, 64  # instants expanded together
 MUCH_LONGER = (
     1e3  # than the step over a jump or a kink are one of those before and the next; a steep force takes several
 )
 PLACES = 16  # in each step at which attitudes are looked at for turns
 APPROACH = 4  # steps to such a place, each much shorter than the one before
-
-
-@dataclasses.dataclass(frozen=True)
-class Track:
-    """Steps taken, in order.
-
-    Parameters
-    ----------
-    start, length : array of shape (steps,)
-        s; lengths are negative backward in time.
-    polynomial : State
-        Coefficients in the time from the start, (steps, order + 1, components, bodies).
-    rough : array of int, shape (steps,)
-        Index of a force or law that is not resolved over a step, which is too short to matter, or -1: `watched_names`.
-    angles : tuple of array of shape (steps, instances)
-        About axes at the start, rad, for each group of forces that measures some.
-    """
-
-    start: np.ndarray
-    length: np.ndarray
-    polynomial: State
-    rough: np.ndarray
-    angles: tuple[np.ndarray, ...] = ()
-
-    @property
-    def end(self) -> float:
-        """Where the last step ends, s."""
-        return float(self.start[-1] + self.length[-1])
 
 
 class Simulation(Motion):
@@ -78,26 +51,26 @@ class Simulation(Motion):
         For each event asked for, the times at which it happened, s.
     kinks : list of tuple of float and str
         When a force or a motion law had a jump or a kink, s, and which.
-    track : Track
+    dense : DenseOutput
         The steps, as polynomials.
     """
 
     def __init__(
         self,
         mechanism: Mechanism,
-        start: Start,
-        track: Track,
+        start: ConsistentStart,
+        dense: DenseOutput,
         instants: np.ndarray,
         order: int,
         ending: tuple[Status, str] = (Status.OK, ""),
         events: list[list[float]] | None = None,
     ):
-        self.track, self._start = track, start
+        self.dense_output, self._start = dense, start
         self.events = [] if events is None else events
         self._ending = ending
         lost = max((output.lost_orders for output in mechanism.outputs.values()), default=0)
-        reached, chosen = _steps_of(track, instants)
-        state, self._angles = _at(start.equations, track, instants, chosen, order + max(lost, 1))
+        reached, chosen = _steps_of(dense, instants)
+        state, self._angles = _at(start.equations, dense, instants, chosen, order + max(lost, 1))
         pose_type = start.model.pose_type
         coordinates = pose_coordinates(state)
         groups = tuple(self._series(group, coordinates, pose_type, instants) for group in start.model.system.outputs)
@@ -112,7 +85,7 @@ class Simulation(Motion):
             }
         if lost.any():  # the state is known there, but not its derivatives
             status[lost], faults[int(np.argmax(lost))] = int(Status.INADMISSIBLE), ending[1]
-        beyond = np.flatnonzero(~reached & (np.abs(instants - track.start[0]) > abs(track.end - track.start[0])))
+        beyond = np.flatnonzero(~reached & (np.abs(instants - dense.start[0]) > abs(dense.end - dense.start[0])))
         if ending[0] != Status.OK and beyond.size:
             status[beyond[0]], faults[int(beyond[0])] = int(ending[0]), ending[1]
         super().__init__(mechanism, start.model, instants, order, (coordinates, groups), status, faults)
@@ -128,7 +101,7 @@ class Simulation(Motion):
     @property
     def steps(self) -> int:
         """Number of steps taken."""
-        return len(self.track.start)
+        return len(self.dense_output.start)
 
     @property
     def kinks(self) -> list[tuple[float, str]]:
@@ -136,19 +109,19 @@ class Simulation(Motion):
 
         A step over such a place is made so short that it costs no digits, and the next may be long again.
         """
-        rough, length = self.track.rough, np.abs(self.track.length)
+        kink, length = self.dense_output.kink, np.abs(self.dense_output.length)
         names = watched_names(self._start.model)
         before = [length[max(k - APPROACH, 0) : k].max(initial=0.0) for k in range(len(length) - 1)]
         short = MUCH_LONGER * length[:-1]
-        places = np.flatnonzero((rough[:-1] >= 0) & (length[1:] > short) & (np.array(before) > short))
-        return [(float(self.track.start[k] + self.track.length[k]), names[rough[k]]) for k in places]
+        places = np.flatnonzero((kink[:-1] >= 0) & (length[1:] > short) & (np.array(before) > short))
+        return [(float(self.dense_output.start[k] + self.dense_output.length[k]), names[kink[k]]) for k in places]
 
     @property
     def ended_at(self) -> float:
         """Time to which the motion was followed, s."""
-        return self.track.end
+        return self.dense_output.end
 
-    def at(self, time: Any, order: int | None = None) -> "Simulation":
+    def at(self, time: ArrayLike, order: int | None = None) -> "Simulation":
         """Return the same simulation at other instants, without integrating again.
 
         Parameters
@@ -160,22 +133,22 @@ class Simulation(Motion):
         """
         instants = np.atleast_1d(np.asarray(time, float))
         order = self.order if order is None else order
-        return Simulation(self.mechanism, self._start, self.track, instants, order, self._ending, self.events)
-
-    @cached_property
-    def energy(self) -> np.ndarray:
-        """Kinetic energy, potential energy in gravity, and what springs have stored, J, shape (time,)."""
-        return self._checked(0)
-
-    @cached_property
-    def drift(self) -> np.ndarray:
-        """Largest residual of joints and drivers, rad or sizes of the mechanism, shape (time,)."""
-        return self._checked(1)
+        return Simulation(self.mechanism, self._start, self.dense_output, instants, order, self._ending, self.events)
 
     @property
-    def kinetic_energy(self) -> np.ndarray:
+    def energy(self) -> Float[np.ndarray, " time"]:
+        """Kinetic energy, potential energy in gravity, and what springs have stored, J, shape (time,)."""
+        return self._checked[0]
+
+    @property
+    def drift(self) -> Float[np.ndarray, " time"]:
+        """Largest residual of joints and drivers, rad or sizes of the mechanism, shape (time,)."""
+        return self._checked[1]
+
+    @property
+    def kinetic_energy(self) -> Float[np.ndarray, " time"]:
         """Kinetic energy, J, shape (time,)."""
-        return self._checked(2)
+        return self._checked[2]
 
     @cached_property
     def forces(self) -> tuple[Group, ...]:
@@ -184,27 +157,29 @@ class Simulation(Motion):
 
     def _attitudes(self) -> tuple[np.ndarray, np.ndarray]:
         """Return instants along the steps, and the Euler parameters of all bodies there, (4, bodies, places)."""
-        track, series = self.track, self.track.polynomial.attitude
-        since = track.length[:, None] * (np.arange(PLACES) / PLACES)
+        dense, series = self.dense_output, self.dense_output.polynomial.attitude
+        since = dense.length[:, None] * (np.arange(PLACES) / PLACES)
         place = np.zeros((*series.shape[:1], *series.shape[2:], PLACES))
         for k in range(series.shape[1])[::-1]:
             place = place * since[:, None, None] + series[:, k, ..., None]
         place = np.moveaxis(place, 0, -2).reshape(*series.shape[2:], -1)
         ground = np.zeros((4, 1, place.shape[-1]))
         ground[0] = 1.0
-        return (track.start[:, None] + since).ravel(), np.concatenate([ground, place], axis=1)
+        return (dense.start[:, None] + since).ravel(), np.concatenate([ground, place], axis=1)
 
     def _coefficients(self, group: Group) -> np.ndarray:
         pose_type, coordinates = self.poses
         return self._series(group, coordinates, pose_type, self.time)
 
-    def _series(self, group: Group, coordinates: dict[str, Any], pose_type: type, instants: np.ndarray) -> np.ndarray:
+    def _series(
+        self, group: Group, coordinates: Coordinates, pose_type: type, instants: np.ndarray
+    ) -> Float[np.ndarray, "order component instance time"]:
         """Return the series of outputs at instants; angles known up to whole turns go on from step to step."""
-        series, track = series_of(group, coordinates, pose_type), self.track
-        if not group.element.turning or not track.length.any():  # no steps: states that another solver gave
+        series, dense = series_of(group, coordinates, pose_type), self.dense_output
+        if not group.element.turning or not dense.length.any():  # no steps: states that another solver gave
             return continuous(group, series, instants)
-        nodes = (track.start[:, None] + track.length[:, None] * NODES).ravel()
-        known = at_nodes(group, track.polynomial, track.length, 1, self._start.model.pose_type)[:2]
+        nodes = (dense.start[:, None] + dense.length[:, None] * NODES).ravel()
+        known = at_nodes(group, dense.polynomial, dense.length, 1, self._start.model.pose_type)[:2]
         known = known.reshape(*known.shape[:3], -1)
         counted = counted_by_rates(known[0], known[1], nodes)
         near = np.abs(nodes[None] - instants[:, None]).argmin(axis=1)
@@ -212,46 +187,46 @@ class Simulation(Motion):
         series[0] = brought_near(series[0], expected)
         return series
 
-    def _checked(self, which: int) -> np.ndarray:
+    @cached_property
+    def _checked(self) -> list[np.ndarray]:
+        """Energy, drift and kinetic energy."""
         pose_type, coordinates = self.poses
-        low = {name: values[: 2 - (name == "angular_velocity")] for name, values in coordinates.items()}
         equations = self._start.equations.near(self._angles)
-        found = np.asarray(_checks(equations, low, self.time[None], pose_type)[which])
-        return np.where(self.status == Status.OK, found, np.nan)
+        found = _checks(equations, cut(coordinates, 1), self.time[None], pose_type)
+        return [np.where(self.status == Status.OK, part, np.nan) for part in found]
 
 
-def _steps_of(track: Track, instants: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _steps_of(dense: DenseOutput, instants: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return which instants the steps reach, and the step in which each of them is."""
-    sense = 1.0 if track.length[0] >= 0 else -1.0
-    rounding = 1e-14 * max(abs(track.start[0]), abs(track.end))
-    reached = (sense * (instants - track.start[0]) >= -rounding) & (sense * (instants - track.end) <= rounding)
-    chosen = np.searchsorted(sense * track.start, sense * instants, side="right") - 1
-    return reached, np.clip(chosen, 0, len(track.start) - 1)
+    sense = 1.0 if dense.length[0] >= 0 else -1.0
+    rounding = 1e-14 * max(abs(dense.start[0]), abs(dense.end))
+    reached = (sense * (instants - dense.start[0]) >= -rounding) & (sense * (instants - dense.end) <= rounding)
+    chosen = np.searchsorted(sense * dense.start, sense * instants, side="right") - 1
+    return reached, np.clip(chosen, 0, len(dense.start) - 1)
 
 
-def _at(equations: Equations, track: Track, instants: np.ndarray, chosen: np.ndarray, order: int) -> Any:
+def _at(equations: Equations, dense: DenseOutput, instants: np.ndarray, chosen: np.ndarray, order: int) -> Any:
     """Return the Taylor coefficients of the motion at instants, order first and the instants last, and its angles."""
-    count = len(instants)
-    width = SMALL_BATCH if count <= SMALL_BATCH else LARGE_BATCH
-    parts = []
-    for first in range(0, count, width):
-        lanes = np.minimum(np.arange(first, first + width), count - 1)
-        steps = chosen[lanes]
-        polynomial = State(*(np.moveaxis(part[steps], 0, -1) for part in track.polynomial))
-        begun = equations.near(tuple(part[steps].T for part in track.angles))
-        found = expanded(begun, polynomial, instants[lanes] - track.start[steps], instants[lanes], order=order)
-        parts.append(jax.tree.map(np.asarray, found))
-    return jax.tree.map(lambda *xs: np.concatenate(xs, axis=-1)[..., :count], *parts)
+
+    def chunk(lanes: np.ndarray) -> Any:
+        steps, now = chosen[lanes], instants[lanes]
+        polynomial = dense.polynomial.map(lambda part: np.moveaxis(part[steps], 0, -1))
+        begun = equations.near(tuple(part[steps].T for part in dense.angles))
+        return expanded(begun, polynomial, now - dense.start[steps], now, order=order)
+
+    return in_chunks(chunk, len(instants), WIDTHS)
 
 
 @compiled("order")
-def expanded(equations: Equations, polynomial: State, step: Any, instants: Any, *, order: int) -> Any:
+def expanded(
+    equations: Equations, polynomial: State, step: Lanes, instants: Lanes, *, order: int
+) -> tuple[State, AnglesOfForces]:
     """Return the Taylor coefficients of the motion at instants a time `step` into steps, from the equations there.
 
     Angles about axes that forces measure are, in the equations, those at the beginnings of the steps; those at the
-    instants are returned too, (instances, batch) for each group.
+    instants are returned too.
     """
-    begun = measured(equations, State(*(part[0] for part in polynomial)))
+    begun = measured(equations, polynomial.map(lambda part: part[0]))
     there = equations.near(followed(equations, begun, polynomial, step).at(step))
     state, _, inverse = projected(there, evaluated(polynomial, step), instants[None])
     return expand(there, state, instants[None], order, inverse).state, measured(there, state)
@@ -265,16 +240,16 @@ def continuous(group: Any, series: np.ndarray, instants: np.ndarray) -> np.ndarr
 
 
 @compiled("pose_type")
-def _checks(equations: Equations, coordinates: dict[str, Any], time: Any, pose_type: type) -> tuple[Any, Any, Any]:
-    """Return the energy, the largest residual and the kinetic energy, all of shape (batch,)."""
-    pose = pose_type.from_coordinates({name: Jet(tuple(c)) for name, c in coordinates.items()})
-    clock = Jet.variable(time, 1)
-    translation, rotation = body_energy(pose, equations.mass, equations.center, equations.moments, 0)
-    height = dot(pose.point(equations.center), equations.gravity).coefficients[0]
+def _checks(
+    equations: Equations, coordinates: Coordinates, time: Instants, pose_type: type
+) -> tuple[Lanes, Lanes, Lanes]:
+    """Return the energy, the largest residual and the kinetic energy."""
+    pose, clock = pose_of(coordinates, pose_type), Jet.variable(time, 1)
+    masses = equations.masses
+    translation, rotation = body_energy(pose, *masses, 0)
+    height = dot(pose.point(masses.center), equations.gravity).coefficients[0]
     kinetic = jnp.sum(translation.coefficients[0] + rotation.coefficients[0], axis=0)
-    energy = kinetic - jnp.sum(equations.mass * height, axis=0)
-    for group in equations.system.forces:
-        stored = jnp.broadcast_to(group.energy(pose, clock).coefficients[0], (group.instances, time.shape[-1]))
-        energy = energy + jnp.sum(stored, axis=0)
+    stored = energy_of_forces(equations.system.forces, pose, clock)
+    energy = kinetic - jnp.sum(masses.mass * height, axis=0) + stored
     gaps = equations.system.residual(pose, clock).coefficients[0]
     return energy, jnp.max(jnp.abs(gaps), axis=0, initial=0.0), kinetic

@@ -8,13 +8,19 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+from jaxtyping import Float
 
-from jounce.dynamics.forward import Equations, State
+from jounce.dynamics.forward import Equations, Lanes, State
 from jounce.integrate.methods import evaluated
 from jounce.jet import Jet
 from jounce.mechanism.axis_angles import measures_angle
+from jounce.shapes import Numbers
 
 PLACES = 16  # in a step: series carry over about one turn in it at most
+
+
+AnglesOfForces = tuple[Float[Numbers, "_ batch"], ...]
+"""For each group of forces that measures an angle about an axis, those of its instances, rad."""
 
 
 class Angles(NamedTuple):
@@ -28,10 +34,10 @@ class Angles(NamedTuple):
         s.
     """
 
-    places: tuple[Any, ...]
-    step: Any
+    places: tuple[Float[Numbers, "place _ batch"], ...]
+    step: Lanes
 
-    def at(self, since: Any) -> tuple[Any, ...]:
+    def at(self, since: Lanes) -> AnglesOfForces:
         """Return the angles a time after the beginning, (instances, batch) each, to within half a turn."""
         if not self.places:
             return ()
@@ -41,7 +47,7 @@ class Angles(NamedTuple):
         return tuple(jnp.sum(weights * angles, axis=0) for angles in self.places)
 
 
-def measured(equations: Equations, state: State) -> tuple[Any, ...]:
+def measured(equations: Equations, state: State) -> AnglesOfForces:
     """Return the angles about axes that forces measure in a state, (instances, batch) each, rad.
 
     They have the turns of what they are near to in the equations.
@@ -55,7 +61,7 @@ def measured(equations: Equations, state: State) -> tuple[Any, ...]:
     return tuple(jnp.broadcast_to(angle, angle.shape[:1] + shape) for angle in found)
 
 
-def followed(equations: Equations, angles: tuple[Any, ...], path: State, step: Any) -> Angles:
+def followed(equations: Equations, angles: AnglesOfForces, path: State, step: Lanes) -> Angles:
     """Return the angles along a step.
 
     Parameters

@@ -13,18 +13,6 @@ if TYPE_CHECKING:
     from jounce.io.robots.loader import load_robot as load_robot
     from jounce.io.robots.trajectories import load_trajectory as load_trajectory
 
-__all__ = [
-    "check_writable",
-    "json_schema",
-    "load",
-    "load_limits",
-    "load_robot",
-    "load_trajectory",
-    "read",
-    "write",
-    "write_mechanism",
-]
-
 _HOMES = {
     "load": "mechanisms.loader",
     "json_schema": "mechanisms.json_schema",

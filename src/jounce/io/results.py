@@ -8,16 +8,18 @@ import itertools
 import re
 from os import PathLike, fspath
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from jaxtyping import Float
 
 from jounce.errors import OutputError
-from jounce.io.files.reading import known_name, read_file, written_name
-from jounce.io.files.writing import check_target, reason_of, replacing
+from jounce.io.files.reading import known_name, read_file, reason_of, written_name
+from jounce.io.files.writing import check_target, replacing
 from jounce.mechanism import EulerAnglesOutput, EulerParametersOutput, RotationMatrixOutput
 
-__all__ = ["check_writable", "columns", "read", "write"]
+if TYPE_CHECKING:
+    import xarray
 
 SUFFIXES = (".csv", ".nc")
 AXES = {  # of outputs that are more than one number, and the labels along them
@@ -46,7 +48,7 @@ def check_writable(path: str | PathLike[str], *, overwrite: bool = False) -> Non
     check_target(path, SUFFIXES, "an output", overwrite=overwrite)
 
 
-def write(dataset: Any, path: str | PathLike[str], *, overwrite: bool = False) -> None:
+def write(dataset: xarray.Dataset, path: str | PathLike[str], *, overwrite: bool = False) -> None:
     """Write the dataset of a motion to a .csv or .nc file, whole or not at all.
 
     A CSV file has the columns ``time``, then for each output ``NAME, NAME_d1, NAME_d2, ...``, and for a vector
@@ -89,7 +91,7 @@ def write(dataset: Any, path: str | PathLike[str], *, overwrite: bool = False) -
             _write_netcdf(dataset, scratch)
 
 
-def columns(dataset: Any) -> dict[str, np.ndarray]:
+def columns(dataset: xarray.Dataset) -> dict[str, Float[np.ndarray, " time"]]:
     """Return the columns of a table of a dataset, by name, each of shape (time,).
 
     Raises
@@ -121,7 +123,7 @@ def columns(dataset: Any) -> dict[str, np.ndarray]:
     return found
 
 
-def _write_csv(dataset: Any, path: Path) -> None:
+def _write_csv(dataset: xarray.Dataset, path: Path) -> None:
     table = columns(dataset)
     rows = np.stack(list(table.values()), axis=1)
     line = ",".join(["%.17g"] * rows.shape[1]) + "\n"
@@ -131,7 +133,7 @@ def _write_csv(dataset: Any, path: Path) -> None:
             stream.writelines(line % tuple(row) for row in rows[start : start + 1000].tolist())
 
 
-def _write_netcdf(dataset: Any, path: Path) -> None:
+def _write_netcdf(dataset: xarray.Dataset, path: Path) -> None:
     named = dataset.assign_attrs({"Conventions": "CF-1.11", "history": f"written by jounce {_version()}"})
     for name in (*named.data_vars, *named.coords):
         if "/" in str(name):
@@ -161,7 +163,7 @@ def _version() -> str:
         return "(not installed)"
 
 
-def read(path: str | PathLike[str]) -> Any:
+def read(path: str | PathLike[str]) -> xarray.Dataset:
     """Read a file that `write` wrote back into a dataset; values come back to the bit.
 
     A CSV file has no units, and does not say what is a vector: neighbouring columns ``NAME_x, NAME_y`` (and
@@ -200,7 +202,7 @@ def read(path: str | PathLike[str]) -> Any:
     return _from_columns(header, np.array(rows))
 
 
-def _from_columns(header: list[str], table: np.ndarray) -> Any:
+def _from_columns(header: list[str], table: Float[np.ndarray, "time columns"]) -> xarray.Dataset:
     """Build the dataset of a table."""
     import xarray
 

@@ -27,7 +27,7 @@ from jounce.shapes import Numbers, Real
 
 Lanes = Float[Numbers, " batch"]
 Truths = Bool[Numbers, " batch"]
-State = tuple[Mapping[str, Numbers], tuple[Numbers, ...], Numbers]
+SolvedState = tuple[Mapping[str, Numbers], tuple[Numbers, ...], Numbers]
 """What a solved instant hands on: jets of coordinates, by name, and of outputs, and the sign of the determinant."""
 
 MAX_ITERATIONS = 30
@@ -57,7 +57,7 @@ class Arrival(NamedTuple):
     admissible: Bool[Numbers, "driver batch"]  # whether each driver has a permitted value
     finite: Bool[Numbers, "result batch"]  # whether all derivatives wanted are, of the pose and of each output
 
-    def state(self, lanes: slice | np.ndarray) -> State:
+    def state(self, lanes: slice | np.ndarray) -> SolvedState:
         """Return what the neighbours of some lanes start from: jets of coordinates and outputs, and the sign."""
         return jax.tree.map(lambda x: x[..., lanes], (self.coordinates, self.outputs, self.sign))
 

@@ -12,7 +12,7 @@ import jax
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from jounce.kinematics.advance import State
+from jounce.kinematics.advance import SolvedState
 from jounce.kinematics.change_points import LARGEST_DISAGREEMENT, bridged, half_width, spoiled_width
 from jounce.kinematics.path_following import (
     LARGE_BATCH,
@@ -31,7 +31,7 @@ LONG_GRID = 1024  # instants: from here on in large batches
 FEW_BATCHES = 4  # of instants: no level of its own for each halving of the spacing
 
 
-class Grid:
+class GridSolver:
     """All instants of a time grid, solved from the anchors of a path.
 
     Attributes
@@ -104,7 +104,7 @@ class Grid:
     def _away(self, lanes: Indices, source: Indices) -> Float[np.ndarray, " lane"]:
         return np.abs(self.time[lanes] - self._instants[source])
 
-    def _keep(self, lanes: slice | Indices, state: State) -> None:
+    def _keep(self, lanes: slice | Indices, state: SolvedState) -> None:
         def put(whole: np.ndarray, part: np.ndarray) -> None:
             whole[..., lanes] = part
 

@@ -1,6 +1,5 @@
 """The result of a solve: outputs and any point of any body, with their derivatives, at every instant."""
 
-import math
 from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
@@ -12,6 +11,7 @@ from jounce.display import Displayed
 from jounce.errors import MechanismError
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked
+from jounce.jet.derivatives import plain_derivatives
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.status import Status
 from jounce.mechanism import (
@@ -35,7 +35,8 @@ _UNDEFINED = Status.UNDEFINED.advice.partition(": ")[2]
 
 
 @compiled("pose_type")
-def _evaluated(group: Group, coordinates: dict[str, Any], pose_type: type) -> Any:
+def output_series(group: Group, coordinates: dict[str, Any], pose_type: type) -> Any:
+    """Return the Taylor coefficients of outputs, (order + 1, components, instances, batch)."""
     pose = pose_type.from_coordinates({name: Jet(tuple(c)) for name, c in coordinates.items()})
     return stacked(group.evaluate(pose))
 
@@ -237,7 +238,7 @@ class Motion(Displayed):
     def _coefficients(self, group: Group) -> Float[np.ndarray, "order component instance time"]:
         """Return the Taylor coefficients of outputs, (order + 1, components, instances, time)."""
         (group,) = self._counting((group,))
-        return np.asarray(_evaluated(group, self._coordinates, self.model.pose_type))
+        return np.asarray(output_series(group, self._coordinates, self.model.pose_type))
 
     def _counting(self, groups: tuple[Group, ...]) -> tuple[Group, ...]:
         return groups if self.history is None else self.history.counting(groups, self.time)
@@ -246,9 +247,8 @@ class Motion(Displayed):
         self, coefficients: Float[Numbers, "order component time"]
     ) -> Float[np.ndarray, "time derivative *component"]:
         """Turn Taylor coefficients (order, component, time) into derivatives (time, derivative[, component])."""
-        coefficients = np.asarray(coefficients[: self.order + 1])
-        factorials = np.array([math.factorial(k) for k in range(len(coefficients))], float)
-        values = np.moveaxis(coefficients * factorials[:, None, None], (2, 0, 1), (0, 1, 2))
+        coefficients = coefficients[: self.order + 1]
+        values = np.moveaxis(np.asarray(plain_derivatives(coefficients)), -1, 0)
         values = np.where((self.status == Status.OK)[:, None, None], values, np.nan)
         return values[..., 0] if values.shape[-1] == 1 else values
 

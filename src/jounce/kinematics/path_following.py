@@ -15,7 +15,7 @@ import jax
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
-from jounce.kinematics.advance import SAFE_FRACTION, Arrival, State, advance
+from jounce.kinematics.advance import SAFE_FRACTION, Arrival, SolvedState, advance
 from jounce.kinematics.status import Status
 from jounce.mechanism import Model
 from jounce.mechanism.axis_angles import AttitudeHistory
@@ -46,7 +46,7 @@ class Solver:
 
     def __call__(
         self,
-        known: State,
+        known: SolvedState,
         step: Float[np.ndarray, " batch"],
         instant: Float[np.ndarray, " batch"],
         *,
@@ -78,7 +78,7 @@ class Solver:
             return f"output {names[int(np.argmin(arrival.finite[1:, lane]))]}"
         return f"body {self.model.bodies[int(arrival.body[lane])]}"
 
-    def _predictor(self, known: State) -> State:
+    def _predictor(self, known: SolvedState) -> SolvedState:
         """Return what a prediction needs of solved instants: jets of the pose and of turning angles, and the sign."""
         coordinates, outputs, sign = known
         angles = [o for o, g in zip(outputs, self.model.system.outputs, strict=True) if g.element.turning]
@@ -114,7 +114,7 @@ class Anchor:
     """
 
     instant: float
-    state: State
+    state: SolvedState
     safe_step: float
     radius: float
     turnover: float

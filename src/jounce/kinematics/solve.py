@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from jounce.errors import MechanismError, SolveError
 from jounce.kinematics.assembly import assemble
-from jounce.kinematics.grid import Grid
+from jounce.kinematics.grid import GridSolver
 from jounce.kinematics.motion import Motion
 from jounce.kinematics.path_following import PASSABLE, Anchor, Solver, follow
 from jounce.kinematics.status import Status
@@ -92,7 +92,7 @@ def solve(
     solver = Solver(model, max(order + lost, LOWEST_ORDER), float(tolerance), refine, order)
     first = _first(solver, coordinates, instants[:1])
     path = follow(solver, first, instants[-1], instants[-1] - instants[0], grid=instants)
-    grid = Grid(solver, path, instants)
+    grid = GridSolver(solver, path, instants)
     grid.solve(progress)
     change_points = np.array([point.instant for point in path.change_points])
     found = (grid.state, grid.status, grid.faults)

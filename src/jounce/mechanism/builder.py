@@ -26,7 +26,7 @@ from jounce.mechanism.axis_angles import (
 )
 from jounce.mechanism.mechanism import GROUND, Mechanism
 from jounce.mechanism.outputs import AbstractMotionOutput
-from jounce.mechanism.resolve import check_value, resolve
+from jounce.mechanism.resolve import resolve, resolved
 from jounce.mechanism.system import (
     POSITION_COMPONENTS,
     Group,
@@ -209,9 +209,9 @@ def starting_guess(mechanism: Mechanism, parameters: dict[str, Any], components:
     positions, attitudes = [np.zeros(components)], [np.zeros(()) if components == 2 else np.array([1.0, 0, 0, 0])]
     for name, body in mechanism.bodies.items():
         place = f"bodies.{name}"
-        positions.append(_guess(body.position, f"{place}.position", "vector", components, parameters))
+        positions.append(resolved(body.position, f"{place}.position", "vector", components, parameters))
         if components == 2:
-            attitudes.append(_guess(body.angle, f"{place}.angle", "scalar", components, parameters))
+            attitudes.append(resolved(body.angle, f"{place}.angle", "scalar", components, parameters))
         else:
             attitudes.append(_attitude(body.orientation, f"{place}.orientation", parameters))
     position, attitude = (np.stack([np.asarray(x) for x in xs], axis=-1)[..., None] for xs in (positions, attitudes))
@@ -231,15 +231,6 @@ def _attitude(orientation: Any, name: str, parameters: dict[str, Any]) -> np.nda
     except JounceError as error:
         key = f"{name}.{error.name}" if error.name else name
         raise type(error)(error.message, name=key, value=error.value) from None
-
-
-def _guess(value: Any, name: str, kind: str, components: int, parameters: dict[str, Any]) -> Any:
-    try:
-        value = resolve(value, parameters)
-        check_value(name, kind, value, components)
-    except JounceError as error:
-        raise error.located(name=name) from None
-    return value
 
 
 def _row_count(group: Group, pose_type: type[Pose], guess: dict[str, Any]) -> int:

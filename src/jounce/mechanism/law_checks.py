@@ -11,7 +11,7 @@ from jounce.errors import JounceError, SampleWarning
 from jounce.forces import AbstractForce, TimeLaw, VectorLaw
 from jounce.mechanism.mechanism import Mechanism
 from jounce.trajectory import AbstractMotion, SplineMotion
-from jounce.trajectory.sampling import doubtful_order, words_of_doubt
+from jounce.trajectory.sample_errors import unsupported_derivative, unsupported_words
 
 
 def check_laws(mechanism: Mechanism, instants: np.ndarray, order: int, *, forces: bool) -> None:
@@ -70,6 +70,6 @@ def _motions(element: AbstractConstraint | AbstractForce) -> Iterator[tuple[str,
 
 def _warn(place: str, law: SplineMotion, order: int) -> None:
     """Warn of the lowest derivative that the samples of a law do not support."""
-    if (doubt := doubtful_order(law.errors, order)) is not None:
-        words = words_of_doubt(place, *doubt, law.degree)
+    if (doubt := unsupported_derivative(law.errors, order)) is not None:
+        words = unsupported_words(place, *doubt, law.degree)
         warnings.warn(SampleWarning(words), stacklevel=4)

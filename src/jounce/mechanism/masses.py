@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from jax.core import Tracer
 
-from jounce.errors import JounceError, MechanismError, RobotError
+from jounce.errors import MechanismError, RobotError
 from jounce.mechanism.mechanism import Body
-from jounce.mechanism.resolve import check_value, resolve
+from jounce.mechanism.resolve import resolved
 from jounce.rigid.inertia import ADVICE, Inertia
 
 
@@ -44,12 +44,12 @@ def body_mass(
     (3.0, [0.1, 0.0], 2.0)
     """
     place = f"bodies.{name}"
-    mass = _resolved(f"{place}.mass", 0.0 if body.mass is None else body.mass, parameters, ())
+    kind, zero = ("scalar", 0.0) if components == 2 else ("tensor", [0.0] * 3)
+    mass = resolved(0.0 if body.mass is None else body.mass, f"{place}.mass", "scalar", 0, parameters)
     center = [0.0] * components if body.center_of_mass is None else body.center_of_mass
-    center = _resolved(f"{place}.center_of_mass", center, parameters, (components,))
-    shapes = ((),) if components == 2 else ((3,), (3, 3))
-    zero = 0.0 if components == 2 else [0.0] * 3
-    inertia = _resolved(f"{place}.inertia", zero if body.inertia is None else body.inertia, parameters, *shapes)
+    center = resolved(center, f"{place}.center_of_mass", "vector", components, parameters)
+    inertia = zero if body.inertia is None else body.inertia
+    inertia = resolved(inertia, f"{place}.inertia", kind, components, parameters)
     for field, value in (("mass", mass), ("inertia", inertia)):
         if np.shape(value) == () and not isinstance(value, Tracer) and value < 0:
             raise MechanismError("must not be negative", name=f"{place}.{field}", value=float(value))
@@ -62,17 +62,3 @@ def body_mass(
             raise MechanismError(f"{fault.words}; {ADVICE}", name=f"{place}.inertia", value=fault.value)
         inertia = whole.tensor
     return mass, center, inertia
-
-
-def _resolved(name: str, value: Any, parameters: Mapping[str, Any], *shapes: tuple[int, ...]) -> Any:
-    try:
-        found = resolve(value, parameters)
-        if isinstance(found, Tracer) or (np.shape(found) in shapes and np.shape(found) != ()):
-            if not isinstance(found, Tracer) and not np.isfinite(found).all():
-                raise MechanismError("must be finite", value=np.asarray(found).tolist())
-            return found
-        kind, size = ("vector", shapes[0][0]) if shapes[0] else ("scalar", 0)
-        check_value(name.rpartition(".")[2], kind, found, size)
-    except JounceError as error:
-        raise error.located(name=name) from None
-    return found

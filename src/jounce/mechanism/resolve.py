@@ -51,7 +51,7 @@ def _are_numbers(entries: list[Any]) -> bool:
 def resolve_motion(motion: Any, parameters: Mapping[str, Any]) -> AbstractMotion:
     """Return the motion law that a number, an expression, a Python function or a law stands for."""
     if isinstance(motion, AbstractMotion):
-        return _traceable(motion)
+        return _traceable(motion.resolved(parameters))
     if isinstance(motion, numbers.Real):
         motion = Expression(repr(float(motion)))
     if isinstance(motion, str):
@@ -119,7 +119,7 @@ def _scalar_law(law: Any, force: AbstractForce, parameters: Mapping[str, Any]) -
     if isinstance(law, AbstractLaw):
         return law
     if isinstance(law, AbstractMotion):
-        return TimeLaw(law)
+        return TimeLaw(law.resolved(parameters))
     if isinstance(law, numbers.Real) and not isinstance(law, bool):
         size = float(law)
         if not np.isfinite(size):
@@ -165,9 +165,14 @@ def check_value(field: str, kind: str, value: Any, components: int, sign: str = 
     """
     if isinstance(value, Tracer):
         return
-    shape = (components,) if kind == "vector" else ()
-    if not isinstance(value, float | np.ndarray) or np.shape(value) != shape or np.asarray(value).dtype.kind != "f":
-        wanted = f"a vector of {components} numbers" if kind == "vector" else "one number"
+    size = components
+    shapes = {"scalar": ((),), "vector": ((size,),), "tensor": ((size,), (size, size))}[kind]
+    if (
+        not isinstance(value, float | np.ndarray)
+        or np.shape(value) not in shapes
+        or np.asarray(value).dtype.kind != "f"
+    ):
+        wanted = "one number" if kind == "scalar" else f"a vector of {size} numbers"
         raise MechanismError(f"must be {wanted}", value=_plain(value))
     if not np.isfinite(value).all():
         raise MechanismError("must be finite", value=_plain(value))
@@ -180,6 +185,16 @@ def check_value(field: str, kind: str, value: Any, components: int, sign: str = 
         raise MechanismError("must not be zero", value=_plain(value))
     if word in NONZERO and not np.any(value):
         raise MechanismError("must not be of zero length", value=_plain(value))
+
+
+def resolved(value: Any, name: str, kind: str, components: int, parameters: Mapping[str, Any]) -> Any:
+    """Return what a value of a body stands for, checked: a ``scalar``, ``vector`` or ``tensor``; `name` is dotted."""
+    try:
+        found = resolve(value, parameters)
+        check_value(name.rpartition(".")[2], kind, found, components)
+    except JounceError as error:
+        raise error.located(name=name) from None
+    return found
 
 
 def _plain(value: Any) -> Any:

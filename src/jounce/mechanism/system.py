@@ -53,37 +53,33 @@ class Group(eqx.Module):
 
     def residual(self, pose: Pose, time: Jet) -> Float[Jet, "row instance batch"]:
         """Return the residuals, shape (rows, instances, batch)."""
-        return _with_rows(self.element.residual(*self._poses(pose), time))
+        return with_rows(self.element.residual(*self._poses(pose), time))
 
     def evaluate(self, pose: Pose) -> Float[Jet, "component instance batch"]:
         """Return the outputs, shape (components, instances, batch)."""
-        return _with_rows(self.element.evaluate(*self._poses(pose)))
+        return with_rows(self.element.evaluate(*self._poses(pose)))
 
     def displacement(self, pose: Pose, time: Jet) -> Float[Jet, "component instance batch"]:
         """Return the displacements of forces, shape (components, instances, batch)."""
-        return _with_rows(self.element.displacement(*self._poses(pose), time))
+        return with_rows(self.element.displacement(*self._poses(pose), time))
 
     def force(self, pose: Pose, time: Jet) -> Float[Jet, "component instance batch"]:
         """Return the forces, shape (components, instances, batch), one order shorter than the pose."""
-        displacement, velocity = self._motion(pose, time)
-        return _with_rows(self.element.force(displacement, velocity, time)).truncate(pose.order - 1)
+        return self._acting(pose, time)[1].truncate(pose.order - 1)
 
     def finite(self, pose: Pose, time: Jet) -> Bool[Numbers, "instance batch"]:
         """Tell where forces and the velocities they work on are finite numbers, shape (instances, batch)."""
-        displacement, velocity = self._motion(pose, time)
-        force = self.element.force(displacement, velocity, time)
-        parts = [_with_rows(jet).coefficients[0] for jet in (velocity, force)]
-        return jnp.isfinite(parts[0]).all(axis=0) & jnp.isfinite(parts[1]).all(axis=0)
+        velocity, force = (jnp.isfinite(jet.coefficients[0]).all(axis=0) for jet in self._acting(pose, time))
+        return velocity & force
 
     def power(self, pose: Pose, time: Jet) -> Float[Jet, "instance batch"]:
         """Return the power that forces put into the mechanism, shape (instances, batch), W."""
-        displacement, velocity = self._motion(pose, time)
-        force = self.element.force(displacement, velocity, time)
-        return force.dot(velocity) if len(force.shape) == 3 else force * velocity
+        velocity, force = self._acting(pose, time)
+        return force.dot(velocity)
 
     def velocity(self, pose: Pose, time: Jet) -> Float[Jet, "component instance batch"]:
         """Return the velocities that forces work on, shape (components, instances, batch)."""
-        return _with_rows(self._motion(pose, time)[1])
+        return with_rows(self.element.velocity(*self._poses(pose), time))
 
     def energy(self, pose: Pose, time: Jet) -> Float[Jet, "instance batch"]:
         """Return the energy that forces have stored, shape (instances, batch), J."""
@@ -91,11 +87,13 @@ class Group(eqx.Module):
 
     def variation(self, pose: Pose, change: Pose, time: Jet) -> Jet:
         """Return how far forces act along as all bodies move by a change, shape (components, instances, batch)."""
-        return _with_rows(self.element.variation(tuple(self._poses(pose)), tuple(self._poses(change)), time))
+        return with_rows(self.element.variation(tuple(self._poses(pose)), tuple(self._poses(change)), time))
 
-    def _motion(self, pose: Pose, time: Jet) -> tuple[Jet, Jet]:
+    def _acting(self, pose: Pose, time: Jet) -> tuple[Jet, Jet]:
+        """Return the velocities that forces work on, and the forces."""
         poses = self._poses(pose)
-        return self.element.displacement(*poses, time), self.element.velocity(*poses, time)
+        displacement, velocity = self.element.displacement(*poses, time), self.element.velocity(*poses, time)
+        return with_rows(velocity), with_rows(self.element.force(displacement, velocity, time))
 
     def derivative_blocks(self, pose: Pose, time: Jet, scale: Float[Numbers, " coordinate"]) -> list[Any]:
         """Return the derivatives of the residuals by the coordinates of the bodies in each slot that may move.
@@ -113,7 +111,7 @@ class Group(eqx.Module):
             def slope(shift: Any, turn: Any, slot: int = slot) -> Any:
                 moved = list(still)
                 moved[slot] = poses[slot].extended(shift, turn)
-                value, rate = _with_rows(self.element.residual(*moved, time)).coefficients
+                value, rate = with_rows(self.element.residual(*moved, time)).coefficients
                 return jnp.zeros_like(value) if rate is None else rate
 
             def wide(direction: Any) -> Any:
@@ -134,7 +132,8 @@ class Group(eqx.Module):
         return [pose.take(indices) for indices in self.bodies]
 
 
-def _with_rows(jet: Jet) -> Jet:
+def with_rows(jet: Jet) -> Jet:
+    """Return a jet of shape (instances, batch) as one of shape (1, instances, batch)."""
     return jet.map(lambda c: c[None]) if len(jet.shape) == 2 else jet
 
 
@@ -212,11 +211,11 @@ class System(eqx.Module):
         if not self.forces:
             return Jet.constant(jnp.zeros(shape), order)
         sizes = [stacked(group.force(pose, time)) for group in self.forces]
-        still, now = _movable(pose.truncate(order)), time.truncate(order)
+        still, now = movable(pose.truncate(order)), time.truncate(order)
 
         def along(velocity: Any) -> list[Any]:
             shift, turn = (Jet(tuple(part)) for part in (velocity[:, : pose.shifts], velocity[:, pose.shifts :]))
-            change = _movable(still.varied(shift, turn).truncate(order))
+            change = movable(still.varied(shift, turn).truncate(order))
             return [stacked(group.variation(still, change, now)) for group in self.forces]
 
         transposed = jax.linear_transpose(along, jax.ShapeDtypeStruct((order + 1, *shape), jnp.float64))
@@ -229,7 +228,7 @@ class System(eqx.Module):
         Where the velocity is not, as for the distance of two points that meet, the force has no direction.
         """
         lanes = time.coefficients[0].shape[-1]
-        moving = [group.finite(_movable(pose.truncate(1)), time.truncate(1)) for group in self.forces]
+        moving = [group.finite(movable(pose.truncate(1)), time.truncate(1)) for group in self.forces]
         parts = [jnp.broadcast_to(x, (x.shape[0], lanes)) for x in moving]
         return jnp.concatenate([*parts, jnp.ones((0, lanes), bool)])
 
@@ -243,7 +242,7 @@ class System(eqx.Module):
         return parts[:shifts], parts[shifts:]
 
 
-def _movable(pose: Pose) -> Any:
+def movable(pose: Pose) -> Any:
     """Return a pose without certain zeros, which may be moved in thought."""
     pose = each_jet(Jet.dense, pose)
     if isinstance(pose, SpatialPose) and pose.order and pose.angular_velocity is None:

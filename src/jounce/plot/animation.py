@@ -11,13 +11,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
-from jounce.errors import MechanismError, OutputError, did_you_mean
+from jounce.errors import MechanismError, OutputError
 from jounce.interrupts import undoing
 from jounce.io.files.writing import check_target, replacing
-from jounce.plot.canvas import AZIMUTH, ELEVATION
+from jounce.kinematics import Motion
+from jounce.plot.drawing import VIEW, View
+from jounce.plot.instants import nearest_instants, solved_instants
 from jounce.plot.scene import scene_of
-from jounce.plot.sketch import NAMES, Drawing, paths_of
+from jounce.plot.sketch import SketchFigure, check_names, paths_of
 from jounce.plot.style import GREY, style
 
 __all__ = ["ANIMATION_SUFFIXES", "animate", "check_animation", "frame_instants"]
@@ -54,7 +57,9 @@ def _ffmpeg() -> str | None:
     return found
 
 
-def frame_instants(time: Any, *, speed: float | None = None, fps: int = FRAMES_PER_SECOND) -> np.ndarray:
+def frame_instants(
+    time: Sequence[float] | Float[np.ndarray, " time"], *, speed: float | None = None, fps: int = FRAMES_PER_SECOND
+) -> Float[np.ndarray, " frames"]:
     """Return the times that the frames of an animation show.
 
     Parameters
@@ -105,7 +110,7 @@ def _above_zero(name: str, value: Any) -> float:
 
 
 def animate(
-    motion: Any,
+    motion: Motion,
     path: str | PathLike[str],
     *,
     speed: float | None = None,
@@ -113,7 +118,7 @@ def animate(
     names: str = "bodies",
     paths: Sequence[str] | None = None,
     order: int = 0,
-    view: tuple[float, float] = (AZIMUTH, ELEVATION),
+    view: View = VIEW,
     progress: Callable[[int, int], None] | None = None,
     overwrite: bool = False,
 ) -> None:
@@ -155,40 +160,32 @@ def animate(
     import matplotlib as mpl
     import matplotlib.animation as writers
 
-    if names not in NAMES:
-        raise MechanismError(f"unknown choice; {did_you_mean(names, NAMES)}", name="names", value=names)
+    check_names(names)
     check_animation(path, overwrite=overwrite)
-    found = paths_of(motion, paths, order, view)
-    solved = np.flatnonzero(np.asarray(motion.status) == 0)
-    if not solved.size:
-        raise MechanismError("no instant was solved, so that there is nothing to draw", name="motion")
-    wanted = frame_instants(motion.time, speed=speed, fps=fps)
-    nearest = _nearest(motion.time, wanted)
+    found, solved = paths_of(motion, paths, order, view), solved_instants(motion)
+    nearest = nearest_instants(motion.time, frame_instants(motion.time, speed=speed, fps=fps))
     shown = nearest[np.isin(nearest, solved)]
-    if not shown.size:
-        shown = solved
-    instants, places = np.unique(shown, return_inverse=True)
-    scene = scene_of(motion, view=view, instants=instants)
-    mechanism = motion.mechanism
-    kind = Path(fspath(path)).suffix.lower()
-    writer = (
-        writers.PillowWriter(fps=fps)
-        if kind == ".gif"
-        else writers.FFMpegWriter(fps=fps, extra_args=["-pix_fmt", "yuv420p"])
-    )
-    program: dict[Any, Any] = {"animation.ffmpeg_path": _ffmpeg()} if kind == ".mp4" else {}
+    instants, places = np.unique(shown if shown.size else solved, return_inverse=True)
+    scene, mechanism = scene_of(motion, view=view, instants=instants), motion.mechanism
+    program: dict[Any, Any] = {}
+    if Path(fspath(path)).suffix.lower() == ".gif":
+        writer = writers.PillowWriter(fps=fps)
+    else:
+        program = {"animation.ffmpeg_path": _ffmpeg()}
+        writer = writers.FFMpegWriter(fps=fps, extra_args=["-pix_fmt", "yuv420p"])
     with style(), mpl.rc_context(program), replacing(path, overwrite=overwrite) as beside:
-        drawing = Drawing(scene, found, mechanism.title, None if mechanism.space == "planar" else view)
+        drawing = SketchFigure(scene, found, mechanism.title, None if mechanism.space == "planar" else view)
         drawing.show(0)
         drawing.write_names(0, names, still=False)
-        _start_clock(drawing, motion.time)
+        at_the_corner = {"transform": drawing.axes.transAxes, "ha": "right", "va": "bottom", "color": GREY}
+        clock = drawing.axes.text(0.99, 0.01, _clock_text(motion.time, float(motion.time[0])), **at_the_corner)
         drawing.figure.set_layout_engine("none")
         _even_pixels(drawing.figure)
         with writer.saving(drawing.figure, str(beside), dpi=RESOLUTION), undoing(lambda: _stop(writer)):
             for done, place in enumerate(places.tolist(), 1):
                 drawing.show(place)
                 drawing.move_names(place)
-                drawing.clock.set_text(_clock_text(motion.time, float(motion.time[instants[place]])))
+                clock.set_text(_clock_text(motion.time, float(motion.time[instants[place]])))
                 writer.grab_frame()
                 if progress is not None:
                     progress(done, len(places))
@@ -202,30 +199,13 @@ def _stop(writer: Any) -> None:
         encoder.wait(1.0)
 
 
-def _nearest(time: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """Return the index of the instant nearest to each time; instants may run backward."""
-    order = np.argsort(time)
-    rising = time[order]
-    above = np.clip(np.searchsorted(rising, wanted), 1, max(len(rising) - 1, 1))
-    if len(rising) == 1:
-        return np.zeros(len(wanted), int)
-    lower = wanted - rising[above - 1] <= rising[above] - wanted
-    return order[np.where(lower, above - 1, above)]
-
-
 def _even_pixels(figure: Any) -> None:
-    """Make width and height even numbers of pixels, which films need."""
+    """Make width and height even numbers of pixels, which video needs."""
     size = np.ceil(figure.get_size_inches() * RESOLUTION / 2) * 2 / RESOLUTION
     figure.set_size_inches(*(size + 1e-6))
 
 
-def _start_clock(drawing: Drawing, time: np.ndarray) -> None:
-    axes = drawing.axes
-    text = _clock_text(time, float(time[0]))
-    drawing.clock = axes.text(0.99, 0.01, text, transform=axes.transAxes, ha="right", va="bottom", color=GREY)
-
-
-def _clock_text(time: np.ndarray, now: float) -> str:
+def _clock_text(time: Float[np.ndarray, " time"], now: float) -> str:
     span = abs(float(time[-1] - time[0])) or 1.0
     digits = max(0, 2 - int(np.floor(np.log10(span))))
     return f"t = {now:.{min(digits, 9)}f} s"

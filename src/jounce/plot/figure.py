@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from jounce.errors import MechanismError, check_name
 from jounce.io.files.writing import check_target, replacing
-from jounce.plot.labels import scale_of, symbol, unit_label
-from jounce.plot.style import COLOURS, PALE_GREY, RESOLUTION, blank_figure, shown_name, style
-from jounce.reporting.peaks import rate_name
+from jounce.kinematics import Motion
+from jounce.mechanism.outputs import AbstractQuantity
+from jounce.plot.instants import unsolved_runs
+from jounce.plot.labels import axis_range, quantity_word, scale_of, symbol, unit_label
+from jounce.plot.style import COLOURS, PALE_GREY, RESOLUTION, blank_figure, set_ticks, shown_name, style
 
-__all__ = ["check_figure", "draw", "finish", "save", "shade_unsolved"]
+__all__ = ["check_figure", "draw", "draw_columns", "finish", "save"]
+
+Column = tuple[AbstractQuantity, Float[np.ndarray, "time derivative *component"]]
+"""An output with its values."""
+
 
 SUFFIXES = (".png", ".svg", ".pdf")
 COLUMNS = 5  # of outputs beside each other, at most
@@ -24,7 +31,7 @@ LEGEND = {"borderaxespad": 0.1, "handlelength": 1.2, "handletextpad": 0.5, "colu
 STROKES = ("-", "--", ":")  # of more components than there are colours
 
 
-def draw(motion: Any, outputs: Sequence[str] | None = None) -> Any:
+def draw(motion: Motion, outputs: Sequence[str] | None = None) -> Any:
     r"""Draw outputs of a motion and their derivatives over time.
 
     Parameters
@@ -53,42 +60,38 @@ def draw(motion: Any, outputs: Sequence[str] | None = None) -> Any:
     >>> [axes.get_ylabel() for axes in figure.axes][2]
     'acceleration\n$\\ddot{\\psi}$  (rad/s$^2$)'
     """
-    names = _chosen(motion, outputs)
-    lost = [motion.mechanism.outputs[name].lost_orders for name in names]
+    for name in outputs or ():
+        check_name("output", name, motion.outputs, MechanismError, name="outputs")
+    names = dict.fromkeys(outputs or motion.outputs)
+    if not names:
+        raise MechanismError("there is nothing to draw; name some outputs", name="outputs")
+    return draw_columns(motion, {name: (motion.mechanism.outputs[name], motion.outputs[name]) for name in names})
+
+
+def draw_columns(motion: Motion, columns: Mapping[str, Column]) -> Any:
+    """Draw outputs of a motion beside each other, each in a column with its derivatives below each other."""
+    lost = [output.lost_orders for output, _ in columns.values()]
     first = min(lost)
     rows = max(motion.order, max(lost)) + 1 - first
     with style():
-        width, height = PANEL if len(names) > 1 else SINGLE_PANEL
-        blocks = -(-len(names) // COLUMNS)
-        columns = -(-len(names) // blocks)
+        width, height = PANEL if len(columns) > 1 else SINGLE_PANEL
+        blocks = -(-len(columns) // COLUMNS)
+        wide = -(-len(columns) // blocks)
         tall = height * rows * blocks + 0.9 + 0.45 * (blocks - 1)
-        figure = blank_figure(width * columns + 0.3, tall, motion.mechanism.title)
-        panels = figure.subplots(rows * blocks, columns, sharex=True, squeeze=False)
-        for place in range(blocks * columns):
-            block, column = divmod(place, columns)
-            chosen = panels[block * rows : (block + 1) * rows, column]
-            if place < len(names):
-                _draw_column(motion, names[place], chosen, first)
-                continue
-            for axes in chosen:
-                axes.set_axis_off()
+        figure = blank_figure(width * wide + 0.3, tall, motion.mechanism.title)
+        grid = figure.subplots(rows * blocks, wide, sharex=True, squeeze=False)
+        places = grid.reshape(blocks, rows, wide).swapaxes(1, 2).reshape(-1, rows)
+        for panels, name in zip(places, columns, strict=False):
+            _draw_column(motion, name, columns[name], panels, first)
+        for axes in places[len(columns) :].flat:
+            axes.set_axis_off()
         figure.align_ylabels()
     return figure
 
 
-def _chosen(motion: Any, outputs: Sequence[str] | None) -> list[str]:
-    valid = motion.outputs
-    for name in outputs or ():
-        check_name("output", name, valid, MechanismError, name="outputs")
-    names = list(dict.fromkeys(outputs or valid))
-    if not names:
-        raise MechanismError("there is nothing to draw; name some outputs", name="outputs")
-    return names
-
-
-def _draw_column(motion: Any, name: str, panels: Any, first: int) -> None:
+def _draw_column(motion: Motion, name: str, column: Column, panels: Any, first: int) -> None:
     """Draw one output: panel by panel its derivatives, with its components over each other."""
-    output, values = motion.mechanism.outputs[name], motion.outputs[name]
+    output, values = column
     values = values[:, :, None] if values.ndim == 2 else values
     vector = values.shape[2] > 1
     for row, axes in enumerate(panels):
@@ -108,11 +111,9 @@ def _draw_column(motion: Any, name: str, panels: Any, first: int) -> None:
                 markersize=3,
                 label=symbol(name, component=output.labels[c]) if vector else None,
             )
-        shade_unsolved(axes, motion)
-        finish(axes, motion.time, scaled)
-        word = rate_name(output, order)
+        finish(axes, motion, scaled)
+        word = quantity_word(output, order)
         word = f"{word} derivative" if row + first > 4 and not output.rate_names else word
-        word = "angle" if row + first == 0 and output.unit == "rad" else word
         mark = "" if vector else symbol(name, order)
         axes.set_ylabel(f"{word}\n{mark}{'  ' if mark else ''}({unit_label(output.unit, order, exponent)})")
     top = panels[max(output.lost_orders - first, 0)]  # a force starts beside the acceleration
@@ -120,43 +121,29 @@ def _draw_column(motion: Any, name: str, panels: Any, first: int) -> None:
     if vector:
         lines = panels[-1].get_lines()[: values.shape[2]]
         beside = len(lines) > len(COLOURS)  # too many for a line above
-        place = {
-            "loc": "upper left" if beside else "lower right",
-            "ncols": -(-len(lines) // 4) if beside else len(lines),
-        }
+        count = -(-len(lines) // 4) if beside else len(lines)
+        place = {"loc": "upper left" if beside else "lower right", "ncols": count}
         top.legend(handles=lines, bbox_to_anchor=(1.0, 1.0), **place, **LEGEND)
     panels[-1].set_xlabel("time  $t$  (s)")
     panels[-1].tick_params(labelbottom=True)
 
 
-def finish(axes: Any, time: np.ndarray, scaled: np.ndarray) -> None:
-    """Set limits, ticks and grid; a constant is drawn as one, not magnified to its rounding."""
-    from matplotlib.ticker import MaxNLocator
-
-    axes.margins(x=0, y=0.08)
-    axes.yaxis.set_major_locator(MaxNLocator(nbins=4, steps=[1, 2, 2.5, 5, 10], min_n_ticks=3))
+def finish(axes: Any, motion: Motion, scaled: Float[np.ndarray, "time *lines"]) -> None:
+    """Set limits, ticks and grid, and shade the time that no solved instant borders."""
+    set_ticks(axes.yaxis, 4, least=3)
     axes.ticklabel_format(axis="y", useOffset=False, style="plain")
-    axes.xaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 2.5, 5, 10]))
+    set_ticks(axes.xaxis, 6)
     axes.ticklabel_format(axis="x", useOffset=False)
-    finite = scaled[np.isfinite(scaled)]
-    if finite.size:
-        low, high = float(finite.min()), float(finite.max())
-        size = max(abs(low), abs(high))
-        if high - low <= 1e-9 * size or size == 0:
-            half = 0.1 * size or 1.0
-            axes.set_ylim(0.5 * (low + high) - half, 0.5 * (low + high) + half)
-        elif low < 0 < high:
-            axes.axhline(0.0, color=PALE_GREY, linewidth=0.7, zorder=1)
+    low, high = axis_range(scaled, 0.08)
+    axes.set_ylim(low, high)
+    if np.nanmin(scaled, initial=0.0) < 0 < np.nanmax(scaled, initial=0.0):
+        axes.axhline(0.0, color=PALE_GREY, linewidth=0.7, zorder=1)
+    time = motion.time
     if len(time) > 1:
         axes.set_xlim(time[0], time[-1])
-
-
-def shade_unsolved(axes: Any, motion: Any) -> None:
-    """Shade the time that no solved instant borders."""
-    failed = np.flatnonzero(motion.status != 0)
-    for run in np.split(failed, np.flatnonzero(np.diff(failed) > 1) + 1) if failed.size else ():
-        begin, end = max(run[0] - 1, 0), min(run[-1] + 1, len(motion.time) - 1)
-        axes.axvspan(motion.time[begin], motion.time[end], color="#EEEEEE", linewidth=0, zorder=0)
+    for run in unsolved_runs(motion):
+        begin, end = max(run[0] - 1, 0), min(run[-1] + 1, len(time) - 1)
+        axes.axvspan(time[begin], time[end], color="#EEEEEE", linewidth=0, zorder=0)
 
 
 def check_figure(path: str | PathLike[str], *, overwrite: bool = False) -> None:

@@ -2,25 +2,17 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
-from jounce.dynamics import kinetic_energy, potential_energy, power_balance, stored_energy
-from jounce.dynamics.inverse import check_loads
-from jounce.dynamics.outputs import (
-    AppliedForceOutput,
-    AppliedTorqueOutput,
-    DriverForceOutput,
-    DriverTorqueOutput,
-    JointForceOutput,
-    JointTorqueOutput,
-    is_turning,
-)
+from jounce.dynamics import kinetic_energy, outputs as loads, potential_energy, power_balance, stored_energy
+from jounce.dynamics.masses import check_loads
 from jounce.errors import MechanismError, check_name
-from jounce.plot.figure import draw, finish, shade_unsolved
+from jounce.kinematics import Motion
+from jounce.plot.figure import draw_columns, finish
 from jounce.plot.geometry import skeleton
 from jounce.plot.labels import scale_of, unit_label
 from jounce.plot.style import BLUE, GREEN, ORANGE, VERMILION, blank_figure, style
@@ -41,18 +33,7 @@ WORDS = {"drivers": "put in by drivers", "forces": "put in by forces", "kinetic"
 PANEL = (6.4, 1.9)  # inches
 
 
-@dataclasses.dataclass(frozen=True)
-class _Forces:
-    """What `draw` needs of a motion, with forces in the place of its outputs."""
-
-    mechanism: Any
-    outputs: dict[str, np.ndarray]
-    time: np.ndarray
-    order: int
-    status: np.ndarray
-
-
-def draw_reactions(motion: Any, names: Sequence[str] | None = None) -> Any:
+def draw_reactions(motion: Motion, names: Sequence[str] | None = None) -> Any:
     """Draw the reactions of joints, the forces of drivers and the applied forces, with their rates.
 
     Parameters
@@ -91,28 +72,33 @@ def draw_reactions(motion: Any, names: Sequence[str] | None = None) -> Any:
     for name in names or ():
         check_name("joint, driver or force", name, known, MechanismError, name="output")
     wanted = names or known
-    found: dict[str, Any] = {name: JointForceOutput(name) for name in mechanism.joints if name in wanted}
-    moments = {f"{name} (moment)": JointTorqueOutput(name) for name in mechanism.joints if name in wanted}
+    found: dict[str, Any] = {}
+    for name in mechanism.joints:
+        if name in wanted:
+            found |= {name: loads.JointForceOutput(name), f"{name} (moment)": loads.JointTorqueOutput(name)}
     for name, driver in mechanism.drivers.items():
         if name in wanted:
-            found[f"{name} (driver)"] = (DriverTorqueOutput if is_turning(driver) else DriverForceOutput)(name)
+            found[f"{name} (driver)"] = (
+                loads.DriverTorqueOutput if loads.is_turning(driver) else loads.DriverForceOutput
+            )(name)
     for name, force in mechanism.forces.items():
         if name in wanted:
-            found[f"{name} (applied)"] = (AppliedForceOutput if force.unit == "N" else AppliedTorqueOutput)(name)
-    values = {name: motion.evaluate(output).values for name, output in (found | moments).items()}
-    least = NOTHING * skeleton(mechanism).size * max(_largest(values[name][:, 0]) for name in found)
-    felt = {name: output for name, output in moments.items() if _largest(values[name][:, 0]) > least}
-    ordered = [n for name in found for n in (name, f"{name} (moment)") if n in found or n in felt]
-    shown = dataclasses.replace(mechanism, outputs={name: (found | felt)[name] for name in ordered})
-    outputs = {name: values[name] for name in ordered}
-    return draw(_Forces(shown, outputs, motion.time, motion.order, motion.status))
+            found[f"{name} (applied)"] = (loads.AppliedForceOutput if force.unit == "N" else loads.AppliedTorqueOutput)(
+                name
+            )
+    columns = {name: (output, motion.evaluate(output).values) for name, output in found.items()}
+    sizes = {name: _largest(values[:, 0]) for name, (_, values) in columns.items()}
+    moments = {name for name, output in found.items() if isinstance(output, loads.JointTorqueOutput)}
+    least = NOTHING * skeleton(mechanism).size * max(size for name, size in sizes.items() if name not in moments)
+    felt = {name: column for name, column in columns.items() if name not in moments or sizes[name] > least}
+    return draw_columns(motion, felt)
 
 
-def _largest(values: np.ndarray) -> float:
+def _largest(values: Float[np.ndarray, "..."]) -> float:
     return float(np.max(np.abs(values), initial=0.0, where=np.isfinite(values)))
 
 
-def draw_energy(motion: Any) -> Any:
+def draw_energy(motion: Motion) -> Any:
     """Draw the energies of a mechanism: kinetic, potential in gravity, stored in springs, and all together.
 
     Parameters
@@ -138,8 +124,8 @@ def draw_energy(motion: Any) -> Any:
     >>> [line.get_label() for line in draw_energy(press).axes[0].get_lines()][:2]
     ['kinetic', 'potential']
     """
-    found = {"kinetic": kinetic_energy(motion).total[:, 0], "potential": potential_energy(motion)[:, 0]}
-    stored = stored_energy(motion)
+    found = {"kinetic": kinetic_energy(motion).total.values[:, 0], "potential": potential_energy(motion).values[:, 0]}
+    stored = stored_energy(motion).values
     if _largest(stored):
         found["springs"] = stored
     found["total"] = np.sum(list(found.values()), axis=0)
@@ -152,7 +138,7 @@ def draw_energy(motion: Any) -> Any:
     return figure
 
 
-def draw_power(motion: Any) -> Any:
+def draw_power(motion: Motion) -> Any:
     """Draw where the power in a mechanism comes from and goes to, with its rates.
 
     Parameters
@@ -180,9 +166,7 @@ def draw_power(motion: Any) -> Any:
     """
     balance = power_balance(motion)
     rows = min(balance.sizes["derivative"], max(motion.order - 1, 1))
-    named = [name for name in WORDS if _largest(balance[name].values[:, 0])] or list(
-        WORDS
-    )  # all, where nothing has power
+    named = [name for name in WORDS if _largest(balance[name].values[:, 0])] or list(WORDS)  # nothing has power: all
     with style():
         figure = blank_figure(PANEL[0], PANEL[1] * rows + 0.9, motion.mechanism.title)
         panels = np.atleast_1d(figure.subplots(rows, 1, sharex=True))
@@ -198,13 +182,15 @@ def draw_power(motion: Any) -> Any:
     return figure
 
 
-def _draw_lines(axes: Any, motion: Any, found: dict[str, np.ndarray], word: str, unit: tuple[str, int]) -> None:
+def _draw_lines(
+    axes: Any, motion: Motion, found: dict[str, Float[np.ndarray, " time"]], word: str, unit: tuple[str, int]
+) -> None:
     """Draw quantities over time in one panel."""
     values = np.stack(list(found.values()), axis=-1)
     exponent = scale_of(values)
+    values = values * 10.0**-exponent
     for k, name in enumerate(found):
         dashes = (0, (4, 1.5)) if name == "total" else "-"
-        axes.plot(motion.time, values[:, k] * 10.0**-exponent, color=LINES[name], linestyle=dashes, label=name)
-    shade_unsolved(axes, motion)
-    finish(axes, motion.time, values * 10.0**-exponent)
+        axes.plot(motion.time, values[:, k], color=LINES[name], linestyle=dashes, label=name)
+    finish(axes, motion, values)
     axes.set_ylabel(f"{word}  ({unit_label(*unit, exponent)})")

@@ -1,38 +1,40 @@
-"""Where bodies and their points are: in a motion, put together at the start, at the starting guess."""
+"""Where bodies and their points are: in a motion, put together at the start, at the starting guess.
+
+A frame holds the origin of a body, m, and its axes, in columns, at some instants: (time, components, 1 + components).
+"""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
-from jounce.errors import MechanismError, check_name
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked
+from jounce.kinematics import Motion
 from jounce.kinematics.assembly import assemble
 from jounce.kinematics.compilation import compiled
-from jounce.mechanism import build, time_grid
+from jounce.mechanism import Mechanism, build, time_grid
 from jounce.mechanism.builder import starting_guess
 from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.system import POSITION_COMPONENTS
 from jounce.rigid import PlanarPose, SpatialPose
 
-__all__ = ["assembled", "frames", "guessed", "placed"]
+__all__ = ["Frame", "assembled", "frames", "guessed", "points_at", "within"]
 
 ASSEMBLY_TOLERANCE = 1e-10  # rad, or sizes of the mechanism
 
+Frame = Float[np.ndarray, "time components columns"]
+"""Origin and axes of a body."""
 
-def assembled(mechanism: Any) -> dict[str, np.ndarray]:
-    """Return the frames of all bodies put together near the starting guess, at the first instant.
+
+def assembled(mechanism: Mechanism) -> dict[str, Frame]:
+    """Return the frames of all bodies, the ground first, put together near the starting guess at the first instant.
 
     Degrees of freedom may be left; initial conditions count as drivers.
-
-    Returns
-    -------
-    dict of str to numpy.ndarray of shape (1, components, 1 + components)
-        For each body, the ground first: its origin, m, and its axes, in columns.
 
     Raises
     ------
@@ -51,105 +53,55 @@ def assembled(mechanism: Any) -> dict[str, np.ndarray]:
     if mechanism.time is not None:
         first = float(time_grid(mechanism.time, mechanism.parameter_values)[0])
     model, coordinates = assemble(build(started), first, ASSEMBLY_TOLERANCE, free=True)
-    whole = np.asarray(_frames(model.pose_type, {name: (value,) for name, value in coordinates.items()}))
-    return {body: np.moveaxis(whole[0, :, :, k], -1, 0) for k, body in enumerate((GROUND, *mechanism.bodies))}
+    return _by_body(mechanism, _frames(model.pose_type, coordinates))
 
 
-def guessed(mechanism: Any) -> dict[str, Any]:
-    """Return for each body the function that takes points of its frame, (n, components), to the starting guess, m.
+def guessed(mechanism: Mechanism) -> dict[str, Frame]:
+    """Return the frames of all bodies, the ground first, at the starting guess.
 
     Examples
     --------
     >>> import jounce as jn
     >>> from jounce.plot.frames import guessed
-    >>> guessed(jn.load("examples/four_bar.yaml"))["rocker"]([[0.0, 0.0]]).round(6).tolist()
-    [[0.1321, 0.0]]
+    >>> guessed(jn.load("examples/four_bar.yaml"))["rocker"][0, :, 0].round(6).tolist()  # origin
+    [0.1321, 0.0]
     """
-    components = POSITION_COMPONENTS[mechanism.space]
-    guess = starting_guess(mechanism, mechanism.parameter_values, components)
-    whole = np.asarray(_frames(PlanarPose if components == 2 else SpatialPose, {k: (v,) for k, v in guess.items()}))
+    guess = starting_guess(mechanism, mechanism.parameter_values, POSITION_COMPONENTS[mechanism.space])
+    return _by_body(mechanism, _frames(PlanarPose if mechanism.space == "planar" else SpatialPose, guess))
 
-    def function(frame: np.ndarray) -> Any:
-        return lambda points: frame[:, 0] + np.asarray(points, float).reshape(-1, components) @ frame[:, 1:].T
 
-    return {body: function(whole[0, :, :, k, 0]) for k, body in enumerate((GROUND, *mechanism.bodies))}
+def frames(motion: Motion) -> dict[str, Frame]:
+    """Return the frames of all bodies of a motion, the ground first; NaN at instants that were not solved."""
+    if "frames" not in motion.derived:
+        pose_type, coordinates = motion.poses
+        whole = _frames(pose_type, {name: derivatives[0] for name, derivatives in coordinates.items()})
+        motion.derived["frames"] = np.where(np.asarray(motion.status) == 0, whole, np.nan)
+    return _by_body(motion.mechanism, motion.derived["frames"])
+
+
+def _by_body(mechanism: Mechanism, whole: Any) -> dict[str, Frame]:
+    by_time, names = np.moveaxis(np.asarray(whole), -1, 0), (GROUND, *mechanism.bodies)
+    return {body: by_time[..., k] for k, body in enumerate(names)}
 
 
 @compiled("pose_type")
 def _frames(pose_type: Any, coordinates: Mapping[str, Any]) -> Any:
-    """Return origin and axes of all bodies, shape (order + 1, components, 1 + components, bodies, time)."""
+    """Return origin and axes of all bodies, shape (components, 1 + components, bodies, time)."""
     import jax.numpy as jnp
 
-    pose = pose_type.from_coordinates({name: Jet(tuple(c)) for name, c in coordinates.items()})
+    pose = pose_type.from_coordinates({name: Jet((value,)) for name, value in coordinates.items()})
     columns = [pose.position, *(pose.direction(unit) for unit in np.eye(pose_type.shifts))]
-    return jnp.stack([stacked(column) for column in columns], axis=2)
+    return jnp.stack([stacked(column)[0] for column in columns], axis=1)
 
 
-def placed(motion: Any, body: str, points: Any, order: int = 0) -> np.ndarray:
-    """Return where points of a body are in the global frame, and their derivatives, at all instants.
-
-    Parameters
-    ----------
-    motion : Motion
-        At instants that were not solved the result is NaN.
-    body : str
-        Name of the body, ``"ground"`` included.
-    points : array_like of shape (n, components)
-        In the frame of the body, m.
-    order : int, default 0
-        Highest derivative.
-
-    Returns
-    -------
-    numpy.ndarray of shape (time, order + 1, n, components)
-        m, m/s, ...
-
-    Raises
-    ------
-    MechanismError
-        No body has the name, the points are no vectors, or the order is above that of the motion.
-
-    Examples
-    --------
-    >>> import jounce as jn
-    >>> from jounce.plot.frames import placed
-    >>> motion = jn.solve(jn.load("examples/four_bar.yaml"), [0.0], order=1)
-    >>> placed(motion, "crank", [[0.0, 0.0], [0.04, 0.0]], order=1)[0, 0].round(5).tolist()
-    [[0.0, 0.0], [0.03464, 0.02]]
-    """
-    names, components = (GROUND, *motion.mechanism.bodies), POSITION_COMPONENTS[motion.mechanism.space]
-    check_name("body", body, names, MechanismError, name="body")
-    local = np.asarray(points, float)
-    if local.ndim != 2 or local.shape[1] != components:
-        raise MechanismError(f"must be a list of vectors of {components} numbers", name="points", value=local.tolist())
-    if not 0 <= order <= motion.order:
-        message = f"the motion has derivatives up to order {motion.order}; solve it with a higher order"
-        raise MechanismError(message, name="order", value=order)
-    frame = _all_frames(motion, order)[..., names.index(body), :]
-    found = frame[:, :, 0, None, :] + np.einsum("kcdt,nd->kcnt", frame[:, :, 1:], local)
-    found = np.moveaxis(found, (3, 0, 2, 1), (0, 1, 2, 3))
-    found[:, 1:] += 0.0  # no negative zeros
-    return np.where((np.asarray(motion.status) == 0)[:, None, None, None], found, np.nan)
+def points_at(
+    frame: Frame, points: Float[np.ndarray, "*points components"]
+) -> Float[np.ndarray, "time *points components"]:
+    """Return points of a body in the global frame."""
+    turned = np.einsum("tck,...k->t...c", frame[:, :, 1:], points)
+    return turned + frame[:, :, 0].reshape(len(frame), *[1] * (points.ndim - 1), -1)
 
 
-def frames(motion: Any) -> dict[str, np.ndarray]:
-    """Return where all bodies of a motion are: for each, the ground first, its origin, m, and its axes in columns.
-
-    Each has the shape (time, components, 1 + components); NaN at instants that were not solved.
-    """
-    whole = np.where(np.asarray(motion.status) == 0, _all_frames(motion, 0)[0], np.nan)
-    names = (GROUND, *motion.mechanism.bodies)
-    return {body: np.moveaxis(whole[:, :, k], -1, 0) for k, body in enumerate(names)}
-
-
-def _all_frames(motion: Any, order: int) -> np.ndarray:
-    """Return derivatives of the frames of all bodies; kept with the motion."""
-    known = motion.derived.get("frames")
-    if known is None or len(known) <= order:
-        pose_type, coordinates = motion.poses
-        cut = {name: tuple(c[: order + 1]) for name, c in coordinates.items()}
-        known = np.array(_frames(pose_type, cut))
-        sizes: Sequence[float] = np.cumprod([1.0, *range(1, order + 1)]).tolist()
-        known *= np.array(sizes).reshape(-1, *[1] * (known.ndim - 1))
-        motion.derived["frames"] = known
-    return known[: order + 1]
+def within(frame: Frame, places: Float[np.ndarray, "time components"]) -> Float[np.ndarray, "time components"]:
+    """Return global places in the frame of a body."""
+    return np.einsum("tkc,tk->tc", frame[:, :, 1:], places - frame[:, :, 0])

@@ -5,17 +5,22 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
-from jounce.mechanism.builder import starting_guess
+from jounce.mechanism import Mechanism
 from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.resolve import resolve
+from jounce.plot.frames import guessed, points_at, within
 
 __all__ = ["pitch_radii"]
 
+Center = Float[np.ndarray, "2"]
+Pins = list[dict[str, Center]]  # the points of each revolute joint by body
+
 
 def pitch_radii(
-    mechanism: Any, bodies: tuple[str, ...], ratio: float
-) -> tuple[list[np.ndarray], tuple[float, float] | None]:
+    mechanism: Mechanism, bodies: tuple[str, ...], ratio: float
+) -> tuple[list[Center], tuple[float, float] | None]:
     """Return the centres of two gears, each in the frame of its body, and their pitch radii, m.
 
     Parameters
@@ -55,9 +60,6 @@ def pitch_radii(
     return centers, (abs(ratio) * second, second)
 
 
-Pins = list[dict[str, np.ndarray]]
-
-
 def _pins(mechanism: Any) -> Pins:
     """Return the points of all revolute joints by body."""
     parameters = mechanism.parameter_values
@@ -71,7 +73,7 @@ def _pins(mechanism: Any) -> Pins:
     ]
 
 
-def _center(pins: Pins, body: str, carrier: str) -> np.ndarray:
+def _center(pins: Pins, body: str, carrier: str) -> Center:
     """Return the point of a gear at which it is pinned: to its carrier, to the ground, or to any other body."""
     held = [pin for pin in pins if body in pin]
     for wanted in (carrier, GROUND):
@@ -81,7 +83,7 @@ def _center(pins: Pins, body: str, carrier: str) -> np.ndarray:
     return held[0][body] if held else np.zeros(2)
 
 
-def _seen_from(mechanism: Any, pins: Pins, body: str, carrier: str, center: np.ndarray) -> np.ndarray:
+def _seen_from(mechanism: Mechanism, pins: Pins, body: str, carrier: str, center: Center) -> Center:
     """Return the centre of a gear in the frame of its carrier: by a pin, by two on one line, else by the guess."""
     held = [pin for pin in pins if body in pin and np.array_equal(pin[body], center)]
     for pin in held:
@@ -92,13 +94,6 @@ def _seen_from(mechanism: Any, pins: Pins, body: str, carrier: str, center: np.n
         for second in pins:
             if other in second and carrier in second and np.allclose(second[other], pin[other], rtol=0, atol=1e-12):
                 return second[carrier]
-    guess = starting_guess(mechanism, mechanism.parameter_values, 2)
-    names = (GROUND, *mechanism.bodies)
-
-    def pose(name: str) -> tuple[np.ndarray, np.ndarray]:
-        angle = float(np.asarray(guess["angle"])[..., names.index(name), 0])
-        turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-        return np.asarray(guess["position"])[:, names.index(name), 0], turn
-
-    (place, turn), (origin, frame) = pose(body), pose(carrier)
-    return frame.T @ (place + turn @ center - origin)
+    frames = guessed(mechanism)
+    (place,) = points_at(frames[body], center)
+    return within(frames[carrier], place[None])[0]

@@ -7,21 +7,30 @@ outputs, whatever their types, one's own included.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
-from jounce.constraints.base import field_kind, value_fields
+from jounce.constraints.base import AbstractConstraint, field_kind, value_fields
 from jounce.errors import JounceError
+from jounce.forces.base import AbstractForce
+from jounce.mechanism import Mechanism
 from jounce.mechanism.mechanism import GROUND, check_mechanism
 from jounce.mechanism.resolve import check_value, resolve
 from jounce.mechanism.system import POSITION_COMPONENTS
-from jounce.plot.frames import guessed, placed as placed
+from jounce.plot.frames import guessed, points_at
 from jounce.plot.gears import pitch_radii
 
-__all__ = ["Link", "Skeleton", "Symbol", "placed", "skeleton"]
+__all__ = ["Link", "Point", "Points", "Skeleton", "Symbol", "Wheel", "frame_along", "skeleton"]
+
+Point = Float[np.ndarray, " components"]
+Points = Float[np.ndarray, "points components"]
+Element = AbstractConstraint | AbstractForce
+Values = Mapping[str, Mapping[str, np.ndarray]]  # numbers and vectors by element and field
 
 SLOTS = {"_i": 0, "_j": 1, "_m": 2}  # endings of fields, and the body that each is fixed to
 DIRECTIONS = ("axis", "vector")  # of joints; the first that there is counts
@@ -36,7 +45,7 @@ class Link:
     ----------
     body : str
         Its name; ``"ground"`` has no bars.
-    points : numpy.ndarray of shape (n, components)
+    points : numpy.ndarray of shape (points, components)
         In the frame of the body, m; at least one.
     names : tuple of tuple of str
         Joints, drivers, forces and outputs at each point; none at a centre of mass or an origin that stands in.
@@ -46,7 +55,7 @@ class Link:
     """
 
     body: str
-    points: np.ndarray
+    points: Points
     names: tuple[tuple[str, ...], ...]
     edges: tuple[tuple[int, int], ...]
 
@@ -77,15 +86,50 @@ class Symbol:
     name: str
     kind: str
     bodies: tuple[str, ...]
-    points: tuple[np.ndarray, ...]
-    axes: tuple[np.ndarray | None, ...]
+    points: tuple[Point, ...]
+    axes: tuple[Point | None, ...]
     radii: tuple[float | None, ...]
     internal: bool = False
 
     @property
-    def radius(self) -> float | None:
-        """Radius of the wheel that rolls or of the first gear, m; None where there is none."""
-        return next((radius for radius in self.radii if radius is not None), None)
+    def moving_slot(self) -> int:
+        """Which of the bodies the symbol is fixed to: one that moves, the last of them."""
+        moving = [k for k, body in enumerate(self.bodies[:2]) if body != GROUND]
+        return moving[-1] if moving else 0
+
+    @property
+    def block_and_rail(self) -> tuple[int, int]:
+        """Which of the bodies slides, and which has the rail: the ground, else the first body."""
+        return (0, 1) if self.bodies[1] == GROUND else (1, 0)
+
+    def axis_on(self, slot: int) -> Point:
+        """Return the axis or direction on one of the bodies, in its frame; x where there is none."""
+        known = [axis for axis in (self.axes[slot], self.axes[1 - slot]) if axis is not None]
+        return known[0] if known else np.eye(len(self.points[slot]))[0]
+
+
+@dataclass(frozen=True)
+class Wheel:
+    """A gear, or a wheel that rolls.
+
+    Parameters
+    ----------
+    body : str
+    center : numpy.ndarray of shape (2,)
+        In the frame of the body, m.
+    radius : float
+        Pitch radius, m.
+    internal : bool
+        Whether it is a ring with its teeth inside.
+    partner : float or None
+        Pitch radius of the gear it meshes with, m; None for a wheel without teeth.
+    """
+
+    body: str
+    center: Point
+    radius: float
+    internal: bool
+    partner: float | None
 
 
 @dataclass(frozen=True)
@@ -104,9 +148,25 @@ class Skeleton:
 
     links: dict[str, Link]
     symbols: tuple[Symbol, ...]
+    drivers: tuple[Symbol, ...]
+    forces: tuple[Symbol, ...]
     size: float
-    drivers: tuple[Symbol, ...] = ()
-    forces: tuple[Symbol, ...] = ()
+
+    @cached_property
+    def wheels(self) -> list[Wheel]:
+        """Gears and wheels, in the order of their joints; a gear of several pairs counts once."""
+        found: list[Wheel] = []
+        for symbol in self.symbols:
+            radii = [radius for radius in symbol.radii if radius is not None]
+            for body, center, radius in zip(symbol.bodies, symbol.points, symbol.radii, strict=True):
+                if radius is None:
+                    continue
+                near = SAME * self.size
+                same = (w for w in found if w.body == body and np.allclose(w.center, center, rtol=0, atol=near))
+                if not any(abs(wheel.radius - radius) <= near for wheel in same):
+                    partner = sum(radii) - radius if symbol.kind == "gear" else None
+                    found.append(Wheel(body, center, radius, symbol.internal and radius == max(radii), partner))
+        return found
 
 
 @dataclass
@@ -116,7 +176,7 @@ class _Points:
     places: list[np.ndarray] = field(default_factory=list)
     names: list[list[str]] = field(default_factory=list)
 
-    def add(self, place: np.ndarray, name: str, near: float) -> None:
+    def add(self, place: Point, name: str, near: float) -> None:
         for known, names in zip(self.places, self.names, strict=True):
             if np.linalg.norm(known - place) <= near:
                 if name and name not in names:
@@ -126,7 +186,7 @@ class _Points:
         self.names.append([name] if name else [])
 
 
-def skeleton(mechanism: Any) -> Skeleton:
+def skeleton(mechanism: Mechanism) -> Skeleton:
     """Return what a mechanism looks like, with its parameters resolved.
 
     Parameters
@@ -161,32 +221,34 @@ def skeleton(mechanism: Any) -> Skeleton:
         kind: {name: _values(element, parameters, components, f"{kind}.{name}") for name, element in elements.items()}
         for kind, elements in mechanism.elements.items()
     }
-    found = [touch for kind in kinds for touch in _touched(mechanism.elements[kind], kinds[kind])]
-    local = {body: [place for _, other, place in found if other == body] for body in (GROUND, *mechanism.bodies)}
-    poses = guessed(mechanism)
-    size = _extent(np.concatenate([poses[body](places) for body, places in local.items() if places] or [[0.0]]))
+    found = [touch for kind, values in kinds.items() for touch in _touched(mechanism.elements[kind], values)]
+    start = guessed(mechanism)
+    everywhere = [points_at(start[body], place)[0] for _, body, place in found]
+    size = float(np.linalg.norm(np.ptp(everywhere or [[0.0]], axis=0)))
     if not size:
-        size = 2 * _largest(local, kinds) or 1.0
-    bodies = {body: _Points() for body in local}
+        size = 2 * _largest([place for _, _, place in found], kinds) or 1.0
+    bodies = {body: _Points() for body in start}
     for name, body, place in found:
         bodies[body].add(place, name, SAME * size)
+    holding = {*mechanism.joints, *mechanism.drivers, *mechanism.forces}
+    links = {}
     for body, points in bodies.items():
         _complete(body, points, mechanism, components, SAME * size)
-    places = {body: np.array(points.places).reshape(-1, components) for body, points in bodies.items()}
-    links = {
-        body: Link(
-            body,
-            places[body],
-            tuple(map(tuple, points.names)),
-            () if body == GROUND else _bars(places[body], SAME * size, _held(points, mechanism)),
+        places = np.array(points.places)
+        held = [bool(holding.intersection(names)) for names in points.names]  # others are only watched
+        bars = () if body == GROUND else _bars(places, SAME * size, held)
+        links[body] = Link(body, places, tuple(map(tuple, points.names)), bars)
+    joints, drivers, forces = (
+        tuple(
+            _symbol(mechanism, name, element, kinds[kind][name], components)
+            for name, element in mechanism.elements[kind].items()
         )
-        for body, points in bodies.items()
-    }
-    drawn = [_symbols(mechanism, kind, kinds[kind], components) for kind in ("joints", "drivers", "forces")]
-    return Skeleton(links, drawn[0], size, *drawn[1:])
+        for kind in ("joints", "drivers", "forces")
+    )
+    return Skeleton(links, joints, drivers, forces, size)
 
 
-def _values(element: Any, parameters: Mapping[str, Any], components: int, name: str) -> dict[str, Any]:
+def _values(element: Any, parameters: Mapping[str, Any], components: int, name: str) -> dict[str, np.ndarray]:
     """Return the numbers and vectors of an element by field; laws and words are left out."""
     values = {}
     for field_name, its_field in value_fields(type(element)).items():
@@ -206,7 +268,7 @@ def _slot(field_name: str) -> int:
     return SLOTS.get(field_name[-2:], 0)
 
 
-def _touched(elements: Mapping[str, Any], values: Mapping[str, Any]) -> Iterator[tuple[str, str, np.ndarray]]:
+def _touched(elements: Mapping[str, Any], values: Values) -> Iterator[tuple[str, str, Point]]:
     """Return the name of each element, the body and the place in its frame, for all points of elements."""
     for name, element in elements.items():
         for field_name, value in values[name].items():
@@ -214,7 +276,7 @@ def _touched(elements: Mapping[str, Any], values: Mapping[str, Any]) -> Iterator
                 yield name, element.bodies[_slot(field_name)], value
 
 
-def _complete(body: str, points: _Points, mechanism: Any, components: int, near: float) -> None:
+def _complete(body: str, points: _Points, mechanism: Mechanism, components: int, near: float) -> None:
     """Add the centre of mass, or the origin, to a body that has too few points to be seen."""
     if body != GROUND and len(points.places) < 2:
         center = mechanism.bodies[body].center_of_mass
@@ -224,26 +286,14 @@ def _complete(body: str, points: _Points, mechanism: Any, components: int, near:
         points.add(np.zeros(components), "", near)
 
 
-def _extent(points: np.ndarray) -> float:
-    return float(np.linalg.norm(np.ptp(np.asarray(points, float), axis=0)))
-
-
-def _largest(local: Mapping[str, list[np.ndarray]], kinds: Mapping[str, Any]) -> float:
+def _largest(places: list[Point], kinds: Mapping[str, Values]) -> float:
     """Return the largest length that is known where all points fall into one."""
-    lengths = [float(np.linalg.norm(place)) for places in local.values() for place in places]
-    for values in kinds.values():
-        for found in values.values():
-            lengths += [abs(float(found[name])) for name in ("length", "radius") if name in found]
-    return max(lengths, default=0.0)
+    elements = [found for values in kinds.values() for found in values.values()]
+    lengths = [abs(float(found[name])) for found in elements for name in ("length", "radius") if name in found]
+    return max([*lengths, *(float(np.linalg.norm(place)) for place in places)], default=0.0)
 
 
-def _held(points: _Points, mechanism: Any) -> list[bool]:
-    """Tell which points of a body something holds or pushes; at the others it is only watched."""
-    holding = {*mechanism.joints, *mechanism.drivers, *mechanism.forces}
-    return [bool(holding.intersection(names)) for names in points.names]
-
-
-def _bars(points: np.ndarray, near: float, held: list[bool]) -> tuple[tuple[int, int], ...]:
+def _bars(points: Points, near: float, held: list[bool]) -> tuple[tuple[int, int], ...]:
     """Return the bars of a link: one between two points, the outline of points in one plane, else a tree."""
     count = len(points)
     if count < 2:
@@ -274,15 +324,9 @@ def _bars(points: np.ndarray, near: float, held: list[bool]) -> tuple[tuple[int,
     return tuple(sorted((min(i, j), max(i, j)) for i, j in zip(tree.row.tolist(), tree.col.tolist(), strict=True)))
 
 
-def _symbols(mechanism: Any, kind: str, values: Mapping[str, Any], components: int) -> tuple[Symbol, ...]:
-    """Return the symbols of all joints, drivers or forces."""
-    return tuple(
-        _symbol(mechanism, name, element, values[name], components)
-        for name, element in mechanism.elements[kind].items()
-    )
-
-
-def _symbol(mechanism: Any, name: str, element: Any, values: Mapping[str, Any], components: int) -> Symbol:
+def _symbol(
+    mechanism: Mechanism, name: str, element: Element, values: Mapping[str, np.ndarray], components: int
+) -> Symbol:
     bodies, kind = element.bodies, element.type_name or type(element).__name__
     points: list[np.ndarray] = [np.zeros(components)] * len(bodies)
     axes: list[np.ndarray | None] = [None] * len(bodies)
@@ -296,26 +340,40 @@ def _symbol(mechanism: Any, name: str, element: Any, values: Mapping[str, Any], 
             axes[slot] = value
     if "radius" in values and len(bodies) > 1:
         radii[1] = float(values["radius"])
-    if getattr(element, "coordinate", "angle") != "angle":
-        axes[0] = np.array([1.0, 0.0]) if element.coordinate == "x" else np.array([0.0, 1.0])
-    if element.role == "joint" and kind in ("gear", "coordinate") and mechanism.space == "planar":
-        return _geared(mechanism, Symbol(name, kind, bodies, tuple(points), tuple(axes), tuple(radii)), element, values)
-    return Symbol(name, kind, bodies, tuple(points), tuple(axes), tuple(radii))
-
-
-def _geared(mechanism: Any, symbol: Symbol, element: Any, values: Mapping[str, Any]) -> Symbol:
-    """Return the symbol of two gears, or of a wheel on a rack, where a joint of coordinates is one."""
-    ratio = float(values.get("ratio", 1.0))
     coordinate = getattr(element, "coordinate", "angle")
+    if coordinate != "angle":
+        axes[0] = np.array([1.0, 0.0]) if coordinate == "x" else np.array([0.0, 1.0])
+    symbol = Symbol(name, kind, bodies, tuple(points), tuple(axes), tuple(radii))
+    if getattr(element, "role", "") == "joint" and kind in ("gear", "coordinate") and mechanism.space == "planar":
+        return _geared(mechanism, symbol, coordinate, float(values.get("ratio", 1.0)))
+    return symbol
+
+
+def _geared(mechanism: Mechanism, symbol: Symbol, coordinate: str, ratio: float) -> Symbol:
+    """Return the symbol of two gears, or of a wheel on a rack, where a joint of coordinates is one."""
     if ratio == 0 or symbol.bodies[0] == GROUND:
         return symbol
     if coordinate != "angle":
-        center, _ = pitch_radii(mechanism, symbol.bodies, -1.0)
+        centers, _ = pitch_radii(mechanism, symbol.bodies, -1.0)
         side = np.array([0.0, -ratio]) if coordinate == "x" else np.array([ratio, 0.0])
-        points = center[0], symbol.points[1]
-        return Symbol(symbol.name, "rack", symbol.bodies, points, (side, symbol.axes[0]), (abs(ratio), None))
+        points, axes = (centers[0], symbol.points[1]), (side, symbol.axes[0])
+        return replace(symbol, kind="rack", points=points, axes=axes, radii=(abs(ratio), None))
     centers, radii = pitch_radii(mechanism, symbol.bodies, ratio)
     if radii is None:
         return symbol
-    points = (*centers, *symbol.points[2:])
-    return Symbol(symbol.name, "gear", symbol.bodies, points, symbol.axes, (*radii, *symbol.radii[2:]), ratio > 0)
+    points, radii = (*centers, *symbol.points[2:]), (*radii, *symbol.radii[2:])
+    return replace(symbol, kind="gear", points=points, radii=radii, internal=ratio > 0)
+
+
+def frame_along(axis: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
+    """Return three unit vectors, in rows, of which the first is along an axis of any length.
+
+    Examples
+    --------
+    >>> frame_along(np.array([0.0, 0.0, 2.0])).tolist()
+    [[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]]
+    """
+    first = axis / np.linalg.norm(axis)
+    second = np.cross(first, np.eye(3)[np.argmin(np.abs(first))])
+    second /= np.linalg.norm(second)
+    return np.stack([first, second, np.cross(first, second)])

@@ -1,4 +1,4 @@
-"""Symbols and units of quantities and of their derivatives, in the notation of matplotlib's mathtext."""
+"""Words, symbols and units of quantities and their derivatives, in matplotlib's mathtext, and the ranges of axes."""
 
 from __future__ import annotations
 
@@ -6,10 +6,12 @@ import math
 import re
 
 import numpy as np
+from jaxtyping import Float
 
-from jounce.reporting.peaks import derivative_unit
+from jounce.mechanism.outputs import AbstractQuantity
+from jounce.reporting.peaks import derivative_unit, rate_name
 
-__all__ = ["scale_of", "symbol", "unit_label"]
+__all__ = ["axis_range", "quantity_word", "rounded_down", "scale_of", "symbol", "unit_label"]
 
 GREEK = (
     "alpha beta gamma delta epsilon zeta eta theta iota kappa lambda mu nu xi pi rho sigma tau upsilon phi chi psi "
@@ -43,6 +45,19 @@ def symbol(name: str, order: int = 0, component: str = "") -> str:
     return f"${letter}{subscript}^{{({order})}}$"
 
 
+def quantity_word(output: AbstractQuantity, order: int) -> str:
+    """Name a derivative of an output: as `rate_name`, but what is an angle is called so.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> quantity_word(jn.AngleOutput("crank"), 0), quantity_word(jn.AngleOutput("crank"), 1)
+    ('angle', 'velocity')
+    """
+    word = rate_name(output, order)
+    return "angle" if word == "position" and output.unit == "rad" else word
+
+
 def unit_label(unit: str, order: int, exponent: int = 0) -> str:
     """Return the unit of a derivative in mathtext, with a prefix or a power of ten.
 
@@ -64,7 +79,7 @@ def unit_label(unit: str, order: int, exponent: int = 0) -> str:
     return f"$10^{{{exponent}}}$ {text}"
 
 
-def scale_of(values: np.ndarray) -> int:
+def scale_of(values: Float[np.ndarray, "..."]) -> int:
     """Return the power of ten, a multiple of three, by which an axis is divided so that its numbers are short.
 
     Examples
@@ -77,3 +92,43 @@ def scale_of(values: np.ndarray) -> int:
     if largest == 0 or 0.01 <= largest < 2000:
         return 0
     return 3 * math.floor(math.log10(largest) / 3)
+
+
+def axis_range(values: Float[np.ndarray, "..."], margin: float = 0.0, size: float | None = None) -> tuple[float, float]:
+    """Return the ends of an axis for values; a constant gets some room, so that its rounding is not magnified.
+
+    Parameters
+    ----------
+    values : numpy.ndarray
+        Those that are not finite do not count.
+    margin : float, default 0
+        Room on either side, in spans of the values.
+    size : float, optional
+        What rounding is small against; the largest value unless given.
+
+    Examples
+    --------
+    >>> axis_range(np.array([0.0, 2.0]), 0.5), axis_range(np.array([10.0, 10.0]))
+    ((-1.0, 3.0), (9.0, 11.0))
+    """
+    finite = values[np.isfinite(values)]
+    if not finite.size:
+        return -1.0, 1.0
+    low, high = float(finite.min()), float(finite.max())
+    size = max(abs(low), abs(high)) if size is None else size
+    if high - low <= 1e-9 * size or size == 0:
+        middle, half = 0.5 * (low + high), 0.1 * size or 1.0
+        return middle - half, middle + half
+    return low - margin * (high - low), high + margin * (high - low)
+
+
+def rounded_down(value: float) -> float:
+    """Return the largest of 1, 2, 5, 10, 20, ... that is not above a value.
+
+    Examples
+    --------
+    >>> [rounded_down(x) for x in (0.07, 0.7, 3.0, 12.0)]
+    [0.05, 0.5, 2.0, 10.0]
+    """
+    power = 10.0 ** np.floor(np.log10(value) + 1e-12)
+    return float(f"{power * max(k for k in (1.0, 2.0, 5.0) if k * power <= value * (1 + 1e-9)):.3g}")

@@ -8,8 +8,9 @@ import numpy as np
 
 from jounce.dynamics.limits import FIELDS, LimitReport, LimitRow
 from jounce.errors import RobotError
+from jounce.plot.instants import evenly_chosen
 from jounce.plot.labels import unit_label
-from jounce.plot.style import GREY, LINE_COLOURS, PALE_GREY, blank_figure, shown_name, style
+from jounce.plot.style import GREY, LINE_COLOURS, PALE_GREY, blank_figure, set_ticks, shown_name, style
 
 __all__ = ["draw_limits"]
 
@@ -90,17 +91,13 @@ def _line_style(joint: int) -> dict[str, Any]:
 
 
 def _draw_panel(report: LimitReport, quantity: int, joints: list[int], axes: Any) -> None:
-    from matplotlib.ticker import MaxNLocator
-
-    step = -(-len(report.times) // DRAWN)
-    chosen = np.unique(np.append(np.arange(0, len(report.times), step), len(report.times) - 1))
+    chosen = evenly_chosen(np.arange(len(report.times)), DRAWN)
     shares = report.shares[chosen, quantity]
     for joint in joints:
         axes.plot(report.times[chosen], shares[:, joint], **_line_style(joint))
     worst = max(_rows_of(report, quantity), key=lambda row: row.ratio or 0.0)
-    low, high = min(-1.0, float(np.nanmin(shares))), max(1.0, float(np.nanmax(shares)))
     at = (worst.ratio or 0.0) * (1 if _is_upper(report, worst) else -1)
-    low, high = min(low, at), max(high, at)
+    low, high = min(-1.0, at, float(np.nanmin(shares))), max(1.0, at, float(np.nanmax(shares)))
     margin = 0.08 * (high - low)
     axes.set_ylim(low - margin, high + margin)
     axes.set_xlim(report.times[0], report.times[-1])
@@ -109,8 +106,8 @@ def _draw_panel(report: LimitReport, quantity: int, joints: list[int], axes: Any
         axes.axhspan(sign, sign * (abs(low) + abs(high) + margin), color=FORBIDDEN, linewidth=0, zorder=0)
     axes.axhline(0.0, color=PALE_GREY, linewidth=0.7, zorder=1)
     axes.plot([worst.time], [at], marker="o", markersize=4, color="black", fillstyle="none", zorder=5, clip_on=False)
-    axes.yaxis.set_major_locator(MaxNLocator(nbins=5, steps=[1, 2, 2.5, 5, 10], min_n_ticks=3))
-    axes.xaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 2.5, 5, 10]))
+    set_ticks(axes.yaxis, 5, least=3)
+    set_ticks(axes.xaxis, 6)
     words = " / ".join(dict.fromkeys(row.quantity for row in _rows_of(report, quantity)))
     axes.set_ylabel(f"{words}\n(share of limit)")
     name = shown_name(worst.joint)
@@ -136,17 +133,7 @@ def _is_upper(report: LimitReport, row: LimitRow) -> bool:
 def _draw_legend(report: LimitReport, joints: list[int], figure: Any) -> None:
     from matplotlib.lines import Line2D
 
-    names = [shown_name(report.joint_names[joint]) for joint in joints]
-    handles = [
-        Line2D([], [], linewidth=1.6, label=name, **_line_style(joint))
-        for joint, name in zip(joints, names, strict=True)
-    ]
-    figure.legend(
-        handles=handles,
-        loc="outside lower center",
-        ncols=_per_line(report, joints),
-        handlelength=1.8,
-        handletextpad=0.5,
-        columnspacing=1.4,
-        borderaxespad=0.1,
-    )
+    names = {joint: shown_name(report.joint_names[joint]) for joint in joints}
+    handles = [Line2D([], [], linewidth=1.6, label=name, **_line_style(joint)) for joint, name in names.items()]
+    spacing = {"handlelength": 1.8, "handletextpad": 0.5, "columnspacing": 1.4, "borderaxespad": 0.1}
+    figure.legend(handles=handles, loc="outside lower center", ncols=_per_line(report, joints), **spacing)

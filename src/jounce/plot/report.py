@@ -11,18 +11,23 @@ from os import PathLike
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float, Int
 
 from jounce.io.files.writing import check_target, replacing
-from jounce.kinematics import Status
+from jounce.kinematics import Motion, Status
+from jounce.mechanism import Mechanism
 from jounce.mechanism.mechanism import GROUND
+from jounce.mechanism.outputs import AbstractQuantity
 from jounce.mechanism.resolve import resolve
 from jounce.plot.animation import LONGEST, SHORTEST
-from jounce.plot.canvas import AZIMUTH, ELEVATION
+from jounce.plot.drawing import VIEW, View
+from jounce.plot.instants import evenly_chosen, unsolved_runs
+from jounce.plot.labels import quantity_word, rounded_down
 from jounce.plot.scene import scene_of
-from jounce.plot.sketch import length_text, paths_of, round_length
+from jounce.plot.sketch import length_text, limits_with, paths_of
 from jounce.plot.style import BODY_COLOURS
 from jounce.reporting.motion_facts import motion_facts
-from jounce.reporting.peaks import derivative_name, derivative_unit, peaks, rate_name
+from jounce.reporting.peaks import Peak, derivative_name, derivative_unit, peaks
 from jounce.reporting.summaries import motion_summary
 
 __all__ = ["check_report", "report"]
@@ -47,10 +52,10 @@ def check_report(path: str | PathLike[str], *, overwrite: bool = False) -> None:
 
 
 def report(
-    motion: Any,
+    motion: Motion,
     path: str | PathLike[str],
     *,
-    view: tuple[float, float] = (AZIMUTH, ELEVATION),
+    view: View = VIEW,
     source: str = "",
     overwrite: bool = False,
 ) -> None:
@@ -104,16 +109,15 @@ def _part(name: str) -> str:
     return files("jounce.plot").joinpath("page", name).read_text(encoding="utf-8")
 
 
-def _data(motion: Any, view: tuple[float, float], source: str) -> dict[str, Any]:
+def _data(motion: Motion, view: View, source: str) -> dict[str, Any]:
     """Return all that the page shows."""
     from jounce import __version__
 
     mechanism = motion.mechanism
     rising = np.argsort(motion.time, kind="stable")
-    shown = rising[np.unique(np.linspace(0, len(rising) - 1, min(MOST_INSTANTS, len(rising))).round().astype(int))]
+    shown = evenly_chosen(rising, MOST_INSTANTS)
     time = motion.time[shown]
     start, stop = float(time[0]), float(time[-1])
-    speed = _speed(stop - start)
     outputs = [_output(name, mechanism.outputs[name], values[shown]) for name, values in motion.outputs.items()]
     lines = motion_summary(motion_facts(motion), source or "mechanism").splitlines()
     return {
@@ -126,7 +130,7 @@ def _data(motion: Any, view: tuple[float, float], source: str) -> dict[str, Any]
         "start": start,
         "stop": stop,
         "digits": min(9, max(0, 3 - math.floor(math.log10(stop - start)))) if stop > start else 3,
-        "speed": speed,
+        "speed": _speed(stop - start),
         "speeds": [[value, f"{value:g} x"] for value in SPEEDS],
         "levels": [derivative_name(k) for k in range(1 + max([motion.order, *(len(o["words"]) - 1 for o in outputs)]))],
         "outputs": outputs,
@@ -150,47 +154,46 @@ def _speed(span: float) -> float:
     return min(SPEEDS, key=lambda speed: abs(math.log(speed / wanted)))
 
 
-def _number(value: Any) -> float | None:
+def _number(value: float | np.ndarray) -> float | None:
     """Return a number that JSON can hold: to some digits, nothing where it is not finite."""
     return float(f"{value:.{DIGITS}g}") if np.isfinite(value) else None
 
 
-def _output(name: str, output: Any, values: np.ndarray) -> dict[str, Any]:
+def _output(
+    name: str, output: AbstractQuantity, values: Float[np.ndarray, "time derivative *component"]
+) -> dict[str, Any]:
     """Return the values of an output by derivative and component, with words and units."""
     columns = values[..., None] if values.ndim == 2 else values
     orders, components = range(columns.shape[1]), columns.shape[2]
-    words = [rate_name(output, k) for k in orders]
     return {
         "name": name,
-        "words": ["angle" if word == "position" and output.unit == "rad" else word for word in words],
+        "words": [quantity_word(output, k) for k in orders],
         "units": [derivative_unit(output.unit, k) for k in orders],
         "components": list(output.labels[:components]) if components > 1 else [""],
         "values": [[[_number(v) for v in columns[:, k, c]] for c in range(components)] for k in orders],
     }
 
 
-def _peak(peak: Any) -> dict[str, Any]:
+def _peak(peak: Peak) -> dict[str, Any]:
     found = {name: getattr(peak, name) for name in ("output", "derivative", "unit")}
     times = {name: _number(getattr(peak, name)) for name in ("minimum_at", "maximum_at")}
     shown = dict(zip(("minimum", "maximum"), map(_number, peak.shown), strict=True))
     return found | times | shown | {"largest": list(peak.largest)}
 
 
-def _messages(motion: Any) -> list[str]:
+def _messages(motion: Motion) -> list[str]:
     """Word which instants were not solved, and why, one line for each run of them."""
-    status = np.asarray(motion.status)
-    failed = np.flatnonzero(status != 0)
     lines = []
-    for run in np.split(failed, np.flatnonzero(np.diff(failed) > 1) + 1) if failed.size else ():
+    for run in unsolved_runs(motion):
         first, last = motion.time[run[0]], motion.time[run[-1]]
         when = f"t = {first:g} s" if len(run) == 1 else f"t = {first:g} s to {last:g} s"
-        known = Status(int(status[run[0]]))
+        known = Status(int(motion.status[run[0]]))
         fault = motion.faults.get(int(run[0]), "")
         lines.append(f"Not solved at {when}{f' ({fault})' if fault else ''}: {known.advice}.")
     return lines
 
 
-def _bodies(mechanism: Any) -> list[dict[str, Any]]:
+def _bodies(mechanism: Mechanism) -> list[dict[str, Any]]:
     parameters, found = mechanism.parameter_values, []
     for k, (name, body) in enumerate(mechanism.bodies.items()):
         position = ", ".join(f"{value:.6g}" for value in np.asarray(resolve(body.position, parameters), float))
@@ -201,30 +204,23 @@ def _bodies(mechanism: Any) -> list[dict[str, Any]]:
 
 
 def _scene(
-    motion: Any, rising: np.ndarray, shown: np.ndarray, view: tuple[float, float], outputs: list[str]
-) -> dict[str, Any] | None:
+    motion: Motion,
+    rising: Int[np.ndarray, " time"],
+    shown: Int[np.ndarray, " shown"],
+    view: View,
+    outputs: list[str],
+) -> dict[str, Any]:
     """Return the shapes of the sketch at evenly spread instants, in whole steps of length."""
     solved = rising[np.asarray(motion.status)[rising] == 0]
-    if not solved.size:
-        solved = rising[:1]
-    chosen = solved[np.unique(np.linspace(0, len(solved) - 1, min(MOST_FRAMES, len(solved))).round().astype(int))]
-    scene = scene_of(motion, view=view, instants=chosen)
-    found = paths_of(motion, None, 0, view)
-    flat = {} if found is None else {name: path[shown] for name, path in found.flat.items()}
-    left, right, lower, upper = scene.limits
-    for path in flat.values():
-        known = path[np.isfinite(path).all(axis=1)]
-        if len(known):
-            left, lower = min(left, float(known[:, 0].min())), min(lower, float(known[:, 1].min()))
-            right, upper = max(right, float(known[:, 0].max())), max(upper, float(known[:, 1].max()))
-    margin = 3.0 * scene.unit
+    chosen = evenly_chosen(solved if solved.size else rising[:1], MOST_FRAMES)
+    scene, paths = scene_of(motion, view=view, instants=chosen), paths_of(motion, None, 0, view)
+    (left, right, lower, upper), margin = limits_with(scene, paths), 3.0 * scene.unit
     limits = [left - margin, right + margin, lower - 1.5 * margin, upper + margin]
     step = max(limits[1] - limits[0], limits[3] - limits[2]) / STEPS
-    bar = round_length(0.25 * (limits[1] - limits[0]))
+    bar = rounded_down(0.25 * (limits[1] - limits[0]))
 
     def places(points: np.ndarray) -> list[int | None]:
-        steps = points / step
-        return [round(v) if math.isfinite(v) else None for v in steps.reshape(-1).tolist()]
+        return [round(v) if math.isfinite(v) else None for v in (points / step).reshape(-1).tolist()]
 
     def moved(points: np.ndarray) -> list[int | None]:
         still = np.nanmax(np.abs(points - points[:1]), initial=0.0) < 0.5 * step
@@ -238,24 +234,15 @@ def _scene(
         "bar_text": length_text(bar),
         "times": motion.time[chosen].tolist(),
         "shapes": [
-            {
-                "kind": shape.kind,
-                "points": moved(shape.points),
-                "count": shape.points.shape[1],
-                "stroke": shape.stroke,
-                "fill": shape.fill,
-                "width": shape.width,
-                "dashes": list(shape.dashes),
-                "layer": shape.layer,
-                "radius": shape.radius,
-                "owner": shape.owner,
-            }
-            for shape in scene.shapes
+            vars(shape) | {"points": moved(shape.points), "count": shape.points.shape[1]} for shape in scene.shapes
         ],
         "labels": [
             {"text": label.text, "colour": label.colour, "points": moved(label.anchor[:, None])}
             for label in scene.labels
             if label.owner != f"bodies.{GROUND}"
         ],
-        "paths": [{"output": outputs.index(name), "points": places(path)} for name, path in flat.items()],
+        "paths": [
+            {"output": outputs.index(name), "points": places(flat[shown])}
+            for name, flat in (paths.flat.items() if paths else ())
+        ],
     }

@@ -7,17 +7,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
+from jaxtyping import Float, Int
 
+from jounce.kinematics import Motion
+from jounce.mechanism import Mechanism
 from jounce.mechanism.mechanism import GROUND
-from jounce.plot.canvas import AZIMUTH, BARS, ELEVATION, PLATES, Canvas, Label, Shape, tinted
+from jounce.plot.drawing import BARS, PLATES, VIEW, Drawing, Label, Shape, View, tinted
 from jounce.plot.frames import assembled, frames
 from jounce.plot.geometry import Link, skeleton
-from jounce.plot.symbols import draw_symbols
+from jounce.plot.joint_symbols import draw_symbols
 
-__all__ = ["Scene", "outline", "scene_of"]
+__all__ = ["Scene", "drawing_of", "outline", "scene_of"]
+
+Instants = Int[np.ndarray, " time"]
 
 
 @dataclass(frozen=True)
@@ -37,6 +41,11 @@ class Scene:
     shapes: list[Shape]
     labels: list[Label]
     unit: float
+
+    @classmethod
+    def of(cls, drawing: Drawing) -> Scene:
+        """Return what was drawn, lower layers first."""
+        return cls(sorted(drawing.shapes, key=lambda shape: shape.layer), drawing.labels, drawing.unit)
 
     @cached_property
     def limits(self) -> tuple[float, float, float, float]:
@@ -60,17 +69,8 @@ class Scene:
         return Scene(shapes, labels, self.unit)
 
 
-def scene_of(moving: Any, *, view: tuple[float, float] = (AZIMUTH, ELEVATION), instants: Any = None) -> Scene:
-    """Return the shapes of a mechanism, at the instants of a motion or as it is put together at the start.
-
-    Parameters
-    ----------
-    moving : Motion or Mechanism
-        What is drawn.
-    view : tuple of float, optional
-        Azimuth and elevation from which a spatial mechanism is seen, degrees.
-    instants : array_like of int, optional
-        Indices of the instants of a motion; all unless given.
+def scene_of(moving: Motion | Mechanism, *, view: View = VIEW, instants: Instants | None = None) -> Scene:
+    """Return the shapes of a mechanism; the arguments are those of `drawing_of`.
 
     Examples
     --------
@@ -80,38 +80,44 @@ def scene_of(moving: Any, *, view: tuple[float, float] = (AZIMUTH, ELEVATION), i
     >>> [label.text for label in scene.labels]
     ['crank', 'rocker', 'A', 'D', 'BC']
     """
-    mechanism = getattr(moving, "mechanism", moving)
-    seen = skeleton(mechanism)
-    places = assembled(mechanism) if mechanism is moving else frames(moving)
+    return Scene.of(drawing_of(moving, view=view, instants=instants))
+
+
+def drawing_of(moving: Motion | Mechanism, *, view: View = VIEW, instants: Instants | None = None) -> Drawing:
+    """Return a mechanism as it is drawn, at the instants of a motion or as it is put together at the start.
+
+    Parameters
+    ----------
+    moving : Motion or Mechanism
+        What is drawn.
+    view : tuple of float, optional
+        Azimuth and elevation from which a spatial mechanism is seen, degrees.
+    instants : array_like of int, optional
+        Indices of the instants of a motion; all unless given.
+    """
+    mechanism = moving if isinstance(moving, Mechanism) else moving.mechanism
+    places = assembled(moving) if isinstance(moving, Mechanism) else frames(moving)
     if instants is not None:
-        places = {body: frame[np.asarray(instants)] for body, frame in places.items()}
-    canvas = Canvas(seen, places, view)
-    for link in seen.links.values():
+        places = {body: frame[instants] for body, frame in places.items()}
+    drawing = Drawing(skeleton(mechanism), places, view)
+    for link in drawing.skeleton.links.values():
         if link.body != GROUND:
-            _draw_link(canvas, link)
-    draw_symbols(canvas, mechanism)
-    order = sorted(range(len(canvas.shapes)), key=lambda k: (canvas.shapes[k].layer, k))
-    return Scene([canvas.shapes[k] for k in order], canvas.labels, canvas.unit)
+            _draw_link(drawing, link)
+    draw_symbols(drawing, mechanism)
+    return drawing
 
 
-def _draw_link(canvas: Canvas, link: Link) -> None:
+def _draw_link(drawing: Drawing, link: Link) -> None:
     """Draw the bars of a body, or its plate, and write its name."""
-    colour, owner = canvas.colours[link.body], f"bodies.{link.body}"
-    places = canvas.flat(canvas.at(link.body, link.points))  # time, n, 2
+    colour, drawing.owner = drawing.colours[link.body], f"bodies.{link.body}"
+    places = drawing.flat(drawing.at(link.body, link.points))  # time, n, 2
     ring = _ring(link)
     if ring:
-        look = {"stroke": colour, "fill": tinted(colour), "width": 2.0, "layer": PLATES, "owner": owner}
-        canvas.curve(places[:, ring], closed=True, **look)
-    for first, second in link.edges[len(ring) :]:
-        width = 2.0 if ring else 4.0
-        canvas.curve(places[:, [first, second]], stroke=colour, width=width, layer=BARS, owner=owner)
-    anchor = places[:, 0]
-    if ring:
-        anchor = places[:, ring].mean(axis=1)
-    elif link.edges:
-        lengths = [np.linalg.norm(link.points[i] - link.points[j]) for i, j in link.edges]
-        anchor = places[:, link.edges[int(np.argmax(lengths))]].mean(axis=1)
-    canvas.name(link.body, anchor, colour, owner)
+        drawing.curve(places[:, ring], closed=True, stroke=colour, fill=tinted(colour), width=2.0, layer=PLATES)
+    for edge in link.edges[len(ring) :]:
+        drawing.curve(places[:, [*edge]], stroke=colour, width=2.0 if ring else 4.0, layer=BARS)
+    longest = max(link.edges, key=lambda edge: np.linalg.norm(np.diff(link.points[[*edge]], axis=0)), default=(0,))
+    drawing.name(link.body, places[:, ring or [*longest]].mean(axis=1), colour)
 
 
 def _ring(link: Link) -> list[int]:
@@ -124,8 +130,8 @@ def _ring(link: Link) -> list[int]:
     return []
 
 
-def outline(shape: Shape, instant: int) -> np.ndarray:
-    """Return the line around a shape at an instant, (n, 2) m."""
+def outline(shape: Shape, instant: int) -> Float[np.ndarray, "points 2"]:
+    """Return the line around a shape at an instant, m."""
     points = shape.points[min(instant, len(shape.points) - 1)]
     if shape.kind == "disc":
         angle = np.linspace(0.0, 2 * np.pi, 13)

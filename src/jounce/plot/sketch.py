@@ -8,16 +8,18 @@ from typing import Any
 import numpy as np
 
 from jounce.errors import MechanismError, did_you_mean
+from jounce.kinematics import Motion
 from jounce.mechanism import PointOutput
 from jounce.mechanism.mechanism import Mechanism, check_mechanism
-from jounce.plot.canvas import AZIMUTH, ELEVATION, WHEELS, screen_of
-from jounce.plot.labels import scale_of, unit_label
-from jounce.plot.naming import place_names
+from jounce.plot.drawing import VIEW, WHEELS, Label, Shape, View, screen_of
+from jounce.plot.instants import evenly_chosen, nearest_instants, solved_instants
+from jounce.plot.labels import rounded_down, scale_of, unit_label
+from jounce.plot.name_placement import place_names
 from jounce.plot.scene import Scene, outline, scene_of
 from jounce.plot.style import GREY, blank_figure, printable, shown_name, style
 from jounce.reporting.peaks import rate_name
 
-__all__ = ["Drawing", "Paths", "draw_scale", "length_text", "paths_of", "round_length", "sketch"]
+__all__ = ["Paths", "SketchFigure", "check_names", "draw_scale", "length_text", "limits_with", "paths_of", "sketch"]
 
 NAMES = ("all", "bodies", "joints", "none")
 WIDEST, TALLEST, LEAST = 6.4, 5.2, 2.6  # inches
@@ -35,38 +37,38 @@ class Paths:
     motion : Motion
         What moves.
     names : sequence of str
-        Outputs that are positions of points.
+        Outputs that are positions of points; at least one.
     order : int
         Derivative by whose size they are coloured; 0 for none.
     view : tuple of float
         From where a spatial mechanism is seen.
     """
 
-    def __init__(self, motion: Any, names: Sequence[str], order: int, view: tuple[float, float]):
+    def __init__(self, motion: Motion, names: Sequence[str], order: int, view: View):
         screen = np.eye(2) if motion.mechanism.space == "planar" else screen_of(view)[:2]
-        self.names, self.order = list(names), order
+        self.order = order
         self.flat = {name: motion.outputs[name][:, 0] @ screen.T for name in names}
-        self.sizes = {name: np.linalg.norm(motion.outputs[name][:, order], axis=-1) for name in names}
-        self.label = ""
-        if names and order:
-            output = motion.mechanism.outputs[names[0]]
-            self.exponent = scale_of(np.concatenate(list(self.sizes.values())))
-            whose = f" of {shown_name(names[0])}" if len(names) == 1 else ""
-            self.label = f"{rate_name(output, order)}{whose}  ({unit_label(output.unit, order, self.exponent)})"
+        sizes = {name: np.linalg.norm(motion.outputs[name][:, order], axis=-1) for name in names}
+        exponent = scale_of(np.concatenate(list(sizes.values())))
+        self.sizes = {name: size * 10.0**-exponent for name, size in sizes.items()}
+        output, whose = motion.mechanism.outputs[names[0]], f" of {shown_name(names[0])}" if len(names) == 1 else ""
+        self.label = f"{rate_name(output, order)}{whose}  ({unit_label(output.unit, order, exponent)})"
 
 
-def paths_of(motion: Any, wanted: Sequence[str] | None, order: int, view: tuple[float, float]) -> Paths | None:
-    """Return the paths of outputs of a motion: those wanted, or of all points; None for a mechanism at rest.
+def check_names(names: str) -> None:
+    """Raise MechanismError unless a choice of names is known."""
+    if names not in NAMES:
+        raise MechanismError(f"unknown choice; {did_you_mean(names, NAMES)}", name="names", value=names)
+
+
+def paths_of(motion: Motion, wanted: Sequence[str] | None, order: int, view: View) -> Paths | None:
+    """Return the paths of outputs of a motion: those wanted, or of all points; None where there are none.
 
     Raises
     ------
     MechanismError
         An output is no position of a point, or the order is above that of the motion.
     """
-    if isinstance(motion, Mechanism):
-        if wanted or order:
-            raise MechanismError("a mechanism has no paths before it moves; solve it first", name="paths")
-        return None
     points = [name for name, output in motion.mechanism.outputs.items() if isinstance(output, PointOutput)]
     for name in wanted or ():
         if name not in points:
@@ -79,7 +81,18 @@ def paths_of(motion: Any, wanted: Sequence[str] | None, order: int, view: tuple[
     return Paths(motion, chosen, order, view) if chosen and len(motion.time) > 1 else None
 
 
-class Drawing:
+def limits_with(scene: Scene, paths: Paths | None) -> tuple[float, float, float, float]:
+    """Return left, right, lower and upper end of a scene and of paths, m."""
+    left, right, lower, upper = scene.limits
+    for flat in paths.flat.values() if paths else ():
+        known = flat[np.isfinite(flat).all(axis=1)]
+        if len(known):
+            (low_x, low_y), (high_x, high_y) = known.min(axis=0).tolist(), known.max(axis=0).tolist()
+            left, lower, right, upper = min(left, low_x), min(lower, low_y), max(right, high_x), max(upper, high_y)
+    return left, right, lower, upper
+
+
+class SketchFigure:
     """A scene as a figure that can be moved from instant to instant.
 
     Parameters
@@ -96,24 +109,21 @@ class Drawing:
         Where to draw; a figure of its own unless given.
     """
 
-    def __init__(
-        self, scene: Scene, paths: Paths | None, title: str, view: tuple[float, float] | None, axes: Any = None
-    ):
+    def __init__(self, scene: Scene, paths: Paths | None, title: str, view: View | None, axes: Any = None):
         self.scene = scene
-        left, right, lower, upper = self._limits(scene, paths)
+        (left, right, lower, upper), margin = limits_with(scene, paths), 3.5 * scene.unit
+        left, right, lower, upper = left - margin, right + margin, lower - 2 * margin, upper + margin
         if axes is None:
-            bar = 0.9 if paths is not None and paths.order and paths.names else 0.0
-            axes = self._blank(right - left, upper - lower, bar, title)
+            axes = self._blank(right - left, upper - lower, 0.9 if paths and paths.order else 0.0, title)
         self.axes, self.figure = axes, axes.figure
         axes.set_aspect("equal")
         axes.set_axis_off()
         axes.set_xlim(left, right)
         axes.set_ylim(lower, upper)
-        if paths is not None:
+        if paths:
             _draw_paths(self.figure, axes, paths)
         self.artists = [self._artist(shape) for shape in scene.shapes]
-        self.texts: list[tuple[Any, Any]] = []
-        self.clock: Any = None
+        self.texts: list[tuple[Any, Label, np.ndarray]] = []
         draw_scale(axes, view)
 
     @staticmethod
@@ -124,18 +134,7 @@ class Drawing:
         size = max(least, wide * scale + 0.3 + bar), max(LEAST, tall * scale + 0.3 + 0.35 * bool(title))
         return blank_figure(*size, title).add_subplot()
 
-    @staticmethod
-    def _limits(scene: Scene, paths: Paths | None) -> tuple[float, float, float, float]:
-        left, right, lower, upper = scene.limits
-        for flat in paths.flat.values() if paths is not None else ():
-            known = flat[np.isfinite(flat).all(axis=1)]
-            if len(known):
-                left, lower = min(left, known[:, 0].min()), min(lower, known[:, 1].min())
-                right, upper = max(right, known[:, 0].max()), max(upper, known[:, 1].max())
-        margin = 3.5 * scene.unit
-        return left - margin, right + margin, lower - 2 * margin, upper + margin
-
-    def _artist(self, shape: Any) -> Any:
+    def _artist(self, shape: Shape) -> Any:
         from matplotlib.lines import Line2D
         from matplotlib.patches import Circle, Polygon
 
@@ -164,15 +163,13 @@ class Drawing:
         kinds = {"all": ("bodies", "joints"), "none": ()}.get(names, (names,))
         wanted = [label for label in self.scene.labels if label.owner.partition(".")[0] in kinds]
         obstacles = [outline(shape, instant) for shape in self.scene.shapes if shape.layer > WHEELS]
-        self.texts = place_names(self.figure, self.axes, wanted, instant, obstacles, self.scene.unit, still)
-        self._named = [
-            (label.anchor, np.array(text.get_position()) - label.anchor[instant]) for label, text in self.texts
-        ]
+        for label, text in place_names(self.figure, self.axes, wanted, instant, obstacles, self.scene.unit, still):
+            self.texts.append((text, label, np.array(text.get_position()) - label.anchor[instant]))
 
     def move_names(self, instant: int) -> None:
         """Let the names go along with what they belong to, to an instant, by index."""
-        for (_, text), (anchor, offset) in zip(self.texts, self._named, strict=True):
-            text.set_position(anchor[min(instant, len(anchor) - 1)] + offset)
+        for text, label, offset in self.texts:
+            text.set_position(label.anchor[min(instant, len(label.anchor) - 1)] + offset)
 
 
 def sketch(
@@ -182,7 +179,7 @@ def sketch(
     names: str = "all",
     paths: Sequence[str] | None = None,
     order: int = 0,
-    view: tuple[float, float] = (AZIMUTH, ELEVATION),
+    view: View = VIEW,
 ) -> Any:
     """Draw a mechanism as textbooks do: links, joint symbols, names, and the paths of its points.
 
@@ -223,27 +220,22 @@ def sketch(
     """
     mechanism = getattr(moving, "mechanism", moving)
     check_mechanism(mechanism)
-    if names not in NAMES:
-        raise MechanismError(f"unknown choice; {did_you_mean(names, NAMES)}", name="names", value=names)
-    found = paths_of(moving, paths, order, view)
-    if mechanism is moving:
-        scene, at = scene_of(mechanism, view=view), 0
+    check_names(names)
+    if isinstance(moving, Mechanism):
+        if paths or order:
+            raise MechanismError("a mechanism has no paths before it moves; solve it first", name="paths")
+        scene, found = scene_of(moving, view=view), None
     else:
-        solved = np.flatnonzero(np.asarray(moving.status) == 0)
-        if not solved.size:
-            raise MechanismError("no instant was solved, so that there is nothing to draw", name="motion")
-        at = int(
-            solved[np.argmin(np.abs(moving.time[solved] - (moving.time[solved[0]] if instant is None else instant)))]
-        )
-        chosen = np.unique([*np.linspace(0, len(solved) - 1, min(MOST, len(solved))).round().astype(int)])
-        chosen = np.unique([*solved[chosen], at])
-        whole = scene_of(moving, view=view, instants=chosen)
-        scene, at = whole.only(int(np.searchsorted(chosen, at))), 0
+        found, solved = paths_of(moving, paths, order, view), solved_instants(moving)
+        wanted = np.array([moving.time[solved[0]] if instant is None else instant])
+        at = solved[nearest_instants(moving.time[solved], wanted)[0]]
+        chosen = np.union1d(evenly_chosen(solved, MOST), at)  # what slides goes as far as in the whole motion
+        scene = scene_of(moving, view=view, instants=chosen).only(int(np.searchsorted(chosen, at)))
     with style():
-        drawing = Drawing(scene, found, mechanism.title, None if mechanism.space == "planar" else view)
-        drawing.show(at)
-        drawing.write_names(at, names)
-    return drawing.figure
+        figure = SketchFigure(scene, found, mechanism.title, None if mechanism.space == "planar" else view)
+        figure.show(0)
+        figure.write_names(0, names)
+    return figure.figure
 
 
 def _draw_paths(figure: Any, axes: Any, paths: Paths) -> None:
@@ -255,27 +247,25 @@ def _draw_paths(figure: Any, axes: Any, paths: Paths) -> None:
         for flat in paths.flat.values():
             axes.plot(flat[:, 0], flat[:, 1], color="#888888", linewidth=0.9, zorder=5)
         return
-    scale = 10.0**-paths.exponent
-    largest = max(float(np.nanmax(size)) for size in paths.sizes.values()) * scale
+    largest = max(float(np.nanmax(size)) for size in paths.sizes.values())
     norm = Normalize(0.0, largest or 1.0)
     drawn: Any = None
     for name, flat in paths.flat.items():
         pieces = np.stack([flat[:-1], flat[1:]], axis=1)
-        size = 0.5 * (paths.sizes[name][:-1] + paths.sizes[name][1:]) * scale
         drawn = LineCollection(pieces.tolist(), cmap=PATH_MAP, norm=norm, linewidth=2.2, zorder=5, capstyle="round")
-        drawn.set_array(size)
+        drawn.set_array(0.5 * (paths.sizes[name][:-1] + paths.sizes[name][1:]))
         axes.add_collection(drawn)
     bar = figure.colorbar(drawn, ax=axes, shrink=0.75, aspect=25, pad=0.02)
     bar.set_label(paths.label)
     bar.outline.set_visible(False)
 
 
-def draw_scale(axes: Any, view: tuple[float, float] | None = None) -> None:
+def draw_scale(axes: Any, view: View | None = None) -> None:
     """Draw a bar of a round length in the place of the one that is there, and the axes of a view in space."""
     for artist in axes.findobj(lambda found: found.get_gid() == "scale"):
         artist.remove()
     (left, right), (lower, upper) = axes.get_xlim(), axes.get_ylim()
-    length = round_length(0.22 * (right - left))
+    length = rounded_down(0.22 * (right - left))
     start, foot = left + 0.03 * (right - left), lower + 0.03 * (upper - lower)
     look = {"color": GREY, "gid": "scale"}
     axes.plot([start, start + length], [foot, foot], linewidth=1.6, solid_capstyle="butt", zorder=8, **look)
@@ -291,18 +281,6 @@ def draw_scale(axes: Any, view: tuple[float, float] | None = None) -> None:
         axes.annotate("", tip, origin, arrowprops=look, zorder=8, gid="scale")
         far = origin + 1.3 * arm * direction
         axes.text(*far, name, color=GREY, fontsize=7.5, ha="center", va="center", gid="scale")
-
-
-def round_length(length: float) -> float:
-    """Return the largest of 1, 2, 5, 10, 20, ... that is not above a length.
-
-    Examples
-    --------
-    >>> round_length(0.07), round_length(3.0)
-    (0.05, 2.0)
-    """
-    power = 10.0 ** np.floor(np.log10(length))
-    return float(f"{power * max(k for k in (1.0, 2.0, 5.0) if k * power <= length * (1 + 1e-9)):.3g}")
 
 
 def length_text(length: float) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.resources import as_file, files
 from typing import Any
 
 __all__ = [
@@ -18,10 +19,10 @@ __all__ = [
     "PURPLE",
     "RESOLUTION",
     "SKY",
-    "STYLE",
     "VERMILION",
     "blank_figure",
     "printable",
+    "set_ticks",
     "shown_name",
     "style",
 ]
@@ -37,43 +38,6 @@ LONGEST_NAME = 100  # characters, as files have it
 LETTER = 0.0088  # inches that a bold letter takes for each point of its size
 PALE_GREY = "#999999"  # of lines through zero
 RESOLUTION = 200  # dots per inch
-
-STYLE: dict[Any, Any] = {
-    "font.family": "sans-serif",
-    "font.sans-serif": ["DejaVu Sans"],
-    "font.size": 8.5,
-    "mathtext.fontset": "dejavusans",
-    "figure.titlesize": TITLE_SIZE,
-    "figure.titleweight": "bold",
-    "axes.titlesize": 9.5,
-    "axes.labelsize": 8.5,
-    "axes.linewidth": 0.7,
-    "axes.edgecolor": GREY,
-    "axes.labelcolor": "black",
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.unicode_minus": True,
-    "axes.axisbelow": True,
-    "axes.grid": True,
-    "grid.color": "#DDDDDD",
-    "grid.linewidth": 0.6,
-    "xtick.color": GREY,
-    "ytick.color": GREY,
-    "xtick.labelsize": 8,
-    "ytick.labelsize": 8,
-    "xtick.major.size": 3,
-    "ytick.major.size": 3,
-    "xtick.major.width": 0.7,
-    "ytick.major.width": 0.7,
-    "lines.linewidth": 1.3,
-    "lines.markersize": 4,
-    "lines.solid_joinstyle": "round",
-    "legend.fontsize": 8.5,
-    "legend.frameon": False,
-    "agg.path.chunksize": 20000,
-    "pdf.fonttype": 42,
-    "svg.hashsalt": "jounce",
-}
 
 
 @contextmanager
@@ -96,9 +60,11 @@ def style(**changes: Any) -> Iterator[None]:
     import matplotlib as mpl
     from matplotlib.rcsetup import cycler
 
-    changed: dict[Any, Any] = {"axes.prop_cycle": cycler(color=LINE_COLOURS)}
-    changed |= {name.replace("_", "."): value for name, value in changes.items()}
-    with mpl.rc_context(STYLE | changed), warnings.catch_warnings():
+    with as_file(files("jounce.plot") / "jounce.mplstyle") as path:
+        settings = mpl.rc_params_from_file(path, use_default_template=False)
+    settings["axes.prop_cycle"] = cycler(color=LINE_COLOURS)
+    changed: dict[Any, Any] = {name.replace("_", "."): value for name, value in changes.items()}
+    with mpl.rc_context(dict(settings) | changed), warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing", category=UserWarning)
         yield
 
@@ -121,6 +87,13 @@ def blank_figure(width: float, height: float, title: str = "", **pads: float) ->
         size = min(TITLE_SIZE, (width - 0.2) / (LETTER * len(title)))
         figure.suptitle(printable(title).replace("$", r"\$"), fontsize=size)
     return figure
+
+
+def set_ticks(axis: Any, most: int, least: int = 2) -> None:
+    """Put few ticks, at round numbers, on an axis."""
+    from matplotlib.ticker import MaxNLocator
+
+    axis.set_major_locator(MaxNLocator(nbins=most, steps=[1, 2, 2.5, 5, 10], min_n_ticks=least))
 
 
 def printable(text: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from fractions import Fraction
 from os import PathLike, fspath
 from typing import Any, Literal, NotRequired
 
@@ -10,10 +11,9 @@ import numpy as np
 from typing_extensions import TypedDict
 
 from jounce.constraints.base import value_fields
-from jounce.dynamics.start import driven
+from jounce.dynamics.start import initial_as_drivers
 from jounce.errors import JounceError, MobilityError
 from jounce.io.files.source import read_source
-from jounce.io.files.units import parse_value
 from jounce.io.mechanisms.keys import OUTPUTS, output_holder
 from jounce.kinematics.assembly import (
     Trial,
@@ -28,8 +28,8 @@ from jounce.mechanism import Mechanism, Model, build, time_grid
 from jounce.mechanism.masses import body_mass
 from jounce.mechanism.system import POSITION_COMPONENTS
 from jounce.reporting.summaries import freedom_words
-
-__all__ = ["InspectedMechanism", "MechanismFacts", "inspected", "mechanism_facts", "unit_of_dimension"]
+from jounce.trajectory.dimensions import Dimension
+from jounce.trajectory.units import parse_value
 
 TOLERANCE = 1e-12
 KINDS = ("joints", "drivers", "forces", "initial")
@@ -227,7 +227,7 @@ class _State:
 
     def _assembled(self) -> tuple[dict[str, Any] | None, dict[str, Any]]:
         told = {"status": "assembled", "message": None, "at": self.instant, "open": None}
-        model = build(driven(self.mechanism)) if self.mechanism.initial else self.model
+        model = build(initial_as_drivers(self.mechanism)) if self.mechanism.initial else self.model
         trial = self._trial(model)
         if trial is None:
             return model.guess, told
@@ -285,7 +285,7 @@ def _numbers(mechanism: Mechanism, value: Any, size: int) -> list[float] | None:
     return np.reshape(np.asarray(resolve(value, mechanism.parameter_values), float), size).tolist()
 
 
-def _parameters(mechanism: Mechanism, path: Any) -> list[dict[str, Any]]:
+def _parameters(mechanism: Mechanism, path: str | PathLike[str] | None) -> list[dict[str, Any]]:
     given = read_source(path).data.get("parameters") or {} if path is not None else mechanism.parameters
     found = []
     for name, value in mechanism.parameter_values.items():
@@ -301,7 +301,7 @@ def _parameters(mechanism: Mechanism, path: Any) -> list[dict[str, Any]]:
     return sorted(found, key=lambda entry: order.index(entry["name"]))
 
 
-def unit_of_dimension(dimension: Any) -> str:
+def unit_of_dimension(dimension: Dimension) -> str:
     """Return the SI unit of a dimension.
 
     Examples
@@ -316,7 +316,7 @@ def unit_of_dimension(dimension: Any) -> str:
     return "*".join(over or ["1"] * bool(under)) + "".join(f"/{unit}" for unit in under)
 
 
-def _power(base: str, power: int) -> str:
+def _power(base: str, power: int | Fraction) -> str:
     unit = BASES.get(base, base)
     return unit if power == 1 else f"{unit}^{power}"
 

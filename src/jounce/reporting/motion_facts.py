@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 from typing_extensions import TypedDict
 
-from jounce.kinematics import Status
+from jounce.integrate import Simulation
+from jounce.kinematics import Motion, Status
 from jounce.mechanism import build
-
-if TYPE_CHECKING:
-    from jounce.kinematics import Motion
-
-__all__ = ["MotionFacts", "SimulationFacts", "motion_facts"]
 
 
 class Span(TypedDict):
@@ -112,10 +108,10 @@ def motion_facts(motion: Motion) -> dict[str, Any]:
         "equations_of_drivers": drives,
         "change_points": np.asarray(motion.change_points, float).tolist(),
     }
-    return facts | _simulated(motion) if hasattr(motion, "energy") else facts
+    return facts | _simulated(motion) if isinstance(motion, Simulation) else facts
 
 
-def _simulated(motion: Any) -> dict[str, Any]:
+def _simulated(motion: Simulation) -> dict[str, Any]:
     reached = motion.status == Status.OK
     some, energy = bool(reached.any()), motion.energy[reached]
     return {

@@ -11,14 +11,17 @@ from typing import Any
 import numpy as np
 
 from jounce.errors import JounceError, SampleWarning
+from jounce.integrate import Batch
+from jounce.kinematics import Motion, Status
+from jounce.mechanism import Mechanism
 from jounce.reporting.mechanism_facts import mechanism_facts
 from jounce.reporting.motion_facts import motion_facts
 from jounce.reporting.peaks import peaks
 from jounce.reporting.robot_facts import robot_facts
 from jounce.reporting.summaries import count
 from jounce.reporting.tables import Table, mechanism_tables, number, peaks_table, robot_tables, table
-
-__all__ = ["shown"]
+from jounce.robot import Robot
+from jounce.trajectory import JointTrajectory
 
 ROWS = 30  # of a table, before the rest is counted
 # Colours are left to the page, so that light and dark themes both fit; lines are see-through grey.
@@ -32,7 +35,7 @@ STYLE = (
 )
 
 
-def shown(thing: Any) -> str:
+def shown(thing: Mechanism | Motion | Robot | JointTrajectory | Batch) -> str:
     """Return the HTML that a notebook shows of a mechanism, motion, simulation, robot, trajectory or batch.
 
     Examples
@@ -42,24 +45,21 @@ def shown(thing: Any) -> str:
     >>> "Planar four-bar" in page, page.count("<table>")
     (True, 5)
     """
-    from jounce.integrate import Batch
-    from jounce.kinematics import Motion
-    from jounce.mechanism import Mechanism
-    from jounce.robot import Robot
-    from jounce.trajectory import JointTrajectory
-
-    kinds: tuple[tuple[type, Any], ...] = (
-        (Mechanism, _mechanism),
-        (Motion, _motion),
-        (Robot, _robot),
-        (JointTrajectory, _trajectory),
-        (Batch, _batch),
-    )
-    parts = next(show for kind, show in kinds if isinstance(thing, kind))(thing)
+    match thing:
+        case Mechanism():
+            parts = _mechanism(thing)
+        case Motion():
+            parts = _motion(thing)
+        case Robot():
+            parts = _robot(thing)
+        case JointTrajectory():
+            parts = _trajectory(thing)
+        case Batch():
+            parts = _batch(thing)
     return f'<div class="jounce">{STYLE}{"".join(parts)}</div>'
 
 
-def _text(value: Any) -> str:
+def _text(value: object) -> str:
     return html.escape(str(value))
 
 
@@ -93,7 +93,7 @@ def _written(value: Any) -> str:
     return getattr(value, "text", None) or number(float(value))
 
 
-def _mechanism(mechanism: Any) -> list[str]:
+def _mechanism(mechanism: Mechanism) -> list[str]:
     bodies = count(len(mechanism.bodies), "moving body", "moving bodies")
     joints = count(len(mechanism.joints), "joint")
     title = _title(mechanism.title or "Mechanism", f"{mechanism.space}: {bodies}, {joints}")
@@ -112,7 +112,7 @@ def _mechanism(mechanism: Any) -> list[str]:
         return [*title, *_title(str(error)), *_tables([guessed])]
 
 
-def _motion(motion: Any) -> list[str]:
+def _motion(motion: Motion) -> list[str]:
     facts = motion_facts(motion)
     time = facts["time"]
     solved = f"{time['solved']} of {count(time['count'], 'instant')} solved"
@@ -136,14 +136,14 @@ def _motion(motion: Any) -> list[str]:
     return [*lines, *_tables([dataclasses.replace(peaks_table(peaks(motion)), title="Peaks")])]
 
 
-def _robot(robot: Any) -> list[str]:
+def _robot(robot: Robot) -> list[str]:
     facts = robot_facts(robot)
     joints, links = count(len(robot.joint_names), "coordinate"), count(len(facts["links"]), "link")
     line = f"{joints}, {links}, {facts['mass']:.6g} kg, on {facts['base']}"
     return [*_title(facts["title"], line), *_tables(robot_tables(facts))]
 
 
-def _trajectory(trajectory: Any) -> list[str]:
+def _trajectory(trajectory: JointTrajectory) -> list[str]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SampleWarning)  # ranges only
         values = np.asarray(trajectory.derivatives(trajectory.times, order=3))
@@ -158,9 +158,7 @@ def _trajectory(trajectory: Any) -> list[str]:
     return [*_title("Joint trajectory", line), *_tables([Table("Ranges", headings, rows)])]
 
 
-def _batch(batch: Any) -> list[str]:
-    from jounce.kinematics import Status
-
+def _batch(batch: Batch) -> list[str]:
     whole = (batch.status == Status.OK).all(axis=1)
     line = f"{int(whole.sum())} of {count(len(whole), 'run')} complete, {count(len(batch.time), 'instant')}"
     parameters = [[name, number(x.min()), number(x.max())] for name, x in batch.parameters.items()]

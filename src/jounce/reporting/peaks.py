@@ -5,15 +5,19 @@ from __future__ import annotations
 import dataclasses
 import re
 import warnings
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
+from jaxtyping import Float
 
 from jounce.dynamics.limits import local_maxima
 from jounce.errors import SampleWarning
-from jounce.kinematics import solve
+from jounce.integrate import Simulation
+from jounce.kinematics import Motion, solve
+from jounce.mechanism import AbstractQuantity
 
-__all__ = ["Peak", "derivative_name", "derivative_unit", "peaks", "rate_name", "scalar_outputs", "table_peaks"]
+if TYPE_CHECKING:
+    import xarray
 
 NAMES = ("position", "velocity", "acceleration", "jerk", "jounce")
 LEAST = 200  # instants that are looked at, at least
@@ -21,6 +25,10 @@ PEAKS, POINTS, ROUNDS = 2, 7, 3  # highest maxima of each curve, instants around
 CHUNK = 1000  # instants solved together
 ROUNDING = 1e-9
 SMALLEST = 1e-15  # share of the size of an output
+_Times = Float[np.ndarray, " time"]
+_Curves = Float[np.ndarray, "time curves"]
+_Peaks = Float[np.ndarray, "peaks curves"]
+_Around = Float[np.ndarray, "points peaks curves"]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -80,7 +88,7 @@ def derivative_name(order: int) -> str:
     return str(order) + {1: "st", 2: "nd", 3: "rd"}.get(last, "th")
 
 
-def rate_name(output: Any, order: int) -> str:
+def rate_name(output: AbstractQuantity, order: int) -> str:
     """Name a time derivative of an output: velocity, jerk, ..., or for a force yank, second rate, ...
 
     Examples
@@ -111,7 +119,7 @@ def derivative_unit(unit: str, order: int) -> str:
     return base if total == 0 else f"{base}/s" if total == 1 else f"{base}/s^{total}"
 
 
-def scalar_outputs(motion: Any) -> dict[str, tuple[str, np.ndarray]]:
+def scalar_outputs(motion: Motion) -> dict[str, tuple[str, Float[np.ndarray, "time derivative"]]]:
     """Return the outputs of a motion one component at a time.
 
     Returns
@@ -129,7 +137,7 @@ def scalar_outputs(motion: Any) -> dict[str, tuple[str, np.ndarray]]:
     return found
 
 
-def peaks(motion: Any, *, refine: bool = True) -> list[Peak]:
+def peaks(motion: Motion, *, refine: bool = True) -> list[Peak]:
     """Return the peak values of each output, component by component, and of each derivative.
 
     Parameters
@@ -158,7 +166,7 @@ def peaks(motion: Any, *, refine: bool = True) -> list[Peak]:
     return motion.derived[name]
 
 
-def table_peaks(dataset: Any) -> list[Peak]:
+def table_peaks(dataset: xarray.Dataset) -> list[Peak]:
     """Return the peak values of torques and their rates, at the instants of a dataset only.
 
     Parameters
@@ -192,7 +200,7 @@ def effort_name(unit: str, order: int) -> str:
     return first[order] if order < len(first) else f"{derivative_name(order)} rate"
 
 
-def _found(motion: Any, refine: bool) -> list[Peak]:
+def _found(motion: Motion, refine: bool) -> list[Peak]:
     scalars = scalar_outputs(motion)
     rows = [(column, name, order) for column, (name, values) in scalars.items() for order in range(values.shape[1])]
     if not rows:
@@ -210,7 +218,7 @@ def _found(motion: Any, refine: bool) -> list[Peak]:
     return found
 
 
-def _extremes(motion: Any, refine: bool) -> tuple[np.ndarray, np.ndarray]:
+def _extremes(motion: Motion, refine: bool) -> tuple[Float[np.ndarray, " curves"], Float[np.ndarray, " curves"]]:
     """Return where each curve is largest and how large, (2 curves,): all curves upside down, then as they are.
 
     Around the highest instants, the best of a few becomes the middle of a shorter interval, again and again; the last
@@ -240,7 +248,9 @@ def _extremes(motion: Any, refine: bool) -> tuple[np.ndarray, np.ndarray]:
     return np.where(solved, times, np.nan), np.where(solved, sizes, np.nan)
 
 
-def _denser(motion: Any, time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _denser(
+    motion: Motion, time: _Times, values: _Curves
+) -> tuple[Float[np.ndarray, " denser"], Float[np.ndarray, "denser curves"]]:
     """Return instants and curves with enough instants for no peak to be missed that is no needle."""
     steps = -(-LEAST // (len(time) - 1))
     if steps == 1:
@@ -251,19 +261,19 @@ def _denser(motion: Any, time: np.ndarray, values: np.ndarray) -> tuple[np.ndarr
     return whole[order], np.concatenate([values, _at(motion, between)])[order]
 
 
-def _own(motion: Any, around: np.ndarray) -> np.ndarray:
+def _own(motion: Motion, around: _Around) -> _Around:
     """Return the values of curves at instants of their own, (points, peaks, curves)."""
     wanted, places = np.unique(around, return_inverse=True)
     values = _at(motion, wanted)
     return values[places.reshape(around.shape), np.arange(around.shape[-1])]
 
 
-def _at(motion: Any, instants: np.ndarray) -> np.ndarray:
+def _at(motion: Motion, instants: _Times) -> _Curves:
     """Return the curves of a motion at other instants, -inf where it cannot be solved."""
     parts = []
     for first in range(0, len(instants), CHUNK):
         chunk = instants[first : first + CHUNK]
-        if hasattr(motion, "at"):
+        if isinstance(motion, Simulation):
             parts.append(_curves(motion.at(chunk)))
             continue
         whole = np.unique(np.append(chunk, motion.time[0]))  # from the same start, on the same branch
@@ -274,13 +284,13 @@ def _at(motion: Any, instants: np.ndarray) -> np.ndarray:
     return np.concatenate(parts)
 
 
-def _curves(motion: Any) -> np.ndarray:
+def _curves(motion: Motion) -> _Curves:
     """Return all derivatives of all outputs, upside down and as they are, (time, 2 curves); -inf where unknown."""
     whole = np.concatenate([values for _, values in scalar_outputs(motion).values()], axis=1)
     return np.nan_to_num(np.concatenate([-whole, whole], axis=1), nan=-np.inf, posinf=-np.inf, neginf=-np.inf)
 
 
-def _scales(motion: Any) -> np.ndarray:
+def _scales(motion: Motion) -> Float[np.ndarray, " curves"]:
     """Return the largest magnitude that any component of the output of a curve has in its derivative, (2 curves,)."""
     found = []
     for name, values in scalar_outputs(motion).values():
@@ -289,7 +299,13 @@ def _scales(motion: Any) -> np.ndarray:
     return np.tile(np.concatenate(found), 2)
 
 
-def _keep_best(times: np.ndarray, sizes: np.ndarray, rounding: np.ndarray, around: np.ndarray, own: np.ndarray) -> None:
+def _keep_best(
+    times: Float[np.ndarray, " curves"],
+    sizes: Float[np.ndarray, " curves"],
+    rounding: Float[np.ndarray, " curves"],
+    around: _Around,
+    own: _Around,
+) -> None:
     """Take over what is larger than what was found before, by more than rounding: instants asked for are round."""
     flat = own.reshape(-1, own.shape[-1])
     every = np.arange(own.shape[-1])
@@ -300,7 +316,11 @@ def _keep_best(times: np.ndarray, sizes: np.ndarray, rounding: np.ndarray, aroun
     sizes[better] = flat[top, every][better]
 
 
-def _vertex(low: np.ndarray, high: np.ndarray, *near: np.ndarray) -> np.ndarray:
+def _vertex(
+    low: _Peaks,
+    high: _Peaks,
+    *near: _Peaks,
+) -> _Peaks:
     """Return where the parabola through three evenly spaced values is largest, between the outer two."""
     left, middle, right = near
     with np.errstate(invalid="ignore", divide="ignore"):

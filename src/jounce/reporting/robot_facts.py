@@ -10,10 +10,8 @@ from typing_extensions import TypedDict
 
 from jounce.errors import RobotError
 from jounce.reporting.summaries import freedom_words
-from jounce.robot import Robot
+from jounce.robot import Joint, Robot
 from jounce.robot.closures import closure_wrenches
-
-__all__ = ["InspectedRobot", "RobotFacts", "inspected_robot", "robot_facts"]
 
 
 class LinkFacts(TypedDict):
@@ -179,7 +177,7 @@ def _link(robot: Robot, name: str) -> dict[str, Any]:
     }
 
 
-def _joint(joint: Any) -> dict[str, Any]:
+def _joint(joint: Joint) -> dict[str, Any]:
     mimic = None if joint.mimic is None else dataclasses.asdict(joint.mimic)
     return {
         "name": joint.name,

@@ -3,27 +3,21 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from jounce.dynamics.limits import LimitReport
+from jounce.trajectory import JointTrajectory
+
 if TYPE_CHECKING:
-    from jounce.dynamics.limits import LimitReport
-    from jounce.trajectory import JointTrajectory
+    import xarray
 
-__all__ = [
-    "count",
-    "freedom_words",
-    "limits_summary",
-    "motion_summary",
-    "start_heading",
-    "start_summary",
-    "torques_summary",
-    "verdict",
-]
+Facts = Mapping[str, Any]
+"""Plain data, by the keys of a kind of facts."""
 
 
-def motion_summary(facts: Any, file: str) -> str:
+def motion_summary(facts: Facts, file: str) -> str:
     """Word what was solved or simulated: bodies, degrees of freedom, instants, and how well energy was kept."""
     time, title = facts["time"], facts["title"] or file
     span = f"t = {time['start']:g} s" if time["count"] == 1 else f"from t = {time['start']:g} s to {time['stop']:g} s"
@@ -48,7 +42,7 @@ def motion_summary(facts: Any, file: str) -> str:
     return "\n".join(lines)
 
 
-def _kept(facts: Any) -> list[str]:
+def _kept(facts: Facts) -> list[str]:
     """Word how well a simulation kept energy and constraints."""
     if not facts["time"]["solved"]:
         return []
@@ -72,12 +66,12 @@ def freedom_words(freedom: int, drivers: Iterable[str]) -> str:
     return f"{words}, driven by {names}" if names else words
 
 
-def start_summary(facts: Any) -> str:
+def start_summary(facts: Facts) -> str:
     """Word how many degrees of freedom a mechanism or a robot has, and whether a motion can start."""
     return "\n".join(_mechanism_start(facts) if facts["kind"] == "mechanism" else _robot_start(facts))
 
 
-def start_heading(facts: Any) -> str:
+def start_heading(facts: Facts) -> str:
     """Word what a file holds."""
     freedom = facts["freedom"]["words"]
     if facts["kind"] == "mechanism":
@@ -85,7 +79,7 @@ def start_heading(facts: Any) -> str:
     return f"{facts['title']}\nrobot on {facts['base']}: {freedom}, {facts['mass']:.6g} kg"
 
 
-def _mechanism_start(facts: Any) -> list[str]:
+def _mechanism_start(facts: Facts) -> list[str]:
     freedom, assembly, time = facts["freedom"], facts["assembly"], facts["time"]
     bodies = count(len(facts["bodies"]), "moving body", "moving bodies")
     lines = [
@@ -114,7 +108,7 @@ def _mechanism_start(facts: Any) -> list[str]:
     return lines
 
 
-def _robot_start(facts: Any) -> list[str]:
+def _robot_start(facts: Facts) -> list[str]:
     freedom, message = facts["freedom"], facts["assembly"]["message"]
     lines = ["Degrees of freedom", f"  {count(freedom['coordinates'], 'moving joint')} that follow no other"]
     if facts["closures"] and facts["ok"]:
@@ -144,7 +138,7 @@ def limits_summary(report: LimitReport, motion: JointTrajectory, robot: Path, tr
     return "\n".join(_wrapped(line) for line in lines)
 
 
-def torques_summary(dataset: Any, motion: JointTrajectory, robot: Path, trajectory: Path) -> str:
+def torques_summary(dataset: xarray.Dataset, motion: JointTrajectory, robot: Path, trajectory: Path) -> str:
     """Word of which joints torques were computed, when, and which stand still."""
     rates, instants = dataset.sizes["derivative"] - 1, dataset["time"].values
     told = f", with {count(rates, 'rate')}" if rates else ""

@@ -5,22 +5,10 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
 
-if TYPE_CHECKING:
-    from jounce.dynamics.limits import LimitReport
-    from jounce.reporting.peaks import Peak
-
-__all__ = [
-    "Table",
-    "bodies_table",
-    "limits_table",
-    "mechanism_tables",
-    "number",
-    "peaks_table",
-    "robot_tables",
-    "table",
-]
+from jounce.dynamics.limits import LimitReport
+from jounce.reporting.peaks import Peak
+from jounce.reporting.summaries import Facts
 
 
 @dataclasses.dataclass(frozen=True)
@@ -62,7 +50,7 @@ def table(title: str, headings: Sequence[str], rows: Sequence[Sequence[str]], nu
     return Table(title, [headings[k] for k in kept], [[row[k] for k in kept] for row in rows], aligned)
 
 
-def mechanism_tables(facts: Any, bodies: Table) -> list[Table]:
+def mechanism_tables(facts: Facts, bodies: Table) -> list[Table]:
     """Return parameters, bodies, elements and outputs of a mechanism."""
     parameters = [[p["name"], f"{p['value']:.9g}", p["unit"] or "", p["written"] or ""] for p in facts["parameters"]]
     found = [table("Parameters (SI)", ("name", "value", "unit", "as written"), parameters, (1,)), bodies]
@@ -79,7 +67,7 @@ def mechanism_tables(facts: Any, bodies: Table) -> list[Table]:
     return [each for each in found if each.rows]
 
 
-def bodies_table(facts: Any) -> Table:
+def bodies_table(facts: Facts) -> Table:
     """Return the bodies of a mechanism that was inspected."""
     angle = "angle" if facts["space"] == "planar" else "quaternion"
     rows = []
@@ -94,7 +82,7 @@ def bodies_table(facts: Any) -> Table:
     return table(title, ("body", "mass/kg", "position/m", "angle/rad" if angle == "angle" else angle, "moved by"), rows)
 
 
-def robot_tables(facts: Any) -> list[Table]:
+def robot_tables(facts: Facts) -> list[Table]:
     """Return the joints, links and closures of a robot."""
     moving, fixed = [], []
     for joint in facts["joints"]:
@@ -114,7 +102,7 @@ def robot_tables(facts: Any) -> list[Table]:
         holder = "" if link["moves_with"] == link["name"] else link["moves_with"]
         links.append([link["name"], number(link["mass"]), vector(link["center_of_mass"]), holder])
     closures = [
-        [x["name"], x["type"], ", ".join(x["links"]), *(str("-" if n is None else n) for n in _counts(x))]
+        [x["name"], x["type"], ", ".join(x["links"]), *(_count(x, key) for key in ("equations", "redundant"))]
         for x in facts["closures"]
     ]
     found = [
@@ -126,8 +114,9 @@ def robot_tables(facts: Any) -> list[Table]:
     return [each for each in found if each.rows]
 
 
-def _counts(closure: Any) -> list[Any]:
-    return [closure.get(key, "") for key in ("equations", "redundant")]
+def _count(closure: Facts, key: str) -> str:
+    found = closure.get(key, "")
+    return "-" if found is None else str(found)
 
 
 def peaks_table(found: Sequence[Peak]) -> Table:
@@ -156,12 +145,12 @@ def limits_table(report: LimitReport) -> Table:
     return Table("", headings, rows, (3, 4, 5, 6), True, marks, (5,), "broken" if any(marks) else "")
 
 
-def number(value: Any) -> str:
+def number(value: float | None) -> str:
     """Word a number that is read, not computed with; a dash where there is none."""
     return "-" if value is None or not math.isfinite(value) else f"{value:.6g}"
 
 
-def vector(values: Any) -> str:
+def vector(values: Sequence[float] | None) -> str:
     """Word the components of a vector."""
     return "-" if values is None else ", ".join(f"{_rounded(x):.5g}" for x in values)
 

@@ -16,19 +16,6 @@ from jounce.interrupts import undoing
 from jounce.reporting.peaks import Peak
 from jounce.reporting.tables import Table, peaks_table
 
-__all__ = [
-    "Bar",
-    "caution",
-    "cautions",
-    "complain",
-    "say",
-    "say_json",
-    "show_columns",
-    "show_peaks",
-    "show_table",
-    "unexpected",
-]
-
 OURS = (RobotWarning, SampleWarning, UnitWarning)  # warnings of this package, which nobody may turn off by mistake
 WIDTH = 80  # of tables that do not go to a terminal
 WIDEST = 9999
@@ -168,9 +155,9 @@ def say(text: str) -> None:
 
 def say_json(command: str, data: Mapping[str, Any]) -> None:
     """Print the result of a command as JSON on standard output."""
-    from jounce.reporting.records import record
+    from jounce.reporting.json_results import result_json
 
-    sys.stdout.write(record(command, data) + "\n")
+    sys.stdout.write(result_json(command, data) + "\n")
     sys.stdout.flush()
 
 
@@ -203,7 +190,7 @@ def cautions(*, json: bool = False) -> Iterator[None]:
 
 def _tell(kind: str, style: str, message: object, json: bool) -> None:
     if json:
-        from jounce.reporting.records import complaint
+        from jounce.reporting.json_results import complaint
 
         sys.stderr.write(complaint(kind, message) + "\n")
         return

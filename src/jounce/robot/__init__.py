@@ -5,7 +5,7 @@ from jounce.robot.closed_loop import body_point as body_point
 from jounce.robot.closures import LinkClosure as LinkClosure, closure_wrenches as closure_wrenches
 from jounce.robot.construct import (
     DenavitHartenberg as DenavitHartenberg,
-    Screw as Screw,
+    JointAxis as JointAxis,
     from_denavit_hartenberg as from_denavit_hartenberg,
     from_screws as from_screws,
 )

@@ -13,7 +13,7 @@ from jounce.errors import RobotError, check_name, did_you_mean
 from jounce.rigid.inertia import Inertia, finite_numbers
 from jounce.robot.floating_base import floating_joints
 from jounce.robot.model import Closure, Joint, Limits, Link
-from jounce.robot.tree import Tree, arrange, ordered
+from jounce.robot.tree import Tree, arrange, ordered, turn_about
 
 Made = TypeVar("Made", bound="AbstractRobot")
 
@@ -38,9 +38,8 @@ class AbstractRobot(Displayed, abc.ABC):
         in_order = ordered(self.links, _by_name("joints", joints, Joint))
         self.joints: Mapping[str, Joint] = MappingProxyType({joint.name: joint for joint in in_order})
         self.base = ({*self.links} - {joint.child for joint in self.joints.values()}).pop()
-        moving = [joint for joint in self.joints.values() if joint.moving]
-        self.joint_names = tuple(joint.name for joint in moving if joint.mimic is None)
-        for joint in moving:
+        self.joint_names = tuple(joint.name for joint in self.moving_joints if joint.mimic is None)
+        for joint in self.moving_joints:
             self._check_mimic(joint)
         self._tree, self.frames = arrange(self.base, self.links, in_order, self.gravity)
         if strict and (massless := self.massless_joints):
@@ -88,19 +87,24 @@ class AbstractRobot(Displayed, abc.ABC):
         return tuple(self.links)
 
     @property
+    def moving_joints(self) -> tuple[Joint, ...]:
+        """Joints that are not fixed, parents before children; some may follow others."""
+        return tuple(joint for joint in self.joints.values() if joint.moving)
+
+    @property
     def moving_links(self) -> tuple[str, ...]:
         """Names of the links that joints move, one for each, in the order of results for each body.
 
         Links fixed to one of them move with it, and their mass is counted there.
         """
-        return tuple(joint.child for joint in self.joints.values() if joint.moving)
+        return tuple(joint.child for joint in self.moving_joints)
 
     @property
     def massless_joints(self) -> tuple[str, ...]:
         """Joints that move no mass, so that no force is needed for any motion of them."""
-        tree, moving = self._tree, [joint.name for joint in self.joints.values() if joint.moving]
+        tree = self._tree
         moved = ((tree.mass > 0) | tree.inertia.any((1, 2))) @ tree.ancestors[:-1]
-        return tuple(name for name, some in zip(moving, moved, strict=True) if not some)
+        return tuple(joint.name for joint, some in zip(self.moving_joints, moved, strict=True) if not some)
 
     @property
     def limits(self) -> dict[str, Limits]:
@@ -143,7 +147,7 @@ class AbstractRobot(Displayed, abc.ABC):
         RobotError
             If there is no such link.
         """
-        self._checked_link(link)
+        check_name("link", link, self.links, RobotError, name="link")
         held = self.links[link].inertia
         whole = payload if held is None else Inertia.total([held, payload])
         links = {**self.links, link: Link(link, whole)}
@@ -222,10 +226,6 @@ class AbstractRobot(Displayed, abc.ABC):
             rotation = turned.T @ other_turned
         return dataclasses.replace(closure, points=points, rotation=rotation)
 
-    def _checked_link(self, link: str) -> str:
-        check_name("link", link, self.links, RobotError, name="link")
-        return link
-
     def _check_mimic(self, joint: Joint) -> None:
         if joint.mimic is not None and joint.mimic.joint not in self.joint_names:
             message = (
@@ -260,8 +260,6 @@ def _poses_at_zero(joints: Mapping[str, Joint]) -> dict[str, tuple[np.ndarray, n
 
 def _held(joint: Joint, coordinate: float) -> Joint:
     """Return the fixed joint that holds a moving one at a coordinate."""
-    from jounce.robot.tree import turn_about
-
     position, rotation = joint.position, joint.rotation
     if joint.turning:
         rotation = rotation @ turn_about(joint.axis, coordinate)

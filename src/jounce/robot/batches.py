@@ -10,67 +10,13 @@ import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
 
-from jounce.errors import RobotError
+from jounce.jet.derivatives import plain_derivatives, taylor_coefficients
 from jounce.kinematics.compilation import compiler_options
 from jounce.mechanism.preconditions import check_process
 from jounce.robot.abstract_robot import AbstractRobot
 
 CHUNK = 128  # samples that are computed side by side
 WIDTHS = (8, CHUNK, 16 * CHUNK)  # sizes of blocks: each compiles once for a kind of robot
-
-
-def coefficients(derivatives: Any) -> Any:
-    """Return Taylor coefficients, order first, from plain derivatives along the leading axis."""
-    scale = np.array([1 / math.factorial(k) for k in range(derivatives.shape[0])])
-    return derivatives * scale.reshape(-1, *[1] * (derivatives.ndim - 1))
-
-
-def derivatives(coefficients: Any) -> Any:
-    """Return plain derivatives, order first, from Taylor coefficients along the leading axis."""
-    scale = np.array([float(math.factorial(k)) for k in range(coefficients.shape[0])])
-    return coefficients * scale.reshape(-1, *[1] * (coefficients.ndim - 1))
-
-
-def floats(name: str, values: Any) -> Any:
-    """Return values as an array of double precision, of NumPy unless it is one of JAX.
-
-    Raises
-    ------
-    RobotError
-        If they are not real numbers in one rectangular array.
-    """
-    array = values if isinstance(values, jax.Array) else None
-    try:
-        array = np.asarray(values) if array is None else array
-        if array.dtype.kind not in "OUSc":
-            return array.astype(float, copy=False)
-        if array.dtype.kind == "O":
-            return np.asarray(array, float)
-    except (TypeError, ValueError):
-        pass
-    raise RobotError("must be an array of real numbers", name=name, value=type(values).__name__)
-
-
-def checked(robot: AbstractRobot, q: Any, least: int) -> Any:
-    """Return q as an array of shape (..., order + 1, n) with at least so many derivatives.
-
-    Raises
-    ------
-    RobotError
-        If its shape does not fit the robot or the derivatives are too few.
-    """
-    q = floats("q", q)
-    n = len(robot.joint_names)
-    if q.ndim < 2 or q.shape[-1] != n:
-        joints = f"{robot.name} has {n} {'joint' if n == 1 else 'joints'}"
-        raise RobotError(f"must have the shape (..., order + 1, n), not {q.shape}; {joints}: n = {n}", name="q")
-    if q.shape[-2] < least + 1:
-        names = ["q", "q'", "q''"][: least + 1]
-        message = (
-            f"must hold {', '.join(names)} along its last axis but one: the shape (..., order + 1, n), not {q.shape}"
-        )
-        raise RobotError(message, name="q")
-    return q
 
 
 class Batched:
@@ -124,9 +70,9 @@ class Batched:
         return jax.tree.map(lambda x: jnp.reshape(x, (width, *x.shape[2:])), found)
 
     def _block(self, tree: Any, arrays: tuple[Any, ...], constants: Any, static: tuple[Any, ...]) -> Any:
-        last = tuple(coefficients(jnp.moveaxis(jnp.asarray(x), 0, -1)) for x in arrays)
+        last = tuple(taylor_coefficients(jnp.moveaxis(jnp.asarray(x), 0, -1)) for x in arrays)
         found = self.function(tree, last, constants, *static)
-        return jax.tree.map(lambda x: jnp.moveaxis(derivatives(x), -1, 0), found)
+        return jax.tree.map(lambda x: jnp.moveaxis(plain_derivatives(x), -1, 0), found)
 
 
 def _blocks(arrays: tuple[np.ndarray, ...]) -> list[tuple[np.ndarray, ...]]:

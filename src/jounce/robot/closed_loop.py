@@ -12,8 +12,8 @@ from jounce.mechanism import Body, Mechanism, time_grid
 from jounce.mechanism.resolve import resolve_motion
 from jounce.rigid.inertia import finite_numbers
 from jounce.robot.abstract_robot import AbstractRobot
-from jounce.robot.closures import Loops, given_coordinates, size_of
-from jounce.robot.mechanism_parts import Parts, on_body
+from jounce.robot.closures import Loops, given_coordinates
+from jounce.robot.mechanism_parts import RobotParts, on_body
 
 DRIVE, START = "_drive", "_start"
 
@@ -93,12 +93,12 @@ def mechanism(
             if name not in robot.joint_names:
                 message = f"no moving joint that follows no other has this name; {_known(robot, name)}"
                 raise RobotError(message, name=kind, value=name)
-    parts = Parts(robot, {*driven, *(x for x in (outputs or {}).values() if isinstance(x, str))}, forces, outputs)
+    parts = RobotParts(robot, {*driven, *(x for x in (outputs or {}).values() if isinstance(x, str))}, forces, outputs)
     wanted = {name: name for name in parts.coordinates} if outputs is None else outputs
     start = _start(robot, q, driven, parameters or {}, time)
     joints = parts.joints()
     if robot.closures:
-        loops = Loops(robot, size_of(robot))
+        loops = Loops(robot)
         free = np.array([name not in driven for name in robot.joint_names], bool)
         start = loops.closed(start, free)
         found = zip(robot.closures.values(), loops.independent(start), strict=True)

@@ -12,18 +12,24 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from jounce.constraints import AbstractConstraint, Scalar, Vector
 from jounce.constraints.base import Wrenches
 from jounce.errors import MechanismError, RobotError
-from jounce.jet import cross, dot, stack
+from jounce.jet import Jet, cross, dot, stack
 from jounce.jet.algebra import stacked, total
 from jounce.rigid.inertia import finite_numbers
 from jounce.robot.abstract_robot import AbstractRobot
 from jounce.robot.batches import Batched
-from jounce.robot.kinematics import body_frames
+from jounce.robot.kinematics import body_frames, place_of
 from jounce.robot.model import Closure
-from jounce.robot.tree import Tree, axes_with_z_along
+from jounce.robot.tree import Frame, Tree, axes_with_z_along
+from jounce.robot.tree_scan import Series
+from jounce.shapes import ArrayLike, Numbers
+
+GivenCoordinates = Mapping[str, float] | ArrayLike | None
+"""Coordinates in order, or by name of the joint; those not given are zero."""
 
 RANK_TOLERANCE = 1e-5  # rad, or sizes of the robot: files give axes with six digits
 MAX_STEPS = 100
@@ -78,7 +84,7 @@ class LinkClosure(AbstractConstraint, type="closure", space="spatial"):
         return jnp.where(along.coefficients[0] < 0, -1.0, 1.0)
 
 
-def borne(closure: Closure) -> np.ndarray:
+def constraint_wrenches(closure: Closure) -> np.ndarray:
     """Return the wrenches that a closure can bear, (rows, 6): force and moment in the frame of its first link."""
     everything = np.eye(6)
     if closure.type == "connect":
@@ -90,16 +96,19 @@ def borne(closure: Closure) -> np.ndarray:
 
 
 @Batched
-def _gaps(tree: Tree, arrays: Any, constants: Any) -> Any:
-    """Return offset of the points and missing turn of each closure, in axes of its first link: (2, 3, closures)."""
+def _gaps(tree: Tree, arrays: tuple[Series], places: tuple[Frame, Frame]) -> Float[Numbers, "order 2 3 closure batch"]:
+    """Return offset of the points and missing turn of each closure, in axes of its first link."""
     frames = body_frames(tree, arrays[0])
-    bodies, points, rotations = constants
-    first, second = (jax.tree.map(lambda c, k=k: jnp.take(c, bodies[k], axis=1), frames) for k in (0, 1))
-    local = [jnp.moveaxis(points[k], 0, -1)[:, :, None] for k in (0, 1)]
-    axes = [[f.direction(rotations[k][:, :, i].T[:, :, None]) for i in range(3)] for k, f in enumerate((first, second))]
-    offset = second.point(local[1]) - first.point(local[0])
-    turn = total(cross(a, b) for a, b in zip(*axes, strict=True)) * 0.5
-    seen = [stack([axis.dot(vector) for axis in axes[0]]) for vector in (offset, turn)]
+
+    def placed(place: Frame) -> tuple[Jet, list[Jet]]:
+        frame = jax.tree.map(lambda c: jnp.take(c, place.body, axis=1), frames)
+        local = (place.position, *jnp.moveaxis(place.rotation, 2, 0))
+        point, *axes = (jnp.moveaxis(x, 0, -1)[:, :, None] for x in local)
+        return frame.point(point), [frame.direction(axis) for axis in axes]
+
+    (origin, axes), (other, others) = map(placed, places)
+    turn = total(cross(a, b) for a, b in zip(axes, others, strict=True)) * 0.5
+    seen = [stack([axis.dot(vector) for axis in axes]) for vector in (other - origin, turn)]
     return jnp.stack([stacked(part) for part in seen], axis=1)
 
 
@@ -110,38 +119,31 @@ class Loops:
     ----------
     robot : Robot
         With closures.
-    size : float
-        Length by which offsets and slides are scaled, m.
     """
 
-    def __init__(self, robot: AbstractRobot, size: float):
-        self.tree, self.size = robot.opened(), size
+    def __init__(self, robot: AbstractRobot):
+        self.tree, self.size = robot.opened(), size_of(robot)
         self.names = tuple(robot.closures)
         turning = [robot.joints[name].turning for name in robot.joint_names]
-        self.scale = np.where(turning, 1.0, size)  # of the coordinates
-        self.wrenches = []
-        places: list[list[Any]] = [[], []]
+        self.scale = np.where(turning, 1.0, self.size)  # of the coordinates
+        self.wrenches = [constraint_wrenches(closure) for closure in robot.closures.values()]
+        sides: list[list[Frame]] = [[], []]
         for closure in robot.closures.values():
-            wrenches = borne(closure)
-            self.wrenches.append(wrenches)
-            for k, link in enumerate(closure.links):
-                frame = robot.frames[link]
-                body = frame.body if frame.body >= 0 else len(robot.moving_links)
-                turned = frame.rotation if k == 0 else frame.rotation @ closure.rotation.T
-                places[k].append((body, frame.position + frame.rotation @ closure.points[k], turned))
-        columns = [[np.array(x) for x in zip(*side, strict=True)] for side in places]
-        self.constants = tuple((first, second) for first, second in zip(*columns, strict=True))
+            first, second = (place_of(robot, link, p) for link, p in zip(closure.links, closure.points, strict=True))
+            sides[0].append(first)
+            sides[1].append(second._replace(rotation=second.rotation @ closure.rotation.T))
+        self.places = tuple(jax.tree.map(lambda *xs: np.stack(xs), *side) for side in sides)
 
     def gaps(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the scaled gaps of all closures, (closures, 6), and their slopes by the scaled coordinates."""
         count = len(q)
         directions = np.diag(self.scale) if count else np.zeros((1, 0))
         states = np.stack([np.broadcast_to(q, directions.shape), directions], axis=1)
-        found = _gaps(self.tree, (states,), self.constants)  # (coordinates, 2, 2, 3, closures)
+        found = _gaps(self.tree, (states,), self.places)  # (coordinates, 2, 2, 3, closures)
         found = np.moveaxis(found.reshape(*found.shape[:2], 6, -1), -1, 2) / np.repeat([self.size, 1.0], 3)
         return found[0, 0], np.moveaxis(found[:count, 1], 0, -1)
 
-    def closed(self, q: np.ndarray, free: np.ndarray) -> np.ndarray:
+    def closed(self, q: Float[np.ndarray, " joint"], free: Any = slice(None)) -> Float[np.ndarray, " joint"]:
         """Return the coordinates nearest to the given ones at which the loops are closed; only those free change.
 
         Raises
@@ -196,7 +198,6 @@ class Loops:
         found = self._split(q)
         best = found
         random = np.random.default_rng(1)  # any directions do, the same each time
-        free = np.full(len(q), True)
         for _ in range(2):
             slopes = np.concatenate([w @ s for (w, _), s in zip(best, self.gaps(q)[1], strict=True)])
             motions = _null_space(slopes)
@@ -204,7 +205,7 @@ class Loops:
                 break
             sway = motions @ random.normal(size=motions.shape[1])
             try:
-                nearby = self._split(self.closed(q + SWAY * self.scale * sway / np.abs(sway).max(), free))
+                nearby = self._split(self.closed(q + SWAY * self.scale * sway / np.abs(sway).max()))
             except RobotError:
                 continue
             if sum(len(kept) for kept, _ in nearby) > sum(len(kept) for kept, _ in best):
@@ -244,7 +245,7 @@ def _null_space(matrix: np.ndarray) -> np.ndarray:
     return right[int(np.sum(sizes > RANK_TOLERANCE)) :].T
 
 
-def given_coordinates(robot: AbstractRobot, q: Any) -> np.ndarray:
+def given_coordinates(robot: AbstractRobot, q: GivenCoordinates) -> Float[np.ndarray, " joint"]:
     """Return coordinates from an array, or from values by name of the joint; zero where none are given."""
     if q is None or isinstance(q, Mapping):
         return robot.coordinates(**(q or {}))
@@ -258,7 +259,9 @@ def size_of(robot: AbstractRobot) -> float:
     return max(lengths, default=0.0) or 1.0
 
 
-def closure_wrenches(robot: AbstractRobot, q: Any = None) -> Mapping[str, tuple[np.ndarray, np.ndarray]]:
+def closure_wrenches(
+    robot: AbstractRobot, q: GivenCoordinates = None
+) -> dict[str, tuple[Float[np.ndarray, "wrench 6"], Float[np.ndarray, "redundant 6"]]]:
     """Return what each closure of a robot bears, and what of it is redundant, as the joints of the tree bear it too.
 
     A mechanism of the robot has one equation for each wrench of the first kind. Those of the second kind hold by
@@ -297,7 +300,6 @@ def closure_wrenches(robot: AbstractRobot, q: Any = None) -> Mapping[str, tuple[
     """
     if not robot.closures:
         return {}
-    loops = Loops(robot, size_of(robot))
-    start = given_coordinates(robot, q)
-    closed = loops.closed(start, np.full(len(start), True))
+    loops = Loops(robot)
+    closed = loops.closed(given_coordinates(robot, q))
     return dict(zip(loops.names, loops.independent(closed), strict=True))

@@ -8,7 +8,6 @@ import numpy as np
 
 from jounce.errors import RobotError, did_you_mean
 from jounce.rigid.inertia import Inertia, finite_numbers
-from jounce.robot.floating_base import floating_joints as floating_joints
 from jounce.robot.model import UNLIMITED, Joint, Limits, Link
 from jounce.robot.robot import Robot
 from jounce.robot.tree import turn_about
@@ -49,7 +48,7 @@ class DenavitHartenberg:
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Screw:
+class JointAxis:
     """A joint by its screw axis in the frame of the base, at coordinates zero. Negrean 2025, equations 31-34.
 
     Parameters
@@ -130,7 +129,7 @@ def from_denavit_hartenberg(
     return Robot(name, links, joints)
 
 
-def from_screws(screws: Sequence[Screw], tool: Any = None, name: str = "robot") -> Robot:
+def from_screws(screws: Sequence[JointAxis], tool: Any = None, name: str = "robot") -> Robot:
     """Return a serial robot from the screw axes of its joints, as a product of exponentials has them.
 
     Links are named link_1 to link_n; at coordinates zero their frames coincide with that of the base. The frame tool is
@@ -138,7 +137,7 @@ def from_screws(screws: Sequence[Screw], tool: Any = None, name: str = "robot") 
 
     Parameters
     ----------
-    screws : sequence of Screw
+    screws : sequence of JointAxis
         One for each joint, from the base outwards.
     tool : array_like of shape (4, 4), optional
         Pose of the tool in the frame of the base at coordinates zero.
@@ -159,8 +158,8 @@ def from_screws(screws: Sequence[Screw], tool: Any = None, name: str = "robot") 
     --------
     >>> import jounce as jn
     >>> load = jn.Inertia(2.0, center_of_mass=[1.0, 0, 0])
-    >>> slide = jn.robot.Screw([0, 0, 1], type="prismatic", inertia=jn.Inertia(1.0))
-    >>> arm = jn.robot.from_screws([slide, jn.robot.Screw([0, 0, 1], inertia=load)])
+    >>> slide = jn.robot.JointAxis([0, 0, 1], type="prismatic", inertia=jn.Inertia(1.0))
+    >>> arm = jn.robot.from_screws([slide, jn.robot.JointAxis([0, 0, 1], inertia=load)])
     >>> jn.inverse_dynamics(arm, [[0.0, 0.0], [0.0, 0.0], [0.0, 3.0]]).round(12).tolist()
     [[29.43, 6.0]]
     """

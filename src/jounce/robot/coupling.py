@@ -21,7 +21,7 @@ LARGEST_DENOMINATOR = 1000  # of ratios that are taken for those of whole number
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Placed:
+class JointPlacement:
     """A moving joint between two bodies of a mechanism, in the frames of these bodies.
 
     Parameters
@@ -105,7 +105,7 @@ class CoupledJoints(AbstractConstraint, type="coupled", space="spatial"):
         return excess if self.period is None else wrap(excess, self.period)
 
 
-def coupled(leader: Placed, follower: Placed, multiplier: float, offset: float) -> CoupledJoints:
+def coupled(leader: JointPlacement, follower: JointPlacement, multiplier: float, offset: float) -> CoupledJoints:
     """Return the constraint that makes a joint follow another: ``q_2 = multiplier q_1 + offset``.
 
     A turning joint whose multiplier is no ratio of whole numbers below a thousand is followed for half a turn either

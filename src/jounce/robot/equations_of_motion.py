@@ -11,16 +11,19 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from jounce.errors import RobotError, did_you_mean
 from jounce.jet import Jet, components, cross, dot
 from jounce.jet.algebra import stacked, total
 from jounce.rigid.frames import Frames
-from jounce.robot.batches import Batched, checked, floats
+from jounce.robot.arguments import checked_coordinates, checked_position
+from jounce.robot.batches import Batched
 from jounce.robot.kinematics import body_frames
 from jounce.robot.robot import Robot
 from jounce.robot.tree import Tree
-from jounce.robot.tree_scan import joint_coordinates, to_coordinates
+from jounce.robot.tree_scan import BodySeries, Series, joint_coordinates, to_coordinates
+from jounce.shapes import ArrayLike, Numbers
 
 PARTS = ("coriolis", "centrifugal", "gravity")
 
@@ -53,8 +56,8 @@ def partial_velocities(tree: Tree, frames: Frames) -> tuple[Jet, Jet]:
     return linear * moved, axis * (turning * moved)
 
 
-def work(partial: tuple[Jet, Jet], force: Jet, moment: Jet | None = None) -> Any:
-    """Return the forces of the joints, (levels, joints, batch), that do the work of forces on all bodies.
+def work(partial: tuple[Jet, Jet], force: Jet, moment: Jet | None = None) -> BodySeries:
+    """Return the forces of the joints that do the work of forces on all bodies.
 
     Forces at the centres of mass, and moments, are of shape (3, bodies, batch), in the axes of the base.
     """
@@ -62,14 +65,14 @@ def work(partial: tuple[Jet, Jet], force: Jet, moment: Jet | None = None) -> Any
     return stacked(total(done).map(lambda c: jnp.sum(c, axis=1)))
 
 
-def work_of_weight(tree: Tree, frames: Frames) -> Any:
-    """Return the forces of the joints that hold the bodies against gravity, (levels, joints, batch)."""
+def work_of_weight(tree: Tree, frames: Frames) -> BodySeries:
+    """Return the forces of the joints that hold the bodies against gravity."""
     weight = jnp.asarray(tree.gravity)[:, None, None] * jnp.asarray(tree.mass)[None, :, None]
     return work(partial_velocities(tree, frames), Jet.constant(-weight, frames.position.order))
 
 
-def work_of_motion(tree: Tree, q: Any, frames: Frames) -> Any:
-    """Return the forces of the joints that velocities alone need, (levels, joints, batch), one level less than q has.
+def work_of_motion(tree: Tree, q: Series, frames: Frames) -> Float[Numbers, "order-1 body batch"]:
+    """Return the forces of the joints that velocities alone need.
 
     They are those of the inertia of bodies that move while the rates of the joints do not change.
     """
@@ -82,8 +85,8 @@ def work_of_motion(tree: Tree, q: Any, frames: Frames) -> Any:
     return work(partial, left[0] * jnp.asarray(tree.mass)[:, None], moment)
 
 
-def mass_jet(tree: Tree, q: Any) -> Any:
-    """Return the mass matrix as Taylor coefficients, (levels, coordinates, coordinates, batch).
+def mass_jet(tree: Tree, q: Series) -> Float[jax.Array, "order coordinate coordinate batch"]:
+    """Return the mass matrix as Taylor coefficients.
 
     The element of two joints is the work, along the one nearer to the base, of the momentum of all that the other moves
     at a rate of one (composite bodies: Featherstone 2008, Rigid Body Dynamics Algorithms, section 6.2).
@@ -109,8 +112,8 @@ def mass_jet(tree: Tree, q: Any) -> Any:
     return jnp.einsum("lijs,ia,jb->labs", matrix, weights, weights)
 
 
-def centrifugal(tree: Tree, q: Any) -> Any:
-    """Return the part of the forces with squares of rates of single coordinates, (levels, coordinates, batch).
+def centrifugal(tree: Tree, q: Series) -> Float[Numbers, "order-1 coordinate batch"]:
+    """Return the part of the forces with squares of rates of single coordinates.
 
     By Christoffel's symbols: ``(dM_ij/dq_j - 1/2 dM_jj/dq_i) q_j'^2``, summed over j.
     """
@@ -127,13 +130,13 @@ def centrifugal(tree: Tree, q: Any) -> Any:
 
 
 @Batched
-def _mass_matrix(tree: Tree, arrays: Any, _: Any, drives: bool) -> Any:
+def _mass_matrix(tree: Tree, arrays: tuple[Series], _: Any, drives: bool) -> Any:
     matrix = mass_jet(tree, arrays[0])
     return matrix.at[0].add(jnp.diag(jnp.asarray(tree.armature))[:, :, None]) if drives else matrix
 
 
 @Batched
-def _bias(tree: Tree, arrays: Any, _: Any, parts: frozenset[str], drives: bool) -> Any:
+def _bias(tree: Tree, arrays: tuple[Series], _: Any, parts: frozenset[str], drives: bool) -> Any:
     (q,) = arrays
     levels = q.shape[0] - 1
     frames = body_frames(tree, q).without_base()
@@ -148,14 +151,16 @@ def _bias(tree: Tree, arrays: Any, _: Any, parts: frozenset[str], drives: bool) 
     return forces + drive_forces(tree, q, levels) if drives else forces
 
 
-def drive_forces(tree: Tree, q: Any, levels: int) -> Any:
-    """Return what viscous damping and Coulomb friction take, (levels, coordinates, batch)."""
+def drive_forces(tree: Tree, q: Series, levels: int) -> Float[Numbers, "{levels} coordinate batch"]:
+    """Return what viscous damping and Coulomb friction take."""
     damping, friction = (jnp.asarray(x)[:, None] for x in (tree.damping, tree.friction))
     forces = stacked((Jet(tuple(q)).differentiate() * damping).truncate(levels - 1))
     return forces.at[0].add(friction * jnp.sign(q[1]))
 
 
-def mass_matrix(robot: Robot, q: Any, *, rates: bool = False, drives: bool = False) -> Any:
+def mass_matrix(
+    robot: Robot, q: ArrayLike, *, rates: bool = False, drives: bool = False
+) -> Float[Numbers, "*batch joint joint"]:
     """Return the mass matrix of a robot, and on request its time derivatives to any order, exact to rounding.
 
     ``tau = M q'' + bias``, with `bias_forces`; and by Leibniz's rule ``tau^(k) = sum_j C(k, j) M^(j) q^(2 + k - j) +
@@ -199,20 +204,14 @@ def mass_matrix(robot: Robot, q: Any, *, rates: bool = False, drives: bool = Fal
     >>> jn.mass_matrix(robot, [[0.3, 0.5], [0.0, 2.0]], rates=True)[1].round(12).tolist()  # 2 * 1 * 2
     [[4.0, 0.0], [0.0, 0.0]]
     """
-    q = floats("q", q)
-    if not rates:
-        n = len(robot.joint_names)
-        if q.ndim < 1 or q.shape[-1] != n:
-            joints = f"{robot.name} has {n} {'joint' if n == 1 else 'joints'}"
-            raise RobotError(f"must have the shape (..., n), not {q.shape}; {joints}: n = {n}", name="q")
-        q = q[..., None, :]
-    found = _mass_matrix(robot, (checked(robot, q, 0),), (), (bool(drives),))
+    q = checked_coordinates(robot, q) if rates else checked_position(robot, q)
+    found = _mass_matrix(robot, (q,), (), (bool(drives),))
     return found if rates else found[..., 0, :, :]
 
 
 def bias_forces(
-    robot: Robot, q: Any, *, rates: bool = False, parts: str | Sequence[str] = PARTS, drives: bool = False
-) -> Any:
+    robot: Robot, q: ArrayLike, *, rates: bool = False, parts: str | Sequence[str] = PARTS, drives: bool = False
+) -> Float[Numbers, "*batch joint"]:
     """Return the joint torques or forces that velocities and gravity need, and on request their rates.
 
     What `inverse_dynamics` gives where all accelerations are zero: ``tau = M q'' + bias``, with `mass_matrix`.
@@ -263,6 +262,6 @@ def bias_forces(
     for part in chosen:
         if part not in PARTS:
             raise RobotError(f"no such part; {did_you_mean(str(part), PARTS)}", name="parts", value=part)
-    q = checked(robot, q, 1)
-    found = _bias(robot, (q if rates else q[..., :2, :],), (), (frozenset(chosen), bool(drives)))
+    q = checked_coordinates(robot, q, 1, most=None if rates else 1)
+    found = _bias(robot, (q,), (), (frozenset(chosen), bool(drives)))
     return found if rates else found[..., 0, :]

@@ -5,29 +5,31 @@ from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from jounce.errors import RobotError, did_you_mean
 from jounce.jet import Jet, concatenate, cross, matvec
 from jounce.jet.algebra import stacked
-from jounce.rigid.frames import Frames
-from jounce.robot.batches import Batched, checked
+from jounce.robot.arguments import checked_coordinates
+from jounce.robot.batches import Batched
 from jounce.robot.equations_of_motion import drive_forces
-from jounce.robot.kinematics import body_frames
-from jounce.robot.newton_euler import newton_euler
+from jounce.robot.kinematics import body_frames, place_of
+from jounce.robot.newton_euler import BodyWrenches, recursive_newton_euler
 from jounce.robot.robot import Robot
-from jounce.robot.tree import Tree
+from jounce.robot.tree import Frame, Tree
 from jounce.robot.tree_scan import to_coordinates
 from jounce.robot.wrenches import FRAMES, Wrench, wrench_arrays
+from jounce.shapes import ArrayLike, Numbers
 
 
 def inverse_dynamics(
     robot: Robot,
-    q: Any,
+    q: ArrayLike,
     *,
     wrenches: Sequence[Wrench] = (),
-    time: Any = None,
+    time: ArrayLike | None = None,
     drives: bool = False,
-) -> Any:
+) -> Float[Numbers, "*batch derivative joint"]:
     """Return the joint torques or forces that a motion needs, and their rates, exact to rounding.
 
     Recursive Newton-Euler on jets: Negrean 2025, equations 123-125 and 144-146, to any order.
@@ -66,14 +68,14 @@ def inverse_dynamics(
     >>> jn.inverse_dynamics(pendulum, [[0.0], [1.0], [3.0], [6.0]]).round(12).tolist()  # torque and torque rate
     [[5.905], [2.0]]
     """
-    q = checked(robot, q, 2)
+    q = checked_coordinates(robot, q, 2)
     arrays, static = _applied(robot, q, wrenches, time)
     return _generalised_forces(robot, arrays[0], arrays[1], (*static, drives))
 
 
 def joint_wrenches(
-    robot: Robot, q: Any, *, wrenches: Sequence[Wrench] = (), time: Any = None, frame: str = "link"
-) -> Any:
+    robot: Robot, q: ArrayLike, *, wrenches: Sequence[Wrench] = (), time: ArrayLike | None = None, frame: str = "link"
+) -> Float[Numbers, "*batch derivative body 6"]:
     """Return the forces and moments that the joints carry, and their rates: what bearings and flanges feel.
 
     Parameters
@@ -105,54 +107,49 @@ def joint_wrenches(
     """
     if frame not in FRAMES:
         raise RobotError(f"no such frame; {did_you_mean(frame, FRAMES)}", name="frame", value=frame)
-    q = checked(robot, q, 2)
+    q = checked_coordinates(robot, q, 2)
     arrays, static = _applied(robot, q, wrenches, time)
     turned = [robot.frames[link].rotation for link in robot.moving_links]
     aligned = np.moveaxis(np.array(turned).reshape(-1, 3, 3), 0, -1)
     return _carried(robot, arrays[0], (arrays[1], aligned), (*static, frame == "base"))
 
 
-def _applied(robot: Robot, q: Any, wrenches: Sequence[Wrench], time: Any) -> tuple[Any, Any]:
+def _applied(robot: Robot, q: Any, wrenches: Sequence[Wrench], time: ArrayLike | None) -> tuple[Any, Any]:
     """Return the arrays, the constants and what is static of the wrenches."""
     given = wrench_arrays(robot, wrenches, q.shape[:-2], q.shape[-2] - 2, time)
-    frames = [robot.frames[wrench.link] for wrench in wrenches]
-    constants = tuple(
-        (np.int64(frame.body), frame.position + frame.rotation @ wrench.point, frame.rotation)
-        for frame, wrench in zip(frames, wrenches, strict=True)
-    )
-    return ((q, *given), constants), (tuple(wrench.frame == "base" for wrench in wrenches),)
+    places = tuple(place_of(robot, wrench.link, wrench.point) for wrench in wrenches)
+    return ((q, *given), places), (tuple(wrench.frame == "base" for wrench in wrenches),)
 
 
-def _on_bodies(tree: Tree, arrays: Any, constants: Any, global_axes: tuple[bool, ...]) -> tuple[Any, Any]:
-    """Return external wrenches about the origins of bodies, in their frames, (levels, bodies, 6, batch); and frames."""
+def _on_bodies(
+    tree: Tree, arrays: tuple[Any, ...], places: tuple[Frame, ...], global_axes: tuple[bool, ...]
+) -> BodyWrenches | None:
+    """Return external wrenches about the origins of bodies, in their frames; None without any."""
     q, *wrenches = arrays
     if not wrenches:
-        return None, None
+        return None
     levels = q.shape[0] - 2
-    frames = body_frames(tree, q[:levels]) if any(global_axes) else None
+    frames: Any = body_frames(tree, q[:levels]) if any(global_axes) else None
     whole = jnp.zeros((levels, tree.shape.bodies, 6, q.shape[-1]))
-    for values, (body, point, rotation), in_base in zip(wrenches, constants, global_axes, strict=True):
+    for values, (body, point, rotation), in_base in zip(wrenches, places, global_axes, strict=True):
         force, torque = Jet(tuple(values[:, :3])), Jet(tuple(values[:, 3:]))
         if in_base:
-            frame = _frame(frames, body)
+            frame = frames.take(body)
             force, torque = frame.to_body(force), frame.to_body(torque)
         else:
             force, torque = (matvec(rotation[:, :, None], part) for part in (force, torque))
         moment = torque + cross(point[:, None], force)
         whole = whole.at[:, body].add(stacked(concatenate([force, moment])))
-    return whole, frames
-
-
-def _frame(frames: Frames | None, body: Any) -> Frames:
-    assert frames is not None
-    return frames.take(body)
+    return whole
 
 
 @Batched
-def _generalised_forces(tree: Tree, arrays: Any, constants: Any, global_axes: tuple[bool, ...], drives: bool) -> Any:
+def _generalised_forces(
+    tree: Tree, arrays: tuple[Any, ...], places: tuple[Frame, ...], global_axes: tuple[bool, ...], drives: bool
+) -> Float[Numbers, "levels coordinate batch"]:
     q = arrays[0]
-    applied, _ = _on_bodies(tree, arrays, constants, global_axes)
-    forces = to_coordinates(tree, newton_euler(tree, q, applied)[0])
+    applied = _on_bodies(tree, arrays, places, global_axes)
+    forces = to_coordinates(tree, recursive_newton_euler(tree, q, applied)[0])
     if drives:
         levels = q.shape[0] - 2
         acceleration = Jet(tuple(q)).differentiate().differentiate()
@@ -161,11 +158,12 @@ def _generalised_forces(tree: Tree, arrays: Any, constants: Any, global_axes: tu
 
 
 @Batched
-def _carried(tree: Tree, arrays: Any, constants: Any, global_axes: tuple[bool, ...], in_base: bool) -> Any:
+def _carried(
+    tree: Tree, arrays: tuple[Any, ...], constants: Any, global_axes: tuple[bool, ...], in_base: bool
+) -> BodyWrenches:
     q = arrays[0]
-    given, aligned = constants
-    applied, _ = _on_bodies(tree, arrays, given, global_axes)
-    _, force, moment = newton_euler(tree, q, applied)
+    places, aligned = constants
+    _, force, moment = recursive_newton_euler(tree, q, _on_bodies(tree, arrays, places, global_axes))
     parts = [Jet(tuple(jnp.swapaxes(x, 1, 2))) for x in (force, moment)]  # components, bodies, batch
     if in_base:
         frames = body_frames(tree, q[:-2])

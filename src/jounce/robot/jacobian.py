@@ -3,24 +3,27 @@
 from typing import Any
 
 import jax.numpy as jnp
+from jaxtyping import Float
 
 from jounce.jet import Jet, concatenate, cross
 from jounce.jet.algebra import stacked
-from jounce.robot.batches import Batched, checked
-from jounce.robot.kinematics import body_frames, frame_constants, link_frame
+from jounce.robot.arguments import checked_coordinates
+from jounce.robot.batches import Batched
+from jounce.robot.kinematics import body_frames, link_frame, place_of
 from jounce.robot.robot import Robot
-from jounce.robot.tree import Tree
+from jounce.robot.tree import Frame, Tree
+from jounce.robot.tree_scan import Series
+from jounce.shapes import ArrayLike, Numbers
 
 
-def jacobian_jet(tree: Tree, q: Any, constants: Any) -> Jet:
+def jacobian_jet(tree: Tree, q: Series, place: Frame) -> Jet:
     """Return the Jacobian of a frame as a jet of shape (6, coordinates, batch), linear rows first."""
-    body, position, _ = constants
     frames = body_frames(tree, q)
-    target = frames.take(body).point(position)[:, None]
+    target = frames.take(place.body).point(place.position)[:, None]
     bodies = frames.without_base()
     axis = bodies.axes[2]
     turning = jnp.asarray(tree.turning)[:, None]
-    moved = jnp.asarray(tree.ancestors)[body][:, None] * jnp.asarray(tree.multiplier)[:, None]
+    moved = jnp.asarray(tree.ancestors)[place.body][:, None] * jnp.asarray(tree.multiplier)[:, None]
     linear = cross(axis, target - bodies.position) * turning + axis * (1 - turning)
     columns = concatenate([linear, axis * turning]) * moved
     if tree.shape.direct:
@@ -30,11 +33,13 @@ def jacobian_jet(tree: Tree, q: Any, constants: Any) -> Jet:
 
 
 @Batched
-def _jacobian(tree: Tree, arrays: Any, constants: Any) -> Any:
-    return stacked(jacobian_jet(tree, arrays[0], constants))
+def _jacobian(tree: Tree, arrays: tuple[Series], place: Frame) -> Any:
+    return stacked(jacobian_jet(tree, arrays[0], place))
 
 
-def jacobian(robot: Robot, q: Any, link: str, point: Any = (0.0, 0.0, 0.0)) -> Any:
+def jacobian(
+    robot: Robot, q: ArrayLike, link: str, point: ArrayLike = (0.0, 0.0, 0.0)
+) -> Float[Numbers, "*batch derivative 6 joint"]:
     """Return the Jacobian of a point of a link and its time derivatives, to any order.
 
     Parameters
@@ -67,21 +72,24 @@ def jacobian(robot: Robot, q: Any, link: str, point: Any = (0.0, 0.0, 0.0)) -> A
     >>> jn.jacobian(jn.Robot("one", links, [pin]), [[0.0]], "rod", [2, 0, 0])[0, :, 0].tolist()
     [0.0, 2.0, 0.0, 0.0, 0.0, 1.0]
     """
-    return _jacobian(robot, (checked(robot, q, 0),), frame_constants(robot, link, point))
+    return _jacobian(robot, (checked_coordinates(robot, q),), place_of(robot, link, point))
 
 
-def twist(tree: Tree, q: Any, constants: Any) -> Jet:
+def twist(tree: Tree, q: Series, place: Frame) -> Jet:
     """Return the velocity of a point and the angular velocity of its link, (6, batch), one order shorter than q."""
-    frame = link_frame(tree, q, constants)
+    frame = link_frame(tree, q, place)
+    assert frame.angular_velocity is not None  # there are velocities
     return concatenate([frame.position.differentiate(), frame.angular_velocity])
 
 
 @Batched
-def _operational(tree: Tree, arrays: Any, constants: Any) -> Any:
-    return stacked(twist(tree, arrays[0], constants))
+def _operational(tree: Tree, arrays: tuple[Series], place: Frame) -> Any:
+    return stacked(twist(tree, arrays[0], place))
 
 
-def operational_accelerations(robot: Robot, q: Any, link: str, point: Any = (0.0, 0.0, 0.0)) -> Any:
+def operational_accelerations(
+    robot: Robot, q: ArrayLike, link: str, point: ArrayLike = (0.0, 0.0, 0.0)
+) -> Float[Numbers, "*batch order 6"]:
     """Return the operational velocity and accelerations of all orders of a point of a link: Negrean 2025, equation 59.
 
     Parameters
@@ -109,4 +117,4 @@ def operational_accelerations(robot: Robot, q: Any, link: str, point: Any = (0.0
     >>> jn.operational_accelerations(robot, [[0.0], [2.0], [0.0]], "rod", [1, 0, 0]).tolist()
     [[0.0, 2.0, 0.0, 0.0, 0.0, 2.0], [-4.0, 0.0, 0.0, 0.0, 0.0, 0.0]]
     """
-    return _operational(robot, (checked(robot, q, 1),), frame_constants(robot, link, point))
+    return _operational(robot, (checked_coordinates(robot, q, 1),), place_of(robot, link, point))

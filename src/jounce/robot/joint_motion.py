@@ -8,16 +8,19 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
+from jaxtyping import Bool, Float
 
 from jounce.errors import RobotError, SingularityError, did_you_mean
 from jounce.jet.algebra import stacked
 from jounce.kinematics.linear import singular_values
 from jounce.rigid.inertia import finite_numbers
-from jounce.robot.batches import Batched, floats
+from jounce.robot.arguments import checked_position, floats
+from jounce.robot.batches import Batched
 from jounce.robot.jacobian import jacobian_jet, twist
-from jounce.robot.kinematics import frame_constants
+from jounce.robot.kinematics import place_of
 from jounce.robot.robot import Robot
 from jounce.robot.tree import Tree
+from jounce.shapes import ArrayLike, Numbers
 
 TASKS = {"pose": (0, 1, 2, 3, 4, 5), "position": (0, 1, 2), "orientation": (3, 4, 5)}
 
@@ -39,14 +42,19 @@ class JointMotion:
         What the motion lacks of the one prescribed: zero to rounding, unless damped or where joints are too few.
     """
 
-    q: Any
-    singular_values: Any
-    singular: Any
-    residual: Any
+    q: Float[Numbers, "*batch derivative joint"]
+    singular_values: Float[Numbers, "*batch value"]
+    singular: Bool[Numbers, "*batch"] | np.bool
+    residual: Float[Numbers, "*batch derivative-1 row"]
 
 
 @Batched
-def _solved(tree: Tree, arrays: Any, constants: Any, rows: tuple[int, ...]) -> Any:
+def _solved(
+    tree: Tree,
+    arrays: tuple[Float[Numbers, "1 coordinate batch"], Float[Numbers, "order row batch"]],
+    constants: Any,
+    rows: tuple[int, ...],
+) -> Any:
     position, wanted = arrays
     frame, damping, threshold = constants
     rows_ = np.array(rows)
@@ -72,10 +80,10 @@ def _solved(tree: Tree, arrays: Any, constants: Any, rows: tuple[int, ...]) -> A
 
 def joint_motion(
     robot: Robot,
-    position: Any,
-    operational: Any,
+    position: ArrayLike,
+    operational: ArrayLike,
     link: str,
-    point: Any = (0.0, 0.0, 0.0),
+    point: ArrayLike = (0.0, 0.0, 0.0),
     *,
     task: str | Sequence[int] = "pose",
     damping: float = 0.0,
@@ -132,17 +140,14 @@ def joint_motion(
     for name, value, least in (("damping", damping, 0.0), ("threshold", threshold, 1e-15)):
         if finite_numbers(name, value, ()) < least:
             raise RobotError(f"must be {least:g} or greater", name=name, value=value)
-    start, n = floats("position", position), len(robot.joint_names)
-    if start.ndim < 1 or start.shape[-1] != n:
-        raise RobotError(f"must have the shape (..., n) with n = {n}, not {start.shape}", name="position")
-    start, wanted = start[..., None, :], floats("operational", operational)
+    start, wanted = checked_position(robot, position, "position"), floats("operational", operational)
     lead = start.shape[:-2]
     if wanted.ndim < 2 or wanted.shape[:-2] != lead or wanted.shape[-1] not in (6, len(rows)) or wanted.shape[-2] < 1:
         shape = f"{(*lead, 'order', len(rows))}".replace("'", "")
         raise RobotError(f"must have the shape {shape}, order 1 or more, not {wanted.shape}", name="operational")
     if wanted.shape[-1] == 6:
         wanted = wanted[..., np.array(rows)]
-    constants = (frame_constants(robot, link, point), np.float64(damping), np.float64(threshold))
+    constants = (place_of(robot, link, point), np.float64(damping), np.float64(threshold))
     q, values, singular, residual = _solved(robot, (start, wanted), constants, (rows,))
     values, singular = values[..., 0, :], singular[..., 0, 0] > 0
     if strict and damping == 0 and not isinstance(singular, Tracer) and np.any(singular):

@@ -6,6 +6,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from jounce.errors import RobotError, check_name
 from jounce.jet import Jet, sine_cosine
@@ -13,21 +14,15 @@ from jounce.jet.algebra import stacked, total
 from jounce.rigid.frames import Frames
 from jounce.rigid.inertia import finite_numbers
 from jounce.robot.abstract_robot import AbstractRobot
-from jounce.robot.batches import Batched, checked
-from jounce.robot.tree import Tree
-from jounce.robot.tree_scan import entries, joint_coordinates, once, places, read, write
+from jounce.robot.arguments import checked_coordinates
+from jounce.robot.batches import Batched
+from jounce.robot.tree import Frame, Tree
+from jounce.robot.tree_scan import Series, entries, fill_slots, joint_coordinates, materialised, read_slot, write_slot
+from jounce.shapes import ArrayLike, Numbers
 
 
-def body_frames(tree: Tree, q: Any) -> Frames:
-    """Return the frames of all bodies, of the shape (3, bodies + 1, batch); the last one is the base.
-
-    Parameters
-    ----------
-    tree : Tree
-        Arrays of the robot.
-    q : array of shape (order + 1, coordinates, batch)
-        Taylor coefficients of the coordinates.
-    """
+def body_frames(tree: Tree, q: Series) -> Frames:
+    """Return the frames of all bodies, of the shape (3, bodies + 1, batch); the last one is the base."""
     levels, _, samples = q.shape
     zero = jnp.zeros((levels, 3, samples))
     units = tuple(zero.at[0, i].set(1.0) for i in range(3))
@@ -35,26 +30,26 @@ def body_frames(tree: Tree, q: Any) -> Frames:
 
     def outward(state: Any, entry: Any) -> tuple[Any, Any]:
         body, coordinate, turn = entry
-        *placed, spin = read(tree, state, body.parent_slot)
+        *placed, spin = read_slot(tree, state, body.parent_slot)
         position, *axes = (Jet(tuple(c)) for c in placed)
         position = position + _combined(axes, body.position)
         x, y, z = (_combined(axes, body.rotation[:, i]) for i in range(3))
         if tree.shape.turning:
             angle, sine, cosine = turn
-            x, y, z = once((x, y, z))
+            x, y, z = materialised((x, y, z))
             x, y = x * cosine + y * sine, y * cosine - x * sine
             if levels > 1:
                 spin = spin + stacked(z * angle.differentiate())
         if tree.shape.sliding:
             position = position + z * (coordinate * (1 - body.turning))
         found = (*(stacked(jet) for jet in (position, x, y, z)), spin)
-        return write(tree, state, body.slot, found), found
+        return write_slot(tree, state, body.slot, found), found
 
     coordinates = Jet(tuple(joint_coordinates(tree, q)[:, :, None]))
     angles = coordinates * jnp.asarray(tree.turning)[:, None, None] if tree.shape.sliding else coordinates
     # made before the scan, in which XLA would take sine and cosine again for each use of them
     turns = (angles, *sine_cosine(angles)) if tree.shape.turning else None
-    _, found = jax.lax.scan(outward, places(tree, base), (entries(tree), coordinates, turns))
+    _, found = jax.lax.scan(outward, fill_slots(tree, base), (entries(tree), coordinates, turns))
     arrays = [jnp.moveaxis(jnp.concatenate([x, fixed[None]]), 0, 2) for x, fixed in zip(found, base, strict=True)]
     position, *axes = (Jet(tuple(x)) for x in arrays[:4])
     return Frames(position, tuple(axes), Jet(tuple(arrays[4])) if levels > 1 else None)
@@ -64,16 +59,15 @@ def _combined(axes: Any, local: Any) -> Jet:
     return total(axis * part for axis, part in zip(axes, local, strict=True))
 
 
-def link_frame(tree: Tree, q: Any, constants: Any) -> Frames:
-    """Return the frame at a point of a link: constants are the index of its body, position and rotation there."""
-    body, position, rotation = constants
-    frame = body_frames(tree, q).take(body)
-    axes = tuple(frame.direction(rotation[:, i]) for i in range(3))
-    return Frames(frame.point(position), axes, frame.angular_velocity)
+def link_frame(tree: Tree, q: Series, place: Frame) -> Frames:
+    """Return the frame at a place on a body, the last of which is the base."""
+    frame = body_frames(tree, q).take(place.body)
+    axes = tuple(frame.direction(place.rotation[:, i]) for i in range(3))
+    return Frames(frame.point(place.position), axes, frame.angular_velocity)
 
 
-def frame_constants(robot: AbstractRobot, link: str, point: Any) -> tuple[Any, Any, Any]:
-    """Return the index of the body of a link, and the pose there of its frame at a point.
+def place_of(robot: AbstractRobot, link: str, point: ArrayLike) -> Frame:
+    """Return where the frame of a link, moved to a point, is in its body; the base stands after the moving bodies.
 
     Raises
     ------
@@ -84,7 +78,7 @@ def frame_constants(robot: AbstractRobot, link: str, point: Any) -> tuple[Any, A
     point = finite_numbers("point", point, (3,))
     frame = robot.frames[link]
     body = frame.body if frame.body >= 0 else len(robot.moving_links)
-    return np.int64(body), frame.position + frame.rotation @ point, frame.rotation
+    return Frame(body, frame.position + frame.rotation @ point, frame.rotation)
 
 
 @jax.tree_util.register_dataclass
@@ -102,21 +96,22 @@ class FrameMotion:
         Angular velocity, acceleration, jerk, ...; rad/s by s.
     """
 
-    position: Any
-    rotation: Any
-    angular_velocity: Any
+    position: Float[Numbers, "*batch derivative 3"]
+    rotation: Float[Numbers, "*batch derivative 3 3"]
+    angular_velocity: Float[Numbers, "*batch derivative-1 3"]
 
 
 @Batched
-def _frame_motion(tree: Tree, arrays: Any, constants: Any) -> Any:
-    frame = link_frame(tree, arrays[0], constants)
-    spin = (
-        stacked(frame.angular_velocity) if frame.angular_velocity is not None else jnp.zeros((0, *frame.position.shape))
-    )
-    return stacked(frame.position), stacked(frame.attitude), spin
+def _frame_motion(tree: Tree, arrays: tuple[Series], place: Frame) -> Any:
+    frame = link_frame(tree, arrays[0], place)
+    spin = frame.angular_velocity
+    rates = jnp.zeros((0, *frame.position.shape)) if spin is None else stacked(spin)
+    return stacked(frame.position), stacked(frame.attitude), rates
 
 
-def forward_kinematics(robot: AbstractRobot, q: Any, link: str, point: Any = (0.0, 0.0, 0.0)) -> FrameMotion:
+def forward_kinematics(
+    robot: AbstractRobot, q: ArrayLike, link: str, point: ArrayLike = (0.0, 0.0, 0.0)
+) -> FrameMotion:
     """Return the motion of the frame of a link, or of the same frame moved to a point, to any order.
 
     Parameters
@@ -150,12 +145,11 @@ def forward_kinematics(robot: AbstractRobot, q: Any, link: str, point: Any = (0.
     >>> motion.position.tolist()
     [[1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [-4.0, 0.0, 0.0]]
     """
-    q = checked(robot, q, 0)
-    return FrameMotion(*_frame_motion(robot, (q,), frame_constants(robot, link, point)))
+    return FrameMotion(*_frame_motion(robot, (checked_coordinates(robot, q),), place_of(robot, link, point)))
 
 
 @Batched
-def _center_of_mass(tree: Tree, arrays: Any, constants: Any) -> Any:
+def _center_of_mass(tree: Tree, arrays: tuple[Series], constants: Any) -> Any:
     frames = body_frames(tree, arrays[0])
     mass, center = constants
     centers = frames.point(jnp.swapaxes(center, 0, 1)[:, :, None])
@@ -163,7 +157,7 @@ def _center_of_mass(tree: Tree, arrays: Any, constants: Any) -> Any:
     return stacked(centers.map(lambda c: jnp.einsum("cbs,b->cs", c, share)))
 
 
-def center_of_mass(robot: AbstractRobot, q: Any) -> Any:
+def center_of_mass(robot: AbstractRobot, q: ArrayLike) -> Float[Numbers, "*batch derivative 3"]:
     """Return the centre of mass of the whole robot and its derivatives: Negrean 2025, equations 44-48 and 55.
 
     Parameters
@@ -191,7 +185,7 @@ def center_of_mass(robot: AbstractRobot, q: Any) -> Any:
     >>> jn.center_of_mass(jn.Robot("one", links, [pin]), [[0.0], [2.0]]).tolist()
     [[0.5, 0.0, 0.0], [0.0, 1.0, 0.0]]
     """
-    q = checked(robot, q, 0)
+    q = checked_coordinates(robot, q)
     base = robot.base_inertia
     if base is None and not robot.moving_links:
         raise RobotError("no link has a mass", name="robot", value=robot.name)

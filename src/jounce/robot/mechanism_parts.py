@@ -1,6 +1,5 @@
 """The bodies, joints, closures and drives that a robot becomes as a mechanism, in the frames of its moving links."""
 
-from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,7 @@ from jounce.rigid.euler_parameters import from_rotation_matrices
 from jounce.rigid.inertia import Inertia
 from jounce.robot.abstract_robot import AbstractRobot
 from jounce.robot.closures import LinkClosure
-from jounce.robot.coupling import Placed, SlideOutput, coupled
+from jounce.robot.coupling import JointPlacement, SlideOutput, coupled
 from jounce.robot.kinematics import forward_kinematics
 from jounce.robot.model import Closure
 from jounce.robot.tree import axes_with_z_along
@@ -36,7 +35,7 @@ def on_body(robot: AbstractRobot, link: str) -> tuple[str, np.ndarray, np.ndarra
     return name, turned @ position, turned @ rotation
 
 
-class Parts:
+class RobotParts:
     """The bodies, joints and drives of a robot, in the frames of its moving links.
 
     Parameters
@@ -51,7 +50,7 @@ class Parts:
 
     def __init__(self, robot: AbstractRobot, kept: set[str], forces: Any, outputs: Any):
         self.robot, self.tree = robot, robot.opened().tree
-        self.moving = [joint for joint in robot.joints.values() if joint.moving]
+        self.moving = robot.moving_joints
         if GROUND in robot.moving_links:
             raise RobotError("a link of this name moves; rename it, it stands for the base", name="links", value=GROUND)
         elements = [*(forces or {}).values(), *(x for x in (outputs or {}).values() if not isinstance(x, str))]
@@ -65,9 +64,8 @@ class Parts:
                     self.merged[k] = count
                     break
         inner = self._inner()
-        self.coordinates = tuple(
-            name for name in robot.joint_names if name not in inner_names(self.moving, self.merged)
-        )
+        merged = {self.moving[k].name for k in inner.union(self.merged)}
+        self.coordinates = tuple(name for name in robot.joint_names if name not in merged)
         self.links = [joint.child for k, joint in enumerate(self.moving) if k not in inner]
 
     def _inner(self) -> set[int]:
@@ -96,17 +94,17 @@ class Parts:
         axes.append(tree.rotation[slides[1]] @ tree.rotation[slides[2]] @ np.eye(3)[2])
         return bool(abs(np.linalg.det(np.array(axes))) > 1e-3)
 
-    def placed(self, index: int) -> Placed:
+    def placed(self, index: int) -> JointPlacement:
         """Return a moving joint in the frames of the two bodies."""
         joint = self.moving[index]
         parent, position, rotation = on_body(self.robot, joint.parent)
         point, rotation = position + rotation @ joint.position, rotation @ joint.rotation
         side = axes_with_z_along(joint.axis)[:, 0]
-        return Placed(
+        return JointPlacement(
             (parent, joint.child), joint.turning, point, rotation @ joint.axis, joint.axis, rotation @ side, side
         )
 
-    def _named(self, name: str) -> Placed:
+    def _named(self, name: str) -> JointPlacement:
         return self.placed([joint.name for joint in self.moving].index(name))
 
     def joints(self) -> dict[str, AbstractConstraint]:
@@ -209,14 +207,9 @@ class Parts:
             whole = Inertia.total(parts) if parts else None
             found[name] = Body(
                 at.position[0].tolist(),
-                orientation=from_rotation_matrices(at.rotation[0]).tolist(),
+                orientation=from_rotation_matrices(np.asarray(at.rotation[0])).tolist(),
                 mass=None if whole is None else whole.mass,
                 inertia=None if whole is None else whole.tensor + armature.get(name, 0.0),
                 center_of_mass=None if whole is None else whole.center_of_mass,
             )
         return found
-
-
-def inner_names(moving: Sequence[Any], merged: Mapping[int, int]) -> set[str]:
-    """Return the names of joints that are merged with their neighbours."""
-    return {moving[k].name for last, count in merged.items() for k in range(last - count + 1, last + 1)}

@@ -12,11 +12,18 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from jounce.jet import Jet, components, concatenate, cross, matvec, next_sine_cosine
 from jounce.jet.algebra import bilinear, stacked, total
 from jounce.robot.tree import Tree
-from jounce.robot.tree_scan import entries, joint_coordinates, once, places, read, write
+from jounce.robot.tree_scan import Series, entries, fill_slots, joint_coordinates, materialised, read_slot, write_slot
+from jounce.shapes import Numbers
+
+BodyWrenches = Float[Numbers, "levels body 6 batch"]
+"""Taylor coefficients of a force and a moment about the origin of each body, in its frame."""
+Rates = Float[Numbers, "order-2 body batch"]
+RatesOfVectors = Float[Numbers, "order-2 body 3 batch"]
 
 QUARTER = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])  # a quarter turn about z, of x and y
 
@@ -31,7 +38,7 @@ class Turn:
     use. The matrix is cheaper made than kept.
     """
 
-    still: Any  # the matrix is still + across cosine + quarter sine
+    still: Any  # the matrix is still + across cosine + quarter sine, each (..., 3, 3, batch or 1)
     across: Any = None
     quarter: Any = None
     start: tuple[Any, Any] | None = None  # cosine and sine of the value
@@ -87,7 +94,9 @@ def _constant(value: Any) -> Any:
     return value[:, None]
 
 
-def newton_euler(tree: Tree, q: Any, wrenches: Any = None) -> tuple[Any, Any, Any]:
+def recursive_newton_euler(
+    tree: Tree, q: Series, wrenches: BodyWrenches | None = None
+) -> tuple[Rates, RatesOfVectors, RatesOfVectors]:
     """Return generalised forces at the joints and the wrenches that they carry.
 
     Parameters
@@ -101,9 +110,9 @@ def newton_euler(tree: Tree, q: Any, wrenches: Any = None) -> tuple[Any, Any, An
 
     Returns
     -------
-    force : array of shape (order - 1, bodies, batch)
+    along : array of shape (order - 1, bodies, batch)
         Taylor coefficients of the force or torque along the axis of each joint.
-    carried : tuple of array of shape (order - 1, bodies, 3, batch)
+    force, moment : array of shape (order - 1, bodies, 3, batch)
         Force and moment about the origin of the body that it gets through its joint, in its own frame.
     """
     order = q.shape[0] - 1
@@ -123,7 +132,7 @@ def newton_euler(tree: Tree, q: Any, wrenches: Any = None) -> tuple[Any, Any, An
 
     def outward(state: Any, entry: Any) -> tuple[Any, Any]:
         body, coordinate, turn, applied = entry
-        w, v = (Jet(tuple(c)) for c in read(tree, state, body.parent_slot))
+        w, v = (Jet(tuple(c)) for c in read_slot(tree, state, body.parent_slot))
         w, v = turn.outward(w), turn.outward(v + cross(w, _constant(body.position)))
         rate = coordinate.differentiate()
         if tree.shape.turning:
@@ -134,21 +143,21 @@ def newton_euler(tree: Tree, q: Any, wrenches: Any = None) -> tuple[Any, Any, An
             slide = coordinate * (1 - body.turning)
             x, y, z = components(w)
             v = v + concatenate([y * slide, -(x * slide), rate * (1 - body.turning)])
-        w, v = once((w, v))
+        w, v = materialised((w, v))
         momentum = (v + cross(w, _constant(body.center))) * body.mass
         spin = matvec(body.inertia[:, :, None], w)
-        momentum, spin = once((momentum, spin))
+        momentum, spin = materialised((momentum, spin))
         force = momentum.differentiate() + cross(w, momentum)
         moment = spin.differentiate() + cross(w, spin) + cross(_constant(body.center), force)
         if applied is not None:
             force = Jet(f - a[:3] for f, a in zip(force.coefficients, applied, strict=True))
             moment = Jet(m - a[3:] for m, a in zip(moment.coefficients, applied, strict=True))
-        state = write(tree, state, body.slot, (stacked(w), stacked(v)))
+        state = write_slot(tree, state, body.slot, (stacked(w), stacked(v)))
         return state, (force.dense(), moment.dense())
 
     def inward(state: Any, entry: Any) -> tuple[Any, Any]:
         body, coordinate, turn, (force, moment) = entry
-        from_children = read(tree, state, body.slot)
+        from_children = read_slot(tree, state, body.slot)
         force, moment = (own + Jet(tuple(c)) for own, c in zip((force, moment), from_children, strict=True))
         along = Jet(c[2] for c in moment.coefficients)
         if tree.shape.sliding:
@@ -161,16 +170,16 @@ def newton_euler(tree: Tree, q: Any, wrenches: Any = None) -> tuple[Any, Any, An
         parent = turn.inward(force)
         about = turn.inward(at_joint) + cross(_constant(body.position), parent)
         if tree.shape.slots > 1:
-            state = write(tree, state, body.slot, jax.tree.map(jnp.zeros_like, from_children))
-            before = read(tree, state, body.parent_slot)
+            state = write_slot(tree, state, body.slot, jax.tree.map(jnp.zeros_like, from_children))
+            before = read_slot(tree, state, body.parent_slot)
             sent = tuple(a + stacked(b) for a, b in zip(before, (parent, about), strict=True))
-            state = write(tree, state, body.parent_slot, sent)
+            state = write_slot(tree, state, body.parent_slot, sent)
         else:
             state = (stacked(parent), stacked(about))
         return state, (stacked(along), stacked(force), stacked(moment))
 
-    _, kept = jax.lax.scan(outward, places(tree, base), bodies)
+    _, kept = jax.lax.scan(outward, fill_slots(tree, base), bodies)
     nothing = jnp.zeros((order - 1, 3, samples))
-    _, results = jax.lax.scan(inward, places(tree, (nothing, nothing)), (*bodies[:3], kept), reverse=True)
+    _, results = jax.lax.scan(inward, fill_slots(tree, (nothing, nothing)), (*bodies[:3], kept), reverse=True)
     along, force, moment = (jnp.moveaxis(x, 0, 1) for x in results)
     return along, force, moment

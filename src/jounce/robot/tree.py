@@ -6,10 +6,13 @@ from typing import Any, NamedTuple
 
 import jax
 import numpy as np
+from jaxtyping import Float
 
 from jounce.errors import RobotError, check_name
 from jounce.rigid.inertia import Inertia
-from jounce.robot.model import Joint, Link
+from jounce.robot.model import Joint, Link, Mimic
+
+MASSLESS = Inertia(0.0, strict=False)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -84,8 +87,8 @@ class Frame(NamedTuple):
     """Where a link is: the body that it moves with (-1 is the base), and its pose in the frame of that body."""
 
     body: int
-    position: np.ndarray
-    rotation: np.ndarray
+    position: Float[np.ndarray, " 3"]
+    rotation: Float[np.ndarray, "3 3"]
 
 
 def ordered(links: Mapping[str, Link], joints: Mapping[str, Joint]) -> list[Joint]:
@@ -150,29 +153,32 @@ def arrange(
         inertia = links[joint.child].inertia
         if inertia is not None and body >= 0:
             masses[body].append(inertia.moved(position, rotation))
-    whole = [Inertia.total(parts) if parts else None for parts in masses]
+    whole = [Inertia.total(parts) if parts else MASSLESS for parts in masses]
     slots, parent_slots, count = _slots(parents)
     bodies, order = len(moving), [joint.name for joint in moving if joint.mimic is None]
-    follows = [joint.name if joint.mimic is None else joint.mimic.joint for joint in moving]
-    coordinate = np.array([order.index(name) for name in follows], int)
-    multiplier = np.array([1.0 if joint.mimic is None else joint.mimic.multiplier for joint in moving], float)
+    mimics = [joint.mimic or Mimic(joint.name) for joint in moving]  # each follows another, or itself
+    coordinate = np.array([order.index(mimic.joint) for mimic in mimics], int)
+    multiplier = np.array([mimic.multiplier for mimic in mimics], float)
+    weights = {"armature": multiplier**2, "damping": multiplier**2, "friction": np.abs(multiplier)}
+    drives = {  # what those of all joints make together at each coordinate, by virtual work
+        field: np.bincount(coordinate, weight * [getattr(joint, field) for joint in moving], len(order)).astype(float)
+        for field, weight in weights.items()
+    }
     turning = np.array([joint.turning for joint in moving], float)
     tree = Tree(
         rotation=np.array([rotation for _, rotation in places]).reshape(bodies, 3, 3),
         position=np.array([position for position, _ in places]).reshape(bodies, 3),
-        mass=np.array([0.0 if one is None else one.mass for one in whole]),
-        center=np.array([zero if one is None else one.center_of_mass for one in whole]).reshape(bodies, 3),
-        inertia=np.array([0 * identity if one is None else one.tensor for one in whole]).reshape(bodies, 3, 3),
+        mass=np.array([one.mass for one in whole]),
+        center=np.array([one.center_of_mass for one in whole]).reshape(bodies, 3),
+        inertia=np.array([one.tensor for one in whole]).reshape(bodies, 3, 3),
         turning=turning,
         coordinate=coordinate,
         multiplier=multiplier,
-        offset=np.array([0.0 if joint.mimic is None else joint.mimic.offset for joint in moving], float),
+        offset=np.array([mimic.offset for mimic in mimics], float),
         slot=np.array(slots, int),
         parent_slot=np.array(parent_slots, int),
         ancestors=_ancestors(parents),
-        armature=_at_coordinates([joint.armature for joint in moving], multiplier**2, coordinate, len(order)),
-        damping=_at_coordinates([joint.damping for joint in moving], multiplier**2, coordinate, len(order)),
-        friction=_at_coordinates([joint.friction for joint in moving], np.abs(multiplier), coordinate, len(order)),
+        **drives,
         gravity=gravity,
         shape=Shape(
             bodies=bodies,
@@ -180,13 +186,13 @@ def arrange(
             slots=count,
             turning=bool(turning.any()),
             sliding=bool((turning == 0).any()),
-            direct=follows == order and all(joint.mimic is None for joint in moving),
+            direct=len(order) == bodies,
         ),
     )
     return tree, frames
 
 
-def axes_with_z_along(axis: np.ndarray) -> np.ndarray:
+def axes_with_z_along(axis: Float[np.ndarray, " 3"]) -> Float[np.ndarray, "3 3"]:
     """Return a rotation matrix whose third column is the given unit vector; exact for the axes of a frame."""
     third = int(np.argmax(np.abs(axis)))
     first = np.eye(3)[(third + 1) % 3]
@@ -195,23 +201,18 @@ def axes_with_z_along(axis: np.ndarray) -> np.ndarray:
     return np.column_stack([first, np.cross(axis, first), axis])
 
 
-def turn_about(axis: np.ndarray, angle: float) -> np.ndarray:
+def turn_about(axis: Float[np.ndarray, " 3"], angle: float) -> Float[np.ndarray, "3 3"]:
     """Return the matrix of a rotation about a unit vector: Negrean 2025, equation 20."""
     from scipy.spatial.transform import Rotation
 
     return Rotation.from_rotvec(angle * np.asarray(axis)).as_matrix()
 
 
-def quaternion_matrix(quaternion: Any) -> np.ndarray:
+def quaternion_matrix(quaternion: Float[np.ndarray, " 4"]) -> Float[np.ndarray, "3 3"]:
     """Return the rotation matrix of a unit quaternion, scalar first."""
     from scipy.spatial.transform import Rotation
 
     return Rotation.from_quat(np.roll(quaternion, -1)).as_matrix()
-
-
-def _at_coordinates(values: list[float], weights: np.ndarray, coordinate: np.ndarray, count: int) -> np.ndarray:
-    """Return what the drives of joints make together at each coordinate, by virtual work."""
-    return np.bincount(coordinate, weights * values, count) if values else np.zeros(count)
 
 
 def _slots(parents: list[int]) -> tuple[list[int], list[int], int]:

@@ -5,20 +5,28 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+from jaxtyping import Float
 
 from jounce.robot.tree import Tree
+from jounce.shapes import Numbers
+
+Series = Float[Numbers, "order coordinate batch"]
+"""Taylor coefficients of the coordinates of a robot, or of what belongs to them."""
+
+BodySeries = Float[Numbers, "order body batch"]
+"""Taylor coefficients of one number for each moving body, or for its joint."""
 
 
-def joint_coordinates(tree: Tree, q: Any) -> Any:
-    """Return the coordinates of the bodies, (order + 1, bodies, batch), from q; both as Taylor coefficients."""
+def joint_coordinates(tree: Tree, q: Series) -> BodySeries:
+    """Return the coordinates of the joints of the bodies."""
     if tree.shape.direct:
         return q
     q = jnp.take(q, jnp.asarray(tree.coordinate), axis=1) * jnp.asarray(tree.multiplier)[None, :, None]
     return jnp.concatenate([q[:1] + jnp.asarray(tree.offset)[None, :, None], q[1:]])
 
 
-def to_coordinates(tree: Tree, forces: Any) -> Any:
-    """Return generalised forces (order + 1, coordinates, batch) from those at the joints of the bodies."""
+def to_coordinates(tree: Tree, forces: BodySeries) -> Series:
+    """Return generalised forces from those at the joints of the bodies."""
     if tree.shape.direct:
         return forces
     shape = (forces.shape[0], tree.shape.coordinates, forces.shape[2])
@@ -32,27 +40,27 @@ def entries(tree: Tree) -> Tree:
     return dataclasses.replace(jax.tree.map(jnp.asarray, tree), **dict.fromkeys(fields))
 
 
-def places(tree: Tree, state: Any) -> Any:
+def fill_slots(tree: Tree, state: Any) -> Any:
     """Return the places where states of parents are kept, all holding the given one."""
     if tree.shape.slots == 1:
         return state
     return jax.tree.map(lambda x: jnp.broadcast_to(x, (tree.shape.slots, *x.shape)), state)
 
 
-def read(tree: Tree, state: Any, slot: Any) -> Any:
+def read_slot(tree: Tree, state: Any, slot: Any) -> Any:
     """Return the state kept in a place; a chain has one place only."""
     if tree.shape.slots == 1:
         return state
     return jax.tree.map(lambda x: jax.lax.dynamic_index_in_dim(x, slot, keepdims=False), state)
 
 
-def write(tree: Tree, state: Any, slot: Any, value: Any) -> Any:
+def write_slot(tree: Tree, state: Any, slot: Any, value: Any) -> Any:
     """Return the places with a new state in one of them."""
     if tree.shape.slots == 1:
         return value
     return jax.tree.map(lambda x, y: jax.lax.dynamic_update_index_in_dim(x, y, slot, 0), state, value)
 
 
-def once(value: Any) -> Any:
+def materialised(value: Any) -> Any:
     """Return a value as it is, kept by XLA, which otherwise computes it again for every use: this halves the time."""
     return jax.lax.optimization_barrier(value)

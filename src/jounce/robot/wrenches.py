@@ -13,7 +13,7 @@ from jax.core import Tracer
 from jounce.errors import RobotError, check_name, did_you_mean
 from jounce.jet import Jet, compose
 from jounce.rigid.inertia import finite_numbers
-from jounce.robot.batches import floats
+from jounce.robot.arguments import floats
 from jounce.robot.robot import Robot
 
 FRAMES = ("base", "link")

@@ -6,25 +6,13 @@ Plane angle counts as a dimension of its own here, so that degrees are refused w
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
 from jounce.errors import UnitError
 from jounce.trajectory.expression import CONSTANTS, Expression
-
-__all__ = [
-    "KINDS",
-    "NUMBER",
-    "Dimension",
-    "check_dimension",
-    "check_one_of",
-    "describe_dimension",
-    "dimension_of",
-    "inferred",
-    "times",
-]
 
 Dimension = tuple[tuple[str, int | Fraction], ...]
 """Powers of the base quantities, sorted by name; empty for a pure number."""
@@ -114,6 +102,16 @@ def check_dimension(dimension: Dimension, kind: str, what: str, *, exactly: bool
         dimension_of_it, fitting = dimension, list(allowed)
     if fitting and dimension_of_it not in fitting:
         raise UnitError(f"expected {words}, but {what} is {describe_dimension(dimension)}")
+
+
+def is_rate(dimension: Dimension, bases: Iterable[str], order: int) -> bool:
+    """Tell whether a dimension is that of a time derivative of one of some base quantities."""
+    return any(dimension == dimension_of(**{base: 1, "time": -order}) for base in bases)
+
+
+def per_seconds(order: int) -> str:
+    """Word the unit of time of a derivative, as it follows the unit of what is derived."""
+    return ("", " per s")[order] if order < 2 else f" per s^{order}"
 
 
 def check_one_of(dimension: Dimension, allowed: tuple[Dimension, ...], *, exactly: bool = True) -> None:

@@ -6,33 +6,21 @@ import ast
 import difflib
 import math
 import numbers
+import operator
 import re
 import warnings
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
 from typing import Any, NoReturn
 
 from jounce.errors import ExpressionError, did_you_mean, show_value
 
-__all__ = ["CONSTANTS", "FUNCTIONS", "RESERVED", "Expression"]
-
 CONSTANTS: dict[str, float] = {"pi": math.pi, "deg": math.pi / 180.0}
 """Constants that every expression knows."""
 
+_NAMES = "sin cos tan asin acos atan atan2 sinh cosh tanh exp log sqrt abs".split()
 FUNCTIONS: dict[str, tuple[int, Callable[..., float]]] = {
-    "sin": (1, math.sin),
-    "cos": (1, math.cos),
-    "tan": (1, math.tan),
-    "asin": (1, math.asin),
-    "acos": (1, math.acos),
-    "atan": (1, math.atan),
-    "atan2": (2, math.atan2),
-    "sinh": (1, math.sinh),
-    "cosh": (1, math.cosh),
-    "tanh": (1, math.tanh),
-    "exp": (1, math.exp),
-    "log": (1, math.log),
-    "sqrt": (1, math.sqrt),
-    "abs": (1, math.fabs),
+    name: (2 if name == "atan2" else 1, math.fabs if name == "abs" else getattr(math, name)) for name in _NAMES
 }
 """Functions that every expression knows: number of arguments, and what to call on plain numbers."""
 
@@ -43,8 +31,16 @@ MAX_CHARACTERS = 2000
 MAX_NESTING = 50
 
 _OPERATORS = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**", ast.UAdd: "pos", ast.USub: "neg"}
+_ARITHMETIC: dict[str, Callable[..., Any]] = {
+    "+": operator.add,
+    "-": operator.sub,
+    "*": operator.mul,
+    "/": operator.truediv,
+    "**": operator.pow,
+    "neg": operator.neg,
+    "pos": operator.pos,
+}
 _FOUND = {
-    ast.Attribute: "an attribute",
     ast.Subscript: "an index in brackets",
     ast.Lambda: "a lambda",
     ast.IfExp: "a conditional",
@@ -54,16 +50,12 @@ _FOUND = {
     ast.Tuple: "a comma",
     ast.Dict: "a mapping",
     ast.Set: "a set",
-    ast.ListComp: "a comprehension",
-    ast.SetComp: "a comprehension",
-    ast.DictComp: "a comprehension",
-    ast.GeneratorExp: "a comprehension",
+    **dict.fromkeys((ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp), "a comprehension"),
     ast.JoinedStr: "a string",
     ast.NamedExpr: "an assignment",
     ast.Starred: "a starred argument",
     ast.Await: "await",
-    ast.Yield: "yield",
-    ast.YieldFrom: "yield",
+    **dict.fromkeys((ast.Yield, ast.YieldFrom), "yield"),
 }
 _ALLOWED = "allowed are numbers, names, + - * / **, parentheses and the usual functions"
 
@@ -71,6 +63,7 @@ _ALLOWED = "allowed are numbers, names, + - * / **, parentheses and the usual fu
 _Instruction = tuple[str, Any, int, int]
 
 
+@dataclass(frozen=True, init=False, repr=False)
 class Expression:
     """A formula of numbers, names and the usual functions, safe to read from a file.
 
@@ -106,20 +99,17 @@ class Expression:
     90.0
     """
 
-    __slots__ = ("_program", "names", "text")
-
     text: str
-    names: frozenset[str]
-    _program: tuple[_Instruction, ...]
+    names: frozenset[str] = field(compare=False)
+    _program: tuple[_Instruction, ...] = field(compare=False)
 
     def __init__(self, text: str, names: Iterable[str] | None = None) -> None:
         if not isinstance(text, str):
             raise ExpressionError("an expression must be text", value=text)
         clean = re.sub(r"\s", " ", text).strip()
-        object.__setattr__(self, "text", clean)
-        object.__setattr__(self, "_program", _compile(clean))
-        free = frozenset(operand for kind, operand, _, _ in self._program if kind == "name")
-        object.__setattr__(self, "names", free)
+        program = _compile(clean)
+        free = frozenset(operand for kind, operand, _, _ in program if kind == "name")
+        self.__dict__.update(text=clean, names=free, _program=program)
         if names is not None:
             self.check(names)
 
@@ -171,18 +161,13 @@ class Expression:
         return self._folded(float, named, self._apply)
 
     def folded(
-        self,
-        number: Callable[[float], Any],
-        name: Callable[[str], Any],
-        operation: Callable[[str, list[Any]], Any],
+        self, number: Callable[[float], Any], name: Callable[[str], Any], operation: Callable[[str, list[Any]], Any]
     ) -> Any:
         """Return what comes of the formula when its numbers, names and operations mean something else.
 
         The last are given by the word for them (``+ - * / ** pos neg``, or a function), with their arguments.
         """
-        return self._folded(
-            number, lambda text, _: name(text), lambda _, word, arguments, __: operation(word, arguments)
-        )
+        return self._folded(number, lambda text, _: name(text), lambda word, arguments, _: operation(word, arguments))
 
     def _folded(self, number: Any, name: Any, operation: Any) -> Any:
         stack: list[Any] = []
@@ -194,36 +179,25 @@ class Expression:
             else:
                 arguments = stack[len(stack) - count :]
                 del stack[len(stack) - count :]
-                stack.append(operation(kind, operand, arguments, column))
+                stack.append(operation(operand, arguments, column))
         return stack[0]
 
-    def _apply(self, kind: str, operand: str, arguments: list[Any], column: int) -> Any:
+    def _apply(self, word: str, arguments: list[Any], column: int) -> Any:
         """Apply one operator or function; plain numbers stay plain."""
-        plain = all(isinstance(argument, float) for argument in arguments)
-        if not plain:
-            return _call_general(operand, arguments) if kind == "call" else _operate(operand, arguments)
+        if not all(isinstance(argument, float) for argument in arguments):
+            return _operate_on_arrays(word, arguments)
         try:
-            value = FUNCTIONS[operand][1](*arguments) if kind == "call" else _operate_plain(operand, arguments)
+            value = FUNCTIONS[word][1](*arguments) if word in FUNCTIONS else _ARITHMETIC[word](*arguments)
+            if isinstance(value, complex):  # a root of a negative number
+                raise ValueError
         except (ArithmeticError, ValueError) as error:
-            shown = _show_operation(kind, operand, arguments)
             problem = "is too large" if isinstance(error, OverflowError) else "is not defined"
-            raise ExpressionError(f"{shown} {problem}{_where(column, self.text)}", column=column) from None
-        if not math.isfinite(value) and all(map(math.isfinite, arguments)):
-            shown = _show_operation(kind, operand, arguments)
-            raise ExpressionError(f"{shown} is too large{_where(column, self.text)}", column=column)
-        return value
-
-    def __setattr__(self, name: str, value: object) -> NoReturn:
-        raise AttributeError(f"an Expression is frozen, cannot set {name}")
-
-    def __delattr__(self, name: str) -> NoReturn:
-        raise AttributeError(f"an Expression is frozen, cannot delete {name}")
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Expression) and self.text == other.text
-
-    def __hash__(self) -> int:
-        return hash((Expression, self.text))
+        else:
+            if math.isfinite(value) or not all(map(math.isfinite, arguments)):
+                return value
+            problem = "is too large"
+        shown = _show_operation(word, arguments)
+        raise ExpressionError(f"{shown} {problem}{_where(column, self.text)}", column=column)
 
     def __repr__(self) -> str:
         return f"Expression({self.text!r})"
@@ -231,57 +205,27 @@ class Expression:
     def __str__(self) -> str:
         return self.text
 
-    def __reduce__(self) -> tuple[type[Expression], tuple[str]]:
-        return (Expression, (self.text,))
-
-    def __copy__(self) -> Expression:
-        return self
-
     def __deepcopy__(self, memo: dict[int, Any]) -> Expression:
         return self
 
 
-def _show_operation(kind: str, operand: str, arguments: list[float]) -> str:
+def _show_operation(word: str, arguments: list[float]) -> str:
     """Word one operation on plain numbers, for messages."""
-    if kind == "call":
-        return f"{operand}({', '.join(f'{argument:g}' for argument in arguments)})"
-    return f" {operand} ".join(f"{argument:g}" if argument >= 0 else f"({argument:g})" for argument in arguments)
+    if word in FUNCTIONS:
+        return f"{word}({', '.join(f'{argument:g}' for argument in arguments)})"
+    return f" {word} ".join(f"{argument:g}" if argument >= 0 else f"({argument:g})" for argument in arguments)
 
 
-def _operate_plain(operator: str, arguments: list[float]) -> float:
-    """Arithmetic on plain numbers, refusing the complex result of a power."""
-    value = _operate(operator, arguments)
-    if isinstance(value, complex):
-        raise ValueError
-    return value
+def _operate_on_arrays(word: str, arguments: list[Any]) -> Any:
+    """Apply an operator or a function to jets, arrays, tracers and numbers."""
+    if word in FUNCTIONS:
+        import jounce.jet  # here, to start quickly
 
-
-def _operate(operator: str, arguments: list[Any]) -> Any:
-    """Arithmetic by Python's own operators, so that it works on jets, arrays and tracers."""
-    match operator, arguments:
-        case "+", [left, right]:
-            return left + right
-        case "-", [left, right]:
-            return left - right
-        case "*", [left, right]:
-            return left * right
-        case "/", [left, right]:
-            return left / right
-        case "**", [left, right]:
-            if not isinstance(left, float) and isinstance(right, float) and right.is_integer() and abs(right) <= 1e6:
-                return left ** int(right)
-            return left**right
-        case "neg", [operand]:
-            return -operand
-        case _:
-            return arguments[0]
-
-
-def _call_general(function: str, arguments: list[Any]) -> Any:
-    """Call a function of ``jounce.jet``, which takes jets, arrays and numbers; imported here to start quickly."""
-    import jounce.jet
-
-    return getattr(jounce.jet, function)(*arguments)
+        return getattr(jounce.jet, word)(*arguments)
+    exponent = arguments[-1]
+    if word == "**" and isinstance(exponent, float) and exponent.is_integer() and abs(exponent) <= 1e6:
+        return arguments[0] ** int(exponent)
+    return _ARITHMETIC[word](*arguments)
 
 
 def _where(column: int, text: str) -> str:
@@ -361,10 +305,10 @@ def _examine(node: ast.AST, text: str) -> tuple[str, Any, list[ast.AST]]:
             return "number", _number(value, _column(node), text), []
         case ast.Name(id=name) if name not in FUNCTIONS:
             return ("number", CONSTANTS[name], []) if name in CONSTANTS else ("name", name, [])
-        case ast.BinOp(left=left, op=operator, right=right) if type(operator) in _OPERATORS:
-            return "operator", _OPERATORS[type(operator)], [left, right]
-        case ast.UnaryOp(op=operator, operand=operand) if type(operator) in _OPERATORS:
-            return "operator", _OPERATORS[type(operator)], [operand]
+        case ast.BinOp(left=left, op=sign, right=right) if type(sign) in _OPERATORS:
+            return "operator", _OPERATORS[type(sign)], [left, right]
+        case ast.UnaryOp(op=sign, operand=operand) if type(sign) in _OPERATORS:
+            return "operator", _OPERATORS[type(sign)], [operand]
         case ast.Call(func=ast.Name(id=name), args=arguments, keywords=keywords):
             return "call", name, _arguments(name, arguments, keywords, _column(node), text)
     return _refuse(node, _column(node), text)
@@ -377,8 +321,8 @@ def _refuse(node: ast.AST, column: int, text: str) -> NoReturn:
             _refuse_name(name, column, text, ())
         case ast.BinOp(op=ast.BitXor()):
             _fail("the operator ^ is not allowed", column, text, "a power is written **")
-        case ast.BinOp(op=operator) | ast.UnaryOp(op=operator):
-            shown = f"the operator {type(operator).__name__}"
+        case ast.BinOp(op=sign) | ast.UnaryOp(op=sign):
+            shown = f"the operator {type(sign).__name__}"
         case ast.Call():
             _fail("something that is not a function is called", column, text, "a product needs its *, as in 2*(a + b)")
         case ast.Attribute(attr=attribute):

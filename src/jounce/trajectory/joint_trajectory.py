@@ -7,15 +7,17 @@ from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from jounce.display import Displayed
-from jounce.errors import JounceError, SampleWarning, TrajectoryError, did_you_mean
+from jounce.errors import JounceError, MechanismError, SampleWarning, TrajectoryError, did_you_mean
 from jounce.jet import Jet
+from jounce.trajectory.checks import ArrayLike, check_samples, finite_numbers, whole_number
 from jounce.trajectory.expression import Expression
 from jounce.trajectory.motion import AbstractMotion, ExpressionMotion, SplineMotion
-from jounce.trajectory.polynomial import MAX_CONTINUITY, PolynomialMotion
 from jounce.trajectory.profiles import motion_profile
-from jounce.trajectory.sampling import TOLERANCE, check_samples, derivative_errors, finite_numbers, words_of_doubt
+from jounce.trajectory.sample_errors import TOLERANCE, unsupported_derivative, unsupported_words
+from jounce.trajectory.splines import HIGHEST_DEGREE
 from jounce.trajectory.stacking import evaluate_laws, law_derivatives
 from jounce.trajectory.trapezoid import LIMITS
 
@@ -50,13 +52,7 @@ class JointTrajectory(Displayed):
     [0.5, 1.0, 1.0, 0.0]
     """
 
-    def __init__(
-        self,
-        laws: Mapping[str, Any],
-        start: float,
-        stop: float,
-        times: Any = None,
-    ):
+    def __init__(self, laws: Mapping[str, object], start: float, stop: float, times: ArrayLike | None = None):
         if not isinstance(laws, Mapping) or not laws:
             raise TrajectoryError("a trajectory needs a law for at least one joint", name="laws", value=laws)
         self.laws: Mapping[str, AbstractMotion] = MappingProxyType({name: _law(name, x) for name, x in laws.items()})
@@ -66,13 +62,13 @@ class JointTrajectory(Displayed):
                 law.check_instants(self.start, self.stop)
             except JounceError as error:
                 raise TrajectoryError(error.message, name=f"laws.{name}", value=error.value) from None
-        self._samples: dict[str, tuple[np.ndarray, np.ndarray, int]] = {}
-        self._estimates: dict[str, np.ndarray] = {}
         instants = np.linspace(self.start, self.stop, 201) if times is None else check_samples(times, times)[0]
         self.times = self._inside(instants)
 
     @classmethod
-    def from_samples(cls, times: Any, positions: Any, names: Sequence[str], degree: int = 5) -> "JointTrajectory":
+    def from_samples(
+        cls, times: ArrayLike, positions: ArrayLike, names: Sequence[str], degree: int = 5
+    ) -> "JointTrajectory":
         """Return the trajectory of splines through samples of the positions.
 
         Parameters
@@ -106,32 +102,29 @@ class JointTrajectory(Displayed):
         [1.0, 3.0, 6.0, 6.0]
         """
         names = _names(names)
-        if isinstance(degree, bool) or degree not in range(3, MAX_CONTINUITY + 2, 2):
-            message = f"the degree of the splines is odd, from 3 to {MAX_CONTINUITY + 1}"
+        if isinstance(degree, bool) or degree not in range(3, HIGHEST_DEGREE + 1, 2):
+            message = f"the degree of the splines is odd, from 3 to {HIGHEST_DEGREE}"
             raise TrajectoryError(f"{message}; even ones carry errors along undamped", name="degree", value=degree)
         times, positions = check_samples(times, positions)
         if positions.ndim != 2 or positions.shape[1] != len(names):
             message = f"positions of {len(names)} joints have the shape (samples, {len(names)})"
             raise TrajectoryError(message, name="positions", value=f"shape {positions.shape}")
-        if len(times) <= degree:
-            message = f"splines of degree {degree} need at least {degree + 1} samples"
-            raise TrajectoryError(f"{message}; give more, or choose a lower degree", value=len(times))
-        columns = dict(zip(names, positions.T, strict=True))
-        laws = {name: PolynomialMotion(times, column, degree - 1) for name, column in columns.items()}
-        trajectory = cls(laws, times[0], times[-1], times)
-        trajectory._samples = {name: (times, column, degree) for name, column in columns.items()}
-        return trajectory
+        try:
+            laws = {name: SplineMotion(times, column, degree) for name, column in zip(names, positions.T, strict=True)}
+        except MechanismError as error:
+            raise TrajectoryError(error.message, name=error.name, value=error.value) from None
+        return cls(laws, times[0], times[-1], times)
 
     @classmethod
     def point_to_point(
         cls,
         names: Sequence[str],
-        start: Any,
-        end: Any,
+        start: ArrayLike,
+        end: ArrayLike,
         profile: str = "minimum_jerk",
         duration: float | None = None,
         start_time: float = 0.0,
-        limits: Any = None,
+        limits: ArrayLike | None = None,
     ) -> "JointTrajectory":
         """Return the trajectory from one position to another, all joints starting and stopping together.
 
@@ -168,25 +161,21 @@ class JointTrajectory(Displayed):
         [[0.5, 0.75], [0.9375, -0.46875]]
         """
         names = _names(names)
-        ends = {
-            "start": finite_numbers("start", start, (len(names),)),
-            "end": finite_numbers("end", end, (len(names),)),
-        }
+        begins, ends = (finite_numbers(key, x, (len(names),)) for key, x in (("start", start), ("end", end)))
         bounds = [None] * len(names) if limits is None else _limits(limits, len(names))
 
         def law(k: int, time: float | None) -> Any:
             try:
-                return motion_profile(profile, ends["start"][k], ends["end"][k], time, start_time, bounds[k])
+                return motion_profile(profile, begins[k], ends[k], time, start_time, bounds[k])
             except TrajectoryError as error:
                 raise error.located(name=names[k]) from None
 
-        moving = [k for k in range(len(names)) if ends["start"][k] != ends["end"][k]]
-        if duration is None and (limits is None or not moving):
-            reason = (
-                "either limits or a duration are needed" if limits is None else "the start is the end; give a duration"
-            )
-            raise TrajectoryError(reason, name="duration", value=duration)
         if duration is None:
+            moving = np.flatnonzero(begins != ends).tolist()
+            if limits is None:
+                raise TrajectoryError("either limits or a duration are needed", name="duration", value=duration)
+            if not moving:
+                raise TrajectoryError("the start is the end; give a duration", name="duration", value=duration)
             duration = max(float(law(k, None).duration) for k in moving)
         return cls({name: law(k, duration) for k, name in enumerate(names)}, start_time, start_time + duration)
 
@@ -215,7 +204,9 @@ class JointTrajectory(Displayed):
         """
         return evaluate_laws([self.laws[name] for name in self._chosen(names)], time)
 
-    def derivatives(self, times: Any, order: int, names: Iterable[str] | None = None) -> np.ndarray:
+    def derivatives(
+        self, times: ArrayLike, order: int, names: Iterable[str] | None = None
+    ) -> Float[np.ndarray, "time derivative joint"]:
         """Return the positions and their derivatives at instants.
 
         Parameters
@@ -243,11 +234,10 @@ class JointTrajectory(Displayed):
             If the trajectory comes from samples and the estimated error of a derivative exceeds a tenth of its peak.
         """
         chosen = self._chosen(names)
-        if isinstance(order, bool) or not isinstance(order, int | np.integer) or not 0 <= order <= MAX_ORDER:
-            raise TrajectoryError(f"must be a whole number from 0 to {MAX_ORDER}", name="order", value=order)
+        order = whole_number("order", order, 0, MAX_ORDER)
         instants = self._inside(finite_numbers("times", times, None))
-        self._warn(int(order), chosen)
-        found = law_derivatives([self.laws[name] for name in chosen], jnp.asarray(instants), int(order))
+        self._warn(order, chosen)
+        found = law_derivatives([self.laws[name] for name in chosen], jnp.asarray(instants), order)
         result = np.ascontiguousarray(np.moveaxis(np.asarray(found), -1, 0))
         bad = np.argwhere(~np.isfinite(result))
         if len(bad):
@@ -258,7 +248,7 @@ class JointTrajectory(Displayed):
             raise TrajectoryError(message, name=f"laws.{chosen[joint]}")
         return result
 
-    def estimate_error(self, order: int, names: Iterable[str] | None = None) -> np.ndarray:
+    def estimate_error(self, order: int, names: Iterable[str] | None = None) -> Float[np.ndarray, "derivative joint"]:
         """Estimate the errors of the derivatives that come from samples, relative to their peaks.
 
         The error of interpolation is told by comparing the splines with others through every second sample; to it three
@@ -290,8 +280,9 @@ class JointTrajectory(Displayed):
         chosen = self._chosen(names)
         errors = np.zeros((order + 1, len(chosen)))
         for column, name in enumerate(chosen):
-            if self._sampled(name):
-                known = self._errors(name)[: order + 1]
+            law = self.laws[name]
+            if isinstance(law, SplineMotion):
+                known = law.errors[: order + 1]
                 errors[:, column] = 1.0 if known.any() else 0.0  # above the degree nothing is known
                 errors[: len(known), column] = known
         return errors
@@ -314,29 +305,15 @@ class JointTrajectory(Displayed):
         kept = (self.estimate_error(MAX_ORDER, names) <= tolerance).all(axis=1)
         return MAX_ORDER if kept.all() else int(np.argmin(kept)) - 1
 
-    def _errors(self, name: str) -> np.ndarray:
-        """Return the estimated errors of a joint to its degree; computed once."""
-        if name not in self._samples:
-            return self.laws[name].errors  # type: ignore[attr-defined]
-        if name not in self._estimates:
-            times, values, degree = self._samples[name]
-            self._estimates[name] = derivative_errors(times, values, degree)
-        return self._estimates[name]
-
-    def _sampled(self, name: str) -> bool:
-        """Tell whether a law goes through samples."""
-        law = self.laws[name]
-        return name in self._samples or (isinstance(law, SplineMotion) and law.samples.value is not None)
-
     def _warn(self, order: int, names: Sequence[str]) -> None:
-        errors = self.estimate_error(order, names)
-        if (errors <= TOLERANCE).all():
-            return
-        worst = int(np.argmax((errors > TOLERANCE).any(axis=1)))
-        joint = int(np.argmax(errors[worst]))
-        degree = self.laws[names[joint]].degree  # type: ignore[attr-defined]
-        message = words_of_doubt(names[joint], worst, float(errors[worst, joint]), degree)
-        warnings.warn(SampleWarning(message), stacklevel=3)
+        found = []
+        for name in names:
+            law = self.laws[name]
+            if isinstance(law, SplineMotion) and (doubt := unsupported_derivative(law.errors, order)):
+                found.append((doubt[0], -doubt[1], name, law.degree))
+        if found:
+            worst, error, name, degree = min(found)
+            warnings.warn(SampleWarning(unsupported_words(name, worst, -error, degree)), stacklevel=3)
 
     def _chosen(self, names: Iterable[str] | None) -> tuple[str, ...]:
         chosen = self.names if names is None else _names(names)
@@ -346,7 +323,7 @@ class JointTrajectory(Displayed):
                 raise TrajectoryError(message, name="names", value=name)
         return chosen
 
-    def _inside(self, times: np.ndarray) -> np.ndarray:
+    def _inside(self, times: Float[np.ndarray, " time"]) -> Float[np.ndarray, " time"]:
         """Return the instants, none outside; those outside by rounding only are moved to the end."""
         slack = 1e-9 * (self.stop - self.start)
         outside = (times < self.start - slack) | (times > self.stop + slack)
@@ -370,7 +347,7 @@ def _law(name: Any, law: Any) -> AbstractMotion:
         raise TrajectoryError(error.message, name=f"laws.{name}", value=error.value) from None
 
 
-def _bounds(start: Any, stop: Any) -> tuple[float, float]:
+def _bounds(start: float, stop: float) -> tuple[float, float]:
     first, last = finite_numbers("start and stop", (start, stop), (2,)).tolist()
     if last <= first:
         raise TrajectoryError(f"must come after the start, {first:g} s", name="stop", value=last)
@@ -387,7 +364,7 @@ def _names(names: Iterable[str]) -> tuple[str, ...]:
     return found
 
 
-def _limits(limits: Any, count: int) -> list[Any]:
+def _limits(limits: ArrayLike, count: int) -> list[Any]:
     """Return the three limits of each joint."""
     shape = (len(LIMITS), count) if np.ndim(limits) == 2 else (len(LIMITS),)
     given = finite_numbers("limits", limits, shape).reshape(len(LIMITS), -1)

@@ -1,19 +1,28 @@
 """Motion laws of which a derivative was measured: splines through its samples, integrated exactly."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import equinox as eqx
+import jax
+import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
+from jaxtyping import Float
 
 from jounce.errors import MechanismError
-from jounce.trajectory.motion import Aside, SplineMotion, check_beyond
-from jounce.trajectory.sampling import derivative_errors
-from jounce.trajectory.splines import checked_samples, interpolated
+from jounce.jet import Jet
+from jounce.trajectory.checks import ArrayLike, check_choice, whole_number
+from jounce.trajectory.expression import Expression
+from jounce.trajectory.motion import SplineMotion, Untraced
+from jounce.trajectory.sample_errors import derivative_errors
+from jounce.trajectory.splines import integrated, spline_through
 
-MOST = 4  # derivatives: jounce
+HIGHEST = 4  # derivative that can be measured: jounce
 BEYOND = ("refuse", "hold", "continue")
+
+InitialValue = float | str | Expression | jax.Array
 
 
 class MeasuredMotion(SplineMotion):
@@ -30,8 +39,9 @@ class MeasuredMotion(SplineMotion):
         Samples of the derivative, m or rad by s to the power of `derivative`.
     derivative : int, default 2
         Which derivative was measured: 1 velocity, 2 acceleration, 3 jerk, 4 jounce.
-    initial : sequence of float, optional
-        The law and its derivatives below `derivative` at the first sample, lowest first; zero where not given.
+    initial : sequence of float, str or Expression, optional
+        The law and its derivatives below `derivative` at the first sample, lowest first; zero where not given. Those
+        that are expressions of parameters have their values from the mechanism that the law belongs to.
     degree : int, default 5
         Of the spline through the samples, from 1 to 11; that of the law is higher by `derivative`.
     beyond : {"refuse", "hold", "continue"}, default "refuse"
@@ -53,32 +63,48 @@ class MeasuredMotion(SplineMotion):
     """
 
     derivative: int = eqx.field(static=True)
-    initial: Aside = eqx.field(static=True)
+    initial: Untraced = eqx.field(static=True)
 
     def __init__(
         self,
-        times: Any,
-        values: Any,
+        times: ArrayLike,
+        values: ArrayLike,
         derivative: int = 2,
-        initial: Sequence[float] = (),
+        initial: Sequence[InitialValue] = (),
         degree: int = 5,
         beyond: str = "refuse",
     ):
-        times, values = checked_samples(times, values, degree)
-        check_beyond(beyond, BEYOND)
-        if isinstance(derivative, bool) or not isinstance(derivative, int | np.integer) or not 1 <= derivative <= MOST:
-            message = f"must be a whole number from 1 to {MOST}"
-            raise MechanismError(message, name="derivative", value=derivative)
-        known = _initial(initial, int(derivative))
-        try:
-            ends, pieces = interpolated(times, values, int(degree))
-        except (np.linalg.LinAlgError, ValueError):
-            message = "no spline goes through the samples: too uneven or too large; sample evenly"
-            raise MechanismError(message, value=float(np.diff(times).min())) from None
-        for value in reversed(known):
-            pieces = integrated(pieces, np.diff(ends), value)
-        self._set(ends[:-1], pieces, ends[-1], beyond, samples=(times, values))
-        self.derivative, self.initial = int(derivative), Aside(tuple(known))
+        check_choice("beyond", beyond, BEYOND, MechanismError)
+        self.derivative = whole_number("derivative", derivative, 1, HIGHEST, MechanismError)
+        samples, ends, pieces, _ = spline_through(times, values, degree)
+        for _ in range(self.derivative):
+            pieces = integrated(pieces, np.diff(ends))
+        self.initial = Untraced(_checked(initial, self.derivative))
+        known = [np.nan if isinstance(x, Expression) else x for x in self.initial.value]
+        if any(isinstance(x, Tracer) for x in known):
+            self.initial = Untraced(())  # a tracer must not outlive its trace
+        self._set(ends[:-1], _started(pieces, ends, known), ends[-1], beyond, samples=samples)
+
+    def resolved(self, parameters: Mapping[str, Any]) -> "MeasuredMotion":
+        """Return the law with numbers in the place of its expressions of parameters."""
+        if not self._open:
+            return self
+        known = [x.evaluate(parameters) if isinstance(x, Expression) else x for x in self.initial.value]
+        times, values = self.samples.value
+        degree = self.degree - self.derivative
+        return MeasuredMotion(times, values, self.derivative, known, degree, self.beyond)
+
+    @property
+    def _open(self) -> list[str]:
+        """Names of the parameters without which the law is not known."""
+        return sorted({name for x in self.initial.value if isinstance(x, Expression) for name in x.names})
+
+    def __call__(self, time: Jet) -> Jet:
+        """Return the jet of the law at the instants of the time jet; parameters need their values, see `resolved`."""
+        if self._open:
+            message = "depends on parameters, whose values a mechanism knows; give numbers"
+            raise MechanismError(message, name="initial", value=self._open)
+        return super().__call__(time)
 
     @property
     def errors(self) -> np.ndarray:
@@ -90,21 +116,28 @@ class MeasuredMotion(SplineMotion):
         return self.samples.derived
 
 
-def integrated(pieces: np.ndarray, lengths: np.ndarray, initial: float) -> np.ndarray:
-    """Return the integral of piecewise polynomials, as local Taylor coefficients, from a value at the beginning."""
-    raised = pieces / np.arange(1, len(pieces) + 1)[:, None]
-    gains = (raised * lengths ** np.arange(1, len(raised) + 1)[:, None]).sum(axis=0)
-    values = [math.fsum([initial, *gains[:k]]) for k in range(len(gains))]
-    return np.concatenate([[values], raised])
+def _started(
+    pieces: Float[np.ndarray, "powers pieces"], ends: Float[np.ndarray, " breakpoints"], initial: Sequence[Any]
+) -> Any:
+    """Return pieces to which the polynomial of the values at the beginning was added."""
+    since = ends[:-1] - ends[0]
+    added = [
+        sum(x / math.factorial(n) * math.comb(n, k) * since ** (n - k) for n, x in enumerate(initial) if n >= k)
+        for k in range(len(initial))
+    ]
+    namespace = jnp if any(isinstance(x, Tracer) for x in initial) else np
+    return namespace.concatenate([pieces[: len(added)] + namespace.stack(added), pieces[len(added) :]])
 
 
-def _initial(initial: Any, derivative: int) -> list[float]:
+def _checked(initial: Any, derivative: int) -> tuple[Any, ...]:
     """Return the values at the first sample, zeros added."""
     try:
-        known = [float(x) for x in initial]
+        known = [Expression(x) if isinstance(x, str) else x for x in initial]
+        known = [x.evaluate() if isinstance(x, Expression) and not x.names else x for x in known]
+        known = [x if isinstance(x, Expression | Tracer) else float(x) for x in known]
     except (TypeError, ValueError):
         raise MechanismError("must be a list of numbers", name="initial", value=initial) from None
-    if len(known) > derivative or not np.isfinite(known).all():
+    if len(known) > derivative or not np.isfinite([x for x in known if isinstance(x, float)]).all():
         message = f"must be at most {derivative} finite numbers: the law and its derivatives below the measured one"
         raise MechanismError(message, name="initial", value=known)
-    return known + [0.0] * (derivative - len(known))
+    return (*known, *(0.0,) * (derivative - len(known)))

@@ -1,6 +1,7 @@
 """Motion laws: what a driver prescribes, as a function of time that acts on jets."""
 
 import abc
+import dataclasses
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -9,12 +10,15 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
+from jaxtyping import Float
 
-from jounce.errors import MechanismError, did_you_mean
+from jounce.errors import MechanismError
 from jounce.jet import Jet, compose
+from jounce.shapes import Numbers
+from jounce.trajectory.checks import ArrayLike, check_choice
 from jounce.trajectory.expression import Expression
-from jounce.trajectory.sampling import derivative_errors
-from jounce.trajectory.splines import checked_samples, interpolated, periodic
+from jounce.trajectory.sample_errors import derivative_errors
+from jounce.trajectory.splines import spline_through
 
 
 class AbstractMotion(eqx.Module):
@@ -26,6 +30,10 @@ class AbstractMotion(eqx.Module):
 
     def check_instants(self, first: float, last: float) -> None:
         """Raise MechanismError if the law says nothing of some instants from a first to a last one, s."""
+
+    def resolved(self, parameters: Mapping[str, Any]) -> "AbstractMotion":  # noqa: ARG002 - few laws have any
+        """Return the law with numbers in the place of its expressions of parameters."""
+        return self
 
 
 class ExpressionMotion(AbstractMotion):
@@ -95,20 +103,12 @@ BEYOND = ("refuse", "hold", "repeat", "continue")
 SLACK = 1e-9  # of the duration: how far rounding may take an instant out of the samples
 
 
-class Aside:
+@dataclasses.dataclass(unsafe_hash=True)
+class Untraced:
     """Data of a law that JAX is not to see: all are equal, so that what is compiled does not depend on them."""
 
-    __slots__ = ("derived", "value")
-
-    def __init__(self, value: Any):
-        self.value = value
-        self.derived: Any = None
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Aside)
-
-    def __hash__(self) -> int:
-        return hash(Aside)
+    value: Any = dataclasses.field(compare=False)
+    derived: Any = dataclasses.field(default=None, compare=False)
 
 
 class SplineMotion(AbstractMotion):
@@ -155,28 +155,25 @@ class SplineMotion(AbstractMotion):
     advance: Any
     degree: int = eqx.field(static=True)
     beyond: str = eqx.field(static=True)
-    samples: Aside = eqx.field(static=True)
+    samples: Untraced = eqx.field(static=True)
 
-    def __init__(self, times: Any, values: Any, degree: int = 5, beyond: str = "refuse"):
-        times, values = checked_samples(times, values, degree)
-        check_beyond(beyond, BEYOND)
-        advance = 0.0
-        try:
-            if beyond == "repeat":
-                ends, pieces, advance = periodic(times, values, int(degree))
-            else:
-                ends, pieces = interpolated(times, values, int(degree))
-        except (np.linalg.LinAlgError, ValueError):
-            message = "no spline goes through the samples: too uneven or too large; sample evenly"
-            raise MechanismError(message, value=float(np.diff(times).min())) from None
-        self._set(ends[:-1], pieces, ends[-1], beyond, advance, (times, values))
+    def __init__(self, times: ArrayLike, values: ArrayLike, degree: int = 5, beyond: str = "refuse"):
+        check_choice("beyond", beyond, BEYOND, MechanismError)
+        samples, ends, pieces, advance = spline_through(times, values, degree, repeats=beyond == "repeat")
+        self._set(ends[:-1], pieces, ends[-1], beyond, advance, samples)
 
     def _set(
-        self, breakpoints: Any, coefficients: Any, stop: Any, beyond: str, advance: float = 0.0, samples: Any = None
+        self,
+        breakpoints: Float[Numbers, " pieces"],
+        coefficients: Float[Numbers, "powers pieces"],
+        stop: float,
+        beyond: str,
+        advance: float = 0.0,
+        samples: tuple[Float[np.ndarray, " samples"], Float[np.ndarray, " samples"]] | None = None,
     ) -> None:
         """Fill in the fields: of the pieces, and of the samples that they go through, if there are any."""
         self.breakpoints, self.coefficients, self.stop, self.advance = breakpoints, coefficients, stop, advance
-        self.degree, self.beyond, self.samples = len(coefficients) - 1, beyond, Aside(samples)
+        self.degree, self.beyond, self.samples = len(coefficients) - 1, beyond, Untraced(samples)
 
     @property
     def errors(self) -> np.ndarray:
@@ -249,9 +246,3 @@ class SplineMotion(AbstractMotion):
         for c in powers[-2::-1]:
             value = value * local + c
         return value
-
-
-def check_beyond(beyond: Any, valid: tuple[str, ...]) -> None:
-    """Raise MechanismError unless a word says what a law is beyond its data."""
-    if beyond not in valid:
-        raise MechanismError(f"no such way; {did_you_mean(beyond, valid)}", name="beyond", value=beyond)

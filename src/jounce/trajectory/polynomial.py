@@ -5,15 +5,16 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
-from jounce.errors import TrajectoryError, did_you_mean
-from jounce.trajectory.measured import integrated
+from jounce.errors import TrajectoryError
+from jounce.trajectory.checks import ArrayLike, check_choice, check_samples, whole_number
 from jounce.trajectory.motion import SplineMotion
-from jounce.trajectory.sampling import check_samples
+from jounce.trajectory.splines import integrated, local_powers
 
 MAX_CONTINUITY = 10
 ENDS = ("not-a-knot", "natural", "clamped")
-WAYS = ("refuse", "hold", "continue")
+BEYOND = ("refuse", "hold", "continue")
 
 _Conditions = Mapping[int, float]
 
@@ -77,8 +78,8 @@ class PolynomialMotion(SplineMotion):
 
     def __init__(
         self,
-        times: Any,
-        values: Any,
+        times: ArrayLike,
+        values: ArrayLike,
         continuity: int = 4,
         derivative: int = 0,
         start: _Conditions | None = None,
@@ -87,11 +88,10 @@ class PolynomialMotion(SplineMotion):
         beyond: str = "refuse",
     ):
         times, values = check_samples(times, values)
-        _check_orders(continuity, derivative)
-        if beyond not in WAYS:
-            raise TrajectoryError(f"no such way; {did_you_mean(beyond, WAYS)}", name="beyond", value=beyond)
-        if ends not in ENDS:
-            raise TrajectoryError(f"no conditions have this name; {did_you_mean(ends, ENDS)}", name="ends", value=ends)
+        continuity = whole_number("continuity", continuity, 1, MAX_CONTINUITY)
+        derivative = whole_number("derivative", derivative, 0, continuity)
+        check_choice("beyond", beyond, BEYOND)
+        check_choice("ends", ends, ENDS)
         conditions = _checked(start, continuity, "start"), _checked(end, continuity, "end")
         constants = _constants(conditions, derivative)
         step = (times[-1] - times[0]) / (len(times) - 1)
@@ -99,7 +99,7 @@ class PolynomialMotion(SplineMotion):
         pieces = _spline(knots, values, continuity + 1 - derivative, _above(conditions, derivative, step), ends)
         pieces = pieces * step**derivative
         for _ in range(derivative):
-            pieces = integrated(pieces, np.diff(knots), 0.0)
+            pieces = integrated(pieces, np.diff(knots))
         if derivative:
             pieces = pieces + _closing(pieces, knots, constants, times[-1] - times[0])
         with np.errstate(over="ignore", invalid="ignore"):
@@ -112,8 +112,8 @@ class PolynomialMotion(SplineMotion):
     @classmethod
     def from_accelerations(
         cls,
-        times: Any,
-        accelerations: Any,
+        times: ArrayLike,
+        accelerations: ArrayLike,
         continuity: int = 4,
         start: _Conditions | None = None,
         end: _Conditions | None = None,
@@ -168,19 +168,19 @@ class PolynomialMotion(SplineMotion):
         return self.degree - 1
 
     @property
-    def knots(self) -> np.ndarray:
+    def knots(self) -> Float[np.ndarray, " knots"]:
         """Instants of the knots, shape (knots,), s."""
         return np.append(self.breakpoints, self.stop)
 
     @property
-    def knot_values(self) -> np.ndarray:
+    def knot_values(self) -> Float[np.ndarray, " knots"]:
         """Values of the m-th derivative at the knots, shape (knots,): ``q^(m)_i`` of Negrean 2025, equation 61."""
         m = self.continuity
         first, slope = math.factorial(m) * self.coefficients[m], math.factorial(m + 1) * self.coefficients[m + 1]
         last = first[-1] + slope[-1] * (self.stop - self.breakpoints[-1])
         return np.append(first, last)
 
-    def integration_constants(self, origin: float = 0.0) -> np.ndarray:
+    def integration_constants(self, origin: float = 0.0) -> Float[np.ndarray, "continuity segments"]:
         """Return the integration constants ``a_k`` of the segments (Negrean 2025, equations 61-63).
 
         On segment i of length ``T_i``, with ``tau`` the time since `origin`, the derivative of order ``m - p`` is
@@ -217,26 +217,14 @@ class PolynomialMotion(SplineMotion):
         return np.stack(constants)
 
 
-def _check_orders(continuity: Any, derivative: Any) -> None:
-    """Refuse orders that no such law has."""
-    for name, order, least, most in (
-        ("continuity", continuity, 1, MAX_CONTINUITY),
-        ("derivative", derivative, 0, continuity),
-    ):
-        if isinstance(order, bool) or not isinstance(order, int | np.integer) or not least <= order <= most:
-            raise TrajectoryError(f"must be a whole number from {least} to {most}", name=name, value=order)
-
-
-def _checked(conditions: _Conditions | None, continuity: int, name: str) -> dict[int, float]:
+def _checked(conditions: Any, continuity: int, name: str) -> dict[int, float]:
     """Return the conditions at one end, refusing orders that are not continuous and values that are no numbers."""
     if conditions is None:
         return {}
     if not isinstance(conditions, Mapping):
         raise TrajectoryError("must map orders of derivatives to values, as {1: 0.0}", name=name, value=conditions)
     for order, value in conditions.items():
-        if isinstance(order, bool) or not isinstance(order, int | np.integer) or not 0 <= order <= continuity:
-            message = f"the order of a condition is a whole number from 0 to the continuity, {continuity}"
-            raise TrajectoryError(message, name=name, value=order)
+        whole_number(name, order, 0, continuity)
         if not np.isscalar(value) or isinstance(value, str | bytes) or not np.isfinite(value):
             raise TrajectoryError(
                 "the value of a condition must be a finite number", name=f"{name}[{order}]", value=value
@@ -245,6 +233,7 @@ def _checked(conditions: _Conditions | None, continuity: int, name: str) -> dict
 
 
 _Ends = tuple[dict[int, float], dict[int, float]]
+_Pieces = Float[np.ndarray, "powers segments"]
 
 
 def _constants(conditions: _Ends, derivative: int) -> _Ends:
@@ -253,15 +242,14 @@ def _constants(conditions: _Ends, derivative: int) -> _Ends:
         if derivative in end:
             message = f"the knots carry the derivative of order {derivative}, it takes no condition"
             raise TrajectoryError(message, name=name, value=end)
-    low: _Ends = ({k: v for k, v in conditions[0].items() if k < derivative}, {})
-    low[1].update({k: v for k, v in conditions[1].items() if k < derivative})
-    count = len(low[0]) + len(low[1])
+    first, last = ({k: v for k, v in end.items() if k < derivative} for end in conditions)
+    count = len(first) + len(last)
     if count == 0:
         return dict.fromkeys(range(derivative), 0.0), {}
     if count != derivative:
         message = f"{derivative} conditions on the derivatives below order {derivative} close the system"
         raise TrajectoryError(f"{message}; give as many in start and end together", value=count)
-    return low
+    return first, last
 
 
 def _above(conditions: _Ends, derivative: int, step: float) -> _Ends:
@@ -272,7 +260,9 @@ def _above(conditions: _Ends, derivative: int, step: float) -> _Ends:
     return first, last
 
 
-def _spline(knots: np.ndarray, values: np.ndarray, degree: int, conditions: _Ends, ends: str) -> np.ndarray:
+def _spline(
+    knots: Float[np.ndarray, " knots"], values: Float[np.ndarray, " knots"], degree: int, conditions: _Ends, ends: str
+) -> _Pieces:
     """Return the local Taylor coefficients, shape (degree + 1, segments), of a spline through values at knots."""
     from scipy.interpolate import make_interp_spline  # here, since importing SciPy takes half a second
 
@@ -304,11 +294,10 @@ def _spline(knots: np.ndarray, values: np.ndarray, degree: int, conditions: _End
             orders = [sorted(end) for end in conditions]
             message = "the conditions at the start and the end do not determine the law; choose others"
             raise TrajectoryError(message, value=orders) from None
-    powers = [spline(knots[:-1], nu=k) / math.factorial(k) for k in range(degree + 1)]
-    return np.stack(powers)
+    return local_powers(spline, knots[:-1], degree)
 
 
-def _closing(pieces: np.ndarray, knots: np.ndarray, constants: _Ends, duration: float) -> np.ndarray:
+def _closing(pieces: _Pieces, knots: Float[np.ndarray, " knots"], constants: _Ends, duration: float) -> _Pieces:
     """Return the polynomial of the integration constants, as local Taylor coefficients of the shape of the pieces."""
     count, span, last = len(constants[0]) + len(constants[1]), knots[-1], knots[-1] - knots[-2]
     rows, values = [], []

@@ -11,8 +11,9 @@ import numpy as np
 
 from jounce.errors import TrajectoryError, check_name
 from jounce.jet import Jet, sin
+from jounce.trajectory.checks import finite, positive, whole_number
 from jounce.trajectory.motion import AbstractMotion
-from jounce.trajectory.trapezoid import LIMITS, TrapezoidalMotion, finite, positive
+from jounce.trajectory.trapezoid import LIMITS, TrapezoidalMotion
 
 MAX_REST = 8
 
@@ -54,17 +55,14 @@ class AbstractProfile(AbstractMotion):
         moving = (instants >= self.start_time) & (instants < self.stop_time)
         # Time counts from the nearer end, so that rest is exact at both; outside, from that end itself.
         forward, backward = (time - self.start_time) / self.duration, (self.stop_time - time) / self.duration
-        near = Jet(jnp.where(late, b, f) for f, b in zip(*_dense(forward, backward), strict=True))
+        both = zip(forward.dense().coefficients, backward.dense().coefficients, strict=True)
+        near = Jet(jnp.where(late, b, f) for f, b in both)
         near = Jet((jnp.where(moving, near.coefficients[0], 0.0), *near.coefficients[1:]))
         way = self.first_half(near).dense().coefficients
         span = jnp.asarray(self.end - self.start)
         signed = jnp.where(late, -span, span)
         value = jnp.where(late, self.end, self.start) + jnp.where(moving, signed * way[0], 0.0)
         return Jet((value, *(jnp.where(moving, signed * c, 0.0) for c in way[1:])))
-
-
-def _dense(*jets: Jet) -> tuple[Any, ...]:
-    return tuple(jet.dense().coefficients for jet in jets)
 
 
 class RestToRestMotion(AbstractProfile):
@@ -101,17 +99,10 @@ class RestToRestMotion(AbstractProfile):
     rest: int = eqx.field(static=True)
 
     def __init__(
-        self,
-        start: float = 0.0,
-        end: float = 1.0,
-        duration: float = 1.0,
-        start_time: float = 0.0,
-        rest: int = 2,
+        self, start: float = 0.0, end: float = 1.0, duration: float = 1.0, start_time: float = 0.0, rest: int = 2
     ):
         super().__init__(start, end, duration, start_time)
-        if isinstance(rest, bool) or not isinstance(rest, int) or not 1 <= rest <= MAX_REST:
-            raise TrajectoryError(f"must be a whole number from 1 to {MAX_REST}", name="rest", value=rest)
-        self.rest = rest
+        self.rest = whole_number("rest", rest, 1, MAX_REST)
 
     def _powers(self) -> list[int]:
         """Return the coefficients of the powers from ``rest + 1`` to ``2 rest + 1``."""
@@ -124,7 +115,7 @@ class RestToRestMotion(AbstractProfile):
         value = share * float(top)
         for coefficient in reversed(lower):
             value = (value + float(coefficient)) * share
-        return value * _whole_power(share, self.rest)
+        return value * share**self.rest
 
     @property
     def peaks(self) -> tuple[float, float, float]:
@@ -132,13 +123,6 @@ class RestToRestMotion(AbstractProfile):
         law = np.polynomial.Polynomial([0.0] * (self.rest + 1) + [float(c) for c in self._powers()])
         first, second, third = (_largest(law.deriv(k)) for k in (1, 2, 3))
         return first, second, third
-
-
-def _whole_power(base: Jet, exponent: int) -> Jet:
-    value = base
-    for _ in range(exponent - 1):
-        value = value * base
-    return value
 
 
 def _largest(law: np.polynomial.Polynomial) -> float:
@@ -187,15 +171,10 @@ class CycloidalMotion(AbstractProfile):
         return 2.0, 2 * math.pi, 4 * math.pi**2
 
 
-PROFILES: dict[str, int | None] = {
-    "cycloidal": None,
-    "polynomial_3_4_5": 2,
-    "polynomial_4_5_6_7": 3,
-    "minimum_jerk": 2,
-    "minimum_snap": 3,
-    "trapezoidal": None,
-}
-"""Names of the profiles; for a polynomial, the order up to which it is at rest at both ends."""
+RESTS = {"polynomial_3_4_5": 2, "polynomial_4_5_6_7": 3, "minimum_jerk": 2, "minimum_snap": 3}
+"""The orders up to which the polynomials are at rest at both ends."""
+PROFILES = ("cycloidal", *RESTS, "trapezoidal")
+"""Names of the profiles."""
 
 
 def motion_profile(
@@ -244,12 +223,11 @@ def motion_profile(
         raise TrajectoryError(message, name="limits", value=list(limits))
     if name == "trapezoidal":
         return TrapezoidalMotion(start, end, *(limits or (None,) * 3), duration=duration, start_time=start_time)
-    rest = PROFILES[name]
 
     def law(time: float) -> AbstractProfile:
-        if rest is None:
+        if name == "cycloidal":
             return CycloidalMotion(start, end, time, start_time)
-        return RestToRestMotion(start, end, time, start_time, rest)
+        return RestToRestMotion(start, end, time, start_time, RESTS[name])
 
     if limits is None:
         if duration is None:

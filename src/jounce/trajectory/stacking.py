@@ -7,6 +7,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from jounce.jet import Jet
 from jounce.trajectory.motion import AbstractMotion
@@ -35,6 +36,8 @@ def _along_joints(*leaves: Any) -> Any:
 
 
 @eqx.filter_jit
-def law_derivatives(laws: list[AbstractMotion], times: Any, order: int) -> jax.Array:
-    """Return plain derivatives of shape (order + 1, joints, time)."""
+def law_derivatives(
+    laws: list[AbstractMotion], times: Float[jax.Array, " time"], order: int
+) -> Float[jax.Array, "order joint time"]:
+    """Return the plain derivatives of laws at instants."""
     return evaluate_laws(laws, Jet.variable(times, order)).derivatives()

@@ -1,11 +1,12 @@
 """Point-to-point laws with a trapezium of velocity and limited jerk."""
 
 import math
-from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from jounce.errors import TrajectoryError
+from jounce.trajectory.checks import finite, positive
 from jounce.trajectory.motion import SplineMotion
 
 LIMITS = ("velocity", "acceleration", "jerk")
@@ -56,9 +57,7 @@ class TrapezoidalMotion(SplineMotion):
         duration: float | None = None,
         start_time: float = 0.0,
     ):
-        start, end, start_time = (
-            finite(name, value) for name, value in (("start", start), ("end", end), ("start_time", start_time))
-        )
+        start, end, start_time = finite("start", start), finite("end", end), finite("start_time", start_time)
         if duration is not None:
             duration = positive("duration", duration)
         way = abs(end - start)
@@ -85,7 +84,7 @@ class TrapezoidalMotion(SplineMotion):
         self._set(begins, pieces, begins[-1], "continue")  # of which the first and the last rest
 
     @property
-    def switches(self) -> np.ndarray:
+    def switches(self) -> Float[np.ndarray, "8"]:
         """The eight instants at which the phases begin and the last one ends, s."""
         return self.breakpoints[1:]
 
@@ -110,7 +109,7 @@ def _quickest(way: float, velocity: float, acceleration: float, jerk: float) -> 
     return ramp, steady, ramp, cruise, ramp, steady, ramp
 
 
-def _phases(lengths: np.ndarray, start: float, end: float) -> np.ndarray:
+def _phases(lengths: Float[np.ndarray, "7"], start: float, end: float) -> Float[np.ndarray, "4 9"]:
     """Return the local Taylor coefficients of rest, seven phases and rest, shape (4, 9)."""
     signs = np.array([1.0, 0.0, -1.0, 0.0, -1.0, 0.0, 1.0])
     position = velocity = acceleration = 0.0
@@ -126,21 +125,3 @@ def _phases(lengths: np.ndarray, start: float, end: float) -> np.ndarray:
     rest = np.zeros((4, 2))
     rest[0] = start, end
     return np.concatenate([rest[:, :1], moving, rest[:, 1:]], axis=1)
-
-
-def finite(name: str, value: Any) -> float:
-    """Return a value as a finite number, or raise a TrajectoryError that names it."""
-    try:
-        number = float(value)
-    except (TypeError, ValueError):
-        number = math.nan
-    if isinstance(value, str | bool) or not math.isfinite(number):
-        raise TrajectoryError("must be a finite number", name=name, value=value)
-    return number
-
-
-def positive(name: str, value: Any) -> float:
-    """Return a value as a number greater than zero, or raise a TrajectoryError that names it."""
-    if finite(name, value) <= 0:
-        raise TrajectoryError("must be greater than zero", name=name, value=value)
-    return float(value)

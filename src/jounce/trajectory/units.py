@@ -30,8 +30,6 @@ from jounce.trajectory.dimensions import (
 )
 from jounce.trajectory.expression import CONSTANTS, FUNCTIONS, MAX_CHARACTERS, Expression
 
-__all__ = ["COMMON", "Value", "elsewhere", "nearest_unit", "parse_unit", "parse_value"]
-
 Size = Decimal | float
 
 _TURN = 2 * math.pi

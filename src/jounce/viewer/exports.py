@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-from contextlib import redirect_stdout
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -11,11 +10,13 @@ from typing import Any
 import numpy as np
 
 from jounce.errors import JounceError
-from jounce.viewer.guard import Guard, refuse_uploads
-from jounce.viewer.prepared import Prepared
-from jounce.viewer.take import Take
+from jounce.plot.instants import nearest_instants
+from jounce.viewer.local_server import quiet_server, quiet_stop
+from jounce.viewer.overlay import Overlay
+from jounce.viewer.recording import Recording
+from jounce.viewer.scene import ViserScene
 
-__all__ = ["animation", "check_installed", "file_name", "picture", "quiet_server", "quiet_stop", "table"]
+__all__ = ["animation", "file_name", "picture", "table"]
 
 SMOOTH = 1 / 30  # s between two pictures of an animation
 
@@ -32,7 +33,7 @@ def file_name(title: str, ending: str) -> str:
     return ("_".join(kept.lower().split()) or "motion") + ending
 
 
-def table(take: Take) -> bytes:
+def table(recording: Recording) -> bytes:
     """Return all outputs with their derivatives as a CSV file.
 
     Raises
@@ -44,7 +45,7 @@ def table(take: Take) -> bytes:
 
     with TemporaryDirectory() as folder:
         path = Path(folder) / "motion.csv"
-        write(take.dataset(), path)
+        write(recording.dataset(), path)
         return path.read_bytes()
 
 
@@ -79,59 +80,12 @@ def picture(client: Any, height: int | None = None, width: int | None = None) ->
     return stream.getvalue()
 
 
-def check_installed() -> None:
-    """Raise JounceError unless the packages of the extra ``viewer`` are there."""
-    from importlib.util import find_spec
-
-    if find_spec("viser") is None or find_spec("trimesh") is None:
-        message = 'the view needs the package viser, which is not installed: pip install "jounce[viewer]"'
-        raise JounceError(message)
-
-
-def quiet_server(port: int = 0, label: str | None = None, guard: Guard | None = None) -> Any:
-    """Return a viser server that listens on this machine only, answers whom its guard allows, and prints nothing.
-
-    Raises
-    ------
-    JounceError
-        If viser is not installed or cannot be guarded, or the port is taken.
-    """
-    check_installed()
-    import viser
-
-    server = None
-    try:
-        with redirect_stdout(io.StringIO()), (guard or Guard()).starting():
-            server = viser.ViserServer(host="127.0.0.1", port=port or free_port(), label=label, verbose=False)
-        refuse_uploads(server)
-    except BaseException:
-        if server is not None:
-            quiet_stop(server)
-        raise
-    return server
-
-
-def quiet_stop(server: Any) -> None:
-    """End a viser server without a word."""
-    with redirect_stdout(io.StringIO()):
-        server.stop()
-
-
-def free_port() -> int:
-    """Return a port of this machine that nobody listens on."""
-    import socket
-
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
-
-
-def animation(prepared: Prepared) -> str:
+def animation(overlay: Overlay) -> str:
     """Return what a page shows as one HTML file that plays in any browser, without a network and this package.
 
     Parameters
     ----------
-    prepared : Prepared
+    overlay : Overlay
         The motion, with arrows, paths and forces.
 
     Raises
@@ -139,30 +93,28 @@ def animation(prepared: Prepared) -> str:
     JounceError
         If viser is not installed.
     """
-    from jounce.viewer.scene import Scene
-
-    take, server = prepared.take, quiet_server()
+    recording, server = overlay.recording, quiet_server()
     try:
-        scene = Scene(server)
-        scene.stage(take)
-        scene.dress(take)
-        prepared.begin(scene)
-        frames = frames_shown(take)
-        prepared.show(scene, frames[0])
-        recording = server.get_scene_serializer()
-        for frame, after in zip(frames, [*frames[1:], None], strict=True):
-            prepared.show(scene, frame)
-            recording.insert_sleep(SMOOTH if after is None else float(take.time[after] - take.time[frame]))
-        return recording.as_html()
+        scene = ViserScene(server)
+        scene.set_stage(recording)
+        scene.set_shapes(recording)
+        scene.begin(overlay)
+        frames = frames_shown(recording)
+        scene.show(overlay, frames[0])
+        messages = server.get_scene_serializer()
+        pauses = [*np.diff(recording.time[frames]).tolist(), SMOOTH]
+        for frame, pause in zip(frames, pauses, strict=True):
+            scene.show(overlay, frame)
+            messages.insert_sleep(pause)
+        return messages.as_html()
     finally:
         quiet_stop(server)
 
 
-def frames_shown(take: Take) -> list[int]:
+def frames_shown(recording: Recording) -> list[int]:
     """Return the frames of an animation: all, or as many as are needed to look smooth."""
-    if len(take.time) < 2:
-        return [0]
-    wanted = np.arange(take.time[0], take.time[-1] + 0.5 * SMOOTH, SMOOTH)
+    time = recording.time
+    wanted = np.arange(time[0], time[-1] + 0.5 * SMOOTH, SMOOTH)
     if len(wanted) < 60:  # short motions are shown instant by instant
-        return list(range(len(take.time)))
-    return sorted({take.frame_at(float(instant)) for instant in wanted} | {len(take.time) - 1})
+        return list(range(len(time)))
+    return sorted({*nearest_instants(time, wanted).tolist(), len(time) - 1})

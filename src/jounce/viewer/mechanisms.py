@@ -4,20 +4,24 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
+from jaxtyping import Bool, Float
+from xarray import Dataset
 
-from jounce.errors import JounceError, SolveError
-from jounce.mechanism import AngularVelocityOutput, Mechanism
+from jounce.errors import SolveError
+from jounce.integrate import simulate
+from jounce.kinematics import Motion, Status, raise_for_status, solve
+from jounce.mechanism import AngularVelocityOutput, Mechanism, time_grid
 from jounce.mechanism.mechanism import GROUND
-from jounce.reporting.peaks import rate_name
+from jounce.plot.labels import quantity_word
 from jounce.trajectory import Expression
-from jounce.viewer.forces import applied
-from jounce.viewer.looks import looks_of
-from jounce.viewer.take import Exertion, Parameter, Quantity, Take, poses, rotated, spatial_vectors
+from jounce.viewer.appearance import Appearance, Place
+from jounce.viewer.loads import has_loads, mechanism_loads
+from jounce.viewer.mechanism_appearance import mechanism_appearance
+from jounce.viewer.recording import Load, Parameter, Quantity, Recording, poses, spatial_vectors
 
-__all__ = ["MechanismSubject", "instants_shown", "parameter_range", "take_of"]
+__all__ = ["MechanismSubject", "instants_shown", "parameter_range", "recorded"]
 
 FEWEST, MOST = 100, 2001  # instants that are shown
 
@@ -39,30 +43,15 @@ class MechanismSubject:
     no_sliders = "There are no parameters. Name values under `parameters:` in the file to get sliders here."
 
     def __init__(self, mechanism: Mechanism):
-        self.mechanism = mechanism
-        self.simulated = bool(mechanism.initial)
         instants_shown(mechanism)
+        self.mechanism, self.name, self.loaded = mechanism, mechanism.title or "mechanism", has_loads(mechanism)
+        given, values = mechanism.parameters, {k: float(v) for k, v in mechanism.parameter_values.items()}
+        self.parameters = tuple(
+            Parameter(name, value, *parameter_range(value), derived=isinstance(given[name], str | Expression))
+            for name, value in values.items()
+        )
 
-    @property
-    def name(self) -> str:
-        """The title."""
-        return self.mechanism.title or "mechanism"
-
-    @property
-    def loaded(self) -> bool:
-        """Whether anything has a mass, or forces are applied, so that joints carry something."""
-        return has_loads(self.mechanism)
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """Those that are numbers, with sensible ranges, and those that follow from them."""
-        found = []
-        for name, value in self.mechanism.parameter_values.items():
-            derived = isinstance(self.mechanism.parameters[name], str | Expression)
-            found.append(Parameter(name, float(value), *parameter_range(float(value)), derived=derived))
-        return tuple(found)
-
-    def solve(self, values: Mapping[str, float], order: int) -> Take:
+    def solve(self, values: Mapping[str, float], order: int) -> Recording:
         """Return the motion for some values of the parameters.
 
         Raises
@@ -71,16 +60,8 @@ class MechanismSubject:
             If the bodies cannot be put together, or the motion ends at once.
         """
         mechanism = self.mechanism.with_parameters(**values)
-        time = instants_shown(mechanism)
-        return take_of(self._motion(mechanism, time, order))
-
-    def _motion(self, mechanism: Mechanism, time: np.ndarray, order: int) -> Any:
-        from jounce.integrate import simulate
-        from jounce.kinematics import solve
-
-        if self.simulated:
-            return simulate(mechanism, time, order=order, strict=False)
-        return solve(mechanism, time, order=order, strict=False)
+        moved = simulate if mechanism.initial else solve
+        return recorded(moved(mechanism, instants_shown(mechanism), order=order, strict=False))
 
 
 def parameter_range(value: float) -> tuple[float, float]:
@@ -97,10 +78,8 @@ def parameter_range(value: float) -> tuple[float, float]:
     return low, high
 
 
-def instants_shown(mechanism: Mechanism) -> np.ndarray:
+def instants_shown(mechanism: Mechanism) -> Float[np.ndarray, " time"]:
     """Return the instants of a mechanism, more where they are too few to look smooth, fewer where they are too many."""
-    from jounce.mechanism import time_grid
-
     given = time_grid(mechanism.time, mechanism.parameter_values)
     if len(given) > MOST:
         return np.linspace(given[0], given[-1], MOST)
@@ -111,47 +90,66 @@ def instants_shown(mechanism: Mechanism) -> np.ndarray:
 
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
-class MotionTake(Take):
+class MechanismRecording(Recording):
     """The motion of a mechanism as the page shows it.
 
     Parameters
     ----------
-    moving : Motion
-    good : array of bool, shape (time,)
-        Instants that were solved.
+    solution : Motion
+    solved : numpy.ndarray of bool, shape (all,)
+        Which of its instants were solved.
     ground : str
         What the ground is called.
     """
 
-    moving: Any
-    good: np.ndarray
+    solution: Motion
+    solved: Bool[np.ndarray, " all"]
     ground: str
 
     def quantities(self) -> dict[str, Quantity]:
-        """Return the outputs, or the angles of the bodies."""
-        return _quantities(self.moving, self.good)
+        """Return all outputs, or how each body turns where there are none."""
+        outputs, found = self.solution.mechanism.outputs, {}
+        for name, values in self.solution.outputs.items():
+            words = tuple(quantity_word(outputs[name], k) for k in range(values.shape[1]))
+            found[name] = self._quantity(outputs[name].unit, values, words, outputs[name].labels)
+        return found or dict(map(self._turning, self.solution.mechanism.bodies))
 
-    def motion_of(self, body: str, point: Any) -> np.ndarray:
+    def _turning(self, body: str) -> tuple[str, Quantity]:
+        rates = [quantity_word(AngularVelocityOutput(body), k) for k in range(self.order + 1)]
+        if self.planar:
+            values, words = self.solution.angle(body).values, ("angle", *rates)
+            return f"angle of {body}", self._quantity("rad", values, words[: values.shape[1]])
+        values = self.solution.angular_velocity(body).values
+        return f"angular velocity of {body}", self._quantity("rad/s", values, tuple(rates[: values.shape[1]]))
+
+    def _quantity(self, unit: str, values: np.ndarray, words: tuple[str, ...], *labels: tuple[str, ...]) -> Quantity:
+        values = values[self.solved]
+        return Quantity(unit, values.reshape(*values.shape[:2], -1), words, *labels)
+
+    def derivatives(self, body: str, point: Place) -> Float[np.ndarray, "time derivative 3"]:
         """Return position and derivatives of a point."""
-        return spatial_vectors(self.moving.point(GROUND if body == self.ground else body, point).values[self.good])
+        body = GROUND if body == self.ground else body
+        return spatial_vectors(self.solution.point(body, np.asarray(point).tolist()).values[self.solved])
 
-    def exertions_of(self) -> list[Exertion]:
+    def all_loads(self) -> list[Load]:
         """Return what joints, drivers and applied forces do."""
-        return _exertions(self.moving, self.good)
+        return mechanism_loads(self.solution, self.solved)
 
-    def dataset(self) -> Any:
+    def dataset(self) -> Dataset:
         """Return the results of all instants."""
-        return self.moving.dataset
+        return self.solution.dataset
 
 
-def take_of(motion: Any, looks: Any = None, title: str = "", ground: str = GROUND) -> MotionTake:
+def recorded(
+    motion: Motion, appearance: Appearance | None = None, title: str = "", ground: str = GROUND
+) -> MechanismRecording:
     """Return a motion as the view shows it.
 
     Parameters
     ----------
     motion : Motion
         Instants that were not solved are left out.
-    looks : Looks, optional
+    appearance : Appearance, optional
         Shapes of the bodies; from joints unless given.
     title : str, optional
         That of the mechanism unless given.
@@ -163,100 +161,27 @@ def take_of(motion: Any, looks: Any = None, title: str = "", ground: str = GROUN
     SolveError
         If no instant was solved.
     """
-    from jounce.kinematics import Status, raise_for_status
-
-    mechanism, good = motion.mechanism, motion.status == Status.OK
+    mechanism, solved = motion.mechanism, np.asarray(motion.status == Status.OK)
     notice = ""
     try:
         raise_for_status(motion)
     except SolveError as error:
-        if np.count_nonzero(good) < min(2, len(good)):
+        if np.count_nonzero(solved) < min(2, len(solved)):
             raise
         notice = str(error)
     position, quaternion = poses(motion)
-    return MotionTake(
-        moving=motion,
-        good=good,
+    return MechanismRecording(
+        solution=motion,
+        solved=solved,
         ground=ground,
         title=title or mechanism.title,
         planar=mechanism.space == "planar",
-        time=motion.time[good],
+        time=motion.time[solved],
         order=motion.order,
         bodies=(ground, *mechanism.bodies),
-        position=position[good],
-        quaternion=quaternion[good],
+        position=position[solved],
+        quaternion=quaternion[solved],
         values={name: float(value) for name, value in mechanism.parameter_values.items()},
-        looks=looks_of(motion) if looks is None else looks,
+        appearance=appearance or mechanism_appearance(motion),
         notice=notice,
     )
-
-
-def _quantities(motion: Any, good: np.ndarray) -> dict[str, Quantity]:
-    """Return all outputs, and the angle of each body of a planar mechanism that has no outputs."""
-    found = {}
-    for name, values in motion.outputs.items():
-        output = motion.mechanism.outputs[name]
-        values = values[good].reshape(np.count_nonzero(good), values.shape[1], -1)
-        words = tuple(rate_name(output, k) for k in range(values.shape[1]))
-        if output.unit == "rad" and words[:1] == ("position",):
-            words = ("angle", *words[1:])
-        found[name] = Quantity(output.unit, values, words, output.labels)
-    if found:
-        return found
-    for body in motion.mechanism.bodies:
-        if motion.mechanism.space == "planar":
-            values, unit = motion.angle(body).values, "rad"
-            name, words = f"angle of {body}", ("angle", *(rate_name(AngularVelocityOutput(body), k) for k in range(30)))
-        else:
-            values, unit = motion.angular_velocity(body).values, "rad/s"
-            name = f"angular velocity of {body}"
-            words = tuple(rate_name(AngularVelocityOutput(body), k) for k in range(30))
-        values = values[good].reshape(np.count_nonzero(good), values.shape[1], -1)
-        found[name] = Quantity(unit, values, words[: values.shape[1]])
-    return found
-
-
-def has_loads(mechanism: Mechanism) -> bool:
-    """Tell whether there are masses or applied forces, so that joints carry something."""
-    return bool(mechanism.forces) or any(body.mass is not None for body in mechanism.bodies.values())
-
-
-def _exertions(motion: Any, good: np.ndarray) -> list[Exertion]:
-    """Return what joints, drivers and applied forces do to the bodies."""
-    mechanism = motion.mechanism
-    if not has_loads(mechanism):
-        return []
-    if motion.order < 2:
-        raise JounceError("forces need accelerations; set the order to 2 or more", name="order", value=motion.order)
-    found = []
-    for kind in ("joints", "drivers"):
-        found += [_reaction(motion, good, name, kind) for name in getattr(mechanism, kind)]
-    return found + applied(motion, good)
-
-
-def _reaction(motion: Any, good: np.ndarray, name: str, kind: str) -> Exertion:
-    """Return what a joint or a driver does to its last body of two."""
-    from jounce.dynamics import joint_reaction
-    from jounce.mechanism.resolve import resolve_element
-
-    mechanism = motion.mechanism
-    element = getattr(mechanism, kind)[name]
-    components = 2 if mechanism.space == "planar" else 3
-    values = resolve_element(element, mechanism.parameter_values, components, f"{kind}.{name}")
-    slot = min(1, len(element.bodies) - 1)
-    local = values.get(f"point_{'ij'[slot]}")
-    local = np.zeros(components) if local is None else np.asarray(local)
-    reaction = joint_reaction(motion, name, point=local)
-    force, torque = reaction.force.values[good][:, 0], reaction.torque.values[good]
-    if torque.ndim == 2:  # planar: about z
-        torque = np.stack([np.zeros(len(torque)), np.zeros(len(torque)), torque[:, 0]], axis=-1)
-    else:
-        torque = torque[:, 0]
-    place = spatial_vectors(motion.point(element.bodies[slot], local.tolist()).values[good][:, 0])
-    return Exertion(name, "reaction" if kind == "joints" else "driver", place, spatial_vectors(force), torque)
-
-
-def directions(take: Take, body: str, vector: Any) -> np.ndarray:
-    """Return a direction fixed in a body at all instants, (time, 3)."""
-    index = take.bodies.index(body)
-    return rotated(take.quaternion[:, index], spatial_vectors(np.asarray(vector, float)))

@@ -1,102 +1,175 @@
-"""Meshes that a URDF names: found beside it or in the folder of its package, and read."""
+"""Meshes of simple solids: the primitives of trimesh, placed, with edges that look sharp where they are.
+
+Faces that share a vertex look round where they meet, so that sharp edges have vertices of their own.
+"""
 
 from __future__ import annotations
 
-import io
-import os
-import warnings
-from collections.abc import Iterable
-from os import PathLike
-from pathlib import Path
-from typing import Any
+from collections.abc import Sequence
+from functools import cache
 
 import numpy as np
+import shapely
+import trimesh
+from jaxtyping import Float
+from shapely.geometry import MultiPoint, Polygon
+from trimesh import Trimesh, creation
 
-from jounce.errors import RobotFileError
-from jounce.io.files.reading import MAX_SAMPLES, named_file, read_file
+from jounce.plot.geometry import frame_along
+from jounce.viewer.appearance import Place
 
-__all__ = ["Meshes"]
+__all__ = [
+    "arc_arrow",
+    "box",
+    "capsule",
+    "coil",
+    "cylinder",
+    "extruded",
+    "merged",
+    "placed",
+    "plate",
+    "rotation_to",
+    "sleeve",
+    "sphere",
+    "tube",
+    "wheel",
+]
 
-LARGEST = 400_000  # triangles of one mesh that a page can move smoothly
+AROUND = 24  # corners of a circle
+Z, ORIGIN = (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
+Vector = Float[np.ndarray, "3"]
+Rotation = Float[np.ndarray, "3 3"]
+FlatPoints = Float[np.ndarray, "points 2"]
 
 
-class Meshes:
-    """The meshes of a robot file.
+def rotation_to(axis: Place) -> Rotation:
+    """Return a rotation matrix whose third column is along an axis of any length.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-    allow
-        Folders besides that of the file that they may be below.
+    Examples
+    --------
+    >>> rotation_to([2.0, 0.0, 0.0])[:, 2].tolist()
+    [1.0, 0.0, 0.0]
     """
-
-    def __init__(self, path: Path, allow: Iterable[str | PathLike[str]] = ()) -> None:
-        self.path, self.allow = path, tuple(allow)
-
-    def triangles(self, name: str) -> list[tuple[np.ndarray, np.ndarray, Any]]:
-        """Return the triangles of a mesh, by its name in the file, with their colours; none where it cannot be read."""
-        import trimesh
-
-        try:
-            file = self._file(name)
-            if file is None:
-                return []
-            content = read_file(file, MAX_SAMPLES, what="the mesh", error=RobotFileError)
-        except RobotFileError as error:
-            warnings.warn(f"a mesh is not shown: {error.located(path=self.path)}", stacklevel=2)
-            return []
-        try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")
-                kind = Path(file).suffix.lower().removeprefix(".")
-                parts = trimesh.load_scene(io.BytesIO(content), file_type=kind, resolver=_resolver(file)).dump()
-        except Exception:  # noqa: BLE001 - readers of meshes fail in ways of their own; bars are shown instead
-            return []
-        whole = [part for part in parts if isinstance(part, trimesh.Trimesh) and 0 < len(part.faces) <= LARGEST]
-        return [(np.asarray(part.vertices), np.asarray(part.faces), _colour(part)) for part in whole]
-
-    def _file(self, name: str) -> str | None:
-        """Return the file of a mesh: beside the robot, or in the folder of its package somewhere above."""
-        scheme, _, rest = name.rpartition("://")
-        if not rest:
-            return None
-        if scheme in ("package", "model"):
-            folders = self.path.resolve().parents[:-1]  # not in that of the whole system
-            places = [(folder, inner) for folder in folders for inner in (rest, rest.partition("/")[2]) if inner]
-            files = [named_file(inner, folder / "package.xml", error=RobotFileError) for folder, inner in places]
-        else:
-            files = [named_file(rest, self.path, self.allow, error=RobotFileError)]
-        return next((file for file in files if os.path.lexists(file)), None)
+    return frame_along(np.asarray(axis, float))[[1, 2, 0]].T
 
 
-def _colour(part: Any) -> np.ndarray | None:
-    try:
-        visual: Any = part.visual
-        rgba = np.asarray(visual.to_color().main_color if visual.defined else None, float) / 255
-    except (AttributeError, TypeError, ValueError):
-        return None
-    return rgba if rgba.shape == (4,) and np.isfinite(rgba).all() else None
+def placed(mesh: Trimesh, center: Place = ORIGIN, rotation: Rotation | None = None) -> Trimesh:
+    """Return a mesh that is turned, then moved."""
+    turned = mesh.vertices if rotation is None else mesh.vertices @ rotation.T
+    return Trimesh(turned + np.asarray(center), mesh.faces, process=False)
 
 
-def _resolver(file: str) -> Any:
-    """Return what trimesh asks for the files that a mesh names: materials, pictures."""
-    from trimesh.resolvers import Resolver
+def merged(meshes: Sequence[Trimesh]) -> Trimesh:
+    """Return several meshes as one."""
+    vertices, faces = trimesh.util.append_faces([mesh.vertices for mesh in meshes], [mesh.faces for mesh in meshes])
+    return Trimesh(vertices, faces, process=False)
 
-    class Beside(Resolver):
-        def __init__(self) -> None:
-            pass
 
-        def get(self, name: str) -> bytes:
-            return read_file(named_file(name.strip(), file, error=RobotFileError), MAX_SAMPLES, error=RobotFileError)
+def cylinder(radius: float, length: float, axis: Place = Z, center: Place = ORIGIN) -> Trimesh:
+    """Return a cylinder about an axis, its middle in a centre."""
+    return placed(_unit_cylinder(), center, rotation_to(axis) * (radius, radius, length))
 
-        def write(self, name: str, data: Any) -> None:
-            raise RobotFileError("is not written", path=file, value=(name, data))
 
-        def namespaced(self, namespace: str) -> Resolver:
-            raise RobotFileError("is in no folder", path=file, value=namespace)
+@cache
+def _unit_cylinder() -> Trimesh:
+    return _round_walls(creation.cylinder(1.0, 1.0, sections=AROUND))
 
-        def keys(self) -> list[str]:
-            return []
 
-    return Beside()
+def sleeve(inside: float, outside: float, length: float, axis: Place = Z, center: Place = ORIGIN) -> Trimesh:
+    """Return a hollow cylinder about an axis, its middle in a centre."""
+    ring = creation.annulus(inside, outside, length, sections=AROUND)
+    return placed(_round_walls(ring), center, rotation_to(axis))
+
+
+def _round_walls(mesh: Trimesh) -> Trimesh:
+    """Return a mesh whose caps, across z, share no vertices with its walls."""
+    caps, count = np.abs(mesh.face_normals[:, 2]) > 0.5, len(mesh.vertices)
+    faces = np.concatenate([mesh.faces[caps], mesh.faces[~caps] + count])
+    return Trimesh(np.tile(mesh.vertices, (2, 1)), faces, process=False)
+
+
+def _flat_walls(mesh: Trimesh) -> Trimesh:
+    """Return a mesh none of whose faces share vertices."""
+    mesh.unmerge_vertices()
+    return mesh
+
+
+def sphere(radius: float, center: Place = ORIGIN) -> Trimesh:
+    """Return a sphere."""
+    return placed(_unit_sphere(), center, radius * np.eye(3))
+
+
+@cache
+def _unit_sphere() -> Trimesh:
+    return creation.uv_sphere(1.0, count=(AROUND // 2, AROUND))
+
+
+def capsule(start: Place, end: Place, radius: float) -> Trimesh:
+    """Return a round bar between two points, with round ends."""
+    start, end = np.asarray(start, float), np.asarray(end, float)
+    length = float(np.linalg.norm(end - start))
+    if length == 0:
+        return sphere(radius, start)
+    bar = creation.capsule(length, radius, count=(AROUND // 2, AROUND))
+    return placed(bar, 0.5 * (start + end), rotation_to(end - start))
+
+
+def box(size: Place, center: Place = ORIGIN, rotation: Rotation | None = None) -> Trimesh:
+    """Return a box of three edges about a centre."""
+    return _flat_walls(placed(creation.box(np.asarray(size, float)), center, rotation))
+
+
+def extruded(outline: Polygon, low: float, high: float, *, sharp: bool = True) -> Trimesh:
+    """Return a flat shape drawn out along z; its walls meet in sharp edges, or look round."""
+    mesh = placed(creation.extrude_polygon(outline, high - low), (0.0, 0.0, low))
+    return _flat_walls(mesh) if sharp else _round_walls(mesh)
+
+
+def plate(points: FlatPoints, radius: float, low: float, high: float) -> Trimesh:
+    """Return the flat plate of the convex outline of some points in the plane, rounded with a radius."""
+    outline = MultiPoint(points).convex_hull.buffer(radius, quad_segs=AROUND // 4)
+    return extruded(outline, low, high, sharp=False)
+
+
+def wheel(
+    radius: float, low: float, high: float, center: Place, *, module: float = 0.0, outside: float = 0.0
+) -> Trimesh:
+    """Return a wheel of a pitch radius with teeth of a module, smooth where that is zero; a ring with an outside."""
+    middle = np.asarray(center, float)
+    outline = _toothed(radius, -module if outside else module) + middle
+    polygon = Polygon(_toothed(outside, 0.0) + middle, [outline]) if outside else Polygon(outline)
+    return extruded(polygon, low, high)
+
+
+def _toothed(radius: float, module: float) -> FlatPoints:
+    """Return the outline of a wheel with teeth outward, inward where the module is negative."""
+    if module == 0:
+        teeth, corners = 4 * AROUND, np.zeros(1)
+    else:
+        teeth, corners = max(8, round(2 * radius / abs(module))), module * np.array([-0.55, -0.55, 0.45, 0.45])
+    steps = np.arange(teeth * len(corners)) / len(corners)
+    angle = 2 * np.pi / teeth * (steps + 0.1 * np.tile((np.arange(len(corners)) % 2) * 2.0 - 1.0, teeth))
+    reach = radius + np.tile(corners, teeth)
+    return np.stack([reach * np.cos(angle), reach * np.sin(angle)], axis=1)
+
+
+def tube(line: Float[np.ndarray, "points 3"], radius: float) -> Trimesh:
+    """Return a tube along a line."""
+    return creation.sweep_polygon(shapely.Point(0, 0).buffer(radius, quad_segs=2), line)
+
+
+def coil(turns: int, radius: float, wire: float) -> Trimesh:
+    """Return a spring of length one along z, to be stretched; its wire is drawn as thick as it can be afterwards."""
+    height = np.linspace(0.0, 1.0, 16 * turns + 1)
+    around = np.clip((height - 0.1) / 0.8, 0, 1) * 2 * np.pi * turns
+    reach = radius * np.clip(np.minimum(height, 1 - height) / 0.1, 0, 1)
+    return tube(np.stack([reach * np.cos(around), reach * np.sin(around), height], axis=1), wire)
+
+
+def arc_arrow() -> Trimesh:
+    """Return an arrow around z, counterclockwise, on a circle of radius one: the sign of a torque."""
+    angle = np.linspace(0.0, 1.45 * np.pi, 40)
+    line = np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
+    ahead = np.array([-line[-1, 1], line[-1, 0], 0.0])
+    head = creation.cone(0.22, 0.55, sections=AROUND)
+    return merged([tube(line, 0.08), placed(_flat_walls(head), line[-1] - 0.05 * ahead, rotation_to(ahead))])

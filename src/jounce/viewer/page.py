@@ -1,49 +1,43 @@
-"""The page of one subject: its motion, what is wanted of it, and what is shown at the instant of now."""
+"""The page of one subject: its motion, what is to be shown of it, and what is shown at the instant of now."""
 
 from __future__ import annotations
 
 import threading
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import numpy as np
 
 from jounce.errors import JounceError
-from jounce.viewer.arrows import Marked
-from jounce.viewer.exports import quiet_stop
+from jounce.viewer.arrows import TracedPoint
+from jounce.viewer.local_server import quiet_stop
+from jounce.viewer.overlay import DisplayOptions, Overlay
 from jounce.viewer.player import Player
-from jounce.viewer.prepared import Prepared, Wanted
-from jounce.viewer.scene import Scene
+from jounce.viewer.recording import Recording
+from jounce.viewer.scene import ViserScene
 from jounce.viewer.session import Session, Subject
-from jounce.viewer.take import Take
 
-__all__ = ["Follower", "Page"]
+__all__ = ["Observer", "Page"]
 
 SLOWLY = 6  # legend and plots follow every so many pictures
 
 
-@runtime_checkable
-class Follower(Protocol):
-    """A panel, which is told what happens."""
+class Observer:
+    """A panel, which is told what happens; does nothing unless it says otherwise."""
 
-    def on_take(self, take: Take) -> None:
+    def on_recording(self, recording: Recording) -> None:
         """There is a new motion."""
-        ...
 
     def on_failure(self, error: JounceError) -> None:
         """There is none for the newest values."""
-        ...
 
     def on_busy(self, busy: bool) -> None:
         """The solver begins to work, or has nothing left to do."""
-        ...
 
     def on_time(self, instant: float) -> None:
         """The player is at a time, s."""
-        ...
 
-    def on_frame(self, take: Take, frame: int) -> None:
+    def on_frame(self, frame: int) -> None:
         """Another instant is shown; not told of every picture of the player."""
-        ...
 
 
 class Page:
@@ -62,87 +56,85 @@ class Page:
         Solves.
     player : Player
         Its clock.
-    prepared : Prepared
+    overlay : Overlay
         What is shown.
     frame : int
         Index of the instant that is shown.
-    followers : list of Follower
+    observers : list of Observer
         Panels.
     """
 
     def __init__(self, server: Any, subject: Subject, order: int):
-        self.server, self.scene = server, Scene(server)
+        self.server, self.scene = server, ViserScene(server)
         self.lock = threading.RLock()
-        self.followers: list[Follower] = []
+        self.observers: list[Observer] = []
         self.session = Session(subject, order, self._arrived, self._failed, self._busy)
-        take = self.session.take
-        marked = ()
-        if take.looks.spots and take.order >= 1:
-            marked = (Marked(take.looks.spots[0], tuple(range(1, min(take.order, 2) + 1))),)
-        self.prepared = Prepared.of(take, Wanted(marked, path_order=min(1, take.order)))
-        self.player = Player(float(take.time[0]), float(take.time[-1]), self._played)
-        self.frame = self._pictures = 0
-        self.scene.stage(take)
-        self.scene.dress(take)
-        self.prepared.begin(self.scene)
-        self._refresh()
+        recording = self.session.recording
+        traced = ()
+        if recording.appearance.points and recording.order >= 1:
+            traced = (TracedPoint(recording.appearance.points[0], tuple(range(1, min(recording.order, 2) + 1))),)
+        self.player = Player(float(recording.time[0]), float(recording.time[-1]), self._played)
+        self._pictures = 0
+        self.scene.set_stage(recording)
+        self.scene.set_shapes(recording)
+        self._show(Overlay.of(recording, DisplayOptions(traced)))
 
     @property
-    def take(self) -> Take:
+    def recording(self) -> Recording:
         """The motion that is shown."""
-        return self.prepared.take
+        return self.overlay.recording
 
     @property
-    def wanted(self) -> Wanted:
+    def options(self) -> DisplayOptions:
         """What is shown of it."""
-        return self.prepared.wanted
+        return self.overlay.options
 
-    def _arrived(self, take: Take) -> None:
+    def _arrived(self, recording: Recording) -> None:
         """Take over a new motion, in the worker; what takes time is done before the page is touched."""
-        prepared = Prepared.of(take, self.wanted)
+        overlay = Overlay.of(recording, self.options)
         with self.lock:
             player = self.player
-            player.start, player.stop = float(take.time[0]), float(take.time[-1])
+            player.start, player.stop = float(recording.time[0]), float(recording.time[-1])
             player.now = float(np.clip(player.now, player.start, player.stop))
             with self.server.atomic():
-                self.scene.dress(take)
-                self._exchange(prepared)
-            for follower in self.followers:
-                follower.on_take(take)
-                follower.on_frame(take, self.frame)
+                self.scene.set_shapes(recording)
+                self._show(overlay)
+            for observer in self.observers:
+                observer.on_recording(recording)
+                observer.on_frame(self.frame)
 
     def _failed(self, error: JounceError) -> None:
         with self.lock:
-            for follower in self.followers:
-                follower.on_failure(error)
+            for observer in self.observers:
+                observer.on_failure(error)
 
     def _busy(self, busy: bool) -> None:
         with self.lock:
-            for follower in self.followers:
-                follower.on_busy(busy)
+            for observer in self.observers:
+                observer.on_busy(busy)
 
-    def want(self, wanted: Wanted) -> None:
+    def set_options(self, options: DisplayOptions) -> None:
         """Show something else of the motion; done by the worker, as forces take a moment."""
 
         def job() -> None:
-            prepared = Prepared.of(self.take, wanted)
+            overlay = Overlay.of(self.recording, options)
             with self.lock:
                 with self.server.atomic():
-                    self._exchange(prepared)
-                for follower in self.followers:
-                    follower.on_frame(self.take, self.frame)
+                    self._show(overlay)
+                for observer in self.observers:
+                    observer.on_frame(self.frame)
 
         self.session.later(job)
 
-    def _exchange(self, prepared: Prepared) -> None:
-        self.prepared = prepared
-        prepared.begin(self.scene)
+    def _show(self, overlay: Overlay) -> None:
+        self.overlay = overlay
+        self.scene.begin(overlay)
         self._refresh()
 
     def _refresh(self) -> None:
         """Show the instant of now; nothing is computed but which one it is."""
-        self.frame = self.take.frame_at(self.player.now)
-        self.prepared.show(self.scene, self.frame)
+        self.frame = self.recording.frame_at(self.player.now)
+        self.scene.show(self.overlay, self.frame)
 
     def seek(self, instant: float) -> None:
         """Go to a time, s."""
@@ -150,9 +142,9 @@ class Page:
             self.player.now = float(np.clip(instant, self.player.start, self.player.stop))
             with self.server.atomic():
                 self._refresh()
-            for follower in self.followers:
-                follower.on_time(self.player.now)
-                follower.on_frame(self.take, self.frame)
+            for observer in self.observers:
+                observer.on_time(self.player.now)
+                observer.on_frame(self.frame)
 
     def _played(self, instant: float) -> None:
         if not self.server.get_clients():
@@ -161,10 +153,10 @@ class Page:
             with self.server.atomic():
                 self._refresh()
             self._pictures += 1
-            for follower in self.followers:
-                follower.on_time(instant)
+            for observer in self.observers:
+                observer.on_time(instant)
                 if self._pictures % SLOWLY == 0 or not self.player.playing:
-                    follower.on_frame(self.take, self.frame)
+                    observer.on_frame(self.frame)
 
     def close(self) -> None:
         """End the threads and the server."""

@@ -10,15 +10,15 @@ import numpy as np
 from jounce.errors import JounceError
 from jounce.viewer.exports import animation, file_name, picture, table
 from jounce.viewer.legend import error_box, status_line
-from jounce.viewer.page import Page
-from jounce.viewer.take import Parameter, Take
+from jounce.viewer.page import Observer, Page
+from jounce.viewer.recording import Parameter, Recording
 
 __all__ = ["Panel"]
 
 SPEEDS = ("0.05", "0.1", "0.25", "0.5", "1", "2", "4")
 
 
-class Panel:
+class Panel(Observer):
     """Controls of time, parameters and exports.
 
     Parameters
@@ -30,16 +30,14 @@ class Panel:
     def __init__(self, page: Page):
         self.page, self.gui = page, page.server.gui
         self._busy = False
-        self._sliders: dict[str, tuple[Any, Any]] = {}
+        self._sliders: dict[str, Any] = {}
+        self._numbers: dict[str, Any] = {}
         self.message = self.gui.add_html("", visible=False)
         self._add_time()
 
     def _add_time(self) -> None:
         gui, player = self.gui, self.page.player
-        span = player.stop - player.start
-        self.time = gui.add_slider(
-            "time (s)", player.start, max(player.stop, player.start + 1e-9), _step(span), player.start
-        )
+        self.time = gui.add_slider("time (s)", *self._span(), player.start)
         self.time.on_update(lambda event: self._seek(event))
         self.play = gui.add_button("Play", icon="player-play", hint="Play or pause")
         self.play.on_click(lambda _: self.set_playing(not player.playing))
@@ -49,6 +47,11 @@ class Panel:
         self.loop.on_update(lambda _: setattr(player, "loop", bool(self.loop.value)))
         self.status = gui.add_html("")
         self._say_status()
+
+    def _span(self) -> tuple[float, float, float]:
+        """Return the ends and the step of the slider of the time, s."""
+        player = self.page.player
+        return player.start, max(player.stop, player.start + 1e-9), _step(player.stop - player.start)
 
     def _seek(self, event: Any) -> None:
         if event.client is not None:  # the user, not the player
@@ -71,72 +74,56 @@ class Panel:
             return
         groups = dict.fromkeys(p.group for p in parameters)
         for group in groups:
-            members = [p for p in parameters if p.group == group]
             with gui.add_folder(group, expand_by_default=len(groups) < 3) if group else contextlib.nullcontext():
-                for parameter in members:
-                    self._add_slider(parameter)
+                for parameter in parameters:
+                    if parameter.group == group and not parameter.derived:
+                        self._add_slider(parameter)
         gui.add_button("Reset", icon="rotate", hint="All values as in the file").on_click(lambda _: self._reset())
         with gui.add_folder("Exact values (SI)", expand_by_default=False):
             for parameter in parameters:
                 self._add_number(parameter)
 
-    def _add_slider(self, parameter: Parameter) -> None:
-        if parameter.derived:
-            return
-        step = _step(parameter.high - parameter.low)
-        hint = f"{parameter.name}, SI units; {parameter.value:.6g} in the file"
-        slider = self.gui.add_slider(parameter.name, parameter.low, parameter.high, step, parameter.value, hint=hint)
-        self._sliders[parameter.name] = (slider, None)
-        slider.on_update(lambda event: self._changed(parameter.name, event))
+    def _add_slider(self, its: Parameter) -> None:
+        step, hint = _step(its.high - its.low), f"{its.name}, SI units; {its.value:.6g} in the file"
+        slider = self._sliders[its.name] = self.gui.add_slider(its.name, its.low, its.high, step, its.value, hint=hint)
+        slider.on_update(lambda event: self._changed(its.name, event))
 
-    def _add_number(self, parameter: Parameter) -> None:
-        number = self.gui.add_number(
-            parameter.name, parameter.value, step=_step(abs(parameter.value) or 1.0), disabled=parameter.derived
-        )
-        slider = self._sliders.get(parameter.name, (None, None))[0]
-        self._sliders[parameter.name] = (slider, number)
-        number.on_update(lambda event: self._typed(parameter.name, event))
+    def _add_number(self, its: Parameter) -> None:
+        step = _step(abs(its.value) or 1.0)
+        number = self._numbers[its.name] = self.gui.add_number(its.name, its.value, step=step, disabled=its.derived)
+        if not its.derived:
+            number.on_update(lambda event: self._changed(its.name, event))
 
     def _changed(self, name: str, event: Any) -> None:
-        if event.client is None:
-            return
-        slider, number = self._sliders[name]
-        if number is not None:
-            number.value = float(slider.value)
-        self.page.session.request({name: float(slider.value)})
+        """Take over a value that the user has set with a slider, or typed."""
+        if event.client is not None:
+            self._put(name, float(event.target.value), but=event.target)
+            self.page.session.request({name: float(event.target.value)})
 
-    def _typed(self, name: str, event: Any) -> None:
-        if event.client is None:
-            return
-        slider, number = self._sliders[name]
-        value = float(number.value)
-        self._put(slider, value)
-        self.page.session.request({name: value})
-
-    def _put(self, slider: Any, value: float) -> None:
-        """Set a slider, and widen it where the value is outside."""
-        if slider is not None:
+    def _put(self, name: str, value: float, but: Any = None) -> None:
+        """Show a value of a parameter but where it comes from; the slider is widened where it is outside."""
+        slider, number = self._sliders[name], self._numbers[name]
+        if number is not but:
+            number.value = value
+        if slider is not but:
             slider.min, slider.max = min(slider.min, value), max(slider.max, value)
             slider.value = value
 
     def _reset(self) -> None:
         values = {p.name: p.value for p in self.page.session.subject.parameters if not p.derived}
         for name, value in values.items():
-            slider, number = self._sliders[name]
-            self._put(slider, value)
-            if number is not None:
-                number.value = value
+            self._put(name, value)
         self.page.session.request(values)
 
     def add_exports(self) -> None:
         """Add the buttons of what can be kept."""
         gui = self.gui
         csv = gui.add_button("Table (CSV)", icon="table-export", hint="All outputs with their derivatives")
-        csv.on_click(lambda event: self._send(event, ".csv", lambda _: table(self.page.take)))
+        csv.on_click(lambda event: self._send(event, ".csv", lambda _: table(self.page.recording)))
         png = gui.add_button("Picture (PNG)", icon="photo", hint="What this browser shows of the scene")
         png.on_click(lambda event: self._send(event, ".png", picture))
         html = gui.add_button("Animation (HTML)", icon="movie", hint="One file that plays in any browser, offline")
-        html.on_click(lambda event: self._send(event, ".html", lambda _: self.recorded().encode()))
+        html.on_click(lambda event: self._send(event, ".html", lambda _: animation(self.page.overlay).encode()))
 
     def _send(self, event: Any, ending: str, make: Any) -> None:
         """Make a file and send it to the browser that asked."""
@@ -145,22 +132,16 @@ class Panel:
         except JounceError as error:
             event.client.add_notification("Nothing was exported", str(error), color="red", auto_close_seconds=10)
             return
-        event.client.send_file_download(file_name(self.page.take.title, ending), content, save_immediately=True)
+        event.client.send_file_download(file_name(self.page.recording.title, ending), content, save_immediately=True)
 
-    def recorded(self) -> str:
-        """Return what is shown as an animation in one HTML file: bodies, arrows, paths and forces."""
-        return animation(self.page.prepared)
-
-    def on_take(self, take: Take) -> None:
+    def on_recording(self, recording: Recording) -> None:
         """Follow a new motion."""
         self.message.visible = False
-        player = self.page.player
-        self.time.min, self.time.max = player.start, max(player.stop, player.start + 1e-9)
-        self.time.step = _step(player.stop - player.start)
-        self.time.value = player.now
-        for name, (_, number) in self._sliders.items():
-            if number is not None and number.disabled and name in take.values:
-                number.value = take.values[name]
+        self.time.min, self.time.max, self.time.step = self._span()
+        self.time.value = self.page.player.now
+        for name, number in self._numbers.items():
+            if number.disabled and name in recording.values:
+                number.value = recording.values[name]
         self._say_status()
 
     def on_failure(self, error: JounceError) -> None:
@@ -181,12 +162,9 @@ class Panel:
         if self.play.label == "Pause" and not self.page.player.playing:  # it came to the end
             self.set_playing(False)
 
-    def on_frame(self, take: Take, frame: int) -> None:
-        """Nothing here changes with the frame alone."""
-
     def _say_status(self) -> None:
         session = self.page.session
-        self.status.content = status_line(self.page.take, session.elapsed, self._busy)
+        self.status.content = status_line(self.page.recording, session.elapsed, self._busy)
 
 
 def _step(span: float) -> float:

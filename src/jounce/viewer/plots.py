@@ -6,22 +6,26 @@ import time
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
-from jounce.errors import JounceError
-from jounce.plot.labels import scale_of
+from jounce.plot.labels import axis_range, scale_of
+from jounce.plot.style import COLOURS
 from jounce.reporting.peaks import derivative_unit
 from jounce.viewer.legend import legend
-from jounce.viewer.take import Quantity, Take
+from jounce.viewer.page import Observer, Page
+from jounce.viewer.recording import Recording
 
 __all__ = ["Chart", "Plots", "cursor_data", "default_charts"]
 
-COLOURS = ("#0072B2", "#D55E00", "#009E73")
+Times = Float[np.ndarray, " time"]
 CURSOR = "#555555"
 TICKS = {"size": 4}
 SETTLING = 1.5  # s
 
 
-def cursor_data(time: np.ndarray, values: np.ndarray, frame: int) -> tuple[np.ndarray, ...]:
+def cursor_data(
+    time: Times, values: Float[np.ndarray, "time component"], frame: int
+) -> tuple[Float[np.ndarray, " longer"], ...]:
     """Return what a plot draws: time, components, and an upright line at an instant, which counts for two.
 
     Parameters
@@ -40,26 +44,15 @@ def cursor_data(time: np.ndarray, values: np.ndarray, frame: int) -> tuple[np.nd
     after = time[frame] + 1e-9 * (time[-1] - time[0])  # not the same, or the page finds no ticks
     times = np.insert(time, min(frame + 1, len(time)), after)
     lines = [np.insert(column, frame, column[frame]) for column in values.T]
-    low, high = limits(values)
+    low, high = axis_range(values)
     cursor = np.full(len(times), np.nan)
     cursor[frame : frame + 2] = low, high
     return times, *lines, cursor
 
 
-def limits(values: np.ndarray) -> tuple[float, float]:
-    """Return the smallest and the largest value; a constant gets some room, so that rounding is not magnified."""
-    finite = values[np.isfinite(values)]
-    if not finite.size:
-        return -1.0, 1.0
-    low, high = float(finite.min()), float(finite.max())
-    size = max(abs(low), abs(high))
-    if high - low <= 1e-9 * size or size == 0:
-        half = 0.1 * size or 1.0
-        return 0.5 * (low + high) - half, 0.5 * (low + high) + half
-    return low, high
-
-
-def cleaned(time: np.ndarray, values: np.ndarray, order: int) -> np.ndarray:
+def cleaned(
+    time: Times, values: Float[np.ndarray, "time derivative component"], order: int
+) -> Float[np.ndarray, "time component"]:
     """Return a derivative, (time, components), or zeros where it is but the rounding of lower ones.
 
     Parameters
@@ -80,13 +73,13 @@ def cleaned(time: np.ndarray, values: np.ndarray, order: int) -> np.ndarray:
     return values[:, order] if sizes[-1] > 1e-9 * max(sizes) else np.zeros_like(values[:, order])
 
 
-def default_charts(take: Take) -> list[tuple[str, int]]:
+def default_charts(recording: Recording) -> list[tuple[str, int]]:
     """Return the output and the derivative of the plots that a page starts with."""
-    names = list(take.outputs)
+    names = list(recording.outputs)
     if not names:
         return []
     first = names[0]
-    highest = take.outputs[first].values.shape[1] - 1
+    highest = recording.outputs[first].values.shape[1] - 1
     return [(first, 0), *([(first, min(2, highest))] if highest else [])]
 
 
@@ -97,84 +90,63 @@ class Chart:
     ----------
     gui : viser.GuiApi
         In the context of the container that the plot is to stand in.
-    take : Take
+    recording : Recording
     name : str
         Of the quantity.
     order : int
         Derivative.
     """
 
-    def __init__(self, gui: Any, take: Take, name: str, order: int):
-        self.gui, self.name, self.order = gui, name, order
-        self.handle = self._drawn(take)
-
-    def _quantity(self, take: Take) -> Quantity:
-        return take.outputs[self.name]
-
-    def _values(self, take: Take) -> np.ndarray:
-        """Return what is drawn: short numbers, and zeros in the place of rounding errors."""
-        values = cleaned(take.time, self._quantity(take).values, self.order)
-        return values * 10.0 ** -scale_of(values)
-
-    def title(self, take: Take) -> str:
-        """Name, derivative and unit."""
-        quantity = self._quantity(take)
-        unit = derivative_unit(quantity.unit.replace("*", " "), self.order)
-        exponent = scale_of(cleaned(take.time, quantity.values, self.order))
-        unit = f"10^{exponent} {unit}" if exponent else unit
-        return f"{self.name}: {quantity.words[self.order]} ({unit})"
-
-    def _drawn(self, take: Take) -> Any:
-        values = self._values(take)
-        count = values.shape[1]
-        labels = [f"{self.name} {c}" for c in self._quantity(take).labels[:count]] if count > 1 else [self.name]
-        series = (
-            {"label": "time"},
-            *(
-                {"label": label, "stroke": COLOURS[k % 3], "width": 1.6, "points": {"show": False}}
-                for k, label in enumerate(labels)
-            ),
-            {"label": "now", "stroke": CURSOR, "width": 1.2, "dash": (4, 3), "points": {"show": False}},
-        )
-        return self.gui.add_uplot(
-            cursor_data(take.time, values, 0),
-            series,
-            title=self.title(take),
-            scales=self._scales(take),
-            axes=(
-                {"label": "time (s)", "labelFont": "11px sans-serif", "labelSize": 15, "size": 28, "ticks": TICKS},
-                {"size": 58, "ticks": TICKS},
-            ),
+    def __init__(self, gui: Any, recording: Recording, name: str, order: int):
+        self.name, self.order = name, order
+        title, scales = self._read(recording)
+        count, plain = self.values.shape[1], {"show": False}
+        labels = [f"{name} {c}" for c in recording.outputs[name].labels[:count]] if count > 1 else [name]
+        looks = {"width": 1.6, "points": plain}
+        lines = [{"label": label, "stroke": COLOURS[k % 3], **looks} for k, label in enumerate(labels)]
+        now = {"label": "now", "stroke": CURSOR, "width": 1.2, "dash": (4, 3), "points": plain}
+        below = {"label": "time (s)", "labelFont": "11px sans-serif", "labelSize": 15, "size": 28, "ticks": TICKS}
+        self.handle = gui.add_uplot(
+            cursor_data(self.time, self.values, 0),
+            ({"label": "time"}, *lines, now),
+            title=title,
+            scales=scales,
+            axes=(below, {"size": 58, "ticks": TICKS}),
             legend={"show": count > 1},
             height=180,
             padding=(6, 14, 0, 0),
         )
 
-    def _scales(self, take: Take) -> Any:
-        low, high = limits(self._values(take))
-        room = 0.06 * (high - low)
-        ends = float(take.time[0]), float(take.time[-1])
-        return {"x": {"time": False, "range": ends}, "y": {"auto": False, "range": (low - room, high + room)}}
+    def _read(self, recording: Recording) -> tuple[str, dict[str, Any]]:
+        """Take what is drawn of a motion, short numbers with zeros for rounding errors; return title and scales."""
+        quantity = recording.outputs[self.name]
+        values = cleaned(recording.time, quantity.values, self.order)
+        exponent = scale_of(values)
+        self.time, self.values = recording.time, values * 10.0**-exponent
+        unit = derivative_unit(quantity.unit.replace("*", " "), self.order)
+        unit = f"10^{exponent} {unit}" if exponent else unit
+        across = {"time": False, "range": (float(self.time[0]), float(self.time[-1]))}
+        upward = {"auto": False, "range": axis_range(self.values, 0.06)}
+        return f"{self.name}: {quantity.words[self.order]} ({unit})", {"x": across, "y": upward}
 
-    def renew(self, take: Take) -> None:
+    def renew(self, recording: Recording) -> None:
         """Fit the axes to another motion."""
-        self.handle.title = self.title(take)
-        self.handle.scales = self._scales(take)
+        self.handle.title, self.handle.scales = self._read(recording)
 
-    def show(self, take: Take, frame: int) -> None:
+    def show(self, frame: int) -> None:
         """Put the cursor at an instant."""
-        self.handle.data = cursor_data(take.time, self._values(take), frame)
+        self.handle.data = cursor_data(self.time, self.values, frame)
 
-    def fits(self, take: Take) -> bool:
-        """Whether a take has the quantity and the derivative."""
-        return self.name in take.outputs and self.order < take.outputs[self.name].values.shape[1]
+    def fits(self, recording: Recording) -> bool:
+        """Whether a recording has the quantity and the derivative."""
+        return self.name in recording.outputs and self.order < recording.outputs[self.name].values.shape[1]
 
     def remove(self) -> None:
         """Take the plot away."""
         self.handle.remove()
 
 
-class Plots:
+class Plots(Observer):
     """The panel on the left: the legend, and plots of any output to any order.
 
     Parameters
@@ -183,30 +155,35 @@ class Plots:
         What is shown.
     """
 
-    def __init__(self, page: Any):
+    def __init__(self, page: Page):
         self.page, self.gui = page, page.server.gui
         self.panel = self.gui.add_panel()
         self.panel.dock_left()
         self.panel.set_width(370)
         self.charts: list[Chart] = []
         self._folders: list[Any] = []
-        take = page.take
+        recording = page.recording
         self.tab = self.panel.add_tab("Legend and plots", "chart-line")
         with self.tab:
             self.legend = self.gui.add_html("")
             self.space = self.gui.add_folder("Plots")
             with self.gui.add_folder("Add a plot", expand_by_default=False):
-                names = tuple(take.outputs) or ("none",)
+                names = tuple(recording.outputs) or ("none",)
                 self.output = self.gui.add_dropdown("output", names, initial_value=names[0])
-                self.derivative = self.gui.add_dropdown("derivative", self._words(take, names[0]))
+                self.derivative = self.gui.add_dropdown("derivative", self._words(recording, names[0]))
                 self.output.on_update(lambda _: self._offer())
                 self.gui.add_button("Add", icon="plus").on_click(lambda _: self._add_chosen())
                 self.gui.add_button("Remove the last", icon="trash").on_click(lambda _: self.remove())
                 self.order = self.gui.add_number(
-                    "highest derivative", take.order, min=0, max=30, step=1, hint="Solves again, to any order up to 30"
+                    "highest derivative",
+                    recording.order,
+                    min=0,
+                    max=30,
+                    step=1,
+                    hint="Solves again, to any order up to 30",
                 )
                 self.order.on_update(lambda event: self._solve_to(event))
-        for name, order in default_charts(take):
+        for name, order in default_charts(recording):
             self.add(name, order)
         self._still_until = 0.0
         page.server.on_client_connect(lambda _: self._settle())
@@ -217,17 +194,17 @@ class Plots:
         time.sleep(SETTLING)
         with self.page.lock:
             for chart in self.charts:
-                chart.renew(self.page.take)
-                chart.show(self.page.take, self.page.frame)
+                chart.renew(self.page.recording)
+                chart.show(self.page.frame)
 
-    def _words(self, take: Take, name: str) -> tuple[str, ...]:
-        if name not in take.outputs:
+    def _words(self, recording: Recording, name: str) -> tuple[str, ...]:
+        if name not in recording.outputs:
             return ("0:",)
-        quantity = take.outputs[name]
+        quantity = recording.outputs[name]
         return tuple(f"{k}: {quantity.words[k]}" for k in range(quantity.values.shape[1]))
 
     def _offer(self) -> None:
-        self.derivative.options = self._words(self.page.take, self.output.value)
+        self.derivative.options = self._words(self.page.recording, self.output.value)
 
     def _add_chosen(self) -> None:
         self.add(self.output.value, int(self.derivative.value.partition(":")[0]))
@@ -241,9 +218,9 @@ class Plots:
         """Add a plot of a derivative of an output."""
         page = self.page
         with page.lock, self.space:
-            if name in page.take.outputs:
-                self.charts.append(Chart(self.gui, page.take, name, order))
-                self.charts[-1].show(page.take, page.frame)
+            if name in page.recording.outputs:
+                self.charts.append(Chart(self.gui, page.recording, name, order))
+                self.charts[-1].show(page.frame)
 
     def remove(self) -> None:
         """Take the last plot away."""
@@ -251,31 +228,22 @@ class Plots:
             if self.charts:
                 self.charts.pop().remove()
 
-    def on_take(self, take: Take) -> None:
+    def on_recording(self, recording: Recording) -> None:
         """Plot a new motion; plots that it has no derivative for go."""
-        for chart in [chart for chart in self.charts if not chart.fits(take)]:
+        for chart in [chart for chart in self.charts if not chart.fits(recording)]:
             self.charts.remove(chart)
             chart.remove()
         for chart in self.charts:
-            chart.renew(take)
-        names = tuple(take.outputs) or ("none",)
+            chart.renew(recording)
+        names = tuple(recording.outputs) or ("none",)
         if tuple(self.output.options) != names:
             self.output.options = names
-        if tuple(self.derivative.options) != self._words(take, self.output.value):
+        if tuple(self.derivative.options) != self._words(recording, self.output.value):
             self._offer()
 
-    def on_frame(self, take: Take, frame: int) -> None:
+    def on_frame(self, frame: int) -> None:
         """Move the cursors, and renew the legend."""
         if time.monotonic() >= self._still_until:
             for chart in self.charts:
-                chart.show(take, frame)
-        self.legend.content = legend(self.page.prepared, frame)
-
-    def on_failure(self, error: JounceError) -> None:
-        """Nothing to be done: the last motion stays."""
-
-    def on_busy(self, busy: bool) -> None:
-        """Nothing to be done."""
-
-    def on_time(self, instant: float) -> None:
-        """Plots follow more slowly, see `on_frame`."""
+                chart.show(frame)
+        self.legend.content = legend(self.page.overlay, frame)

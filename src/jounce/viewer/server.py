@@ -9,12 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from jounce.errors import JounceError
-from jounce.viewer.exports import quiet_server, quiet_stop
-from jounce.viewer.guard import Guard
-from jounce.viewer.marks import Forces, Marks
-from jounce.viewer.page import Page
-from jounce.viewer.panel import Panel
-from jounce.viewer.plots import Plots
+from jounce.mechanism import Mechanism
+from jounce.robot import Robot
+from jounce.viewer.local_server import AccessControl, check_installed, check_port, quiet_server, quiet_stop
 
 __all__ = ["View", "view"]
 
@@ -41,23 +38,29 @@ class View:
         Its address, with the token that it takes to see and move it.
     page : Page
         What is shown.
-    panel, marks, plots
+    panel, arrows, forces, plots
         Its controls.
     """
 
     def __init__(self, subject: Any, *, port: int = 0, order: int = 4, playing: bool = True):
-        _check_port(port)
-        guard = Guard()
-        server = quiet_server(port, label=subject.name, guard=guard)
+        check_port(port)
+        access = AccessControl()
+        server = quiet_server(port, label=subject.name, access=access)
         try:
+            from jounce.viewer.page import Page  # which needs the extra
+
             self.page = Page(server, subject, order)
             self._lay_out(subject, playing)
         except BaseException:
             quiet_stop(server)
             raise
-        self.url = f"http://127.0.0.1:{server.get_port()}/?token={guard.token}"
+        self.url = f"http://127.0.0.1:{server.get_port()}/?token={access.token}"
 
     def _lay_out(self, subject: Any, playing: bool) -> None:
+        from jounce.viewer.panel import Panel
+        from jounce.viewer.plots import Plots
+        from jounce.viewer.tabs import ArrowsTab, ForcesTab
+
         gui = self.page.server.gui
         gui.configure_theme(control_width="medium", show_logo=False, show_share_button=False, brand_color=(0, 90, 140))
         gui.main_panel.dock_right()
@@ -67,14 +70,14 @@ class View:
         with tabs.add_tab("Parameters"):
             self.panel.add_parameters()
         with tabs.add_tab("Arrows"):
-            self.marks = Marks(self.page)
+            self.arrows = ArrowsTab(self.page)
         with tabs.add_tab("Forces"):
-            self.forces = Forces(self.page, subject.loaded)
+            self.forces = ForcesTab(self.page, subject.loaded)
         with tabs.add_tab("Export"):
             self.panel.add_exports()
         self.plots = Plots(self.page)
-        self.page.followers += [self.panel, self.marks, self.plots]
-        self.plots.on_frame(self.page.take, self.page.frame)
+        self.page.observers += [self.panel, self.arrows, self.plots]
+        self.plots.on_frame(self.page.frame)
         self.page.player.begin()
         self.panel.set_playing(playing)
 
@@ -150,6 +153,7 @@ def view(
     ...     page.url.startswith("http://127.0.0.1:")
     True
     """
+    check_installed()
     found = View(subject_of(subject, trajectory, allow), port=port, order=order, playing=playing)
     if open_page:
         import webbrowser
@@ -166,21 +170,13 @@ def subject_of(given: Any, trajectory: Any = None, allow: Iterable[str | PathLik
     JounceError
         If it is none of them, or a trajectory is given with a mechanism.
     """
-    from jounce.mechanism import Mechanism
-    from jounce.robot import Robot
+    from jounce.io import load, load_robot
     from jounce.viewer.mechanisms import MechanismSubject
 
     path = None
     if isinstance(given, str | PathLike):
         path = Path(fspath(given))
-        if path.suffix.lower() in MECHANISM_FILES:
-            from jounce.io import load
-
-            given = load(path, allow=allow)
-        else:
-            from jounce.io import load_robot
-
-            given = load_robot(path, allow=allow)
+        given = (load if path.suffix.lower() in MECHANISM_FILES else load_robot)(path, allow=allow)
     if isinstance(given, Robot):
         return robot_subject(given, trajectory, path, allow)
     if not isinstance(given, Mechanism):
@@ -196,7 +192,7 @@ def subject_of(given: Any, trajectory: Any = None, allow: Iterable[str | PathLik
 
 
 def robot_subject(
-    robot: Any, trajectory: Any = None, path: Path | None = None, allow: Iterable[str | PathLike[str]] = ()
+    robot: Robot, trajectory: Any = None, path: Path | None = None, allow: Iterable[str | PathLike[str]] = ()
 ) -> Any:
     """Return a robot as what is looked at; one with closures moves as the mechanism that it is.
 
@@ -214,31 +210,12 @@ def robot_subject(
     JounceError
         If the trajectory cannot be read or does not fit the robot.
     """
-    from jounce.viewer.closed import ClosedRobotSubject
+    from jounce.io import load_trajectory
+    from jounce.viewer.closed_loops import ClosedRobotSubject
+    from jounce.viewer.robot_appearance import robot_appearance
     from jounce.viewer.robots import RobotSubject
-    from jounce.viewer.visuals import robot_looks
 
-    looks = robot_looks(robot, path, allow)
     if isinstance(trajectory, str | PathLike):
-        from jounce.io import load_trajectory
-
         trajectory = load_trajectory(trajectory)
-    if robot.closures:
-        return ClosedRobotSubject(robot, looks, trajectory)
-    return RobotSubject(robot, looks, trajectory)
-
-
-def _check_port(port: Any) -> None:
-    """Raise JounceError unless a port can be listened on."""
-    import socket
-
-    if isinstance(port, bool) or not isinstance(port, int) or not 0 <= port <= 65535:
-        raise JounceError("must be a whole number from 0 to 65535; 0 takes a free one", name="port", value=port)
-    if port:
-        with socket.socket() as probe:
-            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            try:
-                probe.bind(("127.0.0.1", port))
-            except OSError as error:
-                message = f"cannot be used: {error.strerror}; 0 takes a free one"
-                raise JounceError(message, name="port", value=port) from None
+    kind = ClosedRobotSubject if robot.closures else RobotSubject
+    return kind(robot, robot_appearance(robot, path, allow), trajectory)

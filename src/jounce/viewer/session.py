@@ -5,39 +5,36 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Mapping
-from typing import Any, Protocol, runtime_checkable
+from typing import Protocol, runtime_checkable
 
 from jounce.errors import JounceError
-from jounce.viewer.take import Parameter, Take
+from jounce.viewer.recording import Parameter, Recording
 
 __all__ = ["Session", "Subject"]
 
 
 @runtime_checkable
 class Subject(Protocol):
-    """What is looked at: something with parameters that has a motion."""
+    """What is looked at: something with parameters that has a motion.
 
-    @property
-    def name(self) -> str:
-        """What it is called."""
-        ...
+    Attributes
+    ----------
+    name : str
+        What it is called.
+    loaded : bool
+        Whether there are forces to be shown.
+    parameters : tuple of Parameter
+        What sliders may set.
+    no_sliders : str
+        What is said where there are none.
+    """
 
-    @property
-    def loaded(self) -> bool:
-        """Whether there are forces to be shown."""
-        ...
+    name: str
+    loaded: bool
+    parameters: tuple[Parameter, ...]
+    no_sliders: str
 
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """What sliders may set."""
-        ...
-
-    @property
-    def no_sliders(self) -> str:
-        """What is said where there are no parameters."""
-        ...
-
-    def solve(self, values: Mapping[str, float], order: int) -> Take:
+    def solve(self, values: Mapping[str, float], order: int) -> Recording:
         """Return the motion for some values, or raise JounceError."""
         ...
 
@@ -55,41 +52,41 @@ class Session:
         What is looked at.
     order : int
         Highest derivative.
-    on_take : callable
-        Called in the worker with each new `Take`, before it is shown.
-    on_failure : callable
+    on_recording : callable, optional
+        Called in the worker with each new `Recording`, before it is shown.
+    on_failure : callable, optional
         Called in the worker with the error of a solve that failed.
     on_busy : callable, optional
         Called in the worker with True when it begins to work and False when nothing is left to do.
 
     Attributes
     ----------
-    take : Take
+    recording : Recording
         The last good motion.
     error : JounceError or None
         Why the newest values have no motion.
     solved : int
         How many solves were made, the first included.
     elapsed : float
-        How long the last solve took, s, with what `on_take` prepared.
+        How long the last solve took, s, with what `on_recording` prepared.
     """
 
     def __init__(
         self,
         subject: Subject,
         order: int,
-        on_take: Callable[[Take], None] | None = None,
-        on_failure: Callable[[JounceError], None] | None = None,
-        on_busy: Callable[[bool], None] | None = None,
+        on_recording: Callable[[Recording], object] = lambda _: None,
+        on_failure: Callable[[JounceError], object] = lambda _: None,
+        on_busy: Callable[[bool], object] = lambda _: None,
     ):
         self.subject, self.order = subject, order
-        self.on_take, self.on_failure, self.on_busy = on_take, on_failure, on_busy
+        self.on_recording, self.on_failure, self.on_busy = on_recording, on_failure, on_busy
         self.values: dict[str, float] = {p.name: p.value for p in subject.parameters if not p.derived}
         self.error: JounceError | None = None
-        self.take = subject.solve(self.values, order)
+        self.recording = subject.solve(self.values, order)
         self.solved, self.elapsed = 1, 0.0
         self._wanted: tuple[dict[str, float], int] | None = None
-        self._jobs: list[Callable[[], Any]] = []
+        self._jobs: list[Callable[[], object]] = []
         self._closed = self._working = False
         self._news = threading.Condition()
         self._worker = threading.Thread(target=self._work, name="jounce-view-solver", daemon=True)
@@ -103,7 +100,7 @@ class Session:
             self._wanted = (dict(self.values), self.order)
             self._news.notify_all()
 
-    def later(self, job: Callable[[], Any]) -> None:
+    def later(self, job: Callable[[], object]) -> None:
         """Let the worker do something between two solves, such as reactions, which take a moment."""
         with self._news:
             self._jobs.append(job)
@@ -130,24 +127,23 @@ class Session:
             with self._news:
                 self._working = False
                 self._news.notify_all()
-                idle = self._wanted is None and not self._jobs
-            if idle and self.on_busy is not None:
+                idle = not self._pending
+            if idle:
                 self.on_busy(False)
             with self._news:
-                self._news.wait_for(lambda: self._closed or self._wanted is not None or self._jobs)
+                self._news.wait_for(lambda: self._closed or self._pending)
                 if self._closed:
                     return
                 self._working = True
                 jobs, self._jobs = self._jobs, []
                 wanted, self._wanted = self._wanted, None
-            if self.on_busy is not None:
-                self.on_busy(True)
+            self.on_busy(True)
             for job in jobs:
                 self._guarded(job)
             if wanted is not None:
                 self._guarded(lambda wanted=wanted: self._solve(*wanted))
 
-    def _guarded(self, job: Callable[[], Any]) -> None:
+    def _guarded(self, job: Callable[[], object]) -> None:
         """Do something; what goes wrong is told, and the worker lives on."""
         try:
             job()
@@ -160,16 +156,14 @@ class Session:
 
     def _failed(self, error: JounceError) -> None:
         self.error = error
-        if self.on_failure is not None:
-            self.on_failure(error)
+        self.on_failure(error)
 
     def _solve(self, values: dict[str, float], order: int) -> None:
         started = time.perf_counter()
         self.solved += 1
-        take = self.subject.solve(values, order)
-        if take.notice and not self.take.notice:  # a part of a motion does not take the place of a whole one
-            raise JounceError(take.notice)
-        if self.on_take is not None:
-            self.on_take(take)
-        self.take, self.error = take, None
+        recording = self.subject.solve(values, order)
+        if recording.notice and not self.recording.notice:  # a part of a motion does not take the place of a whole one
+            raise JounceError(recording.notice)
+        self.on_recording(recording)
+        self.recording, self.error = recording, None
         self.elapsed = time.perf_counter() - started

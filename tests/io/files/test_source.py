@@ -8,8 +8,8 @@ import hypothesis.strategies as st
 import pytest
 
 from jounce.errors import MechanismFileError
-from jounce.io.files import entries
-from jounce.io.files.entries import MAX_DEPTH, dotted
+from jounce.io.files import located_data
+from jounce.io.files.located_data import MAX_DEPTH, dotted
 from jounce.io.files.reading import MAX_BYTES
 from jounce.io.files.source import read_source
 
@@ -217,7 +217,7 @@ def test_monstrous_lines_are_refused(tmp_path, text, words):
 
 
 def test_too_many_values_are_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr(entries, "MAX_VALUES", 1000)
+    monkeypatch.setattr(located_data, "MAX_VALUES", 1000)
     for suffix in (".json", ".yaml"):
         error = refusal(tmp_path, '{"a": [\n' + "1, 1,\n" * 600 + "1]}", suffix)
         assert "more than 1000 values" in str(error)

@@ -10,8 +10,8 @@ import pytest
 import jounce as jn
 from jounce.constraints import catalogue
 from jounce.integrate.batch_equations import Family
+from jounce.io.mechanisms.inertia_forms import _solid_keys
 from jounce.io.mechanisms.keys import file_keys, output_holder, output_types
-from jounce.io.mechanisms.masses import _solid_keys
 from jounce.io.mechanisms.overrides import override
 from jounce.mechanism import build, time_grid
 from jounce.mechanism.builder import starting_guess

@@ -10,7 +10,7 @@ import pytest
 import jounce as jn
 from jounce.constraints import AbstractConstraint, Vector
 from jounce.errors import MechanismError, MechanismFileError, OutputError
-from jounce.io.files.formats import dumped
+from jounce.io.files.dumping import dumped
 from jounce.io.files.source import read_source
 from jounce.io.mechanisms.writer import mechanism_data
 

@@ -78,7 +78,7 @@ def changed(line, text):
         ("", "motion.csv: the file of samples is empty"),
         ("\n\n", "motion.csv: the file of samples is empty"),
         (ROWS[:1], "motion.csv: at least two samples are needed, got 0"),
-        (ROWS[:6], "motion.csv: splines of degree 5 need at least 6 samples, got 5; give more, or choose a lower"),
+        (ROWS[:6], "motion.csv: a spline of degree 5 needs at least 6 samples, got 5; give more, or lower"),
         (
             changed(5, "0.2,0,0"),
             "motion.csv, line 5, time: times must increase, got 0.2; this one repeats that of line 4",
@@ -93,7 +93,7 @@ def changed(line, text):
         (changed(1, "time,a,a"), "motion.csv, line 1: two columns have this name, got 'a'"),
         (changed(1, "time,a,time"), "motion.csv, line 1: two columns have this name, got 'time'"),
         (changed(1, "time,a,"), "motion.csv, line 1: column 3 has no name"),
-        (changed(1, "tme,a,b"), "motion.csv, line 1: there is no column 'time'; did you mean 'tme'"),
+        (changed(1, "tme,a,b"), "motion.csv, line 1: no column has this name, got 'time'; did you mean 'tme'"),
         (ROWS[1:], "motion.csv, line 1: the first row holds the names"),
         (["time", "0", "1"], "there is no column besides 'time'"),
         ('time,a\n0,"1\n', "the samples cannot be read"),
@@ -174,7 +174,7 @@ def test_json_and_toml(tmp_path):
         (PICK.replace("duration: 2 s, ", ""), "point_to_point.duration: .*duration|limits or a duration"),
         (PICK.replace("2 s", "-2 s"), "greater than zero, got -2.0"),
         (PICK.replace("duration", "profile: s, duration"), r"point_to_point\.profile: no profile has this name"),
-        (PICK.replace("duration", "profile: 3, duration"), r"point_to_point\.profile: must be the name"),
+        (PICK.replace("duration", "profile: 3, duration"), r"point_to_point\.profile: must be a name"),
         (PICK.replace("duration", "limits: {velocity: 1}, duration"), r"limits\.acceleration: is missing"),
         (
             PICK.replace("duration", "limits: {velocity: 1 m/s^2, acceleration: 1, jerk: 1}, duration"),

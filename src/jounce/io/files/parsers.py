@@ -11,9 +11,7 @@ import re
 from typing import Any
 
 from jounce.errors import MechanismFileError
-from jounce.io.files.entries import MAX_DEPTH, Builder, Location, Source
-
-__all__ = ["plain_scalar", "read_json", "read_toml", "read_yaml"]
+from jounce.io.files.located_data import MAX_DEPTH, TOO_DEEP, Builder, Location, Source
 
 # The core schema of YAML 1.2 (section 10.3.2 of its specification).
 _NULL = {"", "~", "null", "Null", "NULL"}
@@ -151,9 +149,7 @@ def _check_depth(path: str, text: str, quotes: str) -> None:
             depth += 1
             if depth > MAX_DEPTH:
                 line = text.count("\n", 0, bracket.start()) + 1
-                raise MechanismFileError(
-                    f"nested more than {MAX_DEPTH} deep; a mechanism file needs 6", path=path, line=line
-                )
+                raise MechanismFileError(TOO_DEEP, path=path, line=line)
         elif bracket.group() in "]}":
             depth -= 1
 
@@ -170,7 +166,7 @@ def read_toml(path: str, text: str) -> Source:
     _check_depth(path, text, quotes="\"'")
     for number, row in enumerate(text.split("\n"), start=1):
         if row.count(".") > MAX_DEPTH and len(_TOML_PART.findall(row.partition("=")[0])) > MAX_DEPTH:
-            raise MechanismFileError(f"nested more than {MAX_DEPTH} deep", path=path, line=number)
+            raise MechanismFileError(TOO_DEEP, path=path, line=number)
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -191,7 +187,7 @@ def _check_plain(path: str, data: Any) -> None:
     while pending:
         value, depth = pending.pop()
         if depth > MAX_DEPTH:
-            raise MechanismFileError(f"nested more than {MAX_DEPTH} deep", path=path)
+            raise MechanismFileError(TOO_DEEP, path=path)
         if isinstance(value, (dict, list)):
             pending.extend((item, depth + 1) for item in (value.values() if isinstance(value, dict) else value))
 

@@ -16,19 +16,6 @@ from pathlib import Path
 
 from jounce.errors import JounceError, MechanismFileError, did_you_mean
 
-__all__ = [
-    "MAX_BYTES",
-    "MAX_SAMPLES",
-    "check_allowed",
-    "is_input",
-    "known_name",
-    "named_file",
-    "note_result",
-    "read_file",
-    "read_rows",
-    "written_name",
-]
-
 MAX_BYTES = 10_000_000
 MAX_SAMPLES = 100_000_000
 """Bytes of a table of samples."""
@@ -87,7 +74,8 @@ def read_file(
         message = f"{word if word == 'file' else f'file of {word}'} not found{_nearby(name)}"
         raise error(message, path=name) from None
     except (OSError, ValueError) as reason:
-        raise error(f"{_subject(what)}cannot be read: {_reason(reason)}", path=name) from None
+        subject = "" if what == "the file" else f"{what} "
+        raise error(f"{subject}cannot be read: {reason_of(reason)}", path=name) from None
     if limit is not None and len(content) > limit:
         raise _too_large(name, len(content), limit, what, error)
     if is_input:
@@ -109,11 +97,8 @@ def _too_large(name: str, size: int, limit: int, what: str, error: type[JounceEr
     return error(f"{what} {has} {size / 1e6:.3g} MB, at most {limit / 1e6:.3g} MB are read", path=name)
 
 
-def _subject(what: str) -> str:
-    return "" if what == "the file" else f"{what} "
-
-
-def _reason(error: Exception) -> str:
+def reason_of(error: Exception) -> str:
+    """Word the reason of a failure by the operating system."""
     return getattr(error, "strerror", None) or str(error)
 
 
@@ -174,13 +159,10 @@ def named_file(
         bases = [beside, Path(os.path.realpath(holder)).parent, *allow]
         below = any(Path(found).is_relative_to(os.path.realpath(base)) for base in bases)
     except (OSError, ValueError) as reason:
-        raise error(f"cannot be the name of a file: {_reason(reason)}", value=name) from None
+        raise error(f"cannot be the name of a file: {reason_of(reason)}", value=name) from None
     if not below:
-        message = (
-            "lies outside the folder of the file that names it; put it there, or allow its folder with --allow DIR (in "
-            "Python allow=[DIR])"
-        )
-        raise error(message, value=name)
+        advice = "put it there, or allow its folder with --allow DIR (in Python allow=[DIR])"
+        raise error(f"lies outside the folder of the file that names it; {advice}", value=name)
     return found
 
 

@@ -1,18 +1,22 @@
-"""Motion laws from samples in a CSV file."""
+"""Samples in CSV files: a table of numbers below a row with the names of its columns."""
 
 from __future__ import annotations
 
 import math
 from pathlib import Path
 
-from jounce.errors import MechanismFileError, check_name, did_you_mean
-from jounce.io.files.reading import fault_of_number, read_rows
+import numpy as np
+from jaxtyping import Float
 
-__all__ = ["read_columns", "read_samples"]
+from jounce.errors import JounceError, MechanismFileError, did_you_mean, no_such
+from jounce.io.files.reading import fault_of_number, known_name, read_rows
 
 
 def read_samples(
-    path: str | Path, time: str | None = None, value: str | None = None
+    path: str | Path,
+    time: str | None = None,
+    value: str | None = None,
+    error_type: type[JounceError] = MechanismFileError,
 ) -> tuple[list[float], list[float]]:
     """Read the columns of time and value from a CSV file.
 
@@ -25,6 +29,8 @@ def read_samples(
         Name of the column of time, s; when not given, ``time``, or else the first column.
     value : str, optional
         Name of the column of the driven quantity, m or rad; the only other column when not given.
+    error_type : type
+        Of the exceptions.
 
     Returns
     -------
@@ -33,81 +39,95 @@ def read_samples(
 
     Raises
     ------
-    MechanismFileError
-        The file cannot be read, a column does not exist, or an entry is not a finite number.
+    JounceError
+        Of the type given: the file cannot be read, a column does not exist, or an entry is not a finite number.
     """
-    name = str(path)
-    header, rows = _table(name)
-    columns = _columns(name, header, time, value)
-    samples = [[_number(name, line, header, row, column) for line, row in rows] for column in columns]
-    return samples[0], samples[1]
+    table = _Table(str(path), error_type)
+    if len(table.header) < 2:
+        raise table.error("samples need a column of times and one of values", line=1)
+    first = table.find(time) if time is not None else table.header.index("time") if "time" in table.header else 0
+    if value is None and len(table.header) != 2:
+        others = [column for k, column in enumerate(table.header) if k != first]
+        message = f"has several columns besides the time, name that of the value; {did_you_mean('', others)}"
+        raise table.error(message, line=1)
+    return table.column(first), table.column(1 - first if value is None else table.find(value))
 
 
-def read_columns(path: str | Path) -> tuple[list[float], dict[str, list[float]]]:
-    """Read the column ``time`` and all others from a CSV file, whose first row names them.
+def read_columns(
+    path: str | Path, error_type: type[JounceError] = MechanismFileError
+) -> tuple[Float[np.ndarray, " time"], dict[str, Float[np.ndarray, " time"]]]:
+    """Read the column ``time``, which increases, and all others from a CSV file, whose first row names them.
 
     Raises
     ------
-    MechanismFileError
-        The file cannot be read, names repeat or there is no ``time``, or an entry is not a finite number.
+    JounceError
+        Of the type given: the file cannot be read, names are missing or repeat, there is no ``time`` or it does not
+        increase, or an entry is not a finite number.
     """
-    name = str(path)
-    header, rows = _table(name)
-    for k, column in enumerate(header):
-        if column in header[:k] or not column:
-            raise MechanismFileError("each column needs a name of its own", path=name, line=1, value=column)
-    time = _find(name, header, "time")
-    found = {column: [_number(name, line, header, row, k) for line, row in rows] for k, column in enumerate(header)}
-    if len(found) < 2:
-        raise MechanismFileError("there is no column besides 'time'", path=name, line=1)
-    return found.pop(header[time]), found
-
-
-def _table(path: str) -> tuple[list[str], list[tuple[int, list[str]]]]:
-    """Return the names of the columns, made up where there are none, and the rows with their lines."""
-    rows = [(line, row) for line, row in read_rows(path, MechanismFileError) if row]
-    if not rows:
-        raise MechanismFileError("the file of samples is empty", path=path)
-    header = [f"column {k + 1}" for k in range(len(rows[0][1]))]
-    if not all(map(_is_number, rows[0][1])):
-        header = rows.pop(0)[1]
-    return header, rows
-
-
-def _columns(path: str, header: list[str], time: str | None, value: str | None) -> tuple[int, int]:
-    """Find the columns of time and value."""
+    table = _Table(str(path), error_type)
+    header, line = table.header, table.header_line
+    if line is None:
+        message = "the first row holds the names of the columns: time, then the joints"
+        raise table.error(message, line=table.rows[0][0], value=", ".join(table.rows[0][1]))
+    for k, name in enumerate(header):
+        if not name:
+            raise table.error(f"column {k + 1} has no name", line=line)
+        if name in header[:k]:
+            raise table.error("two columns have this name", line=line, value=name)
+    time = table.find("time")
     if len(header) < 2:
-        raise MechanismFileError("samples need a column of times and one of values", path=path, line=1)
-    if time is None:
-        first = header.index("time") if "time" in header else 0
-    else:
-        first = _find(path, header, time)
-    if value is not None:
-        return first, _find(path, header, value)
-    if len(header) != 2:
-        others = [column for column in header if column != header[first]]
-        message = f"has several columns besides the time, name that of the value; {did_you_mean('', others)}"
-        raise MechanismFileError(message, path=path, line=1)
-    return first, 1 - first
+        raise table.error("there is no column besides 'time'; give one for each joint", line=line)
+    for row_line, row in table.rows:
+        if len(row) != len(header):
+            message = f"each row has one value for each of the {len(header)} columns; this one has another number"
+            raise table.error(message, line=row_line, value=len(row))
+    found = {name: np.array(table.column(k)) for k, name in enumerate(header)}
+    times = found.pop(header[time])
+    for k in np.flatnonzero(np.diff(times) <= 0)[:1]:
+        what = "repeats" if times[k + 1] == times[k] else "comes before"
+        message = f"times must increase; this one {what} that of line {table.rows[k][0]}"
+        raise table.error(message, line=table.rows[k + 1][0], name="time", value=float(times[k + 1]))
+    return times, found
 
 
-def _find(path: str, header: list[str], column: str) -> int:
-    check_name("column", column, header, MechanismFileError, path=path, line=1)
-    return header.index(column)
+class _Table:
+    """Rows of a CSV file with their lines, and the names of its columns, made up where it has none."""
+
+    def __init__(self, path: str, error_type: type[JounceError]):
+        self.path, self.error_type = path, error_type
+        self.rows = [(line, row) for line, row in read_rows(path, error_type) if any(row)]
+        if not self.rows:
+            raise self.error("the file of samples is empty")
+        self.header_line: int | None = None
+        self.header = [f"column {k + 1}" for k in range(len(self.rows[0][1]))]
+        if any(_number(entry) is None for entry in self.rows[0][1]):
+            self.header_line, names = self.rows.pop(0)
+            self.header = [known_name(name) for name in names]
+
+    def error(self, message: str, **place: object) -> JounceError:
+        return self.error_type(message, path=self.path, **place)  # type: ignore[arg-type]
+
+    def find(self, column: str) -> int:
+        """Return the number of a column by its name."""
+        if column not in self.header:
+            raise self.error(no_such("column", column, self.header), line=self.header_line or 1, value=column)
+        return self.header.index(column)
+
+    def column(self, number: int) -> list[float]:
+        """Return the numbers of a column."""
+        found = []
+        for line, row in self.rows:
+            text = row[number] if number < len(row) else ""
+            entry = _number(text)
+            if fault := fault_of_number(math.nan if entry is None else entry):
+                raise self.error(fault, line=line, name=self.header[number], value=text)
+            found.append(entry)
+        return found
 
 
-def _is_number(text: str) -> bool:
+def _number(text: str) -> float | None:
+    """Return the number that a text is."""
     try:
-        float(text)
+        return float(text)
     except ValueError:
-        return False
-    return True
-
-
-def _number(path: str, line: int, header: list[str], row: list[str], column: int) -> float:
-    text = row[column] if column < len(row) else ""
-    number = float(text) if _is_number(text) else math.nan
-    fault = fault_of_number(number)
-    if fault:
-        raise MechanismFileError(fault, path=path, line=line, name=header[column], value=text)
-    return number
+        return None

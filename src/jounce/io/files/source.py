@@ -6,16 +6,13 @@ from collections.abc import Iterable
 from os import PathLike, fspath
 from pathlib import Path
 
-from jounce.errors import MechanismFileError
-from jounce.io.files import parsers
-from jounce.io.files.entries import Source
+from jounce.errors import JounceError, MechanismFileError
+from jounce.io.files import DATA_FILES, parsers
+from jounce.io.files.located_data import Source
 from jounce.io.files.reading import check_allowed, read_file
-
-__all__ = ["SUFFIXES", "read_source"]
 
 MAX_LINES = 200_000
 MAX_LINE_LENGTH = 100_000
-SUFFIXES = (".yaml", ".yml", ".toml", ".json")
 
 
 def _decode(path: str, content: bytes) -> str:
@@ -38,7 +35,13 @@ def _decode(path: str, content: bytes) -> str:
     return text
 
 
-def read_source(path: str | PathLike[str], allow: Iterable[str | PathLike[str]] = ()) -> Source:
+def read_source(
+    path: str | PathLike[str],
+    allow: Iterable[str | PathLike[str]] = (),
+    *,
+    kind: str = "mechanism",
+    error_type: type[JounceError] = MechanismFileError,
+) -> Source:
     """Read a YAML, TOML or JSON file, chosen by its suffix, into plain data with line numbers.
 
     Parameters
@@ -47,6 +50,10 @@ def read_source(path: str | PathLike[str], allow: Iterable[str | PathLike[str]] 
         A file ending in .yaml, .yml, .toml or .json.
     allow
         Folders besides its own that files named in it may be below.
+    kind : str
+        What the file holds, for messages.
+    error_type : type
+        Of the exceptions, also of those that the source makes.
 
     Returns
     -------
@@ -55,21 +62,22 @@ def read_source(path: str | PathLike[str], allow: Iterable[str | PathLike[str]] 
 
     Raises
     ------
-    MechanismFileError
-        The file cannot be read, breaks the syntax, has a duplicate name, or exceeds a limit on size or nesting.
+    JounceError
+        Of the type given: the file cannot be read, breaks the syntax, has a duplicate name, or exceeds a limit on size
+        or nesting.
     """
-    name = fspath(path)
-    name = name if isinstance(name, str) else str(name)
+    name = str(fspath(path))
     if not name:
-        raise MechanismFileError("the name of a file is needed", value=name)
+        raise error_type("the name of a file is needed", value=name)
     suffix = Path(name).suffix.lower()
+    if suffix not in DATA_FILES and not Path(name).is_dir():
+        raise error_type(f"the kind of a {kind} file is told by its ending; valid: {', '.join(DATA_FILES)}", path=name)
     reader = {".toml": parsers.read_toml, ".json": parsers.read_json}.get(suffix, parsers.read_yaml)
-    if suffix not in SUFFIXES and not Path(name).is_dir():
-        raise MechanismFileError(
-            f"the kind of a mechanism file is told by its ending; valid: {', '.join(SUFFIXES)}", path=name
-        )
-    source = reader(name, _decode(name, read_file(name)))
+    try:
+        source = reader(name, _decode(name, read_file(name)))
+        source.allow, source.error_type = check_allowed(allow), error_type
+    except MechanismFileError as error:
+        raise error_type(error.message, path=error.path, line=error.line, name=error.name, value=error.value) from None
     if source.data is None and not source.lines:  # only comments
-        raise MechanismFileError("the file is empty", path=name)
-    source.allow = check_allowed(allow)
+        raise error_type("the file is empty", path=name)
     return source

@@ -7,22 +7,8 @@ from functools import lru_cache
 from typing import Any
 
 from jounce.errors import UnitError
-from jounce.trajectory.dimensions import (
-    KINDS as KINDS,
-    NUMBER,
-    Dimension as Dimension,
-    check_dimension as check_dimension,
-    describe_dimension as describe_dimension,
-    dimension_of,
-)
-from jounce.trajectory.units import (
-    Value as Value,
-    nearest_unit,
-    parse_unit as parse_unit,
-    parse_value as parse_value,
-)
-
-__all__ = ["ask_pint"]
+from jounce.trajectory.dimensions import NUMBER, Dimension, dimension_of
+from jounce.trajectory.units import nearest_unit
 
 _BASES = {"meter": "length", "radian": "angle", "second": "time", "kilogram": "mass"}
 

@@ -17,9 +17,7 @@ from typing import Any
 
 from jounce.errors import OutputError
 from jounce.interrupts import undoing
-from jounce.io.files.reading import is_input, note_result
-
-__all__ = ["check_target", "reason_of", "replacing"]
+from jounce.io.files.reading import is_input, note_result, reason_of
 
 _scratches: set[Path] = set()
 """Files that are not yet in their places."""
@@ -171,8 +169,3 @@ def _removed(scratch: Path) -> Iterator[None]:
         _scratches.discard(scratch)
         for number in watched:
             signal.signal(number, signal.SIG_DFL)
-
-
-def reason_of(error: Exception) -> str:
-    """Word the reason of a failure by the operating system."""
-    return getattr(error, "strerror", None) or str(error)

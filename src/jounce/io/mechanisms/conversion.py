@@ -13,15 +13,14 @@ from typing import Any
 
 from jounce.dynamics import DriverForceOutput, DriverTorqueOutput
 from jounce.errors import JounceError, RobotError, check_name
+from jounce.io.files.assignments import assignments
 from jounce.io.files.reading import named_file
 from jounce.io.files.source import read_source
-from jounce.io.files.units import parse_value
 from jounce.mechanism import Mechanism, TimeGrid
 from jounce.mechanism.mechanism import GROUND, names_column
 from jounce.robot import Robot
 from jounce.robot.closed_loop import DRIVE
-
-__all__ = ["assigned", "converted", "robot_mechanism", "with_file_names"]
+from jounce.trajectory.units import parse_value
 
 
 def converted(
@@ -85,14 +84,14 @@ def _move_samples(
         _move_samples(entry, path, there, allow, copies)
 
 
-def assigned(robot: Robot, assignments: Iterable[str], option: str, *, law: bool) -> dict[str, Any]:
+def assigned(robot: Robot, texts: Iterable[str], option: str, *, law: bool) -> dict[str, Any]:
     """Return values or laws of joints from ``JOINT=VALUE``, with units.
 
     Parameters
     ----------
     robot : Robot
         Says which joints slide.
-    assignments : iterable of str
+    texts : iterable of str
         A number in SI units, a number with a unit, or, for a law, an expression of t.
     option : str
         Their name, for messages.
@@ -112,12 +111,8 @@ def assigned(robot: Robot, assignments: Iterable[str], option: str, *, law: bool
     {'quill': 0.05}
     """
     found: dict[str, Any] = {}
-    for text in assignments:
-        name, equals, value = (part.strip() for part in text.partition("="))
-        if not equals or not name or not value:
-            raise JounceError(
-                "a joint is given a value by JOINT=VALUE, such as 'elbow=30 deg'", name=option, value=text
-            )
+    form = "a joint is given a value by JOINT=VALUE, such as 'elbow=30 deg'"
+    for name, value in assignments(texts, option, form).items():
         check_name("moving joint", name, robot.joint_names, JounceError, name=option)
         kind = "angle" if robot.joints[name].turning else "length"
         try:

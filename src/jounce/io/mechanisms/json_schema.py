@@ -6,8 +6,6 @@ import json
 from os import PathLike
 from typing import Any
 
-__all__ = ["json_schema", "write_json_schema"]
-
 
 def json_schema(*, own_types: bool = True) -> dict[str, Any]:
     """Return the JSON Schema (2020-12) of mechanism files.

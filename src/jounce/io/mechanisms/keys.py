@@ -11,43 +11,15 @@ from collections.abc import Iterable
 from dataclasses import MISSING, dataclass
 from typing import Any
 
+from jounce import dynamics, mechanism
 from jounce.constraints.base import field_kind, value_fields
-from jounce.dynamics import (
-    AppliedForceOutput,
-    AppliedTorqueOutput,
-    DriverForceOutput,
-    DriverTorqueOutput,
-    JointForceOutput,
-    JointTorqueOutput,
-)
 from jounce.dynamics.energy_outputs import ENERGY_OUTPUTS
-from jounce.mechanism import (
-    AbstractQuantity,
-    AngleOutput,
-    AngularVelocityOutput,
-    DistanceOutput,
-    EulerAnglesOutput,
-    EulerParametersOutput,
-    PlanarRelativeAngleOutput,
-    PointOutput,
-    RelativeAngleOutput,
-    RelativeEulerAnglesOutput,
-    RelativeEulerParametersOutput,
-    RelativeRotationMatrixOutput,
-    RotationMatrixOutput,
-)
+from jounce.io.files.located_data import Location
+from jounce.mechanism import AbstractQuantity
 from jounce.robot.coupling import SlideOutput
 
-__all__ = [
-    "HOLDERS",
-    "OUTPUTS",
-    "FileKey",
-    "file_keys",
-    "location_of",
-    "output_holder",
-    "output_tag",
-    "output_types",
-]
+ROLES = {"joints": "joint", "drivers": "driver", "forces": "force", "initial": "driver"}
+"""The sections of a file that hold what is told apart by ``type``, and the role of each."""
 
 _PLURALS = {"point": "points", "vector": "vectors", "axis": "axes", "normal": "normals"}
 
@@ -123,26 +95,26 @@ def _quantity(kind: type[Any], stem: str, fields: set[str]) -> str:
 
 
 OUTPUTS: tuple[tuple[str | None, type[AbstractQuantity]], ...] = (
-    (None, PointOutput),
-    ("angle", AngleOutput),
-    ("angle", PlanarRelativeAngleOutput),
-    ("angle", RelativeAngleOutput),
-    ("angular_velocity", AngularVelocityOutput),
-    ("distance", DistanceOutput),
-    ("euler_parameters", EulerParametersOutput),
-    ("euler_parameters", RelativeEulerParametersOutput),
-    ("rotation_matrix", RotationMatrixOutput),
-    ("rotation_matrix", RelativeRotationMatrixOutput),
-    ("euler_angles", EulerAnglesOutput),
-    ("euler_angles", RelativeEulerAnglesOutput),
+    (None, mechanism.PointOutput),
+    ("angle", mechanism.AngleOutput),
+    ("angle", mechanism.PlanarRelativeAngleOutput),
+    ("angle", mechanism.RelativeAngleOutput),
+    ("angular_velocity", mechanism.AngularVelocityOutput),
+    ("distance", mechanism.DistanceOutput),
+    ("euler_parameters", mechanism.EulerParametersOutput),
+    ("euler_parameters", mechanism.RelativeEulerParametersOutput),
+    ("rotation_matrix", mechanism.RotationMatrixOutput),
+    ("rotation_matrix", mechanism.RelativeRotationMatrixOutput),
+    ("euler_angles", mechanism.EulerAnglesOutput),
+    ("euler_angles", mechanism.RelativeEulerAnglesOutput),
     ("slide", SlideOutput),
-    ("force", DriverForceOutput),
-    ("torque", DriverTorqueOutput),
-    ("force", JointForceOutput),
-    ("reaction", JointForceOutput),
-    ("torque", JointTorqueOutput),
-    ("force", AppliedForceOutput),
-    ("torque", AppliedTorqueOutput),
+    ("force", dynamics.DriverForceOutput),
+    ("torque", dynamics.DriverTorqueOutput),
+    ("force", dynamics.JointForceOutput),
+    ("reaction", dynamics.JointForceOutput),
+    ("torque", dynamics.JointTorqueOutput),
+    ("force", dynamics.AppliedForceOutput),
+    ("torque", dynamics.AppliedTorqueOutput),
     *ENERGY_OUTPUTS,
 )
 """The word for ``quantity`` in a file (None when there is none) and the class of each output."""
@@ -177,7 +149,7 @@ def output_types(space: str) -> dict[str, tuple[str | None, type[AbstractQuantit
     }
 
 
-def location_of(keys: Iterable[FileKey], field: str) -> tuple[str | int, ...]:
+def location_of(keys: Iterable[FileKey], field: str) -> Location:
     """Return where in a file the value of a field stands, below its joint, driver or output."""
     for key in keys:
         if field in key.fields:

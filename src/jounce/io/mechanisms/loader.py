@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from os import PathLike
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,21 +11,21 @@ import numpy as np
 from jounce.constraints import catalogue
 from jounce.dynamics import AppliedForceOutput, AppliedTorqueOutput, JointForceOutput, JointTorqueOutput
 from jounce.errors import JounceError, MechanismFileError, did_you_mean
-from jounce.io.files.entries import Location, Source
+from jounce.io.files.located_data import Location, Source
 from jounce.io.files.source import read_source
-from jounce.io.mechanisms.keys import FileKey, file_keys, location_of, output_types
+from jounce.io.mechanisms.keys import ROLES, FileKey, file_keys, location_of, output_types
 from jounce.io.mechanisms.unit_hints import warn_of_units
 from jounce.mechanism import AngularVelocityOutput, Body, Mechanism, PointOutput, TimeGrid, time_grid
 from jounce.mechanism.builder import starting_guess
 from jounce.mechanism.masses import body_mass
 from jounce.mechanism.resolve import resolve, resolve_element
+from jounce.mechanism.system import POSITION_COMPONENTS
 from jounce.rigid.euler_parameters import euler_parameters
 from jounce.trajectory import Expression, MeasuredMotion, SplineMotion
+from jounce.trajectory.units import parse_value
 
-__all__ = ["load"]
-
-SPACES = {"planar": 2, "spatial": 3}
-ROLES = {"joints": "joint", "drivers": "driver", "forces": "force", "initial": "driver"}
+_Places = dict[str, tuple[Location, tuple[FileKey, ...]]]
+"""Where in the file the elements of a mechanism stand, by dotted name, and the keys of each."""
 
 
 def load(path: str | PathLike[str], *, allow: Iterable[str | PathLike[str]] = ()) -> Mechanism:
@@ -65,7 +64,7 @@ def load(path: str | PathLike[str], *, allow: Iterable[str | PathLike[str]] = ()
     source = read_source(path, allow)
     space = _space(source)
     model = _validate(source, space)
-    places: dict[str, tuple[Location, tuple[FileKey, ...]]] = {}
+    places: _Places = {}
     try:
         mechanism = _build(source, space, model, places)
         _check_values(mechanism)
@@ -87,8 +86,8 @@ def _space(source: Source) -> str:
     if "space" not in source.data:
         raise source.error("is missing; valid: planar, spatial", ("space",))
     space = source.data["space"]
-    if not isinstance(space, str) or space not in SPACES:
-        raise source.error(f"unknown space; {did_you_mean(space, SPACES)}", ("space",), value=space)
+    if not isinstance(space, str) or space not in POSITION_COMPONENTS:
+        raise source.error(f"unknown space; {did_you_mean(space, POSITION_COMPONENTS)}", ("space",), value=space)
     return space
 
 
@@ -121,8 +120,6 @@ def _validate(source: Source, space: str) -> dict[str, Any]:
 
 def _dimensions(parameters: dict[str, Any]) -> dict[str, Any]:
     """Return the dimensions of those parameters that have a unit, or follow from others that have one."""
-    from jounce.io.files.units import parse_value
-
     found: dict[str, Any] = {}
     waiting, count = dict(parameters), -1
     while len(found) > count:
@@ -143,9 +140,11 @@ def _plain(model: Any) -> dict[str, Any]:
     return {field.alias: getattr(model, name) for name, field in type(model).model_fields.items()}
 
 
-def _build(source: Source, space: str, model: dict[str, Any], places: dict[str, Any]) -> Mechanism:
+def _build(source: Source, space: str, model: dict[str, Any], places: _Places) -> Mechanism:
     parameters = model["parameters"]
-    bare = Mechanism(space=space, bodies={"any": Body([0.0] * SPACES[space])}, joints={}, parameters=parameters)
+    bare = Mechanism(
+        space=space, bodies={"any": Body([0.0] * POSITION_COMPONENTS[space])}, joints={}, parameters=parameters
+    )
     try:
         values = bare.parameter_values
     except JounceError as error:
@@ -153,11 +152,7 @@ def _build(source: Source, space: str, model: dict[str, Any], places: dict[str, 
     mechanism = Mechanism(
         space=space,
         bodies={name: _body(source, space, name, _plain(body), values) for name, body in model["bodies"].items()},
-        joints=_constraints(source, space, "joints", model["joints"], places),
-        drivers=_constraints(source, space, "drivers", model["drivers"], places),
-        forces=_constraints(source, space, "forces", model["forces"], places),
-        initial=_constraints(source, space, "initial", model["initial"], places),
-        outputs=_outputs(space, model["outputs"], places),
+        **{kind: _elements(source, space, kind, model[kind], places) for kind in (*ROLES, "outputs")},
         parameters=parameters,
         gravity=model["gravity"],
         time=TimeGrid(**_plain(model["time"])) if model["time"] is not None else None,
@@ -171,7 +166,7 @@ def _build(source: Source, space: str, model: dict[str, Any], places: dict[str, 
 def _body(source: Source, space: str, name: str, given: dict[str, Any], parameters: dict[str, Any]) -> Body:
     """Build a body; values that depend on parameters stay expressions of them."""
     if isinstance(given["inertia"], dict):
-        from jounce.io.mechanisms.masses import expanded
+        from jounce.io.mechanisms.inertia_forms import expanded
 
         try:
             given |= expanded(given, parameters, planar=space == "planar")
@@ -197,72 +192,47 @@ def _arguments(keys: tuple[FileKey, ...], given: dict[str, Any]) -> dict[str, An
     return found
 
 
-def _constraints(
-    source: Source, space: str, section: str, models: dict[str, Any], places: dict[str, Any]
-) -> dict[str, Any]:
-    """Build the joints, drivers or forces, and note where their fields stand in the file."""
+def _elements(source: Source, space: str, section: str, models: dict[str, Any], places: _Places) -> dict[str, Any]:
+    """Build joints, drivers, forces or outputs, and note where their fields stand in the file."""
+    outputs = {f"{space}_{tag.replace(' ', '_')}": kind for tag, (_, kind) in output_types(space).items()}
     found = {}
     for name, model in models.items():
-        given = _plain(model)
-        kind = catalogue(space, ROLES[section])[given["type"]]
-        keys = file_keys(kind)
-        place = f"{section}.{name}"
-        places[place] = ((section, name), keys)
-        arguments = _arguments(keys, given)
-        for field, value in arguments.items():
-            arguments[field] = _splines(source, (section, name, field), value)
+        given, place = _plain(model), f"{section}.{name}"
+        if section == "outputs":
+            kind: Any = outputs[type(model).__name__]
+        else:
+            kind = catalogue(space, ROLES[section])[given["type"]]
+        places[place] = ((section, name), file_keys(kind))
+        arguments = _arguments(places[place][1], given)
+        arguments = {field: _with_splines(source, (section, name, field), x) for field, x in arguments.items()}
+        if kind.body_count:
+            arguments["bodies"] = given["bodies"] if kind.body_count > 1 else (given["body"],)
         try:
-            found[name] = kind(bodies=given["bodies"] if "bodies" in given else given["body"], **arguments)
-        except JounceError as error:
-            raise error if isinstance(error, MechanismFileError) else _placed(error, place) from None
+            found[name] = kind(**arguments)
+        except JounceError as error:  # of a constructor, which knows its fields only
+            error.name = f"{place}.{error.name}" if error.name else place
+            raise
     return found
 
 
-def _placed(error: JounceError, place: str) -> JounceError:
-    """Return an error of a constructor, which knows its fields only, with its full dotted name."""
-    error.name = f"{place}.{error.name}" if error.name else place
-    return error
-
-
-def _splines(source: Source, location: Location, value: Any) -> Any:
+def _with_splines(source: Source, location: Location, value: Any) -> Any:
     """Return a value with samples turned into motion laws, also where it is a list of laws."""
-    if isinstance(value, tuple) and any(hasattr(entry, "samples") for entry in value):
-        return tuple(_splines(source, (*location, index), entry) for index, entry in enumerate(value))
+    if isinstance(value, tuple):
+        return tuple(_with_splines(source, (*location, index), entry) for index, entry in enumerate(value))
     return _spline(source, location, value) if hasattr(value, "samples") else value
 
 
 def _spline(source: Source, location: Location, samples: Any) -> SplineMotion:
     from jounce.io.files.samples import read_samples
 
-    path = source.named_file(samples.samples, location)
-    try:
+    def law(path: str) -> SplineMotion:
         table = read_samples(path, samples.time, samples.value)
         given = {"degree": samples.degree, "beyond": samples.beyond}
         if samples.derivative:
             return MeasuredMotion(*table, samples.derivative, samples.initial, **given)
         return SplineMotion(*table, **given)
-    except JounceError as error:
-        if error.path == path:  # as the user knows it
-            error.path = Path(source.path).parent / samples.samples
-        raise source.error(str(error), location) from None
 
-
-def _outputs(space: str, models: dict[str, Any], places: dict[str, Any]) -> dict[str, Any]:
-    """Build the outputs, and note where their fields stand in the file."""
-    tags = {f"{space}_{tag.replace(' ', '_')}": kind for tag, (_, kind) in output_types(space).items()}
-    found = {}
-    for name, model in models.items():
-        kind = tags[type(model).__name__]
-        keys, given = file_keys(kind), _plain(model)
-        places[f"outputs.{name}"] = (("outputs", name), keys)
-        arguments = _arguments(keys, given)
-        if kind.body_count:
-            arguments["bodies"] = given["bodies"] if kind.body_count > 1 else (given["body"],)
-        try:
-            found[name] = kind(**arguments)
-        except JounceError as error:
-            raise _placed(error, f"outputs.{name}") from None
-    return found
+    return source.read_named(samples.samples, location, law)
 
 
 def _check_columns(source: Source, mechanism: Mechanism) -> None:
@@ -284,26 +254,22 @@ def _has_components(mechanism: Mechanism, output: Any) -> bool:
 
 def _check_values(mechanism: Mechanism) -> None:
     """Check what depends on the values of parameters: finite numbers, lengths above zero, axes that are not zero."""
-    parameters, components = mechanism.parameter_values, SPACES[mechanism.space]
+    parameters, components = mechanism.parameter_values, POSITION_COMPONENTS[mechanism.space]
     for kind, elements in mechanism.elements.items():
         for name, element in elements.items():
             resolve_element(element, parameters, components, f"{kind}.{name}")
     starting_guess(mechanism, parameters, components)
     for name, body in mechanism.bodies.items():
         body_mass(name, body, parameters, components)
-    _check_expressions("gravity", mechanism.gravity, parameters)
+    try:
+        resolve(mechanism.gravity, parameters)
+    except JounceError as error:
+        raise error.located(name="gravity") from None
     if mechanism.time is not None:
         time_grid(mechanism.time, parameters)
 
 
-def _check_expressions(name: str, value: Any, parameters: dict[str, Any]) -> None:
-    try:
-        resolve(value, parameters)
-    except JounceError as error:
-        raise error.located(name=name) from None
-
-
-def _find(name: str | None, places: dict[str, tuple[Location, tuple[FileKey, ...]]]) -> Location:
+def _find(name: str | None, places: _Places) -> Location:
     """Return the location in the file of a dotted name of the mechanism."""
     if not name:
         return ()

@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any
 
 from jounce.errors import JounceError, MechanismError, check_name
+from jounce.io.files.assignments import assignments
 from jounce.mechanism import Mechanism
 
-__all__ = ["override"]
 
-
-def override(mechanism: Mechanism, assignments: Iterable[str]) -> Mechanism:
+def override(mechanism: Mechanism, texts: Iterable[str]) -> Mechanism:
     """Return a mechanism with other values of some parameters.
 
     Parameters
     ----------
     mechanism : Mechanism
         As `load` read it, which knows what dimensions the parameters have.
-    assignments : iterable of str
+    texts : iterable of str
         ``NAME=VALUE``, the value as a file would have it: a number in SI units, a number with a unit, or an expression
         of the other parameters.
 
@@ -33,13 +31,9 @@ def override(mechanism: Mechanism, assignments: Iterable[str]) -> Mechanism:
     >>> override(jn.load("examples/four_bar.yaml"), ["BC=15 cm"]).parameters["BC"]
     0.15
     """
-    values: dict[str, Any] = {}
-    for text in assignments:
-        name, equals, value = (part.strip() for part in text.partition("="))
-        if not equals or not name or not value:
-            raise MechanismError("a parameter is set by NAME=VALUE, such as 'BC=15 cm'", name="--set", value=text)
+    values = assignments(texts, "--set", "a parameter is set by NAME=VALUE, such as 'BC=15 cm'", MechanismError)
+    for name in values:
         check_name("parameter", name, mechanism.parameters, MechanismError, name="--set")
-        values[name] = value
     try:
         changed = mechanism.with_parameters(**values) if values else mechanism
     except JounceError as error:

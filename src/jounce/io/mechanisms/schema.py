@@ -16,37 +16,35 @@ from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, create_mo
 from jounce.constraints import catalogue
 from jounce.constraints.planar import COORDINATES
 from jounce.errors import no_such
+from jounce.io.mechanisms.inertia_forms import inertia
 from jounce.io.mechanisms.keys import HOLDERS, FileKey, file_keys, output_holder, output_tag, output_types
-from jounce.io.mechanisms.masses import inertia
 from jounce.io.mechanisms.values import Checked, laws, motion, orientation, problem, scalar, vector, vectors, wrenches
 from jounce.mechanism.mechanism import names_column
+from jounce.mechanism.system import POSITION_COMPONENTS
 from jounce.rigid.orientation import FRAMES
 from jounce.rigid.rotations import SEQUENCES
 from jounce.trajectory.dimensions import variables_of
 from jounce.trajectory.expression import RESERVED
 
-__all__ = ["file_model", "output_form"]
-
-COMPONENTS = {"planar": 2, "spatial": 3}
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]{0,99}")
 _CHOICES = {"coordinate": COORDINATES, "frame": FRAMES, "sequence": SEQUENCES}
 _Types = tuple[tuple[str, type[Any]], ...]
 _PARAMETER = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,99}")
 
 
-def _text(raw: Any, _info: Any) -> str:
+def _text(raw: object, _info: Any) -> str:
     if not isinstance(raw, str):
         raise problem("must be text")
     return raw
 
 
-def _whole(raw: Any, _info: Any) -> int:
+def _whole(raw: object, _info: Any) -> int:
     if isinstance(raw, bool) or not isinstance(raw, int | float) or raw != raw // 1 or raw < 0:
         raise problem("must be a whole number, 0 or greater")
     return int(raw)
 
 
-def _all(raw: Any, _info: Any) -> bool:
+def _all(raw: object, _info: Any) -> bool:
     if raw not in (None, True, "all"):
         raise problem("an energy of the mechanism is that of all its bodies: write true; for one body, body: NAME")
     return True
@@ -55,7 +53,7 @@ def _all(raw: Any, _info: Any) -> bool:
 def _names(*counts: int) -> Any:
     """Return the annotation of a list of names of bodies, as many as one of the counts."""
 
-    def check(raw: Any, info: Any) -> tuple[str, ...]:
+    def check(raw: object, info: Any) -> tuple[str, ...]:
         if not isinstance(raw, (list, tuple)) or len(raw) not in counts:
             raise problem(f"must be a list of {' or '.join(map(str, counts))} names of bodies")
         for index, name in enumerate(raw):
@@ -78,11 +76,10 @@ def _check_body(name: Any, info: Any, *at: int) -> str:
 def _named(item: Any, pattern: re.Pattern[str], check: Callable[[str], str | None] | None = None) -> Any:
     """Return the annotation of a mapping of names to items."""
 
-    def name_of(raw: Any, _info: Any) -> str:
+    def name_of(raw: object, _info: Any) -> str:
         if not isinstance(raw, str) or not pattern.fullmatch(raw):
-            start = "" if pattern is _NAME else ", not starting with a digit"
-            dash = " and -" if pattern is _NAME else ""
-            raise problem(f"a name is up to 100 letters, digits, _{dash}{start}")
+            allowed = "_ and -" if pattern is _NAME else "_, not starting with a digit"
+            raise problem(f"a name is up to 100 letters, digits, {allowed}")
         if check is not None and (message := check(raw)):
             raise problem(message)
         return raw
@@ -121,19 +118,23 @@ def _model(name: str, doc: str | None, fields: dict[str, tuple[Any, Any]]) -> ty
 
 
 def _annotation(kind: type[Any], key: FileKey, size: int, choices: dict[str, tuple[str, ...]]) -> Any:
-    if key.kind in ("law", "laws"):
-        variables = variables_of(kind)
-        return motion(key.quantity, variables) if key.kind == "law" else laws(size, key.quantity, variables)
-    if key.kind == "motion":
-        return motion(key.quantity)
-    if key.kind == "scalar":
-        return scalar(key.quantity)
-    if key.kind == "vector":
-        return vector(size, key.quantity) if len(key.fields) == 1 else vectors(len(key.fields), size, key.quantity)
-    if key.kind == "wrenches":
-        return wrenches()
-    if key.kind == "whole":
-        return Annotated[Any, Checked(_whole, {"type": "integer", "minimum": 0})]
+    match key.kind:
+        case "law":
+            return motion(key.quantity, variables_of(kind))
+        case "laws":
+            return laws(size, key.quantity, variables_of(kind))
+        case "motion":
+            return motion(key.quantity)
+        case "scalar":
+            return scalar(key.quantity)
+        case "vector" if len(key.fields) == 1:
+            return vector(size, key.quantity)
+        case "vector":
+            return vectors(len(key.fields), size, key.quantity)
+        case "wrenches":
+            return wrenches()
+        case "whole":
+            return Annotated[Any, Checked(_whole, {"type": "integer", "minimum": 0})]
     words = {"enum": list(choices[key.key])} if key.key in choices else {"type": "string"}
     return Annotated[Any, Checked(_text, words)]
 
@@ -158,11 +159,11 @@ def _constraint_union(space: str, role: str, types: _Types) -> Any:
     for name, kind in types:
         fields = {"type": (Literal[name], ...)} | _bodies(kind)
         title = f"{space}_{name}_{role}"
-        models.append(_model(title, kind.__doc__, fields | _values(kind, COMPONENTS[space])))
+        models.append(_model(title, kind.__doc__, fields | _values(kind, POSITION_COMPONENTS[space])))
     return Annotated[Union[tuple(models)], Discriminator("type")]  # noqa: UP007
 
 
-def output_form(raw: Any) -> Any:
+def output_form(raw: object) -> Any:
     """Return the tag of the form that an output of a file has, None when it is not a mapping."""
     if not isinstance(raw, dict):
         return None
@@ -178,20 +179,21 @@ def _output_union(space: str) -> Any:
             fields["mechanism"] = (Annotated[Any, Checked(_all, {"enum": [True, "all", None]})], ...)
         if quantity is not None:
             fields["quantity"] = (Literal[quantity], ...)
-        fields |= _values(kind, COMPONENTS[space])
+        fields |= _values(kind, POSITION_COMPONENTS[space])
         models.append(Annotated[_model(f"{space}_{tag.replace(' ', '_')}", kind.__doc__, fields), Tag(tag)])
     return Annotated[Union[tuple(models)], Discriminator(output_form)]  # noqa: UP007
 
 
 def _body_model(space: str) -> type[BaseModel]:
-    size = COMPONENTS[space]
-    fields: dict[str, tuple[Any, Any]] = {"position": (vector(size, "length"), (0.0,) * size)}
-    if space == "planar":
-        fields |= {"angle": (scalar("angle"), 0.0)}
-    else:
-        fields |= {"orientation": (orientation(), None)}
-    fields |= {"mass": (scalar("mass"), None), "inertia": (inertia(space), None)}
-    fields |= {"center_of_mass": (vector(size, "length"), None)}
+    size = POSITION_COMPONENTS[space]
+    attitude = {"angle": (scalar("angle"), 0.0)} if space == "planar" else {"orientation": (orientation(), None)}
+    fields: dict[str, tuple[Any, Any]] = {
+        "position": (vector(size, "length"), (0.0,) * size),
+        **attitude,
+        "mass": (scalar("mass"), None),
+        "inertia": (inertia(space), None),
+        "center_of_mass": (vector(size, "length"), None),
+    }
     return _model(f"{space}_body", "A moving body; its pose is the starting guess for assembly.", fields)
 
 
@@ -199,9 +201,11 @@ def _body_model(space: str) -> type[BaseModel]:
 def _file_model(space: str, joints: _Types, drivers: _Types, forces: _Types) -> type[BaseModel]:
     time = {"start": (scalar("time"), 0.0), "stop": (scalar("time"), ...)}
     time |= {"step": (scalar("time"), None), "count": (scalar("ratio"), None)}
-    optional = {
+    fields = {
+        "space": (Literal[space], ...),
+        "bodies": (_named(_body_model(space), _NAME, _body_name), ...),
         "title": (Annotated[Any, Checked(_text, {"type": "string"})], ""),
-        "gravity": (vector(COMPONENTS[space], "acceleration"), None),
+        "gravity": (vector(POSITION_COMPONENTS[space], "acceleration"), None),
         "parameters": (_named(scalar("any"), _PARAMETER, _parameter_name), {}),
         "joints": (_named(_constraint_union(space, "joint", joints), _NAME), {}),
         "drivers": (_named(_constraint_union(space, "driver", drivers), _NAME), {}),
@@ -209,11 +213,6 @@ def _file_model(space: str, joints: _Types, drivers: _Types, forces: _Types) -> 
         "initial": (_named(_constraint_union(space, "driver", drivers), _NAME), {}),
         "outputs": (_named(_output_union(space), _NAME, _output_name), {}),
         "time": (_model(f"{space}_time", "Instants from start to stop, by step or by count.", time), None),
-    }
-    fields = {
-        "space": (Literal[space], ...),
-        "bodies": (_named(_body_model(space), _NAME, _body_name), ...),
-        **optional,
     }
     return _model(f"{space}_mechanism", f"A {space} mechanism.", fields)
 

@@ -5,21 +5,18 @@ from __future__ import annotations
 from typing import Any
 
 from jounce.constraints import catalogue
-from jounce.errors import MechanismFileError, did_you_mean, show_value
-from jounce.io.files.entries import Location, Source
-from jounce.io.mechanisms.keys import file_keys, output_holder, output_types
+from jounce.errors import JounceError, did_you_mean, show_value
+from jounce.io.files.located_data import Location, Source
+from jounce.io.mechanisms.keys import ROLES, file_keys, output_holder, output_types
 from jounce.io.mechanisms.schema import file_model, output_form
 
-__all__ = ["first_problem"]
-
-_TAGGED = {"joints": "joint", "drivers": "driver", "forces": "force", "initial": "driver", "outputs": "output"}
 _HINTS = {
     ("planar", "orientation"): "a planar body has an angle",
     ("spatial", "angle"): "a spatial body has an orientation",
 }
 
 
-def first_problem(source: Source, space: str, problems: list[Any]) -> MechanismFileError:
+def first_problem(source: Source, space: str, problems: list[Any]) -> JounceError:
     """Return the error for the first problem in the file; an unknown key goes before the missing one that it misspells.
 
     Parameters
@@ -44,12 +41,12 @@ def _location(problem: Any) -> Location:
     at: Location = problem["loc"]
     if at and at[-1] == "[key]":
         at = at[:-1]
-    if len(at) > 2 and at[0] in _TAGGED:
+    if len(at) > 2 and at[0] in (*ROLES, "outputs"):
         at = (*at[:2], *at[3:])
     return (*at, *problem.get("ctx", {}).get("at", ()))
 
 
-def _word(source: Source, space: str, problem: Any) -> MechanismFileError:
+def _word(source: Source, space: str, problem: Any) -> JounceError:
     at, value, context = _location(problem), problem["input"], problem.get("ctx", {})
     match problem["type"]:
         case "jounce":
@@ -78,33 +75,28 @@ def _unknown_key(source: Source, space: str, at: Location) -> str:
 
 def _valid_keys(source: Source, space: str, parent: Location) -> list[str]:
     """Return the keys that the mapping at a place may have."""
-    model = file_model(space)
     if not parent:
-        return _aliases(model)
+        return [field.alias for field in file_model(space).model_fields.values()]  # type: ignore[misc]
     kind = parent[0]
     if kind == "time":
         return ["start", "stop", "step", "count"]
     if kind == "bodies":
-        mass = ["mass", "inertia", "center_of_mass"]
-        return ["position", "angle" if space == "planar" else "orientation", *mass]
+        attitude = "angle" if space == "planar" else "orientation"
+        return ["position", attitude, "mass", "inertia", "center_of_mass"]
     entry = source.data[parent[0]][parent[1]]
     if kind == "outputs":
         quantity, output = output_types(space)[output_form(entry)]
         keys = dict.fromkeys([output_holder(output), *(["quantity"] if quantity else [])])
         return list(keys | dict.fromkeys(key.key for key in file_keys(output)))
-    constraint = catalogue(space, _TAGGED[str(kind)])[entry["type"]]
+    constraint = catalogue(space, ROLES[str(kind)])[entry["type"]]
     return ["type", "body" if constraint.body_count == 1 else "bodies", *(key.key for key in file_keys(constraint))]
 
 
-def _aliases(model: Any) -> list[str]:
-    return [field.alias for field in model.model_fields.values()]
-
-
-def _unknown_type(source: Source, space: str, at: Location, entry: dict[str, Any]) -> MechanismFileError:
+def _unknown_type(source: Source, space: str, at: Location, entry: dict[str, Any]) -> JounceError:
     """Word a joint, driver, force or output of a kind that does not exist."""
     if at[0] == "outputs":
         return _unknown_output(source, space, at, entry)
-    role = _TAGGED[str(at[0])]
+    role = ROLES[str(at[0])]
     valid = catalogue(space, role)
     if "type" not in entry:
         return source.error(f"is missing; valid: {', '.join(sorted(valid))}", (*at, "type"))
@@ -120,7 +112,7 @@ def _unknown_type(source: Source, space: str, at: Location, entry: dict[str, Any
     return source.error(message, (*at, "type"), value=name)
 
 
-def _unknown_output(source: Source, space: str, at: Location, entry: dict[str, Any]) -> MechanismFileError:
+def _unknown_output(source: Source, space: str, at: Location, entry: dict[str, Any]) -> JounceError:
     quantity, forms = entry.get("quantity"), output_types(space)
     quantities = {word for word, _ in forms.values() if word}
     place = (*at, "quantity")

@@ -9,8 +9,6 @@ from pathlib import Path
 
 from jounce.errors import JounceError, OutputError, check_name
 
-__all__ = ["STARTERS", "Starter", "write_starter"]
-
 
 @dataclass(frozen=True)
 class Starter:
@@ -79,13 +77,14 @@ def write_starter(name: str, path: str | PathLike[str], *, overwrite: bool = Fal
     ...     (pathlib.Path(folder) / "mine.yaml").read_text().splitlines()[3]
     'title: Four-bar linkage'
     """
-    from jounce.io.files.formats import SUFFIXES, dumped
+    from jounce.io.files import DATA_FILES
+    from jounce.io.files.dumping import dumped
     from jounce.io.files.parsers import read_yaml
     from jounce.io.files.writing import check_target, replacing
 
     check_name("starter", name, STARTERS, JounceError)
     starter, suffix = STARTERS[name], Path(path).suffix.lower()
-    check_target(path, SUFFIXES, "mechanism file", overwrite=overwrite)
+    check_target(path, DATA_FILES, "mechanism file", overwrite=overwrite)
     refuse_existing(path, overwrite=overwrite)
     text = starter.text
     if suffix in (".toml", ".json"):

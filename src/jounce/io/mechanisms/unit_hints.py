@@ -10,15 +10,12 @@ from typing import Any
 
 from jounce.constraints import catalogue
 from jounce.errors import JounceError, UnitWarning
-from jounce.io.files.entries import Location, Source, dotted
-from jounce.io.mechanisms.keys import file_keys
+from jounce.io.files.located_data import Location, Source, dotted
+from jounce.io.mechanisms.keys import ROLES, file_keys
 from jounce.mechanism import Mechanism
 from jounce.trajectory import Expression
-from jounce.trajectory.dimensions import ANGLE, LENGTH
+from jounce.trajectory.dimensions import ANGLE, LENGTH, Dimension
 
-__all__ = ["warn_of_units"]
-
-ROLES = {"joints": "joint", "drivers": "driver", "forces": "force", "initial": "driver"}
 MANY_TURNS = 4 * math.pi
 FAR_OFF = 100.0  # times the other lengths
 ALIKE = 30.0  # within which a thousandth of a length must be to them
@@ -81,7 +78,7 @@ def _leaves(location: Location, quantity: str, value: Any) -> Iterator[tuple[Loc
         yield location, quantity, value
 
 
-def _parameters(data: dict[str, Any], mechanism: Mechanism, dimension: Any) -> Iterator[tuple[Location, Any]]:
+def _parameters(data: dict[str, Any], mechanism: Mechanism, dimension: Dimension) -> Iterator[tuple[Location, Any]]:
     for name, raw in (data.get("parameters") or {}).items():
         if dimension in mechanism.dimensions.get(name, ()):
             yield ("parameters", name), raw

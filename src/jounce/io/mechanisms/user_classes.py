@@ -12,8 +12,6 @@ from pathlib import Path
 from jounce.errors import JounceError, MechanismFileError
 from jounce.io.files.reading import read_file
 
-__all__ = ["import_file"]
-
 
 def import_file(path: str | PathLike[str]) -> None:
     """Run a Python file, so that the joints and drivers it defines join the catalogue.

@@ -6,32 +6,20 @@ JSON Schema. Imported only when a file is loaded, since pydantic takes a while.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic_core import PydanticCustomError, core_schema
 
-from jounce.errors import UNSET, ExpressionError, JounceError, MechanismError, did_you_mean, show_value
-from jounce.io.files.units import KINDS, Dimension, Value, parse_value
+from jounce.errors import UNSET, JounceError, MechanismError, did_you_mean, show_value
+from jounce.io.files.located_data import shows_value
 from jounce.rigid.euler_parameters import form_of
-from jounce.trajectory.dimensions import TIME
+from jounce.trajectory.dimensions import KINDS, TIME, Dimension, is_rate, per_seconds
 from jounce.trajectory.expression import Expression
-from jounce.trajectory.measured import MOST
-
-__all__ = [
-    "Checked",
-    "Samples",
-    "below",
-    "laws",
-    "motion",
-    "orientation",
-    "problem",
-    "scalar",
-    "vector",
-    "vectors",
-    "wrenches",
-]
+from jounce.trajectory.measured import HIGHEST as MOST
+from jounce.trajectory.splines import HIGHEST_DEGREE
+from jounce.trajectory.units import Value, parse_value
 
 WAYS = ("refuse", "hold", "repeat")
 
@@ -42,13 +30,6 @@ def problem(message: str, *at: str | int, value: object = ...) -> PydanticCustom
     The value shown is that of the entry unless another is given, and none when it is ``UNSET``.
     """
     return PydanticCustomError("jounce", "{message}", {"message": message, "at": at, "value": value})
-
-
-def below(error: PydanticCustomError, *at: str | int, value: object = ...) -> PydanticCustomError:
-    """Return the same error one or more steps further down, with the value there unless it has one already."""
-    context = error.context or {}
-    shown = value if context["value"] is ... else context["value"]
-    return problem(context["message"], *at, *context["at"], value=shown)
 
 
 class Checked:
@@ -65,7 +46,10 @@ class Checked:
         return self.schema
 
 
-def parse(raw: Any, quantity: str, info: Any, variables: dict[str, Dimension | None] | None = None) -> Value:
+def parse(
+    raw: object, quantity: str, info: Any, *at: str | int, variables: dict[str, Dimension | None] | None = None
+) -> Value:
+    """Read one value of a kind of ``dimensions.KINDS``; ``at`` leads on from the entry being validated."""
     if quantity in ("of coordinate", "per angle"):
         turning = info.data.get("coordinate") == "angle"
         by_coordinate = {"of coordinate": ("length", "angle"), "per angle": ("length per angle", "ratio")}
@@ -73,11 +57,10 @@ def parse(raw: Any, quantity: str, info: Any, variables: dict[str, Dimension | N
     context = info.context or {}
     try:
         value = parse_value(raw, quantity, context.get("names", ()), context.get("dimensions"), variables)
-        _note_use(context.get("uses", {}), value.value, quantity)
-        return value
     except JounceError as error:
-        quoted = isinstance(error, ExpressionError) and error.column is not None  # the text is in the message
-        raise problem(error.message, value=UNSET if quoted else raw) from None
+        raise problem(error.message, *at, value=UNSET if shows_value(error) else raw) from None
+    _note_use(context.get("uses", {}), value.value, quantity)
+    return value
 
 
 def _note_use(uses: dict[str, tuple[Dimension, ...]], value: Any, quantity: str) -> None:
@@ -94,9 +77,25 @@ def _words(quantity: str) -> str:
     return {"of coordinate": "a length or an angle", "per angle": "a pure number or a length"}.get(quantity, "a value")
 
 
+ANY_VALUE = [{"type": "number"}, {"type": "string", "minLength": 1}]
+"""Forms of a value in the JSON Schema."""
+
+
 def scalar_schema(quantity: str, described: str = "") -> dict[str, Any]:
+    """Return the JSON Schema of one value."""
     text = f"{_words(quantity)}: a number (SI), a number with a unit, or an expression of parameters{described}"
-    return {"description": text, "anyOf": [{"type": "number"}, {"type": "string", "minLength": 1}]}
+    return {"description": text, "anyOf": ANY_VALUE}
+
+
+def list_schema(items: dict[str, Any], size: int) -> dict[str, Any]:
+    """Return the JSON Schema of a list of a length."""
+    return {"type": "array", "items": items, "minItems": size, "maxItems": size}
+
+
+def object_schema(properties: dict[str, Any], required: Iterable[str] | None = None) -> dict[str, Any]:
+    """Return the JSON Schema of a mapping without other keys; all are required unless some are named."""
+    needed = list(properties if required is None else required)
+    return {"type": "object", "properties": properties, "required": needed, "additionalProperties": False}
 
 
 def scalar(quantity: str) -> Any:
@@ -104,15 +103,12 @@ def scalar(quantity: str) -> Any:
     return Annotated[Any, Checked(lambda raw, info: parse(raw, quantity, info).value, scalar_schema(quantity))]
 
 
-def vector_value(raw: Any, size: int, quantity: str, info: Any, *at: str | int) -> tuple[Any, ...]:
+def vector_value(raw: object, size: int, quantity: str, info: Any, *at: str | int) -> tuple[float | Expression, ...]:
+    """Read a list of values of one kind."""
     if not isinstance(raw, (list, tuple)) or len(raw) != size:
         raise problem(f"must be a list of {size} values", *at, value=raw)
-    parsed = []
-    for index, item in enumerate(raw):
-        try:
-            parsed.append(parse(item, "any" if quantity == "direction" else quantity, info))
-        except PydanticCustomError as error:
-            raise below(error, *at, index) from None
+    kind = "any" if quantity == "direction" else quantity
+    parsed = [parse(item, kind, info, *at, index) for index, item in enumerate(raw)]
     if quantity == "direction":
         used = {item.dimension for item in parsed if item.value != 0 and isinstance(item.value, float)}
         stated = {item.dimension for item in parsed} - {None}
@@ -122,34 +118,32 @@ def vector_value(raw: Any, size: int, quantity: str, info: Any, *at: str | int) 
 
 
 def vector_schema(size: int, quantity: str) -> dict[str, Any]:
+    """Return the JSON Schema of a list of values of one kind."""
     words = "a direction, of any length but zero" if quantity == "direction" else _words(quantity)
-    items = {"anyOf": [{"type": "number"}, {"type": "string", "minLength": 1}]}
-    return {"type": "array", "description": words, "items": items, "minItems": size, "maxItems": size}
+    return {"description": words} | list_schema({"anyOf": ANY_VALUE}, size)
 
 
 def vector(size: int, quantity: str) -> Any:
     """Return the annotation of a list of values of one kind."""
-    return Annotated[
-        Any, Checked(lambda raw, info: vector_value(raw, size, quantity, info), vector_schema(size, quantity))
-    ]
+    check = Checked(lambda raw, info: vector_value(raw, size, quantity, info), vector_schema(size, quantity))
+    return Annotated[Any, check]
 
 
 def vectors(count: int, size: int, quantity: str) -> Any:
     """Return the annotation of a list of vectors, one on each body."""
 
-    def check(raw: Any, info: Any) -> tuple[Any, ...]:
+    def check(raw: object, info: Any) -> tuple[Any, ...]:
         if not isinstance(raw, (list, tuple)) or len(raw) != count:
             raise problem(f"must be a list of {count} vectors, one on each body")
         return tuple(vector_value(item, size, quantity, info, index) for index, item in enumerate(raw))
 
-    schema = {"type": "array", "items": vector_schema(size, quantity), "minItems": count, "maxItems": count}
-    return Annotated[Any, Checked(check, schema)]
+    return Annotated[Any, Checked(check, list_schema(vector_schema(size, quantity), count))]
 
 
 def wrenches() -> Any:
     """Return the annotation of rows of six values: a force and a moment."""
 
-    def check(raw: Any, info: Any) -> tuple[Any, ...]:
+    def check(raw: object, info: Any) -> tuple[Any, ...]:
         if not isinstance(raw, (list, tuple)) or not raw:
             raise problem("must be rows of six values, a force and a moment")
         return tuple(vector_value(row, 6, "any", info, index) for index, row in enumerate(raw))
@@ -172,84 +166,70 @@ class Samples(BaseModel):
     value: str | None = None
     beyond: Literal["refuse", "hold", "repeat"] = "refuse"
     derivative: int = Field(default=0, ge=0, le=MOST)
-    initial: tuple[float, ...] = ()
+    initial: tuple[Any, ...] = ()
 
 
 def motion(quantity: str, variables: dict[str, Dimension | None] | None = None) -> Any:
     """Return the annotation of a law of time, and of other variables where there are some: of motion, or of a force."""
     variables = {"t": TIME} if variables is None else variables
 
-    def check(raw: Any, info: Any) -> Any:
+    def check(raw: object, info: Any) -> Any:
         if not isinstance(raw, dict):
-            return parse(raw, quantity, info, variables).value
+            return parse(raw, quantity, info, variables=variables).value
         if raw.keys() == {"expression"}:
-            try:
-                return parse(raw["expression"], quantity, info, variables).value
-            except PydanticCustomError as error:
-                raise below(error, "expression") from None
+            return parse(raw["expression"], quantity, info, "expression", variables=variables).value
         valid = ["expression"] if "expression" in raw else list(Samples.model_fields)
         valid += [] if {"expression", "samples"} & raw.keys() else ["expression"]
         for key in raw.keys() - set(valid):
             raise problem(f"unknown key {show_value(key)}; {did_you_mean(key, valid)}", key, value=UNSET)
         if "samples" not in raw:
             raise problem("must be an expression, or samples: the name of a CSV file")
-        for key, kind in (("samples", str), ("degree", int), ("time", str), ("value", str)):
-            if key in raw and (not isinstance(raw[key], kind) or isinstance(raw[key], bool)):
-                raise problem("must be a whole number" if kind is int else "must be a name", key, value=raw[key])
-        if raw.get("beyond", "refuse") not in WAYS:
-            raise problem(f"no such way; {did_you_mean(raw['beyond'], WAYS)}", "beyond", value=raw["beyond"])
-        if not 1 <= raw.get("degree", 5) <= 11:
-            raise problem("the degree of a spline is from 1 to 11", "degree", value=raw["degree"])
-        return Samples(**raw | _measured(raw, quantity, info))
+        return _samples(raw, quantity, info)
 
     others = [name for name in variables if name != "t"]
     named = f", {', '.join(others[:-1])} and {others[-1]}" if len(others) > 1 else ""
-    described = f" and of t, the time in s{named}"
-    law = scalar_schema(quantity, described)
-    formula = {"type": "object", "properties": {"expression": law}, "required": ["expression"]}
+    law = scalar_schema(quantity, f" and of t, the time in s{named}")
     spline = Samples.model_json_schema()
-    values = {"anyOf": [{"type": "number"}, {"type": "string", "minLength": 1}]}
-    spline["properties"]["initial"] = {"type": "array", "items": values, "maxItems": MOST}
-    for entry in (spline["properties"]["time"], spline["properties"]["value"]):
-        entry.pop("anyOf")
-        entry |= {"type": "string", "description": "name of a column; by default time, and the only other one"}
-        entry.pop("default")
-    schema = {
-        "description": law["description"],
-        "anyOf": [*law["anyOf"], formula | {"additionalProperties": False}, spline],
-    }
+    spline["properties"]["initial"] = {"type": "array", "items": {"anyOf": ANY_VALUE}, "maxItems": MOST}
+    words = "name of a column; by default time, and the only other one"
+    for key in ("time", "value"):
+        title = spline["properties"][key]["title"]
+        spline["properties"][key] = {"title": title, "type": "string", "description": words}
+    schema = {"description": law["description"], "anyOf": [*ANY_VALUE, object_schema({"expression": law}), spline]}
     return Annotated[Any, Checked(check, schema)]
 
 
-def _measured(raw: dict[str, Any], quantity: str, info: Any) -> dict[str, Any]:
-    """Return which derivative of a law was measured, and the numbers that it begins with, in SI units."""
-    derivative, initial = raw.get("derivative", 0), raw.get("initial", [])
-    if isinstance(derivative, bool) or not isinstance(derivative, int) or not 0 <= derivative <= MOST:
-        message = f"must be a whole number from 0 to {MOST}: 0 the value itself, 2 the acceleration"
-        raise problem(message, "derivative", value=derivative)
-    if derivative and raw.get("beyond") == "repeat":
-        raise problem("samples of a derivative cannot repeat; valid: refuse, hold", "beyond", value=raw["beyond"])
+def _samples(raw: dict[str, Any], quantity: str, info: Any) -> Samples:
+    """Return what a law through samples is made of; values that it begins with follow parameters, in SI units."""
+    for key in ("samples", "time", "value"):
+        if key in raw and not isinstance(raw[key], str):
+            raise problem("must be a name", key, value=raw[key])
+    whole = {"degree": "the degree of a spline", "derivative": "0 is the value itself, 2 the acceleration"}
+    for (key, words), (least, most) in zip(whole.items(), ((1, HIGHEST_DEGREE), (0, MOST)), strict=True):
+        value = raw.get(key, least)
+        if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
+            raise problem(f"must be a whole number from {least} to {most}; {words}", key, value=value)
+    derivative, initial, beyond = raw.get("derivative", 0), raw.get("initial", []), raw.get("beyond", WAYS[0])
+    if beyond not in WAYS:
+        raise problem(f"no such way; {did_you_mean(beyond, WAYS)}", "beyond", value=beyond)
+    if derivative and beyond == "repeat":
+        raise problem("samples of a derivative cannot repeat; valid: refuse, hold", "beyond", value=beyond)
     if not isinstance(initial, list | tuple) or len(initial) > derivative:
         message = f"must be a list of at most {derivative} values: the law and its derivatives below the measured one"
         raise problem(message, "initial", value=initial)
-    found = [_initial(entry, order, quantity, info) for order, entry in enumerate(initial)]
-    return {"derivative": derivative, "initial": tuple(found)}
+    found = tuple(_initial(entry, order, quantity, info) for order, entry in enumerate(initial))
+    return Samples.model_validate(raw | {"initial": found})
 
 
-def _initial(raw: Any, order: int, quantity: str, info: Any) -> float:
-    """Return a number in SI units: of a driven quantity, per s to the power of an order."""
-    try:
-        value = parse(raw, quantity if order == 0 else "any", info)
-    except PydanticCustomError as error:
-        raise below(error, "initial", order) from None
-    if not isinstance(value.value, float | int):
-        raise problem("must be a number, with or without a unit", "initial", order, value=raw)
+def _initial(raw: object, order: int, quantity: str, info: Any) -> float | Expression:
+    """Return a value of a driven quantity, in SI units per s to the power of an order."""
+    value = parse(raw, quantity if order == 0 else "any", info, "initial", order)
     if order and value.dimension:
         bases = _bases(quantity, info)
-        if value.dimension not in [tuple(sorted(((base, 1), ("time", -order)))) for base in bases]:
-            rate = f" per s{f'^{order}' if order > 1 else ''}"
-            raise problem(f"must be {' or '.join(bases) or 'a number'}{rate}", "initial", order, value=raw)
-    return float(value.value)
+        if not is_rate(value.dimension, bases, order):
+            words = f"must be {' or '.join(bases) or 'a number'}{per_seconds(order)}"
+            raise problem(words, "initial", order, value=raw)
+    return value.value
 
 
 def _bases(quantity: str, info: Any) -> list[str]:
@@ -264,7 +244,7 @@ def laws(size: int, quantity: str, variables: dict[str, Dimension | None]) -> An
     one = motion(quantity, variables)
     single: Checked = one.__metadata__[0]
 
-    def check(raw: Any, info: Any) -> tuple[Any, ...]:
+    def check(raw: object, info: Any) -> tuple[Any, ...]:
         if not isinstance(raw, (list, tuple)) or len(raw) != size:
             raise problem(f"must be a list of {size} laws, one for each component")
         found = []
@@ -272,13 +252,15 @@ def laws(size: int, quantity: str, variables: dict[str, Dimension | None]) -> An
             try:
                 found.append(single.function(entry, info))
             except PydanticCustomError as error:
-                raise below(error, index, value=entry) from None
+                context = error.context or {}
+                value = entry if context["value"] is ... else context["value"]
+                raise problem(context["message"], index, *context["at"], value=value) from None
         return tuple(found)
 
-    return Annotated[Any, Checked(check, {"type": "array", "items": single.schema, "minItems": size, "maxItems": size})]
+    return Annotated[Any, Checked(check, list_schema(single.schema, size))]
 
 
-def _orientation(raw: Any, info: Any) -> dict[str, Any]:
+def _orientation(raw: object, info: Any) -> dict[str, Any]:
     """Read one of the three forms of an orientation; the values stay numbers or expressions."""
     if not isinstance(raw, dict):
         raise problem("must be {quaternion: [e0, e1, e2, e3]}, {axis, angle} or {euler: zxz, angles}")
@@ -292,10 +274,7 @@ def _orientation(raw: Any, info: Any) -> dict[str, Any]:
         if not isinstance(raw["euler"], str):
             raise problem("must be three letters, such as zxz", "euler", value=raw["euler"])
         return {"euler": raw["euler"], "angles": vector_value(raw["angles"], 3, "angle", info, "angles")}
-    try:
-        angle = parse(raw["angle"], "angle", info).value
-    except PydanticCustomError as error:
-        raise below(error, "angle") from None
+    angle = parse(raw["angle"], "angle", info, "angle").value
     return {"axis": vector_value(raw["axis"], 3, "direction", info, "axis"), "angle": angle}
 
 
@@ -304,12 +283,8 @@ def orientation() -> Any:
     forms = [
         {"quaternion": vector_schema(4, "ratio")},
         {"axis": vector_schema(3, "direction"), "angle": scalar_schema("angle")},
-        {
-            "euler": {"type": "string", "pattern": "^([xyz]{3}|[XYZ]{3})$"},
-            "angles": vector_schema(3, "angle"),
-        },
+        {"euler": {"type": "string", "pattern": "^([xyz]{3}|[XYZ]{3})$"}, "angles": vector_schema(3, "angle")},
     ]
-    closed = {"type": "object", "additionalProperties": False}
     text = "lower-case Euler letters turn about fixed axes, upper-case ones about the moving axes of the body"
-    schema = {"description": text, "oneOf": [closed | {"properties": f, "required": list(f)} for f in forms]}
+    schema = {"description": text, "oneOf": [object_schema(form) for form in forms]}
     return Annotated[Any, Checked(_orientation, schema)]

@@ -17,14 +17,11 @@ from jounce.constraints import catalogue
 from jounce.constraints.base import value_fields
 from jounce.errors import JounceError, MechanismError
 from jounce.forces import ExpressionLaw, TimeLaw, VectorLaw
-from jounce.io.mechanisms.keys import OUTPUTS, file_keys, output_holder
+from jounce.io.mechanisms.keys import OUTPUTS, ROLES, file_keys, output_holder
 from jounce.mechanism import Body, Mechanism, TimeGrid
 from jounce.trajectory import Expression, ExpressionMotion, MeasuredMotion, SplineMotion, TrapezoidalMotion
 from jounce.trajectory.expression import CONSTANTS, FUNCTIONS
 
-__all__ = ["mechanism_data", "write_mechanism"]
-
-ROLES = {"joints": "joint", "drivers": "driver", "forces": "force", "initial": "driver"}
 _WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 
@@ -59,10 +56,11 @@ def write_mechanism(mechanism: Mechanism, path: str | PathLike[str], *, overwrit
     ...     jn.load(path) == jn.load("examples/four_bar.yaml")
     True
     """
-    from jounce.io.files.formats import SUFFIXES, dumped
+    from jounce.io.files import DATA_FILES
+    from jounce.io.files.dumping import dumped
     from jounce.io.files.writing import check_target, replacing
 
-    check_target(path, SUFFIXES, "mechanism file", overwrite=overwrite)
+    check_target(path, DATA_FILES, "mechanism file", overwrite=overwrite)
     data, samples = mechanism_data(mechanism, Path(path).stem)
     text = dumped(data, Path(path).suffix.lower(), str(path))
     tables = {Path(path).parent / name: columns for name, columns in samples.items()}
@@ -225,7 +223,7 @@ class _Writer:
         found: dict[str, Any] = {"samples": name, "degree": law.degree}
         if isinstance(law, MeasuredMotion):
             found |= {"degree": law.degree - law.derivative, "derivative": law.derivative}
-            found["initial"] = list(law.initial.value)
+            found["initial"] = _plain(law.initial.value, f"{place}.initial")
         return found if beyond == "refuse" else found | {"beyond": beyond}
 
 

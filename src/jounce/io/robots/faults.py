@@ -5,8 +5,6 @@ from __future__ import annotations
 from jounce.errors import RobotFileError, RobotWarning
 from jounce.rigid.inertia import ADVICE, NEGATIVE, TRIANGLE, WITHOUT_MASS, Inertia
 
-__all__ = ["Faults"]
-
 MASSLESS = "these links move but have no mass"
 IDLE = "these links move and neither have nor carry mass, so that a simulation has no answer unless they are driven"
 FOLLOWS_NONE = "these joints follow one that the file does not have, and are taken as free"

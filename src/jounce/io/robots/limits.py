@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from os import PathLike
 from typing import Any
 
-from jounce.errors import JounceError, MechanismFileError, RobotError, did_you_mean
-from jounce.io.files.entries import Location, Source
+from jounce.errors import RobotError, did_you_mean
+from jounce.io.files.located_data import Location, Source
 from jounce.io.files.source import read_source
-from jounce.io.files.units import Dimension, describe_dimension, parse_value
 from jounce.robot.model import Joint, Limits
 from jounce.robot.robot import Robot
-
-__all__ = ["load_limits"]
+from jounce.trajectory.dimensions import Dimension, describe_dimension
 
 KEYS = tuple(field.name for field in dataclasses.fields(Limits))
 RANGE = ("lower", "upper")
@@ -63,13 +61,7 @@ def load_limits(path: str | PathLike[str], robot: Robot) -> dict[str, Limits]:
     >>> limits["panda_joint2"].jerk
     3750.0
     """
-    try:
-        source = read_source(path)
-    except MechanismFileError as error:
-        message = error.message.replace("a mechanism file needs 6", "a limits file needs 3")
-        message = message.replace("mechanism file", "limits file")
-        raise RobotError(message, path=error.path, line=error.line, name=error.name, value=error.value) from None
-    return _LimitsFile(source, robot).limits()
+    return _LimitsFile(read_source(path, kind="limits", error_type=RobotError), robot).limits()
 
 
 class _LimitsFile:
@@ -80,15 +72,15 @@ class _LimitsFile:
 
     def limits(self) -> dict[str, Limits]:
         """Return the limits of every joint."""
-        data = self._mapping((), ("title", "default", "joints"))
+        data = self.source.mapping((), ("title", "default", "joints"))
         if "default" not in data and "joints" not in data:
-            raise self._error("a limits file has the key 'joints', 'default', or both", value=list(data))
-        default = self._mapping(("default",), KEYS) if "default" in data else {}
-        joints = self._mapping(("joints",)) if "joints" in data else {}
+            raise self.source.error("a limits file has the key 'joints', 'default', or both", value=list(data))
+        default = self.source.mapping(("default",), KEYS) if "default" in data else {}
+        joints = self.source.mapping(("joints",)) if "joints" in data else {}
         for name in joints:
             if name not in self.robot.joint_names:
-                raise self._error(self._why_not(name), ("joints", name))
-            self._mapping(("joints", name), KEYS)
+                raise self.source.error(self._why_not(name), ("joints", name))
+            self.source.mapping(("joints", name), KEYS)
         for key in default:
             self._check_default(key)
         return {name: self._of(name, default, joints.get(name, {})) for name in self.robot.joint_names}
@@ -108,7 +100,7 @@ class _LimitsFile:
         if None not in (lower, upper) and lower > upper:
             at = places.get("lower") or places["upper"]
             message = f"the lower limit of {name}, {lower:g}, must not exceed the upper one, {upper:g}"
-            raise self._error(f"{message}; the one not given in this file is the robot's own", at)
+            raise self.source.error(f"{message}; the one not given in this file is the robot's own", at)
         return Limits(**values)
 
     def _value(self, raw: Any, key: str, at: Location, joint: Joint) -> float | None:
@@ -120,24 +112,20 @@ class _LimitsFile:
             unit = EXAMPLES[joint.turning][KEYS.index(key)]
             kind = "turns" if joint.turning else "slides"
             message = f"{_wrong_unit(dimension)}; a joint that {kind} has {key} in {unit}"
-            raise self._error(message, at, value=raw)
+            raise self.source.error(message, at, value=raw)
         self._check_size(number, raw, key, at)
         return number
 
     def _parsed(self, raw: Any, at: Location) -> tuple[float, Dimension | None]:
-        try:
-            found = parse_value(raw)
-        except JounceError as error:
-            quoted = getattr(error, "column", None) is not None  # the text is in the message
-            raise self._error(error.message, at, **({} if quoted else {"value": raw})) from None
+        found = self.source.value(at, raw)
         assert isinstance(found.value, float)  # no names are allowed, so that expressions are worked out
         return found.value, found.dimension
 
     def _check_size(self, number: float, raw: Any, key: str, at: Location) -> None:
         if not math.isfinite(number):
-            raise self._error("must be a finite number; null is no limit", at, value=raw)
+            raise self.source.error("must be a finite number; null is no limit", at, value=raw)
         if key not in RANGE and number <= 0:
-            raise self._error("must be greater than zero; null is no limit", at, value=raw)
+            raise self.source.error("must be greater than zero; null is no limit", at, value=raw)
 
     def _check_default(self, key: str) -> None:
         """Check an entry of the defaults by itself: it may be one that fits no joint of this robot."""
@@ -149,7 +137,7 @@ class _LimitsFile:
         if dimension and dimension not in (*_dimensions(key, True), *_dimensions(key, False)):
             turning, sliding = (EXAMPLES[kind][KEYS.index(key)] for kind in (True, False))
             message = f"{_wrong_unit(dimension)}; {key} is in {turning} or {sliding}"
-            raise self._error(message, at, value=raw)
+            raise self.source.error(message, at, value=raw)
         self._check_size(number, raw, key, at)
 
     def _fits(self, raw: Any, key: str, joint: Joint) -> bool:
@@ -164,22 +152,6 @@ class _LimitsFile:
         if joint is not None:
             return "this joint is fixed and has no limits; leave it out"
         return f"{self.robot.name} has no moving joint of this name; {did_you_mean(name, self.robot.joint_names)}"
-
-    def _mapping(self, at: Location, keys: Iterable[str] | None = None) -> Mapping[str, Any]:
-        """Return the mapping at a place, which is not empty and has known keys only."""
-        found = self.source.data
-        for step in at:
-            found = found[step]
-        if not isinstance(found, dict) or not found:
-            raise self._error("must be a mapping with at least one entry", at, value=found)
-        for key in found:
-            if keys is not None and key not in keys:
-                raise self._error(f"unknown key; {did_you_mean(key, keys)}", (*at, key))
-        return found
-
-    def _error(self, message: str, at: Location = (), **value: Any) -> RobotError:
-        place = self.source.error(message, at)
-        return RobotError(message, path=place.path, line=place.line, name=place.name, **value)
 
 
 def _wrong_unit(dimension: Dimension) -> str:

@@ -8,6 +8,7 @@ from os import PathLike, fspath
 from pathlib import Path
 
 from jounce.errors import RobotFileError
+from jounce.io.files import ROBOT_FILES
 from jounce.io.files.reading import check_allowed
 from jounce.io.robots.faults import Faults
 from jounce.io.robots.mjcf import read_mjcf
@@ -15,9 +16,6 @@ from jounce.io.robots.urdf import read_urdf
 from jounce.io.robots.xml_elements import Element, read_markup
 from jounce.robot.robot import Robot
 
-__all__ = ["load_robot"]
-
-ENDINGS = (".urdf", ".xml")
 LOOKS = ("visual", "collision")
 XACRO = "is a xacro file, from which a URDF has yet to be made; run: xacro FILE.urdf.xacro > FILE.urdf"
 
@@ -84,8 +82,8 @@ def load_robot(
     suffix = Path(name).suffix.lower()
     if suffix == ".xacro":
         raise RobotFileError(XACRO, path=name)
-    if suffix not in ENDINGS and not Path(name).is_dir():
-        message = f"the kind of a robot file is told by its ending; valid: {', '.join(ENDINGS)}"
+    if suffix not in ROBOT_FILES and not Path(name).is_dir():
+        message = f"the kind of a robot file is told by its ending; valid: {', '.join(ROBOT_FILES)}"
         raise RobotFileError(message, path=name)
     root, faults = read_markup(name), Faults(name, strict)
     if root.tag == "robot":

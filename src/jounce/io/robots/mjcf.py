@@ -10,10 +10,11 @@ from os import PathLike
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from jounce.errors import JounceError, RobotError, RobotFileError
 from jounce.io.robots.faults import Faults
-from jounce.io.robots.mjcf_files import check_assets, included, quiet_mujoco
+from jounce.io.robots.mjcf_files import check_assets, included, line_of, quiet_mujoco
 from jounce.io.robots.xml_elements import Element
 from jounce.rigid.inertia import Inertia
 from jounce.robot.floating_base import floating_joints
@@ -21,8 +22,9 @@ from jounce.robot.model import Closure, Joint, Limits, Link, Mimic, leaders
 from jounce.robot.robot import Robot
 from jounce.robot.tree import quaternion_matrix, turn_about
 
-__all__ = ["names_of_bodies", "read_mjcf"]
-
+_Vector = Float[np.ndarray, "3"]
+_Matrix = Float[np.ndarray, "3 3"]
+DEFORMABLE = "has deformable parts (flex), which no rigid body stands for"
 PLACE = ("pos", "quat", "axisangle", "xyaxes", "zaxis", "euler")
 NUMERIC = {  # attributes whose numbers MuJoCo takes even when they are not finite
     **dict.fromkeys(("body", "site"), PLACE),
@@ -85,7 +87,7 @@ def _check_numbers(root: Element) -> None:
     names = {element.attributes.get(key) for element in root.walk() for key in ("name", "class")}
     for element in root.walk():
         if element.tag in ("flex", "flexcomp"):
-            raise element.error("has deformable parts (flex), which no rigid body stands for")
+            raise element.error(DEFORMABLE)
         numeric = NUMERIC.get(element.tag, ())
         for key, text in element.attributes.items():
             words = text.split()
@@ -95,26 +97,17 @@ def _check_numbers(root: Element) -> None:
 
 def _refused(says: str, root: Element) -> RobotFileError:
     """Return MuJoCo's own message as an error with the place that it names."""
-    line = re.search(r"[Ll]ine (?:number=)?(\d+)", says)
     name = re.search(r"[Ee]lement (?:name )?'([^']+)'", says)
     words = re.sub(r"\s*\n?Element (?:name )?'.*", "", says, flags=re.DOTALL)
-    words = " ".join(
-        ascii(re.sub(r"^(?:XML )?Error: (?:Error: )?", "", words.strip()))[1:-1].replace("\\n", " ").split()
-    )
-    advice = ""
-    if "opening file" in words and (name is None or name.group(1) != "include"):
-        advice = (
-            "; meshes are needed only for bodies without an <inertial>: give those bodies one, or put the file where "
-            "the model looks for it"
-        )
+    words = ascii(re.sub(r"^(?:XML )?Error: (?:Error: )?", "", words.strip()))[1:-1]
+    message = f"MuJoCo cannot use this: {' '.join(words.replace(chr(92) + 'n', ' ').split())}"
+    if "opening file" in words and (name is None or name[1] != "include"):
+        advice = "meshes are needed only for bodies without an <inertial>: give those bodies one, or put the file where"
+        message += f"; {advice} the model looks for it"
     elif "mass and inertia of moving bodies" in words:
-        advice = "; give the body an <inertial> with a mass and an inertia, or a <geom> with a size"
-    return RobotFileError(
-        f"MuJoCo cannot use this: {words}{advice}",
-        path=root.path,
-        line=None if line is None else int(line.group(1)),
-        name=None if name is None else ascii(name.group(1))[1:-1],
-    )
+        message += "; give the body an <inertial> with a mass and an inertia, or a <geom> with a size"
+    named = None if name is None else ascii(name[1])[1:-1]
+    return RobotFileError(message, path=root.path, line=line_of(says), name=named)
 
 
 def _strip(spec: Any, mujoco: Any) -> None:
@@ -157,8 +150,8 @@ class _Reader:
         self.kind = {name: int(getattr(mujoco.mjtJoint, f"mjJNT_{name.upper()}")) for name in kinds}
         self.bodies = names_of_bodies(model)
         self.joint_names = _names([model.joint(k).name for k in range(model.njnt)], "joint")
-        self.lines = {f"joints.{self.joint_names[joint.id]}": _line(joint.info) for joint in spec.joints}
-        self.lines |= {f"links.{self.bodies[body.id]}": _line(body.info) for body in spec.bodies}
+        self.lines = {f"joints.{self.joint_names[joint.id]}": line_of(joint.info) for joint in spec.joints}
+        self.lines |= {f"links.{self.bodies[body.id]}": line_of(body.info) for body in spec.bodies}
         self.links: list[Link] = []
         self.joints: list[Joint] = []
         self.held: dict[str, float] = {}
@@ -177,9 +170,7 @@ class _Reader:
         """Return the robot."""
         model = self.model
         if model.nflex:
-            raise RobotFileError(
-                "has deformable parts (flex), which rigid bodies cannot stand for", path=self.root.path
-            )
+            raise RobotFileError(DEFORMABLE, path=self.root.path)
         self._tie()
         weightless = model.opt.disableflags & int(self.mujoco.mjtDisableBit.mjDSBL_GRAVITY)
         try:
@@ -197,7 +188,7 @@ class _Reader:
     def _tie(self) -> None:
         """Read what joints have to do with one another, and what closes loops."""
         model, kinds = self.model, self.mujoco.mjtEq
-        lines = [_line(equality.info) for equality in self.spec.equalities]
+        lines = [line_of(equality.info) for equality in self.spec.equalities]
         names = _names([model.equality(k).name for k in range(model.neq)], "closure")
         for k in np.flatnonzero(model.eq_active0):
             kind, name = model.eq_type[k], model.equality(int(k)).name
@@ -208,18 +199,13 @@ class _Reader:
                 continue
             if kind != int(kinds.mjEQ_JOINT):
                 word = kinds(int(kind)).name.removeprefix("mjEQ_").lower()
-                message = (
-                    f"an active equality of type {word} ties parts together as no joint or closure can; remove it, or "
-                    "set active='false'"
-                )
-                raise RobotFileError(message, **place)
+                message = f"an active equality of type {word} ties parts together as no joint or closure can"
+                raise RobotFileError(f"{message}; remove it, or set active='false'", **place)
             first, second = int(model.eq_obj1id[k]), int(model.eq_obj2id[k])
             coefficients = model.eq_data[k][:5]
             name = self.joint_names[first]
-            scalar = all(
-                model.jnt_type[j] in (self.kind["hinge"], self.kind["slide"]) for j in (first, second) if j >= 0
-            )
-            if not scalar or name in self.mimics or name in self.held:
+            kinds_tied = {int(model.jnt_type[j]) for j in (first, second) if j >= 0}
+            if kinds_tied - {self.kind["hinge"], self.kind["slide"]} or name in self.mimics or name in self.held:
                 message = "ties a joint of several coordinates, or one that is tied already"
                 raise RobotFileError(message, **place, value=name)
             start = self._reference(first) + coefficients[0]
@@ -240,11 +226,9 @@ class _Reader:
         weld = model.eq_type[k] == int(self.mujoco.mjtEq.mjEQ_WELD)
         numbers = (int(model.eq_obj1id[k]), int(model.eq_obj2id[k]))
         if model.eq_objtype[k] == int(self.mujoco.mjtObj.mjOBJ_SITE):
-            ends = [
-                (int(model.site_bodyid[i]), model.site_pos[i], quaternion_matrix(model.site_quat[i])) for i in numbers
-            ]
-            points, rotation = [position for _, position, _ in ends], ends[0][2] @ ends[1][2].T
-            numbers = tuple(body for body, _, _ in ends)
+            sites, turns = list(numbers), [quaternion_matrix(model.site_quat[i]) for i in numbers]
+            points, rotation = [model.site_pos[i] for i in sites], turns[0] @ turns[1].T
+            numbers = tuple(int(model.site_bodyid[i]) for i in sites)
         elif weld:  # the anchor is kept in the frame of the second body, and where it has to be in that of the first
             points, rotation = [data[3:6], data[0:3]], quaternion_matrix(data[6:10])
         else:
@@ -296,7 +280,7 @@ class _Reader:
             name += "_"
         return name
 
-    def _single(self, j: int, parent: str, child: str, position: np.ndarray, rotation: np.ndarray) -> None:
+    def _single(self, j: int, parent: str, child: str, position: _Vector, rotation: _Matrix) -> None:
         """Add a hinge or a slide; the pose in the file is that at its reference coordinate."""
         model, dof, name = self.model, self.model.jnt_dofadr[j], self.joint_names[j]
         turning, axis, reference = model.jnt_type[j] == self.kind["hinge"], model.jnt_axis[j], self._reference(j)
@@ -310,21 +294,10 @@ class _Reader:
         lower, upper = (float(value) for value in model.jnt_range[j]) if limited else (None, None)
         kind = "prismatic" if not turning else "revolute" if limited else "continuous"
         armature, damping = self._of_drives(j)
+        limits = Limits(lower=lower, upper=upper, effort=self.efforts.get(j))
+        drive = {"armature": armature, "damping": damping, "friction": float(model.dof_frictionloss[dof])}
         self.joints.append(
-            Joint(
-                name,
-                parent,
-                child,
-                kind,
-                position,
-                rotation,
-                axis,
-                limits=Limits(lower=lower, upper=upper, effort=self.efforts.get(j)),
-                mimic=self.mimics.get(name),
-                armature=armature,
-                damping=damping,
-                friction=float(model.dof_frictionloss[dof]),
-            )
+            Joint(name, parent, child, kind, position, rotation, axis, limits, self.mimics.get(name), **drive)
         )
 
     def _of_drives(self, j: int) -> tuple[float, float]:
@@ -339,19 +312,17 @@ class _Reader:
             damping += gear * float(np.ravel(model.actuator_damping[k])[0])
         return armature, damping
 
-    def _expand(self, j: int, parent: str, child: str, position: np.ndarray, rotation: np.ndarray) -> None:
+    def _expand(self, j: int, parent: str, child: str, position: _Vector, rotation: _Matrix) -> None:
         """Add the slides and turns that a free joint or a ball stands for."""
         model, name, dof = self.model, self.joint_names[j], self.model.jnt_dofadr[j]
         links, joints = floating_joints(child, prefix=name)
         if model.jnt_type[j] == self.kind["ball"]:
             links, joints = links[3:], joints[3:]
-        for field, values in (("armature", model.dof_armature), ("damping", model.dof_damping)):
-            if values[dof : dof + len(joints)].any():
+        for field in ("armature", "damping", "frictionloss"):
+            values = getattr(model, f"dof_{field}")[dof : dof + len(joints)]
+            if values.any():
                 message = f"{field} of a ball or free joint has no counterpart in slides and turns; set it to zero"
-                raise self.error(message, f"joints.{name}.{field}", value=values[dof : dof + len(joints)].tolist())
-        if model.dof_frictionloss[dof : dof + len(joints)].any():
-            message = "of a ball or free joint has no counterpart in slides and turns; set it to zero"
-            raise self.error(message, f"joints.{name}.frictionloss")
+                raise self.error(message, f"joints.{name}.{field}", value=values.tolist())
         self.links += links[1:]
         first = dataclasses.replace(joints[0], parent=parent, position=position, rotation=rotation)
         self.joints += [first, *joints[1:]]
@@ -374,28 +345,20 @@ def _names(given: list[str], kind: str) -> list[str]:
     return names
 
 
-def _line(info: str) -> int | None:
-    found = re.search(r"line (\d+)", info)
-    return None if found is None else int(found.group(1))
-
-
 def _efforts(model: Any, mujoco: Any) -> dict[int, float]:
     """Return the largest force of each joint where its own range, or that of its only actuator, is symmetric."""
     found: dict[int, float] = {}
     for j in range(model.njnt):
         actuators = np.flatnonzero(model.actuator_trnid[:, 0] == j)
-        ranges = []
-        if model.jnt_actfrclimited[j]:
-            ranges.append(model.jnt_actfrcrange[j])
+        ranges = [model.jnt_actfrcrange[j]] if model.jnt_actfrclimited[j] else []
         if len(actuators) == 1:
             k = actuators[0]
             gear = float(model.actuator_gear[k, 0])
-            plain = model.actuator_gaintype[k] == int(mujoco.mjtGain.mjGAIN_FIXED)
-            plain = plain and model.actuator_biastype[k] == int(mujoco.mjtBias.mjBIAS_NONE)
-            plain = plain and model.actuator_dyntype[k] == int(mujoco.mjtDyn.mjDYN_NONE)
+            types = [int(getattr(model, f"actuator_{name}type")[k]) for name in ("gain", "bias", "dyn")]
+            simple = (mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_NONE, mujoco.mjtDyn.mjDYN_NONE)
             if model.actuator_forcelimited[k]:
                 ranges.append(model.actuator_forcerange[k] * gear)
-            elif plain and model.actuator_ctrllimited[k]:
+            elif types == [int(kind) for kind in simple] and model.actuator_ctrllimited[k]:
                 ranges.append(model.actuator_ctrlrange[k] * model.actuator_gainprm[k, 0] * gear)
         symmetric = [float(abs(high)) for low, high in ranges if low == -high and high != 0]
         if symmetric:

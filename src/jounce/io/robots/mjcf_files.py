@@ -15,8 +15,6 @@ from jounce.errors import RobotFileError
 from jounce.io.files.reading import MAX_SAMPLES, named_file, read_file
 from jounce.io.robots.xml_elements import Element, read_markup
 
-__all__ = ["check_assets", "included", "quiet_mujoco"]
-
 
 @contextmanager
 def quiet_mujoco(mujoco: Any) -> Iterator[None]:
@@ -69,6 +67,12 @@ def _named(
         raise element.error(error.message, element.tag, value=name) from None
 
 
+def line_of(text: str) -> int | None:
+    """Return the line that a text of MuJoCo speaks of."""
+    found = re.search(r"[Ll]ine (?:number=)?(\d+)", text)
+    return None if found is None else int(found[1])
+
+
 def check_assets(spec: Any, parts: Iterable[Element], allow: Iterable[str | PathLike[str]] = ()) -> None:
     """Refuse meshes and pictures that lie where they may not, or are no files: MuJoCo reads whatever it is given.
 
@@ -91,8 +95,7 @@ def check_assets(spec: Any, parts: Iterable[Element], allow: Iterable[str | Path
     for tag, asset, file in _asset_files(spec):
         kept = spec.texturedir if tag == "texture" else spec.meshdir
         name = str(Path(kept) / (Path(file).name if spec.strippath else file))
-        line = re.search(r"line (\d+)", asset.info)
-        element = Element(tag, {}, roots[0].path, int(line[1]) if line else roots[0].line)
+        element = Element(tag, {}, roots[0].path, line_of(asset.info) or roots[0].line)
         for folder in folders:
             path = _named(element, name, roots[0], allow, folder)
             if os.path.lexists(path):

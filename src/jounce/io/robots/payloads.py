@@ -5,21 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from jounce.errors import JounceError, RobotError
-from jounce.io.files.units import parse_value
+from jounce.io.files.assignments import assignments
 from jounce.rigid.inertia import Inertia
 from jounce.robot.robot import Robot
+from jounce.trajectory.units import parse_value
 
-__all__ = ["with_payloads"]
 
-
-def with_payloads(robot: Robot, assignments: Iterable[str]) -> Robot:
+def with_payloads(robot: Robot, texts: Iterable[str]) -> Robot:
     """Return a robot that holds point masses in the origins of links.
 
     Parameters
     ----------
     robot : Robot
         The robot without them.
-    assignments : iterable of str
+    texts : iterable of str
         ``LINK=MASS``, the mass a number in kg or a number with a unit.
 
     Raises
@@ -35,10 +34,8 @@ def with_payloads(robot: Robot, assignments: Iterable[str]) -> Robot:
     >>> with_payloads(pendulum, ["rod=500 g"]).mass
     1.5
     """
-    for text in assignments:
-        link, equals, mass = (part.strip() for part in text.partition("="))
-        if not equals or not link or not mass:
-            raise RobotError("a load is given by LINK=MASS, such as 'hand=3 kg'", name="--payload", value=text)
+    form = "a load is given by LINK=MASS, such as 'hand=3 kg'"
+    for link, mass in assignments(texts, "--payload", form, RobotError).items():
         try:
             number = parse_value(mass, "mass").value
             assert isinstance(number, float)  # no names are allowed, so that expressions are worked out

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from jounce.errors import RobotError, RobotFileError, did_you_mean, no_such
 from jounce.io.robots.faults import FOLLOWS_NONE, IDLE, MASSLESS, Faults
@@ -18,14 +18,13 @@ from jounce.robot.model import Joint, Limits, Link, Mimic, leaders
 from jounce.robot.robot import Robot
 from jounce.robot.tree import axes_with_z_along, ordered
 
-__all__ = ["read_urdf"]
-
 EXPANDED = ("floating", "planar")
 TYPES = ("continuous", "fixed", "prismatic", "revolute", *EXPANDED)
 LINK_PARTS = ("inertial", "visual", "collision", "contact", "material", "sensor")
 INERTIAL_PARTS = ("origin", "mass", "inertia")
 JOINT_PARTS = ("origin", "parent", "child", "axis", "limit", "dynamics", "mimic", "calibration", "safety_controller")
 SIZES = ("velocity", "acceleration", "deceleration", "jerk", "effort")
+_Pose = tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3 3"]]
 TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
@@ -61,13 +60,13 @@ def read_urdf(root: Element, faults: Faults, massless: bool = False) -> Robot:
     if not links:
         raise root.error("a robot needs at least one <link>")
     lines = _Lines(root)
+    made = []
     for name, element in links.items():
-        _check_link(element, name)
         lines.add(element, "links", name)
+        made.append(_link(name, element, faults))
     for name, element in joints.items():
         _check_joint(element, name, links)
-        _add_joint_lines(lines, element, name)
-    made = [_link(name, element, faults) for name, element in links.items()]
+        lines.add_joint(element, name)
     parts: list[Joint] = []
     mimics = _mimics(joints, faults)
     try:
@@ -97,6 +96,13 @@ class _Lines:
     def add(self, element: Element | None, *name: str) -> None:
         if element is not None:
             self.elements.setdefault(".".join(name), element)
+
+    def add_joint(self, element: Element, name: str) -> None:
+        self.add(element, "joints", name)
+        for tag in ("parent", "child", "axis", "mimic"):
+            self.add(element.first(tag), "joints", name, tag)
+        for key in ("damping", "friction"):
+            self.add(element.first("dynamics"), "joints", name, key)
 
     def placed(self, error: RobotError) -> RobotFileError:
         """Return an error of the robot with the file and the line that it is about."""
@@ -131,23 +137,27 @@ def _distinct(kind: str, parts: list[Any], root: Element) -> dict[str, Any]:
     return found
 
 
-def _check_link(element: Element, name: str) -> None:
+def _link(name: str, element: Element, faults: Faults) -> Link:
+    """Return a link; its inertia is turned from the axes of ``<inertial>`` to those of the link."""
     where = ("links", name)
     element.check_children(LINK_PARTS, *where)
     inertial = element.first("inertial")
     if inertial is None:
-        return
+        return Link(name)
     inertial.check_children(INERTIAL_PARTS, *where, "inertial")
-    _check_origin(inertial, *where, "inertial")
-    mass = _part(inertial, "mass", "; give it, or leave out <inertial>", *where, "inertial")
-    tensor = _part(inertial, "inertia", "; six zeros are a point mass", *where, "inertial")
-    mass.text("value", *where, "mass")
-    values = mass.numbers("value", 1, *where, "mass") or [0.0]
-    for key in TENSOR:
-        tensor.text(key, *where, "inertia", key)
-        tensor.numbers(key, 1, *where, "inertia", key)
-    if values[0] < 0:
-        raise mass.error("must be greater than zero", *where, "mass", value=values[0])
+    pose = _pose(inertial, *where, "inertial")
+    weight = _part(inertial, "mass", "; give it, or leave out <inertial>", *where, "inertial")
+    moments = _part(inertial, "inertia", "; six zeros are a point mass", *where, "inertial")
+    mass = weight.number("value", *where, "mass")
+    xx, xy, xz, yy, yz, zz = (moments.number(key, *where, "inertia", key) for key in TENSOR)
+    if mass < 0:
+        raise weight.error("must be greater than zero", *where, "mass", value=mass)
+    tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    if mass == 0 and not tensor.any():
+        return Link(name)
+    inertia = Inertia(mass, tensor=tensor, strict=False)
+    faults.check(inertia, name, (weight if mass == 0 else moments).line)
+    return Link(name, inertia.moved(*pose))
 
 
 def _part(element: Element, tag: str, advice: str, *name: str) -> Element:
@@ -158,16 +168,22 @@ def _part(element: Element, tag: str, advice: str, *name: str) -> Element:
     return part
 
 
-def _check_origin(element: Element, *name: str) -> None:
+def _pose(element: Element, *name: str) -> _Pose:
+    """Return the pose of an ``<origin>``: turns about fixed axes, or a quaternion of URDF 1.1."""
+    from scipy.spatial.transform import Rotation
+
     origin = element.first("origin")
-    if origin is not None:
-        for key in ("xyz", "rpy"):
-            origin.numbers(key, 3, *name, "origin")
-        quaternion = origin.numbers("quat_xyzw", 4, *name, "origin")
-        if quaternion is not None and math.hypot(*quaternion) < 1e-9:
-            raise origin.error("quat_xyzw must not be zero", *name, "origin", value=quaternion)
-        if quaternion is not None and "rpy" in origin.attributes:
-            raise origin.error("has both rpy and quat_xyzw; leave one of them out", *name, "origin")
+    if origin is None:
+        return np.zeros(3), np.eye(3)
+    position, turns = (origin.numbers(key, 3, *name, "origin") or [0.0] * 3 for key in ("xyz", "rpy"))
+    quaternion = origin.numbers("quat_xyzw", 4, *name, "origin")
+    if quaternion is None:
+        return np.array(position), Rotation.from_euler("xyz", turns).as_matrix()
+    if math.hypot(*quaternion) < 1e-9:
+        raise origin.error("quat_xyzw must not be zero", *name, "origin", value=quaternion)
+    if "rpy" in origin.attributes:
+        raise origin.error("has both rpy and quat_xyzw; leave one of them out", *name, "origin")
+    return np.array(position), Rotation.from_quat(quaternion).as_matrix()
 
 
 def _check_joint(element: Element, name: str, links: dict[str, Element]) -> None:
@@ -181,13 +197,6 @@ def _check_joint(element: Element, name: str, links: dict[str, Element]) -> None
         link = part.text("link", *where, role)
         if link not in links:
             raise part.error(no_such("link", link, links), *where, role, value=link)
-    _check_origin(element, *where)
-    axis = element.first("axis")
-    if axis is not None:
-        vector = axis.numbers("xyz", 3, *where, "axis")
-        if vector is not None and kind not in ("fixed", "floating") and math.hypot(*vector) < 1e-9:
-            raise axis.error("must have a direction", *where, "axis", value=vector)
-    _check_drive(element, *where)
     mimic = element.first("mimic")
     if mimic is not None:
         mimic.text("joint", *where, "mimic")
@@ -195,61 +204,6 @@ def _check_joint(element: Element, name: str, links: dict[str, Element]) -> None
             mimic.numbers(key, 1, *where, "mimic", key)
         if kind in EXPANDED:
             raise mimic.error(f"a {kind} joint has several coordinates, it cannot follow another", *where, "mimic")
-
-
-def _check_drive(element: Element, *where: str) -> None:
-    limit, dynamics = element.first("limit"), element.first("dynamics")
-    if limit is not None:
-        for key in ("lower", "upper", *SIZES):
-            none = -math.inf if key == "lower" else math.inf
-            if limit.numbers(key, 1, *where, "limit", key, infinite=True) not in (None, [none]):
-                limit.numbers(key, 1, *where, "limit", key)
-    if dynamics is not None:
-        for key in ("damping", "friction"):
-            dynamics.numbers(key, 1, *where, "dynamics", key)
-
-
-def _add_joint_lines(lines: _Lines, element: Element, name: str) -> None:
-    where = ("joints", name)
-    lines.add(element, *where)
-    for tag in ("parent", "child", "axis", "mimic"):
-        lines.add(element.first(tag), *where, tag)
-    for key in ("damping", "friction"):
-        lines.add(element.first("dynamics"), *where, key)
-
-
-def _given(element: Element, tag: str, key: str, default: Sequence[float]) -> np.ndarray:
-    """Return the numbers of an attribute of the first child of a tag."""
-    part = element.first(tag)
-    values = None if part is None else part.numbers(key, len(default))
-    return np.array(default if values is None else values, float)
-
-
-def _pose(element: Element) -> tuple[np.ndarray, np.ndarray]:
-    """Return the pose of an ``<origin>``: turns about fixed axes, or a quaternion of URDF 1.1."""
-    from scipy.spatial.transform import Rotation
-
-    position, origin = _given(element, "origin", "xyz", (0.0, 0.0, 0.0)), element.first("origin")
-    quaternion = None if origin is None else origin.numbers("quat_xyzw", 4)
-    if quaternion is not None:
-        return position, Rotation.from_quat(quaternion).as_matrix()
-    return position, Rotation.from_euler("xyz", _given(element, "origin", "rpy", (0.0, 0.0, 0.0))).as_matrix()
-
-
-def _link(name: str, element: Element, faults: Faults) -> Link:
-    """Return a link; its inertia is turned from the axes of ``<inertial>`` to those of the link."""
-    inertial = element.first("inertial")
-    if inertial is None:
-        return Link(name)
-    (mass,) = _given(inertial, "mass", "value", (0.0,))
-    xx, xy, xz, yy, yz, zz = (_given(inertial, "inertia", key, (0.0,))[0] for key in TENSOR)
-    tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    if mass == 0 and not tensor.any():
-        return Link(name)
-    inertia = Inertia(float(mass), tensor=tensor, strict=False)
-    at = inertial.first("mass" if mass == 0 else "inertia") or inertial
-    faults.check(inertia, name, at.line)
-    return Link(name, inertia.moved(*_pose(inertial)))
 
 
 def _ends(element: Element) -> tuple[str, str]:
@@ -260,20 +214,28 @@ def _ends(element: Element) -> tuple[str, str]:
 
 def _joints(name: str, element: Element, mimics: dict[str, Mimic]) -> tuple[list[Link], list[Joint]]:
     """Return a joint of the file, or those that it is expanded to and the massless links between them."""
-    kind, (parent, child), (position, rotation) = element.attributes["type"], _ends(element), _pose(element)
+    where = ("joints", name)
+    kind, (parent, child), (position, rotation) = element.attributes["type"], _ends(element), _pose(element, *where)
+    axis, limit, dynamics = (element.first(tag) for tag in ("axis", "limit", "dynamics"))
+    direction = [1.0, 0.0, 0.0] if axis is None else axis.numbers("xyz", 3, *where, "axis") or [1.0, 0.0, 0.0]
+    bounds = {key: 0.0 if limit is None else _bound(limit, key, name) for key in (*SIZES, "lower", "upper")}
+    damping, friction = (
+        0.0 if dynamics is None else dynamics.number(key, *where, "dynamics", key, default=0.0)
+        for key in ("damping", "friction")
+    )
     if kind == "fixed":
         return [], [Joint(name, parent, child, kind, position, rotation)]
     if kind == "floating":
         links, parts = floating_joints(child, prefix=name)
         first = dataclasses.replace(parts[0], parent=parent, position=position, rotation=rotation)
         return links[1:], [first, *parts[1:]]
-    axis = _given(element, "axis", "xyz", (1.0, 0.0, 0.0))
+    if math.hypot(*direction) < 1e-9:
+        raise (axis or element).error("must have a direction", *where, "axis", value=direction)
     if kind == "planar":
-        return _planar(name, element, axis)
-    damping, friction = (float(_given(element, "dynamics", key, (0.0,))[0]) for key in ("damping", "friction"))
-    kept: dict[str, Any] = {"limits": _limits(name, element), "mimic": mimics.get(name)}
-    kept |= {"damping": damping, "friction": friction}
-    return [], [Joint(name, parent, child, kind, position, rotation, axis=axis, **kept)]
+        return _planar(name, (parent, child), (position, rotation), np.array(direction))
+    kept: dict[str, Any] = {"limits": _limits(name, limit, kind, bounds), "mimic": mimics.get(name)}
+    kept |= {"axis": np.array(direction), "damping": damping, "friction": friction}
+    return [], [Joint(name, parent, child, kind, position, rotation, **kept)]
 
 
 def _mimics(joints: dict[str, Element], faults: Faults) -> dict[str, Mimic]:
@@ -287,37 +249,43 @@ def _mimics(joints: dict[str, Element], faults: Faults) -> dict[str, Mimic]:
             continue
         followed = mimic.attributes["joint"]
         if followed in joints:
-            multiplier, offset = (
-                _given(joint, "mimic", key, (x,))[0] for key, x in (("multiplier", 1.0), ("offset", 0.0))
-            )
-            found[name] = Mimic(followed, float(multiplier), float(offset))
+            multiplier, offset = mimic.number("multiplier", default=1.0), mimic.number("offset", default=0.0)
+            found[name] = Mimic(followed, multiplier, offset)
             continue
         message = f"must follow a moving joint that follows no other; {did_you_mean(followed, leading)}"
         faults.add(FOLLOWS_NONE, name, mimic.error(message, "joints", name, "mimic", value=followed))
     return leaders(found)
 
 
-def _planar(name: str, element: Element, axis: np.ndarray) -> tuple[list[Link], list[Joint]]:
+def _planar(
+    name: str, ends: tuple[str, str], pose: _Pose, axis: Float[np.ndarray, "3"]
+) -> tuple[list[Link], list[Joint]]:
     """Return two slides across the axis and a turn about it."""
-    axes, (parent, child) = axes_with_z_along(axis / np.linalg.norm(axis)).T, _ends(element)
-    names = [parent, f"{name}_frame_1", f"{name}_frame_2", child]
+    axes = axes_with_z_along(axis / np.linalg.norm(axis)).T
+    names = [ends[0], f"{name}_frame_1", f"{name}_frame_2", ends[1]]
     kinds = (("x", "prismatic"), ("y", "prismatic"), ("angle", "continuous"))
     parts = [
         Joint(f"{name}_{suffix}", names[k], names[k + 1], kind, axis=axes[k]) for k, (suffix, kind) in enumerate(kinds)
     ]
-    position, rotation = _pose(element)
-    parts[0] = dataclasses.replace(parts[0], position=position, rotation=rotation)
+    parts[0] = dataclasses.replace(parts[0], position=pose[0], rotation=pose[1])
     return [Link(frame) for frame in names[1:3]], parts
 
 
-def _limits(name: str, element: Element) -> Limits:
-    limit = element.first("limit")
+def _bound(limit: Element, key: str, name: str) -> float:
+    """Return a bound of a joint, zero where none is given; an infinite one bounds nothing."""
+    place = ("joints", name, "limit", key)
+    given = limit.numbers(key, 1, *place, infinite=True)
+    if given not in (None, [-math.inf if key == "lower" else math.inf]):
+        limit.numbers(key, 1, *place)
+    return given[0] if given else 0.0
+
+
+def _limits(name: str, limit: Element | None, kind: str, bounds: dict[str, float]) -> Limits:
     if limit is None:
         return Limits()
-    values = {key: (limit.numbers(key, 1, infinite=True) or [0.0])[0] for key in (*SIZES, "lower", "upper")}
-    given = {key: values[key] for key in SIZES if values[key] != 0}
-    if element.attributes["type"] != "continuous" and (values["lower"], values["upper"]) != (0, 0):
-        given |= {key: values[key] for key in ("lower", "upper")}
+    given = {key: bounds[key] for key in SIZES if bounds[key] != 0}
+    if kind != "continuous" and (bounds["lower"], bounds["upper"]) != (0, 0):
+        given |= {key: bounds[key] for key in ("lower", "upper")}
     try:
         return Limits(**{key: value for key, value in given.items() if math.isfinite(value)})
     except RobotError as error:

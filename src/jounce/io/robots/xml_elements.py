@@ -9,10 +9,8 @@ from typing import Any
 from xml.parsers import expat
 
 from jounce.errors import RobotFileError, did_you_mean
-from jounce.io.files.entries import dotted
+from jounce.io.files.located_data import dotted
 from jounce.io.files.reading import LARGEST_NUMBER, fault_of_number, read_file
-
-__all__ = ["Element", "read_markup"]
 
 MAX_DEPTH = 2000
 
@@ -55,6 +53,13 @@ class Element:
         if not value.strip():
             raise self.error(f"the attribute {key} of <{self.tag}> is empty", *name, value=value)
         return value
+
+    def number(self, key: str, *name: str, default: float | None = None) -> float:
+        """Return the finite number in an attribute, which must be there unless there is a default."""
+        if default is None:
+            self.text(key, *name)
+        found = self.numbers(key, 1, *name)
+        return found[0] if found else float(default or 0.0)
 
     def numbers(self, key: str, count: int, *name: str, infinite: bool = False) -> list[float] | None:
         """Return the finite numbers in an attribute, None if it is not there."""

@@ -9,24 +9,19 @@ import dataclasses
 from collections.abc import Callable
 
 import numpy as np
+from jaxtyping import Float
 
 from jounce.rigid.inertia import Inertia
-from jounce.robot import Robot, Screw, from_screws
+from jounce.robot import JointAxis, Robot, from_screws
 from jounce.trajectory import PolynomialMotion
+
+Samples = Float[np.ndarray, " instants"]
 
 ANGLE = np.pi  # rad, section 4
 DURATION = 1.7  # s, section 4
 SEGMENTS = 51  # section 4; the spacing of the samples is then 0.0333 s
 CONTINUITY = 4  # m of equations 61 and 62: segments of degree 5
 KNOTS = np.linspace(0.0, DURATION, SEGMENTS + 1)
-
-MASS = 6.5  # kg; these six are stand-ins for figure 6
-CENTER_X = 0.12  # m
-CENTER_Z = 0.03  # m
-INERTIA_X = 0.020  # kg m^2, as the next two about the centre of mass
-INERTIA_Y = 0.060
-INERTIA_Z = 0.055
-RADIUS = 0.25  # m from the axis to the accelerometer, a stand-in
 
 RIPPLE = ((0.08, 29.0, 0.7), (0.05, 41.0, 2.1))  # rad/s^2, rad/s, rad: what the accelerometer adds
 STOP = 0.9  # s, when braking begins
@@ -62,7 +57,7 @@ class Link:
         """Return the robot of one joint: the link on its axis, y, horizontal."""
         moments = (self.inertia_x, self.inertia_y, self.inertia_z)
         link = Inertia(self.mass, (self.center_x, 0.0, self.center_z), moments)
-        return from_screws([Screw((0.0, 1.0, 0.0), inertia=link)], name="arm")
+        return from_screws([JointAxis((0.0, 1.0, 0.0), inertia=link)], name="arm")
 
     @property
     def inertia_about_axis(self) -> float:
@@ -70,7 +65,9 @@ class Link:
         return self.mass * (self.center_x**2 + self.center_z**2) + self.inertia_y
 
 
-STAND_IN = Link(MASS, CENTER_X, CENTER_Z, INERTIA_X, INERTIA_Y, INERTIA_Z, RADIUS)
+STAND_IN = Link(  # for figure 6
+    mass=6.5, center_x=0.12, center_z=0.03, inertia_x=0.020, inertia_y=0.060, inertia_z=0.055, radius=0.25
+)
 
 
 def arm() -> Robot:
@@ -78,12 +75,7 @@ def arm() -> Robot:
     return STAND_IN.robot()
 
 
-def inertia_about_axis() -> float:
-    """Return ``M (x_C^2 + z_C^2) + I_y`` of equations 141-146 with the stand-ins, kg m^2."""
-    return STAND_IN.inertia_about_axis
-
-
-def rest_to_rest(time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def rest_to_rest(time: Samples) -> tuple[Samples, Samples]:
     """Return speed and acceleration of the polynomial of degree 7 from 0 to pi, with rest to the third derivative."""
     s = time / DURATION
     speed = 140 * s**3 * (1 - s) ** 3
@@ -91,12 +83,12 @@ def rest_to_rest(time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return speed * ANGLE / DURATION, acceleration * ANGLE / DURATION**2
 
 
-def high_speed() -> np.ndarray:
+def high_speed() -> Samples:
     """Return samples of the angular acceleration in the motion at high speed, rad/s^2, one for each knot."""
     return rest_to_rest(KNOTS)[1] + ripple(KNOTS)
 
 
-def sudden_stop() -> np.ndarray:
+def sudden_stop() -> Samples:
     """Return samples of the angular acceleration where the motion is stopped at 0.9 s, rad/s^2, one for each knot."""
     turned = KNOTS - STOP
     phase = np.clip(turned / BRAKING, 0.0, 1.0)
@@ -107,26 +99,26 @@ def sudden_stop() -> np.ndarray:
     return np.where(turned < 0, rest_to_rest(KNOTS)[1], braking + ringing) + ripple(KNOTS)
 
 
-def ripple(time: np.ndarray) -> np.ndarray:
+def ripple(time: Samples) -> Samples:
     """Return what the accelerometer adds to the motion, rad/s^2."""
     parts = (size * np.sin(frequency * time + phase) for size, frequency, phase in RIPPLE)
     return np.sum(list(parts), axis=0)
 
 
-def law(accelerations: np.ndarray, knots: np.ndarray = KNOTS) -> PolynomialMotion:
+def law(accelerations: Samples, knots: Samples = KNOTS) -> PolynomialMotion:
     """Return the quintic segments through samples of the acceleration, from rest at zero, without jerk at the ends."""
     start = {0: 0.0, 1: 0.0}
     return PolynomialMotion.from_accelerations(knots, accelerations, CONTINUITY, start=start, ends="clamped")
 
 
-def end_of(motion: PolynomialMotion) -> np.ndarray:
+def end_of(motion: PolynomialMotion) -> Float[np.ndarray, "2"]:
     """Return angle and speed at the last knot, rad and rad/s."""
     local = float(motion.stop - motion.breakpoints[-1])
     piece = np.polynomial.Polynomial(motion.coefficients[:, -1])
     return np.array([piece(local), piece.deriv()(local)])
 
 
-def at_rest(accelerations: np.ndarray, angle: float | None) -> np.ndarray:
+def at_rest(accelerations: Samples, angle: float | None) -> Samples:
     """Return samples less the bias, and with an angle less the drift, that keep the motion from its end.
 
     Parameters
@@ -168,14 +160,14 @@ class Case:
 
     name: str
     title: str
-    samples: Callable[[], np.ndarray]
+    samples: Callable[[], Samples]
     angle: float | None
     link: Link = STAND_IN
-    knots: np.ndarray = dataclasses.field(default_factory=lambda: KNOTS)
+    knots: Samples = dataclasses.field(default_factory=lambda: KNOTS)
     measured: bool = False
 
     @property
-    def accelerations(self) -> np.ndarray:
+    def accelerations(self) -> Samples:
         """Samples less bias and drift, rad/s^2: what the law goes through."""
         return self.samples() if self.measured else at_rest(self.samples(), self.angle)
 

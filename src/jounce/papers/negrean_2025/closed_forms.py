@@ -1,13 +1,13 @@
 """Energies and torques of a link that turns about one fixed axis, as the paper prints them: equations 141-146."""
 
-from typing import Any
-
 import numpy as np
+from jaxtyping import Float
+from numpy.typing import ArrayLike
 
 from jounce.jet import Jet, sine_cosine
 
 
-def energies(inertia: float, motion: Any) -> np.ndarray:
+def energies(inertia: float, motion: ArrayLike) -> Float[np.ndarray, "*batch 3"]:
     """Return the acceleration energies of orders 1 to 3: Negrean 2025, equations 141-143.
 
     Two terms of equation 143 stand twice in the text that we read; they count once.
@@ -37,7 +37,9 @@ def energies(inertia: float, motion: Any) -> np.ndarray:
     return inertia / 2 * np.stack([first, second, third], axis=-1)
 
 
-def gravity_torques(mass: float, center: tuple[float, float], gravity: float, motion: Any, rates: int = 2) -> Any:
+def gravity_torques(
+    mass: float, center: tuple[float, float], gravity: float, motion: ArrayLike, rates: int = 2
+) -> Float[np.ndarray, "*batch rates"]:
     """Return the torque that holds the link against its weight, and its rates: Q_g of Negrean 2025, 144-146.
 
     The paper does not write it out. The axis y is horizontal, the link turns from x towards -z and z is up at angle
@@ -72,7 +74,7 @@ def gravity_torques(mass: float, center: tuple[float, float], gravity: float, mo
     return np.moveaxis(np.asarray((slope * (mass * gravity)).derivatives()), 0, -1)
 
 
-def torques(inertia: float, motion: Any, gravity: Any) -> np.ndarray:
+def torques(inertia: float, motion: ArrayLike, gravity: ArrayLike) -> Float[np.ndarray, "*batch rates"]:
     """Return the driving torque and its rates: Negrean 2025, equations 144-146, with the part of gravity.
 
     Parameters

@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from jounce.papers.figures import legend_below, panels
 from jounce.papers.negrean_2025.history import STEPS, History
-from jounce.plot.style import BLUE, GREEN, GREY, PALE_GREY, VERMILION, blank_figure, style as style
+from jounce.plot.style import BLUE, GREEN, GREY, PALE_GREY, VERMILION
 
 TORQUES = (
     ("torque", "Driving torque", "N m"),
@@ -23,27 +24,24 @@ STAND_IN = "stand-in data: samples, masses and lengths are not those of the pape
 ENERGY_COLOURS = (BLUE, VERMILION, GREEN)
 
 
-def _figure(
+def _panels(
     rows: int, columns: int, size: tuple[float, float], title: str, note: str = STAND_IN
 ) -> tuple[Figure, np.ndarray]:
-    figure = blank_figure(*size, title)
-    if note:
-        figure.supxlabel(note, fontsize=7.5, color=GREY)
-    panels = figure.subplots(rows, columns, squeeze=False, sharex=True)
-    for panel in panels.flat:
+    figure, grid = panels(rows, columns, size, title, note, sharex=True)
+    for panel in grid.flat:
         panel.axhline(0.0, color=PALE_GREY, linewidth=0.7, zorder=1)
         panel.margins(x=0.0)
-    for panel in panels[-1]:
+    for panel in grid[-1]:
         panel.set_xlabel("time / s")
-    return figure, panels
+    return figure, grid
 
 
 def accelerations(histories: Mapping[str, History], *, tangential: bool, number: int) -> Figure:
     """Draw the samples and the law through them, one panel for each motion (figures 4 and 5)."""
     what = "Tangential acceleration" if tangential else "Generalised angular acceleration"
     unit = r"m/s$^2$" if tangential else r"rad/s$^2$"
-    figure, panels = _figure(len(histories), 1, (6.0, 4.8), f"{what} (figure {number} of Negrean 2025)")
-    for panel, history in zip(panels[:, 0], histories.values(), strict=True):
+    figure, grid = _panels(len(histories), 1, (6.0, 4.8), f"{what} (figure {number} of Negrean 2025)")
+    for panel, history in zip(grid[:, 0], histories.values(), strict=True):
         factor = history.case.link.radius if tangential else 1.0
         panel.plot(history.time, factor * history.motion[:, 2], color=BLUE, label="quintic segments")
         samples = factor * history.case.accelerations
@@ -51,7 +49,7 @@ def accelerations(histories: Mapping[str, History], *, tangential: bool, number:
         panel.plot(history.case.knots, samples, color=VERMILION, marker="o", linestyle="", label=label)
         panel.set_title(history.case.title)
         panel.set_ylabel(f"acceleration / ({unit})")
-    panels[0, 0].legend(loc="upper right")
+    grid[0, 0].legend(loc="upper right")
     figure.align_ylabels()
     return figure
 
@@ -59,19 +57,17 @@ def accelerations(histories: Mapping[str, History], *, tangential: bool, number:
 def torque(histories: Mapping[str, History], *, rate: int, number: int) -> Figure:
     """Draw the driving torque or one of its rates, and the part of inertia in it (figures 7 to 9)."""
     name, title, unit = TORQUES[rate]
-    figure, panels = _figure(len(histories), 1, (6.0, 4.8), f"{title} (figure {number} of Negrean 2025)", note="")
-    for panel, history in zip(panels[:, 0], histories.values(), strict=True):
+    figure, grid = _panels(len(histories), 1, (6.0, 4.8), f"{title} (figure {number} of Negrean 2025)", note="")
+    for panel, history in zip(grid[:, 0], histories.values(), strict=True):
         whole = history.torques[:, rate]
+        gravity = history.gravity[:, rate]
+        inertial = {"color": VERMILION, "linestyle": "--", "linewidth": 1.1, "label": "share of inertia"}
         panel.plot(history.time, whole, color=BLUE, label="driving torque", zorder=3)
-        inertial = whole - history.gravity[:, rate]
-        panel.plot(history.time, inertial, color=VERMILION, linestyle="--", linewidth=1.1, label="share of inertia")
-        panel.plot(
-            history.time, history.gravity[:, rate], color=GREEN, linestyle=":", linewidth=1.3, label="share of gravity"
-        )
+        panel.plot(history.time, whole - gravity, **inertial)
+        panel.plot(history.time, gravity, color=GREEN, linestyle=":", linewidth=1.3, label="share of gravity")
         panel.set_title(history.case.title)
         panel.set_ylabel(f"{name} / ({unit})")
-    handles = panels[0, 0].get_legend_handles_labels()
-    figure.legend(*handles, loc="outside lower center", ncols=3, title=STAND_IN, title_fontsize=7.5)
+    legend_below(figure, grid[0, 0], 3, STAND_IN)
     figure.align_ylabels()
     return figure
 
@@ -79,9 +75,9 @@ def torque(histories: Mapping[str, History], *, rate: int, number: int) -> Figur
 def energies(histories: Mapping[str, History]) -> Figure:
     """Draw the acceleration energies of orders 1 to 3, by the library and by the closed forms (equations 141-143)."""
     title = "Acceleration energies of orders 1 to 3 (equations 141-143 of Negrean 2025)"
-    figure, panels = _figure(3, len(histories), (7.2, 6.0), title)
+    figure, grid = _panels(3, len(histories), (7.2, 6.0), title)
     for column, history in enumerate(histories.values()):
-        for p, panel in enumerate(panels[:, column], 1):
+        for p, panel in enumerate(grid[:, column], 1):
             found, closed = history.energies[:, p - 1], history.closed_energies[:, p - 1]
             panel.plot(history.time, found, color=ENERGY_COLOURS[p - 1], label="library")
             every = slice(None, None, STEPS)  # the knots
@@ -93,7 +89,7 @@ def energies(histories: Mapping[str, History]) -> Figure:
                 panel.set_ylabel(rf"$E_{p}$ / (kg m$^2$ s$^{{-{2 * p + 2}}}$)")
             if p == 1:
                 panel.set_title(history.case.title)
-    panels[0, -1].legend(loc="upper left")
+    grid[0, -1].legend(loc="upper left")
     figure.align_ylabels()
     return figure
 

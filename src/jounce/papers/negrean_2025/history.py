@@ -4,6 +4,7 @@ import dataclasses
 
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from jounce.dynamics import acceleration_energy, gravity_forces, higher_order
 from jounce.jet import Jet
@@ -13,6 +14,7 @@ from jounce.robot import inverse_dynamics
 
 ORDER = 6  # of the derivatives of the angle: equation 131 with m = 4 needs as many
 STEPS = 20  # instants in each segment
+Table = Float[np.ndarray, "time 3"]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -37,14 +39,14 @@ class History:
     """
 
     case: Case
-    time: np.ndarray
-    motion: np.ndarray
-    energies: np.ndarray
-    closed_energies: np.ndarray
-    torques: np.ndarray
-    closed_torques: np.ndarray
-    equation_torques: np.ndarray
-    gravity: np.ndarray
+    time: Float[np.ndarray, " time"]
+    motion: Float[np.ndarray, "time 7"]
+    energies: Table
+    closed_energies: Table
+    torques: Table
+    closed_torques: Table
+    equation_torques: Table
+    gravity: Table
 
 
 def history(case: Case) -> History:
@@ -83,6 +85,8 @@ def history(case: Case) -> History:
     )
 
 
-def difference(found: np.ndarray, right: np.ndarray) -> np.ndarray:
+def difference(
+    found: Float[np.ndarray, "time column"], right: Float[np.ndarray, "time column"]
+) -> Float[np.ndarray, " column"]:
     """Return the largest differences over time, divided by the largest values, one for each column."""
     return np.max(np.abs(found - right), axis=0) / np.max(np.abs(right), axis=0)

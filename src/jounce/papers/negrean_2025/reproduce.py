@@ -1,21 +1,21 @@
 """The figures and comparisons of section 4, written into one directory."""
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
-from jounce.papers.files import FORMATS, rendered, writable, write
 from jounce.papers.negrean_2025.case import CASES
 from jounce.papers.negrean_2025.comparison import comparison
-from jounce.papers.negrean_2025.given import given_cases, told
 from jounce.papers.negrean_2025.history import History, history
+from jounce.papers.negrean_2025.measured_data import given_cases, told
+from jounce.papers.output import Progress, counter, csv_table, writable, write_figures, write_texts
 
 
 def reproduce(
     out_directory: str | os.PathLike[str],
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
     *,
     samples: str | os.PathLike[str] | None = None,
     masses: str | os.PathLike[str] | None = None,
@@ -58,28 +58,19 @@ def reproduce(
     directory = writable(Path(out_directory))
     from jounce.papers.negrean_2025 import figures  # imports matplotlib
 
-    total = len(cases) + len(figures.FIGURES)
-    done = 0
-
-    def advanced() -> None:
-        nonlocal done
-        done += 1
-        if progress is not None:
-            progress(done, total)
-
+    advanced = counter(len(cases) + len(figures.FIGURES), progress)
     histories: dict[str, History] = {}
     for name, case in cases.items():
         histories[name] = history(case)
         advanced()
-    paths = [
-        write(directory / "comparison.md", comparison(histories, data).encode("ascii")),
-        write(directory / "energies.csv", energies_csv(histories).encode("ascii")),
-        write(directory / "torques.csv", torques_csv(histories).encode("ascii")),
-    ]
-    for name, draw in figures.FIGURES.items():
-        with figures.style():
-            figure = draw(histories)
-            paths += [write(directory / f"{name}.{kind}", rendered(figure, kind)) for kind in FORMATS]
+    texts = {
+        "comparison.md": comparison(histories, data),
+        "energies.csv": energies_csv(histories),
+        "torques.csv": torques_csv(histories),
+    }
+    paths = write_texts(directory, texts)
+    for written in write_figures(directory, figures.FIGURES, histories):
+        paths += written
         advanced()
     return paths
 
@@ -97,8 +88,9 @@ def torques_csv(histories: Mapping[str, History]) -> str:
 
 
 def _csv(columns: tuple[str, ...], tables: Mapping[str, np.ndarray], histories: Mapping[str, History]) -> str:
-    rows = [",".join(("motion", "time", *columns))]
-    for name, table in tables.items():
-        for instant, values in zip(histories[name].time, table, strict=True):
-            rows.append(",".join([name, *(f"{value:.16e}" for value in (instant, *values))]))
-    return "\n".join(rows) + "\n"
+    rows = (
+        (name, instant, *values)
+        for name, table in tables.items()
+        for instant, values in zip(histories[name].time, table, strict=True)
+    )
+    return csv_table(("motion", "time", *columns), rows)

@@ -8,6 +8,7 @@ import dataclasses
 from decimal import Decimal
 
 import numpy as np
+from jaxtyping import Float
 
 INTERVAL = (0.565, 0.605)  # s
 POLYNOMIALS = (  # highest power first, as printed: angle to jounce, rad by s
@@ -72,8 +73,8 @@ def check() -> list[Check]:
     return found
 
 
-def evaluated(time: np.ndarray) -> np.ndarray:
-    """Return angle, speed, acceleration, jerk and jounce of the printed segment, shape (5, time), rad by s."""
+def evaluated(time: Float[np.ndarray, " time"]) -> Float[np.ndarray, "5 time"]:
+    """Return angle, speed, acceleration, jerk and jounce of the printed segment, rad by s."""
     return np.array([np.polyval([float(c) for c in printed], time) for printed in POLYNOMIALS])
 
 

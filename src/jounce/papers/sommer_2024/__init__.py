@@ -4,17 +4,17 @@ H. J. Sommer III, Kinematic jerk and jounce for multibody dynamics with joint co
 196 (2024) 105613.
 """
 
+from jounce.papers.sommer_2024.cases import (
+    QUANTITIES as QUANTITIES,
+    VALIDATION_CASES as VALIDATION_CASES,
+    Cycle as Cycle,
+    ValidationCase as ValidationCase,
+    nominal_cycle as nominal_cycle,
+)
 from jounce.papers.sommer_2024.differences import (
     backward_difference as backward_difference,
     central_difference as central_difference,
 )
-from jounce.papers.sommer_2024.lag import Lag as Lag, lags as lags
 from jounce.papers.sommer_2024.measure import Results as Results, measure as measure
+from jounce.papers.sommer_2024.phase_lag import Lag as Lag, lags as lags
 from jounce.papers.sommer_2024.reproduce import reproduce as reproduce
-from jounce.papers.sommer_2024.simulations import (
-    QUANTITIES as QUANTITIES,
-    SIMULATIONS as SIMULATIONS,
-    Cycle as Cycle,
-    Simulation as Simulation,
-    nominal_cycle as nominal_cycle,
-)

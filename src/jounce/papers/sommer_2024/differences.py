@@ -1,6 +1,7 @@
 """Finite differences, what jerk and jounce were taken from before: central (Sommer 2024, 57-58) and backward."""
 
 import numpy as np
+from jaxtyping import Float, Int
 
 WEIGHTS = {  # by order of accuracy and order of derivative, from the sample two steps before to that two steps after
     (2, 1): (0, -1 / 2, 0, 1 / 2, 0),
@@ -12,8 +13,13 @@ REACH = 2  # samples needed on either side
 
 
 def central_difference(
-    samples: np.ndarray, step: float, *, derivative: int, accuracy: int, at: np.ndarray | None = None
-) -> np.ndarray:
+    samples: Float[np.ndarray, " time"],
+    step: float,
+    *,
+    derivative: int,
+    accuracy: int,
+    at: Int[np.ndarray, " instants"] | None = None,
+) -> Float[np.ndarray, " instants"]:
     """Return the first or second derivative of evenly spaced samples (Sommer 2024, equations 57 and 58 corrected).
 
     Parameters
@@ -40,14 +46,15 @@ def central_difference(
     >>> central_difference(t**4, 0.1, derivative=2, accuracy=4)
     array([0.48])
     """
-    samples = np.asarray(samples, float)
-    centres = np.arange(REACH, len(samples) - REACH) if at is None else np.asarray(at)
+    centres = np.arange(REACH, len(samples) - REACH) if at is None else at
     weights = WEIGHTS[accuracy, derivative]
     terms = [weight * samples[centres + k - REACH] for k, weight in enumerate(weights) if weight]
     return np.sum(terms, axis=0) / step**derivative
 
 
-def backward_difference(samples: np.ndarray, step: float, *, derivative: int) -> np.ndarray:
+def backward_difference(
+    samples: Float[np.ndarray, " time"], step: float, *, derivative: int
+) -> Float[np.ndarray, " time-{derivative}"]:
     """Return the first or second derivative of evenly spaced samples from those of the past alone.
 
     Parameters
@@ -70,4 +77,4 @@ def backward_difference(samples: np.ndarray, step: float, *, derivative: int) ->
     >>> backward_difference(t**2, 0.5, derivative=1).tolist()  # 2 t, half a step late
     [0.5, 1.5, 2.5]
     """
-    return np.diff(np.asarray(samples, float), derivative) / step**derivative
+    return np.diff(samples, derivative) / step**derivative

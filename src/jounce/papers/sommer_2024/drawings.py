@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from jounce.papers.sommer_2024.simulations import SIMULATIONS
-from jounce.plot.canvas import Label, Shape, screen_of
-from jounce.plot.frames import assembled
-from jounce.plot.scene import scene_of
-from jounce.plot.sketch import Drawing, draw_scale
-from jounce.plot.style import GREY, PALE_GREY, blank_figure
+from jounce.papers.figures import panels
+from jounce.papers.sommer_2024.cases import VALIDATION_CASES
+from jounce.plot.drawing import View
+from jounce.plot.scene import Scene, drawing_of
+from jounce.plot.sketch import SketchFigure, draw_scale
+from jounce.plot.style import GREY, PALE_GREY
 
 ARC = 7.0  # radius of the arc of an angle, in halves of a pin
 VIEW = (-130.0, 25.0)  # degrees, of the spatial ones
@@ -83,45 +83,34 @@ RSPU = Drawn(
 )
 
 
-def draw(
-    panels: Mapping[str, Drawn],
-    *,
-    title: str,
-    note: str,
-    size: tuple[float, float],
-    view: tuple[float, float] = VIEW,
-) -> Figure:
-    """Draw one figure of the paper, a panel with a title for each mechanism."""
-    figure = blank_figure(*size, title)
-    axes = figure.subplots(1, len(panels), squeeze=False)[0]
-    figure.supxlabel(note, fontsize=7.5, color=GREY)
+def draw(drawn: Mapping[str, Drawn], _: Any, *, title: str, note: str, size: tuple[float, float]) -> Figure:
+    """Draw one figure of the paper, a panel with a title for each mechanism; it takes no results."""
+    figure, axes = panels(1, len(drawn), size, title, note)
     drawings = []
-    for panel, (name, drawn) in zip(axes, panels.items(), strict=True):
+    for panel, (name, its) in zip(axes[0], drawn.items(), strict=True):
         panel.set_title(name)
-        drawings.append(_panel(panel, drawn, view))
+        drawings.append(_panel(panel, its, VIEW))
     for drawing in drawings:  # once all panels have their places
         drawing.write_names(0, "all")
     return figure
 
 
-def _panel(axes: Any, drawn: Drawn, view: tuple[float, float]) -> Drawing:
+def _panel(axes: Any, drawn: Drawn, view: View) -> SketchFigure:
     """Return a mechanism, put together at the start of its cycle, in a panel; its names are not yet written."""
-    mechanism = SIMULATIONS[drawn.simulation].load()
-    values, frames = mechanism.parameter_values, assembled(mechanism)
-    scene = scene_of(mechanism, view=view)
-    planar = mechanism.space == "planar"
-    screen = np.eye(2) if planar else screen_of(view)[:2]
-    places = {}
-    for letter, (body, local) in drawn.points.items():
-        frame = frames[body][0]
-        places[letter] = frame[:, 0] + frame[:, 1:] @ [float(values.get(c, c)) for c in local]
-    shapes, labels = list(scene.shapes), []
+    mechanism = VALIDATION_CASES[drawn.simulation].load()
+    values, drawing = mechanism.parameter_values, drawing_of(mechanism, view=view)
+    drawing.labels.clear()
+    places = {
+        letter: drawing.at(body, np.array([float(values.get(c, c)) for c in local]))[0]
+        for letter, (body, local) in drawn.points.items()
+    }
 
     def line(points: Any, **look: Any) -> None:
-        shapes.append(Shape("line", (np.asarray(points) @ screen.T)[None], stroke=PALE_GREY, layer=2, **look))
+        drawing.curve(drawing.flat(np.asarray(points))[None], stroke=PALE_GREY, layer=2, owner="", **look)
 
     def name(text: str, place: np.ndarray, colour: str, owner: str) -> None:
-        labels.append(Label(text, (place @ screen.T)[None], colour, owner))
+        drawing.owner = owner
+        drawing.name(text, drawing.flat(place[None]), colour)
 
     for pair in drawn.fixed:
         line([places[letter] for letter in pair], width=0.9, dashes=(5.0, 4.0))
@@ -129,7 +118,7 @@ def _panel(axes: Any, drawn: Drawn, view: tuple[float, float]) -> Drawing:
         name(letter, place, "black", f"bodies.{letter}")
     for symbol, (vertex, start, quarter, arm) in drawn.angles.items():
         reach = places[arm] - places[vertex]
-        angle, radius = np.arctan2(reach @ quarter, reach @ start), ARC * scene.unit
+        angle, radius = np.arctan2(reach @ quarter, reach @ start), ARC * drawing.unit
         turns = np.linspace(0.0, angle, 31)[:, None]
         arc = places[vertex] + radius * (np.cos(turns) * start + np.sin(turns) * quarter)
         line(arc, width=0.9)
@@ -138,27 +127,27 @@ def _panel(axes: Any, drawn: Drawn, view: tuple[float, float]) -> Drawing:
     for pair in drawn.lengths:
         text = f"{pair} = {100 * values[pair]:.2f} cm" if pair in values else f"d = {pair}, driven"
         name(text, (places[pair[0]] + places[pair[1]]) / 2, GREY, f"joints.{pair}")
-    seen_from = None if planar else view
-    drawing = Drawing(dataclasses.replace(scene, shapes=shapes, labels=labels), None, "", seen_from, axes)
+    seen_from = None if drawing.planar else view
+    figure = SketchFigure(Scene.of(drawing), None, "", seen_from, axes)
     left, right = axes.get_xlim()
     axes.set_xlim(left - 0.15 * (right - left), right)  # room for lengths on the left
     draw_scale(axes, seen_from)
-    drawing.show(0)
-    return drawing
+    figure.show(0)
+    return figure
 
 
 FIGURES = {
-    1: partial(
+    "figure_01": partial(
         draw,
         {"Four-bar": FOUR_BAR, "Inverted slider-crank": SLIDER_CRANK},
         title="Planar mechanisms (figure 1 of Sommer 2024)",
         note=LENGTHS_ONLY,
         size=(8.0, 4.0),
     ),
-    8: partial(
+    "figure_08": partial(
         draw, {"": RSUR}, title="RSUR mechanism (figure 8 of Sommer 2024)", note=CHOSEN.format("s"), size=(5.6, 3.6)
     ),
-    9: partial(
+    "figure_09": partial(
         draw, {"": RSPU}, title="RSPU mechanism (figure 9 of Sommer 2024)", note=CHOSEN.format(""), size=(5.6, 3.2)
     ),
 }

@@ -8,37 +8,29 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from jounce.papers.sommer_2024 import drawings
+from jounce.papers.figures import legend_below, panels
+from jounce.papers.sommer_2024 import cases, drawings
 from jounce.papers.sommer_2024.comparison import STANDS_IN
 from jounce.papers.sommer_2024.measure import Results
-from jounce.papers.sommer_2024.simulations import QUANTITIES, SIMULATIONS, STEPS, TOLERANCES
-from jounce.plot.style import BLUE, GREEN, GREY, PURPLE, VERMILION, blank_figure, style as style
+from jounce.plot.style import BLUE, GREEN, GREY, PURPLE, VERMILION
 
 LOOKS = {
     "velocity": {"color": BLUE, "marker": "o", "linestyle": "-"},
     "acceleration": {"color": VERMILION, "marker": "s", "linestyle": "--"},
     "jerk": {"color": GREEN, "marker": "^", "linestyle": "-."},
     "jounce": {"color": PURPLE, "marker": "D", "linestyle": ":"},
-    "second order": {"color": VERMILION, "marker": "s", "linestyle": "--"},
-    "fourth order": {"color": GREEN, "marker": "^", "linestyle": "-."},
-    "simulation": {"color": BLUE, "marker": "o", "linestyle": "-"},
 }
+LOOKS |= {"simulation": LOOKS["velocity"], "second order": LOOKS["acceleration"], "fourth order": LOOKS["jerk"]}
 METHODS = {
     "second order": "central differences of acceleration, order 2",
     "fourth order": "central differences of acceleration, order 4",
     "simulation": "jounce",
 }
 RATE_UNITS = {"jerk": r"rad/s$^3$", "jounce": r"rad/s$^4$"}
-
-
-def _figure(rows: int, columns: int, size: tuple[float, float], title: str, **shared: Any) -> tuple[Figure, np.ndarray]:
-    figure = blank_figure(*size, title)
-    return figure, figure.subplots(rows, columns, squeeze=False, **shared)
 
 
 def _note(names: Sequence[str]) -> str:
@@ -50,10 +42,10 @@ def _note(names: Sequence[str]) -> str:
 def time_history(results: Mapping[str, Results], *, name: str, quantity: str, number: int) -> Figure:
     """Draw a derivative of the output over one cycle, and below it the error of its simulation (figures 2 and 3)."""
     cycle, unit = results[name].cycle, RATE_UNITS[quantity]
-    derivative = 1 + QUANTITIES.index(quantity)
+    derivative = 1 + cases.QUANTITIES.index(quantity)
     found, right = cycle.simulated[:, derivative], cycle.explicit[:, derivative]
-    title = f"{SIMULATIONS[name].title}: {quantity} of the output angle (figure {number} of Sommer 2024)"
-    figure, axes = _figure(2, 1, (6.0, 4.8), title, sharex=True)
+    title = f"{cases.VALIDATION_CASES[name].title}: {quantity} of the output angle (figure {number} of Sommer 2024)"
+    figure, axes = panels(2, 1, (6.0, 4.8), title, sharex=True)
     above, below = axes[:, 0]
     above.plot(cycle.time, found, color=BLUE)
     above.set_ylabel(f"{quantity} / ({unit})")
@@ -74,19 +66,19 @@ def tolerance_sweep(results: Mapping[str, Results], *, names: Sequence[str], num
     """Draw the errors against the assembly tolerance, one panel per simulation (figures 4, 6, 10 and 12)."""
     title = f"Error against assembly tolerance (figure {number} of Sommer 2024)"
     wide = 1.0 + 3.6 * len(names) + (0.8 if len(names) == 1 else 0)
-    figure, axes = _figure(1, len(names), (wide, 3.9), title, sharex=True, sharey=True)
+    figure, axes = panels(1, len(names), (wide, 3.9), title, _note(names), sharex=True, sharey=True)
     for panel, name in zip(axes[0], names, strict=True):
-        for k, quantity in enumerate(QUANTITIES):
-            panel.loglog(TOLERANCES, results[name].by_tolerance[:, k], label=quantity, **LOOKS[quantity])
-        panel.loglog(TOLERANCES, TOLERANCES, color=GREY, linewidth=0.8, zorder=1, label="the tolerance itself")
-        panel.set_title(SIMULATIONS[name].title)
+        for k, quantity in enumerate(cases.QUANTITIES):
+            panel.loglog(cases.TOLERANCES, results[name].by_tolerance[:, k], label=quantity, **LOOKS[quantity])
+        panel.loglog(
+            cases.TOLERANCES, cases.TOLERANCES, color=GREY, linewidth=0.8, zorder=1, label="the tolerance itself"
+        )
+        panel.set_title(cases.VALIDATION_CASES[name].title)
         panel.set_xlabel("assembly tolerance (rad, or mechanism sizes)")
         _decades(panel.xaxis, 2)
         _decades(panel.yaxis, 2)
     axes[0, 0].set_ylabel("normalised RMSE")
     axes[0, 0].legend(loc="upper left")
-    if _note(names):
-        figure.supxlabel(_note(names), fontsize=7.5, color=GREY)
     return figure
 
 
@@ -94,27 +86,28 @@ def step_sweep(results: Mapping[str, Results], *, names: Sequence[str], number: 
     """Draw the errors of jerk (top) and jounce (bottom) against the time step (figures 5, 7, 11 and 13)."""
     title = f"Error against time step (figure {number} of Sommer 2024)"
     wide = 1.0 + 3.6 * len(names) + (1.4 if len(names) == 1 else 0)
-    figure, axes = _figure(2, len(names), (wide, 6.2), title, sharex=True, sharey=True)
+    figure, axes = panels(2, len(names), (wide, 6.2), title, sharex=True, sharey=True)
     for column, name in enumerate(names):
         for row, quantity in enumerate(("jerk", "jounce")):
             panel: Axes = axes[row, column]
             for method, label in METHODS.items():
-                panel.loglog(STEPS, results[name].by_step[method][:, row], label=label, **LOOKS[method])
-            panel.set_title(f"{SIMULATIONS[name].title}: {quantity}")
+                panel.loglog(cases.STEPS, results[name].by_step[method][:, row], label=label, **LOOKS[method])
+            panel.set_title(f"{cases.VALIDATION_CASES[name].title}: {quantity}")
             _decades(panel.yaxis, 2)
     for panel in axes[-1]:
         panel.set_xlabel("time step h / s")
     for panel in axes[:, 0]:
         panel.set_ylabel("normalised RMSE")
-    look = {"title": _note(names) or None, "title_fontsize": 7.5, "ncols": min(len(names) + 1, 3)}
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", **look)
+    legend_below(figure, axes[0, 0], min(len(names) + 1, 3), _note(names))
     return figure
 
 
 def phase_lag(results: Mapping[str, Results], *, name: str, step: float) -> Figure:
     """Draw jerk and jounce by backward differences beside the simulation and the explicit solution (section 7)."""
-    title = f"{SIMULATIONS[name].title}: lag of backward differences, h = {step:g} s (section 7 of Sommer 2024)"
-    figure, axes = _figure(2, 1, (6.0, 5.0), title, sharex=True)
+    title = (
+        f"{cases.VALIDATION_CASES[name].title}: lag of backward differences, h = {step:g} s (section 7 of Sommer 2024)"
+    )
+    figure, axes = panels(2, 1, (6.0, 5.0), title, sharex=True)
     chosen = [lag for lag in results[name].lags if lag.step == step]
     for panel, lag in zip(axes[:, 0], chosen, strict=True):
         panel.plot(lag.time, lag.explicit, color=GREY, linewidth=1.0, label="explicit solution")
@@ -127,13 +120,9 @@ def phase_lag(results: Mapping[str, Results], *, name: str, step: float) -> Figu
         )
     axes[-1, 0].set_xlabel("time / s")
     axes[-1, 0].set_xlim(0.0, chosen[0].time[-1])
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    legend_below(figure, axes[0, 0], 3)
     figure.align_ylabels()
     return figure
-
-
-def _drawing(_: Mapping[str, Results], *, number: int) -> Figure:
-    return drawings.FIGURES[number]()
 
 
 def _decades(axis: Any, every: int) -> None:
@@ -143,20 +132,9 @@ def _decades(axis: Any, every: int) -> None:
     axis.set_minor_formatter(NullFormatter())
 
 
-_CRANKS = ("inverted_slider_crank_slide", "inverted_slider_crank_distance")
-FIGURES = {  # by the name of their files
-    "figure_01": partial(_drawing, number=1),
-    "figure_02": partial(time_history, name="four_bar", quantity="jerk", number=2),
-    "figure_03": partial(time_history, name="four_bar", quantity="jounce", number=3),
-    "figure_04": partial(tolerance_sweep, names=("four_bar",), number=4),
-    "figure_05": partial(step_sweep, names=("four_bar",), number=5),
-    "figure_06": partial(tolerance_sweep, names=_CRANKS, number=6),
-    "figure_07": partial(step_sweep, names=_CRANKS, number=7),
-    "figure_08": partial(_drawing, number=8),
-    "figure_09": partial(_drawing, number=9),
-    "figure_10": partial(tolerance_sweep, names=("rsur", "rssr"), number=10),
-    "figure_11": partial(step_sweep, names=("rsur", "rssr"), number=11),
-    "figure_12": partial(tolerance_sweep, names=("rspu_distance", "rspu_slide"), number=12),
-    "figure_13": partial(step_sweep, names=("rspu_distance", "rspu_slide"), number=13),
-    "phase_lag": partial(phase_lag, name="four_bar", step=0.05),
-}
+FIGURES: dict[str, Any] = dict(drawings.FIGURES)  # by the names of their files
+for _number, _quantity in cases.HISTORIES.items():
+    FIGURES[f"figure_{_number:02d}"] = partial(time_history, name="four_bar", quantity=_quantity, number=_number)
+for _draw, _sweeps in ((tolerance_sweep, cases.TOLERANCE_SWEEPS), (step_sweep, cases.STEP_SWEEPS)):
+    FIGURES |= {f"figure_{number:02d}": partial(_draw, names=names, number=number) for number, names in _sweeps.items()}
+FIGURES = dict(sorted(FIGURES.items())) | {"phase_lag": partial(phase_lag, name="four_bar", step=0.05)}

@@ -12,6 +12,7 @@ from typing import Any
 
 import jax
 import numpy as np
+from jaxtyping import Float
 
 from jounce import jet
 from jounce.jet import Jet
@@ -19,15 +20,16 @@ from jounce.jet import Jet
 THETA_START, THETA_DELTA = math.radians(30), math.radians(60)
 LANES = 1024  # instants evaluated together; one width, so that each form compiles once
 
+Number = Jet | jax.Array | float
 Form = Callable[[Jet, Mapping[str, Any]], Jet]
 
 
-def swing(time: Jet, period: Any) -> Jet:
+def swing(time: Jet, period: Number) -> Jet:
     """Return the sine of the phase of a cycle, the time-dependent part of all driver motions (Sommer 2024, 56)."""
     return jet.sin(2 * math.pi * time / period)
 
 
-def balanced_angle(x: Any, y: Any, z: Any, side: int) -> Any:
+def balanced_angle(x: Number, y: Number, z: Number, side: int) -> Jet:
     """Return the angle phi for which ``x cos(phi) + y sin(phi) = z``.
 
     Of the two solutions, `side` +1 is the one ahead of the direction (x, y), -1 the one behind it.
@@ -36,7 +38,7 @@ def balanced_angle(x: Any, y: Any, z: Any, side: int) -> Any:
     return jet.atan2(y * z + x * root, x * z - y * root)
 
 
-def opening_angle(distance: Any, nearest: Any, farthest: Any) -> Any:
+def opening_angle(distance: Jet, nearest: Number, farthest: Number) -> Jet:
     """Return the angle between 0 and pi at which two points are `distance` apart.
 
     One point turns about a fixed axis; the other is fixed. The angle is counted from the place where they are
@@ -91,7 +93,9 @@ def rspu(time: Jet, p: Mapping[str, Any]) -> Jet:
     return opening_angle(distance, nearest, farthest)
 
 
-def evaluate(form: Form, time: Any, parameters: Mapping[str, float], order: int = 4) -> np.ndarray:
+def evaluate(
+    form: Form, time: Float[np.ndarray, " time"], parameters: Mapping[str, float], order: int = 4
+) -> Float[np.ndarray, "time {order}+1"]:
     """Return an output angle and its time derivatives from its explicit solution.
 
     Parameters
@@ -113,11 +117,10 @@ def evaluate(form: Form, time: Any, parameters: Mapping[str, float], order: int 
     Examples
     --------
     >>> sides = {"EF": 0.07, "FG": 0.02, "d_start": 0.07, "d_delta": 0.01, "tau": 2.0}
-    >>> psi = evaluate(inverted_slider_crank, [0.0, 0.5], sides, order=1)
+    >>> psi = evaluate(inverted_slider_crank, np.array([0.0, 0.5]), sides, order=1)
     >>> psi.shape, f"{np.cos(psi[0, 0]):.12f}"
     ((2, 2), '-0.142857142857')
     """
-    time = np.asarray(time, float)
     whole = np.pad(time, (0, -len(time) % LANES), mode="edge").reshape(-1, LANES)
     values = {name: float(value) for name, value in parameters.items()}
     parts = [np.asarray(_derivatives(form, part, values, order)) for part in whole]

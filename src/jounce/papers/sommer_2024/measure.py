@@ -1,20 +1,22 @@
 """All that is measured of one simulation: its errors at nominal settings and in sweeps, and the lag of differences."""
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
-from jounce.papers.sommer_2024.lag import STEPS as LAG_STEPS, Lag, lags
-from jounce.papers.sommer_2024.simulations import (
+from jounce.papers.sommer_2024.cases import (
     STEPS,
     TOLERANCES,
     Cycle,
-    Simulation,
+    ValidationCase,
     nominal_cycle,
     step_errors,
     tolerance_error,
 )
+from jounce.papers.sommer_2024.phase_lag import STEPS as LAG_STEPS, Lag, lags
 
 RUNS = 1 + len(TOLERANCES) + len(STEPS) + len(LAG_STEPS)  # of each simulation
 
@@ -37,35 +39,33 @@ class Results:
     """
 
     cycle: Cycle
-    by_tolerance: np.ndarray
-    by_step: dict[str, np.ndarray]
+    by_tolerance: Float[np.ndarray, "tolerances 4"]
+    by_step: dict[str, Float[np.ndarray, "steps 2"]]
     lags: list[Lag]
 
 
-def measure(simulation: Simulation, advanced: Callable[[], None] = lambda: None) -> Results:
+def measure(case: ValidationCase, advanced: Callable[[], None] = lambda: None) -> Results:
     """Run a simulation at nominal settings, over all tolerances, over all time steps, and for the lag of differences.
 
     Parameters
     ----------
-    simulation : Simulation
+    case : ValidationCase
         What to run.
     advanced : callable, optional
         Called after each of the `RUNS` runs.
     """
-    mechanism = simulation.load()
-    cycle = nominal_cycle(simulation, mechanism)
+    mechanism = case.load()
+
+    def each(run: Callable[..., Any], settings: Iterable[float]) -> list[Any]:
+        found = []
+        for value in settings:
+            found.append(run(case, mechanism, value))
+            advanced()
+        return found
+
+    cycle = nominal_cycle(case, mechanism)
     advanced()
-    by_tolerance = []
-    for tolerance in TOLERANCES:
-        by_tolerance.append(tolerance_error(simulation, mechanism, tolerance))
-        advanced()
-    by_step = []
-    for step in STEPS:
-        by_step.append(step_errors(simulation, mechanism, step))
-        advanced()
+    by_tolerance, by_step = each(tolerance_error, TOLERANCES), each(step_errors, STEPS)
     methods = {name: np.stack([errors[name] for errors in by_step]) for name in by_step[0]}
-    late: list[Lag] = []
-    for step in LAG_STEPS:
-        late += lags(simulation, mechanism, step)
-        advanced()
-    return Results(cycle, np.stack(by_tolerance), methods, late)
+    late = each(lags, LAG_STEPS)
+    return Results(cycle, np.stack(by_tolerance), methods, [lag for pair in late for lag in pair])

@@ -1,16 +1,16 @@
 """All figures and errors of the paper, written into one directory."""
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
-from jounce.papers.files import FORMATS, rendered, writable, write
+from jounce.papers.output import Progress, counter, csv_table, writable, write_figures, write_texts
+from jounce.papers.sommer_2024.cases import QUANTITIES, STEPS, TOLERANCES, VALIDATION_CASES, Cycle
 from jounce.papers.sommer_2024.comparison import comparison
 from jounce.papers.sommer_2024.measure import RUNS, Results, measure
-from jounce.papers.sommer_2024.simulations import QUANTITIES, SIMULATIONS, STEPS, TOLERANCES, Cycle
 
 
-def reproduce(out_directory: str | os.PathLike[str], progress: Callable[[int, int], None] | None = None) -> list[Path]:
+def reproduce(out_directory: str | os.PathLike[str], progress: Progress | None = None) -> list[Path]:
     """Run the seven simulations of Sommer 2024 and write figures 1-13, one of the phase lag of section 7,
     the errors as CSV, and `comparison.md`.
 
@@ -40,54 +40,47 @@ def reproduce(out_directory: str | os.PathLike[str], progress: Callable[[int, in
     directory = writable(Path(out_directory))
     from jounce.papers.sommer_2024 import figures  # imports matplotlib
 
-    total = RUNS * len(SIMULATIONS) + len(figures.FIGURES)
-    done = 0
-
-    def advanced() -> None:
-        nonlocal done
-        done += 1
-        if progress is not None:
-            progress(done, total)
-
-    results = {name: measure(simulation, advanced) for name, simulation in SIMULATIONS.items()}
-    cycles = {name: result.cycle for name, result in results.items()}
-    paths = [
-        write(directory / "comparison.md", comparison(results).encode("ascii")),
-        write(directory / "errors.csv", errors_csv(cycles).encode("ascii")),
-        write(directory / "errors_by_tolerance.csv", tolerances_csv(results).encode("ascii")),
-        write(directory / "errors_by_step.csv", steps_csv(results).encode("ascii")),
-    ]
-    for name, draw in figures.FIGURES.items():
-        with figures.style():
-            figure = draw(results)
-            paths += [write(directory / f"{name}.{kind}", rendered(figure, kind)) for kind in FORMATS]
+    advanced = counter(RUNS * len(VALIDATION_CASES) + len(figures.FIGURES), progress)
+    results = {name: measure(case, advanced) for name, case in VALIDATION_CASES.items()}
+    texts = {
+        "comparison.md": comparison(results),
+        "errors.csv": errors_csv({name: result.cycle for name, result in results.items()}),
+        "errors_by_tolerance.csv": tolerances_csv(results),
+        "errors_by_step.csv": steps_csv(results),
+    }
+    paths = write_texts(directory, texts)
+    for written in write_figures(directory, figures.FIGURES, results):
+        paths += written
         advanced()
     return paths
 
 
 def errors_csv(cycles: Mapping[str, Cycle]) -> str:
     """Return the errors at nominal settings as CSV, one row per simulation and quantity, 17 significant digits."""
-    rows = ["simulation,quantity,rmse,normalised_rmse"]
-    for name, cycle in cycles.items():
-        columns = zip(QUANTITIES, cycle.rmse, cycle.normalised_rmse, strict=True)
-        rows += [f"{name},{quantity},{error:.16e},{normalised:.16e}" for quantity, error, normalised in columns]
-    return "\n".join(rows) + "\n"
+    rows = (
+        (name, *errors)
+        for name, cycle in cycles.items()
+        for errors in zip(QUANTITIES, cycle.rmse, cycle.normalised_rmse, strict=True)
+    )
+    return csv_table(("simulation", "quantity", "rmse", "normalised_rmse"), rows)
 
 
 def tolerances_csv(results: Mapping[str, Results]) -> str:
     """Return the normalised errors at each assembly tolerance as CSV: what figures 4, 6, 10 and 12 draw."""
-    rows = [",".join(("simulation", "tolerance", *QUANTITIES))]
-    for name, result in results.items():
-        for tolerance, errors in zip(TOLERANCES, result.by_tolerance, strict=True):
-            rows.append(",".join([name, f"{tolerance:g}", *(f"{error:.16e}" for error in errors)]))
-    return "\n".join(rows) + "\n"
+    rows = (
+        (name, f"{tolerance:g}", *errors)
+        for name, result in results.items()
+        for tolerance, errors in zip(TOLERANCES, result.by_tolerance, strict=True)
+    )
+    return csv_table(("simulation", "tolerance", *QUANTITIES), rows)
 
 
 def steps_csv(results: Mapping[str, Results]) -> str:
     """Return the normalised errors of jerk and jounce at each time step as CSV: what figures 5, 7, 11 and 13 draw."""
-    rows = ["simulation,step,method,jerk,jounce"]
-    for name, result in results.items():
-        for method, table in result.by_step.items():
-            for step, errors in zip(STEPS, table, strict=True):
-                rows.append(",".join([name, f"{step:g}", method, *(f"{error:.16e}" for error in errors)]))
-    return "\n".join(rows) + "\n"
+    rows = (
+        (name, f"{step:g}", method, *errors)
+        for name, result in results.items()
+        for method, table in result.by_step.items()
+        for step, errors in zip(STEPS, table, strict=True)
+    )
+    return csv_table(("simulation", "step", "method", "jerk", "jounce"), rows)

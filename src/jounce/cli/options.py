@@ -1,0 +1,199 @@
+"""What commands have in common: how files are read, where results go, and which option or file an error is about."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from cyclopts import Parameter
+
+from jounce.cli.file_kinds import expecting
+from jounce.errors import JounceError, OutputError, RobotError
+from jounce.mechanism import Mechanism
+from jounce.reporting.terminal import say, say_json
+from jounce.robot import Robot
+from jounce.trajectory import JointTrajectory
+
+Overwrite = Annotated[bool, Parameter(alias="--force")]
+"""The option of commands that replace no file unasked; --force is what it was called first."""
+
+AMONG_THE_OTHERS = Parameter(name="*")
+"""The fields of a class are options of the command, beside those that it names itself."""
+
+
+class WritingError(Exception):
+    """A result that was computed could not be written."""
+
+
+@AMONG_THE_OTHERS
+@dataclass(frozen=True, kw_only=True)
+class MechanismReading:
+    """How a mechanism file is read.
+
+    Parameters
+    ----------
+    set_
+        NAME=VALUE of a parameter, with a unit; repeatable.
+    import_
+        Python file with your own joints and forces; repeatable.
+    allow
+        Folder whose files it may name, besides its own; repeatable.
+    """
+
+    set_: list[str] | None = None
+    import_: list[Path] | None = None
+    allow: list[Path] | None = None
+
+    def mechanism(self, file: Path) -> Mechanism:
+        """Return the mechanism of a file, with parameters changed, after the user's own classes were imported."""
+        from jounce.io import load
+
+        import_files(self.import_)
+        with expecting(file, "mechanism"):
+            mechanism = load(file, allow=allowed(self.allow))
+        if not self.set_:
+            return mechanism
+        from jounce.io.mechanisms.overrides import override
+
+        return override(mechanism, self.set_)
+
+
+@AMONG_THE_OTHERS
+@dataclass(frozen=True, kw_only=True)
+class RobotReading:
+    """How a robot and its trajectory are read.
+
+    Parameters
+    ----------
+    payload
+        LINK=MASS with a unit, held in its origin; repeatable.
+    degree
+        Of the splines through samples, odd from 3 to 11.
+    strict
+        Refuse a robot whose links are as those of no real one.
+    allow
+        Folder whose files it may name, besides its own; repeatable.
+    """
+
+    payload: list[str] | None = None
+    degree: int = 5
+    strict: bool = False
+    allow: list[Path] | None = None
+
+    def robot(self, file: Path) -> Robot:
+        """Return the robot of a file, with what it holds."""
+        from jounce.io import load_robot
+        from jounce.io.robots.payloads import with_payloads
+
+        with expecting(file, "robot"):
+            robot = load_robot(file, strict=self.strict, allow=allowed(self.allow))
+        return with_payloads(robot, self.payload or ())
+
+    def trajectory(self, file: Path) -> JointTrajectory:
+        """Return the trajectory of a file."""
+        from jounce.io import load_trajectory
+
+        with expecting(file, "trajectory"):
+            return load_trajectory(file, self.degree, allowed(self.allow))
+
+
+@AMONG_THE_OTHERS
+@dataclass(frozen=True, kw_only=True)
+class TableOutput:
+    """Where the values of a result go.
+
+    Parameters
+    ----------
+    out
+        Write all values to this .csv or .nc (NetCDF) file.
+    overwrite
+        Let --out replace a file that is read here.
+    json
+        Print the result as JSON.
+    """
+
+    out: Path | None = None
+    overwrite: bool = False
+    json: bool = False
+
+    def check(self) -> None:
+        """Raise OutputError unless the file can be written."""
+        from jounce.io import check_writable
+
+        if self.out is not None:
+            check_writable(self.out, overwrite=self.overwrite)
+
+    def write(self, dataset: Callable[[], Any]) -> None:
+        """Write the values, an xarray.Dataset, if they are wanted."""
+        from jounce import io
+
+        if (out := self.out) is not None:
+            written(lambda: io.write(dataset(), out, overwrite=self.overwrite))
+
+    def tell(self, command: str, result: Callable[[], Mapping[str, Any]]) -> None:
+        """Print the result as JSON, or where it was written."""
+        tell(command, result, self.out, json=self.json)
+
+
+PLAIN_MECHANISM, PLAIN_ROBOT, NO_TABLE = MechanismReading(), RobotReading(), TableOutput()
+
+
+def tell(command: str, result: Callable[[], Mapping[str, Any]], out: Path | None, *, json: bool) -> None:
+    """Print the result of a command as JSON, or where it was written."""
+    if json:
+        say_json(command, result())
+    elif out is not None:
+        say(f"\nWritten to {out}")
+
+
+def import_files(paths: Sequence[Path] | None) -> None:
+    """Run Python files with the user's own classes."""
+    if paths:
+        from jounce.io.mechanisms.user_classes import import_file
+
+        for path in paths:
+            import_file(path)
+
+
+def allowed(folders: Sequence[Path] | None) -> Sequence[Path]:
+    """Return the folders that named files may be in, each of which must exist."""
+    from jounce.io.files.reading import check_allowed
+
+    try:
+        check_allowed(folders or ())
+    except JounceError as error:
+        error.name = "--allow"
+        raise
+    return folders or ()
+
+
+def spare_inputs(out: Path | None, *, overwrite: bool) -> None:
+    """Raise OutputError where a result would replace what has been read; meant to be asked once all is read."""
+    if out is not None:
+        from jounce.io.files.writing import check_target
+
+        check_target(out, overwrite=overwrite)
+
+
+def written(write: Callable[[], object]) -> None:
+    """Call a function that writes a result; what fails then is no bad input."""
+    try:
+        write()
+    except OutputError as error:
+        raise WritingError(error) from None
+
+
+@contextmanager
+def errors_about(file: Path, robot: Path | None = None) -> Iterator[None]:
+    """Give errors the option or the file that they are about."""
+    try:
+        yield
+    except JounceError as error:
+        if error.name in ("order", "tolerance", "longest_step", "port"):
+            error.name = f"--{error.name.replace('_', '-')}"
+            raise
+        about_robot = robot is not None and isinstance(error, RobotError)
+        raise error.located(path=robot if about_robot else file) from None

@@ -1,0 +1,72 @@
+"""The command that shows a mechanism or a robot in the browser."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from jounce.cli.arguments import check_ending
+from jounce.cli.file_kinds import expecting
+from jounce.cli.options import PLAIN_MECHANISM, MechanismReading, allowed, errors_about
+from jounce.errors import JounceError
+from jounce.interrupts import raising
+from jounce.io.files import DATA_FILES, ROBOT_FILES
+from jounce.reporting.terminal import say
+
+
+def view(
+    file: Path,
+    trajectory: Path | None = None,
+    /,
+    *,
+    port: int = 0,
+    no_open: bool = False,
+    order: int = 4,
+    reading: MechanismReading = PLAIN_MECHANISM,
+) -> int:
+    r"""Show a mechanism or a robot in the browser, moving.
+
+    With arrows, paths, plots, forces, and a slider for each parameter.
+    The page is served on this machine only, and needs no network. Ctrl-C
+    ends it.
+
+    Parameters
+    ----------
+    file
+        Mechanism file, or robot file: .urdf or .xml.
+    trajectory
+        Of a robot (.csv, .yaml, .toml, .json); it swings without.
+    port
+        Of this machine; 0 takes one that is free.
+    no_open
+        Only print the address; do not open the browser.
+    order
+        Highest derivative of arrows and plots, 0 to 30.
+
+    Examples
+    --------
+      jounce view examples/four_bar.yaml
+      jounce view examples/press.yaml --order 6 --set "stroke=80 mm"
+      jounce view examples/robots/panda.urdf \
+        examples/trajectories/panda_wave.yaml --port 8080 --no-open
+    """
+    from jounce.kinematics.solve import checked_order
+    from jounce.viewer import view as show
+    from jounce.viewer.local_server import check_installed
+
+    check_installed()
+    subject: object = file
+    with errors_about(file):
+        checked_order(order)
+        if file.suffix.lower() in DATA_FILES:
+            subject = reading.mechanism(file)
+        elif reading.set_ or reading.import_:
+            option = "--set" if reading.set_ else "--import"
+            raise JounceError("is for mechanism files; a robot has no parameters", name=option)
+        with expecting(file, "mechanism", "robot"):
+            check_ending(file, (*DATA_FILES, *ROBOT_FILES))
+            folders = allowed(reading.allow)
+            page = show(subject, trajectory, port=port, order=order, open_page=not no_open, allow=folders)
+    say(f"{page.page.recording.title or file.name}: {page.url} (Ctrl-C ends)")
+    with raising():
+        page.wait()
+    return 0

@@ -1,0 +1,89 @@
+"""The masses of all bodies of a mechanism as arrays, and the gravity that it feels."""
+
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
+from jaxtyping import Float
+
+from jounce.errors import MechanismError
+from jounce.mechanism import Mechanism
+from jounce.mechanism.masses import body_mass
+from jounce.mechanism.resolve import resolve
+from jounce.mechanism.system import POSITION_COMPONENTS
+from jounce.shapes import Numbers
+
+Gravity = Float[Numbers, "component 1 #batch"]
+"""Acceleration of free fall, m/s^2."""
+
+
+class Masses(NamedTuple):
+    """Masses, kg, centres of mass, m, and second moments about them, kg m^2, of all bodies, the ground first.
+
+    The second moments are the integrals of rho rho^T dm along the axes of each body.
+    """
+
+    mass: Float[Numbers, "body #batch"]
+    center: Float[Numbers, "component body #batch"]
+    moments: Float[Numbers, "component component body #batch"]
+
+
+def masses_of(mechanism: Mechanism) -> Masses:
+    """Return the masses of all bodies, zero where none are given; parameters may be traced by JAX.
+
+    Raises
+    ------
+    MechanismError
+        If a body has an inertia without a mass, or a value is not valid.
+    """
+    size = POSITION_COMPONENTS[mechanism.space]
+    columns: list[tuple[Any, ...]] = [(0.0, np.zeros(size), np.zeros((size, size)))]
+    for name, body in mechanism.bodies.items():
+        if body.mass is None and body.inertia is not None:
+            raise MechanismError("an inertia needs a mass beside it", name=f"bodies.{name}.mass")
+        mass, center, inertia = body_mass(name, body, mechanism.parameter_values, size, solid=False)
+        if size == 2:  # the second moments of a plane body about its axes are not known apart; only their sum counts
+            moments = np.eye(2) * 0.5 * inertia
+        else:
+            tensor = inertia * np.eye(3) if np.ndim(inertia) < 2 else inertia
+            moments = second_moments(tensor)
+        columns.append((mass, center, moments))
+    traced = any(isinstance(value, Tracer) for column in columns for value in column)
+    library = jnp if traced else np
+    return Masses(
+        *(library.stack([library.asarray(x) for x in part], -1)[..., None] for part in zip(*columns, strict=True))
+    )
+
+
+def second_moments(tensor: Float[Numbers, "3 3 *batch"]) -> Float[Numbers, "3 3 *batch"]:
+    """Return the second moments about the centre of mass from the inertia tensor: Negrean 2025, equation 108."""
+    unit = np.eye(3).reshape(3, 3, *[1] * (tensor.ndim - 2))
+    return (tensor[0, 0] + tensor[1, 1] + tensor[2, 2])[None, None] / 2 * unit - tensor
+
+
+def required_masses(mechanism: Mechanism, what: str = "energies") -> Masses:
+    """Return the masses of all bodies.
+
+    Raises
+    ------
+    MechanismError
+        If no body has a mass, or a body has an inertia without a mass.
+    """
+    found = masses_of(mechanism)
+    if not np.any(found.mass):
+        raise MechanismError(f"no body has a mass; {what} need some", name="bodies")
+    return found
+
+
+def check_loads(mechanism: Mechanism, name: str = "bodies") -> None:
+    """Raise MechanismError unless a body has a mass or a force is applied."""
+    if not mechanism.forces and all(body.mass is None for body in mechanism.bodies.values()):
+        raise MechanismError("forces need masses, and no body has one; give the bodies mass and inertia", name=name)
+
+
+def gravity_of(mechanism: Mechanism) -> Gravity:
+    """Return the acceleration of free fall in a mechanism, m/s^2; zero unless given."""
+    size = POSITION_COMPONENTS[mechanism.space]
+    given = [0.0] * size if mechanism.gravity is None else mechanism.gravity
+    return resolve(given, mechanism.parameter_values)[:, None, None]

@@ -1,0 +1,85 @@
+"""Values along a motion: computed in chunks of instants, turned into plain derivatives, labelled."""
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, TypeVar
+
+import jax
+import numpy as np
+from jaxtyping import Float, Int
+
+from jounce.jet import Jet
+from jounce.jet.derivatives import plain_derivatives
+from jounce.kinematics import Motion, Status
+from jounce.rigid.pose import Pose
+from jounce.shapes import Numbers
+
+Coordinates = Mapping[str, Float[Numbers, "_ ... _"]]
+"""Taylor coefficients of the coordinates of poses, by name: as `Motion.poses` has them."""
+
+Found = TypeVar("Found")
+
+WIDTHS = 64, 512  # instants; a short motion compiles for one width only, and fills less of it
+
+
+def in_chunks(
+    function: Callable[[Int[np.ndarray, " chunk"]], Found], count: int, widths: tuple[int, ...] = WIDTHS, axis: int = -1
+) -> Found:
+    """Return what a function of indices of instants gives, for all of them; few lengths of chunks are compiled.
+
+    Parameters
+    ----------
+    function : callable
+        Maps indices to a pytree of arrays with the instants along the axis.
+    count : int
+        How many instants there are, at least one.
+    widths : tuple of int
+        Lengths of chunks, increasing: the first that holds all instants, or else the last. The last chunk is filled up.
+    axis : int, default -1
+        Of the instants in the results.
+    """
+    width = next((width for width in widths if count <= width), widths[-1])
+    parts = []
+    for first in range(0, count, width):
+        found = function(np.minimum(np.arange(first, first + width), count - 1))
+        parts.append(jax.tree.map(np.asarray, found))
+    return jax.tree.map(lambda *xs: np.split(np.concatenate(xs, axis), [count], axis)[0], *parts)
+
+
+def pose_of(coordinates: Coordinates, pose_type: type[Pose], order: int | None = None) -> Any:
+    """Return the pose of bodies; a place alone is one at rest, where an order is given."""
+    pose = pose_type.from_coordinates({name: Jet(tuple(c)) for name, c in coordinates.items()})
+    if order is None:
+        return pose
+    if pose.order < order:
+        return jax.tree.map(
+            lambda j: Jet.constant(j.coefficients[0], order), pose, is_leaf=lambda x: isinstance(x, Jet)
+        )
+    return jax.lax.optimization_barrier(pose)  # or XLA computes it again in everything that uses it
+
+
+def cut(coordinates: Coordinates, order: int) -> dict[str, Any]:
+    """Return coordinates to an order of the pose; angular velocities have one coefficient less, and none at order 0."""
+    counts = {name: order + 1 - (name == "angular_velocity") for name in coordinates}
+    return {name: values[: counts[name]] for name, values in coordinates.items() if counts[name]}
+
+
+def derivatives_along(motion: Motion, coefficients: Float[Numbers, "order *shape time"]) -> np.ndarray:
+    """Return plain derivatives, the time first, from Taylor coefficients; NaN at instants that were not solved."""
+    values = np.moveaxis(np.asarray(plain_derivatives(np.asarray(coefficients))), -1, 0)
+    values[motion.status != Status.OK] = np.nan
+    return values
+
+
+def labelled(
+    motion: Motion,
+    coefficients: Float[Numbers, "order *shape time"],
+    units: str | None = None,
+    **axes: Iterable[str],
+) -> Any:
+    """Return plain derivatives as an xarray.DataArray of dimensions time, derivative, and those that are named."""
+    import xarray
+
+    values = derivatives_along(motion, coefficients)
+    coordinates = {"time": motion.time, "derivative": np.arange(values.shape[1])}
+    coordinates |= {axis: list(labels) for axis, labels in axes.items()}
+    return xarray.DataArray(values, coordinates, tuple(coordinates), attrs={"units": units} if units else None)

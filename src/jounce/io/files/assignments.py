@@ -1,0 +1,44 @@
+"""Values given from outside a file, as ``NAME=VALUE``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from jounce.errors import JounceError
+
+
+def assignments(
+    texts: Iterable[str], option: str, form: str, error_type: type[JounceError] = JounceError
+) -> dict[str, str]:
+    """Return values by name, as text.
+
+    Parameters
+    ----------
+    texts : iterable of str
+        ``NAME=VALUE``.
+    option : str
+        What they are given by, for messages.
+    form : str
+        How they are given, for messages.
+    error_type : type
+        Of the exceptions.
+
+    Raises
+    ------
+    JounceError
+        Of the type given: a name or a value is missing, or a name is given twice: which is meant, nobody can know.
+
+    Examples
+    --------
+    >>> assignments(["BC=15 cm"], "--set", "a parameter is set by NAME=VALUE")
+    {'BC': '15 cm'}
+    """
+    found: dict[str, str] = {}
+    for text in texts:
+        name, _, value = (part.strip() for part in text.partition("="))
+        if not name or not value:
+            raise error_type(form, name=option, value=text)
+        if name in found:
+            raise error_type(f"is given more than once, as {found[name]} and as {value}", name=f"{option} {name}")
+        found[name] = value
+    return found

@@ -1,0 +1,201 @@
+"""Plain data from a text file, with the line of every entry remembered for the error messages."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from jounce.errors import UNSET, ExpressionError, JounceError, MechanismFileError, did_you_mean
+from jounce.io.files.reading import named_file
+from jounce.trajectory.dimensions import Dimension
+from jounce.trajectory.units import Value, parse_value
+
+MAX_VALUES = 200_000
+MAX_DEPTH = 50
+TOO_DEEP = f"nested more than {MAX_DEPTH} deep; 6 are enough for any file"
+
+Location = tuple[str | int, ...]
+"""Where an entry is: keys and indices from the top, such as ``("joints", "BC", "points", 1)``."""
+
+
+def dotted(location: Location) -> str:
+    """Word a location for a reader.
+
+    Examples
+    --------
+    >>> dotted(("joints", "BC", "points", 1, 0))
+    'joints.BC.points[1][0]'
+    """
+    text = ""
+    for step in location:
+        word = f"[{step}]" if isinstance(step, int) else ascii(step[:100])[1:-1]
+        text += f".{word}" if text and isinstance(step, str) else word
+    return text
+
+
+@dataclass
+class Source:
+    """Plain data from a file, and the line of every entry; errors about them name the file, the line and the entry."""
+
+    path: str
+    data: Any
+    lines: dict[Location, int] = field(default_factory=dict)
+    allow: tuple[str, ...] = ()
+    error_type: type[JounceError] = MechanismFileError
+
+    def line(self, location: Location) -> int | None:
+        """Return the line of an entry, or of the nearest entry around it whose line is known."""
+        for length in range(len(location), -1, -1):
+            if location[:length] in self.lines:
+                return self.lines[location[:length]]
+        return None
+
+    def error(self, message: str, location: Location = (), **value: Any) -> JounceError:
+        """Return an error that names the file, the line and the dotted name of an entry."""
+        name = dotted(location) or None
+        return self.error_type(message, path=self.path, line=self.line(location), name=name, **value)
+
+    def at(self, location: Location) -> Any:
+        """Return what stands at a location, None where nothing does."""
+        found = self.data
+        for step in location:
+            found = found.get(step) if isinstance(found, dict) else None
+        return found
+
+    def mapping(self, location: Location = (), keys: Iterable[str] | None = None) -> dict[str, Any]:
+        """Return the mapping at a location, which is not empty and has, where they are given, known keys only."""
+        found = self.at(location)
+        if not isinstance(found, dict) or not found:
+            raise self.error("must be a mapping with at least one entry", location, value=found)
+        for key in found:
+            if keys is not None and key not in keys:
+                raise self.error(f"unknown key; {did_you_mean(key, keys)}", (*location, key))
+        return found
+
+    def value(
+        self,
+        location: Location,
+        raw: Any,
+        kind: str = "any",
+        names: Iterable[str] = (),
+        dimensions: Mapping[str, Dimension] | None = None,
+    ) -> Value:
+        """Return a value in SI units with its dimension, as `parse_value` reads it."""
+        try:
+            return parse_value(raw, kind, names, dimensions)
+        except JounceError as error:
+            raise self.error(error.message, location, value=UNSET if shows_value(error) else raw) from None
+
+    def number(self, location: Location, raw: Any, kind: str = "any") -> float:
+        """Return a number in SI units; expressions without names are worked out."""
+        value = self.value(location, raw, kind).value
+        assert isinstance(value, float)
+        return value
+
+    def named_file(self, name: str, location: Location) -> str:
+        """Return the path of a file that an entry names, below the folder of this one or one that is allowed."""
+        try:
+            return named_file(name, self.path, self.allow)
+        except MechanismFileError as error:
+            raise self.error(error.message, location, value=name) from None
+
+    def read_named(self, name: str, location: Location, read: Callable[[str], Any]) -> Any:
+        """Return what is read from a file that an entry names; errors tell its path as the entry has it."""
+        path = self.named_file(name, location)
+        try:
+            return read(path)
+        except JounceError as error:
+            if error.path == path:
+                error.path = Path(self.path).parent / name
+            raise self.error(str(error), location) from None
+
+
+def shows_value(error: JounceError) -> bool:
+    """Tell whether the message of an error holds the value itself: that of an expression with the place within it."""
+    return isinstance(error, ExpressionError) and error.column is not None
+
+
+class Builder:
+    """Builds nested data from a stream of small steps, without recursion, within the limits.
+
+    ``open`` a mapping or a list, ``key`` inside a mapping, ``value`` for a leaf, ``close``.
+    """
+
+    def __init__(self, path: str) -> None:
+        self.source = Source(path, None)
+        self._stack: list[tuple[dict[str, Any] | list[Any], Location]] = []
+        self._key: str | None = None
+        self._count = 0
+
+    @property
+    def wants_key(self) -> bool:
+        """Whether the next step must be a key of a mapping, or its close."""
+        return bool(self._stack) and isinstance(self._stack[-1][0], dict) and self._key is None
+
+    def fail(self, message: str, line: int) -> MechanismFileError:
+        """Return an error at a line, named after the entry being built."""
+        return MechanismFileError(message, path=self.source.path, line=line, name=dotted(self._here()) or None)
+
+    def _here(self) -> Location:
+        if not self._stack:
+            return ()
+        container, location = self._stack[-1]
+        if isinstance(container, list):
+            return (*location, len(container))
+        return location if self._key is None else (*location, self._key)
+
+    def key(self, name: Any, line: int) -> None:
+        """Start an entry of the mapping that is open."""
+        self._check_text(name, line)
+        container, location = self._stack[-1]
+        if not isinstance(name, str):
+            raise self.fail(f"a key must be a name, got {name!r}; put it in quotes to make it one", line)
+        if name in container:
+            first = self.source.lines[(*location, name)]
+            message = f"duplicate name, already given in line {first}"
+            raise MechanismFileError(message, path=self.source.path, line=line, name=dotted((*location, name)))
+        self._key = name
+        self.source.lines[(*location, name)] = line
+
+    def open(self, container: dict[str, Any] | list[Any], line: int) -> None:
+        """Start a mapping or a list."""
+        location = self._here()
+        if len(location) >= MAX_DEPTH:
+            raise MechanismFileError(TOO_DEEP, path=self.source.path, line=line)
+        self._put(container, line)
+        self._stack.append((container, location))
+
+    def close(self) -> None:
+        """End the mapping or list opened last."""
+        self._stack.pop()
+
+    def value(self, value: Any, line: int) -> None:
+        """Add a leaf."""
+        self._check_text(value, line)
+        self._put(value, line)
+
+    def _check_text(self, value: Any, line: int) -> None:
+        """Refuse halves of surrogate pairs, which escapes can write but no output can show."""
+        if isinstance(value, str) and not value.isascii():
+            try:
+                value.encode()
+            except UnicodeEncodeError:
+                raise self.fail("is not text in UTF-8", line) from None
+
+    def _put(self, value: Any, line: int) -> None:
+        self._count += 1
+        if self._count > MAX_VALUES:
+            raise MechanismFileError(f"more than {MAX_VALUES} values", path=self.source.path, line=line)
+        location = self._here()
+        self.source.lines.setdefault(location, line)
+        if not self._stack:
+            self.source.data = value
+            return
+        container = self._stack[-1][0]
+        if isinstance(container, list):
+            container.append(value)
+        else:
+            container[str(location[-1])] = value
+            self._key = None

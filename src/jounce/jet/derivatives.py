@@ -1,0 +1,20 @@
+"""Plain derivatives from Taylor coefficients and back, of whole arrays, the order first."""
+
+import math
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.shapes import Numbers
+
+
+def taylor_coefficients(derivatives: Float[Numbers, "order *shape"]) -> Float[Numbers, "order *shape"]:
+    """Return Taylor coefficients from plain derivatives along the leading axis."""
+    scale = np.array([1 / math.factorial(k) for k in range(derivatives.shape[0])])
+    return derivatives * scale.reshape(-1, *[1] * (derivatives.ndim - 1))
+
+
+def plain_derivatives(coefficients: Float[Numbers, "order *shape"]) -> Float[Numbers, "order *shape"]:
+    """Return plain derivatives from Taylor coefficients along the leading axis."""
+    scale = np.array([float(math.factorial(k)) for k in range(coefficients.shape[0])])
+    return coefficients * scale.reshape(-1, *[1] * (coefficients.ndim - 1))

@@ -1,0 +1,112 @@
+"""How the figures and tables of papers are written: whole files or none, into a directory that is tried first."""
+
+import io
+import tempfile
+from collections.abc import Callable, Iterable, Mapping
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from jounce.errors import OutputError
+from jounce.io.files.writing import replacing
+
+FORMATS = ("png", "svg")
+Progress = Callable[[int, int], None]
+"""Called with the number of steps done and their total."""
+
+
+def write(path: Path, content: bytes) -> Path:
+    """Write a whole file or nothing.
+
+    Raises
+    ------
+    OutputError
+        If it cannot be written.
+    """
+    with replacing(path) as beside:
+        beside.write_bytes(content)
+    return path
+
+
+def write_texts(directory: Path, texts: Mapping[str, str]) -> list[Path]:
+    """Write texts by the names of their files."""
+    return [write(directory / name, text.encode("ascii")) for name, text in texts.items()]
+
+
+def write_figures(directory: Path, figures: Mapping[str, Callable[[Any], Any]], results: Any) -> Iterable[list[Path]]:
+    """Draw the figures of some results, and give the files of each as it is done."""
+    from jounce.plot.style import style
+
+    for name, draw in figures.items():
+        with style():
+            figure = draw(results)
+            yield [write(directory / f"{name}.{kind}", rendered(figure, kind)) for kind in FORMATS]
+
+
+def writable(directory: Path) -> Path:
+    """Make the directory, and try a file in it.
+
+    Raises
+    ------
+    OutputError
+        If files cannot be written there.
+    """
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=directory):
+            pass
+    except (OSError, ValueError) as error:  # ValueError: a null character in the name
+        reason = getattr(error, "strerror", None) or error
+        raise OutputError(f"files cannot be written there: {reason}", path=directory) from None
+    return directory
+
+
+def counter(total: int, progress: Progress | None) -> Callable[[], None]:
+    """Return what is called after each of some steps to tell the progress."""
+    done = 0
+
+    def advanced() -> None:
+        nonlocal done
+        done += 1
+        if progress is not None:
+            progress(done, total)
+
+    return advanced
+
+
+def rendered(figure: Any, kind: str) -> bytes:
+    """Return a figure as the bytes of a PNG or SVG file."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format=kind, dpi=200, metadata={"Date": None} if kind == "svg" else None)
+    return buffer.getvalue()
+
+
+def csv_table(columns: Iterable[str], rows: Iterable[Iterable[Any]]) -> str:
+    r"""Return a table as CSV, numbers with 17 significant digits.
+
+    Examples
+    --------
+    >>> csv_table(["name", "error"], [["a", 0.5]])
+    'name,error\na,5.0000000000000000e-01\n'
+    """
+    cells = ([cell if isinstance(cell, str) else f"{cell:.16e}" for cell in row] for row in rows)
+    return "\n".join(",".join(line) for line in ([*columns], *cells)) + "\n"
+
+
+def markdown_table(columns: str, rows: Iterable[Iterable[str]]) -> str:
+    """Return a table in Markdown; its columns are divided by upright lines.
+
+    Examples
+    --------
+    >>> print(markdown_table("name | error", [["a", "0.5"]]))
+    | name | error |
+    |---|---|
+    | a | 0.5 |
+    """
+    lines = [f"| {columns} |", "|" + "---|" * (1 + columns.count("|"))]
+    return "\n".join([*lines, *(f"| {' | '.join(row)} |" for row in rows)])
+
+
+def page(package: str | None, name: str, **values: Any) -> str:
+    """Return a text of a package with values in the place of names in braces."""
+    return (files(str(package)) / name).read_text(encoding="ascii").format(**values)

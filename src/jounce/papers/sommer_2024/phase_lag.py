@@ -1,0 +1,91 @@
+"""The phase lag of backward differences, which the paper's section 7 holds against them, and what it must be.
+
+In real time only samples of the past are known. A backward difference of the acceleration over a step h is the mean of
+the jerk over that step, and a second one the mean of the jounce over two steps, weighted by a triangle. So of a part of
+the motion with angular frequency w they give back ``sinc(w h / 2) exp(-i w h / 2)`` and the square of that: all parts
+of the motion come late by h / 2 and by h, and smaller.
+"""
+
+import dataclasses
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.mechanism import Mechanism
+from jounce.papers.sommer_2024.cases import CYCLE, QUANTITIES, STEP, ValidationCase, normalised_rmse
+from jounce.papers.sommer_2024.differences import backward_difference
+
+STEPS = (STEP, 0.02, 0.05, 0.1)  # s, each a whole part of the cycle
+Series = Float[np.ndarray, " time"]
+FINE = 2000  # instants of the cycle from which the spectrum of the explicit solution is taken
+
+
+@dataclasses.dataclass(frozen=True)
+class Lag:
+    """Jerk or jounce by backward differences over one cycle, and by the simulation.
+
+    Attributes
+    ----------
+    quantity : str
+        ``"jerk"`` or ``"jounce"``.
+    step : float
+        Time step, s.
+    time : array of shape (time,)
+        One cycle, s.
+    explicit, simulated, difference : array of shape (time,)
+        The quantity by the explicit solution, by the simulation and by backward differences of its acceleration.
+    error : float
+        Normalised RMSE that backward differences of these steps must have, from the spectrum of the explicit solution.
+    """
+
+    quantity: str
+    step: float
+    time: Series
+    explicit: Series
+    simulated: Series
+    difference: Series
+    error: float
+
+    @property
+    def expected(self) -> float:
+        """How late the differences must be, s: h / 2 for the jerk, h for the jounce."""
+        return self.step * (0.5 if self.quantity == "jerk" else 1.0)
+
+    def late(self, found: Series) -> float:
+        """Return how late a quantity is, s, in the harmonic of the cycle in which the explicit one is largest."""
+        right = np.fft.rfft(self.explicit)
+        n = 1 + int(np.argmax(np.abs(right[1:])))
+        return -float(np.angle(np.fft.rfft(found)[n] / right[n])) * CYCLE / (2 * np.pi * n)
+
+    def measured_error(self, found: Series) -> float:
+        """Return the normalised RMSE of a quantity."""
+        return float(normalised_rmse(found[:, None], self.explicit[:, None])[0])
+
+
+def lags(case: ValidationCase, mechanism: Mechanism, step: float) -> list[Lag]:
+    """Return jerk and jounce of one cycle with the lag of their backward differences.
+
+    Parameters
+    ----------
+    case : ValidationCase
+        What is driven.
+    mechanism : Mechanism
+        Its mechanism.
+    step : float
+        Time step, s, a whole part of the cycle.
+    """
+    count = round(CYCLE / step)
+    time = step * np.arange(count + 2)  # two samples before the first difference
+    found, right = case.simulated(mechanism, time), case.explicit(mechanism, time)
+    fine = case.explicit(mechanism, CYCLE / FINE * np.arange(FINE))
+    frequency = 2 * np.pi / CYCLE * np.arange(FINE // 2 + 1)
+    transfer = np.sinc(frequency * step / (2 * np.pi)) * np.exp(-0.5j * frequency * step)
+    every = []
+    for derivative, quantity in ((1, "jerk"), (2, "jounce")):
+        k = 1 + QUANTITIES.index(quantity)
+        spectrum = np.fft.rfft(fine[:, k]) / FINE
+        lost = np.abs((1 - transfer**derivative) * spectrum) ** 2
+        error = float(np.sqrt(lost[0] + 2 * lost[1:].sum()) / np.abs(right[2:, k]).max())
+        difference = backward_difference(found[:, 2], step, derivative=derivative)[2 - derivative :]
+        every.append(Lag(quantity, step, time[2:], right[2:, k], found[2:, k], difference, error))
+    return every

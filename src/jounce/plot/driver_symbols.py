@@ -1,0 +1,92 @@
+"""Symbols of drivers and forces: arrows, cylinders, springs."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.mechanism.mechanism import GROUND
+from jounce.plot.drawing import INK, MARKS, SYMBOLS, Drawing, Flat
+from jounce.plot.geometry import Symbol
+from jounce.plot.symbol_parts import PAPER, actuator, ball, normal_of, pin, spring, stand, turn, unit_vector
+
+__all__ = ["DRIVERS_AND_FORCES"]
+
+HINGES = ("revolute", "cylindrical", "universal", "screw", "spherical", "parallel2", "prismatic")
+
+
+def _spring(drawing: Drawing, symbol: Symbol) -> None:
+    stand(drawing, symbol)
+    ends = drawing.ends(symbol)
+    spring(drawing, *ends)
+    for place in ends:
+        drawing.disc(place, 0.4 * drawing.unit, fill=PAPER, width=1.0, layer=SYMBOLS)
+
+
+def _cylinder_and_rod(drawing: Drawing, symbol: Symbol) -> None:
+    stand(drawing, symbol)
+    ends = drawing.ends(symbol)
+    actuator(drawing, *ends)
+    for place in ends:
+        (pin if drawing.planar else ball)(drawing, place)
+
+
+def _sliding(drawing: Drawing, symbol: Symbol) -> None:
+    """Draw a double arrow along the direction in which a point is driven, beside it."""
+    if symbol.kind == "coordinate" and symbol.axes[0] is None:
+        _turning(drawing, symbol)
+        return
+    body = GROUND if symbol.kind == "coordinate" else symbol.bodies[0]
+    along = drawing.flat(drawing.toward(body, symbol.axis_on(0)))
+    u, side = drawing.unit, normal_of(unit_vector(along))
+    place = drawing.place(symbol, 1) + 2.0 * u * side
+    drawing.line(place - 2.4 * u * along, place + 2.4 * u * along, width=1.3, layer=MARKS)
+    for sign in (-1.0, 1.0):
+        tip = place + sign * 3.4 * u * along
+        back = place + sign * 2.2 * u * along
+        drawing.area(tip, back + 0.55 * u * side, back - 0.55 * u * side, fill=INK, width=0.4, layer=MARKS)
+
+
+def _turning(drawing: Drawing, symbol: Symbol) -> None:
+    """Draw an arrow, or a spring, about the axis of a turn, at the joint of its bodies where they have one."""
+    turn(drawing, *_pivot(drawing, symbol), spiral=symbol.kind == "torsional_spring")
+
+
+def _pivot(drawing: Drawing, symbol: Symbol) -> tuple[Flat, Float[np.ndarray, "time 2 2"]]:
+    """Return the place about which two bodies turn, and two flat vectors across the axis there."""
+    hinges = [s for s in drawing.skeleton.symbols if s.kind in HINGES]
+    between = set(symbol.bodies)
+    shared = [s for s in hinges if between - {GROUND} <= set(s.bodies) and between <= {*s.bodies[:2], GROUND}]
+    shared = shared or [s for s in hinges if symbol.bodies[-1] in s.bodies]
+    body = next(body for body in reversed(symbol.bodies) if body != GROUND)
+    if shared:
+        center = drawing.place(shared[0], shared[0].bodies.index(body) if body in shared[0].bodies else None)
+    else:
+        center = drawing.flat(drawing.at(body, drawing.skeleton.links[body].points[0]))
+    if drawing.planar:
+        return center, np.broadcast_to(np.eye(2), (len(center), 2, 2))
+    axis = symbol.axes[0] if symbol.axes[0] is not None else np.array([0.0, 0.0, 1.0])
+    return center, drawing.flat(drawing.frame_along(symbol.bodies[0], axis)[:, 1:])
+
+
+def _point_force(drawing: Drawing, symbol: Symbol) -> None:
+    """Draw a mark where a force acts: its direction changes with time."""
+    place, u = drawing.place(symbol, 0), drawing.unit
+    corners = [place + u * np.array(corner) for corner in ((0.0, 0.9), (0.9, 0.0), (0.0, -0.9), (-0.9, 0.0))]
+    drawing.area(*corners, fill=INK, width=0.6, layer=MARKS)
+
+
+DRIVERS_AND_FORCES = {
+    "coordinate": _sliding,
+    "slide": _sliding,
+    "distance": _cylinder_and_rod,
+    "rotation": _turning,
+    "spring": _spring,
+    "slide_spring": _spring,
+    "distance_force": _cylinder_and_rod,
+    "slide_force": _sliding,
+    "torque": _turning,
+    "torsional_spring": _turning,
+    "moment": _turning,
+    "point_force": _point_force,
+}

@@ -1,0 +1,59 @@
+"""Which instants of a motion are drawn."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from jounce.errors import MechanismError
+from jounce.kinematics import Motion
+
+__all__ = ["evenly_chosen", "nearest_instants", "solved_instants", "unsolved_runs"]
+
+Indices = Int[np.ndarray, " chosen"]
+Times = Float[np.ndarray, " time"]
+
+
+def evenly_chosen(indices: Int[np.ndarray, " some"], most: int) -> Indices:
+    """Return all of some indices, or as many as there may be, evenly spread, the first and the last among them.
+
+    Examples
+    --------
+    >>> evenly_chosen(np.arange(10, 17), 3).tolist()
+    [10, 13, 16]
+    """
+    return indices[np.unique(np.linspace(0, len(indices) - 1, min(most, len(indices))).round().astype(int))]
+
+
+def nearest_instants(time: Times, wanted: Float[np.ndarray, " wanted"]) -> Int[np.ndarray, " wanted"]:
+    """Return the index of the instant nearest to each time; instants may run backward.
+
+    Examples
+    --------
+    >>> nearest_instants(np.array([0.0, 1.0, 2.0]), np.array([-1.0, 0.6, 1.5])).tolist()
+    [0, 1, 1]
+    """
+    order = np.argsort(time)
+    rising = time[order]
+    after = np.searchsorted(0.5 * (rising[:-1] + rising[1:]), wanted)
+    return order[after]
+
+
+def solved_instants(motion: Motion) -> Indices:
+    """Return the indices of the instants that were solved.
+
+    Raises
+    ------
+    MechanismError
+        There is none.
+    """
+    solved = np.flatnonzero(np.asarray(motion.status) == 0)
+    if not solved.size:
+        raise MechanismError("no instant was solved, so that there is nothing to draw", name="motion")
+    return solved
+
+
+def unsolved_runs(motion: Motion) -> list[Indices]:
+    """Return the indices of the instants that were not solved, in runs."""
+    failed = np.flatnonzero(np.asarray(motion.status))
+    return np.split(failed, np.flatnonzero(np.diff(failed) > 1) + 1) if failed.size else []

@@ -1,0 +1,232 @@
+"""Symbols of joints, as textbooks of mechanisms draw them, with those of drivers and forces."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.mechanism import Mechanism
+from jounce.mechanism.mechanism import GROUND
+from jounce.plot import symbol_parts as parts
+from jounce.plot.drawing import BARS, GUIDES, INK, MARKS, SYMBOLS, WHEELS, Drawing, Flat, tinted
+from jounce.plot.driver_symbols import DRIVERS_AND_FORCES
+from jounce.plot.geometry import Symbol, Wheel, frame_along
+
+__all__ = ["draw_symbols"]
+
+
+def draw_symbols(drawing: Drawing, mechanism: Mechanism) -> None:
+    """Draw all joints, drivers and forces of a mechanism, with the names of joints."""
+    seen = drawing.skeleton
+    for wheel in seen.wheels:
+        _draw_wheel(drawing, wheel)
+    for symbol in seen.symbols:
+        drawing.owner = f"joints.{symbol.name}"
+        (_PLANAR if drawing.planar else _SPATIAL).get(symbol.kind, _unknown)(drawing, symbol)
+        if symbol.kind not in _UNNAMED:
+            place = np.mean(drawing.ends(symbol), axis=0) if "double" in symbol.kind else drawing.place(symbol)
+            drawing.name(symbol.name, place, INK)
+    for kind, symbols in (("drivers", seen.drivers), ("forces", seen.forces)):
+        for symbol in symbols:
+            drawing.owner = f"{kind}.{symbol.name}"
+            DRIVERS_AND_FORCES.get(symbol.kind, _unknown)(drawing, symbol)
+    for name, output in mechanism.outputs.items():
+        bodies = getattr(output, "bodies", ())
+        if getattr(output, "point", None) is not None and len(bodies) == 1:
+            link = seen.links[bodies[0]]
+            for place in (point for point, names in zip(link.points, link.names, strict=True) if name in names):
+                drawing.owner, flat = f"outputs.{name}", drawing.flat(drawing.at(link.body, place))
+                drawing.disc(flat, 0.3 * drawing.unit, stroke="", fill=INK, layer=MARKS)
+
+
+def _draw_wheel(drawing: Drawing, wheel: Wheel) -> None:
+    """Draw a wheel with a mark that shows how it turns; one with its teeth inside is hollow."""
+    body, radius, rim = wheel.body, wheel.radius, 1.2 * drawing.unit
+    center, colour = drawing.flat(drawing.at(body, wheel.center)), drawing.colours.get(body, INK)
+    look = {"stroke": colour, "layer": WHEELS, "owner": f"bodies.{body}"}
+    if wheel.internal:
+        drawing.disc(center, radius + rim, width=1.2, **look)
+    drawing.disc(center, radius, fill="" if wheel.internal else tinted(colour, 0.15), width=1.6, **look)
+    if not drawing.skeleton.links[body].edges:  # its name stands in the wheel, or at its rim
+        above = np.array([0.0, radius if wheel.internal else 0.55 * radius])
+        drawing.move_name(f"bodies.{body}", center + above)
+    marked = (radius + rim, radius) if wheel.internal else (0.0, radius)
+    far, out = (drawing.flat(drawing.at(body, wheel.center + np.array([reach, 0.0]))) for reach in marked)
+    drawing.line(far, out, width=1.2, **look)
+
+
+def _revolute(drawing: Drawing, symbol: Symbol) -> None:
+    parts.stand(drawing, symbol)
+    parts.pin(drawing, drawing.place(symbol))
+
+
+def _rod(drawing: Drawing, symbol: Symbol) -> None:
+    parts.stand(drawing, symbol)
+    ends = drawing.ends(symbol)
+    drawing.line(*ends, width=2.6, stroke="#666666", layer=BARS)
+    for place in ends:
+        (parts.ball if symbol.kind == "double_spherical" else parts.pin)(drawing, place)
+
+
+def _slide(drawing: Drawing, symbol: Symbol, beyond: float) -> tuple[int, str]:
+    """Draw the rail of a joint; return the slot and the body of what slides on it."""
+    block, guide = symbol.block_and_rail
+    place, start = drawing.global_place(symbol, block), symbol.points[guide]
+    parts.rail(drawing, symbol.bodies[guide], place, symbol.axis_on(guide), beyond=beyond, start=start)
+    return block, symbol.bodies[block]
+
+
+def _prismatic(drawing: Drawing, symbol: Symbol) -> None:
+    block, body = _slide(drawing, symbol, 2.6)
+    along = parts.unit_vector(drawing.toward(body, symbol.axis_on(block)))
+    _draw_block(drawing, body, drawing.place(symbol, block), along)
+
+
+def _draw_block(drawing: Drawing, body: str, place: Flat, along: Flat) -> None:
+    u, side = drawing.unit, parts.normal_of(along)
+    corners = [place + a * 1.7 * u * along + b * 0.9 * u * side for a, b in parts.CORNERS]
+    colour = drawing.colours.get(body, INK)
+    drawing.area(*corners, stroke=colour, fill=tinted(colour, 0.35), width=1.6, layer=BARS)
+
+
+def _pin_in_slot(drawing: Drawing, symbol: Symbol) -> None:
+    held = drawing.global_place(symbol, 1)
+    parts.rail(drawing, symbol.bodies[0], held, symbol.axis_on(0), start=symbol.points[0])
+    parts.pin(drawing, drawing.flat(held))
+
+
+def _coordinate(drawing: Drawing, symbol: Symbol) -> None:
+    """Draw the line along which a body may move whose x or y is fixed; a fixed angle has no symbol."""
+    direction = symbol.axes[0]
+    if direction is None or symbol.bodies[0] != GROUND:
+        return
+    free, place = direction[::-1].copy(), drawing.place(symbol, 1)
+    parts.rail(drawing, GROUND, place, free)
+    _draw_block(drawing, symbol.bodies[1], place, np.broadcast_to(free, place.shape))
+
+
+def _rack(drawing: Drawing, symbol: Symbol) -> None:
+    wheel, rack = symbol.bodies[:2]
+    touch = drawing.at(wheel, symbol.points[0]) + symbol.axis_on(0)
+    parts.rail(drawing, rack, touch, symbol.axis_on(1))
+
+
+def _rolling(drawing: Drawing, symbol: Symbol) -> None:
+    body, start, axis = symbol.bodies[0], symbol.points[0], symbol.axis_on(0)
+    along = axis / np.linalg.norm(axis)
+    travel = (drawing.within(body, drawing.global_place(symbol, 1)) - start) @ along
+    frame = drawing.frames[body]
+    touch = frame[:, :, 0] + np.einsum("tck,tk->tc", frame[:, :, 1:], start + travel[:, None] * along)
+    parts.rail(drawing, body, touch, axis, start=start)
+
+
+def _spherical(drawing: Drawing, symbol: Symbol) -> None:
+    parts.stand(drawing, symbol)
+    place = drawing.place(symbol)
+    angle = np.radians(np.linspace(150.0, 390.0, 20))
+    socket = 1.3 * drawing.unit * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    drawing.curve(place[:, None] + socket, width=1.2, layer=SYMBOLS)
+    parts.ball(drawing, place)
+
+
+def _hinge(drawing: Drawing, symbol: Symbol) -> None:
+    parts.stand(drawing, symbol)
+    slot = symbol.moving_slot
+    axes = drawing.frame_along(symbol.bodies[slot], symbol.axis_on(slot))
+    place, reach = drawing.place(symbol, slot), 3.2 * drawing.unit * drawing.flat(axes[:, 0])
+    drawing.line(place - reach, place + reach, width=0.7, dashes=parts.DASH_DOT, layer=SYMBOLS)
+    parts.cylinder(drawing, place, axes, (1.5, 0.75), fill=parts.PAPER, width=1.1, layer=SYMBOLS)
+
+
+def _sliding_body(drawing: Drawing, symbol: Symbol, block: int) -> tuple[Flat, Float[np.ndarray, "time 3 3"], Any]:
+    """Return place, axes and look of what slides in space."""
+    body = symbol.bodies[block]
+    axes, colour = drawing.frame_along(body, symbol.axis_on(block)), drawing.colours.get(body, INK)
+    return drawing.place(symbol, block), axes, {"stroke": colour, "fill": tinted(colour, 0.35), "width": 1.2}
+
+
+def _sleeve(drawing: Drawing, symbol: Symbol) -> None:
+    """Draw a sleeve on a shaft, which it may turn about; with a thread it is a nut on a screw."""
+    block, _ = _slide(drawing, symbol, 3.5)
+    place, axes, look = _sliding_body(drawing, symbol, block)
+    if symbol.kind == "screw":
+        shaft = drawing.flat(drawing.frame_along(symbol.bodies[1 - block], symbol.axis_on(1 - block)))
+        turns = np.linspace(-3.0, 3.0, 49)
+        helix = np.array([turns, 0.45 * np.cos(5 * turns), 0.45 * np.sin(5 * turns)])
+        points = place[:, None] + drawing.unit * np.einsum("kn,tkc->tnc", helix, shaft)
+        drawing.curve(points, width=0.9, layer=SYMBOLS)
+    parts.cylinder(drawing, place, axes, (1.9, 0.9), layer=SYMBOLS, **look)
+
+
+def _slider(drawing: Drawing, symbol: Symbol) -> None:
+    block, _ = _slide(drawing, symbol, 3.0)
+    place, axes, look = _sliding_body(drawing, symbol, block)
+    parts.box(drawing, place, axes, (1.7, 0.9, 0.9), layer=SYMBOLS, **look)
+
+
+def _universal(drawing: Drawing, symbol: Symbol) -> None:
+    parts.stand(drawing, symbol)
+    place, u = drawing.place(symbol), drawing.unit
+    for slot, body in enumerate(symbol.bodies):
+        colour = drawing.colours.get(body, INK)
+        arm = drawing.flat(drawing.toward(body, symbol.axis_on(slot))) * 1.7 * u
+        drawing.line(place - arm, place + arm, stroke=colour, width=2.4, layer=SYMBOLS)
+        for end in (place - arm, place + arm):
+            drawing.disc(end, 0.4 * u, stroke=colour, fill=parts.PAPER, width=1.2, layer=SYMBOLS)
+
+
+def _plane(drawing: Drawing, symbol: Symbol) -> None:
+    """Draw the plane of a body, as large as the point on it travels, and a ball at the point."""
+    body, place = symbol.bodies[0], drawing.global_place(symbol, 1)
+    across = frame_along(symbol.axis_on(0))[1:]
+    local = drawing.within(body, place)
+    spread = local @ across.T  # time, 2
+    middle = np.nanmean(local - spread @ across, axis=0)
+    low, high = np.nanmin(spread, axis=0) - 3 * drawing.unit, np.nanmax(spread, axis=0) + 3 * drawing.unit
+    center, half = 0.5 * (low + high), 0.5 * (high - low)
+    corners = [middle + (center + half * np.array(corner)) @ across for corner in parts.CORNERS]
+    flat = [drawing.flat(drawing.at(body, corner)) for corner in corners]
+    drawing.area(*flat, fill="#F2F2F2", stroke="#888888", width=0.8, layer=GUIDES - 1)
+    parts.ball(drawing, drawing.flat(place))
+
+
+def _nothing(drawing: Drawing, symbol: Symbol) -> None:
+    """Draw nothing: what only keeps a direction has no place, and gears are drawn as wheels."""
+
+
+def _unknown(drawing: Drawing, symbol: Symbol) -> None:
+    """Draw a square at each point, and a dotted line between them: what a type of one's own is, nobody else knows."""
+    places = [drawing.place(symbol, slot) for slot in range(len(symbol.bodies))]
+    for place in places:
+        corners = [place + 0.7 * drawing.unit * np.array(corner) for corner in parts.CORNERS]
+        drawing.area(*corners, fill=parts.PAPER, width=1.2, layer=SYMBOLS)
+    if len(places) > 1:
+        drawing.line(*places, width=1.0, dashes=parts.DASHES, layer=GUIDES)
+
+
+_UNNAMED = ("dot1", "parallel1", "coordinate", "gear", "rack", "rolling")
+_PLANAR: dict[str, Callable[[Drawing, Symbol], None]] = {
+    "revolute": _revolute,
+    "double_revolute": _rod,
+    "parallel1": _nothing,
+    "parallel2": _pin_in_slot,
+    "prismatic": _prismatic,
+    "coordinate": _coordinate,
+    "gear": _nothing,
+    "rack": _rack,
+    "rolling": _rolling,
+}
+_SPATIAL: dict[str, Callable[[Drawing, Symbol], None]] = {
+    "spherical": _spherical,
+    "double_spherical": _rod,
+    "dot1": _nothing,
+    "dot2": _plane,
+    "universal": _universal,
+    "revolute": _hinge,
+    "cylindrical": _sleeve,
+    "prismatic": _slider,
+    "screw": _sleeve,
+}

@@ -1,0 +1,215 @@
+"""The JSON Schema of what commands print with ``--json``, made from the types of the facts."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from pydantic import TypeAdapter
+from pydantic.json_schema import GenerateJsonSchema
+from typing_extensions import TypedDict
+
+from jounce.reporting.mechanism_facts import Grid, InspectedMechanism
+from jounce.reporting.motion_facts import MotionFacts, SimulationFacts
+from jounce.reporting.robot_facts import InspectedRobot
+
+
+class Result(TypedDict):
+    """What all results begin with."""
+
+    jounce: str
+    record: Literal[1]
+
+
+class Extremes(TypedDict):
+    """Extreme values, with their times."""
+
+    derivative: str
+    unit: str
+    minimum: float | None
+    minimum_at: float | None
+    maximum: float | None
+    maximum_at: float | None
+
+
+class OutputPeak(Extremes):
+    """Extreme values of a derivative of an output."""
+
+    output: str
+
+
+class TorquePeak(Extremes):
+    """Extreme values, at the instants of the trajectory, of a torque or force of a joint, or of one of its rates."""
+
+    joint: str
+
+
+class Written(TypedDict):
+    """What a motion is told with."""
+
+    file: str
+    peaks: list[OutputPeak]
+    written: str | None
+
+
+class RunResult(Result, MotionFacts, Written):
+    """jounce run --json."""
+
+    command: Literal["run"]
+
+
+class SimulateResult(Result, SimulationFacts, Written):
+    """jounce simulate --json."""
+
+    command: Literal["simulate"]
+
+
+class InspectMechanismResult(Result, InspectedMechanism):
+    """jounce inspect --json of a mechanism file."""
+
+    command: Literal["inspect"]
+
+
+class InspectRobotResult(Result, InspectedRobot):
+    """jounce inspect --json of a robot file."""
+
+    command: Literal["inspect"]
+
+
+class LimitRow(TypedDict):
+    """The worst instant of a joint and quantity; without a limit, its ratio is null."""
+
+    joint: str
+    quantity: str
+    unit: str
+    worst: float
+    limit: float | None
+    ratio: float | None
+    at: float
+    broken: bool
+
+
+class TrajectoryResult(Result):
+    """What is told of a robot on a trajectory."""
+
+    robot: str
+    file: str
+    trajectory: str
+    time: Grid
+    written: str | None
+
+
+class CheckResult(TrajectoryResult):
+    """jounce check --json."""
+
+    command: Literal["check"]
+    kept: bool
+    broken: int
+    held: dict[str, float]
+    limits: list[LimitRow]
+
+
+class TorquesResult(TrajectoryResult):
+    """jounce torques --json."""
+
+    command: Literal["torques"]
+    rates: int
+    held: list[str]
+    peaks: list[TorquePeak]
+
+
+class Starter(TypedDict):
+    """A mechanism to begin from, and the command that writes it."""
+
+    name: str
+    about: str
+    command: str
+
+
+class NewListResult(Result):
+    """jounce new --json."""
+
+    command: Literal["new"]
+    starters: list[Starter]
+
+
+class NewResult(Result):
+    """jounce new NAME --json."""
+
+    command: Literal["new"]
+    name: str
+    written: str
+    next: list[str]
+
+
+class Problem(TypedDict):
+    """An error or a warning, taken apart."""
+
+    kind: str
+    message: str
+    file: str | None
+    line: int | None
+    name: str | None
+    value: Any
+    text: str
+
+
+class ErrorLine(TypedDict):
+    """One line on standard error."""
+
+    error: Problem
+
+
+class WarningLine(TypedDict):
+    """One line on standard error."""
+
+    warning: Problem
+
+
+RESULTS: dict[str, Any] = {
+    "run": RunResult,
+    "simulate": SimulateResult,
+    "inspect_mechanism": InspectMechanismResult,
+    "inspect_robot": InspectRobotResult,
+    "check": CheckResult,
+    "torques": TorquesResult,
+    "new_list": NewListResult,
+    "new": NewResult,
+}
+
+
+class _Closed(GenerateJsonSchema):
+    """No keys but the known ones."""
+
+    def typed_dict_schema(self, schema: Any) -> dict[str, Any]:
+        return super().typed_dict_schema(schema) | {"additionalProperties": False}
+
+
+def result_schema() -> dict[str, Any]:
+    """Return the JSON Schema (2020-12) of the results of commands, and of the errors and warnings beside them.
+
+    Examples
+    --------
+    >>> sorted(result_schema()["$defs"])
+    ['check', 'complaint', 'inspect_mechanism', 'inspect_robot', 'new', 'new_list', 'run', 'simulate', 'torques']
+    """
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "Results of jounce",
+        "description": "Numbers are in SI units; null stands for a number that is not known or not finite.",
+        "oneOf": [{"$ref": f"#/$defs/{name}"} for name in RESULTS],
+        "$defs": {name: _schema(kind) for name, kind in (RESULTS | {"complaint": ErrorLine | WarningLine}).items()},
+    }
+
+
+def _schema(kind: Any) -> dict[str, Any]:
+    """Return the schema of a type, whole: each part in its place."""
+    found = TypeAdapter(kind).json_schema(mode="serialization", schema_generator=_Closed)
+    parts = found.pop("$defs", {})
+
+    def whole(schema: Any) -> Any:
+        if isinstance(schema, dict):
+            part = schema.get("$ref", "").removeprefix("#/$defs/")
+            return whole(parts[part]) if part else {key: whole(entry) for key, entry in schema.items()}
+        return [whole(entry) for entry in schema] if isinstance(schema, list) else schema
+
+    return whole(found)

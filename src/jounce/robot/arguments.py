@@ -1,0 +1,85 @@
+"""What users hand to the functions of robots, checked: numbers, coordinates and their derivatives."""
+
+from typing import Any
+
+import jax
+import numpy as np
+from jaxtyping import Float
+
+from jounce.errors import JounceError, RobotError
+from jounce.robot.abstract_robot import AbstractRobot
+from jounce.shapes import Numbers
+
+
+def floats(name: str, values: object) -> Float[Numbers, "..."]:
+    """Return values as an array of double precision, of NumPy unless it is one of JAX.
+
+    Raises
+    ------
+    RobotError
+        If they are not real numbers in one rectangular array.
+    """
+    array = values if isinstance(values, jax.Array) else None
+    try:
+        array = np.asarray(values) if array is None else array
+        if array.dtype.kind not in "OUSc":
+            return array.astype(float, copy=False)
+        if array.dtype.kind == "O":
+            return np.asarray(array, float)
+    except (TypeError, ValueError):
+        pass
+    raise RobotError("must be an array of real numbers", name=name, value=type(values).__name__)
+
+
+def whole_number(
+    name: str, value: Any, least: int = 0, most: int | None = None, error: type[JounceError] = RobotError
+) -> int:
+    """Return a whole number within bounds.
+
+    Raises
+    ------
+    JounceError
+        If it is none; of the type given.
+    """
+    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    if not whole or value < least or (most is not None and value > most):
+        bounds = f", {least} or greater" if most is None else f" from {least} to {most}"
+        raise error(f"must be a whole number{bounds}", name=name, value=value)
+    return int(value)
+
+
+def checked_position(robot: AbstractRobot, q: object, name: str = "q") -> Float[Numbers, "*batch 1 joint"]:
+    """Return coordinates without derivatives as those of order zero.
+
+    Raises
+    ------
+    RobotError
+        If their shape, (..., n), does not fit the robot.
+    """
+    q, n = floats(name, q), len(robot.joint_names)
+    if q.ndim < 1 or q.shape[-1] != n:
+        raise RobotError(f"must have the shape (..., n) with n = {n}, not {q.shape}", name=name)
+    return q[..., None, :]
+
+
+def checked_coordinates(
+    robot: AbstractRobot, q: object, least: int = 0, most: int | None = None
+) -> Float[Numbers, "*batch derivative joint"]:
+    """Return coordinates and their derivatives, at least so many, cut to at most so many.
+
+    Raises
+    ------
+    RobotError
+        If their shape does not fit the robot or the derivatives are too few.
+    """
+    q = floats("q", q)
+    n = len(robot.joint_names)
+    if q.ndim < 2 or q.shape[-1] != n:
+        joints = f"{robot.name} has {n} {'joint' if n == 1 else 'joints'}"
+        raise RobotError(f"must have the shape (..., order + 1, n), not {q.shape}; {joints}: n = {n}", name="q")
+    if q.shape[-2] < least + 1:
+        names = ", ".join(["q", "q'", "q''"][: least + 1])
+        lacks = f"must hold {names}" if least < 3 else f"needs derivatives of q to order {least}"
+        message = f"{lacks} along its last axis but one: the shape (..., order + 1, n), not {q.shape}"
+        raise RobotError(message, name="q")
+    return q if most is None else q[..., : most + 1, :]

@@ -1,0 +1,87 @@
+"""Checks of the numbers that motion laws are made of; each raises an error that names the number at fault."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.errors import JounceError, TrajectoryError, did_you_mean
+from jounce.shapes import Numbers
+
+ArrayLike = Numbers | Sequence | float | int
+"""What becomes an array of numbers: an array, lists or tuples of numbers in any nesting, a number."""
+
+
+def check_choice(name: str, value: object, valid: tuple[str, ...], error: type[JounceError] = TrajectoryError) -> None:
+    """Raise unless a word is one of those that there are."""
+    if value not in valid:
+        raise error(f"no such choice; {did_you_mean(value, valid)}", name=name, value=value)
+
+
+def whole_number(name: str, value: object, least: int, most: int, error: type[JounceError] = TrajectoryError) -> int:
+    """Return a whole number within bounds."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not least <= value <= most:
+        raise error(f"must be a whole number from {least} to {most}", name=name, value=value)
+    return int(value)
+
+
+def finite(name: str, value: Any) -> float:
+    """Return a finite number."""
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        number = math.nan
+    if isinstance(value, str | bool) or not math.isfinite(number):
+        raise TrajectoryError("must be a finite number", name=name, value=value)
+    return number
+
+
+def positive(name: str, value: Any) -> float:
+    """Return a finite number greater than zero."""
+    number = finite(name, value)
+    if number <= 0:
+        raise TrajectoryError("must be greater than zero", name=name, value=value)
+    return number
+
+
+def finite_numbers(name: str, values: ArrayLike, shape: tuple[int, ...] | None) -> Float[np.ndarray, "..."]:
+    """Return finite numbers of a shape; of any one axis when none is given."""
+    try:
+        array = np.asarray(values, float)
+    except (TypeError, ValueError):
+        raise TrajectoryError("must be numbers", name=name, value=values) from None
+    if (array.ndim != 1 or not array.size) if shape is None else array.shape != shape:
+        wanted = "one axis of at least one number" if shape is None else f"the shape {shape}"
+        raise TrajectoryError(f"must have {wanted}", name=name, value=f"shape {array.shape}")
+    if not np.isfinite(array).all():
+        raise TrajectoryError("must be finite numbers", name=name, value=array[~np.isfinite(array)][0].item())
+    return array
+
+
+def check_samples(
+    times: ArrayLike, values: ArrayLike, error: type[JounceError] = TrajectoryError
+) -> tuple[Float[np.ndarray, " samples"], Float[np.ndarray, "samples *columns"]]:
+    """Return times and values of samples: finite, two at least, a value or row for each time, times that increase."""
+    try:
+        times, values = np.asarray(times, float), np.asarray(values, float)
+    except (TypeError, ValueError):
+        raise error("times and values must be lists of numbers of equal length") from None
+    if times.ndim != 1 or values.ndim < 1 or len(times) != len(values):
+        shapes = f"shapes {times.shape} and {values.shape}"
+        raise error("samples need one value for each time; give lists of equal length", value=shapes)
+    if len(times) < 2:
+        raise error("at least two samples are needed", value=len(times))
+    for name, entries in (("times", times), ("values", values)):
+        bad = np.argwhere(~np.isfinite(entries))
+        if len(bad):
+            place = "".join(f"[{k}]" for k in bad[0])
+            raise error("samples must be finite", name=f"{name}{place}", value=float(entries[tuple(bad[0])]))
+    steps = np.diff(times)
+    if (steps <= 0).any():
+        first = int(np.argmax(steps <= 0))
+        what = "repeats the one before" if steps[first] == 0 else "comes before the one before"
+        message = f"times of samples must increase; this one {what}"
+        raise error(message, name=f"times[{first + 1}]", value=float(times[first + 1]))
+    return times, values

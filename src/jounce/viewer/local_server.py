@@ -1,0 +1,192 @@
+"""The server of a page: on this machine only, for whoever has its address, with the token, and for no other origin.
+
+A server that listens on this machine only can still be reached from it by every program, and by every page that is open
+in a browser here: scripts may open a WebSocket to any port (only its Origin says whose script it is), and a name of an
+attacker may be made to mean this machine after its page was loaded (DNS rebinding: only the Host says so). So every
+request, for a page or a WebSocket, must name this machine as its host, come from this page or from no page, and hold
+the token.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+import secrets
+import socket
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, redirect_stdout
+from typing import Any
+from urllib.parse import parse_qs, urlsplit
+
+from jounce.errors import JounceError
+
+__all__ = ["AccessControl", "check_installed", "check_port", "quiet_server", "quiet_stop"]
+
+HOSTS = ("127.0.0.1", "localhost", "[::1]")  # of any port, as a tunnel may have another one at its other end
+REFUSED = "This page is opened by the whole address that jounce view prints, with its token.\n"
+HEADERS = {"Cache-Control": "no-store", "Referrer-Policy": "no-referrer", "X-Content-Type-Options": "nosniff"}
+# The page of viser connects to its own address without what stands behind the question mark, unless told another one.
+CONNECT = b"""<script>{
+const given = new URLSearchParams(location.search);
+if (!given.has("websocket")) {
+  const token = given.get("token"), server = location.origin.replace("http", "ws");
+  history.replaceState(null, "", `?token=${token}&websocket=${server}/?token=${token}`);
+}
+}</script>"""
+_starting = threading.Lock()
+
+
+class AccessControl:
+    """Lets requests pass that hold a token of its own.
+
+    Attributes
+    ----------
+    token : str
+        128 random bits, for the address.
+    """
+
+    def __init__(self) -> None:
+        self.token = secrets.token_urlsafe(16)
+
+    def allows(self, request: Any) -> bool:
+        """Tell whether a request may pass.
+
+        Parameters
+        ----------
+        request : websockets.http11.Request
+        """
+        hosts, origins = (request.headers.get_all(name) for name in ("Host", "Origin"))
+        if len(hosts) != 1 or not _this_machine(hosts[0]) or origins not in ([], [f"http://{hosts[0]}"]):
+            return False
+        given = parse_qs(urlsplit(request.path).query).get("token", [])
+        return len(given) == 1 and secrets.compare_digest(given[0].encode(), self.token.encode())
+
+    @contextmanager
+    def starting(self) -> Iterator[None]:
+        """Guard the server that viser starts meanwhile, which has no hook for it.
+
+        Raises
+        ------
+        JounceError
+            If viser did not start one as is known here: what cannot be guarded is not served.
+        """
+        from websockets.asyncio import server as library
+
+        serve, guarded = library.serve, []
+
+        def serving(*arguments: Any, process_request: Any = None, **options: Any) -> Any:
+            if getattr(process_request, "__module__", "").startswith("viser."):  # any other server is left alone
+                guarded.append(True)
+                process_request = self._before(process_request)
+            return serve(*arguments, process_request=process_request, **options)
+
+        with _starting:
+            library.serve = serving
+            try:
+                yield
+            finally:
+                library.serve = serve
+        if not guarded:
+            raise JounceError("this version of viser cannot be guarded; install that of the extra jounce[viewer]")
+
+    def _before(self, process_request: Callable[..., Any]) -> Callable[..., Any]:
+        """Return what answers a request only where it is allowed."""
+
+        def guarded(connection: Any, request: Any) -> Any:
+            if not self.allows(request):
+                return connection.respond(403, REFUSED)
+            if "Accept-Encoding" in request.headers:
+                del request.headers["Accept-Encoding"]  # so that the page comes as it is
+            response = process_request(connection, request)
+            if response is not None:
+                _complete(response)
+            return response
+
+        return guarded
+
+
+def _refuse_uploads(server: Any) -> None:
+    """Take no files: no control of the page asks for any, but viser would keep what is sent for a slider.
+
+    Parameters
+    ----------
+    server : viser.ViserServer
+    """
+    from viser import _messages as messages
+
+    for kind in (messages.FileTransferStartUpload, messages.FileTransferPart):
+        server.gui._websock_interface.unregister_handler(kind)
+
+
+def _this_machine(host: str) -> bool:
+    return re.sub(r":[0-9]+$", "", host).lower() in HOSTS
+
+
+def _complete(response: Any) -> None:
+    """Tell the page where to connect, and the browser to keep the address to itself."""
+    response.headers.update(HEADERS)
+    head = b"<head>"
+    if response.headers.get("Content-Type", "").startswith("text/html") and head in response.body:
+        response.body = response.body.replace(head, head + CONNECT, 1)
+        del response.headers["Content-Length"]
+        response.headers["Content-Length"] = str(len(response.body))
+
+
+def check_installed() -> None:
+    """Raise JounceError unless the packages of the extra ``viewer`` are there."""
+    from importlib.util import find_spec
+
+    if any(find_spec(name) is None for name in ("viser", "trimesh", "shapely")):
+        message = 'the view needs the package viser, which is not installed: pip install "jounce[viewer]"'
+        raise JounceError(message)
+
+
+def quiet_server(port: int = 0, label: str | None = None, access: AccessControl | None = None) -> Any:
+    """Return a viser server that listens on this machine only, answers whom it is told to, and prints nothing.
+
+    Raises
+    ------
+    JounceError
+        If viser is not installed or cannot be guarded, or the port is taken.
+    """
+    check_installed()
+    import viser
+
+    server = None
+    try:
+        with redirect_stdout(io.StringIO()), (access or AccessControl()).starting():
+            server = viser.ViserServer(host="127.0.0.1", port=port or _free_port(), label=label, verbose=False)
+        _refuse_uploads(server)
+    except BaseException:
+        if server is not None:
+            quiet_stop(server)
+        raise
+    return server
+
+
+def quiet_stop(server: Any) -> None:
+    """End a viser server without a word."""
+    with redirect_stdout(io.StringIO()):
+        server.stop()
+
+
+def _free_port() -> int:
+    """Return a port of this machine that nobody listens on."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def check_port(port: Any) -> None:
+    """Raise JounceError unless a port can be listened on."""
+    if isinstance(port, bool) or not isinstance(port, int) or not 0 <= port <= 65535:
+        raise JounceError("must be a whole number from 0 to 65535; 0 takes a free one", name="port", value=port)
+    if port:
+        with socket.socket() as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            try:
+                probe.bind(("127.0.0.1", port))
+            except OSError as error:
+                message = f"cannot be used: {error.strerror}; 0 takes a free one"
+                raise JounceError(message, name="port", value=port) from None
