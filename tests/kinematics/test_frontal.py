@@ -53,7 +53,7 @@ def drawn(count, width, redundant):
     bodies = random_pattern(random, count, width, redundant)
     places = random.permutation(bodies.size * width).reshape(*bodies.shape, width)
     entries = random.standard_normal((places.size, LANES))
-    fronts = Fronts.of(bodies, places, count)
+    fronts = Fronts.of(bodies, places, count, places.size)
     matrix, scale = dense(bodies, places, entries, count), random.uniform(0.5, 2.0, (len(bodies), 1))
     return FrontalFactor.of(fronts, jnp.asarray(entries), jnp.asarray(scale)), scale * matrix, random
 
@@ -94,7 +94,7 @@ def test_what_is_singular_is_told():
     bodies, places = np.array([[0, -1]] * 3), np.stack([np.arange(9).reshape(3, 3), np.full((3, 3), 9)], axis=1)
     singular, regular = np.array([[1.0, 2, 3], [2, 4, 6], [1, 1, 1]]), np.eye(3)
     entries = jnp.asarray(np.stack([singular.ravel(), regular.ravel()], axis=-1))
-    factor = FrontalFactor.of(Fronts.of(bodies, places, 1), entries, jnp.ones((3, 1)))
+    factor = FrontalFactor.of(Fronts.of(bodies, places, 1, 9), entries, jnp.ones((3, 1)))
     ratio = np.asarray(factor.pivot_ratio())
     assert ratio[0] < 1e-15
     np.testing.assert_allclose(ratio[1], 1.0)

@@ -1,16 +1,15 @@
 """The factorisation of a mechanism's Jacobian: dense where it is small, front by front where that is less work."""
 
-from typing import Any
-
 from jounce.jet import Jet
 from jounce.kinematics.frontal import FrontalFactor
 from jounce.kinematics.linear import DenseFactor
 from jounce.mechanism.system import System
+from jounce.rigid.pose import Pose
 
 Factor = DenseFactor | FrontalFactor
 
 
-def factored(system: System, pose: Any, time: Jet) -> Factor:
+def factored(system: System, pose: Pose, time: Jet) -> Factor:
     """Return the factored Jacobian at a pose of order zero."""
     if system.fronts is None:
         return DenseFactor.of(system.jacobian(pose, time))

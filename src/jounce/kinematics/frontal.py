@@ -6,8 +6,11 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
+from jounce.kinematics.linear import Columns
 from jounce.mechanism.fronts import Fronts
+from jounce.shapes import Numbers
 
 
 class FrontalFactor(eqx.Module):
@@ -18,13 +21,15 @@ class FrontalFactor(eqx.Module):
     """
 
     fronts: Fronts
-    vectors: Any  # (fronts, width, rows, batch): the reflections of each front
-    factors: Any  # (fronts, width, batch): two over their squares
-    triangle: Any  # (fronts, width, columns, batch): finished rows
-    inverted: Any  # (fronts, width, batch): inverse of the diagonal, infinite where singular
+    vectors: Float[Numbers, "front width row batch"]  # the reflections of each front
+    factors: Float[Numbers, "front width batch"]  # two over their squares
+    triangle: Float[Numbers, "front width column batch"]  # finished rows
+    inverted: Float[Numbers, "front width batch"]  # of the diagonal, infinite where singular
 
     @classmethod
-    def of(cls, fronts: Fronts, entries: Any, scale: Any) -> "FrontalFactor":
+    def of(
+        cls, fronts: Fronts, entries: Float[Numbers, "entry batch"], scale: Float[Numbers, "row 1"]
+    ) -> "FrontalFactor":
         """Factor the matrices with these entries, shape (entries, batch), in rows multiplied by a scale, (rows, 1)."""
         count, height, columns = fronts.shape
         width, lanes = fronts.width, entries.shape[-1]
@@ -49,7 +54,7 @@ class FrontalFactor(eqx.Module):
         sizes = ((count, width, height, lanes), (count, width, lanes), (count, width, columns, lanes))
         return cls(fronts, *map(np.zeros, (*sizes, sizes[1])))
 
-    def solve(self, right: Any, *, refined: bool = True) -> Any:
+    def solve(self, right: Columns, *, refined: bool = True) -> Float[Numbers, "column batch"]:
         """Return the solutions, shape (columns, batch), for right-hand sides of shape (rows, batch)."""
         del refined  # they are as good as can be
         _, height, columns = self.fronts.shape
@@ -78,10 +83,10 @@ class FrontalFactor(eqx.Module):
         known, _ = jax.lax.scan(backward, known, levels, reverse=True)
         return known[plan.of_body].reshape(-1, lanes)
 
-    def solve_transposed(self, right: Any) -> Any:
+    def solve_transposed(self, right: Float[Numbers, "column batch"]) -> Columns:
         """Return the solutions with the transposed matrices, shape (rows, batch), of least norm where they are many."""
-        _, height, columns = self.fronts.shape
-        width, lanes, plan = self.fronts.width, right.shape[-1], self.fronts
+        height, width = self.fronts.shape[1], self.fronts.width
+        lanes, plan = right.shape[-1], self.fronts
         count = np.arange(len(plan.entries))
         blocks = jnp.asarray(right).reshape(len(count), width, lanes)
         order = jnp.argsort(plan.of_body)
@@ -111,17 +116,19 @@ class FrontalFactor(eqx.Module):
         levels = (count, plan.rights, plan.left_rows, self.vectors, self.factors, u)
         return jax.lax.scan(backward, blank, levels, reverse=True)[0][1]
 
-    def applied_inverse(self, matrix: Any) -> Any:
+    def applied_inverse(self, matrix: Float[Numbers, "row column"]) -> Float[Numbers, "row column"]:
         """Return the products of the inverse of the first matrix with the columns of another, shape (rows, columns)."""
-        first = FrontalFactor(self.fronts, *(x[..., :1] for x in (self.vectors, self.factors, self.triangle, self.inverted)))
+        first = FrontalFactor(
+            self.fronts, *(x[..., :1] for x in (self.vectors, self.factors, self.triangle, self.inverted))
+        )
         return first.solve(matrix)
 
-    def pivot_ratio(self) -> Any:
+    def pivot_ratio(self) -> Float[Numbers, " batch"]:
         """Return the smallest pivot over the largest, shape (batch,): near zero at a singular position."""
         sizes = 1 / jnp.abs(self.inverted.reshape(-1, self.inverted.shape[-1]))
         return jnp.min(sizes, axis=0) / jnp.max(sizes, axis=0)
 
-    def sign(self) -> Any:
+    def sign(self) -> Float[Numbers, " batch"]:
         """Return the signs of the determinants, or all of them turned round, shape (batch,): 0 where singular.
 
         The order of rows and columns, which is the same for all matrices of a pattern, is not counted.

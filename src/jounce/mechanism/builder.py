@@ -31,8 +31,8 @@ from jounce.mechanism.system import (
     POSITION_COMPONENTS,
     Group,
     System,
-    group_elements,
     elimination,
+    group_elements,
     jacobian_cells,
 )
 from jounce.rigid import PlanarPose, SpatialPose
@@ -130,11 +130,20 @@ def build(mechanism: Mechanism, like: Model | None = None) -> Model:
     rows = [n for members, count in zip(names, row_counts, strict=True) for _ in range(count) for n in members]
     drivers = tuple(n for group, members in zip(groups, names, strict=True) if group.is_driver for n in members)
     length, count = _size(groups, guess), len(mechanism.bodies)
-    cells = jacobian_cells(groups, row_counts, components + pose_type.turns, count)
+    cells, entry_count = jacobian_cells(groups, row_counts, components + pose_type.turns, count)
     scale = np.array([length] * components + [1.0] * pose_type.turns)
     history = AttitudeHistory(guess["quaternion"], np.zeros(1)) if components == 3 else None
     return Model(
-        System(groups, outputs, cells, np.ones((len(rows), 1)), scale, count, forces, elimination(cells, len(scale))),
+        System(
+            groups,
+            outputs,
+            cells,
+            np.ones((len(rows), 1)),
+            scale,
+            count,
+            forces,
+            elimination(cells, len(scale), entry_count),
+        ),
         pose_type,
         guess,
         tuple(rows),

@@ -10,10 +10,14 @@ compile it grows with the number of bodies.
 """
 
 import heapq
-from typing import Any
 
 import equinox as eqx
 import numpy as np
+from jaxtyping import Int
+
+from jounce.shapes import Numbers
+
+Row = tuple[int, int]  # the front that left it over, and its place there; -1 and its number if it is one of the matrix
 
 
 class Fronts(eqx.Module):
@@ -39,22 +43,29 @@ class Fronts(eqx.Module):
         Columns of a body.
     """
 
-    entries: Any
-    rights: Any
-    left_rows: Any
-    left_columns: Any
-    neighbours: Any
-    of_body: Any
+    entries: Int[Numbers, "front row column"]
+    rights: Int[Numbers, "front row"]
+    left_rows: Int[Numbers, "front row"]
+    left_columns: Int[Numbers, "front row column"]
+    neighbours: Int[Numbers, "front neighbour"]
+    of_body: Int[Numbers, " front"]
     row_count: int = eqx.field(static=True)
     width: int = eqx.field(static=True)
 
     @property
     def shape(self) -> tuple[int, int, int]:
         """Number of fronts, and of rows and columns of each."""
-        return self.entries.shape
+        count, rows, columns = self.entries.shape
+        return count, rows, columns
 
     @classmethod
-    def of(cls, bodies: np.ndarray, places: np.ndarray, body_count: int) -> "Fronts":
+    def of(
+        cls,
+        bodies: Int[np.ndarray, "row slot"],
+        places: Int[np.ndarray, "row slot width"],
+        body_count: int,
+        entry_count: int,
+    ) -> "Fronts":
         """Plan the elimination from the pattern of a matrix.
 
         Parameters
@@ -63,19 +74,15 @@ class Fronts(eqx.Module):
             Bodies that each row touches, below zero where there are fewer.
         places : array of int, shape (rows, slots, width)
             Where the entries of the row in the columns of that body stand in the list of all entries.
-        body_count : int
-            Number of bodies.
+        body_count, entry_count : int
+            Number of bodies, and of all entries.
         """
-        height = places.shape[-1] + 1  # and at least one neighbour: no empty arrays
         order, separators, held = _ordered(bodies, body_count, places.shape[-1])
-        height, beside = max(height, *map(len, held)), max(1, *map(len, separators))
-        return cls._written(held, order, separators, bodies, places, height, beside)
-
-    @classmethod
-    def _written(cls, held, order, separators, bodies, places, height, beside) -> "Fronts":
         position = np.argsort(order)
-        count, width = len(order), places.shape[-1]
-        columns, entry_count, left_height = width * (1 + beside), int(places.max()) + 1, height - width
+        count, width = body_count, places.shape[-1]
+        height = max(width + 1, *map(len, held))  # no empty arrays
+        beside = max(1, *map(len, separators))
+        columns, left_height = width * (1 + beside), height - width
         entries = np.full((count, height, columns), entry_count, np.int32)
         rights = np.full((count, height), len(bodies), np.int32)
         left_rows = np.full((count, height), count * left_height, np.int32)
@@ -101,15 +108,14 @@ class Fronts(eqx.Module):
 
 
 def _ordered(
-    bodies: np.ndarray, count: int, width: int
-) -> tuple[np.ndarray, list[set[int]], list[list[tuple[int, int]]]]:
+    bodies: Int[np.ndarray, "row slot"], count: int, width: int
+) -> tuple[Int[np.ndarray, " body"], list[set[int]], list[list[Row]]]:
     """Return the bodies in the order of their elimination, and the neighbours and rows that each has then.
 
-    A row is told by the front that left it over and its place there; -1 and its number in the matrix if none did. Of
-    bodies with as many neighbours, one with the fewest rows is the first.
+    Of bodies with as many neighbours, one with the fewest rows is the first.
     """
     beside: list[set[int]] = [set() for _ in range(count)]
-    rows: list[set[tuple[int, int]]] = [set() for _ in range(count)]
+    rows: list[set[Row]] = [set() for _ in range(count)]
     for row, slots in enumerate(bodies):
         touched = {int(body) for body in slots if body >= 0}
         for body in touched:

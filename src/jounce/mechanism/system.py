@@ -255,8 +255,13 @@ def _flat(block: Float[Numbers, "*rest batch"]) -> Float[Numbers, "entry batch"]
     return block.reshape(-1, block.shape[-1])
 
 
-def jacobian_cells(groups: tuple[Group, ...], rows: list[int], coordinate_count: int, body_count: int) -> np.ndarray:
-    """Return where each entry of the Jacobian stands among the flattened blocks; beyond their end there is a zero."""
+def jacobian_cells(
+    groups: tuple[Group, ...], rows: list[int], coordinate_count: int, body_count: int
+) -> tuple[Int[np.ndarray, "row column"], int]:
+    """Return where each entry of the Jacobian stands among those of the blocks, and how many these are.
+
+    Beyond their end stands what is zero for certain.
+    """
     row_total = sum(r * g.instances for r, g in zip(rows, groups, strict=True))
     total = sum(r * g.instances * coordinate_count * len(g.moving_slots) for r, g in zip(rows, groups, strict=True))
     cells = np.full((row_total, body_count * coordinate_count), total, np.int32)
@@ -272,20 +277,20 @@ def jacobian_cells(groups: tuple[Group, ...], rows: list[int], coordinate_count:
                 cells[block_rows[:, moving], np.broadcast_to(columns, (r, columns.size))] = places[c][:, moving]
             position += coordinate_count * r * n
         first_row += r * n
-    return cells
+    return cells, total
 
 
-def elimination(cells: np.ndarray, width: int) -> Fronts | None:
+def elimination(cells: Int[np.ndarray, "row column"], width: int, entry_count: int) -> Fronts | None:
     """Return how a Jacobian is eliminated body by body, where that is less work than as a dense matrix."""
-    (rows, columns), empty = cells.shape, int(cells.max(initial=0))
+    rows, columns = cells.shape
     if rows != columns or not rows:
         return None
     blocks = cells.reshape(rows, columns // width, width)
-    touched = (blocks < empty).any(axis=2)
+    touched = (blocks < entry_count).any(axis=2)
     slots = int(touched.sum(axis=1).max())
     bodies = np.argsort(~touched, axis=1, kind="stable")[:, :slots]
     places = np.take_along_axis(blocks, bodies[..., None], axis=1)
     bodies = np.where(np.take_along_axis(touched, bodies, axis=1), bodies, -1)
-    fronts = Fronts.of(bodies, places, columns // width)
+    fronts = Fronts.of(bodies, places, columns // width, entry_count)
     count, height, wide = fronts.shape
     return fronts if FRONT_COST * count * width * height * wide < rows**3 else None
