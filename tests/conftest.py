@@ -34,7 +34,7 @@ MEMORY_MAPS = 65530  # of a process, unless the system is set up otherwise
 
 def pytest_configure(config):
     """Keep compiled programs for the other worker and the next run, in files that cannot be read half written."""
-    if config.cache is None or "JAX_COMPILATION_CACHE_DIR" in os.environ:
+    if getattr(config, "cache", None) is None or "JAX_COMPILATION_CACHE_DIR" in os.environ:
         return
     folder = pathlib.Path(config.cache.mkdir("programs"))
     if not hasattr(config, "workerinput") and sum(file.stat().st_size for file in folder.iterdir()) > LARGEST_STORE:

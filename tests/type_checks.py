@@ -91,4 +91,5 @@ class Finder:
 
 if PACKAGE in sys.modules:
     raise RuntimeError(f"{PACKAGE} was imported before its types could be checked")
-sys.meta_path.insert(0, Finder)
+if not jaxtyping.config.jaxtyping_disable:  # JAXTYPING_DISABLE=1, as for the slow tests
+    sys.meta_path.insert(0, Finder)

@@ -13,7 +13,7 @@ import numpy as np
 Numbers = jax.Array | np.ndarray
 """An array of JAX or NumPy."""
 
-ArrayLike = Numbers | Sequence | float | int
+ArrayLike = Numbers | Sequence | np.floating | np.integer | float | int
 """What becomes an array of numbers: an array, lists or tuples of numbers in any nesting, a number."""
 
 Real = Numbers | np.floating | np.integer | float | int

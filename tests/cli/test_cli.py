@@ -83,6 +83,7 @@ def test_the_star_marks_the_largest_magnitude(run, four_bar):
     assert sum(cell.endswith("*") for cell in jounce_row) == 1
 
 
+@pytest.mark.slow
 def test_vectors_and_angular_velocities_of_a_spatial_mechanism(run):
     _, out, _ = run("run", RSUR)
     rows = table_rows(out)
@@ -309,7 +310,7 @@ def test_a_result_that_cannot_be_written_after_all_ends_with_1(run, monkeypatch,
     def full(*_, **_options):
         raise jn.OutputError("cannot be written: No space left on device", path="motion.csv")
 
-    monkeypatch.setattr("jounce.io.results.write", full)
+    monkeypatch.setattr("jounce.io.write", full)
     status, out, err = run("run", FOUR_BAR, "--order", "0", "--out", tmp_path / "motion.csv")
     assert status == 1
     assert "psi" in out
@@ -368,6 +369,7 @@ def test_a_process_of_its_own_imports_no_more_than_it_needs():
     assert done.stdout.splitlines()[-1] == "[]"
 
 
+@pytest.mark.slow
 def test_python_m_jounce_keeps_compiled_programs_for_the_next_call(tmp_path):
     cache = tmp_path / "cache"
     first = process("run", FOUR_BAR, "--order", "1", JOUNCE_CACHE_DIR=str(cache))

@@ -155,6 +155,7 @@ def test_standard_output_that_cannot_be_written(redirection, reason, arguments):
     assert done.stderr.startswith('{"error"' if "json" in arguments else "error: standard output")
 
 
+@pytest.mark.slow
 def test_a_file_is_written_though_nobody_reads_the_table(tmp_path, cache):
     done = shell(f"jounce run {FOUR_BAR} --order 0 --out a.csv | true; exit ${{PIPESTATUS[0]}}", tmp_path, **cache)
     assert (done.returncode, done.stderr) == (0, "")

@@ -139,6 +139,7 @@ def test_balances_of_a_closed_loop():
         newton_euler(heavy, rates=3)
 
 
+@pytest.mark.slow
 def test_what_is_refused():
     free = jn.Mechanism(space="planar", bodies={"puck": jn.Body([0, 0], mass=1.0, inertia=1.0)}, joints={})
     with pytest.raises(jn.MechanismError, match="do not prescribe all"):

@@ -32,6 +32,7 @@ def disc(share):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [1.0, 0.5])
 def test_power_that_grows_evenly_balances_at_every_order(share):
     balance = jn.power_balance(jn.solve(disc(share), TIME, order=6))

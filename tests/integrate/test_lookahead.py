@@ -48,7 +48,8 @@ def gained(stop, t0, w):
     return STRENGTH * w * math.sqrt(math.pi) / 2 * (erf((stop - t0) / w) + erf(t0 / w))
 
 
-@pytest.mark.parametrize("stop", [0.4, pytest.param(5.0, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("stop", [0.4, 5.0])
 def test_a_pulse_in_time_is_seen_from_any_distance_and_of_any_width(stop):
     for t0 in (0.05, 0.137, 0.2, 0.2137, 0.35):
         for w in (1e-4, 1e-3, 1e-2, 1e-1):
@@ -104,6 +105,7 @@ def test_a_rate_that_is_not_finite_at_the_start_is_named():
         jn.simulate(sled(N=1.0, end=0.0), [0.0, -1.0], 1)
 
 
+@pytest.mark.slow
 def test_the_longest_step_finds_what_is_narrower_than_the_places_looked_at():
     motion = jn.simulate(sled(A=STRENGTH, t0=0.23456, w=1e-6), [0.0, 0.4], 1, longest_step=2e-4)
     assert motion.outputs["x"][-1, 1, 0] == pytest.approx(gained(0.4, 0.23456, 1e-6), abs=PRECISION / 1e-6)

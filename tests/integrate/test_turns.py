@@ -70,6 +70,7 @@ def test_a_spring_wound_up_by_three_turns_swings_three_turns_to_either_side(kind
         np.testing.assert_allclose(stored, 0.5 * STIFFNESS * closed_form(TIME)[:, 0] ** 2, rtol=0, atol=1e-10)
 
 
+@pytest.mark.slow
 def test_its_power_balance_closes():
     balance = jn.power_balance(released("spatial"))
     assert float((abs(balance["residual"]) / balance["scale"]).max()) < 1e-13

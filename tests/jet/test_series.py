@@ -273,6 +273,7 @@ def test_interpolation_keeps_to_its_interval():
     assert np.max(np.abs(found[0] - np.interp(path[0], knots, values))) < 1e-14
 
 
+@pytest.mark.slow
 def test_coefficients_that_come_late_make_the_same_history():
     x, y = (jnp.asarray(path) for path in paths((2, 3), (3, 2)))
 

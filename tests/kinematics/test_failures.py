@@ -106,6 +106,7 @@ def test_distance_driver_that_reaches_zero(time):
     assert error.motion.status[~good].all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("motion", ["-0.5", "0", "0.5*t"])
 def test_distance_driver_that_is_not_positive_at_the_start(motion):
     error = failure(distance_slider(motion), [0.0, 1.0])

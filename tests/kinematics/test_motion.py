@@ -75,6 +75,7 @@ def test_spatial_angular_velocity_in_both_frames(spatial):
     )
 
 
+@pytest.mark.slow
 def test_relative_angle_asked_for_later(spatial):
     asked = spatial.evaluate(jn.RelativeAngleOutput(("ground", "spindle"), [1.0, 2.0, 2.0]))
     np.testing.assert_allclose(asked.values, spatial.outputs["angle"], atol=1e-12)

@@ -156,6 +156,7 @@ def test_a_tolerance_below_rounding_still_ends(tolerance):
     assert not motion.status.any()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("time", [[0.0, 1.0], np.linspace(0, 1, 11)], ids=["ends", "grid"])
 def test_a_quick_whole_turn_between_rests_is_counted(time):
     """Before and after it the nut rests in the same attitude: only the law tells that it has turned."""

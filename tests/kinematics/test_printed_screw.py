@@ -41,6 +41,7 @@ def test_screw_as_printed_with_the_driver_of_equation_104_has_a_row_of_zeros():
         jn.solve(printed_screw(drivers.SpatialDistanceDriver(BODIES, ORIGIN, ORIGIN, 0.0)), TIME, order=1)
 
 
+@pytest.mark.slow
 def test_screw_advances_by_its_lead_a_turn():
     motion = jn.solve(small.screw(0.02, "3*t + t**3/40"), TIME, order=4)
     angle = np.stack([3 * TIME + TIME**3 / 40, 3 + 3 * TIME**2 / 40, 6 * TIME / 40, 6 / 40 + 0 * TIME, 0 * TIME], 1)

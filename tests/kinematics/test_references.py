@@ -37,6 +37,7 @@ def test_to_jounce(name):
     assert max(found.values()) < JOUNCE, found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["rack_pinion"])
 def test_order_10(name):
     found = errors(name, 10)

@@ -56,6 +56,7 @@ def test_angles_about_axes_have_the_turns_of_the_law(law, turn):
         np.testing.assert_allclose(last[name][0], whole[name][-1], rtol=0, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_half_a_turn_is_pi_whatever_its_last_digit_says():
     for sign in (1, -1):
         mechanism = spindle("pi")
@@ -198,6 +199,7 @@ def test_springs_in_space_count_turns_on_any_grid_as_in_the_plane(start, rate):
             assert (np.abs(found[name] - values[both]) <= 1e-11 * size).all()
 
 
+@pytest.mark.slow
 def test_energies_and_powers_have_the_turns_of_the_forces():
     start, rate = LAWS["from the second turn"]
     motion = jn.solve(wound(start, rate), GRIDS[0])

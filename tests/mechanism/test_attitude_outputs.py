@@ -112,6 +112,7 @@ def test_angles_are_the_laws_of_the_drivers_over_turns_between_instants(turning)
         np.testing.assert_allclose(turning.outputs["angles"][k], expected, rtol=0, atol=1e-10)
 
 
+@pytest.mark.slow
 def test_euler_parameters_go_on_with_their_sign_and_have_their_derivatives(turning):
     def parameters(t):
         a, b, c = 0.3 + 7 * t, 1.2 + 0.4 * mp.sin(2 * t), 0.5 - 5 * t + 0.2 * t**2

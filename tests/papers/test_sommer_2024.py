@@ -168,6 +168,7 @@ def check_errors(path, names):
         assert 0 < float(row["rmse"]) <= 1e-12, row
 
 
+@pytest.mark.slow
 def test_reproduction_writes_its_files(small_run):
     directory, paths, calls, _ = small_run
     names = ["comparison.md", "errors.csv", "errors_by_tolerance.csv", "errors_by_step.csv"]

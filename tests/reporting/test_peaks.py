@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.reporting.peaks import peaks
+from jounce.reporting.peaks import Peak, derivative_name, peaks
 
 CRANK = jn.Mechanism(
     space="planar",
@@ -40,6 +40,32 @@ def test_peaks_do_not_depend_on_the_instants(count):
     assert peaks(motion) is peaks(motion)
 
 
+@pytest.mark.parametrize(
+    "minimum, maximum, largest",
+    [
+        (-1.0, 0.5, (True, False)),
+        (-0.5, 1.0, (False, True)),
+        (-1.0, 1.0, (True, True)),
+        (-1.0 + 1e-14, 1.0, (True, True)),  # they differ by rounding
+        (2.0, 2.0, (False, False)),  # it does not change, and has no peak
+    ],
+)
+def test_the_largest_magnitude_is_marked(minimum, maximum, largest):
+    assert Peak("psi", "velocity", "rad/s", minimum, 0.0, maximum, 1.0, 2.0).largest == largest
+
+
+def test_ordinals_of_derivatives():
+    assert [derivative_name(k) for k in (11, 12, 13, 21, 23)] == ["11th", "12th", "13th", "21st", "23rd"]
+
+
+def test_instants_are_solved_together_or_one_by_one(monkeypatch):
+    motion, again = (jn.solve(CRANK, np.linspace(0.0, 1.0, 3), order=1) for _ in range(2))
+    together = peaks(motion)
+    monkeypatch.setattr("jounce.reporting.peaks.CHUNK", 1)
+    for one, other in zip(together, peaks(again), strict=True):
+        assert one.maximum == pytest.approx(other.maximum, rel=1e-12)
+
+
 def test_a_peak_on_an_instant_keeps_its_time():
     (position, velocity) = peaks(jn.solve(CRANK, [0.0, 0.1], order=1))
     assert (velocity.maximum_at, position.minimum_at, position.minimum) == (0.0, 0.0, 0.0)
@@ -59,6 +85,7 @@ def test_peaks_of_a_motion_that_ends_early():
         assert 0 <= peak.maximum_at <= reached[-1] + 0.01
 
 
+@pytest.mark.slow
 def test_peaks_of_a_simulation():
     free = jn.Mechanism(
         space="planar",

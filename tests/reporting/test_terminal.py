@@ -4,6 +4,8 @@ import math
 import pathlib
 import sys
 
+import pytest
+
 import jounce as jn
 from jounce.reporting.peaks import Peak, peaks
 from jounce.reporting.terminal import Bar, show_peaks
@@ -62,6 +64,7 @@ def test_a_bar_is_shown_on_a_terminal_and_for_long_work_only(capsys, monkeypatch
     assert "solving" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_peaks_of_an_angular_velocity_start_with_velocity():
     found = [p for p in peaks(jn.solve(jn.load(RSUR), [0.0, 0.1])) if p.output == "coupler_spin_x"]
     assert [(p.derivative, p.unit) for p in found][:2] == [("velocity", "rad/s"), ("acceleration", "rad/s^2")]

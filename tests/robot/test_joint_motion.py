@@ -62,6 +62,7 @@ def test_one_sample_and_transformed_by_jax(motion):
     np.testing.assert_allclose(mapped.singular_values, expected.singular_values, rtol=0, atol=1e-14)
 
 
+@pytest.mark.slow
 def test_a_redundant_arm_moves_with_the_least_norm():
     robot = random_robot(9, 8, tree=False)
     place = robot.moving_links[-1], (0.1, 0.0, 0.2)

@@ -24,7 +24,7 @@ from jounce.jet.coefficients import (
     square_root,
     total,
 )
-from jounce.shapes import Numbers, Real
+from jounce.shapes import ArrayLike, Numbers, Real
 
 
 @jax.tree_util.register_pytree_node_class
@@ -63,18 +63,18 @@ class Jet:
             raise ValueError("a jet needs at least one coefficient, got none")
 
     @classmethod
-    def constant(cls, value: Real, order: int) -> "Jet":
+    def constant(cls, value: ArrayLike, order: int) -> "Jet":
         """Return the jet of a quantity that does not change in time."""
         return cls((jnp.asarray(value), *[None] * _checked(order)))
 
     @classmethod
-    def variable(cls, value: Real, order: int) -> "Jet":
+    def variable(cls, value: ArrayLike, order: int) -> "Jet":
         """Return the jet of time itself at the instant (or instants) `value`, in seconds."""
         value = jnp.asarray(value)
         return cls((value, jnp.ones_like(value), *[None] * (order - 1))[: _checked(order) + 1])
 
     @classmethod
-    def from_derivatives(cls, derivatives: Iterable[Real]) -> "Jet":
+    def from_derivatives(cls, derivatives: Iterable[ArrayLike]) -> "Jet":
         """Return the jet whose plain derivatives ``x, x', x'', ...`` stand along the leading axis."""
         return cls(jnp.asarray(x, float) * (1 / math.factorial(k)) for k, x in enumerate(derivatives))
 

@@ -3,14 +3,13 @@
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
-from numpy.typing import ArrayLike
 
 from jounce.errors import JounceError, TrajectoryError
 from jounce.jet import Jet, cross, dot, sqrt, stack, transpose
 from jounce.rigid.euler_parameters import from_rotation_matrices
 from jounce.rigid.orientation import angular_velocity, check_rotation
 from jounce.rigid.rotations import is_traced, rotation_matrix
-from jounce.shapes import Numbers, Real
+from jounce.shapes import ArrayLike, Numbers, Real
 
 HIGHEST_DEGREE = 11
 UNIT = 1e-6  # how far the length of a sampled quaternion may be from one: printed digits, single precision
@@ -43,8 +42,6 @@ class AttitudeSamples:
     Examples
     --------
     >>> import numpy as np
-    from jaxtyping import Float
-    from numpy.typing import ArrayLike
     >>> import jounce as jn
     >>> t = np.linspace(0.0, 1.0, 41)
     >>> angles = np.stack([0.5 * t**2, 0 * t, 0 * t], axis=1)

@@ -1,17 +1,13 @@
 """Checks of the numbers that motion laws are made of; each raises an error that names the number at fault."""
 
 import math
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
 from jounce.errors import JounceError, TrajectoryError, did_you_mean
-from jounce.shapes import Numbers
-
-ArrayLike = Numbers | Sequence | float | int
-"""What becomes an array of numbers: an array, lists or tuples of numbers in any nesting, a number."""
+from jounce.shapes import ArrayLike
 
 
 def check_choice(name: str, value: object, valid: tuple[str, ...], error: type[JounceError] = TrajectoryError) -> None:

@@ -12,7 +12,8 @@ from jaxtyping import Float
 from jounce.display import Displayed
 from jounce.errors import JounceError, MechanismError, SampleWarning, TrajectoryError, did_you_mean
 from jounce.jet import Jet
-from jounce.trajectory.checks import ArrayLike, check_samples, finite_numbers, whole_number
+from jounce.shapes import ArrayLike
+from jounce.trajectory.checks import check_samples, finite_numbers, whole_number
 from jounce.trajectory.expression import Expression
 from jounce.trajectory.motion import AbstractMotion, ExpressionMotion, SplineMotion
 from jounce.trajectory.profiles import motion_profile

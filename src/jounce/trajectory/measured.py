@@ -13,7 +13,8 @@ from jaxtyping import Float
 
 from jounce.errors import MechanismError
 from jounce.jet import Jet
-from jounce.trajectory.checks import ArrayLike, check_choice, whole_number
+from jounce.shapes import ArrayLike
+from jounce.trajectory.checks import check_choice, whole_number
 from jounce.trajectory.expression import Expression
 from jounce.trajectory.motion import SplineMotion, Untraced
 from jounce.trajectory.sample_errors import derivative_errors

@@ -8,7 +8,8 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.errors import TrajectoryError
-from jounce.trajectory.checks import ArrayLike, check_choice, check_samples, whole_number
+from jounce.shapes import ArrayLike
+from jounce.trajectory.checks import check_choice, check_samples, whole_number
 from jounce.trajectory.motion import SplineMotion
 from jounce.trajectory.splines import integrated, local_powers
 

@@ -8,7 +8,8 @@ from jaxtyping import Float
 
 from jounce.errors import MechanismError
 from jounce.jet.turns import whole_periods
-from jounce.trajectory.checks import ArrayLike, check_samples, whole_number
+from jounce.shapes import ArrayLike
+from jounce.trajectory.checks import check_samples, whole_number
 
 _Samples = Float[np.ndarray, " samples"]
 _Breakpoints = Float[np.ndarray, " breakpoints"]

@@ -9,7 +9,7 @@ import pytest
 
 import jounce as jn
 from jounce.constraints import catalogue
-from jounce.integrate.batch_equations import Family
+from jounce.integrate.batch_equations import ParametricMechanism
 from jounce.io.mechanisms.inertia_forms import _solid_keys
 from jounce.io.mechanisms.keys import file_keys, output_holder, output_types
 from jounce.io.mechanisms.overrides import override
@@ -266,7 +266,7 @@ def test_orientations_in_python_have_the_forms_of_files(tmp_path):
         ({"axis": [0, 0, 1], "angel": 1.0}, "unknown key 'angel'; did you mean 'angle'"),
         ({"axis": [0, 0, 1]}, "is missing"),
         ({"axis": [0, 0, "tilt - 0.1"], "angle": 1.0}, "zero length"),
-        ({"euler": "xyy", "angles": [0, 0, 1]}, "neighbouring"),
+        ({"euler": "xyy", "angles": [0, 0, 1]}, "neighbours"),
         ([1, 0, 0], "4 numbers"),
         ("1000", "4 numbers"),
     ],
@@ -285,7 +285,7 @@ def test_offsets_that_follow_from_the_guess_follow_it_in_a_batch():
     joints |= {"gear": jn.planar.Coordinate(("a", "b"), "angle", ratio=-2.0)}
     bodies = {"a": jn.Body([0, 0], angle="turn", mass=1, inertia=1), "b": jn.Body([1, 0], mass=1, inertia=1)}
     gears = jn.Mechanism(space="planar", bodies=bodies, joints=joints, parameters={"turn": 0.1, "other": 1.0})
-    family = Family(gears, build(gears), ("turn",))
+    family = ParametricMechanism(gears, build(gears), ("turn",))
     rows = np.array([[0.1], [0.5], [-0.3]])
     equations, _ = family.of(rows)
     offsets = [g.element.offset for g in equations.system.groups if hasattr(g.element, "offset")]

@@ -47,6 +47,7 @@ def motion(path):
     return jn.solve(jn.load(path), order=2)
 
 
+@pytest.mark.slow
 def test_outputs_are_what_the_functions_return(motion):
     longer = jn.solve(motion.mechanism, order=4)
     pairs = {

@@ -82,6 +82,10 @@ def test_a_default_with_a_unit_is_for_the_joints_that_it_fits(read):
     assert found["pin"] == jn.Limits(velocity=3.0, effort=5.0, jerk=9.0, effort_rate=8.0)
 
 
+def test_a_joint_may_be_held_by_its_limits(read):
+    assert read("joints: {slide: {lower: 0.5, upper: 0.5}}")["slide"] == jn.Limits(lower=0.5, upper=0.5, velocity=2.0)
+
+
 def test_null_takes_a_limit_away(read):
     found = read("default: {velocity: null}\njoints: {slide: {lower: null}}")
     assert found["slide"] == jn.Limits(upper=1.0)

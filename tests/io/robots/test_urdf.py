@@ -331,6 +331,12 @@ def chain(tmp_path, *mimics):
     return path
 
 
+def test_what_a_joint_does_not_say_is_said_by_the_format(tmp_path):
+    robot = load_robot(chain(tmp_path, "<axis/>", '<mimic joint="ja"/>'))
+    assert robot.joints["jb"].mimic == jn.Mimic("ja", 1.0, 0.0)
+    np.testing.assert_array_equal(robot.joints["ja"].axis, [1.0, 0.0, 0.0])
+
+
 def test_a_joint_may_follow_one_that_follows_another(tmp_path):
     second = '<mimic joint="ja" multiplier="2" offset="0.5"/>'
     robot = load_robot(chain(tmp_path, "", second, '<mimic joint="jb" multiplier="-3" offset="1"/>'))

@@ -16,6 +16,7 @@ from jounce.io.files.located_data import Location, Source
 from jounce.io.files.reading import fault_of_number
 from jounce.io.files.samples import read_columns, read_samples
 from jounce.io.files.source import read_source
+from jounce.shapes import ArrayLike
 from jounce.trajectory import (
     AbstractMotion,
     Expression,
@@ -24,7 +25,6 @@ from jounce.trajectory import (
     MeasuredMotion,
     SplineMotion,
 )  # fmt: skip
-from jounce.trajectory.checks import ArrayLike
 from jounce.trajectory.dimensions import Dimension, describe_dimension, is_rate, per_seconds
 from jounce.trajectory.expression import RESERVED
 from jounce.trajectory.trapezoid import LIMITS

@@ -2,9 +2,9 @@
 
 import numpy as np
 from jaxtyping import Float
-from numpy.typing import ArrayLike
 
 from jounce.jet import Jet, sine_cosine
+from jounce.shapes import ArrayLike
 
 
 def energies(inertia: float, motion: ArrayLike) -> Float[np.ndarray, "*batch 3"]:
