@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import copy
 import difflib
+import numbers
+import operator
 from collections.abc import Collection, Iterable
 from typing import Any
 
@@ -34,6 +36,7 @@ __all__ = [
     "did_you_mean",
     "no_such",
     "show_value",
+    "whole_number",
 ]
 
 
@@ -123,6 +126,15 @@ def check_choice(field: str, value: object, valid: Collection[str], error: type[
     """Raise an error unless a word, such as the name of a frame, is one of those valid."""
     if value not in valid:
         raise error(f"unknown {field}; {did_you_mean(value, valid)}", name=field, value=value)
+
+
+def whole_number(name: str, value: object, least: int = 0, most: int | None = None, *, error: type[JounceError]) -> int:
+    """Return a whole number within bounds, or raise an error."""
+    whole = operator.index(value) if isinstance(value, numbers.Integral) and not isinstance(value, bool) else None
+    if whole is None or whole < least or (most is not None and whole > most):
+        bounds = f", {least} or greater" if most is None else f" from {least} to {most}"
+        raise error(f"must be a whole number{bounds}", name=name, value=value)
+    return whole
 
 
 def did_you_mean(name: object, valid: Iterable[str], limit: int = 20) -> str:

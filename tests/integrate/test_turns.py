@@ -113,10 +113,10 @@ def test_all_methods_count_turns(method, tolerance, error):
 @pytest.mark.slow
 def test_runs_side_by_side_have_turns_of_their_own():
     wound = np.array([0.5, WOUND, -4 * np.pi, 20.0, 2.0, 3.2])
-    found = jn.simulate_batch(rotor("spatial", wound=0.3), {"wound": wound}, TIME).outputs["angle"]
+    found = jn.simulate_batch(rotor("spatial", wound=0.3), {"wound": wound}, TIME, 2).outputs["angle"]
     expected = wound[:, None, None] * closed_form(TIME, 3, 1.0)
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
-    plane = jn.simulate_batch(rotor("planar", wound=0.3), {"wound": wound}, TIME).outputs["angle"]
+    plane = jn.simulate_batch(rotor("planar", wound=0.3), {"wound": wound}, TIME, 2).outputs["angle"]
     np.testing.assert_allclose(found, plane, rtol=0, atol=1e-12)
 
 

@@ -7,6 +7,7 @@ import sys
 
 import pytest
 
+NEEDS_FORK = pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "examples"
 
@@ -86,7 +87,7 @@ def test_threads_compute_at_once(tmp_path):
     assert ended(tmp_path, THREADS) == "0 wrong\n"
 
 
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")
+@NEEDS_FORK
 def test_a_fork_of_a_process_that_computed_is_refused(tmp_path):
     program = """
 job()
@@ -98,7 +99,7 @@ print(told() == job())
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")
+@NEEDS_FORK
 def test_a_fork_before_the_first_computation_computes(tmp_path):
     program = """
 with multiprocessing.get_context("fork").Pool(2) as pool:
@@ -109,10 +110,8 @@ print(all(one == job() for one in found))
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("method", ["spawn", "forkserver"])
+@pytest.mark.parametrize("method", ["spawn", pytest.param("forkserver", marks=NEEDS_FORK)])
 def test_new_processes_compute_after_the_parent_has(tmp_path, method):
-    if method == "forkserver" and not hasattr(os, "fork"):
-        pytest.skip("this system has no fork")
     program = """
 if __name__ == "__main__":
     expected = job()

@@ -1,5 +1,6 @@
 """Energies as outputs: kinetic, of accelerations of any order, and potential, of a body or of the whole mechanism."""
 
+import abc
 from typing import ClassVar
 
 import equinox as eqx
@@ -42,9 +43,9 @@ class AbstractEnergyOutput(AbstractMotionOutput):
         index = 1 + list(motion.mechanism.bodies).index(self.alone)  # the ground first
         return parts[:, index : index + 1]
 
+    @abc.abstractmethod
     def _of_bodies(self, motion: Motion) -> np.ndarray:
         """Return the Taylor coefficients of all bodies, (levels, bodies, time)."""
-        raise NotImplementedError
 
 
 class KineticEnergyOutput(AbstractEnergyOutput):

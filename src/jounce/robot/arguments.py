@@ -1,12 +1,13 @@
 """What users hand to the functions of robots, checked: numbers, coordinates and their derivatives."""
 
-from typing import Any
+from functools import partial
 
 import jax
 import numpy as np
 from jaxtyping import Float
 
-from jounce.errors import JounceError, RobotError
+from jounce import errors
+from jounce.errors import RobotError
 from jounce.robot.abstract_robot import AbstractRobot
 from jounce.shapes import Numbers
 
@@ -31,21 +32,7 @@ def floats(name: str, values: object) -> Float[Numbers, "..."]:
     raise RobotError("must be an array of real numbers", name=name, value=type(values).__name__)
 
 
-def whole_number(
-    name: str, value: Any, least: int = 0, most: int | None = None, error: type[JounceError] = RobotError
-) -> int:
-    """Return a whole number within bounds.
-
-    Raises
-    ------
-    JounceError
-        If it is none; of the type given.
-    """
-    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
-    if not whole or value < least or (most is not None and value > most):
-        bounds = f", {least} or greater" if most is None else f" from {least} to {most}"
-        raise error(f"must be a whole number{bounds}", name=name, value=value)
-    return int(value)
+whole_number = partial(errors.whole_number, error=RobotError)
 
 
 def checked_position(robot: AbstractRobot, q: object, name: str = "q") -> Float[Numbers, "*batch 1 joint"]:

@@ -1,26 +1,17 @@
 """Checks of the numbers that motion laws are made of; each raises an error that names the number at fault."""
 
 import math
+from functools import partial
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
-from jounce.errors import JounceError, TrajectoryError, did_you_mean
+from jounce import errors
+from jounce.errors import JounceError, TrajectoryError
 from jounce.shapes import ArrayLike
 
-
-def check_choice(name: str, value: object, valid: tuple[str, ...], error: type[JounceError] = TrajectoryError) -> None:
-    """Raise unless a word is one of those that there are."""
-    if value not in valid:
-        raise error(f"no such choice; {did_you_mean(value, valid)}", name=name, value=value)
-
-
-def whole_number(name: str, value: object, least: int, most: int, error: type[JounceError] = TrajectoryError) -> int:
-    """Return a whole number within bounds."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not least <= value <= most:
-        raise error(f"must be a whole number from {least} to {most}", name=name, value=value)
-    return int(value)
+whole_number = partial(errors.whole_number, error=TrajectoryError)
 
 
 def finite(name: str, value: Any) -> float:

@@ -11,10 +11,10 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Float
 
-from jounce.errors import MechanismError
+from jounce.errors import MechanismError, check_choice
 from jounce.jet import Jet
 from jounce.shapes import ArrayLike
-from jounce.trajectory.checks import check_choice, whole_number
+from jounce.trajectory.checks import whole_number
 from jounce.trajectory.expression import Expression
 from jounce.trajectory.motion import SplineMotion, Untraced
 from jounce.trajectory.sample_errors import derivative_errors
@@ -76,7 +76,7 @@ class MeasuredMotion(SplineMotion):
         beyond: str = "refuse",
     ):
         check_choice("beyond", beyond, BEYOND, MechanismError)
-        self.derivative = whole_number("derivative", derivative, 1, HIGHEST, MechanismError)
+        self.derivative = whole_number("derivative", derivative, 1, HIGHEST, error=MechanismError)
         samples, ends, pieces, _ = spline_through(times, values, degree)
         for _ in range(self.derivative):
             pieces = integrated(pieces, np.diff(ends))

@@ -12,10 +12,9 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Float
 
-from jounce.errors import MechanismError
+from jounce.errors import MechanismError, check_choice
 from jounce.jet import Jet, compose
 from jounce.shapes import ArrayLike, Numbers
-from jounce.trajectory.checks import check_choice
 from jounce.trajectory.expression import Expression
 from jounce.trajectory.sample_errors import derivative_errors
 from jounce.trajectory.splines import spline_through

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from jounce.errors import TrajectoryError
+from jounce.errors import TrajectoryError, check_choice
 from jounce.shapes import ArrayLike
-from jounce.trajectory.checks import check_choice, check_samples, whole_number
+from jounce.trajectory.checks import check_samples, whole_number
 from jounce.trajectory.motion import SplineMotion
 from jounce.trajectory.splines import integrated, local_powers
 
@@ -91,8 +91,8 @@ class PolynomialMotion(SplineMotion):
         times, values = check_samples(times, values)
         continuity = whole_number("continuity", continuity, 1, MAX_CONTINUITY)
         derivative = whole_number("derivative", derivative, 0, continuity)
-        check_choice("beyond", beyond, BEYOND)
-        check_choice("ends", ends, ENDS)
+        check_choice("beyond", beyond, BEYOND, TrajectoryError)
+        check_choice("ends", ends, ENDS, TrajectoryError)
         conditions = _checked(start, continuity, "start"), _checked(end, continuity, "end")
         constants = _constants(conditions, derivative)
         step = (times[-1] - times[0]) / (len(times) - 1)

@@ -51,7 +51,7 @@ def spline_through(
     times, values = check_samples(times, values, MechanismError)
     if values.ndim != 1:
         raise MechanismError("samples need one value for each time", name="values", value=f"shape {values.shape}")
-    degree = whole_number("degree", degree, 1, HIGHEST_DEGREE, MechanismError)
+    degree = whole_number("degree", degree, 1, HIGHEST_DEGREE, error=MechanismError)
     if len(times) <= degree:
         message = f"a spline of degree {degree} needs at least {degree + 1} samples; give more, or lower the degree"
         raise MechanismError(message, value=len(times))
