@@ -10,17 +10,18 @@ import jounce as jn
 from jounce.kinematics.frontal import FrontalFactor
 from jounce.mechanism import build
 from jounce.mechanism.fronts import Fronts
+from jounce.mechanism.pattern import Pattern
 from tests.problems.small import four_bar
 
 LANES = 5
 
 
 def random_pattern(random, count, width, redundant=0):
-    """Bodies of each row: a tree of joints of width - 1 rows, and for each body one more row to any other."""
-    joints = [((k - 1 - int(random.integers(0, min(k, 3))), k) if k else (0, -1), width - 1) for k in range(count)]
+    """Bodies of each row, or `count`: a tree of joints of width - 1 rows, and a row from each body to any other."""
+    joints = [((k - 1 - int(random.integers(0, min(k, 3))), k) if k else (0, count), width - 1) for k in range(count)]
     joints += [((k, int(random.integers(0, count))), 1) for k in range(count)]
     joints += [((int(random.integers(0, count)), int(random.integers(0, count))), 1) for _ in range(redundant)]
-    bodies = np.array([(i, j if j != i else -1) for (i, j), rows in joints for _ in range(rows)])
+    bodies = np.array([(i, j if j != i else count) for (i, j), rows in joints for _ in range(rows)])
     return bodies[random.permutation(len(bodies))]
 
 
@@ -28,7 +29,7 @@ def dense(bodies, places, entries, count):
     rows, _, width = places.shape
     matrix = np.zeros((rows, count, width, entries.shape[-1]))
     for row, slot in itertools.product(range(rows), range(2)):
-        if bodies[row, slot] >= 0:
+        if bodies[row, slot] < count:
             matrix[row, bodies[row, slot]] = entries[places[row, slot]]
     return np.moveaxis(matrix.reshape(rows, count * width, -1), -1, 0)
 
@@ -53,7 +54,7 @@ def drawn(count, width, redundant):
     bodies = random_pattern(random, count, width, redundant)
     places = random.permutation(bodies.size * width).reshape(*bodies.shape, width)
     entries = random.standard_normal((places.size, LANES))
-    fronts = Fronts.of(bodies, places, count, places.size)
+    fronts = Fronts.of(Pattern(bodies, places, count, places.size))
     matrix, scale = dense(bodies, places, entries, count), random.uniform(0.5, 2.0, (len(bodies), 1))
     return FrontalFactor.of(fronts, jnp.asarray(entries), jnp.asarray(scale)), scale * matrix, random
 
@@ -91,10 +92,10 @@ def test_signs_are_those_of_the_determinants_or_all_turned_round(square):
 
 
 def test_what_is_singular_is_told():
-    bodies, places = np.array([[0, -1]] * 3), np.stack([np.arange(9).reshape(3, 3), np.full((3, 3), 9)], axis=1)
+    bodies, places = np.array([[0, 1]] * 3), np.stack([np.arange(9).reshape(3, 3), np.full((3, 3), 9)], axis=1)
     singular, regular = np.array([[1.0, 2, 3], [2, 4, 6], [1, 1, 1]]), np.eye(3)
     entries = jnp.asarray(np.stack([singular.ravel(), regular.ravel()], axis=-1))
-    factor = FrontalFactor.of(Fronts.of(bodies, places, 1, 9), entries, jnp.ones((3, 1)))
+    factor = FrontalFactor.of(Fronts.of(Pattern(bodies, places, 1, 9)), entries, jnp.ones((3, 1)))
     ratio = np.asarray(factor.pivot_ratio())
     assert ratio[0] < 1e-15
     np.testing.assert_allclose(ratio[1], 1.0)
@@ -130,7 +131,7 @@ def test_a_long_chain_is_eliminated_by_bodies_and_moves_in_closed_form():
 
 @pytest.mark.parametrize("cost", [0.0, np.inf])
 def test_a_dead_point_is_told_whichever_way_the_jacobian_is_eliminated(cost, monkeypatch):
-    monkeypatch.setattr("jounce.mechanism.system.FRONT_COST", cost)
+    monkeypatch.setattr("jounce.mechanism.fronts.FRONT_COST", cost)
     rocker = four_bar("60*deg", "150*deg", "60*deg + t", AD=0.2, AB=0.2, BC=0.15, CD=0.1)
     assert (build(rocker).system.fronts is None) == bool(cost)
     motion = jn.solve(rocker, np.linspace(0, 2, 21), order=1, strict=False)

@@ -197,13 +197,13 @@ class Equations(eqx.Module):
             As `balance` returns them.
         """
         scale = self.system.column_scale
-        columns = self.system.cells.shape[1]
+        columns = self.system.shape[1]
         solution = -solve(jnp.concatenate([as_column(forces, scale), second]))
         return by_body(solution[:columns], scale), solution[columns:]
 
     def least_change(self, factor: DenseFactor, gap: Rows) -> Column:
         """Return the change of coordinates of least kinetic energy that closes a gap of the scaled rows, scaled."""
-        columns = self.system.cells.shape[1]
+        columns = self.system.shape[1]
         return factor.solve(-jnp.concatenate([jnp.zeros((columns, gap.shape[-1])), gap]))[:columns]
 
     def with_rates(self, factor: DenseFactor, state: State, time: Instants) -> State:

@@ -11,8 +11,9 @@ from jounce.dynamics.forward import Equations, Instants, State
 from jounce.dynamics.masses import gravity_of, masses_of, required_masses
 from jounce.errors import AssemblyError, JounceError, MechanismError, MobilityError
 from jounce.jet import Jet
-from jounce.kinematics.assembly import RANK_TOLERANCE, assemble, freely_moving
+from jounce.kinematics.assembly import assemble, freely_moving
 from jounce.kinematics.compilation import compiled
+from jounce.kinematics.host_jacobian import RANK_TOLERANCE
 from jounce.kinematics.linear import DenseFactor
 from jounce.mechanism import Mechanism, Model, build
 from jounce.mechanism.builder import pose_at

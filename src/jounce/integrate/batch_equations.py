@@ -145,7 +145,7 @@ class BatchStart:
     ):
         self._parametric, self._begun, self._state, self._instant = parametric, begun, state, instant
         self._own: State | None = None
-        equations, coordinates = begun.model.system.cells.shape
+        equations, coordinates = begun.model.system.shape
         if equations < coordinates and parametric.guesses_differ(rows):
             own = [consistent_start(parametric.varied(row), instant) for row in rows.tolist()]
             self._own = State(*(np.concatenate(parts, axis=-1) for parts in zip(*(s.state for s in own), strict=True)))

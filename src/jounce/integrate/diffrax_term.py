@@ -171,7 +171,7 @@ def _rates(time: Any, state: State, equations: Equations) -> tuple[State, State]
     state = state.map(lambda part: part[..., None])
     state = state._replace(attitude=normalised(state.attitude))
     clock = jnp.reshape(jnp.asarray(time, float), (1, 1))
-    trial = jnp.zeros((equations.coordinates, *state.position.shape[1:])), jnp.zeros((len(equations.system.cells), 1))
+    trial = jnp.zeros((equations.coordinates, *state.position.shape[1:])), jnp.zeros((equations.system.shape[0], 1))
     forces, second, attitude_rate = equations.balance(state, *trial, clock)
     factor, shifts = DenseFactor.of(equations.matrix(state, clock)), equations.pose_type.shifts
     acceleration, _ = equations.unknowns(factor.solve, forces, second)

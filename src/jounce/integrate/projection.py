@@ -62,7 +62,7 @@ def projected(equations: Equations, state: State, time: Instants) -> tuple[State
         *_, size, _, count = carry
         return jnp.any((size > 1e-9) & jnp.isfinite(size)) & (count < MOST_ITERATIONS) | (count == 0)
 
-    size = equations.system.cells.shape
+    size = equations.system.shape
     blank = DenseFactor.blank((sum(size), sum(size)), lanes)
     start = (position, attitude, blank, jnp.full(lanes, jnp.inf), jnp.zeros(lanes), 0)
     position, attitude, factor, last, first, _ = jax.lax.while_loop(unfinished, iterate, start)

@@ -19,5 +19,5 @@ def factored(system: System, pose: Pose, time: Jet) -> Factor:
 def blank_factor(system: System, lanes: int) -> Factor:
     """Return a placeholder for the factors of a batch, to start a loop with."""
     if system.fronts is None:
-        return DenseFactor.blank(system.cells.shape, lanes)
+        return DenseFactor.blank(system.shape, lanes)
     return FrontalFactor.blank(system.fronts, lanes)

@@ -15,8 +15,10 @@ import equinox as eqx
 import numpy as np
 from jaxtyping import Int
 
+from jounce.mechanism.pattern import Pattern
 from jounce.shapes import Numbers
 
+FRONT_COST = 4.0  # of an operation in fronts, by that of one in dense elimination, as measured
 Row = tuple[int, int]  # the front that left it over, and its place there; -1 and its number if it is one of the matrix
 
 
@@ -59,27 +61,12 @@ class Fronts(eqx.Module):
         return count, rows, columns
 
     @classmethod
-    def of(
-        cls,
-        bodies: Int[np.ndarray, "row slot"],
-        places: Int[np.ndarray, "row slot width"],
-        body_count: int,
-        entry_count: int,
-    ) -> "Fronts":
-        """Plan the elimination from the pattern of a matrix.
-
-        Parameters
-        ----------
-        bodies : array of int, shape (rows, slots)
-            Bodies that each row touches, below zero where there are fewer.
-        places : array of int, shape (rows, slots, width)
-            Where the entries of the row in the columns of that body stand in the list of all entries.
-        body_count, entry_count : int
-            Number of bodies, and of all entries.
-        """
-        order, separators, held = _ordered(bodies, body_count, places.shape[-1])
+    def of(cls, pattern: Pattern) -> "Fronts":
+        """Plan the elimination of matrices of a pattern, which holds arrays of NumPy."""
+        bodies, places, count, width = pattern.bodies, pattern.places, pattern.body_count, pattern.width
+        entry_count = pattern.entry_count
+        order, separators, held = _ordered(pattern)
         position = np.argsort(order)
-        count, width = body_count, places.shape[-1]
         height = max(width + 1, *map(len, held))  # no empty arrays
         beside = max(1, *map(len, separators))
         columns, left_height = width * (1 + beside), height - width
@@ -96,7 +83,7 @@ class Fronts(eqx.Module):
                 if source < 0:
                     rights[front, at] = row
                     for slot, body in enumerate(bodies[row]):
-                        if body >= 0:
+                        if body < count:
                             first = block[position[body]] * width
                             entries[front, at, first : first + width] = places[row, slot]
                 else:
@@ -107,17 +94,16 @@ class Fronts(eqx.Module):
         return cls(entries, rights, left_rows, left_columns, neighbours, position.astype(np.int32), len(bodies), width)
 
 
-def _ordered(
-    bodies: Int[np.ndarray, "row slot"], count: int, width: int
-) -> tuple[Int[np.ndarray, " body"], list[set[int]], list[list[Row]]]:
+def _ordered(pattern: Pattern) -> tuple[Int[np.ndarray, " body"], list[set[int]], list[list[Row]]]:
     """Return the bodies in the order of their elimination, and the neighbours and rows that each has then.
 
     Of bodies with as many neighbours, one with the fewest rows is the first.
     """
+    count, width = pattern.body_count, pattern.width
     beside: list[set[int]] = [set() for _ in range(count)]
     rows: list[set[Row]] = [set() for _ in range(count)]
-    for row, slots in enumerate(bodies):
-        touched = {int(body) for body in slots if body >= 0}
+    for row, slots in enumerate(pattern.bodies.tolist()):
+        touched = {body for body in slots if body < count}
         for body in touched:
             beside[body] |= touched - {body}
             rows[body].add((-1, row))
@@ -142,3 +128,13 @@ def _ordered(
             rows[other] |= left
             heapq.heappush(waiting, (len(beside[other]), len(rows[other]), other))
     return np.array(order, int), separators, held
+
+
+def elimination(pattern: Pattern) -> Fronts | None:
+    """Return how matrices of a pattern are eliminated body by body, where that is less work than as dense ones."""
+    rows, columns = pattern.shape
+    if rows != columns or not rows:
+        return None
+    fronts = Fronts.of(pattern)
+    count, height, wide = fronts.shape
+    return fronts if FRONT_COST * count * pattern.width * height * wide < rows**3 else None
