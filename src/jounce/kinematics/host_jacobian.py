@@ -204,9 +204,12 @@ def _null_space(matrix: Any, count: int | None = None) -> Float[np.ndarray, "col
     null space: two products leave of a random block that space and the vectors nearest to it. The block is large enough
     as soon as one vector of it is no null vector by far.
     """
-    (rows, columns), size = matrix.shape, _largest_size(matrix)
+    rows, columns = matrix.shape
+    if not rows or not columns:
+        return np.linalg.qr(_probes(columns, min(columns, MOST_VECTORS)))[0]
     if count == 0 or (count is None and _clearly_independent(matrix.T)):
         return np.zeros((columns, 0))
+    size = _largest_size(matrix)
     factors = _factored(_saddle(matrix, (DAMPING * size) ** 2))
 
     def nearest(width: int) -> Any:
