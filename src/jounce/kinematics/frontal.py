@@ -54,6 +54,11 @@ class FrontalFactor(eqx.Module):
         sizes = ((count, width, height, lanes), (count, width, lanes), (count, width, columns, lanes))
         return cls(fronts, *map(np.zeros, (*sizes, sizes[1])))
 
+    @property
+    def arrays(self) -> tuple[Numbers, Numbers, Numbers, Numbers]:
+        """Reflections, their factors, triangle and inverted diagonal; the batch is the last axis of all of them."""
+        return self.vectors, self.factors, self.triangle, self.inverted
+
     def solve(self, right: Columns, *, refined: bool = True) -> Float[Numbers, "column batch"]:
         """Return the solutions, shape (columns, batch), for right-hand sides of shape (rows, batch)."""
         del refined  # they are as good as can be
@@ -118,10 +123,7 @@ class FrontalFactor(eqx.Module):
 
     def applied_inverse(self, matrix: Float[Numbers, "row column"]) -> Float[Numbers, "row column"]:
         """Return the products of the inverse of the first matrix with the columns of another, shape (rows, columns)."""
-        first = FrontalFactor(
-            self.fronts, *(x[..., :1] for x in (self.vectors, self.factors, self.triangle, self.inverted))
-        )
-        return first.solve(matrix)
+        return FrontalFactor(self.fronts, *(x[..., :1] for x in self.arrays)).solve(matrix)
 
     def pivot_ratio(self) -> Float[Numbers, " batch"]:
         """Return the smallest pivot over the largest, shape (batch,): near zero at a singular position."""

@@ -19,7 +19,7 @@ STEP_TOLERANCE = 1e-10
 MOST_DENSE = 100  # rows and columns; from there on an elimination of what is not zero is quicker
 DAMPING = 1e-6  # of the largest singular value
 PROBES = 8  # random vectors, of which at least one has its part of every vector that an inverse makes long
-MOST_VECTORS = 256  # of a null space; of a larger one, so many at random
+MOST_VECTORS = 1024  # of a null space; of a larger one, so many at random
 
 
 @dataclasses.dataclass(frozen=True)
@@ -187,6 +187,19 @@ def _solved(matrix: Any, right: Float[np.ndarray, "row k"]) -> tuple[Float[np.nd
         return np.zeros((columns, count)), 0.0
     growth = float(np.max(np.linalg.norm(found[-rows:, count:], axis=0) / np.linalg.norm(right[:, count:], axis=0)))
     return found[:columns, :count], 1 / growth if square else growth**-0.5
+
+
+def is_clearly_regular(matrix: Float[np.ndarray, "size size"], tolerance: float) -> bool:
+    """Tell whether a large square matrix with many zeros has no small singular value by far; of a small one, nothing.
+
+    A value counts as small if it is at most the tolerance times the largest.
+    """
+    from scipy.sparse import csr_array
+
+    if len(matrix) <= MOST_DENSE or not np.isfinite(matrix).all():
+        return False
+    whole = csr_array(matrix)
+    return _solved(whole, np.zeros((len(matrix), 0)))[1] > 10 * tolerance * _largest_size(whole)
 
 
 def _clearly_independent(matrix: Any) -> bool:

@@ -58,7 +58,7 @@ def _of_matrix(relative: Float[Numbers, "column column"]) -> Float[Numbers, " 1"
 
 
 def _of_products(
-    product: Callable[[Float[Numbers, "column probe"]], Float[Numbers, "column probe"]], system: System
+    product: Callable[[Float[Numbers, "column probe"]], Float[Numbers, "column probe"]], columns: int
 ) -> Float[Numbers, " 1"]:
     """Return it for a matrix of which only products are to be had.
 
@@ -73,7 +73,6 @@ def _of_products(
         size = jnp.maximum(jnp.sqrt(jnp.mean(jnp.sum(vectors * vectors, axis=0))), 1e-300)
         return product(vectors / size), grown + jnp.log(size)
 
-    columns = system.shape[1]
     start = jax.random.normal(jax.random.key(0), (columns, PROBES))
     power = 2**SQUARINGS
     vectors, grown = jax.lax.fori_loop(0, power, multiplied, (start / np.sqrt(columns), np.zeros(())))
