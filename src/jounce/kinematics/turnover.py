@@ -40,9 +40,11 @@ def turnover_of(
 
     _, slope = jax.jvp(entries, (np.zeros(1),), (np.ones(1),))
     if isinstance(factor, FrontalFactor):
-        return _of_products(
-            lambda x: factor.applied_inverse(system.pattern.product(slope, x) * system.row_scale), system
-        )
+
+        def product(vectors: Any) -> Any:
+            return factor.applied_inverse(system.pattern.product(slope, vectors) * system.row_scale)
+
+        return _of_products(product, system.shape[1])
     return _of_matrix(factor.applied_inverse(system.pattern.dense(slope)[..., 0] * system.row_scale))
 
 
