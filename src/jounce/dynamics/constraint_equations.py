@@ -24,8 +24,8 @@ from jounce.errors import MechanismError
 from jounce.jet import Jet
 from jounce.jet.derivatives import plain_derivatives
 from jounce.kinematics import Motion, Status
-from jounce.kinematics.assembly import split
 from jounce.kinematics.compilation import compiled
+from jounce.kinematics.host_jacobian import RANK_TOLERANCE
 from jounce.mechanism import Mechanism
 from jounce.mechanism.preconditions import concrete
 from jounce.mechanism.system import System
@@ -180,7 +180,7 @@ def _numbers(motion: Motion, order: int) -> dict[str, np.ndarray]:
     pose_type, coordinates = motion.poses
     count = pose_type.shifts + pose_type.turns
     system = motion.model.system
-    ones = np.ones((system.cells.shape[0], 1)), np.ones(count)
+    ones = np.ones((system.shape[0], 1)), np.ones(count)
     plain = dataclasses.replace(system, outputs=(), forces=(), row_scale=ones[0], column_scale=ones[1])
 
     def chunk(lanes: np.ndarray) -> Any:
@@ -248,7 +248,7 @@ def _velocities(motion: Motion, order: int) -> Float[np.ndarray, "time derivativ
     plain = {name: plain_derivatives(values) for name, values in moving.items()}
     turns = plain["angle"][1:, None] if "angle" in plain else plain["angular_velocity"]
     parts = np.concatenate([plain["position"][1 : order + 1], turns[:order]], axis=1)
-    columns = motion.model.system.cells.shape[1]
+    columns = motion.model.system.shape[1]
     return np.transpose(parts, (3, 0, 2, 1)).reshape(len(motion.time), order, columns)
 
 
@@ -294,7 +294,7 @@ def _determined(
         mass = mass * scale[:, None] * scale
         mass = mass / (np.max(np.abs(mass)) or 1.0)
         whole = np.asarray(saddle_point(mass[..., None], whole[..., None]))[..., 0]
-    return split(whole)[1] == len(whole)
+    return np.linalg.matrix_rank(whole, rtol=RANK_TOLERANCE) == len(whole)
 
 
 def _mass_matrix(motion: Motion) -> Float[np.ndarray, "time column column"]:

@@ -152,7 +152,7 @@ def _solver(system: System, blocks: Slopes, mass: BodyMatrices | None) -> Callab
     """Return what solves for the multipliers of scaled rows: by the Jacobian alone where there are no masses."""
     scale = jnp.asarray(system.column_scale)
     flat = [(slope[0] * scale[:, None, None, None]).reshape(-1, slope.shape[-1]) for parts in blocks for slope in parts]
-    jacobian = jnp.concatenate([*flat, jnp.zeros((1, flat[0].shape[-1]))])[system.cells] * system.row_scale[:, :, None]
+    jacobian = system.pattern.dense(jnp.concatenate(flat)) * system.row_scale[:, :, None]
     if mass is None:
         return balancing(None, jacobian)
     whole = block_diagonal(mass, scale)

@@ -94,7 +94,7 @@ def drivers_of(motion: Motion) -> tuple[str, ...]:
         If something moves that no driver prescribes.
     """
     system, names = motion.model.system, tuple(motion.mechanism.drivers)
-    rows, columns = system.cells.shape if system.groups else (0, 1)
+    rows, columns = system.shape if system.groups else (0, 1)
     if rows != columns or not names:
         message = "the coordinates here are the laws of the drivers, and they do not prescribe all that can move"
         raise MechanismError(message, name="drivers", value=list(names))

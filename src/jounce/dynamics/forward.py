@@ -17,7 +17,17 @@ from jaxtyping import Bool, Float, Int
 
 from jounce.dynamics.loads import inertia_forces, mass_matrices
 from jounce.dynamics.masses import Gravity, Masses
-from jounce.dynamics.saddle_point import ByBody, Column, MassMatrix, as_column, block_diagonal, by_body, saddle_point
+from jounce.dynamics.saddle_fronts import SaddleFactor, SaddleFronts
+from jounce.dynamics.saddle_point import (
+    BodyMatrices,
+    ByBody,
+    Column,
+    MassMatrix,
+    as_column,
+    block_diagonal,
+    by_body,
+    saddle_point,
+)
 from jounce.jet import Jet
 from jounce.jet.algebra import total
 from jounce.jet.series import Recursion
@@ -34,6 +44,7 @@ Lanes = Float[Numbers, " batch"]
 """One number for each run of a batch; of `Flags` and `Indices` alike."""
 Flags = Bool[Numbers, " batch"]
 Indices = Int[Numbers, " batch"]
+Factor = DenseFactor | SaddleFactor
 Matrices = Float[Numbers, "size size batch"]
 """Of the equations of motion, or their inverses."""
 Rows = Float[Numbers, "row batch"]
@@ -91,6 +102,8 @@ class Equations(eqx.Module):
         Of the masses, by which the equations are divided, kg.
     pose_type : type
         PlanarPose or SpatialPose.
+    saddle : SaddleFronts, optional
+        How the matrix of a large mechanism is eliminated.
     """
 
     system: System
@@ -98,6 +111,7 @@ class Equations(eqx.Module):
     gravity: Gravity
     scale: float | Float[Numbers, ""]
     pose_type: type = eqx.field(static=True)
+    saddle: SaddleFronts | None = None
 
     @property
     def coordinates(self) -> int:
@@ -181,10 +195,27 @@ class Equations(eqx.Module):
         jacobian = self.system.jacobian(self.still(state.position, state.attitude), Jet([time]))
         return saddle_point(self.mass_matrix(state), jacobian)
 
+    def factored(self, state: State, time: Instants) -> Factor:
+        """Return the factors of that matrix."""
+        if self.saddle is None:
+            return DenseFactor.of(self.matrix(state, time))
+        entries = self.system.entries(self.still(state.position, state.attitude), Jet([time]))
+        return self.saddle.factored(self._masses(state), entries, self.system.column_scale, self.system.row_scale)
+
+    def blank_factor(self, lanes: int) -> Factor:
+        """Return a placeholder for the factors of a batch, to start a loop with."""
+        if self.saddle is None:
+            size = sum(self.system.shape)
+            return DenseFactor.blank((size, size), lanes)
+        return self.saddle.blank(lanes)
+
     def mass_matrix(self, state: State) -> MassMatrix:
         """Return the mass matrix over the scale of the masses, scaled."""
-        blocks = mass_matrices(self.still(state.position, state.attitude), self.masses)[:, :, 1:]
-        return block_diagonal(blocks / self.scale, self.system.column_scale)
+        return block_diagonal(self._masses(state), self.system.column_scale)
+
+    def _masses(self, state: State) -> BodyMatrices:
+        """Return the mass matrices of the moving bodies over the scale of the masses."""
+        return mass_matrices(self.still(state.position, state.attitude), self.masses)[:, :, 1:] / self.scale
 
     def unknowns(self, solve: Callable[[Rows], Rows], forces: ByBody, second: Rows) -> tuple[ByBody, Rows]:
         """Return the changes of accelerations and multipliers that make what `balance` returns vanish.
@@ -197,16 +228,16 @@ class Equations(eqx.Module):
             As `balance` returns them.
         """
         scale = self.system.column_scale
-        columns = self.system.cells.shape[1]
+        columns = self.system.shape[1]
         solution = -solve(jnp.concatenate([as_column(forces, scale), second]))
         return by_body(solution[:columns], scale), solution[columns:]
 
-    def least_change(self, factor: DenseFactor, gap: Rows) -> Column:
+    def least_change(self, factor: Factor, gap: Rows) -> Column:
         """Return the change of coordinates of least kinetic energy that closes a gap of the scaled rows, scaled."""
-        columns = self.system.cells.shape[1]
+        columns = self.system.shape[1]
         return factor.solve(-jnp.concatenate([jnp.zeros((columns, gap.shape[-1])), gap]))[:columns]
 
-    def with_rates(self, factor: DenseFactor, state: State, time: Instants) -> State:
+    def with_rates(self, factor: Factor, state: State, time: Instants) -> State:
         """Return the state with the least change of its velocities that fulfils the rates of all constraints."""
         rate = self.system.residual(self.pose(state), Jet.variable(time, 1)).dense().coefficients[1]
         change = by_body(self.least_change(factor, rate), self.system.column_scale)
@@ -279,7 +310,7 @@ def expand(
         Of the equations' matrix at this state, where it is known.
     """
     count, bodies, lanes = equations.coordinates, *state.position.shape[1:]
-    known = DenseFactor.of(equations.matrix(state, time)).inverse() if inverse is None else inverse
+    known = equations.factored(state, time).inverse() if inverse is None else inverse
     rows = equations.system.row_scale.shape[0]
     solved = partial(equations.unknowns, partial(multiplied, known))
 

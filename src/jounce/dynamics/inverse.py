@@ -103,7 +103,7 @@ class MotionForces:
         system = dataclasses.replace(self.model.system, outputs=())
         nothing = np.zeros((0, 0), np.int32)
         unjoined = dataclasses.replace(system, groups=(), cells=nothing, row_scale=np.zeros((0, 1)))
-        square = system.cells.shape[0] == system.cells.shape[1]
+        square = system.shape[0] == system.shape[1]
 
         def chunk(lanes: np.ndarray) -> Any:
             blocks = [

@@ -9,11 +9,12 @@ from jaxtyping import Float
 
 from jounce.dynamics.forward import Equations, Instants, State
 from jounce.dynamics.masses import gravity_of, masses_of, required_masses
+from jounce.dynamics.saddle_fronts import SaddleFronts
 from jounce.errors import AssemblyError, JounceError, MechanismError, MobilityError
 from jounce.jet import Jet
-from jounce.kinematics.assembly import RANK_TOLERANCE, assemble, freely_moving
+from jounce.kinematics.assembly import assemble, freely_moving
 from jounce.kinematics.compilation import compiled
-from jounce.kinematics.linear import DenseFactor
+from jounce.kinematics.host_jacobian import RANK_TOLERANCE, HostJacobian, is_clearly_regular
 from jounce.mechanism import Mechanism, Model, build
 from jounce.mechanism.builder import pose_at
 from jounce.shapes import Numbers
@@ -87,7 +88,8 @@ def equations_of(mechanism: Mechanism, model: Model) -> Equations:
     """Return the equations of motion of a mechanism."""
     masses = masses_of(mechanism)
     system, scale = dataclasses.replace(model.system, outputs=()), np.float64(np.max(masses.mass))
-    return jax.device_put(Equations(system, masses, gravity_of(mechanism), scale, model.pose_type))
+    saddle = SaddleFronts.of(system.pattern)
+    return jax.device_put(Equations(system, masses, gravity_of(mechanism), scale, model.pose_type, saddle))
 
 
 def _assembled(mechanism: Mechanism, instant: float) -> tuple[Model, dict[str, np.ndarray]]:
@@ -132,24 +134,25 @@ def at_rest(model: Model, coordinates: dict[str, np.ndarray]) -> State:
 @compiled()
 def with_rates(equations: Equations, state: State, time: Instants) -> State:
     """Return the state with the least change of its velocities that fulfils the rates of all constraints."""
-    return equations.with_rates(DenseFactor.of(equations.matrix(state, time)), state, time)
+    return equations.with_rates(equations.factored(state, time), state, time)
 
 
 @compiled()
 def _matrices(
     equations: Equations, state: State, time: Instants
-) -> tuple[Float[Numbers, "size size"], Float[Numbers, "row column"]]:
+) -> tuple[Float[Numbers, "size size"], Float[Numbers, " entry"]]:
+    """Return the matrix of the equations, and the entries of the Jacobian."""
     pose = equations.still(state.position, state.attitude)
-    return equations.matrix(state, time)[..., 0], equations.system.jacobian(pose, Jet([time]))[..., 0]
+    return equations.matrix(state, time)[..., 0], equations.system.entries(pose, Jet([time]))[..., 0]
 
 
 def _explain(equations: Equations, model: Model, state: State, instant: float) -> str:
     """Return the mobility in words, or raise for a body whose acceleration nothing determines."""
     state = state._replace(velocity=np.zeros_like(state.velocity), spin=np.zeros_like(state.spin))
-    whole, jacobian = (np.asarray(x) for x in _matrices(equations, state, np.array([[instant]])))
+    whole, entries = (np.asarray(x) for x in _matrices(equations, state, np.array([[instant]])))
+    jacobian = HostJacobian.of(model.system.pattern, entries).scaled(np.asarray(model.system.row_scale)[:, 0])
     columns = jacobian.shape[1]
-    _, sizes, right = np.linalg.svd(whole)
-    loose = right[sizes <= RANK_TOLERANCE * 1e-3 * sizes.max()]
+    loose = _loose(whole)
     if len(loose):
         mass, _, moments = map(np.asarray, equations.masses)
         by_body = np.linalg.norm(loose[:, :columns].reshape(len(loose), len(model.bodies), -1), axis=(0, 2))
@@ -163,23 +166,39 @@ def _explain(equations: Equations, model: Model, state: State, instant: float) -
                 raise MechanismError(f"{message}; {advice}", name=f"bodies.{name}.{lacks}")
         names = freely_moving(model, loose[:, :columns])
         raise MobilityError(f"the equations of motion are singular at t = {instant:g} s: {names}")
-    _, sizes, right = np.linalg.svd(jacobian)
-    rank = int(np.sum(sizes > RANK_TOLERANCE * sizes.max(initial=0.0)))
-    free = columns - rank
+    free = columns - jacobian.rank
     if not free:
         return "no degree of freedom: all motion is prescribed"
-    _check_energy(model, whole[:columns, :columns], right[rank:])
+    _check_energy(model, whole[:columns, :columns], jacobian)
     noun = "degree of freedom" if free == 1 else "degrees of freedom"
-    return f"{free} {noun}: {freely_moving(model, right[rank:])}"
+    return f"{free} {noun}: {freely_moving(model, jacobian.free_directions)}"
 
 
-def _check_energy(model: Model, mass: np.ndarray, free: np.ndarray) -> None:
-    """Refuse masses and moments by which a motion along the rows of `free` would have negative kinetic energy."""
-    values, motions = np.linalg.eigh(free @ mass @ free.T)
-    if values[0] >= -RANK_TOLERANCE * np.abs(values).max():
+def _loose(whole: Float[np.ndarray, "size size"]) -> Float[np.ndarray, "direction size"]:
+    """Return the unknowns that the matrix of the equations leaves open."""
+    tolerance = 1e-3 * RANK_TOLERANCE
+    if is_clearly_regular(whole, tolerance):
+        return np.zeros((0, len(whole)))
+    _, sizes, right = np.linalg.svd(whole)
+    return right[sizes <= tolerance * sizes.max()]
+
+
+def _check_energy(model: Model, mass: Float[np.ndarray, "column column"], jacobian: HostJacobian) -> None:
+    """Refuse masses and moments by which a motion that is free would have negative kinetic energy."""
+    count = len(model.bodies)
+    by_body = np.einsum("bibj->bij", mass.reshape(count, -1, count, mass.shape[0] // count))
+    lowest = np.linalg.eigvalsh(by_body)
+    if lowest.min() >= 0:
         return
-    motion = (motions[:, 0] @ free).reshape(len(model.bodies), -1)
-    energies = np.einsum("bi,bibj,bj->b", motion, mass.reshape(*motion.shape, *motion.shape), motion)
+    free = jacobian.free_directions
+    if len(free) == mass.shape[0] - jacobian.rank:
+        values, motions = np.linalg.eigh(free @ mass @ free.T)
+        if values[0] >= -RANK_TOLERANCE * np.abs(values).max():
+            return
+        motion = (motions[:, 0] @ free).reshape(count, -1)
+        energies = np.einsum("bi,bij,bj->b", motion, by_body, motion)
+    else:  # too many to look at all of them
+        energies = lowest.min(axis=1)
     name = model.bodies[int(np.argmin(energies))]
     message = "the body can move so that its kinetic energy is negative; correct its mass and its moments of inertia"
     raise MechanismError(message, name=f"bodies.{name}.inertia")

@@ -12,6 +12,7 @@ from jax.core import Tracer
 from jounce.constraints.base import value_fields
 from jounce.dynamics.forward import Equations, State
 from jounce.dynamics.masses import gravity_of, masses_of
+from jounce.dynamics.saddle_fronts import SaddleFronts
 from jounce.dynamics.start import consistent_start, with_rates
 from jounce.integrate.events import pose_coordinates
 from jounce.integrate.projection import projected
@@ -56,13 +57,14 @@ class ParametricMechanism:
     def __init__(self, mechanism: Mechanism, model: Model, names: tuple[str, ...]):
         self.mechanism, self.model, self.names = mechanism, model, names
         self.scale = np.float64(np.max(masses_of(mechanism).mass))
+        self.saddle = SaddleFronts.of(model.system.pattern)
         self._moved: list[bool] = []
         self._leaves, self._structure = jax.tree.flatten(self._made(mechanism, model))
 
     def _made(self, mechanism: Mechanism, model: Model) -> tuple[Equations, Any]:
         system = dataclasses.replace(model.system, outputs=())
         masses, gravity = masses_of(mechanism), gravity_of(mechanism)
-        return Equations(system, masses, gravity, self.scale, model.pose_type), model.system.outputs
+        return Equations(system, masses, gravity, self.scale, model.pose_type, self.saddle), model.system.outputs
 
     def of(self, rows: np.ndarray) -> tuple[Equations, Any]:
         """Return equations of motion and outputs for values of the parameters, (runs, parameters)."""
@@ -145,7 +147,7 @@ class BatchStart:
     ):
         self._parametric, self._begun, self._state, self._instant = parametric, begun, state, instant
         self._own: State | None = None
-        equations, coordinates = begun.model.system.cells.shape
+        equations, coordinates = begun.model.system.shape
         if equations < coordinates and parametric.guesses_differ(rows):
             own = [consistent_start(parametric.varied(row), instant) for row in rows.tolist()]
             self._own = State(*(np.concatenate(parts, axis=-1) for parts in zip(*(s.state for s in own), strict=True)))

@@ -17,7 +17,6 @@ from jounce.integrate.projection import normalised
 from jounce.integrate.simulation import Simulation
 from jounce.integrate.turns import measured
 from jounce.jet import Jet
-from jounce.kinematics.linear import DenseFactor
 from jounce.mechanism import Mechanism
 from jounce.mechanism.axis_angles import measures_angle
 from jounce.shapes import ArrayLike, Numbers
@@ -171,9 +170,9 @@ def _rates(time: Any, state: State, equations: Equations) -> tuple[State, State]
     state = state.map(lambda part: part[..., None])
     state = state._replace(attitude=normalised(state.attitude))
     clock = jnp.reshape(jnp.asarray(time, float), (1, 1))
-    trial = jnp.zeros((equations.coordinates, *state.position.shape[1:])), jnp.zeros((len(equations.system.cells), 1))
+    trial = jnp.zeros((equations.coordinates, *state.position.shape[1:])), jnp.zeros((equations.system.shape[0], 1))
     forces, second, attitude_rate = equations.balance(state, *trial, clock)
-    factor, shifts = DenseFactor.of(equations.matrix(state, clock)), equations.pose_type.shifts
+    factor, shifts = equations.factored(state, clock), equations.pose_type.shifts
     acceleration, _ = equations.unknowns(factor.solve, forces, second)
     rate = State(state.velocity, attitude_rate, acceleration[:shifts], acceleration[shifts:])
     return jax.tree.map(lambda part: part[..., 0], rate), state

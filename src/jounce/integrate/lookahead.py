@@ -59,7 +59,7 @@ def mobility_of(equations: Equations, inverse: Matrices) -> Mobility:
     The largest acceleration, in rad or sizes of the mechanism by s^2, by a force of one on one of the scaled
     coordinates of the body.
     """
-    columns, count = equations.system.cells.shape[1], equations.coordinates
+    columns, count = equations.system.shape[1], equations.coordinates
     responses = jnp.max(jnp.abs(inverse[:columns, :columns]), axis=0).reshape(-1, count, inverse.shape[-1])
     return with_ground(jnp.max(responses, axis=1)[None])[0] / equations.scale
 

@@ -13,7 +13,6 @@ from jounce.integrate.methods import AbstractMethod, Number, near_singular
 from jounce.integrate.projection import projected
 from jounce.integrate.turns import AnglesOfForces, followed, measured
 from jounce.kinematics.compilation import compiled
-from jounce.kinematics.linear import DenseFactor
 from jounce.shapes import Numbers
 
 SMALLEST_STEP = 1e-13  # of the span, or of the time itself
@@ -80,7 +79,7 @@ def begin_march(equations: Equations, state: State, time: Lanes, *, order: int) 
     """
     angles = measured(equations, state)
     equations = equations.near(angles)
-    inverse = DenseFactor.of(equations.matrix(state, time[None])).inverse()
+    inverse = equations.factored(state, time[None]).inverse()
     expansion = _kept(expand(equations, state, time[None], order, inverse))
     outcome = jnp.where(_finite(expansion), int(Outcome.RUNNING), int(Outcome.LOST))
     none, nothing = jnp.full(time.shape, -1), jnp.zeros(time.shape)

@@ -105,7 +105,7 @@ def _horner(
 
 def near_singular(equations: Equations, inverse: Matrices) -> Flags:
     """Tell where rows of the constraints are about to depend on each other, from the inverse of the matrix."""
-    columns = equations.system.cells.shape[1]
+    columns = equations.system.shape[1]
     return jnp.max(jnp.abs(inverse[columns:, columns:]), axis=(0, 1), initial=0.0) > BRACED
 
 

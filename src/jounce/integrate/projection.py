@@ -7,7 +7,6 @@ import jax.numpy as jnp
 
 from jounce.dynamics.forward import Attitudes, Equations, Instants, Lanes, Matrices, State
 from jounce.jet import Jet
-from jounce.kinematics.linear import DenseFactor
 
 MOST_ITERATIONS = 10
 CLOSE = 4e-15  # so near to where the matrix was inverted, in the same unit, the inverse is the same but for rounding
@@ -41,7 +40,7 @@ def projected(equations: Equations, state: State, time: Instants) -> tuple[State
     position, attitude = state.position, normalised(state.attitude)
 
     def correction(position: Any, attitude: Any) -> tuple[Any, Any]:
-        factor = DenseFactor.of(equations.matrix(state._replace(position=position, attitude=attitude), time))
+        factor = equations.factored(state._replace(position=position, attitude=attitude), time)
         gap = equations.system.residual(equations.still(position, attitude), clock).coefficients[0]
         return factor, gap
 
@@ -62,15 +61,13 @@ def projected(equations: Equations, state: State, time: Instants) -> tuple[State
         *_, size, _, count = carry
         return jnp.any((size > 1e-9) & jnp.isfinite(size)) & (count < MOST_ITERATIONS) | (count == 0)
 
-    size = equations.system.cells.shape
-    blank = DenseFactor.blank((sum(size), sum(size)), lanes)
-    start = (position, attitude, blank, jnp.full(lanes, jnp.inf), jnp.zeros(lanes), 0)
+    start = (position, attitude, equations.blank_factor(lanes), jnp.full(lanes, jnp.inf), jnp.zeros(lanes), 0)
     position, attitude, factor, last, first, _ = jax.lax.while_loop(unfinished, iterate, start)
     moving = equations.with_rates(factor, state._replace(position=position, attitude=attitude), time)
     inverse = jax.lax.cond(
         jnp.all(last <= CLOSE),
         lambda: factor.inverse(),
-        lambda: DenseFactor.of(equations.matrix(moving, time)).inverse(),
+        lambda: equations.factored(moving, time).inverse(),
     )
     return moving, jnp.where(last <= 1e-9, first, jnp.inf), inverse
 

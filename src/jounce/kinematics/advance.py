@@ -19,8 +19,9 @@ from jounce.jet import Jet
 from jounce.jet.algebra import stacked, total
 from jounce.jet.turns import brought_near
 from jounce.kinematics.compilation import compiled
-from jounce.kinematics.linear import DenseFactor
+from jounce.kinematics.factors import Factor, blank_factor, factored
 from jounce.kinematics.status import Status
+from jounce.kinematics.turnover import turnover_of
 from jounce.mechanism.system import System
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers, Real
@@ -36,7 +37,6 @@ SAFE_FRACTION = 0.4  # of the time in which some Taylor term would move a body b
 LARGEST_CONTRACTION = 0.25  # of the first simplified Newton corrections: Deuflhard 2011, section 5.1
 LARGEST_DEPARTURE = 0.05  # from a prediction, rad or sizes of the mechanism: beyond, a motion law jumps
 SMALLEST_DEPARTURE = 1e-6  # below this no prediction is called wrong
-SQUARINGS = 4  # of the matrix of which the largest eigenvalue is sought
 SINGULAR_PIVOT = 1e-12  # of the largest; corrections tell before that they no longer converge
 ROUNDING = 4e-15  # a correction this small (in rad, or in sizes of the mechanism) leaves the Jacobian as good as new
 
@@ -80,7 +80,7 @@ class Correction(NamedTuple):
 
 def newton_raphson(
     system: System, pose: Pose, time: Float[Jet, "1 batch"], tolerance: Float[Numbers, ""], refine: Bool[Numbers, ""]
-) -> tuple[Pose, DenseFactor, Correction]:
+) -> tuple[Pose, Factor, Correction]:
     """Return the assembled pose, the factored Jacobian there, and how large the corrections were.
 
     An instant is accepted when its correction is at most the tolerance. With `refine` that correction is still made,
@@ -108,7 +108,7 @@ def newton_raphson(
         )
         accepted = correction.last <= tolerance
         simplified = jnp.where(refine | ~accepted, again, correction.simplified)  # else the pose was left as it was
-        factor = DenseFactor.of(system.jacobian(pose, time))
+        factor = factored(system, pose, time)
         step = factor.solve(-residual, refined=False)
         size = sized(pose, step)
         step = jnp.where(refine | ~(size <= tolerance), step, 0.0)
@@ -118,13 +118,13 @@ def newton_raphson(
 
     lanes = time.coefficients[0].shape[-1]
     unknown = np.full(lanes, np.inf)
-    blank = DenseFactor.blank(system.cells.shape, lanes)
+    blank = blank_factor(system, lanes)
     state = (pose, blank, Correction(unknown, unknown, np.zeros(lanes)), np.zeros(lanes, bool), 0)
     pose, factor, correction, _, _ = jax.lax.while_loop(unfinished, iterate, state)
     return pose, factor, correction
 
 
-def differentiated(system: System, pose: Pose, factor: DenseFactor, time: Float[Jet, "1 batch"]) -> Pose:
+def differentiated(system: System, pose: Pose, factor: Factor, time: Float[Jet, "1 batch"]) -> Pose:
     """Return the pose with all derivatives that the time jet has: order after order, one solve each.
 
     The coefficient of order k of the residual is affine in the unknown (r[k], w'[k-1] / k) with the Jacobian as its
@@ -166,37 +166,6 @@ def _safe_step(terms: list[Lanes]) -> Lanes:
     """
     steps = [jnp.power(jnp.maximum(term, 1e-300), -1.0 / k) for k, term in enumerate(terms, 1)]
     return SAFE_FRACTION * jnp.min(jnp.stack(steps), axis=0)
-
-
-def _turnover(
-    system: System, pose_type: type[Pose], coordinates: dict[str, Jet], factor: DenseFactor, time: Lanes
-) -> Float[Numbers, " 1"]:
-    """Return the eigenvalue of ``J^-1 J'`` of largest size with the sign of its real part, 1/s, for the first lane.
-
-    To first order in a step s the determinant is ``det(J) det(1 + s J^-1 J')``: minus the inverse of that eigenvalue is
-    the distance in time to its nearest zero, which may be complex. All zeros count, also those that leave the sign of
-    the determinant as it is, as two loops do that pass their dead points together. A power of the matrix finds it:
-    the root of its norm is never too small, and tends to the size of the eigenvalue.
-    """
-    first = {name: jet.truncate(1).map(lambda c: c[..., :1]) for name, jet in coordinates.items()}
-    instant = time[:1]
-
-    def jacobian(step: Any) -> Any:
-        return system.jacobian(pose_type.predicted_from(first, step), Jet([(instant + step)[None]]))
-
-    still = np.zeros(1)
-    _, slope = jax.jvp(jacobian, (still,), (np.ones(1),))
-    inverse = jax.tree.map(lambda x: x[..., :1], factor).inverse()
-    relative = inverse[..., 0] @ slope[..., 0]
-    power, grown = relative, np.zeros(())
-    for k in range(1, SQUARINGS + 1):
-        size = jnp.maximum(jnp.sqrt(jnp.sum(power * power)), 1e-300)
-        power, grown = (power / size) @ (power / size), grown + jnp.log(size) / 2 ** (k - 1)
-    size = jnp.exp(grown + jnp.log(jnp.maximum(jnp.sqrt(jnp.sum(power * power)), 1e-300)) / 2**SQUARINGS)
-    along, trace = jnp.sum(power * relative.T), jnp.trace(power)
-    eigenvalue = along / jnp.where(trace == 0, 1.0, trace)  # where one is real and leads, as near a singular position
-    leads = (jnp.abs(eigenvalue) > 0.7 * size) & (jnp.abs(eigenvalue) <= size)
-    return jnp.where(leads, eigenvalue, jnp.where(along < 0, -size, size))[None]
 
 
 def _outputs(system: System, pose: Pose, angles: Sequence[Numbers], step: Lanes) -> tuple[Numbers, ...]:
@@ -329,7 +298,9 @@ def advance(
     admitted, defined = jnp.all(admissible, axis=0), jnp.all(finite, axis=0)
     status = _status(correction.last, predictable, pivot_ratio, admitted, defined, tolerance)
     terms = _terms(system, reached, pose_type.predictor)
-    turnover = jax.lax.cond(survey, lambda: _turnover(system, pose_type, reached, factor, instant), lambda: np.zeros(1))
+    turnover = jax.lax.cond(
+        survey, lambda: turnover_of(system, pose_type, reached, factor, instant), lambda: np.zeros(1)
+    )
     return Arrival(
         coordinates,
         outputs,

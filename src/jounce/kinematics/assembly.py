@@ -13,14 +13,13 @@ from jounce.constraints.spatial import DoubleSpherical
 from jounce.errors import AssemblyError, MobilityError
 from jounce.jet import Jet
 from jounce.kinematics.compilation import compiled
+from jounce.kinematics.host_jacobian import HostJacobian
 from jounce.kinematics.initial_turns import (
     Coordinates,
     DriverLag,
     Mover,
     driver_lag,
     nearest_turns,
-    newton_step,
-    row_scale,
     turned_to_laws,
 )
 from jounce.kinematics.status import Status
@@ -32,7 +31,6 @@ from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
 
 MAX_STEPS = 100
-RANK_TOLERANCE = 1e-9
 MAX_DATUMS = 100
 SETTLED = 1e-12  # rad, by which the angles of drivers may be counted otherwise
 
@@ -45,12 +43,12 @@ def _moved(
     instant: Float[Numbers, ""],
     pose_type: type[Pose],
 ) -> Any:
-    """Return the coordinates after an increment, with residual and Jacobian there, for one instant."""
+    """Return the coordinates after an increment, with residual and entries of the Jacobian, for one instant."""
     pose = pose_at(coordinates, pose_type)
     pose = pose.displaced(*system.coordinates(increment[:, None], pose.shifts))
     time = Jet([instant[None, None]])
     moved = {name: jet.coefficients[0] for name, jet in pose.coordinates().items()}
-    return moved, system.residual(pose, time).coefficients[0][:, 0], system.jacobian(pose, time)[:, :, 0]
+    return moved, system.residual(pose, time).coefficients[0][:, 0], system.entries(pose, time)[:, 0]
 
 
 class Trial(NamedTuple):
@@ -64,7 +62,7 @@ class Trial(NamedTuple):
         By which the rows are multiplied.
     gaps : array of shape (rows,)
         By how much each row is open, rad or sizes of the mechanism.
-    jacobian : array of shape (rows, columns)
+    jacobian : HostJacobian
         Scaled, there.
     closed : bool
         Whether all gaps are closed, to the tolerance of the last correction.
@@ -73,7 +71,7 @@ class Trial(NamedTuple):
     coordinates: Coordinates
     scale: Float[np.ndarray, " row"]
     gaps: Float[np.ndarray, " row"]
-    jacobian: Float[np.ndarray, "row column"]
+    jacobian: HostJacobian
     closed: bool
 
 
@@ -105,7 +103,7 @@ def assemble(model: Model, instant: float, tolerance: float, *, free: bool = Fal
     MobilityError
         If joints and drivers leave degrees of freedom, or there are too many of them.
     """
-    columns = model.system.cells.shape[1]
+    columns = model.system.shape[1]
     if not model.rows and not free:
         noun = "degree of freedom" if columns == 1 else "degrees of freedom"
         raise MobilityError(f"the mechanism has no joints and no drivers: {columns} {noun} are left")
@@ -174,13 +172,13 @@ def _turned(model: Model, instant: float, tolerance: float) -> tuple[Model, Coor
 
 def _lag(model: Model, instant: float) -> DriverLag | None:
     """Return what the drivers lack at the guess."""
-    still = np.zeros(model.system.cells.shape[1])
+    still = np.zeros(model.system.shape[1])
     return driver_lag(model, instant, _mover(model, instant)(model.guess, still)[1])
 
 
 def _nearest(model: Model, found: Trial, instant: float) -> Trial:
     """Return planar bodies put together, with every angle shifted by whole turns to be nearest to the guess."""
-    moved, still = _mover(model, instant), np.zeros(model.system.cells.shape[1])
+    moved, still = _mover(model, instant), np.zeros(model.system.shape[1])
 
     def residual_at(angle: np.ndarray) -> np.ndarray:
         return found.scale * moved({**found.coordinates, "angle": angle}, still)[1]
@@ -189,11 +187,13 @@ def _nearest(model: Model, found: Trial, instant: float) -> Trial:
 
 
 def _mover(model: Model, instant: float) -> Mover:
-    """Return what takes coordinates and an increment to coordinates, residual and Jacobian, all NumPy arrays."""
+    """Return what takes coordinates and an increment to coordinates, residual and Jacobian, all on the host."""
+    system = model.system
 
     def moved(coordinates: dict[str, Any], increment: np.ndarray) -> Any:
-        result = _moved(model.system, coordinates, increment, np.float64(instant), model.pose_type)
-        return jax.tree.map(np.asarray, result)
+        result = _moved(system, coordinates, increment, np.float64(instant), model.pose_type)
+        to, residual, entries = jax.tree.map(np.asarray, result)
+        return to, residual, HostJacobian.of(system.pattern, entries).scaled(np.asarray(system.row_scale)[:, 0])
 
     return moved
 
@@ -221,16 +221,16 @@ def put_together(
     lag : DriverLag, optional
         What drivers may still lack.
     """
-    still, free = np.zeros(model.system.cells.shape[1]), _mover(model, instant)
+    still, free = np.zeros(model.system.shape[1]), _mover(model, instant)
 
     def moved(coordinates: dict[str, Any], increment: np.ndarray) -> Any:
         moved_to, residual, jacobian = free(coordinates, increment)
         return moved_to, residual if lag is None else lag.open(residual, 1.0), jacobian
 
     coordinates, residual, jacobian = moved(model.guess if start is None else start, still)
-    scale = row_scale(jacobian)
+    scale = jacobian.row_scale()
     for _ in range(MAX_STEPS):
-        step = newton_step(residual, jacobian)
+        step = jacobian.step(residual)
         if step is None:
             break  # told by name
         size = np.max(np.abs(step), initial=0.0)
@@ -244,12 +244,12 @@ def put_together(
         else:
             break
         coordinates, residual, jacobian = trial
-        scale = row_scale(jacobian)
+        scale = jacobian.row_scale()
         if size <= tolerance:
             break
-    gaps = np.where(np.isfinite(jacobian).all(axis=1), scale * residual, np.nan)
+    gaps = np.where(jacobian.finite(), scale * residual, np.nan)
     closed = bool(np.all(np.abs(gaps) <= max(1e3 * tolerance, 1e-9)))
-    return Trial(coordinates, scale, gaps, scale[:, None] * jacobian, closed)
+    return Trial(coordinates, scale, gaps, jacobian.scaled(scale), closed)
 
 
 def check_assembled(model: Model, found: Trial, instant: float, *, free: bool = False) -> None:
@@ -282,8 +282,7 @@ def check_assembled(model: Model, found: Trial, instant: float, *, free: bool = 
 
 def _widths(model: Model, found: Trial, instant: float) -> dict[str, str]:
     """Return by how much each joint and driver is open, as a length or as an angle, whichever it closes."""
-    shifts, jacobian = model.pose_type.shifts, found.jacobian
-    entries = np.abs(jacobian).reshape(len(jacobian), len(model.bodies), -1)
+    shifts, entries = model.pose_type.shifts, np.abs(found.jacobian.blocks)
     by_shift, by_turn = (np.max(part, axis=(1, 2)) for part in (entries[:, :, :shifts], entries[:, :, shifts:]))
     lengthy = by_shift > 1e-9 * by_turn
     unit = np.where(lengthy, 1e3 * model.length, np.degrees(1.0))
@@ -293,14 +292,14 @@ def _widths(model: Model, found: Trial, instant: float) -> dict[str, str]:
         if name in squares:  # the residual is the square of a distance less this
             square = max(found.gaps[row] / found.scale[row] + squares[name], 0.0)
             open_by[row] = 1e3 * abs(np.sqrt(square) - np.sqrt(squares[name]))
-    words = {}
-    for name in dict.fromkeys(model.rows):
-        its = np.array([row == name for row in model.rows])
-        sizes = (
-            (np.max(open_by[its & kind], initial=0.0), unit) for kind, unit in ((lengthy, "mm"), (~lengthy, "deg"))
-        )
-        words[name] = " and ".join(f"{size:.3g} {unit}" for size, unit in sizes if size > 1e-6)
-    return words
+    sizes = {name: {"mm": 0.0, "deg": 0.0} for name in model.rows}
+    for row, name in enumerate(model.rows):
+        unit = "mm" if lengthy[row] else "deg"
+        sizes[name][unit] = max(sizes[name][unit], open_by[row])
+    return {
+        name: " and ".join(f"{size:.3g} {unit}" for unit, size in its.items() if size > 1e-6)
+        for name, its in sizes.items()
+    }
 
 
 def _squared_lengths(model: Model, instant: float) -> dict[str, float]:
@@ -322,13 +321,12 @@ def _squared_lengths(model: Model, instant: float) -> dict[str, float]:
     return found
 
 
-def check_mobility(model: Model, jacobian: Float[np.ndarray, "row column"], *, free: bool = False) -> None:
+def check_mobility(model: Model, jacobian: HostJacobian, *, free: bool = False) -> None:
     """Raise MobilityError, with the bodies and joints concerned, unless the Jacobian is square and regular.
 
     Where degrees of freedom may be left, it is enough that no constraint is redundant.
     """
-    rows, columns = jacobian.shape
-    left, rank, right = split(jacobian)
+    (rows, columns), rank = jacobian.shape, jacobian.rank
     if rows == rank and (free or rank == columns):
         return
     left_over, redundant = columns - rank, rows - rank
@@ -339,33 +337,25 @@ def check_mobility(model: Model, jacobian: Float[np.ndarray, "row column"], *, f
     ]
     if left_over and not free:
         noun = "degree of freedom is" if left_over == 1 else "degrees of freedom are"
-        moving = freely_moving(model, right[rank:])
+        moving = freely_moving(model, jacobian.free_directions)
         remedy = f"add {_count(left_over, 'driver')}, or simulate it under its forces"
         parts.append(f"{left_over} {noun} left, with which {moving} can move: {remedy}")
     if redundant:
         parts.append(
-            f"{_count(redundant, 'equation')} too many among {redundant_rows(model, left[:, rank:])}: free a direction "
-            "there (a spherical or cylindrical joint for a revolute, say), or remove a driver"
+            f"{_count(redundant, 'equation')} too many among {redundant_rows(model, jacobian.dependences)}: free a "
+            "direction there (a spherical or cylindrical joint for a revolute, say), or remove a driver"
         )
     if left_over and redundant and rows == columns and not free:
         parts.append("or the start is a singular position: start at another instant")
     raise MobilityError("; ".join(parts))
 
 
-def split(
-    jacobian: Float[np.ndarray, "row column"],
-) -> tuple[Float[np.ndarray, "row row"], int, Float[np.ndarray, "column column"]]:
-    """Return the left vectors, the rank and the right vectors of a scaled Jacobian."""
-    left, sizes, right = np.linalg.svd(jacobian)
-    return left, int(np.sum(sizes > RANK_TOLERANCE * sizes.max(initial=0.0))), right
-
-
 def redundant_rows(model: Model, combinations: Float[np.ndarray, "row combination"]) -> str:
     """Name the joints and drivers in combinations of rows that vanish, shape (rows, combinations)."""
-    names = tuple(dict.fromkeys(model.rows))
-    weights = np.linalg.norm(combinations, axis=1)
-    by_name = np.array([max(w for w, n in zip(weights, model.rows, strict=True) if n == name) for name in names])
-    return _concerned(by_name, names)
+    by_name: dict[str, float] = {}
+    for name, weight in zip(model.rows, np.linalg.norm(combinations, axis=1).tolist(), strict=True):
+        by_name[name] = max(weight, by_name.get(name, 0.0))
+    return _concerned(np.array([*by_name.values()]), tuple(by_name))
 
 
 def freely_moving(model: Model, directions: Float[np.ndarray, "direction column"]) -> str:

@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from jounce.jet.turns import WHOLE_TURN, principal, whole_periods
+from jounce.kinematics.host_jacobian import HostJacobian
 from jounce.mechanism import Model
 from jounce.mechanism.axis_angles import AttitudeHistory, measures_angle
 from jounce.mechanism.builder import with_reference
@@ -26,7 +27,7 @@ SMALLEST_PERIOD, LARGEST_PERIOD = 1, 60  # whole turns, among which those are so
 
 Coordinates = dict[str, np.ndarray]
 """Coordinates of all bodies by name, the ground first, (..., bodies, 1)."""
-Mover = Callable[[Coordinates, np.ndarray], tuple[Coordinates, np.ndarray, np.ndarray]]
+Mover = Callable[[Coordinates, np.ndarray], tuple[Coordinates, np.ndarray, HostJacobian]]
 
 
 class DriverLag(NamedTuple):
@@ -105,7 +106,7 @@ def turned_to_laws(
         skipped = int(turns) - MOST_TURNS + 1
     left = np.arange(0, turns * STEPS_A_TURN)[::-1] / (STEPS_A_TURN * turns)
     states, last = [start], None
-    increment = np.zeros(model.system.cells.shape[1])
+    increment = np.zeros(model.system.shape[1])
     for count, part in enumerate(left):
         if skipped and count == len(left) - skipped * STEPS_A_TURN:
             last = _repeated(states, skipped)
@@ -135,30 +136,13 @@ def _corrected(
     """Return coordinates a step on, and the step; None where Newton-Raphson does not go there."""
     whole, trial = increment, moved(coordinates, increment)
     for _ in range(CORRECTIONS):
-        step = newton_step(opened(trial[1]), trial[2])
+        step = trial[2].step(opened(trial[1]))
         if step is None or (size := np.max(np.abs(step), initial=0.0)) > 0.5:
             return None
         whole, trial = whole + step, moved(trial[0], step)
         if size < 1e-9:
             return trial[0], whole
     return None
-
-
-def newton_step(
-    residual: Float[np.ndarray, " row"], jacobian: Float[np.ndarray, "row column"]
-) -> Float[np.ndarray, " column"] | None:
-    """Return the shortest step that closes the residual to first order, by rows of one size; None if not finite."""
-    if not (np.isfinite(residual).all() and np.isfinite(jacobian).all()):
-        return None  # what factors a matrix may never end on one that is not finite
-    scale = row_scale(jacobian)
-    step = np.linalg.lstsq(scale[:, None] * jacobian, -scale * residual, rcond=1e-10)[0]
-    return step if np.isfinite(step).all() else None
-
-
-def row_scale(jacobian: Float[np.ndarray, "row column"]) -> Float[np.ndarray, " row"]:
-    """Return what makes the largest entry of each row one."""
-    largest = np.max(np.abs(jacobian), axis=1)
-    return 1 / np.where((largest > 0) & np.isfinite(largest), largest, 1.0)
 
 
 def _repeated(states: list[Coordinates], turns: int) -> Coordinates | None:

@@ -94,6 +94,11 @@ class DenseFactor(eqx.Module):
         rows = jnp.take_along_axis(self.eliminated, self.order[:, None], axis=0)
         return jnp.take_along_axis(rows, jnp.argsort(self.order, axis=0)[None], axis=1) * self._regular()[None]
 
+    def applied_inverse(self, matrix: Float[Numbers, "row column"]) -> Float[Numbers, "row column"]:
+        """Return the products of the inverse of the first matrix with the columns of another, shape (rows, columns)."""
+        first = DenseFactor(self.matrix[..., :1], self.eliminated[..., :1], self.order[..., :1], self.pivots[..., :1])
+        return first.inverse()[..., 0] @ matrix
+
     def pivot_ratio(self) -> Float[Numbers, " batch"]:
         """Return the smallest pivot over the largest, shape (batch,): near zero at a singular position."""
         sizes = jnp.abs(self.pivots)

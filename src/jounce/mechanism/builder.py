@@ -24,16 +24,12 @@ from jounce.mechanism.axis_angles import (
     with_datum_of,
     with_datums,
 )
+from jounce.mechanism.fronts import elimination
 from jounce.mechanism.mechanism import GROUND, Mechanism
 from jounce.mechanism.outputs import AbstractMotionOutput
+from jounce.mechanism.pattern import Pattern
 from jounce.mechanism.resolve import resolve, resolved
-from jounce.mechanism.system import (
-    POSITION_COMPONENTS,
-    Group,
-    System,
-    group_elements,
-    jacobian_cells,
-)
+from jounce.mechanism.system import POSITION_COMPONENTS, Group, System, group_elements
 from jounce.rigid import PlanarPose, SpatialPose
 from jounce.rigid.euler_parameters import euler_parameters
 from jounce.rigid.pose import Pose
@@ -129,11 +125,11 @@ def build(mechanism: Mechanism, like: Model | None = None) -> Model:
     rows = [n for members, count in zip(names, row_counts, strict=True) for _ in range(count) for n in members]
     drivers = tuple(n for group, members in zip(groups, names, strict=True) if group.is_driver for n in members)
     length, count = _size(groups, guess), len(mechanism.bodies)
-    cells = jacobian_cells(groups, row_counts, components + pose_type.turns, count)
+    pattern = Pattern.of(groups, row_counts, components + pose_type.turns, count)
     scale = np.array([length] * components + [1.0] * pose_type.turns)
     history = AttitudeHistory(guess["quaternion"], np.zeros(1)) if components == 3 else None
     return Model(
-        System(groups, outputs, cells, np.ones((len(rows), 1)), scale, count, forces),
+        System(groups, outputs, pattern, np.ones((len(rows), 1)), scale, count, forces, elimination(pattern)),
         pose_type,
         guess,
         tuple(rows),

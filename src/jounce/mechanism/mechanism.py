@@ -200,7 +200,8 @@ class Mechanism(Displayed):
         if element.space and element.space != self.space:
             raise MechanismError(f"is {element.space}, in a {self.space} mechanism", name=place)
         for body in getattr(element, "bodies", ()):
-            check_name("body", body, (GROUND, *self.bodies), MechanismError, name=f"{place}.bodies")
+            if body not in self.bodies:
+                check_name("body", body, (GROUND, *self.bodies), MechanismError, name=f"{place}.bodies")
 
     @property
     def elements(self) -> dict[str, Mapping[str, Any]]:

@@ -57,11 +57,17 @@ def resolve_motion(motion: Any, parameters: Mapping[str, Any]) -> AbstractMotion
     if isinstance(motion, str):
         motion = Expression(motion)
     if isinstance(motion, Expression):
-        motion.check({*parameters, "t"})
+        _check_names(motion, {"t"}, parameters)
         return ExpressionMotion(motion, {name: parameters[name] for name in sorted(motion.names - {"t"})})
     if callable(motion):
         return _traceable(FunctionMotion(motion))
     raise MechanismError("a motion is an expression, a function of time or a motion law", value=motion)
+
+
+def _check_names(expression: Expression, own: set[str], parameters: Mapping[str, Any]) -> None:
+    """Raise ExpressionError for a name that is neither a parameter, of which there may be thousands, nor its own."""
+    if any(name not in own and name not in parameters for name in expression.names):
+        expression.check({*parameters, *own})
 
 
 def _traceable(motion: AbstractMotion) -> AbstractMotion:
@@ -129,8 +135,8 @@ def _scalar_law(law: Any, force: AbstractForce, parameters: Mapping[str, Any]) -
         law = Expression(law)
     if isinstance(law, Expression):
         own = {"t", *names[0], *names[1]}
-        law.check({*parameters, *own})
-        for name in sorted(law.names & own & parameters.keys()):
+        _check_names(law, own, parameters)
+        for name in sorted({name for name in law.names & own if name in parameters}):
             message = f"the parameter '{name}' has the name of a variable of this law; give it another name"
             raise MechanismError(message, value=law.text)
         return ExpressionLaw(law, {name: parameters[name] for name in sorted(law.names - own)}, *names)

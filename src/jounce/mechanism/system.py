@@ -7,11 +7,12 @@ from typing import Any
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 
 from jounce.jet import Jet, concatenate
 from jounce.jet.algebra import stacked
+from jounce.mechanism.fronts import Fronts
+from jounce.mechanism.pattern import Pattern
 from jounce.mechanism.resolve import group_key, resolve_element, stack_elements
 from jounce.rigid import SpatialPose
 from jounce.rigid.body_arrays import each_jet
@@ -161,13 +162,17 @@ class System(eqx.Module):
 
     groups: tuple[Group, ...]
     outputs: tuple[Group, ...]
-    cells: Int[
-        Numbers, "row column"
-    ]  # where each entry of the Jacobian stands among the blocks of the groups, shape (rows, columns)
+    pattern: Pattern  # where the entries of the blocks of the groups stand in the Jacobian
     row_scale: Float[Numbers, "row 1"]
     column_scale: Float[Numbers, " coordinate"]  # one for each coordinate of a body
     body_count: int = eqx.field(static=True)
     forces: tuple[Group, ...] = ()
+    fronts: Fronts | None = None  # how a large Jacobian is eliminated
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Number of rows and columns of the Jacobian."""
+        return self.pattern.shape
 
     def residual(self, pose: Pose, time: Jet) -> Float[Jet, "row batch"]:
         """Return the residuals of all constraints, shape (rows, batch), scaled."""
@@ -178,10 +183,13 @@ class System(eqx.Module):
 
     def jacobian(self, pose: Pose, time: Jet) -> Float[Numbers, "row column batch"]:
         """Return the scaled Jacobian at a pose of order zero, shape (rows, columns, batch)."""
+        return self.pattern.dense(self.entries(pose, time)) * self.row_scale[:, :, None]
+
+    def entries(self, pose: Pose, time: Jet) -> Float[Numbers, "entry batch"]:
+        """Return the entries of the Jacobian that are not zero for certain, before rows are scaled."""
         frozen = Jet.constant(time.coefficients[0], 1)
         blocks = [b for group in self.groups for b in group.derivative_blocks(pose, frozen, self.column_scale)]
-        entries = jnp.concatenate([*map(_flat, blocks), jnp.zeros_like(time.coefficients[0])])
-        return entries[self.cells] * self.row_scale[:, :, None]
+        return jnp.concatenate([*map(_flat, blocks)])
 
     def admissible(self, time: Jet) -> Bool[Numbers, "driver batch"]:
         """Tell at which instants each driver has a permitted value, shape (drivers, batch)."""
@@ -248,23 +256,3 @@ def movable(pose: Pose) -> Any:
 
 def _flat(block: Float[Numbers, "*rest batch"]) -> Float[Numbers, "entry batch"]:
     return block.reshape(-1, block.shape[-1])
-
-
-def jacobian_cells(groups: tuple[Group, ...], rows: list[int], coordinate_count: int, body_count: int) -> np.ndarray:
-    """Return where each entry of the Jacobian stands among the flattened blocks; beyond their end there is a zero."""
-    row_total = sum(r * g.instances for r, g in zip(rows, groups, strict=True))
-    total = sum(r * g.instances * coordinate_count * len(g.moving_slots) for r, g in zip(rows, groups, strict=True))
-    cells = np.full((row_total, body_count * coordinate_count), total, np.int32)
-    first_row = position = 0
-    for r, group in zip(rows, groups, strict=True):
-        n = group.instances
-        block_rows = first_row + np.arange(r * n).reshape(r, n)
-        for bodies in (np.array(group.bodies[slot]) for slot in group.moving_slots):
-            places = position + np.arange(coordinate_count * r * n).reshape(coordinate_count, r, n)
-            for c in range(coordinate_count):
-                moving = bodies > 0
-                columns = (bodies[moving] - 1) * coordinate_count + c
-                cells[block_rows[:, moving], np.broadcast_to(columns, (r, columns.size))] = places[c][:, moving]
-            position += coordinate_count * r * n
-        first_row += r * n
-    return cells

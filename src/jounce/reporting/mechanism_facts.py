@@ -22,8 +22,8 @@ from jounce.kinematics.assembly import (
     freely_moving,
     put_together,
     redundant_rows,
-    split,
 )
+from jounce.kinematics.host_jacobian import HostJacobian
 from jounce.mechanism import Mechanism, Model, build, time_grid
 from jounce.mechanism.masses import body_mass
 from jounce.mechanism.system import POSITION_COMPONENTS
@@ -240,17 +240,17 @@ class _State:
 
     def _counted(self) -> dict[str, Any]:
         mechanism, model = self.mechanism, self.model
-        columns = int(model.system.cells.shape[1])
+        columns = int(model.system.shape[1])
         if self.coordinates is not None:
             model = dataclasses.replace(model, guess=self.coordinates)
         trial = self._trial(model)
-        jacobian = np.zeros((0, columns)) if trial is None else trial.jacobian
-        finite = bool(np.isfinite(jacobian).all())
-        jacobian = jacobian if finite else np.zeros_like(jacobian)
-        left, rank, right = split(jacobian) if len(jacobian) else (np.zeros((0, 0)), 0, np.eye(columns))
+        finite = trial is None or bool(trial.jacobian.finite().all())
+        pattern = model.system.pattern
+        nothing = HostJacobian.of(pattern, np.zeros(pattern.entry_count))
+        jacobian = nothing if trial is None or not finite else trial.jacobian
+        rank = jacobian.rank
         drives = np.array([name.startswith("drivers.") for name in model.rows], bool)
-        alone = jacobian[~drives]
-        freedom = columns - (split(alone)[1] if len(alone) else 0)
+        freedom = columns - jacobian.take(~drives).rank
         redundant = len(model.rows) - rank
         try:
             if trial is not None and finite:
@@ -266,8 +266,8 @@ class _State:
             "of_joints": freedom,
             "left": columns - rank,
             "redundant": redundant,
-            "redundant_among": redundant_rows(model, left[:, rank:]).split(", ") if redundant and finite else [],
-            "moving": freely_moving(model, right[rank:]).split(", ") if columns > rank else [],
+            "redundant_among": redundant_rows(model, jacobian.dependences).split(", ") if redundant and finite else [],
+            "moving": freely_moving(model, jacobian.free_directions).split(", ") if columns > rank else [],
             "words": freedom_words(freedom, mechanism.drivers),
             "message": message,
         }

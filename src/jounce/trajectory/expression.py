@@ -9,8 +9,9 @@ import numbers
 import operator
 import re
 import warnings
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Set as AbstractSet
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any, NoReturn
 
 from jounce.errors import ExpressionError, did_you_mean, show_value
@@ -121,7 +122,7 @@ class Expression:
         names : iterable of str
             The names that are defined.
         """
-        known = set(names)
+        known = names if isinstance(names, Mapping | AbstractSet) else set(names)
         for kind, operand, _, column in self._program:
             if kind == "name" and operand not in known:
                 _refuse_name(operand, column, self.text, known)
@@ -243,6 +244,7 @@ def _refuse_name(name: str, column: int, text: str, known: Iterable[str]) -> NoR
     _fail(f"unknown name '{name}'", column, text, did_you_mean(name, candidates))
 
 
+@lru_cache(maxsize=4096)  # a file of many bodies says the same again and again
 def _compile(text: str) -> tuple[_Instruction, ...]:
     """Parse the text and flatten the tree to a postfix program, without recursion."""
     if not text:

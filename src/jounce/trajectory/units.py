@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections import ChainMap
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation, Overflow, localcontext
 from functools import lru_cache
@@ -193,7 +194,7 @@ def parse_value(
     kind : str
         What is expected, one of ``KINDS``.
     names : iterable of str
-        Names that an expression may use.
+        Names that an expression may use; a dictionary of thousands is not copied.
     dimensions : mapping of str to Dimension, optional
         Dimensions of those parameters that have a unit; what follows from them in an expression is checked.
     variables : mapping of str to Dimension or None, optional
@@ -220,7 +221,8 @@ def parse_value(
         raise UnitError("must be a number, a number with a unit, or an expression")
     if isinstance(raw, str):
         variables = variables or {}
-        return _parse_text(raw, kind, {*names, *variables}, dimensions or {}, variables)
+        known = ChainMap(dict(variables), names) if isinstance(names, dict) else {*names, *variables}
+        return _parse_text(raw, kind, known, dimensions or {}, variables)
     try:
         number = float(raw)
     except OverflowError:
@@ -233,7 +235,7 @@ def parse_value(
 def _parse_text(
     text: str,
     kind: str,
-    known: set[str],
+    known: Collection[str],
     dimensions: Mapping[str, Dimension],
     variables: Mapping[str, Dimension | None],
 ) -> Value:
@@ -252,26 +254,26 @@ def _parse_text(
     if expression.text in dimensions:
         check_dimension(dimensions[expression.text], kind, f"the parameter '{expression.text}'")
         return Value(expression, dimensions[expression.text])
-    stated = {name: dimension for name, dimension in dimensions.items() if name not in variables}
+    stated = {name: dimensions[name] for name in expression.names if name in dimensions and name not in variables}
     dimension = inferred(expression, stated, variables, kind)
     if dimension is not None:
         check_dimension(dimension, kind, f"'{expression.text}'", exactly=False)
     return Value(expression, dimension)
 
 
-def _divided_by_a_name(unit: str, known: set[str]) -> bool:
+def _divided_by_a_name(unit: str, known: Collection[str]) -> bool:
     """Tell whether what follows a number is a division by a parameter or a variable: 1/t is no number per tonne."""
     first = re.match(_ATOM, unit.lstrip("/ "))
     return unit.startswith("/") and first is not None and first.group() in known
 
 
-def _parse_with_unit(number: str, unit: str, *, kind: str, known: set[str]) -> Value:
+def _parse_with_unit(number: str, unit: str, *, kind: str, known: Collection[str]) -> Value:
     try:
         size, dimension = parse_unit(unit)
         check_dimension(dimension, kind, f"the unit of {show_value(f'{number} {unit}')}")
     except UnitError as error:
         first = re.match(_ATOM, unit)
-        if first and first.group() in known | {"pi"} | FUNCTIONS.keys():
+        if first and first.group() in {*known, "pi", *FUNCTIONS}:
             raise UnitError(f"{error.message}; a product needs its *, as in {number}*{unit}") from None
         raise
     except (ArithmeticError, InvalidOperation):

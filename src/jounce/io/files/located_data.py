@@ -12,7 +12,7 @@ from jounce.io.files.reading import named_file
 from jounce.trajectory.dimensions import Dimension
 from jounce.trajectory.units import Value, parse_value
 
-MAX_VALUES = 200_000
+MAX_VALUES = 1_000_000
 MAX_DEPTH = 50
 TOO_DEEP = f"nested more than {MAX_DEPTH} deep; 6 are enough for any file"
 

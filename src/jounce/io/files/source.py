@@ -11,7 +11,7 @@ from jounce.io.files import DATA_FILES, parsers
 from jounce.io.files.located_data import Source
 from jounce.io.files.reading import check_allowed, read_file
 
-MAX_LINES = 200_000
+MAX_LINES = 1_000_000
 MAX_LINE_LENGTH = 100_000
 
 

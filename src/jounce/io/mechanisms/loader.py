@@ -99,13 +99,13 @@ def _validate(source: Source, space: str) -> dict[str, Any]:
     from jounce.io.mechanisms.schema_errors import first_problem
 
     parameters = source.data.get("parameters")
-    names = list(parameters) if isinstance(parameters, dict) else []
+    names = dict.fromkeys(parameters if isinstance(parameters, dict) else ())  # found at once, however many
     bodies = source.data.get("bodies", {})
     if not bodies:
         raise source.error("a mechanism needs at least one moving body", ("bodies",), value=bodies)
     context = {
         "names": names,
-        "bodies": ["ground", *(bodies if isinstance(bodies, dict) else ())],
+        "bodies": dict.fromkeys(("ground", *(bodies if isinstance(bodies, dict) else ()))),
         "dimensions": _dimensions(parameters) if names else {},
         "uses": dict.fromkeys(names, ()),
     }

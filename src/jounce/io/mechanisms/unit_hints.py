@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-import statistics
 import warnings
+from bisect import bisect_left
 from collections.abc import Iterator
 from typing import Any
 
@@ -35,14 +35,21 @@ def warn_of_units(source: Source, mechanism: Mechanism) -> None:
         if round_degrees or abs(value) > MANY_TURNS:
             _warn(source, location, f"{value:g} rad is {abs(value) / (2 * math.pi):.2g} turns: {value:g} deg?")
     lengths = [(location, abs(value), plain) for location, value, plain in _lengths(source.data, mechanism) if value]
+    in_order = sorted(value for _, value, _ in lengths)
     for location, value, plain in lengths:
-        others = [other for place, other, _ in lengths if place != location]
-        if not plain or len(others) < TO_COMPARE:
+        if not plain or len(lengths) <= TO_COMPARE:
             continue
-        usual = statistics.median(others)
+        usual = _median_of_others(in_order, value)
         if value > FAR_OFF * usual and usual / ALIKE < value / 1000 < ALIKE * usual:
             times = float(f"{value / usual:.1g}")
             _warn(source, location, f"{value:g} m is {times:g} times the others: {value:g} mm?")
+
+
+def _median_of_others(in_order: list[float], value: float) -> float:
+    """Return the median of numbers in order without one of them."""
+    own, count = bisect_left(in_order, value), len(in_order) - 1
+    low, high = (in_order[k + (k >= own)] for k in ((count - 1) // 2, count // 2))
+    return (low + high) / 2
 
 
 def _warn(source: Source, location: Location, hint: str) -> None:

@@ -1,0 +1,244 @@
+"""The Jacobian at one position on the host: what it closes, its rank, and the vectors that it takes to zero.
+
+A small one is decomposed into singular values. Of a large one only what is not zero is kept: its equations go through
+SuperLU, and its null vectors are found by subspace iteration with a shifted inverse, as many as there are.
+"""
+
+import dataclasses
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from jounce.mechanism.pattern import Pattern
+from jounce.shapes import Numbers
+
+RANK_TOLERANCE = 1e-9
+STEP_TOLERANCE = 1e-10
+MOST_DENSE = 100  # rows and columns; from there on an elimination of what is not zero is quicker
+DAMPING = 1e-6  # of the largest singular value
+PROBES = 8  # random vectors, of which at least one has its part of every vector that an inverse makes long
+MOST_VECTORS = 1024  # of a null space; of a larger one, so many at random
+
+
+@dataclasses.dataclass(frozen=True)
+class HostJacobian:
+    """A Jacobian by the bodies that each row touches.
+
+    Attributes
+    ----------
+    bodies : array of int, shape (rows, slots)
+        The number of bodies where a row touches fewer.
+    blocks : array of shape (rows, slots, width)
+        Entries in the columns of those bodies.
+    body_count : int
+        Number of bodies.
+    """
+
+    bodies: Int[np.ndarray, "row slot"]
+    blocks: Float[np.ndarray, "row slot width"]
+    body_count: int
+
+    @classmethod
+    def of(cls, pattern: Pattern, entries: Float[Numbers, " entry"]) -> "HostJacobian":
+        """Return the Jacobian with these entries in places of a pattern."""
+        blocks = np.append(np.asarray(entries), 0.0)[np.asarray(pattern.places)]
+        return cls(np.asarray(pattern.bodies), blocks, pattern.body_count)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Number of rows and columns."""
+        return len(self.blocks), self.body_count * self.blocks.shape[-1]
+
+    @property
+    def is_large(self) -> bool:
+        """Whether only what is not zero is kept."""
+        return max(self.shape) > MOST_DENSE
+
+    def finite(self) -> Bool[np.ndarray, " row"]:
+        """Tell which rows are finite."""
+        return np.isfinite(self.blocks).all(axis=(1, 2))
+
+    def row_scale(self) -> Float[np.ndarray, " row"]:
+        """Return what makes the largest entry of each row one."""
+        largest = np.max(np.abs(self.blocks), axis=(1, 2), initial=0.0)
+        return 1 / np.where((largest > 0) & np.isfinite(largest), largest, 1.0)
+
+    def scaled(self, scale: Float[np.ndarray, " row"]) -> "HostJacobian":
+        """Return the Jacobian with its rows multiplied by a scale."""
+        return dataclasses.replace(self, blocks=scale[:, None, None] * self.blocks)
+
+    def take(self, rows: Bool[np.ndarray, " row"]) -> "HostJacobian":
+        """Return the Jacobian of some rows."""
+        return dataclasses.replace(self, bodies=self.bodies[rows], blocks=self.blocks[rows])
+
+    def dense(self) -> Float[np.ndarray, "row column"]:
+        """Return the matrix."""
+        rows, _, width = self.blocks.shape
+        matrix = np.zeros((rows, self.body_count + 1, width))
+        matrix[np.arange(rows)[:, None], self.bodies] = self.blocks
+        return matrix[:, :-1].reshape(self.shape)
+
+    def sparse(self) -> Any:
+        """Return the matrix as one of SciPy that keeps what is not zero."""
+        from scipy.sparse import coo_array  # here, since importing SciPy takes half a second
+
+        width = self.blocks.shape[-1]
+        columns = self.bodies[:, :, None] * width + np.arange(width)
+        row, slot, place = np.nonzero((self.blocks != 0) & (columns < self.shape[1]))
+        where = row, columns[row, slot, place]
+        return coo_array((self.blocks[row, slot, place], where), shape=self.shape).tocsr()
+
+    def step(self, residual: Float[np.ndarray, " row"]) -> Float[np.ndarray, " column"] | None:
+        """Return the shortest step that closes the residual to first order, by rows of one size; None if not finite."""
+        if not (np.isfinite(residual).all() and np.isfinite(self.blocks).all()):
+            return None  # what factors a matrix may never end on one that is not finite
+        scale = self.row_scale()
+        matrix, right = self.scaled(scale), -scale * residual
+        if self.is_large:
+            step = _shortest(matrix.sparse(), right)
+        else:
+            step = np.linalg.lstsq(matrix.dense(), right, rcond=STEP_TOLERANCE)[0]
+        return step if np.isfinite(step).all() else None
+
+    @cached_property
+    def rank(self) -> int:
+        """Number of rows that depend on no others."""
+        if not self.is_large:
+            return int(np.sum(self._singular[1] > RANK_TOLERANCE * self._singular[1].max(initial=0.0)))
+        rows, columns = self.shape
+        return rows - self.dependences.shape[1] if rows <= columns else columns - len(self.free_directions)
+
+    @cached_property
+    def dependences(self) -> Float[np.ndarray, "row combination"]:
+        """Combinations of rows that vanish, orthonormal."""
+        if not self.is_large:
+            return self._singular[0][:, self.rank :]
+        rows, columns = self.shape
+        return _null_space(self.sparse().T.tocsr(), None if rows <= columns else rows - self.rank)
+
+    @cached_property
+    def free_directions(self) -> Float[np.ndarray, "direction column"]:
+        """Directions that no row sees, orthonormal; of hundreds in a large mechanism, some at random."""
+        if not self.is_large:
+            return self._singular[2][self.rank :]
+        rows, columns = self.shape
+        return _null_space(self.sparse(), columns - self.rank if rows <= columns else None).T
+
+    @cached_property
+    def _singular(self) -> tuple[Float[np.ndarray, "row row"], Float[np.ndarray, " k"], Float[np.ndarray, "c c"]]:
+        return np.linalg.svd(self.dense())
+
+
+def _largest_size(matrix: Any) -> float:
+    """Return a bound of the largest singular value, near it where rows have few entries."""
+    from scipy.sparse.linalg import norm
+
+    return float(np.sqrt(norm(matrix, 1) * norm(matrix, np.inf)))
+
+
+def _probes(rows: int, count: int) -> Float[np.ndarray, "row probe"]:
+    return np.random.default_rng(0).standard_normal((rows, count))
+
+
+def _factored(matrix: Any) -> Any:
+    """Return the factors of a square matrix, None where it is singular."""
+    from scipy.sparse.linalg import splu
+
+    try:
+        return splu(matrix.tocsc())
+    except RuntimeError:  # that is how SuperLU tells
+        return None
+
+
+def _saddle(matrix: Any, damping: float) -> Any:
+    """Return ``[[I, A^T], [A, -damping I]]``."""
+    from scipy.sparse import block_array, eye_array
+
+    rows, columns = matrix.shape
+    return block_array([[eye_array(columns), matrix.T], [matrix, -damping * eye_array(rows)]])
+
+
+def _shortest(matrix: Any, right: Float[np.ndarray, " row"]) -> Float[np.ndarray, " column"]:
+    """Return the shortest solution; of least squares, damped, where rows depend on one another."""
+    columns = matrix.shape[1]
+    found, smallest = _solved(matrix, right[:, None])
+    if smallest > STEP_TOLERANCE * _largest_size(matrix):
+        return found[:, 0]
+    damped = _factored(_saddle(matrix, (DAMPING * _largest_size(matrix)) ** 2))
+    return damped.solve(np.concatenate([np.zeros(columns), right]))[:columns]
+
+
+def _solved(matrix: Any, right: Float[np.ndarray, "row k"]) -> tuple[Float[np.ndarray, "column k"], float]:
+    """Return the shortest solutions, and nearly the smallest singular value; zero where these are not to be had.
+
+    The inverse makes a random vector longer by about the inverse of that value.
+    """
+    (rows, columns), count = matrix.shape, right.shape[1]
+    square = rows == columns
+    factors = _factored(matrix if square else _saddle(matrix, 0.0)) if rows <= columns else None
+    if factors is None:
+        return np.zeros((columns, count)), 0.0
+    right = np.column_stack([right, _probes(rows, PROBES)])
+    wanted = right if square else np.concatenate([np.zeros((columns, count + PROBES)), right])
+    found = factors.solve(wanted)
+    if not np.isfinite(found).all():
+        return np.zeros((columns, count)), 0.0
+    growth = float(np.max(np.linalg.norm(found[-rows:, count:], axis=0) / np.linalg.norm(right[:, count:], axis=0)))
+    return found[:columns, :count], 1 / growth if square else growth**-0.5
+
+
+def is_clearly_regular(matrix: Float[np.ndarray, "size size"], tolerance: float) -> bool:
+    """Tell whether a large square matrix with many zeros has no small singular value by far; of a small one, nothing.
+
+    A value counts as small if it is at most the tolerance times the largest.
+    """
+    from scipy.sparse import csr_array
+
+    if len(matrix) <= MOST_DENSE or not np.isfinite(matrix).all():
+        return False
+    whole = csr_array(matrix)
+    return _solved(whole, np.zeros((len(matrix), 0)))[1] > 10 * tolerance * _largest_size(whole)
+
+
+def _clearly_independent(matrix: Any) -> bool:
+    """Tell whether no combination of rows vanishes by far."""
+    smallest = _solved(matrix, np.zeros((matrix.shape[0], 0)))[1]
+    # in the larger matrix rounding hides what is smaller
+    least = 10 * RANK_TOLERANCE if matrix.shape[0] == matrix.shape[1] else 1e-7
+    return smallest > least * _largest_size(matrix)
+
+
+def _null_space(matrix: Any, count: int | None = None) -> Float[np.ndarray, "column vector"]:
+    """Return an orthonormal basis of what a matrix takes to zero; if its dimension is given and large, a part of it.
+
+    The inverse of ``A^T A + d I`` shortens every vector by d over the square of its singular value, but those of the
+    null space: two products leave of a random block that space and the vectors nearest to it. The block is large enough
+    as soon as one vector of it is no null vector by far.
+    """
+    rows, columns = matrix.shape
+    if not rows or not columns:
+        return np.linalg.qr(_probes(columns, min(columns, MOST_VECTORS)))[0]
+    if count == 0 or (count is None and _clearly_independent(matrix.T)):
+        return np.zeros((columns, 0))
+    size = _largest_size(matrix)
+    factors = _factored(_saddle(matrix, (DAMPING * size) ** 2))
+
+    def nearest(width: int) -> Any:
+        block = _probes(columns, width)
+        for _ in range(2):
+            block = factors.solve(np.concatenate([block, np.zeros((rows, width))]))[:columns]
+            block = np.linalg.qr(block)[0]
+        return block
+
+    if count is not None and count > MOST_VECTORS:
+        return nearest(MOST_VECTORS)
+    width = PROBES + (max(0, columns - rows) if count is None else count)
+    while True:
+        block = nearest(min(columns, width))
+        _, sizes, turned = np.linalg.svd(np.linalg.qr(matrix @ block, mode="r"))
+        if width >= columns or sizes[0] > 10 * DAMPING * size:
+            found = np.count_nonzero(sizes > RANK_TOLERANCE * size) if count is None else len(turned) - count
+            return block @ turned[found:].T
+        width *= 4

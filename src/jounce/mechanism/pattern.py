@@ -1,0 +1,92 @@
+"""Where the entries of a Jacobian stand: a row touches two bodies, seldom three, however many there are."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float, Int
+
+from jounce.shapes import Numbers
+
+
+class Pattern(eqx.Module):
+    """The bodies that each row of a matrix touches, and where its entries stand in a list of them.
+
+    Attributes
+    ----------
+    bodies : array of int, shape (rows, slots)
+        The number of bodies where a row touches fewer.
+    places : array of int, shape (rows, slots, width)
+        Of the entries in the columns of that body; the number of entries where there are none.
+    body_count, entry_count : int
+        Number of bodies, and of entries.
+    """
+
+    bodies: Int[Numbers, "row slot"]
+    places: Int[Numbers, "row slot width"]
+    body_count: int = eqx.field(static=True)
+    entry_count: int = eqx.field(static=True)
+
+    @classmethod
+    def of(cls, groups: Sequence[Any], row_counts: Sequence[int], width: int, body_count: int) -> "Pattern":
+        """Return the pattern of the blocks of groups of joints and drivers, one after another.
+
+        Parameters
+        ----------
+        groups : sequence of Group
+            Each with the bodies of its instances, the ground as 0.
+        row_counts : sequence of int
+            Rows of an instance of each.
+        width : int
+            Columns of a body.
+        body_count : int
+            Number of bodies, without the ground.
+        """
+        blocks = [count * group.instances for count, group in zip(row_counts, groups, strict=True)]
+        touching = [len(group.moving_slots) for group in groups]
+        entry_count = width * sum(map(math.prod, zip(blocks, touching, strict=True)))
+        bodies = np.full((sum(blocks), max(touching, default=1)), body_count)
+        places = np.full((*bodies.shape, width), entry_count)
+        row = place = 0
+        for block, count, group in zip(blocks, row_counts, groups, strict=True):
+            its = slice(row, row + block)
+            for k, slot in enumerate(group.moving_slots):
+                touched = np.tile(group.bodies[slot], count) - 1
+                bodies[its, k] = np.where(touched < 0, body_count, touched)
+                there = place + np.arange(width * block).reshape(width, block).T
+                places[its, k] = np.where(touched[:, None] < 0, entry_count, there)
+                place += width * block
+            row += block
+        return cls(bodies.astype(np.int32), places.astype(np.int32), body_count, entry_count)
+
+    @property
+    def width(self) -> int:
+        """Columns of a body."""
+        return self.places.shape[-1]
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Number of rows and of columns."""
+        return len(self.bodies), self.body_count * self.width
+
+    def dense(self, entries: Float[Numbers, "entry batch"]) -> Float[Numbers, "row column batch"]:
+        """Return the matrices with these entries."""
+        (rows, columns), count = self.shape, self.entry_count
+        cells = jnp.full((rows, self.body_count, self.width), count, jnp.int32)
+        cells = cells.at[np.arange(rows)[:, None], self.bodies].set(self.places, mode="drop", unique_indices=True)
+        return _with_zero(entries)[cells.reshape(rows, columns)]
+
+    def product(
+        self, entries: Float[Numbers, "entry #batch"], columns: Float[Numbers, "column batch"]
+    ) -> Float[Numbers, "row batch"]:
+        """Return the products of the matrices with these entries and columns."""
+        by_body = jnp.reshape(columns, (self.body_count, self.width, -1))
+        touched = by_body.at[self.bodies].get(mode="fill", fill_value=0.0)
+        return jnp.sum(_with_zero(entries)[self.places] * touched, axis=(1, 2))
+
+
+def _with_zero(entries: Float[Numbers, "entry batch"]) -> Float[Numbers, "entry+1 batch"]:
+    return jnp.concatenate([entries, jnp.zeros((1, entries.shape[-1]))])

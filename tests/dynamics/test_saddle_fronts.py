@@ -1,0 +1,99 @@
+"""The equations of motion eliminated body by body: solutions of the whole matrix, and motions as from dense ones."""
+
+import dataclasses
+import itertools
+
+import jax
+import numpy as np
+import pytest
+
+import jounce as jn
+from jounce.dynamics.forward import expand
+from jounce.dynamics.saddle_fronts import SaddleFronts
+from jounce.dynamics.start import consistent_start
+from jounce.kinematics.compilation import compiled
+from jounce.mechanism import build
+from tests.problems import dynamics
+
+CLOCK = np.zeros((1, 1))
+expanded = compiled("order")(expand)
+
+
+@compiled()
+def factored(equations, state):
+    """The matrix, its solutions and its inverse."""
+    factor, matrix = equations.factored(state, CLOCK), equations.matrix(state, CLOCK)
+    return matrix, factor.solve(np.arange(1.0, len(matrix) + 1)[:, None]), factor.inverse()
+
+
+@pytest.fixture(params=["double_pendulum", "free_four_bar", "spatial_slider_crank", "gear_pair"])
+def mechanism(request):
+    return getattr(dynamics, request.param)()
+
+
+def start_in_fronts(mechanism, monkeypatch):
+    monkeypatch.setattr("jounce.dynamics.saddle_fronts.FRONT_COST", 0.0)
+    start = consistent_start(mechanism, 0.0)
+    assert start.equations.saddle is not None
+    return start
+
+
+def test_solutions_and_inverses_are_those_of_the_whole_matrix(mechanism, monkeypatch):
+    start = start_in_fronts(mechanism, monkeypatch)
+    matrix, solution, inverse = (np.asarray(x) for x in factored(start.equations, start.state))
+    matrix, inverse = matrix[..., 0], inverse[..., 0]
+    size = np.abs(matrix).sum(axis=1).max()
+    right = np.arange(1.0, len(matrix) + 1)[:, None]
+    assert np.abs(matrix @ solution - right).max() < 1e-14 * size * np.abs(solution).max()
+    assert np.abs(matrix @ inverse - np.eye(len(matrix))).max() < 1e-14 * size * np.abs(inverse).max()
+
+
+def test_expansions_are_those_of_dense_elimination(mechanism, monkeypatch):
+    start = start_in_fronts(mechanism, monkeypatch)
+    dense = dataclasses.replace(start.equations, saddle=None)
+    found, wanted = (expanded(e, start.state, CLOCK, order=6) for e in (start.equations, dense))
+    for x, y in zip(jax.tree.leaves(found), jax.tree.leaves(wanted), strict=True):
+        np.testing.assert_allclose(x, y, atol=1e-11 * max(1.0, np.abs(y).max()))
+
+
+def pendulums(count, length=0.1):
+    """A chain of uniform rods, each hanging from the one before, at rest and straight, 60 degrees from the vertical."""
+    names = ["ground", *(f"rod{k}" for k in range(count))]
+    pairs = list(itertools.pairwise(names))
+    inertia = 0.1 * length**2 / 3
+    rod = {"angle": -np.pi / 6, "mass": 0.1, "inertia": inertia / 4, "center_of_mass": [length / 2, 0]}
+    way = length * np.array([np.cos(np.pi / 6), -np.sin(np.pi / 6)])
+    return jn.Mechanism(
+        space="planar",
+        gravity=[0, -9.81],
+        bodies={name: jn.Body((k * way).tolist(), **rod) for k, name in enumerate(names[1:])},
+        joints={f"pin{k}": jn.planar.Revolute(pair, [length * (k > 0), 0], [0, 0]) for k, pair in enumerate(pairs)},
+        outputs={"tip": jn.PointOutput(names[-1], [length, 0])},
+    )
+
+
+def test_a_long_chain_goes_through_fronts_and_balances_its_weight():
+    count = 30
+    mechanism = pendulums(count)
+    start = consistent_start(mechanism, 0.0)
+    assert start.equations.saddle.fronts.shape[0] == count
+    assert start.mobility.startswith("30 degrees of freedom: ")
+    found = np.asarray(expanded(start.equations, start.state, CLOCK, order=2).acceleration)[0, :, :, 0]
+    # moments about the first pin: those of weight alone, as all other pins act on two rods
+    arms = np.arange(count) * 0.1 + 0.05
+    acceleration = found[:2] + found[2] * 0.05 * np.array([[0.5], [np.sqrt(3) / 2]])
+    moment = arms * (np.cos(np.pi / 6) * acceleration[1] + np.sin(np.pi / 6) * acceleration[0])
+    inertia = 0.1 * 0.1**2 / 12 * found[2]
+    weight = -9.81 * np.cos(np.pi / 6) * arms
+    np.testing.assert_allclose(np.sum(0.1 * moment + inertia), np.sum(0.1 * weight), rtol=1e-11)
+
+
+def test_where_a_body_has_many_neighbours_the_matrix_stays_dense():
+    count = 40
+    spokes = {f"rod{k}": jn.Body([0, 0]) for k in range(count)}
+    hub = jn.Mechanism(
+        space="planar",
+        bodies={"hub": jn.Body([0, 0]), **spokes},
+        joints={name: jn.planar.Revolute(("hub", name), [0, 0], [0, 0]) for name in spokes},
+    )
+    assert SaddleFronts.of(build(hub).system.pattern) is None
