@@ -152,10 +152,12 @@ def tell(command: str, result: Callable[[], Mapping[str, Any]], out: Path | None
 
 
 def import_files(paths: Sequence[Path] | None) -> None:
-    """Run Python files with the user's own classes."""
+    """Run Python files with the user's own classes; what is compiled may then be other than this package says."""
     if paths:
         from jounce.io.mechanisms.user_classes import import_file
+        from jounce.kinematics.compilation import keep_programs
 
+        keep_programs(None)
         for path in paths:
             import_file(path)
 
