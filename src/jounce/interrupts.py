@@ -1,9 +1,11 @@
-"""How the command ends when it is told to stop: at once, with a status that says so, and nothing half written.
+"""What may happen to the process: that it is told to stop, or forked.
+
+The command ends when it is told to stop: at once, with a status that says so, and nothing half written.
 
 `KeyboardInterrupt` is no way to end a program that computes in JAX: raised in a callback of the tracer or the collector
 it is lost, and the command goes on; raised while XLA's threads compile, the interpreter is taken down under them. So
 the command handles signals itself, from before the libraries are imported: it undoes what it has begun and leaves the
-process without unwinding anything. Nothing here is active in a program that imports this package.
+process without unwinding anything. Nothing of it is active in a program that imports this package.
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 
-__all__ = ["end_on_signals", "is_command", "raising", "undoing"]
+__all__ = ["end_on_signals", "is_command", "left_behind", "mark_forks", "raising", "undoing"]
 
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 PATIENCE = 0.2  # s that the main thread has to come out of native code before another one ends the process
@@ -26,6 +28,7 @@ STATUS = 128  # of a process ended by a signal, plus its number
 _undo: dict[object, Callable[[], object]] = {}
 _ending = threading.Lock()
 _ender = 0  # the thread that ends the process
+_left_behind = False  # whether the threads of XLA stayed in the process that this one was forked from
 
 
 def is_command() -> bool:
@@ -116,3 +119,24 @@ def raising() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, _end)
+
+
+def mark_forks() -> None:
+    """Have the processes that are forked from this one know it."""
+    if hasattr(os, "register_at_fork"):
+        os.register_at_fork(after_in_child=_after_fork)
+
+
+def left_behind() -> bool:
+    """Tell whether this process was forked from one in which JAX had started: XLA's threads are not in it."""
+    return _left_behind
+
+
+def _after_fork() -> None:
+    global _left_behind
+    if "jax" not in sys.modules:
+        return
+    from jax._src import xla_bridge
+
+    started = getattr(xla_bridge, "backends_are_initialized", lambda: True)  # private to JAX: if unknown, the worst
+    _left_behind = _left_behind or started()

@@ -8,7 +8,9 @@ import sys
 
 import pytest
 
-from jounce.cli.compiled_programs import CheckedEntries
+from jounce.cli import compiled_programs
+from jounce.cli.compiled_programs import CheckedEntries, JaxEntries
+from jounce.kinematics import compilation
 
 FOUR_BAR = pathlib.Path(__file__).resolve().parents[2] / "examples" / "four_bar.yaml"
 PROGRAM = bytes(range(256)) * 40
@@ -44,6 +46,27 @@ def test_an_entry_that_cannot_be_replaced_is_compiled_each_time(tmp_path):
     entries.put("key", PROGRAM)
     assert entries.get("key") is None
     CheckedEntries(tmp_path / "gone").put("key", PROGRAM)
+
+
+def test_those_that_were_not_used_for_longest_go_first(tmp_path, monkeypatch):
+    monkeypatch.setattr(compiled_programs, "LARGEST", 3 * (len(PROGRAM) + 32))
+    for key in "abcde":
+        CheckedEntries(tmp_path).put(key, PROGRAM)
+        for file in tmp_path.iterdir():
+            os.utime(file, (1e9 + "abcde".index(file.stem),) * 2)
+    assert sorted(file.stem for file in tmp_path.iterdir()) == ["c", "d", "e"]
+    assert CheckedEntries(tmp_path).get("c") == PROGRAM
+    CheckedEntries(tmp_path).put("f", PROGRAM)
+    assert sorted(file.stem for file in tmp_path.iterdir()) == ["c", "e", "f"]
+
+
+def test_jax_takes_nothing_from_its_own_store_where_a_program_is_to_be_kept(tmp_path):
+    entries = JaxEntries(tmp_path)
+    entries.put("key", PROGRAM)
+    with compilation.compiling_anew():
+        assert entries.get("key") is None
+        entries.put("other", PROGRAM)
+    assert (entries.get("key"), entries.get("other")) == (PROGRAM, None)
 
 
 def started(cache):

@@ -8,12 +8,13 @@ move, or a result could not be written.
 
 from __future__ import annotations
 
+import functools
 import gc
 import os
 import re
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from inspect import cleandoc
 from pathlib import Path
 from typing import Any, Literal
@@ -58,6 +59,7 @@ def completion(shell: Literal["bash", "zsh", "fish"], /, *, install: bool = Fals
 COMMANDS = (
     new, inspect, run, simulate, plot, report, view, check, torques, convert, reproduce, schema, completion
 )  # fmt: skip
+LIGHT = (new, completion)  # they compute nothing
 FIRST = """\
   jounce new four-bar                          # a commented starter file
   jounce inspect four-bar.yaml                 # what is in it, can it move?
@@ -111,9 +113,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _status(given: list[str], as_json: bool) -> int:
     """Return the exit status of a command, whose errors are told."""
     try:
-        from jounce.cli.compiled_programs import use_compilation_cache
-
-        use_compilation_cache()
         return _dispatch(given)
     except KeyboardInterrupt:
         return 130
@@ -161,5 +160,20 @@ def application() -> Any:
     )
     for place, command in enumerate(COMMANDS):
         _, _, examples = cleandoc(command.__doc__ or "").partition("Examples\n--------\n")
-        app.command(command, help_epilogue=f"Examples:\n{examples}", sort_key=place)
+        app.command(
+            command if command in LIGHT else _computing(command), help_epilogue=f"Examples:\n{examples}", sort_key=place
+        )
     return app
+
+
+def _computing(command: Callable[..., int]) -> Callable[..., int]:
+    """Return a command that keeps the programs that it compiles; JAX is imported when it runs, not before."""
+
+    @functools.wraps(command)
+    def computing(*arguments: Any, **keywords: Any) -> int:
+        from jounce.cli.compiled_programs import use_compilation_cache
+
+        use_compilation_cache()
+        return command(*arguments, **keywords)
+
+    return computing

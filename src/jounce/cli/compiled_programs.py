@@ -11,6 +11,10 @@ from typing import Any
 
 from jounce.errors import OutputError
 from jounce.io.files.writing import replacing
+from jounce.kinematics import compilation
+from jounce.kinematics.compilation import compiles_anew
+
+LARGEST = 2**29  # bytes of programs in a folder, looked at when the first one of a process is added
 
 
 def cache_directory() -> Path | None:
@@ -41,6 +45,7 @@ class CheckedEntries:
 
     def __init__(self, path: str | Path):
         self._path = Path(path)  # the name by which JAX asks for it
+        self._bounded = False  # whether this process has looked at how much is kept
 
     def get(self, key: str) -> bytes | None:
         """Return the program of this key, or None."""
@@ -50,9 +55,10 @@ class CheckedEntries:
                 return None
             whole = file.read_bytes()
             if hashlib.sha256(whole[size:]).digest() == whole[:size]:
+                with suppress(OSError):
+                    os.utime(file)  # those that are not used for long go first
                 return whole[size:]
-        with suppress(OSError):
-            file.unlink()
+        self.drop(key)
         return None
 
     def put(self, key: str, value: bytes) -> None:
@@ -60,25 +66,65 @@ class CheckedEntries:
         # a full disk, or a folder in the place of the file: compiled again next time
         with suppress(OutputError), replacing(self._file(key)) as new:
             new.write_bytes(hashlib.sha256(value).digest() + value)
+        if not self._bounded:
+            self._bounded = True
+            self._remove_oldest()
+
+    def drop(self, key: str) -> None:
+        """Remove a program that is of no use."""
+        with suppress(OSError):
+            self._file(key).unlink()
+
+    def _remove_oldest(self) -> None:
+        """Remove the programs that were not used for longest, until no more is kept than is allowed."""
+        found = []
+        for file in self._path.glob("*.program"):
+            with suppress(OSError):  # another process removes them too
+                status = file.stat()
+                found.append((status.st_mtime, status.st_size, file))
+        total = sum(size for _, size, _ in found)
+        for _, size, file in sorted(found):
+            if total <= LARGEST:
+                break
+            total -= size
+            with suppress(OSError):
+                file.unlink()
 
     def _file(self, key: str) -> Path:
         return self._path / f"{key}.program"
 
 
-def keep_programs(directory: Path) -> None:
-    """Have JAX keep its programs in checked files; a release of JAX that works otherwise keeps them in its own."""
+class JaxEntries(CheckedEntries):
+    """The programs that JAX keeps by itself: those that `jounce.kinematics.compilation` does not."""
+
+    def get(self, key: str) -> bytes | None:
+        """Return the program of this key, or None, as it is where programs are to be compiled anew."""
+        return None if compiles_anew() else super().get(key)
+
+    def put(self, key: str, value: bytes) -> None:
+        """Keep a program, unless it is kept in another form."""
+        if not compiles_anew():
+            super().put(key, value)
+
+
+def keep_programs(directory: Path) -> bool:
+    """Have JAX keep its programs in checked files; a release of JAX that works otherwise keeps them in its own.
+
+    Returns whether they are in checked files.
+    """
     import jax
     from jax._src import compilation_cache
 
     def file_cache(path: str) -> Any:
-        return CheckedEntries(path), path
+        return JaxEntries(path), path
 
-    if hasattr(compilation_cache, "get_file_cache"):
+    if known := hasattr(compilation_cache, "get_file_cache"):
         compilation_cache.get_file_cache = file_cache
     jax.config.update("jax_compilation_cache_dir", str(directory))
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.05)
     jax.config.update("jax_persistent_cache_min_entry_size_bytes", 0)
     jax.config.update("jax_persistent_cache_enable_xla_caches", "none")  # those are for GPUs
+    return known
 
 
 def use_compilation_cache() -> None:
@@ -93,10 +139,11 @@ def use_compilation_cache() -> None:
         directory = cache_directory()
         if directory is None:
             return
-        directory.mkdir(parents=True, exist_ok=True)
+        directory.mkdir(mode=0o700, parents=True, exist_ok=True)
     except (OSError, RuntimeError, ValueError):  # RuntimeError: there is no home
         return
     if not os.access(directory, os.W_OK | os.X_OK):
         return
-    keep_programs(directory)
+    if keep_programs(directory):
+        compilation.keep_programs(CheckedEntries(directory))
     warnings.filterwarnings("ignore", message="Error (reading|writing) persistent compilation cache")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from jounce.cli.arguments import check_ending
 from jounce.cli.file_kinds import expecting
@@ -12,7 +12,9 @@ from jounce.cli.options import Overwrite, RobotReading, allowed, errors_about, i
 from jounce.errors import JounceError
 from jounce.io.files import DATA_FILES, ROBOT_FILES
 from jounce.reporting.terminal import caution, say
-from jounce.robot import Robot
+
+if TYPE_CHECKING:
+    from jounce.robot import Robot
 
 
 def convert(

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from jounce.cli.mechanisms import outcome, simulated, solved
 from jounce.cli.options import PLAIN_MECHANISM, MechanismReading, errors_about, spare_inputs, written
 from jounce.errors import JounceError, MechanismError, check_name
-from jounce.kinematics import Motion
-from jounce.mechanism import Mechanism
 from jounce.reporting.terminal import Bar, say
+
+if TYPE_CHECKING:
+    from jounce.kinematics import Motion
+    from jounce.mechanism import Mechanism
 
 Kind = Literal["outputs", "sketch", "hodograph", "phase", "energy", "power", "reactions", "animation"]
 Names = Literal["all", "bodies", "joints", "none"]
@@ -143,7 +145,7 @@ def _moved(mechanism: Mechanism, file: Path, order: int) -> Motion:
 
 
 def _drawn(motion: Motion, kind: str, output: list[str] | None, derivative: int | None, look: dict[str, Any]) -> Any:
-    from jounce import plot as figures
+    import jounce.plot as figures
 
     one = _portrayed(motion, kind, output)
     upper = 1 if derivative is None else max(derivative, 1)

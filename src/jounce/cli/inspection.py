@@ -9,8 +9,6 @@ from jounce.cli.file_kinds import expecting
 from jounce.cli.options import PLAIN_MECHANISM, MechanismReading, RobotReading, errors_about
 from jounce.errors import JounceError
 from jounce.io.files import DATA_FILES, ROBOT_FILES
-from jounce.reporting.summaries import start_heading, start_summary
-from jounce.reporting.tables import bodies_table, mechanism_tables, robot_tables
 from jounce.reporting.terminal import say, say_json, show_table
 
 
@@ -39,6 +37,9 @@ def inspect(
       jounce inspect examples/six_bar_watt.yaml
       jounce inspect examples/robots/panda.urdf --json
     """
+    from jounce.reporting.summaries import start_heading, start_summary
+    from jounce.reporting.tables import bodies_table, mechanism_tables, robot_tables
+
     suffix = file.suffix.lower()
     with expecting(file, "mechanism", "robot"):
         check_ending(file, (*DATA_FILES, *ROBOT_FILES))

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from jounce.cli.options import NO_TABLE, PLAIN_MECHANISM, MechanismReading, TableOutput, errors_about, spare_inputs
 from jounce.errors import JounceError, check_name
-from jounce.integrate import Obreshkov, Taylor
-from jounce.kinematics import Motion
-from jounce.mechanism import Mechanism
-from jounce.reporting.summaries import motion_summary
 from jounce.reporting.terminal import Bar, say, show_peaks
+
+if TYPE_CHECKING:
+    from jounce.integrate import Obreshkov, Taylor
+    from jounce.kinematics import Motion
+    from jounce.mechanism import Mechanism
 
 
 def run(
@@ -103,6 +104,7 @@ def _finished(command: str, motion: Motion, file: Path, output: TableOutput, *, 
     from jounce.reporting.json_results import motion_result
     from jounce.reporting.motion_facts import motion_facts
     from jounce.reporting.peaks import peaks
+    from jounce.reporting.summaries import motion_summary
 
     if not output.json:
         say(motion_summary(motion_facts(motion), file.name))

@@ -6,16 +6,18 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
 from jounce.cli.file_kinds import expecting
 from jounce.errors import JounceError, OutputError, RobotError
-from jounce.mechanism import Mechanism
 from jounce.reporting.terminal import say, say_json
-from jounce.robot import Robot
-from jounce.trajectory import JointTrajectory
+
+if TYPE_CHECKING:
+    from jounce.mechanism import Mechanism
+    from jounce.robot import Robot
+    from jounce.trajectory import JointTrajectory
 
 Overwrite = Annotated[bool, Parameter(alias="--force")]
 """The option of commands that replace no file unasked; --force is what it was called first."""
@@ -128,10 +130,10 @@ class TableOutput:
 
     def write(self, dataset: Callable[[], Any]) -> None:
         """Write the values, an xarray.Dataset, if they are wanted."""
-        from jounce import io
-
         if (out := self.out) is not None:
-            written(lambda: io.write(dataset(), out, overwrite=self.overwrite))
+            from jounce.io import write
+
+            written(lambda: write(dataset(), out, overwrite=self.overwrite))
 
     def tell(self, command: str, result: Callable[[], Mapping[str, Any]]) -> None:
         """Print the result as JSON, or where it was written."""
@@ -150,10 +152,12 @@ def tell(command: str, result: Callable[[], Mapping[str, Any]], out: Path | None
 
 
 def import_files(paths: Sequence[Path] | None) -> None:
-    """Run Python files with the user's own classes."""
+    """Run Python files with the user's own classes; what is compiled may then be other than this package says."""
     if paths:
         from jounce.io.mechanisms.user_classes import import_file
+        from jounce.kinematics.compilation import keep_programs
 
+        keep_programs(None)
         for path in paths:
             import_file(path)
 

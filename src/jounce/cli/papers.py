@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 from jounce.errors import JounceError, check_name
-from jounce.reporting.summaries import count
 from jounce.reporting.terminal import Bar, say
 
 PAPERS = {"sommer-2024": "jounce.papers.sommer_2024", "negrean-2025": "jounce.papers.negrean_2025"}
@@ -33,6 +32,8 @@ def reproduce(paper: str, /, *, out: Path, samples: Path | None = None, masses: 
       jounce reproduce negrean-2025 --out out --samples a.csv --masses link.yaml
     """
     import importlib
+
+    from jounce.reporting.summaries import count
 
     check_name("paper", paper, PAPERS, JounceError)
     given = {name: path for name, path in (("samples", samples), ("masses", masses)) if path is not None}

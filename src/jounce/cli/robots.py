@@ -17,8 +17,6 @@ from jounce.cli.options import (
     written,
 )
 from jounce.errors import JounceError, SampleWarning
-from jounce.reporting.summaries import limits_summary, torques_summary, verdict
-from jounce.reporting.tables import limits_table
 from jounce.reporting.terminal import caution, say, show_peaks, show_table
 
 MOST_RATES = 28  # of torques: the highest derivative of a law is 30
@@ -66,6 +64,8 @@ def check(
     from jounce.dynamics.limits import check_limits
     from jounce.io import load_limits
     from jounce.reporting.json_results import limits_result
+    from jounce.reporting.summaries import limits_summary, verdict
+    from jounce.reporting.tables import limits_table
 
     if out is not None:
         from jounce.plot import check_figure
@@ -133,6 +133,7 @@ def torques(
     from jounce.dynamics.trajectories import trajectory_torques
     from jounce.reporting.json_results import torques_result
     from jounce.reporting.peaks import table_peaks
+    from jounce.reporting.summaries import torques_summary
 
     if not 0 <= rates <= MOST_RATES:
         raise JounceError(f"must be a whole number from 0 to {MOST_RATES}", name="--rates", value=rates)

@@ -13,8 +13,10 @@ from jounce.jet.coefficients import (
     Coefficient,
     Product,
     convolution,
-    elementwise,
+    divided,
     minus,
+    multiplied,
+    negated,
     next_of_chain,
     plus,
     quotient,
@@ -146,18 +148,20 @@ class Jet:
         """
         if self.order == 0:
             raise ValueError("a jet of order 0 carries no derivative")
-        first, *rest = (None if c is None else k * c for k, c in enumerate(self.coefficients) if k)
+        first, *rest = (None if c is None else multiplied(c, k) for k, c in enumerate(self.coefficients) if k)
         return Jet((jnp.zeros_like(self.coefficients[0]) if first is None else first, *rest))
 
     def integrate(self, initial: Real) -> "Jet":
         """Return the jet of the time integral that has the value `initial`, one order longer."""
-        return Jet((initial, *[None if c is None else c * (1 / (k + 1)) for k, c in enumerate(self.coefficients)]))
+        return Jet(
+            (initial, *[None if c is None else multiplied(c, 1 / (k + 1)) for k, c in enumerate(self.coefficients)])
+        )
 
     def evaluate(self, step: Real) -> Any:
         """Return the Taylor prediction a time `step` (in seconds) away."""
         *lower, value = self.coefficients
         for c in reversed(lower):
-            value = plus(c, None if value is None else elementwise(jnp.multiply)(value, step))
+            value = plus(c, None if value is None else multiplied(value, step))
         return value
 
     def dot(self, other: "Jet | Numbers") -> Any:
@@ -169,7 +173,7 @@ class Jet:
         return cross(self, other)
 
     def __neg__(self) -> "Jet":
-        return self.map(lambda c: -c)
+        return self.map(negated)
 
     def __pos__(self) -> "Jet":
         return self
@@ -201,17 +205,17 @@ class Jet:
     def __mul__(self, other: "Quantity") -> "Jet":
         if other is self:
             return self.square()
-        return bilinear(elementwise(jnp.multiply), self, other)
+        return bilinear(multiplied, self, other)
 
     __rmul__ = __mul__
 
     def square(self) -> "Jet":
         """Return the square, with half the products of a general multiplication."""
-        return symmetric(jnp.multiply, self)
+        return symmetric(multiplied, self)
 
     def __truediv__(self, other: "Quantity") -> "Jet":
         if not isinstance(other, Jet):
-            return self.map(lambda c: elementwise(jnp.divide)(c, other))
+            return self.map(lambda c: divided(c, other))
         return Jet(quotient(self.coefficients, other.coefficients))._filled()
 
     def __rtruediv__(self, other: Real) -> "Jet":
@@ -276,8 +280,8 @@ def components(vector: Jet | Numbers) -> list[Any]:
 def dot(a: Jet | Numbers, b: Jet | Numbers) -> Any:
     """Return the scalar product of two vectors, of shape (components, ...), as shape (...)."""
     if isinstance(a, Jet) and a is b:
-        return total(symmetric(jnp.multiply, x) for x in components(a))[0]
-    return total(bilinear(jnp.multiply, x, y) for x, y in zip(components(a), components(b), strict=True))[0]
+        return total(symmetric(multiplied, x) for x in components(a))[0]
+    return total(bilinear(multiplied, x, y) for x, y in zip(components(a), components(b), strict=True))[0]
 
 
 def cross(a: Jet | Numbers, b: Jet | Numbers) -> Any:
@@ -285,7 +289,7 @@ def cross(a: Jet | Numbers, b: Jet | Numbers) -> Any:
     x, y = components(a), components(b)
 
     def entry(i: int, j: int) -> Any:
-        return bilinear(jnp.multiply, x[i], y[j]) - bilinear(jnp.multiply, x[j], y[i])
+        return bilinear(multiplied, x[i], y[j]) - bilinear(multiplied, x[j], y[i])
 
     if len(x) == 2:
         return entry(0, 1)[0]

@@ -1,11 +1,17 @@
-"""Sums and products of Taylor coefficients; None is a coefficient that is zero for certain."""
+"""Sums and products of Taylor coefficients; None is a coefficient that is zero for certain.
+
+High orders trace them thousands of times. Every function of `jax.numpy` is a `jax.jit` of its own around an operation
+of `jax.lax`; numbers that need no promotion go to that at once.
+"""
 
 from collections.abc import Callable, Iterable, Sequence
 from functools import reduce
 from operator import add
 from typing import Any
 
+import jax
 import jax.numpy as jnp
+import numpy as np
 
 from jounce.shapes import Real
 
@@ -18,6 +24,57 @@ Coefficients = Sequence[Any]
 Product = Callable[[Any, Any], Any]
 
 
+_FLOAT = np.dtype(float)
+
+
+def _elementwise(operation: Product, promoting: Product) -> Product:
+    """Let operands of different rank meet at their trailing (batch) axes, said aloud for strict rank promotion.
+
+    Parameters
+    ----------
+    operation : callable
+        Of `jax.lax`, for arrays of doubles and numbers.
+    promoting : callable
+        The same of `jax.numpy`, for all others.
+    """
+
+    def aligned(a: Any, b: Any) -> Any:
+        x, y = _plain(a), _plain(b)
+        if x is None or y is None or (type(x) is type(y) is float):
+            rank = max(jnp.ndim(a), jnp.ndim(b))
+            return promoting(ranked(a, rank), ranked(b, rank))
+        if type(x) is not float and type(y) is not float and x.ndim != y.ndim:
+            rank = max(x.ndim, y.ndim)
+            x, y = (jax.lax.reshape(z, (1,) * (rank - z.ndim) + z.shape) for z in (x, y))
+        return operation(x, y)
+
+    return aligned
+
+
+def _plain(x: Any) -> Any:
+    """Return what `jax.lax` takes without promotion, a double or an array of them; None for anything else."""
+    kind = type(x)
+    if kind is float:
+        return x
+    if kind is int:
+        return float(x)
+    if kind is np.ndarray:
+        return x if x.dtype == _FLOAT else None
+    known = getattr(x, "aval", None)  # of arrays of JAX and of what it traces
+    return x if known is not None and known.dtype == _FLOAT and not known.weak_type else None
+
+
+added = _elementwise(jax.lax.add, jnp.add)
+subtracted = _elementwise(jax.lax.sub, jnp.subtract)
+multiplied = _elementwise(jax.lax.mul, jnp.multiply)
+divided = _elementwise(jax.lax.div, jnp.divide)
+
+
+def negated(a: Any) -> Any:
+    """Return a coefficient with the other sign."""
+    return -a if (x := _plain(a)) is None or type(a) in (int, float) else jax.lax.neg(x)
+
+
 def total(terms: Iterable[Any]) -> Any:
     """Sum without the leading ``0 +`` of the built-in, which would put an operation into every trace."""
     return reduce(add, terms)
@@ -27,20 +84,20 @@ def plus(a: Coefficient, b: Coefficient) -> Any:
     """Add coefficients; None is zero."""
     if a is None or b is None:
         return b if a is None else a
-    return elementwise(jnp.add)(a, b)
+    return added(a, b)
 
 
 def minus(a: Coefficient, b: Coefficient) -> Any:
     """Subtract coefficients; None is zero."""
     if a is None or b is None:
-        return a if b is None else -b
-    return elementwise(jnp.subtract)(a, b)
+        return a if b is None else negated(b)
+    return subtracted(a, b)
 
 
 def sum_of_products(product: Product, a: Iterable[Any], b: Iterable[Any]) -> Any:
     """Return the sum of the products of paired coefficients, None where all of them vanish."""
     terms = [product(x, y) for x, y in zip(a, b, strict=True) if x is not None and y is not None]
-    return total(terms) if terms else None
+    return reduce(added, terms) if terms else None
 
 
 def convolution(product: Product, a: Coefficients, b: Coefficients) -> list[Any]:
@@ -55,7 +112,7 @@ def self_convolution(product: Product, a: Coefficients) -> list[Any]:
         half = (k + 1) // 2
         twice = sum_of_products(product, a[:half], a[k : k - half : -1] if half else ())
         middle = sum_of_products(product, a[k // 2 : k // 2 + 1], a[k // 2 : k // 2 + 1]) if k % 2 == 0 else None
-        found.append(plus(None if twice is None else 2 * twice, middle))
+        found.append(plus(None if twice is None else multiplied(twice, 2.0), middle))
     return found
 
 
@@ -64,25 +121,25 @@ def quotient(a: Coefficients, b: Coefficients) -> list[Any]:
     first, *others = b
     found: list[Any] = []
     for k in range(min(len(a), len(b))):
-        rest = minus(a[k], sum_of_products(elementwise(jnp.multiply), others[:k], found[::-1]))
-        found.append(None if rest is None else elementwise(jnp.divide)(rest, first))
+        rest = minus(a[k], sum_of_products(multiplied, others[:k], found[::-1]))
+        found.append(None if rest is None else divided(rest, first))
     return found
 
 
 def next_of_chain(outer: Coefficients, inner: Coefficients, slope: Coefficients) -> Any:
     """Return the next coefficient of y from ``y' = slope * inner'``."""
     k = len(outer)
-    rates = [None if c is None else j * c for j, c in enumerate(inner[: k + 1])]
-    value = sum_of_products(jnp.multiply, rates[1:], slope[k - 1 :: -1])
-    return None if value is None else value * (1 / k)
+    rates = [None if c is None else multiplied(c, j) for j, c in enumerate(inner[: k + 1])]
+    value = sum_of_products(multiplied, rates[1:], slope[k - 1 :: -1])
+    return None if value is None else multiplied(value, 1 / k)
 
 
 def square_root(x: Coefficients) -> list[Any]:
     """Return the coefficients of the square root of a series."""
     y: list[Any] = [jnp.sqrt(x[0])]
     for k in range(1, len(x)):
-        rest = minus(x[k], sum_of_products(jnp.multiply, y[1:k], y[k - 1 : 0 : -1]))
-        y.append(None if rest is None else rest / (2 * y[0]))
+        rest = minus(x[k], sum_of_products(multiplied, y[1:k], y[k - 1 : 0 : -1]))
+        y.append(None if rest is None else divided(rest, multiplied(y[0], 2.0)))
     return y
 
 
@@ -91,19 +148,9 @@ def raised(x: Coefficients, exponent: Real) -> list[Any]:
     y: list[Any] = [jnp.power(x[0], exponent)]
     for k in range(1, len(x)):
         weighted = [None if x[j] is None else (exponent * j - (k - j)) * x[j] for j in range(1, k + 1)]
-        value = sum_of_products(jnp.multiply, weighted, y[k - 1 :: -1])
+        value = sum_of_products(multiplied, weighted, y[k - 1 :: -1])
         y.append(None if value is None else value / (k * x[0]))
     return y
-
-
-def elementwise(operation: Product) -> Product:
-    """Let operands of different rank meet at their trailing (batch) axes, said aloud for strict rank promotion."""
-
-    def aligned(a: Any, b: Any) -> Any:
-        rank = max(jnp.ndim(a), jnp.ndim(b))
-        return operation(ranked(a, rank), ranked(b, rank))
-
-    return aligned
 
 
 def ranked(a: Real, rank: int) -> Any:

@@ -12,7 +12,7 @@ import jax
 import jax.numpy as jnp
 
 from jounce.jet.algebra import Jet, Quantity, exp, log, of_quantities, power, real_power, sqrt
-from jounce.jet.coefficients import Coefficients, next_of_chain, sum_of_products
+from jounce.jet.coefficients import Coefficients, multiplied, negated, next_of_chain, sum_of_products
 from jounce.shapes import Real
 
 
@@ -25,7 +25,7 @@ def next_sine_cosine(
 ) -> tuple[Any, Any]:
     """Return the next coefficients of sine and cosine, from those before and a jet of the angle that reaches them."""
     slope = next_of_chain(cosine, angle.coefficients, sine)
-    return next_of_chain(sine, angle.coefficients, cosine), slope if slope is None or hyperbolic else -slope
+    return next_of_chain(sine, angle.coefficients, cosine), slope if slope is None or hyperbolic else negated(slope)
 
 
 def _sine_cosine_from(x: Jet, values: tuple[Any, Any], *, hyperbolic: bool) -> tuple[Jet, Jet]:
@@ -61,7 +61,7 @@ def _riccati(x: Jet, value: Real, slope: Real, sign: int) -> Jet:
     s: list[Any] = [slope]
     for _ in range(x.order):
         y.append(next_of_chain(y, x.coefficients, s))
-        square = sum_of_products(jnp.multiply, y, y[::-1])
+        square = sum_of_products(multiplied, y, y[::-1])
         s.append(None if square is None else sign * square)
     return Jet(y)
 

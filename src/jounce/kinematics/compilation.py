@@ -1,12 +1,71 @@
-"""How the solver's functions are compiled."""
+"""How the solver's functions are compiled, and how what was compiled is kept for other processes.
 
-from collections.abc import Callable
-from functools import cached_property, lru_cache, update_wrapper
-from typing import Any
+Where a store is given to `keep_programs`, compiled programs go there, and come from there without the functions being
+traced: half of the time of a first use is Python's. Without one, which is how the package is imported, `jax.jit` does
+everything.
+"""
+
+import inspect
+import pickle
+import threading
+import zlib
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from functools import cached_property, lru_cache, partial, update_wrapper
+from typing import Any, Protocol, runtime_checkable
 
 import jax
+import numpy as np
+from jax.core import Tracer
+from jax.experimental import serialize_executable
 
+from jounce.kinematics.structure import UndescribedError, being_debugged, program_key, settings
 from jounce.mechanism.preconditions import check_process
+
+
+@runtime_checkable
+class Store(Protocol):
+    """Where programs are kept, by their names: what it gives back was put there, whole and unchanged."""
+
+    def get(self, key: str) -> bytes | None:
+        """Return the program of this name, or None."""
+        ...
+
+    def put(self, key: str, value: bytes) -> None:
+        """Keep a program."""
+        ...
+
+    def drop(self, key: str) -> None:
+        """Forget a program that is of no use."""
+        ...
+
+
+_store: Store | None = None
+_anew = threading.local()
+
+
+@contextmanager
+def compiling_anew() -> Iterator[None]:
+    """Have this thread compile meanwhile, and take nothing from JAX's own store, which asks `compiles_anew`.
+
+    What XLA has read from bytes it cannot write again: it loses functions on the way.
+    """
+    _anew.active = True
+    try:
+        yield
+    finally:
+        _anew.active = False
+
+
+def compiles_anew() -> bool:
+    """Tell whether this thread is to compile, and takes nothing from JAX's own store."""
+    return getattr(_anew, "active", False)
+
+
+def keep_programs(store: Store | None) -> None:
+    """Keep what is compiled from here on in a store, and take it from there; None for not."""
+    global _store
+    _store = store
 
 
 @lru_cache(maxsize=1)
@@ -26,10 +85,25 @@ def compiler_options() -> dict[str, Any] | None:
 
 
 class Compiled:
-    """A function compiled at its first call, as by `jax.jit` with the solver's options."""
+    """A function compiled at its first call, as by `jax.jit` with the solver's options.
 
-    def __init__(self, function: Callable[..., Any], static: tuple[str, ...]):
-        self.function, self.static = function, static
+    Parameters
+    ----------
+    function : callable
+        Of arrays, of pytrees of them, and of static arguments.
+    static : tuple of str
+        Names of the static arguments.
+    made_of : tuple of callable, optional
+        Functions of the package that say what it computes, where it is none of them itself.
+    """
+
+    def __init__(
+        self, function: Callable[..., Any], static: tuple[str, ...], made_of: tuple[Callable[..., Any], ...] = ()
+    ):
+        self.function, self.static, self.made_of = function, static, made_of or (function,)
+        self._programs: dict[Any, Callable[..., Any]] = {}
+        self._names = tuple(inspect.signature(function).parameters)
+        self._traced = min([self._names.index(name) for name in static], default=len(self._names))
         update_wrapper(self, function)
 
     @cached_property
@@ -40,7 +114,76 @@ class Compiled:
     def __call__(self, *arguments: Any, **keywords: Any) -> Any:
         """Call the compiled function."""
         check_process()
-        return self.jitted(*arguments, **keywords)
+        if _store is None:
+            return self.jitted(*arguments, **keywords)
+        keywords |= zip(self._names[self._traced :], arguments[self._traced :], strict=False)
+        arguments = arguments[: self._traced]
+        static = {name: keywords.pop(name) for name in self.static if name in keywords}
+        leaves, tree = jax.tree.flatten((arguments, keywords))
+        kinds = tuple(map(_kind, leaves))
+        if None in kinds or being_debugged():
+            return self.jitted(*arguments, **keywords, **static)
+        key = (tree, kinds, tuple((name, type(value), value) for name, value in static.items()), settings())
+        if (program := self._programs.get(key)) is not None:
+            return program(*arguments, **keywords)
+        self._programs[key], results = self._begun(_store, tree, kinds, arguments, keywords, static)
+        return results
+
+    def _begun(
+        self, store: Store, tree: Any, kinds: tuple[Any, ...], arguments: Any, keywords: Any, static: Mapping[str, Any]
+    ) -> tuple[Callable[..., Any], Any]:
+        """Return a program from the store, or one that is compiled, and kept there if it has a name; and its results.
+
+        A program from the store has run to its end before it is trusted.
+        """
+        try:
+            key = program_key(self.made_of, tree, kinds, static)
+        except UndescribedError:
+            program = partial(self.jitted, **static)
+            return program, program(*arguments, **keywords)
+        if (kept := store.get(key)) is not None:
+            try:
+                program = _unpacked(kept, tree)
+                return program, jax.block_until_ready(program(*arguments, **keywords))
+            except Exception:  # noqa: BLE001 - whatever is wrong with it, it is compiled again
+                store.drop(key)
+        with compiling_anew():
+            program = self.jitted.lower(*arguments, **keywords, **static).compile()
+        if (packed := _packed(program, tree)) is not None:
+            store.put(key, packed)
+        return program, program(*arguments, **keywords)
+
+
+def _packed(program: Any, tree: Any) -> bytes | None:
+    """Return a program as bytes; None where it holds what cannot be written, such as calls into Python."""
+    try:
+        payload, in_tree, out_tree = serialize_executable.serialize(program)
+        packed = zlib.compress(pickle.dumps((payload, out_tree)), level=1)
+    except (NotImplementedError, TypeError, ValueError, pickle.PicklingError):
+        return None
+    return packed if in_tree == tree else None
+
+
+def _unpacked(packed: bytes, tree: Any) -> Callable[..., Any]:
+    payload, out_tree = pickle.loads(zlib.decompress(packed))
+    return serialize_executable.deserialize_and_load(payload, tree, out_tree)
+
+
+def _kind(leaf: Any) -> tuple[Any, ...] | None:
+    """Return what JAX compiles for in place of a value; None for what it traces, or what is on another device."""
+    if type(leaf) is np.ndarray or isinstance(leaf, np.generic):
+        return leaf.shape, str(leaf.dtype), False
+    if type(leaf) in (bool, int, float):
+        return (type(leaf).__name__,)
+    if isinstance(leaf, jax.Array) and not isinstance(leaf, Tracer) and leaf.sharding == _home():
+        return leaf.shape, str(leaf.dtype), leaf.weak_type
+    return None
+
+
+@lru_cache(maxsize=1)
+def _home() -> jax.sharding.Sharding:
+    """Return where arrays are unless they were put elsewhere."""
+    return jax.sharding.SingleDeviceSharding(jax.devices()[0])
 
 
 def compiled(*static: str) -> Callable[[Callable[..., Any]], Compiled]:

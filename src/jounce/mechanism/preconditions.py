@@ -3,29 +3,16 @@
 import dataclasses
 import functools
 import inspect
-import os
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, ParamSpec, TypeVar
 
 from jax.core import Tracer, eval_context
 
 from jounce.errors import UnsupportedError
+from jounce.interrupts import left_behind
 
 P = ParamSpec("P")
 R = TypeVar("R")
-_left_behind = False  # whether the threads of XLA stayed in the process that this one was forked from
-
-
-def _after_fork() -> None:
-    global _left_behind
-    from jax._src import xla_bridge
-
-    started = getattr(xla_bridge, "backends_are_initialized", lambda: True)  # private to JAX: if unknown, the worst
-    _left_behind = _left_behind or started()
-
-
-if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_after_fork)
 
 
 def check_process() -> None:
@@ -33,7 +20,7 @@ def check_process() -> None:
 
     XLA computes in threads, and a fork has none of them, only the locks that they held.
     """
-    if _left_behind:
+    if left_behind():
         raise UnsupportedError(
             "this process was forked from one in which JAX had already computed, and would wait for ever for threads "
             "that are not here; start processes by 'spawn' or 'forkserver' (multiprocessing.get_context), or fork "

@@ -9,12 +9,14 @@ import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from jounce.errors import RobotWarning, SampleWarning, UnitWarning
 from jounce.interrupts import undoing
-from jounce.reporting.peaks import Peak
-from jounce.reporting.tables import Table, peaks_table
+
+if TYPE_CHECKING:
+    from jounce.reporting.peaks import Peak
+    from jounce.reporting.tables import Table
 
 OURS = (RobotWarning, SampleWarning, UnitWarning)  # warnings of this package, which nobody may turn off by mistake
 WIDTH = 80  # of tables that do not go to a terminal
@@ -26,6 +28,8 @@ PATIENCE = 1.0  # s, before a progress bar is shown
 def show_peaks(found: Sequence[Peak]) -> None:
     """Print a table of peaks."""
     if found:
+        from jounce.reporting.tables import peaks_table
+
         show_table(peaks_table(found))
     else:
         say("\nNo outputs are defined, so there is nothing to tabulate.")

@@ -11,7 +11,7 @@ import numpy as np
 from jax.core import Tracer
 
 from jounce.jet.derivatives import plain_derivatives, taylor_coefficients
-from jounce.kinematics.compilation import compiler_options
+from jounce.kinematics.compilation import Compiled
 from jounce.mechanism.preconditions import check_process
 from jounce.robot.abstract_robot import AbstractRobot
 
@@ -29,12 +29,13 @@ class Batched:
 
     def __init__(self, function: Callable[..., Any]):
         self.function = function
+        self._on_block = Compiled(self._chunks, ("static",), (Batched._chunks, function))
         update_wrapper(self, function)
 
-    @cached_property
+    @property
     def jitted(self) -> Any:
-        """The function on a block of samples, compiled; made at the first call, since the options start the backend."""
-        return jax.jit(self._chunks, static_argnums=3, compiler_options=compiler_options())
+        """The function on a block of samples, as `jax.jit` returns it."""
+        return self._on_block.jitted
 
     @cached_property
     def nested(self) -> Any:
@@ -53,7 +54,7 @@ class Batched:
             found = self.nested(robot.tree, flat, constants, static)
             return jax.tree.map(lambda x: jnp.reshape(x, (*lead, *x.shape[1:])), found)
         flat = tuple(np.reshape(np.asarray(x), (count, *x.shape[axes:])) for x in arrays)
-        found = [self.jitted(robot.tree, block, constants, static) for block in _blocks(flat)]
+        found = [self._on_block(robot.tree, block, constants, static) for block in _blocks(flat)]
 
         def joined(*parts: Any) -> Any:
             whole = np.concatenate(parts)  # a copy that its user may write to

@@ -1,15 +1,16 @@
 """Values as a mechanism file writes them: a number (SI), a number with a unit, or an expression of parameters.
 
 The units that engineers write are in a table; every other one is asked of a library of units, which is imported only
-then (see `elsewhere`).
+then.
 """
 
 from __future__ import annotations
 
+import importlib
 import math
 import re
 from collections import ChainMap
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation, Overflow, localcontext
 from functools import lru_cache
@@ -71,9 +72,6 @@ COMPACT: dict[str, tuple[str, ...]] = {
     "ozin": ("ozf", "in"),
 }
 """Products that are written without a sign between; a power belongs to the last factor, as in ``kgm^2``."""
-
-elsewhere: list[Callable[[str], tuple[Size, Dimension] | None]] = []
-"""Where units are looked up that are not in the table, one after the other: None is for unknown there."""
 
 _DIGITS = str.maketrans("\N{SUPERSCRIPT ONE}\N{SUPERSCRIPT TWO}\N{SUPERSCRIPT THREE}\N{SUPERSCRIPT FOUR}", "1234")
 _NUMBER_PATTERN = r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
@@ -161,9 +159,9 @@ def _product(size: Size, factor: Size, power: int) -> Size:
 
 
 def _looked_up(name: str) -> tuple[Size, Dimension]:
-    for ask in elsewhere:
-        if found := ask(name):
-            return found
+    """Return what a library of units knows; the room that asks it is above this one, so is imported by its name."""
+    if found := importlib.import_module("jounce.io.files.units").ask_pint(name):
+        return found
     raise UnitError(f"unknown unit '{_ascii(name)}'; {nearest_unit(name)}".rstrip("; "))
 
 

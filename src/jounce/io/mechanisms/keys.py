@@ -11,7 +11,8 @@ from collections.abc import Iterable
 from dataclasses import MISSING, dataclass
 from typing import Any
 
-from jounce import dynamics, mechanism
+import jounce.dynamics as dynamics
+import jounce.mechanism as mechanism
 from jounce.constraints.base import field_kind, value_fields
 from jounce.dynamics.energy_outputs import ENERGY_OUTPUTS
 from jounce.io.files.located_data import Location

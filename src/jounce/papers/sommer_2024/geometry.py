@@ -14,7 +14,7 @@ import jax
 import numpy as np
 from jaxtyping import Float
 
-from jounce import jet
+import jounce.jet as jet
 from jounce.jet import Jet
 
 THETA_START, THETA_DELTA = math.radians(30), math.radians(60)

@@ -1,0 +1,91 @@
+"""The package itself: what it offers, and what is imported when."""
+
+import ast
+import pathlib
+import subprocess
+import sys
+
+import pytest
+
+import jounce
+
+HOME = pathlib.Path(jounce.__file__).parent
+HEAVY = ("equinox", "jax", "numpy", "pandas", "pint", "pydantic", "rich.progress", "ruamel", "scipy", "xarray")
+
+
+def printed(code, *arguments):
+    """What a new process prints, whose arguments are those given."""
+    return subprocess.run([sys.executable, "-c", code, *arguments], capture_output=True, text=True, check=True).stdout
+
+
+def test_all_that_the_stub_lists_is_there_and_comes_from_where_it_says():
+    stub = ast.parse((HOME / "__init__.pyi").read_text(encoding="utf-8"))
+    imports = [line for line in stub.body if isinstance(line, ast.ImportFrom)]
+    names = [alias.name for line in imports for alias in line.names]
+    assert len(names) == len(set(names)) > 100
+    for line in imports:
+        for alias in line.names:
+            assert alias.asname == alias.name
+            assert f"{line.module}.{alias.name}" in sys.modules or getattr(jounce, alias.name) is getattr(
+                sys.modules[line.module], alias.name
+            )
+    assert {*names, "__version__"} == {*jounce.__all__}
+    assert {*names} <= {*dir(jounce)}
+    with pytest.raises(AttributeError, match="module 'jounce' has no attribute 'sovle'"):
+        jounce.sovle  # noqa: B018 - what is looked for is the error
+
+
+def test_the_package_has_double_precision_at_once_and_the_rest_when_it_is_used():
+    found = printed(
+        "import sys, jounce, jax; print(jax.numpy.ones(1).dtype, 'equinox' in sys.modules)\n"
+        "print(jounce.solve.__module__, jounce.io.load is jounce.load, 'scipy' in sys.modules, 'xarray' in sys.modules)"
+    )
+    assert found.split() == "float64 False jounce.kinematics.solve True False False".split()
+
+
+def test_everything_can_be_imported_by_a_star():
+    assert printed("from jounce import *; print(solve.__name__, planar.Revolute.__name__)") == "solve Revolute\n"
+
+
+def test_several_threads_may_be_the_first_to_use_it():
+    code = """
+import sys, threading, jounce
+sys.setswitchinterval(1e-5)
+names = "solve load simulate Robot planar motion_profile Mechanism forces io".split()
+start, found = threading.Event(), []
+def use(name):
+    start.wait()
+    found.append(getattr(jounce, name))
+threads = [threading.Thread(target=use, args=(name,)) for name in names * 3]
+for thread in threads: thread.start()
+start.set()
+for thread in threads: thread.join()
+print(len(found), len(set(map(id, found))))"""
+    assert printed(code).split() == ["27", "9"]
+
+
+@pytest.mark.parametrize(
+    "arguments", [["--help"], ["--version"], ["run", "--help"], ["completion", "bash"], ["run"], ["new"], ["nonsense"]]
+)
+def test_commands_that_compute_nothing_do_not_import_the_libraries(arguments):
+    code = f"""
+import io, sys
+sys.argv[0] = "jounce"
+from jounce.cli import main
+sys.stdout, told = io.StringIO(), sys.stdout
+main()
+print([name for name in {HEAVY} if name in sys.modules], file=told)"""
+    assert printed(code, *arguments) == "[]\n"
+
+
+def test_the_command_computes_in_double_precision():
+    code = "import sys; sys.argv[0] = 'jounce'; import jounce, jax; print(jax.numpy.ones(1).dtype)"
+    assert printed(code) == "float64\n"
+
+
+def test_rooms_do_not_import_one_another_through_the_package():
+    """It would import all rooms in the midst of one, unless the other happens to be there."""
+    for file in HOME.rglob("*.py"):
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and node.module == "jounce":
+                assert {alias.name for alias in node.names} <= {"__version__", "errors"}, file
