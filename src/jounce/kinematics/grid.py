@@ -52,10 +52,9 @@ class GridSolver:
             lambda *xs: np.concatenate([np.zeros((*xs[0].shape[:-1], len(time))), *xs], axis=-1),
             *(anchor.state for anchor in path.anchors),
         )
-        for lanes, arrival in path.on_the_way:
-            solved = arrival.status[1:] == Status.OK
-            self._keep(lanes[solved], arrival.state(np.flatnonzero(solved) + 1))
-            self.status[lanes[solved]] = Status.OK
+        for lanes, state in path.on_the_way:
+            self._keep(lanes, state)
+            self.status[lanes] = Status.OK
 
     @property
     def state(self) -> tuple[dict[str, Any], tuple[Any, ...]]:

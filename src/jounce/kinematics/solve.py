@@ -9,9 +9,9 @@ from jaxtyping import Float
 
 from jounce.errors import MechanismError, SolveError
 from jounce.kinematics.assembly import assemble
-from jounce.kinematics.grid import GridSolver
+from jounce.kinematics.grid import LONG_GRID, GridSolver
 from jounce.kinematics.motion import Motion
-from jounce.kinematics.path_following import PASSABLE, Anchor, Solver, follow
+from jounce.kinematics.path_following import NO_GRID, PASSABLE, Anchor, Solver, follow
 from jounce.kinematics.status import Status
 from jounce.mechanism import Mechanism, build, check_mechanism, time_grid
 from jounce.mechanism.axis_angles import measures_angle
@@ -91,7 +91,8 @@ def solve(
     model, coordinates = assemble(build(mechanism), instants[0], tolerance)
     solver = Solver(model, max(order + lost, LOWEST_ORDER), float(tolerance), refine, order)
     first = _first(solver, coordinates, instants[:1])
-    path = follow(solver, first, instants[-1], instants[-1] - instants[0], grid=instants)
+    on_the_way = instants if len(instants) <= LONG_GRID else NO_GRID
+    path = follow(solver, first, instants[-1], instants[-1] - instants[0], grid=on_the_way)
     grid = GridSolver(solver, path, instants)
     grid.solve(progress)
     change_points = np.array([point.instant for point in path.change_points])
