@@ -12,7 +12,7 @@ import jax
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from jounce.kinematics.advance import SolvedState
+from jounce.kinematics.advance import Arrival, SolvedState
 from jounce.kinematics.change_points import LARGEST_DISAGREEMENT, bridged, half_width, spoiled_width
 from jounce.kinematics.path_following import (
     LARGE_BATCH,
@@ -24,6 +24,7 @@ from jounce.kinematics.path_following import (
     follow,
 )
 from jounce.kinematics.status import Status
+from jounce.kinematics.threads import Threads
 from jounce.mechanism.time import nearest_instants
 
 Indices = Int[np.ndarray, " lane"]
@@ -62,24 +63,25 @@ class GridSolver:
         coordinates, outputs, _ = jax.tree.map(lambda x: x[..., : len(self.time)], self._store)
         return coordinates, outputs
 
-    def solve(self, progress: Callable[[int, int], None] | None) -> None:
-        """Solve level after level; an instant that its neighbour cannot predict is followed to from an anchor."""
+    def solve(self, progress: Callable[[int, int], None] | None, threads: int = 1) -> None:
+        """Solve level after level; an instant that its neighbour cannot predict is followed to from an anchor.
+
+        The batches of a level are solved in several threads; what comes of it does not depend on how many.
+        """
         count = len(self.time)
         reached = self.time < self.path.ended_at
         width = LARGE_BATCH if count > LONG_GRID else SMALL_BATCH
         left = reached & (self.status != Status.OK)
         done = count - int(np.count_nonzero(left))
-        for lanes, distance in _levels(left, len(self.path.anchors), width):
-            source = self._nearest[lanes]
-            if distance is not None:
-                neighbour = lanes - distance
-                nearer = self._away(lanes, neighbour) <= self._away(lanes, source)
-                source = np.where(nearer & (self.status[neighbour] == Status.OK), neighbour, source)
-            for first in range(0, len(lanes), width):
-                self._solve_batch(lanes[first : first + width], source[first : first + width])
-                done += min(width, len(lanes) - first)
-                if progress is not None:
-                    progress(done, count)
+        with Threads(threads) as pool:
+            for lanes, distance in _levels(left, len(self.path.anchors), width):
+                source = self._sources(lanes, distance)
+                batches = [(lanes[k : k + width], source[k : k + width]) for k in range(0, len(lanes), width)]
+                for (batch, _), arrival in zip(batches, pool.map(self._solved, batches), strict=True):
+                    self._take(batch, arrival)
+                    done += len(batch)
+                    if progress is not None:
+                        progress(done, count)
         for point in self.path.change_points:
             self._bridge(point)
         for point in self.path.singular_positions_outside():
@@ -89,10 +91,24 @@ class GridSolver:
         if progress is not None and done < count:
             progress(count, count)
 
-    def _solve_batch(self, lanes: Indices, source: Indices) -> None:
+    def _sources(self, lanes: Indices, distance: int | None) -> Indices:
+        """Return from where each instant is predicted: its neighbour, where that is solved, or its nearest anchor."""
+        source = self._nearest[lanes]
+        if distance is None:
+            return source
+        neighbour = lanes - distance
+        nearer = self._away(lanes, neighbour) <= self._away(lanes, source)
+        return np.where(nearer & (self.status[neighbour] == Status.OK), neighbour, source)
+
+    def _solved(self, batch: tuple[Indices, Indices]) -> Arrival:
+        """Return what comes of a batch of instants, with their sources; nothing here is changed by it."""
+        lanes, source = batch
         chosen = _slice_of(source)
         known = jax.tree.map(lambda x: x[..., chosen], self._store)
-        arrival = self.solver(known, self.time[lanes] - self._instants[source], self.time[lanes])
+        return self.solver(known, self.time[lanes] - self._instants[source], self.time[lanes])
+
+    def _take(self, lanes: Indices, arrival: Arrival) -> None:
+        """Keep what came of a batch, and follow the motion to the instants that failed."""
         self.status[lanes] = arrival.status
         self._keep(_slice_of(lanes), arrival.state(slice(None)))
         for k in np.flatnonzero(arrival.status != Status.OK).tolist():
