@@ -33,7 +33,7 @@ FEW_BATCHES = 4  # of instants: no level of its own for each halving of the spac
 
 
 class GridSolver:
-    """All instants of a time grid, solved from the anchors of a path.
+    """The instants of a time grid, or of a stretch of one, solved from the anchors of a path that lasts for a span, s.
 
     Attributes
     ----------
@@ -42,8 +42,8 @@ class GridSolver:
         For instants that failed, the body farthest from its prediction, or the driver without a permitted value.
     """
 
-    def __init__(self, solver: Solver, path: FollowedPath, time: Float[np.ndarray, " time"]):
-        self.solver, self.path, self.time = solver, path, time
+    def __init__(self, solver: Solver, path: FollowedPath, time: Float[np.ndarray, " time"], span: float):
+        self.solver, self.path, self.time, self.span = solver, path, time, span
         self.status = np.full(len(time), int(Status.NOT_REACHED))
         self.faults: dict[int, str] = {}
         anchors = np.array([anchor.instant for anchor in path.anchors])
@@ -63,10 +63,11 @@ class GridSolver:
         coordinates, outputs, _ = jax.tree.map(lambda x: x[..., : len(self.time)], self._store)
         return coordinates, outputs
 
-    def solve(self, progress: Callable[[int, int], None] | None, threads: int = 1) -> None:
+    def solve(self, progress: Callable[[int, int], None] | None, threads: int, *, explain: bool) -> None:
         """Solve level after level; an instant that its neighbour cannot predict is followed to from an anchor.
 
-        The batches of a level are solved in several threads; what comes of it does not depend on how many.
+        The batches of a level are solved in several threads; what comes of it does not depend on how many. To `explain`
+        is to say at the first instant that was not reached why.
         """
         count = len(self.time)
         reached = self.time < self.path.ended_at
@@ -86,7 +87,7 @@ class GridSolver:
             self._bridge(point)
         for point in self.path.singular_positions_outside():
             self._refuse(np.abs(self.time - point.instant) < spoiled_width(point, self.solver.order))
-        if not reached.all():
+        if explain and not reached.all():
             self._explain_end(int(np.argmin(reached)))
         if progress is not None and done < count:
             progress(count, count)
@@ -130,7 +131,7 @@ class GridSolver:
         anchors, instant = self.path.anchors, float(self.time[lane])
         before = int(np.searchsorted([a.instant for a in anchors], instant, side="right")) - 1
         start = anchors[before]
-        local = follow(self.solver, start, instant, self.time[-1] - self.time[0], (instant - start.instant) / 2)
+        local = follow(self.solver, start, instant, self.span, (instant - start.instant) / 2)
         if local.status != Status.OK:
             self.status[lane], self.faults[lane] = local.status, local.fault
         elif len(local.anchors) > 1:

@@ -9,7 +9,8 @@ from jaxtyping import Float
 
 from jounce.errors import MechanismError, SolveError
 from jounce.kinematics.assembly import assemble
-from jounce.kinematics.grid import LONG_GRID, GridSolver
+from jounce.kinematics.grid import LONG_GRID
+from jounce.kinematics.long_grids import solve_grid
 from jounce.kinematics.motion import Motion
 from jounce.kinematics.path_following import NO_GRID, PASSABLE, Anchor, Solver, follow
 from jounce.kinematics.status import Status
@@ -36,6 +37,7 @@ def solve(
     strict: bool = True,
     progress: Callable[[int, int], None] | None = None,
     threads: int | None = None,
+    keep: bool | None = None,
 ) -> Motion:
     """Return the motion of a driven mechanism and its time derivatives up to any order, exact to rounding.
 
@@ -61,6 +63,9 @@ def solve(
     threads : int, optional
         That solve a grid of more than a thousand instants: as many as the process has cores, or as the environment
         variable ``JOUNCE_THREADS`` says, unless given. Results do not depend on it.
+    keep : bool, optional
+        Whether to keep the motion of all bodies beside the outputs, for points, energies or reactions asked for later;
+        unless given, up to 65,536 instants. What is not kept is computed again when it is asked for.
 
     Returns
     -------
@@ -99,11 +104,10 @@ def solve(
     first = _first(solver, coordinates, instants[:1])
     on_the_way = instants if len(instants) <= LONG_GRID else NO_GRID
     path = follow(solver, first, instants[-1], instants[-1] - instants[0], grid=on_the_way)
-    grid = GridSolver(solver, path, instants)
-    grid.solve(progress, count)
+    found = solve_grid(solver, path, instants, progress, count, keep=keep)
     change_points = np.array([point.instant for point in path.change_points])
-    found = (grid.state, grid.status, grid.faults)
-    motion = Motion(mechanism, model, instants, order, *found, change_points, path.history())
+    state, outcome = (found.coordinates, found.outputs), (found.status, found.faults)
+    motion = Motion(mechanism, model, instants, order, state, *outcome, change_points, path.history())
     if strict:
         raise_for_status(motion)
     return motion
