@@ -7,6 +7,7 @@ import pytest
 import jounce as jn
 from jounce.jet import Jet
 from jounce.kinematics.advance import advance
+from jounce.kinematics.legs import leg
 from jounce.mechanism import build
 from tests.problems.small import crank, four_bar, law, screw, slider_crank, spindle
 
@@ -109,7 +110,7 @@ def test_long_grid_is_the_short_one_and_progress_is_told():
 
 
 def compilations():
-    return advance.jitted._cache_size()
+    return advance.jitted._cache_size() + leg.jitted._cache_size()
 
 
 def test_parameters_and_number_of_instants_compile_nothing_again():

@@ -62,6 +62,13 @@ class Arrival(NamedTuple):
         return jax.tree.map(lambda x: x[..., lanes], (self.coordinates, self.outputs, self.sign))
 
 
+def predictor(system: System, pose_type: type[Pose], solved: SolvedState) -> SolvedState:
+    """Return what a prediction needs of solved instants: jets of the pose and of turning angles, and the sign."""
+    coordinates, outputs, sign = solved
+    angles = [output for output, group in zip(outputs, system.outputs, strict=True) if group.element.turning]
+    return {name: coordinates[name] for name in pose_type.predictor}, tuple(angles), sign
+
+
 def _size(increment: Float[Numbers, "component body batch"]) -> Float[Numbers, "body batch"]:
     return jnp.max(jnp.abs(increment), axis=0)
 

@@ -12,7 +12,7 @@ import jax
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from jounce.kinematics.advance import SolvedState
+from jounce.kinematics.advance import Arrival, SolvedState
 from jounce.kinematics.change_points import LARGEST_DISAGREEMENT, bridged, half_width, spoiled_width
 from jounce.kinematics.path_following import (
     LARGE_BATCH,
@@ -24,6 +24,7 @@ from jounce.kinematics.path_following import (
     follow,
 )
 from jounce.kinematics.status import Status
+from jounce.kinematics.threads import Threads
 from jounce.mechanism.time import nearest_instants
 
 Indices = Int[np.ndarray, " lane"]
@@ -32,7 +33,7 @@ FEW_BATCHES = 4  # of instants: no level of its own for each halving of the spac
 
 
 class GridSolver:
-    """All instants of a time grid, solved from the anchors of a path.
+    """The instants of a time grid, or of a stretch of one, solved from the anchors of a path that lasts for a span, s.
 
     Attributes
     ----------
@@ -41,8 +42,8 @@ class GridSolver:
         For instants that failed, the body farthest from its prediction, or the driver without a permitted value.
     """
 
-    def __init__(self, solver: Solver, path: FollowedPath, time: Float[np.ndarray, " time"]):
-        self.solver, self.path, self.time = solver, path, time
+    def __init__(self, solver: Solver, path: FollowedPath, time: Float[np.ndarray, " time"], span: float):
+        self.solver, self.path, self.time, self.span = solver, path, time, span
         self.status = np.full(len(time), int(Status.NOT_REACHED))
         self.faults: dict[int, str] = {}
         anchors = np.array([anchor.instant for anchor in path.anchors])
@@ -52,10 +53,9 @@ class GridSolver:
             lambda *xs: np.concatenate([np.zeros((*xs[0].shape[:-1], len(time))), *xs], axis=-1),
             *(anchor.state for anchor in path.anchors),
         )
-        for lanes, arrival in path.on_the_way:
-            solved = arrival.status[1:] == Status.OK
-            self._keep(lanes[solved], arrival.state(np.flatnonzero(solved) + 1))
-            self.status[lanes[solved]] = Status.OK
+        for lanes, state in path.on_the_way:
+            self._keep(lanes, state)
+            self.status[lanes] = Status.OK
 
     @property
     def state(self) -> tuple[dict[str, Any], tuple[Any, ...]]:
@@ -63,37 +63,53 @@ class GridSolver:
         coordinates, outputs, _ = jax.tree.map(lambda x: x[..., : len(self.time)], self._store)
         return coordinates, outputs
 
-    def solve(self, progress: Callable[[int, int], None] | None) -> None:
-        """Solve level after level; an instant that its neighbour cannot predict is followed to from an anchor."""
+    def solve(self, progress: Callable[[int, int], None] | None, threads: int, *, explain: bool) -> None:
+        """Solve level after level; an instant that its neighbour cannot predict is followed to from an anchor.
+
+        The batches of a level are solved in several threads; what comes of it does not depend on how many. To `explain`
+        is to say at the first instant that was not reached why.
+        """
         count = len(self.time)
         reached = self.time < self.path.ended_at
         width = LARGE_BATCH if count > LONG_GRID else SMALL_BATCH
         left = reached & (self.status != Status.OK)
         done = count - int(np.count_nonzero(left))
-        for lanes, distance in _levels(left, len(self.path.anchors), width):
-            source = self._nearest[lanes]
-            if distance is not None:
-                neighbour = lanes - distance
-                nearer = self._away(lanes, neighbour) <= self._away(lanes, source)
-                source = np.where(nearer & (self.status[neighbour] == Status.OK), neighbour, source)
-            for first in range(0, len(lanes), width):
-                self._solve_batch(lanes[first : first + width], source[first : first + width])
-                done += min(width, len(lanes) - first)
-                if progress is not None:
-                    progress(done, count)
+        with Threads(threads) as pool:
+            for lanes, distance in _levels(left, len(self.path.anchors), width):
+                source = self._sources(lanes, distance)
+                batches = [(lanes[k : k + width], source[k : k + width]) for k in range(0, len(lanes), width)]
+                for (batch, _), arrival in zip(batches, pool.map(self._solved, batches), strict=True):
+                    self._take(batch, arrival)
+                    done += len(batch)
+                    if progress is not None:
+                        progress(done, count)
         for point in self.path.change_points:
             self._bridge(point)
         for point in self.path.singular_positions_outside():
             self._refuse(np.abs(self.time - point.instant) < spoiled_width(point, self.solver.order))
-        if not reached.all():
+        if explain and not reached.all():
             self._explain_end(int(np.argmin(reached)))
         if progress is not None and done < count:
             progress(count, count)
 
-    def _solve_batch(self, lanes: Indices, source: Indices) -> None:
+    def _sources(self, lanes: Indices, distance: int | None) -> Indices:
+        """Return from where each instant is predicted: its neighbour, where that is solved, or its nearest anchor."""
+        source = self._nearest[lanes]
+        if distance is None:
+            return source
+        neighbour = lanes - distance
+        nearer = self._away(lanes, neighbour) <= self._away(lanes, source)
+        return np.where(nearer & (self.status[neighbour] == Status.OK), neighbour, source)
+
+    def _solved(self, batch: tuple[Indices, Indices]) -> Arrival:
+        """Return what comes of a batch of instants, with their sources; nothing here is changed by it."""
+        lanes, source = batch
         chosen = _slice_of(source)
         known = jax.tree.map(lambda x: x[..., chosen], self._store)
-        arrival = self.solver(known, self.time[lanes] - self._instants[source], self.time[lanes])
+        return self.solver(known, self.time[lanes] - self._instants[source], self.time[lanes])
+
+    def _take(self, lanes: Indices, arrival: Arrival) -> None:
+        """Keep what came of a batch, and follow the motion to the instants that failed."""
         self.status[lanes] = arrival.status
         self._keep(_slice_of(lanes), arrival.state(slice(None)))
         for k in np.flatnonzero(arrival.status != Status.OK).tolist():
@@ -115,7 +131,7 @@ class GridSolver:
         anchors, instant = self.path.anchors, float(self.time[lane])
         before = int(np.searchsorted([a.instant for a in anchors], instant, side="right")) - 1
         start = anchors[before]
-        local = follow(self.solver, start, instant, self.time[-1] - self.time[0], (instant - start.instant) / 2)
+        local = follow(self.solver, start, instant, self.span, (instant - start.instant) / 2)
         if local.status != Status.OK:
             self.status[lane], self.faults[lane] = local.status, local.fault
         elif len(local.anchors) > 1:

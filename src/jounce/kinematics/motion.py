@@ -1,5 +1,6 @@
 """The result of a solve: outputs and any point of any body, with their derivatives, at every instant."""
 
+from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
@@ -92,7 +93,7 @@ class Motion(Displayed):
         model: Model,
         time: np.ndarray,
         order: int,
-        state: tuple[dict[str, Any], tuple[Any, ...]],
+        state: tuple[dict[str, Any] | Callable[[], dict[str, Any]], tuple[Any, ...]],
         status: np.ndarray,
         faults: dict[int, str],
         change_points: np.ndarray | None = None,
@@ -103,8 +104,13 @@ class Motion(Displayed):
         self.change_points = np.zeros(0) if change_points is None else change_points
         self.derived: dict[str, Any] = {}
         self.model, self.history = model, history
-        self._coordinates, groups = state
+        self._bodies, groups = state
         self._groups = dict(zip(model.outputs, groups, strict=True))
+
+    @cached_property
+    def _coordinates(self) -> dict[str, Any]:
+        """Taylor coefficients of the coordinates of all bodies, computed again where they were not kept."""
+        return self._bodies() if callable(self._bodies) else self._bodies
 
     @property
     def poses(self) -> tuple[type, dict[str, Any]]:
@@ -247,8 +253,8 @@ class Motion(Displayed):
     ) -> Float[np.ndarray, "time derivative *component"]:
         """Turn Taylor coefficients (order, component, time) into derivatives (time, derivative[, component])."""
         coefficients = coefficients[: self.order + 1]
-        values = np.moveaxis(np.asarray(plain_derivatives(coefficients)), -1, 0)
-        values = np.where((self.status == Status.OK)[:, None, None], values, np.nan)
+        values = np.moveaxis(np.asarray(plain_derivatives(np.asarray(coefficients))), -1, 0)
+        values[self.status != Status.OK] = np.nan
         return values[..., 0] if values.shape[-1] == 1 else values
 
     def _labelled(

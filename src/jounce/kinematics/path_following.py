@@ -1,37 +1,37 @@
 """Following a motion from anchor to anchor: steps that no singular position hides in, checked one by one.
 
-Two things limit a step. The Taylor series must carry it: no term moves a body far. And the Jacobian must not come near
-a singular one on the way, where branches meet and a series that looks smooth may lead over to another: `advance` tells
-where its determinant vanishes next, to first order, and a step goes only part of that way. Towards a dead point steps
-become shorter and shorter, and the motion ends there; a near miss is followed through its sharp turn. Where the steps
-shrink while the motion itself stays smooth, two branches cross: a change point. It is passed on the series that leads
-through it, if that arrives on the other side to rounding, and is told.
+A leg makes the steps that are in the ordinary (see `legs`). Towards a dead point steps become shorter and shorter, and
+the motion ends there; a near miss is followed through its sharp turn. Where the steps shrink while the motion itself
+stays smooth, two branches cross: a change point. It is passed on the series that leads through it, if that arrives on
+the other side to rounding, and is told.
 """
 
 import dataclasses
-from typing import NamedTuple
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
 
 import jax
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
-from jounce.kinematics.advance import SAFE_FRACTION, Arrival, SolvedState, advance
+from jounce.kinematics.advance import Arrival, SolvedState, advance, predictor
+from jounce.kinematics.legs import Ending, Leg, Limits, Place, Settings, Way, leg
 from jounce.kinematics.status import Status
 from jounce.mechanism import Model
 from jounce.mechanism.axis_angles import AttitudeHistory
 
 PASSABLE = (Status.OK, Status.UNDEFINED)
 SMALLEST_STEP = 1e-10  # of the span
-LARGEST_TURNOVER = 1.0  # of the Jacobian over a step, seen from its end; from its start, SAFE_FRACTION
-PASSAGE = 3e-3  # of the radius of the series: so near a singular position it is seen whether the motion is smooth there
 PASSAGE_ORDER = 4  # of the series that leads through: rounding spoils higher derivatives near a singular position
 PASSAGE_DEVIATION = 1e-8  # from that series, as a part of the way: two branches a gap of g apart deviate by (g / way)^2
-CRAWLING = 1e-6  # of what is left of the motion: steps this short, and for so many anchors,
-LONGEST_CRAWL = 300  # are no sharp turn, which takes a few dozen, but a law that grows beyond all bounds
 NEARLY_SINGULAR = 1e-6  # of the span: a motion that ends so short before a singular position ends at it
 NEARBY = 0.1  # radii: a singular position nearer than this spoils high derivatives, if the motion is smooth there
 PLACES = 8  # in each step at which attitudes are looked at for turns: nowhere between them a body turns by half a turn
 SMALL_BATCH, LARGE_BATCH = 16, 512  # lanes; a batch width compiles once, so a short grid uses one, and so do anchors
+LONGEST_LEG = 32  # batches
+LEG_ENTRIES = 2**19  # of what a leg keeps: a large mechanism has shorter ones
+NO_GRID = np.empty(0)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -54,19 +54,47 @@ class Solver:
     ) -> Arrival:
         """Solve instants from known neighbours, as many as fit into a batch; `survey` looks for singular positions."""
         lanes = len(instant)
-        width = SMALL_BATCH if lanes <= SMALL_BATCH else LARGE_BATCH
-        filled = jax.tree.map(lambda x: _filled(x, width), (*self._predictor(known), step, instant))
-        arrival = advance(
-            self.model.system,
-            *filled,
-            self.tolerance,
-            self.refine,
-            survey,
-            self.wanted,
-            pose_type=self.model.pose_type,
-            order=self.order,
-        )
+        if lanes <= SMALL_BATCH:
+            known, step, instant = jax.tree.map(
+                lambda x: _filled(x, SMALL_BATCH), (self._predictor(known), step, instant)
+            )
+            way = _way(known, (0.0,) * 4, away=step, instant=instant, planned=True)
+            arrival = self._leg(way, NO_GRID, _limits(0.0, 0.0, 1), survey=survey).last
+        else:
+            filled = jax.tree.map(lambda x: _filled(x, LARGE_BATCH), (*self._predictor(known), step, instant))
+            settings = self._settings._replace(survey=np.asarray(survey))
+            arrival = advance(self.model.system, *filled, *settings, pose_type=self.model.pose_type, order=self.order)
         return jax.tree.map(lambda x: np.asarray(x)[..., :lanes], arrival)
+
+    def leg(self, way: Way, grid: Float[np.ndarray, " time"], stop: float, smallest: float) -> Leg:
+        """Go on along a way with the next instants of a grid, as far as they fit; see `legs.leg`."""
+        way = way._replace(next_up=np.zeros((), int))
+        return self._leg(way, grid, _limits(stop, smallest, self._batches), survey=True)
+
+    def way(self, start: "Anchor", largest: float, crawled: int = 0) -> Way:
+        """Return the way that begins at an anchor, with a largest first step, s."""
+        known = jax.tree.map(lambda x: _filled(x, SMALL_BATCH), self._predictor(start.state))
+        place = start.instant, start.safe_step, start.radius, start.turnover
+        return _way(known, place, largest=largest, crawled=crawled)
+
+    @cached_property
+    def _batches(self) -> int:
+        """How many batches a leg may have; static, so that each mechanism compiles one program."""
+        entries = (self.order + 1) * SMALL_BATCH * sum(x.size for x in self.model.guess.values())
+        return min(LONGEST_LEG, max(1, LEG_ENTRIES // entries))
+
+    @cached_property
+    def _settings(self) -> Settings:
+        return Settings(*map(np.asarray, (self.tolerance, self.refine, True, self.wanted)))
+
+    def _leg(self, way: Way, grid: Float[np.ndarray, " time"], limits: Limits, *, survey: bool) -> Leg:
+        room = (self._batches + 1) * (SMALL_BATCH - 1)
+        window = np.full(room, np.inf)
+        window[: len(grid)] = grid[:room]
+        settings, kind = self._settings._replace(survey=np.asarray(survey)), self.model.pose_type
+        return leg(
+            self.model.system, way, window, limits, settings, pose_type=kind, order=self.order, batches=self._batches
+        )
 
     def fault(self, arrival: Arrival, lane: int) -> str:
         """Return where to look for the fault: a driver without a permitted value, an output, the farthest body."""
@@ -79,10 +107,31 @@ class Solver:
         return f"body {self.model.bodies[int(arrival.body[lane])]}"
 
     def _predictor(self, known: SolvedState) -> SolvedState:
-        """Return what a prediction needs of solved instants: jets of the pose and of turning angles, and the sign."""
-        coordinates, outputs, sign = known
-        angles = [o for o, g in zip(outputs, self.model.system.outputs, strict=True) if g.element.turning]
-        return {name: coordinates[name] for name in self.model.pose_type.predictor}, tuple(angles), sign
+        return predictor(self.model.system, self.model.pose_type, known)
+
+
+def _way(known: SolvedState, place: Sequence[float], **given: Any) -> Way:
+    """Return a way that begins; of one type whatever is given, so that it is compiled once."""
+    lanes, nothing, no = np.zeros(SMALL_BATCH), np.zeros(()), np.zeros((), bool)
+    way = Way(
+        known,
+        Place(*map(np.asarray, place)),
+        step=nothing,
+        away=lanes,
+        instant=lanes,
+        planned=no,
+        may_pass=~no,
+        next_up=np.zeros((), int),
+        largest=np.asarray(np.inf),
+        crawled=np.zeros((), int),
+        refused=np.asarray(np.nan),
+        ending=np.zeros((), int),
+    )
+    return way._replace(**{name: np.asarray(value) for name, value in given.items()})
+
+
+def _limits(stop: float, smallest: float, batches: int) -> Limits:
+    return Limits(*map(np.asarray, (stop, smallest, batches)))
 
 
 def _filled(x: Shaped[np.ndarray, "*rest batch"], width: int) -> Shaped[np.ndarray, "*rest width"]:
@@ -129,12 +178,7 @@ class Anchor:
     @property
     def reach(self) -> float:
         """Time to or from the nearest singular position, to first order, s."""
-        return 1 / abs(self.turnover) if self.turnover else np.inf
-
-    @property
-    def longest_step(self) -> float:
-        """Longest step from here, s."""
-        return min(self.safe_step, SAFE_FRACTION * self.reach)
+        return 1 / abs(self.turnover) if abs(self.turnover) > 0 else np.inf
 
 
 @dataclasses.dataclass(frozen=True)
@@ -149,15 +193,30 @@ class ChangePoint:
 class FollowedPath:
     """Anchors in order of time, the change points passed, and where and why following the motion ended, if it did.
 
-    Instants of a grid that were solved on the way are told by their indices, each with the batch that it was solved in.
+    Instants of a grid that were solved on the way are told by their indices, with their states.
     """
 
     anchors: list[Anchor]
-    on_the_way: list[tuple[Int[np.ndarray, " lane"], Arrival]] = dataclasses.field(default_factory=list)
+    on_the_way: list[tuple[Int[np.ndarray, " lane"], SolvedState]] = dataclasses.field(default_factory=list)
     change_points: list[ChangePoint] = dataclasses.field(default_factory=list)
     status: Status = Status.OK
     ended_at: float = np.inf
     fault: str = ""
+
+    def add(self, done: Leg, first: int) -> None:
+        """Add the anchors of a leg, and the instants of the grid that it solved, which begin with the first."""
+        count = int(done.count)
+        records = jax.tree.map(lambda x: np.asarray(x)[:count], done.records)
+        leaves, structure = jax.tree.flatten((records.coordinates, records.outputs, records.sign))
+        for k in np.flatnonzero(records.taken).tolist():
+            state = jax.tree.unflatten(structure, [x[k, ..., :1] for x in leaves])
+            instant, safe_step, radius, turnover = (float(x[k]) for x in records.place)
+            status = Status(int(records.status[k, 0]))
+            self.anchors.append(Anchor(instant, state, safe_step, radius, turnover, status))
+        solved = (records.lane >= 0) & (records.status == Status.OK)
+        if solved.any():
+            found = [np.moveaxis(x, 0, -2)[..., solved] for x in leaves]
+            self.on_the_way.append((first + records.lane[solved], jax.tree.unflatten(structure, found)))
 
     def history(self) -> AttitudeHistory | None:
         """Return the attitudes of all bodies in space along the motion: at the anchors, and by their series beyond."""
@@ -190,9 +249,6 @@ class FollowedPath:
         return found if self.status == Status.OK else found[:1]
 
 
-NO_GRID = np.empty(0)
-
-
 def follow(
     solver: Solver,
     start: Anchor,
@@ -202,9 +258,6 @@ def follow(
     grid: Float[np.ndarray, " time"] = NO_GRID,
 ) -> FollowedPath:
     """Follow the motion from an anchor to another instant, in steps checked one by one.
-
-    A step that is refused is halved until it is not, or is too small to be halved. The lanes of a batch that a step
-    leaves free solve the next instants of a grid on the way.
 
     Parameters
     ----------
@@ -221,67 +274,47 @@ def follow(
     grid : array of shape (time,), optional
         Instants to be solved on the way, s.
     """
-    path, largest, crawled = FollowedPath([start]), first_step, 0
+    path, way = FollowedPath([start]), solver.way(start, first_step)
+    before, first = (int(np.searchsorted(grid, start.instant, side=side)) for side in ("left", "right"))
+    if first > before and start.status == Status.OK:
+        path.on_the_way.append((np.arange(before, first), start.state))
     while path.anchors[-1].instant < stop:
-        here = path.anchors[-1]
-        passed = _passed(solver, here, stop)
-        if passed is not None:
+        done = solver.leg(way, grid[first:], stop, SMALLEST_STEP * span)
+        path.add(done, first)
+        way, here = jax.tree.map(np.asarray, done.way), path.anchors[-1]
+        ending = int(way.ending)
+        first += int(way.next_up)
+        if ending == Ending.PASSAGE:
+            passed = _passed(solver, here, stop)
+            if passed is None:
+                no = np.zeros((), bool)
+                way = way._replace(planned=no, may_pass=no, ending=np.asarray(int(Ending.UNFINISHED)))
+                continue
             far_side, change_point = passed
             path.anchors.append(far_side)
             path.change_points.append(change_point)
-            continue
-        left = stop - here.instant
-        step = min(here.longest_step, largest, left)
-        crawled = crawled + 1 if step < CRAWLING * left else 0
-        if crawled > LONGEST_CRAWL or here.instant + step == here.instant:
+            way = solver.way(far_side, float(way.largest), int(way.crawled))
+            first = int(np.searchsorted(grid, far_side.instant, side="right"))
+        elif ending == Ending.COLLAPSED:
             beyond = float(np.nextafter(here.instant, np.inf))
             return path.ended(Status.COLLAPSED, beyond, ", ".join(solver.model.drivers))
-        if left - step < 0.1 * step:
-            step = left  # no sliver of a step at the end
-        taken = _taken(solver, here, stop, step, SMALLEST_STEP * span, grid)
-        status = Status(int(taken.arrival.status[0]))
-        if not taken.accepted:
-            if status != Status.INADMISSIBLE and here.reach < NEARLY_SINGULAR * span:
-                status = Status.SINGULAR  # the range of the motion ends at a dead point
-            return path.ended(status, taken.target, solver.fault(taken.arrival, 0))
-        largest = 4 * taken.step
-        path.anchors.append(Anchor.of(taken.arrival, taken.target))
-        if taken.lanes.size:
-            path.on_the_way.append((taken.lanes, taken.arrival))
+        elif ending == Ending.REFUSED:
+            return _ended(solver, path, done, span)
     return path
 
 
-class _Step(NamedTuple):
-    """A step from an anchor: where it led, how long it was, which instants of the grid were solved beside it."""
-
-    arrival: Arrival
-    target: float
-    step: float
-    lanes: np.ndarray
-    accepted: bool
-
-
-def _taken(
-    solver: Solver, here: Anchor, stop: float, step: float, smallest: float, grid: Float[np.ndarray, " time"]
-) -> _Step:
-    """Return the step from an anchor, halved until it is accepted, or too small to be halved.
-
-    Of one that is not accepted, what is told is where a law was first refused, if it was.
-    """
-    refused, left = None, stop - here.instant
-    while True:
-        target = stop if step == left else here.instant + step
-        first, end = np.searchsorted(grid, (here.instant, target), side="right")
-        lanes = np.arange(first, min(end, first + SMALL_BATCH - 1))
-        instants = np.concatenate([[target], grid[lanes]])
-        arrival = solver(here.state, instants - here.instant, instants, survey=True)
-        if arrival.status[0] in PASSABLE and step * abs(arrival.turnover[0]) <= LARGEST_TURNOVER:
-            return _Step(arrival, target, step, lanes, accepted=True)
-        if arrival.status[0] == Status.INADMISSIBLE:
-            refused = refused or (arrival, target)
-        if step < smallest or target <= here.instant:
-            return _Step(*(refused or (arrival, target)), step, lanes, accepted=False)
-        step *= 0.5
+def _ended(solver: Solver, path: FollowedPath, done: Leg, span: float) -> FollowedPath:
+    """Return the path that cannot be followed any further: where a law was first refused, if it was."""
+    here, refused = path.anchors[-1], float(done.way.refused)
+    if np.isnan(refused):
+        target, arrival = float(done.way.instant[0]), jax.tree.map(np.asarray, done.last)
+    else:
+        target, instant = refused, np.array([refused])
+        arrival = solver(here.state, instant - here.instant, instant, survey=True)
+    status = Status(int(arrival.status[0]))
+    if status != Status.INADMISSIBLE and here.reach < NEARLY_SINGULAR * span:
+        status = Status.SINGULAR  # the range of the motion ends at a dead point
+    return path.ended(status, target, solver.fault(arrival, 0))
 
 
 def _passed(solver: Solver, here: Anchor, stop: float) -> tuple[Anchor, ChangePoint] | None:
@@ -290,8 +323,6 @@ def _passed(solver: Solver, here: Anchor, stop: float) -> tuple[Anchor, ChangePo
     The far side must lie on the series that leads there, to rounding, and the Jacobian must leave the singular position
     as fast as it came near: two branches that only come near each other, and a dead point, do neither.
     """
-    if not (here.turnover < 0 and here.reach < PASSAGE * here.radius):
-        return None
     middle = here.instant + here.reach
     target = min(middle + here.reach, stop)
     if target - middle < 0.2 * here.reach:

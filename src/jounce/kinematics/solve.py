@@ -9,10 +9,12 @@ from jaxtyping import Float
 
 from jounce.errors import MechanismError, SolveError
 from jounce.kinematics.assembly import assemble
-from jounce.kinematics.grid import GridSolver
+from jounce.kinematics.grid import LONG_GRID
+from jounce.kinematics.long_grids import solve_grid
 from jounce.kinematics.motion import Motion
-from jounce.kinematics.path_following import PASSABLE, Anchor, Solver, follow
+from jounce.kinematics.path_following import NO_GRID, PASSABLE, Anchor, Solver, follow
 from jounce.kinematics.status import Status
+from jounce.kinematics.threads import thread_count
 from jounce.mechanism import Mechanism, build, check_mechanism, time_grid
 from jounce.mechanism.axis_angles import measures_angle
 from jounce.mechanism.law_checks import check_laws
@@ -34,6 +36,8 @@ def solve(
     refine: bool = True,
     strict: bool = True,
     progress: Callable[[int, int], None] | None = None,
+    threads: int | None = None,
+    keep: bool | None = None,
 ) -> Motion:
     """Return the motion of a driven mechanism and its time derivatives up to any order, exact to rounding.
 
@@ -56,6 +60,12 @@ def solve(
         Raise if an instant fails. Otherwise it is NaN and `Motion.status` says why.
     progress : callable, optional
         Called with the number of instants done and their total.
+    threads : int, optional
+        That solve a grid of more than a thousand instants: as many as the process has cores, or as the environment
+        variable ``JOUNCE_THREADS`` says, unless given. Results do not depend on it.
+    keep : bool, optional
+        Whether to keep the motion of all bodies beside the outputs, for points, energies or reactions asked for later;
+        unless given, up to 65,536 instants. What is not kept is computed again when it is asked for.
 
     Returns
     -------
@@ -85,18 +95,19 @@ def solve(
     if not (isinstance(tolerance, numbers.Real) and 0 < tolerance <= LARGEST_TOLERANCE):
         message = f"the tolerance must be a number above zero and at most {LARGEST_TOLERANCE:g}"
         raise MechanismError(message, name="tolerance", value=tolerance)
+    count = thread_count(threads)
     instants = time_grid(mechanism.time if time is None else time, mechanism.parameter_values)
     lost = max((output.lost_orders for output in mechanism.outputs.values()), default=0)
     check_laws(mechanism, instants, order + lost, forces=any(output.of_forces for output in mechanism.outputs.values()))
     model, coordinates = assemble(build(mechanism), instants[0], tolerance)
     solver = Solver(model, max(order + lost, LOWEST_ORDER), float(tolerance), refine, order)
     first = _first(solver, coordinates, instants[:1])
-    path = follow(solver, first, instants[-1], instants[-1] - instants[0], grid=instants)
-    grid = GridSolver(solver, path, instants)
-    grid.solve(progress)
+    on_the_way = instants if len(instants) <= LONG_GRID else NO_GRID
+    path = follow(solver, first, instants[-1], instants[-1] - instants[0], grid=on_the_way)
+    found = solve_grid(solver, path, instants, progress, count, keep=keep)
     change_points = np.array([point.instant for point in path.change_points])
-    found = (grid.state, grid.status, grid.faults)
-    motion = Motion(mechanism, model, instants, order, *found, change_points, path.history())
+    state, outcome = (found.coordinates, found.outputs), (found.status, found.faults)
+    motion = Motion(mechanism, model, instants, order, state, *outcome, change_points, path.history())
     if strict:
         raise_for_status(motion)
     return motion

@@ -12,6 +12,7 @@ from jax.core import Tracer
 
 from jounce.jet.derivatives import plain_derivatives, taylor_coefficients
 from jounce.kinematics.compilation import Compiled
+from jounce.kinematics.threads import Threads, thread_count
 from jounce.mechanism.preconditions import check_process
 from jounce.robot.abstract_robot import AbstractRobot
 
@@ -54,7 +55,12 @@ class Batched:
             found = self.nested(robot.tree, flat, constants, static)
             return jax.tree.map(lambda x: jnp.reshape(x, (*lead, *x.shape[1:])), found)
         flat = tuple(np.reshape(np.asarray(x), (count, *x.shape[axes:])) for x in arrays)
-        found = [self._on_block(robot.tree, block, constants, static) for block in _blocks(flat)]
+
+        def computed(block: tuple[np.ndarray, ...]) -> Any:
+            return jax.block_until_ready(self._on_block(robot.tree, block, constants, static))
+
+        with Threads(thread_count()) as threads:
+            found = list(threads.map(computed, _blocks(flat)))
 
         def joined(*parts: Any) -> Any:
             whole = np.concatenate(parts)  # a copy that its user may write to

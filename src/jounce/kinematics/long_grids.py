@@ -1,0 +1,112 @@
+"""Time grids of any length, solved stretch by stretch, so that no more is kept of each than what is asked for."""
+
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+import jax
+import numpy as np
+from jaxtyping import Float, Int
+
+from jounce.kinematics.grid import GridSolver
+from jounce.kinematics.path_following import FollowedPath, Solver
+
+STRETCH = 2**16  # instants
+
+
+class Solved(NamedTuple):
+    """What is known of all instants of a grid.
+
+    Attributes
+    ----------
+    coordinates : dict of str to array, or callable
+        Jets of the coordinates of all bodies, time last, or what computes them again.
+    outputs : tuple of array
+        Jets of the outputs, time last.
+    status : array of int, shape (time,)
+    faults : dict of int to str
+    """
+
+    coordinates: dict[str, Any] | Callable[[], dict[str, Any]]
+    outputs: tuple[Any, ...]
+    status: Int[np.ndarray, " time"]
+    faults: dict[int, str]
+
+
+def solve_grid(
+    solver: Solver,
+    path: FollowedPath,
+    time: Float[np.ndarray, " time"],
+    progress: Callable[[int, int], None] | None,
+    threads: int,
+    *,
+    keep: bool | None,
+) -> Solved:
+    """Return all instants of a grid, solved from the anchors of a path.
+
+    Parameters
+    ----------
+    solver : Solver
+        What solved the path.
+    path : FollowedPath
+        The motion followed.
+    time : array of shape (time,)
+        Instants, s.
+    progress : callable, optional
+        Called with the number of instants done and their total.
+    threads : int
+        That solve batches.
+    keep : bool, optional
+        Whether the jets of all bodies are kept; where they fit into one stretch, unless given. They are computed again
+        when they are asked for.
+    """
+    kept = len(time) <= STRETCH if keep is None else keep
+    status, faults = np.empty(len(time), int), {}
+    whole: Any = None
+    for first, part in _stretches(solver, path, time, progress, threads):
+        state = part.state if kept else part.state[1]
+        lanes = slice(first, first + len(part.time))
+        if len(part.time) == len(time):
+            whole = state
+        else:
+            if whole is None:
+                whole = jax.tree.map(lambda x: np.empty((*x.shape[:-1], len(time))), state)
+            _put(whole, state, lanes)
+        status[lanes] = part.status
+        faults |= {first + lane: fault for lane, fault in part.faults.items()}
+    if kept:
+        coordinates, outputs = whole
+        return Solved(coordinates, outputs, status, faults)
+    return Solved(lambda: _coordinates(solver, path, time, threads), whole, status, faults)
+
+
+def _coordinates(
+    solver: Solver, path: FollowedPath, time: Float[np.ndarray, " time"], threads: int
+) -> dict[str, np.ndarray]:
+    """Return the jets of the coordinates of all bodies, solved once more."""
+    found: Any = solve_grid(solver, path, time, None, threads, keep=True).coordinates
+    return found
+
+
+def _stretches(
+    solver: Solver,
+    path: FollowedPath,
+    time: Float[np.ndarray, " time"],
+    progress: Callable[[int, int], None] | None,
+    threads: int,
+) -> Iterator[tuple[int, GridSolver]]:
+    """Yield the stretches of a grid one after another, solved, with the index of their first instant."""
+    for first in range(0, len(time), STRETCH):
+
+        def told(done: int, _: int, first: int = first) -> None:
+            if progress is not None:
+                progress(first + done, len(time))
+
+        before = time[first - 1] if first else -np.inf
+        part = GridSolver(solver, path, time[first : first + STRETCH], span=time[-1] - time[0])
+        part.solve(None if progress is None else told, threads, explain=bool(before < path.ended_at))
+        yield first, part
+
+
+def _put(whole: Any, part: Any, lanes: slice) -> None:
+    for into, values in zip(jax.tree.leaves(whole), jax.tree.leaves(part), strict=True):
+        into[..., lanes] = values

@@ -1,0 +1,82 @@
+"""Several batches at once, in threads: compiled programs release Python's lock while they run."""
+
+import numbers
+import os
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import nullcontext
+from typing import Any, TypeVar
+
+import jax
+
+from jounce.errors import MechanismError
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+VARIABLE = "JOUNCE_THREADS"
+AHEAD = 2  # results for each thread that may wait to be fetched
+
+
+def thread_count(given: Any = None) -> int:
+    """Return how many threads compute: those given, or told by the environment, or the cores that this process has.
+
+    Raises
+    ------
+    MechanismError
+        If it is not a whole number above zero.
+    """
+    told = os.environ.get(VARIABLE, "") if given is None else ""
+    if given is None and not told:
+        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    count: Any = int(told) if told.isdecimal() else told or given
+    if not isinstance(count, numbers.Integral) or isinstance(count, bool) or count < 1:
+        name = VARIABLE if told else "threads"
+        raise MechanismError("the number of threads must be a whole number above zero", name=name, value=count)
+    return int(count)
+
+
+class Threads:
+    """Threads that compute one batch each, started when there is more than one to compute; to be closed after use.
+
+    Parameters
+    ----------
+    count : int
+        1 computes in the thread that asks.
+    """
+
+    def __init__(self, count: int):
+        self.count = count
+        self._pool: ThreadPoolExecutor | None = None
+        # what `with jax.default_device` says holds for one thread only
+        device: Any = getattr(jax.config, "jax_default_device", None)
+        self._context = nullcontext if device is None else lambda: jax.default_device(device)
+
+    def __enter__(self) -> "Threads":
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        if self._pool is not None:
+            self._pool.shutdown(cancel_futures=True)
+
+    def map(self, function: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
+        """Yield what a function returns for each item, in their order; it may compute a few of them beforehand."""
+        items = deque(items)
+        if items and (self.count == 1 or self._pool is None):  # what the first one compiles, the others find
+            yield function(items.popleft())
+        if self.count == 1 or len(items) < 2:
+            yield from map(function, items)
+            return
+        if self._pool is None:
+            self._pool = ThreadPoolExecutor(self.count, thread_name_prefix="jounce")
+        waiting: deque[Future[Result]] = deque()
+        for item in items:
+            waiting.append(self._pool.submit(self._called, function, item))
+            if len(waiting) > AHEAD * self.count:
+                yield waiting.popleft().result()
+        while waiting:
+            yield waiting.popleft().result()
+
+    def _called(self, function: Callable[[Item], Result], item: Item) -> Result:
+        with self._context():
+            return function(item)
