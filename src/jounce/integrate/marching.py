@@ -13,6 +13,7 @@ from jounce.integrate.methods import AbstractMethod, Number, near_singular
 from jounce.integrate.projection import projected
 from jounce.integrate.turns import AnglesOfForces, followed, measured
 from jounce.kinematics.compilation import compiled
+from jounce.kinematics.kernels import WITHOUT_LIBRARIES, in_one_piece
 from jounce.kinematics.linear import DenseFactor
 from jounce.shapes import Numbers
 
@@ -88,7 +89,7 @@ def begin_march(equations: Equations, state: State, time: Lanes, *, order: int) 
     return IntegratorState(time, expansion, jnp.zeros(time.shape, int), outcome, nothing, time, *known, none, angles)
 
 
-@compiled("count", "keep")
+@compiled("count", "keep", further=WITHOUT_LIBRARIES)
 def march(
     equations: Equations,
     current: IntegratorState,
@@ -183,9 +184,21 @@ def march(
             kept = jax.tree.map(lambda k, s: jax.lax.dynamic_update_index_in_dim(k, s, tried, 0), kept, steps)
         return current, kept, tried + 1
 
-    shapes = jax.eval_shape(lambda f: attempt(f)[1], current)
-    kept = jax.tree.map(lambda s: jnp.zeros((count, *s.shape), s.dtype), shapes) if keep else None
-    return jax.lax.while_loop(unfinished, iterate, (current, kept, 0))
+    kept = _blank(method, current, count) if keep else None
+    start = (current, kept, 0)
+    if len(current.time) > 1:  # arrays of many runs are worth a call for each operation
+        return jax.lax.while_loop(unfinished, iterate, start)
+    return in_one_piece(lambda carry: jax.lax.while_loop(unfinished, iterate, carry), start)
+
+
+def _blank(
+    method: AbstractMethod, current: IntegratorState, count: int
+) -> tuple[DenseOutput, Bool[Numbers, "steps batch"]]:
+    """Return room for steps and whether they were taken."""
+    time, expansion = current.time, current.expansion
+    polynomial = jax.eval_shape(method.polynomial, expansion, expansion, time)
+    room = DenseOutput(time, time, polynomial, current.blocked, current.angles), current.singular
+    return jax.tree.map(lambda part: jnp.zeros((count, *part.shape), part.dtype), room)
 
 
 def _lasting(kick: Lanes, step: Lanes, span: Lanes, bound: Lanes, current: IntegratorState) -> Flags:

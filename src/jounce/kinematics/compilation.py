@@ -28,14 +28,16 @@ def compiler_options() -> dict[str, Any] | None:
 class Compiled:
     """A function compiled at its first call, as by `jax.jit` with the solver's options."""
 
-    def __init__(self, function: Callable[..., Any], static: tuple[str, ...]):
-        self.function, self.static = function, static
+    def __init__(self, function: Callable[..., Any], static: tuple[str, ...], further: dict[str, Any] | None = None):
+        self.function, self.static, self.further = function, static, further or {}
         update_wrapper(self, function)
 
     @cached_property
     def jitted(self) -> Any:
         """The function as `jax.jit` returns it."""
-        return jax.jit(self.function, static_argnames=self.static, compiler_options=compiler_options())
+        options = compiler_options()
+        options = None if options is None else {**options, **self.further}
+        return jax.jit(self.function, static_argnames=self.static, compiler_options=options)
 
     def __call__(self, *arguments: Any, **keywords: Any) -> Any:
         """Call the compiled function."""
@@ -43,6 +45,6 @@ class Compiled:
         return self.jitted(*arguments, **keywords)
 
 
-def compiled(*static: str) -> Callable[[Callable[..., Any]], Compiled]:
-    """Compile the decorated function at its first call, with these static arguments."""
-    return lambda function: Compiled(function, static)
+def compiled(*static: str, further: dict[str, Any] | None = None) -> Callable[[Callable[..., Any]], Compiled]:
+    """Compile the decorated function at its first call, with these static arguments, and further options of XLA."""
+    return lambda function: Compiled(function, static, further)
