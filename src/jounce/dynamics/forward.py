@@ -259,7 +259,7 @@ def multiplied(matrix: Float[Numbers, "row size batch"], column: Float[Numbers, 
     return jax.lax.fori_loop(0, count, added, jnp.zeros((rows, lanes)))
 
 
-def _begun(coefficients: list[Any], levels: int) -> Any:
+def begun_series(coefficients: list[Any], levels: int) -> Any:
     """Return the first coefficients of a series with room for the others."""
     first = jnp.stack(coefficients)
     return jnp.pad(first, ((0, levels - len(first)), *((0, 0),) * (first.ndim - 1)))
@@ -319,8 +319,8 @@ def expand(
         return history, now, series, put(rates, multipliers, k, 0)
 
     now = raised(state, acceleration, recursion.outputs[2], 1)
-    series = State(*(_begun([c, d], order + 1) for c, d in zip(state, now, strict=True)))
-    rates = _begun([multipliers], order)
+    series = State(*(begun_series([c, d], order + 1) for c, d in zip(state, now, strict=True)))
+    rates = begun_series([multipliers], order)
     _, _, series, rates = jax.lax.fori_loop(1, order, level, (recursion.history, now, series, rates))
     numbers = jnp.arange(1.0, order + 1)[:, None, None, None]
     accelerations = numbers * jnp.concatenate([series.velocity[1:], series.spin[1:]], axis=1)
