@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from jounce.dynamics.loads import inertia_forces, mass_matrices
@@ -141,8 +142,10 @@ class Equations(eqx.Module):
         origins = Jet([with_ground(position)])
         if self.pose_type is PlanarPose:
             return PlanarPose.from_jets(origins, Jet([with_ground(attitude)[0]]))
-        fixed = jnp.zeros_like(attitude[:, :1]).at[0].set(1.0)
-        quaternion = jnp.concatenate([fixed, attitude], axis=1)  # of unit length already: it is kept so
+        fixed = np.eye(1, 4).reshape(4, 1, 1)  # no turn
+        quaternion = jnp.concatenate(
+            [jnp.broadcast_to(fixed, attitude[:, :1].shape), attitude], axis=1
+        )  # of unit length already: it is kept so
         spins, axes = (tuple(Jet([x]) for x in f(quaternion)) for f in (quaternion_spins, body_axes))
         return SpatialPose(origins, Jet([quaternion]), spins, axes, None)
 
@@ -287,6 +290,12 @@ def multiplied(matrix: Float[Numbers, "row size batch"], column: Float[Numbers, 
     return jax.lax.fori_loop(0, count, added, jnp.zeros((rows, lanes)))
 
 
+def begun_series(coefficients: list[Any], levels: int) -> Any:
+    """Return the first coefficients of a series with room for the others."""
+    first = jnp.stack(coefficients)
+    return jnp.pad(first, ((0, levels - len(first)), *((0, 0),) * (first.ndim - 1)))
+
+
 def expand(
     equations: Equations,
     state: State,
@@ -341,10 +350,8 @@ def expand(
         return history, now, series, put(rates, multipliers, k, 0)
 
     now = raised(state, acceleration, recursion.outputs[2], 1)
-    series = State(
-        *(jnp.zeros((order + 1, *c.shape)).at[0].set(c).at[1].set(d) for c, d in zip(state, now, strict=True))
-    )
-    rates = jnp.zeros((order, rows, lanes)).at[0].set(multipliers)
+    series = State(*(begun_series([c, d], order + 1) for c, d in zip(state, now, strict=True)))
+    rates = begun_series([multipliers], order)
     _, _, series, rates = jax.lax.fori_loop(1, order, level, (recursion.history, now, series, rates))
     numbers = jnp.arange(1.0, order + 1)[:, None, None, None]
     accelerations = numbers * jnp.concatenate([series.velocity[1:], series.spin[1:]], axis=1)

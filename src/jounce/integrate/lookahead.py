@@ -164,7 +164,7 @@ class _Signals:
         """
         knots = jax.vmap(lambda s: self._values(s * step, 0.0))(NODES)
         shaken = jax.vmap(lambda s: self._values(s * step, SHAKE))(NODES[::SPARSE])
-        coefficients = jnp.einsum("cn,n...->c...", INTERPOLATION, knots)
+        coefficients = _combined(INTERPOLATION, knots)
         wanted = jnp.max(jnp.where(span > 0, jnp.abs(step) / span, 0.0)) * (SPAN_POINTS / POINTS)
         rounds = jnp.clip(jnp.ceil(wanted), 1, SPAN_POINTS // POINTS)
         count = rounds * POINTS
@@ -174,7 +174,7 @@ class _Signals:
         def look(k: Any, carry: tuple[Any, Any]) -> tuple[Any, Any]:
             share = (k * POINTS + jnp.arange(POINTS)).astype(float) / (count - 1.0)  # both ends too
             found = jax.vmap(lambda s: self._values(s * step, 0.0))(share)
-            away = jnp.abs(found - jnp.einsum("cp,c...->p...", _chebyshev(2.0 * share - 1.0), coefficients))
+            away = jnp.abs(found - _combined(_chebyshev(2.0 * share - 1.0).T, coefficients))
             away = jnp.maximum(away - jnp.maximum(noise[None], FAINT * jnp.abs(found)), 0.0)
             return jnp.maximum(carry[0], jnp.max(away, axis=0)), carry[1] + jnp.sum(away, axis=0)
 
@@ -215,6 +215,13 @@ class _Signals:
         most = max(len(part) for part in parts)
         padded = [jnp.pad(part, ((0, most - len(part)), (0, 0), (0, 0))) for part in parts]
         return jnp.concatenate([jnp.broadcast_to(p, (*p.shape[:2], lanes)) for p in padded], axis=1)
+
+
+def _combined(
+    weights: Float[Numbers, "place node"], values: Float[Numbers, "node component instance batch"]
+) -> Float[Numbers, "place component instance batch"]:
+    """Return sums of values with weights; for a product of matrices XLA would call a library."""
+    return jnp.sum(weights[:, :, None, None, None] * values[None], axis=1)
 
 
 def _signs(shape: tuple[int, ...]) -> Float[np.ndarray, "component body 1"]:

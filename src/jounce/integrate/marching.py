@@ -5,14 +5,16 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from jounce.dynamics.forward import Equations, Expansion, Flags, Indices, Lanes, State, expand
+from jounce.dynamics.forward import Equations, Expansion, Flags, Indices, Lanes, State, begun_series, expand
 from jounce.integrate.lookahead import HARMLESS, SHORTEST, Lookahead, look_ahead, mobility_of
 from jounce.integrate.methods import AbstractMethod, Number, near_singular
 from jounce.integrate.projection import projected
 from jounce.integrate.turns import AnglesOfForces, followed, measured
 from jounce.kinematics.compilation import compiled
+from jounce.kinematics.kernels import WITHOUT_LIBRARIES, in_one_piece
 from jounce.shapes import Numbers
 
 SMALLEST_STEP = 1e-13  # of the span, or of the time itself
@@ -27,6 +29,10 @@ class Outcome(enum.IntEnum):
     ARRIVED = 1
     COLLAPSED = 2  # steps became too small to move on
     LOST = 3  # the motion is not finite from the start
+    UNEXPANDED = 4  # the motion is to be expanded at the start, by the first of the steps tried
+
+
+MOVING = np.array([Outcome.RUNNING, Outcome.UNEXPANDED])
 
 
 class IntegratorState(NamedTuple):
@@ -72,6 +78,23 @@ class DenseOutput(NamedTuple):
 
 
 @compiled("order")
+def unexpanded(equations: Equations, state: State, time: Lanes, *, order: int) -> IntegratorState:
+    """Return what `begin_march` does, but for the expansion, which is left to `march`: one large program less."""
+    *_, bodies, lanes = state.position.shape
+    size, columns = equations.system.cells.shape
+    series = state.map(lambda c: begun_series([c], order + 1))
+    rates = jnp.zeros((1, columns // bodies, bodies, lanes)), jnp.zeros((1, size, lanes))
+    blank, nothing, none = (
+        jnp.full(time.shape, int(Outcome.UNEXPANDED)),
+        jnp.zeros(time.shape),
+        jnp.full(time.shape, -1),
+    )
+    known = jnp.zeros((bodies + 1, lanes)), jnp.zeros(time.shape, bool)
+    expansion, refused = Expansion(series, *rates), jnp.zeros(time.shape, int)
+    return IntegratorState(time, expansion, refused, blank, nothing, time, *known, none, measured(equations, state))
+
+
+@compiled("order")
 def begin_march(equations: Equations, state: State, time: Lanes, *, order: int) -> IntegratorState:
     """Return the start of runs from states on the constraints.
 
@@ -87,7 +110,7 @@ def begin_march(equations: Equations, state: State, time: Lanes, *, order: int) 
     return IntegratorState(time, expansion, jnp.zeros(time.shape, int), outcome, nothing, time, *known, none, angles)
 
 
-@compiled("count", "keep")
+@compiled("count", "keep", further=WITHOUT_LIBRARIES)
 def march(
     equations: Equations,
     current: IntegratorState,
@@ -145,13 +168,14 @@ def march(
         last = step >= 0.999 * jnp.abs(left)  # no sliver of a step at the end
         step = jnp.where(last, left, jnp.sign(left) * step)
         time = jnp.where(last, stop, current.time + step)
-        running = current.outcome == Outcome.RUNNING
+        running, opening = (current.outcome == int(x) for x in (Outcome.RUNNING, Outcome.UNEXPANDED))
         step = jnp.where(running, step, 0.0)
         time = jnp.where(running, time, current.time)
 
         there = equations.near(angles.at(step))
-        state = method.arrive(there, start, current.time, step)
-        state, distance, inverse = projected(there, state, time[None])
+        arrived = method.arrive(there, start, current.time, step)
+        state, distance, inverse = projected(there, arrived, time[None])
+        state = jax.tree.map(lambda a, b: jnp.where(opening, a, b), arrived, state)  # it is on the constraints already
         expansion = _kept(expand(there, state, time[None], order, inverse))
         error = method.error(start, expansion, step, length)
         good = _finite(expansion) & jnp.isfinite(distance) & (error <= MARGIN * allowed) & running & look.resolved
@@ -163,17 +187,20 @@ def march(
         steps = DenseOutput(current.time, step, polynomial, look.kink, current.angles), good
         outcome = jnp.where(good & last, int(Outcome.ARRIVED), current.outcome)
         outcome = jnp.where(running & ~good & tiny, int(Outcome.COLLAPSED), outcome)
-        drift, none = jnp.maximum(current.drift, distance), jnp.full(step.shape, -1)
+        opened = jnp.where(_finite(expansion), int(Outcome.RUNNING), int(Outcome.LOST))
+        outcome = jnp.where(opening, opened, outcome)
+        drift = jnp.where(opening, current.drift, jnp.maximum(current.drift, distance))
+        none = jnp.full(step.shape, -1)
         known = mobility_of(equations, inverse), near_singular(equations, inverse)
         fresh, reached = jnp.zeros_like(current.refused), measured(there, state)
         onwards = IntegratorState(time, expansion, fresh, outcome, drift, current.begun, *known, none, reached)
         blocked = jnp.where(look.resolved, current.blocked, look.limiting)
         refused = current._replace(refused=current.refused + 1, outcome=outcome, blocked=blocked)
-        return jax.tree.map(lambda a, b: jnp.where(good, a, b), onwards, refused), steps
+        return jax.tree.map(lambda a, b: jnp.where(good | opening, a, b), onwards, refused), steps
 
     def unfinished(carry: Any) -> Any:
         current, _, tried = carry
-        return jnp.any(current.outcome == Outcome.RUNNING) & (tried < count)
+        return jnp.any(jnp.isin(current.outcome, MOVING)) & (tried < count)
 
     def iterate(carry: Any) -> Any:
         current, kept, tried = carry
@@ -182,9 +209,21 @@ def march(
             kept = jax.tree.map(lambda k, s: jax.lax.dynamic_update_index_in_dim(k, s, tried, 0), kept, steps)
         return current, kept, tried + 1
 
-    shapes = jax.eval_shape(lambda f: attempt(f)[1], current)
-    kept = jax.tree.map(lambda s: jnp.zeros((count, *s.shape), s.dtype), shapes) if keep else None
-    return jax.lax.while_loop(unfinished, iterate, (current, kept, 0))
+    kept = _blank(method, current, count) if keep else None
+    start = (current, kept, 0)
+    if len(current.time) > 1:  # arrays of many runs are worth a call for each operation
+        return jax.lax.while_loop(unfinished, iterate, start)
+    return in_one_piece(lambda carry: jax.lax.while_loop(unfinished, iterate, carry), start)
+
+
+def _blank(
+    method: AbstractMethod, current: IntegratorState, count: int
+) -> tuple[DenseOutput, Bool[Numbers, "steps batch"]]:
+    """Return room for steps and whether they were taken."""
+    time, expansion = current.time, current.expansion
+    polynomial = jax.eval_shape(method.polynomial, expansion, expansion, time)
+    room = DenseOutput(time, time, polynomial, current.blocked, current.angles), current.singular
+    return jax.tree.map(lambda part: jnp.zeros((count, *part.shape), part.dtype), room)
 
 
 def _lasting(kick: Lanes, step: Lanes, span: Lanes, bound: Lanes, current: IntegratorState) -> Flags:

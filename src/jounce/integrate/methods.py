@@ -133,7 +133,7 @@ def coefficient_sizes(expansion: Expansion, length: Number) -> Sizes:
         return sizes
     # Euler parameters of a body that spins evenly go on where its angular velocity has no more terms
     turned = 2.0 * jnp.max(jnp.abs(attitude[1:]), axis=(1, 2))
-    return sizes.at[:-1].max(turned)
+    return jnp.concatenate([jnp.maximum(sizes[:-1], turned), sizes[-1:]])
 
 
 def reach(sizes: Sizes, first: int) -> Lanes:

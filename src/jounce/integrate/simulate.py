@@ -16,7 +16,7 @@ from jounce.dynamics.start import ConsistentStart, consistent_start
 from jounce.errors import MechanismError, SolveError
 from jounce.integrate.events import Event, EventDetector, pose_coordinates
 from jounce.integrate.lookahead import watched_names
-from jounce.integrate.marching import DenseOutput, IntegratorState, Outcome, begin_march, march
+from jounce.integrate.marching import MOVING, DenseOutput, IntegratorState, Outcome, march, unexpanded
 from jounce.integrate.methods import AbstractMethod, Taylor, evaluated
 from jounce.integrate.simulation import Simulation
 from jounce.jet import Jet
@@ -254,10 +254,8 @@ class _Run:
         equations, stop = self.start.equations, instants[-1]
         self.sense = sense = np.sign(instants[-1] - instants[0])
         order = self.method.expansion_order(self.tolerance)
-        current = begin_march(equations, self.start.state, instants[:1], order=order)
-        if len(instants) == 1 or int(current.outcome[0]) != Outcome.RUNNING:
-            self._stand(current)
-        while int(current.outcome[0]) == Outcome.RUNNING and self.stopped_at is None and len(instants) > 1:
+        current = unexpanded(equations, self.start.state, instants[:1], order=order)
+        while int(current.outcome[0]) in MOVING and self.stopped_at is None:
             current, steps, tried = march(
                 equations, current, stop, self.tolerance, self.longest, method=self.method, count=STEPS
             )

@@ -95,12 +95,19 @@ class Compiled:
         Names of the static arguments.
     made_of : tuple of callable, optional
         Functions of the package that say what it computes, where it is none of them itself.
+    further : mapping, optional
+        Further options of XLA.
     """
 
     def __init__(
-        self, function: Callable[..., Any], static: tuple[str, ...], made_of: tuple[Callable[..., Any], ...] = ()
+        self,
+        function: Callable[..., Any],
+        static: tuple[str, ...],
+        made_of: tuple[Callable[..., Any], ...] = (),
+        further: Mapping[str, Any] | None = None,
     ):
         self.function, self.static, self.made_of = function, static, made_of or (function,)
+        self.further = further or {}
         self._programs: dict[Any, Callable[..., Any]] = {}
         self._names = tuple(inspect.signature(function).parameters)
         self._traced = min([self._names.index(name) for name in static], default=len(self._names))
@@ -109,7 +116,9 @@ class Compiled:
     @cached_property
     def jitted(self) -> Any:
         """The function as `jax.jit` returns it."""
-        return jax.jit(self.function, static_argnames=self.static, compiler_options=compiler_options())
+        options = compiler_options()
+        options = None if options is None else {**options, **self.further}
+        return jax.jit(self.function, static_argnames=self.static, compiler_options=options)
 
     def __call__(self, *arguments: Any, **keywords: Any) -> Any:
         """Call the compiled function."""
@@ -186,6 +195,6 @@ def _home() -> jax.sharding.Sharding:
     return jax.sharding.SingleDeviceSharding(jax.devices()[0])
 
 
-def compiled(*static: str) -> Callable[[Callable[..., Any]], Compiled]:
-    """Compile the decorated function at its first call, with these static arguments."""
-    return lambda function: Compiled(function, static)
+def compiled(*static: str, further: Mapping[str, Any] | None = None) -> Callable[[Callable[..., Any]], Compiled]:
+    """Compile the decorated function at its first call, with these static arguments, and further options of XLA."""
+    return lambda function: Compiled(function, static, further=further)

@@ -79,7 +79,7 @@ class DenseFactor(eqx.Module):
 
     def solve_transposed(self, right: Columns) -> Columns:
         """Return the solution with the transposed matrices, for right-hand sides of shape (rows, batch)."""
-        rank = jnp.argsort(self.order, axis=0)
+        rank = self._rank()
 
         def product(right: Any) -> Any:
             rows = jnp.take_along_axis(right, rank, axis=0)
@@ -92,7 +92,7 @@ class DenseFactor(eqx.Module):
     def inverse(self) -> Matrices:
         """Return the inverse matrices, shape (rows, rows, batch), for many right-hand sides that come one by one."""
         rows = jnp.take_along_axis(self.eliminated, self.order[:, None], axis=0)
-        return jnp.take_along_axis(rows, jnp.argsort(self.order, axis=0)[None], axis=1) * self._regular()[None]
+        return jnp.take_along_axis(rows, self._rank()[None], axis=1) * self._regular()[None]
 
     def applied_inverse(self, matrix: Float[Numbers, "row column"]) -> Float[Numbers, "row column"]:
         """Return the products of the inverse of the first matrix with the columns of another, shape (rows, columns)."""
@@ -111,6 +111,12 @@ class DenseFactor(eqx.Module):
         swaps = later & (self.order[:, None] > self.order[None])
         odd = jnp.sum(swaps, axis=(0, 1)) % 2 == 1
         return jnp.prod(jnp.sign(self.pivots), axis=0) * jnp.where(odd, -1.0, 1.0)
+
+    def _rank(self) -> Int[Numbers, "row batch"]:
+        """Return which pivot is that of each row; `argsort` would call a library of XLA's."""
+        places = np.arange(len(self.order), dtype=np.int32)
+        matches = self.order[None] == places[:, None, None]
+        return jnp.sum(jnp.where(matches, places[None, :, None], 0), axis=1)
 
     def _regular(self) -> Float[Numbers, "1 batch"]:
         return jnp.where(jnp.all(self.pivots != 0, axis=0, keepdims=True), 1.0, jnp.nan)

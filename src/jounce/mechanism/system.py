@@ -189,7 +189,8 @@ class System(eqx.Module):
         """Return the entries of the Jacobian that are not zero for certain, before rows are scaled."""
         frozen = Jet.constant(time.coefficients[0], 1)
         blocks = [b for group in self.groups for b in group.derivative_blocks(pose, frozen, self.column_scale)]
-        return jnp.concatenate([*map(_flat, blocks)])
+        none = jnp.zeros((0, pose.position.shape[-1]))  # bodies that fly freely
+        return jnp.concatenate([*map(_flat, blocks), none])
 
     def admissible(self, time: Jet) -> Bool[Numbers, "driver batch"]:
         """Tell at which instants each driver has a permitted value, shape (drivers, batch)."""

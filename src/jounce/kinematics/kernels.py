@@ -1,0 +1,72 @@
+"""Loops over small arrays as one function of machine code."""
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import jax
+import jaxlib.version
+from jax.experimental.xla_metadata import set_xla_metadata
+from jax.extend.core import Jaxpr, jaxpr_as_fun, jaxprs_in_params
+
+from jounce.kinematics.compilation import compiler_options
+
+WITHOUT_LIBRARIES = {"xla_disable_hlo_passes": "dot-library-rewriter"}
+"""Options, beside `compiler_options`, of programs with such functions: XLA puts sums into a library as well."""
+
+TRIED = (0, 10)  # releases of jaxlib: of others it is not known whether they break off
+LARGEST = 6000  # operations: of twice as many LLVM makes one function in a minute, and many in ten seconds
+
+# not among them: products of matrices, convolutions, sorting and what is foreign, for which XLA calls libraries that
+# such a function cannot reach, and scatter, for which it has no code there
+SUPPORTED = frozenset(
+    "abs acos acosh add add_any and argmax argmin asin asinh atan atan2 atanh broadcast_in_dim cbrt ceil clamp "
+    "concatenate cond convert_element_type copy cos cosh custom_jvp_call custom_vjp_call div dynamic_slice "
+    "dynamic_update_slice eq erf erfc exp exp2 expm1 floor gather ge gt integer_pow iota is_finite jit le log log1p "
+    "logistic lt max min mul ne neg not optimization_barrier or pad pow reduce_and reduce_max reduce_min reduce_or "
+    "reduce_prod reduce_sum rem reshape rev round rsqrt scan select_n sign sin sinh slice split sqrt square "
+    "squeeze stack stop_gradient sub tan tanh transpose unstack while xor".split()
+)
+
+
+def in_one_piece(function: Callable[[Any], Any], argument: Any) -> Any:
+    """Return the value of a function that XLA compiles into one piece of machine code where it can.
+
+    XLA calls each operation on a processor as a function of its own, which takes longer than arithmetic on small
+    arrays. The mark asks for what XLA does by itself with the smallest loops; one that does not know it passes it over.
+
+    Parameters
+    ----------
+    function : callable
+        Of a pytree of arrays, such as a loop whose length is known only when it runs. In a program compiled with
+        `compiler_options` and `WITHOUT_LIBRARIES`: neither the newer code of XLA for fused operations nor its
+        libraries can be part of such a function.
+    argument : pytree
+        Of arrays.
+    """
+    program, shape = jax.make_jaxpr(function, return_shape=True)(argument)
+    whole = jaxpr_as_fun(program)
+    if _tried() and _suits(program.jaxpr):
+        with set_xla_metadata(xla_cpu_small_call="true", inlineable="false"):
+            found = jax.jit(whole)(*jax.tree.leaves(argument))
+    else:
+        found = whole(*jax.tree.leaves(argument))
+    return jax.tree.unflatten(jax.tree.structure(shape), found)
+
+
+def _tried() -> bool:
+    """Tell whether this release of XLA, on a processor, is known to compile such functions."""
+    return jaxlib.version.__version_info__[:2] == TRIED and compiler_options() is not None
+
+
+def _operations(program: Jaxpr) -> Iterator[str]:
+    """Yield the names of all operations of a program, those of loops and branches once."""
+    for equation in program.eqns:
+        yield equation.primitive.name
+        for part in jaxprs_in_params(equation.params):
+            yield from _operations(part)
+
+
+def _suits(program: Jaxpr) -> bool:
+    """Tell whether XLA compiles all operations of a program by itself, and as one function before long."""
+    names = list(_operations(program))
+    return len(names) <= LARGEST and SUPPORTED.issuperset(names)

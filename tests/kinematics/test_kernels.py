@@ -1,0 +1,74 @@
+"""Loops compiled as one function: the same numbers, and only where XLA can."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jounce.kinematics import kernels
+from jounce.kinematics.compilation import compiled
+
+MARK = "xla_cpu_small_call"
+
+
+def halved(body):
+    """Return a loop that goes on until its value, which `body` halves, is small."""
+
+    def loop(x):
+        return jax.lax.while_loop(lambda x: jnp.max(x) > 1e-3, body, x)
+
+    return lambda x: kernels.in_one_piece(loop, x)
+
+
+def marked(function, x) -> bool:
+    return MARK in jax.jit(function).lower(x).as_text()
+
+
+@pytest.fixture
+def tried(monkeypatch):
+    """As if this release of XLA were known."""
+    monkeypatch.setattr(kernels, "_tried", lambda: True)
+
+
+@pytest.mark.parametrize("size", [1, 3, 90])
+def test_sums_of_every_size_are_those_of_numpy(size):
+    matrix = np.random.default_rng(1).normal(size=(size, size, 1))
+    matrix /= 2.0 * np.linalg.norm(matrix[..., 0], 2)
+
+    def body(carry):
+        x, count = carry
+        return jnp.sum(matrix * x[None], axis=1), count + 1
+
+    @compiled(further=kernels.WITHOUT_LIBRARIES)
+    def found(x):
+        return kernels.in_one_piece(lambda c: jax.lax.while_loop(lambda c: c[1] < 5, body, c), (x, 0))
+
+    start = np.ones((size, 1))
+    np.testing.assert_allclose(found(start)[0], np.linalg.matrix_power(matrix[..., 0], 5) @ start, atol=1e-16)
+
+
+def test_small_loops_are_marked(tried):
+    assert marked(halved(lambda x: 0.5 * jnp.sin(x)), jnp.ones(3))
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        lambda x: 0.5 * jnp.eye(3) @ x,
+        lambda x: 0.5 * jnp.sort(x),
+        lambda x: 0.5 * jnp.zeros(3).at[jnp.array([2, 0, 1])].add(x),
+        lambda x: jax.lax.fori_loop(0, 2, lambda i, y: 0.5 * jnp.eye(3) @ y, x),
+    ],
+)
+def test_loops_for_which_a_library_is_called_are_not(tried, body):
+    assert not marked(halved(body), jnp.ones(3))
+
+
+def test_large_loops_are_not(tried, monkeypatch):
+    monkeypatch.setattr(kernels, "LARGEST", 3)
+    assert not marked(halved(lambda x: 0.5 * jnp.sin(x) + 0.1 * x), jnp.ones(3))
+
+
+def test_nothing_is_marked_for_releases_that_were_not_tried(monkeypatch):
+    monkeypatch.setattr(kernels, "TRIED", (0, 1))
+    assert not marked(halved(lambda x: 0.5 * jnp.sin(x)), jnp.ones(3))
