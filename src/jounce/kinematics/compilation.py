@@ -6,18 +6,21 @@ from typing import Any
 
 import jax
 
+from jounce.kinematics.device import on_processor
 from jounce.mechanism.preconditions import check_process
 
 
-@lru_cache(maxsize=1)
 def compiler_options() -> dict[str, Any] | None:
     """Return options that halve XLA's compile time of long chains of small operations, without making them slower.
 
-    They are private to XLA, and a release that does not know them refuses them: then there are none.
+    They are private to XLA, and a release that does not know them refuses them: then there are none, as on a GPU.
     """
+    return _processor_options() if on_processor() else None
+
+
+@lru_cache(maxsize=1)
+def _processor_options() -> dict[str, Any] | None:
     options = {"xla_cpu_use_fusion_emitters": False}
-    if jax.default_backend() != "cpu":
-        return None
     try:
         jax.jit(lambda: 0.0, compiler_options=options).lower().compile()
     except (RuntimeError, ValueError):  # jax.errors.JaxRuntimeError is a RuntimeError

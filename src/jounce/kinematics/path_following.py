@@ -16,6 +16,7 @@ import numpy as np
 from jaxtyping import Float, Int, Shaped
 
 from jounce.kinematics.advance import SAFE_FRACTION, Arrival, SolvedState, advance
+from jounce.kinematics.device import on_processor
 from jounce.kinematics.status import Status
 from jounce.mechanism import Model
 from jounce.mechanism.axis_angles import AttitudeHistory
@@ -32,6 +33,12 @@ NEARLY_SINGULAR = 1e-6  # of the span: a motion that ends so short before a sing
 NEARBY = 0.1  # radii: a singular position nearer than this spoils high derivatives, if the motion is smooth there
 PLACES = 8  # in each step at which attitudes are looked at for turns: nowhere between them a body turns by half a turn
 SMALL_BATCH, LARGE_BATCH = 16, 512  # lanes; a batch width compiles once, so a short grid uses one, and so do anchors
+GPU_BATCH = 2**15  # the large one of a GPU
+
+
+def large_batch() -> int:
+    """Return how many instants of a long grid are solved side by side on the device that JAX computes on."""
+    return LARGE_BATCH if on_processor() else GPU_BATCH
 
 
 @dataclasses.dataclass(frozen=True)
@@ -54,7 +61,7 @@ class Solver:
     ) -> Arrival:
         """Solve instants from known neighbours, as many as fit into a batch; `survey` looks for singular positions."""
         lanes = len(instant)
-        width = SMALL_BATCH if lanes <= SMALL_BATCH else LARGE_BATCH
+        width = SMALL_BATCH if lanes <= SMALL_BATCH else large_batch()
         filled = jax.tree.map(lambda x: _filled(x, width), (*self._predictor(known), step, instant))
         arrival = advance(
             self.model.system,
