@@ -107,7 +107,7 @@ def gpu() -> str:
 
 def works(quick: bool) -> Iterator[tuple[str, str, int, tuple[Any, ...], Callable[[Any], float], str]]:
     """Yield title, task, size, arguments, error and reference of each work."""
-    sizes = (10_001,) if quick else (10_001, 1_000_001)
+    sizes = (10_001,) if quick else (10_001, 200_001)
     for name, title in (("four_bar", "four-bar"), ("rsur", "RSUR")):
         for task, of in (("solve", "as called"), ("program", "the program alone")):
             for count in sizes:

@@ -18,7 +18,7 @@ from benchmarks.four_bar import rocker
 from benchmarks.references import KINEMATIC, error_of
 
 ORDERS = (2, 3, 4, 6, 8, 10)
-HIGHEST_NESTED = 8  # each further order takes three times as long to compile
+HIGHEST_NESTED = 8  # each further order takes two to three times as long to compile
 NESTED = "JAX, nested jvp of the closed form"
 
 

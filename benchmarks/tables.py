@@ -1,12 +1,13 @@
 """Rows as a table: on the terminal, as Markdown, CSV and JSON."""
 
 import csv
-import importlib.metadata
 import json
 import os
 import platform
+import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime
+from importlib import metadata
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks import BENCHMARKS
+from benchmarks.cases import ROOT
 
 Rows = Sequence[Mapping[str, Any]]
 HEADINGS = ("work", "by", "cost", "quartiles", "jounce takes that", "error")
@@ -27,11 +29,12 @@ def circumstances(quick: bool) -> dict[str, str]:
     info = Path("/proc/cpuinfo")
     lines = info.read_text(encoding="utf-8").splitlines() if info.exists() else []
     model = next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), "")
+    own = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     found = {
         "processor": f"{model or platform.processor() or platform.machine()}, {cores} cores",
         "system": f"{platform.system()} {platform.machine()}, Python {platform.python_version()}",
-        "versions": ", ".join(f"{name} {importlib.metadata.version(name)}" for name in ("jounce", "jax", "numpy")),
+        "versions": f"jounce {own}, " + ", ".join(f"{name} {metadata.version(name)}" for name in ("jax", "numpy")),
         "day": datetime.now(UTC).date().isoformat(),
     }
     if hasattr(os, "getloadavg"):

@@ -55,7 +55,7 @@ def measured(case: Case, quick: bool) -> Iterator[dict[str, Any]]:
         yield {
             "case": case.name,
             "contestant": entry.name,
-            "version": _version(entry.needs),
+            "version": _version(entry.needs) if k else "",
             "unit": case.unit,
             "clock": case.clock,
             "cost": spread(cost),

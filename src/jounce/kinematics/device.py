@@ -14,5 +14,5 @@ def on_processor() -> bool:
     ...     on_processor()
     True
     """
-    chosen = jax.config.jax_default_device
+    chosen = getattr(jax.config, "jax_default_device", None)
     return (getattr(chosen, "platform", chosen) or jax.default_backend()) == "cpu"
