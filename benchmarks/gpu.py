@@ -10,30 +10,24 @@ from collections.abc import Callable, Iterator
 from functools import cache, partial
 from typing import Any
 
+import jax
 import numpy as np
 
-from benchmarks.arm import REFERENCE, motion
+import jounce as jn
+from benchmarks.arm import REFERENCE, arm, motion
 from benchmarks.cases import EXAMPLES, CannotRunError, Case, Cases, Contestant
 from benchmarks.processes import Worker
 from benchmarks.references import KINEMATIC, error_of, largest_error
+from jounce.kinematics.advance import advance
 
-ON_CPU = {"JAX_PLATFORMS": "cpu"}
-ON_GPU = {"JAX_PLATFORMS": "cuda,cpu", "XLA_PYTHON_CLIENT_PREALLOCATE": "false"}
+os.environ.setdefault("XLA_PYTHON_CLIENT_PREALLOCATE", "false")  # several processes share the device
+ON_CPU, ON_GPU = {"JAX_PLATFORMS": "cpu"}, {"JAX_PLATFORMS": "cuda,cpu"}
 NEIGHBOURS = 2001  # solved instants that the program alone starts from
 FACTORIALS = np.array([1.0, 1.0, 2.0, 6.0, 24.0])  # derivatives from Taylor coefficients
 
 
-def device() -> str:
-    """Return what JAX computes on; within a worker."""
-    import jax
-
-    return jax.devices()[0].device_kind
-
-
 def solve(name: str, instants: int) -> Callable[[], Any]:
     """Return what solves a mechanism as a user does; within a worker."""
-    import jounce as jn
-
     mechanism, time = jn.load(EXAMPLES / f"{name}.yaml"), np.linspace(0.0, 2.0, instants)
     return lambda: jn.solve(mechanism, time).outputs["psi"]
 
@@ -43,11 +37,6 @@ def program(name: str, lanes: int) -> Callable[[], Any]:
 
     It returns what it solves, or raises ArithmeticError where an instant is not solved.
     """
-    import jax
-
-    import jounce as jn
-    from jounce.kinematics.advance import advance
-
     mechanism, time = jn.load(EXAMPLES / f"{name}.yaml"), np.linspace(0.0, 2.0, NEIGHBOURS)
     motion = jn.solve(mechanism, time)
     model, groups = motion.model, motion._groups
@@ -78,11 +67,6 @@ def program(name: str, lanes: int) -> Callable[[], Any]:
 
 def torques(samples: int, inside: bool) -> Callable[[], Any]:
     """Return what computes torques and two rates of the panda: as called, or within `jax.jit` on the device."""
-    import jax
-
-    import jounce as jn
-    from benchmarks.arm import arm
-
     robot, (q, _) = arm(), motion(samples)
     if not inside:
         return lambda: jn.inverse_dynamics(robot, q)
@@ -100,8 +84,8 @@ def gpu() -> str:
         If there is none, with what JAX says about it.
     """
     try:
-        return Worker("benchmarks.gpu:device", environment=ON_GPU).run().outcome
-    except CannotRunError as failure:
+        return jax.devices("cuda")[0].device_kind
+    except RuntimeError as failure:
         raise CannotRunError(f"no CUDA device: {failure}") from None
 
 

@@ -70,8 +70,6 @@ def cases(quick: bool) -> Cases:
         yield Case(
             f"chain of {count} pendulums, {stop:g} s",
             [Contestant("jounce, absolute coordinates", ready(run), error), peer],
-            count=1,
-            unit=f"{stop:g} s",
             reference="DOP853 on the angles at a tolerance of 2.3e-14, rad at the end",
             rounds=5,
             at={"bodies": count},
