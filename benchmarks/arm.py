@@ -199,7 +199,7 @@ def cases(quick: bool) -> Cases:
 
     def in_cpp(rates: int) -> Callable[[], Any]:
         if quick:
-            raise CannotRunError("left out by --quick: it compiles for minutes")
+            raise CannotRunError("not with --quick, as it compiles for minutes")
         return tensors_run(q, rates)
 
     def casadi(rates: bool) -> Contestant:

@@ -46,7 +46,7 @@ def show(rows: Rows) -> None:
     """Print the rows of one benchmark."""
     table = Table(box=None, pad_edge=False)
     for heading in HEADINGS:
-        table.add_column(heading, no_wrap=True)
+        table.add_column(heading, no_wrap=heading != "cost")  # where it is told why one was left out
     for cells in _cells(rows):
         table.add_row(*cells)
     Console(width=max(Console().width, WIDTH)).print(table, soft_wrap=True)
