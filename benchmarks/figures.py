@@ -29,11 +29,22 @@ def _lines(rows: Rows, benchmark: str, key: str, value: Callable[[Any], float], 
     return {name: sorted(points) for name, points in found.items()}
 
 
-def _plot(axes: Any, lines: Lines, scale: str) -> None:
+def _plot(axes: Any, lines: Lines, scale: str, *, ticks: bool = True) -> None:
+    """Draw lines against a logarithmic axis; ticks of the other are where the points are, or as the scale has them."""
+    from matplotlib.ticker import LogFormatter, NullLocator
+
     for (name, points), marker, colour in zip(lines.items(), MARKERS, LINE_COLOURS, strict=False):
         axes.plot(*zip(*points, strict=True), marker=marker, color=colour, label=name)
     axes.set_xscale(scale)
     axes.set_yscale("log")
+    axes.yaxis.set_major_formatter(LogFormatter())
+    axes.yaxis.set_minor_formatter(LogFormatter(minor_thresholds=(1, 0.4)))
+    if ticks:
+        places = sorted({x for points in lines.values() for x, _ in points})
+        axes.set_xticks(places, [f"{x:.4g}" for x in places])
+        axes.xaxis.set_minor_locator(NullLocator())
+    else:
+        axes.xaxis.set_major_formatter(LogFormatter())
 
 
 def _cost(unit: float) -> Callable[[Any], float]:
@@ -54,34 +65,31 @@ def orders(rows: Rows) -> Any:
     if not all(drawn.values()):
         return None
     with style():
-        figure = blank_figure(9.0, 3.4)
+        figure = blank_figure(9.0, 3.8)
         for axes, (label, lines) in zip(figure.subplots(1, len(drawn)), drawn.items(), strict=True):
             _plot(axes, lines, "linear")
             axes.set_xlabel("highest derivative")
             axes.set_title(label)
-        figure.axes[0].legend()
+        figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
         return figure
 
 
 def bodies(rows: Rows) -> Any:
-    """Return the cost of an instant of a chain, and of a simulated second, against the number of bodies."""
-    chains, pendulums = (
-        _lines(rows, name, "bodies", _cost(unit)) for name, unit in (("bodies", 1e-6), ("pendulums", 1e-3))
-    )
-    if not chains and not pendulums:
+    """Return the cost of an instant of a chain, and of a simulation, against the number of bodies."""
+    drawn = {
+        "Chain of four-bars, an instant  (us)": _lines(rows, "bodies", "bodies", _cost(1e-6)),
+        "Chain of pendulums, simulated  (ms)": _lines(rows, "pendulums", "bodies", _cost(1e-3)),
+    }
+    drawn = {label: lines for label, lines in drawn.items() if lines}
+    if not drawn:
         return None
     with style():
-        figure = blank_figure(8.0, 3.6)
-        left, right = figure.subplots(1, 2)
-        for axes, lines, label in (
-            (left, chains, "four-bars, an instant  (us)"),
-            (right, pendulums, "pendulums, simulated  (ms)"),
-        ):
+        figure = blank_figure(4.5 * len(drawn), 4.2)
+        for axes, (label, lines) in zip(figure.subplots(1, len(drawn), squeeze=False)[0], drawn.items(), strict=True):
             _plot(axes, lines, "log")
             axes.set_xlabel("bodies")
-            axes.set_title(f"Chain of {label}")
-            if lines:
-                axes.legend()
+            axes.set_title(label)
+            axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.15))
         return figure
 
 
@@ -98,6 +106,7 @@ def work_precision(rows: Rows) -> Any:
             axes,
             {name: [(t, e) for (_, t), (_, e) in zip(times[name], errors[name], strict=True)] for name in times},
             "log",
+            ticks=False,
         )
         axes.set_title("Double pendulum from horizontal rest")
         axes.set_xlabel("time for 10 s of motion, one core  (ms)")
@@ -121,16 +130,14 @@ def obreshkov(rows: Rows) -> Any:
             jerk = next(iter(lines.values()))
             _plot(above, lines, "log")
             _plot(below, {name: _over(points, jerk) for name, points in lines.items()}, "log")
-            below.lines[0].set_visible(False)
+            below.lines[0].set_visible(False)  # ones
             above.set_title(f"Free {title} under gravity")
             below.axhline(10, color=GREY, linewidth=0.8, linestyle="--")
             below.text(jerk[0][0], 10, "ten, as claimed", color=GREY, va="bottom")
             below.set_xlabel("step  (ms)")
-            below.set_xticks([step for step, _ in jerk], [f"{step:.3g}" for step, _ in jerk])
-            below.minorticks_off()
         panels[0, 0].set_ylabel("largest error of an angle in 1 s  (rad)")
         panels[1, 0].set_ylabel("times the error with jerk")
-        panels[0, 0].legend()
+        figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
         return figure
 
 
