@@ -18,10 +18,11 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from timing import use_one_core
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from benchmarks.timing import use_one_core
 
 use_one_core()
-sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import numpy as np  # noqa: E402
 

@@ -1,71 +1,75 @@
-"""Four-bar, position to jounce over 10,000 instants, beside CasADi's general and hand-specialised routes.
+"""Four-bar, position to jounce, beside routes that know this one mechanism.
 
-CasADi compiles C code for this one mechanism: ``rootfinder`` (fast_newton) with four directional derivatives is its
-general route; an unrolled Newton iteration with a hand-derived recursion is the specialised one. jounce reads a file.
-Run: ``python benchmarks/four_bar.py`` (needs CasADi and a C compiler).
+CasADi's ``rootfinder`` (fast_newton) with four directional derivatives is its general route; an unrolled Newton
+iteration with a hand-derived recursion is specialised by hand. SymPy differentiates the closed form of the angle.
 """
 
 import math
-import subprocess
-import tempfile
-from pathlib import Path
+from collections.abc import Callable
+from typing import Any
 
-from timing import race, report, use_one_core
+import numpy as np
 
-use_one_core()
+import jounce as jn
+from benchmarks.cases import EXAMPLES, Case, Cases, Contestant, ready
+from benchmarks.compiled_c import compiled
+from benchmarks.references import KINEMATIC, error_of
 
-import casadi  # noqa: E402
-import numpy as np  # noqa: E402
-
-import jounce as jn  # noqa: E402
-
-INSTANTS = 10_000
 AD, AB, BC, CD = 13.21, 4.00, 14.23, 20.31  # cm
-GENERAL = "CasADi rootfinder fast_newton + jtimes, C code"
 
 
-def closure(time, unknown):
-    """Return the loop equations in the angles of coupler and rocker."""
+def rocker(t: Any, m: Any, arctan2: Any) -> Any:
+    """Return the angle of the rocker in closed form, with the functions of a module."""
+    theta = np.pi / 6 + np.pi / 3 * m.sin(np.pi * t)
+    x, y = AB * m.cos(theta) - AD, AB * m.sin(theta)
+    distance = m.sqrt(x * x + y * y)
+    cosine = (distance * distance + CD * CD - BC * BC) / (2 * CD * distance)
+    return np.pi + arctan2(-y, -x) - arctan2(m.sqrt(1 - cosine * cosine), cosine)
+
+
+def start() -> np.ndarray:
+    """Return the angles of coupler and rocker at the first instant."""
+    psi = rocker(0.0, np, np.arctan2)
+    coupler = math.atan2(CD * math.sin(psi) - AB / 2, AD + CD * math.cos(psi) - AB * math.sqrt(3) / 2)
+    return np.array([coupler, psi])
+
+
+def closure(time: Any, unknown: Any) -> Any:
+    """Return the loop equations in the angles of coupler and rocker, for CasADi."""
+    import casadi
+
     theta = math.pi / 6 + math.pi / 3 * casadi.sin(math.pi * time)
-    coupler, rocker = unknown[0], unknown[1]
+    coupler, psi = unknown[0], unknown[1]
     return casadi.vertcat(
-        AB * casadi.cos(theta) + BC * casadi.cos(coupler) - AD - CD * casadi.cos(rocker),
-        AB * casadi.sin(theta) + BC * casadi.sin(coupler) - CD * casadi.sin(rocker),
+        AB * casadi.cos(theta) + BC * casadi.cos(coupler) - AD - CD * casadi.cos(psi),
+        AB * casadi.sin(theta) + BC * casadi.sin(coupler) - CD * casadi.sin(psi),
     )
 
 
-def compiled(function, folder: Path):
-    """Return a CasADi function compiled by gcc, mapped over all instants."""
-    generator = casadi.CodeGenerator(f"{function.name()}.c")
-    generator.add(function)
-    generator.generate(f"{folder}/")
-    library = folder / f"{function.name()}.so"
-    source = folder / f"{function.name()}.c"
-    subprocess.check_call(["gcc", "-fPIC", "-shared", "-O3", "-march=native", str(source), "-o", str(library), "-lm"])
-    return casadi.external(function.name(), str(library)).map(INSTANTS)
+def general_route() -> Any:
+    """Return the angle and four derivatives by CasADi's implicit function and directional derivatives."""
+    import casadi
 
-
-def general_route(start, folder: Path):
-    """Return the output angle and four derivatives by CasADi's implicit function and directional derivatives."""
     unknown, t = casadi.SX.sym("x", 2), casadi.SX.sym("t")
     residual = casadi.Function("residual", [unknown, t], [closure(t, unknown)])
-    options = {"abstol": 1e-14, "abstolStep": 1e-14}
-    finder = casadi.rootfinder("finder", "fast_newton", residual, options)
+    finder = casadi.rootfinder("finder", "fast_newton", residual, {"abstol": 1e-14, "abstolStep": 1e-14})
     time = casadi.MX.sym("t")
-    results = [finder(start, time)[1]]
+    results = [finder(start(), time)[1]]
     for _ in range(4):
         results.append(casadi.jtimes(results[-1], time, casadi.MX(1)))
-    return compiled(casadi.Function("general", [time], results), folder)
+    return casadi.Function("general", [time], results)
 
 
-def specialised_route(start, folder: Path):
+def specialised_route() -> Any:
     """Return the same by seven unrolled Newton steps and a total derivative written for two unknowns."""
+    import casadi
+
     unknown, t = casadi.SX.sym("x", 2), casadi.SX.sym("t")
     residual = closure(t, unknown)
     jacobian = casadi.jacobian(residual, unknown)
     determinant = jacobian[0, 0] * jacobian[1, 1] - jacobian[0, 1] * jacobian[1, 0]
 
-    def solve(b):
+    def solve(b: Any) -> Any:
         first = jacobian[1, 1] * b[0] - jacobian[0, 1] * b[1]
         second = jacobian[0, 0] * b[1] - jacobian[1, 0] * b[0]
         return casadi.vertcat(first / determinant, second / determinant)
@@ -75,35 +79,57 @@ def specialised_route(start, folder: Path):
         rates.append(casadi.jacobian(rates[-1], t) + casadi.jtimes(rates[-1], unknown, rates[0]))
     newton = casadi.Function("newton", [unknown, t], [unknown - solve(residual)])
     derivatives = casadi.Function("derivatives", [unknown, t], [rate[1] for rate in rates])
-    position = casadi.SX(start)
+    position = casadi.SX(start())
     for _ in range(7):
         position = newton(position, t)
-    results = [position[1], *derivatives(position, t)]
-    return compiled(casadi.Function("specialised", [t], results, {"cse": True}), folder)
+    return casadi.Function("specialised", [t], [position[1], *derivatives(position, t)], {"cse": True})
 
 
-def main() -> None:
-    """Print the ratios; the aim is 1 at most, beside the general route."""
-    mechanism = jn.load(Path(__file__).parents[1] / "examples" / "four_bar.yaml")
-    time = np.arange(INSTANTS) * 2.0 / INSTANTS
-    motion = jn.solve(mechanism, time)
-    psi = motion.outputs["psi"][0, 0]
-    tip = np.array([AD + CD * math.cos(psi), CD * math.sin(psi)])
-    pin = np.array([AB * math.cos(math.pi / 6), AB * math.sin(math.pi / 6)])
-    start = np.array([math.atan2(*(tip - pin)[::-1]), psi])
-    row = casadi.DM(time).T
-    with tempfile.TemporaryDirectory() as folder:
-        general, specialised = (route(start, Path(folder)) for route in (general_route, specialised_route))
-        reference = np.array([np.array(column).ravel() for column in general(row)]).T
-        difference = np.max(np.abs(motion.outputs["psi"] - reference) / np.max(np.abs(reference), axis=0), axis=0)
-        print("largest difference from CasADi, normalised, position to jounce:", *(f"{d:.1e}" for d in difference))
-        competitors = {
-            GENERAL: lambda: general(row),
-            "CasADi, specialised by hand to this mechanism, C code": lambda: specialised(row),
-            "jounce.solve of the mechanism file": lambda: jn.solve(mechanism, time),
-        }
-        report(f"four-bar, {INSTANTS} instants, one core", race(competitors), INSTANTS, GENERAL)
+def casadi_run(route: Callable[[], Any], time: np.ndarray) -> Callable[[], Any]:
+    """Return the function that CasADi is timed by: C code mapped over all instants."""
+    import casadi
+
+    (function,), row = compiled([route()], len(time)), casadi.DM(time).T
+    return lambda: function(row)
 
 
-if __name__ == "__main__":
-    main()
+def sympy_run(time: np.ndarray) -> Callable[[], Any]:
+    """Return NumPy code of the closed form and its four derivatives, with common subexpressions."""
+    import sympy
+
+    t = sympy.Symbol("t")
+    levels = [rocker(t, sympy, sympy.atan2)]
+    for _ in range(4):
+        levels.append(sympy.diff(levels[-1], t))
+    function = sympy.lambdify(t, levels, "numpy", cse=True)
+    return lambda: function(time)
+
+
+def cases(quick: bool) -> Cases:
+    """Yield the grid of the file, and a long one."""
+    mechanism = jn.load(EXAMPLES / "four_bar.yaml")
+    for count in (201, 2001 if quick else 10_001):
+        time = np.linspace(0.0, 2.0, count)
+        error = error_of("four_bar", time, "psi")
+
+        def of_columns(found: Any, error: Any = error) -> float:
+            return error(np.stack([np.array(x).ravel() for x in found], axis=1))
+
+        def of_motion(motion: Any, error: Any = error) -> float:
+            return error(motion.outputs["psi"])
+
+        def by(route: Callable[..., Any], time: np.ndarray = time) -> Callable[[], Any]:
+            return lambda: casadi_run(route, time)
+
+        yield Case(
+            f"four-bar to jounce, {count:,} instants",
+            [
+                Contestant("jounce", ready(lambda time=time: jn.solve(mechanism, time)), of_motion),
+                Contestant("CasADi rootfinder and jtimes, C code", by(general_route), of_columns, "casadi", aim=1.0),
+                Contestant("CasADi, specialised by hand, C code", by(specialised_route), of_columns, "casadi"),
+                Contestant("SymPy, closed form, NumPy", lambda time=time: sympy_run(time), of_columns, "sympy"),
+            ],
+            count=count,
+            unit="instant",
+            reference=KINEMATIC,
+        )

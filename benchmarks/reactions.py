@@ -1,37 +1,34 @@
-"""Multipliers of a slider-crank with two rates, beside a hand-written NumPy solver that differences them.
+"""Torque of a slider-crank's driver with two rates, beside a hand-written NumPy solver that differences multipliers.
 
 The peer is what one writes without this package: positions in closed form, the Jacobian and gamma of this one mechanism
 by hand, NumPy's batched LAPACK, and rates from central differences of fourth order of the multipliers, which take four
 more solves of every instant. jounce reads a file and takes no difference. Both are vectorised over all instants.
-Run: ``python benchmarks/reactions.py``.
 """
 
 import dataclasses
-from pathlib import Path
+from typing import Any
 
-from timing import race, report, use_one_core
+import numpy as np
+from mpmath import mp, mpf
 
-use_one_core()
+import jounce as jn
+from benchmarks.cases import EXAMPLES, Case, Cases, Contestant, ready
+from benchmarks.references import largest_error
+from tests.oracles.mp_series import Series, cos, sin, sqrt
 
-import numpy as np  # noqa: E402
-
-import jounce as jn  # noqa: E402
-
-INSTANTS = 10_000
 R, L, E = 0.05, 0.15, 0.01  # m: crank, rod, offset of the slider
 MASS, INERTIA, GRAVITY = (1.2, 0.8, 2.0), (0.002, 0.003, 0.001), 9.81
-TAU = 1.0
-PEER = "NumPy by hand: torque, and two rates by differences"
+STEP = 1e-3  # s, of the differences: a larger one is worse for the first rate, a smaller one for the second
 
 
-def law(t):
+def law(t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the crank angle and two derivatives."""
-    w = 2 * np.pi / TAU
+    w = 2 * np.pi
     s, c = np.sin(w * t), np.cos(w * t)
     return np.pi / 6 + w * t + 0.3 * s, w + 0.3 * w * c, -0.3 * w * w * s
 
 
-def solved_by_hand(t):
+def solved_by_hand(t: np.ndarray) -> np.ndarray:
     """Return the multipliers of all nine constraints, the driver's last, shape (instants, 9).
 
     Coordinates are x, y, angle of crank (about its pin), rod and slider; centres of mass lie in the origins.
@@ -39,8 +36,7 @@ def solved_by_hand(t):
     theta, speed, acceleration = law(t)
     s, c = np.sin(theta), np.cos(theta)
     sine = (E - R * s) / L
-    phi = np.arcsin(sine)
-    cosine = np.cos(phi)
+    cosine = np.cos(np.arcsin(sine))
     n = len(t)
     jacobian = np.zeros((n, 9, 9))
     jacobian[:, 0, 0] = jacobian[:, 1, 1] = 1.0  # A
@@ -66,17 +62,17 @@ def solved_by_hand(t):
     return np.linalg.solve(np.swapaxes(jacobian, 1, 2), load[..., None])[..., 0]
 
 
-def differenced(t, h):
-    """Return the multipliers and two rates by central differences of fourth order."""
-    far, near, here, after, further = (solved_by_hand(t + k * h) for k in (-2, -1, 0, 1, 2))
-    first = (far - 8 * near + 8 * after - further) / (12 * h)
-    second = (-far + 16 * near - 30 * here + 16 * after - further) / (12 * h * h)
-    return here, first, second
+def differenced(t: np.ndarray) -> np.ndarray:
+    """Return the torque and two rates by central differences of fourth order, shape (instants, 3)."""
+    far, near, here, after, further = (-solved_by_hand(t + k * STEP)[:, 8] for k in (-2, -1, 0, 1, 2))
+    first = (far - 8 * near + 8 * after - further) / (12 * STEP)
+    second = (-far + 16 * near - 30 * here + 16 * after - further) / (12 * STEP * STEP)
+    return np.stack([here, first, second], axis=1)
 
 
-def mechanism():
+def mechanism() -> jn.Mechanism:
     """Return the example with masses, its centres of mass in the origins of the bodies."""
-    bare = jn.load(Path(__file__).parents[1] / "examples" / "slider_crank.yaml")
+    bare = jn.load(EXAMPLES / "slider_crank.yaml")
     bodies = {
         name: dataclasses.replace(body, mass=mass, inertia=inertia)
         for (name, body), mass, inertia in zip(bare.bodies.items(), MASS, INERTIA, strict=True)
@@ -84,32 +80,51 @@ def mechanism():
     return dataclasses.replace(bare, bodies=bodies, outputs={}, gravity=[0.0, -GRAVITY])
 
 
-def torque(motion):
-    """Return the driver's torque and its rates, computed anew."""
-    motion.derived.clear()
-    return jn.driver_force(motion, "theta").values
+def exact(time: np.ndarray) -> np.ndarray:
+    """Return the torque and two rates in fifty digits: power is the rate of the energy, (instants, 3)."""
+
+    def torque(t: float) -> list[Any]:
+        lapse = Series([mpf(float(t)), mpf(1), *[mpf(0)] * 3])
+        theta = lapse * (2 * mp.pi) + 0.3 * sin(lapse * (2 * mp.pi)) + mp.pi / 6
+        sine = (E - R * sin(theta)) / L
+        rise, cosine = R * sin(theta), sqrt(1 - sine * sine)  # of the crank's end; of the rod's angle
+        speed, across = theta.differentiate(), (R * cos(theta)).differentiate()
+        turn = sine.differentiate() / Series(cosine.c[:-1])
+        along = (R * cos(theta) + L * cosine).differentiate()
+        up = rise.differentiate()
+        squares = (INERTIA[0] / 2, speed), (INERTIA[1] / 2, turn), (MASS[1] / 2, across), (MASS[1] / 2, up)
+        kinetic = sum((x * x * size for size, x in squares), along * along * (MASS[2] / 2))
+        energy = kinetic + Series(rise.c[:-1]) * (MASS[1] * GRAVITY)
+        return (energy.differentiate() / Series(speed.c[:-1])).derivatives()
+
+    with mp.workdps(50):
+        return np.array([[float(x) for x in torque(t)] for t in time])
 
 
-def main() -> None:
-    """Print the errors of the differences and the ratios of time."""
+def cases(quick: bool) -> Cases:
+    """Yield the torque with two rates of a solved motion, and with its solution."""
     model = mechanism()
-    time = np.linspace(0.0, 2 * TAU, INSTANTS)
+    time = np.linspace(0.0, 2.0, 2001 if quick else 10_001)
     motion = jn.solve(model, time, order=4)
-    exact = torque(motion)
-    sizes = np.abs(exact).max(axis=0)
-    by_hand = -solved_by_hand(time)[:, 8]  # the driver's multiplier is minus its torque
-    print(f"torque, largest difference from NumPy, normalised: {np.abs(by_hand - exact[:, 0]).max() / sizes[0]:.1e}")
-    for h in (1e-2, 1e-3, 1e-4):
-        errors = [np.abs(-part[:, 8] - exact[:, k]).max() / sizes[k] for k, part in enumerate(differenced(time, h))]
-        print(f"differences with h = {h:g} s: yank off by {errors[1]:.1e}, second rate by {errors[2]:.1e}")
-    competitors = {
-        PEER: lambda: differenced(time, 1e-3),
-        "NumPy by hand: torque only": lambda: solved_by_hand(time),
-        "jounce: torque, yank, second rate of a solved motion": lambda: torque(motion),
-        "jounce: the same with the solve of the motion to jounce": lambda: torque(jn.solve(model, time, order=4)),
+    expected, lanes = exact(time[::400]), slice(None, None, 400)
+
+    def torque(motion: Any) -> Any:
+        motion.derived.clear()  # computed anew
+        return jn.driver_force(motion, "theta").values
+
+    def error(found: Any) -> float:
+        return largest_error(found[lanes], expected)
+
+    peer = Contestant("NumPy by hand, rates by differences", ready(lambda: differenced(time)), error)
+    ours = {
+        "of a solved motion": lambda: torque(motion),
+        "with the solution to jounce": lambda: torque(jn.solve(model, time, order=4)),
     }
-    report(f"slider-crank, {INSTANTS} instants, one core", race(competitors), INSTANTS, PEER)
-
-
-if __name__ == "__main__":
-    main()
+    for what, run in ours.items():
+        yield Case(
+            f"driver torque and two rates of a slider-crank, {what}, {len(time):,} instants",
+            [Contestant("jounce", ready(run), error), peer],
+            count=len(time),
+            unit="instant",
+            reference="the power balance in fifty digits, by the peak of each derivative",
+        )

@@ -1,54 +1,79 @@
-"""RSUR mechanism to jounce over 10,000 instants, positions included, beside the bare linear algebra that it needs.
+"""RSUR mechanism to jounce, positions included, beside the bare linear algebra that it needs.
 
-The base is one batched LU factorisation and four solves of the same 18 x 18 systems, by LAPACK through JAX, on
-Jacobians that are already there. Run: ``python benchmarks/rsur.py``
+The base is one LU factorisation and four solves of 18 x 18 systems that are already there, by LAPACK through JAX, in
+blocks of 512 that stay in the cache.
 """
 
-from pathlib import Path
+from collections.abc import Callable
+from typing import Any
 
-from timing import race, report, use_one_core
+import jax
+import jax.numpy as jnp
+import numpy as np
 
-use_one_core()
+import jounce as jn
+from benchmarks.cases import EXAMPLES, Case, Cases, Contestant, ready
+from benchmarks.references import KINEMATIC, error_of
 
-import jax  # noqa: E402
-import jax.numpy as jnp  # noqa: E402
-import numpy as np  # noqa: E402
-
-import jounce as jn  # noqa: E402
-
-INSTANTS, ORDER = 10_000, 4
+SIZE, SOLVES, BLOCK = 18, 4, 512
 
 
-def bare_linear_algebra(size: int):
-    """Return a function that factors and solves random systems of the same size, all at once."""
+def bare_linear_algebra(blocks: int, width: int) -> Callable[[], Any]:
+    """Return a function that factors and solves random systems of known solutions, one block after another.
+
+    It returns the largest error of a solution, by which it is judged.
+    """
     generator = np.random.default_rng(0)
-    matrices = jnp.asarray(generator.normal(size=(INSTANTS, size, size)))
-    right_sides = jnp.asarray(generator.normal(size=(ORDER, INSTANTS, size, 1)))
+    matrices = jnp.asarray(generator.normal(size=(blocks, width, SIZE, SIZE)))
+    solutions = jnp.asarray(generator.normal(size=(blocks, SOLVES, width, SIZE, 1)))
+    right_sides = matrices[:, None] @ solutions
     triangular_solve = jax.lax.linalg.triangular_solve
 
-    @jax.jit
-    def factor_and_solve(matrices, right_sides):
+    def block(systems: Any) -> Any:
+        matrices, right_sides = systems
         lu, _, permutation = jax.lax.linalg.lu(matrices)
-        solutions = []
-        for right in right_sides:
+
+        def solved(right: Any) -> Any:
             y = jnp.take_along_axis(right, permutation[..., None], 1)
             y = triangular_solve(lu, y, left_side=True, lower=True, unit_diagonal=True)
-            solutions.append(triangular_solve(lu, y, left_side=True, lower=False))
-        return solutions
+            return triangular_solve(lu, y, left_side=True, lower=False)
 
-    return lambda: jax.block_until_ready(factor_and_solve(matrices, right_sides))
+        return jnp.stack([solved(right) for right in right_sides])
 
+    factored_and_solved = jax.jit(lambda matrices, right_sides: jax.lax.map(block, (matrices, right_sides)))
 
-def main() -> None:
-    """Print the ratio; the aim is 3 at most."""
-    mechanism = jn.load(Path(__file__).parents[1] / "examples" / "rsur.yaml")
-    time = np.linspace(0.0, 2.0, INSTANTS)
-    competitors = {
-        "bare LU and four solves of 18 x 18": bare_linear_algebra(18),
-        "jounce.solve to jounce, positions included": lambda: jn.solve(mechanism, time, order=ORDER),
-    }
-    report(f"RSUR, {INSTANTS} instants, one core", race(competitors), INSTANTS, "bare LU and four solves of 18 x 18")
+    def run() -> Any:
+        return jax.block_until_ready(factored_and_solved(matrices, right_sides))
+
+    run.solutions = solutions  # type: ignore[attr-defined]
+    return run
 
 
-if __name__ == "__main__":
-    main()
+def cases(quick: bool) -> Cases:
+    """Yield the grid of the file, and a long one."""
+    mechanism = jn.load(EXAMPLES / "rsur.yaml")
+    for count in (201, 2001 if quick else 10_001):
+        time = np.linspace(0.0, 2.0, count)
+        error = error_of("rsur", time, "psi")
+        blocks, width = -(-count // BLOCK), min(count, BLOCK)
+        base = bare_linear_algebra(blocks, width)
+        yield Case(
+            f"RSUR to jounce, {count:,} instants",
+            [
+                Contestant(
+                    "jounce, positions included",
+                    ready(lambda time=time: jn.solve(mechanism, time)),
+                    lambda motion, error=error: error(motion.outputs["psi"]),
+                ),
+                Contestant(
+                    f"LAPACK: LU and {SOLVES} solves in blocks of {width}, Jacobians given",
+                    ready(base),
+                    lambda found, base=base: float(np.abs(found - base.solutions).max()),
+                    count=blocks * width,
+                    aim=2.0,
+                ),
+            ],
+            count=count,
+            unit="instant",
+            reference=f"{KINEMATIC}; of LAPACK against the solutions that its right-hand sides were made from",
+        )

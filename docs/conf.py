@@ -13,7 +13,7 @@ copyright = "The jounce developers, Apache-2.0"
 version = release = importlib.metadata.version("jounce")
 
 extensions = ["mathml", "myst_parser", "numpydoc", "sphinx.ext.autodoc", "sphinx.ext.viewcode"]
-exclude_patterns = ["_build", "_ext"]
+exclude_patterns = ["_build", "_ext", "benchmarks"]
 source_suffix = {".md": "markdown"}
 
 html_theme = "furo"

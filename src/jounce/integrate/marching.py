@@ -81,7 +81,7 @@ class DenseOutput(NamedTuple):
 def unexpanded(equations: Equations, state: State, time: Lanes, *, order: int) -> IntegratorState:
     """Return what `begin_march` does, but for the expansion, which is left to `march`: one large program less."""
     *_, bodies, lanes = state.position.shape
-    size, columns = equations.system.cells.shape
+    size, columns = equations.system.shape
     series = state.map(lambda c: begun_series([c], order + 1))
     rates = jnp.zeros((1, columns // bodies, bodies, lanes)), jnp.zeros((1, size, lanes))
     blank, nothing, none = (

@@ -19,6 +19,7 @@ import numpy as np
 from jax.core import Tracer
 from jax.experimental import serialize_executable
 
+from jounce.kinematics.device import on_processor
 from jounce.kinematics.structure import UndescribedError, being_debugged, program_key, settings
 from jounce.mechanism.preconditions import check_process
 
@@ -68,15 +69,17 @@ def keep_programs(store: Store | None) -> None:
     _store = store
 
 
-@lru_cache(maxsize=1)
 def compiler_options() -> dict[str, Any] | None:
     """Return options that halve XLA's compile time of long chains of small operations, without making them slower.
 
-    They are private to XLA, and a release that does not know them refuses them: then there are none.
+    They are private to XLA, and a release that does not know them refuses them: then there are none, as on a GPU.
     """
+    return _processor_options() if on_processor() else None
+
+
+@lru_cache(maxsize=1)
+def _processor_options() -> dict[str, Any] | None:
     options = {"xla_cpu_use_fusion_emitters": False}
-    if jax.default_backend() != "cpu":
-        return None
     try:
         jax.jit(lambda: 0.0, compiler_options=options).lower().compile()
     except (RuntimeError, ValueError):  # jax.errors.JaxRuntimeError is a RuntimeError

@@ -15,13 +15,13 @@ from jaxtyping import Bool, Float, Int
 from jounce.kinematics.advance import Arrival, SolvedState
 from jounce.kinematics.change_points import LARGEST_DISAGREEMENT, bridged, half_width, spoiled_width
 from jounce.kinematics.path_following import (
-    LARGE_BATCH,
     PASSABLE,
     SMALL_BATCH,
     ChangePoint,
     FollowedPath,
     Solver,
     follow,
+    large_batch,
 )
 from jounce.kinematics.status import Status
 from jounce.kinematics.threads import Threads
@@ -71,7 +71,7 @@ class GridSolver:
         """
         count = len(self.time)
         reached = self.time < self.path.ended_at
-        width = LARGE_BATCH if count > LONG_GRID else SMALL_BATCH
+        width = large_batch() if count > LONG_GRID else SMALL_BATCH
         left = reached & (self.status != Status.OK)
         done = count - int(np.count_nonzero(left))
         with Threads(threads) as pool:

@@ -16,6 +16,7 @@ import numpy as np
 from jaxtyping import Float, Int, Shaped
 
 from jounce.kinematics.advance import Arrival, SolvedState, advance, predictor
+from jounce.kinematics.device import on_processor
 from jounce.kinematics.legs import Ending, Leg, Limits, Place, Settings, Way, leg
 from jounce.kinematics.status import Status
 from jounce.mechanism import Model
@@ -31,7 +32,13 @@ PLACES = 8  # in each step at which attitudes are looked at for turns: nowhere b
 SMALL_BATCH, LARGE_BATCH = 16, 512  # lanes; a batch width compiles once, so a short grid uses one, and so do anchors
 LONGEST_LEG = 32  # batches
 LEG_ENTRIES = 2**19  # of what a leg keeps: a large mechanism has shorter ones
+GPU_BATCH = 2**15  # the large one of a GPU
 NO_GRID = np.empty(0)
+
+
+def large_batch() -> int:
+    """Return how many instants of a long grid are solved side by side on the device that JAX computes on."""
+    return LARGE_BATCH if on_processor() else GPU_BATCH
 
 
 @dataclasses.dataclass(frozen=True)
@@ -61,7 +68,7 @@ class Solver:
             way = _way(known, (0.0,) * 4, away=step, instant=instant, planned=True)
             arrival = self._leg(way, NO_GRID, _limits(0.0, 0.0, 1), survey=survey).last
         else:
-            filled = jax.tree.map(lambda x: _filled(x, LARGE_BATCH), (*self._predictor(known), step, instant))
+            filled = jax.tree.map(lambda x: _filled(x, large_batch()), (*self._predictor(known), step, instant))
             settings = self._settings._replace(survey=np.asarray(survey))
             arrival = advance(self.model.system, *filled, *settings, pose_type=self.model.pose_type, order=self.order)
         return jax.tree.map(lambda x: np.asarray(x)[..., :lanes], arrival)

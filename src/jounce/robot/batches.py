@@ -12,12 +12,14 @@ from jax.core import Tracer
 
 from jounce.jet.derivatives import plain_derivatives, taylor_coefficients
 from jounce.kinematics.compilation import Compiled
+from jounce.kinematics.device import on_processor
 from jounce.kinematics.threads import Threads, thread_count
 from jounce.mechanism.preconditions import check_process
 from jounce.robot.abstract_robot import AbstractRobot
 
-CHUNK = 128  # samples that are computed side by side
+CHUNK = 128  # samples that are computed side by side; a GPU computes a block at once
 WIDTHS = (8, CHUNK, 16 * CHUNK)  # sizes of blocks: each compiles once for a kind of robot
+GPU_WIDTHS = (CHUNK, 2**12, 2**17)
 
 
 class Batched:
@@ -70,7 +72,7 @@ class Batched:
 
     def _chunks(self, tree: Any, arrays: tuple[Any, ...], constants: Any, static: tuple[Any, ...]) -> Any:
         width = arrays[0].shape[0]
-        if width <= CHUNK:
+        if width <= CHUNK or not on_processor():
             return self._block(tree, arrays, constants, static)
         parts = tuple(jnp.reshape(x, (width // CHUNK, CHUNK, *x.shape[1:])) for x in arrays)
         found = jax.lax.map(lambda part: self._block(tree, part, constants, static), parts)
@@ -85,7 +87,8 @@ class Batched:
 def _blocks(arrays: tuple[np.ndarray, ...]) -> list[tuple[np.ndarray, ...]]:
     """Cut arrays of samples into blocks of one of the known widths; the last one is filled up with zeros."""
     count, start, blocks = len(arrays[0]), 0, []
-    small, middle, large = WIDTHS  # half of a large block at least is in use, so that no more than twice is computed
+    small, middle, large = WIDTHS if on_processor() else GPU_WIDTHS
+    # half of a large block at least is in use, so that no more than twice is computed
     width = small if count <= small else middle if count <= large // 2 else large
     while start < count or not blocks:
         left = count - start

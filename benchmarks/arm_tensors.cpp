@@ -1,5 +1,5 @@
 // Torque of a chain of revolute joints and its two exact rates by Pinocchio in C++: the first rate from the first
-// derivatives of inverse dynamics, the second from their tensors of second order. Built and called by robot_arm.py.
+// derivatives of inverse dynamics, the second from their tensors of second order. Built and called by arm.py.
 
 // What Pinocchio's own build files define, without which Boost's lists are too short for its joints.
 #define BOOST_MPL_CFG_NO_PREPROCESSED_HEADERS

@@ -3,11 +3,11 @@
 Sommer 2024, section 7, reports about ten times the accuracy from integrating jerk together with acceleration. Compared
 here at the same steps, all projected onto the constraints in the same way: the trapezoidal rule (accelerations of both
 ends), the classical Runge-Kutta method (four accelerations, order 4 as well), and Obreshkov of order 4, which is the
-trapezoidal rule with jerk of both ends. Errors are the largest of all angles over the run, against Taylor series at
-rounding. Prints a table and draws docs/images/obreshkov.png. Run: ``python benchmarks/obreshkov.py``.
+trapezoidal rule with jerk of both ends. Errors are the largest of all angles over the run.
 """
 
-from pathlib import Path
+from collections.abc import Callable
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -15,14 +15,14 @@ import jax.numpy as jnp
 import numpy as np
 
 import jounce as jn
+from benchmarks.cases import Case, Cases, Contestant, ready
 from jounce import drivers, planar
 from jounce.dynamics.forward import State
 from jounce.integrate import AbstractMethod
 from jounce.integrate.diffrax_term import state_rates
 
-FIGURE = Path(__file__).parents[1] / "docs" / "images" / "obreshkov.png"
 GRID = np.linspace(0.0, 1.0, 17)  # s
-STEPS = [1 / 16 / n for n in (1, 2, 4, 8, 16, 32)]  # s; all end on the grid
+STEPS = tuple(1 / 16 / n for n in (1, 2, 4, 8, 16, 32))  # s; all end on the grid
 
 
 class RungeKutta(AbstractMethod):
@@ -60,10 +60,10 @@ class RungeKutta(AbstractMethod):
         return jnp.zeros_like(step)
 
 
-METHODS = {
+METHODS: dict[str, Callable[[float], AbstractMethod]] = {
+    "with jerk: Obreshkov, order 4": lambda step: jn.Obreshkov(4, step=step),
     "acceleration: trapezoidal rule, order 2": lambda step: jn.Obreshkov(2, step=step),
     "acceleration: Runge-Kutta, order 4": RungeKutta,
-    "with jerk: Obreshkov, order 4": lambda step: jn.Obreshkov(4, step=step),
 }
 
 
@@ -115,59 +115,28 @@ def slider_crank():
     )
 
 
-def measured(mechanism):
-    """Return the errors of all methods at all steps, rad."""
+def cases(quick: bool) -> Cases:
+    """Yield both mechanisms at each step, the method with jerk first."""
+    for title, mechanism in (("four-bar", four_bar()), ("slider-crank", slider_crank())):
 
-    def angles(method):
-        motion = jn.simulate(mechanism, GRID, 1, method=method)
-        return np.stack([motion.outputs[name][:, 0] for name in mechanism.outputs])
+        def angles(method: AbstractMethod, mechanism: jn.Mechanism = mechanism) -> np.ndarray:
+            motion = jn.simulate(mechanism, GRID, 1, method=method)
+            return np.stack([motion.outputs[name][:, 0] for name in mechanism.outputs])
 
-    exact = angles(jn.Taylor())
-    return {
-        name: np.array([np.max(np.abs(angles(method(step)) - exact)) for step in STEPS])
-        for name, method in METHODS.items()
-    }
+        exact = angles(jn.Taylor())
 
+        def error(found: Any, exact: np.ndarray = exact) -> float:
+            return float(np.abs(found - exact).max())
 
-def main():
-    """Measure, print and draw."""
-    results = {"four-bar": measured(four_bar()), "slider-crank": measured(slider_crank())}
-    for title, errors in results.items():
-        trapezoid, classical, jerk = errors.values()
-        print(f"{title}, largest error of an angle in 1 s, rad")
-        print(f"  {'step, ms':>9} {'trapezoid':>10} {'Runge-Kutta':>12} {'with jerk':>10} {'ratios':>14}")
-        for step, a, b, c in zip(STEPS, trapezoid, classical, jerk, strict=True):
-            print(f"  {step * 1e3:9.3f} {a:10.1e} {b:12.1e} {c:10.1e} {a / c:8.1f} {b / c:6.1f}")
-    draw(results)
+        for step in STEPS[:1] if quick else STEPS:
 
+            def by(method: Callable[[float], AbstractMethod], step: float = step, angles: Any = angles) -> Any:
+                return ready(lambda: angles(method(step)))
 
-def draw(results):
-    """Draw errors, and how many times smaller they are with jerk, against the step."""
-    from jounce.plot.style import COLOURS, GREY, RESOLUTION, blank_figure, style
-
-    with style():
-        figure = blank_figure(8.0, 6.0)
-        panels = figure.subplots(2, 2, sharex=True, sharey="row")
-        looks = list(zip(COLOURS, "osD", strict=True))
-        steps = np.array(STEPS) * 1e3
-        for (above, below), (title, errors) in zip(panels.T, results.items(), strict=True):
-            jerk = list(errors.values())[-1]
-            for (name, values), (colour, marker) in zip(errors.items(), looks, strict=True):
-                above.loglog(steps, values, color=colour, marker=marker, label=name)
-                if values is not jerk:
-                    below.loglog(steps, values / jerk, color=colour, marker=marker, label=name)
-            above.set_title(f"Free {title} under gravity")
-            below.axhline(10, color=GREY, linewidth=0.8, linestyle="--")
-            below.text(steps[-1], 10, "ten, as claimed", color=GREY, va="bottom")
-            below.set_xlabel("step  (ms)")
-            below.set_xticks(steps, [f"{step:.3g}" for step in steps])
-            below.minorticks_off()
-        panels[0, 0].set_ylabel("largest error of an angle in 1 s  (rad)")
-        panels[1, 0].set_ylabel("times the error with jerk")
-        panels[0, 0].legend()
-        figure.savefig(FIGURE, dpi=RESOLUTION)
-    print(f"drawn: {FIGURE}")
-
-
-if __name__ == "__main__":
-    main()
+            yield Case(
+                f"{title} of rods, steps of {step * 1e3:.3g} ms",
+                [Contestant(name, by(method), error) for name, method in METHODS.items()],
+                reference="Taylor series of this library at rounding, the largest of all angles, rad",
+                rounds=3,
+                at={"step": step},
+            )

@@ -1,0 +1,76 @@
+"""All cores of the machine beside one, each in a process of its own; and several threads of one process."""
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+
+from benchmarks.cases import EXAMPLES, Case, Cases, Contestant
+from benchmarks.processes import Worker
+
+
+def solve(name: str, instants: int, threads: int) -> Callable[[], Any]:
+    """Return what solves a mechanism in so many threads at once; within a worker."""
+    import jounce as jn
+
+    mechanism, time = jn.load(EXAMPLES / f"{name}.yaml"), np.linspace(0.0, 2.0, instants)
+    return _at_once(lambda: jn.solve(mechanism, time).outputs["psi"], threads)
+
+
+def torques(samples: int, threads: int) -> Callable[[], Any]:
+    """Return what computes the panda's torque and two rates in so many threads at once; within a worker."""
+    import jounce as jn
+    from benchmarks.arm import arm, motion
+
+    robot, (q, _) = arm(), motion(samples)
+    return _at_once(lambda: jn.inverse_dynamics(robot, q), threads)
+
+
+def _at_once(work: Callable[[], Any], threads: int) -> Callable[[], Any]:
+    if threads == 1:
+        return work
+    pool = ThreadPoolExecutor(threads)
+    return lambda: [future.result() for future in [pool.submit(work) for _ in range(threads)]].pop()
+
+
+def cases(quick: bool) -> Cases:
+    """Yield grids and batches; errors are how far results are from those of one core."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    instants, samples = (5_000, 5_000) if quick else (100_000, 100_000)
+    works = {
+        f"four-bar to jounce, {instants:,} instants": ("solve", ("four_bar", instants), instants),
+        f"RSUR to jounce, {instants:,} instants": ("solve", ("rsur", instants), instants),
+        f"torque and two rates of the panda, {samples:,} samples": ("torques", (samples,), samples),
+    }
+    for name, (task, arguments, count) in works.items():
+        known: dict[str, Any] = {}
+
+        def contestant(
+            title: str,
+            threads: int,
+            given: int | None,
+            of: tuple[str, Any, int] = (task, arguments, count),
+            known: Any = known,
+        ) -> Contestant:
+            task, arguments, count = of
+
+            def error(found: Any) -> float:
+                return float(np.abs(found - known.setdefault("first", found)).max())
+
+            worker = lambda: Worker(f"benchmarks.cores:{task}", *arguments, threads, cores=given).run  # noqa: E731
+            return Contestant(title, worker, error, count=count * threads)
+
+        yield Case(
+            name,
+            [
+                contestant(f"jounce, {cores} cores", 1, None),
+                contestant("jounce, one core", 1, 1),
+                contestant("jounce, two threads at once", 2, None),
+            ],
+            count=count,
+            unit="sample" if task == "torques" else "instant",
+            reference="the first row's results, the largest difference",
+            clock="wall time",
+        )

@@ -1,0 +1,28 @@
+"""Start-up in fresh processes: the command's help, and the import, beside Python and JAX alone."""
+
+import sys
+from collections.abc import Callable
+from typing import Any
+
+from benchmarks.cases import Case, Cases, Contestant, Told, ready
+from benchmarks.processes import command
+
+
+def fresh(*words: str) -> Callable[[], Callable[[], Any]]:
+    """Return what runs Python with these words in a new process."""
+    return ready(lambda: Told(command([sys.executable, *words]).processor))
+
+
+def cases(quick: bool) -> Cases:
+    """Yield the command and the import."""
+    del quick  # there is nothing to make smaller
+    bare = Contestant("Python alone", fresh("-c", "pass"))
+    yield Case("`jounce --help`", [Contestant("jounce", fresh("-m", "jounce", "--help")), bare])
+    yield Case(
+        "`import jounce`",
+        [
+            Contestant("jounce", fresh("-c", "import jounce")),
+            Contestant("`import jax, jax.numpy`", fresh("-c", "import jax, jax.numpy")),
+            bare,
+        ],
+    )
