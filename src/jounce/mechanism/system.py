@@ -189,7 +189,7 @@ class System(eqx.Module):
         """Return the entries of the Jacobian that are not zero for certain, before rows are scaled."""
         frozen = Jet.constant(time.coefficients[0], 1)
         blocks = [b for group in self.groups for b in group.derivative_blocks(pose, frozen, self.column_scale)]
-        return jnp.concatenate([*map(_flat, blocks)])
+        return jnp.concatenate([*map(_flat, blocks), jnp.zeros((0, time.coefficients[0].shape[-1]))])
 
     def admissible(self, time: Jet) -> Bool[Numbers, "driver batch"]:
         """Tell at which instants each driver has a permitted value, shape (drivers, batch)."""
