@@ -27,6 +27,7 @@ from jounce.dynamics.saddle_point import (
 )
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked, total
+from jounce.kinematics.frontal import FrontalFactor
 from jounce.kinematics.linear import DenseFactor
 from jounce.mechanism.system import System, movable, with_rows
 from jounce.rigid.pose import Pose
@@ -152,7 +153,10 @@ def _solver(system: System, blocks: Slopes, mass: BodyMatrices | None) -> Callab
     """Return what solves for the multipliers of scaled rows: by the Jacobian alone where there are no masses."""
     scale = jnp.asarray(system.column_scale)
     flat = [(slope[0] * scale[:, None, None, None]).reshape(-1, slope.shape[-1]) for parts in blocks for slope in parts]
-    jacobian = system.pattern.dense(jnp.concatenate(flat)) * system.row_scale[:, :, None]
+    entries = jnp.concatenate(flat)
+    if mass is None and system.fronts is not None:
+        return FrontalFactor.of(system.fronts, entries, system.row_scale).solve_transposed
+    jacobian = system.pattern.dense(entries) * system.row_scale[:, :, None]
     if mass is None:
         return balancing(None, jacobian)
     whole = block_diagonal(mass, scale)

@@ -25,6 +25,7 @@ from jounce.kinematics import Motion, Status
 from jounce.kinematics.compilation import compiled
 from jounce.mechanism import Model
 from jounce.mechanism.axis_angles import at_lanes
+from jounce.mechanism.pattern import Pattern
 from jounce.mechanism.system import System, with_rows
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
@@ -101,8 +102,8 @@ class MotionForces:
     def multipliers(self) -> np.ndarray:
         """Multipliers of the rows of all residuals, as Taylor coefficients, (levels, rows, time)."""
         system = dataclasses.replace(self.model.system, outputs=())
-        nothing = np.zeros((0, 0), np.int32)
-        unjoined = dataclasses.replace(system, groups=(), cells=nothing, row_scale=np.zeros((0, 1)))
+        nothing = Pattern.of((), (), system.pattern.width, system.body_count)
+        unjoined = dataclasses.replace(system, groups=(), pattern=nothing, row_scale=np.zeros((0, 1)))
         square = system.shape[0] == system.shape[1]
 
         def chunk(lanes: np.ndarray) -> Any:

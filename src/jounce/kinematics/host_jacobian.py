@@ -58,7 +58,7 @@ class HostJacobian:
 
     def finite(self) -> Bool[np.ndarray, " row"]:
         """Tell which rows are finite."""
-        return np.all(np.isfinite(self.blocks), axis=(1, 2))
+        return np.asarray(np.isfinite(self.blocks).all(axis=(1, 2)))
 
     def row_scale(self) -> Float[np.ndarray, " row"]:
         """Return what makes the largest entry of each row one."""
