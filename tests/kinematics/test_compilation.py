@@ -101,6 +101,15 @@ def test_functions_of_users_go_the_ordinary_way(shelf):
     assert not shelf
 
 
+def test_what_cannot_be_written_is_not_kept(shelf, monkeypatch):
+    def refusing(_):
+        raise jax.errors.JaxRuntimeError("UNIMPLEMENTED")
+
+    monkeypatch.setattr(compilation.serialize_executable, "serialize", refusing)
+    assert float(anew()(np.ones(2))["sum"]) == 2.0
+    assert not shelf
+
+
 def test_threads_share_programs(shelf):
     x, found = np.arange(5.0), []
     anew()(x)

@@ -167,11 +167,14 @@ class Compiled:
 
 
 def _packed(program: Any, tree: Any) -> bytes | None:
-    """Return a program as bytes; None where it holds what cannot be written, such as calls into Python."""
+    """Return a program as bytes; None where it holds what cannot be written: calls into Python, or sorts that have run.
+
+    So a program is written before it is run; one that `jax.jit` has run before it was to be kept may be none.
+    """
     try:
         payload, in_tree, out_tree = serialize_executable.serialize(program)
         packed = zlib.compress(pickle.dumps((payload, out_tree)), level=1)
-    except (NotImplementedError, TypeError, ValueError, pickle.PicklingError):
+    except (RuntimeError, TypeError, ValueError, pickle.PicklingError):  # those of XLA are RuntimeErrors
         return None
     return packed if in_tree == tree else None
 
