@@ -10,6 +10,7 @@ from jaxtyping import Float, Int
 from jounce.jet import Jet
 from jounce.jet.derivatives import plain_derivatives
 from jounce.kinematics import Motion, Status
+from jounce.kinematics.threads import Threads, thread_count
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
 
@@ -26,6 +27,8 @@ def in_chunks(
 ) -> Found:
     """Return what a function of indices of instants gives, for all of them; few lengths of chunks are compiled.
 
+    Chunks are computed in several threads at once; the function must let them.
+
     Parameters
     ----------
     function : callable
@@ -38,10 +41,12 @@ def in_chunks(
         Of the instants in the results.
     """
     width = next((width for width in widths if count <= width), widths[-1])
-    parts = []
-    for first in range(0, count, width):
-        found = function(np.minimum(np.arange(first, first + width), count - 1))
-        parts.append(jax.tree.map(np.asarray, found))
+
+    def computed(first: int) -> Any:
+        return jax.tree.map(np.asarray, function(np.minimum(np.arange(first, first + width), count - 1)))
+
+    with Threads(thread_count()) as threads:
+        parts = list(threads.map(computed, range(0, count, width)))
     return jax.tree.map(lambda *xs: np.split(np.concatenate(xs, axis), [count], axis)[0], *parts)
 
 
