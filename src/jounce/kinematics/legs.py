@@ -5,8 +5,8 @@ a singular one on the way, where branches meet and a series that looks smooth ma
 where its determinant vanishes next, to first order, and a step goes only part of that way. A step that is refused is
 halved until it is not, or is too small to be halved. What is out of the ordinary ends the leg and is decided outside.
 
-The first lane of a batch makes the step; the others solve the next instants of the grid that lie within it, in as many
-batches as they need.
+The first lane of a batch makes the step; the others solve the next instants of the grid up to its end. Those that do
+not fit into it are solved from the same anchor, in more batches, or from the next one if they are few.
 """
 
 import enum
@@ -218,11 +218,12 @@ def _after(
     accepted = passable & (way.step * jnp.abs(there.turnover) <= LARGEST_TURNOVER)
     within = accepted & (_next_up(way, grid) <= target)
     lane = jnp.where(within, way.next_up + np.arange(lanes), -1)
-    taken = accepted & ~(grid[way.next_up + lanes] <= target)  # else the same step again, with the instants left
+    way = way._replace(next_up=way.next_up + jnp.sum(within))
+    behind = jnp.sum(_next_up(way, grid) <= target)  # a few are solved from the next anchor, which is near them
+    taken = accepted & (behind <= jnp.where(target < limits.stop, lanes // 2, 0))  # else the same step with those left
     stuck = ~accepted & ((way.step < limits.smallest) | (target <= way.place.instant))
     inadmissible = ~accepted & (status == int(Status.INADMISSIBLE)) & jnp.isnan(way.refused)
     way = way._replace(
-        next_up=way.next_up + jnp.sum(within),
         ending=jnp.where(stuck, int(Ending.REFUSED), int(Ending.UNFINISHED)),
         refused=jnp.where(inadmissible, target, way.refused),
     )
