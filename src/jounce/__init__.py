@@ -43,7 +43,7 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     _import_all()
-    return sorted(globals())
+    return sorted({*globals()["__all__"], *(name for name in globals() if name.startswith("__"))})
 
 
 def _import_all() -> None:

@@ -33,7 +33,7 @@ def documented():
 
 def public():
     """Every public name, as short as it can be written."""
-    top = {n for n in vars(jn) if not n.startswith("_") and not isinstance(getattr(jn, n), types.ModuleType)}
+    top = {n for n in jn.__all__ if not n.startswith("_") and not isinstance(getattr(jn, n), types.ModuleType)}
     names = {f"jounce.{name}" for name in top - ALIASES}
     for package in (*PACKAGES, *CATALOGUES):
         module = getattr(jn, package)

@@ -294,7 +294,7 @@ def _determined(
         mass = mass * scale[:, None] * scale
         mass = mass / (np.max(np.abs(mass)) or 1.0)
         whole = np.asarray(saddle_point(mass[..., None], whole[..., None]))[..., 0]
-    return np.linalg.matrix_rank(whole, rtol=RANK_TOLERANCE) == len(whole)
+    return int(np.linalg.matrix_rank(whole, rtol=RANK_TOLERANCE)) == len(whole)
 
 
 def _mass_matrix(motion: Motion) -> Float[np.ndarray, "time column column"]:
