@@ -17,6 +17,7 @@ from jounce.kinematics.compilation import compiled
 from jounce.kinematics.host_jacobian import RANK_TOLERANCE, HostJacobian, is_clearly_regular
 from jounce.mechanism import Mechanism, Model, build
 from jounce.mechanism.builder import pose_at
+from jounce.mechanism.modules import with_fields
 from jounce.shapes import Numbers
 
 TOLERANCE = 1e-12  # of the assembled positions, rad or sizes of the mechanism
@@ -71,7 +72,7 @@ def consistent_start(mechanism: Mechanism, instant: float) -> ConsistentStart:
     if mechanism.initial:
         whole, coordinates = _assembled(mechanism, instant)
         state = with_rates(equations_of(mechanism, whole), at_rest(whole, coordinates), np.array([[instant]]))
-        system = dataclasses.replace(model.system, forces=whole.system.forces, outputs=whole.system.outputs)
+        system = with_fields(model.system, forces=whole.system.forces, outputs=whole.system.outputs)
         model = dataclasses.replace(
             model, guess=coordinates, system=system, prescribed=whole.prescribed, history=whole.history
         )
@@ -87,7 +88,7 @@ def consistent_start(mechanism: Mechanism, instant: float) -> ConsistentStart:
 def equations_of(mechanism: Mechanism, model: Model) -> Equations:
     """Return the equations of motion of a mechanism."""
     masses = masses_of(mechanism)
-    system, scale = dataclasses.replace(model.system, outputs=()), np.float64(np.max(masses.mass))
+    system, scale = with_fields(model.system, outputs=()), np.float64(np.max(masses.mass))
     saddle = SaddleFronts.of(system.pattern)
     return jax.device_put(Equations(system, masses, gravity_of(mechanism), scale, model.pose_type, saddle))
 

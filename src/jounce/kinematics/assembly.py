@@ -26,6 +26,7 @@ from jounce.kinematics.status import Status
 from jounce.mechanism import Model
 from jounce.mechanism.axis_angles import measures_angle, with_angles, with_datums
 from jounce.mechanism.builder import pose_at, with_reference
+from jounce.mechanism.modules import with_fields
 from jounce.mechanism.system import System
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
@@ -113,7 +114,7 @@ def assemble(model: Model, instant: float, tolerance: float, *, free: bool = Fal
     model, found = _settled(model, instant, tolerance)
     check_assembled(model, found, instant, free=free)
     check_mobility(model, found.jacobian, free=free)
-    system = jax.device_put(dataclasses.replace(model.system, row_scale=found.scale[:, None]))
+    system = jax.device_put(with_fields(model.system, row_scale=found.scale[:, None]))
     return dataclasses.replace(model, system=system), found.coordinates
 
 
@@ -165,7 +166,7 @@ def _turned(model: Model, instant: float, tolerance: float) -> tuple[Model, Coor
             with_angles(with_datums(part, coordinates), history.last_angles(part))
             for part in (model.system.forces, model.system.outputs)
         )
-        system = dataclasses.replace(model.system, forces=forces, outputs=outputs)
+        system = with_fields(model.system, forces=forces, outputs=outputs)
         model = dataclasses.replace(model, system=system, history=history)
     return model, coordinates
 

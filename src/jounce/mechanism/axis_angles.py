@@ -1,6 +1,5 @@
 """Where angles about axes are counted from: the position in which a mechanism was put together, and its turns."""
 
-import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -9,6 +8,7 @@ from jaxtyping import Float, Int
 
 from jounce.constraints.angles import Datum, angle_of
 from jounce.jet.turns import counted_on, principal, whole_periods
+from jounce.mechanism.modules import with_fields
 from jounce.mechanism.system import Group
 from jounce.mechanism.time import nearest_instants
 from jounce.shapes import Numbers
@@ -133,12 +133,12 @@ def _raw_angle(group: Group, attitude: Quaternions) -> Angles:
 
 def with_angles(groups: Sequence[Group], angles: Sequence[np.ndarray]) -> tuple[Group, ...]:
     """Return groups of which the data hold other angles, for those that measure one about an axis."""
-    return _with_data(groups, angles, lambda datum, angle: dataclasses.replace(datum, angle=angle, near=angle))
+    return _with_data(groups, angles, lambda datum, angle: with_fields(datum, angle=angle, near=angle))
 
 
 def with_turns(groups: Sequence[Group], near: Sequence[Any]) -> tuple[Group, ...]:
     """Return groups that measure angles about axes with the turns of these, (instances, batch) each; may be traced."""
-    return _with_data(groups, near, lambda datum, turns: dataclasses.replace(datum, near=turns))
+    return _with_data(groups, near, lambda datum, turns: with_fields(datum, near=turns))
 
 
 def _with_data(groups: Sequence[Group], values: Sequence[Any], put: Callable[[Datum, Any], Datum]) -> tuple[Group, ...]:
@@ -181,7 +181,7 @@ def with_datum_of(group: Group, known: Group) -> Group:
     datum = known.element.datum
     if datum.across is not None:
         across = _across(group.element.vector_j, np.asarray(datum.attitude), axis_of(known))
-        datum = dataclasses.replace(datum, across=across)
+        datum = with_fields(datum, across=across)
     return group.holding("datum", datum)
 
 
