@@ -248,7 +248,7 @@ def _between(attitude: Quaternions, axis: Vectors, first: Vectors, second: Vecto
     """Return the signed angle about an axis from a vector of body i to one of body j."""
     b = _turned(attitude, second)
     across = b - (b * axis).sum(axis=0) * axis
-    return np.arctan2((np.cross(axis, first, axis=0) * across).sum(axis=0), (first * across).sum(axis=0))
+    return np.arctan2((_cross(axis, first) * across).sum(axis=0), (first * across).sum(axis=0))
 
 
 def _across(second: Numbers, attitude: Quaternions, axis: Vectors) -> Numbers:
@@ -259,7 +259,7 @@ def _across(second: Numbers, attitude: Quaternions, axis: Vectors) -> Numbers:
 
 def _sense(bodies: tuple[int, ...], axis: Float[np.ndarray, " 3"], given: PrescribedAngle) -> int:
     """Return 1 where an angle follows that of a driver, -1 where it runs against it, else 0."""
-    if sorted(bodies) != sorted(given.bodies) or np.linalg.norm(np.cross(axis, given.axis)) > PARALLEL:
+    if sorted(bodies) != sorted(given.bodies) or np.linalg.norm(_cross(axis, given.axis)) > PARALLEL:
         return 0
     return int(np.sign(axis @ given.axis)) * (1 if bodies == given.bodies else -1)
 
@@ -270,9 +270,14 @@ def _inverse(p: Quaternions) -> Quaternions:
 
 def _product(p: Quaternions, q: Quaternions) -> Quaternions:
     e0 = p[:1] * q[:1] - (p[1:] * q[1:]).sum(axis=0, keepdims=True)
-    return np.concatenate([e0, p[:1] * q[1:] + q[:1] * p[1:] + np.cross(p[1:], q[1:], axis=0)])
+    return np.concatenate([e0, p[:1] * q[1:] + q[:1] * p[1:] + _cross(p[1:], q[1:])])
 
 
 def _turned(p: Quaternions, vector: Vectors) -> Vectors:
-    twice = 2 * np.cross(p[1:], vector, axis=0)
-    return vector + p[:1] * twice + np.cross(p[1:], twice, axis=0)
+    twice = 2 * _cross(p[1:], vector)
+    return vector + p[:1] * twice + _cross(p[1:], twice)
+
+
+def _cross(a: Vectors, b: Vectors) -> Any:
+    """Return the cross products along the first axis, in a fraction of the time that NumPy's takes for few."""
+    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])

@@ -172,9 +172,7 @@ def with_reference(
     if not any(map(measures_angle, (*system.groups, *system.forces, *system.outputs))):
         return dataclasses.replace(model, reference=coordinates, prescribed=prescribed), 0.0
     groups = with_datums(system.groups, coordinates, keep=keep)
-    motions = [group.element.motion for group in groups if measures_angle(group)]
-    values = [np.asarray(value) for value in _law_values(motions, np.full((1, 1), instant))]
-    prescribed = (*prescribed_angles(groups, coordinates, values), *prescribed)
+    prescribed = (*prescribed_by_drivers(groups, coordinates, instant), *prescribed)
     forces, outputs = (with_datums(part, coordinates, prescribed) for part in (system.forces, system.outputs))
     system = with_fields(system, groups=groups, forces=forces, outputs=outputs)
     away = departure(model.system.groups, groups)
@@ -189,6 +187,17 @@ def counted_as_in(groups: tuple[Group, ...], model: Model) -> tuple[Group, ...]:
     groups = with_datums(groups, first)
     groups = with_angles(with_datums(groups, last), model.history.last_angles(groups))
     return with_datums(groups, model.reference, model.prescribed)
+
+
+def prescribed_by_drivers(
+    groups: tuple[Group, ...], coordinates: dict[str, Any], instant: float
+) -> list[PrescribedAngle]:
+    """Return the angles about axes that drivers prescribe at an instant, with their whole turns."""
+    motions = [group.element.motion for group in groups if measures_angle(group)]
+    if not motions:
+        return []
+    values = [np.asarray(value) for value in _law_values(motions, np.full((1, 1), instant))]
+    return prescribed_angles(groups, coordinates, values)
 
 
 @jax.jit
