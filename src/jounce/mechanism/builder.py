@@ -253,17 +253,18 @@ def _layout(
 
 def _row_count(group: Group, pose_type: type[Pose], guess: dict[str, Any]) -> int:
     leaves, structure = jax.tree.flatten((group, guess))
-    return _row_count_of(structure, tuple(jax.ShapeDtypeStruct(np.shape(x), np.float64) for x in leaves), pose_type)
+    return _row_count_of(structure, tuple(map(np.shape, leaves)), pose_type)
 
 
 @lru_cache(maxsize=1000)
-def _row_count_of(structure: Any, leaves: tuple[Any, ...], pose_type: type[Pose]) -> int:
+def _row_count_of(structure: Any, shapes: tuple[tuple[int, ...], ...], pose_type: type[Pose]) -> int:
     """Read the number of rows off the shape of the residual; it depends on the structure only, so is kept."""
 
     def residual(leaves: tuple[Any, ...], time: Any) -> Any:
         group, guess = jax.tree.unflatten(structure, leaves)
         return group.residual(pose_at(guess, pose_type), Jet([time])).coefficients[0]
 
+    leaves = tuple(jax.ShapeDtypeStruct(shape, np.float64) for shape in shapes)
     return jax.eval_shape(residual, leaves, np.zeros((1, 1))).shape[0]
 
 

@@ -5,6 +5,7 @@ A model is put together of modules that were checked already, and of each severa
 """
 
 import dataclasses
+from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any, TypeVar
 
@@ -29,10 +30,15 @@ def with_fields(module: M, **values: Any) -> M:
     names = field_names(type(module))
     if not values.keys() <= set(names):
         raise TypeError(f"{type(module).__name__} has no field {sorted(values.keys() - set(names))}")
-    copy = object.__new__(type(module))
-    for name in names:
-        object.__setattr__(copy, name, values[name] if name in values else getattr(module, name))
-    return copy
+    held = vars(module)
+    return unchecked(type(module), {name: held[name] for name in names if name in held} | values)
+
+
+def unchecked(kind: type[M], values: Mapping[str, Any]) -> M:
+    """Return a module with these values of all its fields; neither converters nor checks are called."""
+    module = object.__new__(kind)
+    vars(module).update(values)
+    return module
 
 
 @lru_cache(maxsize=1000)

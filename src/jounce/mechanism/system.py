@@ -12,7 +12,7 @@ from jaxtyping import Bool, Float
 from jounce.jet import Jet, concatenate
 from jounce.jet.algebra import stacked
 from jounce.mechanism.fronts import Fronts
-from jounce.mechanism.modules import with_fields
+from jounce.mechanism.modules import unchecked, with_fields
 from jounce.mechanism.pattern import Pattern
 from jounce.mechanism.resolve import group_key, resolve_element, stack_elements
 from jounce.rigid import SpatialPose
@@ -149,7 +149,7 @@ def group_elements(
     for members in found.values():
         instance_names, instances, values = zip(*members, strict=True)
         slots = zip(*([body_index[b] for b in e.bodies] for e in instances), strict=True)
-        groups.append(Group(stack_elements(instances, values), tuple(slots)))
+        groups.append(unchecked(Group, {"element": stack_elements(instances, values), "bodies": tuple(slots)}))
         names.append(instance_names)
     return tuple(groups), tuple(names)
 
