@@ -231,7 +231,7 @@ def put_together(
 
     known = free(model.guess if start is None else start, still) if known is None else known
     coordinates, residual, jacobian = opened(known)
-    scale = jacobian.row_scale()
+    scale = jacobian.row_scale
     for _ in range(MAX_STEPS):
         step = jacobian.step(residual)
         if step is None:
@@ -247,7 +247,7 @@ def put_together(
         else:
             break
         coordinates, residual, jacobian = trial
-        scale = jacobian.row_scale()
+        scale = jacobian.row_scale
         if size <= tolerance:
             break
     gaps = np.where(jacobian.finite(), scale * residual, np.nan)
