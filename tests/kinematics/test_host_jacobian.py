@@ -47,10 +47,10 @@ def test_rank_and_null_vectors_are_those_of_the_singular_values(jacobian):
 
 
 def test_steps_are_the_shortest_that_close_what_can_be_closed(jacobian):
-    matrix = jacobian.scaled(jacobian.row_scale()).dense()
+    matrix = jacobian.scaled(jacobian.row_scale).dense()
     gap = matrix @ np.random.default_rng(1).standard_normal(matrix.shape[1])
     expected = -np.linalg.pinv(matrix, rcond=1e-10) @ gap
-    step = jacobian.step(gap / jacobian.row_scale())
+    step = jacobian.step(gap / jacobian.row_scale)
     np.testing.assert_allclose(step, expected, atol=1e-4 * np.abs(expected).max())  # damped where rows are redundant
 
 

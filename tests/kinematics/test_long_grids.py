@@ -5,6 +5,9 @@ import pytest
 
 import jounce as jn
 from jounce.kinematics import Status
+from jounce.kinematics.device import on_processor
+from jounce.kinematics.path_following import large_batch
+from jounce.mechanism import build
 from tests.problems.small import four_bar, slider_crank
 
 TIME = np.linspace(0, 2, 2501)
@@ -56,3 +59,13 @@ def test_an_end_is_explained_once(monkeypatch, stretch):
     np.testing.assert_array_equal(motion.status, whole.status)
     assert motion.faults == whole.faults
     assert (motion.status == Status.NOT_REACHED).sum() > 1000
+
+
+@pytest.mark.skipif(not on_processor(), reason="a GPU is filled whatever the size")
+def test_a_large_mechanism_is_solved_fewer_instants_side_by_side():
+    pins = {f"g{k}": jn.planar.Revolute(("ground", f"b{k}"), [k, 0], [0, 0]) for k in range(30)}
+    drivers = {f"d{k}": jn.drivers.CoordinateDriver(("ground", f"b{k}"), "angle", motion="t") for k in range(30)}
+    many = jn.Mechanism(
+        space="planar", bodies={f"b{k}": jn.Body([k, 0]) for k in range(30)}, joints=pins, drivers=drivers
+    )
+    assert large_batch(build(many).system) < large_batch(build(four_bar()).system)

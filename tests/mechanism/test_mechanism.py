@@ -265,3 +265,23 @@ def test_gears_of_a_carrier_in_any_order_with_the_ground_among_them():
     found = jn.solve(train, [0.0, 1.0, 2.0], order=2).outputs["carrier"]
     expected = [[3 * t**2, 6 * t, 6] for t in (0.0, 1.0, 2.0)]
     np.testing.assert_allclose(found, np.array(expected) * 24 / 84, rtol=0, atol=1e-14)
+
+
+def test_what_is_changed_in_place_is_seen_and_what_was_built_stays():
+    point, lengths = np.array([0.1, 0.2]), np.array([0.5, 0.0])
+    hinge = planar.Revolute(("ground", "crank"), point, [0, 0])
+    given = mechanism(joints={"O": hinge}, bodies={"crank": jn.Body(lengths)})
+    before = build(given)
+    point[0], lengths[1] = 0.3, 0.4
+    after = build(given)
+    points = [model.system.groups[0].element.point_i[:, 0, 0].tolist() for model in (before, after)]
+    guesses = [model.guess["position"][:, 1, 0].tolist() for model in (before, after)]
+    assert points == [[0.1, 0.2], [0.3, 0.2]]
+    assert guesses == [[0.5, 0.0], [0.5, 0.4]]
+
+
+def test_what_models_of_one_structure_share_cannot_be_written():
+    first, second = build(four_bar()), build(four_bar(BC=0.15))
+    assert first.system.pattern is second.system.pattern
+    with pytest.raises(ValueError, match="read-only"):
+        first.system.pattern.places[0] = 0

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.dynamics.forward import Equations, Instants, State
-from jounce.dynamics.masses import gravity_of, masses_of, required_masses
+from jounce.dynamics.masses import Masses, gravity_of, required_masses
 from jounce.dynamics.saddle_fronts import SaddleFronts
 from jounce.errors import AssemblyError, JounceError, MechanismError, MobilityError
 from jounce.jet import Jet
@@ -17,6 +17,7 @@ from jounce.kinematics.compilation import compiled
 from jounce.kinematics.host_jacobian import RANK_TOLERANCE, HostJacobian, is_clearly_regular
 from jounce.mechanism import Mechanism, Model, build
 from jounce.mechanism.builder import pose_at
+from jounce.mechanism.modules import with_fields
 from jounce.shapes import Numbers
 
 TOLERANCE = 1e-12  # of the assembled positions, rad or sizes of the mechanism
@@ -66,17 +67,17 @@ def consistent_start(mechanism: Mechanism, instant: float) -> ConsistentStart:
     MobilityError
         If constraints or initial conditions are redundant.
     """
-    required_masses(mechanism, "the equations of motion")
+    masses = required_masses(mechanism, "the equations of motion")
     model, state = build(mechanism), None
     if mechanism.initial:
         whole, coordinates = _assembled(mechanism, instant)
-        state = with_rates(equations_of(mechanism, whole), at_rest(whole, coordinates), np.array([[instant]]))
-        system = dataclasses.replace(model.system, forces=whole.system.forces, outputs=whole.system.outputs)
+        state = with_rates(equations_of(mechanism, whole, masses), at_rest(whole, coordinates), np.array([[instant]]))
+        system = with_fields(model.system, forces=whole.system.forces, outputs=whole.system.outputs)
         model = dataclasses.replace(
             model, guess=coordinates, system=system, prescribed=whole.prescribed, history=whole.history
         )
     model, coordinates = assemble(model, instant, TOLERANCE, free=True)
-    equations = equations_of(mechanism, model)
+    equations = jax.device_put(equations_of(mechanism, model, masses))
     state = at_rest(model, coordinates) if state is None else state
     state = jax.tree.map(np.asarray, with_rates(equations, state, np.array([[instant]])))
     if not all(np.isfinite(part).all() for part in state):
@@ -84,12 +85,11 @@ def consistent_start(mechanism: Mechanism, instant: float) -> ConsistentStart:
     return ConsistentStart(model, equations, state, _explain(equations, model, state, instant))
 
 
-def equations_of(mechanism: Mechanism, model: Model) -> Equations:
+def equations_of(mechanism: Mechanism, model: Model, masses: Masses) -> Equations:
     """Return the equations of motion of a mechanism."""
-    masses = masses_of(mechanism)
-    system, scale = dataclasses.replace(model.system, outputs=()), np.float64(np.max(masses.mass))
+    system, scale = with_fields(model.system, outputs=()), np.float64(np.max(masses.mass))
     saddle = SaddleFronts.of(system.pattern)
-    return jax.device_put(Equations(system, masses, gravity_of(mechanism), scale, model.pose_type, saddle))
+    return Equations(system, masses, gravity_of(mechanism), scale, model.pose_type, saddle)
 
 
 def _assembled(mechanism: Mechanism, instant: float) -> tuple[Model, dict[str, np.ndarray]]:

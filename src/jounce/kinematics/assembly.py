@@ -13,11 +13,13 @@ from jounce.constraints.spatial import DoubleSpherical
 from jounce.errors import AssemblyError, MobilityError
 from jounce.jet import Jet
 from jounce.kinematics.compilation import compiled
+from jounce.kinematics.device import resident
 from jounce.kinematics.host_jacobian import HostJacobian
 from jounce.kinematics.initial_turns import (
     Coordinates,
     DriverLag,
     Mover,
+    Place,
     driver_lag,
     nearest_turns,
     turned_to_laws,
@@ -26,6 +28,7 @@ from jounce.kinematics.status import Status
 from jounce.mechanism import Model
 from jounce.mechanism.axis_angles import measures_angle, with_angles, with_datums
 from jounce.mechanism.builder import pose_at, with_reference
+from jounce.mechanism.modules import with_fields
 from jounce.mechanism.system import System
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
@@ -109,11 +112,11 @@ def assemble(model: Model, instant: float, tolerance: float, *, free: bool = Fal
         raise MobilityError(f"the mechanism has no joints and no drivers: {columns} {noun} are left")
     if not model.rows:  # bodies that fly freely are together as they are
         model, _ = with_reference(model, model.guess, instant, model.prescribed)
-        return dataclasses.replace(model, system=jax.device_put(model.system)), model.guess
+        return dataclasses.replace(model, system=resident(model.system)), model.guess
     model, found = _settled(model, instant, tolerance)
     check_assembled(model, found, instant, free=free)
     check_mobility(model, found.jacobian, free=free)
-    system = jax.device_put(dataclasses.replace(model.system, row_scale=found.scale[:, None]))
+    system = resident(with_fields(model.system, row_scale=found.scale[:, None]))
     return dataclasses.replace(model, system=system), found.coordinates
 
 
@@ -123,12 +126,13 @@ def _settled(model: Model, instant: float, tolerance: float) -> tuple[Model, Tri
     Where the axes were tilted against each other in the starting guess, the angles in the position found are others
     than those counted from the guess, and it takes another turn to get to those that the drivers prescribe.
     """
-    model, start = _turned(model, instant, tolerance)
-    found, told = put_together(model, instant, tolerance, start), model.prescribed
+    guessed = _mover(model, instant)(model.guess, np.zeros(model.system.shape[1]))
+    lag, told = driver_lag(model, instant, guessed[1]), model.prescribed
+    model, start = _turned(model, instant, tolerance, guessed, lag)
+    found = put_together(model, instant, tolerance, start, known=guessed if start is None else None)
     if not found.closed and any(map(measures_angle, model.system.groups)):
         # angles counted from a tilted guess may be far off: first the joints alone, with the drivers as they are
-        lag = _lag(model, instant)
-        begin = found if lag is None else put_together(model, instant, tolerance, lag=lag)
+        begin = found if lag is None else put_together(model, instant, tolerance, lag=lag, known=guessed)
         if begin.closed:
             model, _ = with_reference(model, begin.coordinates, instant, told)
             found = put_together(model, instant, tolerance, begin.coordinates)
@@ -144,19 +148,20 @@ def _settled(model: Model, instant: float, tolerance: float) -> tuple[Model, Tri
     return with_reference(model, found.coordinates, instant, told, keep=True)[0], found
 
 
-def _turned(model: Model, instant: float, tolerance: float) -> tuple[Model, Coordinates | None]:
+def _turned(
+    model: Model, instant: float, tolerance: float, guessed: Place, lag: DriverLag | None
+) -> tuple[Model, Coordinates | None]:
     """Return the model and the coordinates to start from where laws begin more than half a turn from the guess.
 
     The drivers are turned from the guess to their laws then, and all angles count their turns; None where none is so
     far away, or the way cannot be gone.
     """
-    moved, lag = _mover(model, instant), _lag(model, instant)
     if lag is None or not np.pi < lag.angle < np.inf:
         return model, None
-    begin = put_together(model, instant, tolerance, lag=lag)
+    begin = put_together(model, instant, tolerance, lag=lag, known=guessed)
     if not begin.closed:
         return model, None
-    found = turned_to_laws(model, lag, begin.coordinates, moved)
+    found = turned_to_laws(model, lag, begin.coordinates, _mover(model, instant))
     if found is None:
         return model, None
     coordinates, history = found
@@ -165,15 +170,9 @@ def _turned(model: Model, instant: float, tolerance: float) -> tuple[Model, Coor
             with_angles(with_datums(part, coordinates), history.last_angles(part))
             for part in (model.system.forces, model.system.outputs)
         )
-        system = dataclasses.replace(model.system, forces=forces, outputs=outputs)
+        system = with_fields(model.system, forces=forces, outputs=outputs)
         model = dataclasses.replace(model, system=system, history=history)
     return model, coordinates
-
-
-def _lag(model: Model, instant: float) -> DriverLag | None:
-    """Return what the drivers lack at the guess."""
-    still = np.zeros(model.system.shape[1])
-    return driver_lag(model, instant, _mover(model, instant)(model.guess, still)[1])
 
 
 def _nearest(model: Model, found: Trial, instant: float) -> Trial:
@@ -188,12 +187,13 @@ def _nearest(model: Model, found: Trial, instant: float) -> Trial:
 
 def _mover(model: Model, instant: float) -> Mover:
     """Return what takes coordinates and an increment to coordinates, residual and Jacobian, all on the host."""
-    system = model.system
+    system = with_fields(model.system, outputs=(), forces=(), fronts=None, pattern=None)  # all that the program needs
+    pattern, scale = model.system.pattern, np.asarray(model.system.row_scale)[:, 0]
 
     def moved(coordinates: dict[str, Any], increment: np.ndarray) -> Any:
         result = _moved(system, coordinates, increment, np.float64(instant), model.pose_type)
         to, residual, entries = jax.tree.map(np.asarray, result)
-        return to, residual, HostJacobian.of(system.pattern, entries).scaled(np.asarray(system.row_scale)[:, 0])
+        return to, residual, HostJacobian.of(pattern, entries).scaled(scale)
 
     return moved
 
@@ -205,6 +205,7 @@ def put_together(
     start: Coordinates | None = None,
     *,
     lag: DriverLag | None = None,
+    known: Place | None = None,
 ) -> Trial:
     """Return how far the bodies can be put together at one instant; nothing is refused.
 
@@ -220,15 +221,17 @@ def put_together(
         Coordinates to start from instead of the guess.
     lag : DriverLag, optional
         What drivers may still lack.
+    known : Place, optional
+        Where to start from, in the place of coordinates, if it is known whole.
     """
     still, free = np.zeros(model.system.shape[1]), _mover(model, instant)
 
-    def moved(coordinates: dict[str, Any], increment: np.ndarray) -> Any:
-        moved_to, residual, jacobian = free(coordinates, increment)
-        return moved_to, residual if lag is None else lag.open(residual, 1.0), jacobian
+    def opened(place: Place) -> Place:
+        return place if lag is None else (place[0], lag.open(place[1], 1.0), place[2])
 
-    coordinates, residual, jacobian = moved(model.guess if start is None else start, still)
-    scale = jacobian.row_scale()
+    known = free(model.guess if start is None else start, still) if known is None else known
+    coordinates, residual, jacobian = opened(known)
+    scale = jacobian.row_scale
     for _ in range(MAX_STEPS):
         step = jacobian.step(residual)
         if step is None:
@@ -237,14 +240,14 @@ def put_together(
         step *= min(1.0, 0.5 / max(size, 1e-300))  # at most half a radian, or half the mechanism, at a time
         now = np.linalg.norm(scale * residual)
         for _halving in range(12):
-            trial = moved(coordinates, step)
+            trial = opened(free(coordinates, step))
             if np.linalg.norm(scale * trial[1]) < now or size <= tolerance:
                 break
             step *= 0.5
         else:
             break
         coordinates, residual, jacobian = trial
-        scale = jacobian.row_scale()
+        scale = jacobian.row_scale
         if size <= tolerance:
             break
     gaps = np.where(jacobian.finite(), scale * residual, np.nan)

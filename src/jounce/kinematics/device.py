@@ -1,6 +1,10 @@
 """What programs run on: a processor, whose cache their batches have to fit, or a GPU, which they have to fill."""
 
+from typing import TypeVar
+
 import jax
+
+T = TypeVar("T")
 
 
 def on_processor() -> bool:
@@ -16,3 +20,8 @@ def on_processor() -> bool:
     """
     chosen = getattr(jax.config, "jax_default_device", None)
     return (getattr(chosen, "platform", chosen) or jax.default_backend()) == "cpu"
+
+
+def resident(arrays: T) -> T:
+    """Return arrays that many programs take, where they are computed: a processor reads those of NumPy as they are."""
+    return arrays if on_processor() else jax.device_put(arrays)

@@ -21,7 +21,6 @@ from jounce.kinematics.path_following import (
     FollowedPath,
     Solver,
     follow,
-    large_batch,
 )
 from jounce.kinematics.status import Status
 from jounce.kinematics.threads import Threads
@@ -71,7 +70,7 @@ class GridSolver:
         """
         count = len(self.time)
         reached = self.time < self.path.ended_at
-        width = large_batch() if count > LONG_GRID else SMALL_BATCH
+        width = self.solver.large_batch if count > LONG_GRID else SMALL_BATCH
         left = reached & (self.status != Status.OK)
         done = count - int(np.count_nonzero(left))
         with Threads(threads) as pool:

@@ -43,8 +43,9 @@ class HostJacobian:
     @classmethod
     def of(cls, pattern: Pattern, entries: Float[Numbers, " entry"]) -> "HostJacobian":
         """Return the Jacobian with these entries in places of a pattern."""
-        blocks = np.append(np.asarray(entries), 0.0)[np.asarray(pattern.places)]
-        return cls(np.asarray(pattern.bodies), blocks, pattern.body_count)
+        padded = np.zeros(pattern.entry_count + 1)
+        padded[:-1] = entries
+        return cls(np.asarray(pattern.bodies), padded[np.asarray(pattern.places)], pattern.body_count)
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -60,18 +61,19 @@ class HostJacobian:
         """Tell which rows are finite."""
         return np.asarray(np.isfinite(self.blocks).all(axis=(1, 2)))
 
+    @cached_property
     def row_scale(self) -> Float[np.ndarray, " row"]:
         """Return what makes the largest entry of each row one."""
-        largest = np.max(np.abs(self.blocks), axis=(1, 2), initial=0.0)
+        largest = np.abs(self.blocks).max(axis=(1, 2), initial=0.0)
         return 1 / np.where((largest > 0) & np.isfinite(largest), largest, 1.0)
 
     def scaled(self, scale: Float[np.ndarray, " row"]) -> "HostJacobian":
         """Return the Jacobian with its rows multiplied by a scale."""
-        return dataclasses.replace(self, blocks=scale[:, None, None] * self.blocks)
+        return HostJacobian(self.bodies, scale[:, None, None] * self.blocks, self.body_count)
 
     def take(self, rows: Bool[np.ndarray, " row"]) -> "HostJacobian":
         """Return the Jacobian of some rows."""
-        return dataclasses.replace(self, bodies=self.bodies[rows], blocks=self.blocks[rows])
+        return HostJacobian(self.bodies[rows], self.blocks[rows], self.body_count)
 
     def dense(self) -> Float[np.ndarray, "row column"]:
         """Return the matrix."""
@@ -94,7 +96,7 @@ class HostJacobian:
         """Return the shortest step that closes the residual to first order, by rows of one size; None if not finite."""
         if not (np.isfinite(residual).all() and np.isfinite(self.blocks).all()):
             return None  # what factors a matrix may never end on one that is not finite
-        scale = self.row_scale()
+        scale = self.row_scale
         matrix, right = self.scaled(scale), -scale * residual
         if self.is_large:
             step = _shortest(matrix.sparse(), right)

@@ -16,7 +16,7 @@ from jounce.jet.turns import WHOLE_TURN, principal, whole_periods
 from jounce.kinematics.host_jacobian import HostJacobian
 from jounce.mechanism import Model
 from jounce.mechanism.axis_angles import AttitudeHistory, measures_angle
-from jounce.mechanism.builder import with_reference
+from jounce.mechanism.builder import prescribed_by_drivers
 
 STEPS_A_TURN = 64
 MOST_TURNS = 4  # followed one by one; beyond, each further turn does what the last one did
@@ -27,7 +27,9 @@ SMALLEST_PERIOD, LARGEST_PERIOD = 1, 60  # whole turns, among which those are so
 
 Coordinates = dict[str, np.ndarray]
 """Coordinates of all bodies by name, the ground first, (..., bodies, 1)."""
-Mover = Callable[[Coordinates, np.ndarray], tuple[Coordinates, np.ndarray, HostJacobian]]
+Place = tuple[Coordinates, np.ndarray, HostJacobian]
+"""Coordinates, with residual and Jacobian there."""
+Mover = Callable[[Coordinates, np.ndarray], Place]
 
 
 class DriverLag(NamedTuple):
@@ -66,7 +68,7 @@ def driver_lag(model: Model, instant: float, residual: Float[np.ndarray, " row"]
         return None
     size = np.zeros(len(model.rows))
     turning, periodic = np.zeros(len(size), bool), np.zeros(len(size), bool)
-    told = iter(with_reference(model, model.guess, instant, keep=True)[0].prescribed)
+    told = iter(prescribed_by_drivers(model.system.groups, model.guess, instant))
     first = 0
     for group in groups:
         its = rows[first : first + group.instances]

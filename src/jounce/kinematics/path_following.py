@@ -7,6 +7,7 @@ the other side to rounding, and is told.
 """
 
 import dataclasses
+import math
 from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
@@ -21,6 +22,7 @@ from jounce.kinematics.legs import Ending, Leg, Limits, Place, Settings, Way, le
 from jounce.kinematics.status import Status
 from jounce.mechanism import Model
 from jounce.mechanism.axis_angles import AttitudeHistory
+from jounce.mechanism.system import System
 
 PASSABLE = (Status.OK, Status.UNDEFINED)
 SMALLEST_STEP = 1e-10  # of the span
@@ -29,16 +31,25 @@ PASSAGE_DEVIATION = 1e-8  # from that series, as a part of the way: two branches
 NEARLY_SINGULAR = 1e-6  # of the span: a motion that ends so short before a singular position ends at it
 NEARBY = 0.1  # radii: a singular position nearer than this spoils high derivatives, if the motion is smooth there
 PLACES = 8  # in each step at which attitudes are looked at for turns: nowhere between them a body turns by half a turn
-SMALL_BATCH, LARGE_BATCH = 16, 512  # lanes; a batch width compiles once, so a short grid uses one, and so do anchors
+SMALL_BATCH = 16  # lanes; a batch width compiles once, so a short grid uses one, and so do anchors
+LARGE_BATCHES = 128, 512  # lanes of a long grid: as many as the cache holds, within these bounds
+CACHED_ENTRIES = 2**16  # of the factors of a batch: half a megabyte
 LONGEST_LEG = 32  # batches
 LEG_ENTRIES = 2**19  # of what a leg keeps: a large mechanism has shorter ones
 GPU_BATCH = 2**15  # the large one of a GPU
 NO_GRID = np.empty(0)
 
 
-def large_batch() -> int:
-    """Return how many instants of a long grid are solved side by side on the device that JAX computes on."""
-    return LARGE_BATCH if on_processor() else GPU_BATCH
+def large_batch(system: System) -> int:
+    """Return how many instants of a long grid are solved side by side: a power of two.
+
+    On a processor so many that the factors of their Jacobians fit into the cache, on a GPU so many that they fill it.
+    """
+    if not on_processor():
+        return GPU_BATCH
+    entries = math.prod(system.shape if system.fronts is None else system.fronts.shape)
+    least, most = LARGE_BATCHES
+    return max(least, min(most, 2 ** int(math.log2(max(1, CACHED_ENTRIES // max(1, entries))))))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -68,7 +79,7 @@ class Solver:
             way = _way(known, (0.0,) * 4, away=step, instant=instant, planned=True)
             arrival = self._leg(way, NO_GRID, _limits(0.0, 0.0, 1), survey=survey).last
         else:
-            filled = jax.tree.map(lambda x: _filled(x, large_batch()), (*self._predictor(known), step, instant))
+            filled = jax.tree.map(lambda x: _filled(x, self.large_batch), (*self._predictor(known), step, instant))
             settings = self._settings._replace(survey=np.asarray(survey))
             arrival = advance(self.model.system, *filled, *settings, pose_type=self.model.pose_type, order=self.order)
         return jax.tree.map(lambda x: np.asarray(x)[..., :lanes], arrival)
@@ -83,6 +94,11 @@ class Solver:
         known = jax.tree.map(lambda x: _filled(x, SMALL_BATCH), self._predictor(start.state))
         place = start.instant, start.safe_step, start.radius, start.turnover
         return _way(known, place, largest=largest, crawled=crawled)
+
+    @cached_property
+    def large_batch(self) -> int:
+        """How many instants of a long grid are solved side by side."""
+        return large_batch(self.model.system)
 
     @cached_property
     def _batches(self) -> int:

@@ -1,6 +1,5 @@
 """Where angles about axes are counted from: the position in which a mechanism was put together, and its turns."""
 
-import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -9,6 +8,7 @@ from jaxtyping import Float, Int
 
 from jounce.constraints.angles import Datum, angle_of
 from jounce.jet.turns import counted_on, principal, whole_periods
+from jounce.mechanism.modules import with_fields
 from jounce.mechanism.system import Group
 from jounce.mechanism.time import nearest_instants
 from jounce.shapes import Numbers
@@ -133,12 +133,12 @@ def _raw_angle(group: Group, attitude: Quaternions) -> Angles:
 
 def with_angles(groups: Sequence[Group], angles: Sequence[np.ndarray]) -> tuple[Group, ...]:
     """Return groups of which the data hold other angles, for those that measure one about an axis."""
-    return _with_data(groups, angles, lambda datum, angle: dataclasses.replace(datum, angle=angle, near=angle))
+    return _with_data(groups, angles, lambda datum, angle: with_fields(datum, angle=angle, near=angle))
 
 
 def with_turns(groups: Sequence[Group], near: Sequence[Any]) -> tuple[Group, ...]:
     """Return groups that measure angles about axes with the turns of these, (instances, batch) each; may be traced."""
-    return _with_data(groups, near, lambda datum, turns: dataclasses.replace(datum, near=turns))
+    return _with_data(groups, near, lambda datum, turns: with_fields(datum, near=turns))
 
 
 def _with_data(groups: Sequence[Group], values: Sequence[Any], put: Callable[[Datum, Any], Datum]) -> tuple[Group, ...]:
@@ -181,7 +181,7 @@ def with_datum_of(group: Group, known: Group) -> Group:
     datum = known.element.datum
     if datum.across is not None:
         across = _across(group.element.vector_j, np.asarray(datum.attitude), axis_of(known))
-        datum = dataclasses.replace(datum, across=across)
+        datum = with_fields(datum, across=across)
     return group.holding("datum", datum)
 
 
@@ -248,7 +248,7 @@ def _between(attitude: Quaternions, axis: Vectors, first: Vectors, second: Vecto
     """Return the signed angle about an axis from a vector of body i to one of body j."""
     b = _turned(attitude, second)
     across = b - (b * axis).sum(axis=0) * axis
-    return np.arctan2((np.cross(axis, first, axis=0) * across).sum(axis=0), (first * across).sum(axis=0))
+    return np.arctan2((_cross(axis, first) * across).sum(axis=0), (first * across).sum(axis=0))
 
 
 def _across(second: Numbers, attitude: Quaternions, axis: Vectors) -> Numbers:
@@ -259,7 +259,7 @@ def _across(second: Numbers, attitude: Quaternions, axis: Vectors) -> Numbers:
 
 def _sense(bodies: tuple[int, ...], axis: Float[np.ndarray, " 3"], given: PrescribedAngle) -> int:
     """Return 1 where an angle follows that of a driver, -1 where it runs against it, else 0."""
-    if sorted(bodies) != sorted(given.bodies) or np.linalg.norm(np.cross(axis, given.axis)) > PARALLEL:
+    if sorted(bodies) != sorted(given.bodies) or np.linalg.norm(_cross(axis, given.axis)) > PARALLEL:
         return 0
     return int(np.sign(axis @ given.axis)) * (1 if bodies == given.bodies else -1)
 
@@ -270,9 +270,14 @@ def _inverse(p: Quaternions) -> Quaternions:
 
 def _product(p: Quaternions, q: Quaternions) -> Quaternions:
     e0 = p[:1] * q[:1] - (p[1:] * q[1:]).sum(axis=0, keepdims=True)
-    return np.concatenate([e0, p[:1] * q[1:] + q[:1] * p[1:] + np.cross(p[1:], q[1:], axis=0)])
+    return np.concatenate([e0, p[:1] * q[1:] + q[:1] * p[1:] + _cross(p[1:], q[1:])])
 
 
 def _turned(p: Quaternions, vector: Vectors) -> Vectors:
-    twice = 2 * np.cross(p[1:], vector, axis=0)
-    return vector + p[:1] * twice + np.cross(p[1:], twice, axis=0)
+    twice = 2 * _cross(p[1:], vector)
+    return vector + p[:1] * twice + _cross(p[1:], twice)
+
+
+def _cross(a: Vectors, b: Vectors) -> Any:
+    """Return the cross products along the first axis, in a fraction of the time that NumPy's takes for few."""
+    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])

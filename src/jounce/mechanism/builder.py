@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Mapping
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import jax
@@ -24,8 +24,9 @@ from jounce.mechanism.axis_angles import (
     with_datum_of,
     with_datums,
 )
-from jounce.mechanism.fronts import elimination
+from jounce.mechanism.fronts import Fronts, elimination
 from jounce.mechanism.mechanism import GROUND, Mechanism
+from jounce.mechanism.modules import with_fields
 from jounce.mechanism.outputs import AbstractMotionOutput
 from jounce.mechanism.pattern import Pattern
 from jounce.mechanism.resolve import resolve, resolved
@@ -115,7 +116,7 @@ def build(mechanism: Mechanism, like: Model | None = None) -> Model:
     if like is not None:
         parts = {"groups": groups, "forces": forces, "outputs": outputs}
         known = {name: tuple(map(_with_found_of, part, getattr(like.system, name))) for name, part in parts.items()}
-        return dataclasses.replace(like, system=dataclasses.replace(like.system, **known))
+        return dataclasses.replace(like, system=with_fields(like.system, **known))
 
     pose_type = PlanarPose if components == 2 else SpatialPose
     guess = starting_guess(mechanism, parameters, components)
@@ -125,11 +126,12 @@ def build(mechanism: Mechanism, like: Model | None = None) -> Model:
     rows = [n for members, count in zip(names, row_counts, strict=True) for _ in range(count) for n in members]
     drivers = tuple(n for group, members in zip(groups, names, strict=True) if group.is_driver for n in members)
     length, count = _size(groups, guess), len(mechanism.bodies)
-    pattern = Pattern.of(groups, row_counts, components + pose_type.turns, count)
+    bodies = tuple(group.bodies for group in groups)
+    pattern, fronts = _layout(bodies, tuple(row_counts), components + pose_type.turns, count)
     scale = np.array([length] * components + [1.0] * pose_type.turns)
     history = AttitudeHistory(guess["quaternion"], np.zeros(1)) if components == 3 else None
     return Model(
-        System(groups, outputs, pattern, np.ones((len(rows), 1)), scale, count, forces, elimination(pattern)),
+        System(groups, outputs, pattern, np.ones((len(rows), 1)), scale, count, forces, fronts),
         pose_type,
         guess,
         tuple(rows),
@@ -170,11 +172,9 @@ def with_reference(
     if not any(map(measures_angle, (*system.groups, *system.forces, *system.outputs))):
         return dataclasses.replace(model, reference=coordinates, prescribed=prescribed), 0.0
     groups = with_datums(system.groups, coordinates, keep=keep)
-    motions = [group.element.motion for group in groups if measures_angle(group)]
-    values = [np.asarray(value) for value in _law_values(motions, np.full((1, 1), instant))]
-    prescribed = (*prescribed_angles(groups, coordinates, values), *prescribed)
+    prescribed = (*prescribed_by_drivers(groups, coordinates, instant), *prescribed)
     forces, outputs = (with_datums(part, coordinates, prescribed) for part in (system.forces, system.outputs))
-    system = dataclasses.replace(system, groups=groups, forces=forces, outputs=outputs)
+    system = with_fields(system, groups=groups, forces=forces, outputs=outputs)
     away = departure(model.system.groups, groups)
     return dataclasses.replace(model, system=system, reference=coordinates, prescribed=prescribed), away
 
@@ -187,6 +187,17 @@ def counted_as_in(groups: tuple[Group, ...], model: Model) -> tuple[Group, ...]:
     groups = with_datums(groups, first)
     groups = with_angles(with_datums(groups, last), model.history.last_angles(groups))
     return with_datums(groups, model.reference, model.prescribed)
+
+
+def prescribed_by_drivers(
+    groups: tuple[Group, ...], coordinates: dict[str, Any], instant: float
+) -> list[PrescribedAngle]:
+    """Return the angles about axes that drivers prescribe at an instant, with their whole turns."""
+    motions = [group.element.motion for group in groups if measures_angle(group)]
+    if not motions:
+        return []
+    values = [np.asarray(value) for value in _law_values(motions, np.full((1, 1), instant))]
+    return prescribed_angles(groups, coordinates, values)
 
 
 @jax.jit
@@ -228,19 +239,32 @@ def _attitude(orientation: Any, name: str, parameters: dict[str, Any]) -> np.nda
         raise type(error)(error.message, name=key, value=error.value) from None
 
 
+@lru_cache(maxsize=32)
+def _layout(
+    bodies: tuple[tuple[tuple[int, ...], ...], ...], row_counts: tuple[int, ...], width: int, body_count: int
+) -> tuple[Pattern, Fronts | None]:
+    """Return where the entries of the Jacobian stand, and how it is eliminated: the same for all values, so is kept."""
+    pattern = Pattern.of([Group(None, its) for its in bodies], row_counts, width, body_count)
+    fronts = elimination(pattern)
+    for array in jax.tree.leaves((pattern, fronts)):
+        array.setflags(write=False)  # many models share it
+    return pattern, fronts
+
+
 def _row_count(group: Group, pose_type: type[Pose], guess: dict[str, Any]) -> int:
     leaves, structure = jax.tree.flatten((group, guess))
-    return _row_count_of(structure, tuple(jax.ShapeDtypeStruct(np.shape(x), np.float64) for x in leaves), pose_type)
+    return _row_count_of(structure, tuple(map(np.shape, leaves)), pose_type)
 
 
 @lru_cache(maxsize=1000)
-def _row_count_of(structure: Any, leaves: tuple[Any, ...], pose_type: type[Pose]) -> int:
+def _row_count_of(structure: Any, shapes: tuple[tuple[int, ...], ...], pose_type: type[Pose]) -> int:
     """Read the number of rows off the shape of the residual; it depends on the structure only, so is kept."""
 
     def residual(leaves: tuple[Any, ...], time: Any) -> Any:
         group, guess = jax.tree.unflatten(structure, leaves)
         return group.residual(pose_at(guess, pose_type), Jet([time])).coefficients[0]
 
+    leaves = tuple(jax.ShapeDtypeStruct(shape, np.float64) for shape in shapes)
     return jax.eval_shape(residual, leaves, np.zeros((1, 1))).shape[0]
 
 
@@ -254,17 +278,18 @@ def _with_offsets(group: Group, pose_type: type[Pose], guess: dict[str, Any]) ->
     fields = value_fields(type(group.element))
     if "offset" not in fields or group.element.offset is not None:
         return group
+    return group.holding("offset", np.asarray(_fulfilling_offset(group, guess, pose_type)))
 
+
+@partial(jax.jit, static_argnames="pose_type")
+def _fulfilling_offset(group: Group, guess: dict[str, Any], pose_type: type[Pose]) -> Float[Numbers, "instance 1"]:
     def residual(offset: Any) -> Any:
         trial = group.holding("offset", offset)
         return trial.residual(pose_at(guess, pose_type), Jet([jnp.zeros((1, 1))])).coefficients[0]
 
-    def fulfilling() -> Any:
-        zero = jnp.zeros((group.instances, 1))
-        value, slope = jax.jvp(residual, (zero,), (jnp.ones_like(zero),))
-        return -jnp.sum(value * slope, axis=0)  # the slope is -1 in the row that holds the offset, else 0
-
-    return group.holding("offset", np.asarray(jax.jit(fulfilling)()))
+    zero = jnp.zeros((group.instances, 1))
+    value, slope = jax.jvp(residual, (zero,), (jnp.ones_like(zero),))
+    return -jnp.sum(value * slope, axis=0)  # the slope is -1 in the row that holds the offset, else 0
 
 
 def _with_sense(group: Group, pose_type: type[Pose], guess: dict[str, Any]) -> Group:

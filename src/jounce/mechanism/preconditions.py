@@ -3,16 +3,21 @@
 import dataclasses
 import functools
 import inspect
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
+from functools import lru_cache
 from typing import Any, ParamSpec, TypeVar
 
+import numpy as np
 from jax.core import Tracer, eval_context
 
 from jounce.errors import UnsupportedError
 from jounce.interrupts import left_behind
+from jounce.trajectory import Expression
+from jounce.trajectory.dimensions import Dimension
 
 P = ParamSpec("P")
 R = TypeVar("R")
+PLAIN = frozenset({float, int, bool, str, type(None), np.ndarray, Expression, Dimension})  # never traced
 
 
 def check_process() -> None:
@@ -44,7 +49,7 @@ def concrete(function: Callable[P, R]) -> Callable[P, R]:
     def door(*arguments: P.args, **keywords: P.kwargs) -> R:
         check_process()
         given = dict(zip(names, arguments, strict=False)) | keywords
-        for place in _traced(given, ""):
+        if (place := _traced(given)) is not None:
             raise UnsupportedError(
                 f"jn.{function.__name__} decides by values, and cannot yet be used with values that jax.jit, jax.grad "
                 "or jax.vmap trace; call it with numbers, one design after another",
@@ -56,17 +61,29 @@ def concrete(function: Callable[P, R]) -> Callable[P, R]:
     return door
 
 
-def _traced(value: Any, place: str) -> Iterator[str]:
-    """Yield the dotted names of values that JAX traces."""
-    if isinstance(value, Tracer):
-        yield place
-    elif isinstance(value, Mapping):
-        for key, entry in value.items():
-            yield from _traced(entry, f"{place}.{key}".lstrip("."))
-    elif isinstance(value, (list, tuple)):
-        for k, entry in enumerate(value):
-            if not isinstance(entry, (int, float, str)):
-                yield from _traced(entry, f"{place}[{k}]")
-    elif dataclasses.is_dataclass(value):
-        for field in dataclasses.fields(value):
-            yield from _traced(getattr(value, field.name, None), f"{place}.{field.name}".lstrip("."))
+def _traced(given: Mapping[str, Any]) -> str | None:
+    """Return the dotted name of the first value that JAX traces, None if there is none."""
+    pending: list[tuple[tuple[str, ...], Any]] = [((), given)]
+    while pending:
+        place, value = pending.pop()
+        if isinstance(value, Tracer):
+            return "".join(place).removeprefix(".")
+        names = _fields(type(value))
+        if names is None:
+            entries = [(f".{key}", entry) for key, entry in value.items()]
+        elif names:
+            entries = [(name, getattr(value, name[1:], None)) for name in names]
+        elif isinstance(value, (list, tuple)):
+            entries = [(f"[{k}]", entry) for k, entry in enumerate(value)]
+        else:
+            continue
+        pending += [((*place, name), entry) for name, entry in reversed(entries) if type(entry) not in PLAIN]
+    return None
+
+
+@lru_cache(maxsize=1000)
+def _fields(kind: type[Any]) -> tuple[str, ...] | None:
+    """Return the names of the fields of a class, each after a dot; none for one without; None for a mapping."""
+    if issubclass(kind, Mapping):
+        return None
+    return tuple(f".{field.name}" for field in dataclasses.fields(kind)) if dataclasses.is_dataclass(kind) else ()

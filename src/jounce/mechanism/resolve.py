@@ -3,6 +3,7 @@
 import dataclasses
 import numbers
 from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
 import equinox as eqx
@@ -15,6 +16,7 @@ from jounce.constraints.base import field_kind, value_fields
 from jounce.errors import JounceError, MechanismError
 from jounce.forces import AbstractForce, AbstractLaw, ExpressionLaw, FunctionLaw, TimeLaw, VectorLaw
 from jounce.jet import Jet
+from jounce.mechanism.modules import unchecked
 from jounce.trajectory import AbstractMotion, Expression, ExpressionMotion, FunctionMotion
 
 Element = eqx.Module
@@ -26,6 +28,8 @@ NONZERO = ("axis", "vector", "normal")
 
 def resolve(value: Any, parameters: Mapping[str, Any]) -> Any:
     """Return the number or array that a value stands for; it may be given by an expression of the parameters."""
+    if type(value) is float:
+        return value
     if isinstance(value, str):
         value = Expression(value)
     if isinstance(value, Expression):
@@ -256,19 +260,21 @@ def _check_sideways(values: Mapping[str, Any], name: str) -> None:
                     raise MechanismError(message, name=f"{name}.{other}", value=_plain(vector))
 
 
-def static_fields(element: Element) -> tuple[str, ...]:
+@lru_cache(maxsize=1000)
+def static_fields(kind: type[Element]) -> tuple[str, ...]:
     """Return the names of the fields that hold no numbers, `bodies` aside."""
     return tuple(
         field.name
-        for field in dataclasses.fields(element)
+        for field in dataclasses.fields(kind)
         if field.metadata.get("static", False) and field.name != "bodies"
     )
 
 
 def group_key(element: Element, values: Mapping[str, Any]) -> Any:
     """Return what instances must share to be stacked: class, words, and the structure of their values."""
-    words = tuple(getattr(element, name) for name in static_fields(element))
-    numbers_only = {name: value for name, value in values.items() if name not in static_fields(element)}
+    static = static_fields(type(element))
+    words = tuple(getattr(element, name) for name in static)
+    numbers_only = {name: value for name, value in values.items() if name not in static}
     leaves, structure = jax.tree.flatten(numbers_only)
     return type(element), words, structure, tuple(np.shape(leaf) for leaf in leaves)
 
@@ -276,19 +282,14 @@ def group_key(element: Element, values: Mapping[str, Any]) -> Any:
 def stack_elements(elements: Sequence[Element], values: Sequence[Mapping[str, Any]]) -> Any:
     """Return one element whose values hold all instances, along an axis that stands before the batch axis."""
     kind = type(elements[0])
-    stacked = object.__new__(kind)  # the checks of __init__ were made for each instance
-    object.__setattr__(stacked, "bodies", ())
-    static = static_fields(elements[0])
-    for name in value_fields(kind):
+    static = static_fields(kind)
+    stacked = {"bodies": ()} | {field.name: field.default for field in dataclasses.fields(kind) if not field.init}
+    for name in value_fields(kind):  # those of no `init` are found later, from the pose of the bodies
         if name in static:
-            value = values[0][name]
+            stacked[name] = values[0][name]
         else:
-            value = jax.tree.map(_along_instances, *(v[name] for v in values))
-        object.__setattr__(stacked, name, value)
-    for field in dataclasses.fields(kind):
-        if not field.init:  # found later, from the pose of the bodies
-            object.__setattr__(stacked, field.name, field.default)
-    return stacked
+            stacked[name] = jax.tree.map(_along_instances, *(v[name] for v in values))
+    return unchecked(kind, stacked)  # the checks were made for each instance
 
 
 def _along_instances(*leaves: Any) -> Any:

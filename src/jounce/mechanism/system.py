@@ -12,6 +12,7 @@ from jaxtyping import Bool, Float
 from jounce.jet import Jet, concatenate
 from jounce.jet.algebra import stacked
 from jounce.mechanism.fronts import Fronts
+from jounce.mechanism.modules import unchecked, with_fields
 from jounce.mechanism.pattern import Pattern
 from jounce.mechanism.resolve import group_key, resolve_element, stack_elements
 from jounce.rigid import SpatialPose
@@ -43,7 +44,7 @@ class Group(eqx.Module):
 
     def holding(self, name: str, value: Any) -> "Group":
         """Return the group with another value in a field of its elements."""
-        return eqx.tree_at(lambda g: getattr(g.element, name), self, value, is_leaf=lambda x: x is None)
+        return with_fields(self, element=with_fields(self.element, **{name: value}))
 
     @property
     def is_driver(self) -> bool:
@@ -148,7 +149,7 @@ def group_elements(
     for members in found.values():
         instance_names, instances, values = zip(*members, strict=True)
         slots = zip(*([body_index[b] for b in e.bodies] for e in instances), strict=True)
-        groups.append(Group(stack_elements(instances, values), tuple(slots)))
+        groups.append(unchecked(Group, {"element": stack_elements(instances, values), "bodies": tuple(slots)}))
         names.append(instance_names)
     return tuple(groups), tuple(names)
 
