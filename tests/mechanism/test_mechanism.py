@@ -10,6 +10,7 @@ import pytest
 import jounce as jn
 from jounce import planar, spatial
 from jounce.mechanism import build, time_grid
+from jounce.mechanism.time import instants_of
 from tests.problems.small import crank, four_bar
 
 PIN = planar.Revolute(("ground", "crank"), [0, 0], [0, 0])
@@ -207,6 +208,14 @@ class TestTimeGrid:
     )
     def test_instants(self, grid, expected):
         np.testing.assert_allclose(time_grid(grid, {"tau": 2.0}), expected, atol=1e-15)
+
+    @pytest.mark.parametrize("start, stop, count", [(0, 2, 10_001), (0.1, 7.3, 1237), (-3, 1e-3, 99), (5, 5, 1)])
+    def test_instants_that_are_spaced_evenly_need_no_place(self, start, stop, count):
+        whole, spaced = np.linspace(start, stop, count), instants_of(jn.TimeGrid(start, stop, count=count), {})
+        np.testing.assert_array_equal(np.asarray(spaced), whole)
+        np.testing.assert_array_equal(spaced[3:57], whole[3:57])
+        np.testing.assert_array_equal(spaced[-5:], whole[-5:])
+        assert (spaced[0], spaced[-1], len(spaced)) == (whole[0], whole[-1], count)
 
     @pytest.mark.parametrize("step", [0.1, 0.01, 1e-3, 1 / 3, 0.7 / 7])
     def test_stop_is_reached_though_the_step_is_rounded(self, step):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -12,7 +13,7 @@ from jounce.reporting.terminal import Bar, say, show_peaks
 
 if TYPE_CHECKING:
     from jounce.integrate import Obreshkov, Taylor
-    from jounce.kinematics import Motion
+    from jounce.kinematics import Motion, Stretches
     from jounce.mechanism import Mechanism
 
 
@@ -48,8 +49,11 @@ def run(
     output.check()
     mechanism = reading.mechanism(file)
     spare_inputs(output.out, overwrite=output.overwrite)
-    motion = solved(mechanism, file, order, tolerance)
-    return _finished("run", motion, file, output, refine=not no_refine)
+    refine = not no_refine
+    if _is_long(mechanism, file):
+        motion = _streamed(mechanism, file, order, tolerance, output, refine=refine)
+        return _told("run", motion, file, output, refine=refine)
+    return _finished("run", solved(mechanism, file, order, tolerance), file, output, refine=refine)
 
 
 def simulate(
@@ -99,8 +103,42 @@ def simulate(
     return _finished("simulate", motion, file, output, refine=not no_refine)
 
 
+def _is_long(mechanism: Mechanism, file: Path) -> bool:
+    from jounce.kinematics import takes_stretches
+
+    with errors_about(file):
+        return takes_stretches(mechanism)
+
+
+def _streamed(
+    mechanism: Mechanism, file: Path, order: int, tolerance: float, output: TableOutput, *, refine: bool
+) -> Stretches:
+    """Solve stretch by stretch, and write each of them before the next is solved."""
+    from jounce.kinematics import solve_in_stretches
+    from jounce.reporting.peaks import looked_at
+
+    with Bar("solving") as bar:
+        with errors_about(file):
+            motion = solve_in_stretches(mechanism, order=order, tolerance=tolerance, progress=bar)
+        output.write_parts((part.dataset for part in looked_at(motion, refine=refine)), len(motion.time))
+    return motion
+
+
 def _finished(command: str, motion: Motion, file: Path, output: TableOutput, *, refine: bool) -> int:
     """Print and write the results of a motion, and return the exit status."""
+    return _told(command, motion, file, output, refine=refine, write=lambda: output.write(lambda: motion.dataset))
+
+
+def _told(
+    command: str,
+    motion: Motion | Stretches,
+    file: Path,
+    output: TableOutput,
+    *,
+    refine: bool,
+    write: Callable[[], None] = lambda: None,
+) -> int:
+    """Print what there is to tell of a motion, write it, and return the exit status."""
     from jounce.reporting.json_results import motion_result
     from jounce.reporting.motion_facts import motion_facts
     from jounce.reporting.peaks import peaks
@@ -109,7 +147,7 @@ def _finished(command: str, motion: Motion, file: Path, output: TableOutput, *, 
     if not output.json:
         say(motion_summary(motion_facts(motion), file.name))
         show_peaks(peaks(motion, refine=refine))
-    output.write(lambda: motion.dataset)
+    write()
     output.tell(command, lambda: motion_result(motion, file, output.out, refine))
     return outcome(motion, file)
 
@@ -169,7 +207,7 @@ def simulated(mechanism: Mechanism, file: Path, order: int, **options: Any) -> M
         return integrate(mechanism, order=order, strict=False, progress=bar, **options)
 
 
-def outcome(motion: Motion, file: Path) -> int:
+def outcome(motion: Motion | Stretches, file: Path) -> int:
     """Return 0, or raise for the first instant that failed."""
     from jounce.kinematics import raise_for_status
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -134,6 +134,16 @@ class TableOutput:
             from jounce.io import write
 
             written(lambda: write(dataset(), out, overwrite=self.overwrite))
+
+    def write_parts(self, parts: Iterable[Any], count: int) -> None:
+        """Write values that come in parts along time, with so many instants in all; if unwanted, only go through."""
+        if (out := self.out) is None:
+            for _ in parts:
+                pass
+            return
+        from jounce.io import write_parts
+
+        written(lambda: write_parts(parts, out, count, overwrite=self.overwrite))
 
     def tell(self, command: str, result: Callable[[], Mapping[str, Any]]) -> None:
         """Print the result as JSON, or where it was written."""

@@ -8,7 +8,12 @@ if TYPE_CHECKING:
     from jounce.io.mechanisms.json_schema import json_schema as json_schema
     from jounce.io.mechanisms.loader import load as load
     from jounce.io.mechanisms.writer import write_mechanism as write_mechanism
-    from jounce.io.results import check_writable as check_writable, read as read, write as write
+    from jounce.io.results import (
+        check_writable as check_writable,
+        read as read,
+        write as write,
+        write_parts as write_parts,
+    )
     from jounce.io.robots.limits import load_limits as load_limits
     from jounce.io.robots.loader import load_robot as load_robot
     from jounce.io.robots.trajectories import load_trajectory as load_trajectory
@@ -23,6 +28,7 @@ _HOMES = {
     "load_robot": "robots.loader",
     "load_trajectory": "robots.trajectories",
     "write_mechanism": "mechanisms.writer",
+    "write_parts": "results",
 }
 
 

@@ -6,14 +6,16 @@ import csv
 import io
 import itertools
 import re
+from collections.abc import Iterable, Iterator
 from os import PathLike, fspath
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO
 
 import numpy as np
 from jaxtyping import Float
 
 from jounce.errors import OutputError
+from jounce.io.files.netcdf_parts import NetcdfParts
 from jounce.io.files.reading import known_name, read_file, reason_of, written_name
 from jounce.io.files.writing import check_target, replacing
 from jounce.mechanism import EulerAnglesOutput, EulerParametersOutput, RotationMatrixOutput
@@ -28,6 +30,14 @@ AXES = {  # of outputs that are more than one number, and the labels along them
     ("euler_angle",): EulerAnglesOutput.labels,
     ("row_axis", "column_axis"): RotationMatrixOutput.labels,
 }
+
+
+class _SourceError(Exception):
+    """What computes the parts failed, not what writes them."""
+
+    def __init__(self, reason: Exception):
+        super().__init__()
+        self.reason = reason
 
 
 def check_writable(path: str | PathLike[str], *, overwrite: bool = False) -> None:
@@ -91,6 +101,82 @@ def write(dataset: xarray.Dataset, path: str | PathLike[str], *, overwrite: bool
             _write_netcdf(dataset, scratch)
 
 
+def write_parts(
+    parts: Iterable[xarray.Dataset], path: str | PathLike[str], count: int, *, overwrite: bool = False
+) -> None:
+    """Write a dataset that comes in parts along time to a .csv or .nc file, whole or not at all.
+
+    The file holds what `write` writes of the whole dataset.
+
+    Parameters
+    ----------
+    parts : iterable of xarray.Dataset
+        At least one, each as for `write`, and alike but for their instants; the next one is asked for when the one
+        before is written.
+    path
+        The file; one of that name is replaced.
+    count : int
+        Number of instants of all parts together.
+    overwrite
+        Whether that may be a file which this process has read as an input.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written, or is an input. What the parts themselves raise comes through as it is.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import jounce as jn
+    >>> from jounce import io
+    >>> from jounce.kinematics import solve_in_stretches
+    >>> fine = jn.TimeGrid(start=0, stop=2, count=100_001)
+    >>> motion = solve_in_stretches(jn.load("examples/four_bar.yaml"), fine, order=0)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     io.write_parts((part.dataset for part in motion), pathlib.Path(folder, "motion.nc"), len(motion))
+    ...     print(io.read(pathlib.Path(folder, "motion.nc"))["psi"].shape)
+    (100001, 1)
+    """
+    check_writable(path, overwrite=overwrite)
+    put = _put_rows if Path(fspath(path)).suffix.lower() == ".csv" else _put_netcdf
+    try:
+        with replacing(path, overwrite=overwrite) as scratch:
+            put(_counted(parts, count), scratch, count)
+    except _SourceError as error:
+        raise error.reason from None
+
+
+def _counted(parts: Iterable[xarray.Dataset], count: int) -> Iterator[tuple[int, xarray.Dataset]]:
+    """Yield parts with the index of their first instant, which must come to a number of instants in the end."""
+    first, source = 0, iter(parts)
+    while True:
+        try:
+            part = next(source, None)
+        except Exception as error:
+            raise _SourceError(error) from error
+        if first + (0 if part is None else part.sizes["time"]) > count or (part is None and first < count):
+            raise OutputError(f"the parts do not have the {count} instants that were announced")
+        if part is None:
+            return
+        yield first, part
+        first += part.sizes["time"]
+
+
+def _put_rows(parts: Iterator[tuple[int, xarray.Dataset]], path: Path, _: int) -> None:
+    with path.open("w", newline="", encoding="utf-8") as stream:
+        for first, part in parts:
+            _write_rows(part, stream, heading=first == 0)
+
+
+def _put_netcdf(parts: Iterator[tuple[int, xarray.Dataset]], path: Path, count: int) -> None:
+    with path.open("r+b", buffering=0) as stream:
+        file: NetcdfParts | None = None
+        for first, part in parts:
+            file = file or NetcdfParts(stream, _netcdf(part), count)
+            file.put(part, first)
+
+
 def columns(dataset: xarray.Dataset) -> dict[str, Float[np.ndarray, " time"]]:
     """Return the columns of a table of a dataset, by name, each of shape (time,).
 
@@ -124,16 +210,27 @@ def columns(dataset: xarray.Dataset) -> dict[str, Float[np.ndarray, " time"]]:
 
 
 def _write_csv(dataset: xarray.Dataset, path: Path) -> None:
-    table = columns(dataset)
-    rows = np.stack(list(table.values()), axis=1)
-    line = ",".join(["%.17g"] * rows.shape[1]) + "\n"
     with path.open("w", newline="", encoding="utf-8") as stream:
-        csv.writer(stream, lineterminator="\n").writerow(map(written_name, table))
-        for start in range(0, len(rows), 1000):
-            stream.writelines(line % tuple(row) for row in rows[start : start + 1000].tolist())
+        _write_rows(dataset, stream)
 
 
 def _write_netcdf(dataset: xarray.Dataset, path: Path) -> None:
+    path.write_bytes(_netcdf(dataset))
+
+
+def _write_rows(dataset: xarray.Dataset, stream: TextIO, *, heading: bool = True) -> None:
+    """Write a dataset as the lines of a CSV file, below a heading with the names of the columns."""
+    table = columns(dataset)
+    rows = np.stack(list(table.values()), axis=1)
+    line = ",".join(["%.17g"] * rows.shape[1]) + "\n"
+    if heading:
+        csv.writer(stream, lineterminator="\n").writerow(map(written_name, table))
+    for start in range(0, len(rows), 1000):
+        stream.writelines(line % tuple(row) for row in rows[start : start + 1000].tolist())
+
+
+def _netcdf(dataset: xarray.Dataset) -> Any:
+    """Return the content of a NetCDF file of a dataset."""
     named = dataset.assign_attrs({"Conventions": "CF-1.11", "history": f"written by jounce {_version()}"})
     for name in (*named.data_vars, *named.coords):
         if "/" in str(name):
@@ -144,8 +241,8 @@ def _write_netcdf(dataset: xarray.Dataset, path: Path) -> None:
         named = named.assign_coords(time=named["time"].assign_attrs(usual | named["time"].attrs))
     for holder in (named, *(named[name] for name in named.variables)):
         holder.attrs = {key: _attribute(value) for key, value in holder.attrs.items() if value is not None}
-    # HDF5 never closes a file on a full disk, says so on standard error, and may take the process with it
-    path.write_bytes(named.to_netcdf(engine="h5netcdf", format="NETCDF4"))
+    # in memory: HDF5 never closes a file on a full disk, says so on standard error, and may take the process with it
+    return named.to_netcdf(engine="h5netcdf", format="NETCDF4")
 
 
 def _attribute(value: Any) -> Any:

@@ -1,5 +1,10 @@
 """Kinematics: assembly, positions, all derivatives from one factorisation, diagnosis, and the result."""
 
 from jounce.kinematics.motion import Motion as Motion
-from jounce.kinematics.solve import raise_for_status as raise_for_status, solve as solve
+from jounce.kinematics.solve import (
+    raise_for_status as raise_for_status,
+    solve as solve,
+    solve_in_stretches as solve_in_stretches,
+)
 from jounce.kinematics.status import Status as Status
+from jounce.kinematics.stretches import Stretches as Stretches, takes_stretches as takes_stretches

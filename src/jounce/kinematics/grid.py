@@ -45,12 +45,13 @@ class GridSolver:
         self.solver, self.path, self.time, self.span = solver, path, time, span
         self.status = np.full(len(time), int(Status.NOT_REACHED))
         self.faults: dict[int, str] = {}
-        anchors = np.array([anchor.instant for anchor in path.anchors])
+        self._anchors = path.anchors_around(time[0], time[-1])
+        anchors = np.array([anchor.instant for anchor in self._anchors])
         self._instants = np.concatenate([time, anchors])
         self._nearest = len(time) + nearest_instants(anchors, time)
         self._store = jax.tree.map(
             lambda *xs: np.concatenate([np.zeros((*xs[0].shape[:-1], len(time))), *xs], axis=-1),
-            *(anchor.state for anchor in path.anchors),
+            *(anchor.state for anchor in self._anchors),
         )
         for lanes, state in path.on_the_way:
             self._keep(lanes, state)
@@ -74,7 +75,7 @@ class GridSolver:
         left = reached & (self.status != Status.OK)
         done = count - int(np.count_nonzero(left))
         with Threads(threads) as pool:
-            for lanes, distance in _levels(left, len(self.path.anchors), width):
+            for lanes, distance in _levels(left, len(self._anchors), width):
                 source = self._sources(lanes, distance)
                 batches = [(lanes[k : k + width], source[k : k + width]) for k in range(0, len(lanes), width)]
                 for (batch, _), arrival in zip(batches, pool.map(self._solved, batches), strict=True):
@@ -127,7 +128,7 @@ class GridSolver:
 
     def _rescue(self, lane: int) -> None:
         """Follow the motion to one instant from the anchor before it."""
-        anchors, instant = self.path.anchors, float(self.time[lane])
+        anchors, instant = self._anchors, float(self.time[lane])
         before = int(np.searchsorted([a.instant for a in anchors], instant, side="right")) - 1
         start = anchors[before]
         local = follow(self.solver, start, instant, self.span, (instant - start.instant) / 2)

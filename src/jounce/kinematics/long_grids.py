@@ -9,6 +9,7 @@ from jaxtyping import Float, Int
 
 from jounce.kinematics.grid import GridSolver
 from jounce.kinematics.path_following import FollowedPath, Solver
+from jounce.mechanism.time import Instants
 
 STRETCH = 2**16  # instants
 
@@ -62,7 +63,7 @@ def solve_grid(
     kept = len(time) <= STRETCH if keep is None else keep
     status, faults = np.empty(len(time), int), {}
     whole: Any = None
-    for first, part in _stretches(solver, path, time, progress, threads):
+    for first, part in stretches(solver, path, time, progress, threads):
         state = part.state if kept else part.state[1]
         lanes = slice(first, first + len(part.time))
         if len(part.time) == len(time):
@@ -87,10 +88,10 @@ def _coordinates(
     return found
 
 
-def _stretches(
+def stretches(
     solver: Solver,
     path: FollowedPath,
-    time: Float[np.ndarray, " time"],
+    time: Instants,
     progress: Callable[[int, int], None] | None,
     threads: int,
 ) -> Iterator[tuple[int, GridSolver]]:

@@ -6,6 +6,7 @@ stays smooth, two branches cross: a change point. It is passed on the series tha
 the other side to rounding, and is told.
 """
 
+import bisect
 import dataclasses
 import math
 from collections.abc import Sequence
@@ -167,7 +168,7 @@ def _filled(x: Shaped[np.ndarray, "*rest batch"], width: int) -> Shaped[np.ndarr
     return filled
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, slots=True)
 class Anchor:
     """A solved instant of a motion that is followed, and how far it may be followed from there.
 
@@ -204,6 +205,10 @@ class Anchor:
         return 1 / abs(self.turnover) if abs(self.turnover) > 0 else np.inf
 
 
+def _instant(anchor: Anchor) -> float:
+    return anchor.instant
+
+
 @dataclasses.dataclass(frozen=True)
 class ChangePoint:
     """A singular position that a motion passes smoothly: when, s, and the radius of its Taylor series there, s."""
@@ -231,8 +236,10 @@ class FollowedPath:
         count = int(done.count)
         records = jax.tree.map(lambda x: np.asarray(x)[:count], done.records)
         leaves, structure = jax.tree.flatten((records.coordinates, records.outputs, records.sign))
-        for k in np.flatnonzero(records.taken).tolist():
-            state = jax.tree.unflatten(structure, [x[k, ..., :1] for x in leaves])
+        steps = np.flatnonzero(records.taken)
+        taken = [x[steps, ..., :1] for x in leaves]  # copies: an anchor is kept for long, the other lanes are not
+        for number, k in enumerate(steps.tolist()):
+            state = jax.tree.unflatten(structure, [x[number] for x in taken])
             instant, safe_step, radius, turnover = (float(x[k]) for x in records.place)
             status = Status(int(records.status[k, 0]))
             self.anchors.append(Anchor(instant, state, safe_step, radius, turnover, status))
@@ -240,6 +247,12 @@ class FollowedPath:
         if solved.any():
             found = [np.moveaxis(x, 0, -2)[..., solved] for x in leaves]
             self.on_the_way.append((first + records.lane[solved], jax.tree.unflatten(structure, found)))
+
+    def anchors_around(self, first: float, last: float) -> list[Anchor]:
+        """Return the anchors between two instants, with one before them and one after, where there are some."""
+        begin = bisect.bisect_right(self.anchors, first, key=_instant) - 1
+        end = bisect.bisect_left(self.anchors, last, key=_instant)
+        return self.anchors[max(min(begin, len(self.anchors) - 1), 0) : end + 1]
 
     def history(self) -> AttitudeHistory | None:
         """Return the attitudes of all bodies in space along the motion: at the anchors, and by their series beyond."""

@@ -12,14 +12,16 @@ from jounce.kinematics.assembly import assemble
 from jounce.kinematics.grid import LONG_GRID
 from jounce.kinematics.long_grids import solve_grid
 from jounce.kinematics.motion import Motion
-from jounce.kinematics.path_following import NO_GRID, PASSABLE, Anchor, Solver, follow
+from jounce.kinematics.path_following import NO_GRID, PASSABLE, Anchor, FollowedPath, Solver, follow
 from jounce.kinematics.status import Status
+from jounce.kinematics.stretches import Stretches
 from jounce.kinematics.threads import thread_count
 from jounce.mechanism import Mechanism, build, check_mechanism, time_grid
 from jounce.mechanism.axis_angles import measures_angle
 from jounce.mechanism.law_checks import check_laws
 from jounce.mechanism.preconditions import concrete
 from jounce.mechanism.system import Group
+from jounce.mechanism.time import Instants, instants_of
 
 LOWEST_ORDER = 4  # of the jets inside: predictions need some, also where the user wants positions only
 HIGHEST_ORDER = 30
@@ -90,30 +92,92 @@ def solve(
     >>> motion.dataset["psi"].dims
     ('time', 'derivative')
     """
-    check_mechanism(mechanism)
-    order = checked_order(order)
-    if not (isinstance(tolerance, numbers.Real) and 0 < tolerance <= LARGEST_TOLERANCE):
-        message = f"the tolerance must be a number above zero and at most {LARGEST_TOLERANCE:g}"
-        raise MechanismError(message, name="tolerance", value=tolerance)
+    order = _checked_settings(mechanism, order, tolerance)
     count = thread_count(threads)
     instants = time_grid(mechanism.time if time is None else time, mechanism.parameter_values)
-    lost = max((output.lost_orders for output in mechanism.outputs.values()), default=0)
-    check_laws(mechanism, instants, order + lost, forces=any(output.of_forces for output in mechanism.outputs.values()))
-    model, coordinates = assemble(build(mechanism), instants[0], tolerance)
-    solver = Solver(model, max(order + lost, LOWEST_ORDER), float(tolerance), refine, order)
-    first = _first(solver, coordinates, instants[:1])
-    on_the_way = instants if len(instants) <= LONG_GRID else NO_GRID
-    path = follow(solver, first, instants[-1], instants[-1] - instants[0], grid=on_the_way)
+    solver, path = _followed(mechanism, instants, order, tolerance, refine=refine)
     found = solve_grid(solver, path, instants, progress, count, keep=keep)
     change_points = np.array([point.instant for point in path.change_points])
     state, outcome = (found.coordinates, found.outputs), (found.status, found.faults)
-    motion = Motion(mechanism, model, instants, order, state, *outcome, change_points, path.history())
+    motion = Motion(mechanism, solver.model, instants, order, state, *outcome, change_points, path.history())
     if strict:
         raise_for_status(motion)
     return motion
 
 
-def raise_for_status(motion: Motion) -> None:
+@concrete
+def solve_in_stretches(
+    mechanism: Mechanism,
+    time: Any = None,
+    order: int = 4,
+    *,
+    tolerance: float = 1e-12,
+    refine: bool = True,
+    progress: Callable[[int, int], None] | None = None,
+    threads: int | None = None,
+) -> Stretches:
+    """Follow a motion as `jounce.solve` does, and solve its instants stretch by stretch, as many as are asked for.
+
+    What is in memory at a time is one stretch, of 65,536 instants, and what following the motion takes, which grows
+    with how far the mechanism moves, not with the number of instants.
+
+    Parameters
+    ----------
+    mechanism, time, order, tolerance, refine, progress, threads
+        As those of `jounce.solve`.
+
+    Returns
+    -------
+    Stretches
+        An iterable of motions; an instant that fails is NaN in its stretch, and nothing is raised for it.
+
+    Raises
+    ------
+    MechanismError, AssemblyError, MobilityError, SolveError
+        As `jounce.solve`, of what is known before the first stretch.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> from jounce.kinematics import solve_in_stretches
+    >>> fine = jn.TimeGrid(start=0, stop=2, count=100_001)
+    >>> motion = solve_in_stretches(jn.load("examples/four_bar.yaml"), fine, order=1)
+    >>> [(len(part.time), round(float(part.outputs["psi"][:, 0].max()), 4)) for part in motion]
+    [(65536, 2.6022), (34465, 2.6436)]
+    """
+    order = _checked_settings(mechanism, order, tolerance)
+    count = thread_count(threads)
+    instants = instants_of(mechanism.time if time is None else time, mechanism.parameter_values)
+    found = _followed(mechanism, instants, order, tolerance, refine=refine)
+    return Stretches(mechanism, found, instants, order, progress, count)
+
+
+def _checked_settings(mechanism: Mechanism, order: Any, tolerance: float) -> int:
+    """Return the order of derivatives, or raise MechanismError unless mechanism, order and tolerance are valid."""
+    check_mechanism(mechanism)
+    order = checked_order(order)
+    if not (isinstance(tolerance, numbers.Real) and 0 < tolerance <= LARGEST_TOLERANCE):
+        message = f"the tolerance must be a number above zero and at most {LARGEST_TOLERANCE:g}"
+        raise MechanismError(message, name="tolerance", value=tolerance)
+    return order
+
+
+def _followed(
+    mechanism: Mechanism, instants: Instants, order: int, tolerance: float, *, refine: bool
+) -> tuple[Solver, FollowedPath]:
+    """Return what solves the instants of a grid: a solver, and the motion followed from the first to the last."""
+    first, last = float(instants[0]), float(instants[-1])
+    lost = max((output.lost_orders for output in mechanism.outputs.values()), default=0)
+    of_forces = any(output.of_forces for output in mechanism.outputs.values())
+    check_laws(mechanism, np.array([first, last]), order + lost, forces=of_forces)
+    model, coordinates = assemble(build(mechanism), first, tolerance)
+    solver = Solver(model, max(order + lost, LOWEST_ORDER), float(tolerance), refine, order)
+    start = _first(solver, coordinates, np.array([first]))
+    on_the_way = np.asarray(instants) if len(instants) <= LONG_GRID else NO_GRID
+    return solver, follow(solver, start, last, last - first, grid=on_the_way)
+
+
+def raise_for_status(motion: Motion | Stretches) -> None:
     """Raise SolveError, with the first instant that failed and what to do, unless all were solved."""
     failed = np.flatnonzero(motion.status != Status.OK)
     if not failed.size:

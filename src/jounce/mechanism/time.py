@@ -31,8 +31,53 @@ class TimeGrid:
     count: Any = None
 
 
+@dataclasses.dataclass(frozen=True)
+class SpacedInstants:
+    """The instants of an evenly spaced grid, computed where they are asked for, s.
+
+    Parameters
+    ----------
+    start, step : float
+    count : int
+    stop : float, optional
+        The last instant to the bit, where it is given.
+    """
+
+    start: float
+    step: float
+    count: int
+    stop: float | None = None
+
+    def __len__(self) -> int:
+        return self.count
+
+    def __getitem__(self, which: Any) -> Any:
+        """Return instants by index or slice, as of an array."""
+        chosen = range(self.count)[which]
+        if isinstance(chosen, int):
+            return self._at(np.array([chosen]))[0]
+        return self._at(np.arange(chosen.start, chosen.stop, chosen.step))
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
+        return self._at(np.arange(self.count)).astype(dtype or float, copy=False)
+
+    def _at(self, index: Int[np.ndarray, " time"]) -> Float[np.ndarray, " time"]:
+        instants = self.start + self.step * index
+        if self.stop is not None:
+            instants[index == self.count - 1] = self.stop
+        return instants
+
+
+Instants = Float[np.ndarray, " time"] | SpacedInstants
+
+
 def time_grid(time: Any, parameters: Mapping[str, Any]) -> Float[np.ndarray, " time"]:
-    """Return the instants of a grid, shape (time,), s.
+    """Return the instants of a grid, shape (time,), s; raise MechanismError as `instants_of` does."""
+    return np.asarray(instants_of(time, parameters))
+
+
+def instants_of(time: Any, parameters: Mapping[str, Any]) -> Instants:
+    """Return the instants of a grid, s, those of an evenly spaced one without a place in memory.
 
     Raises
     ------
@@ -59,7 +104,7 @@ def time_grid(time: Any, parameters: Mapping[str, Any]) -> Float[np.ndarray, " t
     return instants
 
 
-def _spaced(grid: TimeGrid, parameters: Mapping[str, Any]) -> Float[np.ndarray, " time"]:
+def _spaced(grid: TimeGrid, parameters: Mapping[str, Any]) -> SpacedInstants:
     given = {k: getattr(grid, k) for k in ("start", "stop", "step", "count") if getattr(grid, k) is not None}
     values = {k: float(resolve(v, parameters)) for k, v in given.items()}
     for name, value in values.items():
@@ -82,8 +127,8 @@ def _spaced(grid: TimeGrid, parameters: Mapping[str, Any]) -> Float[np.ndarray, 
     if count > MAX_INSTANTS:
         raise MechanismError(f"a time grid holds at most {MAX_INSTANTS} instants", name="time", value=float(count))
     if "count" in values:
-        return np.linspace(start, stop, int(count))
-    return start + values["step"] * np.arange(int(count))
+        return SpacedInstants(start, (stop - start) / max(int(count) - 1, 1), int(count), stop)
+    return SpacedInstants(start, values["step"], int(count))
 
 
 def nearest_instants(

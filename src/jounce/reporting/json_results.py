@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from jounce.dynamics.limits import LimitReport
 from jounce.errors import UNSET, JounceError, show_value
-from jounce.kinematics import Motion
+from jounce.kinematics import Motion, Stretches
 from jounce.reporting.motion_facts import motion_facts
 from jounce.reporting.peaks import Peak, peaks, table_peaks
 from jounce.trajectory import JointTrajectory
@@ -69,7 +69,7 @@ def complaint(kind: str, problem: object) -> str:
     return json.dumps({kind: told}, allow_nan=False)
 
 
-def motion_result(motion: Motion, file: Path, written: Path | None, refine: bool = True) -> dict[str, Any]:
+def motion_result(motion: Motion | Stretches, file: Path, written: Path | None, refine: bool = True) -> dict[str, Any]:
     """Return what `jounce run` and `jounce simulate` tell of a motion."""
     told = [_peak(peak) for peak in peaks(motion, refine=refine)]
     return {"file": file, **motion_facts(motion), "peaks": told, "written": written}

@@ -8,7 +8,7 @@ import numpy as np
 from typing_extensions import TypedDict
 
 from jounce.integrate import Simulation
-from jounce.kinematics import Motion, Status
+from jounce.kinematics import Motion, Status, Stretches
 from jounce.mechanism import build
 
 
@@ -72,12 +72,13 @@ class SimulationFacts(MotionFacts):
     kinks: list[Kink]
 
 
-def motion_facts(motion: Motion) -> dict[str, Any]:
+def motion_facts(motion: Motion | Stretches) -> dict[str, Any]:
     """Return what was solved or simulated: MotionFacts, or SimulationFacts.
 
     Parameters
     ----------
-    motion : Motion
+    motion : Motion or Stretches
+        Of stretches, all must have been solved.
 
     Examples
     --------

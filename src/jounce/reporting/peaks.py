@@ -5,16 +5,17 @@ from __future__ import annotations
 import dataclasses
 import re
 import warnings
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Float
 
-from jounce.dynamics.limits import local_maxima
 from jounce.errors import SampleWarning
 from jounce.integrate import Simulation
-from jounce.kinematics import Motion, solve
+from jounce.kinematics import Motion, Stretches, solve
 from jounce.mechanism import AbstractQuantity
+from jounce.reporting.maxima import Curves, Highest, Peaks, Times
 
 if TYPE_CHECKING:
     import xarray
@@ -25,9 +26,6 @@ PEAKS, POINTS, ROUNDS = 2, 7, 3  # highest maxima of each curve, instants around
 CHUNK = 1000  # instants solved together
 ROUNDING = 1e-9
 SMALLEST = 1e-15  # share of the size of an output
-_Times = Float[np.ndarray, " time"]
-_Curves = Float[np.ndarray, "time curves"]
-_Peaks = Float[np.ndarray, "peaks curves"]
 _Around = Float[np.ndarray, "points peaks curves"]
 
 
@@ -137,13 +135,13 @@ def scalar_outputs(motion: Motion) -> dict[str, tuple[str, Float[np.ndarray, "ti
     return found
 
 
-def peaks(motion: Motion, *, refine: bool = True) -> list[Peak]:
+def peaks(motion: Motion | Stretches, *, refine: bool = True) -> list[Peak]:
     """Return the peak values of each output, component by component, and of each derivative.
 
     Parameters
     ----------
-    motion : Motion
-        What was solved.
+    motion : Motion or Stretches
+        What was solved; of stretches, those that `looked_at` found; else they are solved for it.
     refine : bool, default True
         Find peaks between its instants too: the motion is solved at more instants where it has few, and then, as often
         as it takes, around the highest of them. Otherwise only its own instants count.
@@ -160,10 +158,24 @@ def peaks(motion: Motion, *, refine: bool = True) -> list[Peak]:
     >>> [(p.output, p.derivative, p.unit, round(p.maximum, 4), round(p.maximum_at, 3)) for p in peaks(motion)][:2]
     [('psi', 'position', 'rad', 2.6436, 1.5), ('psi', 'velocity', 'rad/s', 1.5179, 1.069)]
     """
-    name = "peaks" if refine else "peaks at the instants"
+    name = _name(refine)
     if name not in motion.derived:
-        motion.derived[name] = _found(motion, refine)
+        for _ in looked_at(motion, refine=refine):
+            pass
     return motion.derived[name]
+
+
+def looked_at(motion: Motion | Stretches, *, refine: bool = True) -> Iterator[Motion]:
+    """Yield the stretches of a motion, for what else is to be done with them, and keep their `peaks` in the end."""
+    search = _PeakSearch()
+    for part in motion if isinstance(motion, Stretches) else (motion,):
+        search.add(part)
+        yield part
+    motion.derived[_name(refine)] = search.found(motion, refine=refine)
+
+
+def _name(refine: bool) -> str:
+    return "peaks" if refine else "peaks at the instants"
 
 
 def table_peaks(dataset: xarray.Dataset) -> list[Peak]:
@@ -200,39 +212,49 @@ def effort_name(unit: str, order: int) -> str:
     return first[order] if order < len(first) else f"{derivative_name(order)} rate"
 
 
-def _found(motion: Motion, refine: bool) -> list[Peak]:
-    scalars = scalar_outputs(motion)
-    rows = [(column, name, order) for column, (name, values) in scalars.items() for order in range(values.shape[1])]
-    if not rows:
-        return []
-    times, values = _extremes(motion, refine)
-    extremes = [(-values[k], times[k], values[len(rows) + k], times[len(rows) + k]) for k in range(len(rows))]
-    sizes: dict[tuple[str, int], float] = {}
-    for (_, name, order), (low, _, high, _) in zip(rows, extremes, strict=True):
-        sizes[name, order] = float(np.nanmax([sizes.get((name, order), 0.0), abs(low), abs(high)]))
-    found = []
-    for (column, name, order), numbers in zip(rows, extremes, strict=True):
-        output = motion.mechanism.outputs[name]
-        unit, told = derivative_unit(output.unit, order), [float(x) for x in numbers]
-        found.append(Peak(column, rate_name(output, order), unit, *told, size=sizes[name, order]))
-    return found
+class _PeakSearch:
+    """A search for the peaks of a motion, which may come stretch by stretch and is not kept."""
+
+    def __init__(self) -> None:
+        self._columns: dict[str, tuple[str, int]] = {}  # the output and the number of derivatives of each
+        self._highest = Highest(PEAKS)
+
+    def add(self, part: Motion) -> None:
+        """Look at the instants of a motion, or at those of its next stretch."""
+        self._columns = {column: (name, x.shape[1]) for column, (name, x) in scalar_outputs(part).items()}
+        if self._columns:
+            self._highest.add(part.time, _curves(part), _scales(part))
+
+    def found(self, motion: Motion | Stretches, *, refine: bool) -> list[Peak]:
+        """Return the peaks of a motion of which all instants were looked at, as `peaks` does."""
+        rows = [(column, name, order) for column, (name, orders) in self._columns.items() for order in range(orders)]
+        if not rows:
+            return []
+        times, values = _extremes(motion, self._highest, refine)
+        extremes = [(-values[k], times[k], values[len(rows) + k], times[len(rows) + k]) for k in range(len(rows))]
+        sizes: dict[tuple[str, int], float] = {}
+        for (_, name, order), (low, _, high, _) in zip(rows, extremes, strict=True):
+            sizes[name, order] = float(np.nanmax([sizes.get((name, order), 0.0), abs(low), abs(high)]))
+        found = []
+        for (column, name, order), numbers in zip(rows, extremes, strict=True):
+            output = motion.mechanism.outputs[name]
+            unit, told = derivative_unit(output.unit, order), [float(x) for x in numbers]
+            found.append(Peak(column, rate_name(output, order), unit, *told, size=sizes[name, order]))
+        return found
 
 
-def _extremes(motion: Motion, refine: bool) -> tuple[Float[np.ndarray, " curves"], Float[np.ndarray, " curves"]]:
+def _extremes(
+    motion: Motion | Stretches, highest: Highest, refine: bool
+) -> tuple[Float[np.ndarray, " curves"], Float[np.ndarray, " curves"]]:
     """Return where each curve is largest and how large, (2 curves,): all curves upside down, then as they are.
 
     Around the highest instants, the best of a few becomes the middle of a shorter interval, again and again; the last
     look is at the vertex of the parabola through three of them.
     """
-    time, values = motion.time, _curves(motion)
-    best = np.argmax(values, axis=0)
-    every = np.arange(values.shape[1])
-    times, sizes = time[best], values[best, every]
-    rounding = ROUNDING * _scales(motion)
-    if refine and len(time) > 1:
-        time, values = _denser(motion, time, values)
-        middle = local_maxima(values, PEAKS)
-        low, high = time[np.maximum(middle - 1, 0)], time[np.minimum(middle + 1, len(time) - 1)]
+    times, sizes = highest.times.copy(), highest.sizes.copy()
+    rounding = ROUNDING * highest.scales
+    if refine and len(motion.time) > 1:
+        low, high = _around_maxima(motion, highest)
         share = np.linspace(0.0, 1.0, POINTS)[:, None, None]
         near = []
         for _ in range(ROUNDS):
@@ -248,27 +270,33 @@ def _extremes(motion: Motion, refine: bool) -> tuple[Float[np.ndarray, " curves"
     return np.where(solved, times, np.nan), np.where(solved, sizes, np.nan)
 
 
-def _denser(
-    motion: Motion, time: _Times, values: _Curves
-) -> tuple[Float[np.ndarray, " denser"], Float[np.ndarray, "denser curves"]]:
-    """Return instants and curves with enough instants for no peak to be missed that is no needle."""
-    steps = -(-LEAST // (len(time) - 1))
-    if steps == 1:
-        return time, values
+def _around_maxima(motion: Motion | Stretches, highest: Highest) -> tuple[Peaks, Peaks]:
+    """Return the instants before and after the highest local maxima, of a motion with few instants at more of them."""
+    steps = -(-LEAST // (len(motion.time) - 1))
+    if steps == 1 or isinstance(motion, Stretches):
+        return highest.around_maxima()
+    denser = Highest(PEAKS)
+    denser.add(*_denser(motion, steps), highest.scales)
+    return denser.around_maxima()
+
+
+def _denser(motion: Motion, steps: int) -> tuple[Float[np.ndarray, " denser"], Float[np.ndarray, "denser curves"]]:
+    """Return instants and curves with so many steps between instants that no peak is missed that is no needle."""
+    time = motion.time
     between = (time[:-1, None] + np.diff(time)[:, None] * np.arange(1, steps) / steps).ravel()
     whole = np.concatenate([time, between])
     order = np.argsort(whole)
-    return whole[order], np.concatenate([values, _at(motion, between)])[order]
+    return whole[order], np.concatenate([_curves(motion), _at(motion, between)])[order]
 
 
-def _own(motion: Motion, around: _Around) -> _Around:
+def _own(motion: Motion | Stretches, around: _Around) -> _Around:
     """Return the values of curves at instants of their own, (points, peaks, curves)."""
     wanted, places = np.unique(around, return_inverse=True)
     values = _at(motion, wanted)
     return values[places.reshape(around.shape), np.arange(around.shape[-1])]
 
 
-def _at(motion: Motion, instants: _Times) -> _Curves:
+def _at(motion: Motion | Stretches, instants: Times) -> Curves:
     """Return the curves of a motion at other instants, -inf where it cannot be solved."""
     parts = []
     for first in range(0, len(instants), CHUNK):
@@ -284,7 +312,7 @@ def _at(motion: Motion, instants: _Times) -> _Curves:
     return np.concatenate(parts)
 
 
-def _curves(motion: Motion) -> _Curves:
+def _curves(motion: Motion) -> Curves:
     """Return all derivatives of all outputs, upside down and as they are, (time, 2 curves); -inf where unknown."""
     whole = np.concatenate([values for _, values in scalar_outputs(motion).values()], axis=1)
     return np.nan_to_num(np.concatenate([-whole, whole], axis=1), nan=-np.inf, posinf=-np.inf, neginf=-np.inf)
@@ -317,10 +345,10 @@ def _keep_best(
 
 
 def _vertex(
-    low: _Peaks,
-    high: _Peaks,
-    *near: _Peaks,
-) -> _Peaks:
+    low: Peaks,
+    high: Peaks,
+    *near: Peaks,
+) -> Peaks:
     """Return where the parabola through three evenly spaced values is largest, between the outer two."""
     left, middle, right = near
     with np.errstate(invalid="ignore", divide="ignore"):

@@ -1,0 +1,176 @@
+"""A NetCDF file written part by part along time: with the memory of a part, whatever their number.
+
+HDF5 never touches the disk: it never closes a file on a full one, says so on standard error, and may take the process
+with it. It lays the file out in memory, with everything but the values along time, whose places are left empty. The
+file has its full length from the start, so that a disk which is too small is found at once, and plain writing puts the
+values into their places.
+"""
+
+from __future__ import annotations
+
+import errno
+import io
+import os
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import xarray
+
+BLOCK = 2**14  # bytes
+NO_SUCH_CALL = (errno.EOPNOTSUPP, errno.EINVAL, errno.ENOSYS)  # of file systems that reserve no space
+
+
+class NetcdfParts:
+    """A NetCDF file of known length, into which parts along time are put.
+
+    Parameters
+    ----------
+    stream : io.FileIO
+        A new file, not buffered.
+    example : bytes
+        Content of a NetCDF file that is as the whole one but for its instants.
+    count : int
+        Number of instants of the whole.
+    """
+
+    def __init__(self, stream: io.FileIO, example: Any, count: int):
+        layout = _layout(example, count)
+        self._stream, self._places = stream, layout.places
+        _reserve(stream, layout.size)
+        for number, block in layout.blocks.items():
+            _write_at(stream, number * BLOCK, memoryview(block)[: layout.size - number * BLOCK])
+
+    def put(self, part: xarray.Dataset, first: int) -> None:
+        """Write the values of a part, of which the first instant has an index in the whole."""
+        for name, (place, dims, dtype) in self._places.items():
+            values = np.ascontiguousarray(part[name].transpose(*dims).values, dtype)
+            _write_at(self._stream, place + first * values[0].nbytes, values.reshape(-1).view(np.uint8))
+
+
+class _Layout(NamedTuple):
+    """A NetCDF file without its values along time.
+
+    Attributes
+    ----------
+    size : int
+        Bytes of the whole file.
+    blocks : dict of int to bytearray
+        What it holds besides these values, block by block; a block that is not there is left to them.
+    places : dict of str to tuple
+        Where the values of a variable begin, its dimensions and its type.
+    """
+
+    size: int
+    blocks: dict[int, bytearray]
+    places: dict[str, tuple[int, tuple[str, ...], np.dtype]]
+
+
+def _layout(example: Any, count: int) -> _Layout:
+    """Return the layout of a file as the example is, but with another number of instants."""
+    import h5netcdf
+
+    file, places = _SparseFile(), {}
+    with h5netcdf.File(io.BytesIO(example), "r") as small, h5netcdf.File(file, "w") as large:
+        ordered = sorted(small.dimensions.items(), key=lambda named: named[1]._dimid)
+        large.dimensions = {name: count if name == "time" else each.size for name, each in ordered}
+        large.attrs.update(small.attrs)
+        for name, given in small.variables.items():
+            along = "time" in given.dimensions
+            attributes = dict(given.attrs)
+            missing = attributes.pop("_FillValue", None)
+            kept = {"dcpl": _left_empty()} if along else {}
+            made = large.create_variable(name, given.dimensions, given.dtype, fillvalue=missing, **kept)
+            made.attrs.update(attributes)
+            if not along:
+                made[...] = given[...]
+                continue
+            place = made._h5ds.id.get_offset()
+            places[name] = place, given.dimensions, made.dtype
+    return _Layout(file.size, file.blocks, places)
+
+
+def _left_empty() -> Any:
+    """Return the properties of a variable that has its place in a file from the start, and nothing written there."""
+    import h5py
+
+    properties = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    properties.set_layout(h5py.h5d.CONTIGUOUS)
+    properties.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
+    properties.set_fill_time(h5py.h5d.FILL_TIME_NEVER)
+    return properties
+
+
+def _reserve(stream: io.FileIO, size: int) -> None:
+    """Give a file its length, and the space for it where the system can tell that there is enough."""
+    stream.truncate(size)
+    if hasattr(os, "posix_fallocate"):
+        try:
+            os.posix_fallocate(stream.fileno(), 0, size)
+        except OSError as error:
+            if error.errno not in NO_SUCH_CALL:
+                raise
+
+
+def _write_at(stream: io.FileIO, place: int, values: Any) -> None:
+    stream.seek(place)
+    left = memoryview(values)
+    while left.nbytes:
+        left = left[stream.write(left) :]
+
+
+class _SparseFile(io.RawIOBase):
+    """A file in memory that holds the blocks which were written to; all else is zero."""
+
+    def __init__(self) -> None:
+        self.blocks: dict[int, bytearray] = {}
+        self.size = self._place = 0
+
+    def readable(self) -> bool:
+        return True
+
+    def writable(self) -> bool:
+        return True
+
+    def seekable(self) -> bool:
+        return True
+
+    def seek(self, place: int, whence: int = os.SEEK_SET) -> int:
+        self._place = place + (0, self._place, self.size)[whence]
+        return self._place
+
+    def tell(self) -> int:
+        return self._place
+
+    def truncate(self, size: int | None = None) -> int:
+        self.size = self._place if size is None else size
+        return self.size
+
+    def readinto(self, into: Any) -> int:
+        view = memoryview(into).cast("B")
+        length = max(0, min(len(view), self.size - self._place))
+        for start, number, part in self._parts(length):
+            block = self.blocks.get(number)
+            view[start : start + len(part)] = bytes(len(part)) if block is None else block[part.start : part.stop]
+        self._place += length
+        return length
+
+    def write(self, values: Any) -> int:
+        view = memoryview(values).cast("B")
+        for start, number, part in self._parts(len(view)):
+            block = self.blocks.setdefault(number, bytearray(BLOCK))
+            block[part.start : part.stop] = view[start : start + len(part)]
+        self._place += len(view)
+        self.size = max(self.size, self._place)
+        return len(view)
+
+    def _parts(self, length: int) -> Iterator[tuple[int, int, range]]:
+        """Yield where in a span of bytes from here each block begins, the block, and the bytes of it."""
+        start = 0
+        while start < length:
+            number, within = divmod(self._place + start, BLOCK)
+            part = range(within, min(BLOCK, within + length - start))
+            yield start, number, part
+            start += len(part)
