@@ -71,6 +71,7 @@ def rotor(quaternion, vectors=None, tilt=0.0):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "tilt", [pytest.param(0.0, marks=pytest.mark.slow, id="guess assembled"), pytest.param(0.2, id="guess tilted")]
 )
@@ -86,6 +87,7 @@ def test_the_bearing_of_a_driven_rotor_carries_nothing(quaternion, tilt):
     np.testing.assert_allclose(found["angle"][:, 0], law_at_instants(), atol=1e-14)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tilt", [0.0, 0.2], ids=["guess assembled", "guess tilted"])
 def test_nor_does_it_where_a_vector_of_the_driver_points_beside_the_plane_of_the_turn(tilt):
     driven = rotor(DRAWINGS["x along the axle"], ([1, 0, 0.4], [0.6, 0.8, 1.5]), tilt)

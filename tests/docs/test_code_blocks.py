@@ -28,6 +28,7 @@ def pages_with(language, needle=""):
     return pytest.mark.parametrize("page", cases, ids=[str(page.relative_to(ROOT)) for page in found])
 
 
+@pytest.mark.slow
 @pages_with("python")
 def test_python_blocks_run(page, tmp_path, monkeypatch):
     (tmp_path / "examples").symlink_to(ROOT / "examples", target_is_directory=True)

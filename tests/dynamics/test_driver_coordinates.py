@@ -72,6 +72,7 @@ FORMS = {
 QUICK = ("energy_slope",)  # every form takes seconds to compile
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", [f if f in QUICK else pytest.param(f, marks=pytest.mark.slow) for f in FORMS])
 def test_an_open_chain_agrees_with_the_robot(form):
     found, right = FORMS[form](sled()), FORMS[form](robot(), laws())

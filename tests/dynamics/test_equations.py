@@ -102,12 +102,14 @@ FORMS = {
 SLOW = ("lagrange", "mangeron_1", "mangeron_2", "gibbs_appell_2")  # to compile
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", [pytest.param(f, marks=pytest.mark.slow) if f in SLOW else f for f in FORMS])
 def test_equations_124_to_128_agree_with_virtual_work_in_fifty_digits(form):
     robot, q, right = case(tree)
     agree(FORMS[form](robot, q), right)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("k", [2, pytest.param(3, marks=pytest.mark.slow)])
 def test_equations_129_to_131_and_134_agree_with_virtual_work_in_fifty_digits(k):
     robot, q, right = case(tree)

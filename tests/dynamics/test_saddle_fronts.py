@@ -48,6 +48,7 @@ def test_solutions_and_inverses_are_those_of_the_whole_matrix(mechanism, monkeyp
     assert np.abs(matrix @ inverse - np.eye(len(matrix))).max() < 1e-14 * size * np.abs(inverse).max()
 
 
+@pytest.mark.slow
 def test_expansions_are_those_of_dense_elimination(mechanism, monkeypatch):
     start = start_in_fronts(mechanism, monkeypatch)
     dense = dataclasses.replace(start.equations, saddle=None)

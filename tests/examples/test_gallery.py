@@ -124,6 +124,7 @@ def test_epicyclic_gear_by_willis():
         near(angle, exact(closed_forms.epicyclic, time, output))
 
 
+@pytest.mark.slow
 def test_valve_follows_the_lift_law_of_its_cam():
     spec = importlib.util.spec_from_file_location("valve_train", EXAMPLES / "valve_train.py")
     spec.loader.exec_module(importlib.util.module_from_spec(spec))

@@ -70,6 +70,7 @@ def test_a_pulse_in_time_backward_and_before_an_event():
     assert run.ended_at == pytest.approx(0.2 + 0.5 / gained(4.0, 0.2, 1e-3), rel=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("place", [1.3, 1.77, 1.99])
 def test_a_pulse_in_place_gives_its_work(place):
     for w in (1e-4, 1e-3, 1e-2):

@@ -86,6 +86,7 @@ def test_any_instants_and_outputs_asked_for_later_have_the_same_turns():
         np.testing.assert_allclose(found.evaluate(output).values, closed_form(TIME), rtol=0, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_and_backward_in_time():
     found = jn.simulate(rotor("spatial"), -TIME, order=4)
     np.testing.assert_allclose(found.outputs["angle"], closed_form(-TIME), rtol=0, atol=1e-12)

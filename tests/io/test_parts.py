@@ -61,6 +61,7 @@ def described(path):
         return found, {key: str(value) for key, value in file.attrs.items() if key != "_NCProperties"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mechanism", [four_bar, turning, lambda: slider_crank("3.8 - 2*t")])
 def test_the_file_is_that_of_the_whole_motion(tmp_path, mechanism):
     whole = jn.solve(mechanism(), GRID, order=2, strict=False)

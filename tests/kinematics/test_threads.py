@@ -42,6 +42,7 @@ def test_progress_is_told_in_the_thread_that_asked_and_may_interrupt():
         jn.solve(four_bar(), LONG, progress=interrupt, threads=2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["rssr", "four_bar"])
 def test_programs_of_long_grids_hold_no_lapack(monkeypatch, name):
     """JAX waits for batches of LAPACK in the threads that they need: two callers would wait for each other."""

@@ -118,6 +118,7 @@ def test_explicit_solutions_use_neither_solver_nor_constraints():
 LONG = ("rspu_distance", "rspu_slide", "rssr")  # to compile; the other spatial one, rsur, is in the quick suite
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", [pytest.param(n, marks=pytest.mark.slow) if n in LONG else n for n in VALIDATION_CASES]
 )

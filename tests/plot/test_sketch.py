@@ -161,6 +161,7 @@ def test_hodograph_is_the_derivative_by_components(four_bar):
         hodograph(four_bar, "C", 4)
 
 
+@pytest.mark.slow
 def test_hodograph_in_space_has_three_projections(hooke):
     figure = hodograph(hooke, "rim")
     for axes, pair in zip(figure.axes, ([0, 1], [0, 2], [1, 2]), strict=True):

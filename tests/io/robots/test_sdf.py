@@ -352,20 +352,27 @@ def test_cassie_moves_as_in_pinocchio():
     motion = jn.solve(mechanism, order=4)
     model_, frames = in_pinocchio(robot.opened())
     data = model_.createData()
-    q = np.stack([motion.outputs[name][:, :3] for name in robot.joint_names], axis=2)
-    torque = np.zeros((3, len(robot.joint_names)))
+    names = list(model_.names)[1:]
+    q = np.stack([motion.outputs[name][:, :3] for name in names], axis=2)
+    torque = np.zeros((3, len(names)))
     for name in drivers:
-        torque[:, robot.joint_names.index(name)] = jn.driver_force(motion, f"{name}_drive").values[:, 0]
+        torque[:, names.index(name)] = jn.driver_force(motion, f"{name}_drive").values[:, 0]
     rods = [in_contact(model_, frames, closure) for closure in robot.closures.values()]
     for state, known in zip(q, torque, strict=True):
         force = pinocchio.rnea(model_, data, *state)
         pinocchio.computeJointJacobians(model_, data, state[0])
-        jacobian = np.vstack([pinocchio.getConstraintJacobian(model_, data, rod, rod.createData()) for rod in rods])
-        np.testing.assert_allclose(jacobian @ state[1], 0, atol=1e-12)
+        kept = [rod.createData() for rod in rods]
+        for rod, found in zip(rods, kept, strict=True):
+            rod.calc(model_, data, found)
+        pairs = zip(rods, kept, strict=True)
+        jacobian = np.vstack([pinocchio.getConstraintJacobian(model_, data, rod, found) for rod, found in pairs])
+        # in one direction of each rod at a foot the hinges hold it already, to the digits that the file gives of axes
+        np.testing.assert_allclose(jacobian @ state[1], 0, atol=1e-8)
         borne = np.linalg.lstsq(jacobian.T, force - known, rcond=1e-9)[0]
         np.testing.assert_allclose(known + jacobian.T @ borne, force, rtol=0, atol=1e-10 * np.abs(force).max())
 
 
+@pytest.mark.slow
 def test_the_hook_of_the_crane_travels_level():
     robot = jn.load_robot("examples/robots/luffing_crane.sdf")
     mechanism = robot.mechanism(drivers={"luff": "0.25*cos(t)"}, time=np.linspace(0, np.pi, 9))
