@@ -32,6 +32,7 @@ def file(tmp_path):
     return write
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("motion, status", [(WHOLE, 0), (ENDS, 1)])
 @pytest.mark.parametrize("suffix", ["nc", "csv"])
 def test_stretches_change_nothing(run, file, tmp_path, monkeypatch, motion, status, suffix):

@@ -60,6 +60,7 @@ def test_summary_table_and_file(simulate, file, tmp_path):
     assert fine.outputs["angle"][:, 4].min() < motion.outputs["angle"][:, 4].min()
 
 
+@pytest.mark.slow
 def test_set_step_and_netcdf(simulate, file, tmp_path):
     import xarray
 

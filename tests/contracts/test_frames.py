@@ -72,9 +72,7 @@ def rotor(quaternion, vectors=None, tilt=0.0):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "tilt", [pytest.param(0.0, marks=pytest.mark.slow, id="guess assembled"), pytest.param(0.2, id="guess tilted")]
-)
+@pytest.mark.parametrize("tilt", [0.0, 0.2], ids=["guess assembled", "guess tilted"])
 @pytest.mark.parametrize("quaternion", DRAWINGS.values(), ids=DRAWINGS)
 def test_the_bearing_of_a_driven_rotor_carries_nothing(quaternion, tilt):
     found = jn.solve(rotor(quaternion, tilt=tilt), INSTANTS, order=2).outputs
@@ -351,6 +349,7 @@ def test_an_angle_between_bodies_in_any_motion_changes_by_a_constant_with_their_
 MECHANISMS = {"plane": all_in_the_plane, "arm": arm, "cross": cross, "linkage": linkage, "screw": screw}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [arm, screw])
 def test_an_attitude_is_the_same_with_either_sign_of_its_euler_parameters(kind):
     mechanism = kind()

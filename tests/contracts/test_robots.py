@@ -51,6 +51,7 @@ def last_link(robot):
     return robot.moving_links[-1]
 
 
+@pytest.mark.slow
 @hypothesis.given(data=strategies.data())
 def test_power_balances_energy_with_rates(robot, data):
     q = data.draw(states(robot))
@@ -62,6 +63,7 @@ def test_power_balances_energy_with_rates(robot, data):
     near(power, kinetic[:, 1 : levels + 1] + potential[:, 1 : levels + 1])
 
 
+@pytest.mark.slow
 @hypothesis.given(data=strategies.data())
 def test_frames_are_those_of_the_joints_in_turn(robot, data):
     q = data.draw(states(robot))
@@ -112,6 +114,7 @@ def test_spin_turns_the_axes(robot, data):
         near(motion.rotation[:, level + 1].swapaxes(1, 2), expected)
 
 
+@pytest.mark.slow
 @hypothesis.given(data=strategies.data())
 def test_operational_accelerations_are_sums_of_jacobian_rates(robot, data):
     q = data.draw(states(robot))
@@ -125,6 +128,7 @@ def test_operational_accelerations_are_sums_of_jacobian_rates(robot, data):
         near(found[:, m - 1], expected)
 
 
+@pytest.mark.slow
 @hypothesis.given(data=strategies.data())
 @hypothesis.settings(max_examples=4)
 def test_the_mass_matrix_is_symmetric_and_positive(robot, data):
@@ -136,6 +140,7 @@ def test_the_mass_matrix_is_symmetric_and_positive(robot, data):
     near(energy, q[0, 1] @ matrix @ q[0, 1] / 2, 1e-13)
 
 
+@pytest.mark.slow
 @hypothesis.given(data=strategies.data())
 @hypothesis.settings(max_examples=4)
 def test_torques_are_of_the_mass_matrix_and_the_bias_with_rates(robot, data):

@@ -372,6 +372,7 @@ def linkage_motion():
     return jn.solve(LINKAGE, [0.2, 0.5], order=7)
 
 
+@pytest.mark.slow
 def test_multipliers_balance_forces_and_inertia_with_rates(linkage_motion):
     """``M q'' + Phi_q^T lambda = Q`` and its five rates: loads and the Jacobian of the pins anew, on polynomials."""
     equations = jn.constraint_equations(linkage_motion)

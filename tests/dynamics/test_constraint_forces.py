@@ -11,7 +11,6 @@ from jounce.dynamics.masses import Masses
 from jounce.jet import Jet
 from tests.problems.bank import cases, group_of, pose_of, random_motion
 
-QUICK = ("planar-joint-gear", "spatial-joint-dot1")
 STEP = 1e-3
 
 
@@ -32,9 +31,8 @@ def binomial(n, k):
     return float(np.prod([(n - i) / (i + 1) for i in range(k)])) if k else 1.0
 
 
-@pytest.mark.parametrize(
-    "case", [pytest.param(c, id=str(c), marks=() if str(c) in QUICK else pytest.mark.slow) for c in cases()]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("case", cases(), ids=str)
 def test_slopes_are_the_jacobian_and_its_rates(case):
     random = np.random.default_rng(7)
     group = group_of([case.element(random)], case.space)
@@ -65,6 +63,7 @@ def test_slopes_are_the_jacobian_and_its_rates(case):
         np.testing.assert_allclose(2 * slope[2], second, atol=1e-6 * size)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("space", ["planar", "spatial"])
 def test_mass_matrices_give_the_kinetic_energy(space):
     random = np.random.default_rng(3)

@@ -69,11 +69,8 @@ FORMS = {
 }
 
 
-QUICK = ("energy_slope",)  # every form takes seconds to compile
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("form", [f if f in QUICK else pytest.param(f, marks=pytest.mark.slow) for f in FORMS])
+@pytest.mark.parametrize("form", FORMS)
 def test_an_open_chain_agrees_with_the_robot(form):
     found, right = FORMS[form](sled()), FORMS[form](robot(), laws())
     assert found.coords["driver"].values.tolist() == ["push", "turn"]
@@ -97,7 +94,8 @@ def four_bar():
     )
 
 
-@pytest.mark.parametrize("rates", [0, pytest.param(2, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("rates", [0, 2])
 def test_a_closed_loop_agrees_with_the_force_of_its_driver(rates):
     motion = jn.solve(four_bar(), TIMES, order=4)
     force = jn.driver_force(motion, "theta").values[:, : rates + 1]  # by multipliers
@@ -122,6 +120,7 @@ def test_a_loop_in_space_agrees_with_the_force_of_its_driver():
     assert (np.abs(higher_order(motion, k=2)[:, 0] - force[:, 1]) <= 1e-11 * scale[1]).all()
 
 
+@pytest.mark.slow
 def test_balances_of_a_closed_loop():
     mechanism = dataclasses.replace(
         four_bar(),

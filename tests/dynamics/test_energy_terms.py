@@ -86,6 +86,7 @@ def test_equations_082_to_106_each_term_is_its_integral(p, about):
         assert not terms.remaining.any()
 
 
+@pytest.mark.slow
 @ABOUT
 def test_equations_083_to_106_closed_forms_of_first_order(about):
     robot = free_body()
@@ -131,6 +132,7 @@ def test_equations_089_to_102_of_one_particle():
             assert terms.remaining[sample, 0, -1] == pytest.approx(mass / 2 * value, rel=1e-12, abs=1e-14)
 
 
+@pytest.mark.slow
 def test_equations_073_and_075_kinetic_energy_is_of_translation_and_of_rotation():
     slides = random_robot(9, 3, tree=False, prismatic=1.0, fixed=0.0)
     q = np.random.default_rng(1).uniform(-1, 1, (2, 3, 3))
@@ -152,6 +154,7 @@ def test_equations_073_and_075_kinetic_energy_is_of_translation_and_of_rotation(
     close(terms.total, jn.kinetic_energy(robot, q).total)
 
 
+@pytest.mark.slow
 def test_equations_109_to_114_of_a_robot_and_rates():
     robot = random_robot(7, 3, prismatic=0.4, fixed=0.4)
     q = np.random.default_rng(3).uniform(-1, 1, (1, 5, 3))

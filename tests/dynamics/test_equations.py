@@ -99,18 +99,17 @@ FORMS = {
     "gibbs_appell_3": lambda robot, q: gibbs_appell(robot, q, 0, m=3),
     "higher_order_1": lambda robot, q: higher_order(robot, q, 1)[:, None],
 }
-SLOW = ("lagrange", "mangeron_1", "mangeron_2", "gibbs_appell_2")  # to compile
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("form", [pytest.param(f, marks=pytest.mark.slow) if f in SLOW else f for f in FORMS])
+@pytest.mark.parametrize("form", FORMS)
 def test_equations_124_to_128_agree_with_virtual_work_in_fifty_digits(form):
     robot, q, right = case(tree)
     agree(FORMS[form](robot, q), right)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("k", [2, pytest.param(3, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("k", [2, 3])
 def test_equations_129_to_131_and_134_agree_with_virtual_work_in_fifty_digits(k):
     robot, q, right = case(tree)
     agree(higher_order(robot, q, k)[:, None], right[:, k - 1 : k])
@@ -164,6 +163,7 @@ def off(found, right):
     return np.abs(found - right).max() / np.abs(right).max()
 
 
+@pytest.mark.slow
 def test_equation_130_by_slopes_of_energies():
     robot, q, right = case(tree)
     first = jn.energy_slope(robot, q, m=3, order=2) + jn.energy_slope(robot, q, m=1, order=1) / 2
@@ -177,6 +177,7 @@ def test_equation_131_by_slopes_of_energies():
     agree(third + 2 / 3 * second + zeroth, right[:, 2:3], 1e-12)  # a third is printed
 
 
+@pytest.mark.slow
 def test_slopes_of_energies_against_differences_in_fifty_digits():
     robot = random_robot(5, 2, tree=False, prismatic=0.0, fixed=0.0)
     q = np.random.default_rng(2).uniform(-1, 1, (6, 2))
@@ -188,6 +189,7 @@ def test_slopes_of_energies_against_differences_in_fifty_digits():
             np.testing.assert_allclose(found[0], right, rtol=0, atol=1e-13 * max(1.0, np.abs(right).max()))
 
 
+@pytest.mark.slow
 def test_rates_of_slopes_follow_each_other():
     robot, q, _ = case(tree)
     slopes, step = jn.energy_slope(robot, q, m=1, order=0, rates=2), 1e-3

@@ -104,6 +104,7 @@ def planar_point(q, s):
     return q[:2] + jnp.array([c * s[0] - n * s[1], n * s[0] + c * s[1]])
 
 
+@pytest.mark.slow
 def test_equations_001_to_005_any_constraint():
     """The general equations, by nested derivatives of Phi(q, t), for a driver that has all their terms."""
     bodies = ("i", "j")

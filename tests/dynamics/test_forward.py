@@ -86,6 +86,7 @@ def swinging_plates(values):
     )
 
 
+@pytest.mark.slow
 def test_multipliers_and_rates_in_the_plane():
     a, b, u, v = 0.7, -1.1, 2.3, -3.1
     ready, found = expansion(swinging_plates({"a": a, "b": b, "u": u, "v": v}), 6)
@@ -110,6 +111,7 @@ def test_multipliers_and_rates_in_the_plane():
     close(derivatives(found.state.attitude[:, 0, :, 0]), angles[:7], 2e-13)
 
 
+@pytest.mark.slow
 def test_multipliers_and_rates_in_space():
     spin = np.array([1.3, -2.1, 3.4])
     top = jn.Mechanism(
@@ -254,6 +256,7 @@ def test_a_driven_mechanism_moves_as_kinematics_says():
     assert ready.mobility.startswith("no degree of freedom")
 
 
+@pytest.mark.slow
 def test_multiplier_rates_are_those_of_differenced_multipliers():
     ready, found = expansion(dynamics.double_pendulum(0.3, 1.2, 2.0, -1.0), 20)
     width = 0.01
@@ -275,6 +278,7 @@ def test_multiplier_rates_are_those_of_differenced_multipliers():
     assert np.allclose(orders, [2, 4], atol=0.05), orders
 
 
+@pytest.mark.slow
 def test_lanes_of_a_batch_are_runs_of_their_own():
     single = [expansion(dynamics.double_pendulum(a, -a, 1.0, a), 6) for a in (0.2, 0.9, 2.0)]
     states = State(*(np.concatenate(parts, axis=-1) for parts in zip(*(r.state for r, _ in single), strict=True)))

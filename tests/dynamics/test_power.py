@@ -43,6 +43,7 @@ def test_power_that_grows_evenly_balances_at_every_order(share):
     np.testing.assert_allclose(balance["kinetic"][:, 1], wanted[2], rtol=1e-13)
 
 
+@pytest.mark.slow
 def test_a_force_bent_by_a_billionth_shows(monkeypatch):
     motion = jn.solve(disc(0.5), TIME, order=6)
     exact = MotionForces.driver_force
@@ -71,6 +72,7 @@ ASKED = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("asked", ASKED)
 @pytest.mark.parametrize(
     "force, words",

@@ -21,7 +21,8 @@ BANK = (
 SECOND_RATE = ("slider_crank", "epicyclic", "rolling_disc", "screw_press", "rssr")  # of power; the others to the first
 
 
-@pytest.mark.parametrize("name", [pytest.param(n, marks=() if n == "slider_crank" else pytest.mark.slow) for n in BANK])
+@pytest.mark.slow
+@pytest.mark.parametrize("name", BANK)
 def test_power_balance_of_the_bank(name):
     # the two sides share no code but the motion; 2e-15 measured, 6e-14 at the second rate of the screw press
     order = 4 if name in SECOND_RATE else 3
@@ -127,6 +128,7 @@ def test_long_motions_in_chunks_agree_with_short_ones():
     np.testing.assert_allclose(long[::100], short, rtol=1e-10)
 
 
+@pytest.mark.slow
 def test_outputs_are_the_functions_with_as_many_derivatives_as_the_motion():
     mechanism = massed_example("slider_crank")
     outputs = {

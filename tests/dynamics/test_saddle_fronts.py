@@ -38,6 +38,7 @@ def start_in_fronts(mechanism, monkeypatch):
     return start
 
 
+@pytest.mark.slow
 def test_solutions_and_inverses_are_those_of_the_whole_matrix(mechanism, monkeypatch):
     start = start_in_fronts(mechanism, monkeypatch)
     matrix, solution, inverse = (np.asarray(x) for x in factored(start.equations, start.state))

@@ -61,6 +61,7 @@ def agrees(name, closed_form, time, *outputs, tolerance=1e-12):
     return motion
 
 
+@pytest.mark.slow
 def test_peaucelliers_point_draws_a_straight_line():
     time = np.linspace(0.0, 1.9, 20)
     motion = agrees("peaucellier", closed_forms.peaucellier, time, "P", "B")
@@ -72,6 +73,7 @@ def test_peaucelliers_point_draws_a_straight_line():
         assert np.abs(P[:, k, 0]).max() < 1e-12 * np.abs(P[:, k, 1]).max()
 
 
+@pytest.mark.slow
 def test_pantograph_enlarges_by_its_ratio_in_every_derivative():
     time = np.linspace(0.0, 1.9, 20)
     motion = solved("pantograph", time)
@@ -84,10 +86,12 @@ def test_pantograph_enlarges_by_its_ratio_in_every_derivative():
     near(motion.outputs["P"], stylus)
 
 
+@pytest.mark.slow
 def test_jansens_foot_is_where_circles_meet():
     agrees("jansen_leg", closed_forms.jansen, [0.0, 0.31, 0.7, 1.2, 1.77], "foot")
 
 
+@pytest.mark.slow
 def test_klanns_foot_is_where_circles_meet():
     agrees("klann_leg", closed_forms.klann, [0.0, 0.31, 0.7, 1.2, 1.77], "foot", "knee")
 
@@ -104,17 +108,20 @@ def test_stephenson_six_bar_dwells():
     assert np.ptp(output[(crank >= 120) & (crank <= 240)]) < 0.25
 
 
+@pytest.mark.slow
 def test_pistons_of_the_radial_engine():
     strokes = [f"stroke{k}" for k in range(1, 6)]
     agrees("radial_engine", closed_forms.radial_engine, [0.0, 0.013, 0.037, 0.06, 0.088], *strokes)
 
 
+@pytest.mark.slow
 def test_wolfrom_train_by_willis():
     time = [0.2, 0.9, 1.6]
     motion = agrees("wolfrom_train", closed_forms.wolfrom, time, "sun_angle", "carrier_angle", "output_angle")
     near(motion.outputs["output_angle"] * 76, motion.outputs["sun_angle"])
 
 
+@pytest.mark.slow
 def test_epicyclic_gear_by_willis():
     time = [0.0, 0.2, 0.9, 1.6]
     motion = solved("epicyclic", time)

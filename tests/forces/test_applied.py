@@ -100,6 +100,7 @@ def check_between(make, loads, components):
     assert not found[:, :, 0].any()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("components", [2, 3], ids=["planar", "spatial"])
 @pytest.mark.parametrize("name", SAME_IN_BOTH)
 def test_force_between_bodies(name, components):

@@ -50,6 +50,7 @@ def exact(space, stop):
     return STARTS[space, stop]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name, space", CASES)
 def test_measured_order_is_that_of_theory(name, space):
     method, steps = METHODS[name]

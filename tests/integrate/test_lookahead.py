@@ -79,6 +79,7 @@ def test_a_pulse_in_place_gives_its_work(place):
         assert motion.outputs["x"][-1, 1, 0] == pytest.approx(speed, rel=2e-9)
 
 
+@pytest.mark.slow
 def test_steps_over_a_jump_and_a_kink_cost_no_digits_and_are_told():
     jump = jn.simulate(sled(J=2.0, edge=0.0), [0.0, 3.0], 1)  # falls to 0 at 1 s, turns at -1 m at 2 s
     np.testing.assert_allclose(jump.outputs["x"][-1, :, 0], [0.0, 2.0], atol=1e-9)

@@ -92,6 +92,7 @@ def test_and_backward_in_time():
     np.testing.assert_allclose(found.outputs["angle"], closed_form(-TIME), rtol=0, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_an_event_after_turns_ends_the_motion_with_its_turns():
     passing = jn.Event(ANGLE, value=-4 * np.pi, terminal=True)
     found = jn.simulate(rotor("spatial"), TIME, order=4, events=[passing])

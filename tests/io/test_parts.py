@@ -80,6 +80,7 @@ def test_the_file_is_that_of_the_whole_motion(tmp_path, mechanism):
     assert described(tmp_path / "parts.nc") == described(tmp_path / "whole.nc")
 
 
+@pytest.mark.slow
 def test_a_motion_that_ends_in_a_later_stretch():
     motion = solve_in_stretches(slider_crank("3.8 - 2*t"), GRID, order=0)  # beyond its range from t = 0.9 on
     assert (motion.status == Status.OK).all()

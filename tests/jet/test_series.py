@@ -209,6 +209,7 @@ def flat(function):
     return flattened
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("function", [products, structure])
 def test_rules_agree_with_nested_derivatives(function):
     order = 3  # nested derivatives take long to compile beyond

@@ -127,6 +127,7 @@ def test_threads_share_programs(shelf):
     assert found == [10.0] * 80
 
 
+@pytest.mark.slow
 def test_a_motion_is_the_same_with_kept_programs(shelf):
     mechanism = jn.load("examples/slider_crank.yaml")
     time = np.linspace(0.0, 0.1, 7)

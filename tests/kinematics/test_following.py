@@ -65,6 +65,7 @@ def turnover_of(mechanism, instant):
     return float(arrival.turnover[0]), np.linalg.eigvals(np.linalg.solve(jacobian(0.0), slope))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("instant", [2.0, 3.0, 3.5])
 def test_turnover_is_the_largest_eigenvalue(instant):
     mechanism = four_bar("t0", "t0", "t", AB=0.1, CD=0.1, AD=0.2, BC=0.2, t0=instant)

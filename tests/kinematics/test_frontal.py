@@ -114,6 +114,7 @@ def chain(links, law="0.4*sin(t)"):
     )
 
 
+@pytest.mark.slow
 def test_a_long_chain_is_eliminated_by_bodies_and_moves_in_closed_form():
     links, time = 40, np.linspace(0, 3, 7)
     mechanism = chain(links)
@@ -138,6 +139,7 @@ def cost(request, monkeypatch):
     builder._layout.cache_clear()
 
 
+@pytest.mark.slow
 def test_a_dead_point_is_told_whichever_way_the_jacobian_is_eliminated(cost):
     rocker = four_bar("60*deg", "150*deg", "60*deg + t", AD=0.2, AB=0.2, BC=0.15, CD=0.1)
     assert (build(rocker).system.fronts is None) == bool(cost)

@@ -18,6 +18,7 @@ def short_stretches(monkeypatch):
     monkeypatch.setattr("jounce.kinematics.long_grids.STRETCH", 1100)
 
 
+@pytest.mark.slow
 def test_stretches_make_one_motion(short_stretches):
     told = []
     motion = jn.solve(four_bar(), TIME, progress=lambda done, total: told.append((done, total)))
@@ -50,6 +51,7 @@ def test_a_short_grid_need_not_keep_bodies_either():
     np.testing.assert_array_equal(motion.poses[1]["angle"], jn.solve(four_bar(), TIME[:40], order=1).poses[1]["angle"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stretch", [500, 1100])
 def test_an_end_is_explained_once(monkeypatch, stretch):
     mechanism = slider_crank("3.8 - 2*t")  # beyond its range from t = 0.9 on

@@ -50,6 +50,7 @@ def test_rotation_driver_over_turns_and_back(vectors):
     np.testing.assert_allclose(motion.outputs["spin"][:, 0, 2], speed, atol=1e-10)
 
 
+@pytest.mark.slow
 def test_rotation_about_an_oblique_axis():
     axis = np.array([1.0, 2.0, -3.0])
     motion = jn.solve(spindle(law(rate=3 * TURN), axis=axis), [0.0, 0.5, 1.0], order=2)

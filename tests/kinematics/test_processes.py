@@ -83,10 +83,12 @@ def ended(tmp_path, program, *arguments):
     return done.stdout
 
 
+@pytest.mark.slow
 def test_threads_compute_at_once(tmp_path):
     assert ended(tmp_path, THREADS) == "0 wrong\n"
 
 
+@pytest.mark.slow
 @NEEDS_FORK
 def test_a_fork_of_a_process_that_computed_is_refused(tmp_path):
     program = """

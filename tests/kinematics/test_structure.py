@@ -100,6 +100,7 @@ def test_a_program_is_named_by_all_that_it_depends_on():
         assert program_key((advance.function,), tree, leaves, {"order": 4}) not in told
 
 
+@pytest.mark.slow
 def test_the_name_is_the_same_in_another_process():
     code = """
 import jax, jounce as jn

@@ -44,6 +44,7 @@ def test_traced_values_are_refused_by_name(name, transformed):
     assert "jax.grad" in str(told.value)
 
 
+@pytest.mark.slow
 def test_values_that_are_not_traced_give_constants_within_jit():
     within = jax.jit(lambda x: x * solved(FOUR_BAR))(2.0)
     assert float(within) == pytest.approx(2 * solved(FOUR_BAR), rel=1e-15)

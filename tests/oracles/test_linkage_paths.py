@@ -48,6 +48,7 @@ def sides_of(linkage):
     raise AssertionError("no assembly is the start")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CLOSED)
 def test_paths_keep_the_sign_of_the_closed_form_and_end_where_it_does(name):
     linkages, values, path = paths(FAMILIES[name], 16)
@@ -70,6 +71,7 @@ def test_paths_keep_the_sign_of_the_closed_form_and_end_where_it_does(name):
     assert ended >= 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TRIADS)
 def test_paths_of_triads_are_those_of_tiny_steps(name):
     linkages, values, path = paths(FAMILIES[name], 10)
@@ -88,6 +90,7 @@ def test_paths_of_triads_are_those_of_tiny_steps(name):
     assert compared >= 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FAMILIES)
 def test_positions_are_roots_in_forty_digits(name):
     family = FAMILIES[name]
@@ -132,6 +135,7 @@ def test_derivatives_of_a_four_bar_are_those_of_its_closed_form():
                 np.testing.assert_allclose(found[k, :, c], expected, rtol=1e-11, atol=1e-11)
 
 
+@pytest.mark.slow
 def test_a_start_is_where_the_equations_hold():
     for name, family in FAMILIES.items():
         for k in range(3):

@@ -43,6 +43,7 @@ def pendulum(angle):
     return problem.close()
 
 
+@pytest.mark.slow
 def test_pendulum_is_the_elliptic_function():
     problem = pendulum(angle=True)
     problem.start(0, [mp.pi / 2], [0]).integrate(10, 30, "1e-32")

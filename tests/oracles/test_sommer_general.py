@@ -51,6 +51,7 @@ def planar_point(q, s):
     return q[:2] + jnp.array([c * s[0] - n * s[1], n * s[0] + c * s[1]])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_general_equations_give_the_planar_slide_driver(seed):
     i, j, s_i, s_j, a_i, q, rates = planar_state(seed)
@@ -124,6 +125,7 @@ def test_simplified_equations_give_revolute_and_spherical(seed):
     np.testing.assert_allclose(general.equation_008(D, rates), spatial.equation_082(*two), atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_printed_general_equations_fail_in_body_axes(seed):
     """S says that 4 and 5 hold for spatial methods: with body-fixed angular velocities they do not, as printed."""

@@ -48,6 +48,7 @@ def test_gravity_and_torques_in_closed_form():
     np.testing.assert_allclose(torques, right + 0.5 * np.array([a, 4.0, 5.0]), rtol=1e-14)
 
 
+@pytest.mark.slow
 def test_equations_061_to_064_the_motions_keep_what_the_text_says(histories):
     assert (case.DURATION, case.SEGMENTS, case.CONTINUITY) == (1.7, 51, 4)
     assert np.diff(case.KNOTS) == pytest.approx(0.033, abs=5e-4)
@@ -106,6 +107,7 @@ def test_the_signs_of_the_printed_segment_are_the_only_ones_that_keep_the_arm_be
     assert fitting == [(1, -1, 1, -1, 1, -1)]
 
 
+@pytest.mark.slow
 def test_reproduction_writes_its_files(histories, tmp_path, monkeypatch):
     module = sys.modules["jounce.papers.negrean_2025.reproduce"]
     monkeypatch.setattr(module, "history", lambda motion: histories[motion.name])
@@ -201,6 +203,7 @@ def test_a_directory_that_cannot_be_made_is_refused_before_any_computing(tmp_pat
         reproduce(tmp_path / "file" / "out")
 
 
+@pytest.mark.slow
 def test_drawing_is_imported_late_and_leaves_pyplot_alone():
     code = (
         "import sys, jounce.papers.negrean_2025 as n; assert 'matplotlib' not in sys.modules\n"

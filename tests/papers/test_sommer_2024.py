@@ -115,13 +115,8 @@ def test_explicit_solutions_use_neither_solver_nor_constraints():
     assert not any(room in text for room in ("jounce.kinematics", "jounce.constraints", "jounce.mechanism", "solve("))
 
 
-LONG = ("rspu_distance", "rspu_slide", "rssr")  # to compile; the other spatial one, rsur, is in the quick suite
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=pytest.mark.slow) if n in LONG else n for n in VALIDATION_CASES]
-)
+@pytest.mark.parametrize("name", VALIDATION_CASES)
 def test_simulation_reaches_rounding_from_velocity_to_jounce(name):
     simulation = VALIDATION_CASES[name]
     cycle = cases.nominal_cycle(simulation, simulation.load())

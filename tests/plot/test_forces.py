@@ -31,6 +31,7 @@ def lines(axes):
     return {line.get_label(): line.get_ydata() for line in axes.lines if len(line.get_xdata()) == len(TIME)}
 
 
+@pytest.mark.slow
 def test_energies(lift):
     (axes,) = draw_energy(lift).axes
     kinetic, potential, springs = 1.5 * (3 * TIME**2) ** 2, 30 * (1 + TIME**3), 2.5 * TIME**6
@@ -55,6 +56,7 @@ def test_reactions_drivers_and_applied_forces(lift):
     assert [axes.get_title(loc="left") for axes in only.axes[:1]] == ["spring (applied)"]
 
 
+@pytest.mark.slow
 def test_moments_are_drawn_where_a_joint_carries_one():
     mechanism = jn.Mechanism(
         space="planar",

@@ -40,6 +40,7 @@ def artists(figure, owner):
     return [artist for artist in (*axes.lines, *axes.patches) if artist.get_gid() == owner]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", FILES)
 def test_every_example_has_all_its_bodies_and_joints(path):
     mechanism = jn.load(path)

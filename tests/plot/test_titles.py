@@ -50,6 +50,7 @@ def motions():
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", TITLES)
 def test_every_figure_takes_every_title(kind, motions, tmp_path):
     motion, name = motions[kind], TITLES[kind][:100]

@@ -60,6 +60,7 @@ def test_a_mechanism(four_bar):
     assert found["Bodies, as guessed"][2] == ["rocker", "[AD, 0]", "1.74533"]
 
 
+@pytest.mark.slow
 def test_a_motion_and_one_that_fails(four_bar):
     motion = jn.solve(four_bar, order=2)
     rows = Tables(shown(motion)).tables["Peaks"]

@@ -41,6 +41,7 @@ def samples(count, degree=5):
     return rigid.AttitudeSamples.from_euler_angles(t, angles(t), "ZYX", degree)
 
 
+@pytest.mark.slow
 def test_samples_of_every_kind_give_one_motion():
     t = np.linspace(0, 2, 81)
     turns = Rotation.from_euler("ZYX", angles(t))

@@ -71,6 +71,7 @@ def skew(v):
     return np.cross(np.eye(3), -np.asarray(v)).T
 
 
+@pytest.mark.slow
 @SEEDS
 def test_equations_023_to_028_position_of_a_point(seed):
     case = body(seed)

@@ -72,6 +72,7 @@ def off(found, right):
     return np.abs(np.asarray(found) - right).max() / np.abs(np.asarray(right)).max()
 
 
+@pytest.mark.slow
 @SEEDS
 def test_equations_050_and_051_all_orders_share_one_slope(seed):
     case = case_of(seed)
@@ -162,6 +163,7 @@ def test_equations_057_and_058_accelerations_by_slopes_of_any_order(seed):
         close(found, case.w[1])
 
 
+@pytest.mark.slow
 def test_equation_058_derivative_of_the_sum():
     """The rate of equation 58's right side, along the motion, is that of the angular acceleration."""
     m, order = 1, 2

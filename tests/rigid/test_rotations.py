@@ -165,6 +165,7 @@ def everything(sequence):
     return jax.jit(computed)
 
 
+@pytest.mark.slow
 @FEW
 @given(angles=ANGLES, rates=RATES)
 def test_identities_of_any_motion(sequence, angles, rates):

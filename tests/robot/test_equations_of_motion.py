@@ -77,6 +77,7 @@ def test_mass_matrix_and_bias(name):
     assert difference(jn.bias_forces(pair.robot, q[:, :2], parts="gravity"), gravity) <= BOUND
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in NAMES if "floating" not in name])
 def test_first_rates(name):  # Pinocchio has no derivatives for a root made of several joints
     pair = pair_named(name)
@@ -86,6 +87,7 @@ def test_first_rates(name):  # Pinocchio has no derivatives for a root made of s
     assert difference(jn.bias_forces(pair.robot, q[:, :3], rates=True)[:, 1], theirs(bias_rate)) <= BOUND
 
 
+@pytest.mark.slow
 def test_parts():
     pair = Pair(FILES / "ur5.urdf")
     q = random_states(pair.robot)
@@ -115,6 +117,7 @@ def test_parts_with_rates_of_joints_that_follow():
     )
 
 
+@pytest.mark.slow
 def test_what_the_robot_holds_and_what_its_drives_take():
     robot = robot_named("mimic").with_payload("link_7", jn.Inertia(2.0, [0.1, 0.0, 0.2], [0.1, 0.1, 0.1]))
     q = np.random.default_rng(6).uniform(-1, 1, (2, 3, len(robot.joint_names)))

@@ -130,6 +130,7 @@ def with_drives(robot):
     return jn.Robot("driven", list(robot.links.values()), joints, robot.gravity)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("drives", [False, True])
 def test_joints_that_follow_do_the_work_of_free_ones(drives):
     robot = with_drives(MIMIC)
@@ -218,6 +219,7 @@ def test_jit_vmap_and_two_ways_of_differentiation_agree(torque):
     near(torque[0, 1], rate)  # the rate of torque is the slope of torque along the motion
 
 
+@pytest.mark.slow
 def test_slopes_in_masses_and_centers():
     """Torque is linear in each mass and quadratic in each centre, so that differences of any step are exact."""
     tree, q = ROBOT.tree, taylor_coefficients(jnp.asarray(Q[0, :3])[:, :, None])

@@ -34,6 +34,7 @@ def motion():
     return q, jn.operational_accelerations(UR5, q, *TOOL)
 
 
+@pytest.mark.slow
 def test_round_trip_to_order_four(motion):
     q, operational = motion
     found = jn.joint_motion(UR5, q[:, 0], operational, *TOOL)
@@ -51,6 +52,7 @@ def test_singular_values_are_those_of_the_jacobian(motion):
     np.testing.assert_allclose(found.singular_values, expected, rtol=0, atol=1e-14)
 
 
+@pytest.mark.slow
 def test_one_sample_and_transformed_by_jax(motion):
     q, operational = motion
     expected = jn.joint_motion(UR5, q[:, 0], operational, *TOOL)
@@ -94,6 +96,7 @@ def test_position_and_orientation_tasks():
     assert found.q.tolist() == [[0.3], [2.0], [3.0]]
 
 
+@pytest.mark.slow
 def test_rows_of_a_task_can_be_chosen():
     """A planar arm of three joints is redundant in the plane, and singular for a task in space."""
     arm, tip = planar(3), ("rod_2", (1.0, 0.0, 0.0))
@@ -108,6 +111,7 @@ def test_rows_of_a_task_can_be_chosen():
         jn.joint_motion(arm, q[:, 0], operational, *tip, task="position")
 
 
+@pytest.mark.slow
 def test_a_singular_configuration_is_named():
     positions = [[0.3, 1.0], [0.3, -1.0], [0.3, 1e-3], [1.0, 1e-9]]
     steps = np.ones((4, 2, 3))

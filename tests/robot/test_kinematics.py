@@ -34,6 +34,7 @@ def test_every_frame_is_a_product_of_transforms(name):
         assert motion.angular_velocity.shape == (0, 3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_the_center_of_mass_is_the_mean_of_those_of_the_links(name):
     robot = robot_named(name)

@@ -72,6 +72,7 @@ def test_torque_and_six_rates_along_sines(name):
     assert np.all(errors(torque, expected) <= 5e-15)
 
 
+@pytest.mark.slow
 def test_forces_and_six_rates_of_a_random_tree():
     robot, q = tree()
     expected = np.array(reference("tree")["torque"], float)
@@ -87,7 +88,8 @@ def test_reactions_of_a_random_tree(order):
     assert np.all(errors(wrench, expected[:, : order - 1]) <= 5e-15)
 
 
-@pytest.mark.parametrize("p, order", [(1, 3), (2, 4), *(pytest.param(p, 8, marks=slow) for p in range(4))])
+@pytest.mark.slow
+@pytest.mark.parametrize("p, order", [(1, 3), (2, 4), *((p, 8) for p in range(4))])
 def test_energies_of_a_random_tree(p, order):
     robot, q = tree()
     expected = np.array([sample[p] for sample in reference("tree")["energy"]], float)[:, : order - p]

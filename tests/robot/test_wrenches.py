@@ -112,6 +112,7 @@ def test_a_robot_that_hangs_on_its_wrench_needs_no_forces():
     near(found[0, :6], np.zeros(6), 1e-13)
 
 
+@pytest.mark.slow
 def test_joints_carry_what_pushes_beyond_them():
     at_rest = np.zeros((3, ORDER + 1, 7))
     at_rest[:, 0] = Q[:, 0]

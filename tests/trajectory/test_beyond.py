@@ -171,6 +171,7 @@ def test_solving_and_simulating_refuse_before_they_compute():
     check_laws(arm(None, law), np.array([0.0, 2.5]), 4, forces=False)  # forces do not bear on what is prescribed
 
 
+@pytest.mark.slow
 def test_laws_of_three_kinds_side_by_side():
     """Stacked drivers take their own samples, each with its own way beyond them."""
     times = np.linspace(0.0, 2 * math.pi, 101)

@@ -48,6 +48,7 @@ class TestFunctionMotion:
         np.testing.assert_allclose(found[0], np.where(t < 0.5, t**2, np.sin(t)), rtol=1e-15)
         np.testing.assert_allclose(found[1], np.where(t < 0.5, 2 * t, np.cos(t)), rtol=1e-15)
 
+    @pytest.mark.slow
     def test_plain_function_and_expression_drive_alike(self):
         by_function = jn.solve(crank(lambda t: 0.3 + jnp.sin(2 * t) * t), [0.0, 0.7]).outputs["angle"]
         by_expression = jn.solve(crank("0.3 + sin(2*t)*t"), [0.0, 0.7]).outputs["angle"]
@@ -96,6 +97,7 @@ class TestSplineMotion:
         step = 1e-3
         np.testing.assert_allclose(jet.evaluate(step), derivatives(law, 0, INSTANTS + step)[0], rtol=1e-14)
 
+    @pytest.mark.slow
     def test_two_splines_drive_two_bodies(self):
         """Drivers of a kind are stacked: each must take its own samples."""
         one, two = (jn.SplineMotion(self.times, a * self.times**2, 3) for a in (1.0, -2.0))

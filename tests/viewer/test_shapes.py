@@ -73,6 +73,7 @@ def test_planar_bodies_lie_in_layers_of_their_own():
     assert plates[0].max() < plates[1].min() < appearance.front
 
 
+@pytest.mark.slow
 def test_joints_swing_within_their_limits():
     robot = jn.load_robot("examples/robots/panda.urdf")
     subject = robot_subject(robot)

@@ -59,6 +59,7 @@ def derivatives(function, t, count):
         return np.array([[float(c * math.factorial(k)) for k, c in enumerate(row)] for row in rows])
 
 
+@pytest.mark.slow
 def test_closed_forms(motion):
     t, found = motion.time, motion.outputs
     w = lambda x: mpmath.mpf("1.2") * mpmath.cos(3 * x)  # noqa: E731

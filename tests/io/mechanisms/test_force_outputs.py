@@ -62,6 +62,7 @@ def test_outputs_are_what_the_functions_return(motion):
     assert [motion.dataset[name].attrs["units"] for name in ("T", "R", "M", "S")] == ["N*m", "N", "N*m", "N*m"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", [".csv", ".nc"])
 def test_files_of_results(motion, tmp_path, suffix):
     io.write(motion.dataset, tmp_path / f"arm{suffix}")
