@@ -124,6 +124,7 @@ def test_the_command_lists_what_there_is():
     assert [line.split()[0] for line in told.stdout.splitlines()] == list(benchmarks.BENCHMARKS)
 
 
+@pytest.mark.slow
 def test_the_command_measures_one(tmp_path):
     told = command("--only", "files", "--quick", "--out", str(tmp_path))
     assert told.returncode == 0, told.stderr

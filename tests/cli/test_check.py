@@ -97,6 +97,7 @@ def test_a_trajectory_that_is_too_fast_ends_with_1_and_its_rows_are_marked(run):
     assert "* broken" in out
 
 
+@pytest.mark.slow
 def test_the_text_is_plain_and_fits_80_columns(run):
     for trajectory in (GOOD, TOO_FAST, WAVE):
         _, out, _ = run(PANDA, trajectory)

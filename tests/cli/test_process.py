@@ -92,6 +92,7 @@ DEAF = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("where", DEAF)
 def test_a_signal_is_heard_where_an_exception_is_not(where, tmp_path):
     program = (
@@ -105,6 +106,7 @@ def test_a_signal_is_heard_where_an_exception_is_not(where, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_after_the_work_is_done_changes_nothing(number, tmp_path):
     program = (
@@ -165,6 +167,7 @@ def test_a_file_is_written_though_nobody_reads_the_table(tmp_path, cache):
     assert len((tmp_path / "a.csv").read_text().splitlines()) == 202
 
 
+@pytest.mark.slow
 def test_bad_input_is_2_though_nobody_can_be_told():
     assert shell("jounce run none.yaml 2>/dev/full").returncode == 2
     assert shell("jounce run none.yaml 2>&-").returncode == 2

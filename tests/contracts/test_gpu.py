@@ -89,6 +89,7 @@ def test_a_default_device_is_asked_before_the_first_backend():
         assert not on_processor()
 
 
+@pytest.mark.slow
 def test_the_wide_batches_of_a_gpu_give_the_same_motion(monkeypatch):
     mechanism, grid = jn.load(example("four_bar")), np.linspace(0.0, 2.0, 1500)
     expected = jn.solve(mechanism, grid).outputs["psi"]
@@ -98,6 +99,7 @@ def test_the_wide_batches_of_a_gpu_give_the_same_motion(monkeypatch):
     assert np.all(peaks_apart(found, expected, 1) < ROUNDING)
 
 
+@pytest.mark.slow
 def test_the_wide_blocks_of_a_gpu_give_the_same_torques(monkeypatch):
     robot, q, expected = arm()
     monkeypatch.setattr(batches, "on_processor", lambda: False)

@@ -39,6 +39,7 @@ def test_python_blocks_run(page, tmp_path, monkeypatch):
     assert "jn" in names or "jounce" in names, "a page's code uses jounce"
 
 
+@pytest.mark.slow
 @pages_with("yaml", "\nspace: ")
 def test_mechanism_files_in_the_pages_solve(page, tmp_path):
     for _, text in blocks(page, "yaml"):

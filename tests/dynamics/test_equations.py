@@ -115,6 +115,7 @@ def test_equations_129_to_131_and_134_agree_with_virtual_work_in_fifty_digits(k)
     agree(higher_order(robot, q, k)[:, None], right[:, k - 1 : k])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("k, m", [(1, 3)])
 def test_the_order_of_the_derivatives_does_not_matter(k, m):
     robot, q, right = case(tree)

@@ -132,6 +132,7 @@ def turned(A, w):
     return A @ jnp.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
 
 
+@pytest.mark.slow
 def test_equations_004_and_005_hold_in_body_axes_with_the_order_of_their_factors():
     """With body-fixed angular velocities 4 and 5 as printed are wrong; what is computed is the right form."""
     pair = Pair(lambda p: jn.spatial.Dot1(("i", "j"), *p.vectors.tolist()), "spatial")
@@ -163,6 +164,7 @@ def ball():
     return Pair(lambda p: jn.spatial.Spherical(("i", "j"), *p.points.tolist()), "spatial")
 
 
+@pytest.mark.slow
 def test_equations_006_to_008_constraints_without_time(revolute, ball):
     q = jnp.concatenate([x for b in (revolute.i, revolute.j) for x in (b.r[0], b.phi[:1])])
     s_i, s_j = revolute.points

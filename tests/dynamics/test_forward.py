@@ -52,6 +52,7 @@ def close(found, wanted, tolerance):
     assert np.max(errors) < tolerance, errors
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_double_pendulum_at_random_states(seed):
     a, b, u, v = np.random.default_rng(seed).uniform(-3, 3, 4)

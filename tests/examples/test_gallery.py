@@ -176,6 +176,7 @@ def test_delta_robot_meets_three_spheres_and_stays_level():
     assert (spin < 1e-11 * speed[:ORDER] / 0.05).all()
 
 
+@pytest.mark.slow
 def test_torques_of_the_human_arm_by_virtual_work():
     robot = jn.load_robot(EXAMPLES / "robots" / "human_arm.xml")
     reach = jn.load_trajectory(EXAMPLES / "trajectories" / "human_arm_reach.yaml")

@@ -144,6 +144,7 @@ def test_what_was_computed_before_a_singularity_is_kept():
     assert e.value.motion.ended_at == motion.ended_at
 
 
+@pytest.mark.slow
 def test_a_force_that_is_not_finite_at_the_start_is_named():
     with pytest.raises(jn.SolveError, match=r"t = 0 s, forces.pull: the force is not finite"):
         jn.simulate(block("1/t"), [0.0, 1.0])

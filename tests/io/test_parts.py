@@ -149,6 +149,7 @@ for name in ("x.nc", "x.csv"):
 """
 
 
+@pytest.mark.slow
 def test_a_full_disk_is_told_before_the_second_part_is_asked_for(tmp_path):
     environment = {**os.environ, "PYTHONPATH": str(ROOT / "src")}
     done = subprocess.run(

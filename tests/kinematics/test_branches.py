@@ -29,6 +29,7 @@ def mechanism(family, values, law, guess):
     return Linkage(family, values, law, np.zeros(0), guess, None).mechanism
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("instants", GRIDS)
 @pytest.mark.parametrize("order", ORDERS)
 def test_slider_crank_that_misses_its_dead_point_by_three_hundredths(order, instants):

@@ -111,6 +111,7 @@ def test_change_point_at_the_end_of_a_grid():
         np.testing.assert_allclose(motion.outputs["psi"][2], [np.pi + 1e-4, 1.0], atol=1e-9)
 
 
+@pytest.mark.slow
 def test_dead_centre_touched_by_the_law_is_a_change_point():
     """The crank goes on through the dead centre: cos(angle) follows from the position of the slider."""
     time = np.linspace(0, 3, 31)
@@ -134,6 +135,7 @@ def test_branches_a_little_apart_are_no_change_point():
     assert (side == side[0]).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("jump", [0.06, 0.3, 1.0, 3.0, 2 * np.pi])
 def test_law_that_jumps_is_refused_at_any_size(jump):
     mechanism = crank(lambda t: 2 * t + jnp.where(t < 0.5, 0.0, jump))
@@ -161,6 +163,7 @@ def test_output_without_a_rate_is_not_ok_and_the_motion_goes_on():
         jn.solve(mechanism, time, order=1)
 
 
+@pytest.mark.slow
 def test_law_without_a_third_derivative_at_the_start():
     mechanism = distance_slider("1 + t**2.5")
     time = np.linspace(0, 2, 5)

@@ -75,6 +75,7 @@ def assembled_angles(mechanism, instant=0.0):
     return assemble(build(mechanism), instant, 1e-12)[1]["angle"][1:, 0]
 
 
+@pytest.mark.slow
 def test_planar_bodies_end_at_the_turn_nearest_to_the_guess():
     """From random guesses of the rocker and of a massless link on it; the torsional spring is on the link."""
     base = four_bar()

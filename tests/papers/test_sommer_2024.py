@@ -343,6 +343,7 @@ def test_a_file_that_cannot_be_written_leaves_nothing_behind(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["errors.csv"]
 
 
+@pytest.mark.slow
 def test_drawing_is_imported_late_and_leaves_pyplot_alone():
     code = (
         "import sys, jounce.papers.sommer_2024 as s; assert 'matplotlib' not in sys.modules\n"

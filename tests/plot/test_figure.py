@@ -114,6 +114,7 @@ def test_dollars_in_a_title_are_not_mathematics(four_bar, tmp_path):
     assert (tmp_path / "figure.png").stat().st_size > 1000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("example, outputs", [("four_bar", ["psi"]), ("rsur", ["psi", "B", "C", "coupler_spin"])])
 def test_the_file_has_ink_in_every_column(example, outputs, request, tmp_path):
     path = tmp_path / "figure.png"
@@ -125,6 +126,7 @@ def test_the_file_has_ink_in_every_column(example, outputs, request, tmp_path):
         assert part.mean() > 1e-3
 
 
+@pytest.mark.slow
 def test_unknown_outputs_and_none_at_all_are_told(four_bar):
     import dataclasses
 

@@ -43,6 +43,7 @@ def test_energies(lift):
     np.testing.assert_allclose(stored_energy(lift), springs, rtol=0, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_reactions_drivers_and_applied_forces(lift):
     figure = draw_reactions(lift)
     grid = np.array(figure.axes, dtype=object).reshape(3, -1)  # force, yank, second rate

@@ -85,6 +85,7 @@ def test_the_legend_names_the_joints_and_the_title_the_robot(report):
     assert draw_limits(report, "costs $5").get_suptitle() == r"costs \$5"
 
 
+@pytest.mark.slow
 def test_joints_beyond_the_colours_differ_in_their_dashes():
     links = [jn.Link("base"), *(jn.Link(f"link{k}", jn.Inertia(1.0, [0.1, 0, 0])) for k in range(9))]
     joints = [
@@ -113,6 +114,7 @@ def test_nothing_to_draw_is_told():
         draw_limits(report)
 
 
+@pytest.mark.slow
 def test_the_file_has_ink(report, tmp_path):
     path = tmp_path / "limits.png"
     save(draw_limits(report), path)

@@ -56,6 +56,7 @@ def test_samples_of_every_kind_give_one_motion():
         np.testing.assert_allclose(other.attitude(time).derivatives(), expected, atol=1e-9)  # 1e-16 / spacing^3
 
 
+@pytest.mark.slow
 def test_attitude_at_the_samples_is_the_sampled_one():
     t = np.linspace(0, 2, 41)
     found = samples(41).attitude(Jet.variable(jnp.asarray(t), 1)).coefficients[0]
@@ -83,6 +84,7 @@ def test_derivatives_are_those_of_the_interpolated_motion():
     np.testing.assert_allclose(slope, near[1].coefficients[1], atol=1e-5)
 
 
+@pytest.mark.slow
 def test_a_steady_turn_and_a_compiled_call():
     t = np.linspace(0, 3, 61)
     turning = rigid.AttitudeSamples(t, np.stack([np.cos(t), 0 * t, 0 * t, np.sin(t)], axis=1), degree=7)

@@ -42,6 +42,7 @@ def law(seed, size):
     return a + t * b + c * jet.sin(t * d + e)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind, pitch", [("revolute", 0.0), ("revolute", 0.3), ("prismatic", 0.0)])
 def test_equations_031_and_034_against_the_exponential_of_a_matrix(kind, pitch):
     random = np.random.default_rng(1)

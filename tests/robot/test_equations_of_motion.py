@@ -126,6 +126,7 @@ def test_what_the_robot_holds_and_what_its_drives_take():
     assert difference(torque, jn.inverse_dynamics(robot, q, drives=True)[:, 0]) <= BOUND
 
 
+@pytest.mark.slow
 def test_shapes_of_batches():
     robot = robot_named("scara")
     n = len(robot.joint_names)

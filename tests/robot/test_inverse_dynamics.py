@@ -62,6 +62,7 @@ def test_a_cart_with_a_pendulum():
     near(found[:, 0], np.column_stack([force, moment]), 1e-14)
 
 
+@pytest.mark.slow
 def test_at_rest_the_torque_is_the_slope_of_the_potential():
     still = np.zeros((3, ORDER + 1, 7))
     still[:, 0] = Q[:, 0]
@@ -260,6 +261,7 @@ def momentum(robot, q, link):
     return linear, angular, center
 
 
+@pytest.mark.slow
 def test_wrenches_of_joints_change_the_momentum_of_each_body():
     """Newton's second and third laws for every body, with rates, about the origin of the base."""
     carried = jn.joint_wrenches(ROBOT, Q, frame="base")

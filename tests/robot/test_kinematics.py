@@ -57,6 +57,7 @@ def test_the_mass_of_the_base_counts():
     np.testing.assert_allclose(found, [[0.125, 0, 0.75], [0, 0.25, 0], [-0.5, 0, 0]], rtol=0, atol=1e-15)
 
 
+@pytest.mark.slow
 def test_a_steady_turn_to_order_eight():
     rate, order = 1.5, 8
     q = np.zeros((order + 1, 1))

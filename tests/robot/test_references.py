@@ -61,7 +61,8 @@ def test_torque_and_two_rates_of_the_panda_to_rounding():
     assert np.all(errors(torque, np.array(content["torque"], float)[..., order]) <= 2e-15)
 
 
-@pytest.mark.parametrize("name", ["panda", pytest.param("solo12", marks=slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["panda", "solo12"])
 def test_torque_and_six_rates_along_sines(name):
     content = reference(name)
     robot, order = of_file(name, name)

@@ -89,6 +89,7 @@ def sled(folder, motion=MOTION):
     return path
 
 
+@pytest.mark.slow
 def test_a_driver_of_a_mechanism_file(tmp_path):
     motion = jn.solve(jn.load(sled(tmp_path)), order=3)
     change = np.array([-0.075, 0.5]) - [polynomial(T[0], 0), polynomial(T[0], 1)]

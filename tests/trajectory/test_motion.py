@@ -54,6 +54,7 @@ class TestFunctionMotion:
         by_expression = jn.solve(crank("0.3 + sin(2*t)*t"), [0.0, 0.7]).outputs["angle"]
         np.testing.assert_allclose(by_function, by_expression, rtol=1e-13, atol=1e-14)
 
+    @pytest.mark.slow
     def test_number_is_a_constant_law(self):
         np.testing.assert_allclose(jn.solve(crank(0.4), [0.0], order=1).outputs["angle"], [[0.4, 0.0]])
 
@@ -81,6 +82,7 @@ class TestSplineMotion:
             expected = spline.derivative(k)(np.array(at)) if k else spline(np.array(at))
             np.testing.assert_allclose(found[k], expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
 
+    @pytest.mark.slow
     def test_it_goes_through_its_samples(self):
         values = np.cos(5 * self.times)
         law = jn.SplineMotion(self.times, values)

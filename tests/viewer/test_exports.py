@@ -46,6 +46,7 @@ def recorded(html):
     return msgspec.msgpack.decode(inner[8 : 8 + length], strict=False)
 
 
+@pytest.mark.slow
 def test_an_animation_holds_all_instants_and_needs_nothing_else(recording):
     point = next(s for s in recording.appearance.points if s.name == "rim")
     html = animation(Overlay.of(recording, DisplayOptions((TracedPoint(point, (1,)),), kinds=frozenset({"driver"}))))

@@ -71,6 +71,7 @@ def test_forces_are_those_of_the_wheel(recording):
     assert {e.kind for e in drawn.loads} == {"reaction"}
 
 
+@pytest.mark.slow
 def test_applied_forces_act_along_their_lines():
     spring = jn.forces.Spring(("ground", "wheel"), [1.0, 0.0], [RADIUS, 0.0], stiffness=5.0, length=0.2)
     push = jn.forces.PointForce(("wheel",), [RADIUS, 0.0], law=[3.0, 0.0], frame="body")

@@ -61,6 +61,7 @@ def test_an_input_is_no_place_for_results(run, alias):
     assert pathlib.Path("lift.csv").read_text() == TABLE
 
 
+@pytest.mark.slow
 def test_an_input_is_replaced_where_that_is_asked_for(run):
     status, out, _ = run("run", "cam.yaml", "--out", "lift.csv", "--overwrite", "--order", "0")
     assert status == 0
@@ -207,6 +208,7 @@ with replacing("motion.csv") as scratch:
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
 def test_a_signal_leaves_nothing_behind(number):
     pathlib.Path("motion.csv").write_text("old")

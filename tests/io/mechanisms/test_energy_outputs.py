@@ -81,6 +81,7 @@ def test_closed_forms(motion):
         np.testing.assert_allclose(found[name], right, rtol=0, atol=1e-12 * max(1.0, np.abs(right).max()), err_msg=name)
 
 
+@pytest.mark.slow
 def test_units_and_names_of_peaks(motion):
     assert motion.dataset["T"].attrs["units"] == "J"
     assert motion.dataset["E2"].attrs["units"] == "J/s^4"
