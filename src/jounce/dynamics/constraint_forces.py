@@ -28,54 +28,18 @@ from jounce.dynamics.saddle_point import (
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked, total
 from jounce.kinematics.frontal import FrontalFactor
+from jounce.kinematics.jacobian_series import Slope
 from jounce.kinematics.linear import DenseFactor
 from jounce.mechanism.system import System, movable, with_rows
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
 from jounce.trajectory import AbstractMotion
 
-Slope = Float[Numbers, "order coordinate row instance batch"]
-"""Taylor coefficients of how the residuals of a group change with the coordinates of the bodies in a slot."""
-
 Slopes = Sequence[Sequence[Float[Numbers, "order coordinate _ _ batch"]]]
 """For each group, those of each of its moving slots."""
 
 Multipliers = Float[Numbers, "order row instance batch"]
 """Taylor coefficients of the multipliers of a group."""
-
-
-def slopes(element: AbstractConstraint, poses: Sequence[Pose], time: Jet, slot: int) -> Slope:
-    """Return how the residual of a joint or driver changes as the body in a slot is displaced: Jacobian, as jets.
-
-    Parameters
-    ----------
-    element : AbstractConstraint
-        Its values have shape (..., instances, 1).
-    poses : sequence of SpatialPose or PlanarPose
-        Of the bodies in each slot, shape (..., instances, batch), of the order of the time.
-    time : Jet
-        Of shape (1, batch).
-    slot : int
-        Which of the bodies is displaced; it may be the ground.
-
-    Returns
-    -------
-    array of shape (order + 1, coordinates, rows, instances, batch)
-        Taylor coefficients of the derivatives by a shift in global axes, m, and by a turn in axes of the body, rad.
-    """
-    body = movable(poses[slot].truncate(time.order))
-    shape, size = body.position.shape[1:], body.shifts + body.turns
-
-    def residual(pose: Any) -> Any:
-        return stacked(with_rows(element.residual(*poses[:slot], pose, *poses[slot + 1 :], time)))
-
-    def along(direction: Any) -> Any:
-        unit = jnp.broadcast_to(direction[:, None, None], (size, *shape))
-        shift, turn = (Jet.constant(part, time.order).dense() for part in (unit[: body.shifts], unit[body.shifts :]))
-        change = movable(body.varied(shift, turn).truncate(time.order))
-        return jax.jvp(residual, (body,), (jax.lax.optimization_barrier(change),))[1]
-
-    return jnp.moveaxis(jax.vmap(along)(jnp.eye(size)), 0, 1)
 
 
 def work_along(

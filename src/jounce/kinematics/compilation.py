@@ -123,9 +123,16 @@ class Compiled:
         options = None if options is None else {**options, **self.further}
         return jax.jit(self.function, static_argnames=self.static, compiler_options=options)
 
+    @cached_property
+    def _within(self) -> Any:
+        """The function within a program of which it is a part: JAX takes options for the whole only."""
+        return jax.jit(self.function, static_argnames=self.static)
+
     def __call__(self, *arguments: Any, **keywords: Any) -> Any:
         """Call the compiled function."""
         check_process()
+        if any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves((arguments, keywords))):
+            return self._within(*arguments, **keywords)
         if _store is None:
             return self.jitted(*arguments, **keywords)
         keywords |= zip(self._names[self._traced :], arguments[self._traced :], strict=False)

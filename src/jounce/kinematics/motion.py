@@ -87,6 +87,8 @@ class Motion(Displayed):
         What was computed of the motion and may be wanted again, by name: the forces, for one.
     """
 
+    traced = False  # by JAX
+
     def __init__(
         self,
         mechanism: Mechanism,
@@ -121,6 +123,17 @@ class Motion(Displayed):
     def forces(self) -> tuple[Group, ...]:
         """The applied forces, in the groups of the model, with the turns of angles about axes at every instant."""
         return self._counting(self.model.system.forces)
+
+    @property
+    def counted_outputs(self) -> tuple[Group, ...]:
+        """The outputs of poses, in the groups of the model, with the turns of angles about axes at every instant."""
+        return self._counting(self.model.system.outputs)
+
+    @property
+    def continued_outputs(self) -> tuple[Float[np.ndarray, "component instance time"], ...]:
+        """Values of the outputs of poses that are angles in a range, made continuous, for each group of such."""
+        pairs = zip(self._groups.values(), self.model.system.outputs, strict=True)
+        return tuple(self._continued(g, c)[0] for c, g in pairs if getattr(g.element, "wraps", ()))
 
     def __repr__(self) -> str:
         solved = int(np.sum(self.status == Status.OK))

@@ -1,21 +1,25 @@
 """From a mechanism and a time grid to its motion."""
 
 import numbers
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
+from jax.errors import ConcretizationTypeError
 from jaxtyping import Float
 
-from jounce.errors import MechanismError, SolveError
+from jounce.errors import MechanismError, SolveError, UnsupportedError
 from jounce.kinematics.assembly import assemble
 from jounce.kinematics.grid import LONG_GRID
 from jounce.kinematics.long_grids import solve_grid
 from jounce.kinematics.motion import Motion
 from jounce.kinematics.path_following import NO_GRID, PASSABLE, Anchor, FollowedPath, Solver, follow
+from jounce.kinematics.sensitivities import differentiable_motion
 from jounce.kinematics.status import Status
 from jounce.kinematics.stretches import Stretches
 from jounce.kinematics.threads import thread_count
+from jounce.kinematics.traced_motion import TracedMotion
 from jounce.mechanism import Mechanism, build, check_mechanism, time_grid
 from jounce.mechanism.axis_angles import measures_angle
 from jounce.mechanism.law_checks import check_laws
@@ -28,7 +32,33 @@ HIGHEST_ORDER = 30
 LARGEST_TOLERANCE = 1e-2
 
 
-@concrete
+def _differentiated(solve: Callable[..., Motion], given: Mapping[str, Any]) -> Motion:
+    """Solve a mechanism of which JAX traces some values."""
+    mechanism = given["mechanism"]
+    check_mechanism(mechanism)
+    options = {name: value for name, value in given.items() if name not in ("mechanism", "time", "order", "strict")}
+    order = _checked_settings(mechanism, given.get("order", 4), options.get("tolerance", 1e-12))
+    time = mechanism.time if given.get("time") is None else given["time"]
+    try:
+        instants = time_grid(time, mechanism.parameter_values)
+    except ConcretizationTypeError:
+        message = "the instants depend on values that JAX traces, and are held when a motion is differentiated; give them"
+        raise UnsupportedError(message, name="time") from None
+    levels = max(order + _lost_orders(mechanism), LOWEST_ORDER) + 1
+
+    def solved(mechanism: Mechanism, known: bool) -> Motion:
+        return solve(mechanism, instants, order, **options, strict=known and given.get("strict", True))
+
+    found, model = differentiable_motion(mechanism, instants, levels, solved)
+    return TracedMotion(mechanism, model, instants, order, found)
+
+
+def _lost_orders(mechanism: Mechanism) -> int:
+    """Return by how many derivatives the outputs are shorter than the motion, at most."""
+    return max((output.lost_orders for output in mechanism.outputs.values()), default=0)
+
+
+@partial(concrete, traced=_differentiated)
 def solve(
     mechanism: Mechanism,
     time: Any = None,
@@ -167,7 +197,7 @@ def _followed(
 ) -> tuple[Solver, FollowedPath]:
     """Return what solves the instants of a grid: a solver, and the motion followed from the first to the last."""
     first, last = float(instants[0]), float(instants[-1])
-    lost = max((output.lost_orders for output in mechanism.outputs.values()), default=0)
+    lost = _lost_orders(mechanism)
     of_forces = any(output.of_forces for output in mechanism.outputs.values())
     check_laws(mechanism, np.array([first, last]), order + lost, forces=of_forces)
     model, coordinates = assemble(build(mechanism), first, tolerance)

@@ -38,6 +38,10 @@ from jounce.shapes import Numbers
 from jounce.trajectory import AbstractMotion
 
 
+Grouped = tuple[tuple[Group, ...], tuple[tuple[str, ...], ...]]
+"""Groups, and the names of the elements of each, with their kinds before them."""
+
+
 @dataclasses.dataclass(frozen=True)
 class Model:
     """The numeric model of a mechanism.
@@ -103,16 +107,7 @@ def build(mechanism: Mechanism, like: Model | None = None) -> Model:
         If an expression uses a name that is not a parameter.
     """
     parameters, components = mechanism.parameter_values, POSITION_COMPONENTS[mechanism.space]
-    body_index = {name: k for k, name in enumerate((GROUND, *mechanism.bodies))}
-
-    def grouped(*kinds: str) -> tuple[tuple[Group, ...], tuple[tuple[str, ...], ...]]:
-        elements = {f"{kind}.{k}": v for kind in kinds for k, v in mechanism.elements[kind].items()}
-        posed = {name: v for name, v in elements.items() if not isinstance(v, AbstractMotionOutput)}
-        return group_elements(posed, parameters, body_index, components)
-
-    groups, names = grouped("joints", "drivers")
-    forces, force_names = grouped("forces")
-    outputs, output_names = grouped("outputs")
+    (groups, names), (forces, force_names), (outputs, output_names) = grouped_elements(mechanism)
     if like is not None:
         parts = {"groups": groups, "forces": forces, "outputs": outputs}
         known = {name: tuple(map(_with_found_of, part, getattr(like.system, name))) for name, part in parts.items()}
@@ -120,29 +115,56 @@ def build(mechanism: Mechanism, like: Model | None = None) -> Model:
 
     pose_type = PlanarPose if components == 2 else SpatialPose
     guess = starting_guess(mechanism, parameters, components)
-    groups = tuple(_with_sense(_with_offsets(group, pose_type, guess), pose_type, guess) for group in groups)
+    groups = tuple(with_sense(with_offsets(group, pose_type, guess), pose_type, guess) for group in groups)
     groups, forces, outputs = (with_datums(part, guess) for part in (groups, forces, outputs))
+    length = _size(groups, guess)
+    history = AttitudeHistory(guess["quaternion"], np.zeros(1)) if components == 3 else None
+    parts = ((groups, names), (forces, force_names), (outputs, output_names))
+    return model_of(tuple(mechanism.bodies), parts, guess, length, history)
+
+
+def model_of(
+    bodies: tuple[str, ...],
+    parts: tuple[Grouped, Grouped, Grouped],
+    guess: dict[str, Any],
+    length: Any,
+    history: AttitudeHistory | None,
+) -> Model:
+    """Return the model of groups that are whole: joints and drivers, forces, outputs, with their names."""
+    (groups, names), (forces, force_names), (outputs, output_names) = parts
+    pose_type = PlanarPose if "angle" in guess else SpatialPose
     row_counts = [_row_count(group, pose_type, guess) for group in groups]
     rows = [n for members, count in zip(names, row_counts, strict=True) for _ in range(count) for n in members]
     drivers = tuple(n for group, members in zip(groups, names, strict=True) if group.is_driver for n in members)
-    length, count = _size(groups, guess), len(mechanism.bodies)
-    bodies = tuple(group.bodies for group in groups)
-    pattern, fronts = _layout(bodies, tuple(row_counts), components + pose_type.turns, count)
-    scale = np.array([length] * components + [1.0] * pose_type.turns)
-    history = AttitudeHistory(guess["quaternion"], np.zeros(1)) if components == 3 else None
+    joined = tuple(group.bodies for group in groups)
+    pattern, fronts = _layout(joined, tuple(row_counts), pose_type.shifts + pose_type.turns, len(bodies))
+    scale = np.array([length] * pose_type.shifts + [1.0] * pose_type.turns)
     return Model(
-        System(groups, outputs, pattern, np.ones((len(rows), 1)), scale, count, forces, fronts),
+        System(groups, outputs, pattern, np.ones((len(rows), 1)), scale, len(bodies), forces, fronts),
         pose_type,
         guess,
         tuple(rows),
         drivers,
         _plain(force_names),
-        tuple(mechanism.bodies),
+        bodies,
         _plain(output_names),
         length,
         reference=guess,
         history=history,
     )
+
+
+def grouped_elements(mechanism: Mechanism) -> tuple[Grouped, Grouped, Grouped]:
+    """Return the groups of joints and drivers, of forces and of outputs; values may be traced by JAX."""
+    parameters, components = mechanism.parameter_values, POSITION_COMPONENTS[mechanism.space]
+    body_index = {name: k for k, name in enumerate((GROUND, *mechanism.bodies))}
+
+    def grouped(*kinds: str) -> Grouped:
+        elements = {f"{kind}.{k}": v for kind in kinds for k, v in mechanism.elements[kind].items()}
+        posed = {name: v for name, v in elements.items() if not isinstance(v, AbstractMotionOutput)}
+        return group_elements(posed, parameters, body_index, components)
+
+    return grouped("joints", "drivers"), grouped("forces"), grouped("outputs")
 
 
 def with_reference(
@@ -220,8 +242,14 @@ def starting_guess(mechanism: Mechanism, parameters: dict[str, Any], components:
             attitudes.append(resolved(body.angle, f"{place}.angle", "scalar", components, parameters))
         else:
             attitudes.append(_attitude(body.orientation, f"{place}.orientation", parameters))
-    position, attitude = (np.stack([np.asarray(x) for x in xs], axis=-1)[..., None] for xs in (positions, attitudes))
+    position, attitude = (_stacked(xs) for xs in (positions, attitudes))
     return {"position": position, "angle" if components == 2 else "quaternion": attitude}
+
+
+def _stacked(values: list[Any]) -> Any:
+    """Return coordinates of bodies as one array, (..., bodies, 1); they may be traced by JAX."""
+    library = jnp if any(isinstance(value, Tracer) for value in values) else np
+    return library.stack([library.asarray(x) for x in values], axis=-1)[..., None]
 
 
 def _attitude(orientation: Any, name: str, parameters: dict[str, Any]) -> np.ndarray:
@@ -273,12 +301,13 @@ def pose_at(coordinates: Mapping[str, Any], pose_type: type[Pose]) -> Any:
     return pose_type.from_coordinates({name: Jet([value]) for name, value in coordinates.items()})
 
 
-def _with_offsets(group: Group, pose_type: type[Pose], guess: dict[str, Any]) -> Group:
+def with_offsets(group: Group, pose_type: type[Pose], guess: dict[str, Any]) -> Group:
     """Fill in the offsets that were not given: those with which the starting guess fulfils the joint."""
     fields = value_fields(type(group.element))
     if "offset" not in fields or group.element.offset is not None:
         return group
-    return group.holding("offset", np.asarray(_fulfilling_offset(group, guess, pose_type)))
+    offset = _fulfilling_offset(group, guess, pose_type)
+    return group.holding("offset", offset if isinstance(offset, Tracer) else np.asarray(offset))
 
 
 @partial(jax.jit, static_argnames="pose_type")
@@ -292,13 +321,13 @@ def _fulfilling_offset(group: Group, guess: dict[str, Any], pose_type: type[Pose
     return -jnp.sum(value * slope, axis=0)  # the slope is -1 in the row that holds the offset, else 0
 
 
-def _with_sense(group: Group, pose_type: type[Pose], guess: dict[str, Any]) -> Group:
+def with_sense(group: Group, pose_type: type[Pose], guess: dict[str, Any]) -> Group:
     """Fill in with which sign of the Euler parameters an attitude is compared: that of the starting guess."""
     if not hasattr(group.element, "sense"):
         return group
     pose = pose_at(guess, pose_type)
     sense = group.element.sense_at(*(pose.take(indices) for indices in group.bodies))
-    return group.holding("sense", None if sense is None else np.asarray(sense))
+    return group.holding("sense", sense if sense is None or isinstance(sense, Tracer) else np.asarray(sense))
 
 
 def _with_found_of(group: Group, known: Group) -> Group:

@@ -19,6 +19,11 @@ P = ParamSpec("P")
 R = TypeVar("R")
 PLAIN = frozenset({float, int, bool, str, type(None), np.ndarray, Expression, Dimension})  # never traced
 
+WHAT_IS_NOT_TRACED = (
+    "jn.{} is differentiated by values of the mechanism only: instants, their number, orders, tolerances and names cannot "
+    "be traced by jax.jit, jax.grad or jax.vmap; the derivative by an instant is the next time derivative"
+)
+
 
 def check_process() -> None:
     """Raise UnsupportedError in a process that was forked after JAX had started: it would wait for ever.
@@ -33,10 +38,20 @@ def check_process() -> None:
         )
 
 
-def concrete(function: Callable[P, R]) -> Callable[P, R]:
+def concrete(
+    function: Callable[P, R], traced: Callable[[Callable[P, R], Mapping[str, Any]], R] | None = None
+) -> Callable[P, R]:
     """Make a function that decides by values refuse what JAX traces, and a fork of a process that used JAX.
 
     Within `jax.jit` it computes at once, since nothing it gets depends on what is traced: the result is a constant.
+
+    Parameters
+    ----------
+    function : callable
+        To be guarded.
+    traced : callable, optional
+        What to do instead where only the first argument holds traced values: it gets the guarded function and the
+        arguments by name.
 
     Raises
     ------
@@ -49,7 +64,12 @@ def concrete(function: Callable[P, R]) -> Callable[P, R]:
     def door(*arguments: P.args, **keywords: P.kwargs) -> R:
         check_process()
         given = dict(zip(names, arguments, strict=False)) | keywords
-        if (place := _traced(given)) is not None:
+        if (place := _traced(given)) is not None and traced is not None:
+            others = {name: value for name, value in given.items() if name != names[0]}
+            if (place := _traced(others)) is None:
+                return traced(door, given)
+            raise UnsupportedError(WHAT_IS_NOT_TRACED.format(function.__name__), name=place)
+        if place is not None:
             raise UnsupportedError(
                 f"jn.{function.__name__} decides by values, and cannot yet be used with values that jax.jit, jax.grad "
                 "or jax.vmap trace; call it with numbers, one design after another",

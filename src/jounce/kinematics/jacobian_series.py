@@ -1,0 +1,166 @@
+"""The Jacobian along a motion as a Taylor series, and linear equations with it: solved with one factorisation.
+
+How the residuals change with virtual displacements of the bodies is a jet, as everything is: none is written anywhere.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from jounce.constraints import AbstractConstraint
+from jounce.jet import Jet
+from jounce.jet.algebra import stacked
+from jounce.kinematics.frontal import FrontalFactor
+from jounce.kinematics.linear import DenseFactor
+from jounce.mechanism.system import System, movable, with_rows
+from jounce.rigid.pose import Pose
+from jounce.shapes import Numbers
+
+Slope = Float[Numbers, "order coordinate row instance batch"]
+"""Taylor coefficients of how the residuals of a group change with the coordinates of the bodies in a slot."""
+
+Series = Float[Numbers, "order column batch"]
+"""Taylor coefficients of what has one entry for each row, or each column, of the Jacobian."""
+
+
+def slopes(element: AbstractConstraint, poses: Sequence[Pose], time: Jet, slot: int) -> Slope:
+    """Return how the residual of a joint or driver changes as the body in a slot is displaced: Jacobian, as jets.
+
+    Parameters
+    ----------
+    element : AbstractConstraint
+        Its values have shape (..., instances, 1).
+    poses : sequence of SpatialPose or PlanarPose
+        Of the bodies in each slot, shape (..., instances, batch), of the order of the time.
+    time : Jet
+        Of shape (1, batch).
+    slot : int
+        Which of the bodies is displaced; it may be the ground.
+
+    Returns
+    -------
+    array of shape (order + 1, coordinates, rows, instances, batch)
+        Taylor coefficients of the derivatives by a shift in global axes, m, and by a turn in axes of the body, rad.
+    """
+    body = movable(poses[slot].truncate(time.order))
+    shape, size = body.position.shape[1:], body.shifts + body.turns
+
+    def residual(pose: Any) -> Any:
+        return stacked(with_rows(element.residual(*poses[:slot], pose, *poses[slot + 1 :], time)))
+
+    def along(direction: Any) -> Any:
+        unit = jnp.broadcast_to(direction[:, None, None], (size, *shape))
+        shift, turn = (Jet.constant(part, time.order).dense() for part in (unit[: body.shifts], unit[body.shifts :]))
+        change = movable(body.varied(shift, turn).truncate(time.order))
+        return jax.jvp(residual, (body,), (jax.lax.optimization_barrier(change),))[1]
+
+    return jnp.moveaxis(jax.vmap(along)(jnp.eye(size)), 0, 1)
+
+
+def jacobian_series(system: System, pose: Pose, time: Jet) -> Float[Numbers, "order entry batch"]:
+    """Return the entries of the Jacobian along a motion, as Taylor coefficients, in rows that are not scaled.
+
+    Parameters
+    ----------
+    system : System
+        The mechanism.
+    pose : SpatialPose or PlanarPose
+        Of all bodies, the ground first, of the order of the time.
+    time : Jet
+        Of shape (1, batch).
+    """
+    found = []
+    for group in system.groups:
+        poses = [pose.take(indices) for indices in group.bodies]
+        for slot in group.moving_slots:
+            slope = slopes(group.element, poses, time, slot) * system.column_scale[:, None, None, None]
+            found.append(slope.reshape(len(slope), -1, slope.shape[-1]))
+    return jnp.concatenate(found, axis=1)
+
+
+def solved_series(system: System, entries: Float[Numbers, "order entry batch"], right: Series) -> Series:
+    """Return the series x with ``J x = right``: order after order, with the factors of the first coefficient of J.
+
+    It is differentiated and transposed as the linear equations that it solves: the factors are not.
+
+    Parameters
+    ----------
+    system : System
+        The mechanism, with as many rows as columns.
+    entries : array of shape (order + 1, entries, batch)
+        As `jacobian_series` gives them.
+    right : array of shape (order + 1, rows, batch)
+        In rows that are not scaled.
+
+    Returns
+    -------
+    array of shape (order + 1, columns, batch)
+    """
+    scale = _row_scale(system, entries)
+    matrices, product, transposed = _products(system, entries, scale)
+    fixed = jax.lax.stop_gradient(entries[0])
+    if system.fronts is None:
+        factor: Any = DenseFactor.of(system.pattern.dense(fixed) * scale[:, :, None])
+    else:
+        factor = FrontalFactor.of(system.fronts, fixed, scale)
+
+    def multiplied(x: Any) -> Any:
+        return _convolution(product, matrices, x)
+
+    def solve(_: Any, b: Any) -> Any:
+        return _in_order(product, jax.lax.stop_gradient(matrices), factor.solve, b)
+
+    def solve_transposed(_: Any, b: Any) -> Any:  # the transpose of a convolution runs backwards in the orders
+        return _in_order(transposed, jax.lax.stop_gradient(matrices), factor.solve_transposed, b[::-1])[::-1]
+
+    return jax.lax.custom_linear_solve(multiplied, right * scale, solve, solve_transposed)
+
+
+def _row_scale(system: System, entries: Float[Numbers, "order entry batch"]) -> Float[Numbers, "row 1"]:
+    """Return factors by which the largest entry of each row, somewhere along the motion, becomes one."""
+    pattern = system.pattern
+    sizes = jnp.max(jnp.abs(jax.lax.stop_gradient(entries[0])), axis=-1)
+    sizes = jnp.concatenate([sizes, jnp.zeros(1)])[pattern.places].max(axis=(1, 2))[:, None]
+    return 1.0 / jnp.where((sizes > 0) & jnp.isfinite(sizes), sizes, 1.0)
+
+
+Product = Callable[[Any, Any], Any]
+
+
+def _products(system: System, entries: Any, scale: Any) -> tuple[Any, Product, Product]:
+    """Return the matrices of a series of them, and how one, or its transpose, multiplies columns, (columns, batch)."""
+    pattern = system.pattern
+    if system.fronts is None:
+        matrices = jax.vmap(pattern.dense)(entries) * scale[:, :, None]
+        return matrices, lambda m, x: jnp.sum(m * x[None], axis=1), lambda m, x: jnp.sum(m * x[:, None], axis=0)
+
+    def product(m: Any, x: Any) -> Any:
+        return pattern.product(m, x) * scale
+
+    def transposed(m: Any, y: Any) -> Any:
+        columns = jax.ShapeDtypeStruct((pattern.shape[1], y.shape[-1]), y.dtype)
+        return jax.linear_transpose(lambda x: product(m, x), columns)(y)[0]
+
+    return entries, product, transposed
+
+
+def _convolution(product: Product, matrices: Any, x: Series) -> Series:
+    """Return the product of a series of matrices with one of columns."""
+    each = jax.vmap(product)
+    return jnp.stack([jnp.sum(each(matrices[: k + 1], x[k::-1]), axis=0) for k in range(len(x))])
+
+
+def _in_order(product: Product, matrices: Any, solve: Callable[[Any], Any], right: Series) -> Series:
+    """Return the series whose product with one of matrices is known, coefficient after coefficient, in one loop."""
+    orders = np.arange(len(right))
+
+    def step(found: Any, k: Any) -> tuple[Any, None]:
+        # those not found yet are zero, also where an index runs round
+        known = jnp.sum(jax.vmap(product)(matrices, found[(k - orders) % len(orders)]), axis=0)
+        return found.at[k].set(solve(right[k] - known)), None
+
+    return jax.lax.scan(step, jnp.zeros_like(right), orders)[0]

@@ -1,0 +1,241 @@
+"""The motion of a mechanism of which JAX traces some values, as a function of them: derivatives of all orders by design.
+
+Along a motion the residuals vanish with all their time derivatives. So a change of a value of the design moves the
+bodies by a series d with ``J d = -r``, where J is the series of the Jacobian and r that of how the residuals change
+while the bodies stay: linear equations, triangular in the orders, with the one matrix on their diagonal that gives the
+time derivatives too. Their transpose gives gradients: a single solution, however many values there are.
+
+What is not a function of the design is decided outside of what is traced, by the solver as it always is: the path from
+the starting guess, steps, branches, whole turns.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
+from jaxtyping import Float
+
+from jounce.errors import AssemblyError, MobilityError, SolveError
+from jounce.jet import Jet
+from jounce.jet.algebra import stacked
+from jounce.kinematics.jacobian_series import jacobian_series, solved_series
+from jounce.kinematics.motion import Motion
+from jounce.kinematics.status import Status
+from jounce.mechanism import Mechanism, Model
+from jounce.mechanism.axis_angles import measures_angle
+from jounce.mechanism.builder import grouped_elements
+from jounce.mechanism.modules import with_fields
+from jounce.mechanism.system import System, movable
+from jounce.mechanism.traced import Angles, angles_of, template, traced_model, traced_values
+from jounce.rigid import PlanarPose, SpatialPose
+from jounce.rigid.pose import Pose
+from jounce.shapes import Numbers
+
+Solve = Callable[[Mechanism, bool], Motion]
+Values = tuple[Any, ...]
+"""What JAX traces in a mechanism, in the order of `traced_values`."""
+
+
+class Solved(NamedTuple):
+    """A motion, as its solver gives it.
+
+    Attributes
+    ----------
+    coordinates : dict of str to array
+        Taylor coefficients of the coordinates of all bodies, the ground first, time last.
+    status : array of shape (time,)
+        As numbers that may be traced.
+    length : array of shape ()
+        Size of the mechanism, m.
+    angles : Angles
+        About axes.
+    continued : tuple of array of shape (components, instances, time)
+        Values of the outputs that are angles in a range, made continuous, for each group of such.
+    """
+
+    coordinates: dict[str, Any]
+    status: Any
+    length: Any
+    angles: Angles
+    continued: tuple[Any, ...]
+
+
+def differentiable_motion(
+    mechanism: Mechanism, instants: Float[np.ndarray, " time"], levels: int, solve: Solve
+) -> tuple[Solved, Model]:
+    """Return the motion of a mechanism, and its model, as functions of the values that JAX traces in it.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        Some of its values are traced.
+    instants : array of shape (time,)
+        s.
+    levels : int
+        How many Taylor coefficients a solution has.
+    solve : callable
+        Solves a mechanism of plain numbers at the instants, strictly or not. What it raises where JAX knows the numbers
+        is raised; elsewhere a motion that cannot be begun is NaN.
+    """
+    made = template(mechanism)
+    values = tuple(jnp.asarray(value, float) for value in traced_values(mechanism))
+    shapes = _shapes(mechanism, len(instants), levels)
+
+    def on_the_host(strict: bool, values: Values) -> Solved:
+        try:
+            return _solved(solve(made(values), strict))
+        except (AssemblyError, MobilityError, SolveError) as error:
+            if strict:
+                raise
+            status = np.full(len(instants), float(getattr(error, "status", None) or Status.NOT_REACHED))
+            return jax.tree.map(lambda x: np.full(x.shape, np.nan), shapes)._replace(status=status)
+
+    @jax.custom_jvp
+    def solution(values: Values) -> Solved:
+        if not any(isinstance(value, Tracer) for value in values):
+            return jax.tree.map(jnp.asarray, on_the_host(True, values))
+        each = partial(_one_by_one, partial(on_the_host, False), shapes, [np.ndim(value) for value in values])
+        return jax.pure_callback(each, shapes, values, vmap_method="broadcast_all")
+
+    @solution.defjvp
+    def along(primals: tuple[Values], tangents: tuple[Values]) -> tuple[Solved, Solved]:
+        (values,), (changes,) = primals, tangents
+        solved = solution(values)
+        still = jax.tree.map(jnp.zeros_like, solved)
+        return solved, still._replace(coordinates=_change(made, values, changes, solved, instants))
+
+    solved = solution(values)
+    return solved, _model(mechanism, solved)
+
+
+def _shapes(mechanism: Mechanism, count: int, levels: int) -> Solved:
+    """Return the shapes of a solution."""
+
+    def of(*shape: int) -> jax.ShapeDtypeStruct:
+        return jax.ShapeDtypeStruct(shape, np.float64)
+
+    bodies = len(mechanism.bodies) + 1
+    if mechanism.space == "planar":
+        coordinates = {"position": of(levels, 2, bodies, count), "angle": of(levels, bodies, count)}
+        return Solved(coordinates, of(count), of(), Angles(((), (), ()), ((), ())), ())
+    coordinates = {
+        "position": of(levels, 3, bodies, count),
+        "quaternion": of(levels, 4, bodies, count),
+        "angular_velocity": of(levels - 1, 3, bodies, count),
+    }
+    parts = [groups for groups, _ in grouped_elements(mechanism)]
+    measuring = [[group.instances for group in groups if measures_angle(group)] for groups in parts]
+    angle: Any = tuple(tuple(of(n, 1) for n in part) for part in measuring)
+    near: Any = tuple(tuple(of(n, count) for n in part) for part in measuring[1:])
+    wrapping = [group for group in parts[2] if getattr(group.element, "wraps", ())]
+    continued = tuple(of(len(group.element.wraps), group.instances, count) for group in wrapping)
+    return Solved(coordinates, of(count), of(), Angles(angle, near), continued)
+
+
+def _solved(motion: Motion) -> Solved:
+    """Return what is kept of a motion, as arrays of NumPy."""
+    coordinates = jax.tree.map(np.asarray, dict(motion.poses[1]))
+    angles = angles_of(motion.model, (motion.forces, motion.counted_outputs))
+    near = jax.tree.map(lambda x: np.broadcast_to(x, (x.shape[0], len(motion.time))), angles.near)
+    length, angles = np.float64(motion.model.length), angles._replace(near=near)
+    return Solved(coordinates, motion.status.astype(float), length, angles, motion.continued_outputs)
+
+
+def _one_by_one(solve: Callable[[Values], Solved], shapes: Solved, sizes: Sequence[int], values: Values) -> Solved:
+    """Solve one design, or many, with the designs on the first axes; called from within what JAX runs.
+
+    `sizes` are the numbers of axes that the values of one design have.
+    """
+    batch = np.shape(values[0])[: np.ndim(values[0]) - sizes[0]]
+    if not batch:
+        return solve(values)
+    found = [solve(tuple(np.asarray(value)[index] for value in values)) for index in np.ndindex(*batch)]
+    return jax.tree.map(lambda shape, *xs: np.stack(xs).reshape(*batch, *shape.shape), shapes, *found)
+
+
+def _model(mechanism: Mechanism, solved: Solved) -> Model:
+    first = {name: solved.coordinates[name][0, ..., :1] for name in solved.coordinates if name != "angular_velocity"}
+    return traced_model(mechanism, solved.length, solved.angles, first)
+
+
+def _change(
+    made: Callable[[Values], Mechanism], values: Values, changes: Values, solved: Solved, instants: Any
+) -> dict[str, Any]:
+    """Return how the coordinates of a motion change, as Taylor coefficients, as values of the design do."""
+    regular = solved.status == int(Status.OK)
+    coordinates = {name: jnp.where(regular, c, c[..., :1]) for name, c in solved.coordinates.items()}
+    instants = jnp.where(regular, instants, instants[0])
+    names = [name for name in coordinates if name != "angular_velocity"]
+    first = {name: coordinates[name][0, ..., :1] for name in names}
+    moved = {name: jnp.zeros_like(x) for name, x in first.items()}
+    if any(solved.angles.angle):  # they are counted from the first position, which moves too
+        system, *slope = _linear(lambda v, _: traced_model(made(v), solved.length), values, changes, first, moved)
+        start = {name: x[None] for name, x in first.items()}
+        moved = _moved(system, *slope, start, instants[:1])
+        moved = {name: moved[name][0] for name in names}
+    system, *slope = _linear(
+        lambda v, x: traced_model(made(v), solved.length, solved.angles, x), values, changes, first, moved
+    )
+    found = _moved(system, *slope, coordinates, instants)
+    return {name: jnp.where(regular, change, 0.0) for name, change in found.items()}
+
+
+def _linear(
+    model: Callable[[Values, Mapping[str, Any]], Model], values: Values, changes: Values, first: Any, moved: Any
+) -> tuple[System, list[Any], tuple[int, ...]]:
+    """Return the system of a model, how its numbers change, and which of them do."""
+    kept: list[Any] = []
+
+    def numbers(values: Values, first: Any) -> list[Any]:
+        system = model(values, first).system
+        leaves, structure = jax.tree.flatten(with_fields(system, forces=(), outputs=()))
+        which = tuple(k for k, leaf in enumerate(leaves) if isinstance(leaf, Tracer))
+        kept.extend([[None if k in which else leaf for k, leaf in enumerate(leaves)], structure, which])
+        return [leaves[k] for k in which]
+
+    here, slope = jax.jvp(numbers, (values, first), (changes, moved))
+    leaves, structure, which = kept
+    for k, leaf in zip(which, here, strict=True):
+        leaves[k] = leaf
+    return jax.tree.unflatten(structure, leaves), slope, which
+
+
+def _moved(
+    system: System, slope: list[Any], which: tuple[int, ...], coordinates: dict[str, Any], instants: Any
+) -> dict[str, Any]:
+    pose_type = PlanarPose if "angle" in coordinates else SpatialPose
+    return _change_along(system, slope, coordinates, instants, pose_type=pose_type, which=which)
+
+
+@partial(jax.jit, static_argnames=("pose_type", "which"))
+def _change_along(
+    system: System,
+    slope: Sequence[Numbers],
+    coordinates: dict[str, Numbers],
+    instants: Float[Numbers, " batch"],
+    *,
+    pose_type: type[Pose],
+    which: tuple[int, ...],
+) -> dict[str, Any]:
+    """Return how the coordinates of a motion change as the numbers of a system do; `which` of its leaves."""
+    order = len(coordinates["position"]) - 1
+    pose = pose_type.from_coordinates({name: Jet(tuple(c)) for name, c in coordinates.items()})
+    pose = movable(jax.lax.optimization_barrier(pose))  # or XLA computes it again in everything that uses it
+    time = Jet.variable(instants[None], order)
+    leaves, structure = jax.tree.flatten(system)
+
+    def residual(numbers: Sequence[Any]) -> Any:
+        own = list(leaves)
+        for k, number in zip(which, numbers, strict=True):
+            own[k] = number
+        return stacked(jax.tree.unflatten(structure, own).residual(pose, time))
+
+    _, missing = jax.jvp(residual, ([leaves[k] for k in which],), (list(slope),))
+    found = solved_series(system, jacobian_series(system, pose, time), -missing)
+    parts = [system.coordinates(level, pose.shifts) for level in found]
+    shift, turn = (Jet(tuple(part)) for part in zip(*parts, strict=True))
+    return {name: stacked(jet) for name, jet in pose.varied(shift, turn).coordinates().items()}

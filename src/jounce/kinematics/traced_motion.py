@@ -1,0 +1,89 @@
+"""The motion of a mechanism that JAX differentiates, maps or compiles: the same questions, answered as its arrays."""
+
+from functools import cached_property
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from jounce.errors import UnsupportedError
+from jounce.jet.derivatives import plain_derivatives
+from jounce.jet.turns import brought_near
+from jounce.kinematics.motion import Motion, output_series
+from jounce.kinematics.sensitivities import Solved
+from jounce.kinematics.status import Status
+from jounce.mechanism import AbstractMotionOutput, AbstractOutput, Mechanism, Model
+from jounce.mechanism.system import Group
+from jounce.shapes import Numbers
+
+
+class TracedMotion(Motion):
+    """A motion of which JAX traces the values.
+
+    Outputs are arrays of JAX; labelled arrays hold such, and give them as ``.data``. `status` is an array too: within
+    `jax.jit` and `jax.vmap` nothing can be raised for it, and an instant that failed is NaN and adds nothing to
+    derivatives. There is no dataset of it, and neither faults nor change points are told.
+    """
+
+    traced = True
+
+    def __init__(self, mechanism: Mechanism, model: Model, time: np.ndarray, order: int, solved: Solved):
+        outputs = [output_series(group, solved.coordinates, model.pose_type) for group in model.system.outputs]
+        wrapping = iter(solved.continued)
+        for k, group in enumerate(model.system.outputs):
+            if getattr(group.element, "wraps", ()):
+                counted = brought_near(outputs[k][0], next(wrapping))
+                outputs[k] = jnp.concatenate([counted[None], outputs[k][1:]])
+        status: Any = solved.status.astype(int)
+        super().__init__(mechanism, model, time, order, (solved.coordinates, tuple(outputs)), status, {})
+
+    def __repr__(self) -> str:
+        return f"<Motion of a design that JAX traces, {len(self.time)} instants, order {self.order}>"
+
+    @cached_property
+    def dataset(self) -> Any:
+        """There is none.
+
+        Raises
+        ------
+        UnsupportedError
+            Always: a dataset holds numbers.
+        """
+        raise UnsupportedError("a dataset holds numbers, and JAX traces this motion; take motion.outputs[name]")
+
+    def evaluate(self, output: AbstractOutput | AbstractMotionOutput, name: str = "output") -> Any:
+        """Return any output, as an `xarray.DataArray` whose ``.data`` is an array that JAX traces.
+
+        Raises
+        ------
+        MechanismError
+            If the output names a body, joint, driver or force that does not exist, or does not fit the mechanism.
+        UnsupportedError
+            If it is an angle that is counted over turns, and no output of the mechanism.
+        """
+        if getattr(output, "turning", False) or getattr(output, "wraps", ()):
+            message = "an angle that is counted over turns must be an output of a mechanism that JAX traces"
+            raise UnsupportedError(message, name=name)
+        return super().evaluate(output, name)
+
+    def _counting(self, groups: tuple[Group, ...]) -> tuple[Group, ...]:
+        return groups  # those of the model have the turns of all instants
+
+    def _continued(
+        self, group: Group, coefficients: Float[Numbers, "order component instance time"]
+    ) -> Float[Numbers, "order component instance time"]:
+        return coefficients
+
+    def _check_finite(self, values: Any, name: str) -> None:
+        """Nothing can be said of values that are traced."""
+
+    def _coefficients(self, group: Group) -> Float[Numbers, "order component instance time"]:
+        return output_series(group, self.poses[1], self.model.pose_type)
+
+    def _derivatives(
+        self, coefficients: Float[Numbers, "order component time"]
+    ) -> Float[Numbers, "time derivative *component"]:
+        values = jnp.moveaxis(plain_derivatives(coefficients[: self.order + 1]), -1, 0)
+        values = jnp.where((self.status == Status.OK)[:, None, None], values, jnp.nan)
+        return values[..., 0] if values.shape[-1] == 1 else values
