@@ -5,10 +5,11 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.dynamics.constraint_forces import balancing, slopes
+from jounce.dynamics.constraint_forces import balancing
 from jounce.dynamics.loads import inertia_forces, mass_matrices
 from jounce.dynamics.masses import Masses
 from jounce.jet import Jet
+from jounce.kinematics.jacobian_series import slopes
 from tests.problems.bank import cases, group_of, pose_of, random_motion
 
 STEP = 1e-3

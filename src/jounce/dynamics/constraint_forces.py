@@ -7,6 +7,7 @@ virtual displacements of the bodies: none is written anywhere, and a joint of on
 """
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import equinox as eqx
@@ -15,7 +16,6 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.constraints import AbstractConstraint
 from jounce.dynamics.saddle_point import (
     BodyMatrices,
     Column,
@@ -28,9 +28,9 @@ from jounce.dynamics.saddle_point import (
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked, total
 from jounce.kinematics.frontal import FrontalFactor
-from jounce.kinematics.jacobian_series import Slope
+from jounce.kinematics.jacobian_series import Slope, solver
 from jounce.kinematics.linear import DenseFactor
-from jounce.mechanism.system import System, movable, with_rows
+from jounce.mechanism.system import System, with_rows
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
 from jounce.trajectory import AbstractMotion
@@ -71,13 +71,12 @@ def balancing(mass: MassMatrix | None, jacobian: Jacobian) -> Callable[[Column],
     is left out.
     """
     if mass is None:
-        return DenseFactor.of(jacobian).solve_transposed
-    factor, rows = DenseFactor.of(saddle_point(mass, jacobian)), len(jacobian)
-
-    def solve(load: Any) -> Any:
-        return factor.solve(jnp.concatenate([load, jnp.zeros((rows, load.shape[-1]))]))[-rows:]
-
-    return solve
+        factor = DenseFactor.of(jax.lax.stop_gradient(jacobian))
+        return solver(lambda x: jnp.sum(jacobian * x[:, None], axis=0), factor.solve_transposed, factor.solve)
+    matrix, rows = saddle_point(mass, jacobian), len(jacobian)
+    factor = DenseFactor.of(jax.lax.stop_gradient(matrix))
+    solve = solver(lambda x: jnp.sum(matrix * x[None], axis=1), factor.solve, factor.solve_transposed)
+    return lambda load: solve(jnp.concatenate([load, jnp.zeros((rows, load.shape[-1]))]))[-rows:]
 
 
 def multipliers(
@@ -119,12 +118,23 @@ def _solver(system: System, blocks: Slopes, mass: BodyMatrices | None) -> Callab
     flat = [(slope[0] * scale[:, None, None, None]).reshape(-1, slope.shape[-1]) for parts in blocks for slope in parts]
     entries = jnp.concatenate(flat)
     if mass is None and system.fronts is not None:
-        return FrontalFactor.of(system.fronts, entries, system.row_scale).solve_transposed
+        factor = FrontalFactor.of(system.fronts, jax.lax.stop_gradient(entries), system.row_scale)
+        return solver(partial(_transposed, system, entries), factor.solve_transposed, factor.solve)
     jacobian = system.pattern.dense(entries) * system.row_scale[:, :, None]
     if mass is None:
         return balancing(None, jacobian)
     whole = block_diagonal(mass, scale)
     return balancing(whole / jnp.max(jnp.abs(whole)), jacobian)  # their size does not matter to the multipliers
+
+
+def _transposed(system: System, entries: Float[Numbers, "entry batch"], rows: Any) -> Any:
+    """Return the products of the transposed matrices with these entries, in scaled rows."""
+
+    def product(columns: Any) -> Any:
+        return system.pattern.product(entries, columns) * system.row_scale
+
+    columns = jax.ShapeDtypeStruct((system.shape[1], rows.shape[-1]), rows.dtype)
+    return jax.linear_transpose(product, columns)(rows)[0]
 
 
 def _by_group(system: System, blocks: Slopes, found: list[Float[Numbers, "row batch"]]) -> list[Any]:

@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.dynamics.masses import Gravity, Masses, gravity_of, required_masses, second_moments
-from jounce.dynamics.motion_values import Coordinates, cut, labelled, pose_of
+from jounce.dynamics.motion_values import Coordinates, cut, held, labelled, pose_of
 from jounce.errors import MechanismError
 from jounce.jet import Jet, dot
 from jounce.jet.algebra import stacked, total
@@ -294,8 +294,8 @@ def potential_energy(motion: Motion) -> Any:
 def potential_coefficients(motion: Motion) -> Energies:
     """Return the potential energies of bodies as Taylor coefficients, the ground first."""
     masses, (pose_type, coordinates) = required_masses(motion.mechanism), motion.poses
-    heights = np.asarray(_heights(coordinates, masses.center, gravity_of(motion.mechanism), pose_type))
-    return 0.0 - heights * masses.mass  # no -0
+    heights = held(motion, _heights(coordinates, masses.center, gravity_of(motion.mechanism), pose_type))
+    return 0.0 - heights * masses.mass[None]  # no -0
 
 
 @compiled("pose_type")
@@ -333,7 +333,7 @@ def stored_energy(motion: Motion) -> Any:
     """
     pose_type, coordinates = motion.poses
     stored = _stored(motion.forces, cut(coordinates, 1), motion.time[None], pose_type)
-    return labelled(motion, np.asarray(stored)[None], "J")[:, 0].drop_vars("derivative")
+    return labelled(motion, held(motion, stored)[None], "J")[:, 0].drop_vars("derivative")
 
 
 @compiled("pose_type")

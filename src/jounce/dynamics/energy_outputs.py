@@ -8,6 +8,7 @@ import numpy as np
 
 from jounce.constraints.base import Whole
 from jounce.dynamics.energies import energy_coefficients, potential_coefficients
+from jounce.dynamics.motion_values import held
 from jounce.errors import MechanismError, check_name
 from jounce.kinematics import Motion
 from jounce.mechanism import AbstractMotionOutput, Mechanism
@@ -37,7 +38,7 @@ class AbstractEnergyOutput(AbstractMotionOutput):
 
     def coefficients(self, motion: Motion) -> np.ndarray:
         """Return the Taylor coefficients of the energy, (levels, 1, time)."""
-        parts = np.asarray(self._of_bodies(motion))
+        parts = held(motion, self._of_bodies(motion))
         if self.alone is None:
             return parts.sum(axis=1, keepdims=True)
         index = 1 + list(motion.mechanism.bodies).index(self.alone)  # the ground first

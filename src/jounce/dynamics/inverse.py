@@ -17,12 +17,13 @@ from jounce.dynamics.constraint_forces import Multipliers, Slope, Slopes
 from jounce.dynamics.forward import Lanes
 from jounce.dynamics.loads import loads, mass_matrices
 from jounce.dynamics.masses import Gravity, Masses, check_loads, gravity_of, masses_of
-from jounce.dynamics.motion_values import Coordinates, cut, in_chunks, pose_of
+from jounce.dynamics.motion_values import Coordinates, along_motion, cut, pose_of
 from jounce.errors import MechanismError
 from jounce.jet import Jet, cross
 from jounce.jet.algebra import stacked
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.compilation import compiled
+from jounce.kinematics.jacobian_series import slopes
 from jounce.mechanism import Model
 from jounce.mechanism.axis_angles import at_lanes
 from jounce.mechanism.pattern import Pattern
@@ -114,7 +115,7 @@ class MotionForces:
             bodies, instants = self.coordinates_at(None, lanes, self.levels + 2), self.motion.time[lanes]
             forces = dataclasses.replace(unjoined, forces=at_lanes(self.forces, lanes))
             load, finite = _loads(forces, bodies, instants, self.masses, self.gravity, self.pose_type)
-            self._check_finite(np.asarray(finite), lanes)
+            self._check_finite(finite, lanes)
             still = None if square else self.coordinates_at(None, lanes, 1)
             return _multipliers(system, blocks, load, still, self.masses, self.pose_type)
 
@@ -160,6 +161,8 @@ class MotionForces:
         name : str, optional
             Of the force; the applied force that is not finite there is looked for unless given.
         """
+        if self.motion.traced:
+            return
         bad = ~np.isfinite(values).all(axis=tuple(range(1, values.ndim - 1))) & (self.motion.status == Status.OK)
         if not bad.any():
             return
@@ -215,7 +218,7 @@ class MotionForces:
 
     def in_chunks(self, function: Callable[[np.ndarray], Any]) -> Any:
         """Return what a function of indices of instants gives, for all of them: arrays with the time last."""
-        return in_chunks(function, len(self.motion.time))
+        return along_motion(self.motion, function)
 
     def coordinates_at(self, bodies: tuple[int, ...] | None, lanes: np.ndarray, levels: int) -> dict[str, Any]:
         """Return coordinates at some instants; of the ground alone it is the place only, as it never moves."""
@@ -224,9 +227,11 @@ class MotionForces:
         found = {name: values[..., lanes] for name, values in cut(self.coordinates, levels - 1).items()}
         return found if bodies is None else {name: values[..., np.array(bodies), :] for name, values in found.items()}
 
-    def _check_finite(self, finite: np.ndarray, lanes: np.ndarray) -> None:
+    def _check_finite(self, finite: Any, lanes: np.ndarray) -> None:
         """Raise MechanismError for the first instant that was solved and at which an applied force is not finite."""
-        bad = np.argwhere((~finite & (self.motion.status[lanes] == Status.OK)).T)
+        if self.motion.traced:
+            return
+        bad = np.argwhere((~np.asarray(finite) & (self.motion.status[lanes] == Status.OK)).T)
         if len(bad):
             lane, force = bad[0]
             message = f"has no finite value at t = {self.motion.time[lanes[lane]]:g} s; check its law there"
@@ -253,7 +258,7 @@ def _slopes(
     element: Any, poses: Sequence[Coordinates], instants: Lanes, pose_type: type[Pose], slot: int, levels: int
 ) -> Any:
     time = Jet.variable(instants[None], levels - 1)
-    return constraint_forces.slopes(element, [pose_of(pose, pose_type, levels - 1) for pose in poses], time, slot)
+    return slopes(element, [pose_of(pose, pose_type, levels - 1) for pose in poses], time, slot)
 
 
 @compiled("pose_type")

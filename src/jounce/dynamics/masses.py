@@ -71,7 +71,7 @@ def required_masses(mechanism: Mechanism, what: str = "energies") -> Masses:
         If no body has a mass, or a body has an inertia without a mass.
     """
     found = masses_of(mechanism)
-    if not np.any(found.mass):
+    if not isinstance(found.mass, Tracer) and not np.any(found.mass):
         raise MechanismError(f"no body has a mass; {what} need some", name="bodies")
     return found
 

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any, TypeVar
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
@@ -50,6 +51,17 @@ def in_chunks(
     return jax.tree.map(lambda *xs: np.split(np.concatenate(xs, axis), [count], axis)[0], *parts)
 
 
+def along_motion(motion: Motion, function: Callable[[Int[np.ndarray, " chunk"]], Found]) -> Found:
+    """Return what a function of indices of instants gives for all of a motion, at once where JAX traces it."""
+    count = len(motion.time)
+    return function(np.arange(count)) if motion.traced else in_chunks(function, count)
+
+
+def held(motion: Motion, values: Any) -> Any:
+    """Return values along a motion as an array of NumPy, or as they are where JAX traces the motion."""
+    return values if motion.traced else np.asarray(values)
+
+
 def pose_of(coordinates: Coordinates, pose_type: type[Pose], order: int | None = None) -> Any:
     """Return the pose of bodies; a place alone is one at rest, where an order is given."""
     pose = pose_type.from_coordinates({name: Jet(tuple(c)) for name, c in coordinates.items()})
@@ -70,6 +82,10 @@ def cut(coordinates: Coordinates, order: int) -> dict[str, Any]:
 
 def derivatives_along(motion: Motion, coefficients: Float[Numbers, "order *shape time"]) -> np.ndarray:
     """Return plain derivatives, the time first, from Taylor coefficients; NaN at instants that were not solved."""
+    if motion.traced:
+        values: Any = jnp.moveaxis(plain_derivatives(coefficients), -1, 0)
+        solved = (motion.status == Status.OK).reshape(-1, *[1] * (values.ndim - 1))
+        return jnp.where(solved, values, jnp.nan)
     values = np.moveaxis(np.asarray(plain_derivatives(np.asarray(coefficients))), -1, 0)
     values[motion.status != Status.OK] = np.nan
     return values

@@ -110,9 +110,9 @@ class _JointOutput(AbstractForceOutput):
             place = forces.indices[self.joint]
             fixed = getattr(forces.model.system.groups[place.group].element, f"point_{'ijmn'[slot : slot + 1]}", None)
             size = forces.pose_type.shifts
-            point = np.zeros(size) if fixed is None else np.asarray(fixed).reshape(size, -1)[:, place.instance]
+            point = np.zeros(size) if fixed is None else fixed.reshape(size, -1)[:, place.instance]
         work = forces.wrench(self.joint, slot)
-        return forces.expressed(work, index(body), None if frame is None else index(frame), np.asarray(point))
+        return forces.expressed(work, index(body), None if frame is None else index(frame), point)
 
 
 class JointForceOutput(_JointOutput):

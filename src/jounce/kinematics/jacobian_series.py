@@ -73,11 +73,11 @@ def jacobian_series(system: System, pose: Pose, time: Jet) -> Float[Numbers, "or
     time : Jet
         Of shape (1, batch).
     """
-    found = []
+    found, scale = [], jnp.asarray(system.column_scale)[None, :, None, None, None]
     for group in system.groups:
         poses = [pose.take(indices) for indices in group.bodies]
         for slot in group.moving_slots:
-            slope = slopes(group.element, poses, time, slot) * system.column_scale[:, None, None, None]
+            slope = slopes(group.element, poses, time, slot) * scale
             found.append(slope.reshape(len(slope), -1, slope.shape[-1]))
     return jnp.concatenate(found, axis=1)
 
@@ -117,7 +117,16 @@ def solved_series(system: System, entries: Float[Numbers, "order entry batch"], 
     def solve_transposed(_: Any, b: Any) -> Any:  # the transpose of a convolution runs backwards in the orders
         return _in_order(transposed, jax.lax.stop_gradient(matrices), factor.solve_transposed, b[::-1])[::-1]
 
-    return jax.lax.custom_linear_solve(multiplied, right * scale, solve, solve_transposed)
+    return jax.lax.custom_linear_solve(multiplied, right * scale[None], solve, solve_transposed)
+
+
+def solver(
+    product: Callable[[Any], Any], solve: Callable[[Any], Any], solve_transposed: Callable[[Any], Any]
+) -> Callable[[Any], Any]:
+    """Return what solves equations with a matrix known by its product, and is differentiated as such equations are."""
+    return lambda right: jax.lax.custom_linear_solve(
+        product, right, lambda _, b: solve(b), lambda _, b: solve_transposed(b)
+    )
 
 
 def _row_scale(system: System, entries: Float[Numbers, "order entry batch"]) -> Float[Numbers, "row 1"]:
@@ -135,7 +144,7 @@ def _products(system: System, entries: Any, scale: Any) -> tuple[Any, Product, P
     """Return the matrices of a series of them, and how one, or its transpose, multiplies columns, (columns, batch)."""
     pattern = system.pattern
     if system.fronts is None:
-        matrices = jax.vmap(pattern.dense)(entries) * scale[:, :, None]
+        matrices = jax.vmap(pattern.dense)(entries) * scale[None, :, :, None]
         return matrices, lambda m, x: jnp.sum(m * x[None], axis=1), lambda m, x: jnp.sum(m * x[:, None], axis=0)
 
     def product(m: Any, x: Any) -> Any:

@@ -1,4 +1,4 @@
-"""The motion of a mechanism of which JAX traces some values, as a function of them: derivatives of all orders by design.
+"""The motion of a mechanism of which JAX traces some values, as a function of them: derivatives of any order by design.
 
 Along a motion the residuals vanish with all their time derivatives. So a change of a value of the design moves the
 bodies by a series d with ``J d = -r``, where J is the series of the Jacobian and r that of how the residuals change
@@ -167,7 +167,7 @@ def _change(
 ) -> dict[str, Any]:
     """Return how the coordinates of a motion change, as Taylor coefficients, as values of the design do."""
     regular = solved.status == int(Status.OK)
-    coordinates = {name: jnp.where(regular, c, c[..., :1]) for name, c in solved.coordinates.items()}
+    coordinates = {name: _where(regular, c, c[..., :1]) for name, c in solved.coordinates.items()}
     instants = jnp.where(regular, instants, instants[0])
     names = [name for name in coordinates if name != "angular_velocity"]
     first = {name: coordinates[name][0, ..., :1] for name in names}
@@ -181,7 +181,11 @@ def _change(
         lambda v, x: traced_model(made(v), solved.length, solved.angles, x), values, changes, first, moved
     )
     found = _moved(system, *slope, coordinates, instants)
-    return {name: jnp.where(regular, change, 0.0) for name, change in found.items()}
+    return {name: _where(regular, change, jnp.zeros_like(change)) for name, change in found.items()}
+
+
+def _where(regular: Any, values: Any, others: Any) -> Any:
+    return jnp.where(regular.reshape(*[1] * (values.ndim - 1), -1), values, others)
 
 
 def _linear(

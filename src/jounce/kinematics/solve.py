@@ -42,7 +42,9 @@ def _differentiated(solve: Callable[..., Motion], given: Mapping[str, Any]) -> M
     try:
         instants = time_grid(time, mechanism.parameter_values)
     except ConcretizationTypeError:
-        message = "the instants depend on values that JAX traces, and are held when a motion is differentiated; give them"
+        message = (
+            "the instants depend on values that JAX traces, and are held when a motion is differentiated; give them"
+        )
         raise UnsupportedError(message, name="time") from None
     levels = max(order + _lost_orders(mechanism), LOWEST_ORDER) + 1
 

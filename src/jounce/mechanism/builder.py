@@ -37,7 +37,6 @@ from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
 from jounce.trajectory import AbstractMotion
 
-
 Grouped = tuple[tuple[Group, ...], tuple[tuple[str, ...], ...]]
 """Groups, and the names of the elements of each, with their kinds before them."""
 
