@@ -27,7 +27,6 @@ def solved(mechanism, time=TIME, **options):
 
 
 CASES = {
-    "mechanism.parameters.BC": lambda x: solved(FOUR_BAR.with_parameters(BC=x)),
     "time[1]": lambda x: solved(FOUR_BAR, [0.0, x]),
     "tolerance": lambda x: solved(FOUR_BAR, tolerance=x),
     "mechanism.bodies.rod.center_of_mass[0]": lambda x: jn.simulate(pendulum(x), TIME).outputs["angle"][-1, 0],

@@ -4,7 +4,6 @@ import abc
 from typing import ClassVar
 
 import equinox as eqx
-import numpy as np
 
 from jounce.constraints.base import Whole
 from jounce.dynamics.energies import energy_coefficients, potential_coefficients
@@ -13,6 +12,7 @@ from jounce.errors import MechanismError, check_name
 from jounce.kinematics import Motion
 from jounce.mechanism import AbstractMotionOutput, Mechanism
 from jounce.robot.arguments import whole_number
+from jounce.shapes import Numbers
 
 
 class AbstractEnergyOutput(AbstractMotionOutput):
@@ -36,7 +36,7 @@ class AbstractEnergyOutput(AbstractMotionOutput):
             which = "no body has a mass" if alone is None else "this body has no mass"
             raise MechanismError(f"{which}, and an energy needs one", name=self.source, value=alone)
 
-    def coefficients(self, motion: Motion) -> np.ndarray:
+    def coefficients(self, motion: Motion) -> Numbers:
         """Return the Taylor coefficients of the energy, (levels, 1, time)."""
         parts = held(motion, self._of_bodies(motion))
         if self.alone is None:
@@ -45,7 +45,7 @@ class AbstractEnergyOutput(AbstractMotionOutput):
         return parts[:, index : index + 1]
 
     @abc.abstractmethod
-    def _of_bodies(self, motion: Motion) -> np.ndarray:
+    def _of_bodies(self, motion: Motion) -> Numbers:
         """Return the Taylor coefficients of all bodies, (levels, bodies, time)."""
 
 

@@ -90,7 +90,7 @@ class MotionForces:
         self.gravity = gravity_of(mechanism) * float(gravity)
         self.forces = motion.forces if applied else ()
         self.indices = element_indices(self.model)
-        self._kept: dict[tuple[Any, ...], np.ndarray] = {}
+        self._kept: dict[tuple[Any, ...], Numbers] = {}
 
     @classmethod
     def of(cls, motion: Motion) -> "MotionForces":
@@ -100,7 +100,7 @@ class MotionForces:
         return motion.derived["forces"]
 
     @cached_property
-    def multipliers(self) -> np.ndarray:
+    def multipliers(self) -> Numbers:
         """Multipliers of the rows of all residuals, as Taylor coefficients, (levels, rows, time)."""
         system = dataclasses.replace(self.model.system, outputs=())
         nothing = Pattern.of((), (), system.pattern.width, system.body_count)
@@ -123,7 +123,7 @@ class MotionForces:
         self.check_finite(found)
         return found
 
-    def driver_force(self, name: str) -> Float[np.ndarray, "order 1 time"]:
+    def driver_force(self, name: str) -> Float[Numbers, "order 1 time"]:
         """Return what a driver exerts along what it prescribes, as Taylor coefficients."""
         place = self.indices[name]
 
@@ -133,7 +133,7 @@ class MotionForces:
 
         return self._once(chunk, "driver", place.group)[:, place.instance : place.instance + 1]
 
-    def wrench(self, name: str, slot: int) -> Float[np.ndarray, "order coordinate time"]:
+    def wrench(self, name: str, slot: int) -> Float[Numbers, "order coordinate time"]:
         """Return what a joint or driver does to the body in a slot, as Taylor coefficients.
 
         Force, global, and moment about the origin of the body, in its axes.
@@ -145,13 +145,13 @@ class MotionForces:
 
         return self._once(chunk, "joint", place.group, slot)[:, :, place.instance]
 
-    def applied_force(self, name: str) -> np.ndarray:
+    def applied_force(self, name: str) -> Numbers:
         """Return an applied force, as Taylor coefficients, (levels, components, time)."""
         found = self._applied_force(name)
         self.check_finite(found, f"forces.{name}")
         return found
 
-    def check_finite(self, values: np.ndarray, name: str | None = None) -> None:
+    def check_finite(self, values: Numbers, name: str | None = None) -> None:
         """Raise MechanismError for the first instant that was solved and at which Taylor coefficients are not finite.
 
         Parameters
@@ -180,7 +180,7 @@ class MotionForces:
             raise MechanismError(f"its derivative {level} has {at}; {advice}, or ask for fewer derivatives", name=name)
         raise MechanismError(f"has {at}; {advice}", name=name)
 
-    def _applied_force(self, name: str) -> Float[np.ndarray, "order component time"]:
+    def _applied_force(self, name: str) -> Float[Numbers, "order component time"]:
         index = next(k for k, names in enumerate(self.model.forces) if name in names)
 
         def chunk(lanes: np.ndarray) -> Any:
@@ -190,13 +190,13 @@ class MotionForces:
 
         return self._once(chunk, "force", index)[:, :, self.model.forces[index].index(name)]
 
-    def _once(self, chunk: Callable[[np.ndarray], Any], *key: Any) -> np.ndarray:
+    def _once(self, chunk: Callable[[np.ndarray], Any], *key: Any) -> Numbers:
         """Return what a function of indices of instants gives for all of them, kept by a key."""
         if key not in self._kept:
             self._kept[key] = self.in_chunks(chunk)
         return self._kept[key]
 
-    def expressed(self, work: np.ndarray, body: int, frame: int | None, point: np.ndarray) -> tuple[Any, Any]:
+    def expressed(self, work: Numbers, body: int, frame: int | None, point: Numbers) -> tuple[Any, Any]:
         """Return a wrench on a body as force and moment about a point of it, (levels, components, time).
 
         Parameters
@@ -246,7 +246,7 @@ class MotionForces:
         poses, instants = self._poses(index, lanes), self.motion.time[lanes]
         return _slopes(element, poses, instants, self.pose_type, slot, self.levels)
 
-    def _of_group(self, place: ElementIndex) -> Float[np.ndarray, "order row instance time"]:
+    def _of_group(self, place: ElementIndex) -> Float[Numbers, "order row instance time"]:
         """Return the multipliers of a group."""
         found = self.multipliers[:, place.rows]
         instances = self.model.system.groups[place.group].instances

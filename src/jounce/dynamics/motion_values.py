@@ -80,7 +80,7 @@ def cut(coordinates: Coordinates, order: int) -> dict[str, Any]:
     return {name: values[: counts[name]] for name, values in coordinates.items() if counts[name]}
 
 
-def derivatives_along(motion: Motion, coefficients: Float[Numbers, "order *shape time"]) -> np.ndarray:
+def derivatives_along(motion: Motion, coefficients: Float[Numbers, "order *shape time"]) -> Numbers:
     """Return plain derivatives, the time first, from Taylor coefficients; NaN at instants that were not solved."""
     if motion.traced:
         values: Any = jnp.moveaxis(plain_derivatives(coefficients), -1, 0)

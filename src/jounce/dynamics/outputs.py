@@ -13,7 +13,7 @@ from jounce.kinematics import Motion
 from jounce.mechanism import AbstractMotionOutput, Mechanism
 from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.resolve import resolve_element
-from jounce.shapes import ArrayLike
+from jounce.shapes import ArrayLike, Numbers
 
 RATES = ("yank", "second rate", "third rate", "fourth rate")
 
@@ -54,7 +54,7 @@ class _DriverOutput(AbstractForceOutput):
 
     source = "driver"
 
-    def coefficients(self, motion: Motion) -> np.ndarray:
+    def coefficients(self, motion: Motion) -> Numbers:
         """Return the Taylor coefficients of what the driver exerts, (levels, 1, time)."""
         return MotionForces.of(motion).driver_force(self.driver)
 
@@ -98,7 +98,7 @@ class _JointOutput(AbstractForceOutput):
             message = f"unknown frame; {did_you_mean(self.frame, ['global', 'body', *element.bodies])}"
             raise MechanismError(message, name="frame", value=self.frame)
 
-    def _wrench(self, motion: Motion, point: ArrayLike | None) -> tuple[np.ndarray, np.ndarray]:
+    def _wrench(self, motion: Motion, point: ArrayLike | None) -> tuple[Numbers, Numbers]:
         """Return force and moment about a point of the body, with rates; about that of the joint unless given."""
         forces, mechanism = MotionForces.of(motion), motion.mechanism
         element = {**mechanism.joints, **mechanism.drivers}[self.joint]
@@ -121,7 +121,7 @@ class JointForceOutput(_JointOutput):
     unit = "N"
     rate_names = ("force", *RATES)
 
-    def coefficients(self, motion: Motion) -> np.ndarray:
+    def coefficients(self, motion: Motion) -> Numbers:
         """Return the Taylor coefficients of the force, (levels, components, time)."""
         return self._wrench(motion, None)[0]
 
@@ -137,7 +137,7 @@ class JointTorqueOutput(_JointOutput):
     unit = "N*m"
     rate_names = ("torque", *RATES)
 
-    def coefficients(self, motion: Motion) -> np.ndarray:
+    def coefficients(self, motion: Motion) -> Numbers:
         """Return the Taylor coefficients of the torque, (levels, components, time)."""
         mechanism = motion.mechanism
         components = 2 if mechanism.space == "planar" else 3
@@ -150,7 +150,7 @@ class _AppliedOutput(AbstractForceOutput):
 
     source = "force"
 
-    def coefficients(self, motion: Motion) -> np.ndarray:
+    def coefficients(self, motion: Motion) -> Numbers:
         """Return the Taylor coefficients of the force, (levels, components, time)."""
         return MotionForces.of(motion).applied_force(self.force)
 

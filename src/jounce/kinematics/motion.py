@@ -96,7 +96,7 @@ class Motion(Displayed):
         time: np.ndarray,
         order: int,
         state: tuple[dict[str, Any] | Callable[[], dict[str, Any]], tuple[Any, ...]],
-        status: np.ndarray,
+        status: Numbers,
         faults: dict[int, str],
         change_points: np.ndarray | None = None,
         history: AttitudeHistory | None = None,
@@ -141,7 +141,7 @@ class Motion(Displayed):
         return f"<Motion {title}{solved} of {len(self.time)} instants solved, order {self.order}>"
 
     @cached_property
-    def outputs(self) -> dict[str, np.ndarray]:
+    def outputs(self) -> dict[str, Numbers]:
         """Outputs by name: arrays of shape (time, order + 1) or (time, order + 1, component), SI.
 
         The nine components of a rotation matrix stand row by row.

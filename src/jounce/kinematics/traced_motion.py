@@ -71,7 +71,9 @@ class TracedMotion(Motion):
         return groups  # those of the model have the turns of all instants
 
     def _continued(
-        self, group: Group, coefficients: Float[Numbers, "order component instance time"]
+        self,
+        group: Group,  # noqa: ARG002 - as a motion of numbers has it
+        coefficients: Float[Numbers, "order component instance time"],
     ) -> Float[Numbers, "order component instance time"]:
         return coefficients
 

@@ -20,8 +20,8 @@ R = TypeVar("R")
 PLAIN = frozenset({float, int, bool, str, type(None), np.ndarray, Expression, Dimension})  # never traced
 
 WHAT_IS_NOT_TRACED = (
-    "jn.{} is differentiated by values of the mechanism only: instants, their number, orders, tolerances and names cannot "
-    "be traced by jax.jit, jax.grad or jax.vmap; the derivative by an instant is the next time derivative"
+    "jn.{} is differentiated by values of the mechanism only: instants, their number, orders, tolerances and names "
+    "cannot be traced by jax.jit, jax.grad or jax.vmap; the derivative by an instant is the next time derivative"
 )
 
 

@@ -1,0 +1,202 @@
+"""Derivatives of motions by the design, against differences in fifty digits of an independent solver."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from mpmath import mp
+
+import jounce as jn
+from tests.oracles.mp_files import read, value
+from tests.oracles.mpmath_kinematics import solve_file
+from tests.problems.mechanisms import example
+
+STEP = "1e-13"  # of a parameter; an even difference of it in fifty digits is exact to 1e-24
+
+
+def differences(name, parameter, order, count):
+    """Return instants and the derivative of each output by a parameter, (time, component, derivative)."""
+    description = read(example(name))
+    given = description["parameters"]
+    with mp.workdps(50):
+        nominal = mp.nstr(value(given[parameter], {}), 40)
+        times, after = solve_file(
+            {**description, "parameters": {**given, parameter: f"{nominal} + {STEP}"}}, order, 50, count
+        )
+        _, before = solve_file(
+            {**description, "parameters": {**given, parameter: f"{nominal} - {STEP}"}}, order, 50, count
+        )
+
+        def slope(b, a):
+            return (
+                [slope(x, y) for x, y in zip(b, a, strict=True)]
+                if isinstance(b, list)
+                else float((b - a) / (2 * mp.mpf(STEP)))
+            )
+
+        return np.array(times), {output: np.array(slope(after[output], before[output])) for output in after}
+
+
+def errors(name, parameters, order, count=3):
+    """Return the largest error of derivatives by parameters, for each order, over the size of that derivative."""
+    mechanism = jn.load(example(name))
+    told = {parameter: differences(name, parameter, order, count) for parameter in parameters}
+    times = told[parameters[0]][0]
+
+    def outputs(values):
+        changed = mechanism.with_parameters(**dict(zip(parameters, values, strict=True)))
+        return jn.solve(changed, times, order=order).outputs
+
+    point = jnp.array([mechanism.parameter_values[parameter] for parameter in parameters])
+    found, worst = jax.jacfwd(outputs)(point), np.zeros(order + 1)
+    for k, parameter in enumerate(parameters):
+        for output, truth in told[parameter][1].items():
+            got = np.asarray(found[output])[..., k]
+            got = got[:, None] if got.ndim == 2 else np.moveaxis(got, -1, 1)
+            size = np.abs(truth).max(axis=(0, 1))
+            whole = max(size.max(), 1e-12)
+            error = np.abs(got - truth).max(axis=(0, 1))
+            worst = np.maximum(worst, error / np.where(size > 1e-9 * whole, size, whole))
+    return worst
+
+
+def test_a_four_bar_in_fifty_digits():
+    assert errors("four_bar", ["BC"], 4, 2).max() < 1e-11
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "name, parameters",
+    [
+        ("four_bar", ["AD", "AB", "BC", "CD", "tau"]),
+        ("gear_pair", ["R1", "AB", "BC"]),  # offsets that follow from the starting guess
+        ("rolling_disc", ["R", "rod"]),
+        ("rsur", ["OA", "AB", "BC", "tau"]),
+        ("screw_press", ["lead", "rod"]),
+        ("rspu_distance", ["OD", "d_delta"]),
+    ],
+)
+def test_high_orders_in_fifty_digits(name, parameters):
+    found = errors(name, parameters, 8)
+    assert found[:5].max() < 1e-11, found
+    assert found.max() < 1e-9, found
+
+
+FOUR_BAR = jn.load(example("four_bar"))
+TIME = [0.0, 0.4, 0.9]
+BC = 0.1423
+
+
+def jounce(BC, time=TIME, **options):
+    return jn.solve(FOUR_BAR.with_parameters(BC=BC), time, order=4, **options).outputs["psi"][-1, 4]
+
+
+@pytest.fixture(scope="module")
+def slope():
+    return jax.grad(jounce)(BC)
+
+
+def test_the_value_is_that_of_a_solution():
+    value, _ = jax.value_and_grad(jounce)(BC)
+    assert float(value) == pytest.approx(jounce(BC), rel=1e-14)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "derivative",
+    [
+        lambda x: jax.jvp(jounce, (x,), (1.0,))[1],
+        lambda x: jax.vjp(jounce, x)[1](1.0)[0],
+        lambda x: jax.jacfwd(jounce)(x),
+        lambda x: jax.jacrev(jounce)(x),
+        lambda x: jax.vmap(jax.grad(jounce))(jnp.array([x, 0.143]))[0],
+        lambda x: jax.jit(jax.grad(jounce))(x),
+        lambda x: jax.jit(jax.vmap(jax.grad(jounce)))(jnp.array([x, 0.143]))[0],
+        lambda x: jax.linearize(jounce, x)[1](1.0),
+    ],
+)
+def test_all_transformations_tell_the_same(derivative, slope):
+    assert float(derivative(BC)) == pytest.approx(float(slope), rel=1e-11)
+
+
+@pytest.mark.slow
+def test_second_derivatives():
+    h = 1e-4
+    slopes = [float(jax.grad(jounce)(BC + k * h)) for k in (-2, -1, 1, 2)]
+    expected = np.dot(slopes, [1, -8, 8, -1]) / (12 * h)
+    assert float(jax.hessian(jounce)(BC)) == pytest.approx(expected, rel=1e-8)
+
+
+@pytest.mark.slow
+def test_values_within_compiled_and_mapped_functions():
+    assert float(jax.jit(jounce)(BC)) == pytest.approx(jounce(BC), rel=1e-14)
+    found = jax.vmap(jounce)(jnp.array([BC, 0.143]))
+    np.testing.assert_allclose(found, [jounce(BC), jounce(0.143)], rtol=1e-14)
+
+
+@pytest.mark.slow
+def test_points_and_lengths_that_are_no_parameters():
+    def from_fields(values):
+        rod = jn.planar.DoubleRevolute(("crank", "rocker"), [values[0], 0.0], [values[1], 0.0], values[2])
+        changed = jn.Mechanism(
+            space="planar",
+            bodies=FOUR_BAR.bodies,
+            joints={**FOUR_BAR.joints, "BC": rod},
+            drivers=FOUR_BAR.drivers,
+            outputs={"psi": FOUR_BAR.outputs["psi"]},
+            parameters=FOUR_BAR.parameters,
+        )
+        return jn.solve(changed, TIME, order=4).outputs["psi"][-1, 4]
+
+    def from_parameters(values):
+        return jn.solve(
+            FOUR_BAR.with_parameters(**dict(zip(("AB", "CD", "BC"), values, strict=True))), TIME, order=4
+        ).outputs["psi"][-1, 4]
+
+    values = jnp.array([0.04, 0.2031, BC])
+    np.testing.assert_allclose(jax.grad(from_fields)(values), jax.grad(from_parameters)(values), rtol=1e-11)
+
+
+@pytest.mark.slow
+def test_points_asked_for_later():
+    def path(BC):
+        motion = jn.solve(FOUR_BAR.with_parameters(BC=BC), TIME, order=3)
+        return motion.point("rocker", [0.2031, 0.0]).data, motion.outputs["C"]
+
+    later, output = jax.jacrev(path)(BC)
+    assert later.shape == (3, 4, 2)
+    np.testing.assert_allclose(later, output, rtol=1e-11, atol=1e-11)
+
+
+@pytest.mark.slow
+def test_a_design_that_cannot_be_assembled():
+    with pytest.raises(jn.AssemblyError, match=r"joints\.BC stays open"):
+        jax.grad(jounce)(0.5)
+    values, slopes = jax.vmap(jax.value_and_grad(jounce))(jnp.array([0.5, BC]))
+    assert np.isnan(values).tolist() == [True, False]
+    assert np.isfinite(slopes[1])
+
+
+@pytest.mark.slow
+def test_a_design_that_locks_on_the_way_is_not_a_number_from_there_on():
+    def angles(AB):
+        return jn.solve(FOUR_BAR.with_parameters(AB=AB), order=1, strict=False).outputs["psi"][:, 0]
+
+    locked = np.isnan(jn.solve(FOUR_BAR.with_parameters(AB=0.2), order=1, strict=False).outputs["psi"][:, 0])
+    values, slopes = jax.jvp(angles, (0.2,), (1.0,))
+    assert 0 < locked.sum() < len(locked)
+    assert (np.isnan(values) == locked).all()
+    assert np.isfinite(slopes).all()
+    assert (slopes[locked] == 0).all()
+    total = jax.grad(lambda AB: jnp.nansum(angles(AB)))(0.2)
+    assert float(total) == pytest.approx(float(slopes[~locked].sum()), rel=1e-10)
+
+
+def test_what_is_not_traced_is_told():
+    with pytest.raises(jn.UnsupportedError, match="next time derivative") as told:
+        jax.grad(lambda t: jounce(BC, [0.0, t]))(0.4)
+    assert told.value.name == "time[1]"
+    grid = jn.TimeGrid(start=0, stop="tau", count=3)
+    with pytest.raises(jn.UnsupportedError, match="instants depend on values") as told:
+        jax.grad(lambda tau: jn.solve(FOUR_BAR.with_parameters(tau=tau), grid).outputs["psi"][-1, 1])(2.0)
+    assert told.value.name == "time"
