@@ -284,6 +284,30 @@ def advance(
     pose_type, order
         PlanarPose or SpatialPose; derivatives wanted.
     """
+    arrival, factor, reached = solved_batch(
+        system, coordinates, angles, sign, step, instant, tolerance, refine, wanted, pose_type=pose_type, order=order
+    )
+    turnover = jax.lax.cond(
+        survey, lambda: turnover_of(system, pose_type, reached, factor, instant), lambda: np.zeros(1)
+    )
+    return arrival._replace(turnover=turnover)
+
+
+def solved_batch(
+    system: System,
+    coordinates: dict[str, Numbers],
+    angles: tuple[Numbers, ...],
+    sign: Lanes,
+    step: Lanes,
+    instant: Lanes,
+    tolerance: Float[Numbers, ""],
+    refine: Bool[Numbers, ""],
+    wanted: Int[Numbers, ""],
+    *,
+    pose_type: type[Pose],
+    order: int,
+) -> tuple[Arrival, Factor, dict[str, Jet]]:
+    """Return what `advance` does but for the turnover, with the factored Jacobian and the jets of the pose."""
     # what a law makes infinite, such as the third derivative of t**2.5 at t = 0, is of no use to a prediction
     moving = {name: Jet(tuple(jnp.where(jnp.isfinite(c), c, 0.0))) for name, c in coordinates.items()}
     predicted = pose_type.predicted_from(moving, step)
@@ -305,10 +329,7 @@ def advance(
     admitted, defined = jnp.all(admissible, axis=0), jnp.all(finite, axis=0)
     status = _status(correction.last, predictable, pivot_ratio, admitted, defined, tolerance)
     terms = _terms(system, reached, pose_type.predictor)
-    turnover = jax.lax.cond(
-        survey, lambda: turnover_of(system, pose_type, reached, factor, instant), lambda: np.zeros(1)
-    )
-    return Arrival(
+    arrival = Arrival(
         coordinates,
         outputs,
         status,
@@ -317,8 +338,9 @@ def advance(
         _safe_step(terms[:3]) / SAFE_FRACTION,
         departure / jnp.maximum(travel, 1e-300),
         found,
-        turnover,
+        np.zeros(1),
         pivot_ratio,
         admissible,
         finite,
     )
+    return arrival, factor, reached

@@ -37,7 +37,7 @@ def _differentiated(solve: Callable[..., Motion], given: Mapping[str, Any]) -> M
     mechanism = given["mechanism"]
     check_mechanism(mechanism)
     options = {name: value for name, value in given.items() if name not in ("mechanism", "time", "order", "strict")}
-    order = _checked_settings(mechanism, given.get("order", 4), options.get("tolerance", 1e-12))
+    order = checked_settings(mechanism, given.get("order", 4), options.get("tolerance", 1e-12))
     time = mechanism.time if given.get("time") is None else given["time"]
     try:
         instants = time_grid(time, mechanism.parameter_values)
@@ -46,7 +46,7 @@ def _differentiated(solve: Callable[..., Motion], given: Mapping[str, Any]) -> M
             "the instants depend on values that JAX traces, and are held when a motion is differentiated; give them"
         )
         raise UnsupportedError(message, name="time") from None
-    levels = max(order + _lost_orders(mechanism), LOWEST_ORDER) + 1
+    levels = max(order + lost_orders(mechanism), LOWEST_ORDER) + 1
 
     def solved(mechanism: Mechanism, known: bool) -> Motion:
         return solve(mechanism, instants, order, **options, strict=known and given.get("strict", True))
@@ -55,7 +55,7 @@ def _differentiated(solve: Callable[..., Motion], given: Mapping[str, Any]) -> M
     return TracedMotion(mechanism, model, instants, order, found)
 
 
-def _lost_orders(mechanism: Mechanism) -> int:
+def lost_orders(mechanism: Mechanism) -> int:
     """Return by how many derivatives the outputs are shorter than the motion, at most."""
     return max((output.lost_orders for output in mechanism.outputs.values()), default=0)
 
@@ -124,7 +124,7 @@ def solve(
     >>> motion.dataset["psi"].dims
     ('time', 'derivative')
     """
-    order = _checked_settings(mechanism, order, tolerance)
+    order = checked_settings(mechanism, order, tolerance)
     count = thread_count(threads)
     instants = time_grid(mechanism.time if time is None else time, mechanism.parameter_values)
     solver, path = _followed(mechanism, instants, order, tolerance, refine=refine)
@@ -177,14 +177,14 @@ def solve_in_stretches(
     >>> [(len(part.time), round(float(part.outputs["psi"][:, 0].max()), 4)) for part in motion]
     [(65536, 2.6022), (34465, 2.6436)]
     """
-    order = _checked_settings(mechanism, order, tolerance)
+    order = checked_settings(mechanism, order, tolerance)
     count = thread_count(threads)
     instants = instants_of(mechanism.time if time is None else time, mechanism.parameter_values)
     found = _followed(mechanism, instants, order, tolerance, refine=refine)
     return Stretches(mechanism, found, instants, order, progress, count)
 
 
-def _checked_settings(mechanism: Mechanism, order: Any, tolerance: float) -> int:
+def checked_settings(mechanism: Mechanism, order: Any, tolerance: float) -> int:
     """Return the order of derivatives, or raise MechanismError unless mechanism, order and tolerance are valid."""
     check_mechanism(mechanism)
     order = checked_order(order)
@@ -199,7 +199,7 @@ def _followed(
 ) -> tuple[Solver, FollowedPath]:
     """Return what solves the instants of a grid: a solver, and the motion followed from the first to the last."""
     first, last = float(instants[0]), float(instants[-1])
-    lost = _lost_orders(mechanism)
+    lost = lost_orders(mechanism)
     of_forces = any(output.of_forces for output in mechanism.outputs.values())
     check_laws(mechanism, np.array([first, last]), order + lost, forces=of_forces)
     model, coordinates = assemble(build(mechanism), first, tolerance)

@@ -1,0 +1,287 @@
+"""Many designs followed side by side, each in steps of its own, and all instants of a grid solved from their anchors.
+
+What decides about a step of one design alone decides here too, lane by lane; see `legs` and `advance`. A design that is
+out of the ordinary, as it comes to a singular position, is left to be solved alone.
+"""
+
+from typing import Any, NamedTuple
+
+import jax
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from jounce.jet import Jet
+from jounce.jet.algebra import stacked
+from jounce.kinematics.advance import SAFE_FRACTION, Arrival, SolvedState, solved_batch
+from jounce.kinematics.compilation import compiled
+from jounce.kinematics.designs import Coordinates, Designs
+from jounce.kinematics.frontal import FrontalFactor
+from jounce.kinematics.legs import GROWTH, LARGEST_TURNOVER, PASSAGE, SLIVER
+from jounce.kinematics.path_following import SMALLEST_STEP, Solver
+from jounce.kinematics.status import Status
+from jounce.kinematics.threads import Threads
+from jounce.kinematics.turnover import turnover_of
+from jounce.mechanism.axis_angles import measures_angle
+from jounce.mechanism.modules import with_fields
+from jounce.mechanism.system import System
+from jounce.rigid.pose import Pose
+from jounce.shapes import Numbers
+
+MOST_STEPS = 10_000  # of a design; one that needs more is left to be solved alone
+WIDEST = 512  # lanes
+
+Lanes = Float[np.ndarray, " design"]
+Indices = Int[np.ndarray, " lane"]
+
+
+class Places(NamedTuple):
+    """Where designs have come to, an entry for each; see `legs.Place`."""
+
+    instant: Lanes
+    safe_step: Lanes
+    radius: Lanes
+    turnover: Lanes
+    largest: Lanes  # step that the last one allows, s
+
+
+@compiled("pose_type", "order", "varying")
+def advance_designs(
+    system: System,
+    known: SolvedState,
+    step: Float[Numbers, " batch"],
+    instant: Float[Numbers, " batch"],
+    settings: tuple[Any, Any, Any],
+    *,
+    pose_type: type[Pose],
+    order: int,
+    varying: tuple[int, ...],
+) -> Arrival:
+    """Solve an instant of each of many designs from one solved before, and survey all of them; see `advance`."""
+    arrival, factor, reached = solved_batch(system, *known, step, instant, *settings, pose_type=pose_type, order=order)
+    leaves, structure = jax.tree.flatten(system)
+    first = {name: stacked(jet.truncate(1)) for name, jet in reached.items()}
+
+    def one(values: Any, first: Any, factor: Any, instant: Any) -> Any:
+        own = list(leaves)
+        for k, value in zip(varying, values, strict=True):
+            own[k] = value[..., None]
+        alone = jax.tree.unflatten(structure, own)
+        jets = {name: Jet(tuple(c[..., None])) for name, c in first.items()}
+        factor = jax.tree.map(lambda x: x[..., None], factor)
+        if isinstance(factor, FrontalFactor):
+            factor = with_fields(factor, fronts=alone.fronts)
+        return turnover_of(alone, pose_type, jets, factor, instant[None])[0]
+
+    if isinstance(factor, FrontalFactor):
+        factor = with_fields(factor, fronts=None)
+    values = [leaves[k] for k in varying]
+    return arrival._replace(turnover=jax.vmap(one, in_axes=-1)(values, first, factor, instant))
+
+
+@compiled("pose_type", "order")
+def _solve_designs(
+    system: System,
+    known: SolvedState,
+    step: Float[Numbers, " batch"],
+    instant: Float[Numbers, " batch"],
+    settings: tuple[Any, Any, Any],
+    *,
+    pose_type: type[Pose],
+    order: int,
+) -> tuple[tuple[Any, ...], Any]:
+    """Solve an instant of each of many designs from one solved before: outputs and status."""
+    arrival, _, _ = solved_batch(system, *known, step, instant, *settings, pose_type=pose_type, order=order)
+    return arrival.outputs, arrival.status
+
+
+class DesignPaths:
+    """The motions of many designs, followed from where each is put together to the last instant.
+
+    Parameters
+    ----------
+    solver : Solver
+        Of the model by which the designs are measured.
+    designs : Designs
+        What is solved.
+    instants : array of shape (time,)
+        s.
+
+    Attributes
+    ----------
+    apart : array of bool, shape (designs,)
+        Those that are left to be solved alone.
+    """
+
+    def __init__(self, solver: Solver, designs: Designs, instants: Float[np.ndarray, " time"]):
+        self.solver, self.designs, self.instants = solver, designs, instants
+        count = len(designs.rows)
+        self.apart = np.zeros(count, bool)
+        self._settings = tuple(map(np.asarray, (solver.tolerance, solver.refine, solver.wanted)))
+        self._width = min(WIDEST, max(16, 1 << (count - 1).bit_length()))
+        self._anchors: list[tuple[Indices, Float[np.ndarray, " lane"], SolvedState]] = []
+        self._turning = [k for k, group in enumerate(solver.model.system.outputs) if group.element.turning]
+
+    def follow(self, coordinates: Coordinates, plain: Bool[np.ndarray, " design"]) -> None:
+        """Follow the designs from where they are put together, those that are plain."""
+        self.apart |= ~plain
+        first, last = self.instants[0], self.instants[-1]
+        count = len(plain)
+        known = self._known_at_the_start(coordinates)
+        places = Places(*(np.full(count, x) for x in (first, np.inf, np.inf, 0.0, np.inf)))
+        step, target = np.zeros(count), np.full(count, first)
+        begun = np.zeros(count, bool)
+        active = ~self.apart
+        for _ in range(MOST_STEPS):
+            lanes = np.flatnonzero(active)
+            if not lanes.size:
+                break
+            arrived = self._advanced(known, step, target, lanes)
+            taken = (arrived.status == Status.OK) & (step[lanes] * np.abs(arrived.turnover) <= LARGEST_TURNOVER)
+            stuck = ~taken & (~begun[lanes] | (arrived.status == Status.UNDEFINED) | (step[lanes] < SMALLEST_STEP * (last - first)))
+            self.apart[lanes[stuck]] = True
+            self._keep(places, known, arrived, (step, target), (lanes[taken], np.flatnonzero(taken)))
+            begun[lanes[taken]] = True
+            halved = lanes[~taken & ~stuck]
+            step[halved] *= 0.5
+            target[halved] = places.instant[halved] + step[halved]
+            onwards = lanes[taken]
+            step[onwards], target[onwards] = self._planned(places, onwards)
+            active = ~self.apart & (places.instant < last) | ~self.apart & ~begun
+        self.apart |= active
+
+    def solved(self, threads: int) -> tuple[list[np.ndarray], Int[np.ndarray, "design time"]]:
+        """Return the outputs of all designs, (order + 1, components, instances, designs, time), and their status.
+
+        A design of which an instant is not solved at once is left to be solved alone, too.
+        """
+        count, times = len(self.apart), len(self.instants)
+        design = np.repeat(np.flatnonzero(~self.apart), times)
+        instant = np.tile(self.instants, count - int(self.apart.sum()))
+        groups, levels = self.solver.model.system.outputs, self.solver.wanted + 1
+        status = np.full((count, times), int(Status.NOT_REACHED))
+        outputs: list[np.ndarray] = [np.zeros(0)] * len(groups)
+        if not design.size:
+            return outputs, status
+        owners, at, store = self._store()
+        source = _nearest(owners, at, design, instant)
+        away = instant - at[source]
+        order = np.argsort(np.abs(away), kind="stable")  # lanes that take as many iterations go together
+        where = np.tile(np.arange(times), count - int(self.apart.sum()))
+        width = min(WIDEST, max(16, 1 << (len(order) - 1).bit_length()))
+        lots = [order[k : k + width] for k in range(0, len(order), width)]
+
+        def solve(lot: Indices) -> Any:
+            some = _filled(lot, width)
+            known = jax.tree.map(lambda x: x[..., source[some]], store)
+            system = self.designs.system(design[some])
+            kind = self.solver.model.pose_type
+            found = _solve_designs(
+                system, known, away[some], instant[some], self._settings, pose_type=kind, order=self.solver.order
+            )
+            return jax.tree.map(lambda x: np.asarray(x)[..., : len(lot)], found)
+
+        with Threads(threads) as pool:
+            for lot, (found, outcome) in zip(lots, pool.map(solve, lots), strict=True):
+                status[design[lot], where[lot]] = outcome
+                for k, jet in enumerate(found):
+                    if not outputs[k].size:
+                        outputs[k] = np.full((levels, *jet.shape[1:-1], count, times), np.nan)
+                    outputs[k][..., design[lot], where[lot]] = jet[:levels]
+        self.apart |= (status != Status.OK).any(axis=1)
+        return outputs, status
+
+    def _known_at_the_start(self, coordinates: Coordinates) -> SolvedState:
+        """Return what the first instant is predicted from: bodies at rest, and the turns that are known of angles."""
+        levels, count = self.solver.order + 1, len(self.apart)
+        names = self.solver.model.pose_type.predictor
+        still = {n: np.stack([coordinates[n], *[np.zeros_like(coordinates[n])] * (levels - 1)]) for n in names}
+        angles = []
+        system = self.designs.system(np.arange(count))
+        for k in self._turning:
+            group = system.outputs[k]
+            known = np.zeros((levels, 1, group.instances, count))
+            if measures_angle(group):
+                known[0, 0] = group.element.datum.angle
+            angles.append(known)
+        return still, tuple(angles), np.zeros(count)
+
+    def _advanced(self, known: SolvedState, step: Lanes, target: Lanes, lanes: Indices) -> Arrival:
+        parts = []
+        for k in range(0, len(lanes), self._width):
+            lot = lanes[k : k + self._width]
+            some = _filled(lot, self._width)
+            kind, order = self.solver.model.pose_type, self.solver.order
+            found = advance_designs(
+                self.designs.system(some),
+                jax.tree.map(lambda x, s=some: x[..., s], known),
+                step[some],
+                target[some],
+                self._settings,
+                pose_type=kind,
+                order=order,
+                varying=self.designs.varying,
+            )
+            parts.append(jax.tree.map(lambda x, n=len(lot): np.asarray(x)[..., :n], found))
+        return jax.tree.map(lambda *xs: np.concatenate(xs, axis=-1), *parts)
+
+    def _keep(
+        self, places: Places, known: SolvedState, arrived: Arrival, tried: tuple[Lanes, Lanes], taken: tuple[Any, Any]
+    ) -> None:
+        """Put designs where their steps led to, which become anchors; `taken` are designs and their lanes."""
+        (step, target), (chosen, some) = tried, taken
+        growth = np.where(step[chosen] > 0, GROWTH * step[chosen], np.inf)
+        found = (target[chosen], *(x[some] for x in (arrived.safe_step, arrived.radius, arrived.turnover)), growth)
+        for into, values in zip(places, found, strict=True):
+            into[chosen] = values
+        names = self.solver.model.pose_type.predictor
+        coordinates = {name: arrived.coordinates[name][..., some] for name in names}
+        state = (coordinates, tuple(arrived.outputs[k][..., some] for k in self._turning), arrived.sign[some])
+
+        def put(whole: np.ndarray, part: np.ndarray) -> None:
+            whole[..., chosen] = part
+
+        jax.tree.map(put, known, state)
+        self._anchors.append((chosen, found[0], state))
+
+    def _planned(self, places: Places, lanes: Indices) -> tuple[Lanes, Lanes]:
+        """Return the next steps of designs and where they lead; see `legs`."""
+        instant, safe_step, radius, turnover, largest = (part[lanes] for part in places)
+        rate = np.abs(turnover)
+        reach = np.where(rate > 0, 1 / np.where(rate > 0, rate, 1.0), np.inf)
+        last = self.instants[-1]
+        left = last - instant
+        step = np.minimum(np.minimum(safe_step, SAFE_FRACTION * reach), np.minimum(largest, left))
+        ahead = (turnover < 0) & (reach < PASSAGE * radius)
+        short = (step <= SMALLEST_STEP * (last - self.instants[0])) & (left > 0)
+        self.apart[lanes[(ahead | short) & (left > 0)]] = True
+        step = np.where(left - step < SLIVER * step, left, step)
+        return step, np.where(step == left, last, instant + step)
+
+    def _store(self) -> tuple[Indices, Float[np.ndarray, " anchor"], SolvedState]:
+        """Return the anchors of all designs, by design and instant: whose they are, when, and their states."""
+        owners, at = (np.concatenate([part[k] for part in self._anchors]) for k in range(2))
+        order = np.lexsort((at, owners))
+        state = jax.tree.map(
+            lambda *xs: np.concatenate(xs, axis=-1)[..., order], *(state for _, _, state in self._anchors)
+        )
+        return owners[order], at[order], state
+
+
+def _nearest(
+    owners: Indices, at: Float[np.ndarray, " anchor"], design: Indices, instant: Float[np.ndarray, " lane"]
+) -> Indices:
+    """Return the anchor of its design that is nearest to each instant, by index; anchors are in order."""
+    begin, end = (np.searchsorted(owners, design, side=side) for side in ("left", "right"))
+    low, high = begin.copy(), end.copy()
+    while (low < high).any():  # bisection, of all at once
+        middle = (low + high) // 2
+        right = (low < high) & (at[np.minimum(middle, len(at) - 1)] < instant)
+        low, high = np.where(right, middle + 1, low), np.where(right | (low >= high), high, middle)
+    before, after = np.maximum(low - 1, begin), np.minimum(low, end - 1)
+    return np.where(instant - at[before] <= at[after] - instant, before, after)
+
+
+def _filled(lanes: Indices, width: int) -> Indices:
+    """Return lanes, of which the last is repeated up to a width."""
+    return lanes[np.minimum(np.arange(width), len(lanes) - 1)]
+

@@ -1,0 +1,294 @@
+"""Families: many designs of one mechanism solved in one program, each with an outcome of its own at every instant."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from jounce.errors import AssemblyError, JounceError, MechanismError, MobilityError, SolveError, check_name
+from jounce.jet.derivatives import plain_derivatives
+from jounce.kinematics.assembly import assemble
+from jounce.kinematics.design_paths import DesignPaths
+from jounce.kinematics.designs import Designs, put_together
+from jounce.kinematics.motion import Motion
+from jounce.kinematics.path_following import Solver
+from jounce.kinematics.solve import LOWEST_ORDER, checked_settings, lost_orders, solve
+from jounce.kinematics.status import Status
+from jounce.kinematics.threads import thread_count
+from jounce.mechanism import AbstractMotionOutput, Mechanism, Model, build, check_mechanism, time_grid
+from jounce.mechanism.axis_angles import measures_angle
+from jounce.mechanism.law_checks import check_laws
+from jounce.mechanism.preconditions import concrete
+from jounce.shapes import ArrayLike
+
+SPOILED = (AssemblyError, MobilityError, SolveError)  # a design, not the family
+
+
+def checked_values(mechanism: Mechanism, parameters: Mapping[str, Any], each: str) -> dict[str, np.ndarray]:
+    """Return values of parameters that many designs, or runs, have, one for each.
+
+    Raises
+    ------
+    MechanismError
+        If a parameter does not exist, or values are not finite or of unequal number.
+    """
+    if not parameters:
+        raise MechanismError("a batch differs in at least one parameter", name="parameters", value=dict(parameters))
+    values, count = {}, None
+    for name, given in parameters.items():
+        check_name("parameter", name, mechanism.parameters, MechanismError, name="parameters")
+        try:
+            array = np.asarray(given, float)
+        except (TypeError, ValueError):
+            array = np.zeros(0)
+        if array.ndim != 1 or not array.size or not np.isfinite(array).all():
+            raise MechanismError(
+                f"must be a list of finite numbers, one for each {each}", name=f"parameters.{name}", value=given
+            )
+        if count is not None and len(array) != count:
+            message = f"must have one value for each {each}, {count} as those before"
+            raise MechanismError(message, name=f"parameters.{name}", value=len(array))
+        values[name], count = array, len(array)
+    return values
+
+
+@concrete
+def solve_batch(
+    mechanism: Mechanism,
+    parameters: Mapping[str, ArrayLike],
+    time: Any = None,
+    order: int = 4,
+    *,
+    tolerance: float = 1e-12,
+    progress: Callable[[int, int], None] | None = None,
+    threads: int | None = None,
+) -> Any:
+    """Return the motions of many designs of a mechanism that differ in its parameters, solved side by side.
+
+    Each design is followed in steps of its own, as `jounce.solve` does it alone. One that locks, or that comes to a
+    singular position, is solved alone; so are all of them where outputs are forces, energies or Euler angles.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        As for `jounce.solve`.
+    parameters : dict of str to array_like of shape (designs,)
+        Values of some parameters in each design, SI.
+    time : array_like of shape (time,), optional
+        Strictly increasing instants, s, the same for all; those of the mechanism unless given.
+    order, tolerance
+        As for `jounce.solve`.
+    progress : callable, optional
+        Called with the number of designs done and their total.
+    threads : int, optional
+        As for `jounce.solve`; results do not depend on it.
+
+    Returns
+    -------
+    xarray.Dataset
+        Outputs with the dimensions design, time, derivative, and component where there are some, SI; the values of the
+        parameters are coordinates of the designs. ``status`` (design, time) tells the outcome, see `Status`: where it
+        is not 0, outputs are NaN.
+
+    Raises
+    ------
+    MechanismError
+        If a parameter does not exist, values are not finite or of unequal number, or no mechanism may have them; and as
+        `jounce.solve`.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> family = jn.solve_batch(jn.load("examples/four_bar.yaml"), {"BC": [0.13, 0.14, 0.15]}, [0.0, 0.5], order=1)
+    >>> dict(family["psi"].sizes), family["BC"].values.tolist()
+    ({'design': 3, 'time': 2, 'derivative': 2}, [0.13, 0.14, 0.15])
+    >>> int(family["status"].max())
+    0
+    """
+    check_mechanism(mechanism)
+    values = checked_values(mechanism, parameters, "design")
+    names, rows = tuple(values), np.stack(list(values.values()), axis=-1)
+    order = checked_settings(mechanism, order, tolerance)
+    instants = time_grid(mechanism.time if time is None else time, mechanism.parameter_values)
+    family = _Family(mechanism, names, rows, instants, order, float(tolerance), progress)
+    family.solve(thread_count(threads))
+    return family.dataset(values)
+
+
+class _Family:
+    """Designs that are being solved, and what is known of them."""
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        names: tuple[str, ...],
+        rows: Float[np.ndarray, "design parameter"],
+        instants: Float[np.ndarray, " time"],
+        order: int,
+        tolerance: float,
+        progress: Callable[[int, int], None] | None,
+    ):
+        self.mechanism, self.names, self.rows, self.instants = mechanism, names, rows, instants
+        self.order, self.tolerance, self.progress = order, tolerance, progress
+        self.status: Int[np.ndarray, "design time"] = np.full((len(rows), len(instants)), int(Status.NOT_REACHED))
+        self.outputs: dict[str, np.ndarray] = {}
+
+    def design(self, k: int) -> Mechanism:
+        """Return one of the designs."""
+        return self.mechanism.with_parameters(**dict(zip(self.names, self.rows[k].tolist(), strict=True)))
+
+    def solve(self, threads: int) -> None:
+        """Solve all designs: most side by side, the others alone."""
+        count = len(self.rows)
+        left = np.arange(count) if self._of_whole_motions() else self._side_by_side(threads)
+        for done, k in enumerate(left.tolist()):
+            self._alone(k)
+            if self.progress is not None:
+                self.progress(count - len(left) + done + 1, count)
+
+    def dataset(self, values: Mapping[str, np.ndarray]) -> Any:
+        """Return the results, labelled."""
+        import xarray
+
+        coordinates: dict[str, Any] = {"design": np.arange(len(self.rows)), "time": self.instants}
+        coordinates["derivative"] = np.arange(self.order + 1)
+        variables = {}
+        for name, output in self.mechanism.outputs.items():
+            found = self.outputs.get(name)
+            if found is None:
+                continue
+            dims = ["design", "time", "derivative"]
+            if found.ndim == 4:
+                axes = output.axes or (("component", output.labels[: found.shape[3]]),)
+                coordinates |= {axis: list(labels) for axis, labels in axes}
+                found = found.reshape(*found.shape[:3], *(len(labels) for _, labels in axes))
+                dims += [axis for axis, _ in axes]
+            variables[name] = (dims, found, {"units": output.unit, "long_name": name})
+        words = {"long_name": "outcome", "flag_values": list(map(int, Status)), "flag_meanings": _flags()}
+        variables["status"] = (("design", "time"), self.status, words)
+        coordinates |= {name: ("design", value) for name, value in values.items() if name not in variables}
+        attributes = {"title": self.mechanism.title or "designs of a mechanism", "source": "jounce"}
+        dataset = xarray.Dataset(variables, coordinates, attributes)
+        dataset["time"].attrs = {"units": "s", "long_name": "time"}
+        dataset["derivative"].attrs = {"long_name": "order of the time derivative"}
+        return dataset
+
+    def _of_whole_motions(self) -> bool:
+        """Tell whether outputs are asked for that follow from whole motions, not from one instant."""
+        outputs = self.mechanism.outputs.values()
+        return any(isinstance(output, AbstractMotionOutput) or output.wraps for output in outputs)
+
+    def _side_by_side(self, threads: int) -> Int[np.ndarray, " design"]:
+        """Solve designs side by side; return which are left to be solved alone."""
+        count = len(self.rows)
+        first, last = float(self.instants[0]), float(self.instants[-1])
+        model, known = self._first_assembled(first)
+        if model is None:
+            return np.arange(count)
+        lost = lost_orders(self.mechanism)
+        check_laws(self.design(known), np.array([first, last]), self.order + lost, forces=False)
+        levels = max(self.order + lost, LOWEST_ORDER)
+        solver = Solver(model, levels, self.tolerance, refine=True, wanted=self.order)
+        system = model.system
+        if any(map(measures_angle, (*system.groups, *system.outputs))) or system.shape[0] != system.shape[1]:
+            return self._assembled_alone(solver, threads)
+        designs = Designs(self.mechanism, model, self.names, self.rows)
+        driven = np.array([[name.startswith("drivers.")] for name in model.rows])
+        every = np.arange(count)
+        found = put_together(
+            designs.system(every),
+            designs.guess,
+            np.full(count, first),
+            np.asarray(self.tolerance),
+            driven,
+            pose_type=model.pose_type,
+        )
+        coordinates = {name: np.asarray(x) for name, x in found.coordinates.items()}
+        return self._followed(solver, designs, coordinates, np.asarray(found.plain) & ~designs.unfit(), every, threads)
+
+    def _first_assembled(self, instant: float) -> tuple[Model | None, int]:
+        """Return the model of the first design that can be put together, and which it is."""
+        for k in range(len(self.rows)):
+            try:
+                return assemble(build(self.design(k)), instant, self.tolerance)[0], k
+            except SPOILED:
+                continue
+            except JounceError as error:
+                raise self._located(error, k) from None
+        return None, 0
+
+    def _assembled_alone(self, solver: Solver, threads: int) -> Int[np.ndarray, " design"]:
+        """Put designs together one by one, as those with angles about axes are, and follow them side by side."""
+        found, which = [], []
+        for k in range(len(self.rows)):
+            try:
+                found.append(assemble(build(self.design(k)), float(self.instants[0]), self.tolerance))
+                which.append(k)
+            except SPOILED:
+                continue
+            except JounceError as error:
+                raise self._located(error, k) from None
+        chosen = np.array(which)
+        models = [model for model, _ in found]
+        designs = Designs.of_models(self.mechanism, models, self.names, self.rows[chosen])
+        coordinates = {
+            name: np.concatenate([np.asarray(place[name]) for _, place in found], axis=-1) for name in found[0][1]
+        }
+        return self._followed(solver, designs, coordinates, np.ones(len(which), bool), chosen, threads)
+
+    def _followed(
+        self,
+        solver: Solver,
+        designs: Designs,
+        coordinates: dict[str, Any],
+        plain: np.ndarray,
+        chosen: np.ndarray,
+        threads: int,
+    ) -> Int[np.ndarray, " design"]:
+        """Follow designs side by side and keep what comes of them; return which are left to be solved alone."""
+        paths = DesignPaths(solver, designs, self.instants)
+        paths.follow(coordinates, plain)
+        outputs, status = paths.solved(threads)
+        whole = ~paths.apart
+        self.status[chosen[whole]] = status[whole]
+        for names, jets in zip(solver.model.outputs, outputs, strict=True):
+            for k, name in enumerate(names):
+                if jets.size:
+                    found = np.moveaxis(plain_derivatives(jets[:, :, k]), (0, 1), (2, 3))
+                    self._put(name, chosen[whole], found[whole])
+        if self.progress is not None:
+            self.progress(int(whole.sum()), len(self.rows))
+        return np.setdiff1d(np.arange(len(self.rows)), chosen[whole])
+
+    def _alone(self, k: int) -> None:
+        """Solve one design alone."""
+        try:
+            motion: Motion = solve(self.design(k), self.instants, self.order, tolerance=self.tolerance, strict=False)
+        except SPOILED as error:
+            status = getattr(error, "status", None)
+            self.status[k] = int(Status.NOT_ASSEMBLED if status is None else status)
+            return
+        except JounceError as error:
+            raise self._located(error, k) from None
+        self.status[k] = motion.status
+        for name, values in motion.outputs.items():
+            self._put(name, np.array([k]), values[None] if values.ndim == 3 else values[None, ..., None])
+
+    def _put(self, name: str, designs: np.ndarray, values: np.ndarray) -> None:
+        """Keep the values of an output, (designs, time, derivative, component)."""
+        single = values.shape[-1] == 1
+        if name not in self.outputs:
+            shape = (len(self.rows), *values.shape[1:3], *(() if single else values.shape[3:]))
+            self.outputs[name] = np.full(shape, np.nan)
+        self.outputs[name][designs] = values[..., 0] if single else values
+
+    def _located(self, error: JounceError, k: int) -> JounceError:
+        """Return an error that says of which design it is."""
+        told = ", ".join(f"{name} = {value:g}" for name, value in zip(self.names, self.rows[k], strict=True))
+        error.message = f"{error.message} (design {k}: {told})"
+        return error
+
+
+def _flags() -> str:
+    return " ".join(status.name.lower() for status in Status)
