@@ -38,6 +38,7 @@ BENCHMARKS = {
     "pendulum": Benchmark("pendulum", "Double pendulum: time against error, beside SciPy, diffrax, heyoka and Exudyn"),
     "pendulums": Benchmark("pendulums", "Chains of pendulums, simulated, beside equations written by hand"),
     "batch": Benchmark("batch", "A thousand double pendulums side by side, beside one alone and diffrax"),
+    "gradients": Benchmark("gradients", "A reverse gradient beside the solution that it is of; families beside loops"),
     "jerk": Benchmark("jerk", "What jerk is worth: integration with it and without it at the same steps"),
     "files": Benchmark("files", "Reading files, beside ruamel.yaml, Pinocchio and MuJoCo"),
     "view": Benchmark("view", "From a slider of the web view to a new motion", one_core=False),

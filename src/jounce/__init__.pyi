@@ -83,7 +83,7 @@ from jounce.io import (
     write_mechanism as write_mechanism,
 )
 from jounce.jet import Jet as Jet, compose as compose
-from jounce.kinematics import Motion as Motion, Status as Status, solve as solve
+from jounce.kinematics import Motion as Motion, Status as Status, solve as solve, solve_batch as solve_batch
 from jounce.mechanism import (
     AbstractOutput as AbstractOutput,
     AngleOutput as AngleOutput,

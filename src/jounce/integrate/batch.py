@@ -13,7 +13,6 @@ from jaxtyping import Float, Int
 from jounce.display import Displayed
 from jounce.dynamics.forward import Equations, State
 from jounce.dynamics.start import consistent_start, initial_as_drivers
-from jounce.errors import MechanismError, check_name
 from jounce.integrate.batch_equations import BatchStart, ParametricMechanism, Turns
 from jounce.integrate.events import pose_coordinates
 from jounce.integrate.marching import DenseOutput, IntegratorState, Outcome, begin_march, march
@@ -23,6 +22,7 @@ from jounce.integrate.simulation import expanded
 from jounce.jet.derivatives import plain_derivatives
 from jounce.jet.turns import whole_periods
 from jounce.kinematics import Status
+from jounce.kinematics.families import checked_values
 from jounce.kinematics.motion import output_series
 from jounce.mechanism import Mechanism, TimeGrid, build, check_mechanism
 from jounce.mechanism.axis_angles import with_turns
@@ -111,7 +111,7 @@ def simulate_batch(
     (3, 2, 5)
     """
     check_mechanism(mechanism)
-    values = _checked_parameters(mechanism, parameters)
+    values = checked_values(mechanism, parameters, "run")
     names, rows = tuple(values), np.stack(list(values.values()), axis=-1)
     first = mechanism.with_parameters(**dict(zip(names, rows[0].tolist(), strict=True)))
     order, method = checked_options(order, method, tolerance, longest_step)
@@ -139,27 +139,6 @@ def simulate_batch(
         while len(runs.moving):
             list(pool.map(runs.advance, runs.lots(runs.moving)))
     return Batch(instants, values, runs.outputs, runs.status, runs.steps)
-
-
-def _checked_parameters(mechanism: Mechanism, parameters: Mapping[str, Any]) -> dict[str, Float[np.ndarray, " run"]]:
-    if not parameters:
-        raise MechanismError("a batch differs in at least one parameter", name="parameters", value=dict(parameters))
-    values, count = {}, None
-    for name, given in parameters.items():
-        check_name("parameter", name, mechanism.parameters, MechanismError, name="parameters")
-        try:
-            array = np.asarray(given, float)
-        except (TypeError, ValueError):
-            array = np.zeros(0)
-        if array.ndim != 1 or not array.size or not np.isfinite(array).all():
-            raise MechanismError(
-                "must be a list of finite numbers, one for each run", name=f"parameters.{name}", value=given
-            )
-        if count is not None and len(array) != count:
-            message = f"must have one value for each run, {count} as those before"
-            raise MechanismError(message, name=f"parameters.{name}", value=len(array))
-        values[name], count = array, len(array)
-    return values
 
 
 class _Runs:

@@ -10,23 +10,20 @@ import jax
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from jounce.jet import Jet
-from jounce.jet.algebra import stacked
 from jounce.kinematics.advance import SAFE_FRACTION, Arrival, SolvedState, solved_batch
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.designs import Coordinates, Designs
-from jounce.kinematics.frontal import FrontalFactor
 from jounce.kinematics.legs import GROWTH, LARGEST_TURNOVER, PASSAGE, SLIVER
 from jounce.kinematics.path_following import SMALLEST_STEP, Solver
 from jounce.kinematics.status import Status
 from jounce.kinematics.threads import Threads
-from jounce.kinematics.turnover import turnover_of
+from jounce.kinematics.turnover import turnovers_of
 from jounce.mechanism.axis_angles import measures_angle
-from jounce.mechanism.modules import with_fields
 from jounce.mechanism.system import System
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
 
+ANCHOR_ORDER = 8  # of the series at the anchors, at least: few carry many instants
 MOST_STEPS = 10_000  # of a design; one that needs more is left to be solved alone
 WIDEST = 512  # lanes
 
@@ -44,7 +41,7 @@ class Places(NamedTuple):
     largest: Lanes  # step that the last one allows, s
 
 
-@compiled("pose_type", "order", "varying")
+@compiled("pose_type", "order")
 def advance_designs(
     system: System,
     known: SolvedState,
@@ -54,28 +51,10 @@ def advance_designs(
     *,
     pose_type: type[Pose],
     order: int,
-    varying: tuple[int, ...],
 ) -> Arrival:
     """Solve an instant of each of many designs from one solved before, and survey all of them; see `advance`."""
     arrival, factor, reached = solved_batch(system, *known, step, instant, *settings, pose_type=pose_type, order=order)
-    leaves, structure = jax.tree.flatten(system)
-    first = {name: stacked(jet.truncate(1)) for name, jet in reached.items()}
-
-    def one(values: Any, first: Any, factor: Any, instant: Any) -> Any:
-        own = list(leaves)
-        for k, value in zip(varying, values, strict=True):
-            own[k] = value[..., None]
-        alone = jax.tree.unflatten(structure, own)
-        jets = {name: Jet(tuple(c[..., None])) for name, c in first.items()}
-        factor = jax.tree.map(lambda x: x[..., None], factor)
-        if isinstance(factor, FrontalFactor):
-            factor = with_fields(factor, fronts=alone.fronts)
-        return turnover_of(alone, pose_type, jets, factor, instant[None])[0]
-
-    if isinstance(factor, FrontalFactor):
-        factor = with_fields(factor, fronts=None)
-    values = [leaves[k] for k in varying]
-    return arrival._replace(turnover=jax.vmap(one, in_axes=-1)(values, first, factor, instant))
+    return arrival._replace(turnover=turnovers_of(system, pose_type, reached, factor, instant))
 
 
 @compiled("pose_type", "order")
@@ -117,6 +96,7 @@ class DesignPaths:
         count = len(designs.rows)
         self.apart = np.zeros(count, bool)
         self._settings = tuple(map(np.asarray, (solver.tolerance, solver.refine, solver.wanted)))
+        self._order = max(solver.order, ANCHOR_ORDER)
         self._width = min(WIDEST, max(16, 1 << (count - 1).bit_length()))
         self._anchors: list[tuple[Indices, Float[np.ndarray, " lane"], SolvedState]] = []
         self._turning = [k for k, group in enumerate(solver.model.system.outputs) if group.element.turning]
@@ -137,7 +117,8 @@ class DesignPaths:
                 break
             arrived = self._advanced(known, step, target, lanes)
             taken = (arrived.status == Status.OK) & (step[lanes] * np.abs(arrived.turnover) <= LARGEST_TURNOVER)
-            stuck = ~taken & (~begun[lanes] | (arrived.status == Status.UNDEFINED) | (step[lanes] < SMALLEST_STEP * (last - first)))
+            hopeless = ~begun[lanes] | (arrived.status == Status.UNDEFINED)
+            stuck = ~taken & (hopeless | (step[lanes] < SMALLEST_STEP * (last - first)))
             self.apart[lanes[stuck]] = True
             self._keep(places, known, arrived, (step, target), (lanes[taken], np.flatnonzero(taken)))
             begun[lanes[taken]] = True
@@ -192,7 +173,7 @@ class DesignPaths:
 
     def _known_at_the_start(self, coordinates: Coordinates) -> SolvedState:
         """Return what the first instant is predicted from: bodies at rest, and the turns that are known of angles."""
-        levels, count = self.solver.order + 1, len(self.apart)
+        levels, count = self._order + 1, len(self.apart)
         names = self.solver.model.pose_type.predictor
         still = {n: np.stack([coordinates[n], *[np.zeros_like(coordinates[n])] * (levels - 1)]) for n in names}
         angles = []
@@ -210,7 +191,7 @@ class DesignPaths:
         for k in range(0, len(lanes), self._width):
             lot = lanes[k : k + self._width]
             some = _filled(lot, self._width)
-            kind, order = self.solver.model.pose_type, self.solver.order
+            kind, order = self.solver.model.pose_type, self._order
             found = advance_designs(
                 self.designs.system(some),
                 jax.tree.map(lambda x, s=some: x[..., s], known),
@@ -219,10 +200,9 @@ class DesignPaths:
                 self._settings,
                 pose_type=kind,
                 order=order,
-                varying=self.designs.varying,
             )
-            parts.append(jax.tree.map(lambda x, n=len(lot): np.asarray(x)[..., :n], found))
-        return jax.tree.map(lambda *xs: np.concatenate(xs, axis=-1), *parts)
+            parts.append(jax.tree.map(np.asarray, found))
+        return jax.tree.map(lambda *xs: np.concatenate(xs, axis=-1)[..., : len(lanes)], *parts)
 
     def _keep(
         self, places: Places, known: SolvedState, arrived: Arrival, tried: tuple[Lanes, Lanes], taken: tuple[Any, Any]
@@ -257,7 +237,7 @@ class DesignPaths:
         step = np.where(left - step < SLIVER * step, left, step)
         return step, np.where(step == left, last, instant + step)
 
-    def _store(self) -> tuple[Indices, Float[np.ndarray, " anchor"], SolvedState]:
+    def _store(self) -> tuple[Int[np.ndarray, " anchor"], Float[np.ndarray, " anchor"], SolvedState]:
         """Return the anchors of all designs, by design and instant: whose they are, when, and their states."""
         owners, at = (np.concatenate([part[k] for part in self._anchors]) for k in range(2))
         order = np.lexsort((at, owners))
@@ -268,7 +248,10 @@ class DesignPaths:
 
 
 def _nearest(
-    owners: Indices, at: Float[np.ndarray, " anchor"], design: Indices, instant: Float[np.ndarray, " lane"]
+    owners: Int[np.ndarray, " anchor"],
+    at: Float[np.ndarray, " anchor"],
+    design: Indices,
+    instant: Float[np.ndarray, " lane"],
 ) -> Indices:
     """Return the anchor of its design that is nearest to each instant, by index; anchors are in order."""
     begin, end = (np.searchsorted(owners, design, side=side) for side in ("left", "right"))
@@ -281,7 +264,6 @@ def _nearest(
     return np.where(instant - at[before] <= at[after] - instant, before, after)
 
 
-def _filled(lanes: Indices, width: int) -> Indices:
+def _filled(lanes: Indices, width: int) -> Int[np.ndarray, " {width}"]:
     """Return lanes, of which the last is repeated up to a width."""
     return lanes[np.minimum(np.arange(width), len(lanes) - 1)]
-

@@ -11,6 +11,7 @@ from jaxtyping import Bool, Float, Int
 
 from jounce.constraints.base import field_kind, value_fields
 from jounce.jet import Jet
+from jounce.kinematics.assembly import MAX_STEPS
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.factors import factored
 from jounce.mechanism import Mechanism, Model
@@ -22,7 +23,6 @@ from jounce.mechanism.traced import traced_model
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
 
-MAX_STEPS = 50  # of Gauss-Newton from the starting guess, as of one design alone
 HALVINGS = 12
 CLEARLY_REGULAR = 1e-9  # smallest pivot over the largest of a Jacobian that is looked at no closer
 
@@ -47,8 +47,6 @@ class Designs:
     ----------
     guess : dict of str to array
         Starting guess of the coordinates of all bodies, (..., bodies, designs).
-    varying : tuple of int
-        Which leaves of the system have an entry for each design.
     """
 
     def __init__(
@@ -87,11 +85,6 @@ class Designs:
         self._fixed, self._values = fixed, values
         system = self.model.system
         self._structure = jax.tree.structure((system.groups, system.outputs))
-        moved = [np.full((), leaf is None) for leaf in fixed]
-        groups, outputs = jax.tree.unflatten(self._structure, moved)
-        marked = jax.tree.map(lambda _: np.zeros((), bool), with_fields(system, groups=(), outputs=(), forces=()))
-        marks = jax.tree.leaves(with_fields(marked, groups=groups, outputs=outputs))
-        self.varying = tuple(k for k, mark in enumerate(marks) if mark)
 
     def design(self, row: Any) -> Mechanism:
         """Return the mechanism with the values of a design."""

@@ -271,7 +271,7 @@ class Motion(Displayed):
         return values[..., 0] if values.shape[-1] == 1 else values
 
     def _labelled(
-        self, name: str, values: Float[np.ndarray, "time derivative *component"], output: AbstractQuantity
+        self, name: str, values: Float[Numbers, "time derivative *component"], output: AbstractQuantity
     ) -> Any:
         import xarray
 

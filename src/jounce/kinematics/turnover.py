@@ -6,6 +6,7 @@ determinant as it is, as two loops do that pass their dead points together.
 """
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import jax
@@ -48,6 +49,39 @@ def turnover_of(
     return _of_matrix(factor.applied_inverse(system.pattern.dense(slope)[..., 0] * system.row_scale))
 
 
+def turnovers_of(
+    system: System,
+    pose_type: type[Pose],
+    coordinates: dict[str, Jet],
+    factor: Factor,
+    time: Float[Numbers, " batch"],
+) -> Float[Numbers, " batch"]:
+    """Return what `turnover_of` does, for all lanes."""
+    first = {name: jet.truncate(1) for name, jet in coordinates.items()}
+
+    def entries(step: Any) -> Any:
+        return system.entries(pose_type.predicted_from(first, step), Jet([(time + step)[None]]))
+
+    _, slope = jax.jvp(entries, (jnp.zeros_like(time),), (jnp.ones_like(time),))
+    relative = system.pattern.dense(slope) * system.row_scale[:, :, None]
+    relative = jax.vmap(partial(factor.solve, refined=False), in_axes=1, out_axes=1)(relative)
+
+    def product(a: Any, b: Any) -> Any:
+        return jnp.sum(a[:, :, None] * b[None], axis=1)
+
+    def norm(x: Any) -> Any:
+        return jnp.maximum(jnp.sqrt(jnp.sum(x * x, axis=(0, 1))), 1e-300)
+
+    power, grown = relative, jnp.zeros_like(time)
+    for k in range(1, SQUARINGS + 1):
+        size = norm(power)
+        scaled = power / size[None, None]
+        power, grown = product(scaled, scaled), grown + jnp.log(size) / 2 ** (k - 1)
+    size = jnp.exp(grown + jnp.log(norm(power)) / 2**SQUARINGS)
+    along, trace = jnp.sum(power * jnp.swapaxes(relative, 0, 1), axis=(0, 1)), jnp.trace(power)
+    return _leading(along / jnp.where(trace == 0, 1.0, trace), size, along, size)
+
+
 def _of_matrix(relative: Float[Numbers, "column column"]) -> Float[Numbers, " 1"]:
     """Return it for a matrix, from a power of it: the root of its norm is never too small, and tends to the size."""
     power, grown = relative, np.zeros(())
@@ -56,7 +90,7 @@ def _of_matrix(relative: Float[Numbers, "column column"]) -> Float[Numbers, " 1"
         power, grown = (power / size) @ (power / size), grown + jnp.log(size) / 2 ** (k - 1)
     size = jnp.exp(grown + jnp.log(jnp.maximum(jnp.sqrt(jnp.sum(power * power)), 1e-300)) / 2**SQUARINGS)
     along, trace = jnp.sum(power * relative.T), jnp.trace(power)
-    return _leading(along / jnp.where(trace == 0, 1.0, trace), size, along, size)
+    return _leading(along / jnp.where(trace == 0, 1.0, trace), size, along, size)[None]
 
 
 def _of_products(
@@ -82,10 +116,10 @@ def _of_products(
     norm = jnp.log(jnp.maximum(jnp.sqrt(square / PROBES * columns), 1e-300))
     size = jnp.exp((grown + norm) / power)
     along = jnp.sum(vectors * product(vectors))
-    return _leading(along / jnp.where(square == 0, 1.0, square), size, along, size / 0.8)
+    return _leading(along / jnp.where(square == 0, 1.0, square), size, along, size / 0.8)[None]
 
 
-def _leading(eigenvalue: Real, size: Real, along: Real, bound: Real) -> Float[Numbers, " 1"]:
+def _leading(eigenvalue: Real, size: Real, along: Real, bound: Real) -> Any:
     """Return an eigenvalue where it is real and leads, as near a singular position, else a bound with its sign."""
     leads = (jnp.abs(eigenvalue) > 0.7 * size) & (jnp.abs(eigenvalue) <= bound)
-    return jnp.where(leads, eigenvalue, jnp.where(along < 0, -bound, bound))[None]
+    return jnp.where(leads, eigenvalue, jnp.where(along < 0, -bound, bound))
