@@ -33,7 +33,7 @@ def test_designs_are_those_solved_alone():
 
 
 def test_one_that_locks_or_cannot_be_assembled_stops_no_other():
-    parameters = {"AB": np.array([0.04, 0.2, 0.05, 0.9])}
+    parameters = {"AB": np.array([0.04, 0.1, 0.05, 0.9])}
     family = jn.solve_batch(FOUR_BAR, parameters, TIME, order=2)
     check(FOUR_BAR, {"AB": parameters["AB"][:3]}, family.isel(design=slice(3)), TIME, 2)
     status = family["status"].values
@@ -49,7 +49,7 @@ def test_bad_designs_are_told():
         jn.solve_batch(FOUR_BAR, {"BC": [0.14, -0.14]}, TIME, order=2)
     with pytest.raises(jn.MechanismError, match="one for each design"):
         jn.solve_batch(FOUR_BAR, {"BC": [0.14, np.nan]}, TIME)
-    with pytest.raises(jn.MechanismError, match="did you mean 'BC'"):
+    with pytest.raises(jn.MechanismError, match="no parameter has this name"):
         jn.solve_batch(FOUR_BAR, {"BCD": [0.14]}, TIME)
     with pytest.raises(jn.MechanismError, match="one value for each design, 2 as"):
         jn.solve_batch(FOUR_BAR, {"BC": [0.14, 0.15], "AB": [0.04]}, TIME)

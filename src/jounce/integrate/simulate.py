@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import jax
@@ -18,6 +19,7 @@ from jounce.integrate.events import Event, EventDetector, pose_coordinates
 from jounce.integrate.lookahead import watched_names
 from jounce.integrate.marching import MOVING, DenseOutput, IntegratorState, Outcome, march, unexpanded
 from jounce.integrate.methods import AbstractMethod, Taylor, evaluated
+from jounce.integrate.sensitivities import traced_simulation
 from jounce.integrate.simulation import Simulation
 from jounce.jet import Jet
 from jounce.kinematics import Status, raise_for_status
@@ -34,7 +36,7 @@ STEPS = 64  # tried between two looks at progress and events
 TOLERANCES = (1e-17, 1e-2)  # below rounding there is still energy to be kept: what series leave out adds up
 
 
-@concrete
+@partial(concrete, traced=traced_simulation)
 def simulate(
     mechanism: Mechanism,
     time: ArrayLike | TimeGrid | None = None,

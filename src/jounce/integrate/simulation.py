@@ -99,6 +99,19 @@ class Simulation(Motion):
         return self._start.mobility
 
     @property
+    def equations(self) -> Equations:
+        """The equations of motion."""
+        return self._start.equations
+
+    def steps_at(self, instants: np.ndarray) -> np.ndarray:
+        """Return the step in which each instant is, by index."""
+        return _steps_of(self.dense_output, instants)[1]
+
+    def output_values(self, group: int) -> np.ndarray:
+        """Return the series of the outputs of a group, (order + 1, components, instances, time)."""
+        return list(self._groups.values())[group]
+
+    @property
     def steps(self) -> int:
         """Number of steps taken."""
         return len(self.dense_output.start)

@@ -1,0 +1,265 @@
+"""The motion of a simulation as a function of what JAX traces in a mechanism: its steps once more, with lengths held.
+
+What was decided on the way, how long steps are and where they end, is taken from the simulation, and so are all states:
+the program here adds to them how they change. It expands the motion at the beginning of each step, evaluates the series
+at its end, and puts it on the constraints, as the integrator does. The corrections that put it there vanish but for
+rounding, so that the matrices that they are found with need no derivatives.
+"""
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
+from jaxtyping import Float, Int
+
+from jounce.dynamics.forward import Equations, Instants, Lanes, State, expand
+from jounce.dynamics.masses import gravity_of, masses_of
+from jounce.dynamics.start import initial_as_drivers
+from jounce.errors import UnsupportedError
+from jounce.integrate.events import pose_coordinates
+from jounce.integrate.methods import Taylor, evaluated
+from jounce.integrate.projection import normalised
+from jounce.integrate.simulation import Simulation
+from jounce.jet import Jet
+from jounce.kinematics.sensitivities import Solved
+from jounce.kinematics.traced_motion import TracedMotion
+from jounce.mechanism import Mechanism, Model
+from jounce.mechanism.axis_angles import measures_angle
+from jounce.mechanism.modules import with_fields
+from jounce.mechanism.traced import Angles, angles_of, template, traced_model, traced_values
+from jounce.shapes import Numbers
+
+AT_REST = 1e-12  # m/s and rad/s
+AS_GUESSED = 1e-9  # rad or sizes of the mechanism
+
+
+def traced_simulation(simulate: Callable[..., Simulation], given: Mapping[str, Any]) -> TracedMotion:
+    """Return the simulation of a mechanism of which JAX traces some values.
+
+    Parameters
+    ----------
+    simulate : callable
+        Simulates a mechanism of plain numbers.
+    given : mapping
+        Its arguments by name.
+
+    Raises
+    ------
+    UnsupportedError
+        Within `jax.jit` and `jax.vmap`, where the number of steps is not known; for a method other than `Taylor`, for
+        events, and for forces that count turns of an angle about an axis.
+    """
+    mechanism, options = given["mechanism"], {k: v for k, v in given.items() if k not in ("mechanism", "initial")}
+    if given.get("initial") is not None:
+        mechanism = dataclasses.replace(mechanism, initial=dict(given["initial"]))
+    if options.get("events") or not isinstance(options.get("method") or Taylor(), Taylor):
+        raise UnsupportedError("a simulation is differentiated with jn.Taylor() and without events", name="mechanism")
+    simulation = _recorded(simulate, mechanism, options)
+    if any(map(measures_angle, simulation.model.system.forces)):
+        message = "a simulation is not differentiated where forces count the turns of an angle about an axis in space"
+        raise UnsupportedError(message, name="forces")
+    model, equations = _model_of(mechanism, simulation)
+    start = _start(mechanism, simulation, equations)
+    order = simulation.poses[1]["position"].shape[0] - 2
+    coordinates = _coordinates(simulation, equations, start, order)
+    known = {name: np.asarray(x) for name, x in simulation.poses[1].items()}
+    coordinates = {name: known[name] + (x - jax.lax.stop_gradient(x)) for name, x in coordinates.items()}
+    angles = _angles(simulation)
+    status = jnp.asarray(simulation.status.astype(float))
+    solved = Solved(coordinates, status, model.length, angles, simulation.continued_outputs)
+    return TracedMotion(mechanism, model, simulation.time, simulation.order, solved)
+
+
+def _recorded(simulate: Callable[..., Simulation], mechanism: Mechanism, options: Mapping[str, Any]) -> Simulation:
+    """Return the simulation at the values that JAX traces, where it knows them."""
+    made, found = template(mechanism), []
+
+    @jax.custom_jvp
+    def record(values: tuple[Any, ...]) -> Any:
+        if any(isinstance(value, Tracer) for value in values):
+            raise UnsupportedError(
+                "jn.simulate is differentiated by jax.grad, jvp, vjp, jacfwd and jacrev, but not compiled or mapped by "
+                "jax.jit and jax.vmap, as the number of its steps follows from the values; see jn.simulate_batch",
+                name="mechanism",
+            )
+        found.append(simulate(made(values), **options))
+        return jnp.zeros(())
+
+    @record.defjvp
+    def held(primals: tuple[Any], _: tuple[Any]) -> tuple[Any, Any]:
+        return record(*primals), jnp.zeros(())
+
+    record(tuple(jnp.asarray(value, float) for value in traced_values(mechanism)))
+    return found[-1]
+
+
+def _angles(simulation: Simulation) -> Angles:
+    """Return the angles about axes that the outputs of a simulation measure, with their turns at its instants."""
+    outputs = simulation.model.system.outputs
+    found = angles_of(simulation.model, (simulation.model.system.forces, outputs))
+    measured = [k for k, group in enumerate(outputs) if measures_angle(group)]
+    near = tuple(np.asarray(simulation.output_values(k)[0, 0]) for k in measured)
+    return found._replace(near=(found.near[0], near))
+
+
+def _model_of(mechanism: Mechanism, simulation: Simulation) -> tuple[Model, Equations]:
+    """Return the model and the equations of motion as functions of what JAX traces."""
+    first = {name: np.asarray(x)[0, ..., :1] for name, x in _first(simulation).items()}
+    known = simulation.equations
+    model = traced_model(mechanism, simulation.model.length, _angles(simulation), first)
+    system = with_fields(
+        model.system, outputs=(), column_scale=known.system.column_scale, row_scale=np.asarray(known.system.row_scale)
+    )
+    masses, gravity = masses_of(mechanism), gravity_of(mechanism)
+    return model, Equations(system, masses, gravity, known.scale, known.pose_type)
+
+
+def _first(simulation: Simulation) -> dict[str, Any]:
+    """Return the coordinates of all bodies at the start."""
+    state = simulation.dense_output.polynomial.map(lambda part: np.asarray(part)[0, :1, ..., None])
+    found = pose_coordinates(state)
+    return {name: found[name] for name in found if name != "angular_velocity"}
+
+
+def _start(mechanism: Mechanism, simulation: Simulation, equations: Equations) -> State:
+    """Return the state at the start: it changes so that joints, drivers and initial conditions go on holding."""
+    known = simulation.dense_output.polynomial.map(lambda part: jnp.asarray(part)[0, 0, ..., None])
+    instant = np.array([[simulation.dense_output.start[0]]])
+    first = {name: x[0] for name, x in _first(simulation).items()}
+    begun = traced_model(initial_as_drivers(mechanism), simulation.model.length)
+    scales = {"column_scale": equations.system.column_scale}
+    whole = dataclasses.replace(equations, system=with_fields(begun.system, outputs=(), forces=(), **scales))
+    rows, columns = whole.system.shape
+    if rows == columns:
+        return _corrected(whole, known, instant)
+    _check_guessed(mechanism, simulation, known)
+    guess = traced_model(mechanism, simulation.model.length).guess
+    position = guess["position"][:, 1:]
+    attitude = guess["angle"][None, 1:] if "angle" in guess else guess["quaternion"][:, 1:]
+    held = simulation.equations
+    jacobian = np.asarray(held.system.jacobian(held.still(known.position, known.attitude), Jet([instant])))[..., 0]
+    still = equations.still(position, attitude)
+    gap = equations.system.residual(still, Jet([instant])).coefficients[0]
+    column = -(np.linalg.pinv(jacobian) @ gap)  # the shortest step, as that of the assembly
+    pose = still.displaced(*equations.system.coordinates(column, still.shifts))
+    state = known._replace(position=pose.position.coefficients[0][:, 1:], attitude=equations.attitude_of(pose))
+    factor = jax.lax.stop_gradient(equations).factored(known, instant)
+    return equations.with_rates(factor, state, instant)
+
+
+def _check_guessed(mechanism: Mechanism, simulation: Simulation, known: State) -> None:
+    """Raise UnsupportedError unless a start that is not prescribed is the starting guess itself, at rest."""
+    guess, name = simulation.model.guess, "angle" if mechanism.space == "planar" else "quaternion"
+    attitude = np.asarray(guess[name])[None, 1:] if name == "angle" else np.asarray(guess[name])[:, 1:]
+    away = np.abs(np.asarray(guess["position"])[:, 1:] - known.position).max() / simulation.model.length
+    turned = np.abs(attitude - known.attitude).max()
+    speed = max(float(np.abs(np.asarray(part)).max()) for part in known[2:])
+    if mechanism.initial or max(away, turned) > AS_GUESSED or speed > AT_REST:
+        raise UnsupportedError(
+            "the start follows from the starting guess and from least velocities, and is differentiated only where "
+            "the guess fulfils all joints and all is at rest; give an initial condition for each degree of freedom",
+            name="initial",
+        )
+
+
+def _coordinates(
+    simulation: Simulation, equations: Equations, start: State, order: int
+) -> dict[str, Any]:
+    """Return the Taylor coefficients of the coordinates at the instants, as the steps lead there from a start."""
+    dense, instants = simulation.dense_output, simulation.time
+    chosen = simulation.steps_at(instants)
+    count = 1 << (len(dense.start) - 1).bit_length()  # few lengths of programs are compiled
+    fill = np.minimum(np.arange(count), len(dense.start) - 1)
+    steps = np.where(np.arange(count) < len(dense.start), dense.length[fill], 0.0)
+    polynomial = dense.polynomial.map(lambda part: np.moveaxis(part[fill], 1, 0))  # (order + 1, steps, ...)
+    known = polynomial.map(lambda part: part[0][..., None])
+    kept = np.any([np.any(part != 0, axis=tuple(range(2, part.ndim))) for part in polynomial], axis=0)
+    since = instants - dense.start[chosen]
+    highest = len(polynomial.position) - 1
+    state = _marched(
+        equations, start, known, kept.T, dense.start[fill], steps, chosen, since, instants, order=order, highest=highest
+    )
+    return pose_coordinates(state)
+
+
+@partial(jax.jit, static_argnames=("order", "highest"))
+def _marched(
+    equations: Equations,
+    start: State,
+    known: State,
+    kept: Any,
+    begun: Float[Numbers, " step"],
+    steps: Float[Numbers, " step"],
+    chosen: Int[Numbers, " time"],
+    since: Float[Numbers, " time"],
+    instants: Float[Numbers, " time"],
+    *,
+    order: int,
+    highest: int,
+) -> State:
+    """Return the series of the motion at instants, (order + 2, ..., time), after a march over steps that are known.
+
+    Parameters
+    ----------
+    known : State
+        At the beginning of all steps, (steps, ..., 1): what comes of the march here has these values.
+    kept : array of bool, shape (steps, highest + 1)
+        Which coefficients of the series the steps were taken with.
+    """
+
+    def ended(state: State, kept: Any, time: Any, step: Any) -> State:
+        series = _expanded(equations, state, time[None], highest).map(
+            lambda part: jnp.where(kept[:, None, None], part, 0.0)
+        )
+        return _corrected(equations, evaluated(series, step), (time + step)[None])
+
+    @jax.checkpoint
+    def march(state: State, step: Any) -> tuple[State, State]:
+        here, kept, time, length = step
+        state = jax.tree.map(_with_value, state, here)
+        return ended(state, kept[:, None], time[None], length[None]), state
+
+    _, states = jax.lax.scan(march, start, (known, kept, begun, steps))
+    chosen_states = states.map(lambda part: jnp.moveaxis(part[chosen, ..., 0], 0, -1))
+    time = instants - since
+
+    @jax.checkpoint
+    def arrive(state: State) -> State:
+        arrived = ended(state, kept[chosen].T, time, since)
+        return _expanded(equations, arrived, instants[None], order + 1)
+
+    return arrive(chosen_states)
+
+
+def _with_value(x: Any, value: Any) -> Any:
+    return value + (x - jax.lax.stop_gradient(x))
+
+
+def _expanded(equations: Equations, state: State, time: Instants, order: int) -> State:
+    """Return the series of the motion through a state."""
+    inverse = jax.lax.stop_gradient(equations.factored(state, time).inverse())
+    matrix = equations.matrix(state, time)
+
+    def product(a: Any, b: Any) -> Any:
+        return jnp.sum(a[:, :, None] * b[None], axis=1)
+
+    # its value is the inverse, and its derivative that of an inverse
+    inverse = 2.0 * inverse - product(product(inverse, matrix), inverse)
+    return expand(equations, state, time, order, inverse).state
+
+
+def _corrected(equations: Equations, state: State, time: Instants) -> State:
+    """Return the state after one correction onto the constraints and their rates; see `projected`."""
+    state = state._replace(attitude=normalised(state.attitude))
+    held, fixed = jax.lax.stop_gradient((equations, state))
+    factor = held.factored(fixed, time)
+    still = equations.still(state.position, state.attitude)
+    gap = equations.system.residual(still, Jet([time])).coefficients[0]
+    pose = still.displaced(*equations.system.coordinates(equations.least_change(factor, gap), still.shifts))
+    position, attitude = pose.position.coefficients[0][:, 1:], equations.attitude_of(pose)
+    return equations.with_rates(factor, state._replace(position=position, attitude=attitude), time)
