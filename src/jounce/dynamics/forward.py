@@ -302,6 +302,8 @@ def expand(
     time: Instants,
     order: int,
     inverse: Matrices | None = None,
+    *,
+    reversible: bool = False,
 ) -> Expansion:
     """Return the Taylor coefficients of the motion through a state, to an order.
 
@@ -317,6 +319,8 @@ def expand(
         Highest coefficient of positions and velocities, at least 1.
     inverse : array of shape (size, size, batch), optional
         Of the equations' matrix at this state, where it is known.
+    reversible : bool, default False
+        Whether JAX may differentiate it in reverse mode.
     """
     count, bodies, lanes = equations.coordinates, *state.position.shape[1:]
     known = equations.factored(state, time).inverse() if inverse is None else inverse
@@ -330,7 +334,7 @@ def expand(
     trial = jnp.zeros((count, bodies, lanes)), jnp.zeros((rows, lanes))
     forces, second, _ = program(*state, *trial, time)
     acceleration, multipliers = solved(forces, second)
-    recursion = Recursion(program, (*state, acceleration, multipliers, time), order - 1)
+    recursion = Recursion(program, (*state, acceleration, multipliers, time), order - 1, reversible=reversible)
     shifts = equations.pose_type.shifts
 
     def raised(before: State, acceleration: Any, attitude_rate: Any, k: Any) -> State:

@@ -17,7 +17,7 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Float, Int
 
-from jounce.dynamics.forward import Equations, Instants, Lanes, State, expand
+from jounce.dynamics.forward import Equations, Instants, State, expand
 from jounce.dynamics.masses import gravity_of, masses_of
 from jounce.dynamics.start import initial_as_drivers
 from jounce.errors import UnsupportedError
@@ -65,7 +65,7 @@ def traced_simulation(simulate: Callable[..., Simulation], given: Mapping[str, A
         raise UnsupportedError(message, name="forces")
     model, equations = _model_of(mechanism, simulation)
     start = _start(mechanism, simulation, equations)
-    order = simulation.poses[1]["position"].shape[0] - 2
+    order = simulation.poses[1]["position"].shape[0] - 1
     coordinates = _coordinates(simulation, equations, start, order)
     known = {name: np.asarray(x) for name, x in simulation.poses[1].items()}
     coordinates = {name: known[name] + (x - jax.lax.stop_gradient(x)) for name, x in coordinates.items()}
@@ -130,7 +130,6 @@ def _start(mechanism: Mechanism, simulation: Simulation, equations: Equations) -
     """Return the state at the start: it changes so that joints, drivers and initial conditions go on holding."""
     known = simulation.dense_output.polynomial.map(lambda part: jnp.asarray(part)[0, 0, ..., None])
     instant = np.array([[simulation.dense_output.start[0]]])
-    first = {name: x[0] for name, x in _first(simulation).items()}
     begun = traced_model(initial_as_drivers(mechanism), simulation.model.length)
     scales = {"column_scale": equations.system.column_scale}
     whole = dataclasses.replace(equations, system=with_fields(begun.system, outputs=(), forces=(), **scales))
@@ -167,9 +166,7 @@ def _check_guessed(mechanism: Mechanism, simulation: Simulation, known: State) -
         )
 
 
-def _coordinates(
-    simulation: Simulation, equations: Equations, start: State, order: int
-) -> dict[str, Any]:
+def _coordinates(simulation: Simulation, equations: Equations, start: State, order: int) -> dict[str, Any]:
     """Return the Taylor coefficients of the coordinates at the instants, as the steps lead there from a start."""
     dense, instants = simulation.dense_output, simulation.time
     chosen = simulation.steps_at(instants)
@@ -184,7 +181,15 @@ def _coordinates(
     state = _marched(
         equations, start, known, kept.T, dense.start[fill], steps, chosen, since, instants, order=order, highest=highest
     )
-    return pose_coordinates(state)
+    return _with_ground(state)
+
+
+def _with_ground(state: State) -> dict[str, Any]:
+    """Return the series of states as those of the pose of all bodies; see `pose_coordinates`."""
+    position, attitude, _, spin = state.map(lambda part: jnp.pad(part, ((0, 0), (0, 0), (1, 0), (0, 0))))
+    if attitude.shape[1] == 1:
+        return {"position": position, "angle": attitude[:, 0]}
+    return {"position": position, "quaternion": attitude.at[0, 0, 0].set(1.0), "angular_velocity": spin[:-1]}
 
 
 @partial(jax.jit, static_argnames=("order", "highest"))
@@ -202,7 +207,7 @@ def _marched(
     order: int,
     highest: int,
 ) -> State:
-    """Return the series of the motion at instants, (order + 2, ..., time), after a march over steps that are known.
+    """Return the series of the motion at instants, (order + 1, ..., time), after a march over steps that are known.
 
     Parameters
     ----------
@@ -231,7 +236,7 @@ def _marched(
     @jax.checkpoint
     def arrive(state: State) -> State:
         arrived = ended(state, kept[chosen].T, time, since)
-        return _expanded(equations, arrived, instants[None], order + 1)
+        return _expanded(equations, arrived, instants[None], order)
 
     return arrive(chosen_states)
 
@@ -250,7 +255,7 @@ def _expanded(equations: Equations, state: State, time: Instants, order: int) ->
 
     # its value is the inverse, and its derivative that of an inverse
     inverse = 2.0 * inverse - product(product(inverse, matrix), inverse)
-    return expand(equations, state, time, order, inverse).state
+    return expand(equations, state, time, order, inverse, reversible=True).state
 
 
 def _corrected(equations: Equations, state: State, time: Instants) -> State:

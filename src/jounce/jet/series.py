@@ -57,6 +57,8 @@ class Recursion(ProgramReader):
         Coefficients of order zero of its arguments.
     order : int
         Highest coefficient that will be wanted.
+    reversible : bool, default False
+        Whether loops are of known length, as JAX wants them for derivatives in reverse mode; they take longer then.
 
     Attributes
     ----------
@@ -73,8 +75,8 @@ class Recursion(ProgramReader):
 
     moving = int  # the number of a variable
 
-    def __init__(self, function: Callable[..., Any], values: Sequence[Any], order: int):
-        self.order = order
+    def __init__(self, function: Callable[..., Any], values: Sequence[Any], order: int, *, reversible: bool = False):
+        self.order, self.reversible = order, reversible
         self._nodes: list[_Node] = []
         self._values: dict[int, Any] = {}  # of order zero, by number of the variable
         self._known: dict[Any, Any] = {}  # results of operations already read, which programs often repeat
@@ -181,7 +183,8 @@ class Recursion(ProgramReader):
             b = jax.lax.dynamic_slice_in_dim(right, k - first + 1, _BLOCK)
             return found + total(a[j] * b[_BLOCK - 1 - j] for j in range(_BLOCK))
 
-        found = jax.lax.fori_loop(0, (k + _BLOCK - 2) // _BLOCK, block, jnp.zeros(left.shape[1]))
+        count = -(-self.order // _BLOCK) if self.reversible else (k + _BLOCK - 2) // _BLOCK  # what is beyond is zero
+        found = jax.lax.fori_loop(0, count, block, jnp.zeros(left.shape[1]))
         sums, place = {}, 0
         for pair in self._products:
             shape = jnp.shape(self._values[pair.left])
