@@ -116,6 +116,8 @@ def solve(
         If degrees of freedom are left, or constraints are redundant.
     SolveError
         If the motion cannot be followed to an instant (with `strict`); it holds the motion up to there.
+    UnsupportedError
+        If JAX traces anything but values of the mechanism; by those, outputs are differentiated.
 
     Examples
     --------

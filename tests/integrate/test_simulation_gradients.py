@@ -1,0 +1,82 @@
+"""Derivatives of simulations by masses, lengths and initial conditions, against variational equations."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import jounce as jn
+
+NAMES = ("lift", "m", "c")
+VALUES = np.array([0.4, 2.0, 1.0])
+INERTIA, GRAVITY = 0.5, 9.81
+TIME = [0.0, 1.0, 10.0]
+
+PENDULUM = jn.Mechanism(
+    space="planar",
+    gravity=[0, -GRAVITY],
+    parameters=dict(zip(NAMES, VALUES.tolist(), strict=True)),
+    bodies={"rod": jn.Body([0, 0], mass="m", inertia=INERTIA, center_of_mass=["c", 0])},
+    joints={"O": jn.planar.Revolute(("ground", "rod"), [0, 0], [0, 0])},
+    initial={"rise": jn.drivers.CoordinateDriver(("ground", "rod"), "angle", motion="lift")},
+    outputs={"angle": jn.AngleOutput("rod"), "tip": jn.PointOutput("rod", ["c", 0])},
+)
+
+
+def angles(values):
+    return jn.simulate(PENDULUM.with_parameters(**dict(zip(NAMES, values, strict=True))), TIME, order=2).outputs[
+        "angle"
+    ]
+
+
+def variational():
+    """Return angle and angular velocity, and how they change with the values, by an integrator of SciPy's."""
+
+    def rate(_, state):
+        angle, speed = state[:2]
+        m, c = VALUES[1:]
+        whole = INERTIA + m * c * c
+        pull = m * GRAVITY * c
+        by_value = [
+            0.0,
+            (-GRAVITY * c * whole + pull * c * c) / whole**2,
+            (-m * GRAVITY * whole + pull * 2 * m * c) / whole**2,
+        ]
+        found = [speed, -pull / whole * np.cos(angle)]
+        for k in range(3):
+            d, v = state[2 + 2 * k : 4 + 2 * k]
+            found += [v, pull / whole * np.sin(angle) * d + by_value[k] * np.cos(angle)]
+        return found
+
+    start = [VALUES[0], 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+    return solve_ivp(rate, (0.0, 10.0), start, "DOP853", TIME, rtol=3e-14, atol=1e-15).y
+
+
+@pytest.mark.slow
+def test_ten_seconds_of_a_pendulum():
+    known = variational()
+    slope = np.asarray(jax.jacfwd(angles)(jnp.array(VALUES)))
+    for level in (0, 1):
+        expected = known[2 + level :: 2].T
+        size = np.abs(expected).max(axis=0)
+        assert (np.abs(slope[:, level] - expected) / size).max() < 1e-10
+    reverse = np.asarray(jax.grad(lambda values: angles(values)[-1, 0])(jnp.array(VALUES)))
+    np.testing.assert_allclose(reverse, slope[-1, 0], rtol=1e-11)
+
+
+@pytest.mark.slow
+def test_the_motion_is_that_of_the_simulation():
+    value, _ = jax.value_and_grad(lambda values: angles(values)[-1, 1])(jnp.array(VALUES))
+    assert float(value) == pytest.approx(angles(VALUES.tolist())[-1, 1], rel=1e-14)
+
+
+def test_what_cannot_be_traced_is_told():
+    with pytest.raises(jn.UnsupportedError, match="number of its steps"):
+        jax.jit(angles)(jnp.array(VALUES))
+
+    def by_formulas(m):
+        return jn.simulate(PENDULUM.with_parameters(m=m), TIME, method=jn.Obreshkov()).outputs["angle"][-1, 0]
+
+    with pytest.raises(jn.UnsupportedError, match=r"jn\.Taylor\(\)"):
+        jax.grad(by_formulas)(2.0)
