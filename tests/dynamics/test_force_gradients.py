@@ -21,7 +21,7 @@ def arm(m, c, stiffness):
         bodies={"arm": jn.Body([0, 0], mass=m, inertia=0.2, center_of_mass=[c, 0])},
         joints={"O": jn.planar.Revolute(("ground", "arm"), [0, 0], [0, 0])},
         drivers={"turn": jn.drivers.CoordinateDriver(("ground", "arm"), "angle", motion="t**3")},
-        forces={"spring": jn.forces.TorsionSpring(("ground", "arm"), stiffness=stiffness, angle=0.0)},
+        forces={"spring": jn.forces.TorsionalSpring(("ground", "arm"), stiffness=stiffness, angle=0.0)},
         outputs={"torque": jn.DriverTorqueOutput("turn"), "energy": jn.KineticEnergyOutput()},
     )
 

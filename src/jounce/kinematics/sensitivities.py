@@ -9,6 +9,7 @@ What is not a function of the design is decided outside of what is traced, by th
 the starting guess, steps, branches, whole turns.
 """
 
+import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple
@@ -81,7 +82,7 @@ def differentiable_motion(
         Solves a mechanism of plain numbers at the instants, strictly or not. What it raises where JAX knows the numbers
         is raised; elsewhere a motion that cannot be begun is NaN.
     """
-    made = template(mechanism)
+    made, built = template(mechanism), _builder(mechanism)
     values = tuple(jnp.asarray(value, float) for value in traced_values(mechanism))
     shapes = _shapes(mechanism, len(instants), levels)
 
@@ -106,10 +107,10 @@ def differentiable_motion(
         (values,), (changes,) = primals, tangents
         solved = solution(values)
         still = jax.tree.map(jnp.zeros_like, solved)
-        return solved, still._replace(coordinates=_change(made, values, changes, solved, instants))
+        return solved, still._replace(coordinates=_change(built, values, changes, solved, instants))
 
     solved = solution(values)
-    return solved, _model(mechanism, solved)
+    return solved, built(values, solved.length, solved.angles, _first(solved.coordinates))
 
 
 def _shapes(mechanism: Mechanism, count: int, levels: int) -> Solved:
@@ -157,29 +158,92 @@ def _one_by_one(solve: Callable[[Values], Solved], shapes: Solved, sizes: Sequen
     return jax.tree.map(lambda shape, *xs: np.stack(xs).reshape(*batch, *shape.shape), shapes, *found)
 
 
-def _model(mechanism: Mechanism, solved: Solved) -> Model:
-    first = {name: solved.coordinates[name][0, ..., :1] for name in solved.coordinates if name != "angular_velocity"}
-    return traced_model(mechanism, solved.length, solved.angles, first)
+def _first(coordinates: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the coordinates at the first instant, (..., bodies, 1)."""
+    return {name: coordinates[name][0, ..., :1] for name in coordinates if name != "angular_velocity"}
 
 
-def _change(
-    made: Callable[[Values], Mechanism], values: Values, changes: Values, solved: Solved, instants: Any
-) -> dict[str, Any]:
+class _Builder:
+    """Makes the model of a mechanism from what JAX traces in it: operation by operation, or compiled once.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        Some of its values are traced.
+    """
+
+    def __init__(self, mechanism: Mechanism):
+        self._made, self._kept = template(mechanism), {}
+        self._compiled = jax.jit(self._numbers, static_argnames="counted")
+        self.uses = 0
+
+    def __call__(self, values: Values, length: Any, angles: Angles | None, first: Any) -> Model:
+        """Return the model; see `traced_model`."""
+        numbers, which = self.numbers(values, length, angles, first)
+        return self.model(numbers, which, angles is not None)
+
+    def numbers(self, values: Values, length: Any, angles: Angles | None, first: Any) -> tuple[list[Any], Any]:
+        """Return those numbers of a system that depend on what is traced, and which of its leaves they are."""
+        make = self._compiled if self.uses > 1 else self._numbers
+        found = make(values, length, angles, first, counted=angles is not None)
+        return found, self._kept[angles is not None][2]
+
+    def model(self, numbers: Sequence[Any], which: tuple[int, ...], counted: bool) -> Model:
+        """Return the model that has these numbers."""
+        model, leaves, _, structure = self._kept[counted]
+        whole = list(leaves)
+        for k, number in zip(which, numbers, strict=True):
+            whole[k] = number
+        return dataclasses.replace(model, system=jax.tree.unflatten(structure, whole))
+
+    def _numbers(self, values: Values, length: Any, angles: Any, first: Any, *, counted: bool) -> list[Any]:
+        model = traced_model(self._made(values), length, angles, first)
+        leaves, structure = jax.tree.flatten(model.system)
+        which = tuple(k for k, leaf in enumerate(leaves) if isinstance(leaf, Tracer))
+        fixed = [None if k in which else leaf for k, leaf in enumerate(leaves)]
+        bare = with_fields(model.system, groups=(), forces=(), outputs=(), column_scale=np.ones(1))  # nothing traced
+        kept = dataclasses.replace(model, system=bare, guess={}, reference={})
+        self._kept[counted] = kept, fixed, which, structure
+        return [leaves[k] for k in which]
+
+
+MOST_BUILDERS = 16
+_builders: dict[Any, _Builder] = {}
+
+
+def _builder(mechanism: Mechanism) -> _Builder:
+    """Return what makes the model of a mechanism: the same for one that differs in the values of its parameters.
+
+    It is compiled where it is used again: a mechanism whose joints are made anew each time is not.
+    """
+    plain = tuple((name, value) for name, value in mechanism.parameters.items() if not isinstance(value, Tracer))
+    fields = [field.name for field in dataclasses.fields(mechanism) if field.name != "parameters"]
+    held = [getattr(mechanism, name) for name in fields]
+    if traced_values(held):
+        return _Builder(mechanism)
+    key = (tuple(map(id, held)), tuple(mechanism.parameters), plain)
+    if key not in _builders:
+        while len(_builders) >= MOST_BUILDERS:
+            _builders.pop(next(iter(_builders)))
+        _builders[key] = _Builder(mechanism)  # which holds what the key is made of
+    found = _builders[key]
+    found.uses += 1
+    return found
+
+
+def _change(built: _Builder, values: Values, changes: Values, solved: Solved, instants: Any) -> dict[str, Any]:
     """Return how the coordinates of a motion change, as Taylor coefficients, as values of the design do."""
     regular = solved.status == int(Status.OK)
     coordinates = {name: _where(regular, c, c[..., :1]) for name, c in solved.coordinates.items()}
     instants = jnp.where(regular, instants, instants[0])
-    names = [name for name in coordinates if name != "angular_velocity"]
-    first = {name: coordinates[name][0, ..., :1] for name in names}
+    first = _first(coordinates)
     moved = {name: jnp.zeros_like(x) for name, x in first.items()}
     if any(solved.angles.angle):  # they are counted from the first position, which moves too
-        system, *slope = _linear(lambda v, _: traced_model(made(v), solved.length), values, changes, first, moved)
+        system, *slope = _linear(built, (solved.length, None), values, changes, first, moved)
         start = {name: x[None] for name, x in first.items()}
         moved = _moved(system, *slope, start, instants[:1])
-        moved = {name: moved[name][0] for name in names}
-    system, *slope = _linear(
-        lambda v, x: traced_model(made(v), solved.length, solved.angles, x), values, changes, first, moved
-    )
+        moved = {name: moved[name][0] for name in first}
+    system, *slope = _linear(built, (solved.length, solved.angles), values, changes, first, moved)
     found = _moved(system, *slope, coordinates, instants)
     return {name: _where(regular, change, jnp.zeros_like(change)) for name, change in found.items()}
 
@@ -189,23 +253,25 @@ def _where(regular: Any, values: Any, others: Any) -> Any:
 
 
 def _linear(
-    model: Callable[[Values, Mapping[str, Any]], Model], values: Values, changes: Values, first: Any, moved: Any
+    built: _Builder, known: tuple[Any, Angles | None], values: Values, changes: Values, first: Any, moved: Any
 ) -> tuple[System, list[Any], tuple[int, ...]]:
     """Return the system of a model, how its numbers change, and which of them do."""
-    kept: list[Any] = []
+    found: list[tuple[int, ...]] = []
 
     def numbers(values: Values, first: Any) -> list[Any]:
-        system = model(values, first).system
-        leaves, structure = jax.tree.flatten(with_fields(system, forces=(), outputs=()))
-        which = tuple(k for k, leaf in enumerate(leaves) if isinstance(leaf, Tracer))
-        kept.extend([[None if k in which else leaf for k, leaf in enumerate(leaves)], structure, which])
-        return [leaves[k] for k in which]
+        made, which = built.numbers(values, *known, first)
+        found.append(which)
+        return made
 
     here, slope = jax.jvp(numbers, (values, first), (changes, moved))
-    leaves, structure, which = kept
-    for k, leaf in zip(which, here, strict=True):
-        leaves[k] = leaf
-    return jax.tree.unflatten(structure, leaves), slope, which
+    system = built.model(here, found[0], known[1] is not None).system
+    leaves, structure = jax.tree.flatten(system)
+    numbered = jax.tree.unflatten(structure, range(len(leaves)))
+    places = jax.tree.leaves(with_fields(numbered, forces=(), outputs=()))  # of what residuals need among all leaves
+    changes_at = dict(zip(found[0], slope, strict=True))
+    moving = [(place, changes_at[k]) for place, k in enumerate(places) if k in changes_at]
+    bare = with_fields(system, forces=(), outputs=())
+    return bare, [change for _, change in moving], tuple(place for place, _ in moving)
 
 
 def _moved(
