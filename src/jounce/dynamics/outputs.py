@@ -111,8 +111,9 @@ class _JointOutput(AbstractForceOutput):
             fixed = getattr(forces.model.system.groups[place.group].element, f"point_{'ijmn'[slot : slot + 1]}", None)
             size = forces.pose_type.shifts
             point = np.zeros(size) if fixed is None else fixed.reshape(size, -1)[:, place.instance]
+        place_on_body: Any = point
         work = forces.wrench(self.joint, slot)
-        return forces.expressed(work, index(body), None if frame is None else index(frame), point)
+        return forces.expressed(work, index(body), None if frame is None else index(frame), place_on_body)
 
 
 class JointForceOutput(_JointOutput):

@@ -38,7 +38,7 @@ AT_REST = 1e-12  # m/s and rad/s
 AS_GUESSED = 1e-9  # rad or sizes of the mechanism
 
 
-def traced_simulation(simulate: Callable[..., Simulation], given: Mapping[str, Any]) -> TracedMotion:
+def traced_simulation(simulate: Callable[..., Simulation], given: Mapping[str, Any]) -> Any:
     """Return the simulation of a mechanism of which JAX traces some values.
 
     Parameters
@@ -186,7 +186,8 @@ def _coordinates(simulation: Simulation, equations: Equations, start: State, ord
 
 def _with_ground(state: State) -> dict[str, Any]:
     """Return the series of states as those of the pose of all bodies; see `pose_coordinates`."""
-    position, attitude, _, spin = state.map(lambda part: jnp.pad(part, ((0, 0), (0, 0), (1, 0), (0, 0))))
+    whole: Any = state.map(lambda part: jnp.pad(part, ((0, 0), (0, 0), (1, 0), (0, 0))))
+    position, attitude, _, spin = whole
     if attitude.shape[1] == 1:
         return {"position": position, "angle": attitude[:, 0]}
     return {"position": position, "quaternion": attitude.at[0, 0, 0].set(1.0), "angular_velocity": spin[:-1]}

@@ -94,6 +94,8 @@ def simulate(
         If constraints are redundant.
     SolveError
         If the motion cannot be followed to an instant (with `strict`); it holds the motion up to there.
+    UnsupportedError
+        If JAX traces anything but values of the mechanism, or is to compile or to map the simulation.
 
     Examples
     --------

@@ -44,7 +44,7 @@ class Places(NamedTuple):
 @compiled("pose_type", "order")
 def advance_designs(
     system: System,
-    known: SolvedState,
+    known: Any,
     step: Float[Numbers, " batch"],
     instant: Float[Numbers, " batch"],
     settings: tuple[Any, Any, Any],
@@ -60,7 +60,7 @@ def advance_designs(
 @compiled("pose_type", "order")
 def _solve_designs(
     system: System,
-    known: SolvedState,
+    known: Any,
     step: Float[Numbers, " batch"],
     instant: Float[Numbers, " batch"],
     settings: tuple[Any, Any, Any],
@@ -239,7 +239,8 @@ class DesignPaths:
 
     def _store(self) -> tuple[Int[np.ndarray, " anchor"], Float[np.ndarray, " anchor"], SolvedState]:
         """Return the anchors of all designs, by design and instant: whose they are, when, and their states."""
-        owners, at = (np.concatenate([part[k] for part in self._anchors]) for k in range(2))
+        owners = np.concatenate([whose for whose, _, _ in self._anchors])
+        at = np.concatenate([when for _, when, _ in self._anchors])
         order = np.lexsort((at, owners))
         state = jax.tree.map(
             lambda *xs: np.concatenate(xs, axis=-1)[..., order], *(state for _, _, state in self._anchors)

@@ -116,7 +116,7 @@ def _unfit(name: str, sign: str, value: Float[np.ndarray, "*shape design"]) -> B
     """Tell which values do not fit a field; see `check_value`."""
     word = name.removesuffix("_i").removesuffix("_j")
     flat = value.reshape(-1, value.shape[-1])
-    bad = ~np.isfinite(flat).all(axis=0)
+    bad: Any = ~np.isfinite(flat).all(axis=0)
     if sign == "not negative":
         bad |= (flat < 0).any(axis=0)
     elif word in POSITIVE and not sign:

@@ -177,7 +177,7 @@ class _Family:
     def _of_whole_motions(self) -> bool:
         """Tell whether outputs are asked for that follow from whole motions, not from one instant."""
         outputs = self.mechanism.outputs.values()
-        return any(isinstance(output, AbstractMotionOutput) or output.wraps for output in outputs)
+        return any(isinstance(output, AbstractMotionOutput) or getattr(output, "wraps", ()) for output in outputs)
 
     def _side_by_side(self, threads: int) -> Int[np.ndarray, " design"]:
         """Solve designs side by side; return which are left to be solved alone."""
@@ -255,7 +255,7 @@ class _Family:
         for names, jets in zip(solver.model.outputs, outputs, strict=True):
             for k, name in enumerate(names):
                 if jets.size:
-                    found = np.moveaxis(plain_derivatives(jets[:, :, k]), (0, 1), (2, 3))
+                    found = np.moveaxis(np.asarray(plain_derivatives(jets[:, :, k])), (0, 1), (2, 3))
                     self._put(name, chosen[whole], found[whole])
         if self.progress is not None:
             self.progress(int(whole.sum()), len(self.rows))

@@ -133,7 +133,8 @@ class Motion(Displayed):
     def continued_outputs(self) -> tuple[Float[np.ndarray, "component instance time"], ...]:
         """Values of the outputs of poses that are angles in a range, made continuous, for each group of such."""
         pairs = zip(self._groups.values(), self.model.system.outputs, strict=True)
-        return tuple(self._continued(g, c)[0] for c, g in pairs if getattr(g.element, "wraps", ()))
+        found: Any = tuple(self._continued(g, c)[0] for c, g in pairs if getattr(g.element, "wraps", ()))
+        return found
 
     def __repr__(self) -> str:
         solved = int(np.sum(self.status == Status.OK))
@@ -141,7 +142,7 @@ class Motion(Displayed):
         return f"<Motion {title}{solved} of {len(self.time)} instants solved, order {self.order}>"
 
     @cached_property
-    def outputs(self) -> dict[str, Numbers]:
+    def outputs(self) -> dict[str, Any]:
         """Outputs by name: arrays of shape (time, order + 1) or (time, order + 1, component), SI.
 
         The nine components of a rotation matrix stand row by row.

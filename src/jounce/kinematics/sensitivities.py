@@ -239,12 +239,12 @@ def _change(built: _Builder, values: Values, changes: Values, solved: Solved, in
     first = _first(coordinates)
     moved = {name: jnp.zeros_like(x) for name, x in first.items()}
     if any(solved.angles.angle):  # they are counted from the first position, which moves too
-        system, *slope = _linear(built, (solved.length, None), values, changes, first, moved)
+        system, slope, which = _linear(built, (solved.length, None), values, changes, first, moved)
         start = {name: x[None] for name, x in first.items()}
-        moved = _moved(system, *slope, start, instants[:1])
+        moved = _moved(system, slope, which, start, instants[:1])
         moved = {name: moved[name][0] for name in first}
-    system, *slope = _linear(built, (solved.length, solved.angles), values, changes, first, moved)
-    found = _moved(system, *slope, coordinates, instants)
+    system, slope, which = _linear(built, (solved.length, solved.angles), values, changes, first, moved)
+    found = _moved(system, slope, which, coordinates, instants)
     return {name: _where(regular, change, jnp.zeros_like(change)) for name, change in found.items()}
 
 

@@ -230,6 +230,6 @@ def angles_of(model: Model, counted: tuple[tuple[Group, ...], tuple[Group, ...]]
     """
     system = model.system
     data = [[g.element.datum for g in part if measures_angle(g)] for part in (system.groups, *counted)]
-    angle = tuple(tuple(np.asarray(datum.angle) for datum in part) for part in data)
-    near = tuple(tuple(np.asarray(datum.near) for datum in part) for part in data[1:])
+    angle: Any = tuple(tuple(np.asarray(datum.angle) for datum in part) for part in data)
+    near: Any = tuple(tuple(np.asarray(datum.near) for datum in part) for part in data[1:])
     return Angles(angle, near)
