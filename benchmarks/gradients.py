@@ -40,18 +40,18 @@ def cases(quick: bool) -> Cases:
     """Yield the gradient of a chain, and the family of a six-bar."""
     links, instants = (3, 51) if quick else (LINKS, 201)
     mechanism, time = chain(links), np.linspace(0.0, 1.0, instants)
-    names, values = zip(*mechanism.parameters.items(), strict=True)
+    values = dict(mechanism.parameters)
 
     def all_jounces(values: Any) -> Any:
-        changed = mechanism.with_parameters(**dict(zip(names, values, strict=True)))
-        return sum(found[-1, 4] for found in jn.solve(changed, time, order=4).outputs.values())
+        motion = jn.solve(mechanism.with_parameters(**values), time, order=4)
+        return sum(found[-1, 4] for found in motion.outputs.values())
 
-    slope, point = jax.grad(all_jounces), np.array(values)
+    slope = jax.grad(all_jounces)
     yield Case(
-        f"chain of {links} four-bars to jounce, {instants} instants, {len(names)} parameters",
+        f"chain of {links} four-bars to jounce, {instants} instants, {len(values)} parameters",
         [
-            Contestant("gradient, reverse", ready(lambda: np.asarray(slope(point)))),
-            Contestant("solution alone", ready(lambda: all_jounces(point.tolist())), aim=6.0),
+            Contestant("gradient, reverse", ready(lambda: np.array(list(slope(values).values())))),
+            Contestant("solution alone", ready(lambda: all_jounces(values)), aim=6.0),
         ],
         rounds=5,
     )

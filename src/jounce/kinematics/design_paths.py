@@ -53,7 +53,10 @@ def advance_designs(
     order: int,
 ) -> Arrival:
     """Solve an instant of each of many designs from one solved before, and survey all of them; see `advance`."""
-    arrival, factor, reached = solved_batch(system, *known, step, instant, *settings, pose_type=pose_type, order=order)
+    coordinates, angles, sign = known
+    arrival, factor, reached = solved_batch(
+        system, coordinates, angles, sign, step, instant, *settings, pose_type=pose_type, order=order
+    )
     return arrival._replace(turnover=turnovers_of(system, pose_type, reached, factor, instant))
 
 
@@ -69,7 +72,10 @@ def _solve_designs(
     order: int,
 ) -> tuple[tuple[Any, ...], Any]:
     """Solve an instant of each of many designs from one solved before: outputs and status."""
-    arrival, _, _ = solved_batch(system, *known, step, instant, *settings, pose_type=pose_type, order=order)
+    coordinates, angles, sign = known
+    arrival, _, _ = solved_batch(
+        system, coordinates, angles, sign, step, instant, *settings, pose_type=pose_type, order=order
+    )
     return arrival.outputs, arrival.status
 
 

@@ -83,7 +83,7 @@ def differentiable_motion(
         is raised; elsewhere a motion that cannot be begun is NaN.
     """
     made, built = template(mechanism), _builder(mechanism)
-    values = tuple(jnp.asarray(value, float) for value in traced_values(mechanism))
+    values = tuple(x if x.dtype == np.float64 else x.astype(float) for x in traced_values(mechanism))
     shapes = _shapes(mechanism, len(instants), levels)
 
     def on_the_host(strict: bool, values: Values) -> Solved:
