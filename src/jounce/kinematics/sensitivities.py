@@ -35,6 +35,7 @@ from jounce.mechanism.traced import Angles, angles_of, template, traced_model, t
 from jounce.rigid import PlanarPose, SpatialPose
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
+from jounce.trajectory import Expression
 
 Solve = Callable[[Mechanism, bool], Motion]
 Values = tuple[Any, ...]
@@ -216,7 +217,8 @@ def _builder(mechanism: Mechanism) -> _Builder:
 
     It is compiled where it is used again: a mechanism whose joints are made anew each time is not.
     """
-    plain = tuple((name, value) for name, value in mechanism.parameters.items() if not isinstance(value, Tracer))
+    numbers = {name: value for name, value in mechanism.parameters.items() if not isinstance(value, Tracer)}
+    plain = tuple((n, x if isinstance(x, str | Expression) else float(x)) for n, x in numbers.items())
     fields = [field.name for field in dataclasses.fields(mechanism) if field.name != "parameters"]
     held = [getattr(mechanism, name) for name in fields]
     if traced_values(held):
