@@ -19,8 +19,7 @@ Coordinates = Mapping[str, Float[Numbers, "_ ... _"]]
 
 Found = TypeVar("Found")
 
-WIDTHS = 64, 512  # instants; a motion that is not long compiles for the first width only
-FEW_CHUNKS = 8  # of that width
+WIDTHS = (512,)  # instants: one program serves a motion, its peaks and a long grid; one of 64 saves a millisecond
 
 
 def in_chunks(
@@ -37,12 +36,11 @@ def in_chunks(
     count : int
         How many instants there are, at least one.
     widths : tuple of int
-        Lengths of chunks, increasing: the first of which a few hold all instants, or else the last. The last chunk is
-        filled up.
+        Lengths of chunks, increasing: the first that holds all instants, or else the last. The last chunk is filled up.
     axis : int, default -1
         Of the instants in the results.
     """
-    width = next((width for width in widths if count <= FEW_CHUNKS * width), widths[-1])
+    width = next((width for width in widths if count <= width), widths[-1])
 
     def computed(first: int) -> Any:
         return jax.tree.map(np.asarray, function(np.minimum(np.arange(first, first + width), count - 1)))
