@@ -78,12 +78,7 @@ def slopes(element: AbstractConstraint, poses: Sequence[Pose], time: Jet, slot: 
     return jnp.moveaxis(jax.vmap(along)(jnp.eye(size)), 0, 1)
 
 
-def work_along(
-    slope: Slope,
-    forces: Sequence[Float[Numbers, "row instance batch"]] | Multipliers,
-    level: int,
-    lowest: int = 0,
-) -> Float[Numbers, "coordinate instance batch"]:
+def work_along(slope: Slope, forces: Multipliers, level: int) -> Float[Numbers, "coordinate instance batch"]:
     """Return the Taylor coefficient of what multipliers do along the coordinates of the bodies: slope times them.
 
     Parameters
@@ -94,10 +89,8 @@ def work_along(
         Coefficients of the multipliers.
     level : int
         Which coefficient of the product.
-    lowest : int
-        The coefficients of the slope below this one are left out.
     """
-    return total(jnp.sum(slope[j] * forces[level - j][None], axis=1) for j in range(lowest, level + 1))
+    return total(jnp.sum(slope[j] * forces[level - j][None], axis=1) for j in range(level + 1))
 
 
 def balancing(mass: MassMatrix | None, jacobian: Jacobian) -> Callable[[Column], Float[Numbers, "row batch"]]:
@@ -138,15 +131,22 @@ def multipliers(
     if not blocks:
         return jnp.zeros((load.shape[0], 0, load.shape[-1]))
     scale = jnp.asarray(system.column_scale)
-    solve = _solver(system, blocks, mass)
-    found: list[Any] = []
-    for k in range(len(load)):
-        missing = load[k]
+    solve, count = _solver(system, blocks, mass), len(load)
+
+    def level(found: Any, wanted: Any) -> tuple[Any, Any]:
+        """Find the next coefficient from those found, the latest first and zero before the lowest."""
+        k, missing = wanted
         for group, parts, forces in _by_group(system, blocks, found):
             for slot, slope in zip(group.moving_slots, parts, strict=True):
-                missing -= _onto_bodies(work_along(slope, forces, k, 1), group.bodies[slot], system.body_count)
-        found.append(solve(as_column(missing, scale)) * system.row_scale)
-    return jnp.stack(found)
+                # what the order k does not need may not be finite
+                needed = [jnp.where(j <= k, slope[j], 0.0) for j in range(1, count)]
+                work = total(jnp.sum(c * f[None], axis=1) for c, f in zip(needed, forces, strict=True))
+                missing -= _onto_bodies(work, group.bodies[slot], system.body_count)
+        newest = solve(as_column(missing, scale)) * system.row_scale
+        return [newest, *found[:-1]][: len(found)], newest
+
+    start = [jnp.zeros((system.shape[0], load.shape[-1]))] * (count - 1)
+    return jax.lax.scan(level, start, (np.arange(count), load))[1]  # compiled once for all orders
 
 
 def _solver(system: System, blocks: Slopes, mass: BodyMatrices | None) -> Callable[[Any], Any]:
@@ -171,7 +171,6 @@ def _by_group(system: System, blocks: Slopes, found: list[Float[Numbers, "row ba
     for group, parts in zip(system.groups, blocks, strict=True):
         _, _, rows, instances, lanes = parts[0].shape
         last = first + rows * instances
-        # the coefficient that is wanted next counts with those of the slope that are left out
         results.append((group, parts, [level[first:last].reshape(rows, instances, lanes) for level in found]))
         first = last
     return results

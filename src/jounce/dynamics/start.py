@@ -16,7 +16,6 @@ from jounce.kinematics.assembly import assemble, freely_moving
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.host_jacobian import RANK_TOLERANCE, HostJacobian, is_clearly_regular
 from jounce.mechanism import Mechanism, Model, build
-from jounce.mechanism.builder import pose_at
 from jounce.mechanism.modules import with_fields
 from jounce.shapes import Numbers
 
@@ -122,12 +121,13 @@ def _renamed(row: str, mechanism: Mechanism) -> str:
 
 def at_rest(model: Model, coordinates: dict[str, np.ndarray]) -> State:
     """Return the state of bodies at rest, from the coordinates of their assembled pose."""
-    pose = pose_at(coordinates, model.pose_type)
-    position = np.asarray(pose.position.coefficients[0])[:, 1:]
-    if pose.turns == 1:
-        attitude, spin = np.asarray(pose.angle.coefficients[0])[None, 1:], np.zeros((1, *position.shape[1:]))
+    position = np.asarray(coordinates["position"])[:, 1:]
+    if model.pose_type.turns == 1:
+        attitude = np.asarray(coordinates["angle"])[None, 1:]
     else:
-        attitude, spin = np.asarray(pose.quaternion.coefficients[0])[:, 1:], np.zeros_like(position)
+        quaternion = np.asarray(coordinates["quaternion"])[:, 1:]
+        attitude = quaternion / np.sqrt((quaternion**2).sum(axis=0))[None]
+    spin = np.zeros((model.pose_type.turns, *position.shape[1:]))
     return State(position, attitude, np.zeros_like(position), spin)
 
 
