@@ -121,7 +121,8 @@ def test_redundant_equations_are_named(facts, run, tmp_path):
     assert set(freedom["redundant_among"]) == {"joints.one", "joints.two"}
     assert set(freedom["moving"]) == {"bar", "other"}
     assert data["assembly"]["status"] == "assembled"
-    assert "1 equation too many, among joints." in run("inspect", path)[1]
+    assert freedom["repeated"] == [{"kind": "joint", "name": "two", "equations": 1, "of": ["one"]}]
+    assert "joint two repeats 1 equation of one" in run("inspect", path)[1]
 
 
 def test_a_body_without_joints(facts, tmp_path):

@@ -24,6 +24,7 @@ from jounce.kinematics.initial_turns import (
     nearest_turns,
     turned_to_laws,
 )
+from jounce.kinematics.redundancy import Redundancy, redundancy
 from jounce.kinematics.status import Status
 from jounce.mechanism import Model
 from jounce.mechanism.axis_angles import measures_angle, with_angles, with_datums
@@ -104,7 +105,7 @@ def assemble(model: Model, instant: float, tolerance: float, *, free: bool = Fal
     AssemblyError
         If no position near the guess fulfils all joints; the message names those that stay open.
     MobilityError
-        If joints and drivers leave degrees of freedom, or there are too many of them.
+        If joints and drivers leave degrees of freedom, or the position is singular.
     """
     columns = model.system.shape[1]
     if not model.rows and not free:
@@ -115,9 +116,9 @@ def assemble(model: Model, instant: float, tolerance: float, *, free: bool = Fal
         return dataclasses.replace(model, system=resident(model.system)), model.guess
     model, found = _settled(model, instant, tolerance)
     check_assembled(model, found, instant, free=free)
-    check_mobility(model, found.jacobian, free=free)
-    system = resident(with_fields(model.system, row_scale=found.scale[:, None]))
-    return dataclasses.replace(model, system=system), found.coordinates
+    model, told = redundancy_of(model, found, instant)
+    check_mobility(model, found.jacobian, told, free=free)
+    return dataclasses.replace(model, system=resident(model.system)), found.coordinates
 
 
 def _settled(model: Model, instant: float, tolerance: float) -> tuple[Model, Trial]:
@@ -324,15 +325,23 @@ def _squared_lengths(model: Model, instant: float) -> dict[str, float]:
     return found
 
 
-def check_mobility(model: Model, jacobian: HostJacobian, *, free: bool = False) -> None:
-    """Raise MobilityError, with the bodies and joints concerned, unless the Jacobian is square and regular.
+def redundancy_of(model: Model, found: Trial, instant: float) -> tuple[Model, Redundancy]:
+    """Return a model that was put together with its rows scaled, and which of them follow from others."""
+    model = dataclasses.replace(model, system=with_fields(model.system, row_scale=found.scale[:, None]))
+    told = redundancy(model, found.coordinates, found.jacobian, _mover(model, instant))
+    rank = told.rank if told.count else None
+    return dataclasses.replace(model, system=with_fields(model.system, rank=rank)), told
 
-    Where degrees of freedom may be left, it is enough that no constraint is redundant.
+
+def check_mobility(model: Model, jacobian: HostJacobian, found: Redundancy, *, free: bool = False) -> None:
+    """Raise MobilityError, with the bodies concerned, where degrees of freedom are left or the position is singular.
+
+    Redundant constraints are no error: here they agree. Degrees of freedom may be left (`free`).
     """
-    (rows, columns), rank = jacobian.shape, jacobian.rank
-    if rows == rank and (free or rank == columns):
+    (rows, columns), rank = jacobian.shape, found.rank
+    left_over = columns - rank
+    if (free or not left_over) and not found.is_singular:
         return
-    left_over, redundant = columns - rank, rows - rank
     bodies = len(model.bodies)
     parts = [
         f"{bodies} moving {'body has' if bodies == 1 else 'bodies have'} {columns} coordinates; joints and drivers "
@@ -340,25 +349,18 @@ def check_mobility(model: Model, jacobian: HostJacobian, *, free: bool = False) 
     ]
     if left_over and not free:
         noun = "degree of freedom is" if left_over == 1 else "degrees of freedom are"
-        moving = freely_moving(model, jacobian.free_directions)
+        moving = freely_moving(model, found.jacobian.free_directions)
         remedy = f"add {_count(left_over, 'driver')}, or simulate it under its forces"
         parts.append(f"{left_over} {noun} left, with which {moving} can move: {remedy}")
-    if redundant:
+    if found.count:
+        parts.append(f"{found}, which is no fault as they agree")
+    if found.is_singular:
+        moving = freely_moving(model, jacobian.free_directions)
         parts.append(
-            f"{_count(redundant, 'equation')} too many among {redundant_rows(model, jacobian.dependences)}: free a "
-            "direction there (a spherical or cylindrical joint for a revolute, say), or remove a driver"
+            f"the start is a singular position (a dead point or a change point), where only {found.rank_here} equations "
+            f"are independent and {moving} can move: start at another instant, or with another position"
         )
-    if left_over and redundant and rows == columns and not free:
-        parts.append("or the start is a singular position: start at another instant")
     raise MobilityError("; ".join(parts))
-
-
-def redundant_rows(model: Model, combinations: Float[np.ndarray, "row combination"]) -> str:
-    """Name the joints and drivers in combinations of rows that vanish, shape (rows, combinations)."""
-    by_name: dict[str, float] = {}
-    for name, weight in zip(model.rows, np.linalg.norm(combinations, axis=1).tolist(), strict=True):
-        by_name[name] = max(weight, by_name.get(name, 0.0))
-    return _concerned(np.array([*by_name.values()]), tuple(by_name))
 
 
 def freely_moving(model: Model, directions: Float[np.ndarray, "direction column"]) -> str:

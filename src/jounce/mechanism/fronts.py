@@ -133,7 +133,7 @@ def _ordered(pattern: Pattern) -> tuple[Int[np.ndarray, " body"], list[set[int]]
 def elimination(pattern: Pattern) -> Fronts | None:
     """Return how matrices of a pattern are eliminated body by body, where that is less work than as dense ones."""
     rows, columns = pattern.shape
-    if rows != columns or not rows:
+    if rows < columns or not rows:
         return None
     fronts = Fronts.of(pattern)
     count, height, wide = fronts.shape

@@ -1,9 +1,11 @@
 """The mechanism as its user sees it: named bodies, joints, drivers, outputs and parameters; frozen."""
 
 import dataclasses
+import math
 import re
 from collections.abc import Mapping
 from functools import cached_property
+from numbers import Real
 from typing import Any
 
 from jounce.constraints import AbstractConstraint
@@ -19,6 +21,7 @@ from jounce.trajectory.expression import RESERVED
 from jounce.trajectory.units import parse_value
 
 GROUND = "ground"
+CHOICES = ("unique", "least_norm")  # of reactions that redundant constraints leave open
 CLASSES = {"outputs": AbstractQuantity, "forces": AbstractForce}  # constraints otherwise
 RESERVED_OUTPUTS = (  # the axes of a result
     "time",
@@ -111,6 +114,11 @@ class Mechanism(Displayed):
         Acceleration of free fall in the global frame, (2,) or (3,), m/s^2; zero unless given.
     time : array_like, optional
         The instants that `jounce.solve` takes when it is given none, s.
+    redundant_reactions : str or dict of str to dict, default "unique"
+        Which reactions to give where constraints are redundant: ``"unique"`` those that are, the others are NaN;
+        ``"least_norm"`` all, such that the sum of the squares of the forces of all constraint rows, and of their couples
+        over the size of the mechanism, is least; or those of elastic joints: by the name of a joint, its stiffness
+        ``force``, N/m, and ``torque``, N m/rad, of which those not given are rigid.
     title : str, optional
         One line for tables and figures.
     dimensions : dict of str to tuple of Dimension, optional
@@ -147,6 +155,7 @@ class Mechanism(Displayed):
     parameters: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     gravity: Any = None
     time: Any = None
+    redundant_reactions: str | Mapping[str, Mapping[str, float]] = "unique"
     title: str = ""
     dimensions: Mapping[str, tuple[Dimension, ...]] = dataclasses.field(default_factory=dict, compare=False, repr=False)
 
@@ -158,6 +167,7 @@ class Mechanism(Displayed):
         if GROUND in self.bodies:
             raise MechanismError("the body 'ground' always exists and never moves", name="bodies.ground")
         self._check_names()
+        self._check_redundant_reactions()
         for kind, elements in self.elements.items():
             for name, element in elements.items():
                 self._check_element(kind, name, element)
@@ -176,6 +186,23 @@ class Mechanism(Displayed):
             for name in self.initial.keys() & getattr(self, kind).keys():
                 message = f"a {kind[:-1]} and an initial condition have the same name"
                 raise MechanismError(message, name=f"initial.{name}")
+
+    def _check_redundant_reactions(self) -> None:
+        wanted, place = self.redundant_reactions, "redundant_reactions"
+        if not isinstance(wanted, Mapping):
+            if wanted not in CHOICES:
+                message = f"must be one of {', '.join(CHOICES)}, or the stiffnesses of joints by name"
+                raise MechanismError(message, name=place, value=wanted)
+            return
+        for name, stiffness in wanted.items():
+            check_name("joint", name, (*self.joints, *self.drivers), MechanismError, name=place)
+            if not isinstance(stiffness, Mapping) or not stiffness or not set(stiffness) <= {"force", "torque"}:
+                message = "must be the stiffness of the joint: force, N/m, and torque, N m/rad, or one of them"
+                raise MechanismError(message, name=f"{place}.{name}", value=stiffness)
+            for key, value in stiffness.items():
+                if not (isinstance(value, Real) and not isinstance(value, bool) and 0 < value < math.inf):
+                    message = "a stiffness must be a number above zero"
+                    raise MechanismError(message, name=f"{place}.{name}.{key}", value=value)
 
     def _check_element(self, kind: str, name: str, element: Any) -> None:
         place = f"{kind}.{name}"

@@ -21,7 +21,7 @@ from jounce.kinematics.assembly import (
     check_mobility,
     freely_moving,
     put_together,
-    redundant_rows,
+    redundancy_of,
 )
 from jounce.kinematics.host_jacobian import HostJacobian
 from jounce.mechanism import Mechanism, Model, build, time_grid
@@ -100,6 +100,15 @@ class Grid(TypedDict):
     count: int
 
 
+class RepetitionFacts(TypedDict):
+    """A joint or driver whose equations follow from those of others, and of how many."""
+
+    kind: str
+    name: str
+    equations: int
+    of: list[str]
+
+
 class FreedomFacts(TypedDict):
     """Coordinates, equations and what they leave."""
 
@@ -111,6 +120,7 @@ class FreedomFacts(TypedDict):
     left: int
     redundant: int
     redundant_among: list[str]
+    repeated: list[RepetitionFacts]
     moving: list[str]
     words: str
     message: str | None
@@ -217,9 +227,10 @@ class _State:
 
     def __init__(self, mechanism: Mechanism, model: Model, instant: float):
         self.mechanism, self.model, self.instant = mechanism, model, instant
+        self.is_singular = False
         self.coordinates, self.assembly = self._assembled()
         self.freedom = self._counted()
-        possible = not self.freedom["redundant"] and (self.freedom["left"] == 0 or bool(_masses(mechanism)))
+        possible = not self.is_singular and (self.freedom["left"] == 0 or bool(_masses(mechanism)))
         self.ok = self.assembly["status"] == "assembled" and possible
 
     def _trial(self, model: Model) -> Trial | None:
@@ -243,21 +254,20 @@ class _State:
         columns = int(model.system.shape[1])
         if self.coordinates is not None:
             model = dataclasses.replace(model, guess=self.coordinates)
-        trial = self._trial(model)
-        finite = trial is None or bool(trial.jacobian.finite().all())
+        trial, told, message = self._trial(model), None, None
         pattern = model.system.pattern
-        nothing = HostJacobian.of(pattern, np.zeros(pattern.entry_count))
-        jacobian = nothing if trial is None or not finite else trial.jacobian
-        rank = jacobian.rank
+        jacobian = HostJacobian.of(pattern, np.zeros(pattern.entry_count))
+        if trial is not None and trial.jacobian.finite().all():
+            model, told = redundancy_of(model, trial, self.instant)
+            jacobian = told.jacobian
+            try:
+                check_mobility(model, trial.jacobian, told)
+            except MobilityError as error:
+                message = error.message
         drives = np.array([name.startswith("drivers.") for name in model.rows], bool)
-        freedom = columns - jacobian.take(~drives).rank
-        redundant = len(model.rows) - rank
-        try:
-            if trial is not None and finite:
-                check_mobility(model, jacobian)
-            message = None
-        except MobilityError as error:
-            message = error.message
+        freedom, rank = columns - jacobian.take(~drives).rank, jacobian.rank
+        repeated = () if told is None else told.repetitions
+        self.is_singular = told is not None and told.is_singular
         return {
             "coordinates": columns,
             "equations": len(model.rows),
@@ -265,8 +275,9 @@ class _State:
             "independent": rank,
             "of_joints": freedom,
             "left": columns - rank,
-            "redundant": redundant,
-            "redundant_among": redundant_rows(model, jacobian.dependences).split(", ") if redundant and finite else [],
+            "redundant": len(model.rows) - rank,
+            "redundant_among": [] if told is None else list(told.among),
+            "repeated": [{**x._asdict(), "of": list(x.of)} for x in repeated],
             "moving": freely_moving(model, jacobian.free_directions).split(", ") if columns > rank else [],
             "words": freedom_words(freedom, mechanism.drivers),
             "message": message,

@@ -88,9 +88,9 @@ def _mechanism_start(facts: Facts) -> list[str]:
         f"  joints: {count(freedom['equations'] - freedom['of_drivers'], 'equation')}"
         f"; drivers: {count(freedom['of_drivers'], 'equation')}; independent: {freedom['independent']}",
     ]
-    if freedom["redundant"]:
-        among = ", ".join(freedom["redundant_among"])
-        lines.append(f"  {count(freedom['redundant'], 'equation')} too many, among {among}")
+    for repeated in freedom["repeated"]:
+        equations = count(repeated["equations"], "equation")
+        lines.append(f"  {repeated['kind']} {repeated['name']} repeats {equations} of {', '.join(repeated['of'])}")
     if freedom["left"]:
         lines.append(f"  left to move: {freedom['left']}, with which {', '.join(freedom['moving'])} can move")
     assembled = assembly["status"] == "assembled"
