@@ -9,7 +9,7 @@ import pytest
 import jounce as jn
 from jounce import Status
 from jounce.mechanism import check_mechanism
-from tests.problems.small import crank, distance_slider, four_bar, four_hinges, slider_crank
+from tests.problems.small import crank, distance_slider, four_bar, slider_crank
 
 GRID = np.linspace(0, 2, 21)
 

@@ -28,6 +28,7 @@ from jounce.kinematics.compilation import compiled
 from jounce.mechanism import Model
 from jounce.mechanism.axis_angles import at_lanes
 from jounce.mechanism.pattern import Pattern
+from jounce.mechanism.redundant_reactions import resolved_reactions
 from jounce.mechanism.system import System, with_rows
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
@@ -136,7 +137,7 @@ class MotionForces:
     def unique(self, quantity: Callable[["MotionForces"], np.ndarray], size: float = 1.0) -> np.ndarray:
         """Return what is asked of the forces, NaN in components that redundant constraints leave open.
 
-        A component is unique where it vanishes for all multipliers that balance no load (Wojtyra 2005), at all instants.
+        Unique is a component that vanishes for all multipliers that balance no load (Wojtyra 2005), at all instants.
 
         Parameters
         ----------
@@ -152,9 +153,9 @@ class MotionForces:
         given = np.abs(quantity(self.loose)[..., solved]).max(axis=-1, initial=0.0)
         level = np.abs(self.loose.multipliers[..., solved]).max(axis=-1, initial=0.0) * self.open.weights
         limits = OPEN * size * level.max(axis=-1)[:, None]
-        open_ = (
-            given > limits if np.count_nonzero(solved) == 1 else np.broadcast_to(given[:1] > limits[:1], given.shape)
-        )
+        open_ = given > limits
+        if np.count_nonzero(solved) > 1:  # what vanishes at all instants has no rates
+            open_[1:] = open_[0]
         return np.where(np.logical_or.accumulate(open_, axis=0)[..., None], np.nan, values)
 
     @cached_property
@@ -185,7 +186,9 @@ class MotionForces:
         lanes = np.flatnonzero(self.motion.status == Status.OK)[:1]
         lanes = lanes if len(lanes) else np.zeros(1, int)
         scaled = _jacobian(dataclasses.replace(model.system, outputs=(), forces=()), self._blocks(lanes))
-        return OpenMultipliers(model, np.asarray(scaled)[..., 0], self.motion.mechanism.redundant_reactions)
+        mechanism = self.motion.mechanism
+        wanted = resolved_reactions(mechanism.redundant_reactions, mechanism.parameter_values)
+        return OpenMultipliers(model, np.asarray(scaled)[..., 0], wanted)
 
     def _blocks(self, lanes: np.ndarray) -> list[list[Any]]:
         """Return the slopes of all groups by the bodies of their moving slots."""

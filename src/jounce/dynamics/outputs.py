@@ -55,8 +55,8 @@ class AbstractForceOutput(AbstractMotionOutput):
         if forces.loose is None or np.isfinite(values[solved]).all():
             return ""
         return (
-            f"not unique, as constraints are redundant: {forces.open.words}; redundant_reactions chooses by least norm or "
-            "by stiffnesses"
+            f"not unique, as constraints are redundant: {forces.open.words}; redundant_reactions chooses by least "
+            "norm or by stiffnesses"
         )
 
 

@@ -158,7 +158,7 @@ class OpenMultipliers:
 
     @cached_property
     def _sizes(self) -> tuple[RowNumbers, RowNumbers]:
-        """The force and the couple by which a multiplier of one acts on a body: a row has a force, or a couple alone."""
+        """Force and couple by which a multiplier of one acts on a body: a row has a force, or a couple alone."""
         scale = np.asarray(self.model.system.column_scale)
         shifts = self.model.pose_type.shifts
         found = np.abs((self._jacobian / self._row_scale).reshape(len(self._jacobian), -1, len(scale)) / scale)

@@ -253,9 +253,10 @@ def _gaps(
         return np.zeros((2, 0, *terms[0].shape))
     rate = jnp.max(jnp.stack([jnp.power(term, 1.0 / k) for k, term in enumerate(terms, 1)]), axis=0)
     first, *others = system.residual(pose, time).dense().coefficients
-    over = [jnp.abs(first) / jnp.maximum(GAP_TOLERANCES * tolerance, LARGEST_GAP)]
+    allowed = GAP_TOLERANCES * tolerance
+    over, part = [jnp.abs(first) / jnp.maximum(allowed, LARGEST_GAP)], jnp.maximum(allowed, LARGEST_CONTRADICTION)
     for k, level in enumerate(others, 1):
-        over.append(jnp.abs(level) / jnp.maximum(LARGEST_CONTRADICTION * rate**k, 1e-300))
+        over.append(jnp.abs(level) / jnp.maximum(part * rate**k, 1e-300)[None])
     return jnp.stack([jnp.abs(first), jnp.max(jnp.nan_to_num(jnp.stack(over)), axis=0)])
 
 

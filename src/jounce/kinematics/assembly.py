@@ -278,10 +278,27 @@ def check_assembled(model: Model, found: Trial, instant: float, *, free: bool = 
         f"{'stays' if len(open_rows) == 1 else 'stay'} open, by {', '.join(wide[name] for name in open_rows[:4])}; "
         "check lengths and positions, or guess the pose of the bodies more closely"
     )
+    extra = _structural_excess(model, found, instant)
+    if extra:
+        message += (
+            f"; {_count(extra, 'equation')} more than coordinates are among them, and redundant constraints contradict "
+            "each other by that much: correct lengths and axes, free a direction there, or raise the tolerance if the "
+            "numbers are no more exact"
+        )
     missing = found.jacobian.shape[1] - len(model.rows)
     if missing > 0 and not free:
         message += f"; {_count(missing, 'equation')} too few for all coordinates: a joint may be missing"
     raise AssemblyError(message, status=Status.NOT_ASSEMBLED)
+
+
+def _structural_excess(model: Model, found: Trial, instant: float) -> int:
+    """Return how many equations are dependent wherever the bodies are, so that they may contradict each other.
+
+    Bodies that do not reach each other come to rest where equations depend on each other too, but only there.
+    """
+    anywhere = 0.1 * np.random.default_rng(1).standard_normal(model.system.shape[1])
+    jacobian = _mover(model, instant)(found.coordinates, anywhere)[2]
+    return len(model.rows) - jacobian.scaled(jacobian.row_scale).rank if jacobian.finite().all() else 0
 
 
 def _widths(model: Model, found: Trial, instant: float) -> dict[str, str]:
@@ -357,8 +374,9 @@ def check_mobility(model: Model, jacobian: HostJacobian, found: Redundancy, *, f
     if found.is_singular:
         moving = freely_moving(model, jacobian.free_directions)
         parts.append(
-            f"the start is a singular position (a dead point or a change point), where only {found.rank_here} equations "
-            f"are independent and {moving} can move: start at another instant, or with another position"
+            "the start is a singular position (a dead point or a change point), where only "
+            f"{found.rank_here} equations are independent and {moving} can move: start at another instant, or with "
+            "another position"
         )
     raise MobilityError("; ".join(parts))
 

@@ -44,8 +44,8 @@ class LeastSquaresFactor(eqx.Module):
                 part = jnp.sum(basis * column[:, None], axis=0)
                 column, along = column - jnp.sum(basis * part[None], axis=1), along + part
             size = jnp.sqrt(jnp.sum(column * column, axis=0))
-            basis = put(basis, column / jnp.where(size == 0, 1.0, size), k, 1)
-            return basis, put(triangle, jnp.where(places == k, size, along), k, 1)
+            basis = put(basis, column / jnp.where(size == 0, 1.0, size)[None], k, 1)
+            return basis, put(triangle, jnp.where(places == k, size[None], along), k, 1)
 
         blank = cls.blank(matrix.shape, lanes)
         return cls(*jax.lax.fori_loop(0, columns, orthogonalise, (blank.basis, blank.triangle)))
@@ -109,7 +109,7 @@ def range_basis(matrix: Basis, rank: int) -> Float[Numbers, "row rank batch"]:
 
     The longest column that is left is the next to be made orthogonal to all before.
     """
-    at, put = jax.lax.dynamic_index_in_dim, jax.lax.dynamic_update_index_in_dim
+    put = jax.lax.dynamic_update_index_in_dim
     rows, _, lanes = matrix.shape
 
     def choose(k: Any, carry: Any) -> Any:
@@ -118,7 +118,7 @@ def range_basis(matrix: Basis, rank: int) -> Float[Numbers, "row rank batch"]:
         column = jnp.take_along_axis(left, longest[None, None], axis=1)[:, 0]
         column = column - jnp.sum(basis * jnp.sum(basis * column[:, None], axis=0)[None], axis=1)
         size = jnp.sqrt(jnp.sum(column * column, axis=0))
-        column = column / jnp.where(size == 0, 1.0, size)
+        column = column / jnp.where(size == 0, 1.0, size)[None]
         left = left - column[:, None] * jnp.sum(column[:, None] * left, axis=0)[None]
         return put(basis, column, k, 1), left
 

@@ -1,11 +1,9 @@
 """The mechanism as its user sees it: named bodies, joints, drivers, outputs and parameters; frozen."""
 
 import dataclasses
-import math
 import re
 from collections.abc import Mapping
 from functools import cached_property
-from numbers import Real
 from typing import Any
 
 from jounce.constraints import AbstractConstraint
@@ -13,6 +11,7 @@ from jounce.display import Displayed
 from jounce.errors import ExpressionError, JounceError, MechanismError, check_name
 from jounce.forces import AbstractForce
 from jounce.mechanism.outputs import AbstractQuantity
+from jounce.mechanism.redundant_reactions import check_redundant_reactions
 from jounce.mechanism.resolve import parameter_value
 from jounce.rigid.inertia import Inertia
 from jounce.trajectory import Expression
@@ -21,7 +20,6 @@ from jounce.trajectory.expression import RESERVED
 from jounce.trajectory.units import parse_value
 
 GROUND = "ground"
-CHOICES = ("unique", "least_norm")  # of reactions that redundant constraints leave open
 CLASSES = {"outputs": AbstractQuantity, "forces": AbstractForce}  # constraints otherwise
 RESERVED_OUTPUTS = (  # the axes of a result
     "time",
@@ -116,9 +114,9 @@ class Mechanism(Displayed):
         The instants that `jounce.solve` takes when it is given none, s.
     redundant_reactions : str or dict of str to dict, default "unique"
         Which reactions to give where constraints are redundant: ``"unique"`` those that are, the others are NaN;
-        ``"least_norm"`` all, such that the sum of the squares of the forces of all constraint rows, and of their couples
-        over the size of the mechanism, is least; or those of elastic joints: by the name of a joint, its stiffness
-        ``force``, N/m, and ``torque``, N m/rad, of which those not given are rigid.
+        ``"least_norm"`` all, such that the sum of the squares of the forces of all constraint rows, and of their
+        couples over the size of the mechanism, is least; or those of elastic joints: by the name of a joint, its
+        stiffness ``force``, N/m, and ``torque``, N m/rad; what is not given is rigid.
     title : str, optional
         One line for tables and figures.
     dimensions : dict of str to tuple of Dimension, optional
@@ -155,7 +153,7 @@ class Mechanism(Displayed):
     parameters: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     gravity: Any = None
     time: Any = None
-    redundant_reactions: str | Mapping[str, Mapping[str, float]] = "unique"
+    redundant_reactions: str | Mapping[str, Mapping[str, Any]] = "unique"
     title: str = ""
     dimensions: Mapping[str, tuple[Dimension, ...]] = dataclasses.field(default_factory=dict, compare=False, repr=False)
 
@@ -167,7 +165,7 @@ class Mechanism(Displayed):
         if GROUND in self.bodies:
             raise MechanismError("the body 'ground' always exists and never moves", name="bodies.ground")
         self._check_names()
-        self._check_redundant_reactions()
+        check_redundant_reactions(self.redundant_reactions, (*self.joints, *self.drivers))
         for kind, elements in self.elements.items():
             for name, element in elements.items():
                 self._check_element(kind, name, element)
@@ -186,23 +184,6 @@ class Mechanism(Displayed):
             for name in self.initial.keys() & getattr(self, kind).keys():
                 message = f"a {kind[:-1]} and an initial condition have the same name"
                 raise MechanismError(message, name=f"initial.{name}")
-
-    def _check_redundant_reactions(self) -> None:
-        wanted, place = self.redundant_reactions, "redundant_reactions"
-        if not isinstance(wanted, Mapping):
-            if wanted not in CHOICES:
-                message = f"must be one of {', '.join(CHOICES)}, or the stiffnesses of joints by name"
-                raise MechanismError(message, name=place, value=wanted)
-            return
-        for name, stiffness in wanted.items():
-            check_name("joint", name, (*self.joints, *self.drivers), MechanismError, name=place)
-            if not isinstance(stiffness, Mapping) or not stiffness or not set(stiffness) <= {"force", "torque"}:
-                message = "must be the stiffness of the joint: force, N/m, and torque, N m/rad, or one of them"
-                raise MechanismError(message, name=f"{place}.{name}", value=stiffness)
-            for key, value in stiffness.items():
-                if not (isinstance(value, Real) and not isinstance(value, bool) and 0 < value < math.inf):
-                    message = "a stiffness must be a number above zero"
-                    raise MechanismError(message, name=f"{place}.{name}.{key}", value=value)
 
     def _check_element(self, kind: str, name: str, element: Any) -> None:
         place = f"{kind}.{name}"
