@@ -160,15 +160,13 @@ def test_a_dead_point_is_no_redundancy():
         linkage, drivers={"turn": jn.drivers.RotationDriver(("ground", "rocker"), Z, f"{rocker} + t")}
     )
     motion = jn.solve(driven, np.linspace(0, 2, 21), strict=False)
-    # the rocker turns as far as crank and coupler stretch, to 4
-    end = np.pi - np.arccos((2.5**2 + 2.0**2 - 4.0**2) / (2 * 2.5 * 2.0)) - rocker
+    angle = float(np.arccos((2.0**2 - 2.5**2 - 2.0**2) / (2 * 2.5 * 2.0)))  # crank and coupler overlap, 3 - 1 = 2 long
     solved = motion.status == Status.OK
-    np.testing.assert_array_equal(solved, motion.time < end)
+    np.testing.assert_array_equal(solved, motion.time < angle - rocker)
     assert motion.status[solved.sum()] == Status.SINGULAR
-    angle = float(rocker + end)
-    line = np.arctan2(2.0 * np.sin(angle), 2.5 + 2.0 * np.cos(angle))
-    poses = {"crank": ([0.0, 0.0, 0.0], line), "rocker": ([2.5, 0.0, 0.0], angle)}
-    poses["coupler"] = ([np.cos(line), np.sin(line), 0.0], line)
+    line = float(np.arctan2(2.0 * np.sin(angle), 2.5 + 2.0 * np.cos(angle)))
+    poses = {"crank": ([0.0, 0.0, 0.0], line + np.pi), "rocker": ([2.5, 0.0, 0.0], angle)}
+    poses["coupler"] = ([-np.cos(line), -np.sin(line), 0.0], line)
     bodies = {
         name: jn.Body(poses[name][0], orientation={"axis": Z, "angle": float(poses[name][1])})
         for name in linkage.bodies

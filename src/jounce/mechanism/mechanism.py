@@ -153,7 +153,7 @@ class Mechanism(Displayed):
     parameters: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     gravity: Any = None
     time: Any = None
-    redundant_reactions: str | Mapping[str, Mapping[str, Any]] = "unique"
+    redundant_reactions: str | Mapping[str, Any] = "unique"
     title: str = ""
     dimensions: Mapping[str, tuple[Dimension, ...]] = dataclasses.field(default_factory=dict, compare=False, repr=False)
 
