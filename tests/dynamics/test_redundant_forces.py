@@ -74,6 +74,8 @@ def test_elastic_hinges_share_the_weight_by_their_stiffness(share):
     wanted = shared(np.concatenate([[x["force"]] * 3 + [x["torque"]] * 2 for x in stiffness]))
     np.testing.assert_allclose(found, wanted, atol=1e-10 * MASS * GRAVITY)
     assert found[7] == pytest.approx(share * MASS * GRAVITY)  # springs side by side
+    asked = jn.joint_reaction(jn.solve(door(law="0*t"), TIMES, order=4), "upper", redundant=chosen)
+    np.testing.assert_array_equal(asked.force.values[0, 0], found[5:8])
 
 
 def test_stiffnesses_that_decide_nothing_are_refused():

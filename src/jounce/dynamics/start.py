@@ -65,7 +65,7 @@ def consistent_start(mechanism: Mechanism, instant: float) -> ConsistentStart:
     AssemblyError
         If joints, drivers and initial conditions cannot all be fulfilled.
     MobilityError
-        If constraints or initial conditions are redundant.
+        If the start is a singular position.
     """
     masses = required_masses(mechanism, "the equations of motion")
     model, state = build(mechanism), None

@@ -236,10 +236,9 @@ def _signs(system: System, factor: Factor, before: Callable[[], tuple[Pose, Jet]
 
     With redundant rows there is no determinant: the space of the columns has an orientation as seen from the neighbour.
     """
-    if system.rank is None:
-        return factor.sign()
-    seen = factor.orientation(factored(system, *before())) if isinstance(factor, LeastSquaresFactor) else 1.0
-    return seen * jnp.where(sign == 0, 1.0, sign)
+    if isinstance(factor, LeastSquaresFactor):
+        return factor.orientation(factored(system, *before())) * jnp.where(sign == 0, 1.0, sign)
+    return factor.sign() if system.rank is None else jnp.ones_like(sign)  # a large one has no orientation at hand
 
 
 def _gaps(

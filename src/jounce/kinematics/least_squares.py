@@ -84,8 +84,8 @@ class LeastSquaresFactor(eqx.Module):
         sizes = jnp.diagonal(self.triangle)
         return jnp.min(sizes, axis=-1) / jnp.max(sizes, axis=-1)
 
-    def orientation(self, before: "LeastSquaresFactor") -> Float[Numbers, " batch"]:
-        """Return the signs of the determinants that the spaces of the columns have as seen from others, shape (batch,).
+    def orientation(self, before: Any) -> Float[Numbers, " batch"]:
+        """Return the signs of the determinants that the columns have as seen from those of other factors, (batch,).
 
         It takes the place of the sign of the determinant, that a matrix with more rows than columns does not have.
         """

@@ -126,7 +126,7 @@ class Solver:
         if refused.size:
             return ", ".join(self.model.drivers[k] for k in refused)
         if arrival.status[lane] == Status.INCONSISTENT:
-            return self._contradicting(arrival.gaps[..., lane])
+            return self._contradicting(np.asarray(arrival.gaps[..., lane]))
         if arrival.status[lane] == Status.UNDEFINED and arrival.finite[0, lane]:
             names = [name for group in self.model.outputs for name in group]
             return f"output {names[int(np.argmin(arrival.finite[1:, lane]))]}"

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Collection, Mapping
-from numbers import Real
 from typing import Any
 
 from jounce.errors import JounceError, MechanismError, check_name
@@ -50,6 +49,6 @@ def _positive(given: Any, name: str, parameters: Mapping[str, Any]) -> float:
         value = resolve(given, parameters)
     except JounceError as error:
         raise error.located(name=name) from None
-    if not (isinstance(value, Real) and 0 < value < math.inf):
+    if not (isinstance(value, float) and 0 < value < math.inf):
         raise MechanismError("a stiffness must be a number above zero", name=name, value=given)
     return float(value)
