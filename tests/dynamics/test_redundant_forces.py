@@ -147,7 +147,7 @@ def test_a_four_bar_of_hinges_in_space_has_the_forces_of_the_plane(law):
     if law:
         expected, found = (jn.driver_force(motion, "turn").values for motion in (flat, wide))
         np.testing.assert_allclose(found, expected, rtol=1e-10)
-        energies = [jn.kinetic_energy(motion).values for motion in (flat, wide)]
+        energies = [jn.kinetic_energy(motion).total.values for motion in (flat, wide)]
         np.testing.assert_allclose(*energies, rtol=1e-11)
     else:
         assert "1 degree of freedom" in wide.mobility
@@ -162,6 +162,20 @@ def test_a_bennett_linkage_swings_under_its_weight_and_keeps_its_energy():
     assert swing.drift.max() < 1e-9
     assert np.ptp(swing.energy) < 1e-11 * np.max(swing.kinetic_energy)
     assert "1 degree of freedom" in swing.mobility
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rate, agrees", [("0.2*t", True), ("0.3*t", False)])
+def test_initial_conditions_that_say_the_same_twice_must_agree_in_their_rates(rate, agrees):
+    swing = dataclasses.replace(door(law=""), gravity=[0, -1.0, 0])
+    laws = {"one": "0.1 + 0.2*t", "two": f"0.1 + {rate}"}
+    starts = {name: jn.drivers.RotationDriver(("ground", "door"), Z, law) for name, law in laws.items()}
+    begun = dataclasses.replace(swing, initial=starts, outputs={"a": jn.RelativeAngleOutput(("ground", "door"), Z)})
+    if agrees:
+        np.testing.assert_allclose(jn.simulate(begun, [0.0], order=1).outputs["a"], [[0.1, 0.2]], rtol=1e-12)
+    else:
+        with pytest.raises(jn.AssemblyError, match=r"contradict each other in their rates .*initial\.two"):
+            jn.simulate(begun, [0.0])
 
 
 @pytest.mark.slow

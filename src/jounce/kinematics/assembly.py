@@ -127,7 +127,7 @@ def _settled(model: Model, instant: float, tolerance: float) -> tuple[Model, Tri
     Where the axes were tilted against each other in the starting guess, the angles in the position found are others
     than those counted from the guess, and it takes another turn to get to those that the drivers prescribe.
     """
-    guessed = _mover(model, instant)(model.guess, np.zeros(model.system.shape[1]))
+    guessed = mover(model, instant)(model.guess, np.zeros(model.system.shape[1]))
     lag, told = driver_lag(model, instant, guessed[1]), model.prescribed
     model, start = _turned(model, instant, tolerance, guessed, lag)
     found = put_together(model, instant, tolerance, start, known=guessed if start is None else None)
@@ -162,7 +162,7 @@ def _turned(
     begin = put_together(model, instant, tolerance, lag=lag, known=guessed)
     if not begin.closed:
         return model, None
-    found = turned_to_laws(model, lag, begin.coordinates, _mover(model, instant))
+    found = turned_to_laws(model, lag, begin.coordinates, mover(model, instant))
     if found is None:
         return model, None
     coordinates, history = found
@@ -178,7 +178,7 @@ def _turned(
 
 def _nearest(model: Model, found: Trial, instant: float) -> Trial:
     """Return planar bodies put together, with every angle shifted by whole turns to be nearest to the guess."""
-    moved, still = _mover(model, instant), np.zeros(model.system.shape[1])
+    moved, still = mover(model, instant), np.zeros(model.system.shape[1])
 
     def residual_at(angle: np.ndarray) -> np.ndarray:
         return found.scale * moved({**found.coordinates, "angle": angle}, still)[1]
@@ -186,7 +186,7 @@ def _nearest(model: Model, found: Trial, instant: float) -> Trial:
     return found._replace(coordinates=nearest_turns(model.guess, found.coordinates, residual_at))
 
 
-def _mover(model: Model, instant: float) -> Mover:
+def mover(model: Model, instant: float) -> Mover:
     """Return what takes coordinates and an increment to coordinates, residual and Jacobian, all on the host."""
     system = with_fields(model.system, outputs=(), forces=(), fronts=None, pattern=None)  # all that the program needs
     pattern, scale = model.system.pattern, np.asarray(model.system.row_scale)[:, 0]
@@ -225,7 +225,7 @@ def put_together(
     known : Place, optional
         Where to start from, in the place of coordinates, if it is known whole.
     """
-    still, free = np.zeros(model.system.shape[1]), _mover(model, instant)
+    still, free = np.zeros(model.system.shape[1]), mover(model, instant)
 
     def opened(place: Place) -> Place:
         return place if lag is None else (place[0], lag.open(place[1], 1.0), place[2])
@@ -297,7 +297,7 @@ def _structural_excess(model: Model, found: Trial, instant: float) -> int:
     Bodies that do not reach each other come to rest where equations depend on each other too, but only there.
     """
     anywhere = 0.1 * np.random.default_rng(1).standard_normal(model.system.shape[1])
-    jacobian = _mover(model, instant)(found.coordinates, anywhere)[2]
+    jacobian = mover(model, instant)(found.coordinates, anywhere)[2]
     return len(model.rows) - jacobian.scaled(jacobian.row_scale).rank if jacobian.finite().all() else 0
 
 
@@ -345,7 +345,7 @@ def _squared_lengths(model: Model, instant: float) -> dict[str, float]:
 def redundancy_of(model: Model, found: Trial, instant: float) -> tuple[Model, Redundancy]:
     """Return a model that was put together with its rows scaled, and which of them follow from others."""
     model = dataclasses.replace(model, system=with_fields(model.system, row_scale=found.scale[:, None]))
-    told = redundancy(model, found.coordinates, found.jacobian, _mover(model, instant))
+    told = redundancy(model, found.coordinates, found.jacobian, mover(model, instant))
     rank = told.rank if told.count else None
     return dataclasses.replace(model, system=with_fields(model.system, rank=rank)), told
 

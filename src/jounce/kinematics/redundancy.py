@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from jounce.kinematics.host_jacobian import HostJacobian
 from jounce.kinematics.initial_turns import Coordinates, Mover
@@ -129,17 +129,29 @@ def _nearby(model: Model, coordinates: Coordinates, jacobian: HostJacobian, move
     for _ in range(POSITIONS):
         sway = random.normal(size=len(directions)) @ directions
         for size in SWAYS:
-            there = _closed(coordinates, size * sway / np.abs(sway).max(), joints, moved)
+            there = closed_nearby(coordinates, size * sway / np.abs(sway).max(), joints, moved)
             if there is not None:
                 found.append(there)
                 break
     return found
 
 
-def _closed(
-    coordinates: Coordinates, sway: Float[np.ndarray, " column"], joints: np.ndarray, moved: Mover
+def closed_nearby(
+    coordinates: Coordinates, sway: Float[np.ndarray, " column"], joints: Bool[np.ndarray, " row"], moved: Mover
 ) -> HostJacobian | None:
-    """Return the Jacobian at the position nearest to a displaced one that fulfils the joints; None if there is none."""
+    """Return the Jacobian at a position near a displaced one that fulfils the joints; None where it is not displaced.
+
+    Parameters
+    ----------
+    coordinates : dict of str to array
+        Of all bodies at a position.
+    sway : array of shape (columns,)
+        By how much they are displaced, rad and sizes of the mechanism.
+    joints : array of bool, shape (rows,)
+        Rows that must hold.
+    moved : callable
+        As `redundancy` takes it.
+    """
     place, step, gone = moved(coordinates, sway), sway, sway
     for _ in range(MOST_STEPS):
         correction = place[2].take(joints).step(place[1][joints])

@@ -92,6 +92,10 @@ def _mechanism_start(facts: Facts) -> list[str]:
     for repeated in freedom["repeated"]:
         equations = count(repeated["equations"], "equation")
         lines.append(f"  {repeated['kind']} {repeated['name']} repeats {equations} of {', '.join(repeated['of'])}")
+    if (mobility := facts["mobility"]) is not None:
+        if mobility["order"] is not None:
+            lines.append(f"  with drivers released: {mobility['count']} by count, {mobility['instantaneous']} by rank")
+        lines.append(f"  {mobility['words']}")
     if freedom["left"]:
         lines.append(f"  left to move: {freedom['left']}, with which {', '.join(freedom['moving'])} can move")
     assembled = assembly["status"] == "assembled"
