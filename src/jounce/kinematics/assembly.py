@@ -345,7 +345,7 @@ def _squared_lengths(model: Model, instant: float) -> dict[str, float]:
 def redundancy_of(model: Model, found: Trial, instant: float) -> tuple[Model, Redundancy]:
     """Return a model that was put together with its rows scaled, and which of them follow from others."""
     model = dataclasses.replace(model, system=with_fields(model.system, row_scale=found.scale[:, None]))
-    told = redundancy(model, found.coordinates, found.jacobian, mover(model, instant))
+    told = redundancy(model, found.coordinates, found.jacobian, lambda *place: mover(model, instant)(*place))
     rank = told.rank if told.count else None
     return dataclasses.replace(model, system=with_fields(model.system, rank=rank)), told
 
