@@ -118,6 +118,14 @@ def test_a_third_crank_closes_one_of_two_branches():
     found = jn.mobility(flat_parallelogram(cranks=3))
     assert (found.kind, found.count, found.instantaneous, found.finite, found.blocked) == ("singular", 0, 2, 1, 2)
     np.testing.assert_allclose(turns(found.branches[0], "crank1", "crank2", "crank3"), 1.0, rtol=1e-9)
+    # what only the flat position makes dependent is no redundancy
+    assert [repeated.equations for repeated in found.repetitions] == [1]
+    turn = jn.drivers.CoordinateDriver(("ground", "crank1"), "angle", "t")
+    driven = dataclasses.replace(flat_parallelogram(cranks=3), drivers={"turn": turn})
+    with pytest.raises(
+        jn.MobilityError, match=r"13 equations, 12 of them .* repeats 1 equation .* a singular position"
+    ):
+        jn.solve(driven, [0.0])
 
 
 @pytest.mark.slow

@@ -13,7 +13,7 @@ from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from jounce.jet import Jet
 from jounce.kinematics.compilation import compiled
@@ -44,6 +44,10 @@ class ReducedConstraints:
         Orthonormal velocities that the constraints allow: K.
     dependent : array of shape (rows, s)
         Orthonormal combinations of rows that vanish there.
+    inverse : array of shape (columns, rows)
+        Pseudo-inverse of the Jacobian.
+    held : array of bool, shape (rows,)
+        Rows that must hold; others, such as those of drivers, are not looked at.
     order : int
         To which series go.
     """
@@ -53,19 +57,28 @@ class ReducedConstraints:
     free: Float[np.ndarray, "column k"]
     dependent: Float[np.ndarray, "row s"]
     inverse: Float[np.ndarray, "column row"]
+    held: Bool[np.ndarray, " row"]
     order: int
 
     @classmethod
     def at(
-        cls, model: Model, coordinates: Coordinates, jacobian: Float[np.ndarray, "row column"], order: int
+        cls,
+        model: Model,
+        coordinates: Coordinates,
+        jacobian: Float[np.ndarray, "row column"],
+        order: int,
+        held: Bool[np.ndarray, " row"] | None = None,
     ) -> "ReducedConstraints":
-        """Reduce the constraints at a position, where they have a scaled Jacobian."""
-        left, sizes, right = np.linalg.svd(jacobian)
+        """Reduce the constraints at a position, where they have a scaled Jacobian; of some rows alone where told."""
+        held = np.ones(len(jacobian), bool) if held is None else held
+        left, sizes, right = np.linalg.svd(jacobian[held])
         rank = int(np.sum(sizes > SINGULAR * sizes.max(initial=0.0)))
-        inverse = right[:rank].T @ (left[:, :rank] / sizes[:rank]).T
+        inverse, dependent = np.zeros(jacobian.shape[::-1]), np.zeros((len(jacobian), left.shape[1] - rank))
+        inverse[:, held] = right[:rank].T @ (left[:, :rank] / sizes[:rank]).T
+        dependent[held] = left[:, rank:]
         system = with_fields(model.system, outputs=(), forces=(), fronts=None)
         model = dataclasses.replace(model, system=system)
-        return cls(model, coordinates, right[rank:].T, left[:, rank:], inverse, order)
+        return cls(model, coordinates, right[rank:].T, dependent, inverse, held, order)
 
     def along(self, series: Float[np.ndarray, "lane order k"]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return what g is along series of y, without their coefficients of order 0, which are zero.
@@ -88,7 +101,7 @@ class ReducedConstraints:
             found = _along(
                 self.model.system,
                 self.coordinates,
-                (self.free, self.dependent, self.inverse),
+                (self.free, self.dependent, self.inverse, self.held.astype(float)),
                 np.moveaxis(filled, 0, -1),
                 pose_type=self.model.pose_type,
             )
@@ -115,12 +128,12 @@ class ReducedConstraints:
 def _along(
     system: System,
     coordinates: dict[str, Numbers],
-    bases: tuple[Float[Numbers, "column k"], Float[Numbers, "row s"], Float[Numbers, "column row"]],
+    bases: tuple[Numbers, Numbers, Numbers, Numbers],
     series: Float[Numbers, "order k lane"],
     *,
     pose_type: type[Pose],
 ) -> tuple[Any, Any, Any]:
-    free, dependent, inverse = bases
+    free, dependent, inverse, held = bases
     order, lanes = len(series), series.shape[-1]
     wide = {name: jnp.broadcast_to(x, (*x.shape[:-1], lanes)) for name, x in coordinates.items()}
     pose: Any = pose_at(wide, pose_type)
@@ -131,7 +144,7 @@ def _along(
         column = _product(free, series[k - 1]) - _product(inverse, rest)
         pose = pose.extended(*system.coordinates(column, pose.shifts))
         equations.append(_product(dependent.T, rest))
-        sizes.append(jnp.max(jnp.abs(rest), axis=0))
+        sizes.append(jnp.max(jnp.abs(rest) * held[:, None], axis=0))
         moved.append(column)
     return jnp.stack(equations), jnp.stack(sizes), jnp.stack(moved)
 

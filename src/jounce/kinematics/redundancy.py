@@ -13,6 +13,8 @@ from jaxtyping import Bool, Float
 
 from jounce.kinematics.host_jacobian import HostJacobian
 from jounce.kinematics.initial_turns import Coordinates, Mover
+from jounce.kinematics.mobility_series import ReducedConstraints
+from jounce.kinematics.tangent_cone import curves
 from jounce.mechanism import Model
 
 SWAYS = (0.1, 0.01)  # rad or sizes of the mechanism: how far a position in general is from the one assembled
@@ -20,6 +22,7 @@ POSITIONS = 3
 MOST_STEPS = 50
 OPEN = 1e-7  # part of a row in combinations that vanish: what is less is none
 KINDS = {"joints": "joint", "drivers": "driver", "initial": "initial condition"}
+CURVE_ORDER = 4  # to which curves are looked for that lead away from a singular position
 CLOSED = 1e-9  # rad or sizes of the mechanism, by which joints may be open at a position in general
 
 
@@ -133,6 +136,23 @@ def _nearby(model: Model, coordinates: Coordinates, jacobian: HostJacobian, move
             if there is not None:
                 found.append(there)
                 break
+    return found or _along_curves(model, coordinates, jacobian, joints, moved)
+
+
+def _along_curves(
+    model: Model, coordinates: Coordinates, jacobian: HostJacobian, joints: Bool[np.ndarray, " row"], moved: Mover
+) -> list[HostJacobian]:
+    """Return the Jacobians a little way along the curves that lead away from a singular position."""
+    if not joints.any() or jacobian.is_large:
+        return []
+    constraints = ReducedConstraints.at(model, coordinates, jacobian.dense(), CURVE_ORDER, joints)
+    going = [curve for curve in curves(constraints) if curve.order == CURVE_ORDER]
+    found = []
+    for curve in going:
+        coefficients = constraints.along(curve.series[None])[2][0]
+        sway = constraints.placed(coefficients, SWAYS[-1] ** (1.0 / curve.multiplicity))
+        there = closed_nearby(coordinates, sway, joints, moved)
+        found += [] if there is None else [there]
     return found
 
 
