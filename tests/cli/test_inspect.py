@@ -331,7 +331,9 @@ def test_reactions_that_are_not_unique_are_nan_and_told(run, tmp_path):
     for choice, open_ in (("unique", True), ("least_norm", False)):
         status, told, _ = run("run", path, "--redundant-reactions", choice, "--out", out, "--overwrite")
         assert status == 0
-        assert ("bearing: not unique, as constraints are redundant: joint D repeats 3" in " ".join(told.split())) == open_
+        assert (
+            "bearing: not unique, as constraints are redundant: joint D repeats 3" in " ".join(told.split())
+        ) == open_
         header, *lines = out.read_text().splitlines()
         table = {name: [line.split(",")[k] for line in lines] for k, name in enumerate(header.split(","))}
         for name, nan in (("bearing_x", open_), ("bearing_z", False), ("torque", False)):

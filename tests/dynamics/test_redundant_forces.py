@@ -154,6 +154,32 @@ def test_a_four_bar_of_hinges_in_space_has_the_forces_of_the_plane(law):
 
 
 @pytest.mark.slow
+def test_the_four_bar_knee_of_a_leg_has_the_torque_of_the_plane():
+    """A thigh, two cruciate links and a shank, all on hinges in space, the last of them a pin that closes the loop."""
+    law = f"0.7 + {overconstrained.LAW}"
+    flat = planar_twin("planar", law)
+    links = [jn.Link("base")]
+    for name, body in flat.bodies.items():
+        inertia = jn.Inertia(2.0, center_of_mass=[*body.center_of_mass, 0.0], tensor=[0.1, 0.2, body.inertia])
+        links.append(jn.Link(name, inertia))
+    joints = [
+        jn.Joint("A", "base", "crank"),
+        jn.Joint("B", "crank", "coupler", position=[1, 0, 0]),
+        jn.Joint("D", "base", "rocker", position=[2.5, 0, 0]),
+    ]
+    pin = jn.Closure("C", ("coupler", "rocker"), points=[[3, 0, 0], [2, 0, 0]], type="pin", axis=Z)
+    knee = jn.Robot("knee", links, joints, closures=[pin], gravity=[0, -9.81, 0])
+    borne, redundant = jn.robot.closure_wrenches(knee, {"A": 0.7, "B": 0.2, "D": 1.5})["C"]
+    assert (len(borne), len(redundant)) == (2, 3)
+    angles = dict(zip(("coupler", "rocker"), overconstrained.closing(1.0, 3.0, 2.5, 2.0, 0.7), strict=True))
+    start = {"A": 0.7, "B": float(angles["coupler"]) - 0.7, "D": float(angles["rocker"])}
+    times = [0.0, 0.4, 0.8]
+    moved = jn.solve(knee.mechanism(start, drivers={"A": law}, time=times), order=4)
+    expected = jn.driver_force(jn.solve(flat, times, order=4), "turn").values
+    np.testing.assert_allclose(jn.driver_force(moved, "A_drive").values, expected, rtol=1e-9)
+
+
+@pytest.mark.slow
 def test_a_bennett_linkage_swings_under_its_weight_and_keeps_its_energy():
     linkage = overconstrained.bennett(law="").mechanism
     bodies = {name: dataclasses.replace(body, inertia=[0.1, 0.2, 0.3]) for name, body in linkage.bodies.items()}

@@ -99,7 +99,7 @@ def sections(space):
             yield f"outputs.{tag}", {"outputs": {"one": entry}}
     for number, form in enumerate(body_forms(space)):
         yield f"body {number}", {"bodies": {"a": form, "b": {}, "c": {}}}
-    point = [0.0] * size
+    point = [0.4, 0.5, 0.6][:size]
     hinge = {"type": "revolute", "bodies": ["a", "b"], "points": [point, point]}
     hinge |= {} if space == "planar" else {"axes": [VECTORS["axis"]] * 2}
     reactions = {"one": {"force": 1e6, "torque": 1e4}}
