@@ -83,6 +83,7 @@ PICTURES = {
         module="own_joint.py",
         outline=("cam", pitch_curve),
     ),
+    "bennett": Picture(("B", "C"), 0.25, points={"B": ("BC", (0, 0, 0))}, view=(-60.0, 30.0)),
     "delta_robot": Picture(("platform",), 0.15, view=(-70.0, 18.0)),
     "double_cardan": Picture(("rim",), 0.1, view=(-70.0, 40.0)),
     "double_four_bar": Picture(("tip",), 0.25, stop=1.5),
@@ -102,6 +103,7 @@ PICTURES = {
     ),
     "flyball_governor": Picture(("ball",), 0.02, points={"ball": ("right", (1, 0, 0))}, view=(-70.0, 20.0)),
     "four_bar": Picture(("C",), 0.3),
+    "four_bar_in_space": Picture(("C",), 0.3, points={"C": ("rocker", (0.2031, 0, 0))}, view=(-75.0, 60.0)),
     "gear_pair": Picture(("C",), 0.2),
     "hooke_joint": Picture(("rim",), 0.1, view=(-70.0, 40.0)),
     "human_arm": robot(
@@ -132,6 +134,7 @@ PICTURES = {
     "rspu_slide": Picture(("B",), 0.2),
     "rssr": Picture(("B", "C"), 0.2, points={"B": ("crank", (0, 0.04, 0))}),
     "rsur": Picture(("B", "C"), 0.2),
+    "sarrus": Picture(("lift", "knee"), 0.3, points={"knee": ("upper_x", (0, 0, 0))}, view=(-50.0, 20.0)),
     "scara": robot("SCARA", "scara.urdf", "scara_pick.yaml", "spindle", (0, 0, 0.06), view=(-50.0, 25.0)),
     "scotch_yoke": Picture(("pin",), 0.2, points={"pin": ("crank", (0.04, 0))}),
     "screw_press": Picture(("tip",), 0.2),

@@ -83,7 +83,14 @@ from jounce.io import (
     write_mechanism as write_mechanism,
 )
 from jounce.jet import Jet as Jet, compose as compose
-from jounce.kinematics import Motion as Motion, Status as Status, solve as solve
+from jounce.kinematics import (
+    Branch as Branch,
+    Mobility as Mobility,
+    Motion as Motion,
+    Status as Status,
+    mobility as mobility,
+    solve as solve,
+)
 from jounce.mechanism import (
     AbstractOutput as AbstractOutput,
     AngleOutput as AngleOutput,

@@ -20,8 +20,9 @@ def inspect(
     Bodies, joints, degrees of freedom, and the assembly that a motion starts from.
 
     The exit status is 0 where a motion can start, 1 where the bodies
-    cannot be put together, equations are redundant, or bodies without
-    mass are left to move.
+    cannot be put together, the start is a singular position, or bodies
+    without mass are left to move. Redundant constraints that agree are
+    told: which joint repeats equations of which others.
 
     Parameters
     ----------

@@ -78,7 +78,12 @@ def slopes(element: AbstractConstraint, poses: Sequence[Pose], time: Jet, slot: 
     return jnp.moveaxis(jax.vmap(along)(jnp.eye(size)), 0, 1)
 
 
-def work_along(slope: Slope, forces: Multipliers, level: int) -> Float[Numbers, "coordinate instance batch"]:
+def work_along(
+    slope: Slope,
+    forces: Sequence[Float[Numbers, "row instance batch"]] | Multipliers,
+    level: int,
+    lowest: int = 0,
+) -> Float[Numbers, "coordinate instance batch"]:
     """Return the Taylor coefficient of what multipliers do along the coordinates of the bodies: slope times them.
 
     Parameters
@@ -89,8 +94,10 @@ def work_along(slope: Slope, forces: Multipliers, level: int) -> Float[Numbers, 
         Coefficients of the multipliers.
     level : int
         Which coefficient of the product.
+    lowest : int
+        The coefficients of the slope below this one are left out.
     """
-    return total(jnp.sum(slope[j] * forces[level - j][None], axis=1) for j in range(level + 1))
+    return total(jnp.sum(slope[j] * forces[level - j][None], axis=1) for j in range(lowest, level + 1))
 
 
 def balancing(mass: MassMatrix | None, jacobian: Jacobian) -> Callable[[Column], Float[Numbers, "row batch"]]:
@@ -136,12 +143,12 @@ def multipliers(
     def level(found: Any, wanted: Any) -> tuple[Any, Any]:
         """Find the next coefficient from those found, the latest first and zero before the lowest."""
         k, missing = wanted
-        for group, parts, forces in _by_group(system, blocks, found):
+        for group, parts, forces in by_group(system, blocks, found):
             for slot, slope in zip(group.moving_slots, parts, strict=True):
                 # what the order k does not need may not be finite
                 needed = [jnp.where(j <= k, slope[j], 0.0) for j in range(1, count)]
                 work = total(jnp.sum(c * f[None], axis=1) for c, f in zip(needed, forces, strict=True))
-                missing -= _onto_bodies(work, group.bodies[slot], system.body_count)
+                missing -= onto_bodies(work, group.bodies[slot], system.body_count)
         newest = solve(as_column(missing, scale)) * system.row_scale
         return [newest, *found[:-1]][: len(found)], newest
 
@@ -151,19 +158,26 @@ def multipliers(
 
 def _solver(system: System, blocks: Slopes, mass: BodyMatrices | None) -> Callable[[Any], Any]:
     """Return what solves for the multipliers of scaled rows: by the Jacobian alone where there are no masses."""
-    scale = jnp.asarray(system.column_scale)
-    flat = [(slope[0] * scale[:, None, None, None]).reshape(-1, slope.shape[-1]) for parts in blocks for slope in parts]
-    entries = jnp.concatenate(flat)
     if mass is None and system.fronts is not None:
-        return FrontalFactor.of(system.fronts, entries, system.row_scale).solve_transposed
-    jacobian = system.pattern.dense(entries) * system.row_scale[:, :, None]
+        return FrontalFactor.of(system.fronts, _entries(system, blocks), system.row_scale).solve_transposed
+    jacobian = jacobian_of(system, blocks)
     if mass is None:
         return balancing(None, jacobian)
-    whole = block_diagonal(mass, scale)
+    whole = block_diagonal(mass, jnp.asarray(system.column_scale))
     return balancing(whole / jnp.max(jnp.abs(whole)), jacobian)  # their size does not matter to the multipliers
 
 
-def _by_group(system: System, blocks: Slopes, found: list[Float[Numbers, "row batch"]]) -> list[Any]:
+def jacobian_of(system: System, blocks: Slopes) -> Jacobian:
+    """Return the scaled Jacobian from the slopes of all groups."""
+    return system.pattern.dense(_entries(system, blocks)) * system.row_scale[:, :, None]
+
+
+def _entries(system: System, blocks: Slopes) -> Float[Numbers, "entry batch"]:
+    scale = jnp.asarray(system.column_scale)[:, None, None, None]
+    return jnp.concatenate([(slope[0] * scale).reshape(-1, slope.shape[-1]) for parts in blocks for slope in parts])
+
+
+def by_group(system: System, blocks: Slopes, found: list[Float[Numbers, "row batch"]]) -> list[Any]:
     """Return groups with their blocks and those of the multipliers found so far, each (rows, instances, batch)."""
     if not found:
         return []
@@ -176,7 +190,7 @@ def _by_group(system: System, blocks: Slopes, found: list[Float[Numbers, "row ba
     return results
 
 
-def _onto_bodies(
+def onto_bodies(
     work: Float[Numbers, "coordinate instance batch"], bodies: tuple[int, ...], count: int
 ) -> Float[Numbers, "coordinate {count} batch"]:
     """Return what acts on each moving body from what acts on the bodies of the instances."""

@@ -12,9 +12,11 @@ from jounce.dynamics.masses import Masses, gravity_of, required_masses
 from jounce.dynamics.saddle_fronts import SaddleFronts
 from jounce.errors import AssemblyError, JounceError, MechanismError, MobilityError
 from jounce.jet import Jet
+from jounce.kinematics.advance import LARGEST_CONTRADICTION
 from jounce.kinematics.assembly import assemble, freely_moving
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.host_jacobian import RANK_TOLERANCE, HostJacobian, is_clearly_regular
+from jounce.kinematics.status import Status
 from jounce.mechanism import Mechanism, Model, build
 from jounce.mechanism.modules import with_fields
 from jounce.shapes import Numbers
@@ -62,15 +64,17 @@ def consistent_start(mechanism: Mechanism, instant: float) -> ConsistentStart:
         If a value is not valid, no body has a mass, one that can move has none, or a motion that is free would have
         negative kinetic energy.
     AssemblyError
-        If joints, drivers and initial conditions cannot all be fulfilled.
+        If joints, drivers and initial conditions cannot all be fulfilled, or redundant ones have other rates.
     MobilityError
-        If constraints or initial conditions are redundant.
+        If the start is a singular position.
     """
     masses = required_masses(mechanism, "the equations of motion")
     model, state = build(mechanism), None
     if mechanism.initial:
         whole, coordinates = _assembled(mechanism, instant)
-        state = with_rates(equations_of(mechanism, whole, masses), at_rest(whole, coordinates), np.array([[instant]]))
+        driven = equations_of(mechanism, whole, masses)
+        state = with_rates(driven, at_rest(whole, coordinates), np.array([[instant]]))
+        _check_rates(driven, whole, state, instant)
         system = with_fields(model.system, forces=whole.system.forces, outputs=whole.system.outputs)
         model = dataclasses.replace(
             model, guess=coordinates, system=system, prescribed=whole.prescribed, history=whole.history
@@ -81,6 +85,7 @@ def consistent_start(mechanism: Mechanism, instant: float) -> ConsistentStart:
     state = jax.tree.map(np.asarray, with_rates(equations, state, np.array([[instant]])))
     if not all(np.isfinite(part).all() for part in state):
         _explain(equations, model, state, instant)
+    _check_rates(equations, model, state, instant)
     return ConsistentStart(model, equations, state, _explain(equations, model, state, instant))
 
 
@@ -135,6 +140,24 @@ def at_rest(model: Model, coordinates: dict[str, np.ndarray]) -> State:
 def with_rates(equations: Equations, state: State, time: Instants) -> State:
     """Return the state with the least change of its velocities that fulfils the rates of all constraints."""
     return equations.with_rates(equations.factored(state, time), state, time)
+
+
+@compiled()
+def _rates(equations: Equations, state: State, time: Instants) -> Float[Numbers, "row 1"]:
+    """Return the rates of all rows."""
+    return equations.system.residual(equations.pose(state), Jet.variable(time, 1)).dense().coefficients[1]
+
+
+def _check_rates(equations: Equations, model: Model, state: State, instant: float) -> None:
+    """Raise AssemblyError, by name, where redundant rows contradict each other in their rates."""
+    if model.system.rank is None:
+        return
+    gaps = np.abs(np.asarray(_rates(equations, state, np.array([[instant]]))))[:, 0]
+    size = max(float(np.max(np.abs(state.velocity))) / model.length, float(np.max(np.abs(state.spin))))
+    if gaps.max() > LARGEST_CONTRADICTION * size:
+        names = dict.fromkeys(row for row, gap in zip(model.rows, gaps, strict=True) if gap > 0.1 * gaps.max())
+        message = f"redundant constraints contradict each other in their rates at t = {instant:g} s: {', '.join(names)}"
+        raise AssemblyError(f"{message}; correct the laws of those named", status=Status.INCONSISTENT)
 
 
 @compiled()

@@ -9,6 +9,9 @@ from jounce.dynamics.forward import Attitudes, Equations, Instants, Lanes, Matri
 from jounce.jet import Jet
 
 MOST_ITERATIONS = 10
+LARGEST_GAP = (
+    1e-9  # rad or sizes of the mechanism, that redundant constraints may leave: then they contradict each other
+)
 CLOSE = 4e-15  # so near to where the matrix was inverted, in the same unit, the inverse is the same but for rounding
 ROUNDING = 1e-15  # a correction this small, in rad or sizes of the mechanism, leaves nothing to correct
 
@@ -32,7 +35,8 @@ def projected(equations: Equations, state: State, time: Instants) -> tuple[State
     State
         With Euler parameters of unit length.
     distance : array of shape (batch,)
-        Size of the first correction of positions, rad or sizes of the mechanism; not finite where it failed.
+        Size of the first correction of positions, rad or sizes of the mechanism; not finite where it failed, or
+        redundant constraints contradict each other.
     inverse : array of shape (rows, rows, batch)
         Of the equations' matrix at this state, which `expand` takes.
     """
@@ -63,8 +67,11 @@ def projected(equations: Equations, state: State, time: Instants) -> tuple[State
     start = (position, attitude, equations.blank_factor(lanes), jnp.full(lanes, jnp.inf), jnp.zeros(lanes), 0, False)
     position, attitude, factor, last, first, *_ = jax.lax.while_loop(lambda carry: ~carry[-1], iterate, start)
     moving = equations.with_rates(factor, state._replace(position=position, attitude=attitude), time)
-    inverse = factor.inverse()
-    return moving, jnp.where(last <= 1e-9, first, jnp.inf), inverse
+    fulfilled = last <= 1e-9
+    if equations.system.rank is not None:
+        gap = equations.system.residual(equations.still(position, attitude), clock).coefficients[0]
+        fulfilled &= jnp.max(jnp.abs(gap), axis=0) <= LARGEST_GAP
+    return moving, jnp.where(fulfilled, first, jnp.inf), factor.inverse()
 
 
 def normalised(attitude: Attitudes) -> Attitudes:

@@ -90,7 +90,7 @@ def simulate(
     AssemblyError
         If joints, drivers and initial conditions contradict each other.
     MobilityError
-        If constraints are redundant.
+        If the start is a singular position.
     SolveError
         If the motion cannot be followed to an instant (with `strict`); it holds the motion up to there.
 

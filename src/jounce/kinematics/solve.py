@@ -49,7 +49,7 @@ def solve(
     Parameters
     ----------
     mechanism : Mechanism
-        Drivers and joints must leave no degree of freedom, and none may be redundant.
+        Drivers and joints must leave no degree of freedom; redundant ones must agree.
     time : array_like of shape (time,), optional
         Strictly increasing instants, s; those of the mechanism unless given.
     order : int, default 4
@@ -81,7 +81,7 @@ def solve(
     AssemblyError
         If the bodies cannot be put together at the first instant.
     MobilityError
-        If degrees of freedom are left, or constraints are redundant.
+        If degrees of freedom are left, or the start is a singular position.
     SolveError
         If the motion cannot be followed to an instant (with `strict`); it holds the motion up to there.
 

@@ -11,6 +11,7 @@ from jounce.display import Displayed
 from jounce.errors import ExpressionError, JounceError, MechanismError, check_name
 from jounce.forces import AbstractForce
 from jounce.mechanism.outputs import AbstractQuantity
+from jounce.mechanism.redundant_reactions import check_redundant_reactions
 from jounce.mechanism.resolve import parameter_value
 from jounce.rigid.inertia import Inertia
 from jounce.trajectory import Expression
@@ -111,6 +112,11 @@ class Mechanism(Displayed):
         Acceleration of free fall in the global frame, (2,) or (3,), m/s^2; zero unless given.
     time : array_like, optional
         The instants that `jounce.solve` takes when it is given none, s.
+    redundant_reactions : str or dict of str to dict, default "unique"
+        Which reactions to give where constraints are redundant: ``"unique"`` those that are, the others are NaN;
+        ``"least_norm"`` all, such that the sum of the squares of the forces of all constraint rows, and of their
+        couples over the size of the mechanism, is least; or those of elastic joints: by the name of a joint, its
+        stiffness ``force``, N/m, and ``torque``, N m/rad; what is not given is rigid.
     title : str, optional
         One line for tables and figures.
     dimensions : dict of str to tuple of Dimension, optional
@@ -147,6 +153,7 @@ class Mechanism(Displayed):
     parameters: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     gravity: Any = None
     time: Any = None
+    redundant_reactions: str | Mapping[str, Any] = "unique"
     title: str = ""
     dimensions: Mapping[str, tuple[Dimension, ...]] = dataclasses.field(default_factory=dict, compare=False, repr=False)
 
@@ -158,6 +165,7 @@ class Mechanism(Displayed):
         if GROUND in self.bodies:
             raise MechanismError("the body 'ground' always exists and never moves", name="bodies.ground")
         self._check_names()
+        check_redundant_reactions(self.redundant_reactions, (*self.joints, *self.drivers))
         for kind, elements in self.elements.items():
             for name, element in elements.items():
                 self._check_element(kind, name, element)

@@ -18,6 +18,7 @@ from jounce.io.mechanisms.unit_hints import warn_of_units
 from jounce.mechanism import AngularVelocityOutput, Body, Mechanism, PointOutput, TimeGrid, time_grid
 from jounce.mechanism.builder import starting_guess
 from jounce.mechanism.masses import body_mass
+from jounce.mechanism.redundant_reactions import resolved_reactions
 from jounce.mechanism.resolve import resolve, resolve_element
 from jounce.mechanism.system import POSITION_COMPONENTS
 from jounce.rigid.euler_parameters import euler_parameters
@@ -156,6 +157,7 @@ def _build(source: Source, space: str, model: dict[str, Any], places: _Places) -
         parameters=parameters,
         gravity=model["gravity"],
         time=TimeGrid(**_plain(model["time"])) if model["time"] is not None else None,
+        redundant_reactions=model["redundant_reactions"],
         title=model["title"],
         dimensions=model["dimensions"],
     )
@@ -265,6 +267,7 @@ def _check_values(mechanism: Mechanism) -> None:
         resolve(mechanism.gravity, parameters)
     except JounceError as error:
         raise error.located(name="gravity") from None
+    resolved_reactions(mechanism.redundant_reactions, parameters)
     if mechanism.time is not None:
         time_grid(mechanism.time, parameters)
 

@@ -18,7 +18,18 @@ from jounce.constraints.planar import COORDINATES
 from jounce.errors import no_such
 from jounce.io.mechanisms.inertia_forms import inertia
 from jounce.io.mechanisms.keys import HOLDERS, FileKey, file_keys, output_holder, output_tag, output_types
-from jounce.io.mechanisms.values import Checked, laws, motion, orientation, problem, scalar, vector, vectors, wrenches
+from jounce.io.mechanisms.values import (
+    Checked,
+    laws,
+    motion,
+    orientation,
+    problem,
+    redundant_reactions,
+    scalar,
+    vector,
+    vectors,
+    wrenches,
+)
 from jounce.mechanism.mechanism import names_column
 from jounce.mechanism.system import POSITION_COMPONENTS
 from jounce.rigid.orientation import FRAMES
@@ -212,6 +223,7 @@ def _file_model(space: str, joints: _Types, drivers: _Types, forces: _Types) -> 
         "forces": (_named(_constraint_union(space, "force", forces), _NAME), {}),
         "initial": (_named(_constraint_union(space, "driver", drivers), _NAME), {}),
         "outputs": (_named(_output_union(space), _NAME, _output_name), {}),
+        "redundant_reactions": (redundant_reactions(), "unique"),
         "time": (_model(f"{space}_time", "Instants from start to stop, by step or by count.", time), None),
     }
     return _model(f"{space}_mechanism", f"A {space} mechanism.", fields)

@@ -126,6 +126,8 @@ class _Writer:
                 found[section] = {name: self._element(section, name, x) for name, x in elements.items()}
         if mechanism.outputs:
             found["outputs"] = {name: self._output(name, x) for name, x in mechanism.outputs.items()}
+        if mechanism.redundant_reactions != "unique":
+            found["redundant_reactions"] = _plain(mechanism.redundant_reactions, "redundant_reactions")
         if mechanism.time is not None:
             found["time"] = _time(mechanism.time)
         return found, self.samples
