@@ -112,7 +112,7 @@ def _of_state_matrix(
     order = np.argsort(np.abs(values))
     moving = order[right.shape[1] + chains :]
     kept = moving[_upper(values[moving])]
-    found = _exactly_real(values[kept])
+    found = _without_rounding(values[kept])
     shapes = np.where(np.abs(np.imag(found)) > 0, vectors[:count, kept], _real(vectors[:count, kept]))
     return np.concatenate([np.zeros(right.shape[1]), found * rate]), np.concatenate([right, shapes], axis=1)
 
@@ -122,8 +122,11 @@ def _upper(values: Complex[np.ndarray, " value"]) -> Bool[np.ndarray, " value"]:
     return np.imag(values) >= -REAL * np.abs(values)
 
 
-def _exactly_real(values: Complex[np.ndarray, " value"]) -> Complex[np.ndarray, " value"]:
-    """Return eigenvalues, those that are real but for rounding without an imaginary part."""
+def _without_rounding(values: Complex[np.ndarray, " value"]) -> Complex[np.ndarray, " value"]:
+    """Return eigenvalues without real and imaginary parts that are rounding."""
+    fastest = np.abs(values).max(initial=0.0)
+    still = np.abs(np.real(values)) <= 8 * len(values) * EPSILON * fastest
+    values = np.where(still, 1j * np.imag(values), values)
     return np.where(np.abs(np.imag(values)) <= REAL * np.abs(values), np.real(values), values)
 
 

@@ -8,7 +8,10 @@ from jaxtyping import Complex, Float
 
 from jounce.display import Displayed
 from jounce.dynamics.eigenmodes import Eigenmodes, eigenmodes
+from jounce.dynamics.mode_motion import checked_amplitude, mode_motion
 from jounce.dynamics.reduction import COLUMNS, Reduction
+from jounce.errors import MechanismError, whole_number
+from jounce.kinematics import Motion
 
 
 class Modes(Displayed):
@@ -91,6 +94,41 @@ class Modes(Displayed):
         columns = (self._reduction.basis @ self.shapes).T.reshape(len(self), len(self.bodies), -1)
         energy = np.einsum("mbi,ijb,mbj->mb", columns.conj(), place.masses, columns).real
         return energy / energy.sum(axis=1, keepdims=True)
+
+    def motion(self, mode: int, amplitude: float = 0.1, *, duration: float | None = None, frames: int = 61) -> Motion:
+        """Return a mode as a motion to be looked at: one swing about the equilibrium, its joints closed.
+
+        Growth and decay are left out. It has the frames of an animation (`jounce.plot.animate`), and no derivatives.
+
+        Parameters
+        ----------
+        mode : int
+            Counted from 1, as in tables.
+        amplitude : float, default 0.1
+            Of the body that moves most, rad or sizes of the mechanism.
+        duration : float, optional
+            Of the swing, s: its period unless given, and 1 s where the mode does not swing.
+        frames : int, default 61
+            Instants, the last of which shows what the first does.
+
+        Raises
+        ------
+        MechanismError
+            If there is no such mode, a value is not valid, or it is a mode about a motion.
+        SolveError
+            If joints cannot be closed so far from the equilibrium.
+        """
+        k = whole_number("mode", mode, 1, len(self), error=MechanismError) - 1
+        count = whole_number("frames", frames, 2, 10_000, error=MechanismError)
+        place, amplitude = self._reduction.place, checked_amplitude(amplitude)
+        if place.clock[1].any():
+            raise MechanismError("modes about a motion cannot be shown, only those of an equilibrium", name="mode")
+        swings = abs(self.damped_frequencies[k])
+        period = 1.0 if not swings else 1.0 / swings
+        if duration is not None and not (isinstance(duration, int | float) and 0 < duration < np.inf):
+            raise MechanismError("must be greater than zero", name="duration", value=duration)
+        instants = np.linspace(0.0, period if duration is None else duration, count)
+        return mode_motion(self._reduction, self.shapes[:, k], amplitude, instants, f"mode {mode}")
 
     @property
     def rows(self) -> list[dict[str, Any]]:

@@ -285,7 +285,7 @@ def _start(mechanism: Mechanism, time: Any, without: Sequence[str], method: str)
     for name in without:
         check_name("driver", name, mechanism.drivers, MechanismError, name="without")
     drivers = {name: driver for name, driver in mechanism.drivers.items() if name not in without}
-    mechanism = dataclasses.replace(mechanism, drivers=drivers)
+    mechanism = dataclasses.replace(mechanism, drivers=drivers, outputs=_outputs_without(mechanism, drivers))
     check_loads(mechanism)
     instant = _instant(mechanism, time)
     check_laws(mechanism, np.array([instant]), 2, forces=True)
@@ -293,6 +293,22 @@ def _start(mechanism: Mechanism, time: Any, without: Sequence[str], method: str)
     place = placed(mechanism, model, coordinates, instant)
     check_forces(place)
     return place
+
+
+def _outputs_without(mechanism: Mechanism, drivers: dict[str, Any]) -> dict[str, Any]:
+    """Return the outputs that a mechanism has with some of its drivers: what a driver exerts goes with it."""
+    if len(drivers) == len(mechanism.drivers):
+        return dict(mechanism.outputs)
+    left = dataclasses.replace(mechanism, drivers=drivers, outputs={})
+
+    def fits(output: Any) -> bool:
+        try:
+            output.check(left)
+        except MechanismError:
+            return False
+        return True
+
+    return {name: output for name, output in mechanism.outputs.items() if fits(output)}
 
 
 def _instant(mechanism: Mechanism, time: Any) -> float:
