@@ -256,6 +256,16 @@ def _magnitudes(place: Place, basis: Float[np.ndarray, "column coordinate"]) -> 
     return [np.einsum("b,bi,bj->ij", weight, moved, moved) for weight in (load, mass * speed)]
 
 
+def with_joints(
+    found: Reduction, names: Sequence[str], extra: tuple[np.ndarray, np.ndarray] | None = None
+) -> Reduction:
+    """Return a reduction whose coordinates have the names of joints, with more inertia and damping of their drives."""
+    matrices = found.matrices.copy()
+    for level, part in zip((2, 1), extra or (), strict=False):
+        matrices[:, found.lanes(level)] += part
+    return dataclasses.replace(found, names=tuple(names), released=tuple(names), matrices=matrices)
+
+
 def null_space(jacobian: Float[np.ndarray, "row column"]) -> Float[np.ndarray, "column direction"]:
     """Return an orthonormal basis of the directions that a scaled Jacobian takes to zero."""
     if not len(jacobian):
@@ -267,6 +277,11 @@ def null_space(jacobian: Float[np.ndarray, "row column"]) -> Float[np.ndarray, "
 def column_names(place: Place) -> list[str]:
     """Return the names of the coordinates of all moving bodies."""
     return [f"{body}.{name}" for body in place.model.bodies for name in COLUMNS[place.mechanism.space]]
+
+
+def chosen_outputs(place: Place) -> tuple[str, ...]:
+    """Return outputs that together tell how all bodies move."""
+    return _chosen(place, place.free, True)
 
 
 def _chosen(place: Place, free: Float[np.ndarray, "column direction"], prefer_outputs: bool) -> tuple[str, ...]:

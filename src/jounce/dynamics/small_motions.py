@@ -10,7 +10,8 @@ from jounce.dynamics.kinks import kinked
 from jounce.dynamics.linearisation import Linearisation, named
 from jounce.dynamics.masses import gravity_of, masses_of, required_masses
 from jounce.dynamics.motion_values import cut
-from jounce.dynamics.reduction import Place, Reduction, reduced
+from jounce.dynamics.reduction import Place, Reduction, reduced, with_joints
+from jounce.dynamics.robot_states import DRIVE, through_state
 from jounce.dynamics.static_equilibrium import Equilibrium, equilibrium
 from jounce.dynamics.statics import BALANCED, Found, remains
 from jounce.dynamics.variations import clock_at
@@ -21,6 +22,7 @@ from jounce.mechanism import Mechanism
 from jounce.mechanism.axis_angles import at_lanes
 from jounce.mechanism.modules import with_fields
 from jounce.mechanism.preconditions import concrete
+from jounce.robot import Robot
 
 INSTANT = 1e-9  # of the time between the ends of a motion: an instant as near to one of its own is that one
 
@@ -32,6 +34,8 @@ def linearise(
     *,
     coordinates: Sequence[str] | None = None,
     release: Sequence[str] = (),
+    q: Any = None,
+    drives: bool = False,
 ) -> Linearisation:
     """Return the equations of small motions of a mechanism: mass, damping and stiffness matrix, state space, modes.
 
@@ -40,8 +44,10 @@ def linearise(
 
     Parameters
     ----------
-    subject : Mechanism, Equilibrium, Motion or Simulation
-        A mechanism is taken in its `jounce.equilibrium`. All bodies that can move need masses.
+    subject : Mechanism, Equilibrium, Motion, Simulation or Robot
+        A mechanism is taken in its `jounce.equilibrium`. All bodies that can move need masses. A robot, with loops or
+        without, is taken as it moves through the state q under the torques that this needs: its coordinates are those
+        of its joints, its inputs what they exert beside these torques.
     time : float, optional
         The instant, s: at which a mechanism is held, as for `jounce.equilibrium`; of a simulation, any that it has
         reached; of another motion, one of its own.
@@ -53,6 +59,10 @@ def linearise(
     release : sequence of str, optional
         Drivers that do not hold in small motions: their force stays as it is, their coordinates are the first of the
         coordinates, and what they exert beside that force are the first inputs.
+    q : array_like of shape (n,), or (k, n) with k to 3, or dict of str to float, optional
+        Of a robot: coordinates, their rates and second derivatives; zero unless given.
+    drives : bool, default False
+        Of a robot: count the viscous damping and, of one without loops, the armature inertia of the joints.
 
     Returns
     -------
@@ -77,6 +87,10 @@ def linearise(
     (('upper.angle', 'lower.angle'), [0.585786437627, 3.414213562373])
     """
     about = None
+    if isinstance(subject, Robot):
+        return _of_robot(subject, q, coordinates, drives)
+    if q is not None:
+        raise MechanismError("is for robots; a mechanism has its own guess", name="q")
     if isinstance(subject, Mechanism):
         required_masses(subject, "small motions")
         subject = equilibrium(subject, time)
@@ -95,9 +109,24 @@ def linearise(
     for name in released:
         check_name("driver", name, place.mechanism.drivers, MechanismError, name="release")
     _check_free(place, about, released)
-    reduction = reduced(place, None if coordinates is None else named("coordinates", coordinates), released)
+    wanted = None if coordinates is None else named("coordinates", coordinates)
+    reduction = reduced(place, wanted, released, prefer_outputs=about is not None and about.of_robot)
     _check(reduction)
     return Linearisation(reduction, about)
+
+
+def _of_robot(robot: Robot, q: Any, coordinates: Sequence[str] | None, drives: bool) -> Linearisation:
+    """Return the equations of small motions of a robot about a state, in the coordinates of its joints."""
+    wanted = None if coordinates is None else named("coordinates", coordinates)
+    motion, names = through_state(robot, q, wanted, drives and bool(robot.closures))
+    place = place_along(motion, 0.0)
+    found = reduced(place, released=[name + DRIVE for name in names], drivers=False)
+    extra = None
+    if drives and not robot.closures:
+        chosen = [robot.joint_names.index(name) for name in names]
+        extra = np.diag(robot.tree.armature[chosen]), np.diag(robot.tree.damping[chosen])
+    _check(found)
+    return Linearisation(with_joints(found, names, extra), None)
 
 
 def place_along(motion: Motion, time: Any) -> Place:

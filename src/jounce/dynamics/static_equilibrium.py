@@ -1,7 +1,7 @@
 """Positions in which a mechanism stands still under its forces, and whether it stays there."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -10,6 +10,7 @@ import numpy as np
 from jounce.display import Displayed
 from jounce.dynamics.masses import check_loads
 from jounce.dynamics.reduction import Place, Reduction, reduced
+from jounce.dynamics.robot_states import standing
 from jounce.dynamics.stability import Verdict, judged
 from jounce.dynamics.start import TOLERANCE
 from jounce.dynamics.statics import Found, check_forces, placed, remains, search
@@ -20,6 +21,7 @@ from jounce.kinematics.motion import output_series
 from jounce.mechanism import Body, Mechanism, build, check_mechanism, time_grid
 from jounce.mechanism.law_checks import check_laws
 from jounce.mechanism.preconditions import concrete
+from jounce.robot import Robot
 
 METHODS = ("settle", "newton")
 SAME = 1e-6  # rad or sizes of the mechanism: positions as near count as one
@@ -45,12 +47,14 @@ class Equilibrium(Displayed):
         Why, in words.
     singular : bool
         Whether joints can move there that cannot elsewhere, so that small motions are not told by linear equations.
+    of_robot : bool
+        Whether it is that of a robot, whose small motions are told by its joints.
     cautions : tuple of str
         What was left out of account.
     """
 
-    def __init__(self, found: Place, singular: bool):
-        self.place = found
+    def __init__(self, found: Place, singular: bool, *, of_robot: bool = False):
+        self.place, self.of_robot = found, of_robot
         self.mechanism, self.time = found.mechanism, float(found.clock[0, 0, 0])
         self.singular = singular
 
@@ -105,7 +109,7 @@ class Equilibrium(Displayed):
 
     @cached_property
     def _reduction(self) -> Reduction:
-        return reduced(self.place, drivers=False)
+        return reduced(self.place, drivers=False, prefer_outputs=self.of_robot)
 
     @cached_property
     def _verdict(self) -> Verdict:
@@ -165,7 +169,14 @@ def _posed(body: Body, pose: dict[str, Any]) -> Body:
 
 @concrete
 def equilibrium(
-    mechanism: Mechanism, time: Any = None, *, without: Sequence[str] = (), method: str = "settle"
+    mechanism: Any,
+    time: Any = None,
+    *,
+    without: Sequence[str] = (),
+    method: str = "settle",
+    q: Any = None,
+    hold: str | Sequence[str] = (),
+    torques: Mapping[str, float] | None = None,
 ) -> Equilibrium:
     """Return a position in which a mechanism stands still under its forces, and whether it is stable.
 
@@ -174,9 +185,10 @@ def equilibrium(
 
     Parameters
     ----------
-    mechanism : Mechanism
+    mechanism : Mechanism or Robot
         With masses or applied forces. The search begins where its bodies can be put together nearest to their starting
-        guess.
+        guess. A robot, with loops or without, is taken as the mechanism that it is (`Robot.mechanism`), whose outputs
+        are the coordinates of its joints.
     time : float, optional
         The instant, s; the first of the mechanism unless given, 0 if it has none.
     without : sequence of str, optional
@@ -184,6 +196,12 @@ def equilibrium(
     method : {"settle", "newton"}, default "settle"
         To settle, the bodies creep where the forces do work, until they rest: what is found is stable, unless the
         search begins on another equilibrium. Newton's method goes to any equilibrium nearby.
+    q : array_like of shape (n,) or dict of str to float, optional
+        Of a robot: coordinates from which the search begins, and at which joints are held.
+    hold : sequence of str, or "all", optional
+        Of a robot: joints that are held. ``jn.driver_force(found.motion, "JOINT_drive")`` is the torque that it takes.
+    torques : dict of str to float, optional
+        Of a robot: constant torques, N m, or forces, N, of joints that are not held.
 
     Returns
     -------
@@ -208,6 +226,13 @@ def equilibrium(
     >>> round(float(hanging.outputs["place"][1]), 12), hanging.stability
     (-1.0, 'stable')
     """
+    robot = isinstance(mechanism, Robot)
+    if robot:
+        mechanism = standing(mechanism, q, hold, torques)
+    elif (given := {"q": q, "hold": hold or None, "torques": torques}) and (
+        unfit := [k for k, v in given.items() if v is not None]
+    ):
+        raise MechanismError("is for robots; a mechanism has its own guess, drivers and forces", name=unfit[0])
     start = _start(mechanism, time, without, method)
     found = search(start, settle=method == "settle")
     if not found.balanced and method == "settle":
@@ -218,7 +243,7 @@ def equilibrium(
             "by nothing; check forces and gravity, hold what is driven, or guess the bodies nearer to it"
         )
         raise SolveError(message, status=Status.NOT_CONVERGED)
-    return _told(found, start)
+    return _told(found, start, of_robot=robot)
 
 
 @concrete
@@ -324,13 +349,10 @@ def _instant(mechanism: Mechanism, time: Any) -> float:
     return found
 
 
-def _told(found: Found, start: Place) -> Equilibrium:
+def _told(found: Found, start: Place, *, of_robot: bool = False) -> Equilibrium:
     """Return the result; a position in which the constraints hold less than they do elsewhere is singular."""
-    return Equilibrium(found.place, singular=found.place.free.shape[1] > _mobility(found.place, start))
-
-
-def _mobility(place: Place, start: Place) -> int:
-    return min(place.free.shape[1], start.free.shape[1])
+    singular = found.place.free.shape[1] > start.free.shape[1]
+    return Equilibrium(found.place, singular, of_robot=of_robot)
 
 
 def _random_place(start: Place, random: np.random.Generator) -> Place | None:
