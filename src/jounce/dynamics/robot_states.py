@@ -6,12 +6,11 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from jounce.dynamics.reduction import chosen_outputs
+from jounce.dynamics.reduction import Place, chosen_outputs
 from jounce.dynamics.start import TOLERANCE
-from jounce.dynamics.statics import placed
+from jounce.dynamics.statics import driven, placed
 from jounce.errors import RobotError, check_name
 from jounce.forces.actuators import SlideForce, SpatialTorque
-from jounce.kinematics import Motion, solve
 from jounce.kinematics.assembly import assemble
 from jounce.mechanism import Mechanism, build
 from jounce.robot import Robot
@@ -60,8 +59,8 @@ def standing(robot: Robot, q: GivenCoordinates, hold: Any, torques: Mapping[str,
 
 def through_state(
     robot: Robot, state: Any, coordinates: Sequence[str] | None, drives: bool
-) -> tuple[Motion, tuple[str, ...]]:
-    """Return the motion of a robot through a state, driven in independent joints, and their names.
+) -> tuple[Place, tuple[str, ...]]:
+    """Return a robot in a state, driven in independent joints, and their names.
 
     Parameters
     ----------
@@ -89,7 +88,8 @@ def through_state(
     series = zip(names, (levels[:, places] * [[1.0], [1.0], [0.5]]).T.tolist(), strict=True)
     laws = {name: f"{value!r} + {rate!r}*t + {half!r}*t**2" for name, (value, rate, half) in series}
     mechanism = robot.mechanism(levels[0], drivers=laws, time=[0.0], drives=drives)
-    return solve(mechanism, [0.0], order=2), names
+    model, found = assemble(build(mechanism), 0.0, TOLERANCE)
+    return driven(placed(mechanism, model, found, 0.0)), names
 
 
 def _levels(robot: Robot, state: Any) -> Float[np.ndarray, "3 joint"]:

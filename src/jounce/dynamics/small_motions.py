@@ -118,8 +118,7 @@ def linearise(
 def _of_robot(robot: Robot, q: Any, coordinates: Sequence[str] | None, drives: bool) -> Linearisation:
     """Return the equations of small motions of a robot about a state, in the coordinates of its joints."""
     wanted = None if coordinates is None else named("coordinates", coordinates)
-    motion, names = through_state(robot, q, wanted, drives and bool(robot.closures))
-    place = place_along(motion, 0.0)
+    place, names = through_state(robot, q, wanted, drives and bool(robot.closures))
     found = reduced(place, released=[name + DRIVE for name in names], drivers=False)
     extra = None
     if drives and not robot.closures:

@@ -12,12 +12,13 @@ from jounce.dynamics.inverse import force_names
 from jounce.dynamics.masses import gravity_of, masses_of
 from jounce.dynamics.reduction import Place
 from jounce.dynamics.start import TOLERANCE
-from jounce.dynamics.variations import LEVELS, at_rest, clock_at, sizes_of_forces
+from jounce.dynamics.variations import LEVELS, at_rest, clock_at, residuals_at, sizes_of_forces
 from jounce.errors import SolveError
 from jounce.jet import Jet
 from jounce.kinematics import Status
 from jounce.kinematics.assembly import put_together
 from jounce.kinematics.compilation import compiled
+from jounce.kinematics.host_jacobian import RANK_TOLERANCE
 from jounce.kinematics.initial_turns import Coordinates
 from jounce.mechanism import Mechanism, Model
 from jounce.mechanism.builder import pose_at, with_reference
@@ -57,6 +58,22 @@ def placed(mechanism: Mechanism, model: Model, coordinates: Coordinates, instant
     system = with_fields(model.system, outputs=())
     equations = Equations(system, masses_of(mechanism), gravity_of(mechanism), 1.0, model.pose_type)
     return Place(mechanism, model, equations, at_rest(coordinates), clock_at(instant, held=True))
+
+
+def driven(place: Place) -> Place:
+    """Return a mechanism that its drivers hold whole with the velocities and accelerations that their laws give."""
+    instant, coordinates = float(place.clock[0, 0, 0]), {name: x.copy() for name, x in place.coordinates.items()}
+    clock, shifts = clock_at(instant, held=False), place.model.pose_type.shifts
+    for level in (1, 2):  # the residual of each order is affine in the coordinates of that order
+        gaps = np.asarray(residuals_at(place.equations, coordinates, clock))[level]
+        column = np.linalg.lstsq(place.jacobian, -gaps, rcond=RANK_TOLERANCE)[0]
+        change = place.changes(column[None, :, None])[0]
+        coordinates["position"][level] = change[:shifts]
+        if "angle" in coordinates:
+            coordinates["angle"][level] = change[shifts]
+        else:
+            coordinates["angular_velocity"][level - 1] = level * change[shifts:]
+    return dataclasses.replace(place, coordinates=coordinates, clock=clock)
 
 
 def search(start: Place, *, settle: bool) -> Found:

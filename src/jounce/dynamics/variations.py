@@ -169,6 +169,13 @@ def sizes_of_forces(
 
 
 @compiled()
+def residuals_at(equations: Equations, coordinates: Coordinates, clock: Clock) -> Float[Numbers, "level row"]:
+    """Return the Taylor coefficients of the scaled residuals in a motion."""
+    pose, time = _moving(equations, coordinates), Jet(tuple(clock))
+    return stacked(equations.system.residual(pose, time))[..., 0]
+
+
+@compiled()
 def masses_at(equations: Equations, coordinates: Coordinates) -> Float[Numbers, "coordinate coordinate body"]:
     """Return the mass matrix of each moving body, about the origin of its frame."""
     return mass_matrices(_moving(equations, coordinates).truncate(0), equations.masses)[:, :, 1:, 0]
