@@ -60,6 +60,15 @@ def test_a_driver_is_left_out_or_released(run):
     assert json.loads(printed)["coordinates"] == ["motor"]
 
 
+@pytest.mark.slow
+def test_a_robot_hangs_and_swings(run):
+    status, printed, err = run("modes", EXAMPLES / "robots" / "planar_arm.xml", "--hold", "ram", "--json")
+    assert (status, err) == (0, "")
+    found = json.loads(printed)
+    assert found["coordinates"] == ["shoulder", "elbow"]
+    assert len(found["modes"]) == 2
+
+
 def test_bad_input_is_named(run):
     for arguments, told in (
         ((EXAMPLES / "press.yaml",), "release it (motor)"),
@@ -69,6 +78,9 @@ def test_bad_input_is_named(run):
         ((PENDULUM, "--mode", "3", "--animation", "a.gif"), "--mode"),
         ((PENDULUM, "--out", "modes.nc"), ".csv"),
         ((EXAMPLES / "none.yaml",), "none.yaml"),
+        ((PENDULUM, "--hold", "A"), "--hold"),
+        ((EXAMPLES / "robots" / "planar_arm.xml", "--hold", "wrist"), "--hold"),
+        ((EXAMPLES / "robots" / "planar_arm.xml", "--without", "ram"), "--without"),
     ):
         status, _, err = run("modes", *arguments)
         assert status == 2, arguments

@@ -11,6 +11,7 @@ import jounce as jn
 from jounce import forces, planar
 from jounce.errors import MechanismError, MobilityError
 from tests.oracles.mp_small_motions import SprungFourBar
+from tests.problems.massed import massed_example
 from tests.problems.mechanisms import example
 from tests.problems.small_motions import (
     chain,
@@ -321,3 +322,21 @@ def test_massless_bodies_are_named():
     with pytest.raises(MechanismError, match="no body has a mass; small motions need some"):
         jn.linearise(bare)
     assert jn.equilibrium(bare).stability == "indifferent"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["four_bar", "six_bar_watt", "klann_leg"])
+def test_stiffness_and_mass_of_a_linkage_are_the_slopes_of_its_energies_along_its_driver(name):
+    mechanism = massed_example(name)
+    rest = jn.equilibrium(mechanism, without=list(mechanism.drivers))
+    small = jn.linearise(rest, coordinates=["crank.angle"])
+    angle = float(rest.poses["crank"]["angle"])
+    drive = jn.drivers.CoordinateDriver(("ground", "crank"), "angle", f"{angle!r} + t")
+    driven = dataclasses.replace(rest.placed, drivers={"drive": drive}, outputs={}, time=None)
+    motion = jn.solve(driven, [0.0], order=4)
+    potential = jn.potential_energy(motion).values.ravel()
+    kinetic = float(jn.kinetic_energy(motion).total[0, 0])
+    assert abs(potential[1]) < 1e-12 * abs(potential[2])
+    assert small.stiffness[0, 0] == pytest.approx(potential[2], rel=1e-11)
+    assert small.mass[0, 0] == pytest.approx(2 * kinetic, rel=1e-12)
+    assert rest.stability == ("stable" if potential[2] > 0 else "unstable")

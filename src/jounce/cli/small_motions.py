@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
+from jounce.cli.arguments import check_ending
+from jounce.cli.file_kinds import expecting
 from jounce.cli.options import (
     PLAIN_MECHANISM,
     MechanismReading,
     Overwrite,
+    RobotReading,
     errors_about,
     spare_inputs,
     tell,
@@ -19,7 +22,7 @@ from jounce.cli.options import (
 from jounce.errors import JounceError
 from jounce.reporting.terminal import Bar, say, show_table
 
-OPTIONS = ("time", "without", "release", "coordinates", "method", "mode", "amplitude")
+OPTIONS = ("time", "without", "hold", "release", "coordinates", "method", "mode", "amplitude")
 
 
 def modes(
@@ -29,6 +32,7 @@ def modes(
     time: float | None = None,
     method: Literal["settle", "newton"] = "settle",
     without: list[str] | None = None,
+    hold: list[str] | None = None,
     release: list[str] | None = None,
     coordinate: list[str] | None = None,
     out: Path | None = None,
@@ -47,13 +51,15 @@ def modes(
     Parameters
     ----------
     file
-        Mechanism file with masses: .yaml, .yml, .toml or .json.
+        Mechanism file with masses, or robot file: .urdf, .xml or .sdf.
     time
         Instant at which laws are held, s [default: the first].
     method
         settle goes where forces do work, newton to any equilibrium.
     without
         Driver that is left out; repeatable.
+    hold
+        Joint of a robot that is held, or all; repeatable.
     release
         Driver whose force stays instead of its motion; repeatable.
     coordinate
@@ -75,6 +81,7 @@ def modes(
     --------
       jounce modes examples/sprung_four_bar.yaml
       jounce modes examples/press.yaml --without motor --json
+      jounce modes examples/robots/planar_arm.xml
       jounce modes examples/double_pendulum.yaml --animation second.gif \
         --mode 2
     """
@@ -87,25 +94,25 @@ def modes(
         from jounce.plot import check_animation
 
         check_animation(animation, overwrite=overwrite)
-    mechanism = reading.mechanism(file)
+    subject, settings = _subject(file, reading, without or (), hold or ())
     for target in (out, animation):
         spare_inputs(target, overwrite=overwrite)
     from jounce.dynamics import equilibrium, linearise
 
     with _errors_about(file):
-        rest = equilibrium(mechanism, time, without=without or (), method=method)
+        rest = equilibrium(subject, time, method=method, **settings)
         small = linearise(rest, coordinates=coordinate, release=release or ())
         found = small.modes
         facts = modes_facts(small, file, without or [])
         moved = None if animation is None else found.motion(mode, amplitude)
     if not json:
-        say(f"{mechanism.title or file.name}\n{equilibrium_words(facts['equilibrium'])}\n")
+        say(f"{rest.mechanism.title or file.name}\n{equilibrium_words(facts['equilibrium'])}\n")
         for table in (*equilibrium_tables(rest), modes_table(found)):
             show_table(table)
     if out is not None:
         from jounce.reporting.modes_facts import write_modes
 
-        written(lambda: write_modes(found, mechanism.space, out, overwrite=overwrite))
+        written(lambda: write_modes(found, rest.mechanism.space, out, overwrite=overwrite))
     if moved is not None and animation is not None:
         from jounce.plot import animate
 
@@ -116,6 +123,22 @@ def modes(
             say(f"\nMode {mode} is in {animation}, {_slowly(span)}")
     tell("modes", lambda: {**facts, "written": out}, out, json=json)
     return 0
+
+
+def _subject(file: Path, reading: MechanismReading, without: Sequence[str], hold: Sequence[str]) -> tuple[Any, Any]:
+    """Return the mechanism or the robot of a file, and what is left out or held of it."""
+    from jounce.io.files import DATA_FILES, ROBOT_FILES
+
+    with expecting(file, "mechanism", "robot"):
+        check_ending(file, (*DATA_FILES, *ROBOT_FILES))
+    if file.suffix.lower() not in ROBOT_FILES:
+        if hold:
+            raise JounceError("is for robot files; drivers hold a mechanism", name="--hold")
+        return reading.mechanism(file), {"without": without}
+    if without or reading.set_:
+        raise JounceError("is for mechanism files; a robot file has none", name="--without" if without else "--set")
+    robot = RobotReading(allow=reading.allow).robot(file)
+    return robot, {"hold": "all" if list(hold) == ["all"] else hold}
 
 
 def _slowly(period: float) -> str:
