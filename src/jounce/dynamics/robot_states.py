@@ -95,16 +95,11 @@ def through_state(
 def _levels(robot: Robot, state: Any) -> Float[np.ndarray, "3 joint"]:
     """Return coordinates, rates and second derivatives, zero where they are not given."""
     count = len(robot.joint_names)
-    given = (
-        robot.coordinates(**state)
-        if isinstance(state, Mapping)
-        else floats("q", np.zeros(count) if state is None else state)
-    )
-    given = np.atleast_2d(np.asarray(given))
+    values = robot.coordinates(**state) if isinstance(state, Mapping) else np.zeros(count) if state is None else state
+    given = np.atleast_2d(np.asarray(floats("q", values)))
     if given.ndim != 2 or given.shape[1] != count or not 1 <= len(given) <= 3:
-        message = (
-            f"must have the shape (n,), or (k, n) with q, q' and q'' for k to 3, n = {count}, not {np.shape(state)}"
-        )
+        shown = f"not {given.shape if len(given) > 1 else given.shape[1:]}"
+        message = f"must have the shape (n,), or (k, n) with q, q' and q'' for k to 3, n = {count}, {shown}"
         raise RobotError(message, name="q")
     if not np.isfinite(given).all():
         raise RobotError("must be finite", name="q")

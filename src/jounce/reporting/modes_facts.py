@@ -90,8 +90,9 @@ def equilibrium_words(facts: EquilibriumFacts) -> str:
 def equilibrium_tables(rest: Equilibrium) -> list[Table]:
     """Return where the bodies stand, and the values of the outputs."""
     attitude = "angle/rad" if rest.mechanism.space == "planar" else "quaternion"
+    key = "angle" if rest.mechanism.space == "planar" else "orientation"
     bodies = [
-        [name, vector(pose["position"].tolist()), vector(np.ravel(pose.get("angle", pose.get("orientation"))).tolist())]
+        [name, vector(pose["position"].tolist()), vector(np.ravel(pose[key]).tolist())]
         for name, pose in rest.poses.items()
     ]
     outputs = [
