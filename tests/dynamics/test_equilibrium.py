@@ -7,7 +7,7 @@ import pytest
 
 import jounce as jn
 from jounce import forces, planar
-from jounce.errors import MechanismError, SolveError
+from jounce.errors import MechanismError, MobilityError, SolveError
 from tests.oracles.mp_small_motions import SprungFourBar
 from tests.problems.mechanisms import example
 from tests.problems.small_motions import column, hanging_chain, sprung_four_bar
@@ -184,16 +184,28 @@ def test_a_simulation_from_the_placed_mechanism_stays_there():
 
 
 @pytest.mark.slow
-def test_a_singular_position_is_told_and_not_linearised():
-    links = {"a": jn.Body([0, 0], mass=1.0, inertia=0.1), "b": jn.Body([1, 0], mass=1.0, inertia=0.1)}
-    joints = {
-        "A": planar.Revolute(("ground", "a"), [0, 0], [0, 0]),
-        "B": planar.Revolute(("a", "b"), [1, 0], [0, 0]),
-        "slot": planar.Parallel2(("ground", "b"), [0, 0], [0.5, 0], [1, 0]),
-    }
-    chain = jn.Mechanism(
-        space="planar", bodies=links, joints=joints, forces={"t": forces.TorsionalSpring(("a", "b"), 2.0)}
+def test_a_change_point_is_told_as_singular_and_not_linearised():
+    # a parallelogram that hangs along its base, where it may turn into its crossed form
+    body = {"mass": 1.0, "inertia": 0.1}
+    place = [np.cos(0.7), np.sin(0.7)]
+    parallelogram = jn.Mechanism(
+        space="planar",
+        gravity=[9.81, 0],
+        bodies={
+            "a": jn.Body([0, 0], angle=0.7, center_of_mass=[0.5, 0], **body),
+            "b": jn.Body(place, center_of_mass=[1, 0], **body),
+            "c": jn.Body([2, 0], angle=0.7, center_of_mass=[0.5, 0], **body),
+        },
+        joints={
+            "A": planar.Revolute(("ground", "a"), [0, 0], [0, 0]),
+            "B": planar.Revolute(("a", "b"), [1, 0], [0, 0]),
+            "C": planar.Revolute(("b", "c"), [2, 0], [1, 0]),
+            "D": planar.Revolute(("ground", "c"), [2, 0], [0, 0]),
+        },
     )
-    found = jn.equilibrium(chain)
-    assert found.degrees_of_freedom == 1
-    assert found.stability == "stable"
+    found = jn.equilibrium(parallelogram)
+    assert found.singular
+    assert (found.stability, found.stable) == ("undetermined", None)
+    assert np.allclose([pose["angle"] for pose in found.poses.values()], 0.0, atol=1e-9)
+    with pytest.raises(MobilityError, match="the position is singular"):
+        jn.linearise(found)
