@@ -1,0 +1,101 @@
+"""From a mechanism to its curve of configurations."""
+
+import numbers
+from typing import Any
+
+import numpy as np
+
+from jounce.errors import MechanismError
+from jounce.kinematics.curves.curve import Curve
+from jounce.kinematics.curves.path import End, Path, walk
+from jounce.kinematics.curves.start import Freed, begun, first_instant, freed
+from jounce.kinematics.curves.walker import Place, Walker
+from jounce.mechanism import Mechanism, check_mechanism
+from jounce.mechanism.preconditions import concrete
+
+HIGHEST_ORDER = 8  # of derivatives with respect to arc length: those above are worse than rounding between the places
+FIRST_STEP = 2e-3  # from a change point along another branch
+
+
+@concrete
+def trace(
+    mechanism: Mechanism,
+    time: float | None = None,
+    *,
+    driver: str | None = None,
+    order: int = 2,
+    count: int = 361,
+    length: float = 200.0,
+) -> Curve:
+    """Return the whole curve of configurations of a mechanism, through the dead points of its driver.
+
+    The law of one driver is replaced by an unknown value, and the curve is followed by its arc length: forward, as the
+    value grows at first, until it is closed, or else to both its ends.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        Driven, or of one degree of freedom; joints may repeat equations of others.
+    time : float, optional
+        Instant of the start, at which all other drivers are held, s; the first of the mechanism's own unless given.
+    driver : str, optional
+        Whose value is free, where there are several; ``"time"`` for the instant, while all drivers follow their laws.
+    order : int, default 2
+        Highest derivative of the outputs with respect to arc length, up to 8.
+    count : int, default 361
+        Number of points, evenly spaced in arc length; limit positions and change points are added to them.
+    length : float, default 200
+        Largest arc length, rad or sizes of the mechanism, to either side: not every curve is closed.
+
+    Returns
+    -------
+    Curve
+        With its limit positions, change points, branches, and outputs along it.
+
+    Raises
+    ------
+    MechanismError
+        If the mechanism or an option is not valid, or it is not said which of several drivers is free.
+    AssemblyError
+        If the bodies cannot be put together at the start.
+    MobilityError
+        If there is more than one degree of freedom with the driver free, or none.
+    SingularityError
+        If the start is a change point.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> curve = jn.trace(jn.load("examples/four_bar.yaml").with_parameters(AB="15 cm"))
+    >>> curve.closed, [round(x.value, 6) for x in curve.limits]
+    (True, [...])
+    """
+    check_mechanism(mechanism)
+    _check_number("order", order, 0, HIGHEST_ORDER, whole=True)
+    _check_number("count", count, 2, 10**7, whole=True)
+    _check_number("length", length, 1e-6, 1e6)
+    if time is not None:
+        _check_number("time", time, -np.inf, np.inf)
+    instant = first_instant(mechanism) if time is None else float(time)
+    free = freed(mechanism, instant, driver)
+    walker, start = begun(free)
+    return followed(mechanism, free, walker, start, order=order, count=count, length=length)
+
+
+def followed(mechanism: Mechanism, free: Freed, walker: Walker, start: Place, **options: Any) -> Curve:
+    """Return the curve through a place, to both sides if it is not closed."""
+    length = options["length"]
+    forward = walk(walker, start, length)
+    backward: Path | None = None
+    if forward.end is not End.CLOSED:
+        backward = walk(walker, start.reversed(), length)
+    return Curve(mechanism, free, walker, (forward, backward), options["order"], options["count"])
+
+
+def _check_number(name: str, value: Any, least: float, most: float, *, whole: bool = False) -> None:
+    kind = numbers.Integral if whole else numbers.Real
+    fits = isinstance(value, kind) and not isinstance(value, bool) and np.isfinite(value) and least <= value <= most
+    if not fits:
+        what = "a whole number" if whole else "a finite number"
+        bounds = "" if not np.isfinite(most) else f" from {least:g} to {most:g}"
+        raise MechanismError(f"must be {what}{bounds}", name=name, value=value)
