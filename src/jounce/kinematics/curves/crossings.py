@@ -10,7 +10,9 @@ import dataclasses
 import numpy as np
 from jaxtyping import Float
 
+from jounce.errors import SolveError
 from jounce.kinematics.curves.walker import Place, Walker, all_finite
+from jounce.kinematics.status import Status
 
 PASSAGE_ORDER = 8  # of the series that leads through: rounding spoils higher coefficients near a singular place
 NEAR = 0.02  # of the radius of the series: from so near its terms up to that order are good to rounding
@@ -21,6 +23,7 @@ LARGEST_DEPARTURE = 1e-8
 VANISHING = 1e-7  # of second derivatives
 MAX_CORRECTIONS, LOCATED = 6, 1e-9  # of the way there, to which a crossing is located
 SAME_DIRECTION = 1e-6
+FIRST_STEPS, LARGEST_BEND = (2e-3, 2e-4, 2e-5), 1e-3  # into a branch
 STARTS, MAX_TURNS = 16, 60
 MOST_MULTIPLE = 4  # directions in which branches touch; more are a surface
 LEAST_ANGLE = 1e-3  # between branches, by the slopes of the forms: nearer ones are not told apart
@@ -94,6 +97,26 @@ def crossing(walker: Walker, here: Place, ahead: complex) -> tuple[ChangePoint, 
         return None
     tangents, decided = _tangents(walker, place, null, own)
     return ChangePoint(place, tangents, null.shape[1], decided), beyond
+
+
+def departed(walker: Walker, point: ChangePoint, branch: int) -> Place:
+    """Return a place on a branch a little way off a change point, from which arc length is counted.
+
+    Raises
+    ------
+    SolveError
+        If the branch is not there where its direction says it is.
+    """
+    direction = point.tangents[branch]
+    place = walker.directed(point.place, direction)
+    for step in FIRST_STEPS:
+        predicted = dataclasses.replace(place.recentred(step), arc_length=0.0)
+        start = walker.begun(walker.with_jacobian(predicted), direction)
+        finite = all(np.isfinite(c).all() for c in start.coordinates.values())
+        if finite and float(walker.tangent(start)[: walker.columns] @ direction[: walker.columns]) > 1 - LARGEST_BEND:
+            return start
+    message = "the branch cannot be entered: near the change point it does not go in the direction of its tangent"
+    raise SolveError(message, status=Status.SINGULAR)
 
 
 def _located(walker: Walker, short: Place, step: float) -> Place | None:

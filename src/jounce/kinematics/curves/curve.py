@@ -2,6 +2,7 @@
 
 import bisect
 import dataclasses
+import itertools
 from functools import cached_property
 from typing import Any
 
@@ -11,9 +12,9 @@ from jaxtyping import Float
 from jounce.display import Displayed
 from jounce.errors import MechanismError
 from jounce.jet.turns import WHOLE_TURN
-from jounce.kinematics.curves.crossings import ChangePoint
+from jounce.kinematics.curves.crossings import ChangePoint, departed
 from jounce.kinematics.curves.limits import LimitPosition, limits_between
-from jounce.kinematics.curves.path import End, Path
+from jounce.kinematics.curves.path import End, Path, walk_both_ways
 from jounce.kinematics.curves.start import Freed
 from jounce.kinematics.curves.walker import Place, Walker, spin
 from jounce.kinematics.motion import Motion, output_series
@@ -65,9 +66,17 @@ class Curve(Displayed):
         Why it ends where it does: at its start, and at its stop.
     """
 
-    def __init__(self, mechanism: Mechanism, free: Freed, walker: Walker, paths: tuple[Path, Path | None], order: int, count: int):
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        free: Freed,
+        walker: Walker,
+        paths: tuple[Path, Path | None],
+        settings: tuple[int, int, float],
+    ):
         self.mechanism, self.driver, self.unit = mechanism, free.driver, free.unit
-        self._free, self._walker, self._order, self._count = free, walker, order, count
+        self._free, self._walker, self._settings = free, walker, settings
+        self._order, self._count, self._longest = settings
         forward, backward = paths
         self.closed = forward.end is End.CLOSED
         self._places = list(forward.places)
@@ -101,8 +110,8 @@ class Curve(Displayed):
         """Limit positions in the order of arc length, located to rounding; none where nothing is driven."""
         if self.driver is None:
             return ()
-        stops = [place.arc_length for place in self._places[1:]] + [self.stop]
-        found = [x for place, stop in zip(self._places, stops, strict=True) for x in limits_between(place, stop)]
+        unit, stops = self._walker.value_scale, [*(p.arc_length for p in self._places[1:]), self.stop]
+        found = [x for p, stop in zip(self._places, stops, strict=True) for x in limits_between(p, stop, unit)]
         return tuple(sorted(found, key=lambda x: x.arc_length))
 
     @property
@@ -128,26 +137,19 @@ class Curve(Displayed):
         """Branches of this circuit, the one that holds the start first; one if the driver never turns back."""
         if self.driver is None:
             return ()
-        cuts = [x.arc_length for x in self.turning_points]
-        if not cuts:
-            return (self._branch(self.start, self.stop),)
-        if self.closed:
-            pairs = list(zip(cuts, [*cuts[1:], cuts[0] + self.length], strict=True))
-            pairs = pairs[-1:] + pairs[:-1]  # the last one goes on over the start
-            return tuple(self._branch(a - self.length if k == 0 and b > self.stop else a, b - self.length if k == 0 else b) for k, (a, b) in enumerate(pairs))
-        bounds = [self.start, *cuts, self.stop]
-        pairs = [(a, b) for a, b in zip(bounds[:-1], bounds[1:], strict=True) if b > a]
-        first = next((k for k, (a, b) in enumerate(pairs) if a <= 0 <= b), 0)
-        return tuple(self._branch(*pair) for pair in [pairs[first], *pairs[:first], *pairs[first + 1 :]])
-
-    def _branch(self, start: float, stop: float) -> Branch:
-        low, high = sorted((self.value(start), self.value(stop)))
-        return Branch(start, stop, low, high)
+        ends = [(x.arc_length, x.value) for x in self.turning_points]
+        if self.closed and ends:
+            ends = [(ends[-1][0] - self.length, ends[-1][1] - self._gain), *ends]  # over the start
+        else:
+            ends = [(self.start, self.value(self.start)), *ends, (self.stop, self.value(self.stop))]
+        found = [Branch(a, b, *sorted((v, w))) for (a, v), (b, w) in itertools.pairwise(ends)]
+        holding = next((k for k, x in enumerate(found) if x.start <= 0 <= x.stop), 0)
+        return tuple(found[holding:] + found[:holding])
 
     @property
     def range(self) -> tuple[float, float]:
         """Smallest and largest value of the driver on the branch that holds the start; infinite for whole turns."""
-        if self.driver is None or self.turns:
+        if self.driver is None or (self.turns and not self.turning_points):
             return (-np.inf, np.inf)
         return self.branches[0].low, self.branches[0].high
 
@@ -189,6 +191,29 @@ class Curve(Displayed):
             raise MechanismError(message, name="arc_length", value=arc_length)
         place = self._at(self._around(arc_length), 0)
         return posed(self.mechanism, {name: c[0] for name, c in place.coordinates.items()})
+
+    def follow(self, change_point: int, branch: int = 1) -> "Curve":
+        """Return the curve of another branch through a change point.
+
+        Parameters
+        ----------
+        change_point : int
+            Which of `change_points`.
+        branch : int, default 1
+            Which of its `tangents`; that of this curve is 0.
+
+        Raises
+        ------
+        MechanismError
+            If there is no such change point or branch.
+        SolveError
+            If the branch does not go on in the direction of its tangent.
+        """
+        point = _one_of(self.change_points, change_point, "change_point", "change points")
+        _one_of(point.tangents, branch, "branch", "branches")
+        start = departed(self._walker, point, branch)
+        paths = walk_both_ways(self._walker, start, self._longest)
+        return Curve(self.mechanism, self._free, self._walker, paths, self._settings)
 
     @cached_property
     def arc_lengths(self) -> Float[np.ndarray, " point"]:
@@ -279,6 +304,14 @@ def with_angular_velocity(coordinates: dict[str, np.ndarray]) -> dict[str, np.nd
     rates = p[1:] * np.arange(1, len(p)).reshape(-1, *[1] * (p.ndim - 1))
     found = [sum((spin(p[j], rates[k - j]) for j in range(k + 1)), np.zeros_like(p[0, 1:])) for k in range(len(rates))]
     return {**coordinates, "angular_velocity": np.array(found).reshape(len(rates), *p[0, 1:].shape)}
+
+
+def _one_of(found: Any, number: Any, name: str, what: str) -> Any:
+    """Return one of some, by a number that there is."""
+    if not isinstance(number, int) or isinstance(number, bool) or not 0 <= number < len(found):
+        there = f"there are {len(found)}, counted from 0" if len(found) else "there are none"
+        raise MechanismError(f"no such one among the {what}: {there}", name=name, value=number)
+    return found[number]
 
 
 def posed(mechanism: Mechanism, coordinates: dict[str, np.ndarray]) -> Mechanism:

@@ -10,6 +10,7 @@ from jounce.kinematics.curves.walker import Place
 
 Kind = Literal["maximum", "minimum", "stationary"]
 ON_THE_CURVE = 1e-7  # of a step: imaginary part of a root that rounding may have made of a double one
+STANDING = 1e-10  # rate of the value, in its unit
 FLAT = 1e-9  # of the largest term: a slope that vanishes for all that is known
 
 
@@ -32,13 +33,16 @@ class LimitPosition:
     kind: Kind
 
 
-def limits_between(place: Place, stop: float) -> list[LimitPosition]:
-    """Return the limit positions from a place, that excluded, to an arc length, that included."""
+def limits_between(place: Place, stop: float, unit: float) -> list[LimitPosition]:
+    """Return the limit positions from a place, that excluded, to an arc length, that included.
+
+    The unit of the value is what it is worth as an unknown; a driver that stands all the way has none.
+    """
     step = stop - place.arc_length
     orders = np.arange(len(place.value))
     slopes = (place.value * step ** orders * orders)[1:]  # of the value along the part of the step
     size = np.max(np.abs(slopes), initial=0.0)
-    if size == 0 or abs(slopes[0]) > np.sum(np.abs(slopes[1:])):
+    if size <= STANDING * unit * step or abs(slopes[0]) > np.sum(np.abs(slopes[1:])):
         return []
     found = []
     for part in _roots(slopes):

@@ -19,7 +19,7 @@ from jounce.kinematics.curves.series import CurvePoints
 LARGEST_DEPARTURE = 1e-8  # of the curve from the series, rad or sizes of the mechanism
 LARGEST_CORRECTION = 1e-10  # the last one
 LARGEST_RESIDUAL = 1e-9  # of rows that repeat others
-SMALLEST_STEP, LONGEST_STEP = 1e-9, 0.5
+SMALLEST_STEP = 1e-9
 SAME_PLACE = 1e-9
 SAME_DIRECTION = 1e-6
 PART_OF_WAY = 0.5  # to a singular place, made in one step
@@ -50,6 +50,12 @@ class Path:
         return Path(places, points, self.end, self.length)
 
 
+def walk_both_ways(walker: Walker, start: Place, length: float) -> tuple[Path, Path | None]:
+    """Return the path from a place forward, and unless that closes, the one backward."""
+    forward = walk(walker, start, length)
+    return forward, None if forward.end is End.CLOSED else walk(walker, start.reversed(), length)
+
+
 def walk(walker: Walker, start: Place, length: float) -> Path:
     """Follow a curve from a place, until it closes, ends, or is as long as asked for."""
     path, here = Path([start]), start
@@ -77,7 +83,7 @@ def walk(walker: Walker, start: Place, length: float) -> Path:
 
 def nominal(walker: Walker, place: Place) -> float:
     """Return the arc length over which the series of a place is good to rounding."""
-    return min(walker.radius(place) * TAIL ** (1 / ORDER), LONGEST_STEP)
+    return walker.radius(place) * TAIL ** (1 / ORDER)
 
 
 def _step(walker: Walker, here: Place, reach: float) -> Place | End:
@@ -112,16 +118,20 @@ def _back_at(walker: Walker, here: Place, start: Place, stretch: float) -> float
     def away(step: float) -> np.ndarray:
         return walker.difference(here.at(step), target)
 
+    def speed(step: float) -> float:
+        return float(direction @ walker.tangent(here.recentred(step))[: walker.columns])
+
     first = away(0.0)
     if np.max(np.abs(first)) > 1.5 * stretch + SAME_PLACE:
         return None
-    step = -float(direction @ first)
+    step, slope = 0.0, speed(0.0)
     for _ in range(20):
-        change = float(direction @ away(step))
-        step -= change
-        if abs(change) < 1e-15 or not -stretch < step < 2 * stretch:
+        if not abs(slope) > 0.1 or not -stretch <= step <= 2 * stretch:
+            return None
+        change = float(direction @ away(step)) / slope
+        step, slope = step - change, speed(step - change)
+        if abs(change) < 1e-14:
             break
     if not -SAME_PLACE < step <= stretch or np.max(np.abs(away(step))) > SAME_PLACE:
         return None
-    ahead = (walker.difference(here.at(step + 1e-5), here.at(step - 1e-5)))[: walker.columns] / 2e-5
-    return step if float(direction @ ahead) > 1 - SAME_DIRECTION else None
+    return step if slope > 1 - SAME_DIRECTION else None

@@ -7,14 +7,12 @@ import numpy as np
 
 from jounce.errors import MechanismError
 from jounce.kinematics.curves.curve import Curve
-from jounce.kinematics.curves.path import End, Path, walk
-from jounce.kinematics.curves.start import Freed, begun, first_instant, freed
-from jounce.kinematics.curves.walker import Place, Walker
+from jounce.kinematics.curves.path import walk_both_ways
+from jounce.kinematics.curves.start import begun, first_instant, freed
 from jounce.mechanism import Mechanism, check_mechanism
 from jounce.mechanism.preconditions import concrete
 
 HIGHEST_ORDER = 8  # of derivatives with respect to arc length: those above are worse than rounding between the places
-FIRST_STEP = 2e-3  # from a change point along another branch
 
 
 @concrete
@@ -79,17 +77,8 @@ def trace(
     instant = first_instant(mechanism) if time is None else float(time)
     free = freed(mechanism, instant, driver)
     walker, start = begun(free)
-    return followed(mechanism, free, walker, start, order=order, count=count, length=length)
-
-
-def followed(mechanism: Mechanism, free: Freed, walker: Walker, start: Place, **options: Any) -> Curve:
-    """Return the curve through a place, to both sides if it is not closed."""
-    length = options["length"]
-    forward = walk(walker, start, length)
-    backward: Path | None = None
-    if forward.end is not End.CLOSED:
-        backward = walk(walker, start.reversed(), length)
-    return Curve(mechanism, free, walker, (forward, backward), options["order"], options["count"])
+    paths = walk_both_ways(walker, start, float(length))
+    return Curve(mechanism, free, walker, paths, (int(order), int(count), float(length)))
 
 
 def _check_number(name: str, value: Any, least: float, most: float, *, whole: bool = False) -> None:

@@ -10,6 +10,7 @@ from jaxtyping import Bool, Float, Int
 from jounce.jet.turns import principal
 from jounce.kinematics.curves.series import CurvePoints, curve_points, second_order
 from jounce.mechanism import Model
+from jounce.rigid import PlanarPose
 from jounce.shapes import Numbers
 
 ORDER = 20
@@ -140,16 +141,37 @@ class Walker:
         values[0] = value
         nothing = np.zeros((self.model.system.shape[0], self.unknowns))
         first = np.arange(self.unknowns - 1) % max(1, len(nothing))
-        blank = Place(0.0, series, values, nothing, nothing, first)
-        points = self.points(blank, np.zeros(1), np.ones(self.columns), corrected=False)
+        return self.with_jacobian(Place(0.0, series, values, nothing, nothing, first))
+
+    def with_jacobian(self, place: Place) -> Place:
+        """Return a place with the Jacobian of its configuration and rows that are independent."""
+        points = self.points(place, np.zeros(1), np.ones(self.columns), corrected=False)
         jacobian = points.jacobian[..., 0]
         rows = self.independent(jacobian)
-        return dataclasses.replace(blank, jacobian=jacobian, slope=nothing, rows=first if rows is None else rows)
+        return dataclasses.replace(place, jacobian=jacobian, rows=place.rows if rows is None else rows)
+
+    def directed(self, place: Place, direction: Float[np.ndarray, " unknown"]) -> Place:
+        """Return a place with a straight line in a direction in the place of its series."""
+        pose_type = self.model.pose_type
+        shift, turn = (np.asarray(x)[..., 0] for x in self._parts(direction))
+        first = {"position": shift, "angle": turn[0]} if pose_type is PlanarPose else {"position": shift}
+        if "quaternion" in place.coordinates:
+            first["quaternion"] = spun(place.coordinates["quaternion"][0], turn)
+        series = {name: np.zeros_like(c) for name, c in place.coordinates.items()}
+        for name, c in place.coordinates.items():
+            series[name][0], series[name][1] = c[0], first[name]
+        value = np.zeros_like(place.value)
+        value[0] = place.value[0]
+        value[1] = direction[-1] * self.value_scale if self.driven else 0.0
+        return dataclasses.replace(place, coordinates=series, value=value)
+
+    def _parts(self, direction: Float[np.ndarray, " unknown"]) -> tuple[Any, Any]:
+        return self.model.system.coordinates(direction[: self.columns, None], self.model.pose_type.shifts)
 
     def begun(self, place: Place, direction: Float[np.ndarray, " unknown"] | None = None) -> Place:
         """Return a place with its series, in a direction; unless told, that in which the value grows."""
         rows = place.rows
-        jacobian = self.points(place, np.zeros(1), np.ones(self.columns), corrected=False).jacobian[..., 0]
+        jacobian = self.with_jacobian(place).jacobian
         tangent = self.null_space(jacobian[rows], 0.0)[:, -1] if direction is None else direction
         if direction is None and self.driven:
             tangent = tangent if tangent[-1] >= 0 else -tangent
@@ -253,8 +275,8 @@ class Walker:
         return np.where(np.isfinite(found), found, np.inf)
 
     def radius(self, place: Place, highest: int = ORDER) -> float:
-        """Return about how far the series converges, by its coefficients from the second to some order."""
-        terms = np.maximum(self.terms(place)[1:highest], 1e-300)
+        """Return about how far the series converges, by its coefficients from the first to some order; at most one."""
+        terms = np.maximum(self.terms(place)[1:highest], 1.0)
         return float(np.min(terms ** (-1.0 / np.arange(2, highest + 1))))
 
     def bordered(self, jacobian: np.ndarray, rates: np.ndarray, rows: np.ndarray) -> np.ndarray:
@@ -327,6 +349,12 @@ class Walker:
 
 def _rank(sizes: Float[np.ndarray, " k"], tolerance: float) -> int:
     return int(np.sum(sizes > tolerance * sizes.max(initial=0.0)))
+
+
+def spun(quaternion: np.ndarray, turn: np.ndarray) -> np.ndarray:
+    """Return how Euler parameters, (4, bodies), change with turns about the axes of the bodies, (3, bodies)."""
+    e0, e = quaternion[0], quaternion[1:]
+    return 0.5 * np.concatenate([-np.sum(e * turn, axis=0)[None], e0 * turn + np.cross(e, turn, axis=0)])
 
 
 def spin(quaternion: np.ndarray, other: np.ndarray) -> np.ndarray:
