@@ -21,6 +21,7 @@ from typing import Any, Literal
 
 from jounce.cli.arguments import converted
 from jounce.cli.conversion import convert
+from jounce.cli.curves import trace
 from jounce.cli.figures import plot, report
 from jounce.cli.inspection import inspect
 from jounce.cli.mechanisms import run, schema, simulate
@@ -57,7 +58,7 @@ def completion(shell: Literal["bash", "zsh", "fish"], /, *, install: bool = Fals
 
 
 COMMANDS = (
-    new, inspect, run, simulate, plot, report, view, check, torques, convert, reproduce, schema, completion
+    new, inspect, run, trace, simulate, plot, report, view, check, torques, convert, reproduce, schema, completion
 )  # fmt: skip
 LIGHT = (new, completion)  # they compute nothing
 FIRST = """\

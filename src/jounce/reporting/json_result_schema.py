@@ -8,6 +8,7 @@ from pydantic import TypeAdapter
 from pydantic.json_schema import GenerateJsonSchema
 from typing_extensions import TypedDict
 
+from jounce.reporting.curve_facts import CurveFacts
 from jounce.reporting.mechanism_facts import Grid, InspectedMechanism
 from jounce.reporting.motion_facts import MotionFacts, SimulationFacts
 from jounce.reporting.robot_facts import InspectedRobot
@@ -73,6 +74,15 @@ class InspectRobotResult(Result, InspectedRobot):
     """jounce inspect --json of a robot file."""
 
     command: Literal["inspect"]
+
+
+class TraceResult(Result):
+    """jounce trace --json."""
+
+    command: Literal["trace"]
+    file: str
+    curves: list[CurveFacts]
+    written: str | None
 
 
 class LimitRow(TypedDict):
@@ -172,6 +182,7 @@ RESULTS: dict[str, Any] = {
     "inspect_robot": InspectRobotResult,
     "check": CheckResult,
     "torques": TorquesResult,
+    "trace": TraceResult,
     "new_list": NewListResult,
     "new": NewResult,
 }
@@ -190,7 +201,7 @@ def result_schema() -> dict[str, Any]:
     Examples
     --------
     >>> sorted(result_schema()["$defs"])
-    ['check', 'complaint', 'inspect_mechanism', 'inspect_robot', 'new', 'new_list', 'run', 'simulate', 'torques']
+    ['check', 'complaint', 'inspect_mechanism', 'inspect_robot', 'new', 'new_list', 'run', 'simulate', 'torques', 'trace']
     """
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

@@ -215,6 +215,25 @@ class Curve(Displayed):
         paths = walk_both_ways(self._walker, start, self._longest)
         return Curve(self.mechanism, self._free, self._walker, paths, self._settings)
 
+    def directions(self, change_point: int) -> list[dict[str, tuple[np.ndarray, np.ndarray]]]:
+        """Return how all bodies move along each branch through a change point, for a unit of arc length.
+
+        Parameters
+        ----------
+        change_point : int
+            Which of `change_points`.
+
+        Returns
+        -------
+        list of dict
+            For each of its branches, this curve first, by the name of the body: its shift, (2,) or (3,) in m, and its
+            turn, (1,) or (3,) in rad about the axes of the body. The sign of the others is arbitrary.
+        """
+        point = _one_of(self.change_points, change_point, "change_point", "change points")
+        found = [self._walker.parts(tangent) for tangent in point.tangents]
+        names = list(enumerate(self.mechanism.bodies, start=1))
+        return [{name: (shift[:, k], turn[:, k]) for k, name in names} for shift, turn in found]
+
     @cached_property
     def arc_lengths(self) -> Float[np.ndarray, " point"]:
         """Arc lengths of the points of the dataset, evenly spaced, with the limit positions and change points."""

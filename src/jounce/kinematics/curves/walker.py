@@ -153,7 +153,7 @@ class Walker:
     def directed(self, place: Place, direction: Float[np.ndarray, " unknown"]) -> Place:
         """Return a place with a straight line in a direction in the place of its series."""
         pose_type = self.model.pose_type
-        shift, turn = (np.asarray(x)[..., 0] for x in self._parts(direction))
+        shift, turn = self.parts(direction)
         first = {"position": shift, "angle": turn[0]} if pose_type is PlanarPose else {"position": shift}
         if "quaternion" in place.coordinates:
             first["quaternion"] = spun(place.coordinates["quaternion"][0], turn)
@@ -165,8 +165,11 @@ class Walker:
         value[1] = direction[-1] * self.value_scale if self.driven else 0.0
         return dataclasses.replace(place, coordinates=series, value=value)
 
-    def _parts(self, direction: Float[np.ndarray, " unknown"]) -> tuple[Any, Any]:
-        return self.model.system.coordinates(direction[: self.columns, None], self.model.pose_type.shifts)
+    def parts(self, direction: Float[np.ndarray, " unknown"]) -> tuple[np.ndarray, np.ndarray]:
+        """Return shifts, (components, bodies) in m, and turns of all bodies in a direction, the ground first."""
+        system, shifts = self.model.system, self.model.pose_type.shifts
+        shift, turn = system.coordinates(direction[: self.columns, None], shifts)
+        return np.asarray(shift)[..., 0], np.asarray(turn)[..., 0]
 
     def begun(self, place: Place, direction: Float[np.ndarray, " unknown"] | None = None) -> Place:
         """Return a place with its series, in a direction; unless told, that in which the value grows."""
