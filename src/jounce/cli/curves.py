@@ -81,9 +81,7 @@ def trace(
     return told(curves, file, figure, show, output)
 
 
-def told(
-    curves: list[Curve], file: Path, figure: Path | None, show: list[str] | None, output: TableOutput
-) -> int:
+def told(curves: list[Curve], file: Path, figure: Path | None, show: list[str] | None, output: TableOutput) -> int:
     """Print what there is to tell of curves, write the first of them, draw all, and return the exit status."""
     from jounce.reporting.curve_facts import curve_facts, curve_summary, curve_tables
 

@@ -9,6 +9,7 @@ from jaxtyping import Float
 
 from jounce.errors import MechanismError, SolveError
 from jounce.kinematics.assembly import assemble
+from jounce.kinematics.dead_ends import dead_end_words
 from jounce.kinematics.grid import LONG_GRID
 from jounce.kinematics.long_grids import solve_grid
 from jounce.kinematics.motion import Motion
@@ -188,6 +189,8 @@ def raise_for_status(motion: Motion | Stretches) -> None:
     where = f"t = {motion.time[first]:g} s" + (f", {fault}" if fault else "")
     total = len(motion.time)
     message = f"{where}: {_words(status)}: {status.advice}"
+    if isinstance(motion, Motion) and (ahead := dead_end_words(motion, first)):
+        message += f"; {ahead}"
     solved = f"{total - failed.size} of {total} instants were solved"
     raise SolveError(f"{message} ({solved})", motion=motion, status=status)
 

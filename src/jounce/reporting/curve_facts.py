@@ -101,7 +101,10 @@ def curve_facts(curve: Curve) -> dict[str, Any]:
                 "dimension": point.dimension,
                 "decided": point.decided,
                 "branches": [
-                    [{"body": name, "shift": shift.tolist(), "turn": turn.tolist()} for name, (shift, turn) in way.items()]
+                    [
+                        {"body": name, "shift": shift.tolist(), "turn": turn.tolist()}
+                        for name, (shift, turn) in way.items()
+                    ]
                     for way in curve.directions(number)
                 ],
             }
@@ -113,7 +116,10 @@ def curve_facts(curve: Curve) -> dict[str, Any]:
 def curve_summary(facts: Facts, file: str) -> str:
     """Word what a curve is like: closed or not, and how far the driver goes on it."""
     shape = "closed" if facts["closed"] else "open"
-    lines = [facts["title"] or file, f"{shape} curve of configurations, arc length {facts['stop'] - facts['start']:.9g}"]
+    lines = [
+        facts["title"] or file,
+        f"{shape} curve of configurations, arc length {facts['stop'] - facts['start']:.9g}",
+    ]
     if not facts["closed"]:
         lines += [f"{which}: {why}" for which, why in zip(("start", "end"), facts["ends"], strict=True)]
     if facts["driver"] is None:
@@ -138,7 +144,9 @@ def curve_tables(facts: Facts) -> list[Table]:
     points = []
     for number, point in enumerate(facts["change_points"]):
         for k, way in enumerate(point["branches"]):
-            place = [str(number), f"{point['arc_length']:.9g}", value_words(point["value"], unit)] if k == 0 else [""] * 3
+            place = (
+                [str(number), f"{point['arc_length']:.9g}", value_words(point["value"], unit)] if k == 0 else [""] * 3
+            )
             points.append([*place, "this curve" if k == 0 else str(k), _way_words(way)])
         if not point["decided"]:
             points.append([""] * 3 + ["?", "there may be others: the second order does not tell them apart"])

@@ -201,7 +201,7 @@ def result_schema() -> dict[str, Any]:
     Examples
     --------
     >>> sorted(result_schema()["$defs"])
-    ['check', 'complaint', 'inspect_mechanism', 'inspect_robot', 'new', 'new_list', 'run', 'simulate', 'torques', 'trace']
+    ['check', 'complaint', 'inspect_mechanism', 'inspect_robot', 'new', 'new_list', ..., 'torques', 'trace']
     """
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

@@ -121,19 +121,23 @@ def departed(walker: Walker, point: ChangePoint, branch: int) -> Place:
 
 def _located(walker: Walker, short: Place, step: float) -> Place | None:
     """Return the place on the series where the bordered Jacobian is singular, if the rows hold there."""
-    first = step
-    for _ in range(MAX_CORRECTIONS):
+
+    def at(step: float) -> tuple[Place, float]:
         points = walker.points(short, np.array([step]), corrected=False)
-        place = dataclasses.replace(
-            short.recentred(step, PASSAGE_ORDER), jacobian=points.jacobian[..., 0], slope=points.slope[..., 0]
-        )
+        known = {"jacobian": points.jacobian[..., 0], "slope": points.slope[..., 0]}
+        return dataclasses.replace(short.recentred(step, PASSAGE_ORDER), **known), float(points.residual[0])
+
+    first = step
+    place, residual = at(step)
+    for _ in range(MAX_CORRECTIONS):
         ahead = walker.nearing(place)
         if abs(ahead) < LOCATED * first:
             break
         step += ahead.real
         if not abs(step - first) < 0.5 * first:
             return None
-    return place if points.residual[0] <= OPEN else None
+        place, residual = at(step)
+    return place if residual <= OPEN else None
 
 
 def _tangents(

@@ -158,7 +158,7 @@ class Curve(Displayed):
         around, turned = 0.0, self._around(arc_length)
         if self.closed and self.driver is not None:
             around = (arc_length - turned) / self.length * self._gain
-        return float(self._at(turned, 0).value[0]) + around
+        return float(self._at(turned).value[0]) + around
 
     @cached_property
     def _gain(self) -> float:
@@ -170,7 +170,7 @@ class Curve(Displayed):
             return self.start + (arc_length - self.start) % self.length
         return arc_length
 
-    def _at(self, arc_length: float, order: int) -> Place:
+    def _at(self, arc_length: float) -> Place:
         """Return the place at an arc length, with the series of the nearest of those that were solved."""
         known = [place.arc_length for place in self._places]
         after = bisect.bisect_left(known, arc_length)
@@ -189,7 +189,7 @@ class Curve(Displayed):
         if not self.closed and not self.start - slack <= arc_length <= self.stop + slack:
             message = f"the curve goes from {self.start:g} to {self.stop:g}"
             raise MechanismError(message, name="arc_length", value=arc_length)
-        place = self._at(self._around(arc_length), 0)
+        place = self._at(self._around(arc_length))
         return posed(self.mechanism, {name: c[0] for name, c in place.coordinates.items()})
 
     def follow(self, change_point: int, branch: int = 1) -> "Curve":
@@ -246,7 +246,7 @@ class Curve(Displayed):
     @cached_property
     def _points(self) -> tuple[dict[str, np.ndarray], np.ndarray]:
         """Taylor coefficients of the coordinates and of the value at the points, the points last."""
-        places = [self._at(s, self._order) for s in self.arc_lengths]
+        places = [self._at(s) for s in self.arc_lengths]
         names = places[0].coordinates
         coordinates = {name: np.stack([p.coordinates[name] for p in places], axis=-1) for name in names}
         return coordinates, np.stack([p.value for p in places], axis=-1)
@@ -274,17 +274,19 @@ class Curve(Displayed):
         if self._walker.is_planar:
             return None
         stops = [place.arc_length for place in self._places[1:]] + [self.stop]
-        parts = [np.linspace(p.arc_length, stop, PLACES, endpoint=False) for p, stop in zip(self._places, stops, strict=True)]
+        parts = [
+            np.linspace(p.arc_length, stop, PLACES, endpoint=False) for p, stop in zip(self._places, stops, strict=True)
+        ]
         begun = float(self._places[0].arc_length)
         instants = np.concatenate([*parts, [self.stop]])
         instants = instants[(instants >= begun)]
-        quaternions = [self._at(s, 0).coordinates["quaternion"][0] for s in instants]
+        quaternions = [self._at(s).coordinates["quaternion"][0] for s in instants]
         return AttitudeHistory(np.stack(quaternions, axis=-1), instants)
 
     @cached_property
     def values(self) -> Float[np.ndarray, "point derivative"]:
         """Value of the driver and its derivatives with respect to arc length at the points."""
-        scale = np.cumprod([1.0, *np.arange(1, self._order + 1)])
+        scale = np.cumprod(np.maximum(np.arange(self._order + 1.0), 1.0))
         return (self._points[1][: self._order + 1] * scale[:, None]).T
 
     @cached_property

@@ -40,7 +40,7 @@ def limits_between(place: Place, stop: float, unit: float) -> list[LimitPosition
     """
     step = stop - place.arc_length
     orders = np.arange(len(place.value))
-    slopes = (place.value * step ** orders * orders)[1:]  # of the value along the part of the step
+    slopes = (place.value * step**orders * orders)[1:]  # of the value along the part of the step
     size = np.max(np.abs(slopes), initial=0.0)
     if size <= STANDING * unit * step or abs(slopes[0]) > np.sum(np.abs(slopes[1:])):
         return []

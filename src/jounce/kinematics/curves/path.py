@@ -13,8 +13,8 @@ import numpy as np
 from jaxtyping import Bool
 
 from jounce.kinematics.curves.crossings import PASSAGE_ORDER, ChangePoint, crossing
-from jounce.kinematics.curves.walker import LANES, ORDER, TAIL, Place, Walker, all_finite
 from jounce.kinematics.curves.series import CurvePoints
+from jounce.kinematics.curves.walker import LANES, ORDER, TAIL, Place, Walker, all_finite
 
 LARGEST_DEPARTURE = 1e-8  # of the curve from the series, rad or sizes of the mechanism
 LARGEST_CORRECTION = 1e-10  # the last one

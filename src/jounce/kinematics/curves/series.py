@@ -54,19 +54,15 @@ class CurvePoints(NamedTuple):
         Whether all drivers have permitted values.
     """
 
-    coordinates: dict[str, Numbers]
-    value: Numbers
-    jacobian: Numbers
-    slope: Numbers
+    coordinates: dict[str, Any]
+    value: Any
+    jacobian: Any
+    slope: Any
     first: Lanes
     last: Lanes
     contraction: Lanes
     residual: Lanes
     admissible: Bool[Numbers, " lane"]
-
-    def take(self, lane: int) -> "CurvePoints":
-        """Return one of the points."""
-        return jax.tree.map(lambda x: np.asarray(x)[..., lane : lane + 1], self)
 
 
 class _Curve:
@@ -149,7 +145,8 @@ def curve_points(
     slope = _slope(curve, pose, reached, _moved_on(series, step), Jet(tuple(value)).differentiate().evaluate(step))
     residual = jnp.max(jnp.abs(curve.residual(pose.truncate(0), reached)), axis=0, initial=0.0)
     admissible = jnp.all(system.admissible(Jet([reached[None]])), axis=0)
-    return CurvePoints(found, whole, jacobian, slope, *sizes, residual, admissible)
+    first, last, contraction = sizes
+    return CurvePoints(found, whole, jacobian, slope, first, last, contraction, residual, admissible)
 
 
 def _corrected(curve: _Curve, pose: Any, value: Any, tangent: Any, corrected: Any) -> Any:
@@ -184,7 +181,7 @@ def _differentiated(curve: _Curve, pose: Any, value: Any, factor: DenseFactor, o
     """Return the series of the coordinates in arc length, by name, and that of the value."""
     count, lanes, shifts = curve.count, value.shape[0], pose.shifts
     null = factor.solve(jnp.zeros((curve.rows.shape[0] + 1, lanes)).at[-1].set(1.0))
-    null = null / jnp.sqrt(jnp.sum(null[:count] ** 2, axis=0))
+    null = null / jnp.sqrt(jnp.sum(null[:count] ** 2, axis=0, keepdims=True))
     tangent, planar = null[:count], isinstance(pose, PlanarPose)
     place = pose.position.coefficients[0]
     attitude = (pose.angle if planar else pose.quaternion).coefficients[0]
@@ -214,7 +211,7 @@ def _differentiated(curve: _Curve, pose: Any, value: Any, factor: DenseFactor, o
         # x'[j] = (j + 1) x[j + 1], and the coefficient of order k - 1 of x'.x' vanishes
         known = jnp.sum(_convolved(rates, rates, k - 1, lambda a, b: jnp.sum(a * b, axis=1)), axis=0)
         lacking = -known / (2 * k) - jnp.sum(tangent * solution[:count], axis=0)
-        solution = solution + null * lacking
+        solution = solution + null * lacking[None]
         shift, turn, rate = parts(solution)
         change = spun(turn)
         history = recursion.corrected(history, (shift, change, rate))
@@ -274,8 +271,7 @@ def _slope(curve: _Curve, pose: Any, value: Any, rates: dict[str, Any], value_ra
         there = {name: x + step * rates[name] for name, x in now.items()}
         return curve.jacobian(pose_at(there, type(pose)), value + step * value_rate)
 
-    zero = jnp.zeros_like(value)
-    return jax.jvp(at, (zero,), (jnp.ones_like(zero),))[1]
+    return jax.jvp(at, (np.zeros(()),), (np.ones(()),))[1]
 
 
 @compiled("pose_type")

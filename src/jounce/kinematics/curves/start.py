@@ -95,7 +95,9 @@ def law_values(mechanism: Mechanism, instant: float) -> dict[str, float]:
 def _with_law(driver: Any, text: str) -> Any:
     fields = [name for name, field in value_fields(type(driver)).items() if field_kind(field) == "motion"]
     if fields != ["motion"]:
-        raise MechanismError("a driver whose value is free needs one law, its field motion", name="driver", value=fields)
+        raise MechanismError(
+            "a driver whose value is free needs one law, its field motion", name="driver", value=fields
+        )
     return dataclasses.replace(driver, motion=ExpressionMotion(text))
 
 

@@ -1,9 +1,8 @@
 """From a mechanism to its curve of configurations."""
 
+import math
 import numbers
 from typing import Any
-
-import numpy as np
 
 from jounce.errors import MechanismError
 from jounce.kinematics.curves.curve import Curve
@@ -18,7 +17,7 @@ HIGHEST_ORDER = 8  # of derivatives with respect to arc length: those above are 
 @concrete
 def trace(
     mechanism: Mechanism,
-    time: float | None = None,
+    time: Any = None,
     *,
     driver: str | None = None,
     order: int = 2,
@@ -73,7 +72,7 @@ def trace(
     _check_number("count", count, 2, 10**7, whole=True)
     _check_number("length", length, 1e-6, 1e6)
     if time is not None:
-        _check_number("time", time, -np.inf, np.inf)
+        _check_number("time", time, -math.inf, math.inf)
     instant = first_instant(mechanism) if time is None else float(time)
     free = freed(mechanism, instant, driver)
     walker, start = begun(free)
@@ -81,10 +80,10 @@ def trace(
     return Curve(mechanism, free, walker, paths, (int(order), int(count), float(length)))
 
 
-def _check_number(name: str, value: Any, least: float, most: float, *, whole: bool = False) -> None:
+def _check_number(name: str, value: Any, least: Any, most: Any, *, whole: bool = False) -> None:
     kind = numbers.Integral if whole else numbers.Real
-    fits = isinstance(value, kind) and not isinstance(value, bool) and np.isfinite(value) and least <= value <= most
-    if not fits:
+    fits = isinstance(value, kind) and not isinstance(value, bool) and math.isfinite(float(value))
+    if not fits or not least <= value <= most:
         what = "a whole number" if whole else "a finite number"
-        bounds = "" if not np.isfinite(most) else f" from {least:g} to {most:g}"
+        bounds = "" if not math.isfinite(most) else f" from {least:g} to {most:g}"
         raise MechanismError(f"must be {what}{bounds}", name=name, value=value)

@@ -319,7 +319,7 @@ class Walker:
             return None
         from scipy.linalg import qr  # here, since importing SciPy takes half a second
 
-        _, _, order = qr(jacobian.T, mode="economic", pivoting=True)
+        order = np.asarray(qr(jacobian.T, mode="r", pivoting=True)[-1])
         return np.sort(order[:wanted])
 
     def null_space(
