@@ -83,7 +83,17 @@ from jounce.io import (
     write_mechanism as write_mechanism,
 )
 from jounce.jet import Jet as Jet, compose as compose
-from jounce.kinematics import Curve as Curve, Motion as Motion, Status as Status, solve as solve, trace as trace
+from jounce.kinematics import (
+    Assemblies as Assemblies,
+    Assembly as Assembly,
+    Curve as Curve,
+    LimitPosition as LimitPosition,
+    Motion as Motion,
+    Status as Status,
+    assemblies as assemblies,
+    solve as solve,
+    trace as trace,
+)
 from jounce.mechanism import (
     AbstractOutput as AbstractOutput,
     AngleOutput as AngleOutput,

@@ -1,6 +1,15 @@
 """Kinematics: assembly, positions, all derivatives from one factorisation, diagnosis, and the result."""
 
-from jounce.kinematics.curves import Curve as Curve, trace as trace
+from jounce.kinematics.curves import (
+    Assemblies as Assemblies,
+    Assembly as Assembly,
+    Branch as Branch,
+    ChangePoint as ChangePoint,
+    Curve as Curve,
+    LimitPosition as LimitPosition,
+    assemblies as assemblies,
+    trace as trace,
+)
 from jounce.kinematics.motion import Motion as Motion
 from jounce.kinematics.solve import (
     raise_for_status as raise_for_status,

@@ -13,8 +13,8 @@ from jounce.display import Displayed
 from jounce.errors import MechanismError
 from jounce.jet.turns import WHOLE_TURN
 from jounce.kinematics.curves.crossings import ChangePoint, departed
-from jounce.kinematics.curves.limits import LimitPosition, limits_between
-from jounce.kinematics.curves.path import End, Path, walk_both_ways
+from jounce.kinematics.curves.limits import LimitPosition, limits_between, values_between
+from jounce.kinematics.curves.path import End, Path, meets, walk_both_ways
 from jounce.kinematics.curves.start import Freed
 from jounce.kinematics.curves.walker import Place, Walker, spin
 from jounce.kinematics.motion import Motion, output_series
@@ -25,6 +25,7 @@ from jounce.mechanism.outputs import AbstractMotionOutput
 
 PLACES = 8  # in each step at which attitudes are looked at for turns
 AXES = ("point", "arc_length", "driver_value")
+MOST_CURVES = 64  # of a circuit
 FULL_TURN = 1e-6  # rad, by which a gain of the driver may differ from whole turns
 
 
@@ -60,6 +61,8 @@ class Curve(Displayed):
         Whose value is free; ``"time"`` where that is the instant, None where nothing is driven.
     unit : str
         Of that value.
+    first_value : float
+        Of the driver where the trace began; a curve that was followed from a change point begins elsewhere.
     closed : bool
         Whether the curve comes back to where it started.
     ends : tuple of str
@@ -77,6 +80,7 @@ class Curve(Displayed):
         self.mechanism, self.driver, self.unit = mechanism, free.driver, free.unit
         self._free, self._walker, self._settings = free, walker, settings
         self._order, self._count, self._longest = settings
+        self.first_value = free.value
         forward, backward = paths
         self.closed = forward.end is End.CLOSED
         self._places = list(forward.places)
@@ -189,8 +193,48 @@ class Curve(Displayed):
         if not self.closed and not self.start - slack <= arc_length <= self.stop + slack:
             message = f"the curve goes from {self.start:g} to {self.stop:g}"
             raise MechanismError(message, name="arc_length", value=arc_length)
+        return posed(self.mechanism, self.coordinates_at(arc_length))
+
+    def where(self, value: float) -> list[float]:
+        """Return the arc lengths at which the driver has a value; of an angle whole turns do not count."""
+        if self.driver is None:
+            return []
+        period = WHOLE_TURN if self.unit == "rad" else None
+        stops = [*(place.arc_length for place in self._places[1:]), self.stop]
+        pairs = zip(self._places, stops, strict=True)
+        return [s for place, stop in pairs for s in values_between(place, stop, value, period)]
+
+    def branch_at(self, arc_length: float) -> int:
+        """Return on which of the branches an arc length is, from 1."""
+        for number, branch in enumerate(self.branches, start=1):
+            around = (arc_length, arc_length - self.length) if self.closed else (arc_length,)
+            if any(branch.start <= s <= branch.stop for s in around):
+                return number
+        return 1
+
+    def coordinates_at(self, arc_length: float) -> dict[str, np.ndarray]:
+        """Return the coordinates of all bodies at an arc length, the ground first, shape (..., bodies)."""
         place = self._at(self._around(arc_length))
-        return posed(self.mechanism, {name: c[0] for name, c in place.coordinates.items()})
+        return {name: c[0] for name, c in place.coordinates.items()}
+
+    def passes(self, coordinates: dict[str, np.ndarray]) -> bool:
+        """Tell whether the curve goes through a configuration."""
+        stops = [*(place.arc_length for place in self._places[1:]), self.stop]
+        pairs = zip(self._places, stops, strict=True)
+        return any(meets(self._walker, p, stop - p.arc_length, coordinates) is not None for p, stop in pairs)
+
+    def connected(self) -> tuple["Curve", ...]:
+        """Return this curve and those that cross it at change points, and those that cross these: the whole circuit."""
+        found, waiting = [self], [self]
+        while waiting and len(found) < MOST_CURVES:
+            curve = waiting.pop()
+            for number, point in enumerate(curve.change_points):
+                for branch in range(1, len(point.tangents)):
+                    other = curve.follow(number, branch)
+                    if not any(known.passes(other.coordinates_at(0.0)) for known in found):
+                        found.append(other)
+                        waiting.append(other)
+        return tuple(found)
 
     def follow(self, change_point: int, branch: int = 1) -> "Curve":
         """Return the curve of another branch through a change point.

@@ -45,7 +45,7 @@ def limits_between(place: Place, stop: float, unit: float) -> list[LimitPosition
     if size <= STANDING * unit * step or abs(slopes[0]) > np.sum(np.abs(slopes[1:])):
         return []
     found = []
-    for part in _roots(slopes):
+    for part in roots(slopes):
         if not 0 < part <= 1:
             continue
         here = place.recentred(part * step)
@@ -53,7 +53,7 @@ def limits_between(place: Place, stop: float, unit: float) -> list[LimitPosition
     return found
 
 
-def _roots(coefficients: Float[np.ndarray, " order"]) -> list[float]:
+def roots(coefficients: Float[np.ndarray, " order"]) -> list[float]:
     """Return the real roots of a polynomial in [0, 1], each once."""
     significant = np.flatnonzero(np.abs(coefficients) > 1e-18 * np.max(np.abs(coefficients)))
     coefficients = coefficients[: significant[-1] + 1]
@@ -83,3 +83,18 @@ def _kind(slopes: Float[np.ndarray, " order"], part: float, size: float) -> Kind
     if min(abs(before), abs(after)) <= FLAT * 1e-6 * size or before * after > 0:
         return "stationary"
     return "maximum" if before > 0 else "minimum"
+
+
+def values_between(place: Place, stop: float, value: float, period: float | None) -> list[float]:
+    """Return the arc lengths from a place to another at which the driver has a value, or one some periods away."""
+    step = stop - place.arc_length
+    terms = place.value * step ** np.arange(len(place.value))
+    reach = float(np.sum(np.abs(terms[1:])))
+    if reach == 0:
+        return []
+    targets = [value]
+    if period is not None:
+        least, most = ((terms[0] + side * reach - value) / period for side in (-1, 1))
+        targets = [value + period * k for k in range(int(np.floor(least)), int(np.ceil(most)) + 1)]
+    found = [part for target in targets for part in roots(np.array([terms[0] - target, *terms[1:]]))]
+    return [place.arc_length + part * step for part in found]

@@ -22,6 +22,7 @@ LARGEST_RESIDUAL = 1e-9  # of rows that repeat others
 SMALLEST_STEP = 1e-9
 SAME_PLACE = 1e-9
 SAME_DIRECTION = 1e-6
+MOST_CORRECTIONS = 50
 PART_OF_WAY = 0.5  # to a singular place, made in one step
 
 
@@ -112,26 +113,27 @@ def _good(walker: Walker, here: Place, points: CurvePoints, sign: float) -> Bool
 
 def _back_at(walker: Walker, here: Place, start: Place, stretch: float) -> float | None:
     """Return how far from here, within a stretch, a curve is back at its start, in the same direction."""
-    target = {name: c[0] for name, c in start.coordinates.items()}
-    direction = walker.tangent(start)[: walker.columns]
-
-    def away(step: float) -> np.ndarray:
-        return walker.difference(here.at(step), target)
-
-    def speed(step: float) -> float:
-        return float(direction @ walker.tangent(here.recentred(step))[: walker.columns])
-
-    first = away(0.0)
-    if np.max(np.abs(first)) > 1.5 * stretch + SAME_PLACE:
+    step = meets(walker, here, stretch, {name: c[0] for name, c in start.coordinates.items()})
+    if step is None:
         return None
-    step, slope = 0.0, speed(0.0)
-    for _ in range(20):
-        if not abs(slope) > 0.1 or not -stretch <= step <= 2 * stretch:
+    ahead, first = (walker.tangent(place)[: walker.columns] for place in (here.recentred(step), start))
+    return step if float(ahead @ first) > 1 - SAME_DIRECTION else None
+
+
+def meets(walker: Walker, here: Place, stretch: float, target: dict[str, np.ndarray]) -> float | None:
+    """Return how far from a place, within a stretch, its curve goes through a configuration, if it does."""
+    if np.max(np.abs(walker.difference(here.at(0.0), target))) > 1.5 * stretch + SAME_PLACE:
+        return None
+    step = 0.0
+    for _ in range(MOST_CORRECTIONS):
+        there = here.recentred(step)
+        away = walker.difference({name: c[0] for name, c in there.coordinates.items()}, target)
+        change = float(walker.tangent(there)[: walker.columns] @ away)
+        step -= change
+        if not -stretch <= step <= 2 * stretch:
             return None
-        change = float(direction @ away(step)) / slope
-        step, slope = step - change, speed(step - change)
         if abs(change) < 1e-14:
             break
-    if not -SAME_PLACE < step <= stretch or np.max(np.abs(away(step))) > SAME_PLACE:
+    if not -SAME_PLACE < step <= stretch or np.max(np.abs(walker.difference(here.at(step), target))) > SAME_PLACE:
         return None
-    return step if slope > 1 - SAME_DIRECTION else None
+    return step

@@ -68,11 +68,11 @@ def trace(
     (True, [...])
     """
     check_mechanism(mechanism)
-    _check_number("order", order, 0, HIGHEST_ORDER, whole=True)
-    _check_number("count", count, 2, 10**7, whole=True)
-    _check_number("length", length, 1e-6, 1e6)
+    check_number("order", order, 0, HIGHEST_ORDER, whole=True)
+    check_number("count", count, 2, 10**7, whole=True)
+    check_number("length", length, 1e-6, 1e6)
     if time is not None:
-        _check_number("time", time, -math.inf, math.inf)
+        check_number("time", time, -math.inf, math.inf)
     instant = first_instant(mechanism) if time is None else float(time)
     free = freed(mechanism, instant, driver)
     walker, start = begun(free)
@@ -80,7 +80,8 @@ def trace(
     return Curve(mechanism, free, walker, paths, (int(order), int(count), float(length)))
 
 
-def _check_number(name: str, value: Any, least: Any, most: Any, *, whole: bool = False) -> None:
+def check_number(name: str, value: Any, least: Any, most: Any, *, whole: bool = False) -> None:
+    """Raise MechanismError unless an option is a number between bounds."""
     kind = numbers.Integral if whole else numbers.Real
     fits = isinstance(value, kind) and not isinstance(value, bool) and math.isfinite(float(value))
     if not fits or not least <= value <= most:
