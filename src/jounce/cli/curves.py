@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from jounce.cli.options import (
     NO_TABLE,
@@ -11,10 +11,10 @@ from jounce.cli.options import (
     MechanismReading,
     TableOutput,
     errors_about,
+    options_named,
     spare_inputs,
     written,
 )
-from jounce.errors import JounceError
 from jounce.reporting.terminal import say, show_table
 
 if TYPE_CHECKING:
@@ -106,17 +106,3 @@ def _draw(curves: list[Curve], figure: Path, show: list[str] | None, file: Path,
     with errors_about(file):
         drawn = draw_curves(curves, show)
         written(lambda: save(drawn, figure, overwrite=overwrite))
-
-
-class options_named:  # noqa: N801 - a context manager, as those of contextlib
-    """Give errors about an argument the option that it came from."""
-
-    OPTIONS = {"driver": "--driver", "order": "--order", "count": "--points", "length": "--length", "time": "--time"}
-
-    def __enter__(self) -> None:
-        """Begin."""
-
-    def __exit__(self, kind: Any, error: Any, _: Any) -> None:
-        """Name the option."""
-        if isinstance(error, JounceError) and error.name in self.OPTIONS:
-            error.name = self.OPTIONS[error.name]

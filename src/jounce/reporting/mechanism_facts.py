@@ -27,6 +27,7 @@ from jounce.kinematics.host_jacobian import HostJacobian
 from jounce.mechanism import Mechanism, Model, build, time_grid
 from jounce.mechanism.masses import body_mass
 from jounce.mechanism.system import POSITION_COMPONENTS
+from jounce.reporting.range_facts import RangeFacts
 from jounce.reporting.summaries import freedom_words
 from jounce.trajectory.dimensions import Dimension
 from jounce.trajectory.units import parse_value
@@ -149,6 +150,7 @@ class InspectedMechanism(MechanismFacts):
     freedom: FreedomFacts
     assembly: AssemblyFacts
     ok: bool
+    range: NotRequired[RangeFacts | None]
 
 
 def mechanism_facts(mechanism: Mechanism, path: str | PathLike[str] | None = None) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from jounce.kinematics.curves.crossings import ChangePoint, departed
 from jounce.kinematics.curves.limits import LimitPosition, limits_between, values_between
 from jounce.kinematics.curves.path import End, Path, meets, walk_both_ways
 from jounce.kinematics.curves.start import Freed
-from jounce.kinematics.curves.walker import Place, Walker, spin
+from jounce.kinematics.curves.walker import LANES, Place, Walker, spin
 from jounce.kinematics.motion import Motion, output_series
 from jounce.kinematics.status import Status
 from jounce.mechanism import AbstractOutput, Mechanism
@@ -332,6 +332,18 @@ class Curve(Displayed):
         """Value of the driver and its derivatives with respect to arc length at the points."""
         scale = np.cumprod(np.maximum(np.arange(self._order + 1.0), 1.0))
         return (self._points[1][: self._order + 1] * scale[:, None]).T
+
+    @cached_property
+    def smallest_singular_values(self) -> Float[np.ndarray, " point"]:
+        """Smallest singular value of the scaled Jacobian with the driver held, at the points: zero at dead points."""
+        columns, found = self._walker.columns, []
+        places = [self._at(s) for s in self.arc_lengths]
+        for first in range(0, len(places), LANES):
+            some = places[first : first + LANES]
+            lanes = [dataclasses.replace(place, rows=some[0].rows) for place in some]
+            points = self._walker.points(lanes, np.zeros(len(lanes)), corrected=False)
+            found.append(np.linalg.svd(np.moveaxis(points.jacobian[:, :columns], -1, 0), compute_uv=False)[:, -1])
+        return np.concatenate(found)
 
     @cached_property
     def outputs(self) -> dict[str, np.ndarray]:
