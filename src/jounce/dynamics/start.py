@@ -14,6 +14,7 @@ from jounce.errors import AssemblyError, JounceError, MechanismError, MobilityEr
 from jounce.jet import Jet
 from jounce.kinematics.assembly import assemble, freely_moving
 from jounce.kinematics.compilation import compiled
+from jounce.kinematics.curves.choice import chosen
 from jounce.kinematics.host_jacobian import RANK_TOLERANCE, HostJacobian, is_clearly_regular
 from jounce.mechanism import Mechanism, Model, build
 from jounce.mechanism.builder import pose_at
@@ -67,6 +68,7 @@ def consistent_start(mechanism: Mechanism, instant: float) -> ConsistentStart:
     MobilityError
         If constraints or initial conditions are redundant.
     """
+    mechanism = chosen(mechanism, instant)
     masses = required_masses(mechanism, "the equations of motion")
     model, state = build(mechanism), None
     if mechanism.initial:

@@ -9,6 +9,7 @@ from jaxtyping import Float
 
 from jounce.errors import MechanismError, SolveError
 from jounce.kinematics.assembly import assemble
+from jounce.kinematics.curves.choice import chosen
 from jounce.kinematics.dead_ends import dead_end_words
 from jounce.kinematics.grid import LONG_GRID
 from jounce.kinematics.long_grids import solve_grid
@@ -171,7 +172,7 @@ def _followed(
     lost = max((output.lost_orders for output in mechanism.outputs.values()), default=0)
     of_forces = any(output.of_forces for output in mechanism.outputs.values())
     check_laws(mechanism, np.array([first, last]), order + lost, forces=of_forces)
-    model, coordinates = assemble(build(mechanism), first, tolerance)
+    model, coordinates = assemble(build(chosen(mechanism, first)), first, tolerance)
     solver = Solver(model, max(order + lost, LOWEST_ORDER), float(tolerance), refine, order)
     start = _first(solver, coordinates, np.array([first]))
     on_the_way = np.asarray(instants) if len(instants) <= LONG_GRID else NO_GRID

@@ -23,6 +23,7 @@ from jounce.kinematics.assembly import (
     put_together,
     redundant_rows,
 )
+from jounce.kinematics.curves.choice import chosen
 from jounce.kinematics.host_jacobian import HostJacobian
 from jounce.mechanism import Mechanism, Model, build, time_grid
 from jounce.mechanism.masses import body_mass
@@ -193,8 +194,11 @@ def inspected(mechanism: Mechanism, path: str | PathLike[str] | None = None) -> 
     >>> [(joint["name"], joint["rows"]) for joint in facts["joints"]]
     [('A', 2), ('D', 2), ('BC', 1)]
     """
-    facts, model = mechanism_facts(mechanism, path), build(mechanism)
-    state = _State(mechanism, model, 0.0 if facts["time"] is None else facts["time"]["start"])
+    facts = mechanism_facts(mechanism, path)
+    instant = 0.0 if facts["time"] is None else facts["time"]["start"]
+    mechanism = chosen(mechanism, instant)
+    model = build(mechanism)
+    state = _State(mechanism, model, instant)
     for kind in ("joints", "drivers"):
         for element in facts[kind]:
             element["rows"] = model.rows.count(f"{kind}.{element['name']}")

@@ -157,6 +157,7 @@ def _build(source: Source, space: str, model: dict[str, Any], places: _Places) -
         gravity=model["gravity"],
         time=TimeGrid(**_plain(model["time"])) if model["time"] is not None else None,
         title=model["title"],
+        assembly=model["assembly"],
         dimensions=model["dimensions"],
     )
     _check_columns(source, mechanism)

@@ -13,7 +13,7 @@ from jounce.kinematics.curves.curve import Curve, posed
 from jounce.kinematics.curves.senses import senses
 from jounce.kinematics.curves.start import first_instant
 from jounce.kinematics.curves.starts import put_together_side_by_side
-from jounce.kinematics.curves.trace import check_number, trace
+from jounce.kinematics.curves.tracing import check_number, traced
 from jounce.kinematics.curves.walker import Walker
 from jounce.kinematics.device import resident
 from jounce.mechanism import Mechanism, build, check_mechanism
@@ -192,7 +192,7 @@ class _Search:
     """What is known of the assemblies at an instant."""
 
     def __init__(self, mechanism: Mechanism, instant: float):
-        self.mechanism, self.instant = mechanism, instant
+        self.mechanism, self.instant = dataclasses.replace(mechanism, assembly=None), instant
         model = build(mechanism)
         if model.system.shape[0] < model.system.shape[1]:
             message = "joints and drivers leave degrees of freedom, so that there are infinitely many assemblies"
@@ -279,7 +279,7 @@ class _Search:
         while number < len(self.found):
             if self.found[number].circuit is None:
                 begun = posed(self.mechanism, self.found[number].coordinates)
-                curves = trace(begun, self.instant, driver=driver, order=0, count=2).connected()
+                curves = traced(begun, self.instant, driver).connected()
                 circuits.append(curves[0])
                 self.found[number].circuit, self.found[number].branch = len(circuits), 1
                 for curve in curves:

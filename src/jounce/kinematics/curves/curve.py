@@ -81,6 +81,7 @@ class Curve(Displayed):
         self._free, self._walker, self._settings = free, walker, settings
         self._order, self._count, self._longest = settings
         self.first_value = free.value
+        self._paths = paths
         forward, backward = paths
         self.closed = forward.end is End.CLOSED
         self._places = list(forward.places)
@@ -98,6 +99,10 @@ class Curve(Displayed):
         shape = "closed" if self.closed else "open"
         counts = f"{len(self.limits)} limit positions, {len(self.change_points)} change points"
         return f"<Curve {title}{shape}, length {self.length:.6g}, {counts}>"
+
+    def sampled(self, order: int, count: int) -> "Curve":
+        """Return the curve with outputs to another order at another number of points."""
+        return Curve(self.mechanism, self._free, self._walker, self._paths, (order, count, self._longest))
 
     @property
     def size(self) -> float:
@@ -401,4 +406,4 @@ def posed(mechanism: Mechanism, coordinates: dict[str, np.ndarray]) -> Mechanism
         else:
             given["orientation"] = coordinates["quaternion"][:, k].tolist()
         bodies[name] = dataclasses.replace(body, **given)
-    return dataclasses.replace(mechanism, bodies=bodies)
+    return dataclasses.replace(mechanism, bodies=bodies, assembly=None)

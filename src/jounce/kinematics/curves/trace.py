@@ -1,13 +1,12 @@
 """From a mechanism to its curve of configurations."""
 
 import math
-import numbers
 from typing import Any
 
-from jounce.errors import MechanismError
+from jounce.kinematics.curves.choice import chosen
 from jounce.kinematics.curves.curve import Curve
-from jounce.kinematics.curves.path import walk_both_ways
-from jounce.kinematics.curves.start import begun, first_instant, freed
+from jounce.kinematics.curves.start import first_instant
+from jounce.kinematics.curves.tracing import check_number, traced
 from jounce.mechanism import Mechanism, check_mechanism
 from jounce.mechanism.preconditions import concrete
 
@@ -74,17 +73,4 @@ def trace(
     if time is not None:
         check_number("time", time, -math.inf, math.inf)
     instant = first_instant(mechanism) if time is None else float(time)
-    free = freed(mechanism, instant, driver)
-    walker, start = begun(free)
-    paths = walk_both_ways(walker, start, float(length))
-    return Curve(mechanism, free, walker, paths, (int(order), int(count), float(length)))
-
-
-def check_number(name: str, value: Any, least: Any, most: Any, *, whole: bool = False) -> None:
-    """Raise MechanismError unless an option is a number between bounds."""
-    kind = numbers.Integral if whole else numbers.Real
-    fits = isinstance(value, kind) and not isinstance(value, bool) and math.isfinite(float(value))
-    if not fits or not least <= value <= most:
-        what = "a whole number" if whole else "a finite number"
-        bounds = "" if not math.isfinite(most) else f" from {least:g} to {most:g}"
-        raise MechanismError(f"must be {what}{bounds}", name=name, value=value)
+    return traced(chosen(mechanism, instant), instant, driver, (int(order), int(count), float(length)))
