@@ -30,6 +30,7 @@ def trace(
     order: int = 2,
     points: int = 361,
     length: float = 200.0,
+    circuits: bool = False,
     figure: Path | None = None,
     show: list[str] | None = None,
     reading: MechanismReading = PLAIN_MECHANISM,
@@ -55,6 +56,8 @@ def trace(
         Of the table, evenly spaced in arc length.
     length
         Largest arc length to either side, rad or sizes of the mechanism.
+    circuits
+        Trace the circuits of all assemblies, not of the file's only.
     figure
         Draw paths of points and outputs: .png, .svg or .pdf.
     show
@@ -64,7 +67,7 @@ def trace(
     --------
       jounce trace examples/four_bar.yaml --set "AB=15 cm"
       jounce trace examples/rspu_slide.yaml --out curve.csv
-      jounce trace examples/four_bar.yaml --figure curve.png --show C
+      jounce trace examples/four_bar.yaml --circuits --figure curve.png
     """
     output.check()
     if figure is not None:
@@ -74,10 +77,14 @@ def trace(
     mechanism = reading.mechanism(file)
     for target in (output.out, figure):
         spare_inputs(target, overwrite=output.overwrite)
-    from jounce.kinematics import trace as traced
+    from jounce.kinematics import assemblies, trace as traced
 
     with errors_about(file), options_named():
         curves = [traced(mechanism, time, driver=driver, order=order, count=points, length=length)]
+        if circuits:
+            found = assemblies(mechanism, time, driver=curves[0].driver).circuits
+            here = curves[0].coordinates_at(0.0)
+            curves += [x.sampled(order, points) for x in found if not any(c.passes(here) for c in x.connected())]
     return told(curves, file, figure, show, output)
 
 

@@ -192,9 +192,7 @@ class Mechanism(Displayed):
             for body, side in wish.items():
                 check_name("body", body, tuple(self.bodies), MechanismError, name=f"assembly.{body}")
                 check_choice(f"assembly.{body}", side, tuple(SIDES), MechanismError)
-        elif not (
-            wish is None or wish == NEAREST or (isinstance(wish, int) and not isinstance(wish, bool) and wish > 0)
-        ):
+        elif wish is not None and wish != NEAREST and not (type(wish) is int and wish > 0):
             message = f"must be a number from 1, {NEAREST}, or for bodies one of {', '.join(SIDES)}"
             raise MechanismError(message, name="assembly", value=wish)
 

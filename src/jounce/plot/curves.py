@@ -11,7 +11,7 @@ from jounce.errors import MechanismError, check_name
 from jounce.kinematics import Curve
 from jounce.mechanism import PointOutput
 from jounce.plot.labels import scale_of, symbol, unit_label
-from jounce.plot.style import GREY, LINE_COLOURS, blank_figure, set_ticks, style
+from jounce.plot.style import GREY, LINE_COLOURS, blank_figure, set_ticks, shown_name, style
 
 __all__ = ["draw_curves"]
 
@@ -107,12 +107,12 @@ def _draw_panel(axes: Any, curves: Sequence[Curve], name: str, pair: tuple[int, 
             axes.plot(x[at], y[at], marker=mark, color=GREY, fillstyle="none", markersize=5.5, linestyle="", zorder=4)
     if pair:
         for label, k in zip((axes.set_xlabel, axes.set_ylabel), pair, strict=True):
-            label(f"{symbol(name, 0, output.labels[k])}  ({unit})")
+            label(f"{symbol(name, 0, output.labels[k]) or shown_name(name)}  ({unit})")
         axes.set_aspect("equal", adjustable="datalim")
     else:
         driver = curves[0].driver
         axes.set_xlabel("arc length" if driver is None else f"{driver}  ({curves[0].unit})")
-        axes.set_ylabel(f"{symbol(name, 0, '')}  ({unit})")
+        axes.set_ylabel(f"{symbol(name, 0, '') or shown_name(name)}  ({unit})")
     for axis in (axes.xaxis, axes.yaxis):
         set_ticks(axis, 5)
     axes.ticklabel_format(useOffset=False)
