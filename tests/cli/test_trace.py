@@ -17,6 +17,7 @@ def shown(capsys, *arguments):
     return status, told.out, told.err
 
 
+@pytest.mark.slow
 def test_limit_positions_in_a_table_a_file_and_a_figure(capsys, tmp_path):
     table, figure = tmp_path / "curve.csv", tmp_path / "curve.png"
     status, out, _ = shown(capsys, "trace", FILE, *STROKE, "--out", table, "--figure", figure, "--points", 50)
@@ -56,6 +57,7 @@ def test_bad_options(capsys, options, message, tmp_path, monkeypatch):
     assert message in err
 
 
+@pytest.mark.slow
 def test_the_range_of_a_driver(capsys):
     status, out, _ = shown(capsys, "inspect", FILE, "--range")
     assert status == 0

@@ -37,6 +37,7 @@ def agree(found, angles):
     return len(crank) == len(angles) and away.min(axis=0).max() < 1e-8 and away.min(axis=1).max() < 1e-8
 
 
+@pytest.mark.slow
 def test_all_assemblies_of_a_stephenson_linkage():
     mechanism, angles = six_bar(0)
     assert agree(jn.assemblies(mechanism, 0.0, circuits=False), angles)
@@ -69,6 +70,7 @@ def test_what_is_found_does_not_depend_on_the_seed():
     assert first.since_last_new > 900
 
 
+@pytest.mark.slow
 def test_a_slider_that_lies_turned_over_in_its_guide_is_no_assembly():
     found = jn.assemblies(slider_crank(), 1.0, circuits=False)
     assert len(found) == 2
@@ -105,6 +107,7 @@ def test_a_motion_of_the_assembly_that_is_wished_for(wish, side):
     assert np.sign(motion.outputs["C"][0, 0, 1]) == side
 
 
+@pytest.mark.slow
 def test_a_motion_of_the_assembly_of_a_number():
     mechanism = four_bar(1.0, 3.0, 2.5, 3.2)
     tips = [

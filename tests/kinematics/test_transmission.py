@@ -26,6 +26,7 @@ def test_types_of_grashof(lengths, kind):
     assert found.type.startswith(kind)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family, point", [(RandomFourBar(), "C"), (RandomSliderCrank(), "B")])
 def test_extremes_are_those_along_the_curve(family, point):
     for seed in range(6):
@@ -77,6 +78,7 @@ def test_a_four_bar_of_hinges_turned_in_its_frames():
     np.testing.assert_allclose(found.transmission(0.3 - turn + 1.1), crank.transmission(1.1))
 
 
+@pytest.mark.slow
 def test_what_is_no_four_bar_is_not_taken_for_one():
     for name in ("six_bar_watt", "six_bar_stephenson", "gear_pair", "rssr", "quick_return"):
         mechanism = jn.load(f"examples/{name}.yaml")

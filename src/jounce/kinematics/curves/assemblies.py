@@ -8,7 +8,7 @@ import numpy as np
 
 from jounce.display import Displayed
 from jounce.errors import AssemblyError, MobilityError
-from jounce.kinematics.assembly import _settled, check_assembled, check_mobility
+from jounce.kinematics.assembly import _nearest, _settled, check_assembled, check_mobility, put_together
 from jounce.kinematics.curves.curve import Curve, posed
 from jounce.kinematics.curves.senses import senses
 from jounce.kinematics.curves.start import first_instant
@@ -267,10 +267,20 @@ class _Search:
             if np.max(np.abs(self.walker.difference(coordinates, known.coordinates))) < same:
                 known.hits += hits
                 return False
+        coordinates = self._polished(coordinates)
         place = self.walker.placed({name: x[..., None] for name, x in coordinates.items()}, self.instant)
         sizes = np.linalg.svd(place.jacobian, compute_uv=False)
         self.found.append(_Found(coordinates, float(sizes[: self.walker.columns][-1]), hits))
         return True
+
+    def _polished(self, coordinates: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Return an assembly to rounding, its planar angles with the whole turns that are nearest to the guess."""
+        begun = {name: x[..., None] for name, x in coordinates.items()}
+        trial = put_together(self.first, self.instant, TOLERANCE, begun)
+        if not trial.closed:
+            return coordinates  # next to a singular position, as good as it gets
+        trial = _nearest(self.first, trial, self.instant) if "angle" in coordinates else trial
+        return {name: x[..., 0] for name, x in trial.coordinates.items()}
 
     def along_circuits(self, driver: str | None) -> tuple[Curve, ...]:
         """Trace the circuits of all assemblies, and add what else is on them."""

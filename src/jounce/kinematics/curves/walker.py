@@ -310,7 +310,7 @@ class Walker:
 
     # rank
 
-    def independent(self, jacobian: Float[np.ndarray, "row unknown"]) -> Int[np.ndarray, " row"] | None:
+    def independent(self, jacobian: Float[np.ndarray, "row unknown"]) -> Int[np.ndarray, " independent"] | None:
         """Return rows that are independent, one less than unknowns; None where there are not so many."""
         wanted = self.unknowns - 1
         if len(jacobian) == wanted:
