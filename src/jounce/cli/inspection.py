@@ -85,8 +85,8 @@ def inspect(
         for table in robot_tables(facts) if robot else mechanism_tables(facts, bodies_table(facts)):
             show_table(table)
         say(f"\n{start_summary(facts)}")
-        if facts.get("range"):
+        if found := facts.get("range"):
             from jounce.reporting.range_facts import range_words
 
-            say(f"\n{range_words(facts['range'])}")
+            say(f"\n{range_words(dict(found))}")
     return 0 if facts["ok"] else 1

@@ -230,7 +230,8 @@ class Curve(Displayed):
 
     def connected(self) -> tuple["Curve", ...]:
         """Return this curve and those that cross it at change points, and those that cross these: the whole circuit."""
-        found, waiting = [self], [self]
+        found: list[Curve] = [self]
+        waiting: list[Curve] = [self]
         while waiting and len(found) < MOST_CURVES:
             curve = waiting.pop()
             for number, point in enumerate(curve.change_points):

@@ -26,6 +26,13 @@ class LimitPosition:
         Of the driver, rad or m.
     kind : str
         ``"maximum"`` or ``"minimum"``, where the driver turns back, ``"stationary"`` where it goes on.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> limits = jn.trace(jn.load("examples/rspu_slide.yaml")).limits
+    >>> [(limit.kind, round(limit.value, 6)) for limit in limits]
+    [('maximum', 0.314952), ('minimum', 0.259312)]
     """
 
     arc_length: float

@@ -129,7 +129,7 @@ def recognised(mechanism: Mechanism, driver: str) -> Linkage | None:
     law = {**mechanism.initial, **mechanism.drivers}.get(driver)
     if mechanism.space != "planar" or law is None or getattr(law, "coordinate", "") != "angle":
         return None
-    if law.bodies[0] != GROUND or law.offset not in (0, 0.0):
+    if law.bodies[0] != GROUND or getattr(law, "offset", 0.0) not in (0, 0.0):
         return None
     hinges, guides = _joints(mechanism)
     crank = law.bodies[1]
@@ -201,9 +201,9 @@ def _loop(hinges: list[Hinge], crank: str, links: int) -> list[tuple[str, Hinge,
 def _four_bar(loop: list[tuple[str, Hinge, Hinge]]) -> FourBar | None:
     arms = [_on(after, body) - _on(before, body) for body, before, after in loop]
     ground = _on(loop[-1][2], GROUND) - _on(loop[0][1], GROUND)
-    sizes = [float(np.linalg.norm(x)) for x in (*arms, ground)]
+    crank, coupler, output, base = (float(np.linalg.norm(x)) for x in (*arms, ground))
     offset = math.atan2(ground[1], ground[0]) - math.atan2(arms[0][1], arms[0][0])
-    return FourBar(*sizes, offset) if min(sizes) > 0 else None
+    return FourBar(crank, coupler, output, base, offset) if min(crank, coupler, output, base) > 0 else None
 
 
 def _slider_crank(hinges: list[Hinge], guide: Any, crank: str) -> SliderCrank | None:
