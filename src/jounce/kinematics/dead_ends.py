@@ -12,6 +12,7 @@ from jounce.kinematics.motion import Motion
 from jounce.kinematics.status import Status
 
 ENDS = (Status.SINGULAR, Status.NOT_CONVERGED, Status.COLLAPSED)
+LENGTH = 40.0  # of the curve, looked at for where the other branch leads
 NEAR = 1e-9  # of the value, by which an instant may be short of a dead point that it is at
 
 
@@ -29,7 +30,7 @@ def dead_end_words(motion: Motion, index: int) -> str:
     name = next(iter(drivers)) if len(drivers) == 1 else TIME
     try:
         wanted = here if name == TIME else law_values(motion.mechanism, here)[name]
-        curve = trace(last, before, driver=name, order=0, count=2)
+        curve = trace(last, before, driver=name, order=0, count=2, length=LENGTH)
     except JounceError:
         return ""  # what failed is told already
     found = _end_before(curve, wanted)
@@ -54,8 +55,12 @@ def _end_before(curve: Curve, wanted: float) -> tuple[float, float | None] | Non
     if not np.isfinite(low) or not (upwards or wanted <= low + slack) or not curve.turning_points:
         return None
     value = high if upwards else low
+    limits = [x.value for x in curve.turning_points]
+    if not any(abs(x - value) <= slack for x in limits):
+        return None  # as far as the curve was followed
     beyond = [b for b in curve.branches[1:] if abs((b.high if upwards else b.low) - value) <= slack]
-    return value, (beyond[0].low if upwards else beyond[0].high) if beyond else None
+    ends = [b.low if upwards else b.high for b in beyond]
+    return value, next((x for x in ends if any(abs(x - y) <= slack for y in limits)), None)
 
 
 def _words(value: float, unit: str) -> str:

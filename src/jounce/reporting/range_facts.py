@@ -34,6 +34,8 @@ class RangeFacts(TypedDict):
     unit: str
     low: float | None
     high: float | None
+    low_is_dead_point: bool
+    high_is_dead_point: bool
     circuit_closed: bool
     type: str | None
     transmission: TransmissionFacts | None
@@ -70,6 +72,8 @@ def range_facts(mechanism: Mechanism, driver: str | None = None) -> dict[str, An
         "unit": curve.unit,
         "low": None if whole else low,
         "high": None if whole else high,
+        "low_is_dead_point": _is_limit(curve, low),
+        "high_is_dead_point": _is_limit(curve, high),
         "circuit_closed": curve.closed,
         "type": None if linkage is None else linkage.type,
         "transmission": transmission,
@@ -78,6 +82,11 @@ def range_facts(mechanism: Mechanism, driver: str | None = None) -> dict[str, An
         "change_points": [curve.value(point.arc_length) for point in curve.change_points],
     }
     return found | {"warnings": _warnings(found, whole, float(np.median(sizes)))}
+
+
+def _is_limit(curve: Curve, value: float) -> bool:
+    """Tell whether the driver turns back at a value: an open curve may end elsewhere."""
+    return any(abs(x.value - value) <= 1e-9 * max(abs(value), 1e-300) for x in curve.turning_points)
 
 
 def _on_branch(curve: Curve) -> tuple[np.ndarray, np.ndarray]:
@@ -99,8 +108,8 @@ def _warnings(found: Facts, whole: bool, median: float) -> list[str]:
     elif found["transmission"] is None and whole and found["smallest_singular_value"] < POOR_SHARE * median:
         where = value_words(found["smallest_singular_value_at"], unit)
         told.append(f"poor transmission: close to a singular position at {found['driver']} = {where}")
-    if not whole:
-        ends = " and ".join(value_words(found[end], unit) for end in ("low", "high"))
+    ends = " and ".join(value_words(found[end], unit) for end in ("low", "high") if found[f"{end}_is_dead_point"])
+    if ends:
         told.append(f"{found['driver']} turns back at dead points: {ends}; keep its law well inside")
     if found["change_points"]:
         where = ", ".join(value_words(value, unit) for value in found["change_points"])
@@ -116,6 +125,11 @@ def range_words(found: Facts) -> str:
         lines.append(f"  {driver} makes whole turns on this circuit")
     else:
         lines.append(f"  {driver} from {value_words(found['low'], unit)} to {value_words(found['high'], unit)}")
+        lines += [
+            f"  (its {end} value is as far as the curve was followed)"
+            for end, key in (("least", "low"), ("largest", "high"))
+            if not found[f"{key}_is_dead_point"]
+        ]
     if found["type"]:
         lines.append(f"  {found['type']}")
     if (transmission := found["transmission"]) is not None:

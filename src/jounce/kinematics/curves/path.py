@@ -14,7 +14,7 @@ from jaxtyping import Bool
 
 from jounce.kinematics.curves.crossings import PASSAGE_ORDER, ChangePoint, crossing
 from jounce.kinematics.curves.series import CurvePoints
-from jounce.kinematics.curves.walker import LANES, ORDER, TAIL, Place, Walker, all_finite
+from jounce.kinematics.curves.walker import LANES, ORDER, TAIL, Place, Walker, all_finite, horner
 
 LARGEST_DEPARTURE = 1e-8  # of the curve from the series, rad or sizes of the mechanism
 LARGEST_CORRECTION = 1e-10  # the last one
@@ -115,6 +115,8 @@ def _back_at(walker: Walker, here: Place, start: Place, stretch: float) -> float
     """Return how far from here, within a stretch, a curve is back at its start, in the same direction."""
     step = meets(walker, here, stretch, {name: c[0] for name, c in start.coordinates.items()})
     if step is None:
+        return None
+    if walker.timed and abs(horner(here.value, step) - start.value[0]) > SAME_PLACE * walker.value_scale:
         return None
     ahead, first = (walker.tangent(place)[: walker.columns] for place in (here.recentred(step), start))
     return step if float(ahead @ first) > 1 - SAME_DIRECTION else None

@@ -135,7 +135,7 @@ def begun(free: Freed, tolerance: float = 1e-12) -> tuple[Walker, Place]:
     check_assembled(model, found, free.value, free=not driven)
     system = resident(with_fields(model.system, row_scale=found.scale[:, None]))
     model = dataclasses.replace(model, system=system)
-    walker = Walker(model, driven)
+    walker = Walker(model, driven, timed=free.driver == TIME)
     place = walker.placed(found.coordinates, free.value)
     _check_freedom(walker, place)
     walker = walker.scaled_at(place)

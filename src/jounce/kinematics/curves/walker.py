@@ -109,6 +109,7 @@ class Walker:
     model: Model
     driven: bool
     value_scale: float = 1.0
+    timed: bool = False  # the value is the instant: the same pose at another one is another place
 
     @property
     def columns(self) -> int:
