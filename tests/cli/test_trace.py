@@ -33,6 +33,7 @@ def test_limit_positions_in_a_table_a_file_and_a_figure(capsys, tmp_path):
     np.testing.assert_array_equal(read(stored)["psi"].values[:, 1], rows["psi_d1"])
 
 
+@pytest.mark.slow
 def test_as_json(capsys):
     status, out, _ = shown(capsys, "trace", FILE, *STROKE, "--json")
     (curve,) = json.loads(out)["curves"]

@@ -53,6 +53,7 @@ def test_all_assemblies_of_many_stephenson_linkages():
     assert max(counts) >= 4
 
 
+@pytest.mark.slow
 def test_circuits_and_branches_of_four_bars():
     turning = jn.assemblies(four_bar(1.0, 3.0, 2.5, 3.2))
     assert [(x.circuit, x.branch) for x in turning] == [(1, 1), (2, 1)]
@@ -100,6 +101,7 @@ def test_a_number_that_is_not_there():
         jn.assemblies(four_bar(1.0, 3.0, 2.5, 3.2), circuits=False).number(3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wish, side", [({"rocker": "above"}, 1), ({"rocker": "below"}, -1)])
 def test_a_motion_of_the_assembly_that_is_wished_for(wish, side):
     mechanism = dataclasses.replace(four_bar(1.0, 3.0, 2.5, 3.2), assembly=wish)
