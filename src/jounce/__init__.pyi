@@ -91,12 +91,18 @@ from jounce.io import (
 )
 from jounce.jet import Jet as Jet, compose as compose
 from jounce.kinematics import (
+    Assemblies as Assemblies,
+    Assembly as Assembly,
     Branch as Branch,
+    Curve as Curve,
+    LimitPosition as LimitPosition,
     Mobility as Mobility,
     Motion as Motion,
     Status as Status,
+    assemblies as assemblies,
     mobility as mobility,
     solve as solve,
+    trace as trace,
 )
 from jounce.mechanism import (
     AbstractOutput as AbstractOutput,

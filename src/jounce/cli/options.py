@@ -216,3 +216,16 @@ def errors_about(file: Path, robot: Path | None = None) -> Iterator[None]:
             raise
         about_robot = robot is not None and isinstance(error, RobotError)
         raise error.located(path=robot if about_robot else file) from None
+
+
+CURVE_OPTIONS = {"driver": "--driver", "order": "--order", "count": "--points", "length": "--length", "time": "--time"}
+
+
+@contextmanager
+def options_named() -> Iterator[None]:
+    """Give errors about an argument of a trace the option that it came from."""
+    try:
+        yield
+    except JounceError as error:
+        error.name = CURVE_OPTIONS.get(str(error.name), error.name)
+        raise

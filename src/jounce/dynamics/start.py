@@ -15,6 +15,7 @@ from jounce.jet import Jet
 from jounce.kinematics.advance import LARGEST_CONTRADICTION
 from jounce.kinematics.assembly import assemble, freely_moving
 from jounce.kinematics.compilation import compiled
+from jounce.kinematics.curves.choice import chosen
 from jounce.kinematics.host_jacobian import RANK_TOLERANCE, HostJacobian, is_clearly_regular
 from jounce.kinematics.status import Status
 from jounce.mechanism import Mechanism, Model, build
@@ -68,6 +69,7 @@ def consistent_start(mechanism: Mechanism, instant: float) -> ConsistentStart:
     MobilityError
         If the start is a singular position.
     """
+    mechanism = chosen(mechanism, instant)
     masses = required_masses(mechanism, "the equations of motion")
     model, state = build(mechanism), None
     if mechanism.initial:

@@ -114,14 +114,14 @@ def assemble(model: Model, instant: float, tolerance: float, *, free: bool = Fal
     if not model.rows:  # bodies that fly freely are together as they are
         model, _ = with_reference(model, model.guess, instant, model.prescribed)
         return dataclasses.replace(model, system=resident(model.system)), model.guess
-    model, found = _settled(model, instant, tolerance)
+    model, found = settled(model, instant, tolerance)
     check_assembled(model, found, instant, free=free)
     model, told = redundancy_of(model, found, instant)
     check_mobility(model, found.jacobian, told, free=free)
     return dataclasses.replace(model, system=resident(model.system)), found.coordinates
 
 
-def _settled(model: Model, instant: float, tolerance: float) -> tuple[Model, Trial]:
+def settled(model: Model, instant: float, tolerance: float) -> tuple[Model, Trial]:
     """Put the bodies together, and count the angles about axes from the position found.
 
     Where the axes were tilted against each other in the starting guess, the angles in the position found are others
@@ -138,7 +138,7 @@ def _settled(model: Model, instant: float, tolerance: float) -> tuple[Model, Tri
             model, _ = with_reference(model, begin.coordinates, instant, told)
             found = put_together(model, instant, tolerance, begin.coordinates)
     if "angle" in found.coordinates and start is None and found.closed:
-        found = _nearest(model, found, instant)
+        found = nearest_to_guess(model, found, instant)
     for _ in range(MAX_DATUMS):
         if not found.closed:
             return model, found
@@ -176,7 +176,7 @@ def _turned(
     return model, coordinates
 
 
-def _nearest(model: Model, found: Trial, instant: float) -> Trial:
+def nearest_to_guess(model: Model, found: Trial, instant: float) -> Trial:
     """Return planar bodies put together, with every angle shifted by whole turns to be nearest to the guess."""
     moved, still = mover(model, instant), np.zeros(model.system.shape[1])
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from jounce.constraints import AbstractConstraint
 from jounce.display import Displayed
-from jounce.errors import ExpressionError, JounceError, MechanismError, check_name
+from jounce.errors import ExpressionError, JounceError, MechanismError, check_choice, check_name
 from jounce.forces import AbstractForce
 from jounce.mechanism.outputs import AbstractQuantity
 from jounce.mechanism.redundant_reactions import check_redundant_reactions
@@ -30,6 +30,9 @@ RESERVED_OUTPUTS = (  # the axes of a result
     "row_axis",
     "column_axis",
 )
+NEAREST = "nearest"
+SIDES = {"above": (-1, 1), "below": (-1, -1), "right": (0, 1), "left": (0, -1)}
+"""Where a body may be wished to lie: the component of the global frame, and its sign."""
 RATE_COLUMN = re.compile(r".*_d[0-9]+")
 
 
@@ -119,6 +122,10 @@ class Mechanism(Displayed):
         stiffness ``force``, N/m, and ``torque``, N m/rad; what is not given is rigid.
     title : str, optional
         One line for tables and figures.
+    assembly : int, str or dict, optional
+        Which of several assemblies is meant, where the nearest to the starting guess by chance of iteration will not
+        do: its number as `jounce.assemblies` counts, ``"nearest"`` for the truly nearest to the guess, or for some
+        bodies ``"above"``, ``"below"``, ``"left"`` or ``"right"``: where the middle of its joints lies farthest there.
     dimensions : dict of str to tuple of Dimension, optional
         Which dimensions parameters may have, where it is known: a file tells it by units and by use.
 
@@ -155,6 +162,7 @@ class Mechanism(Displayed):
     time: Any = None
     redundant_reactions: str | Mapping[str, Any] = "unique"
     title: str = ""
+    assembly: Any = None
     dimensions: Mapping[str, tuple[Dimension, ...]] = dataclasses.field(default_factory=dict, compare=False, repr=False)
 
     def __post_init__(self):
@@ -166,6 +174,7 @@ class Mechanism(Displayed):
             raise MechanismError("the body 'ground' always exists and never moves", name="bodies.ground")
         self._check_names()
         check_redundant_reactions(self.redundant_reactions, (*self.joints, *self.drivers))
+        self._check_assembly()
         for kind, elements in self.elements.items():
             for name, element in elements.items():
                 self._check_element(kind, name, element)
@@ -184,6 +193,16 @@ class Mechanism(Displayed):
             for name in self.initial.keys() & getattr(self, kind).keys():
                 message = f"a {kind[:-1]} and an initial condition have the same name"
                 raise MechanismError(message, name=f"initial.{name}")
+
+    def _check_assembly(self) -> None:
+        wish = self.assembly
+        if isinstance(wish, Mapping) and wish:
+            for body, side in wish.items():
+                check_name("body", body, tuple(self.bodies), MechanismError, name=f"assembly.{body}")
+                check_choice(f"assembly.{body}", side, tuple(SIDES), MechanismError)
+        elif wish is not None and wish != NEAREST and not (type(wish) is int and wish > 0):
+            message = f"must be a number from 1, {NEAREST}, or for bodies one of {', '.join(SIDES)}"
+            raise MechanismError(message, name="assembly", value=wish)
 
     def _check_element(self, kind: str, name: str, element: Any) -> None:
         place = f"{kind}.{name}"

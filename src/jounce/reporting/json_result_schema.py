@@ -8,6 +8,7 @@ from pydantic import TypeAdapter
 from pydantic.json_schema import GenerateJsonSchema
 from typing_extensions import TypedDict
 
+from jounce.reporting.curve_facts import CurveFacts
 from jounce.reporting.mechanism_facts import Grid, InspectedMechanism
 from jounce.reporting.modes_facts import ModesFacts
 from jounce.reporting.motion_facts import MotionFacts, SimulationFacts
@@ -74,6 +75,15 @@ class InspectRobotResult(Result, InspectedRobot):
     """jounce inspect --json of a robot file."""
 
     command: Literal["inspect"]
+
+
+class TraceResult(Result):
+    """jounce trace --json."""
+
+    command: Literal["trace"]
+    file: str
+    curves: list[CurveFacts]
+    written: str | None
 
 
 class LimitRow(TypedDict):
@@ -181,6 +191,7 @@ RESULTS: dict[str, Any] = {
     "check": CheckResult,
     "torques": TorquesResult,
     "modes": ModesResult,
+    "trace": TraceResult,
     "new_list": NewListResult,
     "new": NewResult,
 }

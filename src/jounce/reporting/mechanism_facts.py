@@ -13,10 +13,12 @@ from jounce.constraints.base import value_fields
 from jounce.errors import JounceError
 from jounce.io.files.source import read_source
 from jounce.io.mechanisms.keys import OUTPUTS, output_holder
+from jounce.kinematics.curves.choice import chosen
 from jounce.mechanism import Mechanism, Model, build, time_grid
 from jounce.mechanism.masses import body_mass
 from jounce.mechanism.system import POSITION_COMPONENTS
 from jounce.reporting.freedom_facts import AssemblyFacts, FreedomFacts, MobilityFacts, StartingState
+from jounce.reporting.range_facts import RangeFacts
 from jounce.trajectory.dimensions import Dimension
 from jounce.trajectory.units import parse_value
 
@@ -113,6 +115,7 @@ class InspectedMechanism(MechanismFacts):
     mobility: MobilityFacts | None
     assembly: AssemblyFacts
     ok: bool
+    range: NotRequired[RangeFacts | None]
 
 
 def mechanism_facts(mechanism: Mechanism, path: str | PathLike[str] | None = None) -> dict[str, Any]:
@@ -155,8 +158,11 @@ def inspected(mechanism: Mechanism, path: str | PathLike[str] | None = None) -> 
     >>> [(joint["name"], joint["rows"]) for joint in facts["joints"]]
     [('A', 2), ('D', 2), ('BC', 1)]
     """
-    facts, model = mechanism_facts(mechanism, path), build(mechanism)
-    state = StartingState(mechanism, model, 0.0 if facts["time"] is None else facts["time"]["start"])
+    facts = mechanism_facts(mechanism, path)
+    instant = 0.0 if facts["time"] is None else facts["time"]["start"]
+    mechanism = chosen(mechanism, instant)
+    model = build(mechanism)
+    state = StartingState(mechanism, model, instant)
     for kind in ("joints", "drivers"):
         for element in facts[kind]:
             element["rows"] = model.rows.count(f"{kind}.{element['name']}")

@@ -159,6 +159,7 @@ def _build(source: Source, space: str, model: dict[str, Any], places: _Places) -
         time=TimeGrid(**_plain(model["time"])) if model["time"] is not None else None,
         redundant_reactions=model["redundant_reactions"],
         title=model["title"],
+        assembly=model["assembly"],
         dimensions=model["dimensions"],
     )
     _check_columns(source, mechanism)

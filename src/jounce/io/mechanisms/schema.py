@@ -30,7 +30,7 @@ from jounce.io.mechanisms.values import (
     vectors,
     wrenches,
 )
-from jounce.mechanism.mechanism import names_column
+from jounce.mechanism.mechanism import NEAREST, SIDES, names_column
 from jounce.mechanism.system import POSITION_COMPONENTS
 from jounce.rigid.orientation import FRAMES
 from jounce.rigid.rotations import SEQUENCES
@@ -59,6 +59,27 @@ def _all(raw: object, _info: Any) -> bool:
     if raw not in (None, True, "all"):
         raise problem("an energy of the mechanism is that of all its bodies: write true; for one body, body: NAME")
     return True
+
+
+ASSEMBLY = {
+    "oneOf": [
+        {"type": "integer", "minimum": 1},
+        {"const": NEAREST},
+        {"type": "object", "additionalProperties": {"enum": list(SIDES)}, "minProperties": 1},
+    ]
+}
+
+
+def _assembly(raw: object, info: Any) -> Any:
+    if isinstance(raw, dict) and raw:
+        for body, side in raw.items():
+            _check_body(body, info, body)
+            if side not in SIDES:
+                raise problem(f"must be one of {', '.join(SIDES)}", body, value=side)
+        return dict(raw)
+    if raw == NEAREST or (isinstance(raw, int) and not isinstance(raw, bool) and raw > 0):
+        return raw
+    raise problem(f"must be a number from 1, {NEAREST}, or for bodies one of {', '.join(SIDES)}")
 
 
 def _names(*counts: int) -> Any:
@@ -216,6 +237,7 @@ def _file_model(space: str, joints: _Types, drivers: _Types, forces: _Types) -> 
         "space": (Literal[space], ...),
         "bodies": (_named(_body_model(space), _NAME, _body_name), ...),
         "title": (Annotated[Any, Checked(_text, {"type": "string"})], ""),
+        "assembly": (Annotated[Any, Checked(_assembly, ASSEMBLY)], None),
         "gravity": (vector(POSITION_COMPONENTS[space], "acceleration"), None),
         "parameters": (_named(scalar("any"), _PARAMETER, _parameter_name), {}),
         "joints": (_named(_constraint_union(space, "joint", joints), _NAME), {}),

@@ -120,6 +120,8 @@ class _Writer:
         if mechanism.parameters:
             found["parameters"] = {n: _plain(x, f"parameters.{n}") for n, x in mechanism.parameters.items()}
         found["bodies"] = {name: self._body(name, body) for name, body in mechanism.bodies.items()}
+        if mechanism.assembly is not None:
+            found["assembly"] = mechanism.assembly
         for section in ROLES:
             elements = getattr(mechanism, section)
             if elements:
