@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from trimesh import Trimesh
 
@@ -31,6 +29,6 @@ def upright_capsule(radius: float, length: float) -> Trimesh:
     return capsule([0, 0, -0.5 * length], [0, 0, 0.5 * length], radius)
 
 
-def words_as_numbers(text: str) -> Sequence[float]:
+def words_as_numbers(text: str) -> list[float]:
     """Return the numbers in a text, or raise ValueError."""
     return [float(word) for word in text.split()]
