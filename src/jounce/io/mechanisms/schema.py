@@ -18,7 +18,8 @@ from jounce.constraints.planar import COORDINATES
 from jounce.errors import no_such
 from jounce.io.mechanisms.inertia_forms import inertia
 from jounce.io.mechanisms.keys import HOLDERS, FileKey, file_keys, output_holder, output_tag, output_types
-from jounce.io.mechanisms.values import Checked, laws, motion, orientation, problem, scalar, vector, vectors, wrenches
+from jounce.io.mechanisms.motion_values import laws, motion
+from jounce.io.mechanisms.values import Checked, orientation, problem, scalar, vector, vectors, wrenches
 from jounce.mechanism.mechanism import names_column
 from jounce.mechanism.system import POSITION_COMPONENTS
 from jounce.rigid.orientation import FRAMES

@@ -19,7 +19,17 @@ from jounce.errors import JounceError, MechanismError
 from jounce.forces import ExpressionLaw, TimeLaw, VectorLaw
 from jounce.io.mechanisms.keys import OUTPUTS, ROLES, file_keys, output_holder
 from jounce.mechanism import Body, Mechanism, TimeGrid
-from jounce.trajectory import Expression, ExpressionMotion, MeasuredMotion, SplineMotion, TrapezoidalMotion
+from jounce.io.mechanisms.written_laws import piecewise_form, segmented_form
+from jounce.trajectory import (
+    Expression,
+    ExpressionMotion,
+    FollowingMotion,
+    MeasuredMotion,
+    PiecewiseMotion,
+    SegmentedMotion,
+    SplineMotion,
+    TrapezoidalMotion,
+)
 from jounce.trajectory.expression import CONSTANTS, FUNCTIONS
 
 _WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
@@ -197,6 +207,12 @@ class _Writer:
             return [self._law(place, entry, element) for entry in law]
         if isinstance(law, TimeLaw):
             law = law.motion
+        if isinstance(law, FollowingMotion):
+            return self._following(place, law, element)
+        if isinstance(law, SegmentedMotion):
+            return segmented_form(law, place)
+        if isinstance(law, PiecewiseMotion):
+            return piecewise_form(law, place)
         if isinstance(law, SplineMotion):
             return self._spline(place, law)
         if isinstance(law, ExpressionMotion):
