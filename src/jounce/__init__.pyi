@@ -27,12 +27,16 @@ from jounce.dynamics import (
     DriverTorqueOutput as DriverTorqueOutput,
     Energy as Energy,
     EnergyTerms as EnergyTerms,
+    Equilibrium as Equilibrium,
     JointForceOutput as JointForceOutput,
     JointTorqueOutput as JointTorqueOutput,
     KineticEnergyOutput as KineticEnergyOutput,
     LimitReport as LimitReport,
+    Linearisation as Linearisation,
+    Modes as Modes,
     PotentialEnergyOutput as PotentialEnergyOutput,
     Reaction as Reaction,
+    StateSpace as StateSpace,
     acceleration_energy as acceleration_energy,
     applied_force as applied_force,
     check_limits as check_limits,
@@ -40,8 +44,11 @@ from jounce.dynamics import (
     driver_force as driver_force,
     energy_slope as energy_slope,
     energy_terms as energy_terms,
+    equilibria as equilibria,
+    equilibrium as equilibrium,
     joint_reaction as joint_reaction,
     kinetic_energy as kinetic_energy,
+    linearise as linearise,
     potential_energy as potential_energy,
     power_balance as power_balance,
 )
@@ -83,7 +90,20 @@ from jounce.io import (
     write_mechanism as write_mechanism,
 )
 from jounce.jet import Jet as Jet, compose as compose
-from jounce.kinematics import Motion as Motion, Status as Status, solve as solve
+from jounce.kinematics import (
+    Assemblies as Assemblies,
+    Assembly as Assembly,
+    Branch as Branch,
+    Curve as Curve,
+    LimitPosition as LimitPosition,
+    Mobility as Mobility,
+    Motion as Motion,
+    Status as Status,
+    assemblies as assemblies,
+    mobility as mobility,
+    solve as solve,
+    trace as trace,
+)
 from jounce.mechanism import (
     AbstractOutput as AbstractOutput,
     AngleOutput as AngleOutput,

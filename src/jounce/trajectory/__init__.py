@@ -17,5 +17,6 @@ from jounce.trajectory.profiles import (
     RestToRestMotion as RestToRestMotion,
     motion_profile as motion_profile,
 )
-from jounce.trajectory.segments import Segment as Segment, SegmentedMotion as SegmentedMotion
+from jounce.trajectory.segment_pieces import Segment as Segment
+from jounce.trajectory.segments import SegmentedMotion as SegmentedMotion
 from jounce.trajectory.trapezoid import TrapezoidalMotion as TrapezoidalMotion

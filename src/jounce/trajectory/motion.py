@@ -14,7 +14,7 @@ from jaxtyping import Float
 
 from jounce.errors import MechanismError, check_choice
 from jounce.jet import Jet, compose
-from jounce.shapes import ArrayLike, Numbers
+from jounce.shapes import ArrayLike, Numbers, Real
 from jounce.trajectory.expression import Expression
 from jounce.trajectory.sample_errors import derivative_errors
 from jounce.trajectory.splines import spline_through
@@ -165,9 +165,9 @@ class SplineMotion(AbstractMotion):
         self,
         breakpoints: Float[Numbers, " pieces"],
         coefficients: Float[Numbers, "powers pieces"],
-        stop: float,
+        stop: float | Real,
         beyond: str,
-        advance: float = 0.0,
+        advance: float | Real = 0.0,
         samples: tuple[Float[np.ndarray, " samples"], Float[np.ndarray, " samples"]] | None = None,
     ) -> None:
         """Fill in the fields: of the pieces, and of the samples that they go through, if there are any."""

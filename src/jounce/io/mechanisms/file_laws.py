@@ -17,8 +17,8 @@ class FileLaws:
     ----------
     source : Source
         The file.
-    drivers : dict of str to model
-        The drivers as the schema gives them: other laws may follow theirs.
+    drivers : dict of str to dict
+        The values of the drivers by key, as the schema gives them: other laws may follow theirs.
     """
 
     def __init__(self, source: Source, drivers: Mapping[str, Any]):
@@ -38,6 +38,8 @@ class FileLaws:
         """
         if isinstance(value, tuple):
             return tuple(self.law((*location, index), entry, following) for index, entry in enumerate(value))
+        if isinstance(value, AbstractMotion):
+            return value
         if hasattr(value, "samples"):
             law, by = self._spline(location, value), value.of
         elif hasattr(value, "driver"):
@@ -50,12 +52,12 @@ class FileLaws:
 
     def _leader(self, location: Location, name: str, following: tuple[str, ...]) -> AbstractMotion | Expression:
         """Return the law of a driver by its name."""
-        own = location[1:2] if location[0] == "drivers" else ()
-        circle = (*own, *following, name) if not following else (*following, name)
-        if name in circle[:-1]:
-            message = f"drivers follow each other in a circle: {' -> '.join(map(str, circle))}"
+        own = (str(location[1]),) if location[0] == "drivers" and not following else following
+        circle = (*own, name)
+        if name in own:
+            message = f"drivers follow each other in a circle: {' -> '.join(circle)}"
             raise self.source.error(message, (*location, "of"), value=name)
-        given = self.law(("drivers", name, "motion"), self.drivers[name].motion, circle)
+        given = self.law(("drivers", name, "motion"), self.drivers[name]["motion"], circle)
         return given if isinstance(given, AbstractMotion | Expression) else Expression(repr(float(given)))
 
     def _spline(self, location: Location, samples: Any) -> SplineMotion:

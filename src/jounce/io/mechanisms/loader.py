@@ -19,6 +19,7 @@ from jounce.io.mechanisms.unit_hints import warn_of_units
 from jounce.mechanism import AngularVelocityOutput, Body, Mechanism, PointOutput, TimeGrid, time_grid
 from jounce.mechanism.builder import starting_guess
 from jounce.mechanism.masses import body_mass
+from jounce.mechanism.redundant_reactions import resolved_reactions
 from jounce.mechanism.resolve import resolve, resolve_element
 from jounce.mechanism.system import POSITION_COMPONENTS
 from jounce.rigid.euler_parameters import euler_parameters
@@ -151,7 +152,7 @@ def _build(source: Source, space: str, model: dict[str, Any], places: _Places) -
         values = bare.parameter_values
     except JounceError as error:
         raise error.located(name="parameters") from None
-    laws = FileLaws(source, model["drivers"])
+    laws = FileLaws(source, {name: _plain(driver) for name, driver in model["drivers"].items()})
     mechanism = Mechanism(
         space=space,
         bodies={name: _body(source, space, name, _plain(body), values) for name, body in model["bodies"].items()},
@@ -159,7 +160,9 @@ def _build(source: Source, space: str, model: dict[str, Any], places: _Places) -
         parameters=parameters,
         gravity=model["gravity"],
         time=TimeGrid(**_plain(model["time"])) if model["time"] is not None else None,
+        redundant_reactions=model["redundant_reactions"],
         title=model["title"],
+        assembly=model["assembly"],
         dimensions=model["dimensions"],
     )
     _check_columns(source, mechanism)
@@ -248,6 +251,7 @@ def _check_values(mechanism: Mechanism) -> None:
         resolve(mechanism.gravity, parameters)
     except JounceError as error:
         raise error.located(name="gravity") from None
+    resolved_reactions(mechanism.redundant_reactions, parameters)
     if mechanism.time is not None:
         time_grid(mechanism.time, parameters)
 

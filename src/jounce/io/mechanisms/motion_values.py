@@ -82,7 +82,9 @@ def motion(quantity: str, variables: dict[str, Dimension | None] | None = None) 
         if form == "piecewise":
             return piecewise(raw, quantity, info, variables)
         if form != "samples":
-            raise problem("must be an expression, samples (the name of a CSV file), a profile of segments, or piecewise")
+            raise problem(
+                "must be an expression, samples (the name of a CSV file), a profile of segments, or piecewise"
+            )
         return _samples(raw, quantity, info)
 
     others = [name for name in variables if name != "t"]

@@ -9,7 +9,8 @@ from jounce.errors import UNSET, TrajectoryError, did_you_mean, show_value
 from jounce.io.mechanisms.values import ANY_VALUE, list_schema, object_schema, parse, problem, scalar_schema
 from jounce.trajectory import AbstractMotion, Expression, FollowingMotion, PiecewiseMotion, Segment, SegmentedMotion
 from jounce.trajectory.dimensions import Dimension, is_rate, per_seconds
-from jounce.trajectory.segments import BEYOND, MOST_CONDITIONS, SEGMENT_PROFILES
+from jounce.trajectory.segment_pieces import SEGMENT_PROFILES
+from jounce.trajectory.segments import BEYOND, MOST_CONDITIONS
 
 PROFILE_KEYS = ("profile", "initial", "start", "beyond", "of")
 SEGMENT_KEYS = tuple(field.name for field in dataclasses.fields(Segment))
@@ -30,7 +31,7 @@ class LedMotion:
 
 
 def leader(raw: dict[str, Any], info: Any) -> str | Expression | None:
-    """Return the name of the driver, or the expression, whose value takes the place of the time; None if it is the time."""
+    """Return the name of a driver, or an expression, whose value takes the place of the time, or None."""
     given = raw.get("of")
     if given is None:
         return None
@@ -86,7 +87,9 @@ def _segment(entry: object, k: int, quantity: str, lapse: str, info: Any, *, tim
         raise problem(words, "profile", k, key, value=UNSET)
     profile = entry.get("profile")
     if not isinstance(profile, str) or profile not in SEGMENT_PROFILES:
-        words = f"no such profile; {did_you_mean(profile, SEGMENT_PROFILES)}" if isinstance(profile, str) else "is missing"
+        words = (
+            f"no such profile; {did_you_mean(profile, SEGMENT_PROFILES)}" if isinstance(profile, str) else "is missing"
+        )
         raise problem(words, "profile", k, "profile", value=UNSET if profile is None else profile)
     found: dict[str, Any] = {"profile": profile}
     for key, kind in (("duration", lapse), ("to", quantity), ("by", quantity)):
@@ -106,9 +109,7 @@ def _segment(entry: object, k: int, quantity: str, lapse: str, info: Any, *, tim
     return Segment(**found)
 
 
-def piecewise(
-    raw: dict[str, Any], quantity: str, info: Any, variables: dict[str, Dimension | None]
-) -> PiecewiseMotion:
+def piecewise(raw: dict[str, Any], quantity: str, info: Any, variables: dict[str, Dimension | None]) -> PiecewiseMotion:
     """Return the law of expressions that follow each other."""
     entries = raw["piecewise"]
     if not isinstance(entries, list | tuple) or not entries:
@@ -126,7 +127,7 @@ def piecewise(
         if "until" in entry:
             end = parse(entry["until"], "time", info, "piecewise", k, "until").value
             if isinstance(end, Expression):
-                raise problem("must be a number: where pieces meet cannot depend on parameters", "piecewise", k, "until")
+                raise problem("must be a number: it cannot depend on parameters", "piecewise", k, "until")
             ends.append(end)
     try:
         return PiecewiseMotion(laws, ends)
@@ -152,13 +153,13 @@ def _bases(quantity: str, info: Any) -> list[str]:
     return [quantity] if quantity in ("length", "angle") else ["angle", "length"] if quantity == "any" else []
 
 
-def segmented_schema() -> dict[str, Any]:
-    """Return the JSON Schema of a profile of segments."""
+def segmented_definition() -> dict[str, Any]:
+    """Return the JSON Schema of a profile of segments, which stands in a schema once."""
     value = {"anyOf": ANY_VALUE}
     rates = {"type": "array", "items": value, "maxItems": MOST_CONDITIONS}
     segment = {
         "profile": {"enum": list(SEGMENT_PROFILES)},
-        **{key: value for key in ("duration", "to", "by")},
+        **dict.fromkeys(("duration", "to", "by"), value),
         "begin": rates,
         "end": rates,
         "limits": list_schema(value, 3),
@@ -171,6 +172,11 @@ def segmented_schema() -> dict[str, Any]:
         "of": LEADER_SCHEMA,
     }
     return object_schema(whole, ["profile"])
+
+
+def segmented_schema() -> dict[str, Any]:
+    """Return what stands for the JSON Schema of a profile of segments until the whole schema is made."""
+    return {"definition": "segmented_law"}  # pydantic knows its own references only
 
 
 def piecewise_schema(law: dict[str, Any]) -> dict[str, Any]:

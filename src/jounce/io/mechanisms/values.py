@@ -13,6 +13,7 @@ from pydantic_core import PydanticCustomError, core_schema
 
 from jounce.errors import UNSET, JounceError, MechanismError
 from jounce.io.files.located_data import shows_value
+from jounce.mechanism.redundant_reactions import CHOICES, STIFFNESSES
 from jounce.rigid.euler_parameters import form_of
 from jounce.trajectory.dimensions import KINDS, Dimension
 from jounce.trajectory.expression import Expression
@@ -174,3 +175,23 @@ def orientation() -> Any:
     text = "lower-case Euler letters turn about fixed axes, upper-case ones about the moving axes of the body"
     schema = {"description": text, "oneOf": [object_schema(form) for form in forms]}
     return Annotated[Any, Checked(_orientation, schema)]
+
+
+def redundant_reactions() -> Any:
+    """Return the annotation of which reactions are wanted where constraints are redundant."""
+
+    def check(raw: object, info: Any) -> Any:
+        if not isinstance(raw, dict):
+            if raw not in CHOICES:
+                raise problem(f"must be one of {', '.join(CHOICES)}, or stiffnesses by the names of joints")
+            return raw
+        found: dict[Any, dict[str, Any]] = {}
+        for name, given in raw.items():
+            if not isinstance(given, dict) or not given or not set(given) <= set(STIFFNESSES):
+                raise problem("must be the stiffness of the joint: force, torque, or both", name, value=given)
+            found[name] = {key: parse(x, STIFFNESSES[key], info, name, key).value for key, x in given.items()}
+        return found
+
+    by_joint = object_schema({key: scalar_schema(kind) for key, kind in STIFFNESSES.items()}, ())
+    forms = [{"enum": list(CHOICES)}, {"type": "object", "additionalProperties": by_joint, "minProperties": 1}]
+    return Annotated[Any, Checked(check, {"anyOf": forms})]
