@@ -18,10 +18,9 @@ from jounce.constraints.planar import COORDINATES
 from jounce.errors import no_such
 from jounce.io.mechanisms.inertia_forms import inertia
 from jounce.io.mechanisms.keys import HOLDERS, FileKey, file_keys, output_holder, output_tag, output_types
+from jounce.io.mechanisms.motion_values import laws, motion
 from jounce.io.mechanisms.values import (
     Checked,
-    laws,
-    motion,
     orientation,
     problem,
     redundant_reactions,
