@@ -70,7 +70,9 @@ def test_the_view_says_which_packages_it_needs(run, monkeypatch):
     assert 'pip install "jounce[viewer]"' in err
 
 
-@pytest.mark.parametrize("command", ["new", "inspect", "run", "simulate", "plot", "report", "view", "check", "convert"])
+@pytest.mark.parametrize(
+    "command", ["new", "inspect", "run", "trace", "simulate", "plot", "report", "view", "check", "convert"]
+)
 def test_help_fits_a_terminal_and_has_examples(run, monkeypatch, command):
     monkeypatch.setenv("COLUMNS", "80")
     status, out, _ = run(command, "--help")

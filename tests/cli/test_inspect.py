@@ -121,7 +121,8 @@ def test_redundant_equations_are_named(facts, run, tmp_path):
     assert set(freedom["redundant_among"]) == {"joints.one", "joints.two"}
     assert set(freedom["moving"]) == {"bar", "other"}
     assert data["assembly"]["status"] == "assembled"
-    assert "1 equation too many, among joints." in run("inspect", path)[1]
+    assert freedom["repeated"] == [{"kind": "joint", "name": "two", "equations": 1, "of": ["one"]}]
+    assert "joint two repeats 1 equation of one" in run("inspect", path)[1]
 
 
 def test_a_body_without_joints(facts, tmp_path):
@@ -308,3 +309,32 @@ def test_the_nearest_name_is_suggested(run, arguments, part):
     status, out, err = run(*arguments)
     assert (status, out) == (2, "")
     assert part in err
+
+
+def test_mobility_is_told_in_words_and_as_data(facts, run):
+    status, data, _ = facts("inspect", EXAMPLES / "sarrus.yaml")
+    assert (status, data["ok"]) == (0, True)
+    mobility = data["mobility"]
+    assert [mobility[key] for key in ("count", "instantaneous", "finite", "order", "kind")] == [0, 1, 1, 10, "regular"]
+    (branch,) = mobility["branches"]
+    assert branch["tangents"]["platform"][0][2] > 0
+    out = run("inspect", EXAMPLES / "sarrus.yaml")[1]
+    assert "joint head_y repeats 1 equation of foot_x, knee_x, head_x, foot_y, knee_y" in out
+    assert "1 degree of freedom, finite to order 10" in out
+
+
+def test_reactions_that_are_not_unique_are_nan_and_told(run, tmp_path):
+    text = (EXAMPLES / "four_bar_in_space.yaml").read_text()
+    path = tmp_path / "a.yaml"
+    path.write_text(text.replace("step: 0.01", "step: 1"))
+    out = tmp_path / "a.csv"
+    for choice, open_ in (("unique", True), ("least_norm", False)):
+        status, told, _ = run("run", path, "--redundant-reactions", choice, "--out", out, "--overwrite")
+        assert status == 0
+        assert (
+            "bearing: not unique, as constraints are redundant: joint D repeats 3" in " ".join(told.split())
+        ) == open_
+        header, *lines = out.read_text().splitlines()
+        table = {name: [line.split(",")[k] for line in lines] for k, name in enumerate(header.split(","))}
+        for name, nan in (("bearing_x", open_), ("bearing_z", False), ("torque", False)):
+            assert all((text in ("", "nan", "NaN")) == nan for text in table[name]), name

@@ -5,11 +5,12 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.dynamics.constraint_forces import balancing
+from jounce.dynamics.constraint_forces import balancing, multipliers
 from jounce.dynamics.loads import inertia_forces, mass_matrices
 from jounce.dynamics.masses import Masses
 from jounce.jet import Jet
 from jounce.kinematics.jacobian_series import slopes
+from jounce.mechanism import build
 from tests.problems.bank import cases, group_of, pose_of, random_motion
 
 STEP = 1e-3
@@ -109,3 +110,30 @@ def test_multipliers_solve_the_equations_of_motion():
         m, j = np.linalg.inv(mass[..., k]), jacobian[..., k]
         expected = np.linalg.solve(j @ m @ j.T, j @ m @ load[:, k])
         np.testing.assert_allclose(found[:, k], expected, rtol=1e-9)
+
+
+def test_multipliers_balance_loads_to_every_order_by_the_coefficients_that_it_needs():
+    bar = jn.Mechanism(
+        space="planar",
+        bodies={"bar": jn.Body([0, 0])},
+        joints={"O": jn.planar.Revolute(("ground", "bar"), [0, 0], [0, 0])},
+        drivers={"turn": jn.drivers.CoordinateDriver(("ground", "bar"), "angle", "t")},
+    )
+    random, levels, lanes = np.random.default_rng(7), 5, 3
+    blocks = [[random.normal(size=(levels, 3, rows, 1, lanes))] for rows in (2, 1)]
+    load = random.normal(size=(levels, 3, 1, lanes))
+    transposed = np.concatenate([slope[:, :, :, 0] for (slope,) in blocks], axis=2)
+    expected = []
+    for k in range(levels):
+        missing = load[k, :, 0] - sum(np.einsum("crb,rb->cb", transposed[j], expected[k - j]) for j in range(1, k + 1))
+        solved = [np.linalg.solve(transposed[0, ..., b], missing[:, b]) for b in range(lanes)]
+        expected.append(np.stack(solved, axis=-1))
+    system = build(bar).system
+    found = np.asarray(multipliers(system, blocks, load))
+    np.testing.assert_allclose(found, np.stack(expected), rtol=1e-9)
+    blocks[1][0][3] = np.nan  # as of a law that has no finite third derivative
+    found = np.asarray(multipliers(system, blocks, load))
+    np.testing.assert_allclose(found[:3], np.stack(expected[:3]), rtol=1e-9)
+    assert np.isnan(found[3:]).any(axis=1).all()
+    one = np.asarray(multipliers(system, blocks, load[:1]))
+    np.testing.assert_allclose(one, np.stack(expected[:1]), rtol=1e-9)

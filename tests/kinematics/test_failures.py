@@ -9,7 +9,7 @@ import pytest
 import jounce as jn
 from jounce import Status
 from jounce.mechanism import check_mechanism
-from tests.problems.small import crank, distance_slider, four_bar, four_hinges, slider_crank
+from tests.problems.small import crank, distance_slider, four_bar, slider_crank
 
 GRID = np.linspace(0, 2, 21)
 
@@ -156,11 +156,15 @@ TURN = jn.drivers.CoordinateDriver(("ground", "crank"), "angle", "t")
     [
         (["crank"], {"O": PIN}, {}, r"1 degree of freedom is left, with which crank can move: add 1 driver"),
         (["crank", "loose"], {"O": PIN}, {"turn": TURN}, r"3 degrees of freedom are left, with which loose can move"),
-        (["crank"], {"O": PIN, "twin": PIN}, {"turn": TURN}, r"2 equations too many among joints\.O, joints\.twin"),
-        (["crank"], {"O": PIN}, {"turn": TURN, "more": TURN}, r"1 equation too many among drivers\.\w+, drivers\.\w+"),
+        (
+            ["crank"],
+            {"O": PIN, "twin": PIN},
+            {},
+            r"with which crank can move: .*; joint twin repeats 2 equations of O, ",
+        ),
         (["crank"], {}, {}, r"3 degrees of freedom are left"),
     ],
-    ids=["driver_missing", "loose_body", "joint_twice", "driver_twice", "nothing_at_all"],
+    ids=["driver_missing", "loose_body", "joint_twice", "nothing_at_all"],
 )
 def test_degrees_of_freedom_are_explained(bodies, joints, drivers, message):
     mechanism = jn.Mechanism(
@@ -168,12 +172,6 @@ def test_degrees_of_freedom_are_explained(bodies, joints, drivers, message):
     )
     with pytest.raises(jn.MobilityError, match=message):
         jn.solve(mechanism, [0.0])
-
-
-def test_redundant_hinges_are_refused_by_name():
-    with pytest.raises(jn.MobilityError, match="3 equations too many") as caught:
-        jn.solve(four_hinges(), [0.0, 0.1])
-    assert all(f"joints.{name}" in str(caught.value) for name in "ABCD")
 
 
 @pytest.mark.parametrize("count", [9, 201])

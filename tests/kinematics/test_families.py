@@ -1,5 +1,7 @@
 """Families of designs beside the same designs solved one by one."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -114,3 +116,14 @@ def test_forces_and_energies_are_those_of_designs_alone():
     m, c = family["m"].values[:, None], family["c"].values[:, None]
     expected = m * c * 10.0 * np.cos(3 * family["time"].values)
     np.testing.assert_allclose(family["torque"].values[..., 0], expected, rtol=1e-12)
+
+
+@pytest.mark.slow
+def test_redundant_constraints_and_assemblies_are_those_of_designs_alone():
+    bennett = jn.load(example("bennett"))
+    bennett = dataclasses.replace(bennett, outputs={"C": bennett.outputs["C"]})  # none of forces
+    crossed = dataclasses.replace(FOUR_BAR, assembly=2)
+    for mechanism, parameters in ((bennett, {"a": np.array([0.1, 0.12])}), (crossed, {"BC": np.array([0.14, 0.15])})):
+        family = jn.solve_batch(mechanism, parameters, TIME[:3], order=2)
+        assert not family["status"].values.any()
+        check(mechanism, parameters, family, TIME[:3], 2)

@@ -1,5 +1,7 @@
 """Derivatives of motions by the design, against differences in fifty digits of an independent solver."""
 
+import dataclasses
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -200,3 +202,27 @@ def test_what_is_not_traced_is_told():
     with pytest.raises(jn.UnsupportedError, match="instants depend on values") as told:
         jax.grad(lambda tau: jn.solve(FOUR_BAR.with_parameters(tau=tau), grid).outputs["psi"][-1, 1])(2.0)
     assert told.value.name == "time"
+
+
+@pytest.mark.parametrize("transformed", [jax.grad, jax.jit])
+def test_redundant_constraints_are_refused(transformed):
+    bennett = jn.load(example("bennett"))
+
+    def angle(length):
+        return jn.solve(bennett.with_parameters(a=length), [0.0, 0.2], order=2).outputs["D_angle"][1, 2]
+
+    with pytest.raises(jn.MechanismError, match="gradients of mechanisms with redundant constraints are not there"):
+        transformed(angle)(0.1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("assembly", [1, 2])
+def test_the_assembly_asked_for_is_differentiated(assembly):
+    four_bar = dataclasses.replace(jn.load(example("four_bar")), assembly=assembly)
+
+    def acceleration(length):
+        return jn.solve(four_bar.with_parameters(BC=length), [0.0, 0.3], order=2).outputs["psi"][1, 2]
+
+    step = 1e-5
+    expected = (acceleration(0.1423 + step) - acceleration(0.1423 - step)) / (2 * step)
+    np.testing.assert_allclose(jax.grad(acceleration)(0.1423), expected, rtol=1e-7)

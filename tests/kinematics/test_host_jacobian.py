@@ -84,11 +84,12 @@ def test_degrees_of_freedom_of_a_long_chain_are_told_by_body():
 def test_redundant_joints_of_a_long_chain_are_told_by_name():
     whole = chain(40)
     again = jn.planar.Revolute(("link19", "link20"), [0.1, 0], [0, 0])
+    drivers = {name: driver for name, driver in whole.drivers.items() if name != "turn39"}
     redundant = jn.Mechanism(
-        space="planar", bodies=whole.bodies, joints={**whole.joints, "again": again}, drivers=whole.drivers
+        space="planar", bodies=whole.bodies, joints={**whole.joints, "again": again}, drivers=drivers
     )
-    pair = r"joints\.(pin20|again), joints\.(pin20|again)"
-    with pytest.raises(jn.MobilityError, match=rf"122 equations, 120 of .*; 2 equations too many among {pair}"):
+    told = r"121 equations, 119 of .* with which link39 can .*; joint again repeats 2 equations of pin20"
+    with pytest.raises(jn.MobilityError, match=told):
         jn.solve(redundant, [0.0])
 
 

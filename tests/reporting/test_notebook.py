@@ -148,3 +148,13 @@ def test_the_notebook_of_the_examples_runs():
     assert len(shows) == len(titles)
     assert all(title in page for title, page in zip(titles, shows, strict=True))
     assert {stream.name for stream in streams} == {"stdout"}, "no bars, no warnings"
+
+
+@pytest.mark.slow
+def test_an_equilibrium_and_what_moves_about_it():
+    rest = jn.equilibrium(jn.load(EXAMPLES / "double_pendulum.yaml"))
+    small = jn.linearise(rest)
+    assert Tables(shown(rest)).tables["Bodies, at rest"][1][0] == "upper"
+    matrices = Tables(small._repr_html_()).tables
+    assert matrices["Mass (SI)"][1] == ["upper.angle", "2", "1"]
+    assert matrices["Modes"][1][1] == Tables(shown(small.modes)).tables["Modes"][1][1] == "0.381526"

@@ -9,7 +9,8 @@ import jounce as jn
 from jounce.viewer import meshes
 from jounce.viewer.closed_loops import independent
 from jounce.viewer.mechanism_appearance import mechanism_appearance
-from jounce.viewer.robot_appearance import file_shapes, robot_appearance
+from jounce.viewer.robot_appearance import robot_appearance
+from jounce.viewer.robot_shapes import file_shapes
 from jounce.viewer.robots import swing_of
 from jounce.viewer.server import robot_subject
 
@@ -182,3 +183,45 @@ def test_shapes_of_an_mjcf_are_read(tmp_path):
     )
     assert recording.appearance.meshes["arm"]
     assert recording.position[0, 1] == pytest.approx([1, 0, 0])
+
+
+SDF = """<sdf version="1.9"><model name="m"><pose>0 0 1 0 0 0</pose>
+  <link name="base"><pose>1 0 0 0 0 0</pose><inertial><mass>1</mass></inertial>
+    <visual name="v"><pose relative_to="lamp">0 0 1 0 0 0</pose><transparency>0.25</transparency>
+      <geometry><box><size>1 2 3</size></box></geometry>
+      <material><ambient>0 0 1 1</ambient><diffuse>1 0 0 1</diffuse></material></visual>
+    <visual name="floor"><geometry><plane><normal>0 0 1</normal></plane></geometry></visual>
+    <visual name="broken"><geometry><sphere><radius>wide</radius></sphere></geometry></visual></link>
+  <link name="arm"><pose relative_to="base">0 2 0 0 0 0</pose><inertial><mass>1</mass></inertial>
+    <visual name="a"><geometry><mesh><uri>model://pack/wedge.obj</uri><scale>2 2 2</scale></mesh></geometry></visual>
+    <visual name="b"><geometry><cylinder><radius>0.5</radius><length>4</length></cylinder></geometry>
+      <material><ambient>0 1 0 1</ambient></material></visual>
+    <visual name="c"><geometry><ellipsoid><radii>1 2 3</radii></ellipsoid></geometry></visual>
+    <visual name="d"><geometry><polyline><point>0 0</point><point>2 0</point><point>0 1</point><height>3</height>
+      </polyline></geometry></visual>
+    <visual name="e"><geometry><capsule><radius>0.5</radius><length>2</length></capsule></geometry></visual></link>
+  <frame name="lamp" attached_to="arm"><pose>0 0 5 0 0 0</pose></frame>
+  <joint name="turn" type="revolute"><parent>base</parent><child>arm</child><axis><xyz>0 0 1</xyz></axis></joint>
+</model></sdf>"""
+
+
+def test_shapes_of_an_sdf_are_read_with_places_colours_and_scales(tmp_path):
+    (tmp_path / "pack").mkdir()
+    (tmp_path / "pack" / "wedge.obj").write_text(
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+    )
+    path = tmp_path / "pack" / "two.sdf"
+    path.write_text(SDF)
+    shapes = file_shapes(path)
+    (block,) = shapes["base"]
+    assert (block.colour, block.opacity) == ((255, 0, 0), 0.75)
+    assert block.mesh.bounds == pytest.approx(np.array([[-0.5, 1, 4.5], [0.5, 3, 7.5]]))  # beside the base, at the lamp
+    wedge, cylinder, ellipsoid, prism, capsule = (shape.mesh for shape in shapes["arm"])
+    assert wedge.volume == pytest.approx(8 / 6)
+    assert shapes["arm"][1].colour == (0, 255, 0)
+    assert np.ptp(cylinder.vertices, axis=0) == pytest.approx([1, 1, 4], rel=1e-6)
+    assert np.ptp(ellipsoid.vertices, axis=0) == pytest.approx([2, 4, 6], rel=0.02)
+    assert prism.volume == pytest.approx(3.0)
+    assert np.ptp(capsule.vertices, axis=0) == pytest.approx([1, 1, 3], rel=1e-6)
+    appearance = robot_appearance(jn.load_robot(path), path)
+    assert len(appearance.meshes["arm"]) == 5

@@ -21,6 +21,7 @@ from typing import Any, Literal
 
 from jounce.cli.arguments import converted
 from jounce.cli.conversion import convert
+from jounce.cli.curves import trace
 from jounce.cli.figures import plot, report
 from jounce.cli.inspection import inspect
 from jounce.cli.mechanisms import run, schema, simulate
@@ -28,6 +29,7 @@ from jounce.cli.options import WritingError
 from jounce.cli.papers import reproduce
 from jounce.cli.robots import check, torques
 from jounce.cli.shell_completion import complete
+from jounce.cli.small_motions import modes
 from jounce.cli.standard_streams import failsafe_streams
 from jounce.cli.starters import new
 from jounce.cli.viewing import view
@@ -57,7 +59,8 @@ def completion(shell: Literal["bash", "zsh", "fish"], /, *, install: bool = Fals
 
 
 COMMANDS = (
-    new, inspect, run, simulate, plot, report, view, check, torques, convert, reproduce, schema, completion
+    new, inspect, run, trace, simulate, modes, plot, report, view, check, torques, convert, reproduce, schema,
+    completion,
 )  # fmt: skip
 LIGHT = (new, completion)  # they compute nothing
 FIRST = """\

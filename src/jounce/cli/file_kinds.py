@@ -13,8 +13,8 @@ from jounce.errors import JounceError, MechanismFileError, RobotError, Trajector
 from jounce.io.files import DATA_FILES
 
 ADVICE = {
-    "mechanism": "is a mechanism; run, simulate, plot, report, view and inspect take mechanisms",
-    "robot": "is a robot; check, torques, inspect and view take robots, and this makes it a mechanism: "
+    "mechanism": "is a mechanism; run, simulate, modes, plot, report, view and inspect take mechanisms",
+    "robot": "is a robot; check, torques, inspect, modes and view take robots, and this makes it a mechanism: "
     "jounce convert {path} {stem}.yaml --hold",
     "trajectory": "is a trajectory, which goes with its robot; jounce check ROBOT {path}, or jounce view ROBOT {path}",
     "limits": "holds limits, which go with robot and trajectory; jounce check ROBOT TRAJECTORY --limits {path}",

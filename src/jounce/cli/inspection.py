@@ -3,25 +3,36 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
 
 from jounce.cli.arguments import check_ending
 from jounce.cli.file_kinds import expecting
-from jounce.cli.options import PLAIN_MECHANISM, MechanismReading, RobotReading, errors_about
+from jounce.cli.options import PLAIN_MECHANISM, MechanismReading, RobotReading, errors_about, options_named
 from jounce.errors import JounceError
 from jounce.io.files import DATA_FILES, ROBOT_FILES
 from jounce.reporting.terminal import say, say_json, show_table
 
 
 def inspect(
-    file: Path, /, *, reading: MechanismReading = PLAIN_MECHANISM, strict: bool = False, json: bool = False
+    file: Path,
+    /,
+    *,
+    reading: MechanismReading = PLAIN_MECHANISM,
+    strict: bool = False,
+    json: bool = False,
+    range_: Annotated[bool, Parameter(name="--range")] = False,
+    driver: str | None = None,
 ) -> int:
     """Tell what is in a mechanism or robot file, and whether it can move.
 
     Bodies, joints, degrees of freedom, and the assembly that a motion starts from.
 
     The exit status is 0 where a motion can start, 1 where the bodies
-    cannot be put together, equations are redundant, or bodies without
-    mass are left to move.
+    cannot be put together, the start is a singular position, or bodies
+    without mass are left to move. Redundant constraints that agree are
+    told: which joint repeats equations of which others.
 
     Parameters
     ----------
@@ -31,10 +42,15 @@ def inspect(
         Refuse a robot whose links are as those of no real one.
     json
         Print the result as JSON.
+    range_
+        Tell how far a driver can go, and the transmission there.
+    driver
+        Whose range, where there are several.
 
     Examples
     --------
       jounce inspect examples/six_bar_watt.yaml
+      jounce inspect examples/four_bar.yaml --range
       jounce inspect examples/robots/panda.urdf --json
     """
     from jounce.reporting.summaries import start_heading, start_summary
@@ -57,6 +73,11 @@ def inspect(
         mechanism = reading.mechanism(file)
         with errors_about(file):
             facts = inspected(mechanism, file)
+            if range_ and facts["ok"]:
+                from jounce.reporting.range_facts import range_facts
+
+                with options_named():
+                    facts["range"] = range_facts(mechanism, driver)
     if json:
         say_json("inspect", facts)
     else:
@@ -65,4 +86,8 @@ def inspect(
         for table in robot_tables(facts) if robot else mechanism_tables(facts, bodies_table(facts)):
             show_table(table)
         say(f"\n{start_summary(facts)}")
+        if found := facts.get("range"):
+            from jounce.reporting.range_facts import range_words
+
+            say(f"\n{range_words(dict(found))}")
     return 0 if facts["ok"] else 1

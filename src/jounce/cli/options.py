@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
@@ -43,11 +43,14 @@ class MechanismReading:
         Python file with your own joints and forces; repeatable.
     allow
         Folder whose files it may name, besides its own; repeatable.
+    redundant_reactions
+        Where constraints are redundant: unique ones only, or least_norm.
     """
 
     set_: list[str] | None = None
     import_: list[Path] | None = None
     allow: list[Path] | None = None
+    redundant_reactions: Literal["unique", "least_norm"] | None = None
 
     def mechanism(self, file: Path) -> Mechanism:
         """Return the mechanism of a file, with parameters changed, after the user's own classes were imported."""
@@ -56,6 +59,8 @@ class MechanismReading:
         import_files(self.import_)
         with expecting(file, "mechanism"):
             mechanism = load(file, allow=allowed(self.allow))
+        if self.redundant_reactions is not None:
+            mechanism = replace(mechanism, redundant_reactions=self.redundant_reactions)
         if not self.set_:
             return mechanism
         from jounce.io.mechanisms.overrides import override
@@ -211,3 +216,16 @@ def errors_about(file: Path, robot: Path | None = None) -> Iterator[None]:
             raise
         about_robot = robot is not None and isinstance(error, RobotError)
         raise error.located(path=robot if about_robot else file) from None
+
+
+CURVE_OPTIONS = {"driver": "--driver", "order": "--order", "count": "--points", "length": "--length", "time": "--time"}
+
+
+@contextmanager
+def options_named() -> Iterator[None]:
+    """Give errors about an argument of a trace the option that it came from."""
+    try:
+        yield
+    except JounceError as error:
+        error.name = CURVE_OPTIONS.get(str(error.name), error.name)
+        raise

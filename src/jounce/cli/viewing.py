@@ -21,6 +21,8 @@ def view(
     port: int = 0,
     no_open: bool = False,
     order: int = 4,
+    modes: bool = False,
+    without: list[str] | None = None,
     reading: MechanismReading = PLAIN_MECHANISM,
 ) -> int:
     r"""Show a mechanism or a robot in the browser, moving.
@@ -41,11 +43,16 @@ def view(
         Only print the address; do not open the browser.
     order
         Highest derivative of arrows and plots, 0 to 30.
+    modes
+        Show the modes about its equilibrium instead of its motion.
+    without
+        Driver that is left out of the equilibrium; repeatable.
 
     Examples
     --------
       jounce view examples/four_bar.yaml
       jounce view examples/press.yaml --order 6 --set "stroke=80 mm"
+      jounce view examples/sprung_four_bar.yaml --modes
       jounce view examples/robots/panda.urdf \
         examples/trajectories/panda_wave.yaml --port 8080 --no-open
     """
@@ -65,7 +72,10 @@ def view(
         with expecting(file, "mechanism", "robot"):
             check_ending(file, (*DATA_FILES, *ROBOT_FILES))
             folders = allowed(reading.allow)
-            page = show(subject, trajectory, port=port, order=order, open_page=not no_open, allow=folders)
+            if without and not modes:
+                raise JounceError("goes with --modes", name="--without")
+            opened = {"port": port, "order": order, "open_page": not no_open, "allow": folders}
+            page = show(subject, trajectory, modes=modes, without=without or (), **opened)
     say(f"{page.page.recording.title or file.name}: {page.url} (Ctrl-C ends)")
     with raising():
         page.wait()

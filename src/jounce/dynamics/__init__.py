@@ -33,6 +33,8 @@ from jounce.dynamics.equations import (
     printed_coefficient as printed_coefficient,
 )
 from jounce.dynamics.limits import LimitReport as LimitReport, LimitRow as LimitRow, check_limits as check_limits
+from jounce.dynamics.linearisation import Linearisation as Linearisation, StateSpace as StateSpace
+from jounce.dynamics.modes import Modes as Modes
 from jounce.dynamics.outputs import (
     AppliedForceOutput as AppliedForceOutput,
     AppliedTorqueOutput as AppliedTorqueOutput,
@@ -47,5 +49,11 @@ from jounce.dynamics.reactions import (
     applied_force as applied_force,
     driver_force as driver_force,
     joint_reaction as joint_reaction,
+)
+from jounce.dynamics.small_motions import linearise as linearise
+from jounce.dynamics.static_equilibrium import (
+    Equilibrium as Equilibrium,
+    equilibria as equilibria,
+    equilibrium as equilibrium,
 )
 from jounce.dynamics.trajectories import trajectory_torques as trajectory_torques

@@ -81,8 +81,8 @@ def constraint_equations(
         ``multipliers`` (time, derivative, row)
             Where there are masses or applied forces: lambda, lambda', ..., with ``M q'' + Phi_q^T lambda = Q``; Q holds
             forces, global, and moments about the origins, along the axes of the bodies, with the terms of inertia that
-            have no q''. Two orders of the motion are used up. They are left out where accelerations are not known, or
-            redundant rows leave them open.
+            have no q''. Two orders of the motion are used up. They are left out where accelerations are not known;
+            what redundant rows leave open is NaN, or as `Mechanism.redundant_reactions` chooses it.
 
     Raises
     ------
@@ -279,7 +279,7 @@ def _forces(motion: Motion, jacobian: Float[np.ndarray, "time row column"]) -> d
         or (isinstance(motion, MotionAtState) and not _determined(motion, jacobian[0], mass[0]))
     ):
         return found
-    values = derivatives_along(motion, MotionForces.of(motion).multipliers[:levels][:, _row_order(motion)])
+    values = derivatives_along(motion, MotionForces.of(motion).unique_multipliers[:levels][:, _row_order(motion)])
     return found | {"multipliers": (("time", "derivative", "row"), values, 0)}
 
 

@@ -101,29 +101,34 @@ def multipliers(
     if not blocks:
         return jnp.zeros((load.shape[0], 0, load.shape[-1]))
     scale = jnp.asarray(system.column_scale)
-    solve = _solver(system, blocks, mass)
-    found: list[Any] = []
-    for k in range(len(load)):
-        missing = load[k]
-        for group, parts, forces in _by_group(system, blocks, found):
+    solve, count = _solver(system, blocks, mass), len(load)
+
+    def level(found: Any, wanted: Any) -> tuple[Any, Any]:
+        """Find the next coefficient from those found, the latest first and zero before the lowest."""
+        k, missing = wanted
+        for group, parts, forces in by_group(system, blocks, found):
             for slot, slope in zip(group.moving_slots, parts, strict=True):
-                missing -= _onto_bodies(work_along(slope, forces, k, 1), group.bodies[slot], system.body_count)
-        found.append(solve(as_column(missing, scale)) * system.row_scale)
-    return jnp.stack(found)
+                # what the order k does not need may not be finite
+                needed = [jnp.where(j <= k, slope[j], 0.0) for j in range(1, count)]
+                work = total(jnp.sum(c * f[None], axis=1) for c, f in zip(needed, forces, strict=True))
+                missing -= onto_bodies(work, group.bodies[slot], system.body_count)
+        newest = solve(as_column(missing, scale)) * system.row_scale
+        return [newest, *found[:-1]][: len(found)], newest
+
+    start = [jnp.zeros((system.shape[0], load.shape[-1]))] * (count - 1)
+    return jax.lax.scan(level, start, (np.arange(count), load))[1]  # compiled once for all orders
 
 
 def _solver(system: System, blocks: Slopes, mass: BodyMatrices | None) -> Callable[[Any], Any]:
     """Return what solves for the multipliers of scaled rows: by the Jacobian alone where there are no masses."""
-    scale = jnp.asarray(system.column_scale)
-    flat = [(slope[0] * scale[:, None, None, None]).reshape(-1, slope.shape[-1]) for parts in blocks for slope in parts]
-    entries = jnp.concatenate(flat)
     if mass is None and system.fronts is not None:
+        entries = _entries(system, blocks)
         factor = FrontalFactor.of(system.fronts, jax.lax.stop_gradient(entries), system.row_scale)
         return solver(partial(_transposed, system, entries), factor.solve_transposed, factor.solve)
-    jacobian = system.pattern.dense(entries) * system.row_scale[:, :, None]
+    jacobian = jacobian_of(system, blocks)
     if mass is None:
         return balancing(None, jacobian)
-    whole = block_diagonal(mass, scale)
+    whole = block_diagonal(mass, jnp.asarray(system.column_scale))
     return balancing(whole / jnp.max(jnp.abs(whole)), jacobian)  # their size does not matter to the multipliers
 
 
@@ -137,7 +142,17 @@ def _transposed(system: System, entries: Float[Numbers, "entry batch"], rows: An
     return jax.linear_transpose(product, columns)(rows)[0]
 
 
-def _by_group(system: System, blocks: Slopes, found: list[Float[Numbers, "row batch"]]) -> list[Any]:
+def jacobian_of(system: System, blocks: Slopes) -> Jacobian:
+    """Return the scaled Jacobian from the slopes of all groups."""
+    return system.pattern.dense(_entries(system, blocks)) * system.row_scale[:, :, None]
+
+
+def _entries(system: System, blocks: Slopes) -> Float[Numbers, "entry batch"]:
+    scale = jnp.asarray(system.column_scale)[:, None, None, None]
+    return jnp.concatenate([(slope[0] * scale).reshape(-1, slope.shape[-1]) for parts in blocks for slope in parts])
+
+
+def by_group(system: System, blocks: Slopes, found: list[Float[Numbers, "row batch"]]) -> list[Any]:
     """Return groups with their blocks and those of the multipliers found so far, each (rows, instances, batch)."""
     if not found:
         return []
@@ -145,13 +160,12 @@ def _by_group(system: System, blocks: Slopes, found: list[Float[Numbers, "row ba
     for group, parts in zip(system.groups, blocks, strict=True):
         _, _, rows, instances, lanes = parts[0].shape
         last = first + rows * instances
-        # the coefficient that is wanted next counts with those of the slope that are left out
         results.append((group, parts, [level[first:last].reshape(rows, instances, lanes) for level in found]))
         first = last
     return results
 
 
-def _onto_bodies(
+def onto_bodies(
     work: Float[Numbers, "coordinate instance batch"], bodies: tuple[int, ...], count: int
 ) -> Float[Numbers, "coordinate {count} batch"]:
     """Return what acts on each moving body from what acts on the bodies of the instances."""

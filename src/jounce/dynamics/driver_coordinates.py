@@ -4,6 +4,7 @@ The laws of the drivers are generalised coordinates: with them, joints and loops
 by a jet, and all poses follow from it to first order by the factored Jacobian, order after order, as in a solve.
 """
 
+import dataclasses
 from collections.abc import Callable
 from typing import Any
 
@@ -23,7 +24,7 @@ from jounce.jet import Jet
 from jounce.jet.algebra import total
 from jounce.kinematics import Motion
 from jounce.kinematics.compilation import compiled
-from jounce.kinematics.linear import DenseFactor
+from jounce.kinematics.factors import Factor, factored
 from jounce.mechanism.system import System
 from jounce.rigid.pose import Pose
 from jounce.shapes import ArrayLike, Numbers
@@ -95,7 +96,7 @@ def drivers_of(motion: Motion) -> tuple[str, ...]:
     """
     system, names = motion.model.system, tuple(motion.mechanism.drivers)
     rows, columns = system.shape if system.groups else (0, 1)
-    if rows != columns or not names:
+    if (rows if system.rank is None else system.rank) != columns or not names:
         message = "the coordinates here are the laws of the drivers, and they do not prescribe all that can move"
         raise MechanismError(message, name="drivers", value=list(names))
     return names
@@ -145,7 +146,7 @@ def _evaluated(
     static: tuple[Any, ...],
 ) -> Any:
     place = pose_of(still, pose_type)
-    factor = DenseFactor.of(system.jacobian(place, Jet([instants[None]])))
+    factor = factored(dataclasses.replace(system, fronts=None), place, Jet([instants[None]]))
 
     def energies(changes: Any, p: int) -> Jet:
         time = Jet.variable(instants[None], changes.shape[0] - 1)
@@ -168,7 +169,7 @@ def with_changes(
     return eqx.tree_at(lambda s: s.groups, system, tuple(groups))
 
 
-def followed(system: System, place: Pose, factor: DenseFactor, time: Jet) -> Pose:
+def followed(system: System, place: Pose, factor: Factor, time: Jet) -> Pose:
     """Return the pose with all derivatives that the time jet has, right to first order in changes of the system.
 
     The factors are those of the system without changes. What they leave of the residual is corrected by them once more,

@@ -23,15 +23,19 @@ from jounce.dynamics.saddle_point import (
     BodyMatrices,
     ByBody,
     Column,
+    Jacobian,
     MassMatrix,
+    ReducedFactor,
     as_column,
     block_diagonal,
     by_body,
+    in_basis,
     saddle_point,
 )
 from jounce.jet import Jet
 from jounce.jet.algebra import total
 from jounce.jet.series import Recursion
+from jounce.kinematics.least_squares import range_basis
 from jounce.kinematics.linear import DenseFactor
 from jounce.mechanism.axis_angles import with_turns
 from jounce.mechanism.system import System
@@ -45,7 +49,7 @@ Lanes = Float[Numbers, " batch"]
 """One number for each run of a batch; of `Flags` and `Indices` alike."""
 Flags = Bool[Numbers, " batch"]
 Indices = Int[Numbers, " batch"]
-Factor = DenseFactor | SaddleFactor
+Factor = DenseFactor | SaddleFactor | ReducedFactor
 Matrices = Float[Numbers, "size size batch"]
 """Of the equations of motion, or their inverses."""
 Rows = Float[Numbers, "row batch"]
@@ -194,12 +198,16 @@ class Equations(eqx.Module):
         return 0.5 * total(spin * part for spin, part in zip(spins, jnp.split(state.spin, 3), strict=True))
 
     def matrix(self, state: State, time: Instants) -> Matrices:
-        """Return the matrix of the unknown accelerations and multipliers, scaled."""
-        jacobian = self.system.jacobian(self.still(state.position, state.attitude), Jet([time]))
+        """Return the matrix of the unknown accelerations and multipliers, scaled; of redundant rows, combinations."""
+        jacobian, rank = self._jacobian(state, time), self.system.rank
+        jacobian = jacobian if rank is None else in_basis(range_basis(jacobian, rank), jacobian)
         return saddle_point(self.mass_matrix(state), jacobian)
 
     def factored(self, state: State, time: Instants) -> Factor:
-        """Return the factors of that matrix."""
+        """Return the factors of that matrix, which solve for all rows."""
+        if self.system.rank is not None:
+            jacobian = self._jacobian(state, time)
+            return ReducedFactor.of(self.mass_matrix(state), jacobian, range_basis(jacobian, self.system.rank))
         if self.saddle is None:
             return DenseFactor.of(self.matrix(state, time))
         entries = self.system.entries(self.still(state.position, state.attitude), Jet([time]))
@@ -207,10 +215,15 @@ class Equations(eqx.Module):
 
     def blank_factor(self, lanes: int) -> Factor:
         """Return a placeholder for the factors of a batch, to start a loop with."""
+        if self.system.rank is not None:
+            return ReducedFactor.blank(self.system.shape, self.system.rank, lanes)
         if self.saddle is None:
             size = sum(self.system.shape)
             return DenseFactor.blank((size, size), lanes)
         return self.saddle.blank(lanes)
+
+    def _jacobian(self, state: State, time: Instants) -> Jacobian:
+        return self.system.jacobian(self.still(state.position, state.attitude), Jet([time]))
 
     def mass_matrix(self, state: State) -> MassMatrix:
         """Return the mass matrix over the scale of the masses, scaled."""

@@ -4,6 +4,7 @@ Long motions go through in chunks of instants. What differs between mechanisms, 
 on the poses of the bodies that it joins, so that all mechanisms share it.
 """
 
+import copy
 import dataclasses
 from collections.abc import Callable, Sequence
 from functools import cached_property
@@ -18,6 +19,7 @@ from jounce.dynamics.forward import Lanes
 from jounce.dynamics.loads import loads, mass_matrices
 from jounce.dynamics.masses import Gravity, Masses, check_loads, gravity_of, masses_of
 from jounce.dynamics.motion_values import Coordinates, along_motion, cut, pose_of
+from jounce.dynamics.redundant_forces import OPEN, OpenMultipliers, least_multipliers
 from jounce.errors import MechanismError
 from jounce.jet import Jet, cross
 from jounce.jet.algebra import stacked
@@ -27,6 +29,7 @@ from jounce.kinematics.jacobian_series import slopes
 from jounce.mechanism import Model
 from jounce.mechanism.axis_angles import at_lanes
 from jounce.mechanism.pattern import Pattern
+from jounce.mechanism.redundant_reactions import resolved_reactions
 from jounce.mechanism.system import System, with_rows
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
@@ -101,27 +104,97 @@ class MotionForces:
 
     @cached_property
     def multipliers(self) -> Numbers:
-        """Multipliers of the rows of all residuals, as Taylor coefficients, (levels, rows, time)."""
+        """Multipliers of the rows of all residuals, as Taylor coefficients, (levels, rows, time).
+
+        Where constraints are redundant, those of least norm, or by the stiffnesses that the mechanism has for it.
+        """
+        found = self._balancing(np.zeros(len(self.model.rows)), 1.0)
+        self.check_finite(found)
+        return found
+
+    def _balancing(self, bent: np.ndarray, weight: float) -> Numbers:
+        """Return the multipliers that balance the loads times a weight; `bent` is for redundant rows."""
         system = dataclasses.replace(self.model.system, outputs=())
         nothing = Pattern.of((), (), system.pattern.width, system.body_count)
-        unjoined = dataclasses.replace(system, groups=(), pattern=nothing, row_scale=np.zeros((0, 1)))
+        unjoined = dataclasses.replace(
+            system, groups=(), pattern=nothing, row_scale=np.zeros((0, 1)), rank=None, fronts=None
+        )
         square = system.shape[0] == system.shape[1]
+        compliance = None if system.rank is None else self.open.compliance
 
         def chunk(lanes: np.ndarray) -> Any:
-            blocks = [
-                [self._slopes(index, slot, lanes) for slot in group.moving_slots]
-                for index, group in enumerate(system.groups)
-            ]
+            blocks = self._blocks(lanes)
             bodies, instants = self.coordinates_at(None, lanes, self.levels + 2), self.motion.time[lanes]
             forces = dataclasses.replace(unjoined, forces=at_lanes(self.forces, lanes))
             load, finite = _loads(forces, bodies, instants, self.masses, self.gravity, self.pose_type)
             self._check_finite(finite, lanes)
+            if compliance is not None:
+                return _least_multipliers(system, blocks, weight * load, compliance, bent)
             still = None if square else self.coordinates_at(None, lanes, 1)
             return _multipliers(system, blocks, load, still, self.masses, self.pose_type)
 
-        found = self.in_chunks(chunk)
-        self.check_finite(found)
-        return found
+        return self.in_chunks(chunk)
+
+    def unique(self, quantity: Callable[["MotionForces"], Numbers], size: float = 1.0) -> Numbers:
+        """Return what is asked of the forces, NaN in components that redundant constraints leave open.
+
+        Unique is a component that vanishes for all multipliers that balance no load (Wojtyra 2005), at all instants.
+
+        Parameters
+        ----------
+        quantity : callable
+            Returns Taylor coefficients of it, (levels, components, time), from forces; linear in the multipliers.
+        size : float
+            Of the quantity for a force of one: 1 for a force, a length for a torque.
+        """
+        values = quantity(self)
+        if self.loose is None:
+            return values
+        solved = self.motion.status == Status.OK
+        given = np.abs(quantity(self.loose)[..., solved]).max(axis=-1, initial=0.0)
+        level = np.abs(self.loose.multipliers[..., solved]).max(axis=-1, initial=0.0) * self.open.weights
+        limits = OPEN * size * level.max(axis=-1)[:, None]
+        open_ = given > limits
+        if np.count_nonzero(solved) > 1:  # what vanishes at all instants has no rates
+            open_[1:] = open_[0]
+        return np.where(np.logical_or.accumulate(open_, axis=0)[..., None], np.nan, values)
+
+    @cached_property
+    def unique_multipliers(self) -> Numbers:
+        """Multipliers, NaN where redundant constraints leave them open."""
+        if self.loose is None:
+            return self.multipliers
+        weights = self.open.weights[:, None]
+        return self.unique(lambda forces: forces.multipliers * weights) / weights
+
+    @cached_property
+    def loose(self) -> "MotionForces | None":
+        """Forces of chance that balance no load, where redundant constraints leave some open and none are chosen."""
+        if self.model.system.rank is None or self.motion.mechanism.redundant_reactions != "unique":
+            return None
+        twin = copy.copy(self)
+        twin._kept = {}
+        found = self._balancing(self.open.chance(), 0.0)
+        solved = self.motion.status == Status.OK
+        size = np.abs(found[0][:, solved] * self.open.weights[:, None]).max(initial=0.0)
+        twin.__dict__["multipliers"] = found / (size or 1.0)
+        return twin
+
+    @cached_property
+    def open(self) -> OpenMultipliers:
+        """What redundant constraints leave open, at the first instant that was solved."""
+        model = self.model
+        lanes = np.flatnonzero(self.motion.status == Status.OK)[:1]
+        lanes = lanes if len(lanes) else np.zeros(1, int)
+        scaled = _jacobian(dataclasses.replace(model.system, outputs=(), forces=()), self._blocks(lanes))
+        mechanism = self.motion.mechanism
+        wanted = resolved_reactions(mechanism.redundant_reactions, mechanism.parameter_values)
+        return OpenMultipliers(model, np.asarray(scaled)[..., 0], wanted)
+
+    def _blocks(self, lanes: np.ndarray) -> list[list[Any]]:
+        """Return the slopes of all groups by the bodies of their moving slots."""
+        groups = enumerate(self.model.system.groups)
+        return [[self._slopes(index, slot, lanes) for slot in group.moving_slots] for index, group in groups]
 
     def driver_force(self, name: str) -> Float[Numbers, "order 1 time"]:
         """Return what a driver exerts along what it prescribes, as Taylor coefficients."""
@@ -282,6 +355,22 @@ def _multipliers(
 ) -> Any:
     mass = None if still is None else mass_matrices(pose_of(still, pose_type, 0), masses)[:, :, 1:]
     return constraint_forces.multipliers(system, blocks, load, mass)
+
+
+@compiled()
+def _least_multipliers(
+    system: System,
+    blocks: Slopes,
+    load: Float[Numbers, "levels coordinate body batch"],
+    compliance: Float[Numbers, " row"],
+    bent: Float[Numbers, " row"],
+) -> Any:
+    return least_multipliers(system, blocks, load, compliance, bent)
+
+
+@compiled()
+def _jacobian(system: System, blocks: Slopes) -> Any:
+    return constraint_forces.jacobian_of(system, blocks)
 
 
 @compiled("pose_type")

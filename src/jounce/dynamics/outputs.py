@@ -9,7 +9,7 @@ from jounce.constraints.base import Vector, value_fields
 from jounce.dynamics.inverse import MotionForces
 from jounce.dynamics.masses import check_loads
 from jounce.errors import MechanismError, check_name, did_you_mean
-from jounce.kinematics import Motion
+from jounce.kinematics import Motion, Status
 from jounce.mechanism import AbstractMotionOutput, Mechanism
 from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.resolve import resolve_element
@@ -48,6 +48,17 @@ class AbstractForceOutput(AbstractMotionOutput):
     def _check_named(self, element: Any) -> None:
         """Raise MechanismError unless the quantity is one of what is named."""
 
+    def remark(self, motion: Motion, values: np.ndarray) -> str:
+        """Return why values are NaN at instants that were solved: redundant constraints leave them open."""
+        forces = MotionForces.of(motion)
+        solved = motion.status == Status.OK
+        if forces.loose is None or np.isfinite(values[solved]).all():
+            return ""
+        return (
+            f"not unique, as constraints are redundant: {forces.open.words}; redundant_reactions chooses by least "
+            "norm or by stiffnesses"
+        )
+
 
 class _DriverOutput(AbstractForceOutput):
     driver: str = eqx.field(static=True)
@@ -56,7 +67,8 @@ class _DriverOutput(AbstractForceOutput):
 
     def coefficients(self, motion: Motion) -> Numbers:
         """Return the Taylor coefficients of what the driver exerts, (levels, 1, time)."""
-        return MotionForces.of(motion).driver_force(self.driver)
+        size = motion.model.length if self.unit == "N*m" else 1.0
+        return MotionForces.of(motion).unique(lambda forces: forces.driver_force(self.driver), size)
 
 
 class DriverForceOutput(_DriverOutput):
@@ -98,9 +110,8 @@ class _JointOutput(AbstractForceOutput):
             message = f"unknown frame; {did_you_mean(self.frame, ['global', 'body', *element.bodies])}"
             raise MechanismError(message, name="frame", value=self.frame)
 
-    def _wrench(self, motion: Motion, point: ArrayLike | None) -> tuple[Numbers, Numbers]:
+    def _wrench(self, forces: MotionForces, mechanism: Mechanism, point: ArrayLike | None) -> tuple[Numbers, Numbers]:
         """Return force and moment about a point of the body, with rates; about that of the joint unless given."""
-        forces, mechanism = MotionForces.of(motion), motion.mechanism
         element = {**mechanism.joints, **mechanism.drivers}[self.joint]
         body = element.bodies[min(1, len(element.bodies) - 1)] if self.body is None else self.body
         slot = element.bodies.index(body)
@@ -124,7 +135,7 @@ class JointForceOutput(_JointOutput):
 
     def coefficients(self, motion: Motion) -> Numbers:
         """Return the Taylor coefficients of the force, (levels, components, time)."""
-        return self._wrench(motion, None)[0]
+        return MotionForces.of(motion).unique(lambda forces: self._wrench(forces, motion.mechanism, None)[0])
 
 
 class JointTorqueOutput(_JointOutput):
@@ -143,7 +154,9 @@ class JointTorqueOutput(_JointOutput):
         mechanism = motion.mechanism
         components = 2 if mechanism.space == "planar" else 3
         values = resolve_element(self, mechanism.parameter_values, components, f"outputs.{self.joint}")
-        return self._wrench(motion, values["point"])[1]
+        return MotionForces.of(motion).unique(
+            lambda forces: self._wrench(forces, mechanism, values["point"])[1], motion.model.length
+        )
 
 
 class _AppliedOutput(AbstractForceOutput):

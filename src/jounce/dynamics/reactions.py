@@ -1,5 +1,6 @@
 """Forces in a moving mechanism, with rates to any order: what drivers, joints and applied forces exert."""
 
+import copy
 import dataclasses
 from typing import Any
 
@@ -16,7 +17,7 @@ from jounce.kinematics import Motion
 from jounce.shapes import ArrayLike
 
 
-def driver_force(motion: Motion, name: str) -> Any:
+def driver_force(motion: Motion, name: str, *, redundant: Any = None) -> Any:
     """Return the force or torque of a driver with its rates: yank, second rate and so on.
 
     It is conjugate to the motion law: a torque, N m, where the law is an angle, else a force, N, and its product with
@@ -29,12 +30,16 @@ def driver_force(motion: Motion, name: str) -> Any:
         Of a mechanism with masses or applied forces.
     name : str
         Name of the driver.
+    redundant : str or mapping, optional
+        Which forces to give where constraints are redundant, as `Mechanism.redundant_reactions`, which it is unless
+        given.
 
     Returns
     -------
     xarray.DataArray
         Dimensions time and derivative. Two orders of the motion are used up by accelerations: one solved to order 4
         has a second rate. (An output, `DriverTorqueOutput`, is not shorter, as the solver goes two orders further.)
+        NaN where redundant drivers leave it open, with the reason as the attribute ``comment``.
 
     Raises
     ------
@@ -56,7 +61,7 @@ def driver_force(motion: Motion, name: str) -> Any:
     """
     driver = motion.mechanism.drivers.get(name)
     kind = DriverTorqueOutput if driver is not None and is_turning(driver) else DriverForceOutput
-    return motion.evaluate(kind(name), name)
+    return _choosing(motion, redundant).evaluate(kind(name), name)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -76,7 +81,13 @@ class Reaction:
 
 
 def joint_reaction(
-    motion: Motion, name: str, body: str | None = None, frame: str = "global", point: ArrayLike | None = None
+    motion: Motion,
+    name: str,
+    body: str | None = None,
+    frame: str = "global",
+    point: ArrayLike | None = None,
+    *,
+    redundant: Any = None,
 ) -> Reaction:
     """Return the force and torque that a joint, or a driver, exerts on one of its bodies, with rates.
 
@@ -94,11 +105,15 @@ def joint_reaction(
     point : sequence, optional
         About which point of the body the torque is taken, in its frame, m; that of the joint unless given, or the
         origin of the body where the joint has none on it.
+    redundant : str or mapping, optional
+        Which reactions to give where constraints are redundant, as `Mechanism.redundant_reactions`, which it is unless
+        given: ``"unique"``, ``"least_norm"``, or stiffnesses of joints.
 
     Returns
     -------
     Reaction
-        Force and torque, two orders shorter than the motion.
+        Force and torque, two orders shorter than the motion. Components that redundant constraints leave open are NaN,
+        with the reason as the attribute ``comment`` (Wojtyra 2005).
 
     Raises
     ------
@@ -121,7 +136,18 @@ def joint_reaction(
     """
     force = JointForceOutput(name, body, frame)
     torque = JointTorqueOutput(name, body, frame, point)
-    return Reaction(motion.evaluate(force, name), motion.evaluate(torque, name))
+    chosen = _choosing(motion, redundant)
+    return Reaction(chosen.evaluate(force, name), chosen.evaluate(torque, name))
+
+
+def _choosing(motion: Motion, redundant: Any) -> Motion:
+    """Return a motion whose mechanism has another choice of reactions that redundant constraints leave open."""
+    if redundant is None or redundant == motion.mechanism.redundant_reactions:
+        return motion
+    other = copy.copy(motion)
+    other.mechanism = dataclasses.replace(motion.mechanism, redundant_reactions=redundant)
+    other.derived = {}
+    return other
 
 
 def applied_force(motion: Motion, name: str) -> Any:

@@ -3,9 +3,12 @@
 Coordinates of bodies are shifts and turns, those of one body after those of another; the ground has none.
 """
 
+import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Float
 
+from jounce.kinematics.linear import DenseFactor
 from jounce.shapes import Numbers
 
 ByBody = Float[Numbers, "coordinate body batch"]
@@ -42,3 +45,46 @@ def as_column(forces: ByBody, scale: Float[Numbers, " coordinate"]) -> Column:
 def by_body(column: Column, scale: Float[Numbers, " coordinate"]) -> ByBody:
     """Return a scaled column of unknown coordinates by body."""
     return jnp.swapaxes(column.reshape(-1, len(scale), column.shape[-1]), 0, 1) * scale[:, None, None]
+
+
+class ReducedFactor(eqx.Module):
+    """The factors of such matrices where rows are redundant: of as many combinations of rows as are independent.
+
+    Right sides and solutions have all rows; of the multipliers, which are not unique, they are those of least norm.
+    """
+
+    factor: DenseFactor
+    basis: Float[Numbers, "row rank batch"]  # orthonormal, of what the Jacobian maps to
+
+    @classmethod
+    def of(cls, mass: MassMatrix, jacobian: Jacobian, basis: Float[Numbers, "row rank batch"]) -> "ReducedFactor":
+        """Factor the matrix bordered by the Jacobian in a basis of what it maps to."""
+        return cls(DenseFactor.of(saddle_point(mass, in_basis(basis, jacobian))), basis)
+
+    @classmethod
+    def blank(cls, shape: tuple[int, int], rank: int, lanes: int) -> "ReducedFactor":
+        """Return a placeholder for the factors of a batch, to start a loop with."""
+        rows, columns = shape
+        size = columns + rank
+        return cls(DenseFactor.blank((size, size), lanes), np.zeros((rows, rank, lanes)))
+
+    def solve(self, right: Float[Numbers, "size batch"]) -> Float[Numbers, "size batch"]:
+        """Return the solutions for right sides of all coordinates and rows."""
+        columns = len(right) - len(self.basis)
+        below = jnp.sum(self.basis * right[columns:][:, None], axis=0)
+        found = self.factor.solve(jnp.concatenate([right[:columns], below]))
+        return jnp.concatenate([found[:columns], jnp.sum(self.basis * found[columns:][None], axis=1)])
+
+    def inverse(self) -> Float[Numbers, "size size batch"]:
+        """Return what takes right sides of all coordinates and rows to solutions."""
+        inverse, (_, rank, _) = self.factor.inverse(), self.basis.shape
+        columns = len(inverse) - rank
+        rows = jnp.sum(self.basis[:, :, None] * inverse[columns:][None], axis=1)
+        wide = jnp.concatenate([inverse[:columns], rows])
+        right = jnp.sum(self.basis[None] * wide[:, None, columns:], axis=2)
+        return jnp.concatenate([wide[:, :columns], right], axis=1)
+
+
+def in_basis(basis: Float[Numbers, "row rank batch"], jacobian: Jacobian) -> Float[Numbers, "rank column batch"]:
+    """Return the combinations of the rows of a Jacobian that a basis tells."""
+    return jnp.sum(basis[:, :, None] * jacobian[:, None], axis=0)

@@ -12,11 +12,13 @@ from jounce.dynamics.masses import Masses, gravity_of, required_masses
 from jounce.dynamics.saddle_fronts import SaddleFronts
 from jounce.errors import AssemblyError, JounceError, MechanismError, MobilityError
 from jounce.jet import Jet
+from jounce.kinematics.advance import LARGEST_CONTRADICTION
 from jounce.kinematics.assembly import assemble, freely_moving
 from jounce.kinematics.compilation import compiled
+from jounce.kinematics.curves.choice import chosen
 from jounce.kinematics.host_jacobian import RANK_TOLERANCE, HostJacobian, is_clearly_regular
+from jounce.kinematics.status import Status
 from jounce.mechanism import Mechanism, Model, build
-from jounce.mechanism.builder import pose_at
 from jounce.mechanism.modules import with_fields
 from jounce.shapes import Numbers
 
@@ -63,15 +65,18 @@ def consistent_start(mechanism: Mechanism, instant: float) -> ConsistentStart:
         If a value is not valid, no body has a mass, one that can move has none, or a motion that is free would have
         negative kinetic energy.
     AssemblyError
-        If joints, drivers and initial conditions cannot all be fulfilled.
+        If joints, drivers and initial conditions cannot all be fulfilled, or redundant ones have other rates.
     MobilityError
-        If constraints or initial conditions are redundant.
+        If the start is a singular position.
     """
+    mechanism = chosen(mechanism, instant)
     masses = required_masses(mechanism, "the equations of motion")
     model, state = build(mechanism), None
     if mechanism.initial:
         whole, coordinates = _assembled(mechanism, instant)
-        state = with_rates(equations_of(mechanism, whole, masses), at_rest(whole, coordinates), np.array([[instant]]))
+        driven = equations_of(mechanism, whole, masses)
+        state = with_rates(driven, at_rest(whole, coordinates), np.array([[instant]]))
+        _check_rates(driven, whole, state, instant)
         system = with_fields(model.system, forces=whole.system.forces, outputs=whole.system.outputs)
         model = dataclasses.replace(
             model, guess=coordinates, system=system, prescribed=whole.prescribed, history=whole.history
@@ -82,6 +87,7 @@ def consistent_start(mechanism: Mechanism, instant: float) -> ConsistentStart:
     state = jax.tree.map(np.asarray, with_rates(equations, state, np.array([[instant]])))
     if not all(np.isfinite(part).all() for part in state):
         _explain(equations, model, state, instant)
+    _check_rates(equations, model, state, instant)
     return ConsistentStart(model, equations, state, _explain(equations, model, state, instant))
 
 
@@ -122,12 +128,13 @@ def _renamed(row: str, mechanism: Mechanism) -> str:
 
 def at_rest(model: Model, coordinates: dict[str, np.ndarray]) -> State:
     """Return the state of bodies at rest, from the coordinates of their assembled pose."""
-    pose = pose_at(coordinates, model.pose_type)
-    position = np.asarray(pose.position.coefficients[0])[:, 1:]
-    if pose.turns == 1:
-        attitude, spin = np.asarray(pose.angle.coefficients[0])[None, 1:], np.zeros((1, *position.shape[1:]))
+    position = np.asarray(coordinates["position"])[:, 1:]
+    if model.pose_type.turns == 1:
+        attitude = np.asarray(coordinates["angle"])[None, 1:]
     else:
-        attitude, spin = np.asarray(pose.quaternion.coefficients[0])[:, 1:], np.zeros_like(position)
+        quaternion = np.asarray(coordinates["quaternion"])[:, 1:]
+        attitude = quaternion / np.sqrt((quaternion**2).sum(axis=0))[None]
+    spin = np.zeros((model.pose_type.turns, *position.shape[1:]))
     return State(position, attitude, np.zeros_like(position), spin)
 
 
@@ -135,6 +142,24 @@ def at_rest(model: Model, coordinates: dict[str, np.ndarray]) -> State:
 def with_rates(equations: Equations, state: State, time: Instants) -> State:
     """Return the state with the least change of its velocities that fulfils the rates of all constraints."""
     return equations.with_rates(equations.factored(state, time), state, time)
+
+
+@compiled()
+def _rates(equations: Equations, state: State, time: Instants) -> Float[Numbers, "row 1"]:
+    """Return the rates of all rows."""
+    return equations.system.residual(equations.pose(state), Jet.variable(time, 1)).dense().coefficients[1]
+
+
+def _check_rates(equations: Equations, model: Model, state: State, instant: float) -> None:
+    """Raise AssemblyError, by name, where redundant rows contradict each other in their rates."""
+    if model.system.rank is None:
+        return
+    gaps = np.abs(np.asarray(_rates(equations, state, np.array([[instant]]))))[:, 0]
+    size = max(float(np.max(np.abs(state.velocity))) / model.length, float(np.max(np.abs(state.spin))))
+    if gaps.max() > LARGEST_CONTRADICTION * size:
+        names = dict.fromkeys(row for row, gap in zip(model.rows, gaps, strict=True) if gap > 0.1 * gaps.max())
+        message = f"redundant constraints contradict each other in their rates at t = {instant:g} s: {', '.join(names)}"
+        raise AssemblyError(f"{message}; correct the laws of those named", status=Status.INCONSISTENT)
 
 
 @compiled()

@@ -148,7 +148,8 @@ class BatchStart:
         self._parametric, self._begun, self._state, self._instant = parametric, begun, state, instant
         self._own: State | None = None
         equations, coordinates = begun.model.system.shape
-        if equations < coordinates and parametric.guesses_differ(rows):
+        rank = begun.model.system.rank
+        if (equations if rank is None else rank) < coordinates and parametric.guesses_differ(rows):
             own = [consistent_start(parametric.varied(row), instant) for row in rows.tolist()]
             self._own = State(*(np.concatenate(parts, axis=-1) for parts in zip(*(s.state for s in own), strict=True)))
             found = [_turns_of(s.model.system.forces, s.model.system.outputs) for s in own]

@@ -20,7 +20,7 @@ from jounce.robot.arguments import whole_number
 _ANGLES = np.pi * (np.arange(20)[::-1] + 0.5) / 20
 NODES = 0.5 + 0.5 * np.cos(_ANGLES)  # of Chebyshev, in a step: steps reach a small part of where their series converge
 INTERPOLATION = np.cos(np.arange(20)[:, None] * _ANGLES) * np.where(np.arange(20) == 0, 0.05, 0.1)[:, None]
-WIDTHS = 16, 64  # instants evaluated together
+WIDTHS = (64,)  # instants evaluated together: one program for few and for many
 REAL = 1e-4  # of a step: an imaginary part below may be that of a real root of several, blurred by rounding
 FAINT = 1e-14  # of a polynomial's coefficients: values below are rounding
 BESIDE = 1e-3  # of a step: where the sign is looked at beside a root
@@ -101,7 +101,7 @@ def pose_coordinates(state: State) -> dict[str, np.ndarray]:
 def series_of(
     group: Group, coordinates: Coordinates, pose_type: type
 ) -> Float[np.ndarray, "order component instance batch"]:
-    """Return `output_series` of a batch of any size, compiled for two sizes only."""
+    """Return `output_series` of a batch of any size, compiled for one size only."""
 
     def chunk(lanes: np.ndarray) -> Any:
         return output_series(group, {name: part[..., lanes] for name, part in coordinates.items()}, pose_type)

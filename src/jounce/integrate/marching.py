@@ -84,14 +84,12 @@ def unexpanded(equations: Equations, state: State, time: Lanes, *, order: int) -
     size, columns = equations.system.shape
     series = state.map(lambda c: begun_series([c], order + 1))
     rates = jnp.zeros((1, columns // bodies, bodies, lanes)), jnp.zeros((1, size, lanes))
-    blank, nothing, none = (
-        jnp.full(time.shape, int(Outcome.UNEXPANDED)),
-        jnp.zeros(time.shape),
-        jnp.full(time.shape, -1),
-    )
+    # of NumPy, so that their types are as strict as those that `march` returns: it is compiled once for both
+    opening, none = (np.full(time.shape, value) for value in (int(Outcome.UNEXPANDED), -1))
+    nothing = jnp.zeros(time.shape)
     known = jnp.zeros((bodies + 1, lanes)), jnp.zeros(time.shape, bool)
     expansion, refused = Expansion(series, *rates), jnp.zeros(time.shape, int)
-    return IntegratorState(time, expansion, refused, blank, nothing, time, *known, none, measured(equations, state))
+    return IntegratorState(time, expansion, refused, opening, nothing, time, *known, none, measured(equations, state))
 
 
 @compiled("order")

@@ -118,7 +118,7 @@ def _drowned(sizes: Sizes) -> Flags:
     series grow faintly too: it must not be passed.
     """
     count = len(sizes)
-    middle, top = (jnp.log(jnp.maximum(jnp.max(sizes[k - 4 : k], axis=0), 1e-300)) for k in (count // 2, count))
+    middle, top = (jnp.log(jnp.maximum(jnp.max(sizes[max(k - 4, 0) : k], axis=0), 1e-300)) for k in (count // 2, count))
     growth = (top - middle) / (count - count // 2)
     faint = middle - (count // 2) * growth < math.log(FAINT)
     return (growth > 0) & faint & (sizes[0] * jnp.exp(-growth) > NEAR)

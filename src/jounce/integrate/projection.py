@@ -9,6 +9,9 @@ from jounce.dynamics.forward import Attitudes, Equations, Instants, Lanes, Matri
 from jounce.jet import Jet
 
 MOST_ITERATIONS = 10
+LARGEST_GAP = (
+    1e-9  # rad or sizes of the mechanism, that redundant constraints may leave: then they contradict each other
+)
 CLOSE = 4e-15  # so near to where the matrix was inverted, in the same unit, the inverse is the same but for rounding
 ROUNDING = 1e-15  # a correction this small, in rad or sizes of the mechanism, leaves nothing to correct
 
@@ -32,7 +35,8 @@ def projected(equations: Equations, state: State, time: Instants) -> tuple[State
     State
         With Euler parameters of unit length.
     distance : array of shape (batch,)
-        Size of the first correction of positions, rad or sizes of the mechanism; not finite where it failed.
+        Size of the first correction of positions, rad or sizes of the mechanism; not finite where it failed, or
+        redundant constraints contradict each other.
     inverse : array of shape (rows, rows, batch)
         Of the equations' matrix at this state, which `expand` takes.
     """
@@ -50,26 +54,24 @@ def projected(equations: Equations, state: State, time: Instants) -> tuple[State
         return pose.position.coefficients[0][:, 1:], equations.attitude_of(pose)
 
     def iterate(carry: Any) -> Any:
-        position, attitude, _, _, first, count = carry
+        position, attitude, _, last, first, count, _ = carry
+        near = ~jnp.any((last > 1e-9) & jnp.isfinite(last)) | (count >= MOST_ITERATIONS)
+        inverting = near & (count > 0)  # the matrix alone, once more: a branch of its own would be compiled twice
         factor, gap = correction(position, attitude)
         column = equations.least_change(factor, gap)
-        size = jnp.max(jnp.abs(column), axis=0)
-        position, attitude = moved(position, attitude, column)
-        return position, attitude, factor, size, jnp.where(count == 0, size, first), count + 1
+        size = jnp.where(inverting, last, jnp.max(jnp.abs(column), axis=0))
+        place = [jnp.where(inverting, x, y) for x, y in zip(carry[:2], moved(position, attitude, column), strict=True)]
+        known = inverting | jnp.all(size <= CLOSE)
+        return *place, factor, size, jnp.where(count == 0, size, first), count + 1, known
 
-    def unfinished(carry: Any) -> Any:
-        *_, size, _, count = carry
-        return jnp.any((size > 1e-9) & jnp.isfinite(size)) & (count < MOST_ITERATIONS) | (count == 0)
-
-    start = (position, attitude, equations.blank_factor(lanes), jnp.full(lanes, jnp.inf), jnp.zeros(lanes), 0)
-    position, attitude, factor, last, first, _ = jax.lax.while_loop(unfinished, iterate, start)
+    start = (position, attitude, equations.blank_factor(lanes), jnp.full(lanes, jnp.inf), jnp.zeros(lanes), 0, False)
+    position, attitude, factor, last, first, *_ = jax.lax.while_loop(lambda carry: ~carry[-1], iterate, start)
     moving = equations.with_rates(factor, state._replace(position=position, attitude=attitude), time)
-    inverse = jax.lax.cond(
-        jnp.all(last <= CLOSE),
-        lambda: factor.inverse(),
-        lambda: equations.factored(moving, time).inverse(),
-    )
-    return moving, jnp.where(last <= 1e-9, first, jnp.inf), inverse
+    fulfilled = last <= 1e-9
+    if equations.system.rank is not None:
+        gap = equations.system.residual(equations.still(position, attitude), clock).coefficients[0]
+        fulfilled &= jnp.max(jnp.abs(gap), axis=0) <= LARGEST_GAP
+    return moving, jnp.where(fulfilled, first, jnp.inf), factor.inverse()
 
 
 def normalised(attitude: Attitudes) -> Attitudes:

@@ -26,7 +26,7 @@ from jounce.integrate.methods import Taylor, evaluated
 from jounce.integrate.projection import normalised
 from jounce.integrate.simulation import Simulation
 from jounce.jet import Jet
-from jounce.kinematics.sensitivities import Solved
+from jounce.kinematics.sensitivities import Solved, check_not_redundant
 from jounce.kinematics.traced_motion import TracedMotion
 from jounce.mechanism import Mechanism, Model
 from jounce.mechanism.axis_angles import measures_angle
@@ -53,6 +53,8 @@ def traced_simulation(simulate: Callable[..., Simulation], given: Mapping[str, A
     UnsupportedError
         Within `jax.jit` and `jax.vmap`, where the number of steps is not known; for a method other than `Taylor`, for
         events, and for forces that count turns of an angle about an axis.
+    MechanismError
+        If constraints are redundant.
     """
     mechanism, options = given["mechanism"], {k: v for k, v in given.items() if k not in ("mechanism", "initial")}
     if given.get("initial") is not None:
@@ -60,6 +62,7 @@ def traced_simulation(simulate: Callable[..., Simulation], given: Mapping[str, A
     if options.get("events") or not isinstance(options.get("method") or Taylor(), Taylor):
         raise UnsupportedError("a simulation is differentiated with jn.Taylor() and without events", name="mechanism")
     simulation = _recorded(simulate, mechanism, options)
+    check_not_redundant(simulation.model)
     if any(map(measures_angle, simulation.model.system.forces)):
         message = "a simulation is not differentiated where forces count the turns of an angle about an axis in space"
         raise UnsupportedError(message, name="forces")

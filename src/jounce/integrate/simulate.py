@@ -7,10 +7,10 @@ from typing import Any
 
 import jax
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from jounce.constraints import AbstractConstraint
-from jounce.dynamics.forward import State
+from jounce.dynamics.forward import Equations, Instants, State
 from jounce.dynamics.inverse import force_names
 from jounce.dynamics.motion_values import Coordinates, cut, pose_of
 from jounce.dynamics.start import ConsistentStart, consistent_start
@@ -23,12 +23,13 @@ from jounce.integrate.sensitivities import traced_simulation
 from jounce.integrate.simulation import Simulation
 from jounce.jet import Jet
 from jounce.kinematics import Status, raise_for_status
+from jounce.kinematics.compilation import compiled
 from jounce.kinematics.motion import check_output, output_group
 from jounce.kinematics.solve import checked_order
 from jounce.mechanism import Mechanism, TimeGrid, check_mechanism, time_grid
 from jounce.mechanism.law_checks import check_laws
 from jounce.mechanism.preconditions import concrete
-from jounce.shapes import ArrayLike
+from jounce.shapes import ArrayLike, Numbers
 
 AHEAD = 1e-9  # of the time so far: where steps collapse, what is not finite lies that close
 FEW = 4  # derivatives that are looked at for one that is not finite
@@ -91,7 +92,7 @@ def simulate(
     AssemblyError
         If joints, drivers and initial conditions contradict each other.
     MobilityError
-        If constraints are redundant.
+        If the start is a singular position.
     SolveError
         If the motion cannot be followed to an instant (with `strict`); it holds the motion up to there.
     UnsupportedError
@@ -198,9 +199,13 @@ def _unfit(start: ConsistentStart, state: State, instant: float) -> str:
     system = start.equations.system
     if not system.forces:
         return ""
-    pose = start.equations.pose(state)
-    fit = np.asarray(system.finite_forces(pose, Jet.variable(np.array([[instant]]), 1)))[:, 0]
+    fit = np.asarray(_finite_forces(start.equations, state, np.array([[instant]])))[:, 0]
     return ", ".join(f"forces.{n}" for n, good in zip(force_names(start.model), fit, strict=True) if not good)
+
+
+@compiled()
+def _finite_forces(equations: Equations, state: State, time: Instants) -> Bool[Numbers, "force 1"]:
+    return equations.system.finite_forces(equations.pose(state), Jet.variable(time, 1))
 
 
 def unfit_rates(start: ConsistentStart, coordinates: Coordinates, instant: float) -> str:

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     import xarray
 
 SUFFIXES = (".csv", ".nc")
+CURVE_AXES = ("arc_length", "driver_value")  # first columns of a curve of configurations
 AXES = {  # of outputs that are more than one number, and the labels along them
     ("component",): ("x", "y", "z"),
     ("euler_parameter",): EulerParametersOutput.labels,
@@ -71,7 +72,8 @@ def write(dataset: xarray.Dataset, path: str | PathLike[str], *, overwrite: bool
     Parameters
     ----------
     dataset : xarray.Dataset
-        With dimensions time, derivative, and those of components, as ``Motion.dataset``.
+        With dimensions time, derivative, and those of components, as ``Motion.dataset``; a curve of configurations,
+        ``Curve.dataset``, has the columns ``arc_length`` and ``driver_value`` in the place of ``time``.
     path
         The file; one of that name is replaced.
     overwrite
@@ -187,20 +189,22 @@ def columns(dataset: xarray.Dataset) -> dict[str, Float[np.ndarray, " time"]]:
     """
     from xarray import Variable
 
-    found = {"time": np.asarray(dataset["time"], float)}
+    along = "time" if "time" in dataset.dims else "point"
+    first = ("time",) if along == "time" else (name for name in CURVE_AXES if name in dataset.coords)
+    found = {name: np.asarray(dataset[name], float) for name in first}
     for name, variable in dataset.data_vars.items():
-        axes = tuple(dim for dim in variable.dims if dim not in ("time", "derivative"))
-        if not {"time", "derivative"} <= set(variable.dims) or (axes and axes not in AXES):
+        axes = tuple(dim for dim in variable.dims if dim not in (along, "derivative"))
+        if not {along, "derivative"} <= set(variable.dims) or (axes and axes not in AXES):
             continue
         parts: list[tuple[str, Any]] = [(str(name), variable)]
         if axes:
             labels = ["".join(map(str, found)) for found in itertools.product(*(variable[a].values for a in axes))]
-            flat = variable.transpose(*axes, "derivative", "time")
+            flat = variable.transpose(*axes, "derivative", along)
             whole = flat.values.reshape(-1, *flat.shape[-2:])
-            dims = ("derivative", "time")
+            dims = ("derivative", along)
             parts = [(f"{name}_{label}", Variable(dims, part)) for label, part in zip(labels, whole, strict=True)]
         for stem, part in parts:
-            values = part.transpose("derivative", "time").values
+            values = part.transpose("derivative", along).values
             for order, row in zip(dataset["derivative"].values, values, strict=True):
                 column = f"{stem}_d{order}" if order else stem
                 if column in found:

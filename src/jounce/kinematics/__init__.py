@@ -1,6 +1,17 @@
 """Kinematics: assembly, positions, all derivatives from one factorisation, diagnosis, and the result."""
 
+from jounce.kinematics.curves import (
+    Assemblies as Assemblies,
+    Assembly as Assembly,
+    ChangePoint as ChangePoint,
+    Curve as Curve,
+    CurveBranch as CurveBranch,
+    LimitPosition as LimitPosition,
+    assemblies as assemblies,
+    trace as trace,
+)
 from jounce.kinematics.families import solve_batch as solve_batch
+from jounce.kinematics.mobility import Branch as Branch, Mobility as Mobility, mobility as mobility
 from jounce.kinematics.motion import Motion as Motion
 from jounce.kinematics.solve import (
     raise_for_status as raise_for_status,

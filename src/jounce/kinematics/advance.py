@@ -7,7 +7,7 @@ the branch of its neighbour is not judged by how near the prediction was: the si
 nearest zero of that determinant is told, real or complex, beyond which no step may go.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import jax
@@ -20,6 +20,7 @@ from jounce.jet.algebra import stacked, total
 from jounce.jet.turns import brought_near
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.factors import Factor, blank_factor, factored
+from jounce.kinematics.least_squares import LeastSquaresFactor
 from jounce.kinematics.status import Status
 from jounce.kinematics.turnover import turnover_of
 from jounce.mechanism.system import System
@@ -38,6 +39,9 @@ LARGEST_CONTRACTION = 0.25  # of the first simplified Newton corrections: Deuflh
 LARGEST_DEPARTURE = 0.05  # from a prediction, rad or sizes of the mechanism: beyond, a motion law jumps
 SMALLEST_DEPARTURE = 1e-6  # below this no prediction is called wrong
 SINGULAR_PIVOT = 1e-12  # of the largest; corrections tell before that they no longer converge
+LARGEST_GAP = 1e-9  # of redundant rows that agree, rad or sizes of the mechanism, or this many tolerances:
+GAP_TOLERANCES = 1e3
+LARGEST_CONTRADICTION = 1e-6  # of derivatives in redundant rows, as a part of what the motion's own could be
 ROUNDING = 4e-15  # a correction this small (in rad, or in sizes of the mechanism) leaves the Jacobian as good as new
 
 
@@ -56,6 +60,7 @@ class Arrival(NamedTuple):
     pivot_ratio: Lanes  # smallest pivot of the Jacobian over the largest
     admissible: Bool[Numbers, "driver batch"]  # whether each driver has a permitted value
     finite: Bool[Numbers, "result batch"]  # whether all derivatives wanted are, of the pose and of each output
+    gaps: Float[Numbers, "2 contradicting batch"]  # of redundant rows, see `_gaps`; of none where none are
 
     def state(self, lanes: slice | np.ndarray) -> SolvedState:
         """Return what the neighbours of some lanes start from: jets of coordinates and outputs, and the sign."""
@@ -226,12 +231,47 @@ def _finite_results(
     return jnp.concatenate([jnp.all(finite[: len(posed)], axis=0, keepdims=True), finite[len(posed) :]])
 
 
+def _signs(system: System, factor: Factor, before: Callable[[], tuple[Pose, Jet]], sign: Lanes) -> Lanes:
+    """Return the signs of the determinants of the Jacobians, those of neighbours being known, and where those are.
+
+    With redundant rows there is no determinant: the space of the columns has an orientation as seen from the neighbour.
+    """
+    if isinstance(factor, LeastSquaresFactor):
+        return factor.orientation(factored(system, *before())) * jnp.where(sign == 0, 1.0, sign)
+    return factor.sign() if system.rank is None else jnp.ones_like(sign)  # a large one has no orientation at hand
+
+
+def _gaps(
+    system: System, pose: Pose, time: Jet, terms: list[Lanes], tolerance: Real
+) -> Float[Numbers, "2 contradicting batch"]:
+    """Return how far redundant rows are from agreeing: open, rad or sizes of the mechanism; and over what is allowed.
+
+    In the second, derivatives count as well: those of the rows, over what those of the motion could be.
+    """
+    if system.rank is None:
+        return np.zeros((2, 0, *terms[0].shape))
+    rate = jnp.max(jnp.stack([jnp.power(term, 1.0 / k) for k, term in enumerate(terms, 1)]), axis=0)
+    first, *others = system.residual(pose, time).dense().coefficients
+    allowed = GAP_TOLERANCES * tolerance
+    over, part = [jnp.abs(first) / jnp.maximum(allowed, LARGEST_GAP)], jnp.maximum(allowed, LARGEST_CONTRADICTION)
+    for k, level in enumerate(others, 1):
+        over.append(jnp.abs(level) / jnp.maximum(part * rate**k, 1e-300)[None])
+    return jnp.stack([jnp.abs(first), jnp.max(jnp.nan_to_num(jnp.stack(over)), axis=0)])
+
+
 def _status(
-    correction: Lanes, predictable: Truths, pivot_ratio: Lanes, admissible: Truths, finite: Truths, tolerance: Real
+    correction: Lanes,
+    predictable: Truths,
+    pivot_ratio: Lanes,
+    admissible: Truths,
+    finite: Truths,
+    consistent: Truths,
+    tolerance: Real,
 ) -> Int[Numbers, " batch"]:
     """Return the outcome at each instant, the gravest last."""
     outcomes = (
         (~finite, Status.UNDEFINED),
+        (~consistent, Status.INCONSISTENT),
         (~predictable, Status.BRANCH_JUMP),
         (~(correction <= jnp.maximum(tolerance, CONVERGED)), Status.NOT_CONVERGED),
         (pivot_ratio <= SINGULAR_PIVOT, Status.SINGULAR),
@@ -321,14 +361,18 @@ def solved_batch(
     departures = _departures(system, pose, predicted)
     departure = jnp.max(departures, axis=0)
     travel = _travel(_terms(system, moving, pose_type.predictor), step)
-    found = factor.sign()
+    found = _signs(
+        system, factor, lambda: (pose_type.predicted_from(moving, 0.0 * step), Jet([(instant - step)[None]])), sign
+    )
     predictable = _predictable(departure, travel) & _laws_predictable(system, instant, step, order)
     predictable &= correction.contracts() & ((sign == 0) | (found == sign))
     admissible, pivot_ratio = system.admissible(time), factor.pivot_ratio()
     finite = _finite_results([coordinates[name] for name in pose_type.predictor], outputs, wanted)
     admitted, defined = jnp.all(admissible, axis=0), jnp.all(finite, axis=0)
-    status = _status(correction.last, predictable, pivot_ratio, admitted, defined, tolerance)
     terms = _terms(system, reached, pose_type.predictor)
+    gaps = _gaps(system, pose, time, terms, tolerance)
+    consistent = jnp.all(gaps[1] <= 1.0, axis=0)
+    status = _status(correction.last, predictable, pivot_ratio, admitted, defined, consistent, tolerance)
     arrival = Arrival(
         coordinates,
         outputs,
@@ -342,5 +386,6 @@ def solved_batch(
         pivot_ratio,
         admissible,
         finite,
+        gaps,
     )
     return arrival, factor, reached

@@ -24,6 +24,7 @@ from jounce.kinematics.initial_turns import (
     nearest_turns,
     turned_to_laws,
 )
+from jounce.kinematics.redundancy import Redundancy, redundancy
 from jounce.kinematics.status import Status
 from jounce.mechanism import Model
 from jounce.mechanism.axis_angles import measures_angle, with_angles, with_datums
@@ -104,7 +105,7 @@ def assemble(model: Model, instant: float, tolerance: float, *, free: bool = Fal
     AssemblyError
         If no position near the guess fulfils all joints; the message names those that stay open.
     MobilityError
-        If joints and drivers leave degrees of freedom, or there are too many of them.
+        If joints and drivers leave degrees of freedom, or the position is singular.
     """
     columns = model.system.shape[1]
     if not model.rows and not free:
@@ -113,20 +114,20 @@ def assemble(model: Model, instant: float, tolerance: float, *, free: bool = Fal
     if not model.rows:  # bodies that fly freely are together as they are
         model, _ = with_reference(model, model.guess, instant, model.prescribed)
         return dataclasses.replace(model, system=resident(model.system)), model.guess
-    model, found = _settled(model, instant, tolerance)
+    model, found = settled(model, instant, tolerance)
     check_assembled(model, found, instant, free=free)
-    check_mobility(model, found.jacobian, free=free)
-    system = resident(with_fields(model.system, row_scale=found.scale[:, None]))
-    return dataclasses.replace(model, system=system), found.coordinates
+    model, told = redundancy_of(model, found, instant)
+    check_mobility(model, found.jacobian, told, free=free)
+    return dataclasses.replace(model, system=resident(model.system)), found.coordinates
 
 
-def _settled(model: Model, instant: float, tolerance: float) -> tuple[Model, Trial]:
+def settled(model: Model, instant: float, tolerance: float) -> tuple[Model, Trial]:
     """Put the bodies together, and count the angles about axes from the position found.
 
     Where the axes were tilted against each other in the starting guess, the angles in the position found are others
     than those counted from the guess, and it takes another turn to get to those that the drivers prescribe.
     """
-    guessed = _mover(model, instant)(model.guess, np.zeros(model.system.shape[1]))
+    guessed = mover(model, instant)(model.guess, np.zeros(model.system.shape[1]))
     lag, told = driver_lag(model, instant, guessed[1]), model.prescribed
     model, start = _turned(model, instant, tolerance, guessed, lag)
     found = put_together(model, instant, tolerance, start, known=guessed if start is None else None)
@@ -137,7 +138,7 @@ def _settled(model: Model, instant: float, tolerance: float) -> tuple[Model, Tri
             model, _ = with_reference(model, begin.coordinates, instant, told)
             found = put_together(model, instant, tolerance, begin.coordinates)
     if "angle" in found.coordinates and start is None and found.closed:
-        found = _nearest(model, found, instant)
+        found = nearest_to_guess(model, found, instant)
     for _ in range(MAX_DATUMS):
         if not found.closed:
             return model, found
@@ -161,7 +162,7 @@ def _turned(
     begin = put_together(model, instant, tolerance, lag=lag, known=guessed)
     if not begin.closed:
         return model, None
-    found = turned_to_laws(model, lag, begin.coordinates, _mover(model, instant))
+    found = turned_to_laws(model, lag, begin.coordinates, mover(model, instant))
     if found is None:
         return model, None
     coordinates, history = found
@@ -175,9 +176,9 @@ def _turned(
     return model, coordinates
 
 
-def _nearest(model: Model, found: Trial, instant: float) -> Trial:
+def nearest_to_guess(model: Model, found: Trial, instant: float) -> Trial:
     """Return planar bodies put together, with every angle shifted by whole turns to be nearest to the guess."""
-    moved, still = _mover(model, instant), np.zeros(model.system.shape[1])
+    moved, still = mover(model, instant), np.zeros(model.system.shape[1])
 
     def residual_at(angle: np.ndarray) -> np.ndarray:
         return found.scale * moved({**found.coordinates, "angle": angle}, still)[1]
@@ -185,7 +186,7 @@ def _nearest(model: Model, found: Trial, instant: float) -> Trial:
     return found._replace(coordinates=nearest_turns(model.guess, found.coordinates, residual_at))
 
 
-def _mover(model: Model, instant: float) -> Mover:
+def mover(model: Model, instant: float) -> Mover:
     """Return what takes coordinates and an increment to coordinates, residual and Jacobian, all on the host."""
     system = with_fields(model.system, outputs=(), forces=(), fronts=None, pattern=None)  # all that the program needs
     pattern, scale = model.system.pattern, np.asarray(model.system.row_scale)[:, 0]
@@ -224,7 +225,7 @@ def put_together(
     known : Place, optional
         Where to start from, in the place of coordinates, if it is known whole.
     """
-    still, free = np.zeros(model.system.shape[1]), _mover(model, instant)
+    still, free = np.zeros(model.system.shape[1]), mover(model, instant)
 
     def opened(place: Place) -> Place:
         return place if lag is None else (place[0], lag.open(place[1], 1.0), place[2])
@@ -277,10 +278,27 @@ def check_assembled(model: Model, found: Trial, instant: float, *, free: bool = 
         f"{'stays' if len(open_rows) == 1 else 'stay'} open, by {', '.join(wide[name] for name in open_rows[:4])}; "
         "check lengths and positions, or guess the pose of the bodies more closely"
     )
+    extra = _structural_excess(model, found, instant)
+    if extra:
+        message += (
+            f"; {_count(extra, 'equation')} more than coordinates are among them, and redundant constraints contradict "
+            "each other by that much: correct lengths and axes, free a direction there, or raise the tolerance if the "
+            "numbers are no more exact"
+        )
     missing = found.jacobian.shape[1] - len(model.rows)
     if missing > 0 and not free:
         message += f"; {_count(missing, 'equation')} too few for all coordinates: a joint may be missing"
     raise AssemblyError(message, status=Status.NOT_ASSEMBLED)
+
+
+def _structural_excess(model: Model, found: Trial, instant: float) -> int:
+    """Return how many equations are dependent wherever the bodies are, so that they may contradict each other.
+
+    Bodies that do not reach each other come to rest where equations depend on each other too, but only there.
+    """
+    anywhere = 0.1 * np.random.default_rng(1).standard_normal(model.system.shape[1])
+    jacobian = mover(model, instant)(found.coordinates, anywhere)[2]
+    return len(model.rows) - jacobian.scaled(jacobian.row_scale).rank if jacobian.finite().all() else 0
 
 
 def _widths(model: Model, found: Trial, instant: float) -> dict[str, str]:
@@ -324,15 +342,23 @@ def _squared_lengths(model: Model, instant: float) -> dict[str, float]:
     return found
 
 
-def check_mobility(model: Model, jacobian: HostJacobian, *, free: bool = False) -> None:
-    """Raise MobilityError, with the bodies and joints concerned, unless the Jacobian is square and regular.
+def redundancy_of(model: Model, found: Trial, instant: float) -> tuple[Model, Redundancy]:
+    """Return a model that was put together with its rows scaled, and which of them follow from others."""
+    model = dataclasses.replace(model, system=with_fields(model.system, row_scale=found.scale[:, None]))
+    told = redundancy(model, found.coordinates, found.jacobian, lambda *place: mover(model, instant)(*place))
+    rank = told.rank if told.count else None
+    return dataclasses.replace(model, system=with_fields(model.system, rank=rank)), told
 
-    Where degrees of freedom may be left, it is enough that no constraint is redundant.
+
+def check_mobility(model: Model, jacobian: HostJacobian, found: Redundancy, *, free: bool = False) -> None:
+    """Raise MobilityError, with the bodies concerned, where degrees of freedom are left or the position is singular.
+
+    Redundant constraints are no error: here they agree. Degrees of freedom may be left (`free`).
     """
-    (rows, columns), rank = jacobian.shape, jacobian.rank
-    if rows == rank and (free or rank == columns):
+    (rows, columns), rank = jacobian.shape, found.rank
+    left_over = columns - rank
+    if (free or not left_over) and not found.is_singular:
         return
-    left_over, redundant = columns - rank, rows - rank
     bodies = len(model.bodies)
     parts = [
         f"{bodies} moving {'body has' if bodies == 1 else 'bodies have'} {columns} coordinates; joints and drivers "
@@ -340,25 +366,19 @@ def check_mobility(model: Model, jacobian: HostJacobian, *, free: bool = False) 
     ]
     if left_over and not free:
         noun = "degree of freedom is" if left_over == 1 else "degrees of freedom are"
-        moving = freely_moving(model, jacobian.free_directions)
+        moving = freely_moving(model, found.jacobian.free_directions)
         remedy = f"add {_count(left_over, 'driver')}, or simulate it under its forces"
         parts.append(f"{left_over} {noun} left, with which {moving} can move: {remedy}")
-    if redundant:
+    if found.count:
+        parts.append(f"{found}, which is no fault as they agree")
+    if found.is_singular:
+        moving = freely_moving(model, jacobian.free_directions)
         parts.append(
-            f"{_count(redundant, 'equation')} too many among {redundant_rows(model, jacobian.dependences)}: free a "
-            "direction there (a spherical or cylindrical joint for a revolute, say), or remove a driver"
+            "the start is a singular position (a dead point or a change point), where only "
+            f"{found.rank_here} equations are independent and {moving} can move: start at another instant, or with "
+            "another position"
         )
-    if left_over and redundant and rows == columns and not free:
-        parts.append("or the start is a singular position: start at another instant")
     raise MobilityError("; ".join(parts))
-
-
-def redundant_rows(model: Model, combinations: Float[np.ndarray, "row combination"]) -> str:
-    """Name the joints and drivers in combinations of rows that vanish, shape (rows, combinations)."""
-    by_name: dict[str, float] = {}
-    for name, weight in zip(model.rows, np.linalg.norm(combinations, axis=1).tolist(), strict=True):
-        by_name[name] = max(weight, by_name.get(name, 0.0))
-    return _concerned(np.array([*by_name.values()]), tuple(by_name))
 
 
 def freely_moving(model: Model, directions: Float[np.ndarray, "direction column"]) -> str:

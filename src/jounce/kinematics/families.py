@@ -67,7 +67,8 @@ def solve_batch(
     """Return the motions of many designs of a mechanism that differ in its parameters, solved side by side.
 
     Each design is followed in steps of its own, as `jounce.solve` does it alone. One that locks, or that comes to a
-    singular position, is solved alone; so are all of them where outputs are forces, energies or Euler angles.
+    singular position, is solved alone; so are all of them where outputs are forces, energies or Euler angles, where
+    constraints are redundant, and where the mechanism asks for one of its assemblies.
 
     Parameters
     ----------
@@ -141,7 +142,8 @@ class _Family:
     def solve(self, threads: int) -> None:
         """Solve all designs: most side by side, the others alone."""
         count = len(self.rows)
-        left = np.arange(count) if self._of_whole_motions() else self._side_by_side(threads)
+        alone = self.mechanism.assembly is not None or self._of_whole_motions()
+        left = np.arange(count) if alone else self._side_by_side(threads)
         for done, k in enumerate(left.tolist()):
             self._alone(k)
             if self.progress is not None:
@@ -184,7 +186,7 @@ class _Family:
         count = len(self.rows)
         first, last = float(self.instants[0]), float(self.instants[-1])
         model, known = self._first_assembled(first)
-        if model is None:
+        if model is None or model.system.rank is not None:
             return np.arange(count)
         lost = lost_orders(self.mechanism)
         check_laws(self.design(known), np.array([first, last]), self.order + lost, forces=False)

@@ -121,8 +121,8 @@ class FrontalFactor(eqx.Module):
         levels = (count, plan.rights, plan.left_rows, self.vectors, self.factors, u)
         return jax.lax.scan(backward, blank, levels, reverse=True)[0][1]
 
-    def applied_inverse(self, matrix: Float[Numbers, "row column"]) -> Float[Numbers, "row column"]:
-        """Return the products of the inverse of the first matrix with the columns of another, shape (rows, columns)."""
+    def applied_inverse(self, matrix: Float[Numbers, "row k"]) -> Float[Numbers, "column k"]:
+        """Return the products of the inverse of the first matrix with the columns of another, shape (columns, k)."""
         return FrontalFactor(self.fronts, *(x[..., :1] for x in self.arrays)).solve(matrix)
 
     def pivot_ratio(self) -> Float[Numbers, " batch"]:

@@ -17,7 +17,7 @@ import jax
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
-from jounce.kinematics.advance import Arrival, SolvedState, advance, predictor
+from jounce.kinematics.advance import LARGEST_GAP, Arrival, SolvedState, advance, predictor
 from jounce.kinematics.device import on_processor
 from jounce.kinematics.legs import Ending, Leg, Limits, Place, Settings, Way, leg
 from jounce.kinematics.status import Status
@@ -125,10 +125,20 @@ class Solver:
         refused = np.flatnonzero(~arrival.admissible[:, lane])
         if refused.size:
             return ", ".join(self.model.drivers[k] for k in refused)
+        if arrival.status[lane] == Status.INCONSISTENT:
+            return self._contradicting(np.asarray(arrival.gaps[..., lane]))
         if arrival.status[lane] == Status.UNDEFINED and arrival.finite[0, lane]:
             names = [name for group in self.model.outputs for name in group]
             return f"output {names[int(np.argmin(arrival.finite[1:, lane]))]}"
         return f"body {self.model.bodies[int(arrival.body[lane])]}"
+
+    def _contradicting(self, gaps: Float[np.ndarray, "2 row"]) -> str:
+        """Name the joints and drivers that contradict each other, and by how much they are open."""
+        size, over = gaps
+        names = dict.fromkeys(self.model.rows[k] for k in np.argsort(-over) if over[k] > 0.1 * over.max())
+        wide = size.max()
+        told = f"open by {wide:.2g} rad, or sizes of the mechanism" if wide > LARGEST_GAP else "in their rates"
+        return f"{', '.join(list(names)[:4])} ({told})"
 
     def _predictor(self, known: SolvedState) -> SolvedState:
         return predictor(self.model.system, self.model.pose_type, known)

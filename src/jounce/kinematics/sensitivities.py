@@ -20,7 +20,7 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Float
 
-from jounce.errors import AssemblyError, MobilityError, SolveError
+from jounce.errors import AssemblyError, MechanismError, MobilityError, SolveError
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked
 from jounce.kinematics.jacobian_series import jacobian_series, solved_series
@@ -164,6 +164,17 @@ def _first(coordinates: Mapping[str, Any]) -> dict[str, Any]:
     return {name: coordinates[name][0, ..., :1] for name in coordinates if name != "angular_velocity"}
 
 
+def check_not_redundant(model: Model) -> None:
+    """Raise MechanismError if constraints are redundant: known by the rank, or more equations than unknowns."""
+    rows, columns = model.system.shape
+    if rows > columns or model.system.rank is not None:
+        raise MechanismError(
+            "gradients of mechanisms with redundant constraints are not there yet; take joints that leave out the "
+            "equations that follow from others, as jn.mobility tells them",
+            name="joints",
+        )
+
+
 class _Builder:
     """Makes the model of a mechanism from what JAX traces in it: operation by operation, or compiled once.
 
@@ -199,6 +210,7 @@ class _Builder:
 
     def _numbers(self, values: Values, length: Any, angles: Any, first: Any, *, counted: bool) -> list[Any]:
         model = traced_model(self._made(values), length, angles, first)
+        check_not_redundant(model)
         leaves, structure = jax.tree.flatten(model.system)
         which = tuple(k for k, leaf in enumerate(leaves) if isinstance(leaf, Tracer))
         fixed = [None if k in which else leaf for k, leaf in enumerate(leaves)]

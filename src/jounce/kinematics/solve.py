@@ -11,6 +11,8 @@ from jaxtyping import Float
 
 from jounce.errors import MechanismError, SolveError, UnsupportedError
 from jounce.kinematics.assembly import assemble
+from jounce.kinematics.curves.choice import chosen
+from jounce.kinematics.dead_ends import dead_end_words
 from jounce.kinematics.grid import LONG_GRID
 from jounce.kinematics.long_grids import solve_grid
 from jounce.kinematics.motion import Motion
@@ -81,7 +83,7 @@ def solve(
     Parameters
     ----------
     mechanism : Mechanism
-        Drivers and joints must leave no degree of freedom, and none may be redundant.
+        Drivers and joints must leave no degree of freedom; redundant ones must agree.
     time : array_like of shape (time,), optional
         Strictly increasing instants, s; those of the mechanism unless given.
     order : int, default 4
@@ -113,7 +115,7 @@ def solve(
     AssemblyError
         If the bodies cannot be put together at the first instant.
     MobilityError
-        If degrees of freedom are left, or constraints are redundant.
+        If degrees of freedom are left, or the start is a singular position.
     SolveError
         If the motion cannot be followed to an instant (with `strict`); it holds the motion up to there.
     UnsupportedError
@@ -204,7 +206,7 @@ def _followed(
     lost = lost_orders(mechanism)
     of_forces = any(output.of_forces for output in mechanism.outputs.values())
     check_laws(mechanism, np.array([first, last]), order + lost, forces=of_forces)
-    model, coordinates = assemble(build(mechanism), first, tolerance)
+    model, coordinates = assemble(build(chosen(mechanism, first)), first, tolerance)
     solver = Solver(model, max(order + lost, LOWEST_ORDER), float(tolerance), refine, order)
     start = _first(solver, coordinates, np.array([first]))
     on_the_way = np.asarray(instants) if len(instants) <= LONG_GRID else NO_GRID
@@ -222,6 +224,8 @@ def raise_for_status(motion: Motion | Stretches) -> None:
     where = f"t = {motion.time[first]:g} s" + (f", {fault}" if fault else "")
     total = len(motion.time)
     message = f"{where}: {_words(status)}: {status.advice}"
+    if isinstance(motion, Motion) and (ahead := dead_end_words(motion, first)):
+        message += f"; {ahead}"
     solved = f"{total - failed.size} of {total} instants were solved"
     raise SolveError(f"{message} ({solved})", motion=motion, status=status)
 

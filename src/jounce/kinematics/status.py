@@ -15,6 +15,7 @@ class Status(enum.IntEnum):
     INADMISSIBLE = 6
     COLLAPSED = 7
     UNDEFINED = 8
+    INCONSISTENT = 9
 
     @property
     def advice(self) -> str:
@@ -39,5 +40,7 @@ _ADVICE = {
     Status.UNDEFINED: "a quantity or a derivative of it is not a finite number here: a distance that is zero has no "
     "rate, a motion law such as t**2.5 no third derivative at t = 0, and Euler angles are none where their first and "
     "last axes are parallel; ask for a lower order, for another sequence, or leave it out",
+    Status.INCONSISTENT: "redundant constraints contradict each other here: they agree at the start, and not all along "
+    "the motion; correct lengths, axes and laws of those named, or free a direction there",
     Status.NOT_REACHED: "not computed, because the motion could not be followed up to here",
 }

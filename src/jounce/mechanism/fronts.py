@@ -18,6 +18,7 @@ from jaxtyping import Int
 from jounce.mechanism.pattern import Pattern
 from jounce.shapes import Numbers
 
+MOST_DENSE = 100  # columns of a matrix with more rows: a dense elimination is dearer, but knows its orientation
 FRONT_COST = 4.0  # of an operation in fronts, by that of one in dense elimination, as measured
 Row = tuple[int, int]  # the front that left it over, and its place there; -1 and its number if it is one of the matrix
 
@@ -133,7 +134,7 @@ def _ordered(pattern: Pattern) -> tuple[Int[np.ndarray, " body"], list[set[int]]
 def elimination(pattern: Pattern) -> Fronts | None:
     """Return how matrices of a pattern are eliminated body by body, where that is less work than as dense ones."""
     rows, columns = pattern.shape
-    if rows != columns or not rows:
+    if rows < columns or not rows or (rows > columns and columns <= MOST_DENSE):
         return None
     fronts = Fronts.of(pattern)
     count, height, wide = fronts.shape

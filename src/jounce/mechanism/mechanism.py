@@ -8,9 +8,10 @@ from typing import Any
 
 from jounce.constraints import AbstractConstraint
 from jounce.display import Displayed
-from jounce.errors import ExpressionError, JounceError, MechanismError, check_name
+from jounce.errors import ExpressionError, JounceError, MechanismError, check_choice, check_name
 from jounce.forces import AbstractForce
 from jounce.mechanism.outputs import AbstractQuantity
+from jounce.mechanism.redundant_reactions import check_redundant_reactions
 from jounce.mechanism.resolve import parameter_value
 from jounce.rigid.inertia import Inertia
 from jounce.trajectory import Expression
@@ -29,6 +30,9 @@ RESERVED_OUTPUTS = (  # the axes of a result
     "row_axis",
     "column_axis",
 )
+NEAREST = "nearest"
+SIDES = {"above": (-1, 1), "below": (-1, -1), "right": (0, 1), "left": (0, -1)}
+"""Where a body may be wished to lie: the component of the global frame, and its sign."""
 RATE_COLUMN = re.compile(r".*_d[0-9]+")
 
 
@@ -111,8 +115,17 @@ class Mechanism(Displayed):
         Acceleration of free fall in the global frame, (2,) or (3,), m/s^2; zero unless given.
     time : array_like, optional
         The instants that `jounce.solve` takes when it is given none, s.
+    redundant_reactions : str or dict of str to dict, default "unique"
+        Which reactions to give where constraints are redundant: ``"unique"`` those that are, the others are NaN;
+        ``"least_norm"`` all, such that the sum of the squares of the forces of all constraint rows, and of their
+        couples over the size of the mechanism, is least; or those of elastic joints: by the name of a joint, its
+        stiffness ``force``, N/m, and ``torque``, N m/rad; what is not given is rigid.
     title : str, optional
         One line for tables and figures.
+    assembly : int, str or dict, optional
+        Which of several assemblies is meant, where the nearest to the starting guess by chance of iteration will not
+        do: its number as `jounce.assemblies` counts, ``"nearest"`` for the truly nearest to the guess, or for some
+        bodies ``"above"``, ``"below"``, ``"left"`` or ``"right"``: where the middle of its joints lies farthest there.
     dimensions : dict of str to tuple of Dimension, optional
         Which dimensions parameters may have, where it is known: a file tells it by units and by use.
 
@@ -147,7 +160,9 @@ class Mechanism(Displayed):
     parameters: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     gravity: Any = None
     time: Any = None
+    redundant_reactions: str | Mapping[str, Any] = "unique"
     title: str = ""
+    assembly: Any = None
     dimensions: Mapping[str, tuple[Dimension, ...]] = dataclasses.field(default_factory=dict, compare=False, repr=False)
 
     def __post_init__(self):
@@ -158,6 +173,8 @@ class Mechanism(Displayed):
         if GROUND in self.bodies:
             raise MechanismError("the body 'ground' always exists and never moves", name="bodies.ground")
         self._check_names()
+        check_redundant_reactions(self.redundant_reactions, (*self.joints, *self.drivers))
+        self._check_assembly()
         for kind, elements in self.elements.items():
             for name, element in elements.items():
                 self._check_element(kind, name, element)
@@ -176,6 +193,16 @@ class Mechanism(Displayed):
             for name in self.initial.keys() & getattr(self, kind).keys():
                 message = f"a {kind[:-1]} and an initial condition have the same name"
                 raise MechanismError(message, name=f"initial.{name}")
+
+    def _check_assembly(self) -> None:
+        wish = self.assembly
+        if isinstance(wish, Mapping) and wish:
+            for body, side in wish.items():
+                check_name("body", body, tuple(self.bodies), MechanismError, name=f"assembly.{body}")
+                check_choice(f"assembly.{body}", side, tuple(SIDES), MechanismError)
+        elif wish is not None and wish != NEAREST and not (type(wish) is int and wish > 0):
+            message = f"must be a number from 1, {NEAREST}, or for bodies one of {', '.join(SIDES)}"
+            raise MechanismError(message, name="assembly", value=wish)
 
     def _check_element(self, kind: str, name: str, element: Any) -> None:
         place = f"{kind}.{name}"

@@ -37,6 +37,11 @@ class AbstractMotionOutput(AbstractQuantity):
     def coefficients(self, motion: Any) -> Any:
         """Return the Taylor coefficients of the quantity at all instants, shape (order + 1, components, time)."""
 
+    def remark(self, motion: Any, values: Any) -> str:
+        """Return what is to be said of plain derivatives, time first, such as why they are NaN; nothing in general."""
+        del motion, values
+        return ""
+
 
 class AbstractOutput(AbstractQuantity):
     """A quantity of a motion: one function on jets, as a joint is, with the unit of its value.

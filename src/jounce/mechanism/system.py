@@ -169,6 +169,7 @@ class System(eqx.Module):
     body_count: int = eqx.field(static=True)
     forces: tuple[Group, ...] = ()
     fronts: Fronts | None = None  # how a large Jacobian is eliminated
+    rank: int | None = eqx.field(static=True, default=None)  # of the Jacobian in general, where rows are redundant
 
     @property
     def shape(self) -> tuple[int, int]:

@@ -17,6 +17,7 @@ from jounce.jet.algebra import stacked
 from jounce.kinematics import Motion
 from jounce.kinematics.assembly import assemble
 from jounce.kinematics.compilation import compiled
+from jounce.kinematics.curves.choice import chosen
 from jounce.mechanism import Mechanism, build, time_grid
 from jounce.mechanism.builder import starting_guess
 from jounce.mechanism.mechanism import GROUND
@@ -52,7 +53,7 @@ def assembled(mechanism: Mechanism) -> dict[str, Frame]:
     first = 0.0
     if mechanism.time is not None:
         first = float(time_grid(mechanism.time, mechanism.parameter_values)[0])
-    model, coordinates = assemble(build(started), first, ASSEMBLY_TOLERANCE, free=True)
+    model, coordinates = assemble(build(chosen(started, first)), first, ASSEMBLY_TOLERANCE, free=True)
     return _by_body(mechanism, _frames(model.pose_type, coordinates))
 
 

@@ -8,7 +8,9 @@ from pydantic import TypeAdapter
 from pydantic.json_schema import GenerateJsonSchema
 from typing_extensions import TypedDict
 
+from jounce.reporting.curve_facts import CurveFacts
 from jounce.reporting.mechanism_facts import Grid, InspectedMechanism
+from jounce.reporting.modes_facts import ModesFacts
 from jounce.reporting.motion_facts import MotionFacts, SimulationFacts
 from jounce.reporting.robot_facts import InspectedRobot
 
@@ -75,6 +77,15 @@ class InspectRobotResult(Result, InspectedRobot):
     command: Literal["inspect"]
 
 
+class TraceResult(Result):
+    """jounce trace --json."""
+
+    command: Literal["trace"]
+    file: str
+    curves: list[CurveFacts]
+    written: str | None
+
+
 class LimitRow(TypedDict):
     """The worst instant of a joint and quantity; without a limit, its ratio is null."""
 
@@ -115,6 +126,13 @@ class TorquesResult(TrajectoryResult):
     rates: int
     held: list[str]
     peaks: list[TorquePeak]
+
+
+class ModesResult(Result, ModesFacts):
+    """jounce modes --json."""
+
+    command: Literal["modes"]
+    written: str | None
 
 
 class Starter(TypedDict):
@@ -172,6 +190,8 @@ RESULTS: dict[str, Any] = {
     "inspect_robot": InspectRobotResult,
     "check": CheckResult,
     "torques": TorquesResult,
+    "modes": ModesResult,
+    "trace": TraceResult,
     "new_list": NewListResult,
     "new": NewResult,
 }
@@ -189,8 +209,8 @@ def result_schema() -> dict[str, Any]:
 
     Examples
     --------
-    >>> sorted(result_schema()["$defs"])
-    ['check', 'complaint', 'inspect_mechanism', 'inspect_robot', 'new', 'new_list', 'run', 'simulate', 'torques']
+    >>> sorted(result_schema()["$defs"])[:6]
+    ['check', 'complaint', 'inspect_mechanism', 'inspect_robot', 'modes', 'new']
     """
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from fractions import Fraction
 from os import PathLike, fspath
 from typing import Any, Literal, NotRequired
@@ -11,27 +10,18 @@ import numpy as np
 from typing_extensions import TypedDict
 
 from jounce.constraints.base import value_fields
-from jounce.dynamics.start import initial_as_drivers
-from jounce.errors import JounceError, MobilityError
+from jounce.errors import JounceError
 from jounce.io.files.source import read_source
 from jounce.io.mechanisms.keys import OUTPUTS, output_holder
-from jounce.kinematics.assembly import (
-    Trial,
-    check_assembled,
-    check_mobility,
-    freely_moving,
-    put_together,
-    redundant_rows,
-)
-from jounce.kinematics.host_jacobian import HostJacobian
+from jounce.kinematics.curves.choice import chosen
 from jounce.mechanism import Mechanism, Model, build, time_grid
 from jounce.mechanism.masses import body_mass
 from jounce.mechanism.system import POSITION_COMPONENTS
-from jounce.reporting.summaries import freedom_words
+from jounce.reporting.freedom_facts import AssemblyFacts, FreedomFacts, MobilityFacts, StartingState
+from jounce.reporting.range_facts import RangeFacts
 from jounce.trajectory.dimensions import Dimension
 from jounce.trajectory.units import parse_value
 
-TOLERANCE = 1e-12
 KINDS = ("joints", "drivers", "forces", "initial")
 BASES = {"mass": "kg", "length": "m", "angle": "rad", "time": "s", "ampere": "A", "kelvin": "K"}
 
@@ -100,31 +90,6 @@ class Grid(TypedDict):
     count: int
 
 
-class FreedomFacts(TypedDict):
-    """Coordinates, equations and what they leave."""
-
-    coordinates: int
-    equations: int
-    of_drivers: int
-    independent: int
-    of_joints: int
-    left: int
-    redundant: int
-    redundant_among: list[str]
-    moving: list[str]
-    words: str
-    message: str | None
-
-
-class AssemblyFacts(TypedDict):
-    """Whether the bodies can be put together, at which instant, and how far joints are open."""
-
-    status: Literal["assembled", "open"]
-    message: str | None
-    at: float
-    open: float | None
-
-
 class MechanismFacts(TypedDict):
     """What a mechanism file holds."""
 
@@ -147,8 +112,10 @@ class InspectedMechanism(MechanismFacts):
     file: str | None
     bodies: list[BodyFacts]
     freedom: FreedomFacts
+    mobility: MobilityFacts | None
     assembly: AssemblyFacts
     ok: bool
+    range: NotRequired[RangeFacts | None]
 
 
 def mechanism_facts(mechanism: Mechanism, path: str | PathLike[str] | None = None) -> dict[str, Any]:
@@ -191,8 +158,11 @@ def inspected(mechanism: Mechanism, path: str | PathLike[str] | None = None) -> 
     >>> [(joint["name"], joint["rows"]) for joint in facts["joints"]]
     [('A', 2), ('D', 2), ('BC', 1)]
     """
-    facts, model = mechanism_facts(mechanism, path), build(mechanism)
-    state = _State(mechanism, model, 0.0 if facts["time"] is None else facts["time"]["start"])
+    facts = mechanism_facts(mechanism, path)
+    instant = 0.0 if facts["time"] is None else facts["time"]["start"]
+    mechanism = chosen(mechanism, instant)
+    model = build(mechanism)
+    state = StartingState(mechanism, model, instant)
     for kind in ("joints", "drivers"):
         for element in facts[kind]:
             element["rows"] = model.rows.count(f"{kind}.{element['name']}")
@@ -200,6 +170,7 @@ def inspected(mechanism: Mechanism, path: str | PathLike[str] | None = None) -> 
         "file": None if path is None else fspath(path),
         "bodies": _bodies(mechanism, model, state.coordinates),
         "freedom": state.freedom,
+        "mobility": state.mobility(),
         "assembly": state.assembly,
         "ok": state.ok,
     }
@@ -210,71 +181,6 @@ def _time(mechanism: Mechanism) -> dict[str, Any] | None:
         return None
     instants = time_grid(mechanism.time, mechanism.parameter_values)
     return {"start": float(instants[0]), "stop": float(instants[-1]), "count": len(instants)}
-
-
-class _State:
-    """The mechanism put together at its first instant, and its degrees of freedom there."""
-
-    def __init__(self, mechanism: Mechanism, model: Model, instant: float):
-        self.mechanism, self.model, self.instant = mechanism, model, instant
-        self.coordinates, self.assembly = self._assembled()
-        self.freedom = self._counted()
-        possible = not self.freedom["redundant"] and (self.freedom["left"] == 0 or bool(_masses(mechanism)))
-        self.ok = self.assembly["status"] == "assembled" and possible
-
-    def _trial(self, model: Model) -> Trial | None:
-        return put_together(model, self.instant, TOLERANCE) if model.rows else None
-
-    def _assembled(self) -> tuple[dict[str, Any] | None, dict[str, Any]]:
-        told = {"status": "assembled", "message": None, "at": self.instant, "open": None}
-        model = build(initial_as_drivers(self.mechanism)) if self.mechanism.initial else self.model
-        trial = self._trial(model)
-        if trial is None:
-            return model.guess, told
-        told["open"] = float(np.max(np.abs(trial.gaps))) if np.isfinite(trial.gaps).all() else None
-        try:
-            check_assembled(model, trial, self.instant)
-        except JounceError as error:
-            return None, told | {"status": "open", "message": error.message}
-        return trial.coordinates, told
-
-    def _counted(self) -> dict[str, Any]:
-        mechanism, model = self.mechanism, self.model
-        columns = int(model.system.shape[1])
-        if self.coordinates is not None:
-            model = dataclasses.replace(model, guess=self.coordinates)
-        trial = self._trial(model)
-        finite = trial is None or bool(trial.jacobian.finite().all())
-        pattern = model.system.pattern
-        nothing = HostJacobian.of(pattern, np.zeros(pattern.entry_count))
-        jacobian = nothing if trial is None or not finite else trial.jacobian
-        rank = jacobian.rank
-        drives = np.array([name.startswith("drivers.") for name in model.rows], bool)
-        freedom = columns - jacobian.take(~drives).rank
-        redundant = len(model.rows) - rank
-        try:
-            if trial is not None and finite:
-                check_mobility(model, jacobian)
-            message = None
-        except MobilityError as error:
-            message = error.message
-        return {
-            "coordinates": columns,
-            "equations": len(model.rows),
-            "of_drivers": int(drives.sum()),
-            "independent": rank,
-            "of_joints": freedom,
-            "left": columns - rank,
-            "redundant": redundant,
-            "redundant_among": redundant_rows(model, jacobian.dependences).split(", ") if redundant and finite else [],
-            "moving": freely_moving(model, jacobian.free_directions).split(", ") if columns > rank else [],
-            "words": freedom_words(freedom, mechanism.drivers),
-            "message": message,
-        }
-
-
-def _masses(mechanism: Mechanism) -> list[str]:
-    return [name for name, body in mechanism.bodies.items() if body.mass is not None]
 
 
 def _numbers(mechanism: Mechanism, value: Any, size: int) -> list[float] | None:

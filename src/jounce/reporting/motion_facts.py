@@ -9,7 +9,7 @@ from typing_extensions import TypedDict
 
 from jounce.integrate import Simulation
 from jounce.kinematics import Motion, Status, Stretches
-from jounce.mechanism import build
+from jounce.mechanism import AbstractMotionOutput, build
 
 
 class Span(TypedDict):
@@ -45,6 +45,8 @@ class MotionFacts(TypedDict):
     equations_of_joints: int
     equations_of_drivers: int
     change_points: list[float]
+    coordinates: int
+    remarks: list[str]
 
 
 class EnergyFacts(TypedDict):
@@ -108,8 +110,19 @@ def motion_facts(motion: Motion | Stretches) -> dict[str, Any]:
         "equations_of_joints": len(rows) - drives,
         "equations_of_drivers": drives,
         "change_points": np.asarray(motion.change_points, float).tolist(),
+        "coordinates": len(mechanism.bodies) * (3 if mechanism.space == "planar" else 6),
+        "remarks": _remarks(motion) if isinstance(motion, Motion) else [],
     }
     return facts | _simulated(motion) if isinstance(motion, Simulation) else facts
+
+
+def _remarks(motion: Motion) -> list[str]:
+    """Return what is to be said of outputs, such as why their values are NaN: one line for those that have it alike."""
+    names: dict[str, list[str]] = {}
+    for name, output in motion.mechanism.outputs.items():
+        if isinstance(output, AbstractMotionOutput) and (remark := output.remark(motion, motion.outputs[name])):
+            names.setdefault(remark, []).append(name)
+    return [f"{', '.join(those)}: {remark}" for remark, those in names.items()]
 
 
 def _simulated(motion: Simulation) -> dict[str, Any]:

@@ -10,11 +10,13 @@ from typing import Any
 
 import numpy as np
 
+from jounce.dynamics import Equilibrium, Linearisation, Modes
 from jounce.errors import JounceError, SampleWarning
 from jounce.integrate import Batch
 from jounce.kinematics import Motion, Status
 from jounce.mechanism import Mechanism
 from jounce.reporting.mechanism_facts import mechanism_facts
+from jounce.reporting.modes_facts import equilibrium_facts, equilibrium_tables, equilibrium_words, modes_table
 from jounce.reporting.motion_facts import motion_facts
 from jounce.reporting.peaks import peaks
 from jounce.reporting.robot_facts import robot_facts
@@ -35,8 +37,10 @@ STYLE = (
 )
 
 
-def shown(thing: Mechanism | Motion | Robot | JointTrajectory | Batch) -> str:
-    """Return the HTML that a notebook shows of a mechanism, motion, simulation, robot, trajectory or batch.
+def shown(
+    thing: Mechanism | Motion | Robot | JointTrajectory | Batch | Equilibrium | Linearisation | Modes,
+) -> str:
+    """Return the HTML that a notebook shows of an object of this package, such as a mechanism or a motion.
 
     Examples
     --------
@@ -56,6 +60,12 @@ def shown(thing: Mechanism | Motion | Robot | JointTrajectory | Batch) -> str:
             parts = _trajectory(thing)
         case Batch():
             parts = _batch(thing)
+        case Equilibrium():
+            parts = _equilibrium(thing)
+        case Linearisation():
+            parts = _linearisation(thing)
+        case Modes():
+            parts = _tables([modes_table(thing)])
     return f'<div class="jounce">{STYLE}{"".join(parts)}</div>'
 
 
@@ -134,6 +144,21 @@ def _motion(motion: Motion) -> list[str]:
     if not motion.mechanism.outputs:
         return [*lines, "<p>No outputs are defined.</p>"]
     return [*lines, *_tables([dataclasses.replace(peaks_table(peaks(motion)), title="Peaks")])]
+
+
+def _equilibrium(rest: Equilibrium) -> list[str]:
+    lines = equilibrium_words(equilibrium_facts(rest, [])).split("\n")
+    return [*_title(rest.mechanism.title or "Equilibrium", *lines), *_tables(equilibrium_tables(rest))]
+
+
+def _linearisation(small: Linearisation) -> list[str]:
+    where = "a motion" if small.equilibrium is None else f"an equilibrium that is {small.equilibrium.stability}"
+    title = _title(small.mechanism.title or "Small motions", f"about {where} at t = {small.time:g} s")
+    found = []
+    for name, matrix in (("Mass", small.mass), ("Damping", small.damping), ("Stiffness", small.stiffness)):
+        rows = [[c, *map(number, row)] for c, row in zip(small.coordinates, matrix.tolist(), strict=True)]
+        found.append(Table(f"{name} (SI)", ("", *small.coordinates), rows, range(1, len(rows) + 1)))
+    return [*title, *_tables([*found, modes_table(small.modes)])]
 
 
 def _robot(robot: Robot) -> list[str]:

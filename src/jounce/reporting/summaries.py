@@ -29,16 +29,17 @@ def motion_summary(facts: Facts, file: str) -> str:
     if "steps" in facts:
         head = f"{facts['space']}: {bodies}, {joints}, {count(len(facts['forces']), 'force')}"
         taken = f"{instants} {span} in {count(facts['steps'], 'step')}, {order}"
-        lines = [title, head, facts["mobility"], taken, *_kept(facts)]
+        lines = [title, head, facts["mobility"], taken, *_kept(facts), *facts["remarks"]]
         return "\n".join(_wrapped(line) for line in lines)
     equations, drives = facts["equations_of_joints"], facts["equations_of_drivers"]
-    bodies, joints = f"{bodies} ({equations + drives} coordinates)", f"{joints} ({count(equations, 'equation')})"
+    bodies, joints = f"{bodies} ({facts['coordinates']} coordinates)", f"{joints} ({count(equations, 'equation')})"
     lines = [title, f"{facts['space']}: {bodies}, {joints}", freedom_words(drives, facts["drivers"])]
     lines.append(f"{instants} {span}, {order}")
     if facts["change_points"]:
         passed = ", ".join(f"{t:g} s" for t in facts["change_points"][:6])
         more = ", ..." if len(facts["change_points"]) > 6 else ""
         lines.append(f"passes a change point, where another motion could branch off, at t = {passed}{more}")
+    lines += [_wrapped(remark) for remark in facts["remarks"]]
     return "\n".join(lines)
 
 
@@ -88,9 +89,13 @@ def _mechanism_start(facts: Facts) -> list[str]:
         f"  joints: {count(freedom['equations'] - freedom['of_drivers'], 'equation')}"
         f"; drivers: {count(freedom['of_drivers'], 'equation')}; independent: {freedom['independent']}",
     ]
-    if freedom["redundant"]:
-        among = ", ".join(freedom["redundant_among"])
-        lines.append(f"  {count(freedom['redundant'], 'equation')} too many, among {among}")
+    for repeated in freedom["repeated"]:
+        equations = count(repeated["equations"], "equation")
+        lines.append(f"  {repeated['kind']} {repeated['name']} repeats {equations} of {', '.join(repeated['of'])}")
+    if (mobility := facts["mobility"]) is not None:
+        if mobility["order"] is not None:
+            lines.append(f"  with drivers released: {mobility['count']} by count, {mobility['instantaneous']} by rank")
+        lines.append(f"  {mobility['words']}")
     if freedom["left"]:
         lines.append(f"  left to move: {freedom['left']}, with which {', '.join(freedom['moving'])} can move")
     assembled = assembly["status"] == "assembled"

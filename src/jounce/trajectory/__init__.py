@@ -1,5 +1,6 @@
 """Motion laws: expressions, Python functions, splines, profiles; and trajectories, one law for each joint."""
 
+from jounce.trajectory.composed import FollowingMotion as FollowingMotion, PiecewiseMotion as PiecewiseMotion
 from jounce.trajectory.expression import Expression as Expression
 from jounce.trajectory.joint_trajectory import JointTrajectory as JointTrajectory
 from jounce.trajectory.measured import MeasuredMotion as MeasuredMotion
@@ -16,4 +17,6 @@ from jounce.trajectory.profiles import (
     RestToRestMotion as RestToRestMotion,
     motion_profile as motion_profile,
 )
+from jounce.trajectory.segment_pieces import Segment as Segment
+from jounce.trajectory.segments import SegmentedMotion as SegmentedMotion
 from jounce.trajectory.trapezoid import TrapezoidalMotion as TrapezoidalMotion

@@ -14,7 +14,7 @@ from jaxtyping import Float
 
 from jounce.errors import MechanismError, check_choice
 from jounce.jet import Jet, compose
-from jounce.shapes import ArrayLike, Numbers
+from jounce.shapes import ArrayLike, Numbers, Real
 from jounce.trajectory.expression import Expression
 from jounce.trajectory.sample_errors import derivative_errors
 from jounce.trajectory.splines import spline_through
@@ -165,9 +165,9 @@ class SplineMotion(AbstractMotion):
         self,
         breakpoints: Float[Numbers, " pieces"],
         coefficients: Float[Numbers, "powers pieces"],
-        stop: float,
+        stop: float | Real,
         beyond: str,
-        advance: float = 0.0,
+        advance: float | Real = 0.0,
         samples: tuple[Float[np.ndarray, " samples"], Float[np.ndarray, " samples"]] | None = None,
     ) -> None:
         """Fill in the fields: of the pieces, and of the samples that they go through, if there are any."""
@@ -227,21 +227,23 @@ class SplineMotion(AbstractMotion):
 
     def _within(self, time: Jet) -> Jet:
         """Return the jet of the polynomials at the instants; outside, those at the ends go on."""
-        instants = time.coefficients[0]
-        breakpoints, coefficients = jnp.asarray(self.breakpoints), jnp.asarray(self.coefficients)
-        if breakpoints.ndim == 1:
-            piece = jnp.searchsorted(breakpoints, instants, side="right") - 1
-            piece = jnp.clip(piece, 0, None)
-            start, powers = breakpoints[piece], coefficients[:, piece]
-        else:  # several drivers of one kind, stacked along an axis before the batch: (samples, drivers, 1)
-            rows = jnp.broadcast_to(instants, (breakpoints.shape[1], instants.shape[-1]))
-            search = jax.vmap(lambda x, row: jnp.searchsorted(x, row, side="right") - 1, in_axes=(1, 0))
-            piece = jnp.clip(search(breakpoints[..., 0], rows), 0, None)
-            start = jnp.take_along_axis(breakpoints[..., 0], piece.T, axis=0).T
-            powers = jnp.take_along_axis(coefficients[..., 0], piece.T[None], axis=1)
-            powers = jnp.swapaxes(powers, 1, 2)
+        start, powers = self._chosen(time.coefficients[0], jnp.asarray(self.coefficients))
         local = time - start
         value = Jet.constant(powers[-1], time.order)
         for c in powers[-2::-1]:
             value = value * local + c
         return value
+
+    def _chosen(self, instants: Any, table: Any) -> tuple[Any, Any]:
+        """Return where the pieces at some instants begin, and their columns of a table of shape (rows, pieces)."""
+        breakpoints = jnp.asarray(self.breakpoints)
+        if breakpoints.ndim == 1:
+            piece = jnp.searchsorted(breakpoints, instants, side="right") - 1
+            piece = jnp.clip(piece, 0, None)
+            return breakpoints[piece], table[:, piece]
+        # several drivers of one kind, stacked along an axis before the batch: (samples, drivers, 1)
+        rows = jnp.broadcast_to(instants, (breakpoints.shape[1], instants.shape[-1]))
+        search = jax.vmap(lambda x, row: jnp.searchsorted(x, row, side="right") - 1, in_axes=(1, 0))
+        piece = jnp.clip(search(breakpoints[..., 0], rows), 0, None)
+        start = jnp.take_along_axis(breakpoints[..., 0], piece.T, axis=0).T
+        return start, jnp.swapaxes(jnp.take_along_axis(table[..., 0], piece.T[None], axis=1), 1, 2)

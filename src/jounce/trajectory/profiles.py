@@ -104,25 +104,26 @@ class RestToRestMotion(AbstractProfile):
         super().__init__(start, end, duration, start_time)
         self.rest = whole_number("rest", rest, 1, MAX_REST)
 
-    def _powers(self) -> list[int]:
-        """Return the coefficients of the powers from ``rest + 1`` to ``2 rest + 1``."""
-        r = self.rest
-        return [(-1) ** j * math.comb(r + j, j) * math.comb(2 * r + 1, r - j) for j in range(r + 1)]
-
     def first_half(self, share: Jet) -> Jet:
         """Return the share of the way done after a share of the time."""
-        *lower, top = self._powers()
-        value = share * float(top)
+        *lower, top = rest_to_rest_powers(self.rest)[self.rest + 1 :]
+        value = share * top
         for coefficient in reversed(lower):
-            value = (value + float(coefficient)) * share
+            value = (value + coefficient) * share
         return value * share**self.rest
 
     @property
     def peaks(self) -> tuple[float, float, float]:
         """Largest velocity, acceleration and jerk over a way and a time of 1."""
-        law = np.polynomial.Polynomial([0.0] * (self.rest + 1) + [float(c) for c in self._powers()])
+        law = np.polynomial.Polynomial(rest_to_rest_powers(self.rest))
         first, second, third = (_largest(law.deriv(k)) for k in (1, 2, 3))
         return first, second, third
+
+
+def rest_to_rest_powers(rest: int) -> list[float]:
+    """Return the coefficients of the powers from 0 to ``2 rest + 1`` of a way of 1 in a time of 1."""
+    powers = [(-1) ** j * math.comb(rest + j, j) * math.comb(2 * rest + 1, rest - j) for j in range(rest + 1)]
+    return [0.0] * (rest + 1) + [float(c) for c in powers]
 
 
 def _largest(law: np.polynomial.Polynomial) -> float:

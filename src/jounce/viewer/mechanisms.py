@@ -21,7 +21,7 @@ from jounce.viewer.loads import has_loads, mechanism_loads
 from jounce.viewer.mechanism_appearance import mechanism_appearance
 from jounce.viewer.recording import Load, Parameter, Quantity, Recording, poses, spatial_vectors
 
-__all__ = ["MechanismSubject", "instants_shown", "parameter_range", "recorded"]
+__all__ = ["MechanismSubject", "instants_shown", "mechanism_parameters", "parameter_range", "recorded"]
 
 FEWEST, MOST = 100, 2001  # instants that are shown
 
@@ -45,11 +45,7 @@ class MechanismSubject:
     def __init__(self, mechanism: Mechanism):
         instants_shown(mechanism)
         self.mechanism, self.name, self.loaded = mechanism, mechanism.title or "mechanism", has_loads(mechanism)
-        given, values = mechanism.parameters, {k: float(v) for k, v in mechanism.parameter_values.items()}
-        self.parameters = tuple(
-            Parameter(name, value, *parameter_range(value), derived=isinstance(given[name], str | Expression))
-            for name, value in values.items()
-        )
+        self.parameters = mechanism_parameters(mechanism)
 
     def solve(self, values: Mapping[str, float], order: int) -> Recording:
         """Return the motion for some values of the parameters.
@@ -62,6 +58,15 @@ class MechanismSubject:
         mechanism = self.mechanism.with_parameters(**values)
         moved = simulate if mechanism.initial else solve
         return recorded(moved(mechanism, instants_shown(mechanism), order=order, strict=False))
+
+
+def mechanism_parameters(mechanism: Mechanism) -> tuple[Parameter, ...]:
+    """Return the parameters of a mechanism with the ranges of their sliders."""
+    given, values = mechanism.parameters, {k: float(v) for k, v in mechanism.parameter_values.items()}
+    return tuple(
+        Parameter(name, value, *parameter_range(value), derived=isinstance(given[name], str | Expression))
+        for name, value in values.items()
+    )
 
 
 def parameter_range(value: float) -> tuple[float, float]:

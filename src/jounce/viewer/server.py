@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from os import PathLike, fspath
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from jounce.errors import JounceError
 from jounce.mechanism import Mechanism
@@ -111,6 +111,8 @@ def view(
     open_page: bool = True,
     playing: bool = True,
     allow: Iterable[str | PathLike[str]] = (),
+    modes: bool = False,
+    without: Sequence[str] = (),
 ) -> View:
     """Show a mechanism or a robot in the browser: moving, with arrows, plots, forces and live parameters.
 
@@ -134,6 +136,10 @@ def view(
         Whether it moves at once.
     allow
         Folders besides that of the file that samples and meshes named in it may be below.
+    modes : bool, default False
+        Show the natural modes of a mechanism about its equilibrium instead of its motion; a slider chooses one.
+    without : sequence of str, optional
+        Drivers that are left out of the equilibrium.
 
     Returns
     -------
@@ -154,7 +160,8 @@ def view(
     True
     """
     check_installed()
-    found = View(subject_of(subject, trajectory, allow), port=port, order=order, playing=playing)
+    chosen = ModesChoice(modes, tuple(without))
+    found = View(subject_of(subject, trajectory, allow, chosen), port=port, order=order, playing=playing)
     if open_page:
         import webbrowser
 
@@ -162,7 +169,19 @@ def view(
     return found
 
 
-def subject_of(given: Any, trajectory: Any = None, allow: Iterable[str | PathLike[str]] = ()) -> Any:
+class ModesChoice(NamedTuple):
+    """Whether modes are shown instead of a motion, and which drivers are left out then."""
+
+    wanted: bool = False
+    without: tuple[str, ...] = ()
+
+
+def subject_of(
+    given: Any,
+    trajectory: Any = None,
+    allow: Iterable[str | PathLike[str]] = (),
+    modes: ModesChoice = ModesChoice(),  # noqa: B008 - a constant
+) -> Any:
     """Return what is to be looked at, from a mechanism, a robot or a file.
 
     Raises
@@ -178,6 +197,9 @@ def subject_of(given: Any, trajectory: Any = None, allow: Iterable[str | PathLik
         path = Path(fspath(given))
         given = (load if path.suffix.lower() in MECHANISM_FILES else load_robot)(path, allow=allow)
     if isinstance(given, Robot):
+        if modes.wanted:
+            message = "modes are shown of mechanisms; robot.mechanism(...) and jounce convert make a robot one"
+            raise JounceError(message, path=path, name="modes")
         return robot_subject(given, trajectory, path, allow)
     if not isinstance(given, Mechanism):
         message = "must be a mechanism, a robot or the path of a file of one"
@@ -186,6 +208,10 @@ def subject_of(given: Any, trajectory: Any = None, allow: Iterable[str | PathLik
         message = "a mechanism moves by its own drivers; a trajectory is for robots"
         raise JounceError(message, path=path, name="trajectory")
     try:
+        if modes.wanted:
+            from jounce.viewer.modes import ModesSubject
+
+            return ModesSubject(given, modes.without)
         return MechanismSubject(given)
     except JounceError as error:
         raise error.located(path=path) from None

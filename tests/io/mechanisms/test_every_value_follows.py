@@ -16,6 +16,7 @@ from jounce.io.mechanisms.overrides import override
 from jounce.mechanism import build, time_grid
 from jounce.mechanism.builder import starting_guess
 from jounce.mechanism.masses import body_mass
+from jounce.mechanism.redundant_reactions import resolved_reactions
 from jounce.mechanism.resolve import resolve, resolve_element
 from jounce.rigid.solids import SOLIDS
 
@@ -98,6 +99,11 @@ def sections(space):
             yield f"outputs.{tag}", {"outputs": {"one": entry}}
     for number, form in enumerate(body_forms(space)):
         yield f"body {number}", {"bodies": {"a": form, "b": {}, "c": {}}}
+    point = [0.4, 0.5, 0.6][:size]
+    hinge = {"type": "revolute", "bodies": ["a", "b"], "points": [point, point]}
+    hinge |= {} if space == "planar" else {"axes": [VECTORS["axis"]] * 2}
+    reactions = {"one": {"force": 1e6, "torque": 1e4}}
+    yield "redundant_reactions", {"joints": {"one": hinge}, "redundant_reactions": reactions}
     yield "gravity", {"gravity": [0.1, 0.2, 9.81][:size]}
     yield "time", {"time": {"start": 0.5, "stop": 2.0, "step": 0.25}}
     yield "count", {"time": {"start": 0.5, "stop": 2.0, "count": 4}}
@@ -144,7 +150,9 @@ def numbers(mechanism):
     masses = [body_mass(name, body, parameters, size) for name, body in mechanism.bodies.items()]
     gravity = resolve(mechanism.gravity, parameters)
     time = [] if mechanism.time is None else time_grid(mechanism.time, parameters)
-    leaves = jax.tree.leaves([elements, masses, gravity, time, starting_guess(mechanism, parameters, size)])
+    reactions = resolved_reactions(mechanism.redundant_reactions, parameters)
+    parts = [elements, masses, gravity, time, reactions, starting_guess(mechanism, parameters, size)]
+    leaves = jax.tree.leaves(parts)
     return np.concatenate([np.ravel(leaf) for leaf in leaves if not isinstance(leaf, (str, type(None)))])
 
 

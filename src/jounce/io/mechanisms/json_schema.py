@@ -33,26 +33,30 @@ def json_schema(*, own_types: bool = True) -> dict[str, Any]:
     from pydantic import Discriminator, TypeAdapter
 
     from jounce.io.mechanisms.schema import file_model
+    from jounce.io.mechanisms.segment_values import segmented_definition
 
     models = tuple(file_model(space, own_types=own_types) for space in ("planar", "spatial"))
     union: Any = Annotated[Union[models], Discriminator("space")]  # noqa: UP007
     generated = TypeAdapter(union).json_schema()
+    generated["$defs"]["segmented_law"] = segmented_definition()
     head = {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "Mechanism file",
         "description": "A planar or spatial mechanism: bodies, joints, drivers, outputs and parameters.",
     }
-    return head | _without_titles(generated)
+    return head | _tidied(generated)
 
 
-def _without_titles(node: Any) -> Any:
-    """Drop the titles that pydantic makes up from the names of keys, and defaults that say nothing."""
+def _tidied(node: Any) -> Any:
+    """Drop titles that pydantic makes up from the names of keys, and defaults that say nothing; put in references."""
     if isinstance(node, list):
-        return [_without_titles(item) for item in node]
+        return [_tidied(item) for item in node]
     if not isinstance(node, dict):
         return node
+    if node.keys() == {"definition"}:
+        return {"$ref": f"#/$defs/{node['definition']}"}
     return {
-        key: _without_titles(item)
+        key: _tidied(item)
         for key, item in node.items()
         if not (key == "title" and isinstance(item, str)) and not (key == "default" and item is None)
     }

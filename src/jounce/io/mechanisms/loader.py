@@ -13,15 +13,17 @@ from jounce.dynamics import AppliedForceOutput, AppliedTorqueOutput, JointForceO
 from jounce.errors import JounceError, MechanismFileError, did_you_mean
 from jounce.io.files.located_data import Location, Source
 from jounce.io.files.source import read_source
+from jounce.io.mechanisms.file_laws import FileLaws
 from jounce.io.mechanisms.keys import ROLES, FileKey, file_keys, location_of, output_types
 from jounce.io.mechanisms.unit_hints import warn_of_units
 from jounce.mechanism import AngularVelocityOutput, Body, Mechanism, PointOutput, TimeGrid, time_grid
 from jounce.mechanism.builder import starting_guess
 from jounce.mechanism.masses import body_mass
+from jounce.mechanism.redundant_reactions import resolved_reactions
 from jounce.mechanism.resolve import resolve, resolve_element
 from jounce.mechanism.system import POSITION_COMPONENTS
 from jounce.rigid.euler_parameters import euler_parameters
-from jounce.trajectory import Expression, MeasuredMotion, SplineMotion
+from jounce.trajectory import Expression
 from jounce.trajectory.units import parse_value
 
 _Places = dict[str, tuple[Location, tuple[FileKey, ...]]]
@@ -108,6 +110,7 @@ def _validate(source: Source, space: str) -> dict[str, Any]:
         "bodies": dict.fromkeys(("ground", *(bodies if isinstance(bodies, dict) else ()))),
         "dimensions": _dimensions(parameters) if names else {},
         "uses": dict.fromkeys(names, ()),
+        "drivers": dict.fromkeys(drivers if isinstance(drivers := source.data.get("drivers"), dict) else ()),
     }
     try:
         model = file_model(space).model_validate(source.data, context=context)
@@ -149,14 +152,17 @@ def _build(source: Source, space: str, model: dict[str, Any], places: _Places) -
         values = bare.parameter_values
     except JounceError as error:
         raise error.located(name="parameters") from None
+    laws = FileLaws(source, {name: _plain(driver) for name, driver in model["drivers"].items()})
     mechanism = Mechanism(
         space=space,
         bodies={name: _body(source, space, name, _plain(body), values) for name, body in model["bodies"].items()},
-        **{kind: _elements(source, space, kind, model[kind], places) for kind in (*ROLES, "outputs")},
+        **{kind: _elements(laws, space, kind, model[kind], places) for kind in (*ROLES, "outputs")},
         parameters=parameters,
         gravity=model["gravity"],
         time=TimeGrid(**_plain(model["time"])) if model["time"] is not None else None,
+        redundant_reactions=model["redundant_reactions"],
         title=model["title"],
+        assembly=model["assembly"],
         dimensions=model["dimensions"],
     )
     _check_columns(source, mechanism)
@@ -192,7 +198,7 @@ def _arguments(keys: tuple[FileKey, ...], given: dict[str, Any]) -> dict[str, An
     return found
 
 
-def _elements(source: Source, space: str, section: str, models: dict[str, Any], places: _Places) -> dict[str, Any]:
+def _elements(laws: FileLaws, space: str, section: str, models: dict[str, Any], places: _Places) -> dict[str, Any]:
     """Build joints, drivers, forces or outputs, and note where their fields stand in the file."""
     outputs = {f"{space}_{tag.replace(' ', '_')}": kind for tag, (_, kind) in output_types(space).items()}
     found = {}
@@ -204,7 +210,7 @@ def _elements(source: Source, space: str, section: str, models: dict[str, Any], 
             kind = catalogue(space, ROLES[section])[given["type"]]
         places[place] = ((section, name), file_keys(kind))
         arguments = _arguments(places[place][1], given)
-        arguments = {field: _with_splines(source, (section, name, field), x) for field, x in arguments.items()}
+        arguments = {field: laws.law((section, name, field), x) for field, x in arguments.items()}
         if kind.body_count:
             arguments["bodies"] = given["bodies"] if kind.body_count > 1 else (given["body"],)
         try:
@@ -213,26 +219,6 @@ def _elements(source: Source, space: str, section: str, models: dict[str, Any], 
             error.name = f"{place}.{error.name}" if error.name else place
             raise
     return found
-
-
-def _with_splines(source: Source, location: Location, value: Any) -> Any:
-    """Return a value with samples turned into motion laws, also where it is a list of laws."""
-    if isinstance(value, tuple):
-        return tuple(_with_splines(source, (*location, index), entry) for index, entry in enumerate(value))
-    return _spline(source, location, value) if hasattr(value, "samples") else value
-
-
-def _spline(source: Source, location: Location, samples: Any) -> SplineMotion:
-    from jounce.io.files.samples import read_samples
-
-    def law(path: str) -> SplineMotion:
-        table = read_samples(path, samples.time, samples.value)
-        given = {"degree": samples.degree, "beyond": samples.beyond}
-        if samples.derivative:
-            return MeasuredMotion(*table, samples.derivative, samples.initial, **given)
-        return SplineMotion(*table, **given)
-
-    return source.read_named(samples.samples, location, law)
 
 
 def _check_columns(source: Source, mechanism: Mechanism) -> None:
@@ -265,6 +251,7 @@ def _check_values(mechanism: Mechanism) -> None:
         resolve(mechanism.gravity, parameters)
     except JounceError as error:
         raise error.located(name="gravity") from None
+    resolved_reactions(mechanism.redundant_reactions, parameters)
     if mechanism.time is not None:
         time_grid(mechanism.time, parameters)
 

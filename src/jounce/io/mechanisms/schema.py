@@ -18,8 +18,18 @@ from jounce.constraints.planar import COORDINATES
 from jounce.errors import no_such
 from jounce.io.mechanisms.inertia_forms import inertia
 from jounce.io.mechanisms.keys import HOLDERS, FileKey, file_keys, output_holder, output_tag, output_types
-from jounce.io.mechanisms.values import Checked, laws, motion, orientation, problem, scalar, vector, vectors, wrenches
-from jounce.mechanism.mechanism import names_column
+from jounce.io.mechanisms.motion_values import laws, motion
+from jounce.io.mechanisms.values import (
+    Checked,
+    orientation,
+    problem,
+    redundant_reactions,
+    scalar,
+    vector,
+    vectors,
+    wrenches,
+)
+from jounce.mechanism.mechanism import NEAREST, SIDES, names_column
 from jounce.mechanism.system import POSITION_COMPONENTS
 from jounce.rigid.orientation import FRAMES
 from jounce.rigid.rotations import SEQUENCES
@@ -48,6 +58,27 @@ def _all(raw: object, _info: Any) -> bool:
     if raw not in (None, True, "all"):
         raise problem("an energy of the mechanism is that of all its bodies: write true; for one body, body: NAME")
     return True
+
+
+ASSEMBLY = {
+    "oneOf": [
+        {"type": "integer", "minimum": 1},
+        {"const": NEAREST},
+        {"type": "object", "additionalProperties": {"enum": list(SIDES)}, "minProperties": 1},
+    ]
+}
+
+
+def _assembly(raw: object, info: Any) -> Any:
+    if isinstance(raw, dict) and raw:
+        for body, side in raw.items():
+            _check_body(body, info, body)
+            if side not in SIDES:
+                raise problem(f"must be one of {', '.join(SIDES)}", body, value=side)
+        return dict(raw)
+    if raw == NEAREST or (isinstance(raw, int) and not isinstance(raw, bool) and raw > 0):
+        return raw
+    raise problem(f"must be a number from 1, {NEAREST}, or for bodies one of {', '.join(SIDES)}")
 
 
 def _names(*counts: int) -> Any:
@@ -205,6 +236,7 @@ def _file_model(space: str, joints: _Types, drivers: _Types, forces: _Types) -> 
         "space": (Literal[space], ...),
         "bodies": (_named(_body_model(space), _NAME, _body_name), ...),
         "title": (Annotated[Any, Checked(_text, {"type": "string"})], ""),
+        "assembly": (Annotated[Any, Checked(_assembly, ASSEMBLY)], None),
         "gravity": (vector(POSITION_COMPONENTS[space], "acceleration"), None),
         "parameters": (_named(scalar("any"), _PARAMETER, _parameter_name), {}),
         "joints": (_named(_constraint_union(space, "joint", joints), _NAME), {}),
@@ -212,6 +244,7 @@ def _file_model(space: str, joints: _Types, drivers: _Types, forces: _Types) -> 
         "forces": (_named(_constraint_union(space, "force", forces), _NAME), {}),
         "initial": (_named(_constraint_union(space, "driver", drivers), _NAME), {}),
         "outputs": (_named(_output_union(space), _NAME, _output_name), {}),
+        "redundant_reactions": (redundant_reactions(), "unique"),
         "time": (_model(f"{space}_time", "Instants from start to stop, by step or by count.", time), None),
     }
     return _model(f"{space}_mechanism", f"A {space} mechanism.", fields)

@@ -1,4 +1,4 @@
-"""Annotations of single values for the schema: scalars, vectors, motion laws, orientations.
+"""Annotations of single values for the schema: scalars, vectors, orientations.
 
 Each checks a value as a file holds it, turns it into a number in SI units or an expression, and describes itself in the
 JSON Schema. Imported only when a file is loaded, since pydantic takes a while.
@@ -7,21 +7,17 @@ JSON Schema. Imported only when a file is loaded, since pydantic takes a while.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field
 from pydantic_core import PydanticCustomError, core_schema
 
-from jounce.errors import UNSET, JounceError, MechanismError, did_you_mean, show_value
+from jounce.errors import UNSET, JounceError, MechanismError
 from jounce.io.files.located_data import shows_value
+from jounce.mechanism.redundant_reactions import CHOICES, STIFFNESSES
 from jounce.rigid.euler_parameters import form_of
-from jounce.trajectory.dimensions import KINDS, TIME, Dimension, is_rate, per_seconds
+from jounce.trajectory.dimensions import KINDS, Dimension
 from jounce.trajectory.expression import Expression
-from jounce.trajectory.measured import HIGHEST as MOST
-from jounce.trajectory.splines import HIGHEST_DEGREE
 from jounce.trajectory.units import Value, parse_value
-
-WAYS = ("refuse", "hold", "repeat")
 
 
 def problem(message: str, *at: str | int, value: object = ...) -> PydanticCustomError:
@@ -151,115 +147,6 @@ def wrenches() -> Any:
     return Annotated[Any, Checked(check, {"type": "array", "items": vector_schema(6, "any"), "minItems": 1})]
 
 
-class Samples(BaseModel):
-    """A motion law through samples: a CSV file, the degree of the spline, and the columns of time and value.
-
-    Beyond the samples there is no law, unless it is to hold the value at the end, or to repeat them as one period. Of a
-    law whose derivative was measured, such as 2, the acceleration, initial holds the value, the velocity and so on at
-    the first sample, zero unless given.
-    """
-
-    model_config = ConfigDict(extra="forbid", strict=True)
-    samples: str
-    degree: int = Field(default=5, ge=1, le=11)
-    time: str | None = None
-    value: str | None = None
-    beyond: Literal["refuse", "hold", "repeat"] = "refuse"
-    derivative: int = Field(default=0, ge=0, le=MOST)
-    initial: tuple[Any, ...] = ()
-
-
-def motion(quantity: str, variables: dict[str, Dimension | None] | None = None) -> Any:
-    """Return the annotation of a law of time, and of other variables where there are some: of motion, or of a force."""
-    variables = {"t": TIME} if variables is None else variables
-
-    def check(raw: object, info: Any) -> Any:
-        if not isinstance(raw, dict):
-            return parse(raw, quantity, info, variables=variables).value
-        if raw.keys() == {"expression"}:
-            return parse(raw["expression"], quantity, info, "expression", variables=variables).value
-        valid = ["expression"] if "expression" in raw else list(Samples.model_fields)
-        valid += [] if {"expression", "samples"} & raw.keys() else ["expression"]
-        for key in raw.keys() - set(valid):
-            raise problem(f"unknown key {show_value(key)}; {did_you_mean(key, valid)}", key, value=UNSET)
-        if "samples" not in raw:
-            raise problem("must be an expression, or samples: the name of a CSV file")
-        return _samples(raw, quantity, info)
-
-    others = [name for name in variables if name != "t"]
-    named = f", {', '.join(others[:-1])} and {others[-1]}" if len(others) > 1 else ""
-    law = scalar_schema(quantity, f" and of t, the time in s{named}")
-    spline = Samples.model_json_schema()
-    spline["properties"]["initial"] = {"type": "array", "items": {"anyOf": ANY_VALUE}, "maxItems": MOST}
-    words = "name of a column; by default time, and the only other one"
-    for key in ("time", "value"):
-        title = spline["properties"][key]["title"]
-        spline["properties"][key] = {"title": title, "type": "string", "description": words}
-    schema = {"description": law["description"], "anyOf": [*ANY_VALUE, object_schema({"expression": law}), spline]}
-    return Annotated[Any, Checked(check, schema)]
-
-
-def _samples(raw: dict[str, Any], quantity: str, info: Any) -> Samples:
-    """Return what a law through samples is made of; values that it begins with follow parameters, in SI units."""
-    for key in ("samples", "time", "value"):
-        if key in raw and not isinstance(raw[key], str):
-            raise problem("must be a name", key, value=raw[key])
-    whole = {"degree": "the degree of a spline", "derivative": "0 is the value itself, 2 the acceleration"}
-    for (key, words), (least, most) in zip(whole.items(), ((1, HIGHEST_DEGREE), (0, MOST)), strict=True):
-        value = raw.get(key, least)
-        if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
-            raise problem(f"must be a whole number from {least} to {most}; {words}", key, value=value)
-    derivative, initial, beyond = raw.get("derivative", 0), raw.get("initial", []), raw.get("beyond", WAYS[0])
-    if beyond not in WAYS:
-        raise problem(f"no such way; {did_you_mean(beyond, WAYS)}", "beyond", value=beyond)
-    if derivative and beyond == "repeat":
-        raise problem("samples of a derivative cannot repeat; valid: refuse, hold", "beyond", value=beyond)
-    if not isinstance(initial, list | tuple) or len(initial) > derivative:
-        message = f"must be a list of at most {derivative} values: the law and its derivatives below the measured one"
-        raise problem(message, "initial", value=initial)
-    found = tuple(_initial(entry, order, quantity, info) for order, entry in enumerate(initial))
-    return Samples.model_validate(raw | {"initial": found})
-
-
-def _initial(raw: object, order: int, quantity: str, info: Any) -> float | Expression:
-    """Return a value of a driven quantity, in SI units per s to the power of an order."""
-    value = parse(raw, quantity if order == 0 else "any", info, "initial", order)
-    if order and value.dimension:
-        bases = _bases(quantity, info)
-        if not is_rate(value.dimension, bases, order):
-            words = f"must be {' or '.join(bases) or 'a number'}{per_seconds(order)}"
-            raise problem(words, "initial", order, value=raw)
-    return value.value
-
-
-def _bases(quantity: str, info: Any) -> list[str]:
-    """Return the dimensions that a driven quantity may have; none of what is no coordinate, such as a force."""
-    if quantity == "of coordinate":
-        return ["angle" if info.data.get("coordinate") == "angle" else "length"]
-    return [quantity] if quantity in ("length", "angle") else ["angle", "length"] if quantity == "any" else []
-
-
-def laws(size: int, quantity: str, variables: dict[str, Dimension | None]) -> Any:
-    """Return the annotation of a list of laws, one for each component of a force."""
-    one = motion(quantity, variables)
-    single: Checked = one.__metadata__[0]
-
-    def check(raw: object, info: Any) -> tuple[Any, ...]:
-        if not isinstance(raw, (list, tuple)) or len(raw) != size:
-            raise problem(f"must be a list of {size} laws, one for each component")
-        found = []
-        for index, entry in enumerate(raw):
-            try:
-                found.append(single.function(entry, info))
-            except PydanticCustomError as error:
-                context = error.context or {}
-                value = entry if context["value"] is ... else context["value"]
-                raise problem(context["message"], index, *context["at"], value=value) from None
-        return tuple(found)
-
-    return Annotated[Any, Checked(check, list_schema(single.schema, size))]
-
-
 def _orientation(raw: object, info: Any) -> dict[str, Any]:
     """Read one of the three forms of an orientation; the values stay numbers or expressions."""
     if not isinstance(raw, dict):
@@ -288,3 +175,23 @@ def orientation() -> Any:
     text = "lower-case Euler letters turn about fixed axes, upper-case ones about the moving axes of the body"
     schema = {"description": text, "oneOf": [object_schema(form) for form in forms]}
     return Annotated[Any, Checked(_orientation, schema)]
+
+
+def redundant_reactions() -> Any:
+    """Return the annotation of which reactions are wanted where constraints are redundant."""
+
+    def check(raw: object, info: Any) -> Any:
+        if not isinstance(raw, dict):
+            if raw not in CHOICES:
+                raise problem(f"must be one of {', '.join(CHOICES)}, or stiffnesses by the names of joints")
+            return raw
+        found: dict[Any, dict[str, Any]] = {}
+        for name, given in raw.items():
+            if not isinstance(given, dict) or not given or not set(given) <= set(STIFFNESSES):
+                raise problem("must be the stiffness of the joint: force, torque, or both", name, value=given)
+            found[name] = {key: parse(x, STIFFNESSES[key], info, name, key).value for key, x in given.items()}
+        return found
+
+    by_joint = object_schema({key: scalar_schema(kind) for key, kind in STIFFNESSES.items()}, ())
+    forms = [{"enum": list(CHOICES)}, {"type": "object", "additionalProperties": by_joint, "minProperties": 1}]
+    return Annotated[Any, Checked(check, {"anyOf": forms})]

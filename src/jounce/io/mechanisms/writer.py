@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 import numbers
-import re
 from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
@@ -15,14 +13,11 @@ import numpy as np
 
 from jounce.constraints import catalogue
 from jounce.constraints.base import value_fields
-from jounce.errors import JounceError, MechanismError
-from jounce.forces import ExpressionLaw, TimeLaw, VectorLaw
+from jounce.errors import MechanismError
 from jounce.io.mechanisms.keys import OUTPUTS, ROLES, file_keys, output_holder
+from jounce.io.mechanisms.written_laws import WrittenLaws
+from jounce.io.mechanisms.written_values import plain, plain_number
 from jounce.mechanism import Body, Mechanism, TimeGrid
-from jounce.trajectory import Expression, ExpressionMotion, MeasuredMotion, SplineMotion, TrapezoidalMotion
-from jounce.trajectory.expression import CONSTANTS, FUNCTIONS
-
-_WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 
 def write_mechanism(mechanism: Mechanism, path: str | PathLike[str], *, overwrite: bool = False) -> None:
@@ -108,41 +103,45 @@ def mechanism_data(mechanism: Mechanism, stem: str = "mechanism") -> tuple[dict[
 
 class _Writer:
     def __init__(self, mechanism: Mechanism, stem: str):
-        self.mechanism, self.stem = mechanism, stem
-        self.samples: dict[str, tuple[list[float], list[float]]] = {}
+        self.mechanism = mechanism
+        self.laws = WrittenLaws(stem, mechanism.drivers)
 
     def data(self) -> tuple[dict[str, Any], dict[str, Any]]:
         mechanism = self.mechanism
         found: dict[str, Any] = {"title": mechanism.title} if mechanism.title else {}
         found["space"] = mechanism.space
         if mechanism.gravity is not None:
-            found["gravity"] = _plain(mechanism.gravity, "gravity")
+            found["gravity"] = plain(mechanism.gravity, "gravity")
         if mechanism.parameters:
-            found["parameters"] = {n: _plain(x, f"parameters.{n}") for n, x in mechanism.parameters.items()}
+            found["parameters"] = {n: plain(x, f"parameters.{n}") for n, x in mechanism.parameters.items()}
         found["bodies"] = {name: self._body(name, body) for name, body in mechanism.bodies.items()}
+        if mechanism.assembly is not None:
+            found["assembly"] = mechanism.assembly
         for section in ROLES:
             elements = getattr(mechanism, section)
             if elements:
                 found[section] = {name: self._element(section, name, x) for name, x in elements.items()}
         if mechanism.outputs:
             found["outputs"] = {name: self._output(name, x) for name, x in mechanism.outputs.items()}
+        if mechanism.redundant_reactions != "unique":
+            found["redundant_reactions"] = plain(mechanism.redundant_reactions, "redundant_reactions")
         if mechanism.time is not None:
             found["time"] = _time(mechanism.time)
-        return found, self.samples
+        return found, self.laws.samples
 
     def _body(self, name: str, body: Body) -> dict[str, Any]:
         place = f"bodies.{name}"
-        found = {"position": _plain(body.position, f"{place}.position")}
+        found = {"position": plain(body.position, f"{place}.position")}
         if self.mechanism.space == "planar":
-            found["angle"] = _plain(body.angle, f"{place}.angle")
+            found["angle"] = plain(body.angle, f"{place}.angle")
         elif body.orientation is not None:
             given = body.orientation
             form = given if isinstance(given, Mapping) else {"quaternion": given}
-            found["orientation"] = _plain(form, f"{place}.orientation")
+            found["orientation"] = plain(form, f"{place}.orientation")
         for key in ("mass", "inertia", "center_of_mass"):
             value = getattr(body, key)
             if value is not None:
-                found[key] = _plain(_tensor(value) if key == "inertia" else value, f"{place}.{key}")
+                found[key] = plain(_tensor(value) if key == "inertia" else value, f"{place}.{key}")
         return found
 
     def _element(self, section: str, name: str, element: Any) -> dict[str, Any]:
@@ -183,97 +182,17 @@ class _Writer:
                 continue
             where = f"{place}.{key.key}"
             if key.kind in ("motion", "law", "laws"):
-                written: list[Any] = [self._law(where, x, element) for x in values]
+                written: list[Any] = [self.laws.written(where, x, element) for x in values]
             else:
-                written = [_plain(value, where) for value in values]
+                written = [plain(value, where) for value in values]
             found[key.key] = written[0] if len(written) == 1 else written
         return found
-
-    def _law(self, place: str, law: Any, element: Any) -> Any:
-        """Return a law of motion, or of a force, as a file holds it."""
-        if isinstance(law, VectorLaw):
-            law = law.parts
-        if isinstance(law, (list, tuple, np.ndarray)):
-            return [self._law(place, entry, element) for entry in law]
-        if isinstance(law, TimeLaw):
-            law = law.motion
-        if isinstance(law, SplineMotion):
-            return self._spline(place, law)
-        if isinstance(law, ExpressionMotion):
-            return _substituted(law.expression, law.parameters)
-        if isinstance(law, ExpressionLaw) and _own_names(law, element):
-            return _substituted(law.expression, law.parameters)
-        if isinstance(law, str | Expression | numbers.Real):
-            return _plain(law, place)
-        message = f"a {type(law).__name__} has no form in a file; give an expression, or a spline through samples"
-        raise MechanismError(message, name=place)
-
-    def _spline(self, place: str, law: SplineMotion) -> dict[str, Any]:
-        """Return a spline as its samples, or as samples through which there is no other with the same breakpoints."""
-        if law.degree % 2 == 0 and not isinstance(law, MeasuredMotion):
-            message = f"a spline of even degree ({law.degree}) has no form in a file; use an odd degree"
-            raise MechanismError(message, name=place)
-        name = f"{self.stem}_{re.sub(r'[^A-Za-z0-9_]+', '_', place)}.csv"
-        times, values = law.samples.value or _samples_of(law)
-        self.samples[name] = (np.asarray(times).tolist(), np.asarray(values).tolist())
-        beyond = "hold" if isinstance(law, TrapezoidalMotion) else law.beyond
-        if beyond == "continue":
-            message = "a law that goes on beyond its data has no form in a file; choose hold, or more data"
-            raise MechanismError(message, name=place, value=beyond)
-        found: dict[str, Any] = {"samples": name, "degree": law.degree}
-        if isinstance(law, MeasuredMotion):
-            found |= {"degree": law.degree - law.derivative, "derivative": law.derivative}
-            found["initial"] = _plain(law.initial.value, f"{place}.initial")
-        return found if beyond == "refuse" else found | {"beyond": beyond}
-
-
-def _samples_of(law: SplineMotion) -> tuple[Any, Any]:
-    """Return samples through which there is one spline only of the degree and the breakpoints of a law."""
-    ends = np.asarray(law.breakpoints, float)
-    pieces = np.asarray(law.coefficients, float)
-    between = (law.degree - 1) // 2  # samples near each end, which are no breakpoints
-    last = float(law.stop)
-    if last <= ends[-1]:  # the last piece is rest, without an end
-        last = ends[-1] + ((between + 1) * (ends[-1] - ends[0]) / (len(ends) + between) if len(ends) > 1 else 1.0)
-    times = np.unique(np.concatenate([
-        np.linspace(ends[0], ends[1] if len(ends) > 1 else last, between + 2),
-        ends, np.linspace(ends[-1], last, between + 2),
-    ]))  # fmt: skip
-    if len(ends) == 1:
-        times = np.linspace(ends[0], last, law.degree + 1)
-    piece = np.clip(np.searchsorted(ends, times, side="right") - 1, 0, len(ends) - 1)
-    local = times - ends[piece]
-    return times, sum(c[piece] * local**k for k, c in enumerate(pieces))
 
 
 def _is_default(value: Any, field: Any) -> bool:
     if field.default is dataclasses.MISSING:
         return False
     return value is field.default or (isinstance(value, str | numbers.Real) and value == field.default)
-
-
-def _plain(value: Any, place: str) -> Any:
-    """Return a value as numbers, text and lists; whole numbers without a point."""
-    if isinstance(value, Expression):
-        return value.text
-    if isinstance(value, str):
-        return value
-    if isinstance(value, numbers.Real) or (np.shape(value) == () and hasattr(value, "dtype")):
-        return _number(float(value), place)
-    if isinstance(value, Mapping):
-        return {key: _plain(entry, place) for key, entry in value.items()}
-    try:
-        return [_plain(entry, place) for entry in (value.tolist() if hasattr(value, "tolist") else value)]
-    except TypeError:
-        message = f"a {type(value).__name__} has no form in a file"
-        raise MechanismError(message, name=place) from None
-
-
-def _number(value: float, place: str) -> float | int:
-    if not math.isfinite(value):
-        raise MechanismError("must be finite", name=place, value=value)
-    whole = value.is_integer() and abs(value) < 1e9 and math.copysign(1.0, value) == (1.0 if value >= 0 else -1.0)
-    return int(value) if whole else value
 
 
 def _tensor(value: Any) -> Any:
@@ -287,7 +206,7 @@ def _tensor(value: Any) -> Any:
 def _time(time: Any) -> dict[str, Any]:
     if isinstance(time, TimeGrid):
         given = {key: getattr(time, key) for key in ("start", "stop", "step", "count")}
-        return {key: _plain(value, f"time.{key}") for key, value in given.items() if value is not None}
+        return {key: plain(value, f"time.{key}") for key, value in given.items() if value is not None}
     try:
         instants = np.asarray(time, float)
     except (TypeError, ValueError):
@@ -295,24 +214,4 @@ def _time(time: Any) -> dict[str, Any]:
     start, stop, count = float(instants[0]), float(instants[-1]), len(instants)
     if not np.allclose(instants, np.linspace(start, stop, count), rtol=0, atol=1e-12 * max(abs(start), abs(stop))):
         raise MechanismError("instants that are not evenly spaced have no form in a file", name="time")
-    return {"start": _number(start, "time"), "stop": _number(stop, "time"), "count": count}
-
-
-def _own_names(law: ExpressionLaw, element: Any) -> bool:
-    names = (tuple(element.displacement_names), tuple(element.velocity_names))
-    return (law.displacements, law.velocities) == names
-
-
-def _substituted(expression: Expression, parameters: Mapping[str, Any]) -> Any:
-    """Return the text of an expression with the values of its own parameters in their places."""
-
-    def value_of(match: re.Match[str]) -> str:
-        name = match.group()
-        known = name in parameters and name not in CONSTANTS and name not in FUNCTIONS
-        return f"({float(parameters[name])!r})" if known else name
-
-    text = re.sub(rf"(?<![0-9.]){_WORD.pattern}", value_of, expression.text)
-    try:
-        return _number(Expression(text).evaluate({}), "") if not Expression(text).names else text
-    except JounceError:
-        return text
+    return {"start": plain_number(start, "time"), "stop": plain_number(stop, "time"), "count": count}

@@ -58,7 +58,7 @@ def read_sdf(root: Element, faults: Faults) -> Robot:
     that its coordinate stays that of the file. A universal joint becomes two turns, a ball three about moving axes z,
     y, x, with massless links between. A joint whose axis passes beside the origin of its child has a massless link
     there. A gearbox makes the second of its two joints follow the first. A link without ``<inertial>`` weighs 1 kg, as
-    SDF says; there is a warning of it. Springs, shapes, sensors and plugins are left out, and limits, damping and
+    SDF says; there is a warning of it. Springs, sensors and plugins are left out, and limits, damping and
     friction of a joint that closes a loop.
 
     Parameters
@@ -74,6 +74,11 @@ def read_sdf(root: Element, faults: Faults) -> Robot:
         Something is missing, unknown or impossible; the message has the line.
     """
     version = _version(root)
+    return _Reader(*model_frames(root), version, faults).robot()
+
+
+def model_frames(root: Element) -> tuple[Frames, Place]:
+    """Return the links, joints and further frames of the one model of a file, and its pose in the world."""
     model, place = _model(root)
     check_known(model, MODEL_PARTS)
     for tag in ("include", "model"):
@@ -83,7 +88,7 @@ def read_sdf(root: Element, faults: Faults) -> Robot:
     elements = _named(model)
     if not any(element.tag == "link" for element in elements.values()):
         raise model.error("a robot needs at least one <link>")
-    return _Reader(model, place, Frames(model, elements), version, faults).robot()
+    return Frames(model, elements), place
 
 
 def _model(root: Element) -> tuple[Element, Place]:
@@ -131,9 +136,9 @@ def _named(model: Element) -> dict[str, Element]:
 class _Reader:
     """Turns the links and joints of a model into those of a tree, and closures."""
 
-    def __init__(self, model: Element, place: Place, frames: Frames, version: tuple[int, ...], faults: Faults):
-        self.model, self.place, self.frames, self.version, self.faults = model, place, frames, version, faults
-        self.elements, self.lines = frames.elements, NamedElements(model)
+    def __init__(self, frames: Frames, place: Place, version: tuple[int, ...], faults: Faults):
+        self.frames, self.place, self.version, self.faults = frames, place, version, faults
+        self.model, self.elements, self.lines = frames.model, frames.elements, NamedElements(frames.model)
         self.links: list[Link] = []
         self.joints: list[Joint] = []
         self.taken = {WORLD, *self.elements}

@@ -1,0 +1,115 @@
+"""The command that traces a mechanism through the dead points of its driver."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from jounce.cli.options import (
+    NO_TABLE,
+    PLAIN_MECHANISM,
+    MechanismReading,
+    TableOutput,
+    errors_about,
+    options_named,
+    spare_inputs,
+    written,
+)
+from jounce.reporting.terminal import say, show_table
+
+if TYPE_CHECKING:
+    from jounce.kinematics import Curve
+
+
+def trace(
+    file: Path,
+    /,
+    *,
+    driver: str | None = None,
+    time: float | None = None,
+    order: int = 2,
+    points: int = 361,
+    length: float = 200.0,
+    circuits: bool = False,
+    figure: Path | None = None,
+    show: list[str] | None = None,
+    reading: MechanismReading = PLAIN_MECHANISM,
+    output: TableOutput = NO_TABLE,
+) -> int:
+    """Follow a mechanism through dead points: limits, branches, curves.
+
+    The value of one driver is free, and the whole curve of positions is
+    followed by its arc length, to where it closes or ends. Limit
+    positions, branches between them and change points are listed.
+
+    Parameters
+    ----------
+    file
+        Mechanism file: .yaml, .yml, .toml or .json.
+    driver
+        Whose value is free, or "time" [default: the only driver].
+    time
+        Of the start, at which other drivers are held, s [file's first].
+    order
+        Highest derivative with respect to arc length, 0 to 8.
+    points
+        Of the table, evenly spaced in arc length.
+    length
+        Largest arc length to either side, rad or sizes of the mechanism.
+    circuits
+        Trace the circuits of all assemblies, not of the file's only.
+    figure
+        Draw paths of points and outputs: .png, .svg or .pdf.
+    show
+        Output in the figure; repeatable [all].
+
+    Examples
+    --------
+      jounce trace examples/four_bar.yaml --set "AB=15 cm"
+      jounce trace examples/rspu_slide.yaml --out curve.csv
+      jounce trace examples/four_bar.yaml --circuits --figure curve.png
+    """
+    output.check()
+    if figure is not None:
+        from jounce.plot import check_figure
+
+        check_figure(figure, overwrite=output.overwrite)
+    mechanism = reading.mechanism(file)
+    for target in (output.out, figure):
+        spare_inputs(target, overwrite=output.overwrite)
+    from jounce.kinematics import assemblies, trace as traced
+
+    with errors_about(file), options_named():
+        curves = [traced(mechanism, time, driver=driver, order=order, count=points, length=length)]
+        if circuits:
+            found = assemblies(mechanism, time, driver=curves[0].driver).circuits
+            here = curves[0].coordinates_at(0.0)
+            curves += [x.sampled(order, points) for x in found if not any(c.passes(here) for c in x.connected())]
+    return told(curves, file, figure, show, output)
+
+
+def told(curves: list[Curve], file: Path, figure: Path | None, show: list[str] | None, output: TableOutput) -> int:
+    """Print what there is to tell of curves, write the first of them, draw all, and return the exit status."""
+    from jounce.reporting.curve_facts import curve_facts, curve_summary, curve_tables
+
+    facts = [curve_facts(curve) for curve in curves]
+    if not output.json:
+        for each in facts:
+            say(curve_summary(each, file.name))
+            for table in curve_tables(each):
+                show_table(table)
+    output.write(lambda: curves[0].dataset)
+    if figure is not None:
+        _draw(curves, figure, show, file, overwrite=output.overwrite)
+    output.tell("trace", lambda: {"file": file, "curves": facts, "written": output.out})
+    if figure is not None and not output.json:
+        say(f"\nWritten to {figure}")
+    return 0
+
+
+def _draw(curves: list[Curve], figure: Path, show: list[str] | None, file: Path, *, overwrite: bool) -> None:
+    from jounce.plot import draw_curves, save
+
+    with errors_about(file):
+        drawn = draw_curves(curves, show)
+        written(lambda: save(drawn, figure, overwrite=overwrite))

@@ -1,0 +1,137 @@
+"""Natural motions of ``M y'' + C y' + K y = 0``: eigenvalues and shapes, zero where they are zero but for rounding."""
+
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Bool, Complex, Float
+
+SYMMETRIC = 1e-9  # of a matrix: what is not symmetric and smaller is rounding
+EPSILON = np.finfo(float).eps
+REAL = 1e-9  # of an eigenvalue: an imaginary part that is smaller
+
+Square = Float[np.ndarray, "coordinate coordinate"]
+
+
+class Eigenmodes(NamedTuple):
+    """Solutions ``y = shape exp(eigenvalue t)``, one for each pair of conjugate eigenvalues, the slowest first.
+
+    Attributes
+    ----------
+    eigenvalues : array of shape (modes,)
+        1/s; the imaginary part is not negative.
+    shapes : array of shape (coordinates, modes)
+        Of unit modal mass, ``shape^H M shape = 1``; the largest component of each, weighted by the masses, is positive.
+    undamped : bool
+        Whether no force depends on velocities and the stiffness is symmetric, so that shapes are real.
+    """
+
+    eigenvalues: Complex[np.ndarray, " mode"]
+    shapes: Complex[np.ndarray, "coordinate mode"]
+    undamped: bool
+
+
+def eigenmodes(mass: Square, damping: Square, stiffness: Square, noise: tuple[Square, Square]) -> Eigenmodes:
+    """Return the natural motions of a system that is linear and does not change in time.
+
+    Parameters
+    ----------
+    mass, damping, stiffness : array of shape (coordinates, coordinates)
+        The mass matrix is symmetric and positive definite.
+    noise : tuple of array
+        Of damping and stiffness: sizes of entries that are rounding.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If the mass matrix is not positive definite.
+    """
+    from scipy.linalg import cholesky, solve_triangular
+
+    lower = cholesky((mass + mass.T) / 2, lower=True)
+
+    def weighted(matrix: Square) -> Square:
+        return solve_triangular(lower, solve_triangular(lower, matrix, lower=True).T, lower=True).T
+
+    reached = np.abs(solve_triangular(lower, np.eye(len(mass)), lower=True))
+    c, k = weighted(damping), weighted(stiffness)
+    c_noise, k_noise = (_with_rounding(reached @ part @ reached.T, x) for part, x in zip(noise, (c, k), strict=True))
+    undamped = bool((np.abs(c) <= c_noise).all()) and is_symmetric(k, k_noise)
+    if undamped:
+        squares, weighted_shapes = np.linalg.eigh((k + k.T) / 2)
+        squares = np.where(np.abs(squares) <= _along(weighted_shapes, k_noise, weighted_shapes), 0.0, squares)
+        values = np.where(squares < 0, np.sqrt(np.abs(squares)), 1j * np.sqrt(np.abs(squares)))
+        shapes = weighted_shapes.astype(complex)
+    else:
+        values, shapes = _of_state_matrix(c, k, c_noise, k_noise)
+    shapes = shapes / np.linalg.norm(shapes, axis=0)
+    places = np.argmax(np.abs(shapes) >= 0.999 * np.abs(shapes).max(axis=0, initial=0.0), axis=0)
+    largest = shapes[places, np.arange(shapes.shape[1])]
+    shapes = shapes * np.conj(largest) / np.abs(largest)
+    order = np.lexsort((np.real(values), np.abs(values)))
+    found = solve_triangular(lower.T, shapes[:, order], lower=False)
+    return Eigenmodes(values[order], found, undamped)
+
+
+def is_symmetric(matrix: Square, noise: Square) -> bool:
+    """Tell whether a matrix is symmetric but for rounding."""
+    size = np.abs(matrix).max(initial=0.0)
+    return bool((np.abs(matrix - matrix.T) <= np.maximum(noise + noise.T, SYMMETRIC * size)).all())
+
+
+def zeros(matrix: Square, noise: Square) -> tuple[Float[np.ndarray, "c k"], Float[np.ndarray, "c k"]]:
+    """Return what a matrix takes to zero from the left and from the right, but for rounding; orthonormal columns."""
+    left, sizes, right = np.linalg.svd(matrix)
+    kept = sizes <= _along(left, noise, right.T)
+    return left[:, kept], right.T[:, kept]
+
+
+def _with_rounding(noise: Square, matrix: Square) -> Square:
+    """Return the noise of a matrix with that of a decomposition of it."""
+    return noise + 4 * EPSILON * np.linalg.norm(matrix, 2) if len(matrix) else noise
+
+
+def _along(left: Square, noise: Square, right: Square) -> Float[np.ndarray, " vector"]:
+    """Return the noise of products of a matrix with vectors from both sides: a soft direction keeps its digits."""
+    return np.einsum("ik,ij,jk->k", np.abs(left), noise, np.abs(right))
+
+
+def _of_state_matrix(
+    c: Square, k: Square, c_noise: Square, k_noise: Square
+) -> tuple[Complex[np.ndarray, " mode"], Complex[np.ndarray, "coordinate mode"]]:
+    """Return eigenvalues with an imaginary part of at least zero and shapes, from the matrix of a state.
+
+    Its zero eigenvalues come in chains, which rounding spreads over a circle: they are counted from the null vectors
+    of the stiffness, and of the damping between these, and set to zero.
+    """
+    count = len(k)
+    rate = max(float(np.sqrt(np.linalg.norm(k, 2))), float(np.linalg.norm(c, 2)), 1e-300)  # 1/s, so that parts are even
+    state = np.block([[np.zeros((count, count)), np.eye(count)], [-k / rate**2, -c / rate]])
+    values, vectors = (x.astype(complex) for x in np.linalg.eig(state))
+    left, right = zeros(k, k_noise)
+    chains = zeros(left.T @ c @ right, np.abs(left.T) @ c_noise @ np.abs(right))[1].shape[1]
+    order = np.argsort(np.abs(values))
+    moving = order[right.shape[1] + chains :]
+    kept = moving[_upper(values[moving])]
+    found = _without_rounding(values[kept])
+    shapes = np.where(np.abs(np.imag(found)) > 0, vectors[:count, kept], _real(vectors[:count, kept]))
+    return np.concatenate([np.zeros(right.shape[1]), found * rate]), np.concatenate([right, shapes], axis=1)
+
+
+def _upper(values: Complex[np.ndarray, " value"]) -> Bool[np.ndarray, " value"]:
+    """Tell which eigenvalues stand for a pair: those that are real, and the upper ones of the others."""
+    return np.imag(values) >= -REAL * np.abs(values)
+
+
+def _without_rounding(values: Complex[np.ndarray, " value"]) -> Complex[np.ndarray, " value"]:
+    """Return eigenvalues without real and imaginary parts that are rounding."""
+    fastest = np.abs(values).max(initial=0.0)
+    still = np.abs(np.real(values)) <= 8 * len(values) * EPSILON * fastest
+    values = np.where(still, 1j * np.imag(values), values)
+    return np.where(np.abs(np.imag(values)) <= REAL * np.abs(values), np.real(values), values)
+
+
+def _real(vectors: Complex[np.ndarray, "c k"]) -> Complex[np.ndarray, "c k"]:
+    """Return vectors that are real but for a factor as real ones."""
+    largest = vectors[np.abs(vectors).argmax(axis=0), np.arange(vectors.shape[1])]
+    turned = vectors * np.conj(largest) / np.where(largest == 0, 1.0, np.abs(largest))
+    return np.real(turned).astype(complex)

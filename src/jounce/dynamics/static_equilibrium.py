@@ -1,0 +1,386 @@
+"""Positions in which a mechanism stands still under its forces, and whether it stays there."""
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from jounce.display import Displayed
+from jounce.dynamics.masses import check_loads
+from jounce.dynamics.reduction import Place, Reduction, reduced
+from jounce.dynamics.robot_states import standing
+from jounce.dynamics.stability import Verdict, judged
+from jounce.dynamics.start import TOLERANCE
+from jounce.dynamics.statics import Found, check_forces, placed, remains, search
+from jounce.errors import MechanismError, SolveError, check_choice, check_name, whole_number
+from jounce.kinematics import Motion, Status
+from jounce.kinematics.assembly import assemble, freely_moving, put_together
+from jounce.kinematics.motion import output_series
+from jounce.mechanism import Body, Mechanism, build, check_mechanism, time_grid
+from jounce.mechanism.law_checks import check_laws
+from jounce.mechanism.preconditions import concrete
+from jounce.robot import Robot
+
+METHODS = ("settle", "newton")
+SAME = 1e-6  # rad or sizes of the mechanism: positions as near count as one
+SINGULAR = "the position is singular, joints can move there that cannot elsewhere; what is near is not told"
+
+
+class Equilibrium(Displayed):
+    """A position in which a mechanism stands still, the laws of its drivers and forces held at an instant.
+
+    Attributes
+    ----------
+    mechanism : Mechanism
+        That stands there, without the drivers that were released.
+    time : float
+        The instant, s.
+    motion : Motion
+        The mechanism at rest, of one instant: outputs, and by `jounce.joint_reaction`, `jounce.driver_force` and
+        `jounce.applied_force` the forces that hold it.
+    stability : str
+        ``stable``; ``unstable``; ``indifferent``, where no force resists some motion; ``held``, where nothing can
+        move; or ``undetermined``.
+    reason : str
+        Why, in words.
+    singular : bool
+        Whether joints can move there that cannot elsewhere, so that small motions are not told by linear equations.
+    of_robot : bool
+        Whether it is that of a robot, whose small motions are told by its joints.
+    cautions : tuple of str
+        What was left out of account.
+    """
+
+    def __init__(self, found: Place, singular: bool, *, of_robot: bool = False):
+        self.place, self.of_robot = found, of_robot
+        self.mechanism, self.time = found.mechanism, float(found.clock[0, 0, 0])
+        self.singular = singular
+
+    def __repr__(self) -> str:
+        title = f"{self.mechanism.title}: " if self.mechanism.title else ""
+        return f"<Equilibrium {title}{self.stability}, {self.degrees_of_freedom} degrees of freedom>"
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        """How many independent small motions the constraints allow."""
+        return self.place.free.shape[1]
+
+    @property
+    def stable(self) -> bool | None:
+        """Whether the mechanism stays there, also where nothing can move; None where that is not determined."""
+        return {"stable": True, "held": True, "unstable": False}.get(self.stability)
+
+    @property
+    def stability(self) -> str:
+        """Whether small motions stay small, in a word."""
+        return self._verdict.word
+
+    @cached_property
+    def reason(self) -> str:
+        """Why the equilibrium is stable or not, in words."""
+        verdict = self._verdict
+        if verdict.direction is None:
+            return verdict.reason
+        direction = self._reduction.basis @ verdict.direction
+        moving = freely_moving(self.place.model, np.abs(direction)[None])
+        tail = {"energy falls": "as {} move", "no stiffness": "resists motions of {}"}.get(
+            verdict.reason, "those of {}"
+        )
+        start = {"no stiffness": "no force", "energy falls": "energy falls"}.get(verdict.reason, verdict.reason)
+        separator = ": " if tail.startswith("those") else " "
+        return f"{start}{separator}{tail.format(moving)}"
+
+    @cached_property
+    def cautions(self) -> tuple[str, ...]:
+        """What was left out of account."""
+        from jounce.dynamics.kinks import kinked
+
+        found = (
+            [
+                f"forces.{name} has a kink or a jump there: its slope is not the same on both sides"
+                for name in kinked(self._reduction)
+            ]
+            if self.degrees_of_freedom and not self.singular
+            else []
+        )
+        return (*found, *((SINGULAR,) if self.singular else ()))
+
+    @cached_property
+    def _reduction(self) -> Reduction:
+        return reduced(self.place, drivers=False, prefer_outputs=self.of_robot)
+
+    @cached_property
+    def _verdict(self) -> Verdict:
+        if self.singular:
+            return Verdict("undetermined", SINGULAR)
+        if not self.degrees_of_freedom:
+            return Verdict("held", "nothing can move")
+        r = self._reduction
+        return judged(r.part(0), r.noise(0), r.part(1), r.noise(1), r.part(2))
+
+    @cached_property
+    def motion(self) -> Motion:
+        """The mechanism at rest, as a motion of one instant, of order 2."""
+        place, model = self.place, self.place.model
+        lost = max((output.lost_orders for output in self.mechanism.outputs.values()), default=0)
+        coordinates = {name: _padded(x, lost) for name, x in place.coordinates.items()}
+        groups = tuple(np.asarray(output_series(g, coordinates, model.pose_type)) for g in model.system.outputs)
+        status = np.array([int(Status.OK)])
+        return Motion(self.mechanism, model, np.array([self.time]), 2, (coordinates, groups), status, {})
+
+    @cached_property
+    def outputs(self) -> dict[str, Any]:
+        """Values of all outputs, by name: a number, or an array of components; SI."""
+        return {name: values[0, 0] for name, values in self.motion.outputs.items()}
+
+    @cached_property
+    def poses(self) -> dict[str, dict[str, Any]]:
+        """Poses of the moving bodies, by name: position, m, and angle, rad, or Euler parameters."""
+        found = {}
+        for k, name in enumerate(self.place.model.bodies, 1):
+            position, attitude = (self.place.coordinates[key][0, ..., k, 0] for key in self._keys)
+            key = "angle" if self._keys[1] == "angle" else "orientation"
+            found[name] = {"position": position, key: float(attitude) if key == "angle" else attitude}
+        return found
+
+    @property
+    def placed(self) -> Mechanism:
+        """The mechanism with its bodies guessed where they stand: a simulation starts from there."""
+        bodies = {name: _posed(self.mechanism.bodies[name], pose) for name, pose in self.poses.items()}
+        return dataclasses.replace(self.mechanism, bodies=bodies, initial={})
+
+    @property
+    def _keys(self) -> tuple[str, str]:
+        return ("position", "angle") if "angle" in self.place.coordinates else ("position", "quaternion")
+
+
+def _padded(values: np.ndarray, count: int) -> np.ndarray:
+    return np.concatenate([values, np.zeros((count, *values.shape[1:]))])
+
+
+def _posed(body: Body, pose: dict[str, Any]) -> Body:
+    changed = {"position": pose["position"].tolist()}
+    if "angle" in pose:
+        return dataclasses.replace(body, **changed, angle=pose["angle"])
+    return dataclasses.replace(body, **changed, orientation=pose["orientation"].tolist())
+
+
+@concrete
+def equilibrium(
+    mechanism: Any,
+    time: Any = None,
+    *,
+    without: Sequence[str] = (),
+    method: str = "settle",
+    q: Any = None,
+    hold: str | Sequence[str] = (),
+    torques: Mapping[str, float] | None = None,
+) -> Equilibrium:
+    """Return a position in which a mechanism stands still under its forces, and whether it is stable.
+
+    Velocities are zero; the laws of drivers and of forces are held at an instant. All forces balance there:
+    ``Q(q, 0, t) = Phi_q^T lambda``, ``Phi(q, t) = 0``. Bodies need no masses but for their weight.
+
+    Parameters
+    ----------
+    mechanism : Mechanism or Robot
+        With masses or applied forces. The search begins where its bodies can be put together nearest to their starting
+        guess. A robot, with loops or without, is taken as the mechanism that it is (`Robot.mechanism`), whose outputs
+        are the coordinates of its joints.
+    time : float, optional
+        The instant, s; the first of the mechanism unless given, 0 if it has none.
+    without : sequence of str, optional
+        Drivers that are left out, so that what they drive is free.
+    method : {"settle", "newton"}, default "settle"
+        To settle, the bodies creep where the forces do work, until they rest: what is found is stable, unless the
+        search begins on another equilibrium. Newton's method goes to any equilibrium nearby.
+    q : array_like of shape (n,) or dict of str to float, optional
+        Of a robot: coordinates from which the search begins, and at which joints are held.
+    hold : sequence of str, or "all", optional
+        Of a robot: joints that are held. ``jn.driver_force(found.motion, "JOINT_drive")`` is the torque that it takes.
+    torques : dict of str to float, optional
+        Of a robot: constant torques, N m, or forces, N, of joints that are not held.
+
+    Returns
+    -------
+    Equilibrium
+        Position, forces and stability.
+
+    Raises
+    ------
+    MechanismError
+        If a name or an option is not valid, or nothing has a mass and no force is applied.
+    AssemblyError
+        If the bodies cannot be put together.
+    SolveError
+        If no equilibrium is found: the message says what force stays on which body. Or if a force has no finite value
+        at rest.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> pendulum = jn.load("examples/simple_pendulum.yaml")
+    >>> hanging = jn.equilibrium(pendulum)
+    >>> round(float(hanging.outputs["place"][1]), 12), hanging.stability
+    (-1.0, 'stable')
+    """
+    robot = isinstance(mechanism, Robot)
+    if robot:
+        mechanism = standing(mechanism, q, hold, torques)
+    elif (given := {"q": q, "hold": hold or None, "torques": torques}) and (
+        unfit := [k for k, v in given.items() if v is not None]
+    ):
+        raise MechanismError("is for robots; a mechanism has its own guess, drivers and forces", name=unfit[0])
+    start = _start(mechanism, time, without, method)
+    found = search(start, settle=method == "settle")
+    if not found.balanced and method == "settle":
+        found = min(found, search(start, settle=False), key=lambda f: not f.balanced)
+    if not found.balanced:
+        message = (
+            f"no equilibrium was found from the starting guess: where the search ended, {remains(found)} is balanced "
+            "by nothing; check forces and gravity, hold what is driven, or guess the bodies nearer to it"
+        )
+        raise SolveError(message, status=Status.NOT_CONVERGED)
+    return _told(found, start, of_robot=robot)
+
+
+@concrete
+def equilibria(
+    mechanism: Mechanism,
+    time: Any = None,
+    *,
+    starts: Any = 100,
+    seed: Any = 0,
+    without: Sequence[str] = (),
+) -> tuple[Equilibrium, ...]:
+    """Return all equilibria that Newton's method finds from many starts, of every assembly of the mechanism.
+
+    Each start is a random position of all bodies, put together; equilibria within 1e-6 rad and sizes of the mechanism
+    count as one, and those that are indifferent are one of a family.
+
+    Parameters
+    ----------
+    mechanism, time, without
+        As for `equilibrium`.
+    starts : int, default 100
+        How many random positions are tried besides the starting guess.
+    seed : int, default 0
+        Of the random positions.
+
+    Returns
+    -------
+    tuple of Equilibrium
+        The stable ones first, then in the order in which they were found; empty where none was.
+
+    Raises
+    ------
+    MechanismError, AssemblyError, SolveError
+        As for `equilibrium`, but for one that does not exist.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> pendulum = jn.load("examples/simple_pendulum.yaml")
+    >>> [found.stability for found in jn.equilibria(pendulum, starts=5)]
+    ['stable', 'unstable']
+    """
+    start = _start(mechanism, time, without, "newton")
+    count = whole_number("starts", starts, error=MechanismError)
+    random = np.random.default_rng(whole_number("seed", seed, error=MechanismError))
+    found: list[Equilibrium] = []
+    for place in (start, *(_random_place(start, random) for _ in range(count))):
+        if place is None:
+            continue
+        for settle in (True, False):
+            ended = search(place, settle=settle)
+            if ended.balanced and not any(_same(ended.place, known.place) for known in found):
+                found.append(_told(ended, start))
+    order = ("stable", "held", "indifferent", "undetermined", "unstable")
+    return tuple(sorted(found, key=lambda one: order.index(one.stability)))
+
+
+def _start(mechanism: Mechanism, time: Any, without: Sequence[str], method: str) -> Place:
+    """Return the mechanism at rest where its bodies can be put together, or raise where something is not valid."""
+    check_mechanism(mechanism)
+    check_choice("method", method, METHODS, MechanismError)
+    if isinstance(without, str):
+        without = (without,)
+    for name in without:
+        check_name("driver", name, mechanism.drivers, MechanismError, name="without")
+    drivers = {name: driver for name, driver in mechanism.drivers.items() if name not in without}
+    mechanism = dataclasses.replace(mechanism, drivers=drivers, outputs=_outputs_without(mechanism, drivers))
+    check_loads(mechanism)
+    instant = _instant(mechanism, time)
+    check_laws(mechanism, np.array([instant]), 2, forces=True)
+    model, coordinates = assemble(build(mechanism), instant, TOLERANCE, free=True)
+    place = placed(mechanism, model, coordinates, instant)
+    check_forces(place)
+    return place
+
+
+def _outputs_without(mechanism: Mechanism, drivers: dict[str, Any]) -> dict[str, Any]:
+    """Return the outputs that a mechanism has with some of its drivers: what a driver exerts goes with it."""
+    if len(drivers) == len(mechanism.drivers):
+        return dict(mechanism.outputs)
+    left = dataclasses.replace(mechanism, drivers=drivers, outputs={})
+
+    def fits(output: Any) -> bool:
+        try:
+            output.check(left)
+        except MechanismError:
+            return False
+        return True
+
+    return {name: output for name, output in mechanism.outputs.items() if fits(output)}
+
+
+def _instant(mechanism: Mechanism, time: Any) -> float:
+    if time is None:
+        given = mechanism.time
+        return 0.0 if given is None else float(time_grid(given, mechanism.parameter_values)[0])
+    try:
+        found = float(time)
+    except (TypeError, ValueError):
+        raise MechanismError("must be one instant, in s", name="time", value=time) from None
+    if not np.isfinite(found):
+        raise MechanismError("must be finite", name="time", value=time)
+    return found
+
+
+def _told(found: Found, start: Place, *, of_robot: bool = False) -> Equilibrium:
+    """Return the result; a position in which the constraints hold less than they do elsewhere is singular."""
+    singular = found.place.free.shape[1] > start.free.shape[1]
+    return Equilibrium(found.place, singular, of_robot=of_robot)
+
+
+def _random_place(start: Place, random: np.random.Generator) -> Place | None:
+    """Return the mechanism put together from a random position; None where that does not go."""
+    from jounce.dynamics.statics import displaced
+
+    model, instant = start.model, float(start.clock[0, 0, 0])
+    shape = (len(model.bodies), 1)
+    shift = random.uniform(-1.0, 1.0, (model.pose_type.shifts, *shape)) * model.length
+    turn = random.uniform(-np.pi, np.pi, (model.pose_type.turns, *shape))
+    parts = (np.pad(x, ((0, 0), (1, 0), (0, 0))) for x in (shift, turn))
+    coordinates = {name: x[0] for name, x in start.coordinates.items() if name != "angular_velocity"}
+    moved = {name: np.asarray(x) for name, x in displaced(coordinates, *parts, model.pose_type).items()}
+    if model.rows:
+        trial = put_together(model, instant, TOLERANCE, moved)
+        if not trial.closed:
+            return None
+        moved = trial.coordinates
+    return placed(start.mechanism, model, moved, instant)
+
+
+def _same(one: Place, other: Place) -> bool:
+    """Tell whether two positions are the same but for rounding; whole turns count where a force counts them."""
+    a, b = one.coordinates, other.coordinates
+    if np.abs(one.loads - other.loads).max() > SAME * np.abs(one.loads).max():
+        return False
+    if np.abs(a["position"][0] - b["position"][0]).max() > SAME * one.model.length:
+        return False
+    if "angle" in a:
+        return bool(np.abs(np.sin((a["angle"][0] - b["angle"][0]) / 2)).max() <= SAME)
+    return bool((1 - np.abs((a["quaternion"][0] * b["quaternion"][0]).sum(axis=0))).max() <= SAME**2)

@@ -1,0 +1,73 @@
+"""From what a file says of laws to laws: samples are read from their files, and names of drivers become their laws."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from jounce.io.files.located_data import Location
+from jounce.io.files.source import Source
+from jounce.trajectory import AbstractMotion, Expression, FollowingMotion, MeasuredMotion, SplineMotion
+
+
+class FileLaws:
+    """The laws of a file.
+
+    Parameters
+    ----------
+    source : Source
+        The file.
+    drivers : dict of str to dict
+        The values of the drivers by key, as the schema gives them: other laws may follow theirs.
+    """
+
+    def __init__(self, source: Source, drivers: Mapping[str, Any]):
+        self.source, self.drivers = source, drivers
+
+    def law(self, location: Location, value: Any, following: tuple[str, ...] = ()) -> Any:
+        """Return a value with samples and followed drivers turned into laws, also where it is a list of laws.
+
+        Parameters
+        ----------
+        location : tuple
+            Where it stands in the file.
+        value : object
+            As the schema gives it.
+        following : tuple of str, optional
+            The drivers that the law is already followed by.
+        """
+        if isinstance(value, tuple):
+            return tuple(self.law((*location, index), entry, following) for index, entry in enumerate(value))
+        if isinstance(value, AbstractMotion):
+            return value
+        if hasattr(value, "samples"):
+            law, by = self._spline(location, value), value.of
+        elif hasattr(value, "driver"):
+            law, by = value.law, value.driver
+        else:
+            return value
+        if by is None:
+            return law
+        return FollowingMotion(law, self._leader(location, by, following) if isinstance(by, str) else by)
+
+    def _leader(self, location: Location, name: str, following: tuple[str, ...]) -> AbstractMotion | Expression:
+        """Return the law of a driver by its name."""
+        own = (str(location[1]),) if location[0] == "drivers" and not following else following
+        circle = (*own, name)
+        if name in own:
+            message = f"drivers follow each other in a circle: {' -> '.join(circle)}"
+            raise self.source.error(message, (*location, "of"), value=name)
+        given = self.law(("drivers", name, "motion"), self.drivers[name]["motion"], circle)
+        return given if isinstance(given, AbstractMotion | Expression) else Expression(repr(float(given)))
+
+    def _spline(self, location: Location, samples: Any) -> SplineMotion:
+        from jounce.io.files.samples import read_samples
+
+        def law(path: str) -> SplineMotion:
+            table = read_samples(path, samples.time, samples.value)
+            given = {"degree": samples.degree, "beyond": samples.beyond}
+            if samples.derivative:
+                return MeasuredMotion(*table, samples.derivative, samples.initial, **given)
+            return SplineMotion(*table, **given)
+
+        return self.source.read_named(samples.samples, location, law)

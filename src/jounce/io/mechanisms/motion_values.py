@@ -1,0 +1,145 @@
+"""Annotations of laws for the schema: of motion and of force, by expression, samples, segments or pieces."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+from pydantic_core import PydanticCustomError
+
+from jounce.errors import UNSET, did_you_mean, show_value
+from jounce.io.mechanisms.segment_values import (
+    LEADER_SCHEMA,
+    PIECEWISE_KEYS,
+    PROFILE_KEYS,
+    leader,
+    piecewise,
+    piecewise_schema,
+    rate,
+    segmented,
+    segmented_schema,
+)
+from jounce.io.mechanisms.values import (
+    ANY_VALUE,
+    Checked,
+    list_schema,
+    object_schema,
+    parse,
+    problem,
+    scalar_schema,
+)
+from jounce.trajectory.dimensions import TIME, Dimension
+from jounce.trajectory.measured import HIGHEST as MOST
+from jounce.trajectory.splines import HIGHEST_DEGREE
+
+WAYS = ("refuse", "hold", "repeat")
+
+
+class Samples(BaseModel):
+    """A motion law through samples: a CSV file, the degree of the spline, and the columns of time and value.
+
+    Beyond the samples there is no law, unless it is to hold the value at the end, or to repeat them as one period. Of a
+    law whose derivative was measured, such as 2, the acceleration, initial holds the value, the velocity and so on at
+    the first sample, zero unless given. Of a law of the coordinate of another driver, `of` is the driver's name, or
+    an expression of t, and the column of the time is that of the coordinate.
+    """
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+    samples: str
+    degree: int = Field(default=5, ge=1, le=11)
+    time: str | None = None
+    value: str | None = None
+    beyond: Literal["refuse", "hold", "repeat"] = "refuse"
+    derivative: int = Field(default=0, ge=0, le=MOST)
+    initial: tuple[Any, ...] = ()
+    of: Any = None
+
+
+FORMS = {
+    "expression": ("expression",),
+    "samples": tuple(Samples.model_fields),
+    "profile": PROFILE_KEYS,
+    "piecewise": PIECEWISE_KEYS,
+}
+"""Keys of a law by the one that says which form it has."""
+
+
+def motion(quantity: str, variables: dict[str, Dimension | None] | None = None) -> Any:
+    """Return the annotation of a law of time, and of other variables where there are some: of motion, or of a force."""
+    variables = {"t": TIME} if variables is None else variables
+
+    def check(raw: object, info: Any) -> Any:
+        if not isinstance(raw, dict):
+            return parse(raw, quantity, info, variables=variables).value
+        if raw.keys() == {"expression"}:
+            return parse(raw["expression"], quantity, info, "expression", variables=variables).value
+        form = next((key for key in FORMS if key in raw), None)
+        valid = list(FORMS[form]) if form else sorted({key for keys in FORMS.values() for key in keys})
+        for key in raw.keys() - set(valid):
+            raise problem(f"unknown key {show_value(key)}; {did_you_mean(key, valid)}", key, value=UNSET)
+        if form == "profile":
+            return segmented(raw, quantity, info)
+        if form == "piecewise":
+            return piecewise(raw, quantity, info, variables)
+        if form != "samples":
+            raise problem(
+                "must be an expression, samples (the name of a CSV file), a profile of segments, or piecewise"
+            )
+        return _samples(raw, quantity, info)
+
+    others = [name for name in variables if name != "t"]
+    named = f", {', '.join(others[:-1])} and {others[-1]}" if len(others) > 1 else ""
+    law = scalar_schema(quantity, f" and of t, the time in s{named}")
+    spline = Samples.model_json_schema()
+    spline["properties"]["initial"] = {"type": "array", "items": {"anyOf": ANY_VALUE}, "maxItems": MOST}
+    words = "name of a column; by default time, and the only other one"
+    spline["properties"]["of"] = LEADER_SCHEMA
+    for key in ("time", "value"):
+        title = spline["properties"][key]["title"]
+        spline["properties"][key] = {"title": title, "type": "string", "description": words}
+    forms = [object_schema({"expression": law}), spline, segmented_schema(), piecewise_schema(law)]
+    schema = {"description": law["description"], "anyOf": [*ANY_VALUE, *forms]}
+    return Annotated[Any, Checked(check, schema)]
+
+
+def _samples(raw: dict[str, Any], quantity: str, info: Any) -> Samples:
+    """Return what a law through samples is made of; values that it begins with follow parameters, in SI units."""
+    for key in ("samples", "time", "value"):
+        if key in raw and not isinstance(raw[key], str):
+            raise problem("must be a name", key, value=raw[key])
+    whole = {"degree": "the degree of a spline", "derivative": "0 is the value itself, 2 the acceleration"}
+    for (key, words), (least, most) in zip(whole.items(), ((1, HIGHEST_DEGREE), (0, MOST)), strict=True):
+        value = raw.get(key, least)
+        if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
+            raise problem(f"must be a whole number from {least} to {most}; {words}", key, value=value)
+    derivative, initial, beyond = raw.get("derivative", 0), raw.get("initial", []), raw.get("beyond", WAYS[0])
+    if beyond not in WAYS:
+        raise problem(f"no such way; {did_you_mean(beyond, WAYS)}", "beyond", value=beyond)
+    if derivative and beyond == "repeat":
+        raise problem("samples of a derivative cannot repeat; valid: refuse, hold", "beyond", value=beyond)
+    if not isinstance(initial, list | tuple) or len(initial) > derivative:
+        message = f"must be a list of at most {derivative} values: the law and its derivatives below the measured one"
+        raise problem(message, "initial", value=initial)
+    found = tuple(rate(entry, order, quantity, info, "initial", order) for order, entry in enumerate(initial))
+    return Samples.model_validate(raw | {"initial": found, "of": leader(raw, info)})
+
+
+def laws(size: int, quantity: str, variables: dict[str, Dimension | None]) -> Any:
+    """Return the annotation of a list of laws, one for each component of a force."""
+    one = motion(quantity, variables)
+    single: Checked = one.__metadata__[0]
+
+    def check(raw: object, info: Any) -> tuple[Any, ...]:
+        if not isinstance(raw, (list, tuple)) or len(raw) != size:
+            raise problem(f"must be a list of {size} laws, one for each component")
+        found = []
+        for index, entry in enumerate(raw):
+            try:
+                found.append(single.function(entry, info))
+            except PydanticCustomError as error:
+                context = error.context or {}
+                value = entry if context["value"] is ... else context["value"]
+                raise problem(context["message"], index, *context["at"], value=value) from None
+        return tuple(found)
+
+    return Annotated[Any, Checked(check, list_schema(single.schema, size))]

@@ -1,0 +1,179 @@
+"""Laws of motion and of forces as a mechanism file holds them; splines go to files of samples beside it."""
+
+from __future__ import annotations
+
+import dataclasses
+import numbers
+import re
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from jounce.errors import JounceError, MechanismError
+from jounce.forces import ExpressionLaw, TimeLaw, VectorLaw
+from jounce.io.mechanisms.written_values import plain, plain_number
+from jounce.trajectory import (
+    Expression,
+    ExpressionMotion,
+    FollowingMotion,
+    MeasuredMotion,
+    PiecewiseMotion,
+    SegmentedMotion,
+    SplineMotion,
+    TrapezoidalMotion,
+)
+from jounce.trajectory.expression import CONSTANTS, FUNCTIONS
+
+_WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+
+
+class WrittenLaws:
+    """Writes laws, and collects the samples of splines.
+
+    Parameters
+    ----------
+    stem : str
+        What the names of files of samples begin with.
+    drivers : dict of str to driver
+        Those of the mechanism, which other laws may follow by name.
+
+    Attributes
+    ----------
+    samples : dict of str to tuple of list
+        Times, s, and values of splines by the name of their CSV file.
+    """
+
+    def __init__(self, stem: str, drivers: Mapping[str, Any]):
+        self.stem, self.drivers = stem, drivers
+        self.samples: dict[str, tuple[list[float], list[float]]] = {}
+
+    def written(self, place: str, law: Any, element: Any) -> Any:
+        """Return a law of motion, or of a force, as a file holds it."""
+        if isinstance(law, VectorLaw):
+            law = law.parts
+        if isinstance(law, (list, tuple, np.ndarray)):
+            return [self.written(place, entry, element) for entry in law]
+        if isinstance(law, TimeLaw):
+            law = law.motion
+        if isinstance(law, FollowingMotion):
+            return self._following(place, law, element)
+        if isinstance(law, SegmentedMotion):
+            return _segmented(place, law)
+        if isinstance(law, PiecewiseMotion):
+            return _piecewise(place, law)
+        if isinstance(law, SplineMotion):
+            return self._spline(place, law)
+        if isinstance(law, ExpressionMotion):
+            return _substituted(law.expression, law.parameters)
+        if isinstance(law, ExpressionLaw) and _own_names(law, element):
+            return _substituted(law.expression, law.parameters)
+        if isinstance(law, str | Expression | numbers.Real):
+            return plain(law, place)
+        message = f"a {type(law).__name__} has no form in a file; give an expression, or a spline through samples"
+        raise MechanismError(message, name=place)
+
+    def _spline(self, place: str, law: SplineMotion) -> dict[str, Any]:
+        """Return a spline as its samples, or as samples through which there is no other with the same breakpoints."""
+        if law.degree % 2 == 0 and not isinstance(law, MeasuredMotion):
+            message = f"a spline of even degree ({law.degree}) has no form in a file; use an odd degree"
+            raise MechanismError(message, name=place)
+        name = f"{self.stem}_{re.sub(r'[^A-Za-z0-9_]+', '_', place)}.csv"
+        times, values = law.samples.value or _samples_of(law)
+        self.samples[name] = (np.asarray(times).tolist(), np.asarray(values).tolist())
+        beyond = "hold" if isinstance(law, TrapezoidalMotion) else law.beyond
+        if beyond == "continue":
+            message = "a law that goes on beyond its data has no form in a file; choose hold, or more data"
+            raise MechanismError(message, name=place, value=beyond)
+        found: dict[str, Any] = {"samples": name, "degree": law.degree}
+        if isinstance(law, MeasuredMotion):
+            found |= {"degree": law.degree - law.derivative, "derivative": law.derivative}
+            found["initial"] = plain(law.initial.value, f"{place}.initial")
+        return found if beyond == "refuse" else found | {"beyond": beyond}
+
+    def _following(self, place: str, law: FollowingMotion, element: Any) -> dict[str, Any]:
+        """Return a law of the coordinate of a driver, by its name, or of an expression of t."""
+        followed, leader = law.recipe.value[0]
+        if isinstance(followed, PiecewiseMotion | ExpressionMotion | FollowingMotion | TrapezoidalMotion):
+            message = f"a {type(followed).__name__} of another coordinate has no form in a file; use segments"
+            raise MechanismError(message, name=place)
+        found = self.written(place, followed, element)
+        for name, driver in self.drivers.items():
+            if driver is not element and _same(getattr(driver, "motion", None), leader):
+                return found | {"of": name}
+        written = self.written(place, leader, element)
+        if not isinstance(written, str):
+            message = f"follows a {type(leader).__name__} that no driver has; give an expression of t"
+            raise MechanismError(message, name=place)
+        return found | {"of": written}
+
+
+def _same(law: Any, leader: Any) -> bool:
+    """Tell whether a law of a driver is the leader: itself, or the same expression."""
+    texts = [x.text if isinstance(x, Expression) else x for x in (law, leader)]
+    return law is leader or (isinstance(texts[0], str) and texts[0] == texts[1])
+
+
+def _segmented(place: str, law: SegmentedMotion) -> dict[str, Any]:
+    """Return a law of segments as they were given."""
+    segments, initial, start, beyond = law.recipe.value
+    entries = []
+    for segment in segments:
+        given = {field.name: getattr(segment, field.name) for field in dataclasses.fields(segment)}
+        entries.append({key: plain(x, place) for key, x in given.items() if x is not None})
+    rest = {"initial": (initial, 0.0), "start": (start, 0.0), "beyond": (beyond, "hold")}
+    return {"profile": entries} | {key: plain(x, place) for key, (x, usual) in rest.items() if x != usual}
+
+
+def _piecewise(place: str, law: PiecewiseMotion) -> dict[str, Any]:
+    """Return expressions that follow each other."""
+    parts, entries = law.recipe.value[0], []
+    for k, part in enumerate(parts):
+        if isinstance(part, ExpressionMotion):
+            text = _substituted(part.expression, part.parameters)
+        elif isinstance(part, Expression):
+            text = part.text
+        else:
+            message = f"a {type(part).__name__} within a piecewise law has no form in a file; give expressions"
+            raise MechanismError(message, name=place)
+        entries.append({"expression": text} | ({"until": plain(law.until[k], place)} if k < len(law.until) else {}))
+    return {"piecewise": entries}
+
+
+def _samples_of(law: SplineMotion) -> tuple[Any, Any]:
+    """Return samples through which there is one spline only of the degree and the breakpoints of a law."""
+    ends = np.asarray(law.breakpoints, float)
+    pieces = np.asarray(law.coefficients, float)
+    between = (law.degree - 1) // 2  # samples near each end, which are no breakpoints
+    last = float(law.stop)
+    if last <= ends[-1]:  # the last piece is rest, without an end
+        last = ends[-1] + ((between + 1) * (ends[-1] - ends[0]) / (len(ends) + between) if len(ends) > 1 else 1.0)
+    times = np.unique(np.concatenate([
+        np.linspace(ends[0], ends[1] if len(ends) > 1 else last, between + 2),
+        ends, np.linspace(ends[-1], last, between + 2),
+    ]))  # fmt: skip
+    if len(ends) == 1:
+        times = np.linspace(ends[0], last, law.degree + 1)
+    piece = np.clip(np.searchsorted(ends, times, side="right") - 1, 0, len(ends) - 1)
+    local = times - ends[piece]
+    return times, sum(c[piece] * local**k for k, c in enumerate(pieces))
+
+
+def _own_names(law: ExpressionLaw, element: Any) -> bool:
+    names = (tuple(element.displacement_names), tuple(element.velocity_names))
+    return (law.displacements, law.velocities) == names
+
+
+def _substituted(expression: Expression, parameters: Mapping[str, Any]) -> Any:
+    """Return the text of an expression with the values of its own parameters in their places."""
+
+    def value_of(match: re.Match[str]) -> str:
+        name = match.group()
+        known = name in parameters and name not in CONSTANTS and name not in FUNCTIONS
+        return f"({float(parameters[name])!r})" if known else name
+
+    text = re.sub(rf"(?<![0-9.]){_WORD.pattern}", value_of, expression.text)
+    try:
+        return plain_number(Expression(text).evaluate({}), "") if not Expression(text).names else text
+    except JounceError:
+        return text

@@ -1,0 +1,83 @@
+"""The assembly that a mechanism asks for, among all that there are."""
+
+import dataclasses
+from collections.abc import Mapping
+
+import numpy as np
+
+from jounce.errors import AssemblyError
+from jounce.kinematics.curves.assemblies import Assemblies, Assembly, assemblies
+from jounce.mechanism import Mechanism, build
+from jounce.mechanism.mechanism import NEAREST, SIDES
+from jounce.rigid.planar import PlanarPose
+
+APART = 1e-6  # sizes of the mechanism, by which a wish must tell assemblies apart
+
+
+def chosen(mechanism: Mechanism, instant: float) -> Mechanism:
+    """Return a mechanism whose starting guess is the assembly that it asks for; itself where it asks for none.
+
+    Raises
+    ------
+    AssemblyError
+        If there is no assembly of the number, or a wish does not tell assemblies apart.
+    """
+    wish = mechanism.assembly
+    if wish is None:
+        return mechanism
+    drivers = {**mechanism.drivers, **mechanism.initial}
+    driven = dataclasses.replace(mechanism, drivers=drivers, initial={}, forces={}, outputs={}, assembly=None)
+    found = assemblies(driven, instant, circuits=isinstance(wish, int))
+    if isinstance(wish, int):
+        picked = found.number(wish)
+    else:
+        picked = found[0] if wish == NEAREST else _by_wish(found, wish)
+    return dataclasses.replace(mechanism, bodies={**mechanism.bodies, **_guesses(mechanism, picked)}, assembly=None)
+
+
+def _guesses(mechanism: Mechanism, picked: Assembly) -> dict:
+    return {
+        name: dataclasses.replace(body, position=there.position, angle=there.angle, orientation=there.orientation)
+        for (name, body), there in zip(mechanism.bodies.items(), picked.mechanism.bodies.values(), strict=True)
+    }
+
+
+def _by_wish(found: Assemblies, wish: Mapping[str, str]) -> Assembly:
+    """Return the assembly in which each body lies farthest to the side wished for, the first wish first."""
+    left = list(found)
+    for body, side in wish.items():
+        axis, sign = SIDES[side]
+        sizes = np.array([sign * _middle(assembly.mechanism, body)[axis] for assembly in left])
+        left = [x for x, size in zip(left, sizes, strict=True) if size > sizes.max() - APART * _size(left[0].mechanism)]
+    if len(left) > 1:
+        numbers = " and ".join(str(x.number) for x in left)
+        message = f"the wish does not tell assemblies {numbers} apart: add one about another body, or give a number"
+        raise AssemblyError(message, name="assembly", value=dict(wish))
+    return left[0]
+
+
+def _size(mechanism: Mechanism) -> float:
+    return build(mechanism).length
+
+
+def _middle(mechanism: Mechanism, body: str) -> np.ndarray:
+    """Return the middle of the points that joints have on a body, in the global frame, else its origin."""
+    model = build(mechanism)
+    number = 1 + list(mechanism.bodies).index(body)
+    points = [
+        np.asarray(getattr(group.element, name))[:, min(k, np.shape(getattr(group.element, name))[1] - 1), 0]
+        for group in model.system.groups
+        if not group.is_driver
+        for slot, name in zip(group.bodies, ("point_i", "point_j"), strict=False)
+        if getattr(group.element, name, None) is not None
+        for k, holder in enumerate(slot)
+        if holder == number
+    ]
+    local = np.mean(points, axis=0) if points else np.zeros(2 if model.pose_type is PlanarPose else 3)
+    coordinates = {name: np.asarray(x)[..., number, 0] for name, x in model.guess.items()}
+    if "angle" in coordinates:
+        c, s = np.cos(coordinates["angle"]), np.sin(coordinates["angle"])
+        return coordinates["position"] + np.array([c * local[0] - s * local[1], s * local[0] + c * local[1]])
+    e0, e = coordinates["quaternion"][0], coordinates["quaternion"][1:]
+    across = np.cross(e, local)
+    return coordinates["position"] + local + 2.0 * (e0 * across + np.cross(e, across))

@@ -1,0 +1,210 @@
+"""Change points: where branches of a curve of configurations cross, and in which directions they leave.
+
+Along a branch that passes through, the series is smooth, while the bordered Jacobian is singular there. So the crossing
+is located on the series, and its directions follow from the rows at second order: of all directions that the first
+order allows, those that every vanishing combination of rows allows at the second (theory: Lyapunov and Schmidt).
+"""
+
+import dataclasses
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.errors import SolveError
+from jounce.kinematics.curves.walker import Place, Walker, all_finite
+from jounce.kinematics.status import Status
+
+PASSAGE_ORDER = 8  # of the series that leads through: rounding spoils higher coefficients near a singular place
+NEAR = 0.02  # of the radius of the series: from so near its terms up to that order are good to rounding
+REAL = 0.02  # a singular place whose imaginary part is more than this part of its distance is not on the curve
+NEARLY_SINGULAR = 1e-6  # of the largest singular value
+OPEN = 1e-12  # of the residual at the crossing: branches a gap of g apart leave g^2
+LARGEST_DEPARTURE = 1e-8
+VANISHING = 1e-7  # of second derivatives
+MAX_CORRECTIONS, LOCATED = 6, 1e-9  # of the way there, to which a crossing is located
+SAME_DIRECTION = 1e-6
+FIRST_STEPS, LARGEST_BEND = (2e-3, 2e-4, 2e-5), 1e-3  # into a branch
+STARTS, MAX_TURNS = 16, 60
+MOST_MULTIPLE = 4  # directions in which branches touch; more are a surface
+LEAST_ANGLE = 1e-3  # between branches, by the slopes of the forms: nearer ones are not told apart
+
+
+@dataclasses.dataclass(frozen=True)
+class ChangePoint:
+    """A configuration in which branches cross.
+
+    Attributes
+    ----------
+    place : Place
+        With the series of the branch that is followed.
+    tangents : array of shape (branches, unknowns)
+        Directions of all branches, the one followed first, of length one in the coordinates.
+    dimension : int
+        How many independent directions the first order allows.
+    decided : bool
+        Whether the second order tells all branches apart; where it does not, there may be others, or fewer.
+    """
+
+    place: Place
+    tangents: Float[np.ndarray, "branch unknown"]
+    dimension: int
+    decided: bool
+
+    @property
+    def arc_length(self) -> float:
+        """Where on the curve."""
+        return self.place.arc_length
+
+    def reversed(self) -> "ChangePoint":
+        """Return it on the curve gone along the other way."""
+        tangents = self.tangents.copy()
+        tangents[0] *= -1
+        return dataclasses.replace(self, place=self.place.reversed(), tangents=tangents)
+
+    def shifted(self, arc_length: float) -> "ChangePoint":
+        """Return it with its arc length counted from somewhere else."""
+        return dataclasses.replace(self, place=self.place.shifted(arc_length))
+
+
+def crossing(walker: Walker, here: Place, ahead: complex) -> tuple[ChangePoint, Place] | None:
+    """Return the change point just ahead and the place beyond it, as far from it as this one, if there is one.
+
+    Parameters
+    ----------
+    walker : Walker
+    here : Place
+        Before it.
+    ahead : complex
+        Arc length to the nearest singular place, to first order.
+    """
+    near = NEAR * walker.radius(here, PASSAGE_ORDER - 2)
+    if not (0 < ahead.real < near and abs(ahead.imag) <= REAL * ahead.real):
+        return None
+    short = here.shortened(PASSAGE_ORDER)
+    place = _located(walker, short, ahead.real)
+    if place is None:
+        return None
+    step = place.arc_length - here.arc_length
+    points = walker.points(short, np.array([2 * step]))
+    beyond = walker.place(points, 0, here.arc_length + 2 * step, here.rows)
+    arrived = {name: c[0] for name, c in beyond.coordinates.items()}
+    departure = walker.difference(arrived, short.at(2 * step))
+    if not all_finite(points)[0] or np.max(np.abs(departure)) > LARGEST_DEPARTURE:
+        return None
+    null = walker.null_space(place.jacobian, NEARLY_SINGULAR)
+    own = walker.tangent(place)
+    if null.shape[1] < 2 or float(own @ walker.tangent(beyond)) < 0:
+        return None
+    tangents, decided = _tangents(walker, place, null, own)
+    return ChangePoint(place, tangents, null.shape[1], decided), beyond
+
+
+def departed(walker: Walker, point: ChangePoint, branch: int) -> Place:
+    """Return a place on a branch a little way off a change point, from which arc length is counted.
+
+    Raises
+    ------
+    SolveError
+        If the branch is not there where its direction says it is.
+    """
+    direction = point.tangents[branch]
+    place = walker.directed(point.place, direction)
+    for step in FIRST_STEPS:
+        predicted = dataclasses.replace(place.recentred(step), arc_length=0.0)
+        start = walker.begun(walker.with_jacobian(predicted), direction)
+        finite = all(np.isfinite(c).all() for c in start.coordinates.values())
+        if finite and float(walker.tangent(start)[: walker.columns] @ direction[: walker.columns]) > 1 - LARGEST_BEND:
+            return start
+    message = "the branch cannot be entered: near the change point it does not go in the direction of its tangent"
+    raise SolveError(message, status=Status.SINGULAR)
+
+
+def _located(walker: Walker, short: Place, step: float) -> Place | None:
+    """Return the place on the series where the bordered Jacobian is singular, if the rows hold there."""
+
+    def at(step: float) -> tuple[Place, float]:
+        points = walker.points(short, np.array([step]), corrected=False)
+        known = {"jacobian": points.jacobian[..., 0], "slope": points.slope[..., 0]}
+        return dataclasses.replace(short.recentred(step, PASSAGE_ORDER), **known), float(points.residual[0])
+
+    first = step
+    place, residual = at(step)
+    for _ in range(MAX_CORRECTIONS):
+        ahead = walker.nearing(place)
+        if abs(ahead) < LOCATED * first:
+            break
+        step += ahead.real
+        if not abs(step - first) < 0.5 * first:
+            return None
+        place, residual = at(step)
+    return place if residual <= OPEN else None
+
+
+def _tangents(
+    walker: Walker, place: Place, null: Float[np.ndarray, "unknown k"], own: Float[np.ndarray, " unknown"]
+) -> tuple[Float[np.ndarray, "branch unknown"], bool]:
+    """Return the directions of all branches that the second order allows, and whether it tells them apart."""
+    rows = walker.left_null_space(place.jacobian, NEARLY_SINGULAR)
+    forms = _quadratic_forms(walker, place, null, rows)
+    size = np.max(np.abs(forms), initial=0.0)
+    known = null.T @ own
+    if not size > VANISHING:
+        return own[None], False
+    found, decided = _common_zeros(forms / size)
+    along = [x for x in found if abs(x @ known) < (1 - SAME_DIRECTION) * np.linalg.norm(known)]
+    decided &= len(along) < len(found)  # the branch that is followed is among them
+    others = [null @ x for x in along]
+    scaled = [x / np.linalg.norm(x[: walker.columns]) for x in others]
+    return np.stack([own, *scaled]), decided
+
+
+def _quadratic_forms(
+    walker: Walker, place: Place, null: Float[np.ndarray, "unknown k"], rows: Float[np.ndarray, "row form"]
+) -> Float[np.ndarray, "form k k"]:
+    """Return the forms by which combinations of rows that vanish see directions of the first order."""
+    count = null.shape[1]
+    first, second = np.triu_indices(count)
+    sums = null[:, first] + np.where(first == second, 0.0, null[:, second])
+    halves = rows.T @ walker.second_order(place, sums)
+    forms = np.zeros((rows.shape[1], count, count))
+    forms[:, first, second] = forms[:, second, first] = halves
+    diagonal = forms[:, np.arange(count), np.arange(count)].copy()
+    for i, j in zip(first, second, strict=True):
+        if i != j:
+            forms[:, i, j] = forms[:, j, i] = 0.5 * (forms[:, i, j] - diagonal[:, i] - diagonal[:, j])
+    return forms
+
+
+def _common_zeros(forms: Float[np.ndarray, "form k k"]) -> tuple[list[np.ndarray], bool]:
+    """Return unit vectors, up to their sign, on which all forms vanish, and whether each is one by itself.
+
+    Gauss-Newton from many starts on the sphere; each start finds the nearest.
+    """
+    count = forms.shape[1]
+    single: list[np.ndarray] = []
+    several: list[np.ndarray] = []
+    for x in np.random.default_rng(0).standard_normal((STARTS * count, count)):
+        x = _zero_near(forms, x / np.linalg.norm(x))
+        if x is None:
+            continue
+        sizes = np.linalg.svd(np.concatenate([2 * forms @ x, x[None]]), compute_uv=False)
+        alone = len(sizes) == count and bool(sizes[-1] > LEAST_ANGLE)
+        found, apart = (single, SAME_DIRECTION) if alone else (several, LEAST_ANGLE)
+        if all(abs(x @ other) < 1 - apart for other in found):
+            found.append(x)
+    if len(several) > MOST_MULTIPLE:
+        return single, False  # a surface of them
+    return [*single, *several], not several
+
+
+def _zero_near(forms: Float[np.ndarray, "form k k"], x: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"] | None:
+    """Return a unit vector near another on which all forms vanish, if Gauss-Newton finds one."""
+    for _ in range(MAX_TURNS):
+        values = np.einsum("fij,i,j->f", forms, x, x)
+        slopes = np.concatenate([2 * forms @ x, x[None]])
+        step = np.linalg.lstsq(slopes, np.append(-values, 0.0), rcond=1e-10)[0]
+        step *= min(1.0, 0.3 / max(np.linalg.norm(step), 1e-300))
+        x = (x + step) / np.linalg.norm(x + step)
+        if np.max(np.abs(step)) < 1e-15:
+            break
+    return x if np.max(np.abs(np.einsum("fij,i,j->f", forms, x, x))) <= 1e-12 else None

@@ -1,0 +1,410 @@
+"""The result of a trace: a curve of configurations, its limit positions and change points, and outputs along it."""
+
+import bisect
+import dataclasses
+import itertools
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.display import Displayed
+from jounce.errors import MechanismError
+from jounce.jet.turns import WHOLE_TURN
+from jounce.kinematics.curves.crossings import ChangePoint, departed
+from jounce.kinematics.curves.limits import LimitPosition, limits_between, values_between
+from jounce.kinematics.curves.path import End, Path, meets, walk_both_ways
+from jounce.kinematics.curves.start import Freed
+from jounce.kinematics.curves.walker import LANES, Place, Walker, spin
+from jounce.kinematics.motion import Motion, output_series
+from jounce.kinematics.status import Status
+from jounce.mechanism import AbstractOutput, Mechanism
+from jounce.mechanism.axis_angles import AttitudeHistory
+from jounce.mechanism.outputs import AbstractMotionOutput
+
+PLACES = 8  # in each step at which attitudes are looked at for turns
+AXES = ("point", "arc_length", "driver_value")
+MOST_CURVES = 64  # of a circuit
+FULL_TURN = 1e-6  # rad, by which a gain of the driver may differ from whole turns
+
+
+@dataclasses.dataclass(frozen=True)
+class CurveBranch:
+    """A part of a circuit between limit positions of the driver, in the sense of Chase and Mirth (1993).
+
+    Attributes
+    ----------
+    start, stop : float
+        Arc length; the stop of the last branch of a closed curve may lie a length further on.
+    low, high : float
+        Range of the driver's value on it, rad or m; a branch without limits makes whole turns.
+    """
+
+    start: float
+    stop: float
+    low: float
+    high: float
+
+
+class Curve(Displayed):
+    """A curve of configurations of a mechanism with the value of one driver free, by arc length.
+
+    Arc length counts the shifts of the origins of all bodies, in sizes of the mechanism, and the turns of all bodies,
+    in rad: ``ds^2 = sum_b (|dr_b| / L)^2 + |dphi_b|^2`` with L as `size`.
+
+    Attributes
+    ----------
+    mechanism : Mechanism
+        That was traced.
+    driver : str or None
+        Whose value is free; ``"time"`` where that is the instant, None where nothing is driven.
+    unit : str
+        Of that value.
+    first_value : float
+        Of the driver where the trace began; a curve that was followed from a change point begins elsewhere.
+    closed : bool
+        Whether the curve comes back to where it started.
+    ends : tuple of str
+        Why it ends where it does: at its start, and at its stop.
+    """
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        free: Freed,
+        walker: Walker,
+        paths: tuple[Path, Path | None],
+        settings: tuple[int, int, float],
+    ):
+        self.mechanism, self.driver, self.unit = mechanism, free.driver, free.unit
+        self._free, self._walker, self._settings = free, walker, settings
+        self._order, self._count, self._longest = settings
+        self.first_value = free.value
+        self._paths = paths
+        forward, backward = paths
+        self.closed = forward.end is End.CLOSED
+        self._places = list(forward.places)
+        self._crossings = list(forward.change_points)
+        self.ends = (forward.end.value, forward.end.value)
+        self.start, self.stop = 0.0, forward.length
+        if backward is not None:
+            before = backward.reversed()
+            self._places = [*before.places[:-1], *self._places]
+            self._crossings = [*before.change_points, *self._crossings]
+            self.start, self.ends = -backward.length, (backward.end.value, forward.end.value)
+
+    def __repr__(self) -> str:
+        title = f"{self.mechanism.title}: " if self.mechanism.title else ""
+        shape = "closed" if self.closed else "open"
+        counts = f"{len(self.limits)} limit positions, {len(self.change_points)} change points"
+        return f"<Curve {title}{shape}, length {self.length:.6g}, {counts}>"
+
+    def sampled(self, order: int, count: int) -> "Curve":
+        """Return the curve with outputs to another order at another number of points."""
+        return Curve(self.mechanism, self._free, self._walker, self._paths, (order, count, self._longest))
+
+    @property
+    def size(self) -> float:
+        """Length by which shifts are divided in arc length, m."""
+        return self._walker.model.length
+
+    @property
+    def length(self) -> float:
+        """Arc length from end to end, or once around."""
+        return self.stop - self.start
+
+    @cached_property
+    def limits(self) -> tuple[LimitPosition, ...]:
+        """Limit positions in the order of arc length, located to rounding; none where nothing is driven."""
+        if self.driver is None:
+            return ()
+        unit, stops = self._walker.value_scale, [*(p.arc_length for p in self._places[1:]), self.stop]
+        found = [x for p, stop in zip(self._places, stops, strict=True) for x in limits_between(p, stop, unit)]
+        return tuple(sorted(found, key=lambda x: x.arc_length))
+
+    @property
+    def turning_points(self) -> tuple[LimitPosition, ...]:
+        """Those limit positions in which the driver turns back."""
+        return tuple(x for x in self.limits if x.kind != "stationary")
+
+    @property
+    def change_points(self) -> tuple[ChangePoint, ...]:
+        """Where branches cross, in the order of arc length."""
+        return tuple(self._crossings)
+
+    @property
+    def turns(self) -> int:
+        """Whole turns that an angular driver gains in going once around a closed curve, negative backwards."""
+        if not self.closed or self.unit != "rad":
+            return 0
+        gained = (self.value(self.stop) - self.value(self.start)) / WHOLE_TURN
+        return round(gained) if abs(gained - round(gained)) * WHOLE_TURN < FULL_TURN else 0
+
+    @cached_property
+    def branches(self) -> tuple[CurveBranch, ...]:
+        """Branches of this circuit, the one that holds the start first; one if the driver never turns back."""
+        if self.driver is None:
+            return ()
+        ends = [(x.arc_length, x.value) for x in self.turning_points]
+        if self.closed and ends:
+            ends = [(ends[-1][0] - self.length, ends[-1][1] - self._gain), *ends]  # over the start
+        else:
+            ends = [(self.start, self.value(self.start)), *ends, (self.stop, self.value(self.stop))]
+        found = [CurveBranch(a, b, *sorted((v, w))) for (a, v), (b, w) in itertools.pairwise(ends)]
+        holding = next((k for k, x in enumerate(found) if x.start <= 0 <= x.stop), 0)
+        return tuple(found[holding:] + found[:holding])
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """Smallest and largest value of the driver on the branch that holds the start; infinite for whole turns."""
+        if self.driver is None or (self.turns and not self.turning_points):
+            return (-np.inf, np.inf)
+        return self.branches[0].low, self.branches[0].high
+
+    def value(self, arc_length: float) -> float:
+        """Return the value of the driver somewhere on the curve."""
+        around, turned = 0.0, self._around(arc_length)
+        if self.closed and self.driver is not None:
+            around = (arc_length - turned) / self.length * self._gain
+        return float(self._at(turned).value[0]) + around
+
+    @cached_property
+    def _gain(self) -> float:
+        last = self._places[-1]
+        return float(last.recentred(self.stop - last.arc_length, 20).value[0]) - float(self._places[0].value[0])
+
+    def _around(self, arc_length: float) -> float:
+        if self.closed and not self.start <= arc_length <= self.stop:
+            return self.start + (arc_length - self.start) % self.length
+        return arc_length
+
+    def _at(self, arc_length: float) -> Place:
+        """Return the place at an arc length, with the series of the nearest of those that were solved."""
+        known = [place.arc_length for place in self._places]
+        after = bisect.bisect_left(known, arc_length)
+        near = min(self._places[max(after - 1, 0) : after + 1], key=lambda p: abs(p.arc_length - arc_length))
+        return near.recentred(arc_length - near.arc_length)
+
+    def at(self, arc_length: float) -> Mechanism:
+        """Return the mechanism with the configuration at an arc length as its starting guess.
+
+        Raises
+        ------
+        MechanismError
+            If the curve does not go there.
+        """
+        slack = 1e-9 * max(1.0, self.length)
+        if not self.closed and not self.start - slack <= arc_length <= self.stop + slack:
+            message = f"the curve goes from {self.start:g} to {self.stop:g}"
+            raise MechanismError(message, name="arc_length", value=arc_length)
+        return posed(self.mechanism, self.coordinates_at(arc_length))
+
+    def where(self, value: float) -> list[float]:
+        """Return the arc lengths at which the driver has a value; of an angle whole turns do not count."""
+        if self.driver is None:
+            return []
+        period = WHOLE_TURN if self.unit == "rad" else None
+        stops = [*(place.arc_length for place in self._places[1:]), self.stop]
+        pairs = zip(self._places, stops, strict=True)
+        return [s for place, stop in pairs for s in values_between(place, stop, value, period)]
+
+    def branch_at(self, arc_length: float) -> int:
+        """Return on which of the branches an arc length is, from 1."""
+        for number, branch in enumerate(self.branches, start=1):
+            around = (arc_length, arc_length - self.length) if self.closed else (arc_length,)
+            if any(branch.start <= s <= branch.stop for s in around):
+                return number
+        return 1
+
+    def coordinates_at(self, arc_length: float) -> dict[str, np.ndarray]:
+        """Return the coordinates of all bodies at an arc length, the ground first, shape (..., bodies)."""
+        place = self._at(self._around(arc_length))
+        return {name: c[0] for name, c in place.coordinates.items()}
+
+    def passes(self, coordinates: dict[str, np.ndarray]) -> bool:
+        """Tell whether the curve goes through a configuration."""
+        stops = [*(place.arc_length for place in self._places[1:]), self.stop]
+        pairs = zip(self._places, stops, strict=True)
+        return any(meets(self._walker, p, stop - p.arc_length, coordinates) is not None for p, stop in pairs)
+
+    def connected(self) -> tuple["Curve", ...]:
+        """Return this curve and those that cross it at change points, and those that cross these: the whole circuit."""
+        found: list[Curve] = [self]
+        waiting: list[Curve] = [self]
+        while waiting and len(found) < MOST_CURVES:
+            curve = waiting.pop()
+            for number, point in enumerate(curve.change_points):
+                for branch in range(1, len(point.tangents)):
+                    other = curve.follow(number, branch)
+                    if not any(known.passes(other.coordinates_at(0.0)) for known in found):
+                        found.append(other)
+                        waiting.append(other)
+        return tuple(found)
+
+    def follow(self, change_point: int, branch: int = 1) -> "Curve":
+        """Return the curve of another branch through a change point.
+
+        Parameters
+        ----------
+        change_point : int
+            Which of `change_points`.
+        branch : int, default 1
+            Which of its `tangents`; that of this curve is 0.
+
+        Raises
+        ------
+        MechanismError
+            If there is no such change point or branch.
+        SolveError
+            If the branch does not go on in the direction of its tangent.
+        """
+        point = _one_of(self.change_points, change_point, "change_point", "change points")
+        _one_of(point.tangents, branch, "branch", "branches")
+        start = departed(self._walker, point, branch)
+        paths = walk_both_ways(self._walker, start, self._longest)
+        return Curve(self.mechanism, self._free, self._walker, paths, self._settings)
+
+    def directions(self, change_point: int) -> list[dict[str, tuple[np.ndarray, np.ndarray]]]:
+        """Return how all bodies move along each branch through a change point, for a unit of arc length.
+
+        Parameters
+        ----------
+        change_point : int
+            Which of `change_points`.
+
+        Returns
+        -------
+        list of dict
+            For each of its branches, this curve first, by the name of the body: its shift, (2,) or (3,) in m, and its
+            turn, (1,) or (3,) in rad about the axes of the body. The sign of the others is arbitrary.
+        """
+        point = _one_of(self.change_points, change_point, "change_point", "change points")
+        found = [self._walker.parts(tangent) for tangent in point.tangents]
+        names = list(enumerate(self.mechanism.bodies, start=1))
+        return [{name: (shift[:, k], turn[:, k]) for k, name in names} for shift, turn in found]
+
+    @cached_property
+    def arc_lengths(self) -> Float[np.ndarray, " point"]:
+        """Arc lengths of the points of the dataset, evenly spaced, with the limit positions and change points."""
+        told = [x.arc_length for x in (*self.limits, *self.change_points)]
+        even = np.linspace(self.start, self.stop, self._count)
+        spacing = self.length / max(1, self._count - 1)
+        there = np.array([s for s in told if np.min(np.abs(even - s)) > 1e-9 * spacing])
+        return np.sort(np.concatenate([even, there]))
+
+    @cached_property
+    def _points(self) -> tuple[dict[str, np.ndarray], np.ndarray]:
+        """Taylor coefficients of the coordinates and of the value at the points, the points last."""
+        places = [self._at(s) for s in self.arc_lengths]
+        names = places[0].coordinates
+        coordinates = {name: np.stack([p.coordinates[name] for p in places], axis=-1) for name in names}
+        return coordinates, np.stack([p.value for p in places], axis=-1)
+
+    @cached_property
+    def _motion(self) -> Motion:
+        """The curve as a motion whose time is arc length: what evaluates outputs."""
+        posed_outputs = {k: v for k, v in self.mechanism.outputs.items() if not isinstance(v, AbstractMotionOutput)}
+        taken = set(posed_outputs) & set(AXES)
+        if taken:
+            message = f"the name '{min(taken)}' is that of an axis of a curve"
+            raise MechanismError(message, name=f"outputs.{min(taken)}")
+        mechanism = dataclasses.replace(self._free.mechanism, outputs=posed_outputs)
+        lost = max((output.lost_orders for output in posed_outputs.values()), default=0)
+        levels = self._order + lost + 1
+        coordinates = with_angular_velocity({name: c[:levels] for name, c in self._points[0].items()})
+        model, instants, history = self._walker.model, self.arc_lengths, self._history
+        groups = model.system.outputs if history is None else history.counting(model.system.outputs, instants)
+        series = tuple(np.asarray(output_series(group, coordinates, model.pose_type)) for group in groups)
+        status = np.full(len(instants), int(Status.OK))
+        return Motion(mechanism, model, instants, self._order, (coordinates, series), status, {}, None, history)
+
+    @cached_property
+    def _history(self) -> AttitudeHistory | None:
+        if self._walker.is_planar:
+            return None
+        stops = [place.arc_length for place in self._places[1:]] + [self.stop]
+        parts = [
+            np.linspace(p.arc_length, stop, PLACES, endpoint=False) for p, stop in zip(self._places, stops, strict=True)
+        ]
+        begun = float(self._places[0].arc_length)
+        instants = np.concatenate([*parts, [self.stop]])
+        instants = instants[(instants >= begun)]
+        quaternions = [self._at(s).coordinates["quaternion"][0] for s in instants]
+        return AttitudeHistory(np.stack(quaternions, axis=-1), instants)
+
+    @cached_property
+    def values(self) -> Float[np.ndarray, "point derivative"]:
+        """Value of the driver and its derivatives with respect to arc length at the points."""
+        scale = np.cumprod(np.maximum(np.arange(self._order + 1.0), 1.0))
+        return (self._points[1][: self._order + 1] * scale[:, None]).T
+
+    @cached_property
+    def smallest_singular_values(self) -> Float[np.ndarray, " point"]:
+        """Smallest singular value of the scaled Jacobian with the driver held, at the points: zero at dead points."""
+        columns, found = self._walker.columns, []
+        places = [self._at(s) for s in self.arc_lengths]
+        for first in range(0, len(places), LANES):
+            some = places[first : first + LANES]
+            lanes = [dataclasses.replace(place, rows=some[0].rows) for place in some]
+            points = self._walker.points(lanes, np.zeros(len(lanes)), corrected=False)
+            found.append(np.linalg.svd(np.moveaxis(points.jacobian[:, :columns], -1, 0), compute_uv=False)[:, -1])
+        return np.concatenate(found)
+
+    @cached_property
+    def outputs(self) -> dict[str, np.ndarray]:
+        """Outputs by name and their derivatives with respect to arc length: (point, derivative) or with components."""
+        return self._motion.outputs
+
+    @cached_property
+    def dataset(self) -> Any:
+        """Outputs as an `xarray.Dataset` with dimensions point, derivative and component.
+
+        The coordinates of a point are ``arc_length`` and, where something is driven, ``driver_value``; derivatives are
+        with respect to arc length. Limit positions and change points are among the points.
+        """
+        dataset = self._motion.dataset.rename(time="point")
+        known = {"arc_length": ("point", self.arc_lengths, {"units": "1", "long_name": "arc length"})}
+        if self.driver is not None:
+            attributes = {"units": self.unit, "long_name": f"value of the driver {self.driver}"}
+            known["driver_value"] = ("point", self.values[:, 0], attributes)
+        dataset = dataset.assign_coords({"point": np.arange(len(self.arc_lengths)), **known})
+        dataset["derivative"].attrs = {"long_name": "order of the derivative with respect to arc length"}
+        dataset.attrs |= {"title": self.mechanism.title or "curve of a mechanism", "closed": int(self.closed)}
+        dataset.attrs |= {"limit_positions": np.array([x.value for x in self.limits])}
+        return dataset
+
+    def evaluate(self, output: AbstractOutput, name: str = "output") -> Any:
+        """Return any output along the curve, as an `xarray.DataArray`."""
+        return self._motion.evaluate(output, name).rename(time="point")
+
+
+def with_angular_velocity(coordinates: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Return series of coordinates with the body-fixed angular velocity that their Euler parameters tell."""
+    if "quaternion" not in coordinates:
+        return coordinates
+    p = coordinates["quaternion"]
+    rates = p[1:] * np.arange(1, len(p)).reshape(-1, *[1] * (p.ndim - 1))
+    found = [sum((spin(p[j], rates[k - j]) for j in range(k + 1)), np.zeros_like(p[0, 1:])) for k in range(len(rates))]
+    return {**coordinates, "angular_velocity": np.array(found).reshape(len(rates), *p[0, 1:].shape)}
+
+
+def _one_of(found: Any, number: Any, name: str, what: str) -> Any:
+    """Return one of some, by a number that there is."""
+    if not isinstance(number, int) or isinstance(number, bool) or not 0 <= number < len(found):
+        there = f"there are {len(found)}, counted from 0" if len(found) else "there are none"
+        raise MechanismError(f"no such one among the {what}: {there}", name=name, value=number)
+    return found[number]
+
+
+def posed(mechanism: Mechanism, coordinates: dict[str, np.ndarray]) -> Mechanism:
+    """Return a mechanism with other starting guesses of its bodies; coordinates have the ground first."""
+    bodies = {}
+    for k, (name, body) in enumerate(mechanism.bodies.items(), start=1):
+        given: dict[str, Any] = {"position": coordinates["position"][:, k].tolist()}
+        if "angle" in coordinates:
+            given["angle"] = float(coordinates["angle"][k])
+        else:
+            given["orientation"] = coordinates["quaternion"][:, k].tolist()
+        bodies[name] = dataclasses.replace(body, **given)
+    return dataclasses.replace(mechanism, bodies=bodies, assembly=None)

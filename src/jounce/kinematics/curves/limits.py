@@ -1,0 +1,107 @@
+"""Limit positions: where the value of the driver turns back along a curve, read off its series."""
+
+import dataclasses
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.kinematics.curves.walker import Place
+
+Kind = Literal["maximum", "minimum", "stationary"]
+ON_THE_CURVE = 1e-7  # of a step: imaginary part of a root that rounding may have made of a double one
+STANDING = 1e-10  # rate of the value, in its unit
+FLAT = 1e-9  # of the largest term: a slope that vanishes for all that is known
+
+
+@dataclasses.dataclass(frozen=True)
+class LimitPosition:
+    """A configuration in which the driver stands while the mechanism moves: a dead point of this driver.
+
+    Attributes
+    ----------
+    arc_length : float
+        Where on the curve, rad or sizes of the mechanism.
+    value : float
+        Of the driver, rad or m.
+    kind : str
+        ``"maximum"`` or ``"minimum"``, where the driver turns back, ``"stationary"`` where it goes on.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> limits = jn.trace(jn.load("examples/rspu_slide.yaml")).limits
+    >>> [(limit.kind, round(limit.value, 6)) for limit in limits]
+    [('maximum', 0.314952), ('minimum', 0.259312)]
+    """
+
+    arc_length: float
+    value: float
+    kind: Kind
+
+
+def limits_between(place: Place, stop: float, unit: float) -> list[LimitPosition]:
+    """Return the limit positions from a place, that excluded, to an arc length, that included.
+
+    The unit of the value is what it is worth as an unknown; a driver that stands all the way has none.
+    """
+    step = stop - place.arc_length
+    orders = np.arange(len(place.value))
+    slopes = (place.value * step**orders * orders)[1:]  # of the value along the part of the step
+    size = np.max(np.abs(slopes), initial=0.0)
+    if size <= STANDING * unit * step or abs(slopes[0]) > np.sum(np.abs(slopes[1:])):
+        return []
+    found = []
+    for part in roots(slopes):
+        if not 0 < part <= 1:
+            continue
+        here = place.recentred(part * step)
+        found.append(LimitPosition(here.arc_length, float(here.value[0]), _kind(slopes, part, size)))
+    return found
+
+
+def roots(coefficients: Float[np.ndarray, " order"]) -> list[float]:
+    """Return the real roots of a polynomial in [0, 1], each once."""
+    significant = np.flatnonzero(np.abs(coefficients) > 1e-18 * np.max(np.abs(coefficients)))
+    coefficients = coefficients[: significant[-1] + 1]
+    slopes = (coefficients * np.arange(len(coefficients)))[1:]
+    found: list[float] = []
+    for root in np.polynomial.polynomial.polyroots(coefficients):
+        if abs(root.imag) > ON_THE_CURVE or not -ON_THE_CURVE < root.real < 1 + ON_THE_CURVE:
+            continue
+        part = float(root.real)
+        for _ in range(3):
+            slope = _value(slopes, part)
+            change = _value(coefficients, part) / slope if slope else 0.0
+            if not abs(change) < ON_THE_CURVE:
+                break
+            part -= change
+        if all(abs(part - other) > 2 * ON_THE_CURVE for other in found):
+            found.append(part)
+    return sorted(found)
+
+
+def _value(coefficients: Float[np.ndarray, " order"], part: float) -> float:
+    return float(np.polynomial.polynomial.polyval(part, coefficients))
+
+
+def _kind(slopes: Float[np.ndarray, " order"], part: float, size: float) -> Kind:
+    before, after = (_value(slopes, part + away) for away in (-1e-3, 1e-3))
+    if min(abs(before), abs(after)) <= FLAT * 1e-6 * size or before * after > 0:
+        return "stationary"
+    return "maximum" if before > 0 else "minimum"
+
+
+def values_between(place: Place, stop: float, value: float, period: float | None) -> list[float]:
+    """Return the arc lengths from a place to another at which the driver has a value, or one some periods away."""
+    step = stop - place.arc_length
+    terms = place.value * step ** np.arange(len(place.value))
+    reach = float(np.sum(np.abs(terms[1:])))
+    if reach == 0:
+        return []
+    targets = [value]
+    if period is not None:
+        least, most = ((terms[0] + side * reach - value) / period for side in (-1, 1))
+        targets = [value + period * k for k in range(int(np.floor(least)), int(np.ceil(most)) + 1)]
+    found = [part for target in targets for part in roots(np.array([terms[0] - target, *terms[1:]]))]
+    return [place.arc_length + part * step for part in found]

@@ -1,0 +1,297 @@
+"""One compiled function: from a point of a curve of configurations to others, each with the series of the curve there.
+
+The unknowns are the coordinates of all bodies and the value of one driver, that which is free; the curve is described
+by its arc length s. Order after order the coefficient of the residual is affine in the highest unknown, as in time
+(Sommer 2024, equations 1-8), and the arc-length condition ``x'.x' = 1`` is one row more of the same kind.
+"""
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from jounce.jet import Jet
+from jounce.jet.algebra import total
+from jounce.jet.series import Recursion
+from jounce.kinematics.compilation import compiled
+from jounce.kinematics.linear import DenseFactor
+from jounce.mechanism.builder import pose_at
+from jounce.mechanism.system import System
+from jounce.rigid import PlanarPose, SpatialPose
+from jounce.rigid.pose import Pose
+from jounce.rigid.spatial import body_axes, quaternion_spins
+from jounce.shapes import Numbers
+
+MAX_CORRECTIONS = 10
+ROUNDING = 4e-15  # a correction this small leaves the Jacobian as good as new
+QUADRATIC = 1e-8  # the correction after one this small is rounding
+
+Lanes = Float[Numbers, " lane"]
+
+
+class CurvePoints(NamedTuple):
+    """Places on a curve of configurations; every array has the lanes last.
+
+    Attributes
+    ----------
+    coordinates : dict of str to array, shape (order + 1, ..., bodies, lanes)
+        Taylor coefficients in arc length of the coordinates of all bodies, the ground first.
+    value : array of shape (order + 1, lanes)
+        Of the value of the driver that is free.
+    jacobian : array of shape (rows, columns, lanes)
+        Of all constraints, scaled; the last column is that of the value, if a driver is free.
+    slope : array of shape (rows, columns, lanes)
+        Its derivative along the series that led there.
+    first, last : array of shape (lanes,)
+        Size of the first and the last correction, rad or sizes of the mechanism.
+    contraction : array of shape (lanes,)
+        Second correction with the Jacobian of the first, over the first.
+    residual : array of shape (lanes,)
+        Largest, of all rows.
+    admissible : array of bool, shape (lanes,)
+        Whether all drivers have permitted values.
+    """
+
+    coordinates: dict[str, Any]
+    value: Any
+    jacobian: Any
+    slope: Any
+    first: Lanes
+    last: Lanes
+    contraction: Lanes
+    residual: Lanes
+    admissible: Bool[Numbers, " lane"]
+
+
+class _Curve:
+    """The equations of a curve: those of a system with the value of a driver in the place of time."""
+
+    def __init__(self, system: System, rows: Any, value_scale: Any, driven: bool):
+        self.system, self.rows, self.value_scale, self.driven = system, rows, value_scale, driven
+        self.count = system.shape[1]
+
+    def residual(self, pose: Any, value: Any) -> Any:
+        return self.system.residual(pose, Jet([value[None]])).coefficients[0]
+
+    def jacobian(self, pose: Any, value: Any) -> Any:
+        """Return the scaled Jacobian, (rows, columns, lanes), with the column of the value last."""
+        entries = self.system.jacobian(pose, Jet([value[None]]))
+        if not self.driven:
+            return entries
+        still = pose.extended(None, None)
+        rate = self.system.residual(still, Jet([value[None], jnp.ones_like(value)[None]])).dense().coefficients[1]
+        return jnp.concatenate([entries, (rate * self.value_scale)[:, None]], axis=1)
+
+    def bordered(self, jacobian: Any, tangent: Any) -> Any:
+        """Return the factors of the independent rows and the row of arc length."""
+        border = jnp.zeros((1, *jacobian.shape[1:])).at[0, : self.count].set(tangent)
+        return DenseFactor.of(jnp.concatenate([jacobian[self.rows], border]))
+
+    def moved(self, pose: Any, value: Any, step: Any) -> Any:
+        shift, turn = self.system.coordinates(step[: self.count], pose.shifts)
+        value = value + self.value_scale * step[-1] if self.driven else value
+        return pose.displaced(shift, turn), value
+
+    def sized(self, step: Any) -> Any:
+        return jnp.max(jnp.abs(step), axis=0)
+
+
+@compiled("pose_type", "order", "driven")
+def curve_points(
+    system: System,
+    coordinates: dict[str, Numbers],
+    value: Float[Numbers, "order lane"],
+    tangent: Float[Numbers, "column lane"],
+    step: Lanes,
+    corrected: Bool[Numbers, ""],
+    rows: Int[Numbers, " independent"],
+    value_scale: Float[Numbers, ""],
+    *,
+    pose_type: type[Pose],
+    order: int,
+    driven: bool,
+) -> CurvePoints:
+    """Return points of a curve, each from the series at a point before it.
+
+    Parameters
+    ----------
+    system : System
+        The mechanism, with the value of the driver in the place of time.
+    coordinates, value
+        Series at the points before, shape (order + 1, ..., lanes).
+    tangent : array of shape (columns, lanes)
+        Directions of the curve there, of the coordinates only, scaled: corrections are made across it.
+    step : array of shape (lanes,)
+        Arc length from there.
+    corrected : bool
+        Whether predictions are corrected; at a change point they must not be.
+    rows : array of int
+        One less than there are unknowns, which are independent here.
+    value_scale : float
+        Unit in which the value counts as an unknown.
+    pose_type, order, driven
+        PlanarPose or SpatialPose; order of the series wanted; whether a driver is free.
+    """
+    curve = _Curve(system, rows, value_scale, driven)
+    series = {name: Jet(tuple(c)) for name, c in coordinates.items()}
+    pose = pose_type.predicted_from(series, step)
+    reached = Jet(tuple(value)).evaluate(step)
+    pose, reached, sizes = _corrected(curve, pose, reached, tangent, corrected)
+    jacobian = curve.jacobian(pose, reached)
+    factor = curve.bordered(jacobian, tangent)
+    found, whole = _differentiated(curve, pose, reached, factor, order)
+    slope = _slope(curve, pose, reached, _moved_on(series, step), Jet(tuple(value)).differentiate().evaluate(step))
+    residual = jnp.max(jnp.abs(curve.residual(pose.truncate(0), reached)), axis=0, initial=0.0)
+    admissible = jnp.all(system.admissible(Jet([reached[None]])), axis=0)
+    first, last, contraction = sizes
+    return CurvePoints(found, whole, jacobian, slope, first, last, contraction, residual, admissible)
+
+
+def _corrected(curve: _Curve, pose: Any, value: Any, tangent: Any, corrected: Any) -> Any:
+    """Return pose and value on the curve, in the plane across a tangent through the prediction, and three sizes."""
+    none = jnp.zeros((1, value.shape[0]))
+
+    def unfinished(state: Any) -> Any:
+        _, _, _, (_, last, _), before, count = state
+        done = (last <= ROUNDING) | (before <= QUADRATIC)
+        return corrected & jnp.any(~done & (jnp.isfinite(last) | (count == 0))) & (count < MAX_CORRECTIONS)
+
+    def iterate(state: Any) -> Any:
+        pose, value, factor, (first, last, again), _, count = state
+        right = jnp.concatenate([-curve.residual(pose, value)[curve.rows], none])
+        simplified = curve.sized(factor.solve(right, refined=False))
+        again = jnp.where(count == 1, simplified, again)
+        factor = curve.bordered(curve.jacobian(pose, value), tangent)
+        step = factor.solve(right, refined=False)
+        size = curve.sized(step)
+        pose, value = curve.moved(pose, value, step)
+        return pose, value, factor, (jnp.where(count == 0, size, first), size, again), last, count + 1
+
+    lanes = value.shape[0]
+    unknown, zero = np.full(lanes, np.inf), np.zeros(lanes)
+    size = curve.rows.shape[0] + 1
+    start = (pose, value, DenseFactor.blank((size, size), lanes), (unknown, unknown, zero), unknown, 0)
+    pose, value, _, (first, last, again), _, _ = jax.lax.while_loop(unfinished, iterate, start)
+    return pose, value, (first, last, again / jnp.maximum(first, 1e-300))
+
+
+def _differentiated(curve: _Curve, pose: Any, value: Any, factor: DenseFactor, order: int) -> Any:
+    """Return the series of the coordinates in arc length, by name, and that of the value."""
+    count, lanes, shifts = curve.count, value.shape[0], pose.shifts
+    null = factor.solve(jnp.zeros((curve.rows.shape[0] + 1, lanes)).at[-1].set(1.0))
+    null = null / jnp.sqrt(jnp.sum(null[:count] ** 2, axis=0, keepdims=True))
+    tangent, planar = null[:count], isinstance(pose, PlanarPose)
+    place = pose.position.coefficients[0]
+    attitude = (pose.angle if planar else pose.quaternion).coefficients[0]
+
+    def program(place: Any, attitude: Any, value: Any) -> Any:
+        return curve.system.residual(_still(place, attitude), Jet([value[None]])).coefficients[0]
+
+    def parts(solution: Any) -> Any:
+        shift, turn = curve.system.coordinates(solution[:count], shifts)
+        return shift, turn, curve.value_scale * solution[-1] if curve.driven else jnp.zeros(lanes)
+
+    def spun(turn: Any) -> Any:
+        return turn[0] if planar else _spun(attitude, turn)
+
+    shift, turn, rate = parts(null)
+    recursion = Recursion(program, (place, attitude, value), order)
+    _, history = recursion.advanced(recursion.history, 1, (shift, spun(turn), rate))
+    series = tuple(begun_series([x, y], order) for x, y in ((place, shift), (attitude, spun(turn)), (value, rate)))
+    turns, rates = begun_series([turn], order - 1), begun_series([tangent], order - 1)
+
+    def level(k: Any, carry: Any) -> Any:
+        history, series, turns, rates = carry
+        trial = None if planar else _known_spin(series[1], turns, k)
+        residual, history = recursion.advanced(history, k, (None, trial, None))
+        right = jnp.concatenate([-residual[curve.rows], jnp.zeros((1, lanes))])
+        solution = factor.solve(right)
+        # x'[j] = (j + 1) x[j + 1], and the coefficient of order k - 1 of x'.x' vanishes
+        known = jnp.sum(_convolved(rates, rates, k - 1, lambda a, b: jnp.sum(a * b, axis=1)), axis=0)
+        lacking = -known / (2 * k) - jnp.sum(tangent * solution[:count], axis=0)
+        solution = solution + null * lacking[None]
+        shift, turn, rate = parts(solution)
+        change = spun(turn)
+        history = recursion.corrected(history, (shift, change, rate))
+        now = shift, change if trial is None else trial + change, rate
+        put = jax.lax.dynamic_update_index_in_dim
+        series = tuple(put(x, y, k, 0) for x, y in zip(series, now, strict=True))
+        return history, series, put(turns, k * turn, k - 1, 0), put(rates, k * solution[:count], k - 1, 0)
+
+    _, series, _, _ = jax.lax.fori_loop(2, order + 1, level, (history, series, turns, rates))
+    name = "angle" if planar else "quaternion"
+    return {"position": series[0], name: series[1]}, series[2]
+
+
+def _still(place: Any, attitude: Any) -> Any:
+    """Return the pose of order zero at a place; Euler parameters are of unit length already."""
+    if attitude.ndim < place.ndim:
+        return PlanarPose.from_jets(Jet([place]), Jet([attitude]))
+    spins, axes = (tuple(Jet([x]) for x in f(attitude)) for f in (quaternion_spins, body_axes))
+    return SpatialPose(Jet([place]), Jet([attitude]), spins, axes, None)
+
+
+def _spun(quaternion: Any, turn: Any) -> Any:
+    """Return how Euler parameters change with a turn about the axes of the body."""
+    spins = quaternion_spins(quaternion)
+    return 0.5 * total(spin * part for spin, part in zip(spins, jnp.split(turn, 3), strict=True))
+
+
+def _known_spin(quaternion: Any, turns: Any, k: Any) -> Any:
+    """Return what is known of the coefficient of order k of Euler parameters: all but the newest turn's part."""
+    return jnp.sum(_convolved(quaternion, turns, k - 1, jax.vmap(_spun)), axis=0) / k
+
+
+def _convolved(left: Any, right: Any, order: Any, product: Any) -> Any:
+    """Return the terms of the coefficient of an order of a product; what is not known yet is zero."""
+    places = order - np.arange(len(right))
+    left = left[: len(right)]
+    there = (places >= 0).reshape(-1, *[1] * (right.ndim - 1))
+    return product(left, jnp.where(there, jnp.take(right, jnp.clip(places, 0, len(right) - 1), axis=0), 0.0))
+
+
+def begun_series(coefficients: list[Any], order: int) -> Any:
+    """Return the first coefficients of a series with room for the others."""
+    first = jnp.stack(coefficients)
+    return jnp.pad(first, ((0, order + 1 - len(first)), *((0, 0),) * (first.ndim - 1)))
+
+
+def _moved_on(series: dict[str, Jet], step: Any) -> dict[str, Any]:
+    """Return the rates of coordinates by their series, a step away."""
+    return {name: jet.differentiate().evaluate(step) for name, jet in series.items()}
+
+
+def _slope(curve: _Curve, pose: Any, value: Any, rates: dict[str, Any], value_rate: Any) -> Any:
+    """Return the derivative of the Jacobian along the series, which is smooth where branches cross too."""
+    now = {name: jet.coefficients[0] for name, jet in pose.coordinates().items()}
+
+    def at(step: Any) -> Any:
+        there = {name: x + step * rates[name] for name, x in now.items()}
+        return curve.jacobian(pose_at(there, type(pose)), value + step * value_rate)
+
+    return jax.jvp(at, (np.zeros(()),), (np.ones(()),))[1]
+
+
+@compiled("pose_type")
+def second_order(
+    system: System,
+    coordinates: dict[str, Numbers],
+    value: Float[Numbers, ""],
+    directions: Float[Numbers, "column lane"],
+    value_scale: Float[Numbers, ""],
+    *,
+    pose_type: type[Pose],
+) -> Float[Numbers, "row lane"]:
+    """Return half the second derivatives of the residual along directions of all unknowns, the value last.
+
+    Coordinates have the shape (..., bodies, 1).
+    """
+    lanes = directions.shape[1]
+    wide = {name: jnp.broadcast_to(x, (*x.shape[:-1], lanes)) for name, x in coordinates.items()}
+    pose = pose_at(wide, pose_type)
+    pose = pose.extended(*system.coordinates(directions[: system.shape[1]], pose.shifts)).extended(None, None)
+    rate = value_scale * directions[-1:]
+    time = Jet([jnp.full((1, lanes), value), rate, jnp.zeros((1, lanes))])
+    return system.residual(pose, time).dense().coefficients[2]

@@ -1,0 +1,175 @@
+"""Where a curve of configurations starts: a mechanism with the value of one driver free, put together."""
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.constraints.base import field_kind, value_fields
+from jounce.errors import MechanismError, MobilityError, SingularityError, check_name
+from jounce.jet import Jet
+from jounce.kinematics.assembly import check_assembled, freely_moving, settled
+from jounce.kinematics.curves.walker import Place, Walker
+from jounce.kinematics.device import resident
+from jounce.mechanism import Mechanism, build, time_grid
+from jounce.mechanism.modules import with_fields
+from jounce.trajectory import ExpressionMotion
+
+TIME = "time"
+VANISHING = 1e-9  # of half the second derivatives along directions of one radian: the rows do not forbid them
+
+
+@dataclasses.dataclass(frozen=True)
+class Freed:
+    """A mechanism of which the value of one driver is free.
+
+    Attributes
+    ----------
+    mechanism : Mechanism
+        With the value in the place of time, and the other drivers held.
+    driver : str or None
+        Which is free; ``"time"`` where all follow their laws and the instant is free, None where nothing is driven.
+    value : float
+        Where it starts, in rad or m, or s.
+    unit : str
+        Of the value.
+    """
+
+    mechanism: Mechanism
+    driver: str | None
+    value: float
+    unit: str
+
+
+def freed(mechanism: Mechanism, instant: float, driver: str | None) -> Freed:
+    """Return a mechanism with the value of one driver free.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        Driven, or of one degree of freedom.
+    instant : float
+        At which the other drivers are held, s.
+    driver : str or None
+        Which is free; None for the only one there is. ``"time"`` for the instant itself.
+
+    Raises
+    ------
+    MechanismError
+        If there are several drivers and none is named, or none has the name.
+    """
+    kind = "drivers" if mechanism.drivers else "initial"
+    found = getattr(mechanism, kind)
+    if driver == TIME and TIME not in found and found:
+        return Freed(_driven(mechanism, found), TIME, instant, "s")
+    if driver is not None:
+        check_name("driver", driver, tuple(found), MechanismError, name="driver")
+    if not found:
+        return Freed(mechanism, None, 0.0, "")
+    if driver is None:
+        if len(found) > 1:
+            message = f"there are several drivers, {', '.join(found)}: name the one whose value is to be free"
+            raise MechanismError(message, name="driver", value=None)
+        driver = next(iter(found))
+    values = law_values(_driven(mechanism, found), instant)
+    laws = {name: _with_law(x, "t" if name == driver else repr(values[name])) for name, x in found.items()}
+    return Freed(_driven(mechanism, laws), driver, values[driver], _unit(found[driver]))
+
+
+def _driven(mechanism: Mechanism, drivers: Any) -> Mechanism:
+    return dataclasses.replace(mechanism, drivers=drivers, initial={})
+
+
+def law_values(mechanism: Mechanism, instant: float) -> dict[str, float]:
+    """Return what the laws of all drivers prescribe at an instant, by name."""
+    model = build(mechanism)
+    groups = [group for group in model.system.groups if group.is_driver]
+    found = []
+    for group in groups:
+        value = group.element.motion(Jet([np.full((1, 1), instant)])).coefficients[0]
+        found += np.broadcast_to(value, (group.instances, 1))[:, 0].tolist()
+    return {name.partition(".")[2]: value for name, value in zip(model.drivers, found, strict=True)}
+
+
+def _with_law(driver: Any, text: str) -> Any:
+    fields = [name for name, field in value_fields(type(driver)).items() if field_kind(field) == "motion"]
+    if fields != ["motion"]:
+        raise MechanismError(
+            "a driver whose value is free needs one law, its field motion", name="driver", value=fields
+        )
+    return dataclasses.replace(driver, motion=ExpressionMotion(text))
+
+
+def _unit(driver: Any) -> str:
+    kind = driver.type_name
+    if kind == "coordinate":
+        return "rad" if driver.coordinate == "angle" else "m"
+    return {"rotation": "rad", "slide": "m", "distance": "m"}.get(kind, "")
+
+
+def first_instant(mechanism: Mechanism) -> float:
+    """Return the first instant of a mechanism's own time, s; 0 where it has none."""
+    if mechanism.time is None:
+        return 0.0
+    return float(time_grid(mechanism.time, mechanism.parameter_values)[0])
+
+
+def begun(free: Freed, tolerance: float = 1e-12) -> tuple[Walker, Place]:
+    """Return what walks along the curve of a mechanism, and where it starts.
+
+    Raises
+    ------
+    AssemblyError
+        If the bodies cannot be put together.
+    MobilityError
+        If there is more than one degree of freedom, or none.
+    SingularityError
+        If the start is a change point.
+    """
+    model = build(free.mechanism)
+    if not model.rows:
+        raise MobilityError(f"the mechanism has no joints: {model.system.shape[1]} degrees of freedom are left")
+    model, found = settled(model, free.value, tolerance)
+    driven = free.driver is not None
+    check_assembled(model, found, free.value, free=not driven)
+    system = resident(with_fields(model.system, row_scale=found.scale[:, None]))
+    model = dataclasses.replace(model, system=system)
+    walker = Walker(model, driven, timed=free.driver == TIME)
+    place = walker.placed(found.coordinates, free.value)
+    _check_freedom(walker, place)
+    walker = walker.scaled_at(place)
+    return walker, walker.begun(place)
+
+
+def _check_freedom(walker: Walker, place: Place) -> None:
+    """Raise an error unless there is one direction to go in."""
+    jacobian = place.jacobian
+    null = walker.null_space(jacobian)
+    if null.shape[1] == 1:
+        return
+    if not null.shape[1]:
+        message = "nothing can move: with the driver free, joints and drivers leave no degree of freedom"
+        raise MobilityError(message if walker.driven else "nothing can move: the joints leave no degree of freedom")
+    missing = jacobian.shape[1] - jacobian.shape[0]
+    if missing > 1 or _unopposed(walker, place, jacobian, null):
+        count = null.shape[1]
+        directions = null[: walker.columns].T
+        message = (
+            f"a curve needs one degree of freedom, and {'with the driver free ' if walker.driven else ''}there are "
+            f"{count}, with which {freely_moving(walker.model, directions)} can move: add drivers, which are held, "
+            "and name the one that is free"
+        )
+        raise MobilityError(message)
+    raise SingularityError(
+        "the start is a change point, where branches cross, so that no one curve starts there: start at another instant"
+    )
+
+
+def _unopposed(
+    walker: Walker, place: Place, jacobian: Float[np.ndarray, "row column"], null: Float[np.ndarray, "column k"]
+) -> bool:
+    """Tell whether the second order leaves all directions of the first."""
+    rows = walker.left_null_space(jacobian)
+    half = walker.second_order(place, null)
+    return bool(np.max(np.abs(rows.T @ half), initial=0.0) < VANISHING)

@@ -1,0 +1,75 @@
+"""One compiled function: bodies put together from many starts side by side, at one instant."""
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from jounce.jet import Jet
+from jounce.kinematics.compilation import compiled
+from jounce.kinematics.linear import DenseFactor
+from jounce.mechanism.builder import pose_at
+from jounce.mechanism.system import System
+from jounce.rigid.pose import Pose
+from jounce.shapes import Numbers
+
+STEPS = 80
+LONGEST_STEP = 1.0  # rad or sizes of the mechanism
+FIRST_DAMPING, SMALLEST_DAMPING, LARGEST_DAMPING = 1e-1, 1e-13, 1e6
+EASED, STIFFENED = 0.2, 4.0
+CLOSED = 1e-12  # of the residual: nothing is gained by going on
+
+
+@compiled("pose_type")
+def put_together_side_by_side(
+    system: System, coordinates: dict[str, Numbers], instant: Float[Numbers, ""], *, pose_type: type[Pose]
+) -> tuple[dict[str, Numbers], Float[Numbers, " start"]]:
+    """Return the coordinates to which starts lead, and the largest residual there, by Levenberg and Marquardt.
+
+    Parameters
+    ----------
+    system : System
+        With rows of one size.
+    coordinates : dict of str to array
+        Of all bodies, the ground first, the starts last.
+    instant : float
+        s.
+    pose_type
+        PlanarPose or SpatialPose.
+    """
+    lanes = coordinates["position"].shape[-1]
+    time = Jet([jnp.full((1, lanes), instant)])
+    columns = system.shape[1]
+
+    def residual(pose: Any) -> Any:
+        return system.residual(pose, time).coefficients[0]
+
+    def unfinished(state: Any) -> Any:
+        _, gaps, _, count = state
+        return jnp.any(jnp.max(jnp.abs(gaps), axis=0) > CLOSED) & (count < STEPS)
+
+    def iterate(state: Any) -> Any:
+        now, gaps, damping, count = state
+        pose = pose_at(now, pose_type)
+        jacobian = system.jacobian(pose, time)
+        normal = jnp.sum(jacobian[:, :, None] * jacobian[:, None], axis=0)
+        normal = normal + jnp.eye(columns)[..., None] * damping[None, None]
+        gradient = jnp.sum(jacobian * gaps[:, None], axis=0)
+        step = -DenseFactor.of(normal).solve(gradient, refined=False)
+        size = jnp.max(jnp.abs(step), axis=0, keepdims=True)
+        step = step * jnp.minimum(1.0, LONGEST_STEP / jnp.maximum(size, 1e-300))
+        moved = pose.displaced(*system.coordinates(step, pose.shifts))
+        there = {name: jet.coefficients[0] for name, jet in moved.coordinates().items()}
+        trial = residual(moved)
+        better = jnp.sum(trial**2, axis=0) < jnp.sum(gaps**2, axis=0)
+        now = {name: jnp.where(better, there[name], x) for name, x in now.items()}
+        eased = jnp.maximum(damping * EASED, SMALLEST_DAMPING)
+        damping = jnp.where(better, eased, jnp.minimum(damping * STIFFENED, LARGEST_DAMPING))
+        return now, jnp.where(better[None], trial, gaps), damping, count + 1
+
+    gaps = residual(pose_at(coordinates, pose_type))
+    start = (coordinates, gaps, np.full(lanes, FIRST_DAMPING), 0)
+    found, gaps, _, _ = jax.lax.while_loop(unfinished, iterate, start)
+    return found, jnp.max(jnp.abs(gaps), axis=0, initial=0.0)

@@ -1,0 +1,30 @@
+"""A mechanism's curve of configurations from its starting guess; options of those who ask for it."""
+
+import math
+import numbers
+from typing import Any
+
+from jounce.errors import MechanismError
+from jounce.kinematics.curves.curve import Curve
+from jounce.kinematics.curves.path import walk_both_ways
+from jounce.kinematics.curves.start import begun, freed
+from jounce.mechanism import Mechanism
+
+BRIEF = 0, 2, 200.0
+
+
+def traced(mechanism: Mechanism, instant: float, driver: str | None, settings: tuple[int, int, float] = BRIEF) -> Curve:
+    """Return the curve through the starting guess: settings are the order, the number of points and the length."""
+    free = freed(mechanism, instant, driver)
+    walker, start = begun(free)
+    return Curve(mechanism, free, walker, walk_both_ways(walker, start, settings[2]), settings)
+
+
+def check_number(name: str, value: Any, least: Any, most: Any, *, whole: bool = False) -> None:
+    """Raise MechanismError unless an option is a number between bounds."""
+    kind = numbers.Integral if whole else numbers.Real
+    fits = isinstance(value, kind) and not isinstance(value, bool) and math.isfinite(float(value))
+    if not fits or not least <= value <= most:
+        what = "a whole number" if whole else "a finite number"
+        bounds = "" if not math.isfinite(most) else f" from {least:g} to {most:g}"
+        raise MechanismError(f"must be {what}{bounds}", name=name, value=value)

@@ -1,0 +1,374 @@
+"""What walks along a curve of configurations: places on it with their series, and what a series tells on the host."""
+
+import dataclasses
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from jounce.jet.turns import principal
+from jounce.kinematics.curves.series import CurvePoints, curve_points, second_order
+from jounce.mechanism import Model
+from jounce.rigid import PlanarPose
+from jounce.shapes import Numbers
+
+ORDER = 20
+LANES = 8  # places solved side by side: a number compiles once
+TAIL = 1e-15  # of the series over a step, rad or sizes of the mechanism: rounding
+RANK_TOLERANCE = 1e-8  # of the largest singular value
+
+
+def comb(n: np.ndarray, k: np.ndarray) -> np.ndarray:
+    """Return binomial coefficients; zero where k is larger than n."""
+    table = np.zeros((ORDER + 1, ORDER + 1))
+    table[:, 0] = 1.0
+    for row in range(1, ORDER + 1):
+        table[row, 1:] = table[row - 1, 1:] + table[row - 1, :-1]
+    return table[n, k]
+
+
+@dataclasses.dataclass(frozen=True)
+class Place:
+    """A place on a curve, with the series of the curve in arc length from there.
+
+    Attributes
+    ----------
+    arc_length : float
+        From the start of the curve.
+    coordinates : dict of str to array, shape (order + 1, ..., bodies)
+        Taylor coefficients of the coordinates of all bodies, the ground first.
+    value : array of shape (order + 1,)
+        Of the value that is free.
+    jacobian, slope : array of shape (rows, unknowns)
+        Of all constraints, scaled, and its derivative along the curve.
+    rows : array of int
+        Those that are independent here, one less than there are unknowns.
+    """
+
+    arc_length: float
+    coordinates: dict[str, np.ndarray]
+    value: np.ndarray
+    jacobian: np.ndarray
+    slope: np.ndarray
+    rows: Int[np.ndarray, " independent"]
+
+    def at(self, step: float) -> dict[str, np.ndarray]:
+        """Return the coordinates that the series gives a step away."""
+        return {name: horner(c, step) for name, c in self.coordinates.items()}
+
+    def recentred(self, step: float, order: int = ORDER) -> "Place":
+        """Return the place a step on that the series gives, with its terms up to an order."""
+        power = np.arange(order + 1)
+        away = power[None] - power[:, None]
+        shift = np.where(away >= 0, comb(power[None], power[:, None]) * step ** np.maximum(away, 0), 0.0)
+
+        def moved(c: np.ndarray) -> np.ndarray:
+            return np.concatenate([np.tensordot(shift, c[: order + 1], 1), np.zeros_like(c[order + 1 :])])
+
+        coordinates = {name: moved(c) for name, c in self.coordinates.items()}
+        known = {"arc_length": self.arc_length + step, "value": moved(self.value)}
+        return dataclasses.replace(self, coordinates=coordinates, **known)
+
+    def reversed(self) -> "Place":
+        """Return the place on the same curve, gone along the other way."""
+
+        def turned(c: np.ndarray) -> np.ndarray:
+            return c * ((-1.0) ** np.arange(len(c))).reshape(-1, *[1] * (c.ndim - 1))
+
+        coordinates = {name: turned(c) for name, c in self.coordinates.items()}
+        known = {"arc_length": -self.arc_length, "value": turned(self.value), "slope": -self.slope}
+        return dataclasses.replace(self, coordinates=coordinates, **known)
+
+    def shifted(self, arc_length: float) -> "Place":
+        """Return the place with its arc length counted from somewhere else."""
+        return dataclasses.replace(self, arc_length=self.arc_length + arc_length)
+
+    def shortened(self, order: int) -> "Place":
+        """Return the place with the coefficients above an order set to zero: rounding spoils those first."""
+
+        def cut(c: np.ndarray) -> np.ndarray:
+            return np.concatenate([c[: order + 1], np.zeros_like(c[order + 1 :])])
+
+        coordinates = {name: cut(c) for name, c in self.coordinates.items()}
+        return dataclasses.replace(self, coordinates=coordinates, value=cut(self.value))
+
+
+def horner(coefficients: np.ndarray, step: float) -> np.ndarray:
+    """Return what a series gives a step away."""
+    found = np.zeros_like(coefficients[0])
+    for c in coefficients[::-1]:
+        found = found * step + c
+    return found
+
+
+@dataclasses.dataclass(frozen=True)
+class Walker:
+    """A model whose value of time is that of the driver that is free, and what is known of its curves."""
+
+    model: Model
+    driven: bool
+    value_scale: float = 1.0
+    timed: bool = False  # the value is the instant: the same pose at another one is another place
+
+    @property
+    def columns(self) -> int:
+        """Number of coordinates."""
+        return self.model.system.shape[1]
+
+    @property
+    def unknowns(self) -> int:
+        """Number of coordinates, and the value."""
+        return self.columns + self.driven
+
+    @property
+    def is_planar(self) -> bool:
+        """Whether attitudes are angles."""
+        return "angle" in self.model.guess
+
+    @cached_property
+    def _lengths(self) -> np.ndarray:
+        return np.asarray(self.model.system.column_scale)[: self.model.pose_type.shifts, None]
+
+    # places
+
+    def placed(self, coordinates: dict[str, Any], value: float) -> Place:
+        """Return a place without a series, of coordinates of shape (..., bodies, 1)."""
+        series = {}
+        for name, x in coordinates.items():
+            series[name] = np.zeros((ORDER + 1, *np.shape(x)[:-1]))
+            series[name][0] = np.asarray(x)[..., 0]
+        values = np.zeros(ORDER + 1)
+        values[0] = value
+        nothing = np.zeros((self.model.system.shape[0], self.unknowns))
+        first = np.arange(self.unknowns - 1) % max(1, len(nothing))
+        return self.with_jacobian(Place(0.0, series, values, nothing, nothing, first))
+
+    def with_jacobian(self, place: Place) -> Place:
+        """Return a place with the Jacobian of its configuration and rows that are independent."""
+        points = self.points(place, np.zeros(1), np.ones(self.columns), corrected=False)
+        jacobian = points.jacobian[..., 0]
+        rows = self.independent(jacobian)
+        return dataclasses.replace(place, jacobian=jacobian, rows=place.rows if rows is None else rows)
+
+    def directed(self, place: Place, direction: Float[np.ndarray, " unknown"]) -> Place:
+        """Return a place with a straight line in a direction in the place of its series."""
+        pose_type = self.model.pose_type
+        shift, turn = self.parts(direction)
+        first = {"position": shift, "angle": turn[0]} if pose_type is PlanarPose else {"position": shift}
+        if "quaternion" in place.coordinates:
+            first["quaternion"] = spun(place.coordinates["quaternion"][0], turn)
+        series = {name: np.zeros_like(c) for name, c in place.coordinates.items()}
+        for name, c in place.coordinates.items():
+            series[name][0], series[name][1] = c[0], first[name]
+        value = np.zeros_like(place.value)
+        value[0] = place.value[0]
+        value[1] = direction[-1] * self.value_scale if self.driven else 0.0
+        return dataclasses.replace(place, coordinates=series, value=value)
+
+    def parts(self, direction: Float[np.ndarray, " unknown"]) -> tuple[np.ndarray, np.ndarray]:
+        """Return shifts, (components, bodies) in m, and turns of all bodies in a direction, the ground first."""
+        system, shifts = self.model.system, self.model.pose_type.shifts
+        shift, turn = system.coordinates(direction[: self.columns, None], shifts)
+        return np.asarray(shift)[..., 0], np.asarray(turn)[..., 0]
+
+    def begun(self, place: Place, direction: Float[np.ndarray, " unknown"] | None = None) -> Place:
+        """Return a place with its series, in a direction; unless told, that in which the value grows."""
+        rows = place.rows
+        jacobian = self.with_jacobian(place).jacobian
+        tangent = self.null_space(jacobian[rows], 0.0)[:, -1] if direction is None else direction
+        if direction is None and self.driven:
+            tangent = tangent if tangent[-1] >= 0 else -tangent
+        tangent = tangent[: self.columns]
+        for _ in range(2):  # the second time along the series that the first gave
+            points = self.points(place, np.zeros(1), tangent)
+            place = self.place(points, 0, place.arc_length, rows)
+        return place
+
+    def scaled_at(self, place: Place) -> "Walker":
+        """Return the walker with the value counted in a unit that makes its largest derivative one."""
+        if not self.driven:
+            return self
+        largest = float(np.max(np.abs(place.jacobian[:, -1]), initial=0.0))
+        return dataclasses.replace(self, value_scale=self.value_scale / largest if largest > 0 else 1.0)
+
+    def place(self, points: CurvePoints, lane: int, arc_length: float, rows: Int[np.ndarray, " row"]) -> Place:
+        """Return one of some points as a place."""
+        coordinates = {name: np.array(c[..., lane]) for name, c in points.coordinates.items()}
+        jacobian = np.array(points.jacobian[..., lane])
+        if len(jacobian) > len(rows):
+            chosen = self.independent(jacobian)
+            rows = rows if chosen is None else chosen
+        slope = np.array(points.slope[..., lane])
+        return Place(arc_length, coordinates, np.array(points.value[:, lane]), jacobian, slope, rows)
+
+    def points(
+        self, places: "Place | list[Place]", steps: np.ndarray, tangent: Any = None, *, corrected: bool = True
+    ) -> CurvePoints:
+        """Return points of the curve some steps from one place, or from one place each with the same rows."""
+        several = [places] if isinstance(places, Place) else places
+        rows, count = several[0].rows, len(steps)
+
+        def lanes(parts: list[np.ndarray]) -> np.ndarray:
+            parts = [*parts, *[parts[-1]] * (LANES - len(parts))]
+            return np.stack(parts, axis=-1)
+
+        coordinates = {name: lanes([p.coordinates[name] for p in several]) for name in several[0].coordinates}
+        directions = [self.tangent(p)[: self.columns] for p in several] if tangent is None else [tangent]
+        padded = np.concatenate([steps, np.full(LANES - count, steps[-1])])
+        found = curve_points(
+            self.model.system,
+            coordinates,
+            lanes([p.value for p in several]),
+            lanes(directions),
+            padded,
+            np.asarray(corrected),
+            rows.astype(np.int32),
+            np.asarray(self.value_scale),
+            pose_type=self.model.pose_type,
+            order=ORDER,
+            driven=self.driven,
+        )
+        cut = {name: np.asarray(x)[..., :count] for name, x in found.coordinates.items()}
+        others = [np.asarray(x)[..., :count] for x in found[1:]]
+        return CurvePoints(cut, *others)
+
+    # what series tell
+
+    def column(self, positions: Numbers, turns: Numbers) -> np.ndarray:
+        """Return shifts and turns of all bodies, shapes (components, bodies, ...), as scaled columns without ground."""
+        parts = np.concatenate([positions / self._scaled_lengths(positions), turns])[:, 1:]
+        return np.moveaxis(parts, 1, 0).reshape(self.columns, *parts.shape[2:])
+
+    def _scaled_lengths(self, positions: Numbers) -> np.ndarray:
+        return self._lengths.reshape(-1, *[1] * (np.ndim(positions) - 1))
+
+    def rates(self, coordinates: dict[str, np.ndarray], value: np.ndarray) -> np.ndarray:
+        """Return the direction of a curve from its series, in all unknowns, shape (unknowns, ...)."""
+        if self.is_planar:
+            turns = coordinates["angle"][1][None]
+        else:
+            turns = spin(coordinates["quaternion"][0], coordinates["quaternion"][1])
+        column = self.column(coordinates["position"][1], turns)
+        return np.concatenate([column, value[1][None] / self.value_scale]) if self.driven else column
+
+    def tangent(self, place: Place) -> Float[np.ndarray, " unknown"]:
+        """Return the direction of the curve at a place, of length one in the coordinates."""
+        return self.rates(place.coordinates, place.value)
+
+    def _turning(self, place: Place) -> Float[np.ndarray, " unknown"]:
+        """Return the derivative of the direction of the curve along it."""
+        second = {name: np.stack([c[0], 2 * c[2]]) for name, c in place.coordinates.items()}
+        return self.rates(second, np.stack([place.value[0], 2 * place.value[2]]))
+
+    def difference(self, there: dict[str, np.ndarray], here: dict[str, np.ndarray]) -> Float[np.ndarray, " column"]:
+        """Return shifts and turns from one configuration to another, scaled; whole turns do not count."""
+        if self.is_planar:
+            turns = principal(there["angle"] - here["angle"])[None]
+        else:
+            turns = spin(here["quaternion"], there["quaternion"])
+            turns = turns * np.where(np.sum(here["quaternion"] * there["quaternion"], axis=0) < 0, -1.0, 1.0)
+        return self.column(there["position"] - here["position"], turns)
+
+    def terms(self, place: Place) -> Float[np.ndarray, " order"]:
+        """Return the size of each coefficient but the first, rad or sizes of the mechanism."""
+        scaled = place.coordinates["position"][1:] / self._lengths
+        attitude = place.coordinates["angle" if self.is_planar else "quaternion"][1:]
+        sizes = [np.abs(x).reshape(len(x), -1).max(axis=1) for x in (scaled, attitude)]
+        found = np.maximum(*sizes)
+        return np.where(np.isfinite(found), found, np.inf)
+
+    def radius(self, place: Place, highest: int = ORDER) -> float:
+        """Return about how far the series converges, by its coefficients from the first to some order; at most one."""
+        terms = np.maximum(self.terms(place)[1:highest], 1.0)
+        return float(np.min(terms ** (-1.0 / np.arange(2, highest + 1))))
+
+    def bordered(self, jacobian: np.ndarray, rates: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        """Return the independent rows with that of arc length below, (..., unknowns, unknowns); lanes first."""
+        border = rates.copy()
+        border[..., self.columns :] = 0.0
+        return np.concatenate([jacobian[..., rows, :], border[..., None, :]], axis=-2)
+
+    def signs(self, points: CurvePoints, rows: np.ndarray) -> Float[np.ndarray, " lane"]:
+        """Return the signs of the determinants of the bordered Jacobians of some points."""
+        rates = np.moveaxis(self.rates(points.coordinates, points.value), -1, 0)
+        whole = self.bordered(np.moveaxis(points.jacobian, -1, 0), rates, rows)
+        return np.linalg.slogdet(np.where(np.isfinite(whole), whole, 0.0))[0]
+
+    def nearing(self, place: Place) -> complex:
+        """Return the arc length to the nearest place where the bordered Jacobian is singular; it may be complex.
+
+        As for motions in time (see `turnover`): minus the inverse of the eigenvalue of ``B^-1 B'`` of largest size.
+        """
+        matrix = self.bordered(place.jacobian, self.tangent(place), place.rows)
+        slope = self.bordered(place.slope, self._turning(place), place.rows)
+        try:
+            values = np.linalg.eigvals(np.linalg.solve(matrix, slope))
+        except np.linalg.LinAlgError:
+            return 0j
+        largest = values[np.argmax(np.abs(values))]
+        return complex(-1 / largest) if abs(largest) > 0 else complex(np.inf)
+
+    # rank
+
+    def independent(self, jacobian: Float[np.ndarray, "row unknown"]) -> Int[np.ndarray, " independent"] | None:
+        """Return rows that are independent, one less than unknowns; None where there are not so many."""
+        wanted = self.unknowns - 1
+        if len(jacobian) == wanted:
+            return np.arange(wanted)
+        if len(jacobian) < wanted:
+            return None
+        from scipy.linalg import qr  # here, since importing SciPy takes half a second
+
+        order = np.asarray(qr(jacobian.T, mode="r", pivoting=True)[-1])
+        return np.sort(order[:wanted])
+
+    def null_space(
+        self, jacobian: Float[np.ndarray, "row unknown"], tolerance: float = RANK_TOLERANCE
+    ) -> Float[np.ndarray, "unknown k"]:
+        """Return an orthonormal basis of the directions that no row forbids."""
+        _, sizes, right = np.linalg.svd(jacobian)
+        return right[_rank(sizes, tolerance) :].T
+
+    def left_null_space(
+        self, jacobian: Float[np.ndarray, "row unknown"], tolerance: float = RANK_TOLERANCE
+    ) -> Float[np.ndarray, "row k"]:
+        """Return an orthonormal basis of the combinations of rows that vanish."""
+        left, sizes, _ = np.linalg.svd(jacobian)
+        return left[:, _rank(sizes, tolerance) :]
+
+    def second_order(self, place: Place, directions: Float[np.ndarray, "unknown k"]) -> Float[np.ndarray, "row k"]:
+        """Return half the second derivatives of the residual along directions."""
+        coordinates = {name: c[0][..., None] for name, c in place.coordinates.items()}
+        scale, value = np.asarray(self.value_scale if self.driven else 0.0), np.asarray(place.value[0])
+        found = []
+        for first in range(0, directions.shape[1], LANES):
+            some = directions[:, first : first + LANES]
+            padded = np.zeros((self.columns + 1, LANES))
+            padded[: self.unknowns, : some.shape[1]] = some
+            arguments = (self.model.system, coordinates, value, padded, scale)
+            found.append(np.asarray(second_order(*arguments, pose_type=self.model.pose_type))[:, : some.shape[1]])
+        return np.concatenate(found, axis=1)
+
+
+def _rank(sizes: Float[np.ndarray, " k"], tolerance: float) -> int:
+    return int(np.sum(sizes > tolerance * sizes.max(initial=0.0)))
+
+
+def spun(quaternion: np.ndarray, turn: np.ndarray) -> np.ndarray:
+    """Return how Euler parameters, (4, bodies), change with turns about the axes of the bodies, (3, bodies)."""
+    e0, e = quaternion[0], quaternion[1:]
+    return 0.5 * np.concatenate([-np.sum(e * turn, axis=0)[None], e0 * turn + np.cross(e, turn, axis=0)])
+
+
+def spin(quaternion: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Return twice the vector part of the product of an attitude's conjugate with other Euler parameters."""
+    e0, e = quaternion[0], quaternion[1:]
+    f0, f = other[0], other[1:]
+    return 2.0 * (e0 * f - f0 * e - np.cross(e, f, axis=0))
+
+
+def all_finite(points: CurvePoints) -> Bool[np.ndarray, " lane"]:
+    """Tell which points are finite with the series of the curve."""
+    parts = (*points.coordinates.values(), points.value)
+    return np.all([np.isfinite(x).reshape(-1, x.shape[-1]).all(axis=0) for x in parts], axis=0)

@@ -1,0 +1,54 @@
+"""Which reactions are wanted where redundant constraints leave some open: checked, and with numbers for expressions."""
+
+import math
+from collections.abc import Collection, Mapping
+from typing import Any
+
+from jounce.errors import JounceError, MechanismError, check_name
+from jounce.mechanism.resolve import resolve
+
+CHOICES = ("unique", "least_norm")
+STIFFNESSES = {"force": "stiffness", "torque": "torsional stiffness"}
+PLACE = "redundant_reactions"
+
+
+def check_redundant_reactions(wanted: Any, names: Collection[str]) -> None:
+    """Raise MechanismError unless it is one of the choices, or stiffnesses by the names of joints."""
+    if not isinstance(wanted, Mapping):
+        if wanted not in CHOICES:
+            message = f"must be one of {', '.join(CHOICES)}, or stiffnesses by the names of joints"
+            raise MechanismError(message, name=PLACE, value=wanted)
+        return
+    if not wanted:
+        raise MechanismError("must name a joint with its stiffness", name=PLACE, value=dict(wanted))
+    for name, stiffness in wanted.items():
+        check_name("joint", name, names, MechanismError, name=PLACE)
+        if not isinstance(stiffness, Mapping) or not stiffness or not set(stiffness) <= set(STIFFNESSES):
+            message = "must be the stiffness of the joint: force, N/m, and torque, N m/rad, or one of them"
+            raise MechanismError(message, name=f"{PLACE}.{name}", value=stiffness)
+
+
+def resolved_reactions(wanted: Any, parameters: Mapping[str, Any]) -> str | dict[str, dict[str, float]]:
+    """Return what is wanted with numbers for expressions of the parameters.
+
+    Raises
+    ------
+    MechanismError
+        If a stiffness is no number above zero.
+    """
+    if not isinstance(wanted, Mapping):
+        return wanted
+    return {
+        name: {key: _positive(value, f"{PLACE}.{name}.{key}", parameters) for key, value in stiffness.items()}
+        for name, stiffness in wanted.items()
+    }
+
+
+def _positive(given: Any, name: str, parameters: Mapping[str, Any]) -> float:
+    try:
+        value = resolve(given, parameters)
+    except JounceError as error:
+        raise error.located(name=name) from None
+    if not (isinstance(value, float) and 0 < value < math.inf):
+        raise MechanismError("a stiffness must be a number above zero", name=name, value=given)
+    return float(value)

@@ -1,0 +1,119 @@
+"""Curves of configurations: the paths of points, circuit by circuit, and outputs against the driver."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from jounce.errors import MechanismError, check_name
+from jounce.kinematics import Curve
+from jounce.mechanism import PointOutput
+from jounce.plot.labels import scale_of, symbol, unit_label
+from jounce.plot.style import GREY, LINE_COLOURS, blank_figure, set_ticks, shown_name, style
+
+__all__ = ["draw_curves"]
+
+SIDE = 3.6  # inches
+MARKS = {"maximum": "^", "minimum": "v", "stationary": "s"}
+PROJECTIONS = ((0, 1), (0, 2), (1, 2))
+
+
+def draw_curves(curves: Curve | Sequence[Curve], outputs: Sequence[str] | None = None) -> Any:
+    r"""Draw curves of configurations of one mechanism: paths of points, and other outputs against the driver's value.
+
+    Parameters
+    ----------
+    curves : Curve or sequence of Curve
+        One, or the circuits of a mechanism, each in a colour of its own.
+    outputs : sequence of str, optional
+        Which; all unless given.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        A panel for each output, for a point in space one for each projection. Limit positions are marked by triangles,
+        change points by crosses.
+
+    Raises
+    ------
+    MechanismError
+        If there is no output, or none has the name.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> from jounce.plot import draw_curves
+    >>> figure = draw_curves(jn.trace(jn.load("examples/four_bar.yaml")))
+    >>> [axes.get_xlabel() for axes in figure.axes]
+    ['theta  (rad)', '$C_{x}$  (m)']
+    """
+    several = [curves] if isinstance(curves, Curve) else list(curves)
+    if not several:
+        raise MechanismError("there is no curve to draw", name="curves", value=[])
+    known = several[0].outputs
+    for name in outputs or ():
+        check_name("output", name, known, MechanismError, name="outputs")
+    panels = _panels(several[0], list(outputs or known))
+    if not panels:
+        raise MechanismError("there is nothing to draw; name some outputs", name="outputs")
+    title = several[0].mechanism.title
+    with style():
+        wide = min(len(panels), 3)
+        tall = -(-len(panels) // wide)
+        figure = blank_figure(SIDE * wide + 0.5, SIDE * tall + 0.4 + 0.3 * (len(several) > 1), title)
+        grid = np.atleast_1d(figure.subplots(tall, wide)).ravel()
+        for axes in grid[len(panels) :]:
+            axes.set_axis_off()
+        for axes, panel in zip(grid, panels, strict=False):
+            _draw_panel(axes, several, *panel)
+        if len(several) > 1:
+            handles, labels = grid[0].get_legend_handles_labels()
+            figure.legend(handles, labels, loc="outside lower center", ncols=min(4, len(several)))
+    return figure
+
+
+Panel = tuple[str, tuple[int, ...]]
+"""An output with the components of a path, or with none."""
+
+
+def _panels(curve: Curve, names: Sequence[str]) -> list[Panel]:
+    found: list[Panel] = []
+    for name in names:
+        values = curve.outputs[name]
+        if isinstance(curve.mechanism.outputs[name], PointOutput):
+            pairs = PROJECTIONS if values.shape[-1] == 3 else PROJECTIONS[:1]
+            found += [(name, pair) for pair in pairs]
+        elif values.ndim == 2:
+            found.append((name, ()))
+    return found
+
+
+def _draw_panel(axes: Any, curves: Sequence[Curve], name: str, pair: tuple[int, ...]) -> None:
+    output = curves[0].mechanism.outputs[name]
+    exponent = scale_of(np.concatenate([curve.outputs[name][:, 0].ravel() for curve in curves]))
+    unit = unit_label(output.unit, 0, exponent)
+    for number, curve in enumerate(curves):
+        values = curve.outputs[name][:, 0] * 10.0**-exponent
+        along = curve.arc_lengths if curve.driver is None else curve.values[:, 0]
+        x, y = (values[:, k] for k in pair) if pair else (along, values)
+        colour = LINE_COLOURS[number % len(LINE_COLOURS)]
+        axes.plot(x, y, color=colour, label=f"circuit {number + 1}")
+        told = [(point.arc_length, MARKS[point.kind]) for point in curve.limits]
+        told += [(point.arc_length, "x") for point in curve.change_points]
+        for arc_length, mark in told:
+            at = int(np.argmin(np.abs(curve.arc_lengths - arc_length)))
+            axes.plot(x[at], y[at], marker=mark, color=GREY, fillstyle="none", markersize=5.5, linestyle="", zorder=4)
+    if pair:
+        for label, k in zip((axes.set_xlabel, axes.set_ylabel), pair, strict=True):
+            label(f"{symbol(name, 0, output.labels[k]) or shown_name(name)}  ({unit})")
+        axes.set_aspect("equal", adjustable="datalim")
+    else:
+        driver = curves[0].driver
+        axes.set_xlabel("arc length" if driver is None else f"{driver}  ({curves[0].unit})")
+        axes.set_ylabel(f"{symbol(name, 0, '') or shown_name(name)}  ({unit})")
+    for axis in (axes.xaxis, axes.yaxis):
+        set_ticks(axis, 5)
+    axes.ticklabel_format(useOffset=False)
+    axes.margins(0.06)

@@ -1,0 +1,100 @@
+"""Laws of segments and of pieces in files, and laws of the coordinate of another driver."""
+
+import numpy as np
+import pytest
+
+import jounce as jn
+from jounce.io.mechanisms.writer import write_mechanism
+
+FILE = """
+space: planar
+parameters: {lift: 20 mm, speed: 60 rpm}
+bodies: {shaft: {position: [0, 0]}, follower: {position: [0, 50 mm]}, table: {position: [1, 0]}}
+joints:
+  O: {type: revolute, bodies: [ground, shaft], points: [[0, 0], [0, 0]]}
+  guide: {type: prismatic, bodies: [ground, follower], points: [[0, 0], [0, 0]], vectors: [[0, 1], [0, 1]]}
+  T: {type: revolute, bodies: [ground, table], points: [[1, 0], [0, 0]]}
+drivers:
+  shaft_angle: {type: coordinate, bodies: [ground, shaft], coordinate: angle, motion: speed*t}
+  cam:
+    type: coordinate
+    bodies: [ground, follower]
+    coordinate: y
+    motion:
+      profile:
+        - {profile: dwell, duration: 60 deg}
+        - {profile: modified_sine, duration: 120 deg, by: lift}
+        - {profile: polynomial_3_4_5, duration: 180 deg, to: 50 mm}
+      initial: 50 mm
+      beyond: repeat
+      of: shaft_angle
+  index:
+    type: coordinate
+    bodies: [ground, table]
+    coordinate: angle
+    motion: {piecewise: [{until: 0.5 s, expression: t^2}, {expression: t - 0.25}]}
+outputs:
+  y: {body: follower, quantity: angle}
+"""
+
+
+def loaded(tmp_path, text):
+    path = tmp_path / "cam.yaml"
+    path.write_text(text.replace("t^2", "t**2"))
+    return jn.load(path)
+
+
+def values(law, parameters, instants):
+    jet = law.resolved(parameters)(jn.Jet.variable(np.asarray(instants, float), 3))
+    return np.asarray(jet.derivatives())
+
+
+def test_files_hold_them_and_are_the_same_after_they_were_written(tmp_path):
+    mechanism = loaded(tmp_path, FILE)
+    parameters, instants = mechanism.parameter_values, [0.1, 1 / 3, 0.4, 0.9, 7.4]
+    lift = values(mechanism.drivers["cam"].motion, parameters, instants)
+    assert lift[0, 1] == pytest.approx(0.06)  # half of the rise, at 120 degrees
+    assert lift[1, 1] == pytest.approx(1.7596 * 0.02 / (1 / 3), rel=1e-4)
+    assert values(mechanism.drivers["cam"].motion, parameters | {"lift": 0.03}, [0.5])[0] == pytest.approx(0.08)
+    np.testing.assert_allclose(values(mechanism.drivers["index"].motion, {}, [0.4, 0.6])[:2], [[0.16, 0.35], [0.8, 1]])
+    write_mechanism(mechanism, tmp_path / "again.yaml")
+    again = jn.load(tmp_path / "again.yaml")
+    assert "of: shaft_angle" in (tmp_path / "again.yaml").read_text()
+    for name in ("cam", "index"):
+        before, after = (values(m.drivers[name].motion, parameters, instants) for m in (mechanism, again))
+        np.testing.assert_array_equal(before, after)
+
+
+def test_samples_may_be_those_of_a_cam(tmp_path):
+    angle = np.linspace(0, 2 * np.pi, 37)
+    rows = "".join(f"{x!r},{float(0.01 * (1 - np.cos(x)))!r}\n" for x in angle.tolist())
+    (tmp_path / "cam.csv").write_text(f"angle,lift\n{rows}")
+    start, stop = FILE.index("    motion:\n      profile"), FILE.index("  index:")
+    law = "    motion: {samples: cam.csv, time: angle, value: lift, beyond: repeat, of: shaft_angle}\n"
+    mechanism = loaded(tmp_path, FILE[:start] + law + FILE[stop:])
+    found = values(mechanism.drivers["cam"].motion, mechanism.parameter_values, [2.3])
+    turn = 2 * np.pi
+    wanted = [0.01 * (1 - np.cos(turn * 2.3)), 0.01 * turn * np.sin(turn * 2.3)]
+    np.testing.assert_allclose(found[:2, 0], wanted, rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    "old, new, name, words",
+    [
+        ("profile: modified_sine", "profile: modified_sin", "drivers.cam.motion.profile[1].profile", "modified_sine"),
+        ("duration: 60 deg", "duration: 60 deg, too: 1", "drivers.cam.motion.profile[0].too", "unknown key"),
+        ("of: shaft_angle", "of: shaft", "drivers.cam.motion.of", "shaft"),
+        ("of: shaft_angle", "of: cam", "drivers.cam.motion.of", "circle: cam -> cam"),
+        ("to: 50 mm", "to: 51 mm", "drivers.cam.motion", "do not end where they begin"),
+        ("by: lift", "by: 20 deg", "drivers.cam.motion.profile[1].by", "a length"),
+        ("until: 0.5 s", "until: 0.5 m", "drivers.index.motion.piecewise[0].until", "a time"),
+        ("until: 0.5 s, ", "", "drivers.index.motion.piecewise[0]", "expression and until"),
+        ("beyond: repeat", "beyond: again", "drivers.cam.motion.beyond", "no such way"),
+    ],
+)
+def test_what_is_wrong_is_named_with_its_line(tmp_path, old, new, name, words):
+    assert old in FILE
+    with pytest.raises(jn.MechanismFileError, match=words) as caught:
+        loaded(tmp_path, FILE.replace(old, new))
+    assert caught.value.line is not None
+    assert caught.value.name.startswith(name)
