@@ -80,3 +80,23 @@ def test_what_cannot_be_traced_is_told():
 
     with pytest.raises(jn.UnsupportedError, match=r"jn\.Taylor\(\)"):
         jax.grad(by_formulas)(2.0)
+
+
+def test_redundant_constraints_are_refused():
+    hinge = {"axis_i": [0, 0, 1], "axis_j": [0, 0, 1]}
+    door = jn.Mechanism(
+        space="spatial",
+        parameters={"m": 3.0, "c": 0.5},
+        bodies={"door": jn.Body([0, 0, 0], mass="m", inertia=[0.1, 0.2, 0.3], center_of_mass=["c", 0, 0.4])},
+        joints={
+            "lower": jn.spatial.Revolute(("ground", "door"), [0, 0, 0], [0, 0, 0], **hinge),
+            "upper": jn.spatial.Revolute(("ground", "door"), [0, 0, 0.8], [0, 0, 0.8], **hinge),
+        },
+        outputs={"corner": jn.PointOutput("door", [1, 0, 0])},
+    )
+
+    def last(mass):
+        return jn.simulate(door.with_parameters(m=mass), [0.0, 0.1], order=1).outputs["corner"][-1, 0, 0]
+
+    with pytest.raises(jn.MechanismError, match="gradients of mechanisms with redundant constraints are not there"):
+        jax.grad(last)(3.0)

@@ -214,7 +214,7 @@ def _with_datum(group: Group, pose: SpatialPose, known: Any, near: Any) -> Group
     if hasattr(element, "role"):  # a driver or a force acts about the axis, see `axis_angles`
         second = jnp.asarray(element.vector_j)
         along = body_j.to_body(body_i.direction(axis)).coefficients[0]
-        across = second - (second * along).sum(axis=0) * along
+        across = second - (second * along).sum(axis=0, keepdims=True) * along
     return group.holding("datum", Datum(attitude, known, near, across))
 
 
