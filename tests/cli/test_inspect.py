@@ -311,6 +311,7 @@ def test_the_nearest_name_is_suggested(run, arguments, part):
     assert part in err
 
 
+@pytest.mark.slow
 def test_mobility_is_told_in_words_and_as_data(facts, run):
     status, data, _ = facts("inspect", EXAMPLES / "sarrus.yaml")
     assert (status, data["ok"]) == (0, True)
@@ -323,6 +324,7 @@ def test_mobility_is_told_in_words_and_as_data(facts, run):
     assert "1 degree of freedom, finite to order 10" in out
 
 
+@pytest.mark.slow
 def test_reactions_that_are_not_unique_are_nan_and_told(run, tmp_path):
     text = (EXAMPLES / "four_bar_in_space.yaml").read_text()
     path = tmp_path / "a.yaml"

@@ -105,6 +105,7 @@ def test_conditions_that_contradict_each_other_or_the_joints():
     refused(jn.AssemblyError, "joints, drivers and initial conditions contradict", with_initial(a=shifted))
 
 
+@pytest.mark.slow
 def test_conditions_drivers_and_joints_that_say_the_same_twice_must_agree():
     begun = jn.simulate(with_initial(a=turn("bob", 0.3), b=turn("bob", "0.3")), [0.0], order=1)
     assert begun.mobility.startswith("1 degree of freedom")

@@ -180,4 +180,4 @@ def test_nearly_singular_factor_is_singular():
     matrix = np.diag([1.0, 1.0, 1e-13])[:, :, None]
     ratio = DenseFactor.of(jnp.asarray(matrix)).pivot_ratio()
     yes = jnp.ones(1, bool)
-    assert int(_status(jnp.zeros(1), yes, ratio, yes, yes, 1e-12)[0]) == Status.SINGULAR
+    assert int(_status(jnp.zeros(1), yes, ratio, yes, yes, yes, 1e-12)[0]) == Status.SINGULAR

@@ -202,6 +202,10 @@ def test_the_walk_meets_every_key_of_the_schema():
         "order",
         "value",
         "beyond",
+        "assembly",
+        "of",
+        "piecewise",
+        "until",
     }
     named = {"planar": set(), "spatial": set()}
     for space, found in named.items():
