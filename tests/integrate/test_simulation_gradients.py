@@ -82,6 +82,7 @@ def test_what_cannot_be_traced_is_told():
         jax.grad(by_formulas)(2.0)
 
 
+@pytest.mark.slow
 def test_redundant_constraints_are_refused():
     hinge = {"axis_i": [0, 0, 1], "axis_j": [0, 0, 1]}
     door = jn.Mechanism(
