@@ -80,17 +80,30 @@ class Assemblies(Displayed, Sequence[Assembly]):
         How many of them came after that which found the last new one: the larger, the less may be missing.
     circuits : tuple of Curve
         One curve of each circuit.
+    movable : int
+        How many starts led to configurations in which the mechanism can move although its drivers are held. There is
+        no end of them, so that they are not among the assemblies.
     """
 
-    def __init__(self, found: Sequence[Assembly], starts: int, since_last_new: int, circuits: tuple[Curve, ...] = ()):
-        self._found = tuple(found)
-        self.starts, self.since_last_new, self.circuits = starts, since_last_new, circuits
+    def __init__(
+        self,
+        found: Sequence[Assembly],
+        starts: int,
+        since_last_new: int,
+        circuits: tuple[Curve, ...] = (),
+        movable: int = 0,
+    ):
+        self._found, self.circuits, self.movable = tuple(found), circuits, movable
+        self.starts, self.since_last_new = starts, since_last_new
 
     def __repr__(self) -> str:
         parts = [f"{len(self)} assemblies" if len(self) != 1 else "1 assembly"]
         if self.circuits:
             parts.append(f"{len(self.circuits)} circuit{'s' * (len(self.circuits) != 1)}")
-        return f"<Assemblies {', '.join(parts)}, {self.starts} starts, {self.since_last_new} since the last new one>"
+        parts += [f"{self.starts} starts", f"{self.since_last_new} since the last new one"]
+        if self.movable:
+            parts.append(f"{self.movable} to configurations that move with the drivers held")
+        return f"<Assemblies {', '.join(parts)}>"
 
     def __len__(self) -> int:
         return len(self._found)
@@ -213,7 +226,7 @@ class _Search:
         self.found: list[_Found] = []
         as_drawn = trial.coordinates if trial.closed else model.guess
         self.senses = senses(self.system, {name: np.asarray(x)[..., 0] for name, x in as_drawn.items()})
-        self.starts = self.since_last_new = 0
+        self.starts = self.since_last_new = self.movable = 0
         if trial.closed:
             check_mobility(self.model, trial.jacobian, redundancy_of(self.first, trial, instant)[1])
             self.add({name: x[..., 0] for name, x in trial.coordinates.items()}, hits=0)
@@ -223,12 +236,10 @@ class _Search:
         most = MOST_ROUNDS * count
         while self.starts < count or (self.starts < most and any(x.hits < OFTEN for x in self.found)):
             self._round(min(BATCH, most - self.starts), random)
-            if self._endless():
-                break
-        if not self.found:
+        if not self.found and not self.movable:
             check_assembled(self.first, self.trial, self.instant)
             raise AssemblyError(f"no assembly was found from {self.starts} starts at t = {self.instant:g} s")
-        if self._endless():
+        if not self.found:
             message = (
                 f"at t = {self.instant:g} s the mechanism can move with its drivers held: there is no end of assemblies"
             )
@@ -243,13 +254,17 @@ class _Search:
             self.starts += 1
             self.since_last_new += 1
             if gaps[lane] <= CLOSED and self.add({name: x[..., lane] for name, x in coordinates.items()}):
-                self.since_last_new = 0
-                if self._endless():
-                    return
+                if not self._set_movable_apart():
+                    self.since_last_new = 0
 
-    def _endless(self) -> bool:
-        """Tell whether the assemblies found are all singular, so that they are likely to be those of a surface."""
-        return len(self.found) > MOST_SINGULAR and all(x.smallest < NEARLY_SINGULAR for x in self.found)
+    def _set_movable_apart(self) -> bool:
+        """Take singular ones for parts of a curve or a surface once they are many, dead points being few; tell it."""
+        singular = [x for x in self.found if x.smallest < NEARLY_SINGULAR]
+        if len(singular) <= (0 if self.movable else MOST_SINGULAR):
+            return False
+        self.movable += sum(x.hits for x in singular)
+        self.found = [x for x in self.found if x.smallest >= NEARLY_SINGULAR]
+        return True
 
     def _random_poses(self, random: np.random.Generator) -> dict[str, np.ndarray]:
         """Return random poses of all bodies, the ground where it is."""
@@ -299,19 +314,21 @@ class _Search:
                 curves = traced(begun, self.instant, driver).connected()
                 circuits.append(curves[0])
                 self.found[number].circuit, self.found[number].branch = len(circuits), 1
+                before = 0  # branches of the curves through the same change points
                 for curve in curves:
-                    self._assign(curve, len(circuits))
+                    self._assign(curve, len(circuits), before)
+                    before += len(curve.branches)
             number += 1
         return tuple(circuits)
 
-    def _assign(self, curve: Curve, circuit: int) -> None:
-        """Tell the circuit and the branch of all assemblies on a curve."""
+    def _assign(self, curve: Curve, circuit: int, before: int) -> None:
+        """Tell the circuit and the branch of all assemblies on a curve, whose branches come after so many others."""
         for arc_length in curve.where(curve.first_value):
             coordinates = curve.coordinates_at(arc_length)
             self.add(coordinates, hits=0)
             known = self._nearest(coordinates)
             if known.circuit is None:
-                known.circuit, known.branch = circuit, curve.branch_at(arc_length)
+                known.circuit, known.branch = circuit, before + curve.branch_at(arc_length)
 
     def _nearest(self, coordinates: dict[str, np.ndarray]) -> _Found:
         away = [np.max(np.abs(self.walker.difference(coordinates, x.coordinates))) for x in self.found]
@@ -334,4 +351,5 @@ class _Search:
             mechanism = posed(self.mechanism, x.coordinates)
             found.append(Assembly(number, mechanism, circuit, x.branch, x.hits, away[k], x.smallest))
         ranked = sorted(renumbered, key=lambda circuit: renumbered[circuit])
-        return Assemblies(found, self.starts, self.since_last_new, tuple(circuits[k - 1] for k in ranked))
+        ranked_circuits = tuple(circuits[k - 1] for k in ranked)
+        return Assemblies(found, self.starts, self.since_last_new, ranked_circuits, self.movable)
