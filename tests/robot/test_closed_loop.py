@@ -282,6 +282,17 @@ def bennett(a=0.3, b=0.4, alpha=0.7):
 
 
 @pytest.mark.slow
+def test_redundant_equations_of_closures_that_are_kept(five_bar):
+    robot, left_out = five_bar
+    laws = {"left_motor": "0.3*sin(4*t)", "right_motor": "0.2*sin(6*t) - 0.1"}
+    motion = jn.solve(robot.mechanism(drivers=laws, redundant_reactions="unique"), TIME[:2], order=3)
+    np.testing.assert_allclose(torques(motion, robot), torques(left_out, robot)[:2], rtol=0, atol=1e-12)
+    force, before = (jn.joint_reaction(x, "tip").force.values[:2] for x in (motion, left_out))
+    assert np.isnan(force[:, :, 1]).all()  # across the plane of the linkage, which the hinges hold already
+    np.testing.assert_allclose(force[:, :, [0, 2]], before[:, :, [0, 2]], rtol=0, atol=1e-10)
+
+
+@pytest.mark.slow
 def test_linkage_with_more_equations_than_its_mobility_allows():
     robot, ratio = bennett()
     start = {"joint_1": 0.9, "joint_2": 3.0, "joint_3": -0.8}

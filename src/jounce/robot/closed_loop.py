@@ -29,13 +29,15 @@ def mechanism(
     parameters: Mapping[str, Any] | None = None,
     time: Any = None,
     drives: bool = False,
+    redundant_reactions: Any = None,
 ) -> Mechanism:
     """Return a robot as a spatial mechanism, with masses and gravity, its loops closed.
 
     Each moving link is a body of that name, whose frame is that of the link; links fixed to it are part of it, the base
     is the ground. Joints and closures keep their names. The six joints of a base that floats, and the three turns of a
     ball, are one free body, and one spherical joint, unless a coordinate of theirs is driven. A closure holds in those
-    directions only in which the joints do not hold already (`closure_wrenches`).
+    directions only in which the joints do not hold already (`closure_wrenches`), so that reactions in the others are
+    the joints' alone; with `redundant_reactions` it holds in all, and what becomes of its reactions is told by that.
 
     Parameters
     ----------
@@ -62,6 +64,9 @@ def mechanism(
         Add the viscous damping of the joints, as forces named ``A_damping``, and the armature inertia of turning joints
         on the base, as inertia of the link about the axis. Armature of other joints and Coulomb friction cannot be had
         in a mechanism, and are then refused; without, all three are left out.
+    redundant_reactions : {"unique", "least_norm"} or dict of str to dict, optional
+        As of `Mechanism`: reactions without a unique value are NaN, those of least norm, or as stiffnesses of joints
+        share them. The redundant equations of closures must then agree, as those of any mechanism: to 1e-9.
 
     Returns
     -------
@@ -101,8 +106,9 @@ def mechanism(
         loops = Loops(robot)
         free = np.array([name not in driven for name in robot.joint_names], bool)
         start = loops.closed(start, free)
-        found = zip(robot.closures.values(), loops.independent(start), strict=True)
-        joints |= {closure.name: parts.closure(closure, kept) for closure, (kept, _) in found if len(kept)}
+        borne = loops.wrenches if redundant_reactions else [kept for kept, _ in loops.independent(start)]
+        found = zip(robot.closures.values(), borne, strict=True)
+        joints |= {closure.name: parts.closure(closure, kept) for closure, kept in found if len(kept)}
     applied = dict(forces or {})
     if drives:
         applied |= parts.damping()
@@ -117,6 +123,7 @@ def mechanism(
         parameters=parameters or {},
         gravity=robot.gravity.tolist(),
         time=time,
+        redundant_reactions=redundant_reactions or "unique",
         title=robot.name,
     )
 

@@ -253,9 +253,9 @@ class _Search:
         for lane in range(count):
             self.starts += 1
             self.since_last_new += 1
-            if gaps[lane] <= CLOSED and self.add({name: x[..., lane] for name, x in coordinates.items()}):
-                if not self._set_movable_apart():
-                    self.since_last_new = 0
+            new = gaps[lane] <= CLOSED and self.add({name: x[..., lane] for name, x in coordinates.items()})
+            if new and not self._set_movable_apart():
+                self.since_last_new = 0
 
     def _set_movable_apart(self) -> bool:
         """Take singular ones for parts of a curve or a surface once they are many, dead points being few; tell it."""
