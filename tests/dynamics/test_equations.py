@@ -136,15 +136,15 @@ def test_joints_that_follow_others():
 
 @pytest.mark.slow
 def test_all_forms_to_the_fourth_rate():
-    robot, q, right = case(functools.partial(random_robot, 1, 4, prismatic=0.3), order=10, samples=1)
+    robot, q, right = case(functools.partial(random_robot, 1, 4, prismatic=0.3), order=8, samples=1)
     bound = 1e-12  # 1.1e-13 was measured, of Gibbs-Appell with m = 4; most are a few roundings
     agree(newton_euler(robot, q, 4), right, bound)
     agree(virtual_work(robot, q, 4), right, bound)
     agree(lagrange(robot, q, 4), right, bound)
     agree(mangeron_nielsen(robot, q, 4, 2), right, bound)
     agree(gibbs_appell(robot, q, 4, 4), right, bound)
-    agree(higher_order(robot, q, 4, 6)[:, None], right[:, 3:4], bound)
-    agree(higher_order(robot, q, 5)[:, None], right[:, 4:5], bound)
+    agree(higher_order(robot, q, 3, 5)[:, None], right[:, 2:3], bound)
+    agree(higher_order(robot, q, 4)[:, None], right[:, 3:4], bound)
 
 
 # what the paper prints, in fifty digits
@@ -247,13 +247,11 @@ def test_coefficients():
 
 @pytest.mark.slow
 def test_printed_coefficients_fail_from_the_fourth_on():
-    robot, q, right = case(tree, order=10, samples=1)
+    robot, q, right = case(tree, order=8, samples=1)
     for k in (1, 2, 3):
         agree(higher_order(robot, q, k, coefficients=printed_coefficient)[:, None], right[:, k - 1 : k])
-    for k in (4, 5):
-        agree(higher_order(robot, q, k)[:, None], right[:, k - 1 : k], 1e-11)
-        printed = higher_order(robot, q, k, coefficients=printed_coefficient)
-        assert off(printed, right[:, k - 1]) > 0.05
+    agree(higher_order(robot, q, 4)[:, None], right[:, 3:4], 1e-11)
+    assert off(higher_order(robot, q, 4, coefficients=printed_coefficient), right[:, 3]) > 0.05
 
 
 def test_leading_term_with_printed_coefficients():

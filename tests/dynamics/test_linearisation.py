@@ -165,8 +165,8 @@ FOUR_BAR = {"crank": lambda law: jn.drivers.CoordinateDriver(("ground", "crank")
 
 def accelerations(mechanism, makers, place, rates):
     """Second derivatives of outputs at a state that is prescribed by them, and the simulation."""
-    initial = {
-        f"start_{name}": make(f"{float(y)!r} + {float(v)!r}*t")
+    initial = {  # values apart from the law, so that all states are compiled once
+        f"start_{name}": make(jn.ExpressionMotion("place + rate*t", {"place": float(y), "rate": float(v)}))
         for (name, make), y, v in zip(makers.items(), place, rates, strict=True)
     }
     motion = jn.simulate(dataclasses.replace(mechanism, initial=initial), [0.0, 1e-4], order=2)

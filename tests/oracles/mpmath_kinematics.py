@@ -169,12 +169,18 @@ class Model:
             table[-1] = solve(lu, [-r.c[-1] for r in self.residuals(table, motions)])
         return table, lu
 
-    def advance(self, table, t, h, lu):
-        """Return coordinates at t + h: the Taylor prediction, corrected with the factors of the instant before."""
-        x = [self.ctx.mpf(0)] * self.size
-        for row in reversed(table):
-            x = [a * h + b for a, b in zip(x, row, strict=True)]
-        return self.solve_position(x, t + h, 1e-11, lu)
+    def advance(self, past, t, lu):
+        """Return coordinates at an instant: the cubic through those of the last ones, corrected with the factors given.
+
+        Returns them and the factors: others where those are too far from the instant.
+        """
+        weights = ([1], [2, -1], [3, -3, 1], [4, -6, 4, -1])[min(len(past), 4) - 1]
+        x = [sum(w * row[n] for w, row in zip(weights, reversed(past), strict=False)) for n in range(self.size)]
+        try:
+            return self.solve_position(x, t, 1e-8, lu, limit=8), lu
+        except ArithmeticError:
+            lu = factor(self.jacobian(x, self.motions(t, 0)))
+            return self.solve_position(x, t, 1e-8, lu), lu
 
     def commit(self, table):
         """Remember the branch of every angle, so that the next instant continues it; return the outputs."""
@@ -266,15 +272,17 @@ def solve_file(description, order=10, digits=50, count=11):
         rough, fine = Model(description, fp), Model(description, mp)
         chosen, grid = instants(description, count)
         x, times, found = rough.solve_position(rough.start, grid[0], 1e-11), [], {name: [] for name in fine.outputs}
+        past, still = [], [0.0] * rough.size
+        lu = factor(rough.jacobian(x, rough.motions(grid[0], 0)))
         for k, t in enumerate(grid):
-            table, lu = rough.solve_orders(x, t, 3)
-            rough.commit(table)
+            if k:
+                x, lu = rough.advance(past, t, lu)
+            past = [*past[-3:], x]
+            rough.commit([x, still])
             if k in chosen:
                 fine.branch = {name: mp.mpf(a) for name, a in rough.branch.items()}
                 times.append(t)
                 y = fine.solve_position([mp.mpf(a) for a in x], mp.mpf(t), mp.mpf(10) ** (8 - digits))
                 for name, parts in fine.commit(fine.solve_orders(y, mp.mpf(t), order + 1)[0]).items():
                     found[name].append([part.derivatives()[: order + 1] for part in parts])
-            if k + 1 < len(grid):
-                x = rough.advance(table, t, grid[k + 1] - t, lu)
     return times, found
