@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce import forces, planar
+from jounce import forces, planar, spatial
 from jounce.errors import MechanismError, MobilityError, SolveError
 from tests.oracles.mp_small_motions import SprungFourBar
 from tests.problems.mechanisms import example
@@ -53,6 +53,32 @@ def test_all_equilibria_of_a_double_pendulum_are_found():
     places = {tuple(np.round(np.sin([p["angle"] for p in one.poses.values()]), 9)): one.stability for one in found}
     assert places == {(-1, -1): "stable", (1, -1): "unstable", (-1, 1): "unstable", (1, 1): "unstable"}
     assert found[0].stability == "stable"
+
+
+@pytest.mark.slow
+def test_a_rod_turned_over_in_its_hinge_is_no_equilibrium():
+    rod = jn.Body([0, 0, 0], mass=1.0, center_of_mass=[0, 0, -1.0], inertia=[0.1, 0.1, 0.1])
+    pin = spatial.Revolute(("ground", "rod"), [0, 0, 0], [0, 0, 0], [0, 1, 0], [0, 1, 0])
+    tip = jn.PointOutput("rod", [1, 0, -1])
+    pendulum = jn.Mechanism(
+        space="spatial", bodies={"rod": rod}, joints={"pin": pin}, outputs={"tip": tip}, gravity=[0, 0, -9.81]
+    )
+    found = jn.equilibria(pendulum, starts=12)
+    assert [one.stability for one in found] == ["stable", "unstable"]
+    np.testing.assert_allclose([one.outputs["tip"] for one in found], [[1, 0, -1], [-1, 0, 1]], atol=1e-12)
+
+
+@pytest.mark.slow
+def test_all_equilibria_of_a_robot():
+    robot = jn.load_robot("examples/robots/planar_arm.xml")
+    found = jn.equilibria(robot, starts=10, hold="ram")  # each link straight up or down
+    angles = np.array([[one.outputs[name] for name in ("shoulder", "elbow")] for one in found])
+    directions = {tuple(np.round(np.sin(np.cumsum(row)), 9)) for row in angles}
+    assert directions == {(-1, -1), (1, 1), (1, -1), (-1, 1)}
+    assert [one.stability for one in found] == ["stable", *["unstable"] * 3]
+    still = np.zeros((4, 3, 3))
+    still[:, 0, :2] = angles
+    assert np.abs(jn.inverse_dynamics(robot, still)[:, 0, :2]).max() < 1e-12  # the joints that are not held
 
 
 @pytest.mark.slow

@@ -26,10 +26,25 @@ def test_a_mode_swings_about_the_equilibrium_with_its_joints_closed():
     assert "mode 1 of 2: 0.1908 Hz" in longer.notice
 
 
-def test_modes_of_robots_and_of_what_is_held_are_refused():
+@pytest.mark.slow
+def test_a_mode_of_a_robot_moves_its_own_shapes():
+    subject = subject_of("examples/robots/planar_arm.xml", modes=ModesChoice(True, hold=["ram"]))
+    found = subject.solve({p.name: p.value for p in subject.parameters}, 4)
+    robot = subject.subject
+    small = jn.linearise(jn.equilibrium(robot, hold=["ram"]))
+    assert f"mode 1 of 2: {small.modes.frequencies[0]:.4g} Hz" in found.notice
+    assert found.bodies[0] == robot.base
+    assert subject.appearance is not None
+    swung = found.position[:, found.bodies.index("ram")]
+    assert np.ptp(swung, axis=0).max() > 0.01
+
+
+def test_what_modes_are_not_of():
     with pytest.raises(JounceError, match="nothing can move"):
         subject_of(example("press"), modes=ModesChoice(True))
-    with pytest.raises(JounceError, match="modes are shown of mechanisms"):
-        subject_of("examples/robots/panda.urdf", modes=ModesChoice(True))
+    with pytest.raises(JounceError, match="joints are held"):
+        subject_of("examples/robots/panda.urdf", modes=ModesChoice(True, ("motor",)))
+    with pytest.raises(JounceError, match="is for robots"):
+        subject_of(example("press"), modes=ModesChoice(True, hold=["motor"]))
     with pytest.raises(JounceError, match="nothing can move"):
-        ModesSubject(jn.load(example("press")))
+        ModesSubject(jn.load(example("press")), {})

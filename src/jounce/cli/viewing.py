@@ -23,6 +23,7 @@ def view(
     order: int = 4,
     modes: bool = False,
     without: list[str] | None = None,
+    hold: list[str] | None = None,
     reading: MechanismReading = PLAIN_MECHANISM,
 ) -> int:
     r"""Show a mechanism or a robot in the browser, moving.
@@ -47,6 +48,8 @@ def view(
         Show the modes about its equilibrium instead of its motion.
     without
         Driver that is left out of the equilibrium; repeatable.
+    hold
+        Joint of a robot that is held there, or all; repeatable.
 
     Examples
     --------
@@ -72,10 +75,12 @@ def view(
         with expecting(file, "mechanism", "robot"):
             check_ending(file, (*DATA_FILES, *ROBOT_FILES))
             folders = allowed(reading.allow)
-            if without and not modes:
-                raise JounceError("goes with --modes", name="--without")
+            for name, given in (("--without", without), ("--hold", hold)):
+                if given and not modes:
+                    raise JounceError("goes with --modes", name=name)
             opened = {"port": port, "order": order, "open_page": not no_open, "allow": folders}
-            page = show(subject, trajectory, modes=modes, without=without or (), **opened)
+            held = "all" if hold == ["all"] else hold or ()
+            page = show(subject, trajectory, modes=modes, without=without or (), hold=held, **opened)
     say(f"{page.page.recording.title or file.name}: {page.url} (Ctrl-C ends)")
     with raising():
         page.wait()

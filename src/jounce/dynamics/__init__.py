@@ -34,6 +34,7 @@ from jounce.dynamics.equations import (
 )
 from jounce.dynamics.limits import LimitReport as LimitReport, LimitRow as LimitRow, check_limits as check_limits
 from jounce.dynamics.linearisation import Linearisation as Linearisation, StateSpace as StateSpace
+from jounce.dynamics.many_equilibria import equilibria as equilibria
 from jounce.dynamics.modes import Modes as Modes
 from jounce.dynamics.outputs import (
     AppliedForceOutput as AppliedForceOutput,
@@ -51,9 +52,5 @@ from jounce.dynamics.reactions import (
     joint_reaction as joint_reaction,
 )
 from jounce.dynamics.small_motions import linearise as linearise
-from jounce.dynamics.static_equilibrium import (
-    Equilibrium as Equilibrium,
-    equilibria as equilibria,
-    equilibrium as equilibrium,
-)
+from jounce.dynamics.static_equilibrium import Equilibrium as Equilibrium, equilibrium as equilibrium
 from jounce.dynamics.trajectories import trajectory_torques as trajectory_torques

@@ -14,9 +14,9 @@ from jounce.dynamics.robot_states import standing
 from jounce.dynamics.stability import Verdict, judged
 from jounce.dynamics.start import TOLERANCE
 from jounce.dynamics.statics import Found, check_forces, placed, remains, search
-from jounce.errors import MechanismError, SolveError, check_choice, check_name, whole_number
+from jounce.errors import MechanismError, SolveError, check_choice, check_name
 from jounce.kinematics import Motion, Status
-from jounce.kinematics.assembly import assemble, freely_moving, put_together
+from jounce.kinematics.assembly import assemble, freely_moving
 from jounce.kinematics.motion import output_series
 from jounce.mechanism import Body, Mechanism, build, check_mechanism, time_grid
 from jounce.mechanism.law_checks import check_laws
@@ -24,7 +24,6 @@ from jounce.mechanism.preconditions import concrete
 from jounce.robot import Robot
 
 METHODS = ("settle", "newton")
-SAME = 1e-6  # rad or sizes of the mechanism: positions as near count as one
 SINGULAR = "the position is singular, joints can move there that cannot elsewhere; what is near is not told"
 
 
@@ -227,13 +226,7 @@ def equilibrium(
     (-1.0, 'stable')
     """
     robot = isinstance(mechanism, Robot)
-    if robot:
-        mechanism = standing(mechanism, q, hold, torques)
-    elif (given := {"q": q, "hold": hold or None, "torques": torques}) and (
-        unfit := [k for k, v in given.items() if v is not None]
-    ):
-        raise MechanismError("is for robots; a mechanism has its own guess, drivers and forces", name=unfit[0])
-    start = _start(mechanism, time, without, method)
+    start = at_rest_from(as_mechanism(mechanism, q, hold, torques), time, without, method)
     found = search(start, settle=method == "settle")
     if not found.balanced and method == "settle":
         found = min(found, search(start, settle=False), key=lambda f: not f.balanced)
@@ -243,65 +236,26 @@ def equilibrium(
             "by nothing; check forces and gravity, hold what is driven, or guess the bodies nearer to it"
         )
         raise SolveError(message, status=Status.NOT_CONVERGED)
-    return _told(found, start, of_robot=robot)
+    return told(found, start, of_robot=robot)
 
 
-@concrete
-def equilibria(
-    mechanism: Mechanism,
-    time: Any = None,
-    *,
-    starts: Any = 100,
-    seed: Any = 0,
-    without: Sequence[str] = (),
-) -> tuple[Equilibrium, ...]:
-    """Return all equilibria that Newton's method finds from many starts, of every assembly of the mechanism.
-
-    Each start is a random position of all bodies, put together; equilibria within 1e-6 rad and sizes of the mechanism
-    count as one, and those that are indifferent are one of a family.
-
-    Parameters
-    ----------
-    mechanism, time, without
-        As for `equilibrium`.
-    starts : int, default 100
-        How many random positions are tried besides the starting guess.
-    seed : int, default 0
-        Of the random positions.
-
-    Returns
-    -------
-    tuple of Equilibrium
-        The stable ones first, then in the order in which they were found; empty where none was.
+def as_mechanism(subject: Any, q: Any, hold: Any, torques: Mapping[str, float] | None) -> Any:
+    """Return a robot as the mechanism that stands with some joints held, or a mechanism as it is.
 
     Raises
     ------
-    MechanismError, AssemblyError, SolveError
-        As for `equilibrium`, but for one that does not exist.
-
-    Examples
-    --------
-    >>> import jounce as jn
-    >>> pendulum = jn.load("examples/simple_pendulum.yaml")
-    >>> [found.stability for found in jn.equilibria(pendulum, starts=5)]
-    ['stable', 'unstable']
+    RobotError, MechanismError
+        If a name or a value does not fit the robot, or is given for a mechanism.
     """
-    start = _start(mechanism, time, without, "newton")
-    count = whole_number("starts", starts, error=MechanismError)
-    random = np.random.default_rng(whole_number("seed", seed, error=MechanismError))
-    found: list[Equilibrium] = []
-    for place in (start, *(_random_place(start, random) for _ in range(count))):
-        if place is None:
-            continue
-        for settle in (True, False):
-            ended = search(place, settle=settle)
-            if ended.balanced and not any(_same(ended.place, known.place) for known in found):
-                found.append(_told(ended, start))
-    order = ("stable", "held", "indifferent", "undetermined", "unstable")
-    return tuple(sorted(found, key=lambda one: order.index(one.stability)))
+    if isinstance(subject, Robot):
+        return standing(subject, q, hold, torques)
+    given = {"q": q, "hold": hold or None, "torques": torques}
+    if unfit := [k for k, v in given.items() if v is not None]:
+        raise MechanismError("is for robots; a mechanism has its own guess, drivers and forces", name=unfit[0])
+    return subject
 
 
-def _start(mechanism: Mechanism, time: Any, without: Sequence[str], method: str) -> Place:
+def at_rest_from(mechanism: Mechanism, time: Any, without: Sequence[str], method: str) -> Place:
     """Return the mechanism at rest where its bodies can be put together, or raise where something is not valid."""
     check_mechanism(mechanism)
     check_choice("method", method, METHODS, MechanismError)
@@ -349,38 +303,7 @@ def _instant(mechanism: Mechanism, time: Any) -> float:
     return found
 
 
-def _told(found: Found, start: Place, *, of_robot: bool = False) -> Equilibrium:
+def told(found: Found, start: Place, *, of_robot: bool = False) -> Equilibrium:
     """Return the result; a position in which the constraints hold less than they do elsewhere is singular."""
     singular = found.place.free.shape[1] > start.free.shape[1]
     return Equilibrium(found.place, singular, of_robot=of_robot)
-
-
-def _random_place(start: Place, random: np.random.Generator) -> Place | None:
-    """Return the mechanism put together from a random position; None where that does not go."""
-    from jounce.dynamics.statics import displaced
-
-    model, instant = start.model, float(start.clock[0, 0, 0])
-    shape = (len(model.bodies), 1)
-    shift = random.uniform(-1.0, 1.0, (model.pose_type.shifts, *shape)) * model.length
-    turn = random.uniform(-np.pi, np.pi, (model.pose_type.turns, *shape))
-    parts = (np.pad(x, ((0, 0), (1, 0), (0, 0))) for x in (shift, turn))
-    coordinates = {name: x[0] for name, x in start.coordinates.items() if name != "angular_velocity"}
-    moved = {name: np.asarray(x) for name, x in displaced(coordinates, *parts, model.pose_type).items()}
-    if model.rows:
-        trial = put_together(model, instant, TOLERANCE, moved)
-        if not trial.closed:
-            return None
-        moved = trial.coordinates
-    return placed(start.mechanism, model, moved, instant)
-
-
-def _same(one: Place, other: Place) -> bool:
-    """Tell whether two positions are the same but for rounding; whole turns count where a force counts them."""
-    a, b = one.coordinates, other.coordinates
-    if np.abs(one.loads - other.loads).max() > SAME * np.abs(one.loads).max():
-        return False
-    if np.abs(a["position"][0] - b["position"][0]).max() > SAME * one.model.length:
-        return False
-    if "angle" in a:
-        return bool(np.abs(np.sin((a["angle"][0] - b["angle"][0]) / 2)).max() <= SAME)
-    return bool((1 - np.abs((a["quaternion"][0] * b["quaternion"][0]).sum(axis=0))).max() <= SAME**2)

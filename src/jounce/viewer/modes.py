@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
+from typing import Any
 
 from jounce.dynamics import equilibrium, linearise
 from jounce.mechanism import Mechanism
+from jounce.mechanism.mechanism import GROUND
+from jounce.robot import Robot
+from jounce.viewer.appearance import Appearance
 from jounce.viewer.mechanisms import mechanism_parameters, recorded
 from jounce.viewer.recording import Parameter, Recording
 
@@ -19,14 +23,16 @@ LARGEST = 0.5  # rad or sizes of the mechanism
 
 
 class ModesSubject:
-    """The modes of a mechanism about its equilibrium, one at a time, in swings of two seconds.
+    """The modes of a mechanism or a robot about its equilibrium, one at a time, in swings of two seconds.
 
     Parameters
     ----------
-    mechanism : Mechanism
+    subject : Mechanism or Robot
         With masses.
-    without : sequence of str
-        Drivers that are left out.
+    settings
+        For `jounce.equilibrium`: drivers that are left out, or joints of a robot that are held.
+    appearance : Appearance, optional
+        Shapes of the bodies; from joints unless given.
 
     Raises
     ------
@@ -37,19 +43,18 @@ class ModesSubject:
     no_sliders = ""
     loaded = False  # a mode is a shape: its size is free, and so are its forces
 
-    def __init__(self, mechanism: Mechanism, without: tuple[str, ...] = ()):
-        self.mechanism, self.without = mechanism, without
-        self.name = f"Modes: {mechanism.title or 'mechanism'}"
-        count = len(linearise(equilibrium(mechanism, without=without)).modes)
-        own = tuple(dataclasses.replace(each, group="Parameters") for each in mechanism_parameters(mechanism))
-        self._keys = self._unused(mechanism, MODE), self._unused(mechanism, AMPLITUDE)
+    def __init__(self, subject: Mechanism | Robot, settings: Mapping[str, Any], appearance: Appearance | None = None):
+        self.subject, self.settings, self.appearance = subject, settings, appearance
+        robot = isinstance(subject, Robot)
+        self.title, self.ground = (subject.name, subject.base) if robot else (subject.title, GROUND)
+        self.name = f"Modes: {self.title or 'mechanism'}"
+        count = len(linearise(equilibrium(subject, **settings)).modes)
+        own = () if robot else mechanism_parameters(subject)
+        taken = {parameter.name for parameter in own}
+        self._keys = _unused(taken, MODE), _unused(taken, AMPLITUDE)
         chosen = Parameter(self._keys[0], 1.0, 1.0, max(float(count), 1.0 + 1e-9), GROUP)
-        self.parameters = (chosen, Parameter(self._keys[1], 0.1, 0.01, LARGEST, GROUP), *own)
-
-    def _unused(self, mechanism: Mechanism, name: str) -> str:
-        while name in mechanism.parameters:
-            name += "_"
-        return name
+        grouped = (dataclasses.replace(each, group="Parameters") for each in own)
+        self.parameters = (chosen, Parameter(self._keys[1], 0.1, 0.01, LARGEST, GROUP), *grouped)
 
     def solve(self, values: Mapping[str, float], _order: int) -> Recording:
         """Return a mode for some values of the parameters.
@@ -61,12 +66,20 @@ class ModesSubject:
         """
         own = {name: value for name, value in values.items() if name not in self._keys}
         mode, amplitude = (values[key] for key in self._keys)
-        rest = equilibrium(self.mechanism.with_parameters(**own), without=self.without)
+        subject = self.subject.with_parameters(**own) if isinstance(self.subject, Mechanism) else self.subject
+        rest = equilibrium(subject, **self.settings)
         modes = linearise(rest).modes
         number = min(max(round(mode), 1), len(modes))
-        found = recorded(modes.motion(number, amplitude, duration=SWING))
+        motion = modes.motion(number, amplitude, duration=SWING)
+        found = recorded(motion, self.appearance, self.title, self.ground)
         row = modes.rows[number - 1]
         swings = f"{row['frequency']:.4g} Hz, damping ratio {row['damping_ratio']:.3g}"
         told = swings if row["damped_frequency"] else row["kind"]
         notice = f"mode {number} of {len(modes)}: {told}; the equilibrium is {rest.stability}"
         return dataclasses.replace(found, notice=notice, values={**found.values, **values})
+
+
+def _unused(taken: Collection[str], name: str) -> str:
+    while name in taken:
+        name += "_"
+    return name

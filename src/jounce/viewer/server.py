@@ -113,6 +113,7 @@ def view(
     allow: Iterable[str | PathLike[str]] = (),
     modes: bool = False,
     without: Sequence[str] = (),
+    hold: str | Sequence[str] = (),
 ) -> View:
     """Show a mechanism or a robot in the browser: moving, with arrows, plots, forces and live parameters.
 
@@ -137,9 +138,11 @@ def view(
     allow
         Folders besides that of the file that samples and meshes named in it may be below.
     modes : bool, default False
-        Show the natural modes of a mechanism about its equilibrium instead of its motion; a slider chooses one.
+        Show the natural modes about the equilibrium instead of a motion; a slider chooses one.
     without : sequence of str, optional
-        Drivers that are left out of the equilibrium.
+        Drivers of a mechanism that are left out of the equilibrium.
+    hold : sequence of str, or "all", optional
+        Joints of a robot that are held in the equilibrium.
 
     Returns
     -------
@@ -160,7 +163,7 @@ def view(
     True
     """
     check_installed()
-    chosen = ModesChoice(modes, tuple(without))
+    chosen = ModesChoice(modes, tuple(without), hold)
     found = View(subject_of(subject, trajectory, allow, chosen), port=port, order=order, playing=playing)
     if open_page:
         import webbrowser
@@ -170,10 +173,11 @@ def view(
 
 
 class ModesChoice(NamedTuple):
-    """Whether modes are shown instead of a motion, and which drivers are left out then."""
+    """Whether modes are shown instead of a motion, and what is left out or held then."""
 
     wanted: bool = False
     without: tuple[str, ...] = ()
+    hold: str | Sequence[str] = ()
 
 
 def subject_of(
@@ -198,8 +202,10 @@ def subject_of(
         given = (load if path.suffix.lower() in MECHANISM_FILES else load_robot)(path, allow=allow)
     if isinstance(given, Robot):
         if modes.wanted:
-            message = "modes are shown of mechanisms; robot.mechanism(...) and jounce convert make a robot one"
-            raise JounceError(message, path=path, name="modes")
+            if trajectory is not None:
+                message = "modes are about an equilibrium, not along a trajectory"
+                raise JounceError(message, path=path, name="trajectory")
+            return modes_subject(given, modes, path, allow)
         return robot_subject(given, trajectory, path, allow)
     if not isinstance(given, Mechanism):
         message = "must be a mechanism, a robot or the path of a file of one"
@@ -207,12 +213,35 @@ def subject_of(
     if trajectory is not None:
         message = "a mechanism moves by its own drivers; a trajectory is for robots"
         raise JounceError(message, path=path, name="trajectory")
+    if modes.wanted:
+        return modes_subject(given, modes, path)
     try:
-        if modes.wanted:
-            from jounce.viewer.modes import ModesSubject
-
-            return ModesSubject(given, modes.without)
         return MechanismSubject(given)
+    except JounceError as error:
+        raise error.located(path=path) from None
+
+
+def modes_subject(
+    given: Mechanism | Robot, modes: ModesChoice, path: Path | None, allow: Iterable[str | PathLike[str]] = ()
+) -> Any:
+    """Return the modes of a mechanism or a robot as what is looked at.
+
+    Raises
+    ------
+    JounceError
+        If there is no equilibrium, nothing moves about it, or an option is for the other kind.
+    """
+    from jounce.viewer.modes import ModesSubject
+    from jounce.viewer.robot_appearance import robot_appearance
+
+    try:
+        if isinstance(given, Mechanism):
+            if modes.hold:
+                raise JounceError("is for robots; drivers hold a mechanism", name="hold")
+            return ModesSubject(given, {"without": modes.without})
+        if modes.without:
+            raise JounceError("is for mechanisms; a robot has no drivers, its joints are held", name="without")
+        return ModesSubject(given, {"hold": modes.hold}, robot_appearance(given, path, allow))
     except JounceError as error:
         raise error.located(path=path) from None
 
