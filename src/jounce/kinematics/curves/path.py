@@ -17,7 +17,8 @@ from jounce.kinematics.curves.series import CurvePoints
 from jounce.kinematics.curves.walker import LANES, ORDER, TAIL, Place, Walker, all_finite, horner
 
 LARGEST_DEPARTURE = 1e-8  # of the curve from the series, rad or sizes of the mechanism
-LARGEST_CORRECTION = 1e-10  # the last one
+LARGEST_CORRECTION = 1e-10  # the last one, where rounding allows that
+ROUNDINGS = 16  # of a correction, over the smallest singular value: what is left of the last one near a crossing
 LARGEST_RESIDUAL = 1e-9  # of rows that repeat others
 SMALLEST_STEP = 1e-9
 SAME_PLACE = 1e-9
@@ -94,20 +95,25 @@ def _step(walker: Walker, here: Place, reach: float) -> Place | End:
     end = End.SINGULAR
     if not np.isfinite(step):
         return end
-    sign = np.linalg.slogdet(walker.bordered(here.jacobian, walker.tangent(here), here.rows))[0]
+    bordered = walker.bordered(here.jacobian, walker.tangent(here), here.rows)
+    sign, sizes = np.linalg.slogdet(bordered)[0], np.linalg.svd(bordered, compute_uv=False)
+    rounding = ROUNDINGS * np.finfo(float).eps * sizes[0] / max(sizes[-1], np.finfo(float).tiny)
+    correction = np.clip(rounding, LARGEST_CORRECTION, LARGEST_DEPARTURE)
     while step > SMALLEST_STEP:
         points = walker.points(here, step * parts)
-        if np.all(_good(walker, here, points, sign)):
+        if np.all(_good(walker, here, points, sign, correction)):
             return walker.place(points, LANES - 1, here.arc_length + step, here.rows)
         end = End.SINGULAR if np.all(points.admissible) else End.INADMISSIBLE
         step *= 0.5
     return end
 
 
-def _good(walker: Walker, here: Place, points: CurvePoints, sign: float) -> Bool[np.ndarray, " lane"]:
+def _good(
+    walker: Walker, here: Place, points: CurvePoints, sign: float, correction: float
+) -> Bool[np.ndarray, " lane"]:
     """Tell which points are on the curve that the series describes, and on the same branch of it."""
     good = all_finite(points) & points.admissible & (points.residual <= LARGEST_RESIDUAL)
-    good &= (points.first <= LARGEST_DEPARTURE) & (points.last <= LARGEST_CORRECTION)
+    good &= (points.first <= LARGEST_DEPARTURE) & (points.last <= correction)
     return good & (walker.signs(points, here.rows) == sign)
 
 
