@@ -44,8 +44,8 @@ def test_limit_positions_of_random_four_bars(number):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", limit_study.FAMILIES)
 def test_limit_positions_of_many_random_linkages(name):
-    for number in range(60):
-        linkage = limit_study.random_linkage(name, 3, number)
+    for seed, number in [*((3, number) for number in range(25)), (0, 828)]:  # the last misses a crossing by 1e-6
+        linkage = limit_study.random_linkage(name, seed, number)
         assert limit_study.judged(linkage).error < limit_study.LARGEST_ERROR, linkage
 
 
