@@ -143,6 +143,7 @@ from jounce.robot import (
     mass_matrix as mass_matrix,
     operational_accelerations as operational_accelerations,
 )
+from jounce.sweeps import sweep as sweep
 from jounce.trajectory import (
     CycloidalMotion as CycloidalMotion,
     Expression as Expression,

@@ -1,0 +1,1 @@
+"""Design: what varies in a mechanism and how, and what follows from it."""
