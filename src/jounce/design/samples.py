@@ -1,4 +1,4 @@
-"""Designs by number: a grid of values, or a low-discrepancy sequence, made stretch by stretch when they are asked for."""
+"""Designs by number: a grid of values, or a low-discrepancy sequence, made stretch by stretch when asked for."""
 
 import dataclasses
 import math

@@ -128,6 +128,32 @@ class TorquesResult(TrajectoryResult):
     peaks: list[TorquePeak]
 
 
+class SweptPeak(TypedDict):
+    """The least and the largest peak that a derivative of an output has among designs, and the designs."""
+
+    output: str
+    derivative: int
+    unit: str
+    least: float | None
+    least_at: dict[str, float] | None
+    largest: float | None
+    largest_at: dict[str, float] | None
+
+
+class SweepResult(Result):
+    """jounce sweep --json."""
+
+    command: Literal["sweep"]
+    file: str
+    designs: int
+    instants: int
+    vary: list[str]
+    failed: dict[str, int]
+    peaks: list[SweptPeak]
+    checksum: str
+    written: str
+
+
 class ModesResult(Result, ModesFacts):
     """jounce modes --json."""
 
@@ -191,6 +217,7 @@ RESULTS: dict[str, Any] = {
     "check": CheckResult,
     "torques": TorquesResult,
     "modes": ModesResult,
+    "sweep": SweepResult,
     "trace": TraceResult,
     "new_list": NewListResult,
     "new": NewResult,

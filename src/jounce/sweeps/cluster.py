@@ -118,7 +118,8 @@ def _reason(future: Any) -> Exception:
 
 
 def _lost(reason: object) -> ClusterError:
-    return ClusterError(f"the cluster was lost ({str(reason).strip() or type(reason).__name__})")
+    said = str(reason).strip().partition("\n")[0].rstrip(": ") or type(reason).__name__
+    return ClusterError(f"the cluster was lost: its scheduler or all of its workers do not answer ({said})")
 
 
 @contextmanager
@@ -126,7 +127,7 @@ def _client(scheduler: str | None, workers: int | None, timeout: float) -> Itera
     """Give a client of a cluster, which is started on this machine unless it has an address."""
     from distributed import Client, LocalCluster
 
-    with ExitStack() as closing, _quiet():
+    with _quiet(), ExitStack() as closing:
         if scheduler is None:
             if getattr(multiprocessing.current_process(), "_inheriting", False):
                 message = (
@@ -164,10 +165,12 @@ def _client(scheduler: str | None, workers: int | None, timeout: float) -> Itera
 @contextmanager
 def _quiet() -> Iterator[None]:
     """Leave what Dask tells of lost connections to this package."""
-    log = logging.getLogger("distributed")
-    before = log.level
-    log.setLevel(logging.CRITICAL)
+    names = [name for name in logging.root.manager.loggerDict if name.partition(".")[0] == "distributed"]
+    before = {name: logging.getLogger(name).level for name in names}
+    for name in names:
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
     try:
         yield
     finally:
-        log.setLevel(before)
+        for name, level in before.items():
+            logging.getLogger(name).setLevel(level)

@@ -1,4 +1,4 @@
-"""A sweep: all designs of a grid or a sample, on all cores or on a cluster, to a folder that the same call goes on with."""
+"""A sweep: all designs of a grid or a sample, on all cores or on a cluster, to a folder that a call goes on with."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
