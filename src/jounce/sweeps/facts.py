@@ -1,4 +1,4 @@
-"""What a sweep came to, as plain facts: how many designs were solved, and which have the least and largest peaks."""
+"""What a sweep came to, as plain facts: how many designs were solved, and which have extreme peaks."""
 
 import itertools
 from collections import Counter

@@ -88,6 +88,17 @@ class Store:
             found[[int(entry.name) for entry in entries if entry.name.isdecimal()]] = True
         return found
 
+    def is_empty(self) -> bool:
+        """Tell whether no chunk is on the disk."""
+        with suppress(FileNotFoundError), os.scandir(self._mark(0).parent) as entries:
+            return not any(entry.name.isdecimal() for entry in entries)
+        return True
+
+    def remove(self) -> None:
+        """Remove the folder, which no other process may be writing to."""
+        with self.locked():
+            shutil.rmtree(self.folder)
+
     def finish(self, count: int) -> str:
         """Put the digest of the digests of all chunks into the manifest, and return it."""
         digest = hashlib.sha256()

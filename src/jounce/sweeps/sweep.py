@@ -11,7 +11,7 @@ import numpy as np
 
 from jounce.design.samples import sample_space
 from jounce.design.variations import read_variations
-from jounce.errors import JounceError, MechanismError, TrajectoryError, whole_number
+from jounce.errors import JounceError, MechanismError, OutputError, TrajectoryError, whole_number
 from jounce.integrate.methods import AbstractMethod
 from jounce.io.files.reading import recording
 from jounce.mechanism import Mechanism
@@ -161,6 +161,9 @@ def prepare(
     manifest = manifest_of(title, problem, files, space, instants, options)
     manifest["identity"] = fingerprint(manifest)
     variables = variables_of(quantities, list(variations), problem.levels, len(instants), histories=histories)
+    if there is not None and there.is_empty() and _differs(there, manifest, folder):
+        there.remove()  # an attempt of which nothing was computed
+        there = None
     if there is None:
         sizes = {"count": space.count, "chunk": chunk, "levels": problem.levels}
         create(folder, manifest, variables, quantities, instants, **sizes)
@@ -211,6 +214,14 @@ def opened(folder: Path) -> Any:
     import xarray
 
     return xarray.open_zarr(folder, consolidated=True, chunks={} if _has_dask() else None)
+
+
+def _differs(there: Store, manifest: Mapping[str, Any], folder: Path) -> bool:
+    try:
+        check_same(there.manifest, manifest, str(folder))
+    except OutputError:
+        return True
+    return False
 
 
 class _Told:
