@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from jounce.design.samples import Grid, Sobol
+from jounce.design.design_space import Grid, Sobol
 from jounce.errors import JounceError, OutputError
 from jounce.kinematics.threads import thread_count
 from jounce.sweeps.problems import Problem, Quantity

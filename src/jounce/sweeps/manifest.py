@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from jounce.design.samples import Grid, Sobol
+from jounce.design.design_space import Grid, Sobol
 from jounce.design.variations import Values
 from jounce.errors import OutputError
 from jounce.sweeps.fingerprints import fingerprint

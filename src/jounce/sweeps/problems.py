@@ -1,10 +1,11 @@
 """What is swept: motions and simulations of a mechanism, and torques of a robot on a trajectory, for many designs."""
 
+import abc
 import dataclasses
 import functools
 import re
 from collections.abc import Mapping
-from typing import Any, Protocol
+from typing import Any
 
 import jax
 import numpy as np
@@ -68,44 +69,70 @@ class Histories:
     pace: Float[np.ndarray, " design"] | None = None
 
 
-class Problem(Protocol):
+class Problem(abc.ABC):
     """What is computed of every design of a sweep."""
 
     @property
+    @abc.abstractmethod
     def instants(self) -> Float[np.ndarray, " time"]:
         """Instants, s."""
-        ...
+
+    @property
+    @abc.abstractmethod
+    def levels(self) -> int:
+        """Number of derivatives, the quantity itself counted."""
+
+    @property
+    @abc.abstractmethod
+    def nominal(self) -> Mapping[str, float]:
+        """Values of what may vary, SI."""
+
+    @property
+    @abc.abstractmethod
+    def reader(self) -> Reader:
+        """Reads values of what may vary, and refuses other names."""
+
+    @abc.abstractmethod
+    def quantities(self) -> tuple[Quantity, ...]:
+        """Return what is computed."""
+
+    @abc.abstractmethod
+    def options(self) -> dict[str, Any]:
+        """Return what was chosen besides the model, in words and numbers."""
+
+    @abc.abstractmethod
+    def histories(self, designs: Designs, threads: int) -> Histories:
+        """Compute some designs side by side."""
+
+
+class _OfMechanism(Problem):
+    """What follows from the parameters of a mechanism."""
+
+    mechanism: Mechanism
+    order: int
 
     @property
     def levels(self) -> int:
         """Number of derivatives, the quantity itself counted."""
-        ...
+        return self.order + 1
 
     @property
     def nominal(self) -> Mapping[str, float]:
-        """Values of what may vary, SI."""
-        ...
+        """Values of the parameters, SI."""
+        return self.mechanism.parameter_values
 
     @property
     def reader(self) -> Reader:
-        """Reads values of what may vary."""
-        ...
+        """Reads values of parameters, with the units that they may have."""
+        return reader_of(self.mechanism)
 
     def quantities(self) -> tuple[Quantity, ...]:
-        """Return what is computed."""
-        ...
-
-    def options(self) -> dict[str, Any]:
-        """Return what was chosen besides the model, in words and numbers."""
-        ...
-
-    def histories(self, designs: Designs, threads: int) -> Histories:
-        """Compute some designs."""
-        ...
+        """Return the outputs of the mechanism."""
+        return outputs_of(self.mechanism, self.instants, self.order)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Motions:
+class Motions(_OfMechanism):
     """The driven motion of a mechanism in every design; see `jounce.solve_batch`."""
 
     mechanism: Mechanism
@@ -121,40 +148,20 @@ class Motions:
         """Instants, s."""
         return time_grid(self.mechanism.time if self.time is None else self.time, self.mechanism.parameter_values)
 
-    @property
-    def levels(self) -> int:
-        """Number of derivatives, the quantity itself counted."""
-        return self.order + 1
-
-    @property
-    def nominal(self) -> Mapping[str, float]:
-        """Values of the parameters, SI."""
-        return self.mechanism.parameter_values
-
-    @property
-    def reader(self) -> Reader:
-        """Reads values of parameters."""
-        return reader_of(self.mechanism)
-
-    def quantities(self) -> tuple[Quantity, ...]:
-        """Return the outputs of the mechanism."""
-        return outputs_of(self.mechanism, self.instants, self.order)
-
     def options(self) -> dict[str, Any]:
         """Return order and tolerance."""
         return {"kind": "motions", "order": self.order, "tolerance": self.tolerance}
 
     def histories(self, designs: Designs, threads: int) -> Histories:
         """Solve some designs side by side."""
-        found = solve_batch(
-            self.mechanism, designs, self.instants, self.order, tolerance=self.tolerance, threads=threads
-        )
+        settings = {"tolerance": self.tolerance, "threads": threads}
+        found = solve_batch(self.mechanism, designs, self.instants, self.order, **settings)
         values = {str(name): array.values for name, array in found.data_vars.items() if name != "status"}
         return Histories(values, found["status"].values)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Simulations:
+class Simulations(_OfMechanism):
     """The motion of a mechanism under its forces in every design; see `jounce.simulate_batch`."""
 
     mechanism: Mechanism
@@ -167,34 +174,15 @@ class Simulations:
     def __post_init__(self) -> None:
         check_mechanism(self.mechanism)
         checked_options(self.order, self.method, self.tolerance, self.longest_step)
+        for name, output in self.mechanism.outputs.items():
+            if isinstance(output, AbstractMotionOutput):
+                message = "forces and energies are not computed in batches of simulations; leave this output out"
+                raise MechanismError(message, name=f"outputs.{name}")
 
     @functools.cached_property
     def instants(self) -> Float[np.ndarray, " time"]:
         """Instants, s."""
         return instants_of(self.mechanism.time if self.time is None else self.time, self.mechanism.parameter_values)
-
-    @property
-    def levels(self) -> int:
-        """Number of derivatives, the quantity itself counted."""
-        return self.order + 1
-
-    @property
-    def nominal(self) -> Mapping[str, float]:
-        """Values of the parameters, SI."""
-        return self.mechanism.parameter_values
-
-    @property
-    def reader(self) -> Reader:
-        """Reads values of parameters."""
-        return reader_of(self.mechanism)
-
-    def quantities(self) -> tuple[Quantity, ...]:
-        """Return the outputs of the mechanism."""
-        for name, output in self.mechanism.outputs.items():
-            if isinstance(output, AbstractMotionOutput):
-                message = "forces and energies are not computed in batches of simulations; leave this output out"
-                raise MechanismError(message, name=f"outputs.{name}")
-        return outputs_of(self.mechanism, self.instants, self.order)
 
     def options(self) -> dict[str, Any]:
         """Return order, tolerance and method."""
@@ -247,7 +235,7 @@ _PARAMETER = re.compile(rf"(payload|{'|'.join(DRIVES)})\.(.+)")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Torques:
+class Torques(Problem):
     """The torques of the joints of a robot on a trajectory, with rates, for many loads, drives and speeds.
 
     Varied are ``payload.LINK``, a point mass in the origin of a link, kg; ``armature.JOINT``, ``damping.JOINT`` and

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from jounce.design.samples import sample_space
+from jounce.design.design_space import sample_space
 from jounce.design.variations import read_variations
 from jounce.errors import JounceError, MechanismError, OutputError, TrajectoryError, whole_number
 from jounce.integrate.methods import AbstractMethod
@@ -193,7 +193,7 @@ def run(
     store = plan.store
     with store.locked():
         done = store.done(plan.chunks)
-        told = _Told(plan, int(sum(map(plan.size, np.flatnonzero(done)))), progress)
+        told = _Told(plan, sum(map(plan.size, np.flatnonzero(done).tolist())), progress)
         left = (chunk for chunk in range(plan.chunks) if not done[chunk])
         if not done.all():
             with told.kept():
