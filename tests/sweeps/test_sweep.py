@@ -326,7 +326,9 @@ def test_a_killed_worker_and_a_killed_client_lose_nothing(tmp_path):
 
     def started():
         command = [sys.executable, str(script), str(FILE), str(out)]
-        return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        programs = {"JAX_COMPILATION_CACHE_DIR": str(tmp_path), "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0.05"}
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+        return subprocess.Popen(command, **pipes, text=True, env=os.environ | programs)
 
     def wait_for(count):
         stop = time.monotonic() + 200
