@@ -16,6 +16,7 @@ from jounce.constraints import (
     rows as rows,
     spatial as spatial,
 )
+from jounce.design import tolerance as tolerance
 from jounce.dynamics import (
     AccelerationEnergyOutput as AccelerationEnergyOutput,
     AppliedForceOutput as AppliedForceOutput,
