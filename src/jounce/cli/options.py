@@ -26,7 +26,20 @@ AMONG_THE_OTHERS = Parameter(name="*")
 """The fields of a class are options of the command, beside those that it names itself."""
 
 
-OPTIONS = {"order", "tolerance", "longest_step", "port", "vary", "sample", "scheduler", "workers", "chunk"}
+OPTIONS = {
+    "order",
+    "tolerance",
+    "longest_step",
+    "port",
+    "vary",
+    "sample",
+    "samples",
+    "of",
+    "indices",
+    "scheduler",
+    "workers",
+    "chunk",
+}
 """Arguments that are options of the same name."""
 
 

@@ -250,10 +250,8 @@ class _Spread:
             found = self._solved_designs({name: x[start:stop] for name, x in values.items()})
             bad = (found["status"].values != Status.OK).any(axis=1)
             if bad.any():
-                message = (
-                    f"of these designs {int(bad.sum())} of {stop - start} lock or cannot be put together, and indices need "
-                    "all of them; narrow the spread"
-                )
+                share = f"{int(bad.sum())} of {stop - start} designs lock or cannot be put together"
+                message = f"{share}, and indices need all of them; narrow the spread"
                 raise MechanismError(message, name="indices")
             for name in self._outputs:
                 peaks[name].append(np.abs(found[name].values).max(axis=1))

@@ -154,6 +154,40 @@ class SweepResult(Result):
     written: str
 
 
+class Spread(TypedDict):
+    """How far a derivative of an output spreads, at the instant at which it spreads most, and its peak."""
+
+    output: str
+    derivative: int
+    unit: str
+    at: float
+    nominal: float | None
+    linear_std: float | None
+    std: float | None
+    low: float | None
+    high: float | None
+    peak: float | None
+    peak_mean: float | None
+    peak_std: float | None
+    peak_low: float | None
+    peak_high: float | None
+    share: dict[str, float | None] | None
+    peak_first_order: dict[str, float | None] | None
+    peak_total_order: dict[str, float | None] | None
+
+
+class ToleranceResult(Result):
+    """jounce tolerance --json."""
+
+    command: Literal["tolerance"]
+    file: str
+    samples: int
+    deviations: dict[str, float]
+    solved: int | None
+    spread: list[Spread]
+    written: str | None
+
+
 class ModesResult(Result, ModesFacts):
     """jounce modes --json."""
 
@@ -218,6 +252,7 @@ RESULTS: dict[str, Any] = {
     "torques": TorquesResult,
     "modes": ModesResult,
     "sweep": SweepResult,
+    "tolerance": ToleranceResult,
     "trace": TraceResult,
     "new_list": NewListResult,
     "new": NewResult,
