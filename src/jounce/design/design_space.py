@@ -99,7 +99,8 @@ def sobol_shares(dimension: int, start: int, stop: int) -> Float[np.ndarray, "po
     """
     from scipy.stats.qmc import Sobol as Sequence
 
-    found = Sequence(dimension, scramble=True, bits=BITS, seed=SEED)
+    settings: dict[str, Any] = {"scramble": True, "bits": BITS, "seed": SEED}  # newer releases call it rng, too
+    found = Sequence(dimension, **settings)
     if start:
         found.fast_forward(start)
         return found.random(stop - start) + 2.0 ** -(BITS + 1)

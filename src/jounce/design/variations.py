@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import numbers
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
@@ -213,7 +214,7 @@ def _from_numbers(form: Any) -> Variation:
 
 
 def _number(value: Any) -> float:
-    if isinstance(value, bool | str) or not np.isscalar(value) or not np.isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, numbers.Real) or not math.isfinite(value):
         raise MechanismError("a bound must be a finite number", value=value)
     return float(value)
 

@@ -77,8 +77,9 @@ def compute_on_cluster(
 
 def _compute(client: Any, content: bytes, chunks: Iterator[int], done: Callable[[int], None]) -> None:
     """Keep a bounded number of chunks on their way."""
-    from distributed import wait
+    import distributed
 
+    wait: Any = distributed.wait
     plan = client.submit(bytes, content, pure=False)  # a task, so that the cluster makes it again for new workers
     ahead = max(2, AHEAD * sum(client.nthreads().values()))
 
@@ -127,6 +128,7 @@ def _client(scheduler: str | None, workers: int | None, timeout: float) -> Itera
     """Give a client of a cluster, which is started on this machine unless it has an address."""
     from distributed import Client, LocalCluster
 
+    nowhere: Any = None  # no dashboard
     with _quiet(), ExitStack() as closing:
         if scheduler is None:
             if getattr(multiprocessing.current_process(), "_inheriting", False):
@@ -141,7 +143,7 @@ def _client(scheduler: str | None, workers: int | None, timeout: float) -> Itera
                     n_workers=count,
                     threads_per_worker=1,
                     processes=True,
-                    dashboard_address=None,
+                    dashboard_address=nowhere,
                     memory_limit=0,
                     silence_logs=logging.CRITICAL,
                 )

@@ -86,9 +86,8 @@ def _differences(there: Mapping[str, Any], wanted: Mapping[str, Any]) -> list[st
         before, now = there["files"].get(name), wanted["files"].get(name)
         if before != now:
             found.append(f"the file {name} {'was not read' if before is None else 'differs' if now else 'is not read'}")
-    groups = [(there[group], wanted[group]) for group in ("vary", "options", "versions")]
-    groups.append(tuple({name: x[name] for name in ("sample", "time")} for x in (there, wanted)))
-    for before, now in groups:
+    others = [{name: x[name] for name in ("sample", "time")} for x in (there, wanted)]
+    for before, now in [*((there[group], wanted[group]) for group in ("vary", "options", "versions")), others]:
         names = [name for name in {**before, **now} if before.get(name) != now.get(name)]
         found += [f"{n} is {_shown(before.get(n))} there, and {_shown(now.get(n))} here" for n in names]
     if list(there["vary"]) != list(wanted["vary"]) and not found:

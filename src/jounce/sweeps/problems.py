@@ -20,7 +20,7 @@ from jounce.integrate.simulate import checked_options, instants_of
 from jounce.kinematics import Motion, Status, solve, solve_batch
 from jounce.kinematics.motion import output_group
 from jounce.kinematics.solve import checked_settings
-from jounce.mechanism import AbstractMotionOutput, Mechanism, build, check_mechanism, time_grid
+from jounce.mechanism import AbstractMotionOutput, AbstractOutput, Mechanism, build, check_mechanism, time_grid
 from jounce.mechanism.builder import pose_at
 from jounce.rigid.inertia import Inertia
 from jounce.robot.robot import Robot
@@ -220,9 +220,10 @@ def outputs_of(mechanism: Mechanism, instants: Float[np.ndarray, " time"], order
             assert motion is not None
             values = motion.outputs[name]
             count = values.shape[2] if values.ndim == 3 else 1
-        elif output.turning:  # counted from where the mechanism is put together
+        elif getattr(output, "turning", False):  # counted from where the mechanism is put together
             count = 1
         else:
+            assert isinstance(output, AbstractOutput)
             group = output_group(output, mechanism, name=name)
             count = jax.eval_shape(lambda g=group: g.evaluate(pose).coefficients[0]).shape[0]
         axes = output.axes or (("component", tuple(output.labels[:count])),)
