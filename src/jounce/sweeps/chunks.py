@@ -11,12 +11,12 @@ import numpy as np
 from jounce.design.design_space import Grid, Sobol
 from jounce.errors import JounceError, OutputError
 from jounce.kinematics.threads import thread_count
-from jounce.sweeps.problems import Problem, Quantity
+from jounce.sweeps.problems import Designs, Problem, Quantity
 from jounce.sweeps.statistics import kept_values
 from jounce.sweeps.store import Store
 
 _computing = threading.Lock()
-"""One chunk at a time in a process, whose threads share it: memory is bounded by the number of processes."""
+"""One chunk at a time is computed in a process, whose threads share it: memory is bounded by the processes."""
 _DESIGN = re.compile(r"\(design (\d+):")
 
 
@@ -88,24 +88,27 @@ class Plan:
         JounceError
             No mechanism may have the parameters, or a result cannot be written.
         """
-        with _computing:
-            if self.store.is_done(chunk):
-                return
-            start = chunk * self.chunk
-            stop = start + self.size(chunk)
-            designs = self.space.values(start, stop)
-            spare = self.chunk - (stop - start) if self.chunks > 1 else 0  # one shape of all chunks compiles once
-            filled = {name: np.concatenate([x, np.repeat(x[-1:], spare)]) for name, x in designs.items()}
-            try:
-                found = self.problem.histories(filled, thread_count(threads))
-            except JounceError as error:
-                error.message = _DESIGN.sub(lambda m: f"(design {int(m[1]) + start}:", error.message)
-                raise
-            instants = self.problem.instants
-            kept = kept_values(found, self.quantities, self.problem.levels, instants, histories=self.histories)
-            arrays = {name: x[: stop - start] for name, x in kept.items()}
-            arrays |= dict(zip(self.names, designs.values(), strict=True))
-            self.store.write(chunk, start, arrays)
+        if self.store.is_done(chunk):
+            return
+        start = chunk * self.chunk
+        designs = self.space.values(start, start + self.size(chunk))
+        with _computing:  # and another one is computed while this one is written
+            arrays = self._computed(designs, start, thread_count(threads))
+        self.store.write(chunk, start, arrays)
+
+    def _computed(self, designs: Designs, start: int, threads: int) -> dict[str, np.ndarray]:
+        """Return all arrays of some designs, the first of which has a number."""
+        count = len(designs[next(iter(designs))])
+        spare = self.chunk - count if self.chunks > 1 else 0  # one shape of all chunks compiles once
+        filled = {name: np.concatenate([x, np.repeat(x[-1:], spare)]) for name, x in designs.items()}
+        try:
+            found = self.problem.histories(filled, threads)
+        except JounceError as error:
+            error.message = _DESIGN.sub(lambda m: f"(design {int(m[1]) + start}:", error.message)
+            raise
+        settings = (self.quantities, self.problem.levels, self.problem.instants)
+        kept = kept_values(found, *settings, histories=self.histories)
+        return {name: x[:count] for name, x in kept.items()} | dict(zip(self.names, designs.values(), strict=True))
 
 
 @lru_cache(maxsize=1)
@@ -125,9 +128,9 @@ def _loaded(content: bytes) -> Plan:
     return pickle.loads(plan)
 
 
-def compute_on_worker(content: bytes, chunk: int) -> int:
-    """Compute a chunk of a pickled plan in a worker of a cluster, with as many threads as it has; return its number."""
+def compute_on_worker(content: bytes, chunk: int, threads: int | None) -> int:
+    """Compute a chunk of a pickled plan in a worker of a cluster, with some threads or all that it has."""
     from distributed import get_worker
 
-    _loaded(content).compute(chunk, get_worker().state.nthreads)
+    _loaded(content).compute(chunk, get_worker().state.nthreads if threads is None else threads)
     return chunk

@@ -72,10 +72,12 @@ def compute_on_cluster(
 
     content = cloudpickle.dumps((prepare, tuple(user_files), cloudpickle.dumps(plan)))
     with _client(scheduler, workers, timeout) as client:
-        _compute(client, content, iter(chunks), done)
+        _compute(client, content, iter(chunks), done, threads=1 if scheduler is None else None)
 
 
-def _compute(client: Any, content: bytes, chunks: Iterator[int], done: Callable[[int], None]) -> None:
+def _compute(
+    client: Any, content: bytes, chunks: Iterator[int], done: Callable[[int], None], *, threads: int | None
+) -> None:
     """Keep a bounded number of chunks on their way."""
     import distributed
 
@@ -84,7 +86,7 @@ def _compute(client: Any, content: bytes, chunks: Iterator[int], done: Callable[
     ahead = max(2, AHEAD * sum(client.nthreads().values()))
 
     def submitted(count: int) -> set[Any]:
-        return {client.submit(compute_on_worker, plan, chunk, pure=False) for chunk in islice(chunks, count)}
+        return {client.submit(compute_on_worker, plan, chunk, threads, pure=False) for chunk in islice(chunks, count)}
 
     waiting, idle = submitted(ahead), 0.0
     while waiting:
@@ -141,7 +143,7 @@ def _client(scheduler: str | None, workers: int | None, timeout: float) -> Itera
             cluster = closing.enter_context(
                 LocalCluster(
                     n_workers=count,
-                    threads_per_worker=1,
+                    threads_per_worker=2,  # one computes, one writes
                     processes=True,
                     dashboard_address=nowhere,
                     memory_limit=0,

@@ -47,10 +47,10 @@ class Store:
         return json.loads(_attributes(self.folder)["manifest"])
 
     @cached_property
-    def _group(self) -> Any:
+    def _arrays(self) -> dict[str, Any]:
         import zarr
 
-        return zarr.open_group(self.folder, mode="r+", use_consolidated=False)
+        return dict(zarr.open_group(self.folder, mode="r+", use_consolidated=True).arrays())
 
     def write(self, chunk: int, start: int, arrays: Mapping[str, np.ndarray]) -> None:
         """Write the arrays of a chunk, whose first design is `start`; it is done once all is on the disk.
@@ -60,16 +60,18 @@ class Store:
         OutputError
             The disk is full, or what else the system says.
         """
-        digest = hashlib.sha256()
+        digest, written = hashlib.sha256(), []
         try:
             for name in sorted(arrays):
                 values = np.ascontiguousarray(arrays[name])
                 digest.update(f"{name} {values.dtype.str} {values.shape} ".encode())
                 digest.update(values.data)
-                target = self._group[name]
+                target = self._arrays[name]
                 target[start : start + len(values)] = values
                 key = target.metadata.encode_chunk_key((chunk, *[0] * (values.ndim - 1)))
-                _sync(self.folder / name / key)
+                written.append(self.folder / name / key)
+            for path in written:
+                _sync(path)
             mark = self._mark(chunk)
             mark.parent.mkdir(exist_ok=True)
         except OSError as error:
