@@ -14,6 +14,7 @@ from jounce.sweeps.chunks import Plan, compute_on_worker
 AHEAD = 2  # chunks that wait for each thread of the cluster
 POLL = 5.0  # s
 PATIENCE = 60.0  # s without any worker
+GUARD = "put what it does below 'if __name__ == \"__main__\":', or sweep with workers=0, in this process"
 MISSING = "needs {}, which is not installed; install it with: pip install 'jounce[sweep]'"
 
 
@@ -128,28 +129,11 @@ def _lost(reason: object) -> ClusterError:
 @contextmanager
 def _client(scheduler: str | None, workers: int | None, timeout: float) -> Iterator[Any]:
     """Give a client of a cluster, which is started on this machine unless it has an address."""
-    from distributed import Client, LocalCluster
+    from distributed import Client
 
-    nowhere: Any = None  # no dashboard
     with _quiet(), ExitStack() as closing:
         if scheduler is None:
-            if getattr(multiprocessing.current_process(), "_inheriting", False):
-                message = (
-                    "this script starts worker processes, which run it again: put what it does below "
-                    "'if __name__ == \"__main__\":', or sweep with workers=0, in this process"
-                )
-                raise UnsupportedError(message)
-            count = thread_count(workers)
-            cluster = closing.enter_context(
-                LocalCluster(
-                    n_workers=count,
-                    threads_per_worker=2,  # one computes, one writes
-                    processes=True,
-                    dashboard_address=nowhere,
-                    memory_limit=0,
-                    silence_logs=logging.CRITICAL,
-                )
-            )
+            cluster = closing.enter_context(_local(thread_count(workers)))
             yield closing.enter_context(Client(cluster))
             return
         try:
@@ -164,6 +148,19 @@ def _client(scheduler: str | None, workers: int | None, timeout: float) -> Itera
             message = f"the cluster has no workers, and none joined within {timeout:g} s"
             raise ClusterError(message, name="scheduler", value=scheduler) from None
         yield client
+
+
+def _local(count: int) -> Any:
+    """Start worker processes on this machine."""
+    from distributed import LocalCluster
+
+    if getattr(multiprocessing.current_process(), "_inheriting", False):
+        raise UnsupportedError(f"a worker process runs the script that starts it: {GUARD}")
+    settings: dict[str, Any] = {"dashboard_address": None, "memory_limit": 0, "silence_logs": logging.CRITICAL}
+    try:  # of two threads one computes and one writes
+        return LocalCluster(n_workers=count, threads_per_worker=2, processes=True, **settings)
+    except (OSError, RuntimeError) as error:
+        raise ClusterError(f"the workers did not start ({error}); if this is a script: {GUARD}") from None
 
 
 @contextmanager
