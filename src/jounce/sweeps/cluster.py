@@ -152,13 +152,19 @@ def _client(scheduler: str | None, workers: int | None, timeout: float) -> Itera
 
 def _local(count: int) -> Any:
     """Start worker processes on this machine."""
+    import dask
     from distributed import LocalCluster
 
     if getattr(multiprocessing.current_process(), "_inheriting", False):
         raise UnsupportedError(f"a worker process runs the script that starts it: {GUARD}")
     settings: dict[str, Any] = {"dashboard_address": None, "memory_limit": 0, "silence_logs": logging.CRITICAL}
-    try:  # of two threads one computes and one writes
-        return LocalCluster(n_workers=count, threads_per_worker=2, processes=True, **settings)
+    lean = {
+        "distributed.worker.profile.enabled": False,  # it looks at all stacks a hundred times a second
+        "distributed.nanny.pre-spawn-environ": {},  # MALLOC_TRIM_THRESHOLD_ gives every large array new pages
+    }
+    try:
+        with dask.config.set(lean):
+            return LocalCluster(n_workers=count, threads_per_worker=1, processes=True, **settings)
     except (OSError, RuntimeError) as error:
         raise ClusterError(f"the workers did not start ({error}); if this is a script: {GUARD}") from None
 
