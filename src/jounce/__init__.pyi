@@ -16,6 +16,7 @@ from jounce.constraints import (
     rows as rows,
     spatial as spatial,
 )
+from jounce.design import tolerance as tolerance
 from jounce.dynamics import (
     AccelerationEnergyOutput as AccelerationEnergyOutput,
     AppliedForceOutput as AppliedForceOutput,
@@ -143,6 +144,7 @@ from jounce.robot import (
     mass_matrix as mass_matrix,
     operational_accelerations as operational_accelerations,
 )
+from jounce.sweeps import sweep as sweep
 from jounce.trajectory import (
     CycloidalMotion as CycloidalMotion,
     Expression as Expression,

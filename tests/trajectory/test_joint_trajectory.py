@@ -1,5 +1,6 @@
 """Trajectories of several joints: values against closed forms, and estimated errors against the true ones."""
 
+import pickle
 import warnings
 
 import numpy as np
@@ -233,3 +234,10 @@ def test_bad_trajectories(number):
 
 def test_exported():
     assert issubclass(jn.TrajectoryError, jn.JounceError)
+
+
+def test_a_trajectory_goes_to_other_processes_whole():
+    trajectory = JointTrajectory.from_samples(SAMPLES, np.sin(SAMPLES)[:, None], ["a"])
+    again = pickle.loads(pickle.dumps(trajectory))
+    assert (again.derivatives(AT, 3) == trajectory.derivatives(AT, 3)).all()
+    assert (again.times == trajectory.times).all()

@@ -32,6 +32,8 @@ from jounce.cli.shell_completion import complete
 from jounce.cli.small_motions import modes
 from jounce.cli.standard_streams import failsafe_streams
 from jounce.cli.starters import new
+from jounce.cli.sweeping import sweep
+from jounce.cli.tolerances import tolerance
 from jounce.cli.viewing import view
 from jounce.errors import JounceError, SolveError
 from jounce.interrupts import end_on_signals
@@ -59,8 +61,8 @@ def completion(shell: Literal["bash", "zsh", "fish"], /, *, install: bool = Fals
 
 
 COMMANDS = (
-    new, inspect, run, trace, simulate, modes, plot, report, view, check, torques, convert, reproduce, schema,
-    completion,
+    new, inspect, run, trace, simulate, sweep, tolerance, modes, plot, report, view, check, torques, convert, reproduce,
+    schema, completion,
 )  # fmt: skip
 LIGHT = (new, completion)  # they compute nothing
 FIRST = """\

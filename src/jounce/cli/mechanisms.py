@@ -96,7 +96,7 @@ def simulate(
         --method obreshkov-6 --tolerance 1e-9
     """
     output.check()
-    chosen = _method(method, step)
+    chosen = method_of(method, step)
     mechanism = reading.mechanism(file)
     spare_inputs(output.out, overwrite=output.overwrite)
     motion = simulated(mechanism, file, order, method=chosen, tolerance=tolerance, longest_step=longest_step)
@@ -152,7 +152,7 @@ def _told(
     return outcome(motion, file)
 
 
-def _method(name: str, step: float | None) -> Taylor | Obreshkov:
+def method_of(name: str, step: float | None) -> Taylor | Obreshkov:
     """Return the integration method of a name."""
     from jounce.integrate import Obreshkov, Taylor
 

@@ -26,6 +26,23 @@ AMONG_THE_OTHERS = Parameter(name="*")
 """The fields of a class are options of the command, beside those that it names itself."""
 
 
+OPTIONS = {
+    "order",
+    "tolerance",
+    "longest_step",
+    "port",
+    "vary",
+    "sample",
+    "samples",
+    "of",
+    "indices",
+    "scheduler",
+    "workers",
+    "chunk",
+}
+"""Arguments that are options of the same name."""
+
+
 class WritingError(Exception):
     """A result that was computed could not be written."""
 
@@ -211,8 +228,9 @@ def errors_about(file: Path, robot: Path | None = None) -> Iterator[None]:
     try:
         yield
     except JounceError as error:
-        if error.name in ("order", "tolerance", "longest_step", "port"):
-            error.name = f"--{error.name.replace('_', '-')}"
+        option, _, rest = str(error.name or "").partition(" ")
+        if option in OPTIONS:
+            error.name = f"--{option.replace('_', '-')} {rest}".rstrip()
             raise
         about_robot = robot is not None and isinstance(error, RobotError)
         raise error.located(path=robot if about_robot else file) from None

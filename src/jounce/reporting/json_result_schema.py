@@ -128,6 +128,66 @@ class TorquesResult(TrajectoryResult):
     peaks: list[TorquePeak]
 
 
+class SweptPeak(TypedDict):
+    """The least and the largest peak that a derivative of an output has among designs, and the designs."""
+
+    output: str
+    derivative: int
+    unit: str
+    least: float | None
+    least_at: dict[str, float] | None
+    largest: float | None
+    largest_at: dict[str, float] | None
+
+
+class SweepResult(Result):
+    """jounce sweep --json."""
+
+    command: Literal["sweep"]
+    file: str
+    designs: int
+    instants: int
+    vary: list[str]
+    failed: dict[str, int]
+    peaks: list[SweptPeak]
+    checksum: str
+    written: str
+
+
+class Spread(TypedDict):
+    """How far a derivative of an output spreads, at the instant at which it spreads most, and its peak."""
+
+    output: str
+    derivative: int
+    unit: str
+    at: float
+    nominal: float | None
+    linear_std: float | None
+    std: float | None
+    low: float | None
+    high: float | None
+    peak: float | None
+    peak_mean: float | None
+    peak_std: float | None
+    peak_low: float | None
+    peak_high: float | None
+    share: dict[str, float | None] | None
+    peak_first_order: dict[str, float | None] | None
+    peak_total_order: dict[str, float | None] | None
+
+
+class ToleranceResult(Result):
+    """jounce tolerance --json."""
+
+    command: Literal["tolerance"]
+    file: str
+    samples: int
+    deviations: dict[str, float]
+    solved: int | None
+    spread: list[Spread]
+    written: str | None
+
+
 class ModesResult(Result, ModesFacts):
     """jounce modes --json."""
 
@@ -191,6 +251,8 @@ RESULTS: dict[str, Any] = {
     "check": CheckResult,
     "torques": TorquesResult,
     "modes": ModesResult,
+    "sweep": SweepResult,
+    "tolerance": ToleranceResult,
     "trace": TraceResult,
     "new_list": NewListResult,
     "new": NewResult,

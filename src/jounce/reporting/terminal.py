@@ -115,10 +115,18 @@ def show_columns(pairs: Sequence[tuple[str, str]]) -> None:
 
 
 class Bar:
-    """A progress bar on the terminal's standard error, shown only when work goes on for more than a moment."""
+    """A progress bar on the terminal's standard error, shown only when work goes on for more than a moment.
 
-    def __init__(self, task: str):
-        self._task = task
+    Parameters
+    ----------
+    task : str
+        What is done.
+    unit : str
+        What is counted, where counts and a rate are of interest.
+    """
+
+    def __init__(self, task: str, unit: str = ""):
+        self._task, self._unit = task, unit
         self._started: float | None = None
         self._bar: Any = None
         self._shown = ExitStack()
@@ -139,11 +147,28 @@ class Bar:
             from rich.console import Console
             from rich.progress import Progress
 
-            self._bar = Progress(console=Console(stderr=True), transient=True)
+            self._bar = Progress(*_columns(self._unit), console=Console(stderr=True), transient=True)
             self._shown.enter_context(undoing(lambda: os.write(2, SHOW_CURSOR)))
             self._shown.enter_context(self._bar)
             self._id = self._bar.add_task(self._task, total=total)
         self._bar.update(self._id, completed=done, total=total)
+
+
+def _columns(unit: str) -> tuple[Any, ...]:
+    """Return the columns of a progress bar, with counts and a rate where there is something to count."""
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, TextColumn, TimeRemainingColumn
+    from rich.text import Text
+
+    class Rate(ProgressColumn):
+        def render(self, task: Any) -> Text:
+            return Text("" if task.speed is None else f"{task.speed:,.0f} {unit}/s")
+
+    if not unit:
+        return Progress.get_default_columns()
+    return (
+        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), Rate(), TextColumn("left"),
+        TimeRemainingColumn(),
+    )  # fmt: skip
 
 
 def _clean(text: str) -> str:

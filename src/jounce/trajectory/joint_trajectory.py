@@ -185,6 +185,9 @@ class JointTrajectory(Displayed):
         """Names of the joints."""
         return tuple(self.laws)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (dict(self.laws), self.start, self.stop, self.times)
+
     def __repr__(self) -> str:
         return f"JointTrajectory({', '.join(self.names)}; {self.start:g} to {self.stop:g} s)"
 

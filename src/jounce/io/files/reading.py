@@ -6,11 +6,14 @@ What was read as an input is remembered, so that no result replaces it unasked (
 from __future__ import annotations
 
 import csv
+import hashlib
 import io
 import math
 import os
 import stat
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from os import PathLike
 from pathlib import Path
 
@@ -27,6 +30,7 @@ FORMULA = ("=", "+", "-", "@", "\t", "\r", "'")
 
 _inputs: dict[str, tuple[int, int]] = {}
 """Device and number of the files read by this process, by their real paths."""
+_recorded: ContextVar[dict[str, str] | None] = ContextVar("_recorded", default=None)
 _results: dict[str, tuple[int, ...]] = {}
 """Device, number, size and time of the files that this process wrote, by their real paths."""
 
@@ -80,7 +84,20 @@ def read_file(
         raise _too_large(name, len(content), limit, what, error)
     if is_input:
         _note_input(name, status)
+        if (recorded := _recorded.get()) is not None:
+            recorded[os.path.realpath(name)] = hashlib.sha256(content).hexdigest()
     return content
+
+
+@contextmanager
+def recording() -> Iterator[dict[str, str]]:
+    """Give a dictionary that gets the digest of every input that is read meanwhile, by its real path."""
+    found: dict[str, str] = {}
+    before = _recorded.set(found)
+    try:
+        yield found
+    finally:
+        _recorded.reset(before)
 
 
 def _check_regular(name: str, status: os.stat_result, limit: int | None, what: str, error: type[JounceError]) -> None:

@@ -1,0 +1,110 @@
+"""Bands in which outputs and derivatives lie where parameters deviate, and the part that each parameter has in them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from jounce.errors import MechanismError
+from jounce.plot.labels import scale_of, symbol, unit_label
+from jounce.plot.style import GREY, LINE_COLOURS, blank_figure, set_ticks, shown_name, style
+from jounce.reporting.spread_facts import Column, chosen
+
+__all__ = ["draw_bands"]
+
+WIDTH, ROW = 9.5, 1.9  # inches
+BAND = 0.3  # of a colour
+TWO_SIDED = 1.959964  # standard deviations that hold 95 percent of a normal distribution
+MOST_SHARES = 8
+
+
+def draw_bands(spread: Any, columns: Sequence[Column], title: str = "") -> Any:
+    """Draw the band of each column over time, how far it is from the nominal motion, and which parameter causes it.
+
+    Parameters
+    ----------
+    spread : xarray.Dataset
+        As `jounce.tolerance` returns it.
+    columns : sequence of (str, str, int)
+        Output, component (or an empty text), and derivative of each row.
+    title : str, optional
+        That of the mechanism unless given.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Three panels for each column: 95 percent of the samples lie in the band, dashed lines are the same to first
+        order; the parts of the variance are those of first order.
+
+    Raises
+    ------
+    MechanismError
+        If there is no column.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> from jounce.plot import draw_bands
+    >>> four_bar = jn.load("examples/four_bar.yaml")
+    >>> spread = jn.tolerance(four_bar, {"BC": "normal:0.1mm"}, [0.0, 0.5, 1.0], of=["psi_d1"], samples=0)
+    >>> len(draw_bands(spread, [("psi", "", 1)]).axes)
+    3
+    """
+    if not columns:
+        raise MechanismError("there is nothing to draw; name some outputs", name="columns")
+    parameters = [str(name) for name in spread["parameter"].values]
+    with style():
+        height = ROW * len(columns) + 0.9
+        figure = blank_figure(WIDTH, height, title or spread.attrs.get("title", ""), h_pad=0.06)
+        grid = figure.subplots(len(columns), 3, sharex=True, squeeze=False)
+        for row, column in zip(grid, columns, strict=True):
+            _draw_row(spread, column, row, parameters)
+        for axes, words in zip(grid[0], ("value", "deviation, 95 % of designs", "part of the variance"), strict=True):
+            axes.set_title(words, loc="left")
+        for axes in grid[-1]:
+            axes.set_xlabel("time  $t$  (s)")
+        told = [axes.get_legend_handles_labels() for axes in grid[0][1:]]
+        handles, labels = ([*first, *second] for first, second in zip(*told, strict=True))
+        if handles:
+            figure.legend(handles, labels, loc="outside lower center", ncols=min(6, len(handles)))
+    return figure
+
+
+def _draw_row(spread: Any, column: Column, panels: Any, parameters: list[str]) -> None:
+    name, component, order = column
+    time = spread["time"].values
+    value, deviation, share = panels
+    nominal = chosen(spread, name, column)
+    exponent = scale_of(nominal)
+    label = symbol(name, order, component) or shown_name(f"{name} {component}".strip())
+    units = spread[name].attrs["units"]
+    value.set_ylabel(f"{label}  ({unit_label(units, order, exponent)})")
+    value.plot(time, nominal * 10.0**-exponent, color=LINE_COLOURS[0])
+    bounds = [chosen(spread, f"{name}_{side}", column) for side in ("low", "high") if f"{name}_{side}" in spread]
+    linear = f"{name}_linear_std"
+    sides = [chosen(spread, linear, column) * TWO_SIDED * sign for sign in (-1, 1)] if linear in spread else []
+    away = scale_of(np.concatenate([*(bound - nominal for bound in bounds), *sides, np.zeros(1)]))
+    if bounds:
+        value.fill_between(time, *(x * 10.0**-exponent for x in bounds), color=LINE_COLOURS[0], alpha=BAND, linewidth=0)
+        apart = [(x - nominal) * 10.0**-away for x in bounds]
+        deviation.fill_between(time, *apart, color=LINE_COLOURS[0], alpha=BAND, linewidth=0, label="samples")
+    for side in sides:
+        label = "first order" if side is sides[0] else None
+        deviation.plot(time, side * 10.0**-away, color=GREY, linewidth=0.9, linestyle=(0, (4, 2)), label=label)
+    deviation.axhline(0.0, color=LINE_COLOURS[0], linewidth=0.8)
+    deviation.set_ylabel(f"({unit_label(units, order, away)})")
+    if f"{name}_share" in spread:
+        parts = chosen(spread, f"{name}_share", column)
+        first = np.argsort(-parts.mean(axis=1), kind="stable")[:MOST_SHARES]
+        ordered = [k for k in range(len(parameters)) if k in first]  # of one colour in all rows
+        colours = [LINE_COLOURS[k % len(LINE_COLOURS)] for k in ordered]
+        names = [shown_name(parameters[k]) for k in ordered]
+        share.stackplot(time, parts[ordered], labels=names, colors=colours, alpha=0.75, linewidth=0)
+    share.set_ylim(0.0, 1.0)
+    for axes in panels:
+        axes.set_xlim(time[0], time[-1])
+        set_ticks(axes.yaxis, 5)
+        set_ticks(axes.xaxis, 5)
+        axes.ticklabel_format(useOffset=False)

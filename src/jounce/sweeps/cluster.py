@@ -1,0 +1,183 @@
+"""Workers: the cores of this machine, or a Dask cluster that has an address; what one loses another one computes."""
+
+import logging
+import multiprocessing
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from itertools import islice
+from typing import Any
+
+from jounce.errors import JounceError, UnsupportedError
+from jounce.kinematics.threads import thread_count
+from jounce.sweeps.chunks import Plan, compute_on_worker
+
+AHEAD = 2  # chunks that wait for each thread of the cluster
+POLL = 5.0  # s
+PATIENCE = 60.0  # s without any worker
+GUARD = "put what it does below 'if __name__ == \"__main__\":', or sweep with workers=0, in this process"
+MISSING = "needs {}, which is not installed; install it with: pip install 'jounce[sweep]'"
+
+
+class ClusterError(JounceError):
+    """The cluster does not answer, or was lost."""
+
+
+def check_installed(*packages: str) -> None:
+    """Raise UnsupportedError unless packages are there."""
+    from importlib.util import find_spec
+
+    missing = [package for package in packages if find_spec(package) is None]
+    if missing:
+        raise UnsupportedError(f"a sweep {MISSING.format(' and '.join(missing))}")
+
+
+def compute_on_cluster(
+    plan: Plan,
+    chunks: Iterable[int],
+    done: Callable[[int], None],
+    *,
+    scheduler: str | None,
+    workers: int | None,
+    timeout: float,
+    user_files: Sequence[str] = (),
+    prepare: Callable[[], object] | None = None,
+) -> None:
+    """Compute chunks on the workers of a cluster; results stay where they are written.
+
+    Parameters
+    ----------
+    plan : Plan
+    chunks : iterable of int
+        Those that are not there yet.
+    done : callable
+        Called with each chunk that is on the disk.
+    scheduler : str, optional
+        Address of a cluster; that of this machine is started unless given.
+    workers : int, optional
+        Processes on this machine.
+    timeout : float
+        Of an answer, s.
+    user_files : sequence of str
+        Python files with the user's own classes.
+    prepare : callable, optional
+        What each worker calls first.
+
+    Raises
+    ------
+    ClusterError
+        It does not answer, or is lost on the way.
+    JounceError
+        A chunk cannot be computed or written.
+    """
+    import cloudpickle
+
+    content = cloudpickle.dumps((prepare, tuple(user_files), cloudpickle.dumps(plan)))
+    with _client(scheduler, workers, timeout) as client:
+        _compute(client, content, iter(chunks), done, threads=1 if scheduler is None else None)
+
+
+def _compute(
+    client: Any, content: bytes, chunks: Iterator[int], done: Callable[[int], None], *, threads: int | None
+) -> None:
+    """Keep a bounded number of chunks on their way."""
+    import distributed
+
+    wait: Any = distributed.wait
+    plan = client.submit(bytes, content, pure=False)  # a task, so that the cluster makes it again for new workers
+    ahead = max(2, AHEAD * sum(client.nthreads().values()))
+
+    def submitted(count: int) -> set[Any]:
+        return {client.submit(compute_on_worker, plan, chunk, threads, pure=False) for chunk in islice(chunks, count)}
+
+    waiting, idle = submitted(ahead), 0.0
+    while waiting:
+        try:
+            ended = wait(waiting, timeout=POLL, return_when="FIRST_COMPLETED").done
+            idle = 0.0
+        except TimeoutError:
+            ended = set()
+            idle = 0.0 if client.status == "running" and client.nthreads() else idle + POLL
+        except Exception as error:  # noqa: BLE001 - CancelledError and what else a lost connection is told by
+            raise _lost(error) from None
+        for future in ended:
+            if future.status != "finished":
+                raise _reason(future)
+            done(future.result())
+        waiting -= ended
+        if client.status != "running" or idle > PATIENCE:
+            raise _lost(f"status {client.status}, no worker for {idle:g} s")
+        waiting |= submitted(ahead - len(waiting))
+
+
+def _reason(future: Any) -> Exception:
+    """Return the error of a task, in words of this package where it is none of its own."""
+    if future.status != "error":
+        return _lost(future.status)
+    error = future.exception()
+    if isinstance(error, JounceError):
+        return error
+    if type(error).__name__ == "KilledWorker":
+        return ClusterError("several workers ended while computing the same chunk; do they lack memory?")
+    return error if isinstance(error, Exception) else RuntimeError(str(error))
+
+
+def _lost(reason: object) -> ClusterError:
+    said = str(reason).strip().partition("\n")[0].rstrip(": ") or type(reason).__name__
+    return ClusterError(f"the cluster was lost: its scheduler or all of its workers do not answer ({said})")
+
+
+@contextmanager
+def _client(scheduler: str | None, workers: int | None, timeout: float) -> Iterator[Any]:
+    """Give a client of a cluster, which is started on this machine unless it has an address."""
+    from distributed import Client
+
+    with _quiet(), ExitStack() as closing:
+        if scheduler is None:
+            cluster = closing.enter_context(_local(thread_count(workers)))
+            yield closing.enter_context(Client(cluster))
+            return
+        try:
+            client = closing.enter_context(Client(scheduler, timeout=timeout))
+        except (OSError, ValueError, ImportError) as error:  # TimeoutError is an OSError
+            said = str(error).strip().partition("\n")[0]
+            message = f"no Dask scheduler answers within {timeout:g} s: {said or type(error).__name__}"
+            raise ClusterError(message, name="scheduler", value=scheduler) from None
+        try:
+            client.wait_for_workers(1, timeout=timeout)
+        except TimeoutError:
+            message = f"the cluster has no workers, and none joined within {timeout:g} s"
+            raise ClusterError(message, name="scheduler", value=scheduler) from None
+        yield client
+
+
+def _local(count: int) -> Any:
+    """Start worker processes on this machine."""
+    import dask
+    from distributed import LocalCluster
+
+    if getattr(multiprocessing.current_process(), "_inheriting", False):
+        raise UnsupportedError(f"a worker process runs the script that starts it: {GUARD}")
+    settings: dict[str, Any] = {"dashboard_address": None, "memory_limit": 0, "silence_logs": logging.CRITICAL}
+    lean = {
+        "distributed.worker.profile.enabled": False,  # it looks at all stacks a hundred times a second
+        "distributed.nanny.pre-spawn-environ": {},  # MALLOC_TRIM_THRESHOLD_ gives every large array new pages
+    }
+    try:
+        with dask.config.set(lean):
+            return LocalCluster(n_workers=count, threads_per_worker=1, processes=True, **settings)
+    except (OSError, RuntimeError) as error:
+        raise ClusterError(f"the workers did not start ({error}); if this is a script: {GUARD}") from None
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Leave what Dask tells of lost connections to this package."""
+    names = [name for name in logging.root.manager.loggerDict if name.partition(".")[0] == "distributed"]
+    before = {name: logging.getLogger(name).level for name in names}
+    for name in names:
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        for name, level in before.items():
+            logging.getLogger(name).setLevel(level)

@@ -1,0 +1,97 @@
+"""What a sweep came to, as plain facts: how many designs were solved, and which have extreme peaks."""
+
+import itertools
+from collections import Counter
+from typing import Any
+
+import numpy as np
+
+from jounce.kinematics import Status
+from jounce.reporting.peaks import derivative_unit
+from jounce.reporting.tables import Table, number
+from jounce.sweeps.chunks import Plan
+
+
+def sweep_facts(plan: Plan) -> dict[str, Any]:
+    """Return the facts of a sweep that is done, of which one chunk at a time is read."""
+    import zarr
+
+    group: Any = zarr.open_group(plan.folder, mode="r")
+    outcomes: Counter[int] = Counter()
+    extremes: dict[str, list[tuple[float, int] | None]] = {}
+    columns = [column for quantity in plan.quantities for column in _columns(quantity, plan.problem.levels)]
+    for chunk in range(plan.chunks):
+        some = slice(chunk * plan.chunk, chunk * plan.chunk + plan.size(chunk))
+        outcomes.update(group["first_status"][some].tolist())
+        for quantity in plan.quantities:
+            peaks = np.moveaxis(
+                group[f"{quantity.name}_peak"][some].reshape(plan.size(chunk), plan.problem.levels, -1), 2, 1
+            )
+            for name, values in zip(_names(quantity), np.moveaxis(peaks, 0, -1), strict=True):
+                for order, row in enumerate(values):
+                    kept = extremes.setdefault(f"{name}/{order}", [None, None])
+                    for side, sign in enumerate((1, -1)):
+                        kept[side] = _better(kept[side], sign * row, some.start)
+    rows = []
+    for name, order, units in columns:
+        low, high = extremes[f"{name}/{order}"]
+        found: dict[str, Any] = {"output": name, "derivative": order, "unit": derivative_unit(units, order)}
+        for word, best, sign in (("least", low, 1), ("largest", high, -1)):
+            found[word] = None if best is None else sign * best[0]
+            found[f"{word}_at"] = None if best is None else _design(plan, best[1])
+        rows.append(found)
+    failed = {Status(code).name.lower(): count for code, count in sorted(outcomes.items()) if code != Status.OK}
+    return {
+        "designs": plan.space.count,
+        "instants": len(plan.problem.instants),
+        "vary": list(plan.space.variations),
+        "failed": failed,
+        "peaks": rows,
+        "checksum": plan.store.manifest["checksum"],
+    }
+
+
+def sweep_summary(facts: dict[str, Any], name: str) -> str:
+    """Word how a sweep went."""
+    count, bad = facts["designs"], sum(facts["failed"].values())
+    lines = [f"{name}: {count} designs ({', '.join(facts['vary'])}) at {facts['instants']} instants"]
+    kinds = ", ".join(f"{number} {word.replace('_', ' ')}" for word, number in facts["failed"].items())
+    lines.append("  all were solved" if not bad else f"  {count - bad} were solved at all instants, {bad} not: {kinds}")
+    return "\n".join([*lines, f"  checksum {facts['checksum']}"])
+
+
+def sweep_table(facts: dict[str, Any]) -> Table:
+    """Return a table of the least and the largest peaks, and of the designs that have them."""
+
+    def at(values: dict[str, float] | None) -> str:
+        return "-" if values is None else " ".join(f"{name}={number(value)}" for name, value in values.items())
+
+    rows = [
+        [x["output"], str(x["derivative"]), x["unit"], number(x["least"]), at(x["least_at"]), number(x["largest"]),
+         at(x["largest_at"])]
+        for x in facts["peaks"]
+    ]  # fmt: skip
+    headings = ("output", "derivative", "unit", "least peak", "of", "largest peak", "of")
+    return Table("", headings, rows, (1, 3, 5), True)
+
+
+def _names(quantity: Any) -> list[str]:
+    labels = ["_".join(found) for found in itertools.product(*(labels for _, labels in quantity.axes))]
+    return [f"{quantity.name}_{label}" if label else quantity.name for label in labels]
+
+
+def _columns(quantity: Any, levels: int) -> list[tuple[str, int, str]]:
+    return [(name, order, quantity.units) for name in _names(quantity) for order in range(levels)]
+
+
+def _better(before: tuple[float, int] | None, values: np.ndarray, start: int) -> tuple[float, int] | None:
+    """Return the least value so far and its design; of equal ones the first."""
+    known = np.where(np.isnan(values), np.inf, values)
+    place = int(np.argmin(known))
+    if not np.isfinite(known[place]) or (before is not None and before[0] <= known[place]):
+        return before
+    return float(known[place]), start + place
+
+
+def _design(plan: Plan, which: int) -> dict[str, float]:
+    return {name: float(value[0]) for name, value in plan.space.values(which, which + 1).items()}

@@ -1,0 +1,110 @@
+"""What a sweep is, in words and digests: whether the same command goes on with it, or means another one."""
+
+import dataclasses
+import importlib.metadata
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from jounce.design.design_space import Grid, Sobol
+from jounce.design.variations import Values
+from jounce.errors import OutputError
+from jounce.sweeps.fingerprints import fingerprint
+
+FORMAT = 1
+PACKAGES = ("jounce", "jax", "jaxlib", "numpy")  # other versions may give other last bits
+
+
+def manifest_of(
+    title: str,
+    model: Any,
+    files: Mapping[str, str],
+    space: Grid | Sobol,
+    instants: np.ndarray,
+    options: Mapping[str, Any],
+) -> dict[str, Any]:
+    """Return what a sweep is.
+
+    Parameters
+    ----------
+    title : str
+    model : object
+        Mechanism, or robot and trajectory, with all that they were made of.
+    files : dict of str to str
+        Digests of the files that were read, by their real paths, that of the model first.
+    space : Grid or Sobol
+        Designs.
+    instants : array of shape (time,)
+        s.
+    options : dict
+        What was chosen besides.
+    """
+    return {
+        "format": FORMAT,
+        "title": title,
+        "files": _named(files),
+        "model": fingerprint(model),
+        "vary": {name: _words(variation) for name, variation in space.variations.items()},
+        "sample": None if isinstance(space, Grid) else f"sobol:{space.count}",
+        "designs": space.count,
+        "time": f"{len(instants)} instants from {float(instants[0])!r} to {float(instants[-1])!r} s, "
+        f"digest {fingerprint(instants)[:16]}",
+        "options": dict(options),
+        "versions": {name: importlib.metadata.version(name) for name in PACKAGES},
+        "checksum": None,
+    }
+
+
+def _named(files: Mapping[str, str]) -> dict[str, str]:
+    """Return digests by names of files as seen from the folder of the first one."""
+    if not files:
+        return {}
+    folder = Path(next(iter(files))).parent
+    return {Path(os.path.relpath(path, folder)).as_posix(): digest for path, digest in files.items()}
+
+
+def check_same(there: Mapping[str, Any], wanted: Mapping[str, Any], folder: str) -> None:
+    """Raise OutputError, with what differs, unless a sweep that was begun is the one that is wanted."""
+    if there.get("format") != FORMAT:
+        raise OutputError("was begun by another release of jounce; give another name", path=folder)
+    differences = list(_differences(there, wanted))
+    if differences:
+        message = (
+            f"another sweep is there: {'; '.join(differences[:4])}; give another name, or the command that it was "
+            "begun with: nothing was changed"
+        )
+        raise OutputError(message, path=folder)
+
+
+def _differences(there: Mapping[str, Any], wanted: Mapping[str, Any]) -> list[str]:
+    """Word what differs."""
+    found = []
+    for name in there["files"] | wanted["files"]:
+        before, now = there["files"].get(name), wanted["files"].get(name)
+        if before != now:
+            found.append(f"the file {name} {'was not read' if before is None else 'differs' if now else 'is not read'}")
+    others = [{name: x[name] for name in ("sample", "time")} for x in (there, wanted)]
+    for before, now in [*((there[group], wanted[group]) for group in ("vary", "options", "versions")), others]:
+        names = [name for name in {**before, **now} if before.get(name) != now.get(name)]
+        found += [f"{n} is {_shown(before.get(n))} there, and {_shown(now.get(n))} here" for n in names]
+    if list(there["vary"]) != list(wanted["vary"]) and not found:
+        found.append(f"the order of what varies is {', '.join(there['vary'])} there")
+    if there["model"] != wanted["model"] and not found:
+        found.append("the model has other values")
+    return found
+
+
+def _shown(value: Any) -> str:
+    return "not given" if value is None else str(value)
+
+
+def _words(variation: Any) -> str:
+    """Return a variation in words that tell every bit of it."""
+    if isinstance(variation, Values):
+        return f"{variation.count} values, digest {fingerprint(variation.values)[:16]}"
+    numbers = [repr(value) for value in dataclasses.astuple(variation) if value is not None]
+    kind = type(variation).__name__.lower()
+    return ":".join(numbers if kind == "interval" else [kind, *numbers])

@@ -1,0 +1,336 @@
+"""What is swept: motions and simulations of a mechanism, and torques of a robot on a trajectory, for many designs."""
+
+import abc
+import dataclasses
+import functools
+import re
+from collections.abc import Mapping
+from typing import Any
+
+import jax
+import numpy as np
+from jaxtyping import Float, Int
+
+from jounce.design.variations import Reader, reader_of
+from jounce.dynamics.trajectories import FollowedTrajectory
+from jounce.errors import MechanismError, RobotError, check_name
+from jounce.integrate import simulate_batch
+from jounce.integrate.methods import AbstractMethod
+from jounce.integrate.simulate import checked_options, instants_of
+from jounce.kinematics import Motion, Status, solve, solve_batch
+from jounce.kinematics.motion import output_group
+from jounce.kinematics.solve import checked_settings
+from jounce.mechanism import AbstractMotionOutput, AbstractOutput, Mechanism, build, check_mechanism, time_grid
+from jounce.mechanism.builder import pose_at
+from jounce.rigid.inertia import Inertia
+from jounce.robot.robot import Robot
+from jounce.trajectory.joint_trajectory import JointTrajectory
+from jounce.trajectory.units import parse_value
+
+Designs = Mapping[str, Float[np.ndarray, " design"]]
+
+
+@dataclasses.dataclass(frozen=True)
+class Quantity:
+    """What is computed of every design: its name, unit and, where it is more than one number, the axes of these.
+
+    Attributes
+    ----------
+    axes : tuple of pairs
+        Name and labels of each axis after time and derivative.
+    """
+
+    name: str
+    units: str
+    axes: tuple[tuple[str, tuple[str, ...]], ...] = ()
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """How many numbers it has along each of its axes."""
+        return tuple(len(labels) for _, labels in self.axes)
+
+
+@dataclasses.dataclass(frozen=True)
+class Histories:
+    """The quantities of some designs at all instants.
+
+    Attributes
+    ----------
+    values : dict of str to array of shape (designs, time, order + 1, ...)
+        SI; NaN where they are not known.
+    status : array of int, shape (designs, time)
+        See `Status`.
+    pace : array of shape (designs,), optional
+        How many times faster than the instants say each design moves.
+    """
+
+    values: dict[str, Float[np.ndarray, "design time derivative *axes"]]
+    status: Int[np.ndarray, "design time"]
+    pace: Float[np.ndarray, " design"] | None = None
+
+
+class Problem(abc.ABC):
+    """What is computed of every design of a sweep."""
+
+    @property
+    @abc.abstractmethod
+    def instants(self) -> Float[np.ndarray, " time"]:
+        """Instants, s."""
+
+    @property
+    @abc.abstractmethod
+    def levels(self) -> int:
+        """Number of derivatives, the quantity itself counted."""
+
+    @property
+    @abc.abstractmethod
+    def nominal(self) -> Mapping[str, float]:
+        """Values of what may vary, SI."""
+
+    @property
+    @abc.abstractmethod
+    def reader(self) -> Reader:
+        """Reads values of what may vary, and refuses other names."""
+
+    @abc.abstractmethod
+    def quantities(self) -> tuple[Quantity, ...]:
+        """Return what is computed."""
+
+    @abc.abstractmethod
+    def options(self) -> dict[str, Any]:
+        """Return what was chosen besides the model, in words and numbers."""
+
+    @abc.abstractmethod
+    def histories(self, designs: Designs, threads: int) -> Histories:
+        """Compute some designs side by side."""
+
+
+class _OfMechanism(Problem):
+    """What follows from the parameters of a mechanism."""
+
+    mechanism: Mechanism
+    order: int
+
+    @property
+    def levels(self) -> int:
+        """Number of derivatives, the quantity itself counted."""
+        return self.order + 1
+
+    @property
+    def nominal(self) -> Mapping[str, float]:
+        """Values of the parameters, SI."""
+        return self.mechanism.parameter_values
+
+    @property
+    def reader(self) -> Reader:
+        """Reads values of parameters, with the units that they may have."""
+        return reader_of(self.mechanism)
+
+    def quantities(self) -> tuple[Quantity, ...]:
+        """Return the outputs of the mechanism."""
+        return outputs_of(self.mechanism, self.instants, self.order)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Motions(_OfMechanism):
+    """The driven motion of a mechanism in every design; see `jounce.solve_batch`."""
+
+    mechanism: Mechanism
+    time: Any = None
+    order: int = 4
+    tolerance: float = 1e-12
+
+    def __post_init__(self) -> None:
+        checked_settings(self.mechanism, self.order, self.tolerance)
+
+    @functools.cached_property
+    def instants(self) -> Float[np.ndarray, " time"]:
+        """Instants, s."""
+        return time_grid(self.mechanism.time if self.time is None else self.time, self.mechanism.parameter_values)
+
+    def options(self) -> dict[str, Any]:
+        """Return order and tolerance."""
+        return {"kind": "motions", "order": self.order, "tolerance": self.tolerance}
+
+    def histories(self, designs: Designs, threads: int) -> Histories:
+        """Solve some designs side by side."""
+        settings = {"tolerance": self.tolerance, "threads": threads}
+        found = solve_batch(self.mechanism, designs, self.instants, self.order, **settings)
+        values = {str(name): array.values for name, array in found.data_vars.items() if name != "status"}
+        return Histories(values, found["status"].values)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Simulations(_OfMechanism):
+    """The motion of a mechanism under its forces in every design; see `jounce.simulate_batch`."""
+
+    mechanism: Mechanism
+    time: Any = None
+    order: int = 4
+    tolerance: float = 1e-15
+    method: AbstractMethod | None = None
+    longest_step: float = np.inf
+
+    def __post_init__(self) -> None:
+        check_mechanism(self.mechanism)
+        checked_options(self.order, self.method, self.tolerance, self.longest_step)
+        for name, output in self.mechanism.outputs.items():
+            if isinstance(output, AbstractMotionOutput):
+                message = "forces and energies are not computed in batches of simulations; leave this output out"
+                raise MechanismError(message, name=f"outputs.{name}")
+
+    @functools.cached_property
+    def instants(self) -> Float[np.ndarray, " time"]:
+        """Instants, s."""
+        return instants_of(self.mechanism.time if self.time is None else self.time, self.mechanism.parameter_values)
+
+    def options(self) -> dict[str, Any]:
+        """Return order, tolerance and method."""
+        longest = None if np.isinf(self.longest_step) else float(self.longest_step)
+        method = "Taylor()" if self.method is None else repr(self.method)
+        chosen = {"order": self.order, "tolerance": self.tolerance, "method": method, "longest_step": longest}
+        return {"kind": "simulations", **chosen}
+
+    def histories(self, designs: Designs, threads: int) -> Histories:
+        """Simulate some designs side by side; their threads are as many as the machine has cores."""
+        del threads
+        settings = {"method": self.method, "tolerance": self.tolerance, "longest_step": self.longest_step}
+        found = simulate_batch(self.mechanism, designs, self.instants, self.order, **settings)
+        shapes = {quantity.name: quantity.shape for quantity in self.quantities()}
+        values = {name: x.reshape(*x.shape[:3], *shapes[name]) for name, x in found.outputs.items()}
+        unknown = found.status != Status.OK
+        for array in values.values():
+            array[unknown] = np.nan
+        return Histories(values, found.status)
+
+
+def outputs_of(mechanism: Mechanism, instants: Float[np.ndarray, " time"], order: int) -> tuple[Quantity, ...]:
+    """Return the outputs of a mechanism as quantities; it is solved only where there are forces or energies."""
+    if not mechanism.outputs:
+        raise MechanismError("the mechanism has no outputs, so that there is nothing to keep", name="outputs")
+    model = build(mechanism)
+    pose = pose_at(model.guess, model.pose_type)
+    still = np.zeros_like(pose.position.coefficients[0])
+    pose = pose.extended(still, None if mechanism.space == "planar" else still)  # for outputs that are rates
+    of_motion = any(isinstance(output, AbstractMotionOutput) for output in mechanism.outputs.values())
+    motion: Motion | None = solve(mechanism, instants, order, strict=False) if of_motion else None
+    found = []
+    for name, output in mechanism.outputs.items():
+        if isinstance(output, AbstractMotionOutput):
+            assert motion is not None
+            values = motion.outputs[name]
+            count = values.shape[2] if values.ndim == 3 else 1
+        elif getattr(output, "turning", False):  # counted from where the mechanism is put together
+            count = 1
+        else:
+            assert isinstance(output, AbstractOutput)
+            group = output_group(output, mechanism, name=name)
+            count = jax.eval_shape(lambda g=group: g.evaluate(pose).coefficients[0]).shape[0]
+        axes = output.axes or (("component", tuple(output.labels[:count])),)
+        found.append(Quantity(name, output.unit, axes if count > 1 else ()))
+    return tuple(found)
+
+
+DRIVES = ("armature", "damping", "friction")
+_PARAMETER = re.compile(rf"(payload|{'|'.join(DRIVES)})\.(.+)")
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Torques(Problem):
+    """The torques of the joints of a robot on a trajectory, with rates, for many loads, drives and speeds.
+
+    Varied are ``payload.LINK``, a point mass in the origin of a link, kg; ``armature.JOINT``, ``damping.JOINT`` and
+    ``friction.JOINT``, in the place of those of the robot; and ``speed``, how many times faster the trajectory is run.
+    """
+
+    robot: Robot
+    trajectory: JointTrajectory
+    time: Any = None
+    rates: int = 2
+
+    @functools.cached_property
+    def instants(self) -> Float[np.ndarray, " time"]:
+        """Instants of the trajectory at its own speed, s."""
+        return self.trajectory.times if self.time is None else np.atleast_1d(np.asarray(self.time, float))
+
+    @property
+    def levels(self) -> int:
+        """Number of rates, the torque itself counted."""
+        return self.rates + 1
+
+    @property
+    def nominal(self) -> Mapping[str, float]:
+        """What the robot holds, has and does, SI."""
+        drives = {f"{kind}.{n}": getattr(self.robot.joints[n], kind) for n in self.robot.joint_names for kind in DRIVES}
+        return {"speed": 1.0, **{f"payload.{link}": 0.0 for link in self.robot.links}, **drives}
+
+    @property
+    def reader(self) -> Reader:
+        """Reads values with units."""
+
+        def read(name: str, text: str) -> float:
+            check_name("parameter of a robot", name, tuple(self.nominal), RobotError, name="vary")
+            value = parse_value(text, "mass" if name.startswith("payload.") else "any").value
+            if not isinstance(value, float):
+                raise RobotError("must be a number, with or without a unit", value=text)
+            return value
+
+        return read
+
+    def quantities(self) -> tuple[Quantity, ...]:
+        """Return the torques of all joints."""
+        return tuple(Quantity(n, "N*m" if self.robot.joints[n].turning else "N") for n in self.robot.joint_names)
+
+    def options(self) -> dict[str, Any]:
+        """Return how many rates are computed."""
+        return {"kind": "torques", "rates": self.rates}
+
+    def histories(self, designs: Designs, threads: int) -> Histories:
+        """Compute some designs: torques are linear in loads and drives, so that one more robot stands for each of them.
+
+        Raises
+        ------
+        RobotError
+            A speed is not above zero, or another value is negative.
+        """
+        del threads
+        count = len(next(iter(designs.values())))
+        for name, values in designs.items():
+            if (values < 0).any() or (name == "speed" and not values.all()):
+                message = "must be above zero" if name == "speed" else "must be zero or greater"
+                raise RobotError(message, name=f"vary {name}", value=float(values.min()))
+        linear = [name for name in designs if name != "speed"]
+        speed = np.unique(designs["speed"]) if "speed" in designs else np.ones(1)
+        which = np.searchsorted(speed, designs["speed"]) if "speed" in designs else np.zeros(count, int)
+        bare = _with(dict.fromkeys(linear, 0.0), self.robot)
+        base = self._torques(bare, speed)
+        found = base[which]
+        for name in linear:
+            share = self._torques(_with({name: 1.0}, bare), speed) - base
+            found = found + designs[name][:, None, None, None] * share[which]
+        values = {name: found[..., k] for k, name in enumerate(self.robot.joint_names)}
+        status = np.full(found.shape[:2], int(Status.OK))
+        return Histories(values, status, designs.get("speed"))
+
+    def _torques(self, robot: Robot, speed: Float[np.ndarray, " speed"]) -> Float[np.ndarray, "speed time rate joint"]:
+        followed = FollowedTrajectory(robot, self.trajectory)
+        orders = np.arange(self.rates + 3)
+        q = followed.coordinates(self.instants, self.rates + 2) * (speed[:, None, None, None] ** orders[:, None])
+        flat = q.reshape(-1, *q.shape[2:])
+        torques = followed.torques(flat, np.tile(self.instants, len(speed)), True)
+        return torques.reshape(len(speed), len(self.instants), *torques.shape[1:])
+
+
+def _with(values: Mapping[str, float], robot: Robot) -> Robot:
+    """Return a robot with other loads and drives; a load of zero is none."""
+    joints = dict(robot.joints)
+    for name, value in values.items():
+        match = _PARAMETER.fullmatch(name)
+        assert match is not None
+        kind, owner = match.groups()
+        if kind == "payload":
+            robot = robot.with_payload(owner, Inertia(value)) if value else robot
+        else:
+            joints[owner] = dataclasses.replace(joints[owner], **{kind: value})
+    parts = (list(robot.links.values()), list(joints.values()))
+    return Robot(robot.name, *parts, robot.gravity, list(robot.closures.values()), robot.strict)

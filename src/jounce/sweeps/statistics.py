@@ -1,0 +1,148 @@
+"""What is kept of every design: peaks, where they are, root mean squares, least and largest values, and the outcome."""
+
+import dataclasses
+import warnings
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.errors import MechanismError
+from jounce.kinematics import Status
+from jounce.sweeps.problems import Histories, Quantity
+
+STATISTICS = {
+    "peak": "largest magnitude of {} at the instants",
+    "peak_time": "instant of the largest magnitude of {}",
+    "rms": "root mean square of {} over time",
+    "min": "least value of {} at the instants",
+    "max": "largest value of {} at the instants",
+}
+
+
+@dataclasses.dataclass(frozen=True)
+class Variable:
+    """One array of a result; its first dimension is design.
+
+    Attributes
+    ----------
+    dims : tuple of str
+        Dimensions after the first one.
+    shape : tuple of int
+        Their sizes.
+    """
+
+    name: str
+    dims: tuple[str, ...]
+    shape: tuple[int, ...]
+    dtype: str
+    attributes: dict[str, Any]
+
+
+def variables_of(
+    quantities: Sequence[Quantity], parameters: Sequence[str], levels: int, instants: int, *, histories: bool
+) -> list[Variable]:
+    """Return the arrays that are kept: of parameters, outcomes and statistics, and of histories where they are wanted.
+
+    Raises
+    ------
+    MechanismError
+        Two of them would have the same name.
+    """
+    flags = {"flag_values": [int(s) for s in Status], "flag_meanings": " ".join(s.name.lower() for s in Status)}
+    kept = [
+        Variable("failed_instants", (), (), "i4", {"long_name": "instants not solved, -1 where not computed"}),
+        Variable("first_status", (), (), "i1", {"long_name": "outcome at the first instant not solved", **flags}),
+    ]
+    if histories:
+        kept.append(Variable("status", ("time",), (instants,), "i1", {"long_name": "outcome", **flags}))
+    for quantity in quantities:
+        dims = ("derivative", *(axis for axis, _ in quantity.axes))
+        shape = (levels, *quantity.shape)
+        for kind, words in STATISTICS.items():
+            units = "s" if kind == "peak_time" else quantity.units
+            attributes = {"units": units, "long_name": words.format(quantity.name)}
+            kept.append(Variable(f"{quantity.name}_{kind}", dims, shape, "f8", attributes))
+        if histories:
+            attributes = {"units": quantity.units, "long_name": quantity.name}
+            kept.append(Variable(quantity.name, ("time", *dims), (instants, *shape), "f8", attributes))
+    taken = {"time", "derivative", "design", *(axis for quantity in quantities for axis, _ in quantity.axes)}
+    for variable in kept:
+        if variable.name in taken:
+            message = f"two arrays of the result would be called {variable.name}; give the output another name"
+            raise MechanismError(message, name=f"outputs.{variable.name}")
+        taken.add(variable.name)
+    named = {name: name if name not in taken else f"parameter_{name}" for name in parameters}
+    return [*(Variable(named[name], (), (), "f8", {"long_name": name}) for name in parameters), *kept]
+
+
+def kept_values(
+    found: Histories, quantities: Sequence[Quantity], levels: int, instants: np.ndarray, *, histories: bool
+) -> dict[str, np.ndarray]:
+    """Return the arrays of some designs, by name; a design that was not solved at all instants has no statistics."""
+    count = len(found.status)
+    bad = found.status != Status.OK
+    first = np.take_along_axis(found.status, np.argmax(bad, axis=1)[:, None], axis=1)[:, 0]
+    kept: dict[str, np.ndarray] = {"failed_instants": bad.sum(axis=1).astype("i4"), "first_status": first.astype("i1")}
+    if histories:
+        kept["status"] = found.status.astype("i1")
+    for quantity in quantities:
+        values = found.values.get(quantity.name)
+        if values is None:  # no design of them was solved
+            values = np.full((count, len(instants), levels, *quantity.shape), np.nan)
+        kept |= {f"{quantity.name}_{kind}": x for kind, x in statistics(values, instants, found.pace).items()}
+        if histories:
+            kept[quantity.name] = values
+    return kept
+
+
+def statistics(
+    values: Float[np.ndarray, "design time *rest"], instants: np.ndarray, pace: np.ndarray | None = None
+) -> dict[str, Float[np.ndarray, "design *rest"]]:
+    """Return statistics of histories over time; NaN where a value is not known.
+
+    Parameters
+    ----------
+    values : array of shape (designs, time, ...)
+    instants : array of shape (time,)
+        s; the mean of squares is over time, by trapezia.
+    pace : array of shape (designs,), optional
+        How many times faster each design moves than the instants say.
+
+    Examples
+    --------
+    >>> found = statistics(np.array([[0.0, -3.0, 2.0]]), np.array([0.0, 1.0, 2.0]))
+    >>> {name: value.tolist() for name, value in found.items() if name != "rms"}
+    {'peak': [3.0], 'peak_time': [1.0], 'min': [-3.0], 'max': [2.0]}
+    """
+    low, high = values.min(axis=1), values.max(axis=1)
+    size = np.abs(values)
+    peak = size.max(axis=1)
+    unknown = np.isnan(peak)
+    when = instants[np.argmax(size, axis=1)]
+    if pace is not None:
+        when = instants[0] + (when - instants[0]) / pace.reshape(-1, *[1] * (when.ndim - 1))
+    weight = _weights(instants)
+    scale = np.where(peak > 0, peak, 1.0)  # squares of large numbers would overflow
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)
+        mean = np.einsum("t,dt...->d...", weight, (size / scale[:, None]) ** 2)
+    return {
+        "peak": peak,
+        "peak_time": np.where(unknown, np.nan, when),
+        "rms": np.where(unknown, np.nan, scale * np.sqrt(mean)),
+        "min": low,
+        "max": high,
+    }
+
+
+def _weights(instants: np.ndarray) -> Float[np.ndarray, " time"]:
+    """Return weights of a mean over time."""
+    if len(instants) == 1:
+        return np.ones(1)
+    step = np.diff(instants)
+    weight = np.zeros(len(instants))
+    weight[:-1] += step / 2
+    weight[1:] += step / 2
+    return weight / (instants[-1] - instants[0])
