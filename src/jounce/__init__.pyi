@@ -124,6 +124,7 @@ from jounce.mechanism import (
     TimeGrid as TimeGrid,
 )
 from jounce.robot import (
+    BaseMotion as BaseMotion,
     Closure as Closure,
     FrameMotion as FrameMotion,
     Inertia as Inertia,
@@ -135,6 +136,7 @@ from jounce.robot import (
     Wrench as Wrench,
     bias_forces as bias_forces,
     center_of_mass as center_of_mass,
+    forward_dynamics as forward_dynamics,
     forward_kinematics as forward_kinematics,
     inverse_dynamics as inverse_dynamics,
     jacobian as jacobian,
