@@ -75,7 +75,9 @@ from jounce.forces import AbstractForce as AbstractForce, Law as Law, Laws as La
 from jounce.integrate import (
     Batch as Batch,
     Event as Event,
+    JointEvent as JointEvent,
     Obreshkov as Obreshkov,
+    RobotSimulation as RobotSimulation,
     Simulation as Simulation,
     Taylor as Taylor,
     ode_term as ode_term,

@@ -96,6 +96,10 @@ class ProgramReader(abc.ABC):
         return [*carry, *(self.composed(lambda *xs: jnp.stack(xs), parts) for parts in zip(*collected, strict=True))]
 
 
+def _is_floating(variable: Any) -> bool:
+    return jnp.issubdtype(variable.aval.dtype, jnp.floating)
+
+
 def only_adds(jaxpr: Any) -> bool:
     """Tell whether a program does nothing to numbers but add and move them, so that it acts on each coefficient alike.
 
@@ -104,10 +108,9 @@ def only_adds(jaxpr: Any) -> bool:
     if jaxpr.constvars:
         return False
     for equation in jaxpr.eqns:
-        if not any(jnp.issubdtype(variable.aval.dtype, jnp.floating) for variable in equation.outvars):
+        if not any(map(_is_floating, equation.outvars)):
             continue
-        literals = [x for x in equation.invars if isinstance(x, Literal) and jnp.issubdtype(x.aval.dtype, jnp.floating)]
-        if any(x.val != 0 for x in literals):
+        if any(isinstance(x, Literal) and _is_floating(x) and x.val != 0 for x in equation.invars):
             return False
         inner = inner_program(equation.params)
         if inner is not None:

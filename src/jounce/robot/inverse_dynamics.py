@@ -193,7 +193,7 @@ def _forces_of_free_tree(
     along, _, _, carried = recursive_newton_euler(tree, q, on_bodies, moving)
     forces = to_coordinates(tree, along)
     w, v = (Jet(tuple(x)) for x in moving)
-    own = inertial_wrench(*map(jnp.asarray, (body.mass, body.center, body.inertia)), w, v)
+    own = inertial_wrench(jnp.asarray(body.mass), jnp.asarray(body.center), jnp.asarray(body.inertia), w, v)
     at_base = jnp.concatenate([stacked(a) + b for a, b in zip(own, carried, strict=True)], axis=1)
     at_base = at_base if applied is None else at_base - applied[:, -1]
     return jnp.concatenate([at_base, forces + _of_drives(tree, q) if drives else forces], axis=1)

@@ -237,6 +237,32 @@ class TreeEquations(eqx.Module):
         axes = cross((before + turn)[:, None], motion.axes)
         return Motion(motion.rates, unknowns.joints, axes, arm, moved)
 
+    def energy(self, motion: Motion) -> tuple[Float[Numbers, " batch"], Float[Numbers, " batch"]]:
+        """Return kinetic energy, that of the armatures of drives included, and potential energy in gravity, J."""
+        tree, base = self.tree, motion.base
+        turning = jnp.asarray(tree.turning)[None, :, None]
+        nothing = jnp.zeros_like(motion.axes[:, 0, 0])
+        place0, spin0, velocity0 = nothing, nothing, nothing
+        if base is not None:
+            place0, spin0 = base.position, _combined(base.axes, base.twist[3:])
+            velocity0 = _combined(base.axes, base.twist[:3])
+        z, rates = motion.axes[:, 2], self._at_joints(motion.rates)[None]
+        turn = z * (turning * rates)
+        before = sums_at_parents(tree, turn, spin0)
+        shift = cross(before, motion.arm) + z * ((1 - turning) * rates)
+        velocity = sums_at_parents(tree, shift, velocity0) + shift
+        place = sums_at_parents(tree, motion.arm, place0) + motion.arm
+        of_bodies = (tree.mass, tree.center, tree.inertia)
+        parts = [_energies(motion.axes, of_bodies, before + turn, velocity, place, tree.gravity)]
+        if base is not None and self.base is not None:
+            own = dataclasses.astuple(self.base)
+            parts.append(_energies(base.axes, own, spin0, velocity0, place0, tree.gravity))
+        kinetic, potential = (total(part[k] for part in parts) for k in (0, 1))
+        if self.drives:
+            armature = jnp.asarray(tree.armature)[:, None]
+            kinetic = kinetic + 0.5 * jnp.sum(armature * motion.rates * motion.rates, axis=0)
+        return kinetic, potential
+
     def _at_joints(self, values: Coordinates) -> Float[Numbers, "body batch"]:
         if self.tree.shape.direct:
             return values
@@ -321,6 +347,19 @@ def _turned_inertia(axes: Any, mass: Any, center: Any, tensor: Any) -> RigidIner
     half = [total(axes[:, k] * tensor[k, j][None] for k in range(3)) for j in range(3)]
     turned = total(half[j][:, None] * axes[None, :, j] for j in range(3))
     return RigidInertia(mass[0], _combined(axes, center), turned)
+
+
+def _energies(
+    axes: Any, values: tuple[Any, ...], spin: Any, velocity: Any, place: Any, gravity: Any
+) -> tuple[Any, Any]:
+    """Return the kinetic energy of bodies, or of one, and the potential energy, summed."""
+    mass, center, tensor = _columns((values[0], values[1], values[2]), axes.ndim > 3)
+    arm, w = _combined(axes, center), _local(axes, spin)
+    moved, momentum = velocity + cross(spin, arm), total(tensor[:, k] * w[k : k + 1] for k in range(3))
+    down = jnp.reshape(jnp.asarray(gravity), (3,) + (1,) * (arm.ndim - 1))
+    kinetic = 0.5 * jnp.sum(mass * moved * moved + w * momentum, axis=0)
+    potential = -jnp.sum(mass * down * (place + arm), axis=0)
+    return tuple(jnp.sum(x.reshape(-1, x.shape[-1]), axis=0) for x in (kinetic, potential))
 
 
 def _of_inertia(axes: Any, values: tuple[Any, ...], spin: Any, spin_rate: Any, acceleration: Any) -> tuple[Any, Any]:
