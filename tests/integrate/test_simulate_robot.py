@@ -65,10 +65,10 @@ def test_sticking_friction_ends_with_a_reason():
 
 @pytest.mark.slow
 def test_arm_is_the_mechanism_that_it_is():
-    robot = random_robot(2, 4, prismatic=0.4)
-    q = np.random.default_rng(1).uniform(-0.5, 0.5, 4)
+    robot = random_robot(3, 2, tree=False, prismatic=0.0)
+    q = np.array([0.4, -0.3])
     time = np.array([0.0, 0.2, 0.4])
-    found = jn.simulate(robot, time, 4, state=[q, np.zeros(4)])
+    found = jn.simulate(robot, time, 4, state=[q, np.zeros(2)])
     link = robot.moving_links[-1]
     whole = jn.simulate(robot.mechanism(q, time=time), time, 4)
     points = whole.point(*jn.robot.body_point(robot, link)).values
@@ -120,7 +120,7 @@ def test_free_base_keeps_its_momenta_and_energy():
 
 def test_bad_input_is_told():
     robot = slider()
-    with pytest.raises(jn.RobotError, match=r"torque\.slider: "):
+    with pytest.raises(jn.RobotError, match="torque: no moving joint has this name"):
         jn.simulate(robot, TIME, torque={"slider": 1.0})
     with pytest.raises(jn.RobotError, match=r"the function must return an array of 1 forces"):
         jn.simulate(robot, TIME, torque=lambda t, q, v: jnp.zeros(3))

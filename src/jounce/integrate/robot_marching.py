@@ -11,7 +11,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Bool, Float, Int
 
-from jounce.integrate.lookahead import POINTS, SHORTEST, SPAN_POINTS
+from jounce.integrate.lookahead import HARMLESS, POINTS, SHORTEST, SPAN_POINTS
 from jounce.integrate.marching import MARGIN, Outcome
 from jounce.integrate.methods import ROUNDING, Lanes, furthest
 from jounce.jet.series import Recursion
@@ -21,7 +21,9 @@ from jounce.robot.motion_series import MotionSeries, motion_series
 from jounce.robot.tree_equations import Motion, TreeEquations, Unknowns, free_base
 from jounce.shapes import Numbers
 
-STUCK = 60  # steps of no length one after the other: a force that switches without end
+STUCK = 100  # steps cut so short one after the other: a force that switches without end; a jump needs some thirty
+SHORT = 1e-5  # of the step that the series alone would allow
+NOISE = 32.0  # times what the equations miss where the series begins is rounding on the way too
 
 
 class RobotState(NamedTuple):
@@ -258,14 +260,21 @@ def march_robot(
     span = jnp.abs(stop - begun)
 
     def look(polynomial: RobotState, time: Any, step: Any, first: Any) -> tuple[Any, Any]:
-        """Return the error that a part of the places on a step shows, and whether all is finite."""
-        shares = (first + jnp.arange(1.0, POINTS + 1)) / jnp.maximum(_places(step), POINTS)
+        """Return the error that a part of the places on a step shows, as part of what is allowed, and if it is finite.
+
+        A velocity that is wrong goes on to the end of the run, so that jumps count by what they move until then. What
+        the equations miss at the beginning, where the series follows from them, is rounding.
+        """
+        places = jnp.maximum(_places(step), POINTS)
+        shares = jnp.concatenate([jnp.zeros(1), (first + jnp.arange(1.0, POINTS + 1)) / places])
         since = jnp.minimum(shares, 1.0) * step
         state, rates = at(polynomial, since), rates_at(polynomial, since)
         gap, size = problem.departures(state, rates, (time + since)[None])
-        gap = jnp.maximum(jnp.abs(gap) - ROUNDING * jnp.max(jnp.abs(size)), 0.0)
-        error = jnp.max(gap) * step**2 / (order * (order + 1.0))
-        return error, jnp.all(jnp.isfinite(gap))
+        rounding = NOISE * jnp.max(jnp.abs(gap[:, 0])) + ROUNDING * jnp.max(jnp.abs(size))
+        largest = jnp.maximum(jnp.max(jnp.abs(gap[:, 1:])) - rounding, 0.0)
+        local = largest * step**2 / (order * (order + 1.0)) / (MARGIN * tolerance)
+        lasting = largest * jnp.abs(step) * span / jnp.maximum(MARGIN * tolerance, HARMLESS)
+        return jnp.maximum(local, lasting), jnp.all(jnp.isfinite(gap))
 
     def _places(step: Any) -> Any:
         return float(POINTS) if problem.blind else jnp.maximum(SPAN_POINTS * jnp.abs(step) / span, POINTS)
@@ -280,10 +289,10 @@ def march_robot(
 
         def open_(carry: Any) -> Any:
             first, error, finite = carry
-            return (first < _places(step)) & finite & (error <= MARGIN * tolerance)
+            return (first < _places(step)) & finite & (error <= 1.0)
 
         _, error, finite = jax.lax.while_loop(open_, further, (jnp.zeros(()), jnp.zeros(()), jnp.ones((), bool)))
-        return finite & (error <= MARGIN * tolerance), finite
+        return finite & (error <= 1.0), finite
 
     def attempt(current: Progress) -> tuple[Progress, Any, Any]:
         time, left = current.time, stop - current.time[0]
@@ -294,7 +303,7 @@ def march_robot(
         polynomial = jax.tree.map(lambda c: jnp.where(kept[: len(c), None], c, 0.0), whole)
         step = jnp.minimum(jnp.minimum(reach[0], longest), jnp.abs(left))
         step = jnp.where(step >= 0.999 * jnp.abs(left), jnp.abs(left), step)
-        shortest = SHORTEST * jnp.maximum(span, jnp.abs(time[0]))
+        shortest, wished = SHORTEST * jnp.maximum(span, jnp.abs(time[0])), step
         sense = jnp.sign(left)
 
         def halved(carry: Any) -> Any:
@@ -309,13 +318,13 @@ def march_robot(
         last = step >= jnp.abs(left)
         arrived = at(polynomial, sense * step[None])
         onwards = jnp.where(last, stop, time[0] + sense * step)
-        tiny = step <= shortest
-        stuck = jnp.where(tiny & ~last, current.stuck + 1, 0)
+        short = (step < SHORT * wished) & ~last
+        stuck = jnp.where(short, current.stuck + 1, 0)
         moves = known & finite & (step > 0) & (onwards != time[0]) & (stuck < STUCK)
         outcome = jnp.where(last, int(Outcome.ARRIVED), int(Outcome.RUNNING))
         outcome = jnp.where(moves, outcome, jnp.where(known, int(Outcome.COLLAPSED), int(Outcome.LOST)))
         after = Progress(onwards[None], arrived, outcome, stuck)
-        steps = RobotSteps(time[0], sense * step, jax.tree.map(lambda c: c[..., 0], polynomial), ~good)
+        steps = RobotSteps(time[0], sense * step, jax.tree.map(lambda c: c[..., 0], polynomial), ~good | short)
         stay = current._replace(outcome=outcome)
         return jax.tree.map(lambda a, b: jnp.where(moves, a, b), after, stay), steps, moves
 

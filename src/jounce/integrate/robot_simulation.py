@@ -82,7 +82,7 @@ class RobotSimulation(Displayed):
         self.q = _derivatives(q)[:, : order + 1]
         self.base: BaseMotion | None = None
         if twist is not None:
-            self.base = BaseMotion(state.position.T, state.quaternion.T, _derivatives(twist))
+            self.base = BaseMotion(state.position.T.copy(), state.quaternion.T.copy(), _derivatives(twist))
         fine = np.isfinite(self.q).all(axis=(1, 2))
         self.status: Int[np.ndarray, " time"] = np.where(reached, int(Status.OK), int(Status.NOT_REACHED))
         self.faults: dict[int, str] = {}

@@ -155,15 +155,6 @@ def simulate(
     >>> fall = jn.simulate(pendulum, [0.0, 0.5, 1.0], order=3)
     >>> bool(abs(fall.energy - fall.energy[0]).max() < 1e-12)
     True
-
-    A robot, under a feedback law that holds its arm at 0.5 rad:
-
-    >>> rod = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0], tensor=[0, 1 / 12, 1 / 12])
-    >>> pin = jn.Joint("pin", "base", "rod", axis=[0, -1, 0])
-    >>> arm = jn.Robot("arm", [jn.Link("base"), jn.Link("rod", rod)], [pin])
-    >>> law = {"pin": "9.81*0.5*cos(pin) - 20*(pin - 0.5) - 5*pin_d1"}
-    >>> jn.simulate(arm, [0.0, 5.0], torque=law).q[-1, 0].round(6).tolist()
-    [0.5]
     """
     if not isinstance(mechanism, Robot):
         check_mechanism(mechanism)

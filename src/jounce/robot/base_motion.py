@@ -81,7 +81,8 @@ def base_arrays(base: BaseMotion, lead: tuple[int, ...], levels: int) -> tuple[A
 def base_body(robot: AbstractRobot) -> BaseBody:
     """Return the inertia of the base; it may have none, as where a massless frame carries the robot."""
     inertia = robot.base_inertia or Inertia(0.0, strict=False)
-    return BaseBody(np.float64(inertia.mass), inertia.center_of_mass, inertia.tensor)
+    mass = inertia.mass if isinstance(inertia.mass, Tracer) else np.float64(inertia.mass)
+    return BaseBody(mass, inertia.center_of_mass, inertia.tensor)
 
 
 def scene_axes(quaternion: Float[Numbers, "4 batch"], twist: TwistSeries) -> tuple[Jet, Jet, Jet]:

@@ -139,9 +139,9 @@ def forward_dynamics(
     places = tuple(place_of(robot, wrench.link, wrench.point) for wrench in wrenches)
     moved = () if base is None else (*base_arrays(base, lead, 1), at_base)
     arrays = (state, forces, *moved, *pushes)
-    traced = any(isinstance(x, Tracer) for x in jax.tree.leaves((arrays, robot.tree)))
-    static = (tuple(wrench.frame == "base" for wrench in wrenches), bool(drives), traced)
     constants = (mask, places, None if base is None else base_body(robot))
+    traced = any(isinstance(x, Tracer) for x in jax.tree.leaves((arrays, robot.tree, constants)))
+    static = (tuple(wrench.frame == "base" for wrench in wrenches), bool(drives), traced)
     q, margin, *found = _moved(robot, arrays, constants, static)
     if strict and not traced:
         _check_margins(robot, margin, mask)
