@@ -126,7 +126,7 @@ def test_bad_input_is_told():
         jn.simulate(robot, TIME, torque=lambda t, q, v: jnp.zeros(3))
     with pytest.raises(jn.ExpressionError, match="wheel"):
         jn.simulate(robot, TIME, torque={"slide": "2*wheel"})
-    with pytest.raises(jn.RobotError, match=r"state: must have the shape"):
+    with pytest.raises(jn.RobotError, match=r"state: must hold q and q', the shape"):
         jn.simulate(robot, TIME, state=[0.0])
     with pytest.raises(jn.JounceError, match=r"torques: simulate has no such option; did you mean 'torque'"):
         jn.simulate(robot, TIME, torques=[1.0])

@@ -224,3 +224,11 @@ def test_loops_are_sent_elsewhere():
     closed = robot.with_closures([jn.Closure("tip", (robot.base, robot.moving_links[-1]))])
     with pytest.raises(jn.RobotError, match=r"jn.simulate\(robot.mechanism"):
         jn.forward_dynamics(closed, np.zeros((2, 6)), np.zeros((1, 6)))
+
+
+def test_free_base_without_inertia_is_told():
+    ball = jn.Inertia(1.0, center_of_mass=[0.1, 0, 0], tensor=[0.1, 0.1, 0.1])
+    robot = jn.Robot("ball", [jn.Link("base"), jn.Link("ball", ball)], [jn.Joint("pin", "base", "ball")])
+    base = jn.BaseMotion([0, 0, 0], [1, 0, 0, 0], np.zeros((1, 6)))
+    with pytest.raises(jn.SingularityError, match="some motion of the joints, or of the free base"):
+        jn.forward_dynamics(robot, np.zeros((2, 1)), [[1.0]], base=base)

@@ -15,7 +15,7 @@ from jounce.integrate.robot_marching import Progress, RobotProblem, RobotState, 
 from jounce.integrate.robot_simulation import RobotSimulation
 from jounce.kinematics import Status
 from jounce.kinematics.solve import raise_for_status
-from jounce.robot.arguments import checked_coordinates, floats
+from jounce.robot.arguments import checked_state, floats
 from jounce.robot.base_motion import BaseMotion, base_arrays, base_body
 from jounce.robot.joint_laws import joint_laws
 from jounce.robot.robot import Robot
@@ -103,7 +103,7 @@ def _start(robot: Robot, problem: RobotProblem, state: Any, base: BaseMotion | N
     if isinstance(state, Mapping):
         state = [robot.coordinates(**state), np.zeros(n)]
     levels = np.zeros((2, n)) if state is None else np.asarray(floats("state", state))
-    levels = np.array(checked_coordinates(robot, levels, 1, most=1))
+    levels = np.array(checked_state(robot, levels))
     if levels.shape != (2, n) or not np.isfinite(levels).all():
         raise RobotError(f"must hold finite q and q', the shape (2, {n})", name="state", value=levels.tolist())
     mask = np.asarray(problem.equations.driven)

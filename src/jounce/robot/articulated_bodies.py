@@ -56,8 +56,8 @@ class ArticulatedBodies(eqx.Module):
         Acceleration of the joint by a unit of force along it; zero where it is driven, NaN where nothing resists.
     margin : array of shape (bodies, batch)
         Inertia along the joint, as part of the largest of its articulated body; not finite where it moves no mass.
-    base : DenseFactor, optional
-        Of the inertia of a free base.
+    base : tuple of DenseFactor and array of shape (6, batch), optional
+        Of the inertia of a free base, scaled, and the scales.
     """
 
     tree: Tree
@@ -67,7 +67,7 @@ class ArticulatedBodies(eqx.Module):
     force: BodyVectors
     compliance: Joints
     margin: Joints
-    base: DenseFactor | None
+    base: tuple[DenseFactor, BaseVector] | None
 
     @classmethod
     def of(
@@ -134,7 +134,9 @@ class ArticulatedBodies(eqx.Module):
         factor = None
         if base is not None:
             carried = state if tree.shape.slots == 1 else jax.tree.map(lambda x: x[0], state)
-            factor = DenseFactor.of(_six_by_six(*(a + b for a, b in zip(base.blocks(), carried, strict=True))))
+            whole = _six_by_six(*(a + b for a, b in zip(base.blocks(), carried, strict=True)))
+            scale = 1.0 / jnp.sqrt(jnp.stack([whole[k, k] for k in range(6)]))
+            factor = DenseFactor.of(whole * scale[:, None] * scale[None]), scale
         moment, force = (jnp.moveaxis(x, 0, 1) for x in (moment, force))
         return cls(tree, axis, arm, moment, force, compliance, margin, factor)
 
@@ -185,7 +187,8 @@ class ArticulatedBodies(eqx.Module):
         start, base = (nothing, nothing), None
         if self.base is not None and at_base is not None:
             carried = state if tree.shape.slots == 1 else jax.tree.map(lambda x: x[0], state)
-            base = self.base.solve(at_base - jnp.concatenate(carried))
+            inertia, scale = self.base
+            base = inertia.solve((at_base - jnp.concatenate(carried)) * scale) * scale
             start = base[:3], base[3:]
         _, found = jax.lax.scan(outward, fill_slots(tree, start), (*bodies, left))
         return found, base

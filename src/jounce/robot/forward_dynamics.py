@@ -10,7 +10,7 @@ from jax.core import Tracer
 from jaxtyping import Float
 
 from jounce.errors import RobotError, SingularityError, check_name
-from jounce.robot.arguments import checked_coordinates, floats
+from jounce.robot.arguments import checked_state, floats
 from jounce.robot.articulated_bodies import LEAST_INERTIA
 from jounce.robot.base_motion import BaseMotion, base_arrays, base_body
 from jounce.robot.batches import Batched
@@ -128,7 +128,7 @@ def forward_dynamics(
             "gives its motion under forces, robot.opened() the tree without closures"
         )
         raise RobotError(message, name=robot.name, value=list(robot.closures))
-    state = checked_coordinates(robot, state, 1, most=1)
+    state = checked_state(robot, state)
     forces, at_base = _checked_forces(robot, tau, state.shape[:-2], base is not None)
     lead, levels, count = state.shape[:-2], forces.shape[-2], len(robot.joint_names)
     mask = np.zeros(count)
@@ -218,17 +218,22 @@ def coordinates_of(series: MotionSeries, order: int) -> Float[Numbers, "order+3 
 def _check_margins(robot: Robot, margin: Any, driven: np.ndarray) -> None:
     """Raise SingularityError, by name, where nothing resists a joint."""
     margin = np.reshape(margin, (-1, margin.shape[-1]))
-    direct = margin.shape[1] == len(robot.moving_joints)
-    free = 1.0 - driven if robot.tree.shape.direct else np.ones(margin.shape[1])
-    bad = ~(margin > LEAST_INERTIA) & (free > 0) & ~np.isposinf(margin)
+    free = np.ones(margin.shape[1])
+    if robot.tree.shape.direct:
+        free[: len(driven)] = 1.0 - driven
+    bad = ~(margin > LEAST_INERTIA) & (free > 0)
     if not bad.any():
         return
     sample = int(np.argwhere(bad)[0, 0])
-    joint = int(np.flatnonzero(bad[sample])[-1])  # the outermost: what carries it is not known there either
     where = f" at sample {sample}" if len(margin) > 1 else ""
-    names = [joint.name for joint in robot.moving_joints]
+    names = [joint.name for joint in robot.moving_joints] if robot.tree.shape.direct else []
+    joints = np.flatnonzero(bad[sample, : len(names)])
+    if not joints.size:
+        message = f"nothing resists some motion of the joints, or of the free base{where}: no acceleration follows"
+        raise SingularityError(f"{message}; give the links and the base inertias", name=robot.name)
     message = (
         f"nothing resists this joint{where}: what it moves has no inertia about its axis, so that no acceleration "
         "follows; give the link an inertia, or the joint an armature with drives=True, or drive it"
     )
-    raise SingularityError(message, name=names[joint] if direct and robot.tree.shape.direct else robot.name)
+    # the outermost one: what carries it is not known there either
+    raise SingularityError(message, name=names[int(joints[-1])])

@@ -297,11 +297,13 @@ class TreeFactor(eqx.Module):
 
     @property
     def margin(self) -> Float[Numbers, "joint batch"]:
-        """How far each joint, or the whole, is from one that nothing resists; see `ArticulatedBodies`."""
-        if self.bodies is not None:
+        """How far each joint, then a free base, or the whole, is from what nothing resists; see `ArticulatedBodies`."""
+        if self.bodies is None:
+            assert self.dense is not None
+            return self.dense[0].pivot_ratio()[None]
+        if self.bodies.base is None:
             return self.bodies.margin
-        assert self.dense is not None
-        return self.dense[0].pivot_ratio()[None]
+        return jnp.concatenate([self.bodies.margin, self.bodies.base[0].pivot_ratio()[None]])
 
     def solve(self, missing: Unknowns) -> Unknowns:
         """Return the accelerations that bring up forces which are missing; none of joints that are driven."""
