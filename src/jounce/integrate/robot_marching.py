@@ -208,7 +208,7 @@ def _sizes(problem: RobotProblem, polynomial: RobotState) -> Any:
     levels = len(polynomial.rates)
     numbers = jnp.arange(1.0, levels + 1)[:, None]
     scale = jnp.asarray(problem.scale)[None, :, None]
-    found = jnp.max(jnp.abs(polynomial.rates) / scale, axis=1) / numbers
+    found = jnp.max(jnp.abs(polynomial.rates) / scale, axis=1, initial=0.0) / numbers
     if polynomial.position is None:
         return found
     moved = jnp.max(jnp.abs(polynomial.position[1:]), axis=1) / problem.length

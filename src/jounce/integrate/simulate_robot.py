@@ -111,13 +111,13 @@ def _start(robot: Robot, problem: RobotProblem, state: Any, base: BaseMotion | N
         time = np.array([[instant]])
         laws = np.asarray(problem.prescribed_series(np.zeros((n, 1)), time, 1))[..., 0]
         levels = np.where(mask > 0, laws, levels)
-    parts = [levels[0][:, None], levels[1][:, None]]
+    q, rates = levels[0][:, None], levels[1][:, None]
     if base is None:
-        return RobotState(*parts)
+        return RobotState(q, rates)
     pose, twist = (np.asarray(x) for x in base_arrays(base, (), 1))
     if not (np.isfinite(pose).all() and np.isfinite(twist).all()):
         raise RobotError("must be finite", name="base")
-    return RobotState(*parts, pose[0, :3, None], pose[0, 3:, None], twist[0][:, None])
+    return RobotState(q, rates, pose[0, :3, None], pose[0, 3:, None], twist[0][:, None])
 
 
 class _Run:

@@ -196,14 +196,14 @@ class AbstractRobot(Displayed, abc.ABC):
         """
         check_name("link", link, self.links, RobotError, name="link")
         held = self.links[link].inertia or Inertia(0.0, strict=False)
-        values = [
-            old if new is None else new
-            for old, new in zip(
-                (held.mass, held.center_of_mass, held.tensor), (mass, center_of_mass, tensor), strict=True
-            )
-        ]
-        traced = isinstance(held, TracedInertia) or any(isinstance(x, Tracer) for x in jax.tree.leaves(values))
-        inertia = TracedInertia(*values) if traced else Inertia(*values, strict=self.strict)
+        mass = held.mass if mass is None else mass
+        center_of_mass = held.center_of_mass if center_of_mass is None else center_of_mass
+        tensor = held.tensor if tensor is None else tensor
+        traced = any(isinstance(x, Tracer) for x in jax.tree.leaves((mass, center_of_mass, tensor)))
+        if traced or isinstance(held, TracedInertia):
+            inertia = TracedInertia(mass, center_of_mass, tensor)
+        else:
+            inertia = Inertia(mass, center_of_mass, tensor, strict=self.strict)
         links = {**self.links, link: Link(link, inertia)}
         return self._changed(links=list(links.values()))
 

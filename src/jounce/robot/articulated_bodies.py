@@ -182,7 +182,7 @@ class ArticulatedBodies(eqx.Module):
         each = (jnp.asarray(tree.slot), jnp.asarray(tree.parent_slot), turning)
         rows = (jnp.moveaxis(x, 1, 0) for x in (self.axis, self.arm, self.moment, self.force))
         bodies = (each, *rows, self.compliance)
-        nothing = jnp.zeros_like(self.axis[:, 0])
+        nothing = jnp.zeros((3, self.axis.shape[-1]))
         state, left = jax.lax.scan(inward, fill_slots(tree, (nothing, nothing)), (*bodies, along), reverse=True)
         start, base = (nothing, nothing), None
         if self.base is not None and at_base is not None:

@@ -222,7 +222,7 @@ class TreeEquations(eqx.Module):
         tree, base = self.tree, motion.base
         turning = jnp.asarray(tree.turning)[None, :, None]
         z, rates = motion.axes[:, 2], self._at_joints(motion.rates)[None]
-        moved, spin0 = None, jnp.zeros_like(motion.axes[:, 0, 0])
+        moved, spin0 = None, jnp.zeros((3, motion.axes.shape[-1]))
         if base is not None and unknowns.base is not None:
             v, w = base.twist[:3], base.twist[3:]
             spin0 = _combined(base.axes, w)
@@ -241,7 +241,7 @@ class TreeEquations(eqx.Module):
         """Return kinetic energy, that of the armatures of drives included, and potential energy in gravity, J."""
         tree, base = self.tree, motion.base
         turning = jnp.asarray(tree.turning)[None, :, None]
-        nothing = jnp.zeros_like(motion.axes[:, 0, 0])
+        nothing = jnp.zeros((3, motion.axes.shape[-1]))
         place0, spin0, velocity0 = nothing, nothing, nothing
         if base is not None:
             place0, spin0 = base.position, _combined(base.axes, base.twist[3:])
@@ -361,7 +361,8 @@ def _energies(
     down = jnp.reshape(jnp.asarray(gravity), (3,) + (1,) * (arm.ndim - 1))
     kinetic = 0.5 * jnp.sum(mass * moved * moved + w * momentum, axis=0)
     potential = -jnp.sum(mass * down * (place + arm), axis=0)
-    return tuple(jnp.sum(x.reshape(-1, x.shape[-1]), axis=0) for x in (kinetic, potential))
+    each = [jnp.sum(x.reshape(-1, x.shape[-1]), axis=0) for x in (kinetic, potential)]
+    return each[0], each[1]
 
 
 def _of_inertia(axes: Any, values: tuple[Any, ...], spin: Any, spin_rate: Any, acceleration: Any) -> tuple[Any, Any]:

@@ -56,6 +56,6 @@ def totals(tree: Tree, own: BodyVectors, passed: BodyVectors | None = None) -> t
         return write_slot(tree, state, parent_slot, sent), whole
 
     bodies = (jnp.asarray(tree.slot), jnp.asarray(tree.parent_slot), *(jnp.moveaxis(x, 1, 0) for x in rows))
-    nothing = jnp.zeros_like(own[:, 0])
+    nothing = jnp.zeros((own.shape[0], own.shape[2]))
     state, found = jax.lax.scan(inward, fill_slots(tree, nothing), bodies, reverse=True)
     return jnp.moveaxis(found, 0, 1), state if tree.shape.slots == 1 else state[0]
