@@ -72,9 +72,9 @@ class JointEventDetector:
         if isinstance(event.of, str):
             check_name("moving joint", event.of, robot.joint_names, RobotError, name="events.of")
         else:
-            n = len(robot.joint_names)
+            n, function = len(robot.joint_names), event.of
             state = jnp.zeros(()), jnp.zeros(n), jnp.zeros(n)
-            shape = jax.eval_shape(lambda *s: jnp.asarray(event.of(*s), float), *state).shape
+            shape = jax.eval_shape(lambda *s: jnp.asarray(function(*s), float), *state).shape
             if shape != ():
                 raise RobotError(f"the function must return one number, not the shape {shape}", name="events.of")
         self.event, self._names = event, robot.joint_names
