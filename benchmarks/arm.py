@@ -82,8 +82,8 @@ def pinocchio_rates(q: np.ndarray) -> Callable[[], Any]:
     return run
 
 
-def mujoco_torques(q: np.ndarray) -> Callable[[], Any]:
-    """Return a loop over MuJoCo's inverse dynamics, on the inertias that Pinocchio reads, (samples, 1, 7)."""
+def mujoco_model() -> Any:
+    """Return MuJoCo's model of the arm, on the inertias that Pinocchio reads."""
     import mujoco
 
     def numbers(values: Any) -> str:
@@ -100,9 +100,16 @@ def mujoco_torques(q: np.ndarray) -> Callable[[], Any]:
         return text + "</body>" * (model.njoints - 1)
 
     settings = '<compiler balanceinertia="false"/><option gravity="0 0 -9.81"/>'
-    model = mujoco.MjModel.from_xml_string(
+    return mujoco.MjModel.from_xml_string(
         f"<mujoco>{settings}<worldbody>{bodies(pinocchio_arm())}</worldbody></mujoco>"
     )
+
+
+def mujoco_torques(q: np.ndarray) -> Callable[[], Any]:
+    """Return a loop over MuJoCo's inverse dynamics, (samples, 1, 7)."""
+    import mujoco
+
+    model = mujoco_model()
     data, found = mujoco.MjData(model), np.empty_like(q[:, :1])
 
     def run() -> Any:

@@ -76,7 +76,9 @@ from jounce.forces import AbstractForce as AbstractForce, Law as Law, Laws as La
 from jounce.integrate import (
     Batch as Batch,
     Event as Event,
+    JointEvent as JointEvent,
     Obreshkov as Obreshkov,
+    RobotSimulation as RobotSimulation,
     Simulation as Simulation,
     Taylor as Taylor,
     ode_term as ode_term,
@@ -125,6 +127,7 @@ from jounce.mechanism import (
     TimeGrid as TimeGrid,
 )
 from jounce.robot import (
+    BaseMotion as BaseMotion,
     Closure as Closure,
     FrameMotion as FrameMotion,
     Inertia as Inertia,
@@ -136,6 +139,7 @@ from jounce.robot import (
     Wrench as Wrench,
     bias_forces as bias_forces,
     center_of_mass as center_of_mass,
+    forward_dynamics as forward_dynamics,
     forward_kinematics as forward_kinematics,
     inverse_dynamics as inverse_dynamics,
     jacobian as jacobian,

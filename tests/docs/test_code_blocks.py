@@ -11,7 +11,7 @@ import jounce as jn
 ROOT = pathlib.Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 SLOW = ("closed_loop_robots", "coming_from", "integrators", "own_joint", "reactions", "robots", "simulation", "spatial")
-SLOW += ("gradients", "torque_rates")  # to compile
+SLOW += ("gradients", "robot_forward_dynamics", "torque_rates")  # to compile
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 

@@ -3,6 +3,8 @@
 import copy
 import pickle
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -221,3 +223,43 @@ def test_a_joint_that_moves_no_mass_may_be_kept():
         assert other.massless_joints == ("two", "three")
     assert robot.with_payload("b", BODY).massless_joints == ("three",)
     assert robot.with_payload("c", BODY).massless_joints == ()
+
+
+def _slope(function, value, step):
+    """Return a central difference, exact for polynomials to the second degree."""
+    return (np.asarray(function(value + step)) - np.asarray(function(value - step))) / (2 * step)
+
+
+@pytest.mark.slow
+def test_gradients_by_inertial_parameters():
+    robot = random_robot(2, 3, prismatic=0.4)
+    link, q = robot.moving_links[1], np.random.default_rng(3).uniform(-1, 1, (3, 3))
+    held = robot.links[link].inertia
+
+    def quantities(mass, shift, moment):
+        center, tensor = held.center_of_mass + np.eye(3)[1] * shift, held.tensor + np.diag([1.0, 1.0, 0.0]) * moment
+        changed = robot.with_inertia(link, mass=mass, center_of_mass=center, tensor=tensor)
+        torque, matrix = jn.inverse_dynamics(changed, q)[0], jn.mass_matrix(changed, q[0]).ravel()
+        acceleration = jn.forward_dynamics(changed, q[:2], q[2:])[2]
+        return jnp.concatenate([jnp.asarray(part) for part in (torque, matrix, acceleration)])
+
+    start = (held.mass, 0.0, 0.0)
+    for k, step in enumerate((1e-4, 1e-4, 1e-5)):
+        change = np.eye(3)[k]
+        _, slope = jax.jvp(quantities, start, tuple(change))
+        expected = _slope(lambda x, k=k: quantities(*(x if i == k else v for i, v in enumerate(start))), start[k], step)
+        assert np.abs(slope - expected).max() <= 1e-6 * np.abs(expected).max()
+    whole = jax.grad(lambda mass: quantities(mass, 0.0, 0.0)[-1])(held.mass)
+    _, forward = jax.jvp(lambda mass: quantities(mass, 0.0, 0.0)[-1], (held.mass,), (1.0,))
+    assert whole == pytest.approx(float(forward), rel=1e-12)
+
+
+def test_inertia_of_a_link_is_changed_and_checked():
+    robot = random_robot(2, 3)
+    link = robot.moving_links[1]
+    changed = robot.with_inertia(link, mass=5.0)
+    assert changed.mass - robot.mass == pytest.approx(5.0 - robot.links[link].inertia.mass)
+    with pytest.raises(jn.RobotError, match="elbow"):
+        robot.with_inertia("elbow", mass=1.0)
+    with pytest.raises(jn.RobotError, match="mass: must be greater than zero"):
+        robot.with_inertia(link, mass=0.0)

@@ -3,7 +3,9 @@
 from jounce.integrate.batch import Batch as Batch, simulate_batch as simulate_batch
 from jounce.integrate.diffrax_term import OrdinaryEquation as OrdinaryEquation, ode_term as ode_term
 from jounce.integrate.events import Event as Event
+from jounce.integrate.joint_events import JointEvent as JointEvent
 from jounce.integrate.methods import AbstractMethod as AbstractMethod, Taylor as Taylor
 from jounce.integrate.obreshkov import Obreshkov as Obreshkov
+from jounce.integrate.robot_simulation import RobotSimulation as RobotSimulation
 from jounce.integrate.simulate import simulate as simulate
 from jounce.integrate.simulation import Simulation as Simulation

@@ -8,7 +8,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from jounce.dynamics.forward import Equations, Expansion, Flags, Lanes, Matrices, State
 from jounce.errors import JounceError
@@ -146,6 +146,27 @@ def reach(sizes: Sizes, first: int) -> Lanes:
     return jnp.min(roots, axis=0)
 
 
+def furthest(sizes: Sizes, allowed: Lanes) -> tuple[Bool[Numbers, "order batch"], Lanes]:
+    """Return which coefficients of series to keep, from order zero on, so that they carry furthest, and how far, s.
+
+    Parameters
+    ----------
+    sizes : array of shape (order + 1, batch)
+        Of the coefficients from order one on.
+    allowed : array of shape (batch,)
+        Error of a step.
+    """
+    orders = np.arange(1.0, len(sizes) + 1)
+    roots = -jnp.log(jnp.maximum(sizes, 1e-300)) / orders[:, None]  # logarithms: powers would cost far more
+    cuts = np.arange(LOWEST_ORDER, len(sizes))[:, None]
+    counted = (orders >= (cuts + 1) // 2) & (orders <= cuts + 1)  # the upper half of what is kept, and the next
+    reaches = jnp.min(jnp.where(counted[:, :, None], roots[None], jnp.inf), axis=1)
+    steps = reaches + jnp.log(allowed)[None] / (cuts + 1.0)
+    best = jnp.argmax(steps, axis=0)
+    kept = np.arange(len(sizes))[:, None] <= best[None] + LOWEST_ORDER
+    return kept, jnp.exp(jnp.max(steps, axis=0))
+
+
 class Taylor(AbstractMethod):
     """Taylor series of the constrained motion, of a chosen order or one that suits the tolerance.
 
@@ -195,20 +216,13 @@ class Taylor(AbstractMethod):
         if self.step is not None:
             return super().prepared(expansion, length, tolerance, singular)
         sizes = coefficient_sizes(expansion, length)
-        orders = np.arange(1.0, len(sizes) + 1)
-        roots = -jnp.log(jnp.maximum(sizes, 1e-300)) / orders[:, None]  # logarithms: powers would cost far more
-        cuts = np.arange(LOWEST_ORDER, len(sizes))[:, None]
-        counted = (orders >= (cuts + 1) // 2) & (orders <= cuts + 1)  # the upper half of what is kept, and the next
-        reaches = jnp.min(jnp.where(counted[:, :, None], roots[None], jnp.inf), axis=1)
         allowed = jnp.where(singular & _drowned(sizes), jnp.maximum(tolerance, ROUGH), tolerance)
-        steps = reaches + jnp.log(allowed)[None] / (cuts + 1.0)
-        best = jnp.argmax(steps, axis=0)
-        kept = np.arange(len(sizes))[:, None] <= best[None] + LOWEST_ORDER  # of the coefficients from zero on
+        kept, step = furthest(sizes, allowed)
 
         def cut(part: Any) -> Any:
             return jnp.where(kept[:, None, None], part, 0.0)
 
-        return expansion._replace(state=expansion.state.map(cut)), jnp.exp(jnp.max(steps, axis=0)), allowed
+        return expansion._replace(state=expansion.state.map(cut)), step, allowed
 
     def arrive(self, equations: Equations, expansion: Expansion, time: Lanes, step: Lanes) -> State:
         """Return the value of the series."""

@@ -3,7 +3,7 @@
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, overload
 
 import jax
 import numpy as np
@@ -14,12 +14,14 @@ from jounce.dynamics.forward import Equations, Instants, State
 from jounce.dynamics.inverse import force_names
 from jounce.dynamics.motion_values import Coordinates, cut, pose_of
 from jounce.dynamics.start import ConsistentStart, consistent_start
-from jounce.errors import MechanismError, SolveError
+from jounce.errors import JounceError, MechanismError, SolveError, did_you_mean
 from jounce.integrate.events import Event, EventDetector, pose_coordinates
 from jounce.integrate.lookahead import watched_names
 from jounce.integrate.marching import MOVING, DenseOutput, IntegratorState, Outcome, march, unexpanded
 from jounce.integrate.methods import AbstractMethod, Taylor, evaluated
+from jounce.integrate.robot_simulation import RobotSimulation
 from jounce.integrate.sensitivities import traced_simulation
+from jounce.integrate.simulate_robot import simulate_robot
 from jounce.integrate.simulation import Simulation
 from jounce.jet import Jet
 from jounce.kinematics import Status, raise_for_status
@@ -29,15 +31,17 @@ from jounce.kinematics.solve import checked_order
 from jounce.mechanism import Mechanism, TimeGrid, check_mechanism, time_grid
 from jounce.mechanism.law_checks import check_laws
 from jounce.mechanism.preconditions import concrete
+from jounce.robot import BaseMotion, Robot
 from jounce.shapes import ArrayLike, Numbers
 
 AHEAD = 1e-9  # of the time so far: where steps collapse, what is not finite lies that close
 FEW = 4  # derivatives that are looked at for one that is not finite
 STEPS = 64  # tried between two looks at progress and events
+ROBOT_OPTIONS = ("state", "torque", "driven", "drives", "base")
 TOLERANCES = (1e-17, 1e-2)  # below rounding there is still energy to be kept: what series leave out adds up
 
 
-@partial(concrete, traced=traced_simulation)
+@overload
 def simulate(
     mechanism: Mechanism,
     time: ArrayLike | TimeGrid | None = None,
@@ -50,15 +54,49 @@ def simulate(
     longest_step: float = np.inf,
     strict: bool = True,
     progress: Callable[[int, int], None] | None = None,
-) -> Simulation:
-    """Return the motion of a mechanism under its forces, with time derivatives of any order.
+) -> Simulation: ...
+@overload
+def simulate(
+    mechanism: Robot,
+    time: ArrayLike | TimeGrid,
+    order: int = 4,
+    *,
+    method: AbstractMethod | None = None,
+    tolerance: float = 1e-15,
+    events: object = (),
+    longest_step: float = np.inf,
+    strict: bool = True,
+    progress: Callable[[int, int], None] | None = None,
+    state: ArrayLike | Mapping[str, float] | None = None,
+    torque: Any = None,
+    driven: Mapping[str, Any] | None = None,
+    drives: bool = False,
+    base: BaseMotion | None = None,
+) -> RobotSimulation: ...
+@partial(concrete, traced=traced_simulation)
+def simulate(
+    mechanism: Mechanism | Robot,
+    time: ArrayLike | TimeGrid | None = None,
+    order: int = 4,
+    *,
+    method: AbstractMethod | None = None,
+    tolerance: float = 1e-15,
+    initial: Mapping[str, AbstractConstraint] | None = None,
+    events: object = (),
+    longest_step: float = np.inf,
+    strict: bool = True,
+    progress: Callable[[int, int], None] | None = None,
+    **robot: Any,
+) -> Simulation | RobotSimulation:
+    """Return the motion of a mechanism, or of a robot, under forces, with time derivatives of any order.
 
     Accelerations, multipliers and all their rates follow from one factored matrix at each step; positions and
-    velocities are projected onto the constraints (Sommer 2024, section 7).
+    velocities are projected onto the constraints (Sommer 2024, section 7). Robots move in joint coordinates, by
+    articulated bodies: `forward_dynamics`.
 
     Parameters
     ----------
-    mechanism : Mechanism
+    mechanism : Mechanism or Robot
         With masses. Joints and drivers may leave degrees of freedom; drivers go on prescribing what they drive.
     time : array_like of shape (time,), optional
         Instants, s, increasing, or decreasing to go backward; those of the mechanism unless given. The first is the
@@ -71,7 +109,7 @@ def simulate(
         Of the error of a step, rad or sizes of the mechanism; 1e-17 to 0.01.
     initial : dict of str to driver, optional
         In the place of ``mechanism.initial``: each fixes one coordinate and its rate at the start.
-    events : sequence of Event, optional
+    events : sequence of Event, or of JointEvent for a robot, optional
         Crossings to look for.
     longest_step : float, optional
         s.
@@ -79,11 +117,17 @@ def simulate(
         Raise if an instant is not reached. Otherwise it is NaN and `Motion.status` says why.
     progress : callable, optional
         Called with the number of instants passed and their total.
+    **robot
+        Of a robot only. `state`: q and q', of shape (2, n), or a mapping of joints to coordinates; at rest at zero
+        unless given. `torque`: the forces of its joints, N m or N: n numbers; a function of time, q and q' of one
+        sample, by operations of JAX, that returns n; or a mapping of joints to numbers, expressions of ``t``, of the
+        names of joints and of their rates as ``NAME_d1``, motion laws, and functions that return one force. `driven`: a
+        mapping of joints to laws of time that they follow, whatever it takes. `drives`: whether armature, damping and
+        friction count. `base`: the `BaseMotion` with which a base that moves freely begins.
 
     Returns
     -------
-    Simulation
-        Also a `Motion`.
+    Simulation, also a `Motion`; or RobotSimulation
 
     Raises
     ------
@@ -112,12 +156,18 @@ def simulate(
     >>> bool(abs(fall.energy - fall.energy[0]).max() < 1e-12)
     True
     """
-    check_mechanism(mechanism)
+    if not isinstance(mechanism, Robot):
+        check_mechanism(mechanism)
     order, method = checked_options(order, method, tolerance, longest_step)
     if progress is not None and not callable(progress):
         raise MechanismError("must be a function of two numbers", name="progress", value=progress)
     if not isinstance(events, Sequence):
         raise MechanismError("must be a list of jn.Event", name="events", value=events)
+    _check_names(mechanism, robot, initial)
+    if isinstance(mechanism, Robot):
+        options = {"method": method, "tolerance": float(tolerance), "longest_step": float(longest_step)}
+        options |= {"events": events, "strict": strict, "progress": progress}
+        return simulate_robot(mechanism, instants_of(time, {}), order, **options, **robot)
     if initial is not None:
         if not isinstance(initial, Mapping):
             raise MechanismError("must be a mapping of names to drivers", name="initial", value=initial)
@@ -135,6 +185,18 @@ def simulate(
     if strict and run.stopped_at is None:
         raise_for_status(simulation)
     return simulation
+
+
+def _check_names(mechanism: Mechanism | Robot, given: Mapping[str, Any], initial: object) -> None:
+    """Raise JounceError for an option that there is not, or that belongs to simulations of the other kind."""
+    for name in given:
+        if name not in ROBOT_OPTIONS:
+            raise JounceError(f"simulate has no such option; {did_you_mean(name, ROBOT_OPTIONS)}", name=name)
+        if not isinstance(mechanism, Robot):
+            message = "belongs to simulations of robots in joint coordinates; a mechanism has forces and `initial`"
+            raise MechanismError(message, name=name)
+    if isinstance(mechanism, Robot) and initial is not None:
+        raise JounceError("belongs to simulations of mechanisms; a robot begins in a `state`", name="initial")
 
 
 def checked_options(

@@ -8,6 +8,8 @@ import jax
 import jax.numpy as jnp
 from jax.extend.core import JaxprEqn, Literal
 
+from jounce.jet.operations import ADDITIVE, REARRANGING
+
 
 class ProgramReader(abc.ABC):
     """Runs programs on values that change in time and on constants; branches are all run, loops unrolled.
@@ -92,6 +94,31 @@ class ProgramReader(abc.ABC):
         if parameters["reverse"]:
             collected.reverse()
         return [*carry, *(self.composed(lambda *xs: jnp.stack(xs), parts) for parts in zip(*collected, strict=True))]
+
+
+def _is_floating(variable: Any) -> bool:
+    return jnp.issubdtype(variable.aval.dtype, jnp.floating)
+
+
+def only_adds(jaxpr: Any) -> bool:
+    """Tell whether a program does nothing to numbers but add and move them, so that it acts on each coefficient alike.
+
+    What it multiplies, or adds of its own, would make it another function of the coefficients than of the values.
+    """
+    if jaxpr.constvars:
+        return False
+    for equation in jaxpr.eqns:
+        if not any(map(_is_floating, equation.outvars)):
+            continue
+        if any(isinstance(x, Literal) and _is_floating(x) and x.val != 0 for x in equation.invars):
+            return False
+        inner = inner_program(equation.params)
+        if inner is not None:
+            if equation.primitive.name != "jit" or not only_adds(inner.jaxpr):
+                return False
+        elif equation.primitive.name not in ADDITIVE | REARRANGING:
+            return False
+    return True
 
 
 def inner_program(parameters: dict[str, Any]) -> Any:

@@ -23,7 +23,7 @@ from jax.extend.core import JaxprEqn
 
 from jounce.jet.coefficients import minus, plus, total
 from jounce.jet.operations import ADDITIVE, BROADCASTING, COMPOSED, LINEAR, PAIRS, PLAIN, SLOPES, STEPWISE, times
-from jounce.jet.programs import ProgramReader
+from jounce.jet.programs import ProgramReader, only_adds
 
 _BLOCK = 8  # terms of a sum taken at once
 
@@ -199,10 +199,35 @@ class Recursion(ProgramReader):
         """Return the results of one operation; what repeats is read once."""
         key = self._key(equation, operands)
         if key is None:
-            return super().results(equation, operands)
+            return self._read(equation, operands)
         if key not in self._known:  # the operands stay alive with it, so that no other takes their place in memory
-            self._known[key] = super().results(equation, operands), operands
+            self._known[key] = self._read(equation, operands), operands
         return self._known[key][0]
+
+    def _read(self, equation: JaxprEqn, operands: list[Any]) -> list[Any]:
+        """Return the results of one operation; a loop that only adds is run as it is, at every order."""
+        scanned = equation.primitive.name == "scan" and not self.is_constant(equation, operands)
+        if not scanned or not only_adds(equation.params["jaxpr"].jaxpr):
+            return super().results(equation, operands)
+        values = equation.primitive.bind(*map(self.value, operands), **equation.params)
+
+        def of(which: int) -> Callable[..., Any]:
+            def rule(parts: list[Any], _: Any) -> Any:
+                if all(part is None for part in parts):
+                    return None
+                whole = [self._next(x, part) for x, part in zip(operands, parts, strict=True)]
+                return equation.primitive.bind(*whole, **equation.params)[which]
+
+            return rule
+
+        return [self._node(of(i), value, operands) for i, value in enumerate(values)]
+
+    def _next(self, x: Any, part: Any) -> Any:
+        """Return the next coefficient of what is added, or a constant that says how."""
+        if part is not None:
+            return part
+        fixed = self.value(x)
+        return jnp.zeros_like(fixed) if jnp.issubdtype(jnp.result_type(fixed), jnp.floating) else fixed
 
     def _key(self, equation: JaxprEqn, operands: list[Any]) -> Any:
         """Return what tells an operation from others; None where that is not known."""

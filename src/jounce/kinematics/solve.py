@@ -213,7 +213,7 @@ def _followed(
     return solver, follow(solver, start, last, last - first, grid=on_the_way)
 
 
-def raise_for_status(motion: Motion | Stretches) -> None:
+def raise_for_status(motion: Any) -> None:
     """Raise SolveError, with the first instant that failed and what to do, unless all were solved."""
     failed = np.flatnonzero(motion.status != Status.OK)
     if not failed.size:

@@ -4,6 +4,7 @@ import dataclasses
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
@@ -116,7 +117,7 @@ class Inertia:
         """
         position, rotation = np.asarray(position, float), np.asarray(rotation, float)
         tensor = rotation @ self.tensor @ rotation.T
-        return Inertia(self.mass, position + rotation @ self.center_of_mass, (tensor + tensor.T) / 2, strict=False)
+        return type(self)(self.mass, position + rotation @ self.center_of_mass, (tensor + tensor.T) / 2, strict=False)
 
     @classmethod
     def solid(
@@ -209,15 +210,35 @@ class Inertia:
         parts = list(parts)
         if not parts:
             raise RobotError("the sum of inertias needs at least one", name="parts", value=parts)
+        traced = next((type(part) for part in parts if isinstance(part, TracedInertia)), None)
         mass = sum(part.mass for part in parts)
-        center = sum(part.mass * part.center_of_mass for part in parts) / (mass or 1.0)
+        center = sum(part.mass * part.center_of_mass for part in parts) / (mass if traced else mass or 1.0)
         tensor = sum(part.tensor + _of_point(part.mass, part.center_of_mass - center) for part in parts)
-        return cls(mass, center, tensor, strict=False)
+        return (traced or cls)(mass, center, tensor, strict=False)
 
 
 def _of_point(mass: float, place: Float[np.ndarray, " 3"]) -> Float[np.ndarray, "3 3"]:
     """Return the inertia tensor of a mass at a place: what Steiner's theorem adds."""
-    return mass * (place @ place * np.eye(3) - np.outer(place, place))
+    return mass * (place @ place * np.eye(3) - place[:, None] * place[None])
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class TracedInertia(Inertia):
+    """An inertia with values that JAX traces, for gradients: its shapes are checked, its values cannot be."""
+
+    def __post_init__(self, strict: bool) -> None:
+        for name, shape in (("mass", ()), ("center_of_mass", (3,)), ("tensor", (3, 3))):
+            value = jnp.asarray(getattr(self, name), float)
+            if name == "tensor" and value.shape == (3,):
+                value = jnp.diag(value)
+            if value.shape != shape:
+                raise RobotError(f"must have the shape {shape}, not {value.shape}", name=name)
+            object.__setattr__(self, name, value)
+
+    @property
+    def fault(self) -> "Fault | None":
+        """None: what is traced is not looked at."""
+        return None
 
 
 def check_solid(kind: str, axis: str, given: dict[str, Any]) -> str:

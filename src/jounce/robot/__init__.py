@@ -1,6 +1,7 @@
 """Serial and tree robots in joint coordinates: kinematics, Jacobians, torques, reactions, with rates of any order."""
 
 from jounce.rigid.inertia import Inertia as Inertia
+from jounce.robot.base_motion import BaseMotion as BaseMotion
 from jounce.robot.closed_loop import body_point as body_point
 from jounce.robot.closures import LinkClosure as LinkClosure, closure_wrenches as closure_wrenches
 from jounce.robot.construct import (
@@ -11,6 +12,7 @@ from jounce.robot.construct import (
 )
 from jounce.robot.coupling import CoupledJoints as CoupledJoints, SlideOutput as SlideOutput
 from jounce.robot.equations_of_motion import bias_forces as bias_forces, mass_matrix as mass_matrix
+from jounce.robot.forward_dynamics import forward_dynamics as forward_dynamics
 from jounce.robot.inverse_dynamics import inverse_dynamics as inverse_dynamics, joint_wrenches as joint_wrenches
 from jounce.robot.jacobian import (
     jacobian as jacobian,

@@ -6,11 +6,13 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, TypeVar
 
+import jax
 import numpy as np
+from jax.core import Tracer
 
 from jounce.display import Displayed
 from jounce.errors import RobotError, check_name, did_you_mean
-from jounce.rigid.inertia import Inertia, finite_numbers
+from jounce.rigid.inertia import Inertia, TracedInertia, finite_numbers
 from jounce.robot.floating_base import floating_joints
 from jounce.robot.model import Closure, Joint, Limits, Link
 from jounce.robot.tree import Tree, arrange, ordered, turn_about
@@ -103,6 +105,8 @@ class AbstractRobot(Displayed, abc.ABC):
     def massless_joints(self) -> tuple[str, ...]:
         """Joints that move no mass, so that no force is needed for any motion of them."""
         tree = self._tree
+        if any(isinstance(link.inertia, TracedInertia) for link in self.links.values()):
+            return ()  # the masses are not known: forward dynamics tells where nothing resists a joint
         moved = ((tree.mass > 0) | tree.inertia.any((1, 2))) @ tree.ancestors[:-1]
         return tuple(joint.name for joint, some in zip(self.moving_joints, moved, strict=True) if not some)
 
@@ -125,7 +129,7 @@ class AbstractRobot(Displayed, abc.ABC):
     @property
     def mass(self) -> float:
         """Mass of all links, the base included, kg."""
-        return float(sum(link.inertia.mass for link in self.links.values() if link.inertia is not None))
+        return sum((link.inertia.mass for link in self.links.values() if link.inertia is not None), 0.0)
 
     def with_gravity(self: Made, gravity: Any) -> Made:
         """Return the same robot under another acceleration of free fall, m/s^2 in the frame of the base."""
@@ -151,6 +155,56 @@ class AbstractRobot(Displayed, abc.ABC):
         held = self.links[link].inertia
         whole = payload if held is None else Inertia.total([held, payload])
         links = {**self.links, link: Link(link, whole)}
+        return self._changed(links=list(links.values()))
+
+    def with_inertia(
+        self: Made, link: str, *, mass: Any = None, center_of_mass: Any = None, tensor: Any = None
+    ) -> Made:
+        """Return the robot with another inertia of a link; what is not given stays, zero where the link had none.
+
+        JAX may trace the values, so that torques, accelerations and the mass matrix have gradients by them; they are
+        not checked then.
+
+        Parameters
+        ----------
+        link : str
+            Name of the link.
+        mass : float, optional
+            kg.
+        center_of_mass : array_like of shape (3,), optional
+            m, in the frame of the link.
+        tensor : array_like of shape (3, 3) or (3,), optional
+            Inertia about the centre of mass, in axes parallel to those of the link, kg m^2; three numbers are its
+            diagonal.
+
+        Raises
+        ------
+        RobotError
+            If there is no such link, or a value is not one of a real body (unless the robot is not strict).
+
+        Examples
+        --------
+        >>> import jax
+        >>> import jounce as jn
+        >>> rod = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0])
+        >>> pin = jn.Joint("pin", "base", "rod", axis=[0, -1, 0])
+        >>> arm = jn.Robot("arm", [jn.Link("base"), jn.Link("rod", rod)], [pin])
+        >>> def torque(mass):
+        ...     return jn.inverse_dynamics(arm.with_inertia("rod", mass=mass), [[0.0], [0.0], [0.0]])[0, 0]
+        >>> round(float(jax.grad(torque)(1.0)), 9)  # N m for each kg at half a metre
+        4.905
+        """
+        check_name("link", link, self.links, RobotError, name="link")
+        held = self.links[link].inertia or Inertia(0.0, strict=False)
+        mass = held.mass if mass is None else mass
+        center_of_mass = held.center_of_mass if center_of_mass is None else center_of_mass
+        tensor = held.tensor if tensor is None else tensor
+        traced = any(isinstance(x, Tracer) for x in jax.tree.leaves((mass, center_of_mass, tensor)))
+        if traced or isinstance(held, TracedInertia):
+            inertia = TracedInertia(mass, center_of_mass, tensor)
+        else:
+            inertia = Inertia(mass, center_of_mass, tensor, strict=self.strict)
+        links = {**self.links, link: Link(link, inertia)}
         return self._changed(links=list(links.values()))
 
     def locked(self: Made, positions: Mapping[str, float]) -> Made:

@@ -49,6 +49,21 @@ def checked_position(robot: AbstractRobot, q: object, name: str = "q") -> Float[
     return q[..., None, :]
 
 
+def checked_state(robot: AbstractRobot, state: object) -> Float[Numbers, "*batch 2 joint"]:
+    """Return coordinates and velocities.
+
+    Raises
+    ------
+    RobotError
+        If their shape, (..., 2, n), does not fit the robot.
+    """
+    state, n = floats("state", state), len(robot.joint_names)
+    if state.ndim < 2 or state.shape[-2:] != (2, n):
+        message = f"must hold q and q', the shape (..., 2, {n}) for the joints of {robot.name}, not {state.shape}"
+        raise RobotError(message, name="state")
+    return state
+
+
 def checked_coordinates(
     robot: AbstractRobot, q: object, least: int = 0, most: int | None = None
 ) -> Float[Numbers, "*batch derivative joint"]:

@@ -52,7 +52,7 @@ class Batched:
         check_process()
         lead = arrays[0].shape[:-2]
         axes, count = len(lead), math.prod(lead)
-        if any(isinstance(x, Tracer) for x in jax.tree.leaves((arrays, constants))):
+        if any(isinstance(x, Tracer) for x in jax.tree.leaves((arrays, constants, robot.tree))):
             flat = tuple(jnp.reshape(x, (count, *x.shape[axes:])) for x in arrays)
             found = self.nested(robot.tree, flat, constants, static)
             return jax.tree.map(lambda x: jnp.reshape(x, (*lead, *x.shape[1:])), found)

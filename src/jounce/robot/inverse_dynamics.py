@@ -9,12 +9,13 @@ from jaxtyping import Float
 
 from jounce.errors import RobotError, did_you_mean
 from jounce.jet import Jet, concatenate, cross, matvec
-from jounce.jet.algebra import stacked
+from jounce.jet.algebra import stacked, total
 from jounce.robot.arguments import checked_coordinates
+from jounce.robot.base_motion import BaseMotion, base_arrays, base_body, falling, scene_axes
 from jounce.robot.batches import Batched
 from jounce.robot.equations_of_motion import drive_forces
 from jounce.robot.kinematics import body_frames, place_of
-from jounce.robot.newton_euler import BodyWrenches, recursive_newton_euler
+from jounce.robot.newton_euler import BodyWrenches, inertial_wrench, recursive_newton_euler
 from jounce.robot.robot import Robot
 from jounce.robot.tree import Frame, Tree
 from jounce.robot.tree_scan import to_coordinates
@@ -29,6 +30,7 @@ def inverse_dynamics(
     wrenches: Sequence[Wrench] = (),
     time: ArrayLike | None = None,
     drives: bool = False,
+    base: BaseMotion | None = None,
 ) -> Float[Numbers, "*batch derivative joint"]:
     """Return the joint torques or forces that a motion needs, and their rates, exact to rounding.
 
@@ -48,16 +50,21 @@ def inverse_dynamics(
     drives : bool, default False
         Add what the drives need: armature inertia, viscous damping and Coulomb friction of the joints. Friction has the
         sign of the velocity and is zero at rest; its jumps are not in the rates.
+    base : BaseMotion, optional
+        Motion of the base, its twist with order - 1 derivatives; it stands still unless given. Gravity, and wrenches in
+        the axes of the base, are then in those of the scene.
 
     Returns
     -------
-    array of shape (..., order - 1, n)
+    array of shape (..., order - 1, n), or (..., order - 1, 6 + n) with `base`
         ``tau, tau', tau'', ...`` in N m, or N for prismatic joints, by s. A joint that others follow bears their part.
+        Of a base that moves come first the force on it from outside, N, and the moment about its origin, N m, in its
+        axes, and their rates: zero where the motion is one that it can make alone.
 
     Raises
     ------
     RobotError
-        If q or a wrench does not fit the robot.
+        If q, a wrench or the motion of the base does not fit the robot.
 
     Examples
     --------
@@ -69,8 +76,11 @@ def inverse_dynamics(
     [[5.905], [2.0]]
     """
     q = checked_coordinates(robot, q, 2)
-    arrays, static = _applied(robot, q, wrenches, time)
-    return _generalised_forces(robot, arrays[0], arrays[1], (*static, drives))
+    arrays, static = _applied(robot, q, wrenches, time, free=base is not None)
+    if base is None:
+        return _generalised_forces(robot, arrays[0], arrays[1], (*static, drives))
+    moved = base_arrays(base, q.shape[:-2], q.shape[-2] - 1)
+    return _forces_of_free_tree(robot, (*arrays[0], *moved), (arrays[1], base_body(robot)), (*static, drives))
 
 
 def joint_wrenches(
@@ -114,27 +124,38 @@ def joint_wrenches(
     return _carried(robot, arrays[0], (arrays[1], aligned), (*static, frame == "base"))
 
 
-def _applied(robot: Robot, q: Any, wrenches: Sequence[Wrench], time: ArrayLike | None) -> tuple[Any, Any]:
+def _applied(
+    robot: Robot, q: Any, wrenches: Sequence[Wrench], time: ArrayLike | None, *, free: bool = False
+) -> tuple[Any, Any]:
     """Return the arrays, the constants and what is static of the wrenches."""
-    given = wrench_arrays(robot, wrenches, q.shape[:-2], q.shape[-2] - 2, time)
+    given = wrench_arrays(robot, wrenches, q.shape[:-2], q.shape[-2] - 2, time, free=free)
     places = tuple(place_of(robot, wrench.link, wrench.point) for wrench in wrenches)
     return ((q, *given), places), (tuple(wrench.frame == "base" for wrench in wrenches),)
 
 
 def _on_bodies(
-    tree: Tree, arrays: tuple[Any, ...], places: tuple[Frame, ...], global_axes: tuple[bool, ...]
+    tree: Tree,
+    arrays: tuple[Any, ...],
+    places: tuple[Frame, ...],
+    global_axes: tuple[bool, ...],
+    scene: tuple[Jet, Jet, Jet] | None = None,
 ) -> BodyWrenches | None:
-    """Return external wrenches about the origins of bodies, in their frames; None without any."""
+    """Return external wrenches about the origins of bodies, in their frames, that of the base last; None without any.
+
+    The axes of the scene are given, in those of the base, where that turns.
+    """
     q, *wrenches = arrays
     if not wrenches:
         return None
     levels = q.shape[0] - 2
     frames: Any = body_frames(tree, q[:levels]) if any(global_axes) else None
-    whole = jnp.zeros((levels, tree.shape.bodies, 6, q.shape[-1]))
+    whole = jnp.zeros((levels, tree.shape.bodies + 1, 6, q.shape[-1]))
     for values, (body, point, rotation), in_base in zip(wrenches, places, global_axes, strict=True):
         force, torque = Jet(tuple(values[:, :3])), Jet(tuple(values[:, 3:]))
         if in_base:
             frame = frames.take(body)
+            if scene is not None:
+                force, torque = (total(u * part[i : i + 1] for i, u in enumerate(scene)) for part in (force, torque))
             force, torque = frame.to_body(force), frame.to_body(torque)
         else:
             force, torque = (matvec(rotation[:, :, None], part) for part in (force, torque))
@@ -149,12 +170,33 @@ def _generalised_forces(
 ) -> Float[Numbers, "levels coordinate batch"]:
     q = arrays[0]
     applied = _on_bodies(tree, arrays, places, global_axes)
+    applied = None if applied is None else applied[:, :-1]
     forces = to_coordinates(tree, recursive_newton_euler(tree, q, applied)[0])
-    if drives:
-        levels = q.shape[0] - 2
-        acceleration = Jet(tuple(q)).differentiate().differentiate()
-        forces = forces + stacked(acceleration * jnp.asarray(tree.armature)[:, None]) + drive_forces(tree, q, levels)
-    return forces
+    return forces + _of_drives(tree, q) if drives else forces
+
+
+def _of_drives(tree: Tree, q: Any) -> Any:
+    acceleration = Jet(tuple(q)).differentiate().differentiate()
+    return stacked(acceleration * jnp.asarray(tree.armature)[:, None]) + drive_forces(tree, q, q.shape[0] - 2)
+
+
+@Batched
+def _forces_of_free_tree(
+    tree: Tree, arrays: tuple[Any, ...], constants: Any, global_axes: tuple[bool, ...], drives: bool
+) -> Float[Numbers, "levels row batch"]:
+    q, *wrenches, pose, twist = arrays
+    places, body = constants
+    scene = scene_axes(pose[0, 3:], twist)
+    applied = _on_bodies(tree, (q, *wrenches), places, global_axes, scene)
+    moving = twist[:, 3:], twist[:, :3] + falling(scene, tree.gravity, len(twist))
+    on_bodies = None if applied is None else applied[:, :-1]
+    along, _, _, carried = recursive_newton_euler(tree, q, on_bodies, moving)
+    forces = to_coordinates(tree, along)
+    w, v = (Jet(tuple(x)) for x in moving)
+    own = inertial_wrench(jnp.asarray(body.mass), jnp.asarray(body.center), jnp.asarray(body.inertia), w, v)
+    at_base = jnp.concatenate([stacked(a) + b for a, b in zip(own, carried, strict=True)], axis=1)
+    at_base = at_base if applied is None else at_base - applied[:, -1]
+    return jnp.concatenate([at_base, forces + _of_drives(tree, q) if drives else forces], axis=1)
 
 
 @Batched
@@ -163,7 +205,9 @@ def _carried(
 ) -> BodyWrenches:
     q = arrays[0]
     places, aligned = constants
-    _, force, moment = recursive_newton_euler(tree, q, _on_bodies(tree, arrays, places, global_axes))
+    applied = _on_bodies(tree, arrays, places, global_axes)
+    applied = None if applied is None else applied[:, :-1]
+    _, force, moment, _ = recursive_newton_euler(tree, q, applied)
     parts = [Jet(tuple(jnp.swapaxes(x, 1, 2))) for x in (force, moment)]  # components, bodies, batch
     if in_base:
         frames = body_frames(tree, q[:-2])

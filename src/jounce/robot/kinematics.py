@@ -6,13 +6,14 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 from jaxtyping import Float
 
 from jounce.errors import RobotError, check_name
 from jounce.jet import Jet, sine_cosine
 from jounce.jet.algebra import stacked, total
 from jounce.rigid.frames import Frames
-from jounce.rigid.inertia import finite_numbers
+from jounce.rigid.inertia import Inertia, TracedInertia, finite_numbers
 from jounce.robot.abstract_robot import AbstractRobot
 from jounce.robot.arguments import checked_coordinates
 from jounce.robot.batches import Batched
@@ -189,6 +190,8 @@ def center_of_mass(robot: AbstractRobot, q: ArrayLike) -> Float[Numbers, "*batch
     base = robot.base_inertia
     if base is None and not robot.moving_links:
         raise RobotError("no link has a mass", name="robot", value=robot.name)
-    mass = np.append(robot.tree.mass, 0.0 if base is None else base.mass)
-    center = np.concatenate([robot.tree.center, [np.zeros(3) if base is None else base.center_of_mass]])
+    whole = Inertia(0.0, strict=False) if base is None else base
+    library = jnp if isinstance(whole, TracedInertia) or isinstance(robot.tree.mass, Tracer) else np
+    mass = library.append(robot.tree.mass, whole.mass)
+    center = library.concatenate([robot.tree.center, whole.center_of_mass[None]])
     return _center_of_mass(robot, (q,), (mass, center))

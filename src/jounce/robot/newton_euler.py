@@ -95,8 +95,8 @@ def _constant(value: Any) -> Any:
 
 
 def recursive_newton_euler(
-    tree: Tree, q: Series, wrenches: BodyWrenches | None = None
-) -> tuple[Rates, RatesOfVectors, RatesOfVectors]:
+    tree: Tree, q: Series, wrenches: BodyWrenches | None = None, base: tuple[Any, Any] | None = None
+) -> tuple[Rates, RatesOfVectors, RatesOfVectors, tuple[Any, Any]]:
     """Return generalised forces at the joints and the wrenches that they carry.
 
     Parameters
@@ -107,6 +107,9 @@ def recursive_newton_euler(
         Taylor coefficients of the coordinates, order 2 or more.
     wrenches : array of shape (order - 1, bodies, 6, batch), optional
         Taylor coefficients of external forces and of their moments about the origin, in the frame of each body.
+    base : tuple of two arrays of shape (order, 3, batch), optional
+        Angular velocity of a base that moves, and velocity of its origin, with that of a fall against gravity, in its
+        own axes; one at rest unless given.
 
     Returns
     -------
@@ -114,13 +117,16 @@ def recursive_newton_euler(
         Taylor coefficients of the force or torque along the axis of each joint.
     force, moment : array of shape (order - 1, bodies, 3, batch)
         Force and moment about the origin of the body that it gets through its joint, in its own frame.
+    carried : tuple of two arrays of shape (order - 1, 3, batch)
+        Force and moment about its origin that the base has to give to what it carries, in its axes.
     """
     order = q.shape[0] - 1
     coordinates = joint_coordinates(tree, q)
     samples = q.shape[-1]
-    zero = jnp.zeros((3, samples))
-    falling = jnp.broadcast_to(-jnp.asarray(tree.gravity)[:, None], (3, samples))
-    base = tuple(jnp.stack(c) for c in ([zero] * order, [zero, falling, *[zero] * (order - 2)]))
+    if base is None:
+        zero = jnp.zeros((3, samples))
+        falling = jnp.broadcast_to(-jnp.asarray(tree.gravity)[:, None], (3, samples))
+        base = jnp.stack([zero] * order), jnp.stack([zero, falling, *[zero] * (order - 2)])
     along_joints = Jet(tuple(coordinates[:, :, None]))
     # turns are made before the scan, all at once: inside, XLA would take sine and cosine again for each use of them
     bodies = (
@@ -144,11 +150,7 @@ def recursive_newton_euler(
             x, y, z = components(w)
             v = v + concatenate([y * slide, -(x * slide), rate * (1 - body.turning)])
         w, v = materialised((w, v))
-        momentum = (v + cross(w, _constant(body.center))) * body.mass
-        spin = matvec(body.inertia[:, :, None], w)
-        momentum, spin = materialised((momentum, spin))
-        force = momentum.differentiate() + cross(w, momentum)
-        moment = spin.differentiate() + cross(w, spin) + cross(_constant(body.center), force)
+        force, moment = inertial_wrench(body.mass, body.center, body.inertia, w, v)
         if applied is not None:
             force = Jet(f - a[:3] for f, a in zip(force.coefficients, applied, strict=True))
             moment = Jet(m - a[3:] for m, a in zip(moment.coefficients, applied, strict=True))
@@ -180,6 +182,15 @@ def recursive_newton_euler(
 
     _, kept = jax.lax.scan(outward, fill_slots(tree, base), bodies)
     nothing = jnp.zeros((order - 1, 3, samples))
-    _, results = jax.lax.scan(inward, fill_slots(tree, (nothing, nothing)), (*bodies[:3], kept), reverse=True)
+    state, results = jax.lax.scan(inward, fill_slots(tree, (nothing, nothing)), (*bodies[:3], kept), reverse=True)
     along, force, moment = (jnp.moveaxis(x, 0, 1) for x in results)
-    return along, force, moment
+    return along, force, moment, state if tree.shape.slots == 1 else jax.tree.map(lambda x: x[0], state)
+
+
+def inertial_wrench(mass: Any, center: Any, inertia: Any, w: Jet, v: Jet) -> tuple[Jet, Jet]:
+    """Return the force and the moment about the origin that a body needs to move so, all in its own axes."""
+    momentum = (v + cross(w, _constant(center))) * mass
+    spin = matvec(inertia[:, :, None], w)
+    momentum, spin = materialised((momentum, spin))
+    force = momentum.differentiate() + cross(w, momentum)
+    return force, spin.differentiate() + cross(w, spin) + cross(_constant(center), force)

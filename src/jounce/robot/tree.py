@@ -5,7 +5,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import jax
+import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 from jaxtyping import Float
 
 from jounce.errors import RobotError, check_name
@@ -168,9 +170,9 @@ def arrange(
     tree = Tree(
         rotation=np.array([rotation for _, rotation in places]).reshape(bodies, 3, 3),
         position=np.array([position for position, _ in places]).reshape(bodies, 3),
-        mass=np.array([one.mass for one in whole]),
-        center=np.array([one.center_of_mass for one in whole]).reshape(bodies, 3),
-        inertia=np.array([one.tensor for one in whole]).reshape(bodies, 3, 3),
+        mass=_array([one.mass for one in whole]),
+        center=_array([one.center_of_mass for one in whole]).reshape(bodies, 3),
+        inertia=_array([one.tensor for one in whole]).reshape(bodies, 3, 3),
         turning=turning,
         coordinate=coordinate,
         multiplier=multiplier,
@@ -190,6 +192,11 @@ def arrange(
         ),
     )
     return tree, frames
+
+
+def _array(parts: list[Any]) -> Any:
+    """Return parts as one array, of JAX where it traces some of them."""
+    return jnp.stack(parts) if any(isinstance(part, Tracer) for part in parts) else np.array(parts)
 
 
 def axes_with_z_along(axis: Float[np.ndarray, " 3"]) -> Float[np.ndarray, "3 3"]:

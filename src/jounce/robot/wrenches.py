@@ -33,7 +33,8 @@ class Wrench:
     point : array_like of shape (3,), default zero
         Where the force acts, in the frame of the link, m.
     frame : {"base", "link"}, default "base"
-        Whose axes the components refer to; those of the link turn with it.
+        Whose axes the components refer to; those of the link turn with it. Where the base moves (`BaseMotion`), "base"
+        are the axes of the scene, in which its pose is given.
 
     Raises
     ------
@@ -55,9 +56,11 @@ class Wrench:
 
 
 def wrench_arrays(
-    robot: Robot, wrenches: Sequence[Wrench], lead: tuple[int, ...], levels: int, time: Any
+    robot: Robot, wrenches: Sequence[Wrench], lead: tuple[int, ...], levels: int, time: Any, *, free: bool = False
 ) -> tuple[Any, ...]:
     """Return the wrenches as arrays of plain derivatives, of shape (..., levels, 6): force, then torque.
+
+    The base may be pushed where it is free.
 
     Raises
     ------
@@ -68,7 +71,7 @@ def wrench_arrays(
     for k, wrench in enumerate(wrenches):
         where = f"wrenches[{k}]"
         check_name("link", wrench.link, robot.frames, RobotError, name=f"{where}.link")
-        if robot.frames[wrench.link].body < 0:
+        if robot.frames[wrench.link].body < 0 and not free:
             raise RobotError(
                 "this link is fixed to the base: nothing moves it", name=f"{where}.link", value=wrench.link
             )

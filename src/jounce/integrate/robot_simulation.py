@@ -1,0 +1,208 @@
+"""The result of a simulation of a robot: coordinates with derivatives of any order, torques, energy and events."""
+
+import math
+from functools import cached_property
+from typing import Any
+
+import jax
+import numpy as np
+from jaxtyping import Float, Int
+
+from jounce.display import Displayed
+from jounce.dynamics.motion_values import in_chunks
+from jounce.integrate.robot_marching import (
+    RobotProblem,
+    RobotState,
+    RobotSteps,
+    at,
+    derivatives_at,
+    energy_at,
+    forces_at,
+)
+from jounce.kinematics import Status
+from jounce.robot.base_motion import BaseMotion
+from jounce.robot.inverse_dynamics import inverse_dynamics
+from jounce.robot.robot import Robot
+from jounce.shapes import ArrayLike
+
+WIDTHS = (64,)  # instants that are computed together: one program for few and for many
+MUCH_LONGER = 1e3  # than the step over a jump are those beside it
+
+
+class RobotSimulation(Displayed):
+    """The motion of a robot under forces of its joints, at the instants asked for and at any other.
+
+    At each instant the derivatives of every order follow from the equations of motion, not from the steps. `status`
+    says of each instant whether it was reached; values are NaN where it was not.
+
+    Attributes
+    ----------
+    robot : Robot
+        As it was given.
+    time : numpy.ndarray of shape (time,)
+        s.
+    order : int
+        Highest derivative.
+    q : numpy.ndarray of shape (time, order + 1, n)
+        Coordinates and their derivatives, rad or m by s.
+    base : BaseMotion or None
+        Of a free base, its twist with derivatives to `order`, at least to 1.
+    status : numpy.ndarray of shape (time,)
+        A `Status` for each instant.
+    faults : dict of int to str
+        What failed at an instant.
+    events : list of list of float
+        For each event asked for, the times at which it happened, s.
+    steps : RobotSteps
+        As polynomials.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        problem: RobotProblem,
+        steps: RobotSteps,
+        instants: np.ndarray,
+        order: int,
+        ending: tuple[Status, str] = (Status.OK, ""),
+        events: list[list[float]] | None = None,
+    ):
+        self.robot, self.time, self.order, self.steps = robot, instants, order, steps
+        self.events = [] if events is None else events
+        self._problem, self._ending = problem, ending
+        reached, state = _states(steps, instants)
+        levels = max(order - 2, 0)
+
+        def chunk(lanes: np.ndarray) -> Any:
+            part = jax.tree.map(lambda x: x[..., lanes], state)
+            return derivatives_at(problem, part, instants[lanes], order=levels)
+
+        q, twist = in_chunks(chunk, len(instants), WIDTHS)
+        self._state = state
+        self.q = _derivatives(q)[:, : order + 1]
+        self.base: BaseMotion | None = None
+        if twist is not None:
+            self.base = BaseMotion(state.position.T.copy(), state.quaternion.T.copy(), _derivatives(twist))
+        fine = np.isfinite(self.q).all(axis=(1, 2))
+        self.status: Int[np.ndarray, " time"] = np.where(reached, int(Status.OK), int(Status.NOT_REACHED))
+        self.faults: dict[int, str] = {}
+        self.status[reached & ~fine] = int(Status.UNDEFINED)
+        beyond = np.flatnonzero(~reached)
+        if ending[0] != Status.OK and beyond.size:
+            self.status[beyond[0]], self.faults[int(beyond[0])] = int(ending[0]), ending[1]
+        self.q[~reached] = np.nan
+        if self.base is not None:
+            for part in (self.base.position, self.base.quaternion, self.base.twist):
+                part[~reached] = np.nan
+
+    def __repr__(self) -> str:
+        solved = int((self.status == Status.OK).sum())
+        return (
+            f"<RobotSimulation of {self.robot.name}: {solved} of {len(self.time)} instants to order {self.order}, "
+            f"{len(self.steps.start)} steps>"
+        )
+
+    @property
+    def ended_at(self) -> float:
+        """Time to which the motion was followed, s."""
+        return self.steps.end
+
+    @property
+    def kinks(self) -> list[float]:
+        """Times at which a force had a jump or a kink, s: derivatives do not exist there."""
+        length, kink = np.abs(self.steps.length), self.steps.kink
+        ends = self.steps.start + self.steps.length
+        return [
+            float(ends[k])
+            for k in np.flatnonzero(kink)
+            if not (k + 1 < len(kink) and kink[k + 1]) and (k == 0 or length[: k + 1].max() > MUCH_LONGER * length[k])
+        ]
+
+    @cached_property
+    def torque(self) -> Float[np.ndarray, "time level n"]:
+        """Torques and forces of the joints with their rates to the order - 2, (time, order - 1, n), N m or N by s.
+
+        Those of driven joints are what it takes to drive them. Where drives count, they are the torques before
+        armature, damping and friction.
+        """
+        found = inverse_dynamics(self.robot, self.q, drives=self._problem.equations.drives, base=self._cut_base())
+        found = found if self.base is None else found[..., 6:]
+        return np.asarray(found)
+
+    def _cut_base(self) -> BaseMotion | None:
+        if self.base is None:
+            return None
+        return BaseMotion(self.base.position, self.base.quaternion, self.base.twist[:, : max(self.order, 1)])
+
+    @cached_property
+    def applied(self) -> Float[np.ndarray, "time n"]:
+        """Forces that the laws of the joints give, (time, n), N m or N; none of those that are driven."""
+
+        def chunk(lanes: np.ndarray) -> Any:
+            return forces_at(self._problem, jax.tree.map(lambda x: x[..., lanes], self._state), self.time[lanes])
+
+        return np.where(self.status == Status.OK, in_chunks(chunk, len(self.time), WIDTHS), np.nan).T
+
+    @property
+    def energy(self) -> Float[np.ndarray, " time"]:
+        """Kinetic energy and potential energy in gravity, J, shape (time,)."""
+        return self._energies.sum(axis=0)
+
+    @property
+    def kinetic_energy(self) -> Float[np.ndarray, " time"]:
+        """Kinetic energy, that of armatures included where drives count, J, shape (time,)."""
+        return self._energies[0]
+
+    @cached_property
+    def _energies(self) -> Float[np.ndarray, "2 time"]:
+        def chunk(lanes: np.ndarray) -> Any:
+            return np.stack(energy_at(self._problem, jax.tree.map(lambda x: x[..., lanes], self._state)))
+
+        return np.where(self.status == Status.OK, in_chunks(chunk, len(self.time), WIDTHS), np.nan)
+
+    def at(self, time: ArrayLike, order: int | None = None) -> "RobotSimulation":
+        """Return the same simulation at other instants, without integrating again.
+
+        Parameters
+        ----------
+        time : array_like of shape (time,)
+            s; those outside of what was simulated are NaN.
+        order : int, optional
+            Highest derivative; that of this simulation unless given.
+        """
+        instants = np.atleast_1d(np.asarray(time, float))
+        order = self.order if order is None else order
+        return RobotSimulation(self.robot, self._problem, self.steps, instants, order, self._ending, self.events)
+
+    @property
+    def dataset(self) -> Any:
+        """Coordinates as an `xarray.Dataset`, a variable for each joint with dimensions time and derivative."""
+        import xarray
+
+        axes = {"time": self.time, "derivative": np.arange(self.order + 1)}
+        variables = {}
+        for k, name in enumerate(self.robot.joint_names):
+            unit = "rad" if self.robot.joints[name].turning else "m"
+            variables[name] = xarray.DataArray(self.q[:, :, k], axes, tuple(axes), attrs={"units": unit})
+        dataset = xarray.Dataset(variables, attrs={"title": self.robot.name, "source": "jounce"})
+        dataset["time"].attrs = {"units": "s", "long_name": "time"}
+        dataset["derivative"].attrs = {"long_name": "order of the time derivative"}
+        return dataset
+
+
+def _states(steps: RobotSteps, instants: np.ndarray) -> tuple[np.ndarray, RobotState]:
+    """Return which instants the steps reach, and the states there, batch last."""
+    sense = 1.0 if steps.length[0] >= 0 else -1.0
+    rounding = 1e-14 * max(abs(steps.start[0]), abs(steps.end))
+    reached = (sense * (instants - steps.start[0]) >= -rounding) & (sense * (instants - steps.end) <= rounding)
+    chosen = np.clip(np.searchsorted(sense * steps.start, sense * instants, side="right") - 1, 0, len(steps.start) - 1)
+    since = instants - steps.start[chosen]
+    since = np.where(reached, since, 0.0)
+    polynomial = jax.tree.map(lambda c: np.moveaxis(np.asarray(c)[chosen], 0, -1), steps.polynomial)
+    return reached, jax.tree.map(np.asarray, at(polynomial, since))
+
+
+def _derivatives(coefficients: np.ndarray) -> np.ndarray:
+    """Return plain derivatives, the batch first, from Taylor coefficients, the batch last."""
+    factorials = np.array([math.factorial(k) for k in range(len(coefficients))], float)
+    return np.moveaxis(np.asarray(coefficients) * factorials[:, None, None], -1, 0)

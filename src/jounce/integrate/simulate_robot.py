@@ -1,0 +1,201 @@
+"""From a robot and the forces of its joints to its motion, in joint coordinates."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import jax
+import numpy as np
+from jax.core import Tracer
+
+from jounce.errors import RobotError, UnsupportedError, check_name
+from jounce.integrate.joint_events import JointEvent, JointEventDetector
+from jounce.integrate.marching import Outcome
+from jounce.integrate.methods import AbstractMethod, Taylor
+from jounce.integrate.robot_marching import Progress, RobotProblem, RobotState, RobotSteps, march_robot
+from jounce.integrate.robot_simulation import RobotSimulation
+from jounce.kinematics import Status
+from jounce.kinematics.solve import raise_for_status
+from jounce.robot.arguments import checked_state, floats
+from jounce.robot.base_motion import BaseMotion, base_arrays, base_body
+from jounce.robot.joint_laws import joint_laws
+from jounce.robot.robot import Robot
+from jounce.robot.tree_equations import TreeEquations
+from jounce.trajectory.motion import AbstractMotion
+
+STEPS = 64  # taken between two looks at progress and events
+MOST = 1_000_000
+
+
+def simulate_robot(
+    robot: Robot,
+    instants: np.ndarray,
+    order: int,
+    *,
+    state: Any = None,
+    torque: Any = None,
+    driven: Mapping[str, Any] | None = None,
+    drives: bool = False,
+    base: BaseMotion | None = None,
+    method: AbstractMethod | None = None,
+    tolerance: float = 1e-15,
+    events: Sequence[JointEvent] = (),
+    longest_step: float = np.inf,
+    strict: bool = True,
+    progress: Callable[[int, int], None] | None = None,
+) -> RobotSimulation:
+    """Return the motion of a robot; see `jounce.simulate`, which checks what is common to all simulations."""
+    if robot.closures:
+        message = "this robot has loops; simulate the mechanism that it is: jn.simulate(robot.mechanism(...), ...)"
+        raise RobotError(message, name=robot.name, value=list(robot.closures))
+    problem = _problem(robot, torque, driven, drives, base)
+    start = _start(robot, problem, state, base, float(instants[0]))
+    for event in events:
+        if not isinstance(event, JointEvent):
+            raise RobotError("must be a jn.JointEvent", name="events", value=event)
+    detectors = [JointEventDetector(event, robot) for event in events]
+    if isinstance(method, Taylor) and method.step is not None:
+        longest_step = float(method.step)
+    elif method is not None and not isinstance(method, Taylor):
+        raise RobotError("robots are simulated by jn.Taylor", name="method", value=type(method).__name__)
+    terms = (method or Taylor()).expansion_order(tolerance)
+    run = _Run(problem, tolerance, longest_step, terms - 1, detectors)
+    run.go(start, instants, progress)
+    simulation = RobotSimulation(robot, problem, run.steps, instants, order, run.ending, run.happened)
+    if strict and run.stopped_at is None:
+        raise_for_status(simulation)
+    return simulation
+
+
+def _problem(
+    robot: Robot, torque: Any, driven: Mapping[str, Any] | None, drives: bool, base: BaseMotion | None
+) -> RobotProblem:
+    if any(isinstance(x, Tracer) for x in jax.tree.leaves(robot.tree)):
+        raise UnsupportedError("simulations of robots are not differentiated; jn.forward_dynamics is", name=robot.name)
+    names, tree = robot.joint_names, robot.tree
+    given = {} if driven is None else driven
+    if not isinstance(given, Mapping):
+        raise RobotError("must be a mapping of joints to laws of time", name="driven", value=driven)
+    for name, law in given.items():
+        check_name("moving joint", name, names, RobotError, name="driven")
+        if not isinstance(law, AbstractMotion | str | int | float):
+            message = "must be a law of time: a motion law, an expression of t, or a number"
+            raise RobotError(message, name=f"driven.{name}", value=law)
+    prescribed = joint_laws(names, dict(given), "driven")
+    mask = np.array([float(name in given) for name in names])
+    length = _length(robot)
+    scale = np.array([1.0 if robot.joints[name].turning else length for name in names])
+    body = None if base is None else base_body(robot)
+    equations = TreeEquations(tree, mask, body, (), (), drives)
+    return RobotProblem(equations, joint_laws(names, torque), prescribed, scale, np.float64(length))
+
+
+def _length(robot: Robot) -> float:
+    """Return the size of a robot: the longest way from its base to a centre of mass, along the links; 1 m for none."""
+    tree = robot.tree
+    arms = np.linalg.norm(tree.position, axis=1)
+    ways = tree.ancestors[:-1] @ arms + np.linalg.norm(tree.center, axis=1)
+    return float(ways.max(initial=0.0)) or 1.0
+
+
+def _start(robot: Robot, problem: RobotProblem, state: Any, base: BaseMotion | None, instant: float) -> RobotState:
+    """Return the state at the beginning: at rest at coordinates zero unless given, driven joints on their laws."""
+    n = len(robot.joint_names)
+    if isinstance(state, Mapping):
+        state = [robot.coordinates(**state), np.zeros(n)]
+    levels = np.zeros((2, n)) if state is None else np.asarray(floats("state", state))
+    levels = np.array(checked_state(robot, levels))
+    if levels.shape != (2, n) or not np.isfinite(levels).all():
+        raise RobotError(f"must hold finite q and q', the shape (2, {n})", name="state", value=levels.tolist())
+    mask = np.asarray(problem.equations.driven)
+    if mask.any():
+        time = np.array([[instant]])
+        laws = np.asarray(problem.prescribed_series(np.zeros((n, 1)), time, 1))[..., 0]
+        levels = np.where(mask > 0, laws, levels)
+    q, rates = levels[0][:, None], levels[1][:, None]
+    if base is None:
+        return RobotState(q, rates)
+    pose, twist = (np.asarray(x) for x in base_arrays(base, (), 1))
+    if not (np.isfinite(pose).all() and np.isfinite(twist).all()):
+        raise RobotError("must be finite", name="base")
+    return RobotState(q, rates, pose[0, :3, None], pose[0, 3:, None], twist[0][:, None])
+
+
+class _Run:
+    """One run: its steps so far, the events in them, and how it ended."""
+
+    def __init__(
+        self, problem: RobotProblem, tolerance: float, longest: float, order: int, detectors: list[JointEventDetector]
+    ):
+        self.problem, self.tolerance, self.longest, self.order = problem, tolerance, longest, order
+        self.detectors = detectors
+        self.happened: list[list[float]] = [[] for _ in detectors]
+        self.parts: list[RobotSteps] = []
+        self.ending = (Status.OK, "")
+        self.stopped_at: float | None = None
+
+    @property
+    def steps(self) -> RobotSteps:
+        """All steps taken."""
+        return jax.tree.map(lambda *parts: np.concatenate(parts), *self.parts)
+
+    def go(self, start: RobotState, instants: np.ndarray, progress: Callable[[int, int], None] | None) -> None:
+        """March from the first to the last instant."""
+        begun, stop = float(instants[0]), float(instants[-1])
+        sense = 1.0 if stop >= begun else -1.0
+        running, none = (np.asarray(value) for value in (int(Outcome.RUNNING), 0))
+        current, total = Progress(np.array([begun]), start, running, none), 0
+        while int(current.outcome) == Outcome.RUNNING and self.stopped_at is None:
+            current, steps, taken = self._marched(current, begun, stop)
+            count = int(taken)
+            total += count
+            if count:
+                kept = jax.tree.map(lambda x, count=count: np.asarray(x)[:count], steps)
+                self.parts.append(self._watch(kept))
+            if total > MOST:
+                self.ending = (Status.COLLAPSED, f"after {total} steps")
+                break
+            if progress is not None:
+                progress(int(np.sum(sense * instants <= sense * float(current.time[0]))), len(instants))
+        if not self.parts:
+            still = jax.tree.map(lambda x: np.asarray(x)[None, None, :, 0], start)
+            self.parts.append(RobotSteps(np.array([begun]), np.zeros(1), still, np.zeros(1, bool)))
+        if int(current.outcome) in (Outcome.COLLAPSED, Outcome.LOST):
+            self.ending = self._explained(current)
+
+    def _marched(self, current: Progress, begun: float, stop: float) -> Any:
+        limits = (np.float64(x) for x in (begun, stop, self.tolerance, self.longest))
+        try:
+            return march_robot(self.problem, current, *limits, order=self.order, count=STEPS)
+        except TypeError as error:
+            if "has no rule for Taylor series" not in str(error):
+                raise
+            message = f"{error}; a law of a joint uses it: write it with other operations"
+            raise UnsupportedError(message, name="torque") from error
+
+    def _watch(self, part: RobotSteps) -> RobotSteps:
+        """Note the events in some steps; cut the steps at the first that is terminal."""
+        found = []
+        for which, detector in enumerate(self.detectors):
+            found += [(step, after, which) for step, after in detector.detect(part)]
+        for step, after, which in sorted(found, key=lambda x: (x[0], abs(x[1]))):
+            instant = float(part.start[step] + after)
+            self.happened[which].append(instant)
+            if self.detectors[which].event.terminal:
+                self.stopped_at = instant
+                kept = jax.tree.map(lambda x, count=step + 1: x[:count], part)
+                return kept._replace(length=np.append(part.length[:step], after))
+        return part
+
+    def _explained(self, current: Progress) -> tuple[Status, str]:
+        """Return why steps did not go on."""
+        time = float(current.time[0])
+        if int(current.stuck) >= STEPS // 2:
+            words = (
+                f"a force of a joint switches without end at t = {time:g} s, as friction of a joint that sticks does: "
+                "smooth it, as by tanh(v/v0)"
+            )
+            return Status.COLLAPSED, words
+        if int(current.outcome) == Outcome.LOST:
+            words = f"accelerations at t = {time:g} s are not finite: a force is not, or nothing resists a joint"
+            return Status.INADMISSIBLE, words
+        return Status.COLLAPSED, f"at t = {time:g} s"

@@ -1,0 +1,134 @@
+"""Simulations of robots in joint coordinates: closed forms, conservation, and the mechanism that a robot is."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jounce as jn
+from jounce.kinematics import Status
+from tests.problems.robots import random_inertia, random_robot
+
+TIME = np.linspace(0.0, 2.0, 9)
+
+
+def slider(mass=2.0, **settings):
+    """Return a mass that slides along x."""
+    joint = jn.Joint("slide", "base", "block", "prismatic", axis=[1, 0, 0], **settings)
+    return jn.Robot("slider", [jn.Link("base"), jn.Link("block", jn.Inertia(mass))], [joint])
+
+
+def swing(time, order):
+    """Return q = exp(-t) cos 2t and its derivatives: a spring of 10 N/m and a damper of 4 N s/m on 2 kg."""
+    series = [((-1 + 2j) ** k * np.exp((-1 + 2j) * time)).real for k in range(order + 1)]
+    return np.stack(series, axis=1)
+
+
+def test_spring_and_damper_in_closed_form_with_events():
+    events = [jn.JointEvent("slide", direction=-1), jn.JointEvent("slide", derivative=1)]
+    law = {"slide": "-10*slide - 4*slide_d1"}
+    found = jn.simulate(slider(), TIME, 6, state=[[1.0], [-1.0]], torque=law, events=events)
+    assert np.abs(found.q[:, :, 0] - swing(TIME, 6)).max() <= 1e-11
+    assert np.abs(found.torque[:, 0, 0] - 2 * swing(TIME, 2)[:, 2]).max() <= 1e-12
+    assert np.abs(found.applied[:, 0] - found.torque[:, 0, 0]).max() <= 1e-12
+    assert found.events[0] == pytest.approx([np.pi / 4], abs=1e-13)
+    turns = (np.arctan2(-1.0, 2.0) + np.pi * np.arange(1, 3)) / 2  # of tan 2t = -1/2
+    assert found.events[1] == pytest.approx(turns[turns < 2], abs=1e-13)
+    assert not found.kinks
+    half = found.at([0.3], order=2)
+    assert np.abs(half.q[0, :, 0] - swing(np.array([0.3]), 2)[0]).max() <= 1e-13
+    assert found.dataset["slide"].attrs["units"] == "m"
+
+
+@pytest.mark.slow
+def test_pulse_and_jumps_are_not_passed_over():
+    mass, width = 2.0, 1e-3
+
+    def law(time, q, rate):
+        pulse = jnp.exp(-(((time - 0.7) / width) ** 2))
+        return jnp.array([pulse + jnp.where(time < 1.0, 3.0, -1.0)])
+
+    found = jn.simulate(slider(mass), TIME, 2, torque=law)
+    late = TIME >= 1.25
+    speed = (3.0 - (TIME[late] - 1.0) + width * np.sqrt(np.pi)) / mass
+    assert np.abs(found.q[late, 1, 0] - speed).max() <= 1e-11
+    assert found.kinks == pytest.approx([1.0], abs=1e-11)
+
+
+@pytest.mark.slow
+def test_sticking_friction_ends_with_a_reason():
+    robot = slider(friction=1.0)
+    with pytest.raises(jn.SolveError, match="a force of a joint switches without end at t = 1 s") as caught:
+        jn.simulate(robot, TIME, 2, state=[[0.0], [0.5]], drives=True)
+    assert caught.value.motion.q[4, 0, 0] == pytest.approx(0.25, abs=1e-9)
+    assert caught.value.motion.status[-1] != Status.OK
+
+
+@pytest.mark.slow
+def test_arm_is_the_mechanism_that_it_is():
+    robot = random_robot(3, 2, tree=False, prismatic=0.0)
+    q = np.array([0.4, -0.3])
+    time = np.array([0.0, 0.2, 0.4])
+    found = jn.simulate(robot, time, 4, state=[q, np.zeros(2)])
+    link = robot.moving_links[-1]
+    whole = jn.simulate(robot.mechanism(q, time=time), time, 4)
+    points = whole.point(*jn.robot.body_point(robot, link)).values
+    own = jn.forward_kinematics(robot, found.q, link).position
+    assert np.abs(points - own).max() <= 1e-9 * np.abs(own).max()
+    energy = found.energy
+    assert np.ptp(energy) <= 1e-12 * np.abs(energy).max()
+
+
+@pytest.mark.slow
+def test_driven_joint_and_feedback():
+    robot = random_robot(3, 3, tree=False, prismatic=0.0)
+    names = robot.joint_names
+    law = "0.3*sin(2*t)"
+
+    def damped(time, q, rate):
+        return -0.2 * rate
+
+    found = jn.simulate(robot, TIME, 4, torque=damped, driven={names[1]: law})
+    expected = jn.ExpressionMotion(law)(jn.Jet.variable(TIME, 4)).derivatives().T
+    assert np.abs(found.q[:, :, 1] - expected).max() <= 1e-12
+    free = [0, 2]
+    assert np.abs(found.torque[:, 0, free] + 0.2 * found.q[:, 1, free]).max() <= 1e-12
+    assert np.abs(found.torque[:, 2, free] + 0.2 * found.q[:, 3, free]).max() <= 1e-9
+
+
+@pytest.mark.slow
+def test_free_base_keeps_its_momenta_and_energy():
+    robot = random_robot(4, 3)
+    massive = random_inertia(np.random.default_rng(5))
+    links = [jn.Link(link.name, massive if link.name == robot.base else link.inertia) for link in robot.links.values()]
+    robot = jn.Robot("satellite", links, list(robot.joints.values()), gravity=[0, 0, 0])
+    base = jn.BaseMotion([0, 0, 0], [1, 0, 0, 0], [[0.1, 0.2, 0.3, 3.0, -1.0, 2.0]])
+    found = jn.simulate(robot, TIME, 4, state=[[0.1, 0.2, 0.3], [0.5, -0.5, 1.0]], base=base)
+    assert np.ptp(found.energy) <= 1e-12 * found.energy.max()
+    forces = jn.inverse_dynamics(robot, found.q, base=jn.BaseMotion(*vars(found.base).values()))
+    assert np.abs(forces[:, 0]).max() <= 1e-11  # nothing pushes the base, nor the joints
+    assert np.abs((found.base.quaternion**2).sum(axis=1) - 1).max() <= 1e-14
+    again = jn.simulate(
+        robot,
+        [2.0, 0.0],
+        2,
+        state=found.q[-1, :2],
+        base=jn.BaseMotion(found.base.position[-1], found.base.quaternion[-1], found.base.twist[-1, :1]),
+    )
+    assert np.abs(again.q[-1, 0] - [0.1, 0.2, 0.3]).max() <= 1e-9
+    assert np.abs(again.base.position[-1]).max() <= 1e-9
+
+
+def test_bad_input_is_told():
+    robot = slider()
+    with pytest.raises(jn.RobotError, match="torque: no moving joint has this name"):
+        jn.simulate(robot, TIME, torque={"slider": 1.0})
+    with pytest.raises(jn.RobotError, match=r"the function must return an array of 1 forces"):
+        jn.simulate(robot, TIME, torque=lambda t, q, v: jnp.zeros(3))
+    with pytest.raises(jn.ExpressionError, match="wheel"):
+        jn.simulate(robot, TIME, torque={"slide": "2*wheel"})
+    with pytest.raises(jn.RobotError, match=r"state: must hold q and q', the shape"):
+        jn.simulate(robot, TIME, state=[0.0])
+    with pytest.raises(jn.JounceError, match=r"torques: simulate has no such option; did you mean 'torque'"):
+        jn.simulate(robot, TIME, torques=[1.0])
+    with pytest.raises(jn.RobotError, match=r"derivative"):
+        jn.JointEvent(lambda t, q, v: q[0], derivative=2)
