@@ -133,18 +133,18 @@ def safe_root(square: Any) -> Any:
     return jnp.where(positive, jnp.sqrt(jnp.where(positive, square, 1.0)), 0.0)
 
 
-def distances(
+def gaps(
     series: Float[Numbers, "order component time"],
     points: Float[np.ndarray, "point component"],
     times: Float[np.ndarray, " point"] | None,
     cells: Cells,
-) -> Float[Numbers, " point"]:
-    """Return the squared distances of points from where a point of the motion is at their times, or comes nearest."""
+) -> Float[Numbers, "component point"]:
+    """Return how far points are from where a point of the motion is at their times, or comes nearest."""
     if times is not None:
         places = [cells.at(float(time)) for time in times]
         index, shift = np.array([k for k, _ in places]), np.array([h for _, h in places])
         there = value(series[:, :, index], jnp.asarray(shift)[None])
-        return jnp.sum((there - points.T) ** 2, axis=0)
+        return there - points.T
     fixed = jax.lax.stop_gradient(series)
 
     def nearest(point: Any) -> tuple[Any, Any]:
@@ -157,7 +157,7 @@ def distances(
 
     index, shift = jax.vmap(nearest)(jnp.asarray(points))
     there = value(series[:, :, index], shift[None])
-    return jnp.sum((there - points.T) ** 2, axis=0)
+    return there - points.T
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

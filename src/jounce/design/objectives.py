@@ -11,13 +11,11 @@ from jaxtyping import Float
 from jounce.design.language import (
     EXERTED,
     MEASURES,
-    OVER_TIME,
     Node,
     Relation,
     operated,
     parsed,
     parsed_relations,
-    refuse_name,
     varying_message,
 )
 from jounce.design.measures import (
@@ -25,31 +23,25 @@ from jounce.design.measures import (
     Curve,
     at_instants,
     derivative,
-    distances,
     environment,
+    gaps,
     integral,
     largest,
     safe_root,
     square,
     value,
 )
-from jounce.dynamics import DriverForceOutput, DriverTorqueOutput, JointForceOutput, JointTorqueOutput
-from jounce.dynamics.outputs import component_labels, is_turning
-from jounce.errors import ExpressionError, JounceError, MechanismError, UnitError, did_you_mean
+from jounce.design.quantities import Quantities, Quantity, told_about
+from jounce.dynamics.outputs import component_labels
+from jounce.errors import ExpressionError, did_you_mean
 from jounce.jet.derivatives import taylor_coefficients
 from jounce.kinematics.solve import HIGHEST_ORDER
-from jounce.mechanism import AbstractQuantity, Mechanism
-from jounce.trajectory import Expression
-from jounce.trajectory.dimensions import LENGTH, TIME, Dimension, times
-from jounce.trajectory.units import parse_unit
+from jounce.mechanism import Mechanism
 
 BEYOND = 5  # derivatives beyond those asked for, by which a quantity is known between instants
 
 Numbers = Callable[[Mapping[str, Any], Any, Any], Any]
 """A number of a design: of its parameters, the extremes of quantities, and other measures."""
-
-Quantity = Callable[[Mapping[str, Any]], Any]
-"""A quantity that changes in time, as a jet along the grid."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -107,6 +99,8 @@ class Goals:
     conditions : list of Condition
     bounded : list of bool
         For each extreme, whether a goal grows with it.
+    gaps : range, optional
+        Which smooth measures are the distances, by coordinate, whose mean square is the objective.
     """
 
     def __init__(
@@ -118,29 +112,29 @@ class Goals:
         curves: Mapping[str, Curve],
         instants: Float[np.ndarray, " time"],
     ):
-        self._original, self._varied, self._curves = mechanism, set(varied), curves
-        self._fixed = _independent(mechanism, self._varied)
-        self._atoms: dict[str, tuple[str, int | None, int]] = {}
-        self._added: dict[str, AbstractQuantity] = {}
-        self._known = self._what_there_is()
+        self._original, self._curves = mechanism, curves
+        self.quantities = Quantities(mechanism, set(varied))
         self._extremes: list[Callable[[Mapping[str, Any], Cells], Any]] = []
         self._windows: list[tuple[float | None, float | None]] = []
         self._smooth: list[Callable[[Mapping[str, Any]], Any]] = []
+        self._smooth_count = 0
+        self.gaps: range | None = None
         self._asked: list[float] = []
-        self._text = ""
         self.bounded: list[bool] = []
         self.order = 0
         self._span = float(instants[0]), float(instants[-1])
-        with _told_about("minimise", minimise):
-            self._text = minimise
+        with told_about("minimise", minimise):
+            self.quantities.text = minimise
             node = parsed(minimise)
             self.objective_value = self._number(node, 1)
             self.objective = self._squared(node) or self.objective_value
         self.conditions = [found for text in subject_to for found in self._conditions(text)]
         self.order = min(self.order + BEYOND, HIGHEST_ORDER)
         self.set_instants(instants)
-        kept = {name: x for name, x in mechanism.outputs.items() if name in {a[0] for a in self._atoms.values()}}
-        self.mechanism = dataclasses.replace(mechanism, outputs={**kept, **self._added})
+        kept = {
+            name: x for name, x in mechanism.outputs.items() if name in {a[0] for a in self.quantities.atoms.values()}
+        }
+        self.mechanism = dataclasses.replace(mechanism, outputs={**kept, **self.quantities.added})
 
     def set_instants(self, instants: Float[np.ndarray, " time"]) -> None:
         """Take another grid."""
@@ -151,7 +145,7 @@ class Goals:
     def series(self, outputs: Mapping[str, Any]) -> dict[str, Any]:
         """Return the Taylor coefficients of the quantities, (order + 1, time), from outputs of a motion."""
         found = {}
-        for text, (name, component, lost) in self._atoms.items():
+        for text, (name, component, lost) in self.quantities.atoms.items():
             values = outputs[name] if component is None else outputs[name][..., component]
             found[text] = taylor_coefficients(jnp.moveaxis(jnp.asarray(values), 1, 0)[lost:])
         return found
@@ -168,7 +162,7 @@ class Goals:
         """
         names = environment(self.instants, self._values(parameters), self.series(outputs))
         rows = [extreme(names, cells) for extreme, cells in zip(self._extremes, self._cells, strict=True)]
-        smooth = [jnp.asarray(measure(names), float).reshape(1) for measure in self._smooth]
+        smooth = [jnp.asarray(measure(names), float).reshape(-1) for measure in self._smooth]
         return rows, jnp.concatenate([*smooth, jnp.zeros(0)])
 
     def numbers(self, parameters: Mapping[str, Any], extremes: Any, smooth: Any, *, as_asked: bool = False) -> Any:
@@ -189,96 +183,12 @@ class Goals:
         """Return the values of all parameters, of which some follow from others."""
         return self._original.with_parameters(**parameters).parameter_values
 
-    # names
-
-    def _what_there_is(self) -> dict[str, str]:
-        """Return what names mean, by kind: a quantity, a parameter, a driver or a joint."""
-        found: dict[str, str] = {}
-        for name, output in self._original.outputs.items():
-            labels = component_labels(self._original, output)
-            found |= {f"{name}_{label}": "quantities" for label in labels} or {name: "quantities"}
-            if labels:
-                found[name] = "points and vectors"
-        found |= dict.fromkeys(self._original.parameters, "parameters")
-        return found
-
-    def _atom(self, text: str) -> Quantity:
-        """Return a quantity of the mechanism by its name, with a derivative such as ``psi_d2``."""
-        name, lost = text, 0
-        if text not in self._known and "_d" in text:
-            stem, _, digits = text.rpartition("_d")
-            if digits.isdigit():
-                name, lost = stem, int(digits)
-        if self._known.get(name) == "points and vectors":
-            labels = component_labels(self._original, self._original.outputs[name])
-            message = f"'{name}' has components; take {' or '.join(f'{name}_{label}' for label in labels)}"
-            raise ExpressionError(message)
-        if self._known.get(name) != "quantities":
-            raise refuse_name(text, self._known, self._text)
-        output, component = self._place(name)
-        self._atoms[text] = (output, component, lost)
-        return lambda names: names[text]
-
-    def _place(self, name: str) -> tuple[str, int | None]:
-        if name in self._original.outputs:
-            return name, None
-        stem, _, label = name.rpartition("_")
-        return stem, component_labels(self._original, self._original.outputs[stem]).index(label)
-
-    def _exerted(self, node: Node) -> Quantity:
-        """Return a force or torque of a driver or a joint."""
-        (subject,) = node.parts
-        kind, _, component = node.word.partition("_")
-        mechanism = self._original
-        known = {**dict.fromkeys(mechanism.drivers, "drivers"), **dict.fromkeys(mechanism.joints, "joints")}
-        if subject.kind != "name" or subject.word not in known:
-            raise refuse_name(subject.text, known, self._text)
-        output = _exerted_by(mechanism, subject.word, kind, component)
-        place = f"{kind}({subject.word})"
-        with _told_about(place):
-            output.check(mechanism)
-        self._added[place] = output
-        labels = component_labels(mechanism, output)
-        if not component and labels:
-            each = [self._component(place, output, k, label) for k, label in enumerate(labels)]
-            squares = [Node("call", "**", (Node("name", x), Node("number", 2.0))) for x in each]
-            total = squares[0]
-            for x in squares[1:]:
-                total = Node("call", "+", (total, x))
-            return self._jet(Node("call", "sqrt", (total,)))
-        if component and component not in labels:
-            message = f"'{node.text}' does not exist; {place} has {'components ' if labels else 'no components '}"
-            raise ExpressionError(f"{message}{', '.join(labels)}".rstrip())
-        text = self._component(place, output, labels.index(component) if component else None, component)
-        return lambda names: names[text]
-
-    def _component(self, place: str, output: AbstractQuantity, index: int | None, label: str) -> str:
-        text = f"{place}_{label}" if label else place
-        self._atoms[text] = (place, index, 0)
-        return text
-
-    # quantities that change in time
-
-    def _jet(self, node: Node) -> Quantity:
-        if node.kind == "number":
-            return lambda names: float(node.word)
-        if node.kind == "name":
-            if node.word in self._atoms or node.word == "t":
-                return lambda names: names[node.word]
-            if node.word in self._original.parameters and self._known[node.word] == "parameters":
-                return lambda names: names[node.word]
-            return self._atom(node.word)
-        if node.word in MEASURES:
-            raise ExpressionError(f"'{node.text}' is one number, and stands within another measure; ask for them apart")
-        if node.word in EXERTED:
-            return self._exerted(node)
-        parts = [self._jet(part) for part in node.parts]
-        return lambda names: operated(node.word, [part(names) for part in parts])
-
     def _series(self, node: Node, order: int) -> Callable[[Mapping[str, Any]], Any]:
         """Return the Taylor coefficients of a derivative of a quantity, (order + 1, time)."""
-        quantity = self._jet(node)
-        lost = max((self._atoms[name][2] for name in node.names() if name in self._atoms), default=0)
+        quantity = self.quantities.jet(node)
+        lost = max(
+            (self.quantities.atoms[name][2] for name in node.names() if name in self.quantities.atoms), default=0
+        )
         self.order = max(self.order, order + lost)
 
         def found(names: Mapping[str, Any]) -> Any:
@@ -294,13 +204,13 @@ class Goals:
     def _number(self, node: Node, sign: int | None) -> Numbers:
         """Return a number; `sign` tells whether goals grow with it (1), shrink (-1), or neither is known (None)."""
         if node.kind == "number":
-            return lambda names, extremes, smooth: float(node.word)
+            return lambda *_: float(node.word)
         if node.kind == "name":
-            if self._known.get(node.word) == "parameters":
-                return lambda names, extremes, smooth: names[node.word]
-            if node.word == "t" or node.word in self._known:
+            if self.quantities.known.get(node.word) == "parameters":
+                return lambda names, *_: names[node.word]
+            if node.word == "t" or node.word in self.quantities.known:
                 raise varying_message(node.text)
-            self._atom(node.word)  # a derivative of a quantity, or refused
+            self.quantities.atom(node.word)  # a derivative of a quantity, or refused
             raise varying_message(node.text)
         if node.word in MEASURES:
             return self._measure(node, sign)
@@ -331,7 +241,7 @@ class Goals:
         if node.kind == "number":
             return float(node.word)
         if node.kind == "name":
-            return self._fixed.get(node.word)
+            return self.quantities.fixed.get(node.word)
         if node.word in MEASURES or node.word in EXERTED:
             return None
         parts = [self._constant(part) for part in node.parts]
@@ -396,9 +306,14 @@ class Goals:
         return found
 
     def _smooth_number(self, measure: Quantity) -> Numbers:
-        index = len(self._smooth)
+        (index,) = self._smooth_block(measure, 1)
+        return lambda *known: known[2][index]
+
+    def _smooth_block(self, measure: Quantity, count: int) -> range:
+        """Take up measures that come together, and return their numbers."""
         self._smooth.append(measure)
-        return lambda names, extremes, smooth: smooth[index]
+        self._smooth_count += count
+        return range(self._smooth_count - count, self._smooth_count)
 
     def _extreme(self, kind: str, series: Callable[..., Any], window: tuple[Any, Any], sign: int | None) -> Numbers:
         def upper(names: Mapping[str, Any], cells: Cells) -> Any:
@@ -428,17 +343,21 @@ class Goals:
         self._extremes.append(rows)
         self._windows.append(window)
         self.bounded.append(sign == 1)
-        return lambda names, extremes, smooth: extremes[index]
+        return lambda *known: known[1][index]
 
     def _path(self, node: Node, sign: int | None) -> Numbers:
         """Return the error of a path: the root of the mean square distance of points from it, or the largest."""
-        apart = self._apart(node)
-        if node.word == "path_error":
-            return self._smooth_number(lambda names: safe_root(jnp.mean(apart(names, self._whole))))
-        return self._added_extreme(lambda names, _: safe_root(apart(names, self._whole)), (None, None), sign)
+        apart, _ = self._gaps(node)
 
-    def _apart(self, node: Node) -> Callable[[Mapping[str, Any], Cells], Any]:
-        """Return the squared distances of the points of a curve from the path of a point."""
+        def squares(names: Mapping[str, Any]) -> Any:
+            return jnp.sum(apart(names) ** 2, axis=0)
+
+        if node.word == "path_error":
+            return self._smooth_number(lambda names: safe_root(jnp.mean(squares(names))))
+        return self._added_extreme(lambda names, _: safe_root(squares(names)), (None, None), sign)
+
+    def _gaps(self, node: Node) -> tuple[Quantity, int]:
+        """Return how far the points of a curve are from the path of a point, (component, point), and how many."""
         point, curve = (part.word for part in node.parts)
         output = self._original.outputs.get(point) if isinstance(point, str) else None
         labels = () if output is None else component_labels(self._original, output)
@@ -462,11 +381,11 @@ class Goals:
         names = [f"{point}_{label}" for label in labels]
         quantities = [self._series(Node("name", name), 0) for name in names]
 
-        def found(known: Mapping[str, Any], cells: Cells) -> Any:
+        def found(known: Mapping[str, Any]) -> Any:
             whole = jnp.stack([quantity(known) for quantity in quantities], axis=1)
-            return distances(whole, target.points, target.times, cells)
+            return gaps(whole, target.points, target.times, self._whole)
 
-        return found
+        return found, len(target.points)
 
     def _is_point(self, name: str) -> bool:
         return bool(component_labels(self._original, self._original.outputs[name]))
@@ -476,8 +395,10 @@ class Goals:
         if node.kind != "call" or node.word not in ("rms", "path_error"):
             return None
         if node.word == "path_error":
-            apart = self._apart(node)
-            return self._smooth_number(lambda names: jnp.mean(apart(names, self._whole)))
+            apart, count = self._gaps(node)
+            size = len(component_labels(self._original, self._original.outputs[node.parts[0].word]))
+            block = self.gaps = self._smooth_block(apart, size * count)
+            return lambda *known: jnp.sum(known[2][block.start : block.stop] ** 2) / count
         order = self._derivative(node.parts[1]) if len(node.parts) > 1 else 0
         window = tuple(self._instant(part) for part in node.parts[2:]) or (None, None)
         series = self._series(node.parts[0], order)
@@ -486,84 +407,17 @@ class Goals:
     # conditions
 
     def _conditions(self, text: str) -> list[Condition]:
-        with _told_about("subject_to", text):
-            self._text = text
+        with told_about("subject_to", text):
+            self.quantities.text = text
             found = []
             for relation in parsed_relations(text):
-                self._check_dimensions(relation)
+                check_dimensions(relation, self.quantities)
                 up = None if relation.equal else 1
                 left = self._number(relation.left, up)
                 right = self._number(relation.right, None if relation.equal else -1)
                 found.append(Condition(relation, _difference(left, right), left, right))
             return found
 
-    def _check_dimensions(self, relation: Relation) -> None:
-        """Raise UnitError if one side has a unit that the other cannot have."""
-        sides = relation.left, relation.right
-        known = [x or self._dimension(side) for x, side in zip(relation.dimensions, sides, strict=True)]
-        if any(relation.dimensions) and None not in known and known[0] != known[1]:
-            measure, unit = (side.text for side in (sides if relation.dimensions[1] else sides[::-1]))
-            raise UnitError(f"{measure} is no quantity of the unit that it is compared with, {unit} in SI units")
-
-    def _dimension(self, node: Node) -> Dimension | None:
-        """Return the dimension of a measure of one quantity, None where it is not known."""
-        if node.kind != "call" or not node.parts:
-            return None
-        if node.word.startswith("path"):
-            return LENGTH
-        if node.word not in MEASURES:
-            found = [self._dimension(part) for part in node.parts]
-            return found[0] if node.word in ("+", "-", "neg", "pos") and len({*found}) == 1 else None
-        rest = node.parts[1:]
-        steps = rest[0] if node.word in OVER_TIME and rest else rest[0] if len(rest) == 2 else None
-        order = 0 if steps is None else self._derivative(steps)
-        subject = node.parts[0]
-        if subject.kind == "call" and subject.word in EXERTED:
-            unit = "N" if subject.word.startswith("force") else "N*m"
-        elif subject.kind == "name" and self._known.get(subject.word) == "quantities":
-            unit = self._original.outputs[self._place(subject.word)[0]].unit
-        else:
-            return None
-        return times(parse_unit(unit)[1], TIME, -order) if unit else None
-
-
-def _independent(mechanism: Mechanism, varied: set[str]) -> dict[str, float]:
-    """Return the values of those parameters that are the same in all designs."""
-    changing, count = set(varied), -1
-    while len(changing) > count:
-        count = len(changing)
-        for name, given in mechanism.parameters.items():
-            expression = Expression(given) if isinstance(given, str) else given
-            if isinstance(expression, Expression) and expression.names & changing:
-                changing.add(name)
-    return {name: x for name, x in mechanism.parameter_values.items() if name not in changing}
-
 
 def _difference(left: Numbers, right: Numbers) -> Numbers:
     return lambda names, extremes, smooth: left(names, extremes, smooth) - right(names, extremes, smooth)
-
-
-def _exerted_by(mechanism: Mechanism, name: str, kind: str, component: str) -> AbstractQuantity:
-    """Return the output for what a driver exerts along what it prescribes, or a joint on its second body."""
-    driver = mechanism.drivers.get(name)
-    if driver is None or component:
-        return JointForceOutput(name) if kind == "force" else JointTorqueOutput(name)
-    if is_turning(driver) != (kind == "torque"):
-        right, wrong = ("torque", "force") if is_turning(driver) else ("force", "torque")
-        raise MechanismError(f"the driver '{name}' exerts a {right}, no {wrong}; write {right}({name})")
-    return DriverTorqueOutput(name) if kind == "torque" else DriverForceOutput(name)
-
-
-class _told_about:  # noqa: N801 - a context, used as a function
-    """Gives errors the place that they are about."""
-
-    def __init__(self, name: str, value: str | None = None):
-        self.name, self.value = name, value
-
-    def __enter__(self) -> None:
-        return None
-
-    def __exit__(self, kind: Any, error: Any, trace: Any) -> bool:
-        if isinstance(error, JounceError):
-            error.name = self.name if error.name is None or self.value is not None else f"{self.name}.{error.name}"
-        return False

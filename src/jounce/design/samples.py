@@ -86,7 +86,7 @@ def sampled(problem: Problem, count: int | None, seed: int) -> Samples:
     goals = problem.goals
     order = max(goals.order - FEWER, 0)
     rows = dict(zip(problem.names, values.T, strict=True))
-    family = solve_batch(goals.mechanism, rows, goals.instants, order)
+    family = solve_batch(goals.mechanism, rows, goals.instants, order, alone=False)
     moving = (family["status"].values == int(Status.OK)).all(axis=1)
     merits = np.full(len(places), np.inf)
     if moving.any():

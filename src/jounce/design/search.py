@@ -12,18 +12,17 @@ from typing import Any
 
 import numpy as np
 from jaxtyping import Float
-from scipy.optimize import minimize, nnls
+from scipy.optimize import least_squares, minimize
 
+from jounce.design.multipliers import ACTIVE, Known, Multipliers, Vector
 from jounce.design.problem import Evaluation, Locked, Problem
 
 ACCURACY = 1e-13  # of SLSQP, relative
 ROUNDS = 12  # regions that are tried, at most
 SMALLEST_REGION = 1e-7  # of the width between bounds
 HELD = 1e-7  # by which a condition may be broken, relative to its size
-ACTIVE = 1e-6  # distance from a bound, relative
+FITTED = 1e-6  # of the residual of the first-order conditions after least squares
 LOCKED = 1e3  # what SLSQP is told of a design that locks, relative: its line search then goes back
-
-Vector = Float[np.ndarray, " entry"]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -104,6 +103,11 @@ class Search:
         here = self.problem.evaluate(place)
         self._set_scales(here)
         best, radius = place, 1.0
+        if self.problem.goals.gaps is not None and not elastic:
+            fitted = self.found(self._fitted(place))
+            if fitted.feasible and (fitted.residual <= FITTED or fitted.objective <= ACCURACY * self.scale):
+                return fitted
+            best = fitted.place
         for _ in range(ROUNDS):
             run = _Run(self, best, radius, elastic=elastic)
             locked, inside = run.run()
@@ -119,6 +123,38 @@ class Search:
                 radius *= 4
         return self.found(best)
 
+    def _fitted(self, place: Vector) -> Vector:
+        """Return a better place by least squares, which knows more of distances from points than their sum."""
+        chosen = np.array(self.problem.goals.gaps)
+
+        def gaps(place: Vector) -> Vector:
+            try:
+                here = self.problem.evaluate(place)
+            except Locked:
+                return np.full(len(chosen), LOCKED * np.sqrt(self.scale))
+            if self.watch is not None:
+                self.watch(self.problem.asked(place, here)[0], 0.0)
+            return here.smooth[chosen]
+
+        def slopes(place: Vector) -> Float[np.ndarray, "gap parameter"]:
+            return self.problem.evaluate(place).smooth_slopes[chosen]
+
+        tolerances = {"xtol": ACCURACY, "ftol": ACCURACY, "gtol": ACCURACY}
+        start = np.clip(place, 1e-10, 1 - 1e-10)
+        found = least_squares(gaps, start, slopes, (0.0, 1.0), max_nfev=self.iterations, **tolerances)
+        near = np.where(found.x < ACTIVE, 0.0, np.where(found.x > 1 - ACTIVE, 1.0, found.x))
+        return min((place, found.x, near), key=self._fitness)
+
+    def _fitness(self, place: Vector) -> tuple[float, float]:
+        """Return by what places are compared: how near they are to a singular position, then the objective."""
+        try:
+            here = self.problem.evaluate(place)
+        except Locked:
+            return np.inf, np.inf
+        numbers, _ = self.problem.numbers(place, self.problem.extremes(here)[0], here.smooth)
+        worst = max(self.near_singular(here), float(self.broken(numbers[1:]).max(initial=0.0)))
+        return (worst if worst > HELD else 0.0), float(numbers[0])
+
     def found(self, place: Vector) -> Found:
         """Return what is known of a place: values, broken conditions, multipliers."""
         here = self.problem.evaluate(place)
@@ -126,9 +162,13 @@ class Search:
         numbers, slopes = self.problem.numbers(place, extremes, here.smooth)
         broken = self.broken(numbers[1:])
         near = self.near_singular(here)
-        kkt = _Multipliers(self, here, numbers, slopes, extremes, chosen)
+        kkt = Multipliers(self._known(), here, numbers, slopes, extremes, chosen)
         residual, conditions, bounds, singular = kkt.solved()
         return Found(place, here, float(numbers[0]), broken, near, residual, conditions, bounds, singular)
+
+    def _known(self) -> Known:
+        owner = self.problem.owner
+        return Known(self.bounded, self.equal, self.sizes, self.extreme_sizes, owner, self.clearance, self.scale)
 
     def broken(self, numbers: Vector) -> Vector:
         """Return by how much conditions are broken, relative to their sizes."""
@@ -304,68 +344,3 @@ class _Run:
 
     def _zero_slopes(self, variables: Vector) -> Float[np.ndarray, "row variable"]:
         return (self._goals(variables)[1][1:] / self.search.sizes[:, None])[self.search.equal]
-
-
-class _Multipliers:
-    """Multipliers of what holds as an equality at a design, by least squares with the signs that they must have."""
-
-    def __init__(
-        self, search: Search, here: Evaluation, numbers: Vector, slopes: list[Any], extremes: Vector, chosen: Any
-    ):
-        self.search, self.here, self.numbers, self.extremes = search, here, numbers, extremes
-        by_place, by_extreme, by_smooth = slopes
-        self.by_extreme, self.chosen = by_extreme, chosen
-        self.fixed = by_place + by_smooth @ here.smooth_slopes
-        free = np.setdiff1d(np.arange(len(extremes)), search.bounded)
-        self.fixed = self.fixed + by_extreme[:, free] @ here.row_slopes[chosen[free]]
-
-    def solved(self) -> tuple[float, Vector, Vector, float]:
-        """Return the residual, and the multipliers of conditions, of bounds and of the smallest singular value."""
-        count, extra = len(self.here.place), len(self.search.bounded)
-        target = -np.concatenate([self.fixed[0], self.by_extreme[0, self.search.bounded]])
-        parts = [*self._conditions(), *self._rows(extra), *self._bounds(count + extra), *self._singular(extra)]
-        columns = np.stack([slope for slope, _, _ in parts], axis=1) if parts else np.zeros((len(target), 0))
-        norms = np.linalg.norm(columns, axis=0)
-        norms[norms == 0] = 1.0
-        weights = nnls(columns / norms, target)[0] / norms if parts else np.zeros(0)
-        found = {"condition": np.zeros(len(self.search.equal)), "bound": np.zeros(count), "singular": np.zeros(1)}
-        for (_, kind, place), weight in zip(parts, weights, strict=True):
-            if kind:
-                sign = -1.0 if place < 0 else 1.0
-                found[kind][abs(place) - 1] += sign * weight
-        size = max(float(np.linalg.norm(target)), self.search.scale)
-        residual = float(np.linalg.norm(columns @ weights - target)) / size
-        return residual, found["condition"], found["bound"], float(found["singular"][0])
-
-    def _conditions(self) -> list[tuple[Vector, str, int]]:
-        """Return the slopes of active conditions, both signs of those that are equalities."""
-        found, search = [], self.search
-        for k, number in enumerate(self.numbers[1:]):
-            slope = np.concatenate([self.fixed[k + 1], self.by_extreme[k + 1, search.bounded]])
-            if search.equal[k] or number > -ACTIVE * search.sizes[k]:
-                found.append((slope, "condition", k + 1))
-            if search.equal[k]:
-                found.append((-slope, "condition", -k - 1))
-        return found
-
-    def _rows(self, extra: int) -> list[tuple[Vector, str, int]]:
-        """Return the slopes of the values that are the largest, less those of the numbers in their places."""
-        search, here = self.search, self.here
-        found = []
-        for k, extreme in enumerate(search.bounded):
-            close = search.problem.owner == extreme
-            close &= here.rows > self.extremes[extreme] - ACTIVE * search.extreme_sizes[extreme]
-            found += [(np.concatenate([row, -np.eye(extra)[k]]), "", 1) for row in here.row_slopes[close]]
-        return found
-
-    def _bounds(self, size: int) -> list[tuple[Vector, str, int]]:
-        """Return the slopes of the bounds that are reached."""
-        place = self.here.place
-        lower = [(-np.eye(size)[k], "bound", k + 1) for k in np.flatnonzero(place <= ACTIVE)]
-        return lower + [(np.eye(size)[k], "bound", -k - 1) for k in np.flatnonzero(place >= 1.0 - ACTIVE)]
-
-    def _singular(self, extra: int) -> list[tuple[Vector, str, int]]:
-        """Return the slopes of the smallest singular values that are at their bound."""
-        bound = self.search.clearance**2 * (1 + 1e-4)
-        rows = self.here.margin_slopes[self.here.margins < bound]
-        return [(np.concatenate([-slope, np.zeros(extra)]), "singular", 1) for slope in rows]

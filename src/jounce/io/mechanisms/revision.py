@@ -122,7 +122,9 @@ def with_value(old: Any, value: float) -> Any:
     for text in _digits(value, size):
         written = f"{text}{gap}{unit}"
         read = parse_value(written).value
-        if isinstance(read, float) and abs(read - value) <= (0.0 if isinstance(size, Decimal) else ROUNDING * abs(value)):
+        if isinstance(read, float) and abs(read - value) <= (
+            0.0 if isinstance(size, Decimal) else ROUNDING * abs(value)
+        ):
             return written
     return value
 
