@@ -21,7 +21,7 @@ from jounce.shapes import Numbers
 SAMPLES = 9  # of a cell, in which its largest value is looked for
 ROUNDS = 6  # of Newton's method from the best of them
 
-Series = Float[Numbers, "order cell"]
+Series = Float[Numbers, "order *cell"]
 """Taylor coefficients about the instants of a grid."""
 
 
@@ -79,14 +79,14 @@ def value(series: Series, shift: Any) -> Any:
     return found
 
 
-def slope_of(series: Series) -> Series:
+def slope_of(series: Series) -> Float[Numbers, "lower *cell"]:
     """Return the series of the rate."""
     if len(series) == 1:
         return jnp.zeros_like(series)
     return series[1:] * np.arange(1.0, len(series))[:, None]
 
 
-def top(series: Series, cells: Cells) -> Float[Numbers, " cell"]:
+def top(series: Float[Numbers, "order cell"], cells: Cells) -> Float[Numbers, " cell"]:
     """Return when, seen from its instant, each series is largest in its cell; nothing is differentiated."""
     series = jax.lax.stop_gradient(series)
     share = np.linspace(0.0, 1.0, SAMPLES)[:, None]
@@ -94,7 +94,7 @@ def top(series: Series, cells: Cells) -> Float[Numbers, " cell"]:
     places = cells.low[None] + share * width[None]
     best = jnp.argmax(value(series[:, None], jnp.asarray(places)), axis=0)
     spacing = width / (SAMPLES - 1)
-    start = jnp.asarray(cells.low) + best * spacing
+    start = jnp.asarray(cells.low) + best.astype(float) * spacing
     low, high = jnp.maximum(start - spacing, cells.low), jnp.minimum(start + spacing, cells.high)
     rate, bend = slope_of(series), slope_of(slope_of(series))
     shift = start
@@ -105,7 +105,7 @@ def top(series: Series, cells: Cells) -> Float[Numbers, " cell"]:
     return jnp.where(value(series, shift) >= value(series, start), shift, start)
 
 
-def largest(series: Series, cells: Cells) -> Float[Numbers, " cell"]:
+def largest(series: Float[Numbers, "order time"], cells: Cells) -> Float[Numbers, " cell"]:
     """Return the largest value of each series in its cell."""
     inside = series[:, cells.index]
     return value(inside, top(inside, cells))
@@ -184,7 +184,7 @@ def environment(
     return {**parameters, "t": Jet.variable(instants, order), **{name: Jet(tuple(x)) for name, x in series.items()}}
 
 
-def at_instants(values: Sequence[float], instants: Float[np.ndarray, " time"]) -> Float[np.ndarray, " time"]:
+def at_instants(values: Sequence[float], instants: Float[np.ndarray, " given"]) -> Float[np.ndarray, " time"]:
     """Return a grid that has the instants at which something is asked, too."""
     wanted = np.unique(np.concatenate([instants, np.asarray(values, float)]))
     gaps = np.diff(wanted)

@@ -96,8 +96,8 @@ class Multipliers:
     def _bounds(self, size: int) -> list[tuple[Vector, str, int]]:
         """Return the slopes of the bounds that are reached."""
         place = self.here.place
-        lower = [(-np.eye(size)[k], "bound", k + 1) for k in np.flatnonzero(place <= ACTIVE)]
-        return lower + [(np.eye(size)[k], "bound", -k - 1) for k in np.flatnonzero(place >= 1.0 - ACTIVE)]
+        lower = [(-np.eye(size)[k], "bound", int(k) + 1) for k in np.flatnonzero(place <= ACTIVE)]
+        return lower + [(np.eye(size)[k], "bound", -int(k) - 1) for k in np.flatnonzero(place >= 1.0 - ACTIVE)]
 
     def _singular(self, extra: int) -> list[tuple[Vector, str, int]]:
         """Return the slopes of the smallest singular values that are at their bound."""

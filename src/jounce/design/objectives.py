@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.design.dimensions import check_dimensions
 from jounce.design.language import (
     EXERTED,
     MEASURES,
@@ -123,7 +124,7 @@ class Goals:
         self.bounded: list[bool] = []
         self.order = 0
         self._span = float(instants[0]), float(instants[-1])
-        with told_about("minimise", minimise):
+        with told_about("minimise", whole=True):
             self.quantities.text = minimise
             node = parsed(minimise)
             self.objective_value = self._number(node, 1)
@@ -219,7 +220,7 @@ class Goals:
         parts = [self._number(part, each) for part, each in zip(node.parts, self._signs(node, sign), strict=True)]
         return lambda names, extremes, smooth: operated(node.word, [part(names, extremes, smooth) for part in parts])
 
-    def _signs(self, node: Node, sign: int | None) -> list[int | None]:
+    def _signs(self, node: Node, sign: int | None) -> Sequence[int | None]:
         """Return how goals grow with the parts of an operation, as far as that is known whatever their values are."""
         if sign is None:
             return [None] * len(node.parts)
@@ -269,6 +270,15 @@ class Goals:
         self._asked.append(instant)
         return instant
 
+    def _window(self, rest: Sequence[Node]) -> tuple[float | None, float | None]:
+        """Return from when to when a measure counts, which two arguments after the derivative tell."""
+        if len(rest) < 3:
+            return None, None
+        start, stop = self._instant(rest[1]), self._instant(rest[2])
+        if not start < stop:
+            raise ExpressionError(f"the window must end after it begins, got {start:g} to {stop:g} s")
+        return start, stop
+
     def _measure(self, node: Node, sign: int | None) -> Numbers:
         kind, (quantity, *rest) = node.word, node.parts
         if kind.startswith("path"):
@@ -284,11 +294,7 @@ class Goals:
 
             return self._smooth_number(there)
         order = self._derivative(rest[0]) if rest else 0
-        window: tuple[float | None, float | None] = (None, None)
-        if len(rest) == 3:
-            window = (self._instant(rest[1]), self._instant(rest[2]))
-            if not window[0] < window[1]:  # type: ignore[operator]
-                raise ExpressionError(f"the window must end after it begins, got {window[0]:g} to {window[1]:g} s")
+        window = self._window(rest)
         series = self._series(quantity, order)
         if kind in ("mean", "rms"):
             return self._smooth_number(self._mean(series, window, root=kind == "rms"))
@@ -400,23 +406,22 @@ class Goals:
             block = self.gaps = self._smooth_block(apart, size * count)
             return lambda *known: jnp.sum(known[2][block.start : block.stop] ** 2) / count
         order = self._derivative(node.parts[1]) if len(node.parts) > 1 else 0
-        window = tuple(self._instant(part) for part in node.parts[2:]) or (None, None)
         series = self._series(node.parts[0], order)
-        return self._smooth_number(self._mean(series, window, root=True, squared=True))  # type: ignore[arg-type]
+        return self._smooth_number(self._mean(series, self._window(node.parts[1:]), root=True, squared=True))
 
     # conditions
 
     def _conditions(self, text: str) -> list[Condition]:
-        with told_about("subject_to", text):
+        found = []
+        with told_about("subject_to", whole=True):
             self.quantities.text = text
-            found = []
             for relation in parsed_relations(text):
                 check_dimensions(relation, self.quantities)
                 up = None if relation.equal else 1
                 left = self._number(relation.left, up)
                 right = self._number(relation.right, None if relation.equal else -1)
                 found.append(Condition(relation, _difference(left, right), left, right))
-            return found
+        return found
 
 
 def _difference(left: Numbers, right: Numbers) -> Numbers:

@@ -22,7 +22,7 @@ from jounce.shapes import ArrayLike
 def optimise(
     mechanism: Mechanism,
     minimise: str,
-    vary: Mapping[str, tuple[Any, Any]],
+    vary: Mapping[str, Any],
     subject_to: Sequence[str] = (),
     *,
     time: Any = None,
@@ -133,7 +133,7 @@ def optimise(
     return best
 
 
-def _bounds(mechanism: Mechanism, vary: Mapping[str, tuple[Any, Any]]) -> dict[str, tuple[float, float]]:
+def _bounds(mechanism: Mechanism, vary: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
     """Return the bounds of parameters as numbers.
 
     Raises

@@ -1,6 +1,7 @@
 """Names in expressions as quantities of a mechanism that change in time: outputs, components, rates, forces."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
 from jounce.design.language import EXERTED, MEASURES, Node, operated, refuse_name
@@ -153,16 +154,11 @@ def _exerted_by(mechanism: Mechanism, name: str, kind: str, component: str) -> A
     return DriverTorqueOutput(name) if kind == "torque" else DriverForceOutput(name)
 
 
-class told_about:  # noqa: N801 - a context, used as a function
-    """Gives errors the place that they are about."""
-
-    def __init__(self, name: str, value: str | None = None):
-        self.name, self.value = name, value
-
-    def __enter__(self) -> None:
-        return None
-
-    def __exit__(self, kind: Any, error: Any, trace: Any) -> bool:
-        if isinstance(error, JounceError):
-            error.name = self.name if error.name is None or self.value is not None else f"{self.name}.{error.name}"
-        return False
+@contextmanager
+def told_about(name: str, whole: bool = False) -> Iterator[None]:
+    """Give errors the place that they are about, before the one that they know, or as the whole of it."""
+    try:
+        yield
+    except JounceError as error:
+        error.name = name if error.name is None or whole else f"{name}.{error.name}"
+        raise

@@ -139,9 +139,9 @@ class Search:
         def slopes(place: Vector) -> Float[np.ndarray, "gap parameter"]:
             return self.problem.evaluate(place).smooth_slopes[chosen]
 
-        tolerances = {"xtol": ACCURACY, "ftol": ACCURACY, "gtol": ACCURACY}
+        tolerances: Any = {"xtol": ACCURACY, "ftol": ACCURACY, "gtol": ACCURACY, "jac": slopes}
         start = np.clip(place, 1e-10, 1 - 1e-10)
-        found = least_squares(gaps, start, slopes, (0.0, 1.0), max_nfev=self.iterations, **tolerances)
+        found = least_squares(gaps, start, bounds=(0.0, 1.0), max_nfev=self.iterations, **tolerances)
         near = np.where(found.x < ACTIVE, 0.0, np.where(found.x > 1 - ACTIVE, 1.0, found.x))
         return min((place, found.x, near), key=self._fitness)
 

@@ -279,14 +279,14 @@ def _nothing_moves(lock: Locked | None, taken: Samples) -> DesignError:
     return DesignError(f"none of {taken.count} designs within the bounds can be put together and moved; {bounds}{why}")
 
 
-def _thinned(instants: Float[np.ndarray, " time"], most: int) -> Float[np.ndarray, " time"]:
+def _thinned(instants: Float[np.ndarray, " given"], most: int) -> Float[np.ndarray, " time"]:
     """Return at most so many of the instants, evenly taken, with both ends."""
     if len(instants) <= most:
         return instants
     return instants[np.unique(np.linspace(0, len(instants) - 1, most).round().astype(int))]
 
 
-def _split(instants: Float[np.ndarray, " time"], parts: int) -> Float[np.ndarray, " time"]:
+def _split(instants: Float[np.ndarray, " given"], parts: int) -> Float[np.ndarray, " time"]:
     """Return the instants, and others evenly between each two of them."""
     share = np.arange(parts) / parts
     between = instants[:-1, None] + np.diff(instants)[:, None] * share
