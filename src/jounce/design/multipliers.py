@@ -4,13 +4,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from scipy.optimize import nnls
 
 from jounce.design.problem import Evaluation
 
 ACTIVE = 1e-6  # distance from a bound, relative
 
-Vector = Float[np.ndarray, " entry"]
+Vector = Float[np.ndarray, " _"]
 
 
 class Known(NamedTuple):
@@ -56,6 +55,8 @@ class Multipliers:
 
     def solved(self) -> tuple[float, Vector, Vector, float]:
         """Return the residual, and the multipliers of conditions, of bounds and of the smallest singular value."""
+        from scipy.optimize import nnls  # here, to start quickly
+
         count, extra = len(self.here.place), len(self.known.bounded)
         target = -np.concatenate([self.fixed[0], self.by_extreme[0, self.known.bounded]])
         parts = [*self._conditions(), *self._rows(extra), *self._bounds(count + extra), *self._singular(extra)]

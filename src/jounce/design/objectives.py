@@ -400,14 +400,14 @@ class Goals:
         """Return the square of an objective that is a root, None for any other: it is smooth where it is zero."""
         if node.kind != "call" or node.word not in ("rms", "path_error"):
             return None
+        subject, *rest = node.parts
         if node.word == "path_error":
             apart, count = self._gaps(node)
-            size = len(component_labels(self._original, self._original.outputs[node.parts[0].word]))
+            size = len(component_labels(self._original, self._original.outputs[subject.word]))
             block = self.gaps = self._smooth_block(apart, size * count)
             return lambda *known: jnp.sum(known[2][block.start : block.stop] ** 2) / count
-        order = self._derivative(node.parts[1]) if len(node.parts) > 1 else 0
-        series = self._series(node.parts[0], order)
-        return self._smooth_number(self._mean(series, self._window(node.parts[1:]), root=True, squared=True))
+        series = self._series(subject, self._derivative(rest[0]) if rest else 0)
+        return self._smooth_number(self._mean(series, self._window(rest), root=True, squared=True))
 
     # conditions
 

@@ -8,7 +8,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from jounce.design.objectives import Goals
 from jounce.dynamics.motion_values import cut, pose_of
@@ -16,6 +16,7 @@ from jounce.errors import AssemblyError, MobilityError, SolveError
 from jounce.jet import Jet
 from jounce.kinematics import Status, solve
 from jounce.mechanism import Mechanism
+from jounce.mechanism.modules import with_fields
 from jounce.mechanism.system import System
 
 LOCKS = (AssemblyError, MobilityError, SolveError)
@@ -172,7 +173,7 @@ class Problem:
             self._scale = 1.0 / np.where(sizes > 0, sizes, 1.0)
         return self._scale
 
-    def extremes(self, found: Evaluation) -> tuple[Float[np.ndarray, " extreme"], Float[np.ndarray, "extreme row"]]:
+    def extremes(self, found: Evaluation) -> tuple[Float[np.ndarray, " extreme"], Int[np.ndarray, " extreme"]]:
         """Return the extremes of a design, and which of its rows each of them is."""
         count = len(self.goals.bounded)
         values, chosen = np.zeros(count), np.zeros(count, int)
@@ -229,8 +230,6 @@ def _along(width: Float[np.ndarray, " parameter"], like: Any) -> Any:
 
 def _bare(system: System) -> System:
     """Return a system without what no Jacobian needs."""
-    from jounce.mechanism.modules import with_fields
-
     return with_fields(system, forces=(), outputs=())
 
 

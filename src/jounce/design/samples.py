@@ -6,7 +6,6 @@ from collections.abc import Mapping
 
 import numpy as np
 from jaxtyping import Bool, Float
-from scipy.stats import qmc
 
 from jounce.design.problem import Problem
 from jounce.errors import MechanismError, whole_number
@@ -79,6 +78,8 @@ def sampled(problem: Problem, count: int | None, seed: int) -> Samples:
         Rounded up to a power of two.
     seed : int
     """
+    from scipy.stats import qmc  # here, to start quickly
+
     size = len(problem.names)
     count = max(64, 16 * size) if count is None else whole_number("samples", count, 1, error=MechanismError)
     places = qmc.Sobol(size, rng=np.random.default_rng(seed)).random_base2(math.ceil(math.log2(count)))

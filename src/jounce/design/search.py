@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 from jaxtyping import Float
-from scipy.optimize import least_squares, minimize
 
 from jounce.design.multipliers import ACTIVE, Known, Multipliers, Vector
 from jounce.design.problem import Evaluation, Locked, Problem
@@ -125,6 +124,8 @@ class Search:
 
     def _fitted(self, place: Vector) -> Vector:
         """Return a better place by least squares, which knows more of distances from points than their sum."""
+        from scipy.optimize import least_squares  # here, to start quickly
+
         chosen = np.array(self.problem.goals.gaps)
 
         def gaps(place: Vector) -> Vector:
@@ -216,6 +217,8 @@ class _Run:
 
     def run(self) -> tuple[Locked | None, bool]:
         """Return the design that locked, if one did, and whether the end is free of the region's bounds."""
+        from scipy.optimize import minimize  # here, to start quickly
+
         bounds = [*zip(self.low, self.high, strict=True)] + [(None, None)] * (len(self.first) - self.count)
         constraints: list[Any] = [{"type": "ineq", "fun": self._above, "jac": self._above_slopes}]
         if self.search.equal.any() and not self.elastic:
