@@ -72,7 +72,7 @@ class Relation:
     Parameters
     ----------
     text : str
-        As it was given.
+        As it was given, or one of the two that it stands for.
     left, right : Node
     equal : bool
         Whether both must be equal.
@@ -122,7 +122,9 @@ def parsed_relations(text: str) -> list[Relation]:
     found = []
     for k, sign in enumerate(pieces[1::2]):
         (left, first), (right, second) = sides[k : k + 2][:: -1 if ">" in sign else 1]
-        found.append(Relation(text.strip(), left, right, sign in ("==", "="), (first, second)))
+        equal = sign in ("==", "=")
+        own = text.strip() if len(pieces) == 3 else f"{left.text} {'==' if equal else '<='} {right.text}"
+        found.append(Relation(own, left, right, equal, (first, second)))
     return found
 
 

@@ -20,6 +20,7 @@ ACCURACY = 1e-13  # of SLSQP, relative
 ROUNDS = 12  # regions that are tried, at most
 SMALLEST_REGION = 1e-7  # of the width between bounds
 HELD = 1e-7  # by which a condition may be broken, relative to its size
+SMALL = 1e-6  # of the first objective, below which one counts as zero
 FITTED = 1e-6  # of the residual of the first-order conditions after least squares
 LOCKED = 1e3  # what SLSQP is told of a design that locks, relative: its line search then goes back
 
@@ -61,7 +62,7 @@ class Found:
     @property
     def feasible(self) -> bool:
         """Whether all conditions hold."""
-        return bool((self.broken <= HELD).all() and self.near_singular <= HELD)
+        return bool(np.isfinite(self.objective) and (self.broken <= HELD).all() and self.near_singular <= HELD)
 
 
 class Search:
@@ -161,19 +162,28 @@ class Search:
         here = self.problem.evaluate(place)
         extremes, chosen = self.problem.extremes(here)
         numbers, slopes = self.problem.numbers(place, extremes, here.smooth)
-        broken = self.broken(numbers[1:])
+        broken = self.broken(numbers[1:], self._sizes_at(here))
         near = self.near_singular(here)
-        kkt = Multipliers(self._known(), here, numbers, slopes, extremes, chosen)
+        kkt = Multipliers(self._known(float(numbers[0])), here, numbers, slopes, extremes, chosen)
         residual, conditions, bounds, singular = kkt.solved()
         return Found(place, here, float(numbers[0]), broken, near, residual, conditions, bounds, singular)
 
-    def _known(self) -> Known:
-        owner = self.problem.owner
-        return Known(self.bounded, self.equal, self.sizes, self.extreme_sizes, owner, self.clearance, self.scale)
+    def _known(self, objective: float) -> Known:
+        goals, size = self.problem.goals, abs(objective)
+        if goals.objective is not goals.objective_value:  # a square, whose slope is as the root
+            size = float(np.sqrt(size * self.scale))
+        scales = self.clearance, max(size, SMALL * self.scale)
+        return Known(self.bounded, self.equal, self.sizes, self.extreme_sizes, self.problem.owner, *scales)
 
-    def broken(self, numbers: Vector) -> Vector:
-        """Return by how much conditions are broken, relative to their sizes."""
-        return np.where(self.equal, np.abs(numbers), np.maximum(numbers, 0.0)) / self.sizes
+    def broken(self, numbers: Vector, sizes: Vector | None = None) -> Vector:
+        """Return by how much conditions are broken, relative to their sizes, those of the start unless given."""
+        found = np.where(self.equal, np.abs(numbers), np.maximum(numbers, 0.0))
+        return found / (self.sizes if sizes is None else sizes)
+
+    def _sizes_at(self, here: Evaluation) -> Vector:
+        """Return the sizes of conditions at a design; where one side is zero, those of the start tell of them."""
+        pairs = np.abs(np.array(self.problem.asked(here.place, here)[2])).reshape(-1, 2)
+        return np.where((pairs > 0).all(axis=1), np.minimum(pairs.max(axis=1, initial=0.0), self.sizes), self.sizes)
 
     def near_singular(self, here: Evaluation) -> float:
         """Return how far the smallest singular value is below its bound, relative."""

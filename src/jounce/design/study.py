@@ -14,8 +14,8 @@ from jounce.design.problem import LOCKS, Locked, Problem
 from jounce.design.result import Comparison, OptimisedDesign
 from jounce.design.samples import Samples, sampled
 from jounce.design.search import HELD, Found, Search
-from jounce.errors import DesignError
-from jounce.kinematics import assemblies as all_assemblies, solve
+from jounce.errors import DesignError, SolveError
+from jounce.kinematics import Status, assemblies as all_assemblies, solve
 from jounce.mechanism import Mechanism
 
 GRID = 121  # instants that a search works with at first, at most
@@ -160,20 +160,27 @@ class Study:
         """Return by how much objective and conditions differ on a finer grid, relative; infinite if that one locks."""
         coarse, numbers, _ = self.problem.asked(found.place, found.evaluation)
         try:
-            objective, fine, _ = self._on(_split(self.goals.instants, FINER), found.place)
+            objective, fine, _ = self._on(_split(self.goals.instants, FINER), self.problem.values(found.place))
         except LOCKS:
             return math.inf
         scale = abs(coarse) or self.search.scale
         errors = [abs(objective - coarse) / scale, *(np.abs(fine - numbers) / self.search.sizes)]
         return float(max(errors))
 
-    def _on(self, instants: Any, place: Any) -> tuple[float, np.ndarray, list[tuple[float, float]]]:
-        """Return objective and conditions on another grid."""
+    def _on(self, instants: Any, values: dict[str, float]) -> tuple[float, np.ndarray, list[tuple[float, float]]]:
+        """Return objective and conditions of a design on another grid.
+
+        Raises
+        ------
+        AssemblyError, MobilityError, SolveError
+            The design cannot be put together, or locks.
+        """
         goals, kept = self.goals, self.goals.instants
         try:
             goals.set_instants(instants)
-            motion = solve(self.problem.design(place), goals.instants, goals.order)
-            values = self.problem.values(place)
+            motion = solve(goals.mechanism.with_parameters(**values), goals.instants, goals.order, strict=False)
+            if (failed := motion.status[motion.status != Status.OK]).size:
+                raise SolveError(Status(int(failed[0])).advice, status=Status(int(failed[0])))
             rows, smooth = goals.measured(values, motion.outputs)
             extremes = np.array([float(np.max(x)) for x in rows])
             numbers = np.asarray(goals.numbers(values, extremes, np.asarray(smooth), as_asked=True))
@@ -198,7 +205,7 @@ class Study:
         mechanism = self._assembled(original.with_parameters(**parameters), found, assembly)
         status, message = self._judged(found, error, infeasible=infeasible)
         try:
-            after = self._on(fine, found.place)
+            after = self._on(fine, parameters)
         except LOCKS:
             after = self.problem.asked(found.place, found.evaluation)
         return OptimisedDesign(
@@ -225,7 +232,7 @@ class Study:
                 f"objective and conditions differ by {error:.1e} on a finer grid; motion laws or forces may not be "
                 "smooth, or too few instants are given"
             )
-        if found.residual > OPTIMAL:
+        if not found.residual <= OPTIMAL:
             return "feasible", (
                 f"the search ended before no better design was near (first-order residual {found.residual:.1e}); "
                 "take more iterations or starts"
@@ -236,7 +243,9 @@ class Study:
     def _comparisons(self, found: Found, after: tuple[float, np.ndarray, list[Any]]) -> Iterator[Comparison]:
         """Return objective, conditions and parameters, before and after."""
         try:
-            before = self._on(_split(self.goals.instants, FINER), self.here)
+            known = self.mechanism.parameter_values  # also outside of the bounds
+            given = {name: float(known[name]) for name in self.problem.names}
+            before = self._on(_split(self.goals.instants, FINER), given)
         except LOCKS:
             nothing = [(math.nan, math.nan)] * len(self.goals.conditions)
             before = math.nan, np.full(len(self.goals.conditions), math.nan), nothing
