@@ -16,7 +16,7 @@ from jounce.constraints import (
     rows as rows,
     spatial as spatial,
 )
-from jounce.design import tolerance as tolerance
+from jounce.design import OptimisedDesign as OptimisedDesign, optimise as optimise, tolerance as tolerance
 from jounce.dynamics import (
     AccelerationEnergyOutput as AccelerationEnergyOutput,
     AppliedForceOutput as AppliedForceOutput,
@@ -55,6 +55,7 @@ from jounce.dynamics import (
 )
 from jounce.errors import (
     AssemblyError as AssemblyError,
+    DesignError as DesignError,
     ExpressionError as ExpressionError,
     JounceError as JounceError,
     MechanismError as MechanismError,

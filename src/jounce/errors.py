@@ -15,6 +15,7 @@ from typing import Any
 
 __all__ = [
     "AssemblyError",
+    "DesignError",
     "ExpressionError",
     "JounceError",
     "MechanismError",
@@ -303,3 +304,11 @@ class SolveError(JounceError):
 
 class AssemblyError(SolveError):
     """The bodies cannot be put together from the starting guess."""
+
+
+class DesignError(SolveError):
+    """No design was found that moves and meets the conditions; `design` is the one nearest to that, if there is one."""
+
+    def __init__(self, message: str, *, design: Any = None, **place: Any) -> None:
+        super().__init__(message, **place)
+        self.design = design

@@ -22,6 +22,7 @@ from typing import Any, Literal
 from jounce.cli.arguments import converted
 from jounce.cli.conversion import convert
 from jounce.cli.curves import trace
+from jounce.cli.designs import optimize
 from jounce.cli.figures import plot, report
 from jounce.cli.inspection import inspect
 from jounce.cli.mechanisms import run, schema, simulate
@@ -61,8 +62,8 @@ def completion(shell: Literal["bash", "zsh", "fish"], /, *, install: bool = Fals
 
 
 COMMANDS = (
-    new, inspect, run, trace, simulate, sweep, tolerance, modes, plot, report, view, check, torques, convert, reproduce,
-    schema, completion,
+    new, inspect, run, trace, simulate, optimize, sweep, tolerance, modes, plot, report, view, check, torques,
+    convert, reproduce,    schema, completion,
 )  # fmt: skip
 LIGHT = (new, completion)  # they compute nothing
 FIRST = """\

@@ -1,3 +1,5 @@
-"""Design: what varies in a mechanism and how, and what follows from it."""
+"""Design: parameters that vary, designs in which something is least, and how tolerances spread."""
 
+from jounce.design.optimise import optimise as optimise
+from jounce.design.result import OptimisedDesign as OptimisedDesign
 from jounce.design.tolerance import tolerance as tolerance

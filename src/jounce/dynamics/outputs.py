@@ -10,7 +10,7 @@ from jounce.dynamics.inverse import MotionForces
 from jounce.dynamics.masses import check_loads
 from jounce.errors import MechanismError, check_name, did_you_mean
 from jounce.kinematics import Motion, Status
-from jounce.mechanism import AbstractMotionOutput, Mechanism
+from jounce.mechanism import AbstractMotionOutput, AngularVelocityOutput, Mechanism, PointOutput
 from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.resolve import resolve_element
 from jounce.shapes import ArrayLike, Numbers
@@ -186,3 +186,16 @@ class AppliedTorqueOutput(_AppliedOutput):
 
     unit = "N*m"
     rate_names = ("torque", *RATES)
+
+
+def component_labels(mechanism: Mechanism, output: Any) -> tuple[str, ...]:
+    """Return the names of the components of an output of a mechanism; none where it is one number."""
+    if isinstance(output, _AppliedOutput):
+        several = len(mechanism.forces[output.force].velocity_names) > 1
+    else:
+        turning = isinstance(output, AngularVelocityOutput | JointTorqueOutput) and mechanism.space == "spatial"
+        several = turning or bool(output.axes) or isinstance(output, PointOutput | JointForceOutput)
+    if not several:
+        return ()
+    named = output.labels if output.axes else output.labels[: 2 if mechanism.space == "planar" else 3]
+    return tuple(named)

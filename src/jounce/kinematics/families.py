@@ -63,6 +63,7 @@ def solve_batch(
     tolerance: float = 1e-12,
     progress: Callable[[int, int], None] | None = None,
     threads: int | None = None,
+    alone: bool = True,
 ) -> Any:
     """Return the motions of many designs of a mechanism that differ in its parameters, solved side by side.
 
@@ -84,6 +85,9 @@ def solve_batch(
         Called with the number of designs done and their total.
     threads : int, optional
         As for `jounce.solve`; results do not depend on it.
+    alone : bool, default True
+        Whether designs that lock, or are out of the ordinary otherwise, are solved alone, which takes long where they
+        are many. Without, they are not reached.
 
     Returns
     -------
@@ -113,7 +117,7 @@ def solve_batch(
     order = checked_settings(mechanism, order, tolerance)
     instants = time_grid(mechanism.time if time is None else time, mechanism.parameter_values)
     family = _Family(mechanism, names, rows, instants, order, float(tolerance), progress)
-    family.solve(thread_count(threads))
+    family.solve(thread_count(threads), alone=alone)
     return family.dataset(values)
 
 
@@ -139,11 +143,13 @@ class _Family:
         """Return one of the designs."""
         return self.mechanism.with_parameters(**dict(zip(self.names, self.rows[k].tolist(), strict=True)))
 
-    def solve(self, threads: int) -> None:
-        """Solve all designs: most side by side, the others alone."""
+    def solve(self, threads: int, *, alone: bool = True) -> None:
+        """Solve all designs: most side by side, the others alone, if they are wanted."""
         count = len(self.rows)
-        alone = self.mechanism.assembly is not None or self._of_whole_motions()
-        left = np.arange(count) if alone else self._side_by_side(threads)
+        apart = self.mechanism.assembly is not None or self._of_whole_motions()
+        left = np.arange(count) if apart else self._side_by_side(threads)
+        if not (alone or apart):
+            return
         for done, k in enumerate(left.tolist()):
             self._alone(k)
             if self.progress is not None:

@@ -9,6 +9,7 @@ from pydantic.json_schema import GenerateJsonSchema
 from typing_extensions import TypedDict
 
 from jounce.reporting.curve_facts import CurveFacts
+from jounce.reporting.design_facts import DesignFacts
 from jounce.reporting.mechanism_facts import Grid, InspectedMechanism
 from jounce.reporting.modes_facts import ModesFacts
 from jounce.reporting.motion_facts import MotionFacts, SimulationFacts
@@ -195,6 +196,13 @@ class ModesResult(Result, ModesFacts):
     written: str | None
 
 
+class OptimizeResult(Result, DesignFacts):
+    """jounce optimize --json."""
+
+    command: Literal["optimize"]
+    written: str | None
+
+
 class Starter(TypedDict):
     """A mechanism to begin from, and the command that writes it."""
 
@@ -254,6 +262,7 @@ RESULTS: dict[str, Any] = {
     "sweep": SweepResult,
     "tolerance": ToleranceResult,
     "trace": TraceResult,
+    "optimize": OptimizeResult,
     "new_list": NewListResult,
     "new": NewResult,
 }

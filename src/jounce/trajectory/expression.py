@@ -78,6 +78,9 @@ class Expression:
         The formula, at most 2000 ASCII characters, nested at most 50 deep.
     names : iterable of str, optional
         The free names that may appear; any name may when not given.
+    functions : mapping of str to tuple of int, optional
+        Functions that may appear besides, with the numbers of arguments that they may have. Such an expression is not
+        evaluated, but given a meaning by `folded`.
 
     Attributes
     ----------
@@ -104,11 +107,16 @@ class Expression:
     names: frozenset[str] = field(compare=False)
     _program: tuple[_Instruction, ...] = field(compare=False)
 
-    def __init__(self, text: str, names: Iterable[str] | None = None) -> None:
+    def __init__(
+        self,
+        text: str,
+        names: Iterable[str] | None = None,
+        functions: Mapping[str, tuple[int, ...]] | None = None,
+    ) -> None:
         if not isinstance(text, str):
             raise ExpressionError("an expression must be text", value=text)
         clean = re.sub(r"\s", " ", text).strip()
-        program = _compile(clean)
+        program = _compile(clean, tuple((functions or {}).items()))
         free = frozenset(operand for kind, operand, _, _ in program if kind == "name")
         self.__dict__.update(text=clean, names=free, _program=program)
         if names is not None:
@@ -245,8 +253,9 @@ def _refuse_name(name: str, column: int, text: str, known: Iterable[str]) -> NoR
 
 
 @lru_cache(maxsize=4096)  # a file of many bodies says the same again and again
-def _compile(text: str) -> tuple[_Instruction, ...]:
-    """Parse the text and flatten the tree to a postfix program, without recursion."""
+def _compile(text: str, functions: tuple[tuple[str, tuple[int, ...]], ...] = ()) -> tuple[_Instruction, ...]:
+    """Parse the text and flatten the tree to a postfix program, without recursion; functions may be added."""
+    counts = {name: (count,) for name, (count, _) in FUNCTIONS.items()} | dict(functions)
     if not text:
         raise ExpressionError("the expression is empty", value=text)
     if len(text) > MAX_CHARACTERS:
@@ -264,7 +273,7 @@ def _compile(text: str) -> tuple[_Instruction, ...]:
         node, depth = pending.pop()
         if depth > MAX_NESTING:
             _fail(f"the expression is nested more than {MAX_NESTING} deep", _column(node), text, "use parameters")
-        kind, operand, children = _examine(node, text)
+        kind, operand, children = _examine(node, text, counts)
         program.append((kind, operand, len(children), _column(node)))
         chain = isinstance(node, ast.BinOp) and not isinstance(node.op, ast.Pow)
         for index, child in enumerate(children):
@@ -300,7 +309,7 @@ def _column(node: ast.AST) -> int:
     return getattr(node, "col_offset", 0) + 1
 
 
-def _examine(node: ast.AST, text: str) -> tuple[str, Any, list[ast.AST]]:
+def _examine(node: ast.AST, text: str, counts: Mapping[str, tuple[int, ...]]) -> tuple[str, Any, list[ast.AST]]:
     """Return kind, operand and children of an allowed node; refuse every other node."""
     match node:
         case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
@@ -312,7 +321,7 @@ def _examine(node: ast.AST, text: str) -> tuple[str, Any, list[ast.AST]]:
         case ast.UnaryOp(op=sign, operand=operand) if type(sign) in _OPERATORS:
             return "operator", _OPERATORS[type(sign)], [operand]
         case ast.Call(func=ast.Name(id=name), args=arguments, keywords=keywords):
-            return "call", name, _arguments(name, arguments, keywords, _column(node), text)
+            return "call", name, _arguments(name, arguments, keywords, _column(node), text, counts)
     return _refuse(node, _column(node), text)
 
 
@@ -352,17 +361,22 @@ def _number(value: int | float, column: int, text: str) -> float:
 
 
 def _arguments(
-    name: str, arguments: list[ast.expr], keywords: list[ast.keyword], column: int, text: str
+    name: str,
+    arguments: list[ast.expr],
+    keywords: list[ast.keyword],
+    column: int,
+    text: str,
+    counts: Mapping[str, tuple[int, ...]],
 ) -> list[ast.AST]:
     """Check that a function exists and has its number of arguments."""
-    if name not in FUNCTIONS:
-        near = difflib.get_close_matches(name, FUNCTIONS, n=1)
-        hint = f"did you mean '{near[0]}'?" if near else f"valid: {', '.join(FUNCTIONS)}"
+    if name not in counts:
+        near = difflib.get_close_matches(name, counts, n=1)
+        hint = f"did you mean '{near[0]}'?" if near else f"valid: {', '.join(counts)}"
         _fail(f"unknown function '{name}'", column, text, hint)
     if keywords:
         _fail(f"a keyword in the arguments of {name} is not allowed", column, text)
-    count = FUNCTIONS[name][0]
-    if len(arguments) != count:
-        noun = "argument" if count == 1 else "arguments"
+    if len(arguments) not in counts[name]:
+        noun = "argument" if counts[name] == (1,) else "arguments"
+        count = " or ".join(map(str, counts[name]))
         _fail(f"{name} takes {count} {noun}, not {len(arguments)},", column, text, "separate arguments by commas")
     return list(arguments)

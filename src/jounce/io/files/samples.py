@@ -90,6 +90,41 @@ def read_columns(
     return times, found
 
 
+def read_points(
+    path: str | Path, error_type: type[JounceError] = MechanismFileError
+) -> tuple[Float[np.ndarray, " point"] | None, Float[np.ndarray, "point component"]]:
+    """Read points from a CSV file, and their times where it has a column ``time``.
+
+    The first row names the columns ``x``, ``y`` and, in space, ``z``, or ``NAME_x`` ..., as results have them; others
+    are not read. Without that row the file has the columns of coordinates only. Lengths are in m, times in s.
+
+    Raises
+    ------
+    JounceError
+        Of the type given: the file cannot be read, columns are missing, or an entry is not a finite number.
+    """
+    table = _Table(str(path), error_type)
+    if table.header_line is None:
+        if len(table.header) not in (2, 3):
+            message = "points have two or three columns; name them in the first row where there are others"
+            raise table.error(message, line=table.rows[0][0], value=len(table.header))
+        return None, np.stack([table.column(k) for k in range(len(table.header))], axis=1)
+    found = {}
+    for letter in "xyz":
+        named = [k for k, name in enumerate(table.header) if name == letter or name.endswith(f"_{letter}")]
+        exact = [k for k in named if table.header[k] == letter] or named
+        if len(exact) > 1:
+            message = f"several columns may be the {letter} of the points; name one of them '{letter}'"
+            raise table.error(message, line=table.header_line)
+        if exact:
+            found[letter] = table.column(exact[0])
+    if list(found) not in (["x", "y"], ["x", "y", "z"]):
+        message = "points need columns x and y, and in space z"
+        raise table.error(message, line=table.header_line, value=", ".join(table.header))
+    points = np.stack(list(found.values()), axis=1)
+    return (np.array(table.column(table.header.index("time"))) if "time" in table.header else None), points
+
+
 class _Table:
     """Rows of a CSV file with their lines, and the names of its columns, made up where it has none."""
 

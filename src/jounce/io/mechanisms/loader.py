@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from jounce.constraints import catalogue
-from jounce.dynamics import AppliedForceOutput, AppliedTorqueOutput, JointForceOutput, JointTorqueOutput
+from jounce.dynamics.outputs import component_labels
 from jounce.errors import JounceError, MechanismFileError, did_you_mean
 from jounce.io.files.located_data import Location, Source
 from jounce.io.files.source import read_source
 from jounce.io.mechanisms.file_laws import FileLaws
 from jounce.io.mechanisms.keys import ROLES, FileKey, file_keys, location_of, output_types
 from jounce.io.mechanisms.unit_hints import warn_of_units
-from jounce.mechanism import AngularVelocityOutput, Body, Mechanism, PointOutput, TimeGrid, time_grid
+from jounce.mechanism import Body, Mechanism, TimeGrid, time_grid
 from jounce.mechanism.builder import starting_guess
 from jounce.mechanism.masses import body_mass
 from jounce.mechanism.redundant_reactions import resolved_reactions
@@ -226,16 +226,8 @@ def _check_columns(source: Source, mechanism: Mechanism) -> None:
     for name in mechanism.outputs:
         stem, _, component = name.rpartition("_")
         output = mechanism.outputs.get(stem)
-        if output is not None and component in output.labels and _has_components(mechanism, output):
+        if output is not None and component in component_labels(mechanism, output):
             raise source.error(f"this name is taken by a component of the output '{stem}'", ("outputs", name))
-
-
-def _has_components(mechanism: Mechanism, output: Any) -> bool:
-    """Tell whether an output is more than one number."""
-    if isinstance(output, AppliedForceOutput | AppliedTorqueOutput):
-        return len(mechanism.forces[output.force].velocity_names) > 1
-    turning = isinstance(output, AngularVelocityOutput | JointTorqueOutput) and mechanism.space == "spatial"
-    return turning or bool(output.axes) or isinstance(output, PointOutput | JointForceOutput)
 
 
 def _check_values(mechanism: Mechanism) -> None:

@@ -1,0 +1,185 @@
+"""What a designer asks for, in words: ``peak(psi, 4)``, ``span(C_x) <= 2 mm``; parsed as every other expression is."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from jounce.errors import ExpressionError, JounceError, MechanismError, did_you_mean, show_value
+from jounce.trajectory.dimensions import Dimension
+from jounce.trajectory.expression import FUNCTIONS, Expression
+from jounce.trajectory.units import parse_value
+
+OVER_TIME: dict[str, tuple[int, ...]] = dict.fromkeys(
+    ("peak", "maximum", "minimum", "span", "mean", "rms"),
+    (1, 2, 4),  # the quantity, its derivative, and from when to when
+)
+MEASURES: dict[str, tuple[int, ...]] = {**OVER_TIME, "at": (2, 3), "path_error": (2,), "path_deviation": (2,)}
+"""What makes one number of a quantity that changes in time, and how many arguments it may have."""
+
+EXERTED: dict[str, tuple[int, ...]] = {
+    f"{kind}{component}": (1,) for kind in ("force", "torque") for component in ("", "_x", "_y", "_z")
+}
+"""What drivers and joints exert, and components of it."""
+
+WORDS = {**MEASURES, **EXERTED}
+_RELATION = re.compile(r"(<=|>=|==|<|>|=)")
+_NUMBER = re.compile(r"\s*[-+]?[0-9.]")
+
+
+@dataclasses.dataclass(frozen=True)
+class Node:
+    """One step of an expression: a number, a name, or an operation on others.
+
+    Parameters
+    ----------
+    kind : str
+        ``"number"``, ``"name"``, or ``"call"`` of an operator or a function.
+    word : float or str
+        The number, the name, or the operation.
+    parts : tuple of Node
+        What it is done to.
+    """
+
+    kind: str
+    word: Any
+    parts: tuple[Node, ...] = ()
+
+    @property
+    def text(self) -> str:
+        """The step as it would be written."""
+        words = [part.text for part in self.parts]
+        if self.kind != "call":
+            return f"{self.word:g}" if self.kind == "number" else self.word
+        if self.word in ("neg", "pos"):
+            return f"{'-' if self.word == 'neg' else '+'}{words[0]}"
+        if self.word in WORDS or self.word in FUNCTIONS:
+            return f"{self.word}({', '.join(words)})"
+        return f"({words[0]} {self.word} {words[1]})"
+
+    def names(self) -> set[str]:
+        """Return the names in it."""
+        found = {self.word} if self.kind == "name" else set()
+        return found.union(*(part.names() for part in self.parts))
+
+
+@dataclasses.dataclass(frozen=True)
+class Relation:
+    """A condition that a design must fulfil: ``left <= right``, or ``left == right``.
+
+    Parameters
+    ----------
+    text : str
+        As it was given, or one of the two that it stands for.
+    left, right : Node
+    equal : bool
+        Whether both must be equal.
+    dimensions : tuple of Dimension or None
+        Of both sides, where a unit tells it.
+    """
+
+    text: str
+    left: Node
+    right: Node
+    equal: bool
+    dimensions: tuple[Dimension | None, Dimension | None] = (None, None)
+
+
+def parsed(text: str) -> Node:
+    """Return an expression of measures as nested steps.
+
+    Raises
+    ------
+    ExpressionError
+        Anything in it is not allowed; the message names it and its column.
+    """
+    return Expression(text, functions=WORDS).folded(
+        lambda number: Node("number", number),
+        lambda name: Node("name", name),
+        lambda word, parts: Node("call", word, tuple(parts)),
+    )
+
+
+def parsed_relations(text: str) -> list[Relation]:
+    """Return the conditions in a text: ``a <= b``, ``a == b``, or ``a <= b <= c``, which are two.
+
+    A side that is a number may have a unit.
+
+    Raises
+    ------
+    ExpressionError, UnitError
+        It is no comparison, or a side of it cannot be read.
+    """
+    if not isinstance(text, str):
+        raise ExpressionError("a condition must be text, such as 'span(psi) == 60 deg'", value=text)
+    pieces = _RELATION.split(text)
+    if not 3 <= len(pieces) <= 5:
+        message = "a condition is a comparison by <=, >= or ==, such as 'peak(psi, 4) <= 20'"
+        raise ExpressionError(message, value=text)
+    sides = [_side(piece) for piece in pieces[::2]]
+    found = []
+    for k, sign in enumerate(pieces[1::2]):
+        (left, first), (right, second) = sides[k : k + 2][:: -1 if ">" in sign else 1]
+        equal = sign in ("==", "=")
+        own = text.strip() if len(pieces) == 3 else f"{left.text} {'==' if equal else '<='} {right.text}"
+        found.append(Relation(own, left, right, equal, (first, second)))
+    return found
+
+
+def _side(text: str) -> tuple[Node, Dimension | None]:
+    """Return one side of a comparison, and its dimension where a unit tells it."""
+    try:
+        return parsed(text), None
+    except ExpressionError:
+        if not _NUMBER.match(text):
+            raise
+        try:
+            value = parse_value(text.strip(), "any")
+        except JounceError as error:
+            raise error.located(value=text.strip()) from None
+        if isinstance(value.value, Expression):
+            raise
+        return Node("number", value.value), value.dimension
+
+
+def folded(node: Node, number: Callable[[Any], Any], name: Callable[[str], Any], call: Callable[..., Any]) -> Any:
+    """Return what comes of an expression whose numbers, names and calls have a meaning; calls get their own node."""
+    if node.kind == "number":
+        return number(node.word)
+    if node.kind == "name":
+        return name(node.word)
+    return call(node)
+
+
+def operated(word: str, values: list[Any]) -> Any:
+    """Return one operation on numbers, arrays of JAX or jets."""
+    names = [f"x{k}" for k in range(len(values))]
+    if word in ("pos", "neg"):
+        text = f"{'-' if word == 'neg' else '+'}x0"
+    else:
+        text = f"{word}({', '.join(names)})" if word in FUNCTIONS else f"x0 {word} x1"
+    whole = word == "**" and isinstance(values[1], float)
+    if whole:  # a whole number as exponent is known as such
+        return Expression(f"x0 ** ({values[1]!r})").evaluate({"x0": values[0]})
+    return Expression(text).evaluate(dict(zip(names, values, strict=True)))
+
+
+def refuse_name(name: str, known: Mapping[str, str], text: str) -> ExpressionError:
+    """Return the error for a name that nothing has, with what there is, by kind."""
+    kinds: dict[str, list[str]] = {}
+    for each, kind in known.items():
+        kinds.setdefault(kind, []).append(each)
+    there = "; ".join(f"{kind}: {', '.join(names)}" for kind, names in kinds.items())
+    near = did_you_mean(name, known, limit=0)
+    return ExpressionError(f"unknown name '{name}' in {show_value(text)}; {near} {there}".replace(";  ", "; "))
+
+
+def varying_message(text: str) -> MechanismError:
+    """Return the error for a quantity that is compared or minimised though it changes in time."""
+    return MechanismError(
+        f"changes in time; make one number of it, as by peak({text}), rms({text}), mean({text}), span({text}), "
+        f"maximum({text}), minimum({text}) or at({text}, 0.5)",
+        value=text,
+    )

@@ -1,0 +1,192 @@
+"""What makes one number of a quantity that changes in time: its largest value, its mean, its distance from points.
+
+A motion is known as a Taylor series about each instant of a grid, so that it is known between instants too: every
+instant has a cell, up to halfway to its neighbours, in which its series stands for the quantity. The largest value in a
+cell is a smooth function of a design, by the envelope theorem: its slope is that of the value, at the instant held.
+"""
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float, Int
+
+from jounce.jet import Jet
+from jounce.shapes import Numbers
+
+SAMPLES = 9  # of a cell, in which its largest value is looked for
+ROUNDS = 6  # of Newton's method from the best of them
+
+Series = Float[Numbers, "order *cell"]
+"""Taylor coefficients about the instants of a grid."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Cells:
+    """Which stretch of time the series about each instant stands for.
+
+    Parameters
+    ----------
+    instants : array of shape (time,)
+        s.
+    index : array of int of shape (cells,)
+        Of those instants that have a part of the window.
+    low, high : array of shape (cells,)
+        Its ends, as seen from the instant, s.
+    """
+
+    instants: Float[np.ndarray, " time"]
+    index: Int[np.ndarray, " cell"]
+    low: Float[np.ndarray, " cell"]
+    high: Float[np.ndarray, " cell"]
+
+    @classmethod
+    def of(cls, instants: Float[np.ndarray, " time"], start: float | None = None, stop: float | None = None) -> "Cells":
+        """Return the cells of a grid within a window, all of it unless given."""
+        middles = (instants[1:] + instants[:-1]) / 2
+        first, last = instants[0] if start is None else start, instants[-1] if stop is None else stop
+        low = np.maximum(np.concatenate([instants[:1], middles]), first)
+        high = np.minimum(np.concatenate([middles, instants[-1:]]), last)
+        (index,) = np.nonzero((high > low) | ((high == low) & (first == last)))
+        if not index.size:  # a window of one instant, at which two cells meet
+            index = np.array([int(np.argmin(np.abs(instants - first)))])
+            low[index] = high[index] = first
+        return cls(instants, index, low[index] - instants[index], high[index] - instants[index])
+
+    def at(self, time: float) -> tuple[int, float]:
+        """Return the nearest instant, and how far a time is from it, s."""
+        nearest = int(np.argmin(np.abs(self.instants - time)))
+        return nearest, float(time - self.instants[nearest])
+
+
+def derivative(jet: Jet, order: int) -> Series:
+    """Return the Taylor coefficients of a derivative of a quantity, the order first."""
+    coefficients = jnp.stack(jet.dense().coefficients)
+    count = len(coefficients) - order
+    scale = np.array([math.factorial(k + order) / math.factorial(k) for k in range(count)])
+    return coefficients[order:] * scale[:, None]
+
+
+def value(series: Series, shift: Any) -> Any:
+    """Return the values of series at times seen from their instants."""
+    found = jnp.zeros_like(series[-1] * shift)
+    for coefficient in series[::-1]:
+        found = found * shift + coefficient
+    return found
+
+
+def slope_of(series: Series) -> Float[Numbers, "lower *cell"]:
+    """Return the series of the rate."""
+    if len(series) == 1:
+        return jnp.zeros_like(series)
+    return series[1:] * np.arange(1.0, len(series))[:, None]
+
+
+def top(series: Float[Numbers, "order cell"], cells: Cells) -> Float[Numbers, " cell"]:
+    """Return when, seen from its instant, each series is largest in its cell; nothing is differentiated."""
+    series = jax.lax.stop_gradient(series)
+    share = np.linspace(0.0, 1.0, SAMPLES)[:, None]
+    width = cells.high - cells.low
+    places = cells.low[None] + share * width[None]
+    best = jnp.argmax(value(series[:, None], jnp.asarray(places)), axis=0)
+    spacing = width / (SAMPLES - 1)
+    start = jnp.asarray(cells.low) + best.astype(float) * spacing
+    low, high = jnp.maximum(start - spacing, cells.low), jnp.minimum(start + spacing, cells.high)
+    rate, bend = slope_of(series), slope_of(slope_of(series))
+    shift = start
+    for _ in range(ROUNDS):
+        curvature = value(bend, shift)
+        step = value(rate, shift) / jnp.where(curvature < 0, curvature, -jnp.inf)
+        shift = jnp.clip(shift - step, low, high)
+    return jnp.where(value(series, shift) >= value(series, start), shift, start)
+
+
+def largest(series: Float[Numbers, "order time"], cells: Cells) -> Float[Numbers, " cell"]:
+    """Return the largest value of each series in its cell."""
+    inside = series[:, cells.index]
+    return value(inside, top(inside, cells))
+
+
+def integral(series: Series, cells: Cells) -> Any:
+    """Return the integral over all cells."""
+    inside = series[:, cells.index]
+    powers = np.arange(1.0, len(series) + 1)[:, None]
+    weights = (cells.high[None] ** powers - cells.low[None] ** powers) / powers
+    return jnp.sum(inside * weights)
+
+
+def square(series: Series) -> Series:
+    """Return the series of the square, to the same order."""
+    orders = range(len(series))
+    return jnp.stack(
+        [sum((series[j] * series[k - j] for j in range(k + 1)), jnp.zeros_like(series[0])) for k in orders]
+    )
+
+
+def safe_root(square: Any) -> Any:
+    """Return a square root whose slope is zero, not infinite, where it is zero."""
+    positive = square > 0
+    return jnp.where(positive, jnp.sqrt(jnp.where(positive, square, 1.0)), 0.0)
+
+
+def gaps(
+    series: Float[Numbers, "order component time"],
+    points: Float[np.ndarray, "point component"],
+    times: Float[np.ndarray, " point"] | None,
+    cells: Cells,
+) -> Float[Numbers, "component point"]:
+    """Return how far points are from where a point of the motion is at their times, or comes nearest."""
+    if times is not None:
+        places = [cells.at(float(time)) for time in times]
+        index, shift = np.array([k for k, _ in places]), np.array([h for _, h in places])
+        there = value(series[:, :, index], jnp.asarray(shift)[None])
+        return there - points.T
+    fixed = jax.lax.stop_gradient(series)
+
+    def nearest(point: Any) -> tuple[Any, Any]:
+        gap = jnp.concatenate([fixed[:1] - point[None, :, None], fixed[1:]])
+        apart = sum((square(gap[:, k]) for k in range(1, gap.shape[1])), square(gap[:, 0]))
+        shift = top(-apart[:, cells.index], cells)
+        least = value(apart[:, cells.index], shift)
+        place = jnp.argmin(least)
+        return jnp.asarray(cells.index)[place], shift[place]
+
+    index, shift = jax.vmap(nearest)(jnp.asarray(points))
+    there = value(series[:, :, index], shift[None])
+    return there - points.T
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Curve:
+    """Points that a point of a mechanism is to pass, in an order or at times.
+
+    Parameters
+    ----------
+    points : array of shape (points, components)
+        m.
+    times : array of shape (points,), optional
+        When it is to be there, s; at any time unless given.
+    """
+
+    points: Float[np.ndarray, "point component"]
+    times: Float[np.ndarray, " point"] | None = None
+
+
+def environment(
+    instants: Float[np.ndarray, " time"], parameters: Mapping[str, Any], series: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Return what names mean: time and quantities are jets along the grid, parameters are numbers."""
+    order = max((len(each) for each in series.values()), default=1) - 1
+    return {**parameters, "t": Jet.variable(instants, order), **{name: Jet(tuple(x)) for name, x in series.items()}}
+
+
+def at_instants(values: Sequence[float], instants: Float[np.ndarray, " given"]) -> Float[np.ndarray, " time"]:
+    """Return a grid that has the instants at which something is asked, too."""
+    wanted = np.unique(np.concatenate([instants, np.asarray(values, float)]))
+    gaps = np.diff(wanted)
+    close = np.concatenate([[False], gaps < 1e-9 * (wanted[-1] - wanted[0] or 1.0)])
+    return wanted[~close]

@@ -1,0 +1,302 @@
+"""The search for the best design of one assembly: starts, searches, conditions that cannot be met, finer grids."""
+
+import dataclasses
+import math
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.design.measures import Curve
+from jounce.design.objectives import Goals
+from jounce.design.problem import LOCKS, Locked, Problem
+from jounce.design.result import Comparison, OptimisedDesign
+from jounce.design.samples import Samples, sampled
+from jounce.design.search import HELD, Found, Search
+from jounce.errors import DesignError, SolveError
+from jounce.kinematics import Status, assemblies as all_assemblies, solve
+from jounce.mechanism import Mechanism
+
+GRID = 121  # instants that a search works with at first, at most
+FINER = 4  # times as many, on which its end is looked at
+AGREED = 1e-6  # of objective and conditions on both grids, relative
+REFINEMENTS = 3
+OPTIMAL = 1e-5  # of the residual of the first-order conditions
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Asked:
+    """What was asked for."""
+
+    minimise: str
+    subject_to: tuple[str, ...]
+    bounds: dict[str, tuple[float, float]]
+    curves: dict[str, Curve]
+    instants: Float[np.ndarray, " time"]
+
+
+class Study:
+    """The search for the best design of one assembly."""
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        asked: Asked,
+        clearance: float,
+        iterations: int,
+        seed: int,
+        progress: Callable[[int, int, float], None] | None,
+    ):
+        self.mechanism, self.asked, self.seed, self.progress = mechanism, asked, seed, progress
+        self.all_instants = asked.instants
+        arguments = asked.minimise, asked.subject_to, tuple(asked.bounds), asked.curves
+        self.goals = Goals(mechanism, *arguments, _thinned(asked.instants, GRID))
+        self.problem = Problem(self.goals, asked.bounds)
+        self.search = Search(self.problem, clearance, iterations, self._watch)
+        self.done, self.total, self.least = 0, 1, math.inf
+        self.notes: list[str] = []
+        self.searches: list[float] = []
+
+    def _watch(self, objective: float, broken: float) -> None:
+        """Tell of a design that was evaluated, with the objective as it was asked for."""
+        if broken <= HELD:
+            self.least = min(self.least, objective)
+        if self.progress is not None:
+            self.progress(self.done, self.total, self.least)
+
+    @property
+    def here(self) -> Float[np.ndarray, " parameter"]:
+        """The mechanism as it is, within the bounds."""
+        values = self.mechanism.parameter_values
+        return self.problem.place({name: values[name] for name in self.problem.names})
+
+    def best(self, starts: int, samples: int | None) -> Found:
+        """Return the best design that searches from several starts end with.
+
+        Raises
+        ------
+        DesignError
+            If none can be put together and moved, or conditions cannot be met.
+        """
+        self._note_bounds()
+        places, lock = [self.here], None
+        try:
+            self.problem.evaluate(self.here)
+        except Locked as error:
+            places, lock = [], error
+        if starts > 1 or not places:
+            taken = sampled(self.problem, samples, self.seed)
+            self.notes += taken.notes(self.asked.bounds)
+            places += taken.best(starts - len(places))
+            if not places:
+                raise _nothing_moves(lock, taken)
+        if lock is not None:
+            self.notes.append(f"the mechanism as it is cannot be moved: {lock}")
+        self.total = len(places)
+        ends = list(self._ends(places))
+        feasible = [end for end in ends if end.feasible]
+        if not feasible:
+            feasible = self._made_feasible(ends)
+        found = min(feasible, key=lambda end: end.objective)
+        return self._refined(found)
+
+    def _ends(self, places: Sequence[Any]) -> Iterator[Found]:
+        for place in places:
+            try:
+                end = self.search.from_place(place)
+            except Locked:  # a sample that moves may be one of another assembly when it is solved alone
+                continue
+            objective = self.problem.asked(end.place, end.evaluation)[0]
+            self.searches.append(objective if end.feasible else math.nan)
+            self.done += 1
+            if self.progress is not None:
+                self.progress(self.done, self.total, self.least)
+            yield end
+
+    def _made_feasible(self, ends: Sequence[Found]) -> list[Found]:
+        """Return designs that meet the conditions, found by meeting them first.
+
+        Raises
+        ------
+        DesignError
+            If none is found: the worst condition is as little broken as it can be.
+        """
+        nearest = sorted(ends, key=lambda end: max(float(end.broken.max(initial=0.0)), end.near_singular))[:3]
+        met = [self.search.from_place(end.place, elastic=True) for end in nearest]
+        ends = [self.search.from_place(end.place) for end in met if end.feasible]
+        feasible = [end for end in (*ends, *met) if end.feasible]
+        if feasible:
+            return feasible
+        least = min(met, key=lambda end: max(float(end.broken.max(initial=0.0)), end.near_singular))
+        design = self.result(self.mechanism, least, infeasible=True)
+        raise DesignError(f"no design within the bounds was found that {self._unmet(least)}", design=design)
+
+    def _unmet(self, least: Found) -> str:
+        """Word which conditions the design breaks that breaks the worst of them least."""
+        _, numbers, sides = self.problem.asked(least.place, least.evaluation)
+        words = []
+        for condition, number, broken, (left, right) in zip(
+            self.goals.conditions, numbers, least.broken, sides, strict=True
+        ):
+            if broken > HELD:
+                text = condition.relation.text
+                words.append(f"meets '{text}': nearest is {left:.6g} against {right:.6g}, off by {abs(number):.3g}")
+        if least.near_singular > HELD:
+            words.append("stays clear of a singular position at all instants")
+        where = ", ".join(f"{name} = {x:.6g}" for name, x in self.problem.values(least.place).items())
+        return f"{'; and none that '.join(words)} (SI, at {where}); widen the bounds or ease the conditions"
+
+    def _refined(self, found: Found) -> Found:
+        """Search on, on finer grids, until what is found does not depend on the grid."""
+        for _ in range(REFINEMENTS):
+            if self.grid_error(found) <= AGREED:
+                break
+            self.problem.set_instants(_split(self.problem.goals.instants, 2))
+            found = self.search.from_place(found.place)
+        return found
+
+    def grid_error(self, found: Found) -> float:
+        """Return by how much objective and conditions differ on a finer grid, relative; infinite if that one locks."""
+        coarse, numbers, _ = self.problem.asked(found.place, found.evaluation)
+        try:
+            objective, fine, _ = self._on(_split(self.goals.instants, FINER), self.problem.values(found.place))
+        except LOCKS:
+            return math.inf
+        scale = abs(coarse) or self.search.scale
+        errors = [abs(objective - coarse) / scale, *(np.abs(fine - numbers) / self.search.sizes)]
+        return float(max(errors))
+
+    def _on(self, instants: Any, values: dict[str, float]) -> tuple[float, np.ndarray, list[tuple[float, float]]]:
+        """Return objective and conditions of a design on another grid.
+
+        Raises
+        ------
+        AssemblyError, MobilityError, SolveError
+            The design cannot be put together, or locks.
+        """
+        goals, kept = self.goals, self.goals.instants
+        try:
+            goals.set_instants(instants)
+            motion = solve(goals.mechanism.with_parameters(**values), goals.instants, goals.order, strict=False)
+            if (failed := motion.status[motion.status != Status.OK]).size:
+                raise SolveError(Status(int(failed[0])).advice, status=Status(int(failed[0])))
+            rows, smooth = goals.measured(values, motion.outputs)
+            extremes = np.array([float(np.max(x)) for x in rows])
+            numbers = np.asarray(goals.numbers(values, extremes, np.asarray(smooth), as_asked=True))
+            return float(numbers[0]), numbers[1:], goals.sides(values, extremes, np.asarray(smooth))
+        finally:
+            goals.set_instants(kept)
+
+    def _note_bounds(self) -> None:
+        """Note what was given outside the bounds."""
+        values = self.mechanism.parameter_values
+        for name, (low, high) in self.asked.bounds.items():
+            if not low <= values[name] <= high:
+                self.notes.append(f"{name} is {values[name]:.6g} in the mechanism, outside of its bounds")
+
+    def result(
+        self, original: Mechanism, found: Found, *, assembly: int | None = None, infeasible: bool = False
+    ) -> OptimisedDesign:
+        """Return what was found, compared with the mechanism as it is, on a finer grid."""
+        fine = _split(self.goals.instants, FINER)
+        error = self.grid_error(found)
+        parameters = self.problem.values(found.place)
+        mechanism = self._assembled(original.with_parameters(**parameters), found, assembly)
+        status, message = self._judged(found, error, infeasible=infeasible)
+        try:
+            after = self._on(fine, parameters)
+        except LOCKS:
+            after = self.problem.asked(found.place, found.evaluation)
+        return OptimisedDesign(
+            mechanism,
+            parameters,
+            after[0],
+            status,
+            message,
+            tuple(self._comparisons(found, after)),
+            float(np.sqrt(found.evaluation.margins.min(initial=np.inf))),
+            found.residual,
+            error,
+            tuple(self.searches),
+            self.problem.evaluations,
+            tuple(self.notes),
+        )
+
+    def _judged(self, found: Found, error: float, *, infeasible: bool) -> tuple[str, str]:
+        """Return the status of a design, and what it means."""
+        if infeasible or not found.feasible:
+            return "infeasible", "conditions do not hold"
+        if not error <= AGREED:
+            return "feasible", (
+                f"objective and conditions differ by {error:.1e} on a finer grid; motion laws or forces may not be "
+                "smooth, or too few instants are given"
+            )
+        if not found.residual <= OPTIMAL:
+            return "feasible", (
+                f"the search ended before no better design was near (first-order residual {found.residual:.1e}); "
+                "take more iterations or starts"
+            )
+        where = f"; the best of {len(self.searches)} searches" if len(self.searches) > 1 else ""
+        return "optimal", f"no design nearby is better, and all conditions hold{where}"
+
+    def _comparisons(self, found: Found, after: tuple[float, np.ndarray, list[Any]]) -> Iterator[Comparison]:
+        """Return objective, conditions and parameters, before and after."""
+        try:
+            known = self.mechanism.parameter_values  # also outside of the bounds
+            given = {name: float(known[name]) for name in self.problem.names}
+            before = self._on(_split(self.goals.instants, FINER), given)
+        except LOCKS:
+            nothing = [(math.nan, math.nan)] * len(self.goals.conditions)
+            before = math.nan, np.full(len(self.goals.conditions), math.nan), nothing
+        root = found.objective and after[0] and self.goals.objective is not self.goals.objective_value
+        factor = 0.5 / after[0] if root else 1.0  # of the slopes of a root, by those of its square
+        yield Comparison("objective", self.asked.minimise, before[0], after[0])
+        rows = zip(self.goals.conditions, before[2], after[2], found.multipliers, strict=True)
+        for condition, first, last, multiplier in rows:
+            relation = condition.relation
+            fixed_left = relation.left.kind == "number"
+            measure, bound = (1, last[0]) if fixed_left else (0, last[1])
+            low = bound if relation.equal or fixed_left else None
+            high = bound if relation.equal or not fixed_left else None
+            slope = multiplier * factor * (1.0 if fixed_left else -1.0)
+            yield Comparison("condition", relation.text, first[measure], last[measure], low, high, slope)
+        values, original = self.problem.values(found.place), self.mechanism.parameter_values
+        for k, (name, (low, high)) in enumerate(self.asked.bounds.items()):
+            slope = float(found.bound_multipliers[k]) * factor / float(self.problem.width[k])
+            yield Comparison("parameter", name, float(original[name]), values[name], low, high, slope)
+
+    def _assembled(self, mechanism: Mechanism, found: Found, assembly: int | None) -> Mechanism:
+        """Return a mechanism that asks for the assembly that was optimised, by its number in the design found."""
+        if assembly is None:
+            return mechanism
+        first = self.goals.instants[:1]
+        wanted = solve(self.problem.design(found.place), first, 0).poses[1]["position"]
+        for each in all_assemblies(mechanism, float(first[0]), circuits=False):
+            chosen = dataclasses.replace(mechanism, assembly=each.number)
+            poses = solve(chosen, first, 0).poses[1]["position"]
+            if np.allclose(poses[0], wanted[0], rtol=0, atol=1e-6 * (np.ptp(wanted[0]) or 1.0)):
+                return chosen
+        message = "the assembly of the best design is none of those that are found of it"
+        raise DesignError(message, name="assemblies", value=assembly)
+
+
+def _nothing_moves(lock: Locked | None, taken: Samples) -> DesignError:
+    """Return the error where no design can be put together and moved."""
+    why = "" if lock is None else f"; the mechanism as it is: {lock}"
+    bounds = "give bounds within which it can be, or a starting guess nearer to them"
+    return DesignError(f"none of {taken.count} designs within the bounds can be put together and moved; {bounds}{why}")
+
+
+def _thinned(instants: Float[np.ndarray, " given"], most: int) -> Float[np.ndarray, " time"]:
+    """Return at most so many of the instants, evenly taken, with both ends."""
+    if len(instants) <= most:
+        return instants
+    return instants[np.unique(np.linspace(0, len(instants) - 1, most).round().astype(int))]
+
+
+def _split(instants: Float[np.ndarray, " given"], parts: int) -> Float[np.ndarray, " time"]:
+    """Return the instants, and others evenly between each two of them."""
+    share = np.arange(parts) / parts
+    between = instants[:-1, None] + np.diff(instants)[:, None] * share
+    return np.concatenate([between.ravel(), instants[-1:]])

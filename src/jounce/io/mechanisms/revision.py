@@ -1,0 +1,198 @@
+"""A mechanism file with other values of some parameters, and all else as it was: comments, units, order, spaces."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from decimal import Decimal, localcontext
+from os import PathLike, fspath
+from pathlib import Path
+from typing import Any
+
+from jounce.errors import JounceError, MechanismFileError, OutputError
+from jounce.io.files import DATA_FILES
+from jounce.io.files.source import read_source
+from jounce.io.files.writing import check_target, replacing
+from jounce.io.mechanisms.loader import load
+from jounce.mechanism import Mechanism
+from jounce.trajectory.units import parse_unit, parse_value
+
+ROUNDING = 4e-16  # of values in units whose size is no decimal number, relative
+_NUMBER_AND_UNIT = re.compile(r"\s*([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)(\s*)([^\s0-9.*/+-].*?|/.*?)\s*")
+_TIMES_DEG = re.compile(r"\s*[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?(\s*\*\s*deg)\s*")
+
+
+def write_revised(
+    mechanism: Mechanism,
+    names: Iterable[str],
+    original: str | PathLike[str],
+    path: str | PathLike[str],
+    *,
+    allow: Iterable[str | PathLike[str]] = (),
+    overwrite: bool = False,
+) -> None:
+    """Write a mechanism file again with the values that some parameters of a mechanism have.
+
+    Nothing else of it changes. A value keeps the unit that it has in the file. What is written is read back before it
+    takes its place, and must give the same values.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        As read from the file, with other values of parameters, and its wish for an assembly.
+    names : iterable of str
+        The parameters whose values are written.
+    original
+        The file that it was read from.
+    path
+        The file to write, of the same format.
+    allow
+        As for `load`.
+    overwrite
+        Whether that file may be the original.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written, is an input or of another format; nothing is written then.
+    MechanismFileError
+        What would be written does not read back as the same mechanism.
+    """
+    suffix = Path(fspath(path)).suffix.lower()
+    check_target(path, DATA_FILES, "mechanism file", overwrite=overwrite)
+    kinds = [".yaml" if each == ".yml" else each for each in (suffix, Path(fspath(original)).suffix.lower())]
+    if kinds[0] != kinds[1]:
+        message = f"must be of the format of {fspath(original)}; jounce convert makes another of it"
+        raise OutputError(message, path=fspath(path), value=suffix)
+    values = {name: float(mechanism.parameter_values[name]) for name in names}
+    data = read_source(original).data
+    written = {name: with_value(data["parameters"][name], value) for name, value in values.items()}
+    assembly = mechanism.assembly if mechanism.assembly != data.get("assembly") else None
+    text = Path(original).read_bytes().decode("utf-8-sig")
+    revised = (_toml if suffix == ".toml" else _spliced)(text, written, assembly)
+    with replacing(path, overwrite=overwrite) as scratch:
+        with scratch.open("w", encoding="utf-8", newline="") as stream:
+            stream.write(revised)
+        try:
+            found = load(scratch, allow=allow)
+        except JounceError as error:
+            error.path = fspath(path)
+            raise
+        read = found.parameter_values
+        wrong = [name for name, value in values.items() if abs(read[name] - value) > ROUNDING * abs(value)]
+        if wrong or found.assembly != mechanism.assembly:
+            message = "what would be written does not read back as the same design"
+            raise MechanismFileError(message, path=fspath(path), name=f"parameters.{wrong[0]}" if wrong else "assembly")
+
+
+def with_value(old: Any, value: float) -> Any:
+    """Return what a file is to hold for a value, in the unit of what it held.
+
+    Parameters
+    ----------
+    old : object
+        What it held: a number, or text with a number and a unit, or an expression.
+    value : float
+        SI.
+
+    Returns
+    -------
+    float or str
+        What reads as the value, to the bit where the size of the unit is a decimal number.
+
+    Examples
+    --------
+    >>> with_value("14.23 cm", 0.1375), with_value(0.5, 0.25), with_value("30*deg", 0.5235987755982988)
+    ('13.75 cm', 0.25, '30*deg')
+    """
+    if not isinstance(old, str):
+        return value
+    if times_deg := _TIMES_DEG.fullmatch(old):
+        unit, gap = times_deg[1], ""
+        size: Any = math.pi / 180
+    elif with_unit := _NUMBER_AND_UNIT.fullmatch(old):
+        gap, unit = with_unit[2], with_unit[3]
+        try:
+            size = parse_unit(unit)[0]
+        except JounceError:
+            return value
+    else:
+        return value
+    for text in _digits(value, size):
+        written = f"{text}{gap}{unit}"
+        read = parse_value(written).value
+        if isinstance(read, float) and abs(read - value) <= (
+            0.0 if isinstance(size, Decimal) else ROUNDING * abs(value)
+        ):
+            return written
+    return value
+
+
+def _digits(value: float, size: Any) -> Iterator[str]:
+    """Return texts of a value in a unit, the shortest first."""
+    if isinstance(size, Decimal):
+        with localcontext(prec=40):
+            exact = Decimal(value) / size
+        for count in range(1, 19):
+            yield _shortest(f"{exact:.{count}g}")
+        return
+    near = value / float(size)
+    for each in (near, math.nextafter(near, math.inf), math.nextafter(near, -math.inf)):
+        for count in (12, 15, 16, 17):
+            yield _shortest(f"{each:.{count}g}")
+
+
+def _shortest(text: str) -> str:
+    """Return a number without zeros at its end, and without an exponent where that is short."""
+    number = Decimal(text).normalize()
+    return f"{number:f}" if -6 <= number.adjusted() < 18 else f"{number:e}"
+
+
+def _spliced(text: str, values: Mapping[str, Any], assembly: Any) -> str:
+    """Return YAML or JSON text in which scalars stand in the places of others, and no other character changes."""
+    from ruamel.yaml import YAML
+    from ruamel.yaml.nodes import MappingNode
+
+    root = YAML(typ="rt", pure=True).compose(text)
+    assert isinstance(root, MappingNode)
+    entries = {key.value: node for key, node in root.value}
+    places = {key.value: node for key, node in entries["parameters"].value}
+    splices = [(places[name], _scalar(value, places[name])) for name, value in values.items()]
+    if assembly is not None and "assembly" in entries:
+        splices.append((entries["assembly"], str(assembly)))
+    for node, new in sorted(splices, key=lambda splice: splice[0].start_mark.index, reverse=True):
+        text = text[: node.start_mark.index] + new + text[node.end_mark.index :]
+    if assembly is not None and "assembly" not in entries:
+        text = _with_assembly(text, assembly, flow=bool(root.flow_style), start=root.start_mark.index)
+    return text
+
+
+def _with_assembly(text: str, assembly: Any, *, flow: bool, start: int) -> str:
+    """Return text with one more key at the top level."""
+    if flow:
+        return f'{text[: start + 1]}"assembly": {assembly}, {text[start + 1 :]}'
+    line = "\r\n" if "\r\n" in text else "\n"
+    return f"{text[:start]}assembly: {assembly}{line}{text[start:]}"
+
+
+def _scalar(value: Any, node: Any) -> str:
+    """Return a number or a text as YAML or JSON, in the quotes that it had."""
+    if not isinstance(value, str):
+        return repr(value)
+    return f"{node.style}{value}{node.style}" if node.style in ("'", '"') else value
+
+
+def _toml(text: str, values: Mapping[str, Any], assembly: Any) -> str:
+    """Return TOML text with other values, and its comments."""
+    import tomlkit
+
+    document: Any = tomlkit.parse(text)
+    for name, value in values.items():
+        document["parameters"][name] = value
+    if assembly is None:
+        return tomlkit.dumps(document)
+    if "assembly" in document:
+        document["assembly"] = assembly
+        return tomlkit.dumps(document)
+    return f"assembly = {assembly}\n{tomlkit.dumps(document)}"

@@ -1,0 +1,94 @@
+"""The command ``optimize``: what it prints and writes, and what it says where it cannot."""
+
+import json
+import pathlib
+
+import numpy as np
+import pytest
+from jsonschema import Draft202012Validator
+
+import jounce as jn
+from jounce.cli import main
+from jounce.reporting.json_result_schema import result_schema
+
+TEXT = """\
+# A crank whose law is a cubic.
+space: planar
+parameters: {a: 0.1, b: 0.1, c: 5.7 deg, r: 300 mm}   # to be found
+bodies: {crank: {position: [0, 0]}}
+joints: {O: {type: revolute, bodies: [ground, crank], points: [[0, 0], [0, 0]]}}
+drivers:
+  theta: {type: coordinate, bodies: [ground, crank], coordinate: angle, motion: t**3 + a*t + b*t**2 + c}
+outputs: {angle: {body: crank, quantity: angle}, tip: {body: crank, point: [r, 0]}}
+time: {start: -1, stop: 1, step: 0.05}
+"""
+VARY = ("--vary", "a=-2:2", "--vary", "b=-2:2", "--vary", "c=-2 rad:2 rad")
+
+
+@pytest.fixture
+def file(tmp_path):
+    path = tmp_path / "crank.yaml"
+    path.write_text(TEXT)
+    return path
+
+
+def shown(capsys, *arguments):
+    status = main(["optimize", *map(str, arguments)])
+    told = capsys.readouterr()
+    return status, told.out, told.err
+
+
+@pytest.mark.slow
+def test_a_better_design_is_told_and_written_in_the_units_of_the_file(capsys, file):
+    out = file.with_name("better.yaml")
+    status, told, _ = shown(capsys, file, "--minimize", "peak(angle)", *VARY, "--starts", 1, "--out", out, "--json")
+    assert status == 0
+    found = json.loads(told)
+    Draft202012Validator(result_schema()).validate(found)
+    assert (found["command"], found["status"]) == ("optimize", "optimal")
+    assert found["objective"] == pytest.approx(0.25, abs=1e-9)
+    better = jn.load(out)
+    assert better.parameters["a"] == pytest.approx(-0.75, abs=1e-7)
+    changed = [(a, b) for a, b in zip(TEXT.splitlines(), out.read_text().splitlines(), strict=True) if a != b]
+    ((_, line),) = changed
+    assert " deg, r: 300 mm}   # to be found" in line
+
+
+@pytest.mark.slow
+def test_points_of_a_file_are_gone_through(capsys, file):
+    points, radii = file.with_name("points.csv"), np.array([0.2, 0.3, 0.55])
+    rows = "".join(
+        f"{r * np.cos(a)!r},{r * np.sin(a)!r}\n" for r, a in zip(radii.tolist(), (-0.5, 0.1, 0.4), strict=True)
+    )
+    points.write_text(f"tip_x,tip_y\n{rows}")
+    arguments = ("--vary", "r=100mm:1m", "--curve", f"ring={points}", "--starts", 1)
+    status, told, _ = shown(capsys, file, "--minimize", "path_error(tip, ring)", *arguments)
+    assert status == 0
+    assert "optimal" in told
+    assert f"{radii.mean():.7g}" in told
+
+
+@pytest.mark.parametrize(
+    "arguments, words",
+    [
+        (("--minimize", "peak(phi)", *VARY), "--minimize: unknown name 'phi'"),
+        (("--minimize", "peak(angle)", "--vary", "a=1"), "NAME=LOW:HIGH"),
+        (("--minimize", "peak(angle)", "--vary", "a=2:1"), "--vary a: bounds"),
+        (("--minimize", "peak(angle)", "--vary", "r=1s:2s"), "--vary r: no mechanism can have this bound"),
+        (("--minimize", "peak(angle)", *VARY, "--subject-to", "span(angle) <= 1 mm"), "--subject-to: span(angle)"),
+        (("--minimize", "path_error(tip, x)", *VARY, "--curve", "x=none.csv"), "--curve x"),
+        (("--minimize", "peak(angle)", *VARY, "--assemblies", "first"), "--assemblies"),
+        (("--minimize", "peak(angle)", *VARY, "--out", "better.csv"), "better.csv"),
+    ],
+)
+def test_bad_input_is_told_by_the_option(capsys, file, arguments, words):
+    status, _, told = shown(capsys, file, *arguments)
+    assert status == 2
+    assert words in told
+
+
+def test_the_file_that_is_read_is_not_replaced_unasked(capsys, file):
+    status, _, told = shown(capsys, file, "--minimize", "peak(angle)", *VARY, "--out", file)
+    assert status == 2
+    assert "--overwrite" in told
+    assert pathlib.Path(file).read_text() == TEXT

@@ -1,0 +1,156 @@
+"""Optimised designs against optima in closed form, and what is told where there is none."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import jounce as jn
+from jounce.design.objectives import Goals
+from jounce.design.problem import Problem
+
+TIME = np.linspace(-1.0, 1.0, 41)
+CRANK = jn.Mechanism(
+    space="planar",
+    gravity=[0, -9.81],
+    parameters={"a": 0.1, "b": 0.1, "c": 0.1, "r": 0.3, "x": 0.0},
+    bodies={"crank": jn.Body([0.0, 0.0], mass=2.0, inertia=0.5, center_of_mass=["r", 0.0])},
+    joints={"O": jn.planar.Revolute(("ground", "crank"), ["x", 0], [0, 0])},
+    drivers={"theta": jn.drivers.CoordinateDriver(("ground", "crank"), "angle", motion="t**3 + a*t + b*t**2 + c")},
+    outputs={"angle": jn.AngleOutput("crank"), "tip": jn.PointOutput("crank", ["r", 0.0])},
+    time=TIME,
+)
+CUBIC = {"a": (-2.0, 2.0), "b": (-2.0, 2.0), "c": (-2.0, 2.0)}
+
+
+@pytest.fixture(scope="module")
+def chebyshev():
+    return jn.optimise(CRANK, "peak(angle)", CUBIC, starts=1)
+
+
+@pytest.mark.slow
+def test_the_least_peak_of_a_cubic_is_that_of_chebyshev(chebyshev):
+    """The cubic of least deviation from zero is T_3/4: four equal peaks, two at the ends and two between instants."""
+    assert chebyshev.success
+    assert chebyshev.objective == pytest.approx(0.25, abs=1e-10)
+    assert list(chebyshev.parameters.values()) == pytest.approx([-0.75, 0.0, 0.0], abs=1e-8)
+    assert chebyshev.mechanism.parameters["a"] == chebyshev.parameters["a"]
+    assert chebyshev.comparisons[0].before == pytest.approx(1.3, abs=1e-12)
+    assert chebyshev.grid_error < 1e-10
+
+
+@pytest.mark.slow
+def test_nothing_is_a_success_that_is_not_solved_at_all_instants(chebyshev):
+    assert (chebyshev.motion.status == jn.Status.OK).all()
+    assert chebyshev.residual < 1e-6
+    assert "0.25" in repr(chebyshev)
+
+
+@pytest.mark.slow
+def test_the_least_mean_square_is_that_of_legendre():
+    found = jn.optimise(CRANK, "rms(angle)", CUBIC, starts=1)
+    assert found.success
+    assert found.objective == pytest.approx(np.sqrt(4 / 175), abs=1e-12)
+    assert found.parameters["a"] == pytest.approx(-0.6, abs=1e-7)
+
+
+@pytest.mark.slow
+def test_a_condition_is_kept_and_its_multiplier_is_the_slope_of_the_optimum():
+    """The least mean square with the rate at the end held is that of linear equations, and so is its slope."""
+    powers = np.array([1, 2, 0])  # of a, b and c
+    gram = 1.0 * ((powers[:, None] + powers) % 2 == 0) / (powers[:, None] + powers + 1)
+    cubic = 1.0 * ((powers + 3) % 2 == 0) / (powers + 4)
+    end = powers * 1.0
+    matrix = np.block([[2 * gram, end[:, None]], [end[None], np.zeros((1, 1))]])
+    *place, multiplier = np.linalg.solve(matrix, [*(-2 * cubic), 3.5 - 3.0])
+    found = jn.optimise(CRANK, "mean(angle**2)", CUBIC, ["at(angle, 1, 1) == 3.5"], starts=1)
+    assert found.success
+    assert list(found.parameters.values()) == pytest.approx(place, abs=1e-7)
+    assert found.objective == pytest.approx(1 / 7 + 2 * cubic @ place + place @ gram @ place, abs=1e-12)
+    assert found.multipliers["at(angle, 1, 1) == 3.5"] == pytest.approx(-multiplier, abs=1e-7)
+    assert found.comparisons[1].after == pytest.approx(3.5, abs=1e-9)
+
+
+@pytest.mark.slow
+def test_conditions_that_cannot_be_met_are_told_with_how_far_they_are():
+    with pytest.raises(jn.DesignError, match=r"'at\(angle, 1, 1\) == 12': nearest is 9 against 12, off by 3 ") as error:
+        jn.optimise(CRANK, "mean(angle**2)", CUBIC, ["at(angle, 1, 1) == 12"], starts=1)
+    assert error.value.design.status == "infeasible"
+    assert list(error.value.design.parameters.values())[:2] == pytest.approx([2.0, 2.0], abs=1e-6)
+
+
+@pytest.mark.slow
+def test_a_crank_through_points_has_their_mean_radius():
+    radii = np.array([0.2, 0.3, 0.55])
+    points = radii[:, None] * np.stack([np.cos([-0.5, 0.1, 0.4]), np.sin([-0.5, 0.1, 0.4])], axis=1)
+    found = jn.optimise(CRANK, "path_error(tip, ring)", {"r": (0.1, 1.0)}, curves={"ring": points}, starts=1)
+    assert found.success
+    assert found.parameters["r"] == pytest.approx(radii.mean(), abs=1e-9)
+    assert found.objective == pytest.approx(radii.std(), abs=1e-9)
+
+
+@pytest.mark.slow
+def test_slopes_are_those_of_differences():
+    """Of every measure, of forces too, at a design that is nothing special."""
+    asked = [
+        "peak(angle, 2)",
+        "maximum(tip_x) - minimum(tip_y)",
+        "span(tip_x*angle_d1, 1, -0.5, 0.53)",
+        "rms(tip_y, 3)",
+    ]
+    asked += ["mean(abs(angle + 2))*r", "at(tip_x, 2, 0.123)", "peak(torque(theta), 1)", "peak(force(O))"]
+    asked += ["rms(force_x(O))", "path_error(tip, ring)", "path_deviation(tip, ring)", "path_error(tip, timed)"]
+    points = np.array([[0.3, 0.2], [0.5, 0.1], [0.1, -0.3]])
+    curves = {"ring": points, "timed": (np.array([-0.7, 0.0, 0.456]), points)}
+    bounds = {"a": (-1.0, 1.0), "b": (-1.0, 1.0), "r": (0.1, 0.5), "x": (-0.1, 0.1)}
+    from jounce.design.optimise import _curve
+
+    targets = {name: _curve(name, given) for name, given in curves.items()}
+    goals = Goals(CRANK, "mean(angle)", [f"{text} <= 1" for text in asked], tuple(bounds), targets, TIME)
+    problem = Problem(goals, bounds)
+    place = np.array([0.62, 0.44, 0.57, 0.68])
+
+    def numbers(place):
+        found = problem.evaluate(place)
+        extremes, chosen = problem.extremes(found)
+        values, (by_place, by_extreme, by_smooth) = problem.numbers(place, extremes, found.smooth)
+        return values, by_place + by_extreme @ found.row_slopes[chosen] + by_smooth @ found.smooth_slopes
+
+    _, slopes = numbers(place)
+    step = 1e-5
+    for k in range(len(place)):
+        shift = step * np.eye(len(place))[k]
+        difference = (numbers(place + shift)[0] - numbers(place - shift)[0]) / (2 * step)
+        scale = 1.0 + np.abs(difference)
+        assert (np.abs(slopes[:, k] - difference) / scale).max() < 1e-7
+
+
+@pytest.mark.slow
+def test_designs_that_lock_are_kept_away_from(four_bar):
+    found = jn.optimise(four_bar, "peak(psi, 4)", {"BC": (0.12, 0.6)}, starts=3, samples=16)
+    assert found.success
+    assert found.smallest_singular_value > 0.01
+    assert "cannot be put together, or lock" in found.notes[0]
+    alone = jn.solve(four_bar.with_parameters(**found.parameters), np.linspace(0.0, 2.0, 4001))
+    assert np.abs(alone.outputs["psi"][:, 4]).max() == pytest.approx(found.objective, rel=1e-6)
+    for change in (-1e-4, 1e-4):
+        other = jn.solve(four_bar.with_parameters(BC=found.parameters["BC"] + change), np.linspace(0.0, 2.0, 4001))
+        assert np.abs(other.outputs["psi"][:, 4]).max() > found.objective
+    with pytest.raises(jn.DesignError, match="none of 16 designs within the bounds can be put together"):
+        jn.optimise(four_bar, "peak(psi, 4)", {"BC": (0.5, 0.6)}, starts=2, samples=16)
+
+
+@pytest.mark.slow
+def test_the_better_of_two_assemblies_is_found_and_asked_for(four_bar):
+    narrow = {"BC": (0.14, 0.145)}
+    found = jn.optimise(four_bar, "maximum(psi)", narrow, starts=1, assemblies="all")
+    assert found.success
+    each = [jn.optimise(four_bar, "maximum(psi)", narrow, starts=1, assemblies=[k]).objective for k in (1, 2)]
+    assert found.objective == pytest.approx(min(each), abs=1e-12)
+    assert each[0] != pytest.approx(each[1], abs=0.1)
+    assert np.max(jn.solve(found.mechanism).outputs["psi"][:, 0]) == pytest.approx(found.objective, abs=1e-9)
+
+
+@pytest.fixture
+def four_bar():
+    return dataclasses.replace(jn.load("examples/four_bar.yaml"), time=np.linspace(0.0, 2.0, 121))
