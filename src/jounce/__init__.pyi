@@ -83,6 +83,7 @@ from jounce.integrate import (
     simulate_batch as simulate_batch,
 )
 from jounce.io import (
+    in_units as in_units,
     load as load,
     load_limits as load_limits,
     load_robot as load_robot,
@@ -111,6 +112,8 @@ from jounce.mechanism import (
     AngularVelocityOutput as AngularVelocityOutput,
     Body as Body,
     DistanceOutput as DistanceOutput,
+    DriverAngleOutput as DriverAngleOutput,
+    DriverDisplacementOutput as DriverDisplacementOutput,
     EulerAnglesOutput as EulerAnglesOutput,
     EulerParametersOutput as EulerParametersOutput,
     Mechanism as Mechanism,
@@ -144,13 +147,16 @@ from jounce.robot import (
     operational_accelerations as operational_accelerations,
 )
 from jounce.trajectory import (
+    Continuity as Continuity,
     CycloidalMotion as CycloidalMotion,
     Expression as Expression,
     ExpressionMotion as ExpressionMotion,
     FollowingMotion as FollowingMotion,
     FunctionMotion as FunctionMotion,
+    HermiteMotion as HermiteMotion,
     JointTrajectory as JointTrajectory,
     MeasuredMotion as MeasuredMotion,
+    OutputMotion as OutputMotion,
     PiecewiseMotion as PiecewiseMotion,
     PolynomialMotion as PolynomialMotion,
     RestToRestMotion as RestToRestMotion,
@@ -158,6 +164,7 @@ from jounce.trajectory import (
     SegmentedMotion as SegmentedMotion,
     SplineMotion as SplineMotion,
     TrapezoidalMotion as TrapezoidalMotion,
+    continuity as continuity,
     motion_profile as motion_profile,
 )
 

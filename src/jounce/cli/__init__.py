@@ -28,6 +28,7 @@ from jounce.cli.mechanisms import run, schema, simulate
 from jounce.cli.options import WritingError
 from jounce.cli.papers import reproduce
 from jounce.cli.robots import check, torques
+from jounce.cli.servo import servo
 from jounce.cli.shell_completion import complete
 from jounce.cli.small_motions import modes
 from jounce.cli.standard_streams import failsafe_streams
@@ -59,7 +60,7 @@ def completion(shell: Literal["bash", "zsh", "fish"], /, *, install: bool = Fals
 
 
 COMMANDS = (
-    new, inspect, run, trace, simulate, modes, plot, report, view, check, torques, convert, reproduce, schema,
+    new, inspect, run, trace, simulate, modes, plot, report, view, servo, check, torques, convert, reproduce, schema,
     completion,
 )  # fmt: skip
 LIGHT = (new, completion)  # they compute nothing

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from jounce.mechanism import Mechanism
     from jounce.robot import Robot
     from jounce.trajectory import JointTrajectory
+    from jounce.trajectory.shown_units import ShownUnits
 
 Overwrite = Annotated[bool, Parameter(alias="--force")]
 """The option of commands that replace no file unasked; --force is what it was called first."""
@@ -133,14 +134,14 @@ class TableOutput:
         if self.out is not None:
             check_writable(self.out, overwrite=self.overwrite)
 
-    def write(self, dataset: Callable[[], Any]) -> None:
+    def write(self, dataset: Callable[[], Any], *, header_units: bool | None = None) -> None:
         """Write the values, an xarray.Dataset, if they are wanted."""
         if (out := self.out) is not None:
             from jounce.io import write
 
-            written(lambda: write(dataset(), out, overwrite=self.overwrite))
+            written(lambda: write(dataset(), out, overwrite=self.overwrite, header_units=header_units))
 
-    def write_parts(self, parts: Iterable[Any], count: int) -> None:
+    def write_parts(self, parts: Iterable[Any], count: int, *, header_units: bool | None = None) -> None:
         """Write values that come in parts along time, with so many instants in all; if unwanted, only go through."""
         if (out := self.out) is None:
             for _ in parts:
@@ -148,14 +149,59 @@ class TableOutput:
             return
         from jounce.io import write_parts
 
-        written(lambda: write_parts(parts, out, count, overwrite=self.overwrite))
+        written(lambda: write_parts(parts, out, count, overwrite=self.overwrite, header_units=header_units))
 
     def tell(self, command: str, result: Callable[[], Mapping[str, Any]]) -> None:
         """Print the result as JSON, or where it was written."""
         tell(command, result, self.out, json=self.json)
 
 
-PLAIN_MECHANISM, PLAIN_ROBOT, NO_TABLE = MechanismReading(), RobotReading(), TableOutput()
+@AMONG_THE_OTHERS
+@dataclass(frozen=True, kw_only=True)
+class UnitChoice:
+    """In which units results are shown and written.
+
+    Parameters
+    ----------
+    units
+        Of what is shown and written, as angle=deg,length=mm; repeatable.
+    header_units
+        Say units in the heading of a CSV; those that are not SI always are.
+    plain_header
+        Say none, whatever the units.
+    """
+
+    units: list[str] | None = None
+    header_units: bool = False
+    plain_header: bool = False
+
+    @property
+    def in_heading(self) -> bool | None:
+        """Whether the heading of a CSV file says units; None where it does if they are not those of SI.
+
+        Raises
+        ------
+        JounceError
+            Both are asked for.
+        """
+        if self.header_units and self.plain_header:
+            raise JounceError("goes against --header-units; give one of them", name="--plain-header")
+        return True if self.header_units else False if self.plain_header else None
+
+    def of(self, known: ShownUnits) -> ShownUnits:
+        """Return the units of a file with those of the option in their place."""
+        from jounce.trajectory.shown_units import units_given
+
+        _ = self.in_heading
+        given = units_given(self.units or ())
+        try:
+            return known.merged(given)
+        except JounceError as error:
+            error.name = f"--units {str(error.name).removeprefix('units.')}"
+            raise
+
+
+PLAIN_MECHANISM, PLAIN_ROBOT, NO_TABLE, SI = MechanismReading(), RobotReading(), TableOutput(), UnitChoice()
 
 
 def tell(command: str, result: Callable[[], Mapping[str, Any]], out: Path | None, *, json: bool) -> None:

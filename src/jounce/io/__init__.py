@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from jounce.io.files.column_units import in_units as in_units
     from jounce.io.mechanisms.json_schema import json_schema as json_schema
     from jounce.io.mechanisms.loader import load as load
     from jounce.io.mechanisms.writer import write_mechanism as write_mechanism
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from jounce.io.robots.trajectories import load_trajectory as load_trajectory
 
 _HOMES = {
+    "in_units": "files.column_units",
     "load": "mechanisms.loader",
     "json_schema": "mechanisms.json_schema",
     "check_writable": "results",

@@ -27,8 +27,9 @@ from jounce.plot.scene import scene_of
 from jounce.plot.sketch import length_text, limits_with, paths_of
 from jounce.plot.style import BODY_COLOURS
 from jounce.reporting.motion_facts import motion_facts
-from jounce.reporting.peaks import Peak, derivative_name, derivative_unit, peaks
+from jounce.reporting.peaks import Peak, derivative_name, peaks
 from jounce.reporting.summaries import motion_summary
+from jounce.trajectory.shown_units import derivative_unit
 
 __all__ = ["check_report", "report"]
 

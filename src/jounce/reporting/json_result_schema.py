@@ -9,6 +9,7 @@ from pydantic.json_schema import GenerateJsonSchema
 from typing_extensions import TypedDict
 
 from jounce.reporting.curve_facts import CurveFacts
+from jounce.reporting.law_facts import LawFacts
 from jounce.reporting.mechanism_facts import Grid, InspectedMechanism
 from jounce.reporting.modes_facts import ModesFacts
 from jounce.reporting.motion_facts import MotionFacts, SimulationFacts
@@ -83,6 +84,24 @@ class TraceResult(Result):
     command: Literal["trace"]
     file: str
     curves: list[CurveFacts]
+    written: str | None
+
+
+class ServoPeak(Extremes):
+    """Extreme values, at the rows of a drive, of a derivative of the coordinate of a driver."""
+
+    output: str
+
+
+class ServoResult(Result):
+    """jounce servo --json: SI, whatever the units of the file."""
+
+    command: Literal["servo"]
+    file: str
+    rate: float
+    drivers: list[str]
+    laws: list[LawFacts]
+    peaks: list[ServoPeak]
     written: str | None
 
 
@@ -190,6 +209,7 @@ RESULTS: dict[str, Any] = {
     "inspect_robot": InspectRobotResult,
     "check": CheckResult,
     "torques": TorquesResult,
+    "servo": ServoResult,
     "modes": ModesResult,
     "trace": TraceResult,
     "new_list": NewListResult,
