@@ -85,6 +85,7 @@ def test_where_the_output_does_not_determine_the_driver_it_is_refused():
         jn.solve(slider_crank(f"{top!r} - 0.01*t"), GRID, order=0)
 
 
+@pytest.mark.slow
 def test_what_needs_the_law_beforehand_says_so(motion):
     mechanism = slider_crank("0.17 + 0.015*cos(3*t)")
     for ask in (jn.simulate, jn.linearise, jn.trace):

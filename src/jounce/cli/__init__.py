@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from jounce.cli.arguments import converted
+from jounce.cli.cams import cam
 from jounce.cli.conversion import convert
 from jounce.cli.curves import trace
 from jounce.cli.figures import plot, report
@@ -60,8 +61,8 @@ def completion(shell: Literal["bash", "zsh", "fish"], /, *, install: bool = Fals
 
 
 COMMANDS = (
-    new, inspect, run, trace, simulate, modes, plot, report, view, servo, check, torques, convert, reproduce, schema,
-    completion,
+    new, inspect, run, trace, simulate, modes, plot, report, view, servo, cam, check, torques, convert, reproduce,
+    schema, completion,
 )  # fmt: skip
 LIGHT = (new, completion)  # they compute nothing
 FIRST = """\

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     import xarray
 
 SUFFIXES = (".csv", ".nc")
+ALONG = ("time", "angle", "point")  # what the rows of a table follow: of a motion, of a cam, of a curve
 CURVE_AXES = ("arc_length", "driver_value")  # first columns of a curve of configurations
 AXES = {  # of outputs that are more than one number, and the labels along them
     ("component",): ("x", "y", "z"),
@@ -210,10 +211,12 @@ def columns(dataset: xarray.Dataset) -> dict[str, Float[np.ndarray, " time"]]:
     """
     from xarray import Variable
 
-    along = "time" if "time" in dataset.dims else "point"
-    first = ("time",) if along == "time" else (name for name in CURVE_AXES if name in dataset.coords)
+    along = next(name for name in ALONG if name in dataset.dims)
+    first = (name for name in CURVE_AXES if name in dataset.coords) if along == "point" else (along,)
     found = {name: np.asarray(dataset[name], float) for name in first}
     for name, variable in dataset.data_vars.items():
+        if variable.dims == (along,) and along == "angle":
+            found[str(name)] = np.asarray(variable, float)
         axes = tuple(dim for dim in variable.dims if dim not in (along, "derivative"))
         if not {along, "derivative"} <= set(variable.dims) or (axes and axes not in AXES):
             continue

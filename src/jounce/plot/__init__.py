@@ -1,6 +1,7 @@
 """Figures of publication quality; matplotlib is imported when one is drawn, not before."""
 
 from jounce.plot.animation import animate as animate, check_animation as check_animation
+from jounce.plot.cams import draw_cam as draw_cam
 from jounce.plot.curves import draw_curves as draw_curves
 from jounce.plot.figure import check_figure as check_figure, draw as draw, save as save
 from jounce.plot.forces import (

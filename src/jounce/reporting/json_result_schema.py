@@ -8,6 +8,7 @@ from pydantic import TypeAdapter
 from pydantic.json_schema import GenerateJsonSchema
 from typing_extensions import TypedDict
 
+from jounce.reporting.cam_facts import CamFacts
 from jounce.reporting.curve_facts import CurveFacts
 from jounce.reporting.law_facts import LawFacts
 from jounce.reporting.mechanism_facts import Grid, InspectedMechanism
@@ -102,6 +103,14 @@ class ServoResult(Result):
     drivers: list[str]
     laws: list[LawFacts]
     peaks: list[ServoPeak]
+    written: str | None
+
+
+class CamResult(Result, CamFacts):
+    """jounce cam --json: SI, whatever the units of the file."""
+
+    command: Literal["cam"]
+    file: str
     written: str | None
 
 
@@ -210,6 +219,7 @@ RESULTS: dict[str, Any] = {
     "check": CheckResult,
     "torques": TorquesResult,
     "servo": ServoResult,
+    "cam": CamResult,
     "modes": ModesResult,
     "trace": TraceResult,
     "new_list": NewListResult,
@@ -230,7 +240,7 @@ def result_schema() -> dict[str, Any]:
     Examples
     --------
     >>> sorted(result_schema()["$defs"])[:6]
-    ['check', 'complaint', 'inspect_mechanism', 'inspect_robot', 'modes', 'new']
+    ['cam', 'check', 'complaint', 'inspect_mechanism', 'inspect_robot', 'modes']
     """
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

@@ -13,7 +13,7 @@ from jounce.mechanism.driver_outputs import is_turning
 from jounce.mechanism.held_outputs import led_outputs, with_outputs_held
 from jounce.mechanism.resolve import resolve_motion
 from jounce.reporting.peaks import derivative_name
-from jounce.trajectory import continuity
+from jounce.trajectory import Continuity, continuity
 from jounce.trajectory.shown_units import derivative_unit
 
 
@@ -58,21 +58,26 @@ def law_facts(mechanism: Mechanism, first: float, last: float) -> list[dict[str,
             "of": led[name].output if name in led else name,
             "unit": "rad" if is_turning(driver) else "m",
             "continuous_to": told.smoothness,
-            "derivatives": [
-                {"order": x.order, "jumps": x.count, "largest": _number(x.size), "at": _number(x.instant)}
-                for x in told.derivatives
-            ],
+            "derivatives": jump_facts(told),
             "remark": told.unknown,
         })  # fmt: skip
     return found
+
+
+def jump_facts(told: Continuity) -> list[dict[str, Any]]:
+    """Return the jumps of each derivative of a law: JumpFacts."""
+    return [
+        {"order": x.order, "jumps": x.count, "largest": _number(x.size), "at": _number(x.instant)}
+        for x in told.derivatives
+    ]
 
 
 def _number(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def law_words(laws: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Word to which derivative laws are continuous, a line for each.
+def law_words(laws: Sequence[Mapping[str, Any]], by: str = "s") -> list[str]:
+    """Word to which derivative laws are continuous, by the time or by an angle, a line for each.
 
     Examples
     --------
@@ -91,7 +96,8 @@ def law_words(laws: Sequence[Mapping[str, Any]]) -> list[str]:
             words = f"continuous to {derivative_name(law['continuous_to'])}"
         for x in broken:
             several = f" ({x['jumps']} jumps)" if x["jumps"] > 1 else ""
-            size = f"{x['largest']:.6g} {derivative_unit(law['unit'], x['order'])}"
-            words += f"; {derivative_name(x['order'])} jumps by {size} at {x['at']:.6g} s{several}"
+            unit = derivative_unit(law["unit"], x["order"]) if by == "s" else f"{law['unit']}/{by}^{x['order']}"
+            words += f"; {derivative_name(x['order'])} jumps by {x['largest']:.6g} {unit}"
+            words += f" at {x['at']:.6g} {by}{several}"
         lines.append(f"law of {law['of']}: {words}{'; ' if law['remark'] else ''}{law['remark']}")
     return lines

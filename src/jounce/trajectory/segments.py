@@ -110,6 +110,23 @@ class SegmentedMotion(SplineMotion):
         """The segments as they were given."""
         return self.recipe.value[0]
 
+    def lasts(self, duration: float) -> bool:
+        """Tell whether the segments go from zero to a duration, s, or an angle."""
+        first = 1 if self.beyond == "continue" else 0  # the first and the last piece rest
+        begin = float(np.asarray(self.breakpoints)[first])
+        return abs(begin) <= CLOSED * duration and abs(float(self.stop) - duration) <= CLOSED * duration
+
+    def repeated(self) -> "SegmentedMotion":
+        """Return the law with its segments again and again.
+
+        Raises
+        ------
+        TrajectoryError
+            If they do not end where they begin.
+        """
+        segments, initial, start, _ = self.recipe.value
+        return SegmentedMotion(segments, initial, start, "repeat")
+
     @property
     def _open(self) -> list[str]:
         """Names of the parameters without which the law is not known."""

@@ -60,7 +60,7 @@ class Continuity:
         return min(broken) - 1 if broken else None
 
 
-def continuity(law: AbstractMotion, first: float, last: float, order: int = 4) -> Continuity:
+def continuity(law: AbstractMotion, first: float, last: float, order: int = 4, *, periodic: bool = False) -> Continuity:
     """Return to which derivative a law is continuous from a first to a last instant.
 
     Parameters
@@ -71,6 +71,8 @@ def continuity(law: AbstractMotion, first: float, last: float, order: int = 4) -
         s.
     order : int, default 4
         Up to which all derivatives are told.
+    periodic : bool, default False
+        Whether the law begins again after the last instant, as that of a cam does after a turn.
 
     Returns
     -------
@@ -92,6 +94,10 @@ def continuity(law: AbstractMotion, first: float, last: float, order: int = 4) -
     """
     whole_number("order", order, 0, HIGHEST)
     instants, jumps, unknown = _jumps(law, first, last)
+    if periodic and getattr(law, "beyond", "") != "repeat":
+        ends = [np.asarray(law(Jet.variable(np.asarray(at, float), HIGHEST)).derivatives()) for at in (last, first)]
+        closing = np.where(np.abs(ends[1] - ends[0]) <= 1e-9 * np.abs(ends).max(axis=0), 0.0, ends[1] - ends[0])
+        instants, jumps = np.append(instants, first), np.column_stack([jumps, closing])
     broken = np.flatnonzero(np.any(jumps != 0, axis=1))
     told = max(order, int(broken[0])) if len(broken) else order
     found = []

@@ -44,8 +44,8 @@ def in_units(dataset: xarray.Dataset, units: Mapping[str, str] | ShownUnits) -> 
         known = {str(name): x.attrs["units"] for name, x in dataset.data_vars.items() if "units" in x.attrs}
         units = ShownUnits(units, known)
     shown = dataset.copy()
-    for name, variable in dataset.data_vars.items():
-        if (unit := variable.attrs.get("units")) is None:
+    for name, variable in dataset.variables.items():
+        if (unit := variable.attrs.get("units")) is None or name == "time":
             continue
         label, factor = units.of(unit, str(name))
         if label != unit:

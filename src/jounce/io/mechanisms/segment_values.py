@@ -57,8 +57,10 @@ def segmented(raw: dict[str, Any], quantity: str, info: Any) -> AbstractMotion |
     entries, by = raw["profile"], leader(raw, info)
     if not isinstance(entries, list | tuple) or not entries:
         raise problem("must be a list of segments, such as {profile: cycloidal, duration: 1 s, to: 20 mm}", "profile")
-    lapse = "time" if by is None else "any"
-    segments = [_segment(entry, k, quantity, lapse, info, timed=by is None) for k, entry in enumerate(entries)]
+    own = (info.context or {}).get("lapse")  # of a cam, whose laws are of its angle
+    lapse = own or ("time" if by is None else "any")
+    timed = by is None and own is None
+    segments = [_segment(entry, k, quantity, lapse, info, timed=timed) for k, entry in enumerate(entries)]
     initial = parse(raw.get("initial", 0.0), quantity, info, "initial").value
     start = parse(raw.get("start", 0.0), lapse, info, "start").value
     beyond = raw.get("beyond", BEYOND[0])
