@@ -5,7 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 
 from jounce.cli.file_kinds import expecting
-from jounce.cli.options import NO_TABLE, SI, TableOutput, UnitChoice, allowed, errors_about, spare_inputs, written
+from jounce.cli.options import (
+    NO_TABLE,
+    PLAIN,
+    Heading,
+    TableOutput,
+    allowed,
+    errors_about,
+    spare_inputs,
+    units_chosen,
+    written,
+)
 from jounce.reporting.terminal import say
 
 
@@ -17,7 +27,8 @@ def cam(
     figure: Path | None = None,
     set_: list[str] | None = None,
     allow: list[Path] | None = None,
-    unit: UnitChoice = SI,
+    units: list[str] | None = None,
+    heading: Heading = PLAIN,
     output: TableOutput = NO_TABLE,
 ) -> int:
     r"""Find the profile of a plate cam, and whether it is undercut.
@@ -40,6 +51,8 @@ def cam(
         NAME=VALUE of a parameter, with a unit; repeatable.
     allow
         Folder whose files it may name, besides its own; repeatable.
+    units
+        Of what is shown and written, as angle=deg,length=mm; repeatable.
 
     Examples
     --------
@@ -51,6 +64,7 @@ def cam(
     from jounce.reporting.cam_facts import cam_facts, cam_words
 
     output.check()
+    told = heading.units
     if figure is not None:
         from jounce.plot import check_figure
 
@@ -59,12 +73,12 @@ def cam(
         found = load_cam(file, allow=allowed(allow), set_=set_ or (), count=count)
     for target in (output.out, figure):
         spare_inputs(target, overwrite=output.overwrite)
-    shown = unit.of(found.shown_units)
+    shown = units_chosen(found.shown_units, units)
     with errors_about(file):
         facts = cam_facts(found)
     if not output.json:
         say(cam_words(facts, shown))
-    output.write(lambda: in_units(found.dataset, shown), header_units=unit.in_heading)
+    output.write(lambda: in_units(found.dataset, shown), header_units=told)
     if figure is not None:
         from jounce.plot import draw_cam, save
 

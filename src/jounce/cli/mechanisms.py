@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from jounce.cli.options import (
     NO_TABLE,
+    PLAIN,
     PLAIN_MECHANISM,
-    SI,
+    Heading,
     MechanismReading,
     TableOutput,
-    UnitChoice,
     errors_about,
     spare_inputs,
 )
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from jounce.integrate import Obreshkov, Taylor
     from jounce.kinematics import Motion, Stretches
     from jounce.mechanism import Mechanism
-    from jounce.trajectory.shown_units import ShownUnits
 
 
 def run(
@@ -35,7 +34,7 @@ def run(
     tolerance: float = 1e-12,
     no_refine: bool = False,
     reading: MechanismReading = PLAIN_MECHANISM,
-    unit: UnitChoice = SI,
+    heading: Heading = PLAIN,
     output: TableOutput = NO_TABLE,
 ) -> int:
     """Solve a mechanism file and print peak values, position to jounce.
@@ -59,16 +58,15 @@ def run(
       jounce run examples/four_bar.yaml --units angle=deg,length=mm
     """
     output.check()
+    told = heading.units
     mechanism = reading.mechanism(file)
-    shown = unit.of(mechanism.shown_units)
     spare_inputs(output.out, overwrite=output.overwrite)
     refine = not no_refine
     if _is_long(mechanism, file):
-        heading = unit.in_heading
-        motion = _streamed(mechanism, file, order, tolerance, output, shown, refine=refine, heading=heading)
-        return _told("run", motion, file, output, shown, refine=refine)
+        motion = _streamed(mechanism, file, order, tolerance, output, refine=refine, heading=told)
+        return _told("run", motion, file, output, refine=refine)
     motion = solved(mechanism, file, order, tolerance)
-    return _finished("run", motion, file, output, shown, refine=refine, heading=unit.in_heading)
+    return _finished("run", motion, file, output, refine=refine, heading=told)
 
 
 def simulate(
@@ -82,7 +80,7 @@ def simulate(
     longest_step: float = math.inf,
     no_refine: bool = False,
     reading: MechanismReading = PLAIN_MECHANISM,
-    unit: UnitChoice = SI,
+    heading: Heading = PLAIN,
     output: TableOutput = NO_TABLE,
 ) -> int:
     r"""Move a mechanism by its forces and print peak values, energy, drift.
@@ -113,11 +111,11 @@ def simulate(
     """
     output.check()
     chosen = _method(method, step)
+    told = heading.units
     mechanism = reading.mechanism(file)
-    shown = unit.of(mechanism.shown_units)
     spare_inputs(output.out, overwrite=output.overwrite)
     motion = simulated(mechanism, file, order, method=chosen, tolerance=tolerance, longest_step=longest_step)
-    return _finished("simulate", motion, file, output, shown, refine=not no_refine, heading=unit.in_heading)
+    return _finished("simulate", motion, file, output, refine=not no_refine, heading=told)
 
 
 def _is_long(mechanism: Mechanism, file: Path) -> bool:
@@ -133,7 +131,6 @@ def _streamed(
     order: int,
     tolerance: float,
     output: TableOutput,
-    shown: ShownUnits,
     *,
     refine: bool,
     heading: bool | None,
@@ -146,7 +143,7 @@ def _streamed(
     with Bar("solving") as bar:
         with errors_about(file):
             motion = solve_in_stretches(mechanism, order=order, tolerance=tolerance, progress=bar)
-        parts = (in_units(part.dataset, shown) for part in looked_at(motion, refine=refine))
+        parts = (in_units(part.dataset, mechanism.shown_units) for part in looked_at(motion, refine=refine))
         output.write_parts(parts, len(motion.time), header_units=heading)
     return motion
 
@@ -156,7 +153,6 @@ def _finished(
     motion: Motion,
     file: Path,
     output: TableOutput,
-    shown: ShownUnits,
     *,
     refine: bool,
     heading: bool | None,
@@ -166,9 +162,9 @@ def _finished(
     def write() -> None:
         from jounce.io import in_units
 
-        output.write(lambda: in_units(motion.dataset, shown), header_units=heading)
+        output.write(lambda: in_units(motion.dataset, motion.mechanism.shown_units), header_units=heading)
 
-    return _told(command, motion, file, output, shown, refine=refine, write=write)
+    return _told(command, motion, file, output, refine=refine, write=write)
 
 
 def _told(
@@ -176,7 +172,6 @@ def _told(
     motion: Motion | Stretches,
     file: Path,
     output: TableOutput,
-    shown: ShownUnits,
     *,
     refine: bool,
     write: Callable[[], None] = lambda: None,
@@ -189,7 +184,7 @@ def _told(
 
     if not output.json:
         say(motion_summary(motion_facts(motion), file.name))
-        show_peaks(shown_peaks(peaks(motion, refine=refine), shown))
+        show_peaks(shown_peaks(peaks(motion, refine=refine), motion.mechanism.shown_units))
     write()
     output.tell(command, lambda: motion_result(motion, file, output.out, refine))
     return outcome(motion, file)

@@ -46,12 +46,15 @@ class MechanismReading:
         Folder whose files it may name, besides its own; repeatable.
     redundant_reactions
         Where constraints are redundant: unique ones only, or least_norm.
+    units
+        Of what is shown and written, as angle=deg,length=mm; repeatable.
     """
 
     set_: list[str] | None = None
     import_: list[Path] | None = None
     allow: list[Path] | None = None
     redundant_reactions: Literal["unique", "least_norm"] | None = None
+    units: list[str] | None = None
 
     def mechanism(self, file: Path) -> Mechanism:
         """Return the mechanism of a file, with parameters changed, after the user's own classes were imported."""
@@ -62,6 +65,8 @@ class MechanismReading:
             mechanism = load(file, allow=allowed(self.allow))
         if self.redundant_reactions is not None:
             mechanism = replace(mechanism, redundant_reactions=self.redundant_reactions)
+        if self.units:
+            mechanism = replace(mechanism, units=dict(units_chosen(mechanism.shown_units, self.units).chosen))
         if not self.set_:
             return mechanism
         from jounce.io.mechanisms.overrides import override
@@ -158,26 +163,23 @@ class TableOutput:
 
 @AMONG_THE_OTHERS
 @dataclass(frozen=True, kw_only=True)
-class UnitChoice:
-    """In which units results are shown and written.
+class Heading:
+    """What the heading of a CSV file says.
 
     Parameters
     ----------
-    units
-        Of what is shown and written, as angle=deg,length=mm; repeatable.
     header_units
         Say units in the heading of a CSV; those that are not SI always are.
     plain_header
         Say none, whatever the units.
     """
 
-    units: list[str] | None = None
     header_units: bool = False
     plain_header: bool = False
 
     @property
-    def in_heading(self) -> bool | None:
-        """Whether the heading of a CSV file says units; None where it does if they are not those of SI.
+    def units(self) -> bool | None:
+        """Whether it says units; None where it does if they are not those of SI.
 
         Raises
         ------
@@ -188,20 +190,20 @@ class UnitChoice:
             raise JounceError("goes against --header-units; give one of them", name="--plain-header")
         return True if self.header_units else False if self.plain_header else None
 
-    def of(self, known: ShownUnits) -> ShownUnits:
-        """Return the units of a file with those of the option in their place."""
-        from jounce.trajectory.shown_units import units_given
 
-        _ = self.in_heading
-        given = units_given(self.units or ())
-        try:
-            return known.merged(given)
-        except JounceError as error:
-            error.name = f"--units {str(error.name).removeprefix('units.')}"
-            raise
+def units_chosen(known: ShownUnits, texts: Sequence[str] | None) -> ShownUnits:
+    """Return the units of a file with those of the option --units in their place."""
+    from jounce.trajectory.shown_units import units_given
+
+    given = units_given(texts or ())
+    try:
+        return known.merged(given)
+    except JounceError as error:
+        error.name = f"--units {str(error.name).removeprefix('units.')}"
+        raise
 
 
-PLAIN_MECHANISM, PLAIN_ROBOT, NO_TABLE, SI = MechanismReading(), RobotReading(), TableOutput(), UnitChoice()
+PLAIN_MECHANISM, PLAIN_ROBOT, NO_TABLE, PLAIN = MechanismReading(), RobotReading(), TableOutput(), Heading()
 
 
 def tell(command: str, result: Callable[[], Mapping[str, Any]], out: Path | None, *, json: bool) -> None:

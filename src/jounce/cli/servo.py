@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 from jounce.cli.mechanisms import outcome
 from jounce.cli.options import (
     NO_TABLE,
+    PLAIN,
     PLAIN_MECHANISM,
-    SI,
+    Heading,
     MechanismReading,
     TableOutput,
-    UnitChoice,
     errors_about,
     spare_inputs,
 )
@@ -35,7 +35,7 @@ def servo(
     order: int = 3,
     driver: list[str] | None = None,
     reading: MechanismReading = PLAIN_MECHANISM,
-    unit: UnitChoice = SI,
+    heading: Heading = PLAIN,
     output: TableOutput = NO_TABLE,
 ) -> int:
     r"""Tell the motion of drivers at the rate of a servo, position to jerk.
@@ -66,13 +66,13 @@ def servo(
     from jounce.reporting.peaks import shown_peaks, table_peaks
 
     output.check()
-    frequency = _frequency(rate)
+    frequency, told = _frequency(rate), heading.units
     mechanism = reading.mechanism(file)
     spare_inputs(output.out, overwrite=output.overwrite)
     names = list(dict.fromkeys(driver or mechanism.drivers))
     for name in names:
         check_name("driver", name, mechanism.drivers, JounceError, name="--driver")
-    shown = unit.of(_units_of(mechanism, names))
+    shown = _units_of(mechanism, names)
     with errors_about(file), Bar("solving") as bar:
         if not names:
             raise JounceError("there is no driver", name="drivers")
@@ -85,7 +85,7 @@ def servo(
         count = f"{len(motion.time)} rows from {first:g} s to {last:g} s, {frequency:g} a second"
         say("\n".join([mechanism.title or file.name, count, *law_words(laws)]))
         show_peaks(shown_peaks(found, shown))
-    output.write(lambda: in_units(dataset, shown), header_units=unit.in_heading)
+    output.write(lambda: in_units(dataset, shown), header_units=told)
     output.tell("servo", lambda: _result(file, frequency, names, laws, found, output.out))
     return outcome(motion, file)
 
@@ -132,12 +132,13 @@ def _driven(motion: Motion, names: list[str]) -> Any:
 
 
 def _units_of(mechanism: Mechanism, names: list[str]) -> ShownUnits:
-    """Return the units of a file for its drivers; those of outputs are not theirs, though they may share names."""
+    """Return the units of a file for its drivers: by their kind, or by the name of an output that a driver shares."""
     from jounce.mechanism.driver_outputs import is_turning
     from jounce.trajectory.shown_units import QUANTITIES, ShownUnits
 
     known = {name: "rad" if is_turning(mechanism.drivers[name]) else "m" for name in names}
-    return ShownUnits({name: unit for name, unit in mechanism.units.items() if name in QUANTITIES}, known)
+    chosen = {name: unit for name, unit in mechanism.units.items() if name in QUANTITIES or name in known}
+    return ShownUnits(chosen, known)
 
 
 def _result(file: Path, frequency: float, names: list[str], laws: Any, found: Any, out: Path | None) -> dict[str, Any]:

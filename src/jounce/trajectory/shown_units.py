@@ -58,7 +58,7 @@ def unit_size(text: str) -> tuple[float, Dimension]:
     UnitError
         It is no unit of mechanics.
     """
-    if not isinstance(text, str) or not text.strip():
+    if not isinstance(text, str) or not re.match(r"[A-Za-z\u00b0\u00b5\u03bc]|1\s*/", text.strip()):
         raise UnitError("must be a unit, such as deg or mm", value=text)
     try:
         found = parse_value(f"1 {text.strip()}")
@@ -107,10 +107,24 @@ class ShownUnits:
                 _, dimension = unit_size(unit)
             except UnitError as error:
                 raise error.located(name=f"units.{name}") from None
-            wanted = _dimension(self.outputs[name]) if name in self.outputs else QUANTITIES[name][1]
-            if dimension != wanted:
-                words = f"measures {describe_dimension(dimension)}, not {describe_dimension(wanted)}"
-                raise UnitError(words, name=f"units.{name}", value=unit)
+            wanted = [self._of_output(name), self._of_kind(name)]
+            if dimension not in wanted:
+                words = " or ".join(describe_dimension(x) for x in wanted if x is not None)
+                message = f"measures {describe_dimension(dimension)}, not {words}"
+                raise UnitError(message, name=f"units.{name}", value=unit)
+
+    def _of_output(self, name: str) -> Dimension | None:
+        """Return the dimension of the output of a name, None where there is none."""
+        return _dimension(self.outputs[name]) if name in self.outputs else None
+
+    def _of_kind(self, name: str) -> Dimension | None:
+        """Return the dimension of a kind of quantity, None for any other name."""
+        return QUANTITIES[name][1] if name in QUANTITIES else None
+
+    def _chosen(self, name: str, wanted: Dimension | None) -> str | None:
+        """Return the unit that is chosen for a name, if it measures what is wanted: a name may be of a kind as well."""
+        unit = self.chosen.get(name)
+        return unit if unit is not None and unit_size(unit)[1] == wanted else None
 
     def of(self, unit: str, name: str = "") -> tuple[str, float]:
         """Return the unit in which a quantity is shown, and by what its values in SI are multiplied.
@@ -125,16 +139,13 @@ class ShownUnits:
         per_time = re.search(r"/s(?:\^(\d+))?$", unit)
         order = int(per_time[1] or 1) if per_time else 0
         base = unit[: per_time.start()] if per_time else unit
-        if name in self.chosen and name in self.outputs:
-            of_output = self.outputs[name]
-            rate = re.search(r"/s(?:\^(\d+))?$", of_output)
+        if shown := self._chosen(name, self._of_output(name)):
+            rate = re.search(r"/s(?:\^(\d+))?$", self.outputs[name])
             order -= int(rate[1] or 1) if rate else 0
-            return derivative_unit(self.chosen[name], order), 1.0 / unit_size(self.chosen[name])[0]
-        kind = next((kind for kind, (known, _) in QUANTITIES.items() if known == base), None)
-        if kind is None or kind not in self.chosen:
-            return unit, 1.0
-        shown = self.chosen[kind]
-        return derivative_unit(shown, order), 1.0 / unit_size(shown)[0]
+            return derivative_unit(shown, order), 1.0 / unit_size(shown)[0]
+        kind = next((kind for kind, (known, _) in QUANTITIES.items() if known == base), "")
+        shown = self._chosen(kind, self._of_kind(kind))
+        return (derivative_unit(shown, order), 1.0 / unit_size(shown)[0]) if shown else (unit, 1.0)
 
     def merged(self, others: Mapping[str, str] | None) -> "ShownUnits":
         """Return these units with others in their place."""
