@@ -107,7 +107,7 @@ def test_a_file_in_degrees_is_never_taken_for_radians(four_bar, tmp_path):
         with pytest.raises(jn.MechanismFileError, match=words) as caught:
             law(column)
         assert "motion.csv" in str(caught.value)
-    text = (tmp_path / "motion.csv").read_text().replace("[deg]", "[dgr]", 1)
+    text = (tmp_path / "motion.csv").read_text().replace("[deg]", "[degx]", 1)
     (tmp_path / "motion.csv").write_text(text)
     with pytest.raises(jn.MechanismFileError, match="unknown unit"):
         law("psi")

@@ -406,6 +406,6 @@ def _runs(angle: Numbers1, lost: Numbers1, where: Bool[np.ndarray, " angle"]) ->
     for low, high in zip(edges[::2], edges[1::2], strict=True):
         inside = order[low:high]
         worst = inside[int(np.argmax(lost[inside]))]
-        at = (float(angle[k]) for k in (inside[0], inside[-1], worst))
-        found.append(Undercut(*at, float(lost[worst])))
+        start, stop, most = (float(angle[k]) for k in (inside[0], inside[-1], worst))
+        found.append(Undercut(start, stop, most, float(lost[worst])))
     return found
