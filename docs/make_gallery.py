@@ -139,6 +139,7 @@ PICTURES = {
     "scotch_yoke": Picture(("pin",), 0.2, points={"pin": ("crank", (0.04, 0))}),
     "screw_press": Picture(("tip",), 0.2),
     "sprung_four_bar": Picture(("C",), 0.0, stop=2.0),
+    "servo_press": Picture(("ram", "pin"), 0.3, points={"pin": ("crank", (0.08, 0))}),
     "simple_pendulum": Picture(("place",), 0.3, stop=2.0),
     "six_bar_stephenson": Picture(("P", "F"), 0.1),
     "six_bar_watt": Picture(("coupler_point",), 0.1),

@@ -87,7 +87,9 @@ from jounce.integrate import (
     simulate_batch as simulate_batch,
 )
 from jounce.io import (
+    in_units as in_units,
     load as load,
+    load_cam as load_cam,
     load_limits as load_limits,
     load_robot as load_robot,
     load_trajectory as load_trajectory,
@@ -99,12 +101,18 @@ from jounce.kinematics import (
     Assembly as Assembly,
     Branch as Branch,
     Curve as Curve,
+    Extreme as Extreme,
     LimitPosition as LimitPosition,
     Mobility as Mobility,
     Motion as Motion,
+    OscillatingFollower as OscillatingFollower,
+    PlateCam as PlateCam,
     Status as Status,
+    TranslatingFollower as TranslatingFollower,
+    Undercut as Undercut,
     assemblies as assemblies,
     mobility as mobility,
+    plate_cam as plate_cam,
     solve as solve,
     solve_batch as solve_batch,
     trace as trace,
@@ -115,6 +123,8 @@ from jounce.mechanism import (
     AngularVelocityOutput as AngularVelocityOutput,
     Body as Body,
     DistanceOutput as DistanceOutput,
+    DriverAngleOutput as DriverAngleOutput,
+    DriverDisplacementOutput as DriverDisplacementOutput,
     EulerAnglesOutput as EulerAnglesOutput,
     EulerParametersOutput as EulerParametersOutput,
     Mechanism as Mechanism,
@@ -151,13 +161,16 @@ from jounce.robot import (
 )
 from jounce.sweeps import sweep as sweep
 from jounce.trajectory import (
+    Continuity as Continuity,
     CycloidalMotion as CycloidalMotion,
     Expression as Expression,
     ExpressionMotion as ExpressionMotion,
     FollowingMotion as FollowingMotion,
     FunctionMotion as FunctionMotion,
+    HermiteMotion as HermiteMotion,
     JointTrajectory as JointTrajectory,
     MeasuredMotion as MeasuredMotion,
+    OutputMotion as OutputMotion,
     PiecewiseMotion as PiecewiseMotion,
     PolynomialMotion as PolynomialMotion,
     RestToRestMotion as RestToRestMotion,
@@ -165,6 +178,7 @@ from jounce.trajectory import (
     SegmentedMotion as SegmentedMotion,
     SplineMotion as SplineMotion,
     TrapezoidalMotion as TrapezoidalMotion,
+    continuity as continuity,
     motion_profile as motion_profile,
 )
 

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from jounce.cli.arguments import converted
+from jounce.cli.cams import cam
 from jounce.cli.conversion import convert
 from jounce.cli.curves import trace
 from jounce.cli.designs import optimize
@@ -29,6 +30,7 @@ from jounce.cli.mechanisms import run, schema, simulate
 from jounce.cli.options import WritingError
 from jounce.cli.papers import reproduce
 from jounce.cli.robots import check, torques
+from jounce.cli.servo import servo
 from jounce.cli.shell_completion import complete
 from jounce.cli.small_motions import modes
 from jounce.cli.standard_streams import failsafe_streams
@@ -62,8 +64,8 @@ def completion(shell: Literal["bash", "zsh", "fish"], /, *, install: bool = Fals
 
 
 COMMANDS = (
-    new, inspect, run, trace, simulate, optimize, sweep, tolerance, modes, plot, report, view, check, torques,
-    convert, reproduce,    schema, completion,
+    new, inspect, run, trace, simulate, optimize, sweep, tolerance, modes, plot, report, view, servo, cam, check,
+    torques, convert, reproduce, schema, completion,
 )  # fmt: skip
 LIGHT = (new, completion)  # they compute nothing
 FIRST = """\

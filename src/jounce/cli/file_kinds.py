@@ -17,13 +17,14 @@ ADVICE = {
     "robot": "is a robot; check, torques, inspect, modes and view take robots, and this makes it a mechanism: "
     "jounce convert {path} {stem}.yaml --hold",
     "trajectory": "is a trajectory, which goes with its robot; jounce check ROBOT {path}, or jounce view ROBOT {path}",
+    "cam": "is a plate cam; jounce cam {path} finds its profile",
     "limits": "holds limits, which go with robot and trajectory; jounce check ROBOT TRAJECTORY --limits {path}",
 }
 _ROOT = re.compile(rb"<(robot|mujoco)[\s>/]")
 
 
 def kind_of(path: str | PathLike[str]) -> str | None:
-    """Return ``mechanism``, ``robot``, ``trajectory`` or ``limits``, or None where the content does not tell.
+    """Return ``mechanism``, ``robot``, ``trajectory``, ``cam`` or ``limits``, or None where the content does not tell.
 
     Examples
     --------
@@ -52,6 +53,8 @@ def _kind_of_data(data: Any) -> str | None:
 
     if not isinstance(data, dict):
         return None
+    if "cam" in data and "follower" in data:
+        return "cam"
     if "bodies" in data or "space" in data:
         return "mechanism"
     if "point_to_point" in data or "motion" in data:

@@ -7,7 +7,16 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from jounce.cli.options import NO_TABLE, PLAIN_MECHANISM, MechanismReading, TableOutput, errors_about, spare_inputs
+from jounce.cli.options import (
+    NO_TABLE,
+    PLAIN,
+    PLAIN_MECHANISM,
+    Heading,
+    MechanismReading,
+    TableOutput,
+    errors_about,
+    spare_inputs,
+)
 from jounce.errors import JounceError, check_name
 from jounce.reporting.terminal import Bar, say, show_peaks
 
@@ -25,6 +34,7 @@ def run(
     tolerance: float = 1e-12,
     no_refine: bool = False,
     reading: MechanismReading = PLAIN_MECHANISM,
+    heading: Heading = PLAIN,
     output: TableOutput = NO_TABLE,
 ) -> int:
     """Solve a mechanism file and print peak values, position to jounce.
@@ -45,15 +55,18 @@ def run(
       jounce run examples/four_bar.yaml
       jounce run examples/rsur.yaml --order 8 --out motion.nc
       jounce run examples/four_bar.yaml --set "BC=15 cm" --set tau=3
+      jounce run examples/four_bar.yaml --units angle=deg,length=mm
     """
     output.check()
+    told = heading.units
     mechanism = reading.mechanism(file)
     spare_inputs(output.out, overwrite=output.overwrite)
     refine = not no_refine
     if _is_long(mechanism, file):
-        motion = _streamed(mechanism, file, order, tolerance, output, refine=refine)
+        motion = _streamed(mechanism, file, order, tolerance, output, refine=refine, heading=told)
         return _told("run", motion, file, output, refine=refine)
-    return _finished("run", solved(mechanism, file, order, tolerance), file, output, refine=refine)
+    motion = solved(mechanism, file, order, tolerance)
+    return _finished("run", motion, file, output, refine=refine, heading=told)
 
 
 def simulate(
@@ -67,6 +80,7 @@ def simulate(
     longest_step: float = math.inf,
     no_refine: bool = False,
     reading: MechanismReading = PLAIN_MECHANISM,
+    heading: Heading = PLAIN,
     output: TableOutput = NO_TABLE,
 ) -> int:
     r"""Move a mechanism by its forces and print peak values, energy, drift.
@@ -97,10 +111,11 @@ def simulate(
     """
     output.check()
     chosen = method_of(method, step)
+    told = heading.units
     mechanism = reading.mechanism(file)
     spare_inputs(output.out, overwrite=output.overwrite)
     motion = simulated(mechanism, file, order, method=chosen, tolerance=tolerance, longest_step=longest_step)
-    return _finished("simulate", motion, file, output, refine=not no_refine)
+    return _finished("simulate", motion, file, output, refine=not no_refine, heading=told)
 
 
 def _is_long(mechanism: Mechanism, file: Path) -> bool:
@@ -111,22 +126,45 @@ def _is_long(mechanism: Mechanism, file: Path) -> bool:
 
 
 def _streamed(
-    mechanism: Mechanism, file: Path, order: int, tolerance: float, output: TableOutput, *, refine: bool
+    mechanism: Mechanism,
+    file: Path,
+    order: int,
+    tolerance: float,
+    output: TableOutput,
+    *,
+    refine: bool,
+    heading: bool | None,
 ) -> Stretches:
     """Solve stretch by stretch, and write each of them before the next is solved."""
+    from jounce.io import in_units
     from jounce.kinematics import solve_in_stretches
     from jounce.reporting.peaks import looked_at
 
     with Bar("solving") as bar:
         with errors_about(file):
             motion = solve_in_stretches(mechanism, order=order, tolerance=tolerance, progress=bar)
-        output.write_parts((part.dataset for part in looked_at(motion, refine=refine)), len(motion.time))
+        parts = (in_units(part.dataset, mechanism.shown_units) for part in looked_at(motion, refine=refine))
+        output.write_parts(parts, len(motion.time), header_units=heading)
     return motion
 
 
-def _finished(command: str, motion: Motion, file: Path, output: TableOutput, *, refine: bool) -> int:
+def _finished(
+    command: str,
+    motion: Motion,
+    file: Path,
+    output: TableOutput,
+    *,
+    refine: bool,
+    heading: bool | None,
+) -> int:
     """Print and write the results of a motion, and return the exit status."""
-    return _told(command, motion, file, output, refine=refine, write=lambda: output.write(lambda: motion.dataset))
+
+    def write() -> None:
+        from jounce.io import in_units
+
+        output.write(lambda: in_units(motion.dataset, motion.mechanism.shown_units), header_units=heading)
+
+    return _told(command, motion, file, output, refine=refine, write=write)
 
 
 def _told(
@@ -141,12 +179,12 @@ def _told(
     """Print what there is to tell of a motion, write it, and return the exit status."""
     from jounce.reporting.json_results import motion_result
     from jounce.reporting.motion_facts import motion_facts
-    from jounce.reporting.peaks import peaks
+    from jounce.reporting.peaks import peaks, shown_peaks
     from jounce.reporting.summaries import motion_summary
 
     if not output.json:
         say(motion_summary(motion_facts(motion), file.name))
-        show_peaks(peaks(motion, refine=refine))
+        show_peaks(shown_peaks(peaks(motion, refine=refine), motion.mechanism.shown_units))
     write()
     output.tell(command, lambda: motion_result(motion, file, output.out, refine))
     return outcome(motion, file)

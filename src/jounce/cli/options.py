@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from jounce.mechanism import Mechanism
     from jounce.robot import Robot
     from jounce.trajectory import JointTrajectory
+    from jounce.trajectory.shown_units import ShownUnits
 
 Overwrite = Annotated[bool, Parameter(alias="--force")]
 """The option of commands that replace no file unasked; --force is what it was called first."""
@@ -62,12 +63,15 @@ class MechanismReading:
         Folder whose files it may name, besides its own; repeatable.
     redundant_reactions
         Where constraints are redundant: unique ones only, or least_norm.
+    units
+        Of what is shown and written, as angle=deg,length=mm; repeatable.
     """
 
     set_: list[str] | None = None
     import_: list[Path] | None = None
     allow: list[Path] | None = None
     redundant_reactions: Literal["unique", "least_norm"] | None = None
+    units: list[str] | None = None
 
     def mechanism(self, file: Path) -> Mechanism:
         """Return the mechanism of a file, with parameters changed, after the user's own classes were imported."""
@@ -78,6 +82,8 @@ class MechanismReading:
             mechanism = load(file, allow=allowed(self.allow))
         if self.redundant_reactions is not None:
             mechanism = replace(mechanism, redundant_reactions=self.redundant_reactions)
+        if self.units:
+            mechanism = replace(mechanism, units=dict(units_chosen(mechanism.shown_units, self.units).chosen))
         if not self.set_:
             return mechanism
         from jounce.io.mechanisms.overrides import override
@@ -150,14 +156,14 @@ class TableOutput:
         if self.out is not None:
             check_writable(self.out, overwrite=self.overwrite)
 
-    def write(self, dataset: Callable[[], Any]) -> None:
+    def write(self, dataset: Callable[[], Any], *, header_units: bool | None = None) -> None:
         """Write the values, an xarray.Dataset, if they are wanted."""
         if (out := self.out) is not None:
             from jounce.io import write
 
-            written(lambda: write(dataset(), out, overwrite=self.overwrite))
+            written(lambda: write(dataset(), out, overwrite=self.overwrite, header_units=header_units))
 
-    def write_parts(self, parts: Iterable[Any], count: int) -> None:
+    def write_parts(self, parts: Iterable[Any], count: int, *, header_units: bool | None = None) -> None:
         """Write values that come in parts along time, with so many instants in all; if unwanted, only go through."""
         if (out := self.out) is None:
             for _ in parts:
@@ -165,14 +171,56 @@ class TableOutput:
             return
         from jounce.io import write_parts
 
-        written(lambda: write_parts(parts, out, count, overwrite=self.overwrite))
+        written(lambda: write_parts(parts, out, count, overwrite=self.overwrite, header_units=header_units))
 
     def tell(self, command: str, result: Callable[[], Mapping[str, Any]]) -> None:
         """Print the result as JSON, or where it was written."""
         tell(command, result, self.out, json=self.json)
 
 
-PLAIN_MECHANISM, PLAIN_ROBOT, NO_TABLE = MechanismReading(), RobotReading(), TableOutput()
+@AMONG_THE_OTHERS
+@dataclass(frozen=True, kw_only=True)
+class Heading:
+    """What the heading of a CSV file says.
+
+    Parameters
+    ----------
+    header_units
+        Say units in the heading of a CSV; those that are not SI always are.
+    plain_header
+        Say none, whatever the units.
+    """
+
+    header_units: bool = False
+    plain_header: bool = False
+
+    @property
+    def units(self) -> bool | None:
+        """Whether it says units; None where it does if they are not those of SI.
+
+        Raises
+        ------
+        JounceError
+            Both are asked for.
+        """
+        if self.header_units and self.plain_header:
+            raise JounceError("goes against --header-units; give one of them", name="--plain-header")
+        return True if self.header_units else False if self.plain_header else None
+
+
+def units_chosen(known: ShownUnits, texts: Sequence[str] | None) -> ShownUnits:
+    """Return the units of a file with those of the option --units in their place."""
+    from jounce.trajectory.shown_units import units_given
+
+    given = units_given(texts or ())
+    try:
+        return known.merged(given)
+    except JounceError as error:
+        error.name = f"--units {str(error.name).removeprefix('units.')}"
+        raise
+
+
+PLAIN_MECHANISM, PLAIN_ROBOT, NO_TABLE, PLAIN = MechanismReading(), RobotReading(), TableOutput(), Heading()
 
 
 def tell(command: str, result: Callable[[], Mapping[str, Any]], out: Path | None, *, json: bool) -> None:

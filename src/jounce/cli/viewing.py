@@ -69,6 +69,8 @@ def view(
         checked_order(order)
         if file.suffix.lower() in DATA_FILES:
             subject = reading.mechanism(file)
+        elif reading.units:
+            raise JounceError("is for mechanism files; what is shown of a robot is in SI", name="--units")
         elif reading.set_ or reading.import_:
             option = "--set" if reading.set_ else "--import"
             raise JounceError("is for mechanism files; a robot has no parameters", name=option)

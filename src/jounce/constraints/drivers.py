@@ -1,4 +1,7 @@
-"""Drivers: constraints with a motion law ``f(t)``. Sommer 2024, equations 39-40, 44-49, 53-55 and 101-111."""
+"""Drivers: constraints with a motion law ``f(t)``. Sommer 2024, equations 39-40, 44-49, 53-55 and 101-111.
+
+Each can be evaluated as an output is: its value is the coordinate that it prescribes, whatever its law.
+"""
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -7,7 +10,7 @@ from jounce.constraints.angles import Datum, check_vectors, relative_angle
 from jounce.constraints.base import AbstractConstraint, MotionLaw, Scalar, Vector
 from jounce.constraints.planar import COORDINATES, coordinate_of, slide
 from jounce.errors import MechanismError, check_choice
-from jounce.jet import wrap
+from jounce.jet import sqrt, wrap
 
 
 class CoordinateDriver(AbstractConstraint, type="coordinate", space="planar", role="driver"):
@@ -24,10 +27,12 @@ class CoordinateDriver(AbstractConstraint, type="coordinate", space="planar", ro
     def __check_init__(self):
         check_choice("coordinate", self.coordinate, COORDINATES, MechanismError)
 
-    def residual(self, body_i, body_j, time):
+    def evaluate(self, body_i, body_j):
         ratio = 1.0 if self.ratio is None else self.ratio
-        driven = coordinate_of(body_j, self.coordinate) - ratio * body_i.angle
-        return driven - self.offset - self.motion(time)
+        return coordinate_of(body_j, self.coordinate) - ratio * body_i.angle - self.offset
+
+    def residual(self, body_i, body_j, time):
+        return self.evaluate(body_i, body_j) - self.motion(time)
 
 
 class SlideDriver(AbstractConstraint, type="slide", space="planar", role="driver"):
@@ -38,8 +43,11 @@ class SlideDriver(AbstractConstraint, type="slide", space="planar", role="driver
     vector_i: Vector  # direction of travel
     motion: MotionLaw  # m
 
+    def evaluate(self, body_i, body_j):
+        return slide(body_i, body_j, self.point_i, self.point_j, self.vector_i)
+
     def residual(self, body_i, body_j, time):
-        return slide(body_i, body_j, self.point_i, self.point_j, self.vector_i) - self.motion(time)
+        return self.evaluate(body_i, body_j) - self.motion(time)
 
 
 class DistanceDriver(AbstractConstraint, type="distance", space="planar", role="driver"):
@@ -48,6 +56,10 @@ class DistanceDriver(AbstractConstraint, type="distance", space="planar", role="
     point_i: Vector  # m, in the frame of body i
     point_j: Vector
     motion: MotionLaw  # m
+
+    def evaluate(self, body_i, body_j):
+        d = body_j.point(self.point_j) - body_i.point(self.point_i)
+        return sqrt(d.dot(d))
 
     def residual(self, body_i, body_j, time):
         d = body_j.point(self.point_j) - body_i.point(self.point_i)
@@ -84,6 +96,8 @@ class RotationDriver(AbstractConstraint, type="rotation", space="spatial", role=
 
     __check_init__ = check_vectors
 
+    def evaluate(self, body_i, body_j):
+        return relative_angle(body_i, body_j, self.axis_i, self.vector_i, self.vector_j, self.datum)
+
     def residual(self, body_i, body_j, time):
-        angle = relative_angle(body_i, body_j, self.axis_i, self.vector_i, self.vector_j, self.datum)
-        return wrap(angle - self.motion(time))
+        return wrap(self.evaluate(body_i, body_j) - self.motion(time))

@@ -5,28 +5,18 @@ from typing import Any, ClassVar
 import equinox as eqx
 import numpy as np
 
-from jounce.constraints.base import Vector, value_fields
+from jounce.constraints.base import Vector
 from jounce.dynamics.inverse import MotionForces
 from jounce.dynamics.masses import check_loads
 from jounce.errors import MechanismError, check_name, did_you_mean
 from jounce.kinematics import Motion, Status
 from jounce.mechanism import AbstractMotionOutput, AngularVelocityOutput, Mechanism, PointOutput
+from jounce.mechanism.driver_outputs import is_turning
 from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.resolve import resolve_element
 from jounce.shapes import ArrayLike, Numbers
 
 RATES = ("yank", "second rate", "third rate", "fourth rate")
-
-
-def is_turning(driver: Any) -> bool:
-    """Tell whether the law of a driver is an angle, so that what it exerts is a torque."""
-    fields = value_fields(type(driver))
-    stated = getattr(driver, "dimensions", {}).get("motion")
-    if stated is not None:
-        return stated == "angle"
-    if "coordinate" in fields:
-        return driver.coordinate == "angle"
-    return "point_i" not in fields and "point_j" not in fields
 
 
 class AbstractForceOutput(AbstractMotionOutput):

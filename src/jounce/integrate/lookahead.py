@@ -15,13 +15,13 @@ from jaxtyping import Float
 
 from jounce.dynamics.forward import Equations, Flags, Indices, Lanes, Matrices, State, with_ground
 from jounce.dynamics.inverse import force_names
-from jounce.dynamics.outputs import is_turning
 from jounce.integrate.events import INTERPOLATION, NODES
 from jounce.integrate.methods import evaluated
 from jounce.integrate.turns import Angles
 from jounce.jet import Jet
 from jounce.mechanism import Model
 from jounce.mechanism.axis_angles import with_turns
+from jounce.mechanism.driver_outputs import is_turning
 from jounce.mechanism.system import Group
 from jounce.shapes import Numbers
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from jounce.io.files.column_units import in_units as in_units
+    from jounce.io.mechanisms.cam_files import load_cam as load_cam
     from jounce.io.mechanisms.json_schema import json_schema as json_schema
     from jounce.io.mechanisms.loader import load as load
     from jounce.io.mechanisms.writer import write_mechanism as write_mechanism
@@ -19,8 +21,10 @@ if TYPE_CHECKING:
     from jounce.io.robots.trajectories import load_trajectory as load_trajectory
 
 _HOMES = {
+    "in_units": "files.column_units",
     "load": "mechanisms.loader",
     "json_schema": "mechanisms.json_schema",
+    "load_cam": "mechanisms.cam_files",
     "check_writable": "results",
     "read": "results",
     "write": "results",

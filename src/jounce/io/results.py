@@ -15,15 +15,18 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.errors import OutputError
+from jounce.io.files.column_units import heading, is_si, name_and_unit
 from jounce.io.files.netcdf_parts import NetcdfParts
 from jounce.io.files.reading import known_name, read_file, reason_of, written_name
 from jounce.io.files.writing import check_target, replacing
 from jounce.mechanism import EulerAnglesOutput, EulerParametersOutput, RotationMatrixOutput
+from jounce.trajectory.shown_units import derivative_unit
 
 if TYPE_CHECKING:
     import xarray
 
 SUFFIXES = (".csv", ".nc")
+ALONG = ("time", "angle", "point")  # what the rows of a table follow: of a motion, of a cam, of a curve
 CURVE_AXES = ("arc_length", "driver_value")  # first columns of a curve of configurations
 AXES = {  # of outputs that are more than one number, and the labels along them
     ("component",): ("x", "y", "z"),
@@ -59,7 +62,13 @@ def check_writable(path: str | PathLike[str], *, overwrite: bool = False) -> Non
     check_target(path, SUFFIXES, "an output", overwrite=overwrite)
 
 
-def write(dataset: xarray.Dataset, path: str | PathLike[str], *, overwrite: bool = False) -> None:
+def write(
+    dataset: xarray.Dataset,
+    path: str | PathLike[str],
+    *,
+    overwrite: bool = False,
+    header_units: bool | None = None,
+) -> None:
     """Write the dataset of a motion to a .csv or .nc file, whole or not at all.
 
     A CSV file has the columns ``time``, then for each output ``NAME, NAME_d1, NAME_d2, ...``, and for a vector
@@ -78,6 +87,9 @@ def write(dataset: xarray.Dataset, path: str | PathLike[str], *, overwrite: bool
         The file; one of that name is replaced.
     overwrite
         Whether that may be a file which this process has read as an input, such as the samples of a motion law.
+    header_units
+        Whether the heading of a CSV file says the units, as ``psi_d1 [deg/s]``; unless given, where some are not of SI:
+        what reads such a file as samples takes them for what they are.
 
     Raises
     ------
@@ -98,13 +110,18 @@ def write(dataset: xarray.Dataset, path: str | PathLike[str], *, overwrite: bool
     check_writable(path, overwrite=overwrite)
     with replacing(path, overwrite=overwrite) as scratch:
         if Path(fspath(path)).suffix.lower() == ".csv":
-            _write_csv(dataset, scratch)
+            _write_csv(dataset, scratch, header_units)
         else:
             _write_netcdf(dataset, scratch)
 
 
 def write_parts(
-    parts: Iterable[xarray.Dataset], path: str | PathLike[str], count: int, *, overwrite: bool = False
+    parts: Iterable[xarray.Dataset],
+    path: str | PathLike[str],
+    count: int,
+    *,
+    overwrite: bool = False,
+    header_units: bool | None = None,
 ) -> None:
     """Write a dataset that comes in parts along time to a .csv or .nc file, whole or not at all.
 
@@ -121,6 +138,8 @@ def write_parts(
         Number of instants of all parts together.
     overwrite
         Whether that may be a file which this process has read as an input.
+    header_units
+        As that of `write`.
 
     Raises
     ------
@@ -141,10 +160,13 @@ def write_parts(
     (100001, 1)
     """
     check_writable(path, overwrite=overwrite)
-    put = _put_rows if Path(fspath(path)).suffix.lower() == ".csv" else _put_netcdf
+    in_rows = Path(fspath(path)).suffix.lower() == ".csv"
     try:
         with replacing(path, overwrite=overwrite) as scratch:
-            put(_counted(parts, count), scratch, count)
+            if in_rows:
+                _put_rows(_counted(parts, count), scratch, header_units)
+            else:
+                _put_netcdf(_counted(parts, count), scratch, count)
     except _SourceError as error:
         raise error.reason from None
 
@@ -165,10 +187,10 @@ def _counted(parts: Iterable[xarray.Dataset], count: int) -> Iterator[tuple[int,
         first += part.sizes["time"]
 
 
-def _put_rows(parts: Iterator[tuple[int, xarray.Dataset]], path: Path, _: int) -> None:
+def _put_rows(parts: Iterator[tuple[int, xarray.Dataset]], path: Path, header_units: bool | None) -> None:
     with path.open("w", newline="", encoding="utf-8") as stream:
         for first, part in parts:
-            _write_rows(part, stream, heading=first == 0)
+            _write_rows(part, stream, header_units, headed=first == 0)
 
 
 def _put_netcdf(parts: Iterator[tuple[int, xarray.Dataset]], path: Path, count: int) -> None:
@@ -189,10 +211,12 @@ def columns(dataset: xarray.Dataset) -> dict[str, Float[np.ndarray, " time"]]:
     """
     from xarray import Variable
 
-    along = "time" if "time" in dataset.dims else "point"
-    first = ("time",) if along == "time" else (name for name in CURVE_AXES if name in dataset.coords)
+    along = next(name for name in ALONG if name in dataset.dims)
+    first = (name for name in CURVE_AXES if name in dataset.coords) if along == "point" else (along,)
     found = {name: np.asarray(dataset[name], float) for name in first}
     for name, variable in dataset.data_vars.items():
+        if variable.dims == (along,) and along == "angle":
+            found[str(name)] = np.asarray(variable, float)
         axes = tuple(dim for dim in variable.dims if dim not in (along, "derivative"))
         if not {along, "derivative"} <= set(variable.dims) or (axes and axes not in AXES):
             continue
@@ -213,22 +237,39 @@ def columns(dataset: xarray.Dataset) -> dict[str, Float[np.ndarray, " time"]]:
     return found
 
 
-def _write_csv(dataset: xarray.Dataset, path: Path) -> None:
+def _column_units(dataset: xarray.Dataset, names: Iterable[str]) -> list[str | None]:
+    """Return the units of columns of a table; None where they are not known."""
+    found = []
+    for name in names:
+        stem, order = re.fullmatch(r"(.*?)(?:_d([0-9]+))?", name, re.DOTALL).groups()  # type: ignore[union-attr]
+        holder = next((n for n in (name, stem, stem.rpartition("_")[0]) if n in dataset.variables), None)
+        unit = dataset[holder].attrs.get("units") if holder is not None else None
+        unit = "s" if unit is None and name == "time" else unit
+        if unit and order and CURVE_AXES[0] in dataset.coords:
+            unit = None  # its derivatives are by arc length
+        found.append(derivative_unit(unit, int(order or 0)) if unit else None)
+    return found
+
+
+def _write_csv(dataset: xarray.Dataset, path: Path, header_units: bool | None) -> None:
     with path.open("w", newline="", encoding="utf-8") as stream:
-        _write_rows(dataset, stream)
+        _write_rows(dataset, stream, header_units)
 
 
 def _write_netcdf(dataset: xarray.Dataset, path: Path) -> None:
     path.write_bytes(_netcdf(dataset))
 
 
-def _write_rows(dataset: xarray.Dataset, stream: TextIO, *, heading: bool = True) -> None:
+def _write_rows(dataset: xarray.Dataset, stream: TextIO, header_units: bool | None, *, headed: bool = True) -> None:
     """Write a dataset as the lines of a CSV file, below a heading with the names of the columns."""
     table = columns(dataset)
     rows = np.stack(list(table.values()), axis=1)
     line = ",".join(["%.17g"] * rows.shape[1]) + "\n"
-    if heading:
-        csv.writer(stream, lineterminator="\n").writerow(map(written_name, table))
+    if headed:
+        units = _column_units(dataset, table)
+        told = not all(map(is_si, units)) if header_units is None else header_units
+        names = [heading(name, unit) if told and unit else name for name, unit in zip(table, units, strict=True)]
+        csv.writer(stream, lineterminator="\n").writerow(map(written_name, names))
     for start in range(0, len(rows), 1000):
         stream.writelines(line % tuple(row) for row in rows[start : start + 1000].tolist())
 
@@ -267,8 +308,9 @@ def _version() -> str:
 def read(path: str | PathLike[str]) -> xarray.Dataset:
     """Read a file that `write` wrote back into a dataset; values come back to the bit.
 
-    A CSV file has no units, and does not say what is a vector: neighbouring columns ``NAME_x, NAME_y`` (and
-    ``NAME_z``) become the vector NAME, and those of Euler parameters, Euler angles and rotation matrices likewise.
+    A CSV file may say units in its heading, which become those of the variables: values stay as they are. It does not
+    say what is a vector: neighbouring columns ``NAME_x, NAME_y`` (and ``NAME_z``) become the vector NAME, and those of
+    Euler parameters, Euler angles and rotation matrices likewise.
 
     Returns
     -------
@@ -291,7 +333,7 @@ def read(path: str | PathLike[str]) -> xarray.Dataset:
         if suffix == ".nc":
             return xarray.load_dataset(io.BytesIO(content), engine="h5netcdf")
         lines = csv.reader(io.StringIO(content.decode(), newline=""))
-        header = [known_name(entry) for entry in next(lines, [])]
+        header, units = _named_columns(next(lines, []))
         rows = [[float(entry) for entry in row] for row in lines]
     except (OSError, ValueError, csv.Error) as error:
         raise OutputError(f"cannot be read: {reason_of(error)}", path=name) from None
@@ -300,7 +342,17 @@ def read(path: str | PathLike[str]) -> xarray.Dataset:
     for line, row in enumerate(rows, start=2):
         if len(row) != len(header):
             raise OutputError(f"must have {len(header)} entries", path=name, line=line, value=len(row))
-    return _from_columns(header, np.array(rows))
+    dataset = _from_columns(header, np.array(rows))
+    for name, variable in dataset.data_vars.items():
+        if (unit := units.get(str(name), units.get(f"{name}_{AXES.get(variable.dims[2:], ('',))[0]}"))) is not None:
+            variable.attrs["units"] = unit
+    return dataset
+
+
+def _named_columns(header: list[str]) -> tuple[list[str], dict[str, str]]:
+    """Return the names of columns, and the units of those that say one."""
+    pairs = [name_and_unit(known_name(entry)) for entry in header]
+    return [name for name, _ in pairs], {name: unit for name, unit in pairs if unit is not None}
 
 
 def _from_columns(header: list[str], table: Float[np.ndarray, "time columns"]) -> xarray.Dataset:

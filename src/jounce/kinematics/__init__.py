@@ -1,5 +1,13 @@
 """Kinematics: assembly, positions, all derivatives from one factorisation, diagnosis, and the result."""
 
+from jounce.kinematics.cams import (
+    Extreme as Extreme,
+    OscillatingFollower as OscillatingFollower,
+    PlateCam as PlateCam,
+    TranslatingFollower as TranslatingFollower,
+    Undercut as Undercut,
+    plate_cam as plate_cam,
+)
 from jounce.kinematics.curves import (
     Assemblies as Assemblies,
     Assembly as Assembly,

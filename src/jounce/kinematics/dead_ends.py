@@ -10,6 +10,8 @@ from jounce.kinematics.curves.curve import posed
 from jounce.kinematics.curves.start import TIME, law_values
 from jounce.kinematics.motion import Motion
 from jounce.kinematics.status import Status
+from jounce.mechanism import with_outputs_held
+from jounce.mechanism.held_outputs import led_outputs
 
 ENDS = (Status.SINGULAR, Status.NOT_CONVERGED, Status.COLLAPSED)
 LENGTH = 40.0  # of the curve, looked at for where the other branch leads
@@ -21,15 +23,16 @@ def dead_end_words(motion: Motion, index: int) -> str:
 
     The curve of configurations is traced from the last instant that was solved.
     """
-    drivers = motion.mechanism.drivers
+    mechanism = with_outputs_held(motion.mechanism)
+    drivers = mechanism.drivers
     if not drivers or index == 0 or motion.status[index] not in ENDS or motion.status[index - 1] != Status.OK:
         return ""
     before, here = float(motion.time[index - 1]), float(motion.time[index])
     _, coordinates = motion.poses
-    last = posed(motion.mechanism, {name: np.asarray(c)[0, ..., index - 1] for name, c in coordinates.items()})
+    last = posed(mechanism, {name: np.asarray(c)[0, ..., index - 1] for name, c in coordinates.items()})
     name = next(iter(drivers)) if len(drivers) == 1 else TIME
     try:
-        wanted = here if name == TIME else law_values(motion.mechanism, here)[name]
+        wanted = here if name == TIME else law_values(mechanism, here)[name]
         curve = trace(last, before, driver=name, order=0, count=2, length=LENGTH)
     except JounceError:
         return ""  # what failed is told already
@@ -38,12 +41,18 @@ def dead_end_words(motion: Motion, index: int) -> str:
         return ""
     value, other = found
     if name == TIME:
-        values = law_values(motion.mechanism, value)
+        values = law_values(mechanism, value)
         told = ", ".join(f"{driver} = {x:.9g}" for driver, x in values.items())
         return (
             f"its drivers lead it to a dead point at t = {value:.9g} s, where {told}: from there they can only go back"
         )
     far = "" if other is None else f", on another branch, which leads to {_words(other, curve.unit)}"
+    led = led_outputs(motion.mechanism)
+    if name in led:
+        return (
+            f"{led[name].output} can go no further than {_words(value, curve.unit)}: there it says nothing of the "
+            f"driver {name}, which goes on past this dead point while it turns back"
+        )
     return f"{name} can go no further than {_words(value, curve.unit)}: past this dead point it turns back{far}"
 
 

@@ -18,6 +18,7 @@ from jounce.kinematics.status import Status
 from jounce.kinematics.threads import thread_count
 from jounce.mechanism import AbstractMotionOutput, Mechanism, Model, build, check_mechanism, time_grid
 from jounce.mechanism.axis_angles import measures_angle
+from jounce.mechanism.held_outputs import refuse_led_outputs
 from jounce.mechanism.law_checks import check_laws
 from jounce.mechanism.preconditions import concrete
 from jounce.shapes import ArrayLike
@@ -112,6 +113,7 @@ def solve_batch(
     0
     """
     check_mechanism(mechanism)
+    refuse_led_outputs(mechanism, "families are not solved")
     values = checked_values(mechanism, parameters, "design")
     names, rows = tuple(values), np.stack(list(values.values()), axis=-1)
     order = checked_settings(mechanism, order, tolerance)

@@ -1,5 +1,6 @@
 """The result of a solve: outputs and any point of any body, with their derivatives, at every instant."""
 
+import dataclasses
 from collections.abc import Callable
 from functools import cached_property
 from typing import Any
@@ -8,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.display import Displayed
-from jounce.errors import MechanismError
+from jounce.errors import MechanismError, check_name
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked
 from jounce.jet.derivatives import plain_derivatives
@@ -20,6 +21,8 @@ from jounce.mechanism import (
     AbstractQuantity,
     AngleOutput,
     AngularVelocityOutput,
+    DriverAngleOutput,
+    DriverDisplacementOutput,
     Mechanism,
     Model,
     PointOutput,
@@ -27,9 +30,11 @@ from jounce.mechanism import (
 from jounce.mechanism.attitude_outputs import continued
 from jounce.mechanism.axis_angles import AttitudeHistory, attitudes_of
 from jounce.mechanism.builder import counted_as_in
+from jounce.mechanism.driver_outputs import is_turning
 from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.system import POSITION_COMPONENTS, Group, group_elements
 from jounce.shapes import ArrayLike, Numbers
+from jounce.trajectory import HermiteMotion
 
 _UNDEFINED = Status.UNDEFINED.advice.partition(": ")[2]
 
@@ -108,6 +113,7 @@ class Motion(Displayed):
         self.model, self.history = model, history
         self._bodies, groups = state
         self._groups = dict(zip(model.outputs, groups, strict=True))
+        self._actuated: Mechanism | None = None  # with laws, where those of drivers follow from outputs
 
     @cached_property
     def _coordinates(self) -> dict[str, Any]:
@@ -135,6 +141,67 @@ class Motion(Displayed):
         pairs = zip(self._groups.values(), self.model.system.outputs, strict=True)
         found: Any = tuple(self._continued(g, c)[0] for c, g in pairs if getattr(g.element, "wraps", ()))
         return found
+
+    def moved_by(self, model: Model, actuated: Mechanism) -> "Motion":
+        """Return the same motion of the same bodies, with a model of the drivers that move them, and their laws."""
+        state = self._bodies, tuple(self._groups.values())
+        outcome = self.status, self.faults, self.change_points, self.history
+        motion = Motion(self.mechanism, model, self.time, self.order, state, *outcome)
+        motion._actuated = actuated
+        return motion
+
+    @property
+    def actuated(self) -> Mechanism:
+        """The mechanism with laws of all drivers: those that follow from outputs are the ones found by this motion.
+
+        They go through the instants of the motion with all derivatives, and say nothing beyond its first and last.
+        """
+        return self.mechanism if self._actuated is None else self._actuated
+
+    def driver(self, name: str) -> Any:
+        """Return the coordinate of a driver and its derivatives, as the bodies have it: what its law must be.
+
+        Parameters
+        ----------
+        name : str
+            Of the driver.
+
+        Returns
+        -------
+        xarray.DataArray
+            Dimensions time and derivative; rad or m.
+
+        Raises
+        ------
+        MechanismError
+            If there is no such driver, or its class does not say what its coordinate is.
+
+        Examples
+        --------
+        >>> import jounce as jn
+        >>> motion = jn.solve(jn.load("examples/four_bar.yaml"), [0.0, 0.5], order=2)
+        >>> motion.driver("theta").values.round(6).tolist()[1]
+        [1.570796, 0.0, -10.335426]
+        """
+        check_name("driver", name, self.mechanism.drivers, MechanismError, name="driver")
+        turning = is_turning(self.mechanism.drivers[name])
+        return self.evaluate((DriverAngleOutput if turning else DriverDisplacementOutput)(name), name)
+
+    def driver_law(self, name: str) -> HermiteMotion:
+        """Return the law of a driver: through the instants that were solved, with the derivatives of the motion.
+
+        Raises
+        ------
+        MechanismError
+            As `driver`.
+        """
+        values, solved = self.driver(name).values, self.status == Status.OK
+        return HermiteMotion(self.time[solved], values[solved])
+
+    def driver_coefficients(self, name: str) -> Float[Numbers, "order 1 time"]:
+        """Return the Taylor coefficients of the coordinate of a driver, as the bodies have it."""
+        bare: Any = dataclasses.replace(self.mechanism.drivers[name], motion=0.0)
+        return self._coefficients(output_group(bare, self.mechanism, self.model, f"drivers.{name}"))[:, :, 0]
 
     def __repr__(self) -> str:
         solved = int(np.sum(self.status == Status.OK))

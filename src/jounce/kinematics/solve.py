@@ -9,7 +9,8 @@ import numpy as np
 from jax.errors import ConcretizationTypeError
 from jaxtyping import Float
 
-from jounce.errors import MechanismError, SolveError, UnsupportedError
+from jounce.errors import AssemblyError, MechanismError, MobilityError, SolveError, UnsupportedError
+from jounce.kinematics.actuation import actuated
 from jounce.kinematics.assembly import assemble
 from jounce.kinematics.curves.choice import chosen
 from jounce.kinematics.dead_ends import dead_end_words
@@ -22,8 +23,9 @@ from jounce.kinematics.status import Status
 from jounce.kinematics.stretches import Stretches
 from jounce.kinematics.threads import thread_count
 from jounce.kinematics.traced_motion import TracedMotion
-from jounce.mechanism import Mechanism, build, check_mechanism, time_grid
+from jounce.mechanism import Mechanism, build, check_mechanism, time_grid, with_outputs_held
 from jounce.mechanism.axis_angles import measures_angle
+from jounce.mechanism.held_outputs import led_outputs, refuse_led_outputs
 from jounce.mechanism.law_checks import check_laws
 from jounce.mechanism.preconditions import concrete
 from jounce.mechanism.system import Group
@@ -38,6 +40,7 @@ def _differentiated(solve: Callable[..., Motion], given: Mapping[str, Any]) -> M
     """Solve a mechanism of which JAX traces some values."""
     mechanism = given["mechanism"]
     check_mechanism(mechanism)
+    refuse_led_outputs(mechanism, "a motion is not differentiated")
     options = {name: value for name, value in given.items() if name not in ("mechanism", "time", "order", "strict")}
     order = checked_settings(mechanism, given.get("order", 4), options.get("tolerance", 1e-12))
     time = mechanism.time if given.get("time") is None else given["time"]
@@ -135,7 +138,7 @@ def solve(
     found = solve_grid(solver, path, instants, progress, count, keep=keep)
     change_points = np.array([point.instant for point in path.change_points])
     state, outcome = (found.coordinates, found.outputs), (found.status, found.faults)
-    motion = Motion(mechanism, solver.model, instants, order, state, *outcome, change_points, path.history())
+    motion = actuated(Motion(mechanism, solver.model, instants, order, state, *outcome, change_points, path.history()))
     if strict:
         raise_for_status(motion)
     return motion
@@ -206,7 +209,12 @@ def _followed(
     lost = lost_orders(mechanism)
     of_forces = any(output.of_forces for output in mechanism.outputs.values())
     check_laws(mechanism, np.array([first, last]), order + lost, forces=of_forces)
-    model, coordinates = assemble(build(chosen(mechanism, first)), first, tolerance)
+    try:
+        model, coordinates = assemble(build(chosen(with_outputs_held(mechanism), first)), first, tolerance)
+    except (AssemblyError, MobilityError) as error:
+        for name, motion in led_outputs(mechanism).items():
+            error.message += f"; the driver {name} follows from the output {motion.output}, which must determine it"
+        raise
     solver = Solver(model, max(order + lost, LOWEST_ORDER), float(tolerance), refine, order)
     start = _first(solver, coordinates, np.array([first]))
     on_the_way = np.asarray(instants) if len(instants) <= LONG_GRID else NO_GRID

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from jounce.kinematics import long_grids
+from jounce.kinematics.actuation import actuated
 from jounce.kinematics.long_grids import stretches
 from jounce.kinematics.motion import Motion
 from jounce.kinematics.path_following import FollowedPath, Solver
@@ -63,8 +64,8 @@ class Stretches:
             self.status[first + failed] = part.status[failed]
             self.faults |= {first + lane: fault for lane, fault in part.faults.items()}
             outcome = part.status, part.faults
-            yield Motion(
-                self.mechanism, model, part.time, self.order, part.state, *outcome, self.change_points, history
+            yield actuated(
+                Motion(self.mechanism, model, part.time, self.order, part.state, *outcome, self.change_points, history)
             )
 
 

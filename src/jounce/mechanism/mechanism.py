@@ -17,6 +17,7 @@ from jounce.rigid.inertia import Inertia
 from jounce.trajectory import Expression
 from jounce.trajectory.dimensions import Dimension, check_one_of
 from jounce.trajectory.expression import RESERVED
+from jounce.trajectory.shown_units import ShownUnits
 from jounce.trajectory.units import parse_value
 
 GROUND = "ground"
@@ -122,6 +123,9 @@ class Mechanism(Displayed):
         stiffness ``force``, N/m, and ``torque``, N m/rad; what is not given is rigid.
     title : str, optional
         One line for tables and figures.
+    units : dict of str to str, optional
+        In which results are shown and written: units by ``angle``, ``length``, ``force``, ``torque``, ``energy``,
+        ``power``, or the name of an output. Values inside, and those of `Motion`, are in SI.
     assembly : int, str or dict, optional
         Which of several assemblies is meant, where the nearest to the starting guess by chance of iteration will not
         do: its number as `jounce.assemblies` counts, ``"nearest"`` for the truly nearest to the guess, or for some
@@ -162,6 +166,7 @@ class Mechanism(Displayed):
     time: Any = None
     redundant_reactions: str | Mapping[str, Any] = "unique"
     title: str = ""
+    units: Mapping[str, str] = dataclasses.field(default_factory=dict)
     assembly: Any = None
     dimensions: Mapping[str, tuple[Dimension, ...]] = dataclasses.field(default_factory=dict, compare=False, repr=False)
 
@@ -178,6 +183,12 @@ class Mechanism(Displayed):
         for kind, elements in self.elements.items():
             for name, element in elements.items():
                 self._check_element(kind, name, element)
+        _ = self.shown_units
+
+    @property
+    def shown_units(self) -> ShownUnits:
+        """The units in which results are shown and written."""
+        return ShownUnits(self.units, {name: output.unit for name, output in self.outputs.items()})
 
     def _check_names(self) -> None:
         for name, body in self.bodies.items():

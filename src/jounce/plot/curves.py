@@ -92,10 +92,11 @@ def _panels(curve: Curve, names: Sequence[str]) -> list[Panel]:
 
 def _draw_panel(axes: Any, curves: Sequence[Curve], name: str, pair: tuple[int, ...]) -> None:
     output = curves[0].mechanism.outputs[name]
-    exponent = scale_of(np.concatenate([curve.outputs[name][:, 0].ravel() for curve in curves]))
-    unit = unit_label(output.unit, 0, exponent)
+    shown, factor = curves[0].mechanism.shown_units.of(output.unit, name)
+    exponent = scale_of(np.concatenate([curve.outputs[name][:, 0].ravel() for curve in curves]) * factor)
+    unit = unit_label(shown, 0, exponent)
     for number, curve in enumerate(curves):
-        values = curve.outputs[name][:, 0] * 10.0**-exponent
+        values = curve.outputs[name][:, 0] * factor * 10.0**-exponent
         along = curve.arc_lengths if curve.driver is None else curve.values[:, 0]
         x, y = (values[:, k] for k in pair) if pair else (along, values)
         colour = LINE_COLOURS[number % len(LINE_COLOURS)]

@@ -92,7 +92,8 @@ def draw_columns(motion: Motion, columns: Mapping[str, Column]) -> Any:
 def _draw_column(motion: Motion, name: str, column: Column, panels: Any, first: int) -> None:
     """Draw one output: panel by panel its derivatives, with its components over each other."""
     output, values = column
-    values = values[:, :, None] if values.ndim == 2 else values
+    unit, factor = motion.mechanism.shown_units.of(output.unit, name)
+    values = (values[:, :, None] if values.ndim == 2 else values) * factor
     vector = values.shape[2] > 1
     for row, axes in enumerate(panels):
         order = row + first - output.lost_orders
@@ -115,7 +116,7 @@ def _draw_column(motion: Motion, name: str, column: Column, panels: Any, first: 
         word = quantity_word(output, order)
         word = f"{word} derivative" if row + first > 4 and not output.rate_names else word
         mark = "" if vector else symbol(name, order)
-        axes.set_ylabel(f"{word}\n{mark}{'  ' if mark else ''}({unit_label(output.unit, order, exponent)})")
+        axes.set_ylabel(f"{word}\n{mark}{'  ' if mark else ''}({unit_label(unit, order, exponent)})")
     top = panels[max(output.lost_orders - first, 0)]  # a force starts beside the acceleration
     top.set_title(shown_name(name), loc="left", pad=6)
     if vector:

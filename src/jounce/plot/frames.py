@@ -18,7 +18,7 @@ from jounce.kinematics import Motion
 from jounce.kinematics.assembly import assemble
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.curves.choice import chosen
-from jounce.mechanism import Mechanism, build, time_grid
+from jounce.mechanism import Mechanism, build, time_grid, with_outputs_held
 from jounce.mechanism.builder import starting_guess
 from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.system import POSITION_COMPONENTS
@@ -49,7 +49,8 @@ def assembled(mechanism: Mechanism) -> dict[str, Frame]:
     >>> assembled(jn.load("examples/four_bar.yaml"))["crank"][0, :, 1].round(6).tolist()  # x axis
     [0.866025, 0.5]
     """
-    started = dataclasses.replace(mechanism, drivers={**mechanism.drivers, **mechanism.initial}, initial={})
+    held = with_outputs_held(mechanism)
+    started = dataclasses.replace(held, drivers={**held.drivers, **held.initial}, initial={})
     first = 0.0
     if mechanism.time is not None:
         first = float(time_grid(mechanism.time, mechanism.parameter_values)[0])

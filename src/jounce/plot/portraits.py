@@ -60,7 +60,7 @@ def hodograph(motion: Motion, output: str, order: int = 1) -> Any:
     pairs = PROJECTIONS if values.shape[1] == 3 else PROJECTIONS[:1]
     its_output, exponent = outputs[output], scale_of(values)
     scaled = values * 10.0**-exponent
-    unit = unit_label(its_output.unit, order, exponent)
+    unit = unit_label(motion.mechanism.shown_units.of(its_output.unit, output)[0], order, exponent)
     with style():
         figure = blank_figure(SIDE * len(pairs) + 0.4 * (len(pairs) == 1), SIDE + 0.3, _title(motion, output, (order,)))
         for axes, (i, j) in zip(np.atleast_1d(figure.subplots(1, len(pairs))), pairs, strict=True):
@@ -110,6 +110,7 @@ def phase_portrait(motion: Motion, output: str, orders: tuple[int, int] = (0, 1)
     pair = tuple(orders)
     first, second = (values.reshape(len(values), -1) for values in _values(motion, output, pair))
     its_output, count = motion.mechanism.outputs[output], first.shape[1]
+    unit, _ = motion.mechanism.shown_units.of(its_output.unit, output)
     with style():
         figure = blank_figure(SIDE * count + 0.5 * (count == 1), SIDE, _title(motion, output, pair))
         for k, axes in enumerate(np.atleast_1d(figure.subplots(1, count))):
@@ -119,7 +120,7 @@ def phase_portrait(motion: Motion, output: str, orders: tuple[int, int] = (0, 1)
                 exponent = scale_of(values)
                 scaled.append(values[:, k] * 10.0**-exponent)
                 mark = symbol(output, order, component) or rate_name(its_output, order)
-                label(f"{mark}  ({unit_label(its_output.unit, order, exponent)})")
+                label(f"{mark}  ({unit_label(unit, order, exponent)})")
                 size = float(np.max(np.abs(values), initial=0.0, where=np.isfinite(values))) * 10.0**-exponent
                 limits(axis_range(scaled[-1], 0.06, size))  # where nothing changes but rounding, it is not magnified
             axes.plot(*scaled, color=COLOURS[k % len(COLOURS)])
@@ -130,9 +131,10 @@ def phase_portrait(motion: Motion, output: str, orders: tuple[int, int] = (0, 1)
 
 
 def _values(motion: Motion, output: str, orders: tuple[int, ...]) -> list[Float[np.ndarray, "time *component"]]:
-    """Return derivatives of an output, or raise for a name or an order that there is not."""
+    """Return derivatives of an output in its shown unit, or raise for a name or an order that there is not."""
     check_name("output", output, motion.outputs, MechanismError, name="output")
-    values = motion.outputs[output]
+    _, factor = motion.mechanism.shown_units.of(motion.mechanism.outputs[output].unit, output)
+    values = motion.outputs[output] * factor
     for order in orders:
         if not 0 <= order < values.shape[1]:
             message = f"there are derivatives up to order {values.shape[1] - 1}; solve with a higher order"

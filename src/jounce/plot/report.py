@@ -27,8 +27,9 @@ from jounce.plot.scene import scene_of
 from jounce.plot.sketch import length_text, limits_with, paths_of
 from jounce.plot.style import BODY_COLOURS
 from jounce.reporting.motion_facts import motion_facts
-from jounce.reporting.peaks import Peak, derivative_name, derivative_unit, peaks
+from jounce.reporting.peaks import Peak, derivative_name, peaks, shown_peaks
 from jounce.reporting.summaries import motion_summary
+from jounce.trajectory.shown_units import ShownUnits, derivative_unit
 
 __all__ = ["check_report", "report"]
 
@@ -118,12 +119,14 @@ def _data(motion: Motion, view: View, source: str) -> dict[str, Any]:
     shown = evenly_chosen(rising, MOST_INSTANTS)
     time = motion.time[shown]
     start, stop = float(time[0]), float(time[-1])
-    outputs = [_output(name, mechanism.outputs[name], values[shown]) for name, values in motion.outputs.items()]
+    units = mechanism.shown_units
+    outputs = [_output(name, mechanism.outputs[name], values[shown], units) for name, values in motion.outputs.items()]
+    of_values = "Outputs in the units shown, the rest" if mechanism.units else "All values"
     lines = motion_summary(motion_facts(motion), source or "mechanism").splitlines()
     return {
         "title": mechanism.title or source or "Motion of a mechanism",
         "summary": "\n".join(lines[1:]),
-        "made": f"Made by jounce {__version__}{f' from {source}' if source else ''}. All values in SI units.",
+        "made": f"Made by jounce {__version__}{f' from {source}' if source else ''}. {of_values} in SI units.",
         "messages": _messages(motion),
         "times": time.tolist(),
         "solved": (np.asarray(motion.status)[shown] == 0).tolist(),
@@ -135,7 +138,7 @@ def _data(motion: Motion, view: View, source: str) -> dict[str, Any]:
         "levels": [derivative_name(k) for k in range(1 + max([motion.order, *(len(o["words"]) - 1 for o in outputs)]))],
         "outputs": outputs,
         "scene": _scene(motion, rising, shown, view, [output["name"] for output in outputs]),
-        "peaks": [_peak(peak) for peak in peaks(motion)],
+        "peaks": [_peak(peak) for peak in shown_peaks(peaks(motion), units)],
         "parameters": [[name, _number(value)] for name, value in mechanism.parameter_values.items()],
         "bodies": _bodies(mechanism),
         "elements": [
@@ -160,15 +163,19 @@ def _number(value: float | np.ndarray) -> float | None:
 
 
 def _output(
-    name: str, output: AbstractQuantity, values: Float[np.ndarray, "time derivative *component"]
+    name: str,
+    output: AbstractQuantity,
+    values: Float[np.ndarray, "time derivative *component"],
+    units: ShownUnits,
 ) -> dict[str, Any]:
     """Return the values of an output by derivative and component, with words and units."""
-    columns = values[..., None] if values.ndim == 2 else values
+    unit, factor = units.of(output.unit, name)
+    columns = (values[..., None] if values.ndim == 2 else values) * factor
     orders, components = range(columns.shape[1]), columns.shape[2]
     return {
         "name": name,
         "words": [quantity_word(output, k) for k in orders],
-        "units": [derivative_unit(output.unit, k) for k in orders],
+        "units": [derivative_unit(unit, k) for k in orders],
         "components": list(output.labels[:components]) if components > 1 else [""],
         "values": [[[_number(v) for v in columns[:, k, c]] for c in range(components)] for k in orders],
     }

@@ -8,8 +8,10 @@ from pydantic import TypeAdapter
 from pydantic.json_schema import GenerateJsonSchema
 from typing_extensions import TypedDict
 
+from jounce.reporting.cam_facts import CamFacts
 from jounce.reporting.curve_facts import CurveFacts
 from jounce.reporting.design_facts import DesignFacts
+from jounce.reporting.law_facts import LawFacts
 from jounce.reporting.mechanism_facts import Grid, InspectedMechanism
 from jounce.reporting.modes_facts import ModesFacts
 from jounce.reporting.motion_facts import MotionFacts, SimulationFacts
@@ -84,6 +86,32 @@ class TraceResult(Result):
     command: Literal["trace"]
     file: str
     curves: list[CurveFacts]
+    written: str | None
+
+
+class ServoPeak(Extremes):
+    """Extreme values, at the rows of a drive, of a derivative of the coordinate of a driver."""
+
+    output: str
+
+
+class ServoResult(Result):
+    """jounce servo --json: SI, whatever the units of the file."""
+
+    command: Literal["servo"]
+    file: str
+    rate: float
+    drivers: list[str]
+    laws: list[LawFacts]
+    peaks: list[ServoPeak]
+    written: str | None
+
+
+class CamResult(Result, CamFacts):
+    """jounce cam --json: SI, whatever the units of the file."""
+
+    command: Literal["cam"]
+    file: str
     written: str | None
 
 
@@ -258,6 +286,8 @@ RESULTS: dict[str, Any] = {
     "inspect_robot": InspectRobotResult,
     "check": CheckResult,
     "torques": TorquesResult,
+    "servo": ServoResult,
+    "cam": CamResult,
     "modes": ModesResult,
     "sweep": SweepResult,
     "tolerance": ToleranceResult,
@@ -281,7 +311,7 @@ def result_schema() -> dict[str, Any]:
     Examples
     --------
     >>> sorted(result_schema()["$defs"])[:6]
-    ['check', 'complaint', 'inspect_mechanism', 'inspect_robot', 'modes', 'new']
+    ['cam', 'check', 'complaint', 'inspect_mechanism', 'inspect_robot', 'modes']
     """
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

@@ -71,11 +71,12 @@ def complaint(kind: str, problem: object) -> str:
 
 def motion_result(motion: Motion | Stretches, file: Path, written: Path | None, refine: bool = True) -> dict[str, Any]:
     """Return what `jounce run` and `jounce simulate` tell of a motion."""
-    told = [_peak(peak) for peak in peaks(motion, refine=refine)]
+    told = [told_peak(peak) for peak in peaks(motion, refine=refine)]
     return {"file": file, **motion_facts(motion), "peaks": told, "written": written}
 
 
-def _peak(peak: Peak) -> dict[str, Any]:
+def told_peak(peak: Peak) -> dict[str, Any]:
+    """Return what is told of a peak, in SI."""
     told = dataclasses.asdict(peak)
     del told["size"]
     return told
@@ -103,7 +104,7 @@ def torques_result(
 ) -> dict[str, Any]:
     """Return what `jounce torques` tells of a robot on a trajectory."""
     times = dataset["time"].values
-    told = [_peak(peak) for peak in table_peaks(dataset)]
+    told = [told_peak(peak) for peak in table_peaks(dataset)]
     return {
         "robot": dataset.attrs["title"],
         "file": robot,

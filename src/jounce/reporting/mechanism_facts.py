@@ -14,11 +14,13 @@ from jounce.errors import JounceError
 from jounce.io.files.source import read_source
 from jounce.io.mechanisms.keys import OUTPUTS, output_holder
 from jounce.kinematics.curves.choice import chosen
-from jounce.mechanism import Mechanism, Model, build, time_grid
+from jounce.mechanism import Mechanism, Model, build, time_grid, with_outputs_held
 from jounce.mechanism.masses import body_mass
 from jounce.mechanism.system import POSITION_COMPONENTS
 from jounce.reporting.freedom_facts import AssemblyFacts, FreedomFacts, MobilityFacts, StartingState
+from jounce.reporting.law_facts import LawFacts, law_facts
 from jounce.reporting.range_facts import RangeFacts
+from jounce.trajectory import OutputMotion, SegmentedMotion
 from jounce.trajectory.dimensions import Dimension
 from jounce.trajectory.units import parse_value
 
@@ -113,6 +115,7 @@ class InspectedMechanism(MechanismFacts):
     bodies: list[BodyFacts]
     freedom: FreedomFacts
     mobility: MobilityFacts | None
+    laws: list[LawFacts]
     assembly: AssemblyFacts
     ok: bool
     range: NotRequired[RangeFacts | None]
@@ -160,7 +163,8 @@ def inspected(mechanism: Mechanism, path: str | PathLike[str] | None = None) -> 
     """
     facts = mechanism_facts(mechanism, path)
     instant = 0.0 if facts["time"] is None else facts["time"]["start"]
-    mechanism = chosen(mechanism, instant)
+    laws = [] if facts["time"] is None else law_facts(mechanism, instant, facts["time"]["stop"])
+    mechanism = chosen(with_outputs_held(mechanism), instant)
     model = build(mechanism)
     state = StartingState(mechanism, model, instant)
     for kind in ("joints", "drivers"):
@@ -171,6 +175,7 @@ def inspected(mechanism: Mechanism, path: str | PathLike[str] | None = None) -> 
         "bodies": _bodies(mechanism, model, state.coordinates),
         "freedom": state.freedom,
         "mobility": state.mobility(),
+        "laws": laws,
         "assembly": state.assembly,
         "ok": state.ok,
     }
@@ -277,6 +282,10 @@ def _law_words(law: Any) -> str:
     """Word a law: its expression, or what kind it is."""
     if isinstance(law, (list, tuple, np.ndarray)):
         return "[" + ", ".join(map(_law_words, law)) + "]"
+    if isinstance(law, OutputMotion):
+        return f"with which {law.output} is {_law_words(law.law)}"
+    if isinstance(law, SegmentedMotion):
+        return f"{len(law.segments)} segments: {', '.join(segment.profile for segment in law.segments)}"
     text = getattr(law, "text", None) or getattr(getattr(law, "expression", None), "text", None)
     if text:
         return text

@@ -9,7 +9,7 @@ from typing_extensions import TypedDict
 
 from jounce.integrate import Simulation
 from jounce.kinematics import Motion, Status, Stretches
-from jounce.mechanism import AbstractMotionOutput, build
+from jounce.mechanism import AbstractMotionOutput, build, with_outputs_held
 
 
 class Span(TypedDict):
@@ -91,7 +91,7 @@ def motion_facts(motion: Motion | Stretches) -> dict[str, Any]:
     """
     mechanism, times = motion.mechanism, motion.time
     failed = np.flatnonzero(motion.status != Status.OK)
-    rows = build(mechanism).rows
+    rows = build(with_outputs_held(mechanism)).rows
     drives = sum(name.startswith("drivers.") for name in rows)
     span = {"start": float(times[0]), "stop": float(times[-1])}
     facts = {

@@ -18,7 +18,7 @@ from jounce.mechanism import Mechanism
 from jounce.reporting.mechanism_facts import mechanism_facts
 from jounce.reporting.modes_facts import equilibrium_facts, equilibrium_tables, equilibrium_words, modes_table
 from jounce.reporting.motion_facts import motion_facts
-from jounce.reporting.peaks import peaks
+from jounce.reporting.peaks import peaks, shown_peaks
 from jounce.reporting.robot_facts import robot_facts
 from jounce.reporting.summaries import count
 from jounce.reporting.tables import Table, mechanism_tables, number, peaks_table, robot_tables, table
@@ -143,7 +143,8 @@ def _motion(motion: Motion) -> list[str]:
         lines += [f"<p>{_text(line)}</p>" for line in told]
     if not motion.mechanism.outputs:
         return [*lines, "<p>No outputs are defined.</p>"]
-    return [*lines, *_tables([dataclasses.replace(peaks_table(peaks(motion)), title="Peaks")])]
+    found = shown_peaks(peaks(motion), motion.mechanism.shown_units)
+    return [*lines, *_tables([dataclasses.replace(peaks_table(found), title="Peaks")])]
 
 
 def _equilibrium(rest: Equilibrium) -> list[str]:

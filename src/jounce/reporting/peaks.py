@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-import re
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +15,7 @@ from jounce.integrate import Simulation
 from jounce.kinematics import Motion, Stretches, solve
 from jounce.mechanism import AbstractQuantity
 from jounce.reporting.maxima import Curves, Highest, Peaks, Times
+from jounce.trajectory.shown_units import ShownUnits, derivative_unit
 
 if TYPE_CHECKING:
     import xarray
@@ -103,20 +103,6 @@ def rate_name(output: AbstractQuantity, order: int) -> str:
     return names[order] if order < len(names) else f"{derivative_name(order)} rate"
 
 
-def derivative_unit(unit: str, order: int) -> str:
-    """Return the unit of a time derivative of a quantity.
-
-    Examples
-    --------
-    >>> derivative_unit("m", 0), derivative_unit("m", 1), derivative_unit("rad/s", 3)
-    ('m', 'm/s', 'rad/s^4')
-    """
-    per_time = re.search(r"/s(?:\^(\d+))?$", unit)
-    base = unit[: per_time.start()] if per_time else unit
-    total = order + (int(per_time[1] or 1) if per_time else 0)
-    return base if total == 0 else f"{base}/s" if total == 1 else f"{base}/s^{total}"
-
-
 def scalar_outputs(motion: Motion) -> dict[str, tuple[str, Float[np.ndarray, "time derivative"]]]:
     """Return the outputs of a motion one component at a time.
 
@@ -179,24 +165,46 @@ def _name(refine: bool) -> str:
 
 
 def table_peaks(dataset: xarray.Dataset) -> list[Peak]:
-    """Return the peak values of torques and their rates, at the instants of a dataset only.
+    """Return the peak values of torques and their rates, or of coordinates, at the instants of a dataset only.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        Of variables of dimensions time and derivative, with the attribute ``units``: N or N*m.
+        Of variables of dimensions time and derivative, with the attribute ``units``: N, N*m, m or rad.
     """
     found = []
     for name, variable in dataset.data_vars.items():
         unit = variable.attrs["units"]
-        for order, values in enumerate(variable.transpose("derivative", "time").values):
-            low, high = int(np.argmin(values)), int(np.argmax(values))
+        for order, given in enumerate(variable.transpose("derivative", "time").values):
+            solved = np.flatnonzero(np.isfinite(given))
+            values = given if solved.size else np.full_like(given, np.nan)
+            low, high = (int(solved[pick(given[solved])]) if solved.size else 0 for pick in (np.argmin, np.argmax))
             extremes = [(float(values[k]), float(dataset["time"][k])) for k in (low, high)]
             (least, least_at), (most, most_at) = extremes
-            told = effort_name(unit, order)
-            size = float(np.abs(values).max())
+            told = derivative_name(order) if unit in ("m", "rad") else effort_name(unit, order)
+            size = float(np.abs(values[solved]).max(initial=0.0))
             found.append(Peak(str(name), told, derivative_unit(unit, order), least, least_at, most, most_at, size))
     return found
+
+
+def shown_peaks(found: Sequence[Peak], units: ShownUnits) -> list[Peak]:
+    """Return peaks in the units in which they are shown.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> units = jn.trajectory.shown_units.ShownUnits({"length": "mm"})
+    >>> shown_peaks([Peak("C_x", "velocity", "m/s", -0.5, 0.0, 2.0, 1.0, 2.0)], units)[0].minimum
+    -500.0
+    """
+    shown = []
+    for peak in found:
+        stem = peak.output.rpartition("_")[0]
+        name = stem if peak.output not in units.outputs and stem in units.outputs else peak.output
+        unit, factor = units.of(peak.unit, name)
+        sizes = {key: getattr(peak, key) * factor for key in ("minimum", "maximum", "size")}
+        shown.append(dataclasses.replace(peak, unit=unit, **sizes))
+    return shown
 
 
 def effort_name(unit: str, order: int) -> str:

@@ -1,7 +1,12 @@
 """Motion laws: expressions, Python functions, splines, profiles; and trajectories, one law for each joint."""
 
-from jounce.trajectory.composed import FollowingMotion as FollowingMotion, PiecewiseMotion as PiecewiseMotion
+from jounce.trajectory.composed import (
+    FollowingMotion as FollowingMotion,
+    OutputMotion as OutputMotion,
+    PiecewiseMotion as PiecewiseMotion,
+)
 from jounce.trajectory.expression import Expression as Expression
+from jounce.trajectory.hermite import HermiteMotion as HermiteMotion
 from jounce.trajectory.joint_trajectory import JointTrajectory as JointTrajectory
 from jounce.trajectory.measured import MeasuredMotion as MeasuredMotion
 from jounce.trajectory.motion import (
@@ -19,4 +24,9 @@ from jounce.trajectory.profiles import (
 )
 from jounce.trajectory.segment_pieces import Segment as Segment
 from jounce.trajectory.segments import SegmentedMotion as SegmentedMotion
+from jounce.trajectory.smoothness import (
+    Continuity as Continuity,
+    DerivativeJumps as DerivativeJumps,
+    continuity as continuity,
+)
 from jounce.trajectory.trapezoid import TrapezoidalMotion as TrapezoidalMotion

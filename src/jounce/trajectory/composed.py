@@ -1,4 +1,4 @@
-"""Motion laws made of others: one law after another, and a law of what another law prescribes."""
+"""Motion laws made of others: one law after another, a law of what another prescribes, and the law of an output."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -47,7 +47,10 @@ class _MadeOfOthers(AbstractMotion):
 
 
 def _is_known(part: AbstractMotion | Expression) -> bool:
-    return isinstance(part, AbstractMotion) or part.names <= {"t"}
+    """Tell whether a part has numbers already, and waits for no parameters."""
+    if isinstance(part, _MadeOfOthers):
+        return bool(part.parts)
+    return not getattr(part, "_open", ()) if isinstance(part, AbstractMotion) else part.names <= {"t"}
 
 
 def _with(part: AbstractMotion | Expression, parameters: Mapping[str, Any]) -> AbstractMotion:
@@ -103,6 +106,76 @@ class FollowingMotion(_MadeOfOthers):
         """Return the jet of the law at the instants of the time jet."""
         law, leader = self._known_parts()
         return law(leader(time))
+
+
+class OutputMotion(_MadeOfOthers):
+    """The motion of a driver with which an output of the mechanism has a law: found by inversion, not by a formula.
+
+    While such a mechanism is solved, the output is held to the law in the place of the driver, whose coordinate then
+    is a result with all its derivatives: `Motion.driver`, and the outputs `DriverAngleOutput` and
+    `DriverDisplacementOutput`. Forces are those of the driver.
+
+    Parameters
+    ----------
+    output : str
+        Name of an output that is an angle, a distance, a slide, or, with its component, a point: ``"C_y"``.
+    law : AbstractMotion, Expression or str
+        That of the output, m or rad; an expression of ``t`` and of the parameters of the mechanism.
+
+    Raises
+    ------
+    TrajectoryError
+        If the law is none.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> rod = jn.Body([0, 0], angle=0.2)
+    >>> pin = jn.planar.Revolute(("ground", "rod"), [0, 0], [0, 0])
+    >>> motor = jn.drivers.CoordinateDriver(("ground", "rod"), "angle", motion=jn.OutputMotion("tip_y", "0.1 + 0.1*t"))
+    >>> lift = jn.Mechanism(
+    ...     space="planar", bodies={"rod": rod}, joints={"pin": pin}, drivers={"motor": motor},
+    ...     outputs={"tip": jn.PointOutput("rod", [0.2, 0])},
+    ... )
+    >>> jn.solve(lift, [0.0, 0.5], order=1).driver("motor").values.round(6).tolist()  # arcsin(y / 0.2)
+    [[0.523599, 0.57735], [0.848062, 0.755929]]
+    """
+
+    output: str = eqx.field(static=True)
+
+    def __init__(self, output: str, law: Law):
+        if not isinstance(output, str) or not output:
+            raise TrajectoryError("must be the name of an output", name="output", value=output)
+        self.output = output
+        self._take([law])
+
+    @property
+    def law(self) -> Law:
+        """The law of the output, as it was given."""
+        return self.recipe.value[0][0]
+
+    def resolved(self, parameters: Mapping[str, Any]) -> "OutputMotion":
+        """Return the law with numbers in the place of parameters."""
+        return OutputMotion(self.output, *self._resolved_parts(parameters))
+
+    def check_instants(self, first: float, last: float) -> None:
+        """Raise MechanismError if the law of the output says nothing of some instants."""
+        for part in self.parts:
+            part.check_instants(first, last)
+
+    def __call__(self, time: Jet) -> Jet:  # noqa: ARG002 - known by solving only
+        """There is no value without a motion.
+
+        Raises
+        ------
+        TrajectoryError
+            Always.
+        """
+        message = (
+            f"follows from the output '{self.output}' by solving the mechanism, which this does not do; solve it by "
+            "jn.solve, and go on with motion.actuated, whose drivers have the laws found"
+        )
+        raise TrajectoryError(message)
 
 
 class PiecewiseMotion(_MadeOfOthers):

@@ -1,6 +1,5 @@
 """Motion laws made of segments: dwells, rises and returns by the profiles of cam design, once or again and again."""
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -15,6 +14,7 @@ from jounce.errors import TrajectoryError, check_choice, check_name
 from jounce.jet import Jet, sin
 from jounce.shapes import Numbers
 from jounce.trajectory.expression import Expression
+from jounce.trajectory.knots import knot_jumps
 from jounce.trajectory.motion import SplineMotion, Untraced
 from jounce.trajectory.segment_pieces import (
     SEGMENT_PROFILES,
@@ -29,7 +29,6 @@ from jounce.trajectory.trapezoid import LIMITS
 
 BEYOND = ("hold", "repeat", "advance")
 CLOSED = 1e-9  # of the range of a law: so near to where it began it ends there
-SMOOTH = 1e-9  # of the peak of a derivative: a smaller jump is rounding
 MOST_CONDITIONS = 10  # derivatives that a polynomial is given at an end
 
 
@@ -111,6 +110,23 @@ class SegmentedMotion(SplineMotion):
         """The segments as they were given."""
         return self.recipe.value[0]
 
+    def lasts(self, duration: float) -> bool:
+        """Tell whether the segments go from zero to a duration, s, or an angle."""
+        first = 1 if self.beyond == "continue" else 0  # the first and the last piece rest
+        begin = float(np.asarray(self.breakpoints)[first])
+        return abs(begin) <= CLOSED * duration and abs(float(self.stop) - duration) <= CLOSED * duration
+
+    def repeated(self) -> "SegmentedMotion":
+        """Return the law with its segments again and again.
+
+        Raises
+        ------
+        TrajectoryError
+            If they do not end where they begin.
+        """
+        segments, initial, start, _ = self.recipe.value
+        return SegmentedMotion(segments, initial, start, "repeat")
+
     @property
     def _open(self) -> list[str]:
         """Names of the parameters without which the law is not known."""
@@ -175,16 +191,7 @@ class SegmentedMotion(SplineMotion):
         >>> jumps[2].round(6).tolist()  # acceleration, at the beginning and at the end
         [9.869604, 9.869604]
         """
-        begins, lengths = np.asarray(self.breakpoints), np.diff(np.append(self.breakpoints, self.stop))
-        left = np.array([_derivatives(self, k, lengths, order) for k in range(len(begins))]).T
-        right = np.array([_derivatives(self, k, np.zeros(len(begins)), order) for k in range(len(begins))]).T
-        if self.beyond == "continue":  # the first and the last piece rest
-            before, after, instants = left[:, :-1], right[:, 1:], begins[1:]
-        else:
-            wrapped = left[:, -1] - np.append(np.asarray(self.advance), np.zeros(order))
-            before, after, instants = np.column_stack([wrapped, left[:, :-1]]), right, begins
-        found, peaks = after - before, _largest(self, lengths, order)[:, None]
-        return instants, np.where(np.abs(found) <= SMOOTH * peaks, 0.0, found)
+        return knot_jumps(self, order)
 
     @property
     def smoothness(self) -> int:
@@ -192,27 +199,6 @@ class SegmentedMotion(SplineMotion):
         _, jumps = self.jumps(MOST_CONDITIONS)
         broken = np.flatnonzero(np.any(jumps != 0, axis=1))
         return int(broken[0]) - 1 if len(broken) else MOST_CONDITIONS
-
-
-def _derivatives(law: SegmentedMotion, piece: int, lengths: Any, order: int) -> list[float]:
-    """Return the derivatives of a piece of a law a time after its beginning."""
-    powers, (amplitude, frequency, phase) = np.asarray(law.coefficients)[:, piece], np.asarray(law.sines)[:, piece]
-    at, found = lengths[piece], []
-    for k in range(order + 1):
-        polynomial = sum(c * math.perm(j, k) * at ** (j - k) for j, c in enumerate(powers) if j >= k)
-        found.append(polynomial + amplitude * frequency**k * math.sin(frequency * at + phase + k * math.pi / 2))
-    return found
-
-
-def _largest(law: SegmentedMotion, lengths: Any, order: int) -> Float[np.ndarray, " {order}+1"]:
-    """Return bounds of the derivatives of a law, of the size of their peaks."""
-    powers, (amplitude, frequency, _) = np.abs(law.coefficients), np.abs(law.sines)
-    at = np.minimum(lengths, np.max(lengths[1:], initial=0.0)) if law.beyond == "continue" else lengths
-    terms = [
-        sum(c * math.perm(j, k) * at ** (j - k) for j, c in enumerate(powers) if j >= k) + amplitude * frequency**k
-        for k in range(order + 1)
-    ]
-    return np.max(np.array(terms), axis=1)
 
 
 def _check_closed(values: list[Value]) -> None:

@@ -11,6 +11,7 @@ from xarray import Dataset
 
 from jounce.errors import SolveError
 from jounce.integrate import simulate
+from jounce.io.files.column_units import in_units
 from jounce.kinematics import Motion, Status, raise_for_status, solve
 from jounce.mechanism import AngularVelocityOutput, Mechanism, time_grid
 from jounce.mechanism.mechanism import GROUND
@@ -114,18 +115,22 @@ class MechanismRecording(Recording):
     def quantities(self) -> dict[str, Quantity]:
         """Return all outputs, or how each body turns where there are none."""
         outputs, found = self.solution.mechanism.outputs, {}
+        units = self.solution.mechanism.shown_units
         for name, values in self.solution.outputs.items():
             words = tuple(quantity_word(outputs[name], k) for k in range(values.shape[1]))
-            found[name] = self._quantity(outputs[name].unit, values, words, outputs[name].labels)
+            unit, factor = units.of(outputs[name].unit, name)
+            found[name] = self._quantity(unit, values * factor, words, outputs[name].labels)
         return found or dict(map(self._turning, self.solution.mechanism.bodies))
 
     def _turning(self, body: str) -> tuple[str, Quantity]:
         rates = [quantity_word(AngularVelocityOutput(body), k) for k in range(self.order + 1)]
         if self.planar:
             values, words = self.solution.angle(body).values, ("angle", *rates)
-            return f"angle of {body}", self._quantity("rad", values, words[: values.shape[1]])
+            unit, factor = self.solution.mechanism.shown_units.of("rad")
+            return f"angle of {body}", self._quantity(unit, values * factor, words[: values.shape[1]])
         values = self.solution.angular_velocity(body).values
-        return f"angular velocity of {body}", self._quantity("rad/s", values, tuple(rates[: values.shape[1]]))
+        unit, factor = self.solution.mechanism.shown_units.of("rad/s")
+        return f"angular velocity of {body}", self._quantity(unit, values * factor, tuple(rates[: values.shape[1]]))
 
     def _quantity(self, unit: str, values: np.ndarray, words: tuple[str, ...], *labels: tuple[str, ...]) -> Quantity:
         values = values[self.solved]
@@ -141,8 +146,8 @@ class MechanismRecording(Recording):
         return mechanism_loads(self.solution, self.solved)
 
     def dataset(self) -> Dataset:
-        """Return the results of all instants."""
-        return self.solution.dataset
+        """Return the results of all instants, in the units in which they are shown."""
+        return in_units(self.solution.dataset, self.solution.mechanism.shown_units)
 
 
 def recorded(

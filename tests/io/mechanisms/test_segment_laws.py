@@ -1,5 +1,7 @@
 """Laws of segments and of pieces in files, and laws of the coordinate of another driver."""
 
+import pathlib
+
 import numpy as np
 import pytest
 
@@ -98,3 +100,41 @@ def test_what_is_wrong_is_named_with_its_line(tmp_path, old, new, name, words):
         loaded(tmp_path, FILE.replace(old, new))
     assert caught.value.line is not None
     assert caught.value.name.startswith(name)
+
+
+def test_the_law_of_an_output_is_read_and_written(tmp_path):
+    press = jn.load("examples/servo_press.yaml")
+    write_mechanism(press, tmp_path / "again.yaml")
+    again = jn.load(tmp_path / "again.yaml")
+    before, after = (m.drivers["motor"].motion for m in (press, again))
+    assert before.output == after.output == "ram_y"
+    instants = [0.0, 0.2, 0.44, 0.9]
+    found = [values(law.law, press.parameter_values, instants) for law in (before, after)]
+    np.testing.assert_array_equal(*found)
+    assert found[0][1, 2] == pytest.approx(-0.06)  # while it forms
+    law = jn.HermiteMotion([0.0, 1.0], [[0.0], [1.0]])
+    with pytest.raises(jn.MechanismError, match="through derivatives has no form in a file"):
+        write_mechanism(jn.load("examples/four_bar.yaml").__class__(
+            space="planar", bodies={"a": jn.Body([0, 0])}, joints={},
+            drivers={"d": jn.drivers.CoordinateDriver(("ground", "a"), "angle", law)},
+        ), tmp_path / "no.yaml")  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "old, new, name, words",
+    [
+        ("output: ram_y", "output: ram_z", "drivers.motor.motion.output", "did you mean 'ram_"),
+        ("output: ram_y", "output: rame", "drivers.motor.motion.output", "no output has this name"),
+        ("output: ram_y", "output: torque", "drivers.motor.motion.output", "cannot be held to a law"),
+        ("by: -12 mm", "by: -12 deg", "drivers.motor.motion.law.profile[2].by", "a length"),
+        ("      law:", "      lawe: 1\n      law:", "drivers.motor.motion.lawe", "unknown key"),
+    ],
+)
+def test_what_is_wrong_with_the_law_of_an_output_is_named(tmp_path, old, new, name, words):
+    text = pathlib.Path("examples/servo_press.yaml").read_text()
+    assert old in text
+    (tmp_path / "press.yaml").write_text(text.replace(old, new, 1))
+    with pytest.raises(jn.MechanismFileError, match=words) as caught:
+        jn.load(tmp_path / "press.yaml")
+    assert caught.value.line is not None
+    assert caught.value.name == name

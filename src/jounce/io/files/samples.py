@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 import math
+import re
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
 
-from jounce.errors import JounceError, MechanismFileError, did_you_mean, no_such
+from jounce.errors import JounceError, MechanismFileError, UnitError, did_you_mean, no_such
+from jounce.io.files.column_units import name_and_unit
 from jounce.io.files.reading import fault_of_number, known_name, read_rows
+from jounce.trajectory.dimensions import TIME, Dimension, describe_dimension, dimension_of
+from jounce.trajectory.shown_units import unit_size
+
+_RATE = re.compile(r"_d([0-9]{1,2})$")
 
 
 def read_samples(
@@ -17,20 +24,23 @@ def read_samples(
     time: str | None = None,
     value: str | None = None,
     error_type: type[JounceError] = MechanismFileError,
+    allowed: tuple[Sequence[Dimension], Sequence[Dimension]] = ((), ()),
 ) -> tuple[list[float], list[float]]:
     """Read the columns of time and value from a CSV file.
 
     Parameters
     ----------
     path
-        The file: numbers in SI units, below a row with the names of the columns. Without that row the file has two
-        columns, time and value.
+        The file: numbers below a row with the names of the columns, in SI units unless the name says another, as
+        ``psi [deg]``. Without that row the file has two columns, time and value.
     time : str, optional
         Name of the column of time, s; when not given, ``time``, or else the first column.
     value : str, optional
         Name of the column of the driven quantity, m or rad; the only other column when not given.
     error_type : type
         Of the exceptions.
+    allowed : tuple of sequence of Dimension, optional
+        What the units that the columns of time and value say may measure; anything where none is given.
 
     Returns
     -------
@@ -40,7 +50,8 @@ def read_samples(
     Raises
     ------
     JounceError
-        Of the type given: the file cannot be read, a column does not exist, or an entry is not a finite number.
+        Of the type given: the file cannot be read, a column does not exist, an entry is not a finite number, or a unit
+        is none, or measures something else.
     """
     table = _Table(str(path), error_type)
     if len(table.header) < 2:
@@ -50,13 +61,17 @@ def read_samples(
         others = [column for k, column in enumerate(table.header) if k != first]
         message = f"has several columns besides the time, name that of the value; {did_you_mean('', others)}"
         raise table.error(message, line=1)
-    return table.column(first), table.column(1 - first if value is None else table.find(value))
+    second = 1 - first if value is None else table.find(value)
+    return table.column(first, allowed[0]), table.column(second, allowed[1])
 
 
 def read_columns(
-    path: str | Path, error_type: type[JounceError] = MechanismFileError
+    path: str | Path, error_type: type[JounceError] = MechanismFileError, derivative: int = 0
 ) -> tuple[Float[np.ndarray, " time"], dict[str, Float[np.ndarray, " time"]]]:
     """Read the column ``time``, which increases, and all others from a CSV file, whose first row names them.
+
+    Values are in SI units unless the name of a column says another: ``elbow [deg]``, ``elbow_d1 [deg/s]``. They are of
+    angles and lengths, or of a derivative of such, and of one more for each that the name of a column tells.
 
     Raises
     ------
@@ -81,7 +96,11 @@ def read_columns(
         if len(row) != len(header):
             message = f"each row has one value for each of the {len(header)} columns; this one has another number"
             raise table.error(message, line=row_line, value=len(row))
-    found = {name: np.array(table.column(k)) for k, name in enumerate(header)}
+    found = {}
+    for k, name in enumerate(header):
+        rate = _RATE.search(name)
+        order = derivative + (int(rate[1]) if rate else 0)
+        found[name] = np.array(table.column(k, (TIME,) if k == time else rates(("angle", "length"), order)))
     times = found.pop(header[time])
     for k in np.flatnonzero(np.diff(times) <= 0)[:1]:
         what = "repeats" if times[k + 1] == times[k] else "comes before"
@@ -90,13 +109,19 @@ def read_columns(
     return times, found
 
 
+def rates(bases: Iterable[str], order: int) -> tuple[Dimension, ...]:
+    """Return the dimensions of time derivatives of angles, lengths or others."""
+    return tuple(dimension_of(**{base: 1, "time": -order}) for base in bases)
+
+
 def read_points(
     path: str | Path, error_type: type[JounceError] = MechanismFileError
 ) -> tuple[Float[np.ndarray, " point"] | None, Float[np.ndarray, "point component"]]:
     """Read points from a CSV file, and their times where it has a column ``time``.
 
     The first row names the columns ``x``, ``y`` and, in space, ``z``, or ``NAME_x`` ..., as results have them; others
-    are not read. Without that row the file has the columns of coordinates only. Lengths are in m, times in s.
+    are not read. Without that row the file has the columns of coordinates only. Lengths are in m, times in s, unless the
+    name of a column says another unit: ``x [mm]``.
 
     Raises
     ------
@@ -117,12 +142,13 @@ def read_points(
             message = f"several columns may be the {letter} of the points; name one of them '{letter}'"
             raise table.error(message, line=table.header_line)
         if exact:
-            found[letter] = table.column(exact[0])
+            found[letter] = table.column(exact[0], rates(("length",), 0))
     if list(found) not in (["x", "y"], ["x", "y", "z"]):
         message = "points need columns x and y, and in space z"
         raise table.error(message, line=table.header_line, value=", ".join(table.header))
     points = np.stack(list(found.values()), axis=1)
-    return (np.array(table.column(table.header.index("time"))) if "time" in table.header else None), points
+    times = np.array(table.column(table.header.index("time"), (TIME,))) if "time" in table.header else None
+    return times, points
 
 
 class _Table:
@@ -135,28 +161,48 @@ class _Table:
             raise self.error("the file of samples is empty")
         self.header_line: int | None = None
         self.header = [f"column {k + 1}" for k in range(len(self.rows[0][1]))]
+        self.units: list[str | None] = [None] * len(self.header)
         if any(_number(entry) is None for entry in self.rows[0][1]):
             self.header_line, names = self.rows.pop(0)
-            self.header = [known_name(name) for name in names]
+            pairs = [name_and_unit(known_name(name)) for name in names]
+            self.header, self.units = [name for name, _ in pairs], [unit for _, unit in pairs]
 
     def error(self, message: str, **place: object) -> JounceError:
         return self.error_type(message, path=self.path, **place)  # type: ignore[arg-type]
 
     def find(self, column: str) -> int:
-        """Return the number of a column by its name."""
+        """Return the number of a column by its name, with its unit or without."""
+        column = column if column in self.header else name_and_unit(column)[0]
         if column not in self.header:
             raise self.error(no_such("column", column, self.header), line=self.header_line or 1, value=column)
         return self.header.index(column)
 
-    def column(self, number: int) -> list[float]:
-        """Return the numbers of a column."""
+    def size(self, number: int, allowed: Sequence[Dimension]) -> float:
+        """Return the size of the unit that a column says, in SI units; one where it says none."""
+        unit = self.units[number]
+        if unit is None:
+            return 1.0
+        place = {"line": self.header_line, "name": self.header[number], "value": unit}
+        try:
+            size, dimension = unit_size(unit)
+        except UnitError as error:
+            raise self.error(error.message, **place) from None
+        if allowed and dimension not in allowed:
+            words = " or ".join(map(describe_dimension, allowed))
+            raise self.error(f"the unit measures {describe_dimension(dimension)}, not {words}", **place)
+        return size
+
+    def column(self, number: int, allowed: Sequence[Dimension] = ()) -> list[float]:
+        """Return the numbers of a column, in SI units."""
+        size = self.size(number, allowed)
         found = []
         for line, row in self.rows:
             text = row[number] if number < len(row) else ""
             entry = _number(text)
-            if fault := fault_of_number(math.nan if entry is None else entry):
+            entry = math.nan if entry is None else entry
+            if fault := fault_of_number(entry):
                 raise self.error(fault, line=line, name=self.header[number], value=text)
-            found.append(entry)
+            found.append(entry * size)
         return found
 
 

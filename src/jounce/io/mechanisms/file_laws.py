@@ -7,7 +7,7 @@ from typing import Any
 
 from jounce.io.files.located_data import Location
 from jounce.io.files.source import Source
-from jounce.trajectory import AbstractMotion, Expression, FollowingMotion, MeasuredMotion, SplineMotion
+from jounce.trajectory import AbstractMotion, Expression, FollowingMotion, MeasuredMotion, OutputMotion, SplineMotion
 
 
 class FileLaws:
@@ -40,6 +40,9 @@ class FileLaws:
             return tuple(self.law((*location, index), entry, following) for index, entry in enumerate(value))
         if isinstance(value, AbstractMotion):
             return value
+        if hasattr(value, "held"):
+            held = self.law((*location, "law"), value.held, following)
+            return OutputMotion(value.output, held if isinstance(held, AbstractMotion | Expression) else repr(held))
         if hasattr(value, "samples"):
             law, by = self._spline(location, value), value.of
         elif hasattr(value, "driver"):
@@ -64,7 +67,7 @@ class FileLaws:
         from jounce.io.files.samples import read_samples
 
         def law(path: str) -> SplineMotion:
-            table = read_samples(path, samples.time, samples.value)
+            table = read_samples(path, samples.time, samples.value, allowed=samples.dimensions)
             given = {"degree": samples.degree, "beyond": samples.beyond}
             if samples.derivative:
                 return MeasuredMotion(*table, samples.derivative, samples.initial, **given)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from os import PathLike
 from typing import Any
 
@@ -33,12 +34,15 @@ def json_schema(*, own_types: bool = True) -> dict[str, Any]:
     from pydantic import Discriminator, TypeAdapter
 
     from jounce.io.mechanisms.schema import file_model
-    from jounce.io.mechanisms.segment_values import segmented_definition
+    from jounce.io.mechanisms.values import DEFINITIONS
 
     models = tuple(file_model(space, own_types=own_types) for space in ("planar", "spatial"))
     union: Any = Annotated[Union[models], Discriminator("space")]  # noqa: UP007
     generated = TypeAdapter(union).json_schema()
-    generated["$defs"]["segmented_law"] = segmented_definition()
+    missing = set(_definitions(generated))
+    while missing:  # a definition may name others
+        generated["$defs"] |= {name: DEFINITIONS[name] for name in sorted(missing)}
+        missing = set(_definitions(generated)) - generated["$defs"].keys()
     head = {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "Mechanism file",
@@ -47,13 +51,22 @@ def json_schema(*, own_types: bool = True) -> dict[str, Any]:
     return head | _tidied(generated)
 
 
+def _definitions(node: Any) -> Iterator[str]:
+    """Return the names of the definitions that parts of a schema stand for."""
+    if isinstance(node, dict) and isinstance(node.get("definition"), str):
+        yield node["definition"]
+    elif isinstance(node, dict | list):
+        for entry in node.values() if isinstance(node, dict) else node:
+            yield from _definitions(entry)
+
+
 def _tidied(node: Any) -> Any:
     """Drop titles that pydantic makes up from the names of keys, and defaults that say nothing; put in references."""
     if isinstance(node, list):
         return [_tidied(item) for item in node]
     if not isinstance(node, dict):
         return node
-    if node.keys() == {"definition"}:
+    if isinstance(node.get("definition"), str):  # pydantic adds a title
         return {"$ref": f"#/$defs/{node['definition']}"}
     return {
         key: _tidied(item)

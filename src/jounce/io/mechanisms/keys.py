@@ -109,6 +109,8 @@ OUTPUTS: tuple[tuple[str | None, type[AbstractQuantity]], ...] = (
     ("euler_angles", mechanism.EulerAnglesOutput),
     ("euler_angles", mechanism.RelativeEulerAnglesOutput),
     ("slide", SlideOutput),
+    ("angle", mechanism.DriverAngleOutput),
+    ("displacement", mechanism.DriverDisplacementOutput),
     ("force", dynamics.DriverForceOutput),
     ("torque", dynamics.DriverTorqueOutput),
     ("force", dynamics.JointForceOutput),
@@ -155,4 +157,5 @@ def location_of(keys: Iterable[FileKey], field: str) -> Location:
     for key in keys:
         if field in key.fields:
             return (key.key,) if len(key.fields) == 1 else (key.key, key.fields.index(field))
-    return (field,)
+    first, _, rest = field.partition(".")
+    return (first, rest) if rest else (field,)

@@ -16,7 +16,7 @@ from jounce.io.files.source import read_source
 from jounce.io.mechanisms.file_laws import FileLaws
 from jounce.io.mechanisms.keys import ROLES, FileKey, file_keys, location_of, output_types
 from jounce.io.mechanisms.unit_hints import warn_of_units
-from jounce.mechanism import Body, Mechanism, TimeGrid, time_grid
+from jounce.mechanism import Body, Mechanism, TimeGrid, time_grid, with_outputs_held
 from jounce.mechanism.builder import starting_guess
 from jounce.mechanism.masses import body_mass
 from jounce.mechanism.redundant_reactions import resolved_reactions
@@ -111,6 +111,7 @@ def _validate(source: Source, space: str) -> dict[str, Any]:
         "dimensions": _dimensions(parameters) if names else {},
         "uses": dict.fromkeys(names, ()),
         "drivers": dict.fromkeys(drivers if isinstance(drivers := source.data.get("drivers"), dict) else ()),
+        "outputs": outputs if isinstance(outputs := source.data.get("outputs"), dict) else {},
     }
     try:
         model = file_model(space).model_validate(source.data, context=context)
@@ -162,6 +163,7 @@ def _build(source: Source, space: str, model: dict[str, Any], places: _Places) -
         time=TimeGrid(**_plain(model["time"])) if model["time"] is not None else None,
         redundant_reactions=model["redundant_reactions"],
         title=model["title"],
+        units=model["units"],
         assembly=model["assembly"],
         dimensions=model["dimensions"],
     )
@@ -232,6 +234,7 @@ def _check_columns(source: Source, mechanism: Mechanism) -> None:
 
 def _check_values(mechanism: Mechanism) -> None:
     """Check what depends on the values of parameters: finite numbers, lengths above zero, axes that are not zero."""
+    mechanism = with_outputs_held(mechanism)
     parameters, components = mechanism.parameter_values, POSITION_COMPONENTS[mechanism.space]
     for kind, elements in mechanism.elements.items():
         for name, element in elements.items():

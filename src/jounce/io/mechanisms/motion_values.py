@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr
 from pydantic_core import PydanticCustomError
 
-from jounce.errors import UNSET, did_you_mean, show_value
+from jounce.errors import UNSET, did_you_mean, no_such, show_value
+from jounce.io.files.samples import rates
 from jounce.io.mechanisms.segment_values import (
     LEADER_SCHEMA,
     PIECEWISE_KEYS,
     PROFILE_KEYS,
+    bases,
     leader,
     piecewise,
     piecewise_schema,
@@ -22,6 +25,7 @@ from jounce.io.mechanisms.segment_values import (
 from jounce.io.mechanisms.values import (
     ANY_VALUE,
     Checked,
+    defined,
     list_schema,
     object_schema,
     parse,
@@ -53,6 +57,22 @@ class Samples(BaseModel):
     derivative: int = Field(default=0, ge=0, le=MOST)
     initial: tuple[Any, ...] = ()
     of: Any = None
+    _bases: tuple[str, ...] = PrivateAttr(default=())
+
+    @property
+    def dimensions(self) -> tuple[tuple[Dimension, ...], tuple[Dimension, ...]]:
+        """What units in the heading of the file may measure, of the time and of the value; anything where none is."""
+        if self.of is not None:
+            return rates(("angle", "length"), 0), () if self.derivative else rates(self._bases, 0)
+        return (TIME,), rates(self._bases, self.derivative)
+
+
+@dataclasses.dataclass(frozen=True)
+class OutputLaw:
+    """The law of an output from which that of a driver follows; samples in it are not read yet."""
+
+    output: str
+    held: Any
 
 
 FORMS = {
@@ -60,6 +80,7 @@ FORMS = {
     "samples": tuple(Samples.model_fields),
     "profile": PROFILE_KEYS,
     "piecewise": PIECEWISE_KEYS,
+    "output": ("output", "law"),
 }
 """Keys of a law by the one that says which form it has."""
 
@@ -81,9 +102,12 @@ def motion(quantity: str, variables: dict[str, Dimension | None] | None = None) 
             return segmented(raw, quantity, info)
         if form == "piecewise":
             return piecewise(raw, quantity, info, variables)
+        if form == "output":
+            return _output_law(raw, info, variables)
         if form != "samples":
             raise problem(
-                "must be an expression, samples (the name of a CSV file), a profile of segments, or piecewise"
+                "must be an expression, samples (the name of a CSV file), a profile of segments, piecewise, or the law "
+                "of an output"
             )
         return _samples(raw, quantity, info)
 
@@ -97,9 +121,48 @@ def motion(quantity: str, variables: dict[str, Dimension | None] | None = None) 
     for key in ("time", "value"):
         title = spline["properties"][key]["title"]
         spline["properties"][key] = {"title": title, "type": "string", "description": words}
-    forms = [object_schema({"expression": law}), spline, segmented_schema(), piecewise_schema(law)]
+    forms = [
+        object_schema({"expression": law}),
+        defined("samples_law", spline),
+        segmented_schema(),
+        piecewise_schema(law),
+    ]
+    if not others:
+        either = {"anyOf": [{"definition": f"{word}_law"} for word in ("length", "angle")]}
+        forms.append(object_schema({"output": {"type": "string", "minLength": 1}, "law": either}))
     schema = {"description": law["description"], "anyOf": [*ANY_VALUE, *forms]}
-    return Annotated[Any, Checked(check, schema)]
+    words = "_".join([*quantity.split(), "law", *(["of", *others] if others else [])])
+    return Annotated[Any, Checked(check, defined(words, schema))]
+
+
+def _output_law(raw: dict[str, Any], info: Any, variables: dict[str, Dimension | None]) -> OutputLaw:
+    """Return the law of an output from which that of a driver follows."""
+    if set(variables) != {"t"}:
+        raise problem("a force has no law of an output; a driver has", "output", value=UNSET)
+    for key in ("output", "law"):
+        if key not in raw:
+            raise problem("is missing", key, value=UNSET)
+    outputs = (info.context or {}).get("outputs", {})
+    name, labels = raw["output"], ("x", "y", "z")
+    if not isinstance(name, str):
+        raise problem("must be the name of an output", "output", value=name)
+    stem, _, label = name.rpartition("_")
+    if name not in outputs and not (stem in outputs and label in labels):
+        raise problem(no_such("output", name, outputs), "output", value=name)
+    known = outputs.get(name)
+    turning = isinstance(known, dict) and known.get("quantity") == "angle"
+    single: Checked = motion("angle" if turning else "length").__metadata__[0]
+    return OutputLaw(name, _below(single, raw["law"], info, "law"))
+
+
+def _below(single: Checked, raw: object, info: Any, at: str | int) -> Any:
+    """Return what a check makes of an entry below another one; what is wrong is told with where it is."""
+    try:
+        return single.function(raw, info)
+    except PydanticCustomError as error:
+        context = error.context or {}
+        value = raw if context["value"] is ... else context["value"]
+        raise problem(context["message"], at, *context["at"], value=value) from None
 
 
 def _samples(raw: dict[str, Any], quantity: str, info: Any) -> Samples:
@@ -121,7 +184,9 @@ def _samples(raw: dict[str, Any], quantity: str, info: Any) -> Samples:
         message = f"must be a list of at most {derivative} values: the law and its derivatives below the measured one"
         raise problem(message, "initial", value=initial)
     found = tuple(rate(entry, order, quantity, info, "initial", order) for order, entry in enumerate(initial))
-    return Samples.model_validate(raw | {"initial": found, "of": leader(raw, info)})
+    samples = Samples.model_validate(raw | {"initial": found, "of": leader(raw, info)})
+    samples._bases = tuple(bases(quantity, info))
+    return samples
 
 
 def laws(size: int, quantity: str, variables: dict[str, Dimension | None]) -> Any:
@@ -132,14 +197,6 @@ def laws(size: int, quantity: str, variables: dict[str, Dimension | None]) -> An
     def check(raw: object, info: Any) -> tuple[Any, ...]:
         if not isinstance(raw, (list, tuple)) or len(raw) != size:
             raise problem(f"must be a list of {size} laws, one for each component")
-        found = []
-        for index, entry in enumerate(raw):
-            try:
-                found.append(single.function(entry, info))
-            except PydanticCustomError as error:
-                context = error.context or {}
-                value = entry if context["value"] is ... else context["value"]
-                raise problem(context["message"], index, *context["at"], value=value) from None
-        return tuple(found)
+        return tuple(_below(single, entry, info, index) for index, entry in enumerate(raw))
 
     return Annotated[Any, Checked(check, list_schema(single.schema, size))]

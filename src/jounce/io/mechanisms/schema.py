@@ -60,6 +60,18 @@ def _all(raw: object, _info: Any) -> bool:
     return True
 
 
+def _units(raw: object, _info: Any) -> dict[str, str]:
+    if not isinstance(raw, dict) or not all(isinstance(unit, str) for unit in raw.values()):
+        raise problem("must be units by kind of quantity or name of an output, such as {angle: deg, length: mm}")
+    return raw
+
+
+UNITS = {
+    "description": "units in which results are shown and written: of angle, length, force, torque, energy, power, "
+    "or of an output by its name",
+    "type": "object",
+    "additionalProperties": {"type": "string", "minLength": 1},
+}
 ASSEMBLY = {
     "oneOf": [
         {"type": "integer", "minimum": 1},
@@ -236,6 +248,7 @@ def _file_model(space: str, joints: _Types, drivers: _Types, forces: _Types) -> 
         "space": (Literal[space], ...),
         "bodies": (_named(_body_model(space), _NAME, _body_name), ...),
         "title": (Annotated[Any, Checked(_text, {"type": "string"})], ""),
+        "units": (Annotated[Any, Checked(_units, UNITS)], {}),
         "assembly": (Annotated[Any, Checked(_assembly, ASSEMBLY)], None),
         "gravity": (vector(POSITION_COMPONENTS[space], "acceleration"), None),
         "parameters": (_named(scalar("any"), _PARAMETER, _parameter_name), {}),

@@ -6,7 +6,7 @@ import dataclasses
 from typing import Any
 
 from jounce.errors import UNSET, TrajectoryError, did_you_mean, show_value
-from jounce.io.mechanisms.values import ANY_VALUE, list_schema, object_schema, parse, problem, scalar_schema
+from jounce.io.mechanisms.values import ANY_VALUE, defined, list_schema, object_schema, parse, problem, scalar_schema
 from jounce.trajectory import AbstractMotion, Expression, FollowingMotion, PiecewiseMotion, Segment, SegmentedMotion
 from jounce.trajectory.dimensions import Dimension, is_rate, per_seconds
 from jounce.trajectory.segment_pieces import SEGMENT_PROFILES
@@ -57,8 +57,10 @@ def segmented(raw: dict[str, Any], quantity: str, info: Any) -> AbstractMotion |
     entries, by = raw["profile"], leader(raw, info)
     if not isinstance(entries, list | tuple) or not entries:
         raise problem("must be a list of segments, such as {profile: cycloidal, duration: 1 s, to: 20 mm}", "profile")
-    lapse = "time" if by is None else "any"
-    segments = [_segment(entry, k, quantity, lapse, info, timed=by is None) for k, entry in enumerate(entries)]
+    own = (info.context or {}).get("lapse")  # of a cam, whose laws are of its angle
+    lapse = own or ("time" if by is None else "any")
+    timed = by is None and own is None
+    segments = [_segment(entry, k, quantity, lapse, info, timed=timed) for k, entry in enumerate(entries)]
     initial = parse(raw.get("initial", 0.0), quantity, info, "initial").value
     start = parse(raw.get("start", 0.0), lapse, info, "start").value
     beyond = raw.get("beyond", BEYOND[0])
@@ -139,22 +141,22 @@ def rate(raw: object, order: int, quantity: str, info: Any, *at: str | int) -> f
     """Return a derivative of a driven quantity, in SI units per s to the power of its order."""
     value = parse(raw, quantity if order == 0 else "any", info, *at)
     if order and value.dimension:
-        bases = _bases(quantity, info)
-        if not is_rate(value.dimension, bases, order):
-            words = f"must be {' or '.join(bases) or 'a number'}{per_seconds(order)}"
+        known = bases(quantity, info)
+        if not is_rate(value.dimension, known, order):
+            words = f"must be {' or '.join(known) or 'a number'}{per_seconds(order)}"
             raise problem(words, *at, value=raw)
     return value.value
 
 
-def _bases(quantity: str, info: Any) -> list[str]:
+def bases(quantity: str, info: Any) -> list[str]:
     """Return the dimensions that a driven quantity may have; none of what is no coordinate, such as a force."""
     if quantity == "of coordinate":
         return ["angle" if info.data.get("coordinate") == "angle" else "length"]
     return [quantity] if quantity in ("length", "angle") else ["angle", "length"] if quantity == "any" else []
 
 
-def segmented_definition() -> dict[str, Any]:
-    """Return the JSON Schema of a profile of segments, which stands in a schema once."""
+def segmented_schema() -> dict[str, Any]:
+    """Return the JSON Schema of a profile of segments."""
     value = {"anyOf": ANY_VALUE}
     rates = {"type": "array", "items": value, "maxItems": MOST_CONDITIONS}
     segment = {
@@ -171,12 +173,7 @@ def segmented_definition() -> dict[str, Any]:
         "beyond": {"enum": list(BEYOND)},
         "of": LEADER_SCHEMA,
     }
-    return object_schema(whole, ["profile"])
-
-
-def segmented_schema() -> dict[str, Any]:
-    """Return what stands for the JSON Schema of a profile of segments until the whole schema is made."""
-    return {"definition": "segmented_law"}  # pydantic knows its own references only
+    return defined("segmented_law", object_schema(whole, ["profile"]))
 
 
 def piecewise_schema(law: dict[str, Any]) -> dict[str, Any]:

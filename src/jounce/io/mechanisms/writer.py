@@ -110,6 +110,8 @@ class _Writer:
         mechanism = self.mechanism
         found: dict[str, Any] = {"title": mechanism.title} if mechanism.title else {}
         found["space"] = mechanism.space
+        if mechanism.units:
+            found["units"] = dict(mechanism.units)
         if mechanism.gravity is not None:
             found["gravity"] = plain(mechanism.gravity, "gravity")
         if mechanism.parameters:

@@ -17,7 +17,9 @@ from jounce.trajectory import (
     Expression,
     ExpressionMotion,
     FollowingMotion,
+    HermiteMotion,
     MeasuredMotion,
+    OutputMotion,
     PiecewiseMotion,
     SegmentedMotion,
     SplineMotion,
@@ -56,6 +58,8 @@ class WrittenLaws:
             return [self.written(place, entry, element) for entry in law]
         if isinstance(law, TimeLaw):
             law = law.motion
+        if isinstance(law, OutputMotion):
+            return {"output": law.output, "law": self.written(f"{place}.law", law.law, element)}
         if isinstance(law, FollowingMotion):
             return self._following(place, law, element)
         if isinstance(law, SegmentedMotion):
@@ -77,6 +81,9 @@ class WrittenLaws:
         """Return a spline as its samples, or as samples through which there is no other with the same breakpoints."""
         if law.degree % 2 == 0 and not isinstance(law, MeasuredMotion):
             message = f"a spline of even degree ({law.degree}) has no form in a file; use an odd degree"
+            raise MechanismError(message, name=place)
+        if isinstance(law, HermiteMotion):
+            message = "a law through derivatives has no form in a file; write its values as samples, or another law"
             raise MechanismError(message, name=place)
         name = f"{self.stem}_{re.sub(r'[^A-Za-z0-9_]+', '_', place)}.csv"
         times, values = law.samples.value or _samples_of(law)

@@ -14,7 +14,7 @@ from jounce.errors import JounceError, TrajectoryError, no_such, show_value
 from jounce.io.files import DATA_FILES
 from jounce.io.files.located_data import Location, Source
 from jounce.io.files.reading import fault_of_number
-from jounce.io.files.samples import read_columns, read_samples
+from jounce.io.files.samples import rates, read_columns, read_samples
 from jounce.io.files.source import read_source
 from jounce.shapes import ArrayLike
 from jounce.trajectory import (
@@ -25,7 +25,7 @@ from jounce.trajectory import (
     MeasuredMotion,
     SplineMotion,
 )  # fmt: skip
-from jounce.trajectory.dimensions import Dimension, describe_dimension, is_rate, per_seconds
+from jounce.trajectory.dimensions import TIME, Dimension, describe_dimension, is_rate, per_seconds
 from jounce.trajectory.expression import RESERVED
 from jounce.trajectory.trapezoid import LIMITS
 
@@ -99,6 +99,12 @@ def _read_csv(path: str, degree: int) -> JointTrajectory:
         raise error.located(path=path) from None
 
 
+def _order(data: Mapping[str, Any]) -> int:
+    """Return which derivative samples are of; what is no number is told where it is read."""
+    order = data.get("derivative", 0)
+    return order if isinstance(order, int) else 0
+
+
 class _LawFile:
     """Reads laws from the plain data of a file; every error names the file, the line and the entry."""
 
@@ -140,14 +146,17 @@ class _LawFile:
             return ExpressionMotion(value, self.parameters) if isinstance(value, Expression) else value
         data = self.source.mapping(at, (*_SAMPLE_KEYS, "time", "value"))
         columns = {key: self._text(data[key], (*at, key)) for key in ("time", "value") if key in data}
-        times, values = self._samples(at, lambda path: read_samples(path, **columns, error_type=TrajectoryError))
+        allowed = rates(("angle", "length"), _order(data))
+        times, values = self._samples(
+            at, lambda path: read_samples(path, **columns, error_type=TrajectoryError, allowed=((TIME,), allowed))
+        )
         return self._spline(at, data, times, values, (*at, "initial"))
 
     def _sampled_motion(self) -> JointTrajectory:
         """Return the trajectory whose joints are the columns of a file of samples."""
         at: Location = ("motion",)
         data = self.source.mapping(at, _SAMPLE_KEYS)
-        times, columns = self._samples(at, lambda path: read_columns(path, TrajectoryError))
+        times, columns = self._samples(at, lambda path: read_columns(path, TrajectoryError, _order(data)))
         for name in self.source.mapping((*at, "initial")) if "initial" in data else ():
             if name not in columns:
                 raise self.source.error(no_such("column", name, columns), (*at, "initial", name))

@@ -1,0 +1,90 @@
+"""The command for plate cams: from the law of a follower to the profile."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from jounce.cli.file_kinds import expecting
+from jounce.cli.options import (
+    NO_TABLE,
+    PLAIN,
+    Heading,
+    TableOutput,
+    allowed,
+    errors_about,
+    spare_inputs,
+    units_chosen,
+    written,
+)
+from jounce.reporting.terminal import say
+
+
+def cam(
+    file: Path,
+    /,
+    *,
+    count: int | None = None,
+    figure: Path | None = None,
+    set_: list[str] | None = None,
+    allow: list[Path] | None = None,
+    units: list[str] | None = None,
+    heading: Heading = PLAIN,
+    output: TableOutput = NO_TABLE,
+) -> int:
+    r"""Find the profile of a plate cam, and whether it is undercut.
+
+    Told are the largest pressure angle, the least radii of curvature and
+    the width of a flat face, with the cam angles where; how smooth the
+    law is; and the parts of it that the follower loses.
+
+    The exit status is 1 where the cam is undercut.
+
+    Parameters
+    ----------
+    file
+        Cam file: .yaml, .yml, .toml or .json.
+    count
+        Points of the table over a turn, both ends counted [file's].
+    figure
+        Draw the cam: .png, .svg or .pdf.
+    set_
+        NAME=VALUE of a parameter, with a unit; repeatable.
+    allow
+        Folder whose files it may name, besides its own; repeatable.
+    units
+        Of what is shown and written, as angle=deg,length=mm; repeatable.
+
+    Examples
+    --------
+      jounce cam examples/cams/intake.yaml --out cam.csv
+      jounce cam examples/cams/intake.yaml --figure cam.png \
+        --set "lift=12 mm" --units length=mm,angle=deg
+    """
+    from jounce.io import in_units, load_cam
+    from jounce.reporting.cam_facts import cam_facts, cam_words
+
+    output.check()
+    told = heading.units
+    if figure is not None:
+        from jounce.plot import check_figure
+
+        check_figure(figure, overwrite=output.overwrite)
+    with expecting(file, "cam"):
+        found = load_cam(file, allow=allowed(allow), set_=set_ or (), count=count)
+    for target in (output.out, figure):
+        spare_inputs(target, overwrite=output.overwrite)
+    shown = units_chosen(found.shown_units, units)
+    with errors_about(file):
+        facts = cam_facts(found)
+    if not output.json:
+        say(cam_words(facts, shown))
+    output.write(lambda: in_units(found.dataset, shown), header_units=told)
+    if figure is not None:
+        from jounce.plot import draw_cam, save
+
+        drawn = draw_cam(found, shown)
+        written(lambda: save(drawn, figure, overwrite=output.overwrite))
+    output.tell("cam", lambda: {"file": file, **facts, "written": output.out})
+    if figure is not None and not output.json:
+        say(f"\nWritten to {figure}")
+    return 1 if facts["undercut"] else 0

@@ -1,0 +1,148 @@
+"""The command that writes what a servo drive needs: the motion of drivers at its rate, position to jerk."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from jounce.cli.mechanisms import outcome
+from jounce.cli.options import (
+    NO_TABLE,
+    PLAIN,
+    PLAIN_MECHANISM,
+    Heading,
+    MechanismReading,
+    TableOutput,
+    errors_about,
+    spare_inputs,
+)
+from jounce.errors import JounceError, UnitError, check_name
+from jounce.reporting.terminal import Bar, say, show_peaks
+
+if TYPE_CHECKING:
+    from jounce.kinematics import Motion
+    from jounce.mechanism import Mechanism
+    from jounce.trajectory.shown_units import ShownUnits
+
+PER_TIME = (("time", -1),)
+
+
+def servo(
+    file: Path,
+    /,
+    *,
+    rate: str = "1 kHz",
+    order: int = 3,
+    driver: list[str] | None = None,
+    reading: MechanismReading = PLAIN_MECHANISM,
+    heading: Heading = PLAIN,
+    output: TableOutput = NO_TABLE,
+) -> int:
+    r"""Tell the motion of drivers at the rate of a servo, position to jerk.
+
+    Where a driver follows from the law of an output, its motion is found
+    by inversion. Told are the peaks, and to which derivative the laws of
+    the file are continuous; --out writes a row for each period.
+
+    Parameters
+    ----------
+    file
+        Mechanism file: .yaml, .yml, .toml or .json.
+    rate
+        Of the rows, as 1kHz, 500Hz; a plain number is in Hz.
+    order
+        Highest derivative, 0 to 30; 3 is jerk.
+    driver
+        Which; repeatable [all].
+
+    Examples
+    --------
+      jounce servo examples/servo_press.yaml --out drive.csv
+      jounce servo examples/servo_press.yaml --rate 2kHz --out drive.csv \
+        --units angle=deg --header-units
+    """
+    from jounce.io import in_units
+    from jounce.reporting.law_facts import law_facts, law_words
+    from jounce.reporting.peaks import shown_peaks, table_peaks
+
+    output.check()
+    frequency, told = _frequency(rate), heading.units
+    mechanism = reading.mechanism(file)
+    spare_inputs(output.out, overwrite=output.overwrite)
+    names = list(dict.fromkeys(driver or mechanism.drivers))
+    for name in names:
+        check_name("driver", name, mechanism.drivers, JounceError, name="--driver")
+    shown = _units_of(mechanism, names)
+    with errors_about(file), Bar("solving") as bar:
+        if not names:
+            raise JounceError("there is no driver", name="drivers")
+        motion = _at_rate(mechanism, frequency, order, bar)
+        dataset = _driven(motion, names)
+    first, last = float(motion.time[0]), float(motion.time[-1])
+    laws = [law for law in law_facts(mechanism, first, last) if law["driver"] in names]
+    found = table_peaks(dataset)
+    if not output.json:
+        count = f"{len(motion.time)} rows from {first:g} s to {last:g} s, {frequency:g} a second"
+        say("\n".join([mechanism.title or file.name, count, *law_words(laws)]))
+        show_peaks(shown_peaks(found, shown))
+    output.write(lambda: in_units(dataset, shown), header_units=told)
+    output.tell("servo", lambda: _result(file, frequency, names, laws, found, output.out))
+    return outcome(motion, file)
+
+
+def _frequency(text: str) -> float:
+    """Return a rate in 1/s."""
+    from jounce.trajectory.units import parse_value
+
+    try:
+        number: Any = float(text)
+    except ValueError:
+        number = text
+    try:
+        found = parse_value(number)
+    except JounceError as error:
+        raise error.located(name="--rate", value=text) from None
+    if found.dimension not in (None, PER_TIME):
+        raise UnitError("must be a frequency, such as 1kHz", name="--rate", value=text)
+    if not isinstance(found.value, float) or found.value <= 0:
+        raise JounceError("must be greater than zero", name="--rate", value=text)
+    return found.value
+
+
+def _at_rate(mechanism: Mechanism, frequency: float, order: int, bar: Bar) -> Motion:
+    """Solve a mechanism at every period of the drive, from the first instant of its file to the last."""
+    from jounce.kinematics import solve
+    from jounce.mechanism import TimeGrid
+    from jounce.mechanism.time import instants_of
+
+    known = instants_of(mechanism.time, mechanism.parameter_values)
+    first, last = float(known[0]), float(known[-1])
+    grid = TimeGrid(first, last, 1 / frequency)
+    return solve(mechanism, grid, order, strict=False, progress=bar, keep=True)
+
+
+def _driven(motion: Motion, names: list[str]) -> Any:
+    """Return the coordinates of drivers as a dataset."""
+    import xarray
+
+    variables = {name: motion.driver(name) for name in names}
+    dataset = xarray.Dataset(variables, attrs={"title": motion.mechanism.title, "source": "jounce"})
+    dataset["time"].attrs = {"units": "s", "long_name": "time"}
+    return dataset
+
+
+def _units_of(mechanism: Mechanism, names: list[str]) -> ShownUnits:
+    """Return the units of a file for its drivers: by their kind, or by the name of an output that a driver shares."""
+    from jounce.mechanism.driver_outputs import is_turning
+    from jounce.trajectory.shown_units import QUANTITIES, ShownUnits
+
+    known = {name: "rad" if is_turning(mechanism.drivers[name]) else "m" for name in names}
+    chosen = {name: unit for name, unit in mechanism.units.items() if name in QUANTITIES or name in known}
+    return ShownUnits(chosen, known)
+
+
+def _result(file: Path, frequency: float, names: list[str], laws: Any, found: Any, out: Path | None) -> dict[str, Any]:
+    from jounce.reporting.json_results import told_peak
+
+    peaks = [told_peak(peak) for peak in found]
+    return {"file": file, "rate": frequency, "drivers": names, "laws": laws, "peaks": peaks, "written": out}

@@ -1,0 +1,177 @@
+"""Plate cams from files: the law of a follower, the follower, and the base circle."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable
+from os import PathLike
+from types import SimpleNamespace
+from typing import Any
+
+from pydantic_core import PydanticCustomError
+
+from jounce.errors import JounceError, MechanismFileError, check_name, did_you_mean
+from jounce.io.files.assignments import assignments
+from jounce.io.files.located_data import Source
+from jounce.io.files.samples import rates, read_samples
+from jounce.io.files.source import read_source
+from jounce.io.mechanisms.motion_values import Samples, motion
+from jounce.kinematics import OscillatingFollower, PlateCam, TranslatingFollower, plate_cam
+from jounce.kinematics.cams.plate_cam import SENSES
+from jounce.mechanism.resolve import resolve_motion
+from jounce.trajectory import AbstractMotion, Expression, SplineMotion
+from jounce.trajectory.dimensions import Dimension
+from jounce.trajectory.expression import RESERVED
+
+KEYS = ("title", "parameters", "units", "cam", "follower", "law")
+CAM_KEYS = ("base_radius", "sense", "count")
+FOLLOWERS = {
+    "translating": (TranslatingFollower, ("radius", "offset")),
+    "oscillating": (OscillatingFollower, ("center_distance", "arm", "radius", "face_offset")),
+}
+
+
+def load_cam(
+    path: str | PathLike[str],
+    *,
+    allow: Iterable[str | PathLike[str]] = (),
+    set_: Iterable[str] = (),
+    count: int | None = None,
+) -> PlateCam:
+    """Read a plate cam from a YAML, TOML or JSON file.
+
+    Parameters
+    ----------
+    path
+        A file with the keys ``cam`` (``base_radius``, ``sense``, ``count``), ``follower`` (``type`` translating or
+        oscillating, ``shape``, and its lengths), ``law``, and optional ``title``, ``parameters`` and ``units``.
+    allow
+        Folders besides that of the file that files of samples may be below.
+    set_
+        ``NAME=VALUE`` of parameters, in the place of those of the file.
+    count : int, optional
+        Points of the table, in the place of those of the file.
+
+    Returns
+    -------
+    PlateCam
+        With the units of the file.
+
+    Raises
+    ------
+    MechanismFileError
+        The file cannot be read or something in it is wrong: the message names the file, the line, the entry and the
+        value.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> cam = jn.load_cam("examples/cams/intake.yaml")
+    >>> cam.follower.shape, cam.units["length"]
+    ('roller', 'mm')
+    """
+    return _CamFile(read_source(path, allow, kind="cam"), set_).cam(count)
+
+
+class _CamFile:
+    """Reads the parts of a cam from the data of a file; every error names the file, the line and the entry."""
+
+    def __init__(self, source: Source, given: Iterable[str]):
+        self.source, self.data = source, source.mapping((), KEYS)
+        self.parameters: dict[str, float] = {}
+        self.dimensions: dict[str, Dimension] = {}
+        told = assignments(given, "--set", "a parameter is set by NAME=VALUE, such as 'lift=12 mm'", MechanismFileError)
+        known = source.mapping(("parameters",)) if "parameters" in self.data else {}
+        for name in told:
+            check_name("parameter", name, known, MechanismFileError, name="--set")
+        for name, raw in known.items():
+            at = ("parameters", name)
+            if not isinstance(name, str) or not name.isidentifier() or name in RESERVED:
+                raise source.error("this cannot be the name of a parameter", at)
+            value = source.value(at, told.get(name, raw), "any", self.parameters, self.dimensions)
+            if value.dimension is not None:
+                self.dimensions[name] = value.dimension
+            found = value.value
+            self.parameters[name] = float(found.evaluate(self.parameters) if isinstance(found, Expression) else found)
+
+    def cam(self, count: int | None) -> PlateCam:
+        """Return the cam."""
+        for key in ("cam", "follower", "law"):
+            if key not in self.data:
+                raise self.source.error("is missing", (key,))
+        body = self.source.mapping(("cam",), CAM_KEYS)
+        base = self._length(("cam", "base_radius"), body)
+        sense = body.get("sense", "counterclockwise")
+        if sense not in SENSES:
+            raise self.source.error(f"unknown sense; {did_you_mean(sense, SENSES)}", ("cam", "sense"), value=sense)
+        follower = self._follower()
+        law = self._law("angle" if follower.turning else "length")
+        title = self.data.get("title", "")
+        points = body.get("count", 721) if count is None else count
+        try:
+            found = plate_cam(law, follower, base, sense=sense, count=points, title=str(title))
+        except JounceError as error:
+            at = {"law": ("law",), "count": ("cam", "count"), "base_radius": ("cam", "base_radius")}
+            place = at.get(str(error.name), ("follower", str(error.name)))
+            raise self.source.error(error.message, place, value=error.value) from None
+        try:
+            found = dataclasses.replace(found, units=self.data.get("units") or {})
+            _ = found.shown_units
+        except JounceError as error:
+            raise self.source.error(error.message, tuple(str(error.name).split(".")), value=error.value) from None
+        return found
+
+    def _length(self, at: tuple[str, ...], data: dict[str, Any]) -> float:
+        if at[-1] not in data:
+            raise self.source.error("is missing", at)
+        value = self.source.value(at, data[at[-1]], "length", self.parameters, self.dimensions).value
+        return float(value.evaluate(self.parameters) if isinstance(value, Expression) else value)
+
+    def _follower(self) -> TranslatingFollower | OscillatingFollower:
+        data = self.source.mapping(("follower",))
+        kind = data.get("type")
+        if kind not in FOLLOWERS:
+            told = did_you_mean(kind, FOLLOWERS)
+            raise self.source.error(f"must be the type of a follower; {told}", ("follower", "type"), value=kind)
+        made, keys = FOLLOWERS[kind]
+        self.source.mapping(("follower",), ("type", "shape", *keys))
+        if "shape" not in data:
+            raise self.source.error("is missing; valid: knife_edge, roller, flat_face", ("follower", "shape"))
+        lengths = {key: self._length(("follower", key), data) for key in keys if key in data}
+        if kind == "oscillating" and "center_distance" not in data:
+            raise self.source.error("is missing", ("follower", "center_distance"))
+        try:
+            return made(data["shape"], **lengths)
+        except JounceError as error:
+            raise self.source.error(error.message, ("follower", str(error.name)), value=error.value) from None
+
+    def _law(self, quantity: str) -> AbstractMotion:
+        """Return the law by the cam angle, with numbers in the place of parameters."""
+        context = {"names": self.parameters, "dimensions": self.dimensions, "uses": {}, "lapse": "angle"}
+        check = motion(quantity, {"t": (("angle", 1),)}).__metadata__[0].function
+        try:
+            found = check(self.data["law"], SimpleNamespace(context=context, data={}))
+        except PydanticCustomError as error:
+            told = error.context or {}
+            value = self.data["law"] if told["value"] is ... else told["value"]
+            raise self.source.error(told["message"], ("law", *told["at"]), value=value) from None
+        if isinstance(found, Samples):
+            found = self._spline(found, quantity)
+        if not isinstance(found, AbstractMotion | Expression | float | int):
+            raise self.source.error("a cam has a law of its own angle: an expression, samples, or segments", ("law",))
+        try:
+            return resolve_motion(found, self.parameters)
+        except JounceError as error:
+            raise self.source.error(error.message, ("law",), value=error.value) from None
+
+    def _spline(self, samples: Any, quantity: str) -> AbstractMotion:
+        if samples.derivative or samples.of is not None:
+            key = "derivative" if samples.derivative else "of"
+            raise self.source.error("a cam takes samples of the lift by its own angle", ("law", key))
+
+        def law(path: str) -> SplineMotion:
+            allowed = (rates(("angle",), 0), rates((quantity,), 0))
+            table = read_samples(path, samples.time, samples.value, allowed=allowed)
+            return SplineMotion(*table, degree=samples.degree, beyond="repeat")
+
+        return self.source.read_named(samples.samples, ("law",), law)

@@ -1,0 +1,411 @@
+"""The profile of a plate cam: the envelope of its follower, which goes round it by its law.
+
+Everything is written on jets by the cam angle, in the frame of the cam: the centre of a roller is a curve, of which the
+profile is the parallel one; a flat face is a line, of which it is the envelope. Tangents, normals, pressure angles and
+curvatures are read off derivatives of these jets; no formula for one is written.
+"""
+
+import dataclasses
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from jounce.errors import MechanismError, TrajectoryError, check_choice, whole_number
+from jounce.jet import Jet, atan2, sqrt
+from jounce.kinematics.cams.followers import AbstractFollower, Follower, across, rotated, unit
+from jounce.kinematics.cams.results import Extreme, Undercut
+from jounce.shapes import ArrayLike
+from jounce.trajectory import (
+    AbstractMotion,
+    Continuity,
+    Expression,
+    ExpressionMotion,
+    SegmentedMotion,
+    SplineMotion,
+    continuity,
+)
+from jounce.trajectory.checks import positive
+from jounce.trajectory.shown_units import ShownUnits
+
+SENSES = {"counterclockwise": 1.0, "clockwise": -1.0}
+TURN = 2 * np.pi
+CLOSED = 1e-9  # of the rise: so near to where it began a law ends
+ORDER = 3  # of the jets: positions, tangents, and how they turn
+BENT = 1e-9  # of how far a normal turns: less is straight
+LOST = 1e-9  # of the size of the cam: less lift is lost to rounding only
+NOTICED = 1e-6  # of the size of the cam: less is lost to the spacing of the points where it is undercut elsewhere
+ROUNDS, POINTS = 9, 9  # looks at an extreme, each nearer than the one before
+FINEST = 3601  # points of an undercut profile, at least
+CHUNK = 200  # positions of the follower that are compared with all points at a time
+MOST = 100_000  # points of a profile
+
+Numbers1 = Float[np.ndarray, " angle"]
+Plane = Float[np.ndarray, "2 angle"]
+
+
+class Geometry(NamedTuple):
+    """A cam at some cam angles, in its own frame; lengths in m, angles in rad.
+
+    Attributes
+    ----------
+    lift : array of shape (angle,)
+        m or rad.
+    pitch, profile : array of shape (2, angle)
+        The centre of the roller or the edge, and where it touches; of a flat face both are the same.
+    pressure_angle : array of shape (angle,)
+        From the travel of the follower to the normal of the profile, in the sense in which the cam turns: positive
+        where the cam lifts the follower.
+    forward, around : array of shape (angle,)
+        How far the contact, and the centre of the roller, go round the cam per rad; where the contact goes back, the
+        profile is undercut.
+    turned : array of shape (angle,)
+        How far the normal turns round the cam per rad, negative where the profile is concave.
+    contact : array of shape (angle,)
+        Where a flat face is touched, along it.
+    """
+
+    lift: Numbers1
+    pitch: Plane
+    profile: Plane
+    pressure_angle: Numbers1
+    forward: Numbers1
+    around: Numbers1
+    turned: Numbers1
+    contact: Numbers1
+
+    @property
+    def curvature(self) -> Numbers1:
+        """Curvature of the profile, positive where it is convex, 1/m; infinite where it is pointed."""
+        with np.errstate(divide="ignore"):
+            return self.turned / self.forward
+
+    @property
+    def pitch_curvature(self) -> Numbers1:
+        """Curvature of the curve of the centre of the roller, 1/m."""
+        return self.turned / self.around
+
+
+@dataclasses.dataclass(frozen=True)
+class PlateCam:
+    """A plate cam, with its follower and its law.
+
+    Parameters
+    ----------
+    law : AbstractMotion
+        Lift of the follower by the cam angle, m or rad by rad.
+    follower : TranslatingFollower or OscillatingFollower
+    base_radius : float
+        m.
+    sense : str
+        In which the cam turns, ``"counterclockwise"`` or ``"clockwise"``.
+    angle : numpy.ndarray of shape (angle,)
+        Cam angles of the table, rad, in the sense in which it turns.
+    title : str
+    units : dict of str to str
+        In which it is shown and written, as those of a `Mechanism`; inside, all is in SI.
+    """
+
+    law: AbstractMotion
+    follower: Follower
+    base_radius: float
+    sense: str
+    angle: np.ndarray
+    title: str = ""
+    units: Mapping[str, str] = dataclasses.field(default_factory=dict)
+
+    @property
+    def shown_units(self) -> ShownUnits:
+        """The units in which the cam is shown and written."""
+        known = {str(name): x.attrs["units"] for name, x in self.dataset.variables.items()}
+        return ShownUnits(self.units, known)
+
+    def at(self, angle: ArrayLike) -> Geometry:
+        """Return the cam at any cam angles, rad: exact but for rounding."""
+        return _geometry(self, np.atleast_1d(np.asarray(angle, float)))
+
+    @cached_property
+    def table(self) -> Geometry:
+        """The cam at the angles of its table."""
+        return self.at(self.angle)
+
+    @cached_property
+    def continuity(self) -> Continuity:
+        """To which derivative the law is continuous, over a turn of the cam and where the next one begins."""
+        return continuity(self.law, 0.0, TURN, periodic=True)
+
+    @cached_property
+    def largest_pressure_angle(self) -> Extreme:
+        """The pressure angle that is farthest from zero, with its sign, rad."""
+        return self._extreme(lambda found: np.abs(found.pressure_angle), lambda found: found.pressure_angle)
+
+    @cached_property
+    def least_radius(self) -> Extreme | None:
+        """The smallest radius of curvature where the profile is convex, m; negative where it is undercut.
+
+        None for a profile that is nowhere convex.
+        """
+        return self._least_radius(1.0)
+
+    @cached_property
+    def least_concave_radius(self) -> Extreme | None:
+        """The smallest radius of curvature where the profile is concave, m; None where it is nowhere."""
+        return self._least_radius(-1.0)
+
+    @property
+    def is_undercut(self) -> bool:
+        """Whether the follower cannot have its law, somewhere on the cam."""
+        return bool(self.undercuts) or (self.least_radius is not None and self.least_radius.value < 0)
+
+    @cached_property
+    def face(self) -> tuple[Extreme, Extreme] | None:
+        """Where the cam touches a flat face, at the least and the most along it, m; None for other followers.
+
+        Along a translating face from its middle, along an oscillating one from the foot of the pivot. The face must
+        reach from one to the other.
+        """
+        if not self.follower.is_flat:
+            return None
+        low = self._extreme(lambda found: -found.contact, lambda found: found.contact)
+        return low, self._extreme(lambda found: found.contact, lambda found: found.contact)
+
+    @cached_property
+    def undercuts(self) -> tuple[Undercut, ...]:
+        """The parts of the law that the cam cannot give, with the cam angles where and the lift that is lost."""
+        lost = self.table.lift - self.followed_lift
+        size = 1.0 if self.follower.turning else self.base_radius
+        return tuple(_runs(self.angle, lost, lost > NOTICED * size))
+
+    @cached_property
+    def followed_lift(self) -> Numbers1:
+        """The lift that the follower has on what is left of the profile, at the angles of the table, m or rad.
+
+        The profile is taken as it is cut, by points; where it is not undercut, the lift is that of the law.
+        """
+        return _followed(self)
+
+    @cached_property
+    def dataset(self) -> Any:
+        """The table as an `xarray.Dataset` along the cam angle, SI, units in the attributes."""
+        import xarray
+
+        found, lift = self.table, "rad" if self.follower.turning else "m"
+        columns = {
+            "lift": (found.lift, lift),
+            "x": (found.profile[0], "m"),
+            "y": (found.profile[1], "m"),
+            "pitch_x": (found.pitch[0], "m"),
+            "pitch_y": (found.pitch[1], "m"),
+            "pressure_angle": (found.pressure_angle, "rad"),
+            "curvature": (found.curvature, "1/m"),
+        }
+        if self.follower.is_flat:
+            columns["contact"] = (found.contact, "m")
+            del columns["pitch_x"], columns["pitch_y"]
+        variables = {name: ("angle", values, {"units": u, "long_name": name}) for name, (values, u) in columns.items()}
+        dataset = xarray.Dataset(variables, coords={"angle": ("angle", self.angle, {"units": "rad"})})
+        return dataset.assign_attrs(title=self.title or "plate cam", source="jounce")
+
+    def _least_radius(self, sign: float) -> Extreme | None:
+        """Return the smallest radius of curvature where the profile is convex, or concave."""
+
+        def radius(found: Geometry) -> Numbers1:
+            bent = sign * found.turned > BENT * np.abs(found.turned).max(initial=0.0)
+            return np.where(bent, found.forward / np.where(bent, sign * found.turned, 1.0), np.inf)
+
+        if not np.isfinite(radius(self.table)).any():
+            return None
+        return self._extreme(lambda found: -radius(found), radius)
+
+    def _extreme(self, size: Any, value: Any) -> Extreme:
+        """Return the largest of a size, looked for nearer and nearer around the largest of the table."""
+        step = TURN / max(len(self.angle) - 1, 1)
+        best = float(self.angle[int(np.nanargmax(size(self.table)))])
+        for _ in range(ROUNDS):
+            near = best + step * np.linspace(-1, 1, POINTS)
+            best = float(near[int(np.nanargmax(size(self.at(near))))])
+            step *= 2 / (POINTS - 1)
+        return Extreme(float(value(self.at(best))[0]), float(best % TURN))
+
+
+def plate_cam(
+    law: AbstractMotion | Expression | str,
+    follower: Follower,
+    base_radius: float,
+    *,
+    sense: str = "counterclockwise",
+    count: int = 721,
+    title: str = "",
+) -> PlateCam:
+    """Return the plate cam that gives a follower its law.
+
+    Parameters
+    ----------
+    law : AbstractMotion, Expression or str
+        Lift of the follower from the base circle by the cam angle, which takes the place of the time: m for a
+        translating one, rad for an oscillating one, by rad. Over a turn it must end where it begins.
+    follower : TranslatingFollower or OscillatingFollower
+    base_radius : float
+        The smallest radius of the profile where the lift is zero, m.
+    sense : str, default "counterclockwise"
+        In which the cam turns, or ``"clockwise"``.
+    count : int, default 721
+        Points of the table over a turn, both ends counted.
+    title : str, optional
+
+    Returns
+    -------
+    PlateCam
+        Its frame is that of the ground where the cam angle is zero.
+
+    Raises
+    ------
+    MechanismError
+        If the follower does not reach the base circle, or the law takes it through the axis of the cam or out of reach.
+    TrajectoryError
+        If the law does not close over a turn, says nothing of some angles, or a value is not valid.
+
+    Examples
+    --------
+    An eccentric disc of 30 mm, 10 mm off its axis, under a flat face:
+
+    >>> import jounce as jn
+    >>> cam = jn.plate_cam("0.01*(1 - cos(t))", jn.TranslatingFollower("flat_face"), base_radius=0.02)
+    >>> round(1 / float(cam.at(1.0).curvature[0]), 12), [round(end.value, 12) for end in cam.face]
+    (0.03, [-0.01, 0.01])
+    """
+    if isinstance(law, str | Expression):
+        law = ExpressionMotion(law)
+    if not isinstance(law, AbstractMotion):
+        raise TrajectoryError("must be a motion law, or an expression of t, the cam angle", name="law", value=law)
+    if not isinstance(follower, AbstractFollower):
+        raise MechanismError("must be a TranslatingFollower or an OscillatingFollower", name="follower", value=follower)
+    check_choice("sense", sense, tuple(SENSES), MechanismError)
+    count = whole_number("count", count, 16, MOST, error=TrajectoryError)
+    cam = PlateCam(law, follower, positive("base_radius", base_radius), sense, np.linspace(0.0, TURN, count), title)
+    law.check_instants(0.0, TURN)
+    if isinstance(law, SegmentedMotion) and law.beyond != "repeat" and law.lasts(TURN):
+        cam = dataclasses.replace(cam, law=law.repeated())
+    _check(cam)
+    return cam
+
+
+def _check(cam: PlateCam) -> None:
+    """Raise for a law that does not close, or that takes the follower where it cannot be."""
+    if isinstance(cam.law, SplineMotion) and cam.law.beyond == "repeat":
+        period = float(cam.law.stop) - float(np.asarray(cam.law.breakpoints)[0])
+        if abs(TURN / period - round(TURN / period)) > CLOSED * TURN / period:
+            message = f"has a period of {period:.9g} rad, which does not go into a turn of the cam"
+            raise TrajectoryError(message, name="law", value=period)
+    follower, start = cam.follower, cam.follower.start(cam.base_radius)
+    lift = np.asarray(cam.law(Jet([cam.angle])).coefficients[0])
+    if not np.isfinite(lift).all():
+        where = float(cam.angle[int(np.argmin(np.isfinite(lift)))])
+        raise TrajectoryError("has no finite value at this cam angle, rad", name="law", value=where)
+    away = float(lift[-1] - lift[0])
+    if abs(away) > CLOSED * max(float(np.ptp(lift)), 1e-3 * cam.base_radius):
+        message = f"does not close: after a turn of the cam the lift is {away:.6g} from where it began"
+        raise TrajectoryError(message, name="law", value=float(lift[-1]))
+    coordinate = start + lift
+    low, high = (0.0, np.pi / 2 if follower.is_flat else np.pi) if follower.turning else (0.0, np.inf)
+    bad = ~((coordinate > low) & (coordinate < high))
+    if bad.any():
+        where = int(np.argmax(bad))
+        message = f"takes the follower through the axis of the cam, or out of reach, at {cam.angle[where]:.6g} rad"
+        raise MechanismError(message, name="law", value=float(lift[where]))
+
+
+def _geometry(cam: PlateCam, angles: Numbers1) -> Geometry:
+    """Return a cam at cam angles, from jets by the cam angle in the frame of the cam."""
+    follower, sense = cam.follower, SENSES[cam.sense]
+    theta = Jet.variable(angles, ORDER)
+    lift = cam.law(theta)
+    coordinate = lift + follower.start(cam.base_radius)
+    back = theta * -sense  # the follower goes round the cam the other way
+    if follower.is_flat:
+        direction, distance = follower.face(coordinate)
+        normal = unit(direction + back)
+        turning = (direction + back).differentiate()
+        pitch = profile = normal * distance + across(normal) * (distance.differentiate() / turning)
+        tangent = across(normal) * -sense
+    else:
+        pitch = rotated(follower.center(coordinate), back)
+        tangent = pitch.differentiate()
+        tangent = tangent / sqrt(_dot(tangent, tangent))
+        normal = across(tangent) * sense  # away from the cam
+        profile = pitch - normal * follower.radius
+    forward, around = (_dot(tangent, curve.differentiate()) for curve in (profile, pitch))
+    turned = _dot(tangent, normal.differentiate())
+    place = rotated(pitch, -back)
+    travel = rotated(follower.travel(coordinate, place), back)
+    pressure = atan2((travel[0] * normal[1] - travel[1] * normal[0]) * sense, _dot(travel, normal))
+    contact = follower.along_face(coordinate, place) if follower.is_flat else lift * 0.0
+    jets = (lift, pitch, profile, pressure, forward, around, turned, contact)
+    return Geometry(*(np.asarray(jet.coefficients[0]) for jet in jets))
+
+
+def _dot(a: Jet, b: Jet) -> Jet:
+    return a[0] * b[0] + a[1] * b[1]
+
+
+def _followed(cam: PlateCam) -> Numbers1:
+    """Return the lift at which a follower comes down on what is left of a profile, m or rad.
+
+    A point of the profile that the follower would pass through at any cam angle is cut away.
+    """
+    follower, found = cam.follower, cam.table
+    if not (follower.is_flat or follower.radius):
+        return found.lift  # an edge is as sharp as what it cuts
+    start = follower.start(cam.base_radius)
+    size = 1.0 if follower.turning else cam.base_radius
+    points = _left(cam, cam.angle, found)
+    if points.shape[1] < len(cam.angle) < FINEST:  # where branches cross is found to the spacing of the points
+        finer = np.linspace(0.0, TURN, FINEST)
+        points = _left(cam, finer, cam.at(finer))
+    turns, lift = SENSES[cam.sense] * cam.angle, np.full(len(cam.angle), -np.inf)
+    if points.shape[1]:
+        for rows in _chunks(len(turns)):
+            lift[rows] = _touching(cam, points, turns[rows]).max(axis=1) - start
+    return np.where(np.abs(lift - found.lift) <= 1e-12 * size, found.lift, lift)
+
+
+def _left(cam: PlateCam, angles: Numbers1, found: Geometry) -> Plane:
+    """Return the points of a profile through which the follower passes at no cam angle."""
+    start, size = cam.follower.start(cam.base_radius), 1.0 if cam.follower.turning else cam.base_radius
+    turns = SENSES[cam.sense] * angles
+    cut = np.zeros(len(angles), bool)
+    for rows in _chunks(len(turns)):
+        touched = _touching(cam, found.profile, turns[rows])
+        cut |= np.any(touched > (start + found.lift[rows] + LOST * size)[:, None], axis=0)
+    return found.profile[:, ~cut]
+
+
+def _chunks(count: int) -> list[slice]:
+    return [slice(first, first + CHUNK) for first in range(0, count, CHUNK)]
+
+
+def _touching(cam: PlateCam, points: Plane, turns: Numbers1) -> Float[np.ndarray, "turn point"]:
+    """Return the coordinate at which the follower touches each point of the cam, turned by each angle."""
+    c, s = np.cos(turns)[:, None], np.sin(turns)[:, None]
+    x, y = points
+    placed = np.stack([c * x - s * y, s * x + c * y]).reshape(2, -1)
+    return cam.follower.touching(placed).reshape(len(turns), -1)
+
+
+def _runs(angle: Numbers1, lost: Numbers1, where: Bool[np.ndarray, " angle"]) -> list[Undercut]:
+    """Return the parts of a turn in which lift is lost, one through zero as a whole."""
+    found, marks = [], where[:-1]  # the last angle is the first one
+    if marks.all():
+        worst = int(np.argmax(lost))
+        return [Undercut(0.0, TURN, float(angle[worst]), float(lost[worst]))]
+    first = int(np.argmin(marks))  # begin where nothing is lost
+    order = np.roll(np.arange(len(marks)), -first)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], marks[order].astype(int), [0]])))
+    for low, high in zip(edges[::2], edges[1::2], strict=True):
+        inside = order[low:high]
+        worst = inside[int(np.argmax(lost[inside]))]
+        start, stop, most = (float(angle[k]) for k in (inside[0], inside[-1], worst))
+        found.append(Undercut(start, stop, most, float(lost[worst])))
+    return found

@@ -1,0 +1,103 @@
+"""To which derivative the laws of the drivers are continuous, as plain data and in words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from typing_extensions import TypedDict
+
+from jounce.mechanism import Mechanism
+from jounce.mechanism.driver_outputs import is_turning
+from jounce.mechanism.held_outputs import led_outputs, with_outputs_held
+from jounce.mechanism.resolve import resolve_motion
+from jounce.reporting.peaks import derivative_name
+from jounce.trajectory import Continuity, continuity
+from jounce.trajectory.shown_units import derivative_unit
+
+
+class JumpFacts(TypedDict):
+    """The jumps of a derivative of a law within the time of the file: how many, and the largest one."""
+
+    order: int
+    jumps: int
+    largest: float | None
+    at: float | None
+
+
+class LawFacts(TypedDict):
+    """To which derivative a law is continuous; ``of`` is the driver, or the output that is held to the law."""
+
+    driver: str
+    of: str
+    unit: str
+    continuous_to: int | None
+    derivatives: list[JumpFacts]
+    remark: str
+
+
+def law_facts(mechanism: Mechanism, first: float, last: float) -> list[dict[str, Any]]:
+    """Return to which derivative each law of a driver is continuous, from a first to a last instant: LawFacts.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> facts, = law_facts(jn.load("examples/servo_press.yaml"), 0.0, 1.2)
+    >>> facts["of"], facts["continuous_to"], facts["derivatives"][4]["jumps"]
+    ('ram_y', 3, 6)
+    """
+    led, held, found = led_outputs(mechanism), with_outputs_held(mechanism), []
+    for name, driver in held.drivers.items():
+        motion = getattr(driver, "motion", None)
+        if motion is None:
+            continue
+        told = continuity(resolve_motion(motion, mechanism.parameter_values), first, last)
+        found.append({
+            "driver": name,
+            "of": led[name].output if name in led else name,
+            "unit": "rad" if is_turning(driver) else "m",
+            "continuous_to": told.smoothness,
+            "derivatives": jump_facts(told),
+            "remark": told.unknown,
+        })  # fmt: skip
+    return found
+
+
+def jump_facts(told: Continuity) -> list[dict[str, Any]]:
+    """Return the jumps of each derivative of a law: JumpFacts."""
+    return [
+        {"order": x.order, "jumps": x.count, "largest": _number(x.size), "at": _number(x.instant)}
+        for x in told.derivatives
+    ]
+
+
+def _number(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def law_words(laws: Sequence[Mapping[str, Any]], by: str = "s") -> list[str]:
+    """Word to which derivative laws are continuous, by the time or by an angle, a line for each.
+
+    Examples
+    --------
+    >>> jumps = {"order": 3, "jumps": 2, "largest": -120.0, "at": 0.5}
+    >>> law_words([{"of": "theta", "unit": "rad", "continuous_to": 2, "derivatives": [jumps], "remark": ""}])
+    ['law of theta: continuous to acceleration; jerk jumps by -120 rad/s^3 at 0.5 s (2 jumps)']
+    """
+    lines = []
+    for law in laws:
+        broken = [x for x in law["derivatives"] if x["jumps"]]
+        if law["continuous_to"] is None:
+            words = f"no derivative up to the {derivative_name(10)} jumps" if not law["remark"] else "no jump is known"
+        elif law["continuous_to"] < 0:
+            words = "not continuous"
+        else:
+            words = f"continuous to {derivative_name(law['continuous_to'])}"
+        for x in broken:
+            several = f" ({x['jumps']} jumps)" if x["jumps"] > 1 else ""
+            unit = derivative_unit(law["unit"], x["order"]) if by == "s" else f"{law['unit']}/{by}^{x['order']}"
+            words += f"; {derivative_name(x['order'])} jumps by {x['largest']:.6g} {unit}"
+            words += f" at {x['at']:.6g} {by}{several}"
+        lines.append(f"law of {law['of']}: {words}{'; ' if law['remark'] else ''}{law['remark']}")
+    return lines

@@ -1,0 +1,75 @@
+"""Motion laws through instants at which derivatives are known, too."""
+
+import math
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.errors import TrajectoryError, check_choice
+from jounce.shapes import ArrayLike
+from jounce.trajectory.checks import finite_numbers
+from jounce.trajectory.motion import SplineMotion
+
+BEYOND = ("refuse", "hold", "continue")
+MET = 6  # values and derivatives that a piece meets at its end, at most: more lose digits
+
+
+class HermiteMotion(SplineMotion):
+    """A motion law through instants with the value and the derivatives at each.
+
+    At an instant it has the derivatives given there. In between it is a polynomial, which begins with all
+    derivatives of the instant before and meets the first five of the instant after it.
+
+    Parameters
+    ----------
+    times : array_like of shape (instants,)
+        Increasing, s.
+    derivatives : array_like of shape (instants, order + 1)
+        The law and its time derivatives, lowest first: m or rad by s to the power of the order.
+    beyond : {"refuse", "hold", "continue"}, default "refuse"
+        What the law is before the first and after the last instant, as for `SplineMotion`.
+
+    Raises
+    ------
+    TrajectoryError
+        If the numbers are not finite, the instants do not increase, or their number is not that of the rows.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> law = jn.HermiteMotion([0.0, 1.0], [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])  # rest to rest: 3-4-5
+    >>> [round(float(x), 12) for x in law(jn.Jet.variable(0.5, order=2)).derivatives()]
+    [0.5, 1.875, -0.0]
+    """
+
+    def __init__(self, times: ArrayLike, derivatives: ArrayLike, beyond: str = "refuse"):
+        check_choice("beyond", beyond, BEYOND, TrajectoryError)
+        instants = finite_numbers("times", times, None)
+        shape = np.shape(derivatives)
+        columns = shape[1] if len(shape) == 2 and shape[1] else 1
+        table = finite_numbers("derivatives", derivatives, (len(instants), columns))
+        if (np.diff(instants) <= 0).any():
+            raise TrajectoryError("must increase", name="times", value=instants.tolist()[:5])
+        self._set(instants, _pieces(instants, table), instants[-1], beyond)
+
+
+def _pieces(
+    times: Float[np.ndarray, " instants"], derivatives: Float[np.ndarray, "instants levels"]
+) -> Float[np.ndarray, "powers instants"]:
+    """Return the powers of the piece that begins at each instant; the last one is its Taylor polynomial."""
+    levels, met = derivatives.shape[1], min(derivatives.shape[1], MET)
+    factorials = np.array([math.factorial(k) for k in range(levels)], float)
+    taylor = (derivatives / factorials).T
+    steps = np.diff(times)
+    scaled = taylor[:, :-1] * steps ** np.arange(levels)[:, None]  # in units of the step
+    ends = taylor[:met, 1:] * steps ** np.arange(met)[:, None]
+    missing = ends - _binomials(met, np.arange(levels)) @ scaled
+    upper = np.linalg.solve(_binomials(met, levels + np.arange(met)), missing)
+    powers = np.concatenate([scaled, upper]) / steps ** np.arange(levels + met)[:, None]
+    powers[:levels] = taylor[:, :-1]
+    return np.column_stack([powers, np.concatenate([taylor[:, -1], np.zeros(met)])])
+
+
+def _binomials(orders: int, powers: np.ndarray) -> Float[np.ndarray, "orders powers"]:
+    """Return the Taylor coefficients at one of the powers of a variable."""
+    return np.array([[math.comb(int(p), j) for p in powers] for j in range(orders)], float)

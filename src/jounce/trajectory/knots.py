@@ -1,0 +1,77 @@
+"""What happens where the pieces of a law meet: by how much its derivatives jump there."""
+
+import math
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.trajectory.motion import SplineMotion
+
+SMOOTH = 1e-9  # of the peak of a derivative: a smaller jump is rounding
+
+Jumps = tuple[Float[np.ndarray, " knots"], Float[np.ndarray, "levels knots"]]
+"""Where derivatives may jump, and by how much: the value from the right less that from the left, by order."""
+
+
+def knot_jumps(law: SplineMotion, order: int) -> Jumps:
+    """Return by how much derivatives jump where pieces of a law meet, and at its ends; rounding is zero.
+
+    Of a law that repeats its beginning stands for its end, too. One that ends at its data has no jumps at its ends.
+    """
+    begins, stop = np.asarray(law.breakpoints, float), float(law.stop)
+    lengths = np.diff(np.append(begins, stop))
+    powers = np.asarray(law.coefficients, float)
+    sines = np.asarray(getattr(law, "sines", np.zeros((3, len(begins)))), float)
+    left, right = (_derivatives(powers, sines, at, order) for at in (lengths, np.zeros(len(begins))))
+    before, after, instants = left[:, :-1], right[:, 1:], begins[1:]
+    found = after - before
+    smooth = law.degree - 1 if getattr(law, "samples", None) and law.samples.value is not None else -1
+    found[: smooth + 1] = 0.0  # a spline through samples is smooth within: what is left is rounding
+    if law.beyond == "repeat":
+        wrapped = left[:, -1:] - np.append(float(law.advance), np.zeros(order))[:, None]
+        closing = right[:, :1] - wrapped
+        closing[: smooth + 1] = 0.0
+        found, instants = np.column_stack([closing, found]), begins
+    elif law.beyond == "hold":
+        rest = np.zeros((order + 1, 1))
+        ends = right[:, :1] - rest, rest - left[:, -1:]
+        for end in ends:
+            end[0] = 0.0
+        found, instants = np.column_stack([ends[0], found, ends[1]]), np.concatenate([begins[:1], instants, [stop]])
+    peaks = _largest(powers, sines, lengths, law, order)[:, None]
+    return instants, np.where(np.abs(found) <= SMOOTH * peaks, 0.0, found)
+
+
+def _derivatives(
+    powers: Float[np.ndarray, "powers pieces"],
+    sines: Float[np.ndarray, "3 pieces"],
+    at: Float[np.ndarray, " pieces"],
+    order: int,
+) -> Float[np.ndarray, "levels pieces"]:
+    """Return the derivatives of each piece a time after its beginning."""
+    amplitude, frequency, phase = sines
+    found = []
+    for k in range(order + 1):
+        polynomial = sum(
+            (c * math.perm(j, k) * at ** (j - k) for j, c in enumerate(powers) if j >= k), np.zeros_like(at)
+        )
+        found.append(polynomial + amplitude * frequency**k * np.sin(frequency * at + phase + k * math.pi / 2))
+    return np.array(found)
+
+
+def _largest(
+    powers: Float[np.ndarray, "powers pieces"],
+    sines: Float[np.ndarray, "3 pieces"],
+    lengths: Float[np.ndarray, " pieces"],
+    law: SplineMotion,
+    order: int,
+) -> Float[np.ndarray, " levels"]:
+    """Return bounds of the derivatives of a law, of the size of their peaks."""
+    powers, (amplitude, frequency, _) = np.abs(powers), np.abs(sines)
+    at = np.minimum(lengths, np.max(lengths[1:], initial=0.0)) if law.beyond == "continue" else lengths
+    terms = [
+        sum((c * math.perm(j, k) * at ** (j - k) for j, c in enumerate(powers) if j >= k), np.zeros_like(at))
+        + amplitude * frequency**k
+        for k in range(order + 1)
+    ]
+    return np.max(np.array(terms), axis=1)

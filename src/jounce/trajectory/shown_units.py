@@ -1,0 +1,186 @@
+"""Units in which results are shown and written; inside, everything is in SI.
+
+A unit is chosen for a kind of quantity, or for an output by its name. Derivatives follow, by s: an angle in deg has
+velocities in deg/s. What is composed of lengths and angles does not follow from them: a torque stays in N m, whatever
+the unit of length, unless a unit of torque is chosen.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+from jounce.errors import JounceError, UnitError, did_you_mean
+from jounce.trajectory.dimensions import (
+    ANGLE,
+    FORCE,
+    LENGTH,
+    TIME,
+    TORQUE,
+    Dimension,
+    describe_dimension,
+    dimension_of,
+    times,
+)
+from jounce.trajectory.units import parse_unit, parse_value
+
+QUANTITIES: dict[str, tuple[str, Dimension]] = {
+    "angle": ("rad", ANGLE),
+    "length": ("m", LENGTH),
+    "force": ("N", FORCE),
+    "torque": ("N*m", TORQUE),
+    "energy": ("J", TORQUE),
+    "power": ("W", times(TORQUE, TIME, -1)),
+}
+"""The kinds of quantity that a unit can be chosen for: the unit in SI, and the dimension."""
+
+
+def derivative_unit(unit: str, order: int) -> str:
+    """Return the unit of a time derivative of a quantity.
+
+    Examples
+    --------
+    >>> derivative_unit("m", 0), derivative_unit("m", 1), derivative_unit("rad/s", 3)
+    ('m', 'm/s', 'rad/s^4')
+    """
+    per_time = re.search(r"/s(?:\^(\d+))?$", unit)
+    base = unit[: per_time.start()] if per_time else unit
+    total = order + (int(per_time[1] or 1) if per_time else 0)
+    return base if total == 0 else f"{base}/s" if total == 1 else f"{base}/s^{total}"
+
+
+def unit_size(text: str) -> tuple[float, Dimension]:
+    """Return the size of a unit in SI units, and its dimension.
+
+    Raises
+    ------
+    UnitError
+        It is no unit of mechanics.
+    """
+    if not isinstance(text, str) or not re.match(r"[A-Za-z\u00b0\u00b5\u03bc]|1\s*/", text.strip()):
+        raise UnitError("must be a unit, such as deg or mm", value=text)
+    try:
+        found = parse_value(f"1 {text.strip()}")
+    except JounceError as error:
+        raise UnitError(error.message, value=text) from None
+    if found.dimension is None or not isinstance(found.value, float):
+        raise UnitError("must be a unit, such as deg or mm", value=text)
+    return found.value, found.dimension
+
+
+@dataclass(frozen=True)
+class ShownUnits:
+    """Units in which quantities are shown, by their kind or by the name of an output.
+
+    Parameters
+    ----------
+    chosen : dict of str to str
+        Units by ``angle``, ``length``, ``force``, ``torque``, ``energy``, ``power``, or by the name of an output, which
+        counts first.
+    outputs : dict of str to str, optional
+        The SI units of the outputs that there are, by name.
+
+    Raises
+    ------
+    UnitError
+        If a name is neither, or a unit does not measure what it is chosen for.
+
+    Examples
+    --------
+    >>> units = ShownUnits({"angle": "deg", "length": "mm"})
+    >>> units.of("rad/s"), units.of("N*m")
+    (('deg/s', 57.29577951308232), ('N*m', 1.0))
+    """
+
+    chosen: Mapping[str, str] = field(default_factory=dict)
+    outputs: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self):
+        if not isinstance(self.chosen, Mapping):
+            raise UnitError("must be units by kind of quantity or name of an output", name="units", value=self.chosen)
+        for name, unit in self.chosen.items():
+            if name not in QUANTITIES and name not in self.outputs:
+                message = f"no quantity and no output has this name; {did_you_mean(name, [*QUANTITIES, *self.outputs])}"
+                raise UnitError(message, name=f"units.{name}")
+            try:
+                _, dimension = unit_size(unit)
+            except UnitError as error:
+                raise error.located(name=f"units.{name}") from None
+            wanted = [self._of_output(name), self._of_kind(name)]
+            if dimension not in wanted:
+                words = " or ".join(describe_dimension(x) for x in wanted if x is not None)
+                message = f"measures {describe_dimension(dimension)}, not {words}"
+                raise UnitError(message, name=f"units.{name}", value=unit)
+
+    def _of_output(self, name: str) -> Dimension | None:
+        """Return the dimension of the output of a name, None where there is none."""
+        return _dimension(self.outputs[name]) if name in self.outputs else None
+
+    def _of_kind(self, name: str) -> Dimension | None:
+        """Return the dimension of a kind of quantity, None for any other name."""
+        return QUANTITIES[name][1] if name in QUANTITIES else None
+
+    def _chosen(self, name: str, wanted: Dimension | None) -> str | None:
+        """Return the unit that is chosen for a name, if it measures what is wanted: a name may be of a kind as well."""
+        unit = self.chosen.get(name)
+        return unit if unit is not None and unit_size(unit)[1] == wanted else None
+
+    def of(self, unit: str, name: str = "") -> tuple[str, float]:
+        """Return the unit in which a quantity is shown, and by what its values in SI are multiplied.
+
+        Parameters
+        ----------
+        unit : str
+            Its unit in SI: one of those that outputs have, or a time derivative of one.
+        name : str, optional
+            Of the output.
+        """
+        per_time = re.search(r"/s(?:\^(\d+))?$", unit)
+        order = int(per_time[1] or 1) if per_time else 0
+        base = unit[: per_time.start()] if per_time else unit
+        if shown := self._chosen(name, self._of_output(name)):
+            rate = re.search(r"/s(?:\^(\d+))?$", self.outputs[name])
+            order -= int(rate[1] or 1) if rate else 0
+            return derivative_unit(shown, order), 1.0 / unit_size(shown)[0]
+        kind = next((kind for kind, (known, _) in QUANTITIES.items() if known == base), "")
+        shown = self._chosen(kind, self._of_kind(kind))
+        return (derivative_unit(shown, order), 1.0 / unit_size(shown)[0]) if shown else (unit, 1.0)
+
+    def merged(self, others: Mapping[str, str] | None) -> "ShownUnits":
+        """Return these units with others in their place."""
+        return ShownUnits({**self.chosen, **(others or {})}, self.outputs)
+
+    @property
+    def are_si(self) -> bool:
+        """Whether nothing is shown in another unit than that of SI."""
+        return all(unit_size(unit)[0] == 1.0 for unit in self.chosen.values())
+
+
+def _dimension(unit: str) -> Dimension:
+    """Return the dimension of a unit that an output has."""
+    return dimension_of() if unit in ("", "1") else parse_unit(unit)[1]
+
+
+def units_given(texts: Iterable[str], option: str = "--units") -> dict[str, str]:
+    """Return units by name from texts such as ``angle=deg,length=mm``.
+
+    Raises
+    ------
+    UnitError
+        A name or a unit is missing, or a name is given twice.
+
+    Examples
+    --------
+    >>> units_given(["angle=deg,length=mm", "C=cm"])
+    {'angle': 'deg', 'length': 'mm', 'C': 'cm'}
+    """
+    found: dict[str, str] = {}
+    for text in (part for given in texts for part in given.split(",")):
+        name, _, unit = (part.strip() for part in text.partition("="))
+        if not name or not unit:
+            raise UnitError("units are given by NAME=UNIT, such as angle=deg,length=mm", name=option, value=text)
+        if name in found:
+            raise UnitError(f"is given more than once, as {found[name]} and as {unit}", name=f"{option} {name}")
+        found[name] = unit
+    return found

@@ -1,0 +1,219 @@
+"""To which derivative motion laws are continuous, and by how much the others jump: what is heard as a ping."""
+
+import dataclasses
+import math
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.jet import Jet
+from jounce.trajectory.checks import whole_number
+from jounce.trajectory.composed import FollowingMotion, OutputMotion, PiecewiseMotion
+from jounce.trajectory.knots import Jumps, knot_jumps
+from jounce.trajectory.motion import AbstractMotion, ExpressionMotion, FunctionMotion, SplineMotion
+
+HIGHEST = 10  # derivative that is looked at
+MOST_CROSSINGS = 10_000
+LOOKS = 4000  # at a leader, for where it passes a knot of the law that follows it
+STEPS = 60  # of bisection
+
+
+@dataclasses.dataclass(frozen=True)
+class DerivativeJumps:
+    """The jumps of one derivative of a law.
+
+    Attributes
+    ----------
+    order : int
+        Of the derivative.
+    count : int
+        How many there are in the time looked at.
+    size, instant : float
+        The largest one, m or rad by s to the power of the order, and where it is, s; NaN where there is none.
+    """
+
+    order: int
+    count: int
+    size: float
+    instant: float
+
+
+@dataclasses.dataclass(frozen=True)
+class Continuity:
+    """To which derivative a law is continuous.
+
+    Attributes
+    ----------
+    derivatives : tuple of DerivativeJumps
+        From the law itself up to jounce, or to the first derivative that jumps if that is higher.
+    unknown : str
+        Why that may not be all; empty where it is.
+    """
+
+    derivatives: tuple[DerivativeJumps, ...]
+    unknown: str = ""
+
+    @property
+    def smoothness(self) -> int | None:
+        """The highest derivative that is continuous, -1 if the law itself jumps; None if none of those told jumps."""
+        broken = [x.order for x in self.derivatives if x.count]
+        return min(broken) - 1 if broken else None
+
+
+def continuity(law: AbstractMotion, first: float, last: float, order: int = 4, *, periodic: bool = False) -> Continuity:
+    """Return to which derivative a law is continuous from a first to a last instant.
+
+    Parameters
+    ----------
+    law : AbstractMotion
+        With numbers in the place of parameters.
+    first, last : float
+        s.
+    order : int, default 4
+        Up to which all derivatives are told.
+    periodic : bool, default False
+        Whether the law begins again after the last instant, as that of a cam does after a turn.
+
+    Returns
+    -------
+    Continuity
+        Of what a law through samples is between them, it is told to be as smooth as its degree says.
+
+    Raises
+    ------
+    TrajectoryError
+        If the order is no whole number from 0 to 10, or the law waits for parameters.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> law = jn.SegmentedMotion([jn.Segment("cycloidal", 0.5, by=0.1), jn.Segment("dwell", 0.5)], beyond="advance")
+    >>> found = jn.continuity(law, 0.0, 2.0)
+    >>> found.smoothness, [(x.order, x.count, x.instant) for x in found.derivatives if x.count]
+    (2, [(3, 5, 0.0)])
+    """
+    whole_number("order", order, 0, HIGHEST)
+    instants, jumps, unknown = _jumps(law, first, last)
+    if periodic and getattr(law, "beyond", "") != "repeat":
+        ends = [np.asarray(law(Jet.variable(np.asarray(at, float), HIGHEST)).derivatives()) for at in (last, first)]
+        closing = np.where(np.abs(ends[1] - ends[0]) <= 1e-9 * np.abs(ends).max(axis=0), 0.0, ends[1] - ends[0])
+        instants, jumps = np.append(instants, first), np.column_stack([jumps, closing])
+    broken = np.flatnonzero(np.any(jumps != 0, axis=1))
+    told = max(order, int(broken[0])) if len(broken) else order
+    found = []
+    for level in range(told + 1):
+        sizes = np.abs(jumps[level])
+        where = int(np.argmax(sizes >= 0.999999 * sizes.max())) if sizes.any() else -1
+        at = (float(jumps[level, where]), float(instants[where])) if where >= 0 else (np.nan, np.nan)
+        found.append(DerivativeJumps(level, int(np.count_nonzero(sizes)), *at))
+    return Continuity(tuple(found), unknown)
+
+
+def _jumps(law: AbstractMotion, first: float, last: float) -> tuple[np.ndarray, Float[np.ndarray, "levels knots"], str]:
+    """Return the instants in a time at which derivatives jump, by how much, and what is not known."""
+    none = np.zeros(0), np.zeros((HIGHEST + 1, 0))
+    match law:
+        case OutputMotion() if law.parts:
+            return _jumps(law.parts[0], first, last)
+        case FollowingMotion() if law.parts:
+            following, leader = law.parts
+            return _followed(following, leader, first, last)
+        case PiecewiseMotion() if law.parts:
+            return _of_pieces(law, first, last)
+        case SplineMotion():
+            return *_repeated(law, knot_jumps(law, HIGHEST), first, last), ""
+        case ExpressionMotion():
+            kinks = "abs" in str(
+                law.expression.folded(lambda _: "", lambda _: "", lambda word, parts: f"{word} {parts}")
+            )
+            return *none, "it may have kinks where abs is of zero" if kinks else ""
+        case FunctionMotion():
+            return *none, "it is a Python function"
+    return *none, f"nothing is known of a {type(law).__name__}"
+
+
+def _repeated(law: SplineMotion, jumps: Jumps, first: float, last: float) -> Jumps:
+    """Return the jumps within a time, those of all periods where the law repeats."""
+    instants, sizes = jumps
+    if law.beyond == "repeat" and len(instants):
+        start, period = float(np.asarray(law.breakpoints)[0]), float(law.stop) - float(np.asarray(law.breakpoints)[0])
+        since = np.arange(np.floor((first - start) / period), np.floor((last - start) / period) + 1)
+        since = since[: max(MOST_CROSSINGS // len(instants), 1)]
+        instants = (instants + period * since[:, None]).ravel()
+        sizes = np.tile(sizes, (1, len(since)))
+    slack = 1e-12 * max(abs(first), abs(last))
+    inside = (instants >= first - slack) & (instants <= last + slack)
+    return instants[inside], sizes[:, inside]
+
+
+def _of_pieces(law: PiecewiseMotion, first: float, last: float) -> tuple[np.ndarray, np.ndarray, str]:
+    """Return the jumps between pieces, and those that pieces have themselves."""
+    instants, sizes = law.jumps(HIGHEST)
+    inside = (instants >= first) & (instants <= last)
+    found = [(instants[inside], sizes[:, inside], "")]
+    begins, ends = (-np.inf, *law.until), (*law.until, np.inf)
+    for part, begin, end in zip(law.parts, begins, ends, strict=True):
+        if first < end and last > begin:
+            own, jumps, unknown = _jumps(part, max(first, begin), min(last, end))
+            within = (own > begin) & (own < end)
+            found.append((own[within], jumps[:, within], unknown))
+    parts = list(zip(*found, strict=True))
+    return np.concatenate(parts[0]), np.concatenate(parts[1], axis=1), "; ".join(dict.fromkeys(filter(None, parts[2])))
+
+
+def _followed(
+    law: AbstractMotion, leader: AbstractMotion, first: float, last: float
+) -> tuple[np.ndarray, np.ndarray, str]:
+    """Return the jumps of a law of what a leader prescribes, where the leader passes its knots.
+
+    The jump is a polynomial of how far the leader is from the knot, so that its derivatives by time follow from the jet
+    of the leader there.
+    """
+    looks = np.linspace(first, last, LOOKS + 1)
+    values = np.asarray(leader(Jet([looks])).coefficients[0])
+    own, _, unknown = _jumps(leader, first, last)
+    if len(own):
+        unknown = "its leader has jumps of its own"
+    knots, jumps, less = _jumps(law, float(values.min()), float(values.max()))
+    peaks = Jet(np.max(np.abs(c)) for c in leader(Jet.variable(looks, HIGHEST)).dense().coefficients)
+    peaks = Jet((0.0, *peaks.coefficients[1:]))
+    instants, sizes = [], []
+    for knot, jump in zip(knots, jumps.T, strict=True):
+        if not jump.any():
+            continue
+        away = values - knot
+        crossing = np.flatnonzero((away[:-1] < 0) != (away[1:] < 0))
+        times = _crossings(leader, knot, looks[crossing], looks[crossing + 1])
+        passing = leader(Jet.variable(times, HIGHEST)).dense().coefficients
+        change = _composed(jump, Jet((np.zeros_like(times), *passing[1:])))  # at the knot, not near it
+        bound = _composed(np.abs(jump), peaks)[:, None]
+        forward = np.where(away[crossing] < 0, 1.0, -1.0)
+        instants.append(times)
+        sizes.append(np.where(np.abs(change) <= 1e-9 * bound, 0.0, forward * change))
+    if not instants:
+        return np.zeros(0), np.zeros((HIGHEST + 1, 0)), unknown or less
+    times, found = np.concatenate(instants), np.concatenate(sizes, axis=1)
+    order = np.argsort(times)
+    return times[order], found[:, order], unknown or less
+
+
+def _composed(jump: Float[np.ndarray, " levels"], away: Jet) -> np.ndarray:
+    """Return the derivatives by time of a polynomial, given by its derivatives at zero, of how far a leader is."""
+    change = Jet.constant(np.zeros_like(np.asarray(away.coefficients[0])), HIGHEST)
+    for level in range(HIGHEST, -1, -1):
+        change = change * away + jump[level] / math.factorial(level)
+    return np.asarray(change.derivatives())
+
+
+def _crossings(leader: AbstractMotion, knot: float, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Return when a leader passes a value, between instants before and after, by bisection."""
+
+    def away(instants: np.ndarray) -> np.ndarray:
+        return np.asarray(leader(Jet([instants])).coefficients[0]) - knot
+
+    below = away(low) < 0
+    for _ in range(STEPS):
+        middle = (low + high) / 2
+        before = (away(middle) < 0) == below
+        low, high = np.where(before, middle, low), np.where(before, high, middle)
+    return high

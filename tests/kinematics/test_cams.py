@@ -1,0 +1,172 @@
+"""Plate cams from laws: against eccentric discs, whose laws are known, and by following the profile back."""
+
+import math
+
+import numpy as np
+import pytest
+
+import jounce as jn
+
+DISC, OFF, ROLLER, COUNT = 0.03, 0.01, 0.008, 181
+
+
+def disc_law(follower, sense=1.0):
+    """The law of a follower on a disc of 30 mm, whose centre is 10 mm off the axis, towards y at the angle zero."""
+
+    def center(t):
+        return -OFF * np.sin(sense * t), OFF * np.cos(sense * t)
+
+    import jax.numpy as jnp
+
+    def coordinate(t):
+        x, y = -OFF * jnp.sin(sense * t), OFF * jnp.cos(sense * t)
+        reach = DISC + follower.radius
+        if isinstance(follower, jn.TranslatingFollower):
+            return y + DISC if follower.is_flat else y + jnp.sqrt(reach**2 - (follower.offset - x) ** 2)
+        away = jnp.hypot(follower.center_distance - x, y)
+        above = jnp.arctan2(y, follower.center_distance - x)
+        if follower.is_flat:
+            return above + jnp.arcsin((DISC + follower.face_offset) / away)
+        return above + jnp.arccos((follower.arm**2 + away**2 - reach**2) / (2 * follower.arm * away))
+
+    start = follower.start(DISC - OFF)
+    return jn.FunctionMotion(lambda t: coordinate(t) - start), center
+
+
+FOLLOWERS = {
+    "flat": jn.TranslatingFollower("flat_face"),
+    "roller": jn.TranslatingFollower("roller", radius=ROLLER),
+    "offset roller": jn.TranslatingFollower("roller", radius=ROLLER, offset=0.006),
+    "edge": jn.TranslatingFollower("knife_edge", offset=-0.004),
+    "rocker with a roller": jn.OscillatingFollower("roller", center_distance=0.08, arm=0.07, radius=ROLLER),
+    "rocker with a face": jn.OscillatingFollower("flat_face", center_distance=0.08, face_offset=0.003),
+}
+
+
+QUICK = {("roller", "counterclockwise"), ("rocker with a face", "clockwise")}
+DISCS = [
+    pytest.param(name, sense, marks=() if (name, sense) in QUICK else pytest.mark.slow)
+    for name in FOLLOWERS
+    for sense in ("counterclockwise", "clockwise")
+]
+
+
+@pytest.mark.parametrize("name, sense", DISCS)
+def test_an_eccentric_disc_comes_back_from_its_law(name, sense):
+    follower = FOLLOWERS[name]
+    turn = 1.0 if sense == "counterclockwise" else -1.0
+    law, _ = disc_law(follower, turn)
+    cam = jn.plate_cam(law, follower, DISC - OFF, sense=sense, count=COUNT)
+    found = cam.table
+    x, y = found.profile
+    np.testing.assert_allclose(np.hypot(x, y - OFF), DISC, rtol=1e-12)
+    np.testing.assert_allclose(found.curvature, 1 / DISC, rtol=1e-11)
+    if follower.shape == "roller":
+        np.testing.assert_allclose(1 / found.pitch_curvature, DISC + ROLLER, rtol=1e-11)
+    np.testing.assert_allclose(cam.followed_lift, found.lift, atol=1e-12)
+    assert cam.undercuts == ()
+    assert cam.least_radius.value == pytest.approx(DISC, rel=1e-11)
+    assert cam.least_concave_radius is None
+    normal = (x / DISC, (y - OFF) / DISC)  # away from the disc
+    for k in range(0, COUNT, 30):  # the normal in the ground, and the way that the follower goes
+        c, s = math.cos(turn * cam.angle[k]), math.sin(turn * cam.angle[k])
+        n = (c * normal[0][k] - s * normal[1][k], s * normal[0][k] + c * normal[1][k])
+        place = found.profile if follower.is_flat else found.pitch
+        p = (c * place[0][k] - s * place[1][k], s * place[0][k] + c * place[1][k])
+        v = (0.0, 1.0) if not follower.turning else (p[1], follower.center_distance - p[0])
+        angle = math.atan2(v[0] * n[1] - v[1] * n[0], v[0] * n[0] + v[1] * n[1])
+        assert found.pressure_angle[k] == pytest.approx(turn * angle, abs=1e-12)
+
+
+def test_handbook_formulas_of_rollers_and_faces():
+    """tan(pressure angle) = (s' - e)/(y0 + s) of an offset roller; R = base + s + s'' and contact s' under a face."""
+    law = jn.SegmentedMotion([
+        jn.Segment("cycloidal", 2.0, to=0.015), jn.Segment("dwell", 0.6), jn.Segment("polynomial_4_5_6_7", 2.2, to=0.0),
+        jn.Segment("dwell", 2 * math.pi - 4.8),
+    ])  # fmt: skip
+    base, offset = 0.03, 0.007
+    angle = np.linspace(0.05, 6.2, 41)
+    s, v, a = (np.asarray(x) for x in law(jn.Jet.variable(angle, 2)).derivatives())
+    roller = jn.plate_cam(law, jn.TranslatingFollower("roller", ROLLER, offset), base, count=COUNT)
+    start = math.sqrt((base + ROLLER) ** 2 - offset**2)
+    pressure = np.tan(roller.at(angle).pressure_angle)
+    np.testing.assert_allclose(pressure, (v - offset) / (start + s), rtol=1e-12, atol=1e-14)
+    radial = jn.plate_cam(law, jn.TranslatingFollower("roller", ROLLER), base, count=COUNT)
+    r = base + ROLLER + s
+    bend = (r * r + 2 * v * v - r * a) / (r * r + v * v) ** 1.5  # of a polar curve
+    np.testing.assert_allclose(radial.at(angle).pitch_curvature, bend, rtol=1e-12)
+    np.testing.assert_allclose(1 / radial.at(angle).curvature, 1 / bend - ROLLER, rtol=1e-10)
+    flat = jn.plate_cam(law, jn.TranslatingFollower("flat_face"), base, count=COUNT)
+    np.testing.assert_allclose(1 / flat.at(angle).curvature, base + s + a, rtol=1e-11)
+    np.testing.assert_allclose(flat.at(angle).contact, v, atol=1e-15)
+    low, high = flat.face
+    assert high.value == pytest.approx(2 * 0.015 / 2.0, rel=1e-12)  # of a cycloid, in the middle of the rise
+    assert high.angle == pytest.approx(1.0, abs=1e-6)
+    assert low.value == pytest.approx(-2.1875 * 0.015 / 2.2, rel=1e-12)
+    assert flat.continuity.smoothness == 2
+    mirrored = jn.plate_cam(
+        law, jn.TranslatingFollower("roller", ROLLER, -offset), base, sense="clockwise", count=COUNT
+    )
+    np.testing.assert_allclose(mirrored.table.profile * [[-1], [1]], roller.table.profile, atol=1e-15)
+
+
+@pytest.mark.slow
+def test_undercut_is_told_with_the_angle_and_what_is_lost():
+    law = jn.SegmentedMotion([jn.Segment("cycloidal", 0.9, to=0.02), jn.Segment("cycloidal", 0.9, to=0.0),
+                              jn.Segment("dwell", 2 * math.pi - 1.8)])  # fmt: skip
+    for follower in (jn.TranslatingFollower("flat_face"), jn.TranslatingFollower("roller", 0.03)):
+        cam = jn.plate_cam(law, follower, 0.025, count=721)
+        assert cam.is_undercut
+        assert len(cam.undercuts) == (1 if follower.is_flat else 2)  # the roller has a part on each flank
+        first, last = cam.undercuts[0], cam.undercuts[-1]
+        assert 0 < first.start < first.angle < first.stop < 1.8
+        assert first.start + last.stop == pytest.approx(1.8, abs=0.02)  # the law is the same backwards
+        assert first.lost == pytest.approx(last.lost, rel=0.1)
+        assert first.lost > 1e-4
+        assert cam.least_radius.value < 0
+        rest = cam.angle > 3.0
+        np.testing.assert_allclose(cam.followed_lift[rest], cam.table.lift[rest], atol=1e-12)
+    sound = jn.plate_cam(law, jn.TranslatingFollower("roller", 0.005), 0.1, count=721)
+    assert not sound.is_undercut
+    assert sound.least_concave_radius.value > 0
+    least = sound.least_radius
+    around = sound.at(least.angle + np.linspace(-0.01, 0.01, 101))
+    assert (1 / around.curvature[around.turned > 0]).min() >= least.value - 1e-12
+
+
+@pytest.mark.slow
+def test_units_do_not_matter():
+    fall = jn.Segment("cycloidal", 2 * math.pi - 3.0, to=0.0)
+    law, large = (jn.SegmentedMotion([jn.Segment("cycloidal", 3.0, to=x), fall]) for x in (0.02, 20.0))
+    first = jn.plate_cam(law, jn.TranslatingFollower("roller", 0.03), 0.02, count=361)
+    second = jn.plate_cam(large, jn.TranslatingFollower("roller", 30.0), 20.0, count=361)
+    assert len(first.undercuts) == len(second.undercuts)
+    np.testing.assert_allclose(second.followed_lift, 1e3 * first.followed_lift, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "law, follower, options, words",
+    [
+        ("0.01*t", jn.TranslatingFollower("flat_face"), {}, "does not close.*0.0628"),
+        ("-0.03*(1 - cos(t))", jn.TranslatingFollower("flat_face"), {}, "through the axis"),
+        ("0", jn.TranslatingFollower("roller", 0.01, offset=0.04), {}, "misses the cam"),
+        ("0", jn.OscillatingFollower("roller", 0.1, arm=0.2, radius=0.01), {}, "from 0.07 m to 0.13 m"),
+        ("0", jn.OscillatingFollower("flat_face", 0.01), {}, "more than 0.02 m"),
+        ("1/t", jn.TranslatingFollower("flat_face"), {}, "no finite value"),
+        ("0", jn.TranslatingFollower("flat_face"), {"sense": "left"}, "unknown sense"),
+        ("0", jn.TranslatingFollower("flat_face"), {"count": 3}, "from 16"),
+        ("0", "flat_face", {}, "must be a TranslatingFollower"),
+    ],
+)
+def test_what_is_wrong_is_named(law, follower, options, words):
+    with pytest.raises(jn.JounceError, match=words):
+        jn.plate_cam(law, follower, 0.02, **options)
+
+
+def test_followers_refuse_what_does_not_go_together():
+    with pytest.raises(jn.MechanismError, match="only a roller has a radius"):
+        jn.TranslatingFollower("flat_face", radius=0.01)
+    with pytest.raises(jn.TrajectoryError, match="greater than zero"):
+        jn.TranslatingFollower("roller")
+    with pytest.raises(jn.MechanismError, match="unknown shape"):
+        jn.TranslatingFollower("mushroom")

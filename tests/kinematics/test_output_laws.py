@@ -1,0 +1,129 @@
+"""Laws of outputs in the place of those of drivers: the motion of the drivers follows by inversion."""
+
+import dataclasses
+import math
+
+import jax
+import mpmath as mp
+import numpy as np
+import pytest
+
+import jounce as jn
+
+GRID = np.linspace(0.0, 1.0, 9)
+ORDER = 4
+
+
+def slider_crank(law, output="stroke_x"):
+    crank = jn.load("examples/slider_crank.yaml")
+    theta = dataclasses.replace(crank.drivers["theta"], motion=jn.OutputMotion(output, law))
+    bodies = {name: dataclasses.replace(body, mass=1.0, inertia=0.01) for name, body in crank.bodies.items()}
+    outputs = crank.outputs | {"theta": jn.DriverAngleOutput("theta"), "torque": jn.DriverTorqueOutput("theta")}
+    more = {"bodies": bodies, "outputs": outputs, "gravity": [0.0, -9.81]}
+    return dataclasses.replace(crank, drivers={"theta": theta}, **more)
+
+
+@pytest.fixture(scope="module")
+def motion():
+    return jn.solve(slider_crank("0.17 + 0.015*cos(3*t)"), GRID, order=ORDER)
+
+
+def crank_angle(t):
+    """The triangle of crank and rod: r = 50, l = 150, offset e = 10 mm."""
+    r, rod, e = mp.mpf("0.05"), mp.mpf("0.15"), mp.mpf("0.01")
+    x = mp.mpf("0.17") + mp.mpf("0.015") * mp.cos(3 * t)
+    d = mp.sqrt(x * x + e * e)
+    return mp.atan2(e, x) + mp.acos((r * r + d * d - rod * rod) / (2 * r * d))
+
+
+def test_the_driver_follows_with_all_derivatives(motion):
+    with mp.workdps(50):
+        exact = np.array([[float(mp.diff(crank_angle, mp.mpf(t), k)) for k in range(ORDER + 1)] for t in GRID])
+    scale = np.abs(exact).max(axis=0)
+    for found in (motion.outputs["theta"], motion.driver("theta").values, motion.outputs["crank_angle"]):
+        assert np.abs((found - exact) / scale).max() < 1e-13
+    wanted = [[0.015 * 3**k * math.cos(3 * t + k * math.pi / 2) for k in range(1, ORDER + 1)] for t in GRID]
+    np.testing.assert_allclose(motion.outputs["stroke"][:, 1:, 0], wanted, atol=1e-12)
+
+
+def test_forces_are_those_of_the_driver_not_of_the_output(motion):
+    balance = jn.power_balance(motion)
+    assert float(np.abs(balance["residual"] / balance["scale"]).max()) < 1e-13
+    torque, rate = motion.outputs["torque"][:, 0], motion.outputs["theta"][:, 1]
+    np.testing.assert_allclose(torque * rate, balance["drivers"].sel(derivative=0), atol=1e-14)
+    again = jn.solve(motion.actuated, GRID, order=ORDER)  # the driver by its own law
+    for name, values in motion.outputs.items():
+        scale = np.abs(values).max(axis=0)
+        np.testing.assert_allclose(again.outputs[name], values, atol=1e-10 * scale.max(), rtol=1e-9)
+    law = motion.driver_law("theta")
+    between = law(jn.Jet.variable(np.array([0.3]), 1)).derivatives()
+    with mp.workdps(50):
+        assert float(between[0][0]) == pytest.approx(float(crank_angle(mp.mpf("0.3"))), abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    "output, words",
+    [
+        ("stroke", "a component of a point"),
+        ("stroke_z", "did you mean 'stroke_"),
+        ("torque", "cannot be held to a law"),
+        ("theta", "cannot be held to a law"),
+    ],
+)
+def test_what_cannot_be_held_is_named(output, words):
+    with pytest.raises(jn.MechanismError, match=words) as caught:
+        jn.solve(slider_crank("0.17", output), GRID)
+    assert caught.value.name == "drivers.theta.motion.output"
+
+
+def test_where_the_output_does_not_determine_the_driver_it_is_refused():
+    with pytest.raises(jn.SolveError, match=r"stroke_x can go no further than 0\.199.*driver theta") as caught:
+        jn.solve(slider_crank("0.19 + 0.02*t"), GRID, order=0)
+    assert caught.value.motion.status[0] == jn.Status.OK
+    top = math.sqrt(0.2**2 - 0.01**2)
+    with pytest.raises(jn.JounceError, match="driver theta follows from the output stroke_x"):
+        jn.solve(slider_crank(f"{top!r} - 0.01*t"), GRID, order=0)
+
+
+@pytest.mark.slow
+def test_what_needs_the_law_beforehand_says_so(motion):
+    mechanism = slider_crank("0.17 + 0.015*cos(3*t)")
+    for ask in (jn.simulate, jn.linearise, jn.trace):
+        with pytest.raises(jn.JounceError, match=r"follows from the output 'stroke_x'.*motion\.actuated"):
+            ask(mechanism)
+    with pytest.raises(jn.UnsupportedError, match="not differentiated where the law of a driver follows"):
+        jax.grad(lambda r: jn.solve(mechanism.with_parameters(r=r), GRID).outputs["theta"][-1, 0])(0.05)
+    with pytest.raises(jn.UnsupportedError, match="families are not solved where"):
+        jn.solve_batch(mechanism, {"r": [0.05, 0.051]}, GRID)
+    with pytest.raises(jn.MechanismError, match="the coordinate of this driver is an angle"):
+        dataclasses.replace(motion.mechanism, outputs={"x": jn.DriverDisplacementOutput("theta")})
+
+
+@pytest.mark.slow
+def test_in_space_the_torque_is_that_of_the_motor():
+    """A rod of 0.2 m turns about z, and its tip is held to y = 0.2 sin(theta): theta = arcsin(5 y)."""
+    rod = jn.Body([0, 0, 0], orientation=[math.cos(0.1), 0, 0, math.sin(0.1)], mass=2.0, inertia=[0.0, 0.01, 0.01])
+    hinge = jn.spatial.Revolute(("ground", "rod"), [0, 0, 0], [0, 0, 0], axis_i=[0, 0, 1], axis_j=[0, 0, 1])
+    motor = jn.drivers.RotationDriver(("ground", "rod"), [0, 0, 1], jn.OutputMotion("tip_y", "0.1*sin(2*t) + 0.05"))
+    mechanism = jn.Mechanism(
+        space="spatial",
+        bodies={"rod": rod},
+        joints={"hinge": hinge},
+        drivers={"motor": motor},
+        outputs={
+            "tip": jn.PointOutput("rod", [0.2, 0, 0]),
+            "angle": jn.DriverAngleOutput("motor"),
+            "torque": jn.DriverTorqueOutput("motor"),
+        },
+    )
+    motion = jn.solve(mechanism, GRID, order=3)
+
+    def angle(t):
+        return mp.asin(5 * (mp.sin(2 * t) / 10 + mp.mpf("0.05")))
+
+    with mp.workdps(40):
+        exact = np.array([[float(mp.diff(angle, mp.mpf(t), k)) for k in range(6)] for t in GRID])
+    np.testing.assert_allclose(
+        motion.outputs["angle"], exact[:, :4], rtol=1e-12, atol=1e-12 * np.abs(exact[:, 3]).max()
+    )
+    np.testing.assert_allclose(motion.outputs["torque"], 0.01 * exact[:, 2:], rtol=1e-10, atol=1e-11)

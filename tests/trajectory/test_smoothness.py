@@ -1,0 +1,96 @@
+"""To which derivative laws are continuous, and the jumps of the others."""
+
+import math
+
+import numpy as np
+import pytest
+
+import jounce as jn
+
+JUMPS = {  # of cam profiles of unit rise and duration, at the beginning: order, size
+    "harmonic": (2, math.pi**2 / 2),
+    "cycloidal": (3, 4 * math.pi**2),
+    "polynomial_3_4_5": (3, 60.0),
+    "polynomial_4_5_6_7": (4, 840.0),
+}
+
+
+@pytest.mark.parametrize("profile", JUMPS)
+def test_segments_jump_as_their_formulas_say(profile):
+    order, size = JUMPS[profile]
+    law = jn.SegmentedMotion([jn.Segment("dwell", 0.5), jn.Segment(profile, 2.0, by=3.0), jn.Segment("dwell", 1.0)])
+    found = jn.continuity(law, 0.0, 4.0)
+    assert found.smoothness == order - 1
+    told = found.derivatives[order]
+    assert told.count == 2
+    assert abs(told.size) == pytest.approx(3 * size / 2**order)
+    assert told.instant == 0.5
+    assert all(x.count == 0 for x in found.derivatives[:order])
+
+
+def test_what_follows_jumps_where_its_leader_passes_the_knots():
+    lift = jn.SegmentedMotion([jn.Segment("harmonic", math.pi, to=0.02), jn.Segment("harmonic", math.pi, to=0.0)])
+    law = jn.FollowingMotion(lift, "2*pi*t + 0.1*sin(2*pi*t)")
+    found = jn.continuity(law, -0.2, 1.2)
+    assert found.smoothness == 1
+    told = found.derivatives[2]
+    speed = 2 * math.pi * 1.1  # at 0 s and at 1 s
+    assert told.count == 2
+    assert abs(told.size) == pytest.approx(0.01 * speed**2)
+    assert told.instant == pytest.approx(0.0, abs=1e-12)
+    assert found.derivatives[3].count == 0  # the leader has no acceleration there
+    repeated = jn.SegmentedMotion([jn.Segment("cycloidal", math.pi, to=1.0), jn.Segment("cycloidal", math.pi, to=0.0)],
+                                  beyond="repeat")  # fmt: skip
+    turning = jn.continuity(jn.FollowingMotion(repeated, "-2*pi*t"), 0.1, 10.1)
+    assert turning.smoothness == 2
+    assert turning.derivatives[3].count == 20
+
+
+def test_pieces_splines_and_expressions():
+    pieces = jn.PiecewiseMotion(["t**3", "3*t - 2"], until=[1.0])
+    told = jn.continuity(pieces, 0.0, 2.0)
+    assert told.smoothness == 1
+    assert told.derivatives[2].size == -6.0
+    assert jn.continuity(pieces, 0.0, 0.5).smoothness is None  # nothing happens there
+    t = np.linspace(0.0, 1.0, 21)
+    spline = jn.continuity(jn.SplineMotion(t, np.sin(7 * t), degree=5), 0.0, 1.0)
+    assert spline.smoothness == 4
+    assert spline.derivatives[5].count > 5
+    held = jn.continuity(jn.SplineMotion(t, np.sin(7 * t), beyond="hold"), -1.0, 2.0)
+    assert held.smoothness == 0
+    assert held.derivatives[1].size == pytest.approx(7.0, rel=1e-3)
+    assert jn.continuity(jn.ExpressionMotion("sin(t)"), 0.0, 1.0).unknown == ""
+    assert "abs" in jn.continuity(jn.ExpressionMotion("abs(t)"), 0.0, 1.0).unknown
+    assert jn.continuity(jn.FunctionMotion(lambda t: t), 0.0, 1.0).unknown
+    with pytest.raises(jn.TrajectoryError, match="from 0 to 10"):
+        jn.continuity(pieces, 0.0, 1.0, order=11)
+
+
+@pytest.mark.parametrize("levels", [1, 3, 5, 9])
+def test_hermite_laws_keep_all_derivatives_and_are_as_good_as_their_order(levels):
+    def exact(t):
+        return np.array([np.cos(3 * t + k * np.pi / 2) * 3.0**k for k in range(levels)]).T
+
+    errors = []
+    for count in (9, 17):
+        times = np.linspace(0.0, 2.0, count)
+        law = jn.HermiteMotion(times, exact(times))
+        at_knots = np.array(law(jn.Jet.variable(times, levels - 1)).derivatives())
+        np.testing.assert_allclose(at_knots, exact(times).T, rtol=1e-15)
+        between = np.linspace(0.0, 2.0, 301)
+        errors.append(np.abs(np.asarray(law(jn.Jet([between])).coefficients[0]) - np.cos(3 * between)).max())
+    if levels <= 5:
+        assert errors[0] / errors[1] > 2 ** (2 * levels - 1)  # order of convergence, less a half
+    assert errors[1] < {1: 0.1, 3: 1e-5, 5: 1e-10, 9: 1e-14}[levels] * 3
+    smooth = jn.continuity(law, 0.0, 2.0).smoothness
+    assert smooth is None or smooth >= min(levels, 6) - 1
+
+
+@pytest.mark.parametrize(
+    "times, rows, name",
+    [([0.0, 1.0], [[1.0]], "derivatives"), ([0.0, 0.0], [[1.0], [1.0]], "times"), ([0.0], [[np.nan]], "derivatives")],
+)
+def test_hermite_laws_refuse_what_does_not_fit(times, rows, name):
+    with pytest.raises(jn.TrajectoryError) as caught:
+        jn.HermiteMotion(times, rows)
+    assert caught.value.name == name
