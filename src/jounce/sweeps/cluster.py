@@ -152,7 +152,7 @@ def _client(scheduler: str | None, workers: int | None, timeout: float) -> Itera
 
 def _local(count: int) -> Any:
     """Start worker processes on this machine."""
-    import dask
+    import dask.config
     from distributed import LocalCluster
 
     if getattr(multiprocessing.current_process(), "_inheriting", False):

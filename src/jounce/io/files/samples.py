@@ -120,8 +120,8 @@ def read_points(
     """Read points from a CSV file, and their times where it has a column ``time``.
 
     The first row names the columns ``x``, ``y`` and, in space, ``z``, or ``NAME_x`` ..., as results have them; others
-    are not read. Without that row the file has the columns of coordinates only. Lengths are in m, times in s, unless the
-    name of a column says another unit: ``x [mm]``.
+    are not read. Without that row the file has the columns of coordinates only. Lengths are in m and times in s unless
+    the name of a column says another unit: ``x [mm]``.
 
     Raises
     ------
