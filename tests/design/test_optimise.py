@@ -132,7 +132,8 @@ def test_designs_that_lock_are_kept_away_from(four_bar):
     assert found.smallest_singular_value > 0.01
     assert "cannot be put together, or lock" in found.notes[0]
     alone = jn.solve(four_bar.with_parameters(**found.parameters), np.linspace(0.0, 2.0, 4001))
-    assert np.abs(alone.outputs["psi"][:, 4]).max() == pytest.approx(found.objective, rel=1e-6)
+    sampled = np.abs(alone.outputs["psi"][:, 4]).max()  # the peak lies between two of the instants
+    assert found.objective * (1 - 1e-5) < sampled < found.objective * (1 + 1e-9)
     for change in (-1e-4, 1e-4):
         other = jn.solve(four_bar.with_parameters(BC=found.parameters["BC"] + change), np.linspace(0.0, 2.0, 4001))
         assert np.abs(other.outputs["psi"][:, 4]).max() > found.objective
