@@ -146,10 +146,10 @@ def test_the_better_of_two_assemblies_is_found_and_asked_for(four_bar):
     narrow = {"BC": (0.14, 0.145)}
     found = jn.optimise(four_bar, "maximum(psi)", narrow, starts=1, assemblies="all")
     assert found.success
-    each = [jn.optimise(four_bar, "maximum(psi)", narrow, starts=1, assemblies=[k]).objective for k in (1, 2)]
-    assert found.objective == pytest.approx(min(each), abs=1e-12)
-    assert each[0] != pytest.approx(each[1], abs=0.1)
-    assert np.max(jn.solve(found.mechanism).outputs["psi"][:, 0]) == pytest.approx(found.objective, abs=1e-9)
+    assert found.mechanism.assembly in (1, 2)
+    other = dataclasses.replace(found.mechanism, assembly=3 - found.mechanism.assembly)
+    assert np.max(jn.solve(other, order=0).outputs["psi"][:, 0]) > found.objective + 0.1
+    assert np.max(jn.solve(found.mechanism, order=0).outputs["psi"][:, 0]) == pytest.approx(found.objective, abs=1e-5)
 
 
 @pytest.fixture
