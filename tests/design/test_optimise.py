@@ -74,7 +74,7 @@ def test_a_condition_is_kept_and_its_multiplier_is_the_slope_of_the_optimum():
 @pytest.mark.slow
 def test_conditions_that_cannot_be_met_are_told_with_how_far_they_are():
     with pytest.raises(jn.DesignError, match=r"'at\(angle, 1, 1\) == 12': nearest is 9 against 12, off by 3 ") as error:
-        jn.optimise(CRANK, "mean(angle**2)", CUBIC, ["at(angle, 1, 1) == 12"], starts=1)
+        jn.optimise(CRANK, "mean(angle**2)", CUBIC, ["at(angle, 1, 1) == 12"], starts=1, iterations=10)
     assert error.value.design.status == "infeasible"
     assert list(error.value.design.parameters.values())[:2] == pytest.approx([2.0, 2.0], abs=1e-6)
 
@@ -132,10 +132,11 @@ def test_designs_that_lock_are_kept_away_from(four_bar):
     assert found.smallest_singular_value > 0.01
     assert "cannot be put together, or lock" in found.notes[0]
     alone = jn.solve(four_bar.with_parameters(**found.parameters), np.linspace(0.0, 2.0, 4001))
-    assert np.abs(alone.outputs["psi"][:, 4]).max() == pytest.approx(found.objective, rel=1e-6)
+    sampled = np.abs(alone.outputs["psi"][:, 4]).max()  # the peak lies between two of the instants
+    assert found.objective * (1 - 1e-5) < sampled < found.objective * (1 + 1e-9)
     for change in (-1e-4, 1e-4):
         other = jn.solve(four_bar.with_parameters(BC=found.parameters["BC"] + change), np.linspace(0.0, 2.0, 4001))
-        assert np.abs(other.outputs["psi"][:, 4]).max() > found.objective
+        assert np.abs(other.outputs["psi"][:, 4]).max() > sampled
     with pytest.raises(jn.DesignError, match="none of 16 designs within the bounds can be put together"):
         jn.optimise(four_bar, "peak(psi, 4)", {"BC": (0.5, 0.6)}, starts=2, samples=16)
 
@@ -145,10 +146,10 @@ def test_the_better_of_two_assemblies_is_found_and_asked_for(four_bar):
     narrow = {"BC": (0.14, 0.145)}
     found = jn.optimise(four_bar, "maximum(psi)", narrow, starts=1, assemblies="all")
     assert found.success
-    each = [jn.optimise(four_bar, "maximum(psi)", narrow, starts=1, assemblies=[k]).objective for k in (1, 2)]
-    assert found.objective == pytest.approx(min(each), abs=1e-12)
-    assert each[0] != pytest.approx(each[1], abs=0.1)
-    assert np.max(jn.solve(found.mechanism).outputs["psi"][:, 0]) == pytest.approx(found.objective, abs=1e-9)
+    assert found.mechanism.assembly in (1, 2)
+    other = dataclasses.replace(found.mechanism, assembly=3 - found.mechanism.assembly)
+    assert np.max(jn.solve(other, order=0).outputs["psi"][:, 0]) > found.objective + 0.1
+    assert np.max(jn.solve(found.mechanism, order=0).outputs["psi"][:, 0]) == pytest.approx(found.objective, abs=1e-5)
 
 
 @pytest.fixture

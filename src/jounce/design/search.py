@@ -17,6 +17,7 @@ from jounce.design.multipliers import ACTIVE, Known, Multipliers, Vector
 from jounce.design.problem import Evaluation, Locked, Problem
 
 ACCURACY = 1e-13  # of SLSQP, relative
+EACH = 2  # designs evaluated for each iteration that is allowed, at most
 ROUNDS = 12  # regions that are tried, at most
 SMALLEST_REGION = 1e-7  # of the width between bounds
 HELD = 1e-7  # by which a condition may be broken, relative to its size
@@ -63,6 +64,10 @@ class Found:
     def feasible(self) -> bool:
         """Whether all conditions hold."""
         return bool(np.isfinite(self.objective) and (self.broken <= HELD).all() and self.near_singular <= HELD)
+
+
+class _Enough(Exception):  # noqa: N818 - no error of a user's
+    """A run has evaluated as many designs as it may."""
 
 
 class Search:
@@ -222,7 +227,7 @@ class _Run:
         worst = self.merit_parts(here)[1] if elastic else 0.0
         self.first = np.concatenate([start, numbers, [worst] * elastic])
         self.best, self._best_merit = start, self.merit_of(start)
-        self.locked: Locked | None = None
+        self.evaluations = 0
         self._last = self._inequalities(self.first)[0]
 
     def run(self) -> tuple[Locked | None, bool]:
@@ -246,6 +251,8 @@ class _Run:
             )
         except Locked as locked:
             return locked, False
+        except _Enough:
+            return None, True
         free = (self.best > self.low + ACTIVE * self.radius) | (self.low <= 0.0)
         free &= (self.best < self.high - ACTIVE * self.radius) | (self.high >= 1.0)
         return None, bool(free.all())
@@ -268,8 +275,7 @@ class _Run:
         """Tell whether a design locks, of which no slopes are there."""
         try:
             self._split(variables)
-        except Locked as locked:
-            self.locked = locked
+        except Locked:
             return True
         return False
 
@@ -277,6 +283,9 @@ class _Run:
         before = self.problem.evaluations
         here = self.problem.evaluate(place)
         if self.problem.evaluations != before:
+            self.evaluations += 1
+            if self.evaluations > EACH * self.search.iterations:
+                raise _Enough
             merit = self.merit_of(place)
             if merit < self._best_merit:
                 self.best, self._best_merit = np.array(place), merit

@@ -259,7 +259,7 @@ class Study:
             measure, bound = (1, last[0]) if fixed_left else (0, last[1])
             low = bound if relation.equal or fixed_left else None
             high = bound if relation.equal or not fixed_left else None
-            slope = multiplier * factor * (1.0 if fixed_left else -1.0)
+            slope = float(multiplier * factor * (1.0 if fixed_left else -1.0))
             yield Comparison("condition", relation.text, first[measure], last[measure], low, high, slope)
         values, original = self.problem.values(found.place), self.mechanism.parameter_values
         for k, (name, (low, high)) in enumerate(self.asked.bounds.items()):
