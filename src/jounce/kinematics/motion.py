@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from jounce.constraints import AbstractConstraint
 from jounce.display import Displayed
 from jounce.errors import MechanismError, check_name
 from jounce.jet import Jet
@@ -53,9 +54,12 @@ def check_output(output: AbstractQuantity, mechanism: Mechanism, name: str = "ou
 
 
 def output_group(
-    output: AbstractOutput, mechanism: Mechanism, model: Model | None = None, name: str = "output"
+    output: AbstractOutput | AbstractConstraint,
+    mechanism: Mechanism,
+    model: Model | None = None,
+    name: str = "output",
 ) -> Group:
-    """Return an output of poses as a group of one, which acts on the pose of all bodies.
+    """Return an output of poses, or a driver for its coordinate, as a group of one, on the pose of all bodies.
 
     With a model, angles about axes are counted as those of the outputs that it was put together with.
     """

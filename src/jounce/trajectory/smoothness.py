@@ -132,7 +132,9 @@ def _jumps(law: AbstractMotion, first: float, last: float) -> tuple[np.ndarray, 
     return *none, f"nothing is known of a {type(law).__name__}"
 
 
-def _repeated(law: SplineMotion, jumps: Jumps, first: float, last: float) -> Jumps:
+def _repeated(
+    law: SplineMotion, jumps: Jumps, first: float, last: float
+) -> tuple[Float[np.ndarray, " all"], Float[np.ndarray, "levels all"]]:
     """Return the jumps within a time, those of all periods where the law repeats."""
     instants, sizes = jumps
     if law.beyond == "repeat" and len(instants):

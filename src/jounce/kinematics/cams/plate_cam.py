@@ -371,7 +371,7 @@ def _followed(cam: PlateCam) -> Numbers1:
     return np.where(np.abs(lift - found.lift) <= 1e-12 * size, found.lift, lift)
 
 
-def _left(cam: PlateCam, angles: Numbers1, found: Geometry) -> Plane:
+def _left(cam: PlateCam, angles: Numbers1, found: Geometry) -> Float[np.ndarray, "2 left"]:
     """Return the points of a profile through which the follower passes at no cam angle."""
     start, size = cam.follower.start(cam.base_radius), 1.0 if cam.follower.turning else cam.base_radius
     turns = SENSES[cam.sense] * angles
@@ -386,7 +386,9 @@ def _chunks(count: int) -> list[slice]:
     return [slice(first, first + CHUNK) for first in range(0, count, CHUNK)]
 
 
-def _touching(cam: PlateCam, points: Plane, turns: Numbers1) -> Float[np.ndarray, "turn point"]:
+def _touching(
+    cam: PlateCam, points: Float[np.ndarray, "2 point"], turns: Float[np.ndarray, " turn"]
+) -> Float[np.ndarray, "turn point"]:
     """Return the coordinate at which the follower touches each point of the cam, turned by each angle."""
     c, s = np.cos(turns)[:, None], np.sin(turns)[:, None]
     x, y = points
