@@ -310,7 +310,9 @@ def with_all_outputs(mechanism):
                 outputs[f"force_{name}_on_{body}"] = JointForceOutput(name, body, frames[0])
                 outputs[f"moment_{name}_on_{body}"] = JointTorqueOutput(name, body, frames[1], point)
     for name, driver in mechanism.drivers.items():
-        outputs[f"drive_{name}"] = (DriverTorqueOutput if is_turning(driver) else DriverForceOutput)(name)
+        turning = is_turning(driver)
+        outputs[f"drive_{name}"] = (DriverTorqueOutput if turning else DriverForceOutput)(name)
+        outputs[f"driven_{name}"] = (jn.DriverAngleOutput if turning else jn.DriverDisplacementOutput)(name)
     body = next(iter(mechanism.bodies))
     outputs |= {f"{kind.__name__}": kind() for kind in ENERGIES} | {
         f"{kind.__name__}": kind(body=body) for kind in ENERGIES_OF_A_BODY
@@ -347,8 +349,9 @@ def assert_same(mechanism, kept, found, drawings, moved):
             expected = expected @ drawings[frame_of(mechanism, output)].axes
         if isinstance(output, jn.PointOutput):
             expected[:, 0] -= world.axes.T @ world.origin
-        if name in moved:
-            turns = values[0, 0] - expected[0, 0] - moved[name]
+        angle = output.driver if isinstance(output, jn.DriverAngleOutput) else name
+        if angle in moved:
+            turns = values[0, 0] - expected[0, 0] - moved[angle]
             assert turns == pytest.approx(2 * np.pi * np.round(turns / (2 * np.pi)), abs=1e-11)
             expected[:, 0] += values[0, 0] - expected[0, 0]
         error = np.abs(values - expected).reshape(*values.shape[:2], -1).max(axis=(0, 2))

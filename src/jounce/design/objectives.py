@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.design.arguments import Arguments
 from jounce.design.dimensions import check_dimensions
 from jounce.design.language import (
     EXERTED,
@@ -120,10 +121,9 @@ class Goals:
         self._smooth: list[Callable[[Mapping[str, Any]], Any]] = []
         self._smooth_count = 0
         self.gaps: range | None = None
-        self._asked: list[float] = []
         self.bounded: list[bool] = []
         self.order = 0
-        self._span = float(instants[0]), float(instants[-1])
+        self._arguments = Arguments(self.quantities.fixed, (float(instants[0]), float(instants[-1])))
         with told_about("minimise", whole=True):
             self.quantities.text = minimise
             node = parsed(minimise)
@@ -139,7 +139,7 @@ class Goals:
 
     def set_instants(self, instants: Float[np.ndarray, " time"]) -> None:
         """Take another grid."""
-        self.instants = at_instants(self._asked, instants)
+        self.instants = at_instants(self._arguments.asked, instants)
         self._cells = [Cells.of(self.instants, *window) for window in self._windows]
         self._whole = Cells.of(self.instants)
 
@@ -230,62 +230,20 @@ class Goals:
             case "-" | "neg":
                 return [sign, -sign][-len(node.parts) :]
             case "*":
-                constants = [self._constant(part) for part in node.parts]
+                constants = [self._arguments.constant(part) for part in node.parts]
                 return [None if x is None else int(sign * np.sign(x)) or None for x in constants[::-1]]
             case "/":
-                divisor = self._constant(node.parts[1])
+                divisor = self._arguments.constant(node.parts[1])
                 return [None if divisor is None else int(sign * np.sign(divisor)) or None, None]
         return [None] * len(node.parts)
-
-    def _constant(self, node: Node) -> float | None:
-        """Return the value of a number that is the same in all designs, None for one that may not be."""
-        if node.kind == "number":
-            return float(node.word)
-        if node.kind == "name":
-            return self.quantities.fixed.get(node.word)
-        if node.word in MEASURES or node.word in EXERTED:
-            return None
-        parts = [self._constant(part) for part in node.parts]
-        return None if None in parts else float(operated(node.word, parts))
-
-    def _argument(self, node: Node, what: str) -> float:
-        found = self._constant(node)
-        if found is None:
-            message = f"{what} '{node.text}' must be a number that is the same in all designs"
-            raise ExpressionError(message)
-        return found
-
-    def _derivative(self, node: Node) -> int:
-        order = self._argument(node, "the derivative")
-        if order != int(order) or not 0 <= order <= HIGHEST_ORDER - 2:
-            raise ExpressionError(f"the derivative must be a whole number from 0 to {HIGHEST_ORDER - 2}, got {order:g}")
-        return int(order)
-
-    def _instant(self, node: Node) -> float:
-        instant = self._argument(node, "the instant")
-        first, last = self._span
-        if not first <= instant <= last:
-            message = f"the instant {instant:g} s is not within the motion, which is from {first:g} to {last:g} s"
-            raise ExpressionError(message)
-        self._asked.append(instant)
-        return instant
-
-    def _window(self, rest: Sequence[Node]) -> tuple[float | None, float | None]:
-        """Return from when to when a measure counts, which two arguments after the derivative tell."""
-        if len(rest) < 3:
-            return None, None
-        start, stop = self._instant(rest[1]), self._instant(rest[2])
-        if not start < stop:
-            raise ExpressionError(f"the window must end after it begins, got {start:g} to {stop:g} s")
-        return start, stop
 
     def _measure(self, node: Node, sign: int | None) -> Numbers:
         kind, (quantity, *rest) = node.word, node.parts
         if kind.startswith("path"):
             return self._path(node, sign)
         if kind == "at":
-            order = self._derivative(rest[0]) if len(rest) == 2 else 0
-            instant = self._instant(rest[-1])
+            order = self._arguments.derivative(rest[0]) if len(rest) == 2 else 0
+            instant = self._arguments.instant(rest[-1])
             series = self._series(quantity, order)
 
             def there(names: Mapping[str, Any]) -> Any:
@@ -293,8 +251,8 @@ class Goals:
                 return value(series(names)[:, index : index + 1], jnp.asarray([shift]))[0]
 
             return self._smooth_number(there)
-        order = self._derivative(rest[0]) if rest else 0
-        window = self._window(rest)
+        order = self._arguments.derivative(rest[0]) if rest else 0
+        window = self._arguments.window(rest)
         series = self._series(quantity, order)
         if kind in ("mean", "rms"):
             return self._smooth_number(self._mean(series, window, root=kind == "rms"))
@@ -382,8 +340,8 @@ class Goals:
             raise ExpressionError(message)
         if target.times is not None:
             for instant in (target.times.min(), target.times.max()):
-                self._instant(Node("number", float(instant)))
-            self._asked.extend(target.times.tolist())
+                self._arguments.instant(Node("number", float(instant)))
+            self._arguments.asked.extend(target.times.tolist())
         names = [f"{point}_{label}" for label in labels]
         quantities = [self._series(Node("name", name), 0) for name in names]
 
@@ -406,8 +364,8 @@ class Goals:
             size = len(component_labels(self._original, self._original.outputs[subject.word]))
             block = self.gaps = self._smooth_block(apart, size * count)
             return lambda *known: jnp.sum(known[2][block.start : block.stop] ** 2) / count
-        series = self._series(subject, self._derivative(rest[0]) if rest else 0)
-        return self._smooth_number(self._mean(series, self._window(rest), root=True, squared=True))
+        series = self._series(subject, self._arguments.derivative(rest[0]) if rest else 0)
+        return self._smooth_number(self._mean(series, self._arguments.window(rest), root=True, squared=True))
 
     # conditions
 

@@ -103,7 +103,7 @@ def optimise(
     >>> mechanism = jn.load("examples/four_bar.yaml")
     >>> found = jn.optimise(mechanism, "peak(psi, 2)", {"BC": (0.13, 0.15)}, starts=1, time=[0.0, 0.1, 0.2])
     >>> found.status, round(found.parameters["BC"], 4)
-    ('optimal', 0.13)
+    ('optimal', 0.15)
     """
     check_mechanism(mechanism)
     bounds = _bounds(mechanism, vary)

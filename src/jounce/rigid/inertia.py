@@ -10,6 +10,7 @@ from jaxtyping import Float
 
 from jounce.errors import RobotError, check_choice, did_you_mean
 from jounce.rigid.solids import SOLIDS, pseudo_parts, solid_moments
+from jounce.shapes import Numbers
 
 ROUNDING = 1e-5  # of the largest principal moment: what files with six digits may miss a possible tensor by
 ADVICE = "check the units, the signs of the products of inertia and the axes"
@@ -217,7 +218,7 @@ class Inertia:
         return (traced or cls)(mass, center, tensor, strict=False)
 
 
-def _of_point(mass: float, place: Float[np.ndarray, " 3"]) -> Float[np.ndarray, "3 3"]:
+def _of_point(mass: Any, place: Float[Numbers, " 3"]) -> Float[Numbers, "3 3"]:
     """Return the inertia tensor of a mass at a place: what Steiner's theorem adds."""
     return mass * (place @ place * np.eye(3) - place[:, None] * place[None])
 
@@ -225,6 +226,8 @@ def _of_point(mass: float, place: Float[np.ndarray, " 3"]) -> Float[np.ndarray, 
 @dataclasses.dataclass(frozen=True, eq=False)
 class TracedInertia(Inertia):
     """An inertia with values that JAX traces, for gradients: its shapes are checked, its values cannot be."""
+
+    mass: Any
 
     def __post_init__(self, strict: bool) -> None:
         for name, shape in (("mass", ()), ("center_of_mass", (3,)), ("tensor", (3, 3))):

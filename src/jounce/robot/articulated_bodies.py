@@ -67,7 +67,7 @@ class ArticulatedBodies(eqx.Module):
     force: BodyVectors
     compliance: Joints
     margin: Joints
-    base: tuple[DenseFactor, BaseVector] | None
+    base: tuple[DenseFactor, Float[Numbers, "6 batch"]] | None
 
     @classmethod
     def of(

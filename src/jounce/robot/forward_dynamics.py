@@ -209,7 +209,7 @@ def _coefficients(equations: TreeEquations, arrays: tuple[Any, ...], reversible:
     return q, margin, jnp.concatenate([twist[: order + 1], last])
 
 
-def coordinates_of(series: MotionSeries, order: int) -> Float[Numbers, "order+3 coordinate batch"]:
+def coordinates_of(series: MotionSeries, order: int) -> Float[Numbers, "level coordinate batch"]:
     """Return the coefficients of the coordinates, two more than those of the accelerations."""
     last = series.accelerations.joints[order:] / ((order + 1) * (order + 2))
     return jnp.concatenate([series.motion.coordinates[: order + 2], last])
