@@ -40,6 +40,7 @@ def test_a_starter_is_written_with_its_comments_and_what_to_try_next(run):
     assert tried == ["jounce run four-bar.yaml", "jounce plot four-bar.yaml --out four-bar.png"]
 
 
+@pytest.mark.slow
 def test_what_is_suggested_works(run):
     _, out, _ = run("new", "gear-train", "my gears.yaml")
     for line in out.splitlines():

@@ -439,6 +439,7 @@ def test_a_state_of_a_motion_has_the_equations_of_the_motion(linkage_motion):
         np.testing.assert_allclose(found.values, wanted.values, rtol=0, atol=1e-12 * scale, err_msg=name)
 
 
+@pytest.mark.slow
 def test_redundant_rows_are_all_there():
     """A door on two hinges: what both bear has no multipliers, as they are not unique."""
     hinge = {"axis_i": [0, 0, 1], "axis_j": [0, 0, 1]}

@@ -65,6 +65,7 @@ def shared(stiffness):
 ACROSS = [0, 1, 2, 3, 4, 6, 7, 8, 9, 10]  # of force and torque of both
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [0.5, 0.2])
 def test_elastic_hinges_share_the_weight_by_their_stiffness(share):
     stiffness = [{"force": 1e7 * part, "torque": 3e4} for part in (1 - share, share)]

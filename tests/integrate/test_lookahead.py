@@ -103,6 +103,7 @@ def test_a_force_that_ends_is_named_with_the_time():
     assert np.isnan(motion.outputs["x"][2:]).all()
 
 
+@pytest.mark.slow
 def test_a_rate_that_is_not_finite_at_the_start_is_named():
     with pytest.raises(jn.SolveError, match=r"a derivative of forces\.push at t = 0 s: inadmissible"):
         jn.simulate(sled(N=1.0, end=0.0), [0.0, -1.0], 1)

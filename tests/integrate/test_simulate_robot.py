@@ -23,6 +23,7 @@ def swing(time, order):
     return np.stack(series, axis=1)
 
 
+@pytest.mark.slow
 def test_spring_and_damper_in_closed_form_with_events():
     events = [jn.JointEvent("slide", direction=-1), jn.JointEvent("slide", derivative=1)]
     law = {"slide": "-10*slide - 4*slide_d1"}

@@ -78,6 +78,7 @@ def test_an_eccentric_disc_comes_back_from_its_law(name, sense):
         assert found.pressure_angle[k] == pytest.approx(turn * angle, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_handbook_formulas_of_rollers_and_faces():
     """tan(pressure angle) = (s' - e)/(y0 + s) of an offset roller; R = base + s + s'' and contact s' under a face."""
     law = jn.SegmentedMotion([

@@ -35,6 +35,7 @@ def test_designs_are_those_solved_alone():
     assert family["tau"].dims == ("design",)
 
 
+@pytest.mark.slow
 def test_one_that_locks_or_cannot_be_assembled_stops_no_other():
     parameters = {"AB": np.array([0.04, 0.1, 0.05, 0.9])}
     family = jn.solve_batch(FOUR_BAR, parameters, TIME, order=2)

@@ -81,6 +81,7 @@ def test_relative_angle_asked_for_later(spatial):
     np.testing.assert_allclose(asked.values, spatial.outputs["angle"], atol=1e-12)
 
 
+@pytest.mark.slow
 def test_points_are_consistent_with_the_angular_velocity(spatial):
     """v = w x r for a body on a fixed axis through the origin."""
     point, spin = spatial.point("spindle", [0.3, -0.2, 0.5]).values, spatial.outputs["spin"]

@@ -76,6 +76,7 @@ def test_what_cannot_be_held_is_named(output, words):
     assert caught.value.name == "drivers.theta.motion.output"
 
 
+@pytest.mark.slow
 def test_where_the_output_does_not_determine_the_driver_it_is_refused():
     with pytest.raises(jn.SolveError, match=r"stroke_x can go no further than 0\.199.*driver theta") as caught:
         jn.solve(slider_crank("0.19 + 0.02*t"), GRID, order=0)

@@ -32,6 +32,7 @@ def test_fifty_turns_with_three_instants_after_the_first():
     np.testing.assert_allclose(motion.outputs["tip"][:, 0, 0], np.cos(TURN * 50 * time), atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "vectors",
     [

@@ -132,6 +132,7 @@ def test_euler_parameters_go_on_with_their_sign_and_have_their_derivatives(turni
                 np.testing.assert_allclose(found[k, n], expected, rtol=0, atol=1e-12 * 12.0**n)
 
 
+@pytest.mark.slow
 def test_dataset_has_axes_of_its_own_for_each_form(turning):
     dataset = turning.dataset
     assert dataset["A"].dims == ("time", "derivative", "row_axis", "column_axis")

@@ -182,6 +182,7 @@ def test_reproduction_writes_its_files(small_run):
     assert [done for done, _ in calls] == list(range(1, calls[-1][1] + 1))
 
 
+@pytest.mark.slow
 def test_sweeps_are_tables_too(small_run):
     directory, _, _, results = small_run
     rows = list(csv.DictReader((directory / "errors_by_tolerance.csv").read_text().splitlines()))

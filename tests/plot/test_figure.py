@@ -60,6 +60,7 @@ def test_components_have_a_legend(four_bar):
     assert [text.get_text() for text in legend.get_texts()] == ["$C_{x}$", "$C_{y}$"]
 
 
+@pytest.mark.slow
 def test_an_angular_velocity_starts_in_the_row_of_velocities(rsur):
     grid = panels(draw(rsur, ["psi", "coupler_spin"]))
     assert not grid[0, 1].axison

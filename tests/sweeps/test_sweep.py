@@ -194,6 +194,7 @@ def test_a_full_disk_loses_nothing(done, tmp_path, monkeypatch):
     assert swept(out).attrs["checksum"] == whole
 
 
+@pytest.mark.slow
 def test_an_attempt_of_which_nothing_was_computed_makes_way(tmp_path, monkeypatch):
     monkeypatch.setattr(cluster, "POLL", 0.2)
     out = tmp_path / "a.zarr"
