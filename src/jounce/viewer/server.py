@@ -59,6 +59,7 @@ class View:
     def _lay_out(self, subject: Any, playing: bool) -> None:
         from jounce.viewer.panel import Panel
         from jounce.viewer.plots import Plots
+        from jounce.viewer.slopes import SlopesFolder, can_be_differentiated
         from jounce.viewer.tabs import ArrowsTab, ForcesTab
 
         gui = self.page.server.gui
@@ -69,6 +70,7 @@ class View:
         tabs = gui.add_tab_group()
         with tabs.add_tab("Parameters"):
             self.panel.add_parameters()
+            self.slopes = SlopesFolder(self.page) if can_be_differentiated(subject) else None
         with tabs.add_tab("Arrows"):
             self.arrows = ArrowsTab(self.page)
         with tabs.add_tab("Forces"):
@@ -76,7 +78,7 @@ class View:
         with tabs.add_tab("Export"):
             self.panel.add_exports()
         self.plots = Plots(self.page)
-        self.page.observers += [self.panel, self.arrows, self.plots]
+        self.page.observers += [self.panel, self.arrows, self.plots, *([self.slopes] if self.slopes else [])]
         self.plots.on_frame(self.page.frame)
         self.page.player.begin()
         self.panel.set_playing(playing)
