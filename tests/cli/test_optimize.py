@@ -58,7 +58,8 @@ def test_a_better_design_is_told_and_written_in_the_units_of_the_file(capsys, fi
 def test_points_of_a_file_are_gone_through(capsys, file):
     points, radii = file.with_name("points.csv"), np.array([0.2, 0.3, 0.55])
     rows = "".join(
-        f"{r * np.cos(a)!r},{r * np.sin(a)!r}\n" for r, a in zip(radii.tolist(), (-0.5, 0.1, 0.4), strict=True)
+        f"{float(r * np.cos(a))!r},{float(r * np.sin(a))!r}\n"
+        for r, a in zip(radii.tolist(), (-0.5, 0.1, 0.4), strict=True)
     )
     points.write_text(f"tip_x,tip_y\n{rows}")
     arguments = ("--vary", "r=100mm:1m", "--curve", f"ring={points}", "--starts", 1)
