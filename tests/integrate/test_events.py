@@ -7,6 +7,7 @@ import jounce as jn
 from jounce import drivers, jet, spatial
 from jounce.dynamics.forward import State
 from jounce.integrate.events import EventDetector, crossings
+from jounce.integrate.marching import DenseOutput
 from jounce.kinematics.motion import output_group
 from jounce.rigid.planar import PlanarPose
 
@@ -114,11 +115,12 @@ def test_turns_of_an_angle_in_space_count():
     assert np.allclose(motion.at([7.0]).outputs["angle"], [[140, 20]], rtol=1e-13)  # also where asked for alone
 
 
-def flight(start, speed, length):
-    """Length and polynomial of a step of a stone free of forces, that begins at a height and rises with a speed."""
+def flight(begun, start, speed, length):
+    """A step of a stone free of forces, that begins at a height and rises with a speed."""
     still = np.zeros((1, 2, 1, 1))
     position = np.array([[[[0.0], [start]], [[0.0], [speed]]]])
-    return np.array([length]), State(position, still, still, still)
+    polynomial = State(position, still, still, still)
+    return DenseOutput(np.array([begun]), np.array([length]), polynomial, np.array([-1]), ())
 
 
 @pytest.mark.parametrize("beyond", [0.0, 1e-10, -1e-10])
@@ -126,13 +128,11 @@ def test_a_crossing_where_two_steps_meet_is_one(beyond):
     """Found at the very end of one step, and again at the beginning of the next."""
     event = height(1.0 + beyond, direction=1)
     detector = EventDetector(event, output_group(event.output, stone()), PlanarPose)
-    first = detector.detect(np.array([0.0]), *flight(0.0, 1.0, 1.0))
-    second = detector.detect(np.array([1.0]), *flight(1.0, 1.0, 1.0))
+    first = detector.detect(flight(0.0, 0.0, 1.0, 1.0))
+    second = detector.detect(flight(1.0, 1.0, 1.0, 1.0))
     assert [when for _, when in first] == pytest.approx([1.0], abs=1e-9)
     assert second == []
-    assert [when for _, when in detector.detect(np.array([2.0]), *flight(0.5, 1.0, 1.0))] == pytest.approx(
-        [0.5 + beyond]
-    )
+    assert [when for _, when in detector.detect(flight(2.0, 0.5, 1.0, 1.0))] == pytest.approx([0.5 + beyond])
 
 
 def chebyshev(*roots, lead=1.0):

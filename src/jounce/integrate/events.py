@@ -3,8 +3,10 @@
 import dataclasses
 import itertools
 import math
+from collections.abc import Sequence
 from typing import Any
 
+import jax
 import numpy as np
 from jaxtyping import Float
 
@@ -160,16 +162,15 @@ class EventDetector:
         self._last = math.nan, 0.0  # time and sense of the last crossing in either direction
         self._begun = False
 
-    def detect(
-        self, start: Float[np.ndarray, " step"], length: Float[np.ndarray, " step"], polynomial: State
-    ) -> list[tuple[int, float]]:
+    def detect(self, part: Any) -> list[tuple[int, float]]:
         """Return the crossings in the next steps, each as the number of the step and the time from its beginning.
 
         Parameters
         ----------
-        start, length, polynomial
-            As in `DenseOutput`.
+        part : DenseOutput
+            Steps; their start, length and polynomial count.
         """
+        start, length, polynomial = part.start, part.length, part.polynomial
         derivative, element = self.event.derivative, self._group.element
         order = derivative + element.lost_orders + 1
         series = at_nodes(self._group, polynomial, length, order, self._pose_type)[:, self.event.component, 0]
@@ -250,3 +251,42 @@ def _real_roots(polynomial: np.polynomial.Chebyshev) -> Float[np.ndarray, " root
         step = np.where(rate != 0, polynomial(real) / np.where(rate == 0, 1.0, rate), 0.0)
         real = real - np.where(np.abs(step) < BESIDE, step, 0.0)
     return np.unique(real)
+
+
+class EventLog:
+    """What happened along a run, and when a terminal event ended it.
+
+    Parameters
+    ----------
+    detectors : sequence
+        Each with its `event`, and `detect`, which takes steps and returns the crossings in them, each as the number of
+        the step and the time from its beginning.
+
+    Attributes
+    ----------
+    happened : list of list of float
+        For each event the times at which it happened, s.
+    stopped_at : float or None
+        When a terminal event ended the run, s.
+    """
+
+    def __init__(self, detectors: Sequence[Any]):
+        self.detectors = detectors
+        self.happened: list[list[float]] = [[] for _ in detectors]
+        self.stopped_at: float | None = None
+
+    def noted(self, part: Any) -> Any:
+        """Note the events in some steps; return those up to the first that is terminal, the last step cut there."""
+        found = [
+            (step, after, which)
+            for which, detector in enumerate(self.detectors)
+            for step, after in detector.detect(part)
+        ]
+        for step, after, which in sorted(found, key=lambda x: (x[0], abs(x[1]))):
+            instant = float(part.start[step] + after)
+            self.happened[which].append(instant)
+            if self.detectors[which].event.terminal:
+                self.stopped_at = instant
+                kept = jax.tree.map(lambda x, count=step + 1: x[:count], part)
+                return kept._replace(length=np.append(part.length[:step], after))
+        return part

@@ -15,7 +15,7 @@ from jounce.dynamics.inverse import force_names
 from jounce.dynamics.motion_values import Coordinates, cut, pose_of
 from jounce.dynamics.start import ConsistentStart, consistent_start
 from jounce.errors import JounceError, MechanismError, SolveError, did_you_mean
-from jounce.integrate.events import Event, EventDetector, pose_coordinates
+from jounce.integrate.events import Event, EventDetector, EventLog, pose_coordinates
 from jounce.integrate.lookahead import watched_names
 from jounce.integrate.marching import MOVING, DenseOutput, IntegratorState, Outcome, march, unexpanded
 from jounce.integrate.methods import AbstractMethod, Taylor, evaluated
@@ -181,8 +181,8 @@ def simulate(
     detectors = [_detector_of(event, mechanism, start) for event in events]
     run = _Run(start, method, float(tolerance), float(longest_step), detectors)
     run.go(instants, progress)
-    simulation = Simulation(mechanism, start, run.dense_output, instants, order, run.ending, run.happened)
-    if strict and run.stopped_at is None:
+    simulation = Simulation(mechanism, start, run.dense_output, instants, order, run.ending, run.events.happened)
+    if strict and run.events.stopped_at is None:
         raise_for_status(simulation)
     return simulation
 
@@ -308,11 +308,9 @@ class _Run:
         detectors: Sequence[EventDetector],
     ):
         self.start, self.method, self.tolerance, self.longest = start, method, tolerance, longest
-        self.detectors = detectors
-        self.happened: list[list[float]] = [[] for _ in detectors]
+        self.events = EventLog(detectors)
         self.parts: list[DenseOutput] = []
         self.ending = (Status.OK, "")
-        self.stopped_at: float | None = None  # by a terminal event
         self.sense = 1.0  # of time
 
     @property
@@ -326,14 +324,14 @@ class _Run:
         self.sense = sense = np.sign(instants[-1] - instants[0])
         order = self.method.expansion_order(self.tolerance)
         current = unexpanded(equations, self.start.state, instants[:1], order=order)
-        while int(current.outcome[0]) in MOVING and self.stopped_at is None:
+        while int(current.outcome[0]) in MOVING and self.events.stopped_at is None:
             current, steps, tried = march(
                 equations, current, stop, self.tolerance, self.longest, method=self.method, count=STEPS
             )
             found, taken = steps
             taken = np.flatnonzero(np.asarray(taken)[: int(tried), 0])
             if len(taken):
-                self.parts.append(self._watch(jax.tree.map(lambda x, k=taken: np.asarray(x)[k][..., 0], found)))
+                self.parts.append(self.events.noted(jax.tree.map(lambda x, k=taken: np.asarray(x)[k][..., 0], found)))
             if progress is not None:
                 progress(int(np.sum(sense * instants <= sense * float(current.time[0]))), len(instants))
         if not self.parts:
@@ -346,22 +344,6 @@ class _Run:
         polynomial = current.expansion.state.map(lambda part: np.asarray(part)[None, ..., 0])
         angles = tuple(np.asarray(part).T for part in current.angles)
         self.parts.append(DenseOutput(np.asarray(current.time), np.zeros(1), polynomial, np.full(1, -1), angles))
-
-    def _watch(self, part: DenseOutput) -> DenseOutput:
-        """Note the events in some steps; cut the steps at the first that is terminal."""
-        if not self.detectors:
-            return part
-        found = []
-        for which, detector in enumerate(self.detectors):
-            found += [(step, after, which) for step, after in detector.detect(part.start, part.length, part.polynomial)]
-        for step, after, which in sorted(found, key=lambda x: (x[0], abs(x[1]))):
-            instant = float(part.start[step] + after)
-            self.happened[which].append(instant)
-            if self.detectors[which].event.terminal:
-                self.stopped_at = instant
-                kept = jax.tree.map(lambda x, count=step + 1: x[:count], part)
-                return kept._replace(length=np.append(part.length[:step], after))
-        return part
 
     def _explained(self, current: IntegratorState) -> tuple[Status, str]:
         """Return why steps did not go on, and where to look: a force that is not finite, or the most urgent body."""

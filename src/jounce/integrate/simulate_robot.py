@@ -8,6 +8,7 @@ import numpy as np
 from jax.core import Tracer
 
 from jounce.errors import RobotError, UnsupportedError, check_name
+from jounce.integrate.events import EventLog
 from jounce.integrate.joint_events import JointEvent, JointEventDetector
 from jounce.integrate.marching import Outcome
 from jounce.integrate.methods import AbstractMethod, Taylor
@@ -60,8 +61,8 @@ def simulate_robot(
     terms = (method or Taylor()).expansion_order(tolerance)
     run = _Run(problem, tolerance, longest_step, terms - 1, detectors)
     run.go(start, instants, progress)
-    simulation = RobotSimulation(robot, problem, run.steps, instants, order, run.ending, run.happened)
-    if strict and run.stopped_at is None:
+    simulation = RobotSimulation(robot, problem, run.steps, instants, order, run.ending, run.events.happened)
+    if strict and run.events.stopped_at is None:
         raise_for_status(simulation)
     return simulation
 
@@ -127,11 +128,9 @@ class _Run:
         self, problem: RobotProblem, tolerance: float, longest: float, order: int, detectors: list[JointEventDetector]
     ):
         self.problem, self.tolerance, self.longest, self.order = problem, tolerance, longest, order
-        self.detectors = detectors
-        self.happened: list[list[float]] = [[] for _ in detectors]
+        self.events = EventLog(detectors)
         self.parts: list[RobotSteps] = []
         self.ending = (Status.OK, "")
-        self.stopped_at: float | None = None
 
     @property
     def steps(self) -> RobotSteps:
@@ -144,13 +143,13 @@ class _Run:
         sense = 1.0 if stop >= begun else -1.0
         running, none = (np.asarray(value) for value in (int(Outcome.RUNNING), 0))
         current, total = Progress(np.array([begun]), start, running, none), 0
-        while int(current.outcome) == Outcome.RUNNING and self.stopped_at is None:
+        while int(current.outcome) == Outcome.RUNNING and self.events.stopped_at is None:
             current, steps, taken = self._marched(current, begun, stop)
             count = int(taken)
             total += count
             if count:
                 kept = jax.tree.map(lambda x, count=count: np.asarray(x)[:count], steps)
-                self.parts.append(self._watch(kept))
+                self.parts.append(self.events.noted(kept))
             if total > MOST:
                 self.ending = (Status.COLLAPSED, f"after {total} steps")
                 break
@@ -171,20 +170,6 @@ class _Run:
                 raise
             message = f"{error}; a law of a joint uses it: write it with other operations"
             raise UnsupportedError(message, name="torque") from error
-
-    def _watch(self, part: RobotSteps) -> RobotSteps:
-        """Note the events in some steps; cut the steps at the first that is terminal."""
-        found = []
-        for which, detector in enumerate(self.detectors):
-            found += [(step, after, which) for step, after in detector.detect(part)]
-        for step, after, which in sorted(found, key=lambda x: (x[0], abs(x[1]))):
-            instant = float(part.start[step] + after)
-            self.happened[which].append(instant)
-            if self.detectors[which].event.terminal:
-                self.stopped_at = instant
-                kept = jax.tree.map(lambda x, count=step + 1: x[:count], part)
-                return kept._replace(length=np.append(part.length[:step], after))
-        return part
 
     def _explained(self, current: Progress) -> tuple[Status, str]:
         """Return why steps did not go on."""

@@ -8,15 +8,15 @@ curvatures are read off derivatives of these jets; no formula for one is written
 import dataclasses
 from collections.abc import Mapping
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float
 
 from jounce.errors import MechanismError, TrajectoryError, check_choice, whole_number
 from jounce.jet import Jet, atan2, sqrt
 from jounce.kinematics.cams.followers import AbstractFollower, Follower, across, rotated, unit
-from jounce.kinematics.cams.results import Extreme, Undercut
+from jounce.kinematics.cams.results import Extreme, Geometry, Numbers1, Undercut
+from jounce.kinematics.cams.undercut import TURN, Cutter, runs
 from jounce.shapes import ArrayLike
 from jounce.trajectory import (
     AbstractMotion,
@@ -31,61 +31,12 @@ from jounce.trajectory.checks import positive
 from jounce.trajectory.shown_units import ShownUnits
 
 SENSES = {"counterclockwise": 1.0, "clockwise": -1.0}
-TURN = 2 * np.pi
 CLOSED = 1e-9  # of the rise: so near to where it began a law ends
 ORDER = 3  # of the jets: positions, tangents, and how they turn
 BENT = 1e-9  # of how far a normal turns: less is straight
-LOST = 1e-9  # of the size of the cam: less lift is lost to rounding only
 NOTICED = 1e-6  # of the size of the cam: less is lost to the spacing of the points where it is undercut elsewhere
 ROUNDS, POINTS = 9, 9  # looks at an extreme, each nearer than the one before
-FINEST = 3601  # points of an undercut profile, at least
-CHUNK = 200  # positions of the follower that are compared with all points at a time
 MOST = 100_000  # points of a profile
-
-Numbers1 = Float[np.ndarray, " angle"]
-Plane = Float[np.ndarray, "2 angle"]
-
-
-class Geometry(NamedTuple):
-    """A cam at some cam angles, in its own frame; lengths in m, angles in rad.
-
-    Attributes
-    ----------
-    lift : array of shape (angle,)
-        m or rad.
-    pitch, profile : array of shape (2, angle)
-        The centre of the roller or the edge, and where it touches; of a flat face both are the same.
-    pressure_angle : array of shape (angle,)
-        From the travel of the follower to the normal of the profile, in the sense in which the cam turns: positive
-        where the cam lifts the follower.
-    forward, around : array of shape (angle,)
-        How far the contact, and the centre of the roller, go round the cam per rad; where the contact goes back, the
-        profile is undercut.
-    turned : array of shape (angle,)
-        How far the normal turns round the cam per rad, negative where the profile is concave.
-    contact : array of shape (angle,)
-        Where a flat face is touched, along it.
-    """
-
-    lift: Numbers1
-    pitch: Plane
-    profile: Plane
-    pressure_angle: Numbers1
-    forward: Numbers1
-    around: Numbers1
-    turned: Numbers1
-    contact: Numbers1
-
-    @property
-    def curvature(self) -> Numbers1:
-        """Curvature of the profile, positive where it is convex, 1/m; infinite where it is pointed."""
-        with np.errstate(divide="ignore"):
-            return self.turned / self.forward
-
-    @property
-    def pitch_curvature(self) -> Numbers1:
-        """Curvature of the curve of the centre of the roller, 1/m."""
-        return self.turned / self.around
 
 
 @dataclasses.dataclass(frozen=True)
@@ -176,7 +127,7 @@ class PlateCam:
         """The parts of the law that the cam cannot give, with the cam angles where and the lift that is lost."""
         lost = self.table.lift - self.followed_lift
         size = 1.0 if self.follower.turning else self.base_radius
-        return tuple(_runs(self.angle, lost, lost > NOTICED * size))
+        return tuple(runs(self.angle, lost, lost > NOTICED * size))
 
     @cached_property
     def followed_lift(self) -> Numbers1:
@@ -184,7 +135,7 @@ class PlateCam:
 
         The profile is taken as it is cut, by points; where it is not undercut, the lift is that of the law.
         """
-        return _followed(self)
+        return Cutter(self.follower, self.base_radius, SENSES[self.sense]).followed(self.angle, self.table, self.at)
 
     @cached_property
     def dataset(self) -> Any:
@@ -348,66 +299,3 @@ def _geometry(cam: PlateCam, angles: Numbers1) -> Geometry:
 
 def _dot(a: Jet, b: Jet) -> Jet:
     return a[0] * b[0] + a[1] * b[1]
-
-
-def _followed(cam: PlateCam) -> Numbers1:
-    """Return the lift at which a follower comes down on what is left of a profile, m or rad.
-
-    A point of the profile that the follower would pass through at any cam angle is cut away.
-    """
-    follower, found = cam.follower, cam.table
-    if not (follower.is_flat or follower.radius):
-        return found.lift  # an edge is as sharp as what it cuts
-    start = follower.start(cam.base_radius)
-    size = 1.0 if follower.turning else cam.base_radius
-    points = _left(cam, cam.angle, found)
-    if points.shape[1] < len(cam.angle) < FINEST:  # where branches cross is found to the spacing of the points
-        finer = np.linspace(0.0, TURN, FINEST)
-        points = _left(cam, finer, cam.at(finer))
-    turns, lift = SENSES[cam.sense] * cam.angle, np.full(len(cam.angle), -np.inf)
-    if points.shape[1]:
-        for rows in _chunks(len(turns)):
-            lift[rows] = _touching(cam, points, turns[rows]).max(axis=1) - start
-    return np.where(np.abs(lift - found.lift) <= 1e-12 * size, found.lift, lift)
-
-
-def _left(cam: PlateCam, angles: Numbers1, found: Geometry) -> Float[np.ndarray, "2 left"]:
-    """Return the points of a profile through which the follower passes at no cam angle."""
-    start, size = cam.follower.start(cam.base_radius), 1.0 if cam.follower.turning else cam.base_radius
-    turns = SENSES[cam.sense] * angles
-    cut = np.zeros(len(angles), bool)
-    for rows in _chunks(len(turns)):
-        touched = _touching(cam, found.profile, turns[rows])
-        cut |= np.any(touched > (start + found.lift[rows] + LOST * size)[:, None], axis=0)
-    return found.profile[:, ~cut]
-
-
-def _chunks(count: int) -> list[slice]:
-    return [slice(first, first + CHUNK) for first in range(0, count, CHUNK)]
-
-
-def _touching(
-    cam: PlateCam, points: Float[np.ndarray, "2 point"], turns: Float[np.ndarray, " turn"]
-) -> Float[np.ndarray, "turn point"]:
-    """Return the coordinate at which the follower touches each point of the cam, turned by each angle."""
-    c, s = np.cos(turns)[:, None], np.sin(turns)[:, None]
-    x, y = points
-    placed = np.stack([c * x - s * y, s * x + c * y]).reshape(2, -1)
-    return cam.follower.touching(placed).reshape(len(turns), -1)
-
-
-def _runs(angle: Numbers1, lost: Numbers1, where: Bool[np.ndarray, " angle"]) -> list[Undercut]:
-    """Return the parts of a turn in which lift is lost, one through zero as a whole."""
-    found, marks = [], where[:-1]  # the last angle is the first one
-    if marks.all():
-        worst = int(np.argmax(lost))
-        return [Undercut(0.0, TURN, float(angle[worst]), float(lost[worst]))]
-    first = int(np.argmin(marks))  # begin where nothing is lost
-    order = np.roll(np.arange(len(marks)), -first)
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], marks[order].astype(int), [0]])))
-    for low, high in zip(edges[::2], edges[1::2], strict=True):
-        inside = order[low:high]
-        worst = inside[int(np.argmax(lost[inside]))]
-        start, stop, most = (float(angle[k]) for k in (inside[0], inside[-1], worst))
-        found.append(Undercut(start, stop, most, float(lost[worst])))
-    return found

@@ -1,0 +1,102 @@
+"""Undercut: what a follower would pass through is cut away, and it comes down on what is left."""
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from jounce.kinematics.cams.followers import AbstractFollower
+from jounce.kinematics.cams.results import Geometry, Numbers1, Undercut
+
+TURN = 2 * np.pi
+LOST = 1e-9  # of the size of the cam: less lift is lost to rounding only
+FINEST = 3601  # points of an undercut profile, at least
+CHUNK = 200  # positions of the follower that are compared with all points at a time
+
+
+@dataclasses.dataclass(frozen=True)
+class Cutter:
+    """A follower as the tool that cuts its cam.
+
+    Parameters
+    ----------
+    follower : AbstractFollower
+    base_radius : float
+        m.
+    sense : float
+        1.0 or -1.0, of the cam's turning.
+    """
+
+    follower: AbstractFollower
+    base_radius: float
+    sense: float
+
+    def followed(self, angle: Numbers1, table: Geometry, at: Callable[[Numbers1], Geometry]) -> Numbers1:
+        """Return the lift at which the follower comes down on what is left of a profile, m or rad.
+
+        A point of the profile that the follower would pass through at any cam angle is cut away.
+
+        Parameters
+        ----------
+        angle : array of shape (angle,)
+            Of the cam, rad.
+        table : Geometry
+            The cam at these angles.
+        at : callable
+            Gives it at others.
+        """
+        if not (self.follower.is_flat or self.follower.radius):
+            return table.lift  # an edge is as sharp as what it cuts
+        points = self._left(angle, table)
+        if points.shape[1] < len(angle) < FINEST:  # where branches cross is found to the spacing of the points
+            finer = np.linspace(0.0, TURN, FINEST)
+            points = self._left(finer, at(finer))
+        turns, lift = self.sense * angle, np.full(len(angle), -np.inf)
+        if points.shape[1]:
+            for rows in _chunks(len(turns)):
+                lift[rows] = self._touching(points, turns[rows]).max(axis=1) - self.follower.start(self.base_radius)
+        return np.where(np.abs(lift - table.lift) <= 1e-12 * self._size, table.lift, lift)
+
+    @property
+    def _size(self) -> float:
+        return 1.0 if self.follower.turning else self.base_radius
+
+    def _left(self, angle: Numbers1, found: Geometry) -> Float[np.ndarray, "2 left"]:
+        """Return the points of a profile through which the follower passes at no cam angle."""
+        start, turns = self.follower.start(self.base_radius), self.sense * angle
+        cut = np.zeros(len(angle), bool)
+        for rows in _chunks(len(turns)):
+            touched = self._touching(found.profile, turns[rows])
+            cut |= np.any(touched > (start + found.lift[rows] + LOST * self._size)[:, None], axis=0)
+        return found.profile[:, ~cut]
+
+    def _touching(
+        self, points: Float[np.ndarray, "2 point"], turns: Float[np.ndarray, " turn"]
+    ) -> Float[np.ndarray, "turn point"]:
+        """Return the coordinate at which the follower touches each point of the cam, turned by each angle."""
+        c, s = np.cos(turns)[:, None], np.sin(turns)[:, None]
+        x, y = points
+        placed = np.stack([c * x - s * y, s * x + c * y]).reshape(2, -1)
+        return self.follower.touching(placed).reshape(len(turns), -1)
+
+
+def _chunks(count: int) -> list[slice]:
+    return [slice(first, first + CHUNK) for first in range(0, count, CHUNK)]
+
+
+def runs(angle: Numbers1, lost: Numbers1, where: Bool[np.ndarray, " angle"]) -> list[Undercut]:
+    """Return the parts of a turn in which lift is lost, one through zero as a whole."""
+    found, marks = [], where[:-1]  # the last angle is the first one
+    if marks.all():
+        worst = int(np.argmax(lost))
+        return [Undercut(0.0, TURN, float(angle[worst]), float(lost[worst]))]
+    first = int(np.argmin(marks))  # begin where nothing is lost
+    order = np.roll(np.arange(len(marks)), -first)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], marks[order].astype(int), [0]])))
+    for low, high in zip(edges[::2], edges[1::2], strict=True):
+        inside = order[low:high]
+        worst = inside[int(np.argmax(lost[inside]))]
+        start, stop, most = (float(angle[k]) for k in (inside[0], inside[-1], worst))
+        found.append(Undercut(start, stop, most, float(lost[worst])))
+    return found
