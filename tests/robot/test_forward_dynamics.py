@@ -226,6 +226,11 @@ def test_loops_are_sent_elsewhere():
         jn.forward_dynamics(closed, np.zeros((2, 6)), np.zeros((1, 6)))
 
 
+def test_a_lone_body_that_is_fixed_has_no_motion():
+    post = jn.Robot("post", [jn.Link("body", jn.Inertia(1.0))], [])
+    assert jn.forward_dynamics(post, np.zeros((3, 2, 0)), np.zeros((3, 2, 0))).shape == (3, 4, 0)
+
+
 def test_free_base_without_inertia_is_told():
     ball = jn.Inertia(1.0, center_of_mass=[0.1, 0, 0], tensor=[0.1, 0.1, 0.1])
     robot = jn.Robot("ball", [jn.Link("base"), jn.Link("ball", ball)], [jn.Joint("pin", "base", "ball")])

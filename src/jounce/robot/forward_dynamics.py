@@ -1,5 +1,6 @@
 """Motion of a robot from torques: accelerations and their rates to any order."""
 
+import math
 from collections.abc import Sequence
 from typing import Any, overload
 
@@ -217,7 +218,7 @@ def coordinates_of(series: MotionSeries, order: int) -> Float[Numbers, "level co
 
 def _check_margins(robot: Robot, margin: Any, driven: np.ndarray) -> None:
     """Raise SingularityError, by name, where nothing resists a joint."""
-    margin = np.reshape(margin, (-1, margin.shape[-1]))
+    margin = np.reshape(margin, (math.prod(margin.shape[:-1]), margin.shape[-1]))  # a lone body has no joints
     free = np.ones(margin.shape[1])
     if robot.tree.shape.direct:
         free[: len(driven)] = 1.0 - driven
