@@ -90,6 +90,7 @@ from jounce.io import (
     in_units as in_units,
     load as load,
     load_cam as load_cam,
+    load_drives as load_drives,
     load_limits as load_limits,
     load_robot as load_robot,
     load_trajectory as load_trajectory,
@@ -136,6 +137,13 @@ from jounce.mechanism import (
     RelativeRotationMatrixOutput as RelativeRotationMatrixOutput,
     RotationMatrixOutput as RotationMatrixOutput,
     TimeGrid as TimeGrid,
+)
+from jounce.planning import (
+    Drive as Drive,
+    Feedforward as Feedforward,
+    MotorMotion as MotorMotion,
+    feedforward as feedforward,
+    simulate_elastic as simulate_elastic,
 )
 from jounce.robot import (
     BaseMotion as BaseMotion,

@@ -18,13 +18,14 @@ ADVICE = {
     "jounce convert {path} {stem}.yaml --hold",
     "trajectory": "is a trajectory, which goes with its robot; jounce check ROBOT {path}, or jounce view ROBOT {path}",
     "cam": "is a plate cam; jounce cam {path} finds its profile",
+    "drives": "holds drives, which go with a robot or mechanism; jounce feedforward FILE --drives {path}",
     "limits": "holds limits, which go with robot and trajectory; jounce check ROBOT TRAJECTORY --limits {path}",
 }
 _ROOT = re.compile(rb"<(robot|mujoco)[\s>/]")
 
 
 def kind_of(path: str | PathLike[str]) -> str | None:
-    """Return ``mechanism``, ``robot``, ``trajectory``, ``cam`` or ``limits``, or None where the content does not tell.
+    """Return ``mechanism``, ``robot``, ``trajectory``, ``cam``, ``drives`` or ``limits``; None if nothing tells it.
 
     Examples
     --------
@@ -49,6 +50,7 @@ def kind_of(path: str | PathLike[str]) -> str | None:
 
 
 def _kind_of_data(data: Any) -> str | None:
+    from jounce.io.robots.drives import KEYS as OF_DRIVES
     from jounce.io.robots.limits import KEYS
 
     if not isinstance(data, dict):
@@ -63,6 +65,9 @@ def _kind_of_data(data: Any) -> str | None:
     rows = list(joints.values()) if isinstance(joints, dict) else []
     if rows and all(isinstance(row, dict) and row.keys() <= {*KEYS} for row in rows):
         return "limits"
+    driven = data["drivers"].values() if isinstance(data.get("drivers"), dict) else rows
+    if driven and all(isinstance(row, dict) and row.keys() <= {*OF_DRIVES} for row in driven if row is not None):
+        return "drives"
     if rows and all(isinstance(row, str | int | float) or "samples" in row for row in rows):
         return "trajectory"
     return None

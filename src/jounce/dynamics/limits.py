@@ -70,8 +70,39 @@ class LimitRow:
         return self.ratio is not None and self.ratio > 1 + ROUNDING
 
 
+class LimitRows:
+    """What is told of rows of quantities and their limits.
+
+    Attributes
+    ----------
+    rows : tuple of LimitRow
+    """
+
+    rows: tuple[LimitRow, ...]
+
+    @property
+    def limited(self) -> tuple[LimitRow, ...]:
+        """Rows that have a limit."""
+        return tuple(row for row in self.rows if row.ratio is not None)
+
+    @property
+    def broken(self) -> tuple[LimitRow, ...]:
+        """Rows whose limit is broken, the worst first."""
+        return tuple(sorted((row for row in self.rows if row.broken), key=_ratio, reverse=True))
+
+    @property
+    def kept(self) -> bool:
+        """Whether no limit is broken."""
+        return not self.broken
+
+    @property
+    def worst(self) -> LimitRow | None:
+        """The row of the largest ratio; None if nothing has a limit."""
+        return max(self.limited, key=_ratio, default=None)
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
-class LimitReport:
+class LimitReport(LimitRows):
     """What `check_limits` found.
 
     Parameters
@@ -99,26 +130,6 @@ class LimitReport:
     times: Float[np.ndarray, " time"]
     values: Float[np.ndarray, "time 6 joint"]
     shares: Float[np.ndarray, "time 6 joint"]
-
-    @property
-    def limited(self) -> tuple[LimitRow, ...]:
-        """Rows that have a limit."""
-        return tuple(row for row in self.rows if row.ratio is not None)
-
-    @property
-    def broken(self) -> tuple[LimitRow, ...]:
-        """Rows whose limit is broken, the worst first."""
-        return tuple(sorted((row for row in self.rows if row.broken), key=_ratio, reverse=True))
-
-    @property
-    def kept(self) -> bool:
-        """Whether no limit is broken."""
-        return not self.broken
-
-    @property
-    def worst(self) -> LimitRow | None:
-        """The row of the largest ratio; None if nothing has a limit."""
-        return max(self.limited, key=_ratio, default=None)
 
 
 def check_limits(
@@ -198,7 +209,7 @@ def check_limits(
         for quantity in range(len(FIELDS))
         if quantity in EFFORTS or name not in held
     ]
-    at, found, shown = _worst(curves, bounds, grid, values, np.array(wanted))
+    at, found, shown = worst_instants(curves, bounds, grid, values, np.array(wanted))
     rows = tuple(
         _row(robot, bounds, quantity, joint, *worst)
         for (quantity, joint), *worst in zip(wanted, at.tolist(), found.tolist(), shown.tolist(), strict=True)
@@ -260,9 +271,9 @@ class _Bounds:
         return np.where(self.limited, np.where(above >= below, np.maximum(above, 0), -np.maximum(below, 0)), np.nan)
 
 
-def _worst(
+def worst_instants(
     curves: Callable[[np.ndarray], np.ndarray],
-    bounds: _Bounds,
+    bounds: Any,
     grid: np.ndarray,
     values: np.ndarray,
     wanted: np.ndarray,
@@ -271,6 +282,17 @@ def _worst(
 
     Around the highest peaks on the grid, the best of a few instants becomes the middle of a shorter interval, again and
     again. A jump between two instants is found from the side on which the curve is worse.
+
+    Parameters
+    ----------
+    curves : callable
+        Maps instants, (time,), to values, (time, quantities, joints).
+    bounds : object
+        Has `weights` and `measure`, as the bounds of this module have.
+    grid, values
+        Instants to begin with, and what `curves` gives there.
+    wanted : array of shape (curves, 2)
+        Quantity and joint of each.
     """
     at = tuple(wanted.T)
     weights = bounds.weights(values)

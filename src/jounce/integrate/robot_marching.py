@@ -16,7 +16,7 @@ from jounce.integrate.marching import MARGIN, Outcome
 from jounce.integrate.methods import ROUNDING, Lanes, furthest
 from jounce.jet.series import Recursion
 from jounce.kinematics.compilation import compiled
-from jounce.robot.joint_laws import JointLaws
+from jounce.robot.joint_laws import AbstractJointLaws
 from jounce.robot.motion_series import MotionSeries, motion_series
 from jounce.robot.tree_equations import Motion, TreeEquations, Unknowns, free_base
 from jounce.shapes import Numbers
@@ -51,9 +51,9 @@ class RobotProblem(eqx.Module):
     ----------
     equations : TreeEquations
         Of the tree.
-    forces : JointLaws
+    forces : AbstractJointLaws
         Of its joints.
-    prescribed : JointLaws
+    prescribed : AbstractJointLaws
         Coordinates of driven joints; only their second derivatives count here.
     scale : array of shape (n,)
         What counts as one in a coordinate: 1 rad, or the size of the robot.
@@ -62,8 +62,8 @@ class RobotProblem(eqx.Module):
     """
 
     equations: TreeEquations
-    forces: JointLaws
-    prescribed: JointLaws
+    forces: AbstractJointLaws
+    prescribed: AbstractJointLaws
     scale: Float[Numbers, " n"]
     length: Float[Numbers, ""] | float
 

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
         write as write,
         write_parts as write_parts,
     )
+    from jounce.io.robots.drives import load_drives as load_drives
     from jounce.io.robots.limits import load_limits as load_limits
     from jounce.io.robots.loader import load_robot as load_robot
     from jounce.io.robots.trajectories import load_trajectory as load_trajectory
@@ -28,6 +29,7 @@ _HOMES = {
     "check_writable": "results",
     "read": "results",
     "write": "results",
+    "load_drives": "robots.drives",
     "load_limits": "robots.limits",
     "load_robot": "robots.loader",
     "load_trajectory": "robots.trajectories",

@@ -1,1 +1,13 @@
 """Planning: what a controller is sent, from a path or a task: time laws, coordinates of a tool path, feedforward."""
+
+from jounce.planning.elastic.drives import Drive as Drive
+from jounce.planning.elastic.feedforward import feedforward as feedforward
+from jounce.planning.elastic.link_errors import LinkErrors as LinkErrors, link_errors as link_errors
+from jounce.planning.elastic.motor_motion import (
+    DriveReport as DriveReport,
+    Feedforward as Feedforward,
+    MotorMotion as MotorMotion,
+)
+from jounce.planning.elastic.robot import elastic_robot as elastic_robot
+from jounce.planning.elastic.simulation import simulate_elastic as simulate_elastic
+from jounce.planning.elastic.spring_deflection import SpringDeflection as SpringDeflection

@@ -4,6 +4,7 @@ from jounce.plot.animation import animate as animate, check_animation as check_a
 from jounce.plot.bands import draw_bands as draw_bands
 from jounce.plot.cams import draw_cam as draw_cam
 from jounce.plot.curves import draw_curves as draw_curves
+from jounce.plot.elastic import draw_feedforward as draw_feedforward
 from jounce.plot.figure import check_figure as check_figure, draw as draw, save as save
 from jounce.plot.forces import (
     draw_energy as draw_energy,

@@ -157,6 +157,40 @@ class TorquesResult(TrajectoryResult):
     peaks: list[TorquePeak]
 
 
+class DriveFacts(TypedDict):
+    """A drive: time constant of its spring, s, what the expansion in it misses, and how its motor begins."""
+
+    name: str
+    elastic: bool
+    time_constant: float
+    expansion_errors: list[float]
+    velocity_at_start: float
+
+
+class SimulatedLink(TypedDict):
+    """By how much a link errs in a simulation, under all of the torques, and without what accelerates the springs."""
+
+    name: str
+    unit: str
+    error: float | None
+    error_without_springs: float | None
+
+
+class FeedforwardResult(Result):
+    """jounce feedforward --json."""
+
+    command: Literal["feedforward"]
+    system: str
+    file: str
+    trajectory: str | None
+    time: Grid
+    drives: list[DriveFacts]
+    kept: bool
+    limits: list[LimitRow]
+    simulated: list[SimulatedLink] | None
+    written: str | None
+
+
 class SweptPeak(TypedDict):
     """The least and the largest peak that a derivative of an output has among designs, and the designs."""
 
@@ -286,6 +320,7 @@ RESULTS: dict[str, Any] = {
     "inspect_robot": InspectRobotResult,
     "check": CheckResult,
     "torques": TorquesResult,
+    "feedforward": FeedforwardResult,
     "servo": ServoResult,
     "cam": CamResult,
     "modes": ModesResult,
@@ -311,7 +346,7 @@ def result_schema() -> dict[str, Any]:
     Examples
     --------
     >>> sorted(result_schema()["$defs"])[:6]
-    ['cam', 'check', 'complaint', 'inspect_mechanism', 'inspect_robot', 'modes']
+    ['cam', 'check', 'complaint', 'feedforward', 'inspect_mechanism', 'inspect_robot']
     """
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

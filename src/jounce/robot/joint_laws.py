@@ -1,5 +1,6 @@
 """Forces of joints as functions of time and state: feedback, expressions, motion laws and constants."""
 
+import abc
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -53,7 +54,22 @@ class _Feedback(eqx.Module):
         return jax.vmap(number, in_axes=-1, out_axes=-1)(time, q, rate)
 
 
-class JointLaws(eqx.Module):
+class AbstractJointLaws(eqx.Module):
+    """Forces of all joints, of whole batches at once."""
+
+    @property
+    @abc.abstractmethod
+    def changing(self) -> bool:
+        """Whether they depend on anything."""
+
+    @abc.abstractmethod
+    def __call__(
+        self, time: Float[Numbers, "1 batch"], q: Float[Numbers, "n batch"], rate: Float[Numbers, "n batch"]
+    ) -> Float[Numbers, "n batch"]:
+        """Return the forces of the joints, N m or N."""
+
+
+class JointLaws(AbstractJointLaws):
     """Forces of all joints; see `joint_laws`.
 
     Attributes
@@ -92,14 +108,14 @@ class JointLaws(eqx.Module):
         return jnp.stack([jnp.broadcast_to(rows[k], shape) if k in rows else found[k] for k in range(len(found))])
 
 
-def joint_laws(names: Sequence[str], given: Any, what: str = "torque") -> JointLaws:
+def joint_laws(names: Sequence[str], given: Any, what: str = "torque") -> AbstractJointLaws:
     """Return what a user gives for the forces of joints, checked.
 
     Parameters
     ----------
     names : sequence of str
         Of the joints, in the order of q.
-    given : None, array_like of shape (n,), callable, mapping or JointTrajectory
+    given : None, array_like of shape (n,), callable, mapping, JointTrajectory or AbstractJointLaws
         None for no forces; constants; a function of time, q and rates, of one sample, by operations of JAX, that
         returns n forces; or one law for each joint that has a force: a number, an expression of ``t``, of the names of
         joints and of their rates as ``NAME_d1``, a motion law, or a function that returns one force.
@@ -114,6 +130,8 @@ def joint_laws(names: Sequence[str], given: Any, what: str = "torque") -> JointL
     count, nothing = len(names), np.zeros(len(names))
     if given is None:
         return JointLaws(nothing, None, (), ())
+    if isinstance(given, AbstractJointLaws):
+        return given
     if isinstance(given, JointTrajectory):
         given = given.laws
     if callable(given):

@@ -1,0 +1,187 @@
+"""Drives of joints, or of the drivers of a mechanism, from files: springs, gears, rotors and their limits."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from os import PathLike
+from typing import Any
+
+from jounce.errors import RobotError, did_you_mean
+from jounce.io.files.located_data import Location, Source
+from jounce.io.files.source import read_source
+from jounce.mechanism import Mechanism
+from jounce.mechanism.driver_outputs import is_turning
+from jounce.planning.elastic.drives import Drive
+from jounce.robot.robot import Robot
+from jounce.trajectory.dimensions import Dimension, describe_dimension, dimension_of
+
+KEYS = tuple(field.name for field in dataclasses.fields(Drive))
+UNITS = {
+    "stiffness": ("N*m/rad", "N/m"),
+    "damping": ("N*m*s/rad", "N*s/m"),
+    "rotor_inertia": ("kg*m^2", "kg"),
+    "gear_ratio": ("no unit", "no unit"),
+    "lead": ("m", "m"),
+    "deflection_limit": ("rad", "m"),
+    "torque_limit": ("N*m", "N"),
+    "velocity_limit": ("rad/s", "m/s"),
+}
+"""Units of each key where it turns, and where it slides; those of a motor itself are by what the motor does."""
+OF_MOTOR = ("rotor_inertia", "torque_limit", "velocity_limit")
+
+
+def load_drives(path: str | PathLike[str], system: Robot | Mechanism) -> dict[str, Drive]:
+    """Read the drives of a robot's joints, or of a mechanism's drivers, from a file.
+
+    The file has the keys ``joints`` (of a robot) or ``drivers`` (of a mechanism), with an entry for each, and
+    ``default``, for all. Each entry has some of the keys of `Drive`: ``stiffness``, ``damping``, ``deflection_limit``,
+    which are those seen at the joint; ``rotor_inertia``, ``torque_limit``, ``velocity_limit``, which are the motor's
+    own; and ``gear_ratio`` or, where a motor that turns makes something slide, ``lead``. A value is a number in SI
+    units or a number with a unit; ``null`` takes a value of ``default`` away, and in the place of an entry all of it. A
+    default with units of what turns is for what turns, one with units of what slides for that. What has no entry is
+    rigid.
+
+    Parameters
+    ----------
+    path
+        A file ending in .yaml, .yml, .toml or .json.
+    system : Robot or Mechanism
+        That the names belong to.
+
+    Returns
+    -------
+    dict of str to Drive
+        As `feedforward` takes it.
+
+    Raises
+    ------
+    RobotError
+        The file cannot be read or something in it is wrong: the message names the file, the line, the entry and the
+        value.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> drives = jn.load_drives("examples/drives/panda.yaml", jn.load_robot("examples/robots/panda.urdf"))
+    >>> drives["panda_joint1"].stiffness, drives["panda_joint1"].gear_ratio
+    (14000.0, 100.0)
+    """
+    return _DrivesFile(read_source(path, kind="drives", error_type=RobotError), system).drives()
+
+
+class _DrivesFile:
+    """Reads drives from the plain data of a file; every error names the file, the line and the entry."""
+
+    def __init__(self, source: Source, system: Robot | Mechanism) -> None:
+        self.source, self.system = source, system
+        if isinstance(system, Robot):
+            self.key, self.noun = "joints", "moving joint"
+            self.turning = {name: system.joints[name].turning for name in system.joint_names}
+        else:
+            self.key, self.noun = "drivers", "driver"
+            self.turning = {name: is_turning(driver) for name, driver in system.drivers.items()}
+
+    def drives(self) -> dict[str, Drive]:
+        """Return the drives that the file has."""
+        data = self.source.mapping((), ("title", "default", "joints", "drivers"))
+        other = "drivers" if self.key == "joints" else "joints"
+        if other in data:
+            message = f"a {'robot' if self.key == 'joints' else 'mechanism'} has '{self.key}' in a file of drives"
+            raise self.source.error(message, (other,))
+        if self.key not in data and "default" not in data:
+            raise self.source.error(f"a file of drives has the key '{self.key}', 'default', or both", value=list(data))
+        own = self.source.mapping((self.key,)) if self.key in data else {}
+        for name in own:
+            if name not in self.turning:
+                raise self.source.error(self._why_not(name), (self.key, name))
+        default = self.source.mapping(("default",), KEYS) if "default" in data else {}
+        fitting = {kind: self._fits(default, kind) for kind in (True, False)}
+        if default and not any(fitting.values()):
+            self._drive(default, dict.fromkeys(default, ("default",)), True)  # says what does not fit
+        found = {}
+        for name, kind in self.turning.items():
+            if name in own and own[name] is None:
+                continue
+            entry = self.source.mapping((self.key, name), KEYS) if name in own else {}
+            taken = default if fitting[kind] else {}
+            places = dict.fromkeys(taken, ("default",)) | dict.fromkeys(entry, (self.key, name))
+            values = {key: raw for key, raw in {**taken, **entry}.items() if raw is not None}
+            if values:
+                found[name] = self._drive(values, places, kind)
+        return found
+
+    def _fits(self, default: Mapping[str, Any], turning: bool) -> bool:
+        """Whether the units of a default are those of what turns, or of what slides."""
+        motor = turning or default.get("lead") is not None
+        if turning and default.get("lead") is not None:
+            return False
+        for key, raw in default.items():
+            dimension = None if raw is None else self._parsed(raw, ("default", key))[1]
+            if dimension and dimension not in _dimensions(key, motor if key in OF_MOTOR else turning):
+                return False
+        return True
+
+    def _drive(self, values: Mapping[str, Any], places: Mapping[str, Location], turning: bool) -> Drive:
+        motor = turning or values.get("lead") is not None
+        if turning and values.get("lead") is not None:
+            message = "belongs to what slides; this turns, and has a gear_ratio"
+            raise self.source.error(message, (*places["lead"], "lead"), value=values["lead"])
+        numbers = {key: self._number(raw, key, (*places[key], key), turning, motor) for key, raw in values.items()}
+        try:
+            return Drive(**numbers)
+        except RobotError as error:
+            key = str(error.name)
+            raise self.source.error(error.message, (*places[key], key), value=values[key]) from None
+
+    def _number(self, raw: Any, key: str, at: Location, turning: bool, motor: bool) -> float:
+        number, dimension = self._parsed(raw, at)
+        kind = motor if key in OF_MOTOR else turning
+        if dimension and dimension not in _dimensions(key, kind):
+            of = "motor" if key in OF_MOTOR else self.noun
+            message = (
+                f"the unit is that of {describe_dimension(dimension)}; a {of} that {'turns' if kind else 'slides'} has"
+            )
+            raise self.source.error(f"{message} {key} in {UNITS[key][not kind]}", at, value=raw)
+        if not math.isfinite(number):
+            raise self.source.error("must be a finite number", at, value=raw)
+        return number * 2 * math.pi if key == "lead" and dimension == PER_ANGLE else number
+
+    def _parsed(self, raw: Any, at: Location) -> tuple[float, Dimension | None]:
+        found = self.source.value(at, raw)
+        assert isinstance(found.value, float)  # no names are allowed, so that expressions are worked out
+        return found.value, found.dimension
+
+    def _why_not(self, name: str) -> str:
+        joint = self.system.joints.get(name) if isinstance(self.system, Robot) else None
+        if joint is not None and joint.mimic is not None:
+            return f"this joint follows {joint.mimic.joint}; give that one the drive"
+        if joint is not None:
+            return "this joint is fixed and has no drive; leave it out"
+        title = self.system.name if isinstance(self.system, Robot) else self.system.title or "the mechanism"
+        return f"{title} has no {self.noun} of this name; {did_you_mean(name, self.turning)}"
+
+
+PER_ANGLE = dimension_of(length=1, angle=-1)
+
+
+def _dimensions(key: str, turning: bool) -> tuple[Dimension, ...]:
+    """Return the dimensions that the unit of a key may have."""
+    time = {"stiffness": -2, "damping": -1, "torque_limit": -2, "velocity_limit": -1}.get(key, 0)
+    length = 2 if turning else 1
+    match key:
+        case "stiffness" | "damping":
+            if not turning:
+                return (dimension_of(mass=1, time=time),)
+            return tuple(dimension_of(mass=1, length=2, time=time, **angle) for angle in ({}, {"angle": -1}))
+        case "rotor_inertia":
+            return (dimension_of(mass=1, length=2) if turning else dimension_of(mass=1),)
+        case "torque_limit":
+            return (dimension_of(mass=1, length=length, time=time),)
+        case "gear_ratio":
+            return ()
+        case "lead":
+            return dimension_of(length=1), PER_ANGLE
+    bases: tuple[dict[str, int], ...] = ({"angle": 1}, {}) if turning else ({"length": 1},)
+    return tuple(dimension_of(**base, **({"time": time} if time else {})) for base in bases)

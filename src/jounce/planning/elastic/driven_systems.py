@@ -1,0 +1,141 @@
+"""What drives move, told alike for robots and for mechanisms: coordinates, and the forces that ask for them."""
+
+import abc
+import warnings
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.dynamics.motion_values import in_chunks
+from jounce.dynamics.reactions import driver_force
+from jounce.dynamics.trajectories import FollowedTrajectory
+from jounce.errors import MechanismError, RobotError, SampleWarning
+from jounce.kinematics.solve import solve
+from jounce.mechanism import Mechanism, time_grid
+from jounce.mechanism.driver_outputs import is_turning
+from jounce.planning.elastic.drives import Drive, DriveArrays
+from jounce.robot.inverse_dynamics import inverse_dynamics
+from jounce.robot.robot import Robot
+from jounce.shapes import Numbers
+from jounce.trajectory.joint_trajectory import JointTrajectory
+
+BLOCK = 2048  # instants at once, always as many, so that all is compiled once
+
+Moved = tuple[Float[np.ndarray, "time level joint"], Float[np.ndarray, "time level joint"]]
+"""Coordinates and the forces on the links that they need, with their derivatives; of both the same number."""
+
+
+class DrivenSystem(abc.ABC):
+    """A robot on a trajectory, or a driven mechanism.
+
+    Attributes
+    ----------
+    title : str
+        Of the robot or mechanism.
+    drives : dict of str to Drive
+        As they were given.
+    arrays : DriveArrays
+        The same in arrays, of all joints.
+    instants : array of shape (time,)
+        Those of the trajectory, s.
+    """
+
+    title: str
+    drives: Mapping[str, Drive]
+    arrays: DriveArrays
+    instants: Float[np.ndarray, " time"]
+
+    @abc.abstractmethod
+    def moved(self, times: Float[np.ndarray, " time"], levels: int) -> Moved:
+        """Return coordinates and forces at instants, each with so many levels."""
+
+
+class DrivenRobot(DrivenSystem):
+    """A robot on a trajectory, its motors on the links before them; damping of the robot file acts on the links."""
+
+    def __init__(self, robot: Robot, trajectory: JointTrajectory, drives: Any, losses: bool):
+        self.robot, self.trajectory, self.losses = robot, trajectory, losses
+        self.drives, self.arrays = drives, robot_drives(robot, drives, losses)
+        self.followed = FollowedTrajectory(robot, trajectory)
+        self.title, self.held = robot.name, self.followed.held
+        self.instants = np.unique(np.concatenate([[trajectory.start], trajectory.times, [trajectory.stop]]))
+
+    def moved(self, times: Float[np.ndarray, " time"], levels: int) -> Moved:
+        """Return coordinates and forces of the joints."""
+        q = self.followed.coordinates(times, levels + 1)
+
+        def block(some: np.ndarray) -> np.ndarray:
+            return np.asarray(link_forces(self.robot, q[some], self.losses))
+
+        return q[:, :levels], in_chunks(block, len(times), (BLOCK,), axis=0)[:, :levels]
+
+    def warn(self) -> None:
+        """Warn of samples that do not support the derivatives that were needed."""
+        for message in self.followed.doubts:
+            warnings.warn(SampleWarning(message), stacklevel=3)
+
+
+def robot_drives(robot: Robot, drives: object, losses: bool) -> DriveArrays:
+    """Return the drives of a robot; motors without inertia of their own have the armature of the robot file."""
+    if robot.closures:
+        message = (
+            "the loops of this robot make its joints depend on one another; drive the mechanism that it is "
+            "(robot.mechanism, jounce convert), whose drivers take drives"
+        )
+        raise RobotError(message, name=robot.name, value=list(robot.closures))
+    if not robot.joint_names:
+        raise RobotError("the robot has no moving joint, and nothing to drive", name="joints")
+    followers = {joint.name: joint.mimic.joint for joint in robot.moving_joints if joint.mimic is not None}
+    for name in drives if isinstance(drives, dict) else ():
+        if name in followers:
+            message = f"this joint follows {followers[name]}; give that one the drive"
+            raise RobotError(message, name="drives", value=name)
+    tree, names = robot.tree, robot.joint_names
+    turning = [robot.joints[name].turning for name in names]
+    friction = np.asarray(tree.friction) if losses else np.zeros(len(names))
+    return DriveArrays.of(names, turning, drives, np.asarray(tree.armature), friction, "moving joint")
+
+
+def link_forces(robot: Robot, q: Numbers, losses: bool) -> Float[Numbers, "*batch level joint"]:
+    """Return forces of joints on their links with rates, two levels fewer than q: with damping, without rotors."""
+    forces = inverse_dynamics(robot, q)
+    if losses:
+        forces = forces + robot.tree.damping * q[..., 1 : 1 + forces.shape[-2], :]
+    return forces
+
+
+class DrivenMechanism(DrivenSystem):
+    """A mechanism moved by its drivers, their motors on the ground side of what they drive."""
+
+    def __init__(self, mechanism: Mechanism, times: Any, drives: Any):
+        self.mechanism, self.drives, names = mechanism, drives, tuple(mechanism.drivers)
+        if not names:
+            raise MechanismError("the mechanism has no driver, and nothing to drive", name="drivers")
+        turning = [is_turning(driver) for driver in mechanism.drivers.values()]
+        nothing = np.zeros(len(names))
+        self.arrays = DriveArrays.of(names, turning, drives, nothing, nothing, "driver")
+        self.title = mechanism.title or "mechanism"
+        self.instants = time_grid(mechanism.time if times is None else times, mechanism.parameter_values)
+        if len(self.instants) < 2:
+            raise MechanismError("at least two instants are needed, a start and a stop", name="time")
+
+    def moved(self, times: Float[np.ndarray, " time"], levels: int) -> Moved:
+        """Return coordinates and forces of the drivers; the motion is followed from its start each time."""
+        known = _filled_up(np.union1d(self.instants, times))
+        asked = np.searchsorted(known, times)
+        motion = solve(self.mechanism, known, order=levels + 1)
+        each = [(motion.driver(name), driver_force(motion, name)) for name in self.arrays.names]
+        for name, (_, force) in zip(self.arrays.names, each, strict=True):
+            if not np.isfinite(force.values).all():
+                message = f"its force is not determined: {force.attrs.get('comment', 'it is not finite')}"
+                raise MechanismError(message, name=f"drivers.{name}")
+        q, force = (np.stack([pair[k].values[asked, :levels] for pair in each], axis=-1) for k in (0, 1))
+        return q, force
+
+
+def _filled_up(times: Float[np.ndarray, " time"]) -> Float[np.ndarray, " more"]:
+    """Return instants with some between them, a power of two in all, so that few sizes are compiled."""
+    missing = (1 << (len(times) - 1).bit_length()) - len(times)
+    return np.union1d(times, 0.5 * (times[:-1] + times[1:])[:missing])

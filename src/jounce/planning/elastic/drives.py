@@ -1,0 +1,207 @@
+"""Drives of joints: a motor with a gear, and a spring with a damper between the gear and the link."""
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.errors import RobotError, did_you_mean
+from jounce.rigid.inertia import finite_numbers
+
+POSITIVE = ("stiffness", "lead", "deflection_limit", "torque_limit", "velocity_limit")
+NOT_NEGATIVE = ("damping", "rotor_inertia")
+
+
+@dataclasses.dataclass(frozen=True)
+class Drive:
+    """The motor of a joint or driver, its gear, and the spring between the gear and what it moves.
+
+    Stiffness, damping and deflection are those seen at the joint, behind the gear: N m/rad, N m s/rad and rad where it
+    turns, N/m, N s/m and m where it slides. Inertia, torque and velocity limits are those of the motor itself, before
+    the gear.
+
+    Parameters
+    ----------
+    stiffness : float, optional
+        Of the spring; the joint is rigid unless given.
+    damping : float, default 0
+        Beside the spring.
+    rotor_inertia : float, optional
+        Of the motor about its own axis, kg m^2, or its mass, kg, where it slides. The armature of the joint in the
+        robot file unless given: that is the same seen at the joint.
+    gear_ratio : float, default 1
+        Turns of the motor for one turn of the joint; negative where the gear reverses.
+    lead : float, optional
+        Of a joint that slides and a motor that turns, in the place of `gear_ratio`: m for one turn of the motor.
+    deflection_limit : float, optional
+        Most that the spring may deflect to either side.
+    torque_limit, velocity_limit : float, optional
+        Of the motor: N m and rad/s, or N and m/s where it slides.
+
+    Raises
+    ------
+    RobotError
+        If a value is not finite, zero or negative where it must not be, or does not go with another.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> drive = jn.Drive(stiffness=2e4, damping=10.0, rotor_inertia=5e-5, gear_ratio=100)
+    >>> drive.reflected_inertia, drive.time_constant
+    (0.5, 0.0005)
+    """
+
+    stiffness: float | int | None = None
+    damping: float | int = 0.0
+    rotor_inertia: float | int | None = None
+    gear_ratio: float | int = 1.0
+    lead: float | int | None = None
+    deflection_limit: float | int | None = None
+    torque_limit: float | int | None = None
+    velocity_limit: float | int | None = None
+
+    def __post_init__(self) -> None:
+        for field in (entry.name for entry in dataclasses.fields(self)):
+            if getattr(self, field) is not None:
+                object.__setattr__(self, field, float(finite_numbers(field, getattr(self, field), ())))
+        for field in POSITIVE:
+            if getattr(self, field) is not None and getattr(self, field) <= 0:
+                raise RobotError("must be greater than zero", name=field, value=getattr(self, field))
+        for field in NOT_NEGATIVE:
+            if (getattr(self, field) or 0.0) < 0:
+                raise RobotError("must be zero or greater", name=field, value=getattr(self, field))
+        if self.gear_ratio == 0:
+            raise RobotError("must not be zero", name="gear_ratio", value=0.0)
+        if self.lead is not None and self.gear_ratio != 1.0:
+            raise RobotError("goes against the lead; give one of them", name="gear_ratio", value=self.gear_ratio)
+        for field in ("damping", "deflection_limit"):
+            if self.stiffness is None and getattr(self, field):
+                message = "belongs to a spring; give the stiffness too, or leave it out for a rigid joint"
+                raise RobotError(message, name=field, value=getattr(self, field))
+
+    @property
+    def elastic(self) -> bool:
+        """Whether there is a spring."""
+        return self.stiffness is not None
+
+    @property
+    def ratio(self) -> float:
+        """Motion of the motor for a motion of the joint: rad/rad, m/m, or rad/m with a lead."""
+        return self.gear_ratio if self.lead is None else 2 * math.pi / self.lead
+
+    @property
+    def reflected_inertia(self) -> float | None:
+        """Inertia of the rotor seen at the joint, kg m^2 or kg; None where it is that of the robot file."""
+        return None if self.rotor_inertia is None else self.ratio**2 * self.rotor_inertia
+
+    @property
+    def time_constant(self) -> float:
+        """Damping over stiffness, s: how fast a deflection that the torque does not ask for fades; 0 undamped."""
+        return 0.0 if self.stiffness is None else self.damping / self.stiffness
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class DriveArrays:
+    """The drives of all joints in arrays of shape (joints,), seen at the joints.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Of joints or drivers.
+    turning : tuple of bool
+        Which of them turn, and do not slide.
+    motor_turning : tuple of bool
+        Whether the motor does.
+    stiffness : array
+        N m/rad or N/m, infinite where rigid.
+    time_constant : array
+        Damping over stiffness, s.
+    inertia : array
+        Of rotors, kg m^2 or kg.
+    friction : array
+        Coulomb friction of the motors, N m or N.
+    ratio : array
+        Of the gears.
+    limits : array of shape (3, joints)
+        Deflection, motor velocity, motor torque; NaN where there is none.
+    """
+
+    names: tuple[str, ...]
+    turning: tuple[bool, ...]
+    motor_turning: tuple[bool, ...]
+    stiffness: Float[np.ndarray, " joint"]
+    time_constant: Float[np.ndarray, " joint"]
+    inertia: Float[np.ndarray, " joint"]
+    friction: Float[np.ndarray, " joint"]
+    ratio: Float[np.ndarray, " joint"]
+    limits: Float[np.ndarray, "3 joint"]
+
+    @classmethod
+    def of(
+        cls,
+        names: Sequence[str],
+        turning: Sequence[bool],
+        drives: object,
+        armature: Float[np.ndarray, " joint"],
+        friction: Float[np.ndarray, " joint"],
+        kind: str,
+    ) -> "DriveArrays":
+        """Return the arrays of drives, checked.
+
+        Parameters
+        ----------
+        names, turning
+            Of joints or drivers.
+        drives : dict of str to Drive
+            Those that are not named are rigid.
+        armature, friction : array of shape (joints,)
+            Of the robot file.
+        kind : str
+            What a name is, for messages.
+
+        Raises
+        ------
+        RobotError
+            If `drives` is no mapping, names what there is not, or a drive does not fit what it moves.
+        """
+        if not isinstance(drives, Mapping):
+            raise RobotError(
+                "must be a mapping of names to jn.Drive, as jn.load_drives gives it", name="drives", value=drives
+            )
+        for name, drive in drives.items():
+            if name not in names:
+                message = f"there is no {kind} of this name; {did_you_mean(str(name), names)}"
+                raise RobotError(message, name="drives", value=name)
+            if not isinstance(drive, Drive):
+                raise RobotError("must be a jn.Drive", name=f"drives.{name}", value=drive)
+            if drive.lead is not None and turning[names.index(name)]:
+                message = "belongs to what slides; this turns, and has a gear_ratio"
+                raise RobotError(message, name=f"drives.{name}.lead", value=drive.lead)
+        each = [drives.get(name, Drive()) for name in names]
+        inertia = [
+            a if x.reflected_inertia is None else x.reflected_inertia for x, a in zip(each, armature, strict=True)
+        ]
+        limits = [[x.deflection_limit, x.velocity_limit, x.torque_limit] for x in each]
+
+        def array(values: Sequence[Any]) -> np.ndarray:
+            return np.array(values, float).reshape(len(names))
+
+        return cls(
+            tuple(names),
+            tuple(map(bool, turning)),
+            tuple(bool(t) or x.lead is not None for x, t in zip(each, turning, strict=True)),
+            array([np.inf if x.stiffness is None else x.stiffness for x in each]),
+            array([x.time_constant for x in each]),
+            array(inertia),
+            np.asarray(friction, float),
+            array([x.ratio for x in each]),
+            np.array(limits, float).reshape(len(names), 3).T,  # None becomes NaN
+        )
+
+    @property
+    def elastic(self) -> np.ndarray:
+        """Which joints have a spring."""
+        return np.isfinite(self.stiffness)

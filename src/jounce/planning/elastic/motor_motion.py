@@ -1,0 +1,273 @@
+"""What a feedforward gives: motions, torques and deflections, at instants or all along a trajectory."""
+
+import dataclasses
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.dynamics.limits import LimitRow, LimitRows, worst_instants
+from jounce.errors import TrajectoryError
+from jounce.planning.elastic.driven_systems import DrivenSystem
+from jounce.planning.elastic.drives import DriveArrays
+from jounce.planning.elastic.pieces import resolved
+from jounce.planning.elastic.spring_deflection import SpringDeflection
+from jounce.trajectory.motion import AbstractMotion
+
+REST = 1e-9  # of the largest velocity of a motor, below which it is at rest
+INSTANTS = 2000  # at least, at which limits are looked at, before peaks are searched between them
+QUANTITIES = ("deflection", "motor velocity", "motor torque")
+
+
+@dataclasses.dataclass(eq=False)
+class MotorMotion:
+    """Motions and torques of motors, and the deflections of springs, with their derivatives.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Of joints or drivers.
+    q : array of shape (..., levels, n)
+        Of the links, rad or m by s.
+    spring_torque : array of shape (..., levels, n)
+        What springs and dampers, or rigid gears, exert on the links, N m or N by s.
+    deflection : array of shape (..., levels, n)
+        Of the springs, ``theta - q``; zero where rigid.
+    position : array of shape (..., levels, n)
+        Of the motors, theta, seen at the joints.
+    torque : array of shape (..., levels - 2, n)
+        Of the motors, u, seen at the joints.
+    motor_position : array of shape (..., levels, n)
+        Their own angles, through the gear ratios.
+    motor_torque : array of shape (..., levels - 2, n)
+        Their own torques.
+    """
+
+    names: tuple[str, ...]
+    q: Float[np.ndarray, "*batch level joint"]
+    spring_torque: Float[np.ndarray, "*batch level joint"]
+    deflection: Float[np.ndarray, "*batch level joint"]
+    position: Float[np.ndarray, "*batch level joint"]
+    torque: Float[np.ndarray, "*batch torque_level joint"]
+    motor_position: Float[np.ndarray, "*batch level joint"]
+    motor_torque: Float[np.ndarray, "*batch torque_level joint"]
+
+
+def motor_motion(
+    arrays: DriveArrays,
+    q: Float[np.ndarray, "*batch level joint"],
+    forces: Float[np.ndarray, "*batch level joint"],
+    deflection: Float[np.ndarray, "*batch level joint"],
+    rest: Any = 0.0,
+) -> MotorMotion:
+    """Return what motors do: positions from deflections, torques from forces and the inertia of rotors.
+
+    Parameters
+    ----------
+    rest : array of shape (joints,)
+        Velocities up to which a motor is at rest, without friction.
+    """
+    position = q + deflection
+    torque = forces[..., :-2, :] + arrays.inertia * position[..., 2:, :]
+    velocity = position[..., 1, :]
+    torque[..., 0, :] += arrays.friction * np.where(np.abs(velocity) > rest, np.sign(velocity), 0.0)
+    return MotorMotion(
+        arrays.names, q, forces, deflection, position, torque, arrays.ratio * position, torque / arrays.ratio
+    )
+
+
+class DriveReport(LimitRows):
+    """How far springs and motors are from their limits: the worst instant of each quantity of each joint.
+
+    Parameters
+    ----------
+    rows : tuple of LimitRow
+        Deflection, motor velocity, motor torque; of rigid joints without the first.
+    """
+
+    def __init__(self, rows: tuple[LimitRow, ...]):
+        self.rows = rows
+
+
+class Feedforward(MotorMotion):
+    """What motors do along a trajectory, at its instants and at any other; see `MotorMotion` for the arrays.
+
+    Attributes
+    ----------
+    time : array of shape (time,)
+        s.
+    drives : dict of str to Drive
+        As they were given.
+    title : str
+        Of the robot or mechanism.
+    system : DrivenRobot or DrivenMechanism
+        What is driven, and how it moves.
+    """
+
+    def __init__(
+        self, system: DrivenSystem, time: np.ndarray, levels: int, springs: SpringDeflection | None, rest: Any = None
+    ):
+        self.time, self.drives, self.title = time, system.drives, system.title
+        self.system, self._arrays = system, system.arrays
+        self._levels, self._springs, self._rest = levels, springs, 0.0
+        if rest is None and system.arrays.friction.any():
+            rest = REST * np.abs(self._found(system.instants).position[:, 1]).max(axis=0)
+        self._rest = 0.0 if rest is None else rest
+        found = self._found(time)
+        super().__init__(*(getattr(found, field.name) for field in dataclasses.fields(found)))
+
+    def __repr__(self) -> str:
+        elastic = int(self._arrays.elastic.sum())
+        return f"<Feedforward of {self.title}: {len(self.names)} drives, {elastic} elastic, {len(self.time)} instants>"
+
+    def _found(self, times: np.ndarray, *, friction: bool = True) -> MotorMotion:
+        q, forces = self.system.moved(times, self._levels)
+        deflection = np.zeros_like(q)
+        if self._springs is not None:
+            deflection[..., self._arrays.elastic] = self._springs.at(times)
+        return motor_motion(self._arrays, q, forces, deflection, self._rest if friction else np.inf)
+
+    def at(self, times: Any) -> "Feedforward":
+        """Return the same at other instants of the trajectory, s.
+
+        Raises
+        ------
+        TrajectoryError
+            If one lies outside of it.
+        """
+        instants, known = np.atleast_1d(np.asarray(times, float)), self.system.instants
+        if not (instants.ndim == 1 and ((instants >= known[0]) & (instants <= known[-1])).all()):
+            message = f"must be instants from {known[0]:.9g} to {known[-1]:.9g} s, where the motion is known"
+            raise TrajectoryError(message, name="times", value=instants.tolist()[:5])
+        return Feedforward(self.system, instants, self._levels, self._springs, self._rest)
+
+    @cached_property
+    def expansion_errors(self) -> Float[np.ndarray, "order joint"]:
+        """What the regular expansion in D / K, cut after each order, misses of the deflection, by its peak.
+
+        Row 0 is ``tau / K``, row 1 has the damping too. Zero for joints without damping.
+        """
+        found = np.zeros((self._levels, len(self.names)))
+        if self._springs is not None:
+            damped = self._arrays.time_constant[self._arrays.elastic] > 0
+            found[:, self._arrays.elastic] = np.where(damped, self._springs.expansion_errors(), 0.0)
+        return found
+
+    @property
+    def start(self) -> Float[np.ndarray, "2 2 joint"]:
+        """Coordinates and rates of the links, and of the motors, at the start: the state for `simulate_elastic`."""
+        found = self._found(self.system.instants[:1])
+        return np.stack([found.q[0, :2], found.position[0, :2]])
+
+    @cached_property
+    def report(self) -> DriveReport:
+        """Deflections, motor velocities and motor torques at their worst instants, beside their limits."""
+        grid = self.system.instants
+        steps = max(1, -(-INSTANTS // (len(grid) - 1)))
+        between = grid[:-1, None] + np.diff(grid)[:, None] * (np.arange(steps) / steps)
+        grid = np.append(between.reshape(-1), grid[-1])
+        rigid = [QUANTITIES.index("deflection")] if not self._arrays.elastic.all() else []
+        wanted = [
+            (quantity, joint)
+            for joint in range(len(self.names))
+            for quantity in range(len(QUANTITIES))
+            if quantity not in rigid or self._arrays.elastic[joint]
+        ]
+        bounds = _Bounds(self._arrays.limits)
+        times, values, _ = worst_instants(self._curves, bounds, grid, self._curves(grid), np.array(wanted))
+        return DriveReport(
+            tuple(
+                self._row(quantity, joint, float(at), float(value))
+                for (quantity, joint), at, value in zip(wanted, times, values, strict=True)
+            )
+        )
+
+    def _curves(self, times: np.ndarray) -> Float[np.ndarray, "time 3 joint"]:
+        found = self._found(times)
+        return np.stack([found.deflection[:, 0], found.motor_position[:, 1], found.motor_torque[:, 0]], axis=1)
+
+    def _row(self, quantity: int, joint: int, time: float, value: float) -> LimitRow:
+        limit = float(self._arrays.limits[quantity, joint])
+        turning = (self._arrays.turning if quantity == 0 else self._arrays.motor_turning)[joint]
+        unit = (("m", "m/s", "N"), ("rad", "rad/s", "N m"))[turning][quantity]
+        word = QUANTITIES[quantity] if turning else QUANTITIES[quantity].replace("torque", "force")
+        if np.isnan(limit):
+            return LimitRow(self.names[joint], word, unit, value, time)
+        return LimitRow(
+            self.names[joint], word, unit, value, time, np.copysign(limit, value).item(), abs(value) / limit
+        )
+
+    def torque_laws(self, *, friction: bool = True) -> dict[str, AbstractMotion]:
+        """Return the motor torques, seen at the joints, as laws of time, of polynomials that are exact to rounding.
+
+        Parameters
+        ----------
+        friction : bool, default True
+            Whether they overcome Coulomb friction, and so jump where a motor turns back.
+        """
+        return self._laws(lambda times: self._found(times, friction=friction).torque[:, 0])
+
+    def position_laws(self) -> dict[str, AbstractMotion]:
+        """Return the motor positions, seen at the joints, as laws of time, of polynomials exact to rounding."""
+        return self._laws(lambda times: self._found(times).position[:, 0])
+
+    def rigid_torque_laws(self, *, friction: bool = True) -> dict[str, AbstractMotion]:
+        """Return what the motor torques are without the acceleration of the springs: ``tau + B q''``, as laws."""
+
+        def torques(times: np.ndarray) -> np.ndarray:
+            found = self._found(times, friction=friction)
+            return found.torque[:, 0] - self._arrays.inertia * found.deflection[:, 2]
+
+        return self._laws(torques)
+
+    def _laws(self, function: Any) -> dict[str, AbstractMotion]:
+        nodes = self.system.instants if self._springs is None else self._springs.pieces.nodes
+        size = np.abs(function(nodes)).max(axis=0)
+        laws = resolved(function, nodes, 1e-15 * size.max() * np.ones_like(size)).laws
+        return dict(zip(self.names, laws, strict=True))
+
+    @property
+    def dataset(self) -> Any:
+        """All of it as an `xarray.Dataset`, for each joint, with as many rates as there are of the torques.
+
+        ``JOINT_motor`` is the motor's own position, ``JOINT_motor_velocity``, ``_acceleration`` and ``_torque`` go with
+        it; ``JOINT_theta`` and ``JOINT_torque`` are position and torque of the motor seen at the joint, and
+        ``JOINT_deflection`` and ``JOINT_spring_torque`` belong to the spring.
+        """
+        import xarray
+
+        count = self._levels - 2
+        axes = {"time": ("time", self.time, {"units": "s", "long_name": "time"}), "derivative": np.arange(count)}
+        variables: dict[str, Any] = {}
+        for k, name in enumerate(self.names):
+            place, force = (("m", "N"), ("rad", "N*m"))[self._arrays.turning[k]]
+            own, effort = (("m", "N"), ("rad", "N*m"))[self._arrays.motor_turning[k]]
+            table = {
+                "motor": (self.motor_position, own),
+                "motor_velocity": (self.motor_position[:, 1:], f"{own}/s"),
+                "motor_acceleration": (self.motor_position[:, 2:], f"{own}/s**2"),
+                "motor_torque": (self.motor_torque, effort),
+                "theta": (self.position, place),
+                "torque": (self.torque, force),
+                "deflection": (self.deflection, place),
+                "spring_torque": (self.spring_torque, force),
+            }
+            for word, (values, unit) in table.items():
+                variables[f"{name}_{word}"] = (("time", "derivative"), values[:, :count, k], {"units": unit})
+        return xarray.Dataset(variables, coords=axes, attrs={"title": self.title, "source": "jounce"})
+
+
+class _Bounds:
+    """Limits of the same size to both sides, as `worst_instants` asks for them."""
+
+    def __init__(self, limits: Float[np.ndarray, "3 joint"]):
+        self.limits = np.where(np.isnan(limits), 1.0, limits)
+
+    def weights(self, values: np.ndarray) -> np.ndarray:
+        """Return ones: all instants count alike."""
+        return np.ones_like(values)
+
+    def measure(self, values: np.ndarray, at: Any = ...) -> np.ndarray:
+        """Return the magnitudes over their limits."""
+        return np.abs(values) / self.limits[at]

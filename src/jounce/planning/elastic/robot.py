@@ -1,0 +1,158 @@
+"""Robots with springs in their joints, simulated with the rotors of their motors.
+
+A rotor is a link of its own on the base, without mass, whose joint has the inertia of the rotor as armature: it turns
+about one axis and does nothing else. The kinetic energy is then that of the links plus ``B theta'^2 / 2`` for each
+rotor, which is the model of Spong (1987), exactly.
+"""
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jounce.errors import RobotError
+from jounce.integrate import RobotSimulation, simulate
+from jounce.jet import Jet
+from jounce.planning.elastic.driven_systems import robot_drives
+from jounce.planning.elastic.drives import Drive, DriveArrays
+from jounce.planning.elastic.motor_torques import MOTOR, torques_of
+from jounce.robot import Joint, Link, Robot
+from jounce.robot.joint_laws import AbstractJointLaws
+from jounce.trajectory import AbstractMotion
+
+
+def elastic_robot(robot: Robot, drives: Mapping[str, Drive], *, losses: bool = True, friction: bool = True) -> Robot:
+    """Return a robot whose elastic joints are two: that of the link, and that of the rotor, ``NAME_motor``.
+
+    Nothing joins the two: the springs are forces, which `simulate_elastic` adds. Coordinates of rotors are those seen
+    at the joints, and their inertia stands in the armatures, so that `drives=True` is needed wherever it shall count.
+
+    Parameters
+    ----------
+    robot : Robot
+        Without closed loops.
+    drives : dict of str to Drive
+        Of its joints; those that are not named stay as they are.
+    losses : bool, default True
+        Whether damping of the links and Coulomb friction of the motors, from the robot file, count.
+    friction : bool, default True
+        Whether Coulomb friction does.
+
+    Raises
+    ------
+    RobotError
+        If a drive does not fit the robot, or an elastic one has a rotor without inertia.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> rod = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0])
+    >>> pin = jn.Joint("pin", "base", "rod", axis=[0, -1, 0])
+    >>> arm = jn.Robot("arm", [jn.Link("base"), jn.Link("rod", rod)], [pin])
+    >>> drive = jn.Drive(stiffness=100.0, rotor_inertia=1e-4, gear_ratio=50)
+    >>> jn.planning.elastic_robot(arm, {"pin": drive}).joint_names
+    ('pin', 'pin_motor')
+    """
+    arrays = robot_drives(robot, drives, losses)
+    columns = {name: k for k, name in enumerate(arrays.names)}
+    for k in np.flatnonzero(arrays.elastic & (arrays.inertia <= 0)):
+        message = "the rotor has no inertia, so that no acceleration follows from its torque; give rotor_inertia"
+        raise RobotError(message, name=f"drives.{arrays.names[k]}", value=float(arrays.inertia[k]))
+    joints: list[Joint] = []
+    rubs = losses and friction
+    for joint in robot.joints.values():
+        k = columns.get(joint.name)
+        armature, rubbing = joint.armature, joint.friction if rubs else 0.0
+        damping = joint.damping if losses else 0.0
+        if k is not None and arrays.elastic[k]:
+            armature = rubbing = 0.0
+        elif k is not None and drives.get(joint.name, Drive()).rotor_inertia is not None:
+            armature = float(arrays.inertia[k])
+        joints.append(dataclasses.replace(joint, armature=armature, damping=damping, friction=rubbing))
+    links = list(robot.links.values())
+    for k in np.flatnonzero(arrays.elastic):
+        name = arrays.names[k] + MOTOR
+        links.append(Link(name))
+        kind = "continuous" if arrays.turning[k] else "prismatic"
+        armature, rubbing = float(arrays.inertia[k]), float(arrays.friction[k]) if rubs else 0.0
+        joints.append(Joint(name, robot.base, name, kind, armature=armature, friction=rubbing))
+    return Robot(robot.name, links, joints, robot.gravity, strict=False)
+
+
+class _ElasticForces(AbstractJointLaws):
+    """Forces of all joints of an elastic robot: of motors, as told, and of springs between them and the links."""
+
+    torque: Any
+    laws: tuple[AbstractMotion, ...]
+    stiffness: Any
+    damping: Any
+    places: tuple[int, ...] = eqx.field(static=True)  # of the laws among the robot's own joints
+    links: tuple[int, ...] = eqx.field(static=True)  # columns of the robot's own joints
+    motors: tuple[int, ...] = eqx.field(static=True)  # of what moves each: its rotor, or itself
+    feedback: Callable[..., Any] | None = eqx.field(static=True)
+
+    @property
+    def changing(self) -> bool:
+        return True
+
+    def __call__(self, time: Any, q: Any, rate: Any) -> Any:
+        links, motors = np.array(self.links), np.array(self.motors)
+        own = jnp.broadcast_to(jnp.asarray(self.torque)[:, None], (len(links), q.shape[-1]))
+        if self.laws:
+            zero = jnp.zeros_like(time[0])
+            found = {k: law(Jet([time[0]])).coefficients[0] for k, law in zip(self.places, self.laws, strict=True)}
+            own = own + jnp.stack([found.get(k, zero) for k in range(len(links))])
+        if self.feedback is not None:
+            parts = time[0], q[links], rate[links], q[motors], rate[motors]
+            own = own + jax.vmap(self.feedback, in_axes=-1, out_axes=-1)(*parts)
+        spring = jnp.asarray(self.stiffness)[:, None] * (q[motors] - q[links])
+        spring = spring + jnp.asarray(self.damping)[:, None] * (rate[motors] - rate[links])
+        forces = jnp.zeros(q.shape)
+        return forces.at[links].add(spring).at[motors].add(own - spring)
+
+
+def simulate_elastic_robot(
+    robot: Robot,
+    drives: Mapping[str, Drive],
+    time: Any,
+    torque: object,
+    state: object,
+    losses: tuple[bool, bool],
+    order: int,
+    options: Mapping[str, Any],
+) -> RobotSimulation:
+    """Return the motion of a robot with elastic joints under torques of its motors; see `simulate_elastic`."""
+    arrays = robot_drives(robot, drives, losses[0])
+    whole = elastic_robot(robot, drives, losses=losses[0], friction=losses[1])
+    names = whole.joint_names
+    links = tuple(names.index(name) for name in arrays.names)
+    motors = tuple(
+        names.index(name + MOTOR) if elastic else names.index(name)
+        for name, elastic in zip(arrays.names, arrays.elastic, strict=True)
+    )
+    constant, laws, feedback = torques_of(arrays, torque)
+    stiffness = np.where(arrays.elastic, arrays.stiffness, 0.0)
+    places, functions = tuple(k for k, _ in laws), tuple(law for _, law in laws)
+    damping = stiffness * arrays.time_constant
+    forces = _ElasticForces(constant, functions, stiffness, damping, places, links, motors, feedback)
+    started = _start(arrays, state, len(names), links, motors)
+    return simulate(whole, time, order, state=started, torque=forces, drives=True, **options)
+
+
+def _start(
+    arrays: DriveArrays, state: object, count: int, links: tuple[int, ...], motors: tuple[int, ...]
+) -> np.ndarray:
+    """Return q and q' of links and rotors; springs are relaxed, and rotors move with the links, unless given."""
+    n, given = len(arrays.names), np.zeros((2, len(arrays.names))) if state is None else np.asarray(state, float)
+    if given.shape not in ((2, n), (2, 2, n)) or not np.isfinite(given).all():
+        message = f"must hold finite q and q' of the links, the shape (2, {n}), or of links and motors, (2, 2, {n})"
+        raise RobotError(message, name="state", value=given.tolist())
+    both = given if given.ndim == 3 else np.stack([given, given])
+    found = np.zeros((2, count))
+    found[:, list(motors)] = both[1]
+    found[:, list(links)] = both[0]
+    return found

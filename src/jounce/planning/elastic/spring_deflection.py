@@ -1,0 +1,181 @@
+"""How springs with dampers deflect under torques that change: ``K x + D x' = tau``, solved along a trajectory.
+
+Every derivative of the deflection obeys the same equation under the same derivative of the torque. From one node to the
+next the solution is a weighted mean of the torque over the past, with weights that fade by the time constant D / K; the
+integrals of Legendre polynomials under such weights are spherical Bessel functions, so that stiff springs (a time
+constant far below the step) are as exact as soft ones. No difference of nearly equal numbers is taken.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.errors import TrajectoryError
+from jounce.planning.elastic.pieces import ANALYSIS, POINTS, points_of, resolved
+
+ROUNDING = 1e-14  # of the largest torque of any joint, or of its derivative
+JUMP = 1e-6  # of the largest value: less is rounding
+LARGE = 100.0  # from here on the finite sum of Bessel functions of half order is exact
+
+Torques = Callable[[np.ndarray], np.ndarray]
+"""Torques of the springs and their derivatives at instants: (time,) to (time, levels, joints)."""
+
+
+class SpringDeflection:
+    """The deflections of springs along a trajectory, and their derivatives.
+
+    With damping one solution is chosen of those that differ by what fades with the time constant: at the start the
+    spring is as deflected as the regular expansion ``(tau - T tau' + T^2 tau'' - ...) / K`` in the time constant
+    T = D / K says, to the order of the derivatives, or to where its terms cease to fall. A trajectory that begins at
+    rest so begins with a spring at rest.
+
+    Parameters
+    ----------
+    torques : callable
+        See `Torques`.
+    stiffness, time_constant : array of shape (joints,)
+        Of the springs.
+    nodes : array of shape (nodes,)
+        Increasing instants from the start to the stop, s, to begin with: those of knots, and those that will be asked
+        for.
+    names : tuple of str
+        Of the joints, for messages.
+
+    Raises
+    ------
+    TrajectoryError
+        If a torque, or a derivative below the last, jumps: the other side of a spring would have to jump too.
+    """
+
+    def __init__(
+        self,
+        torques: Torques,
+        stiffness: Float[np.ndarray, " joint"],
+        time_constant: Float[np.ndarray, " joint"],
+        nodes: Float[np.ndarray, " nodes"],
+        names: tuple[str, ...],
+    ):
+        self.torques, self.stiffness, self.time_constant = torques, stiffness, time_constant
+        self.damped = np.flatnonzero(time_constant > 0)
+        at_nodes = torques(nodes)
+        self.levels = at_nodes.shape[1]
+        largest = np.abs(at_nodes).max(axis=0)
+        floor = np.broadcast_to(ROUNDING * largest.max(axis=1, keepdims=True), largest.shape)
+
+        def flat(times: np.ndarray) -> np.ndarray:
+            return torques(times).reshape(len(times), -1)
+
+        self.pieces = resolved(flat, nodes, floor.reshape(-1))
+        self.at_nodes = at_nodes if len(self.pieces.nodes) == len(nodes) else torques(self.pieces.nodes)
+        self._check_jumps(names)
+        self.solution = self._solved()
+
+    def _check_jumps(self, names: tuple[str, ...]) -> None:
+        """Raise TrajectoryError where a derivative is not the integral of the next one."""
+        changes = np.diff(self.at_nodes[:, :-1], axis=0)
+        integrals = self.pieces.integrals.reshape(len(changes), self.levels, -1)[:, 1:]
+        size = np.abs(self.at_nodes[:, :-1]).max(axis=0)
+        gap = np.abs(changes - integrals)
+        share = gap / np.maximum(size + 1e-6 * size.max(axis=1, keepdims=True), 1e-300)
+        if (share > JUMP).any():
+            piece, level, joint = np.unravel_index(np.argmax(share), share.shape)
+            time, jump = self.pieces.nodes[piece + 1], gap[piece, level, joint]
+            derivative = ("position", "velocity")[level] if level < 2 else f"derivative {level}"
+            need = ("acceleration", "jerk", "jounce")[level] if level < 3 else f"derivative {level + 2}"
+            message = (
+                f"the {f'rate {level} of the ' if level else ''}torque of the spring jumps by {jump:.3g} near "
+                f"t = {time:.6g} s, and the {derivative} of its motor would have to jump too; choose a trajectory "
+                f"whose derivatives are continuous to {need}"
+            )
+            raise TrajectoryError(message, name=names[joint])
+
+    def _solved(self) -> Float[np.ndarray, "nodes level joint"]:
+        """Return deflections at the nodes, a linear recurrence for all joints at once."""
+        from scipy.linalg import solve_banded  # here, since importing SciPy takes half a second
+
+        found = self.at_nodes / self.stiffness
+        if not len(self.damped):
+            return found
+        constant, stiffness = self.time_constant[self.damped], self.stiffness[self.damped]
+        steps = np.diff(self.pieces.nodes)[:, None] / constant
+        count, joints = steps.shape
+        values = self.pieces.values.reshape(count, POINTS, self.levels, -1)[..., self.damped]
+        gained = np.einsum("pjg,pglj->jpl", mean_weights(steps), values) / stiffness[:, None, None]
+        right = np.concatenate([self._first()[:, None], gained], axis=1).reshape(-1, self.levels)
+        below = np.zeros((joints, count + 1))
+        below[:, :-1] = -np.exp(-steps).T
+        bands = np.stack([np.ones(joints * (count + 1)), below.reshape(-1)])
+        solved = solve_banded((1, 0), bands, right).reshape(joints, count + 1, self.levels)
+        found[..., self.damped] = np.moveaxis(solved, 0, -1)
+        return found
+
+    def _first(self) -> Float[np.ndarray, "joint level"]:
+        """Return the deflections with which damped joints begin: the regular expansion, cut where its terms rise."""
+        constant, stiffness = self.time_constant[self.damped], self.stiffness[self.damped]
+        torque = self.at_nodes[0][:, self.damped]
+        sizes = np.abs(self.at_nodes[..., self.damped]).max(axis=0) * constant ** np.arange(self.levels)[:, None]
+        rising = np.concatenate([sizes[1:] >= sizes[:-1], np.ones((1, len(constant)), bool)])
+        last = np.argmax(rising, axis=0)  # the last term before the first that is larger
+        found = np.zeros_like(torque)
+        for level in range(self.levels):  # each from those below
+            terms = np.arange(self.levels - level)[:, None]
+            within = terms <= last - level
+            expanded = np.sum(np.where(within, (-constant) ** terms * torque[level:], 0.0), axis=0) / stiffness
+            beyond = 0.0 if level == 0 else (torque[level - 1] / stiffness - found[level - 1]) / constant
+            found[level] = np.where(level <= last, expanded, beyond)
+        return found.T
+
+    def at(self, times: Float[np.ndarray, " time"]) -> Float[np.ndarray, "time level joint"]:
+        """Return deflections and their derivatives at instants of the trajectory."""
+        nodes = self.pieces.nodes
+        if not len(self.damped):
+            return self.torques(times) / self.stiffness
+        place = np.clip(np.searchsorted(nodes, times, side="right") - 1, 0, len(nodes) - 1)
+        found = self.solution[place]
+        between = np.flatnonzero(times > nodes[place])
+        if not len(between):
+            return found
+        start, stop = nodes[place[between]], times[between]
+        constant, stiffness = self.time_constant[self.damped], self.stiffness[self.damped]
+        instants = np.concatenate([points_of(start, stop).reshape(-1), stop])
+        torques = self.torques(instants)
+        values, there = torques[: -len(stop)].reshape(len(start), POINTS, self.levels, -1), torques[-len(stop) :]
+        steps = (stop - start)[:, None] / constant
+        gained = np.einsum("pjg,pglj->plj", mean_weights(steps), values[..., self.damped]) / stiffness
+        moved = there / self.stiffness
+        moved[..., self.damped] = np.exp(-steps)[:, None] * found[between][..., self.damped] + gained
+        found[between] = moved
+        return found
+
+    def expansion_errors(self) -> Float[np.ndarray, "order joint"]:
+        """Return what the regular expansion misses of the deflection, cut after each order, by its peak; 0 undamped."""
+        terms = self.at_nodes * (-self.time_constant) ** np.arange(self.levels)[:, None] / self.stiffness
+        missed = np.abs(np.cumsum(terms, axis=1) - self.solution[:, :1]).max(axis=0)
+        return missed / np.maximum(np.abs(self.solution[:, 0]).max(axis=0), 1e-300)
+
+
+def mean_weights(steps: Float[np.ndarray, "*shape"]) -> Float[np.ndarray, "*shape points"]:
+    """Return the weights of values at the points of Gauss in a mean over the past that fades.
+
+    It is the integral of ``exp(-(h - s) / T) f(s) / T`` over a step h. That of a Legendre polynomial of degree k is
+    ``h/T exp(-a) i_k(a)``, where a = h / 2T and i_k is the modified spherical Bessel function of the first kind.
+
+    Parameters
+    ----------
+    steps : array of shape (...)
+        h / T, greater than zero.
+    """
+    from scipy.special import factorial, ive
+
+    a = 0.5 * steps[..., None]
+    degrees = np.arange(POINTS)
+    near = np.minimum(a, LARGE)
+    small = 2.0 * near * np.sqrt(np.pi / (2.0 * near)) * ive(degrees + 0.5, near)
+    j = np.arange(POINTS)
+    with np.errstate(over="ignore"):
+        share = 1.0 / (2.0 * np.maximum(a, LARGE))
+    ways = np.where(j <= degrees[:, None], factorial(degrees[:, None] + j) / factorial(j), 0.0)
+    ways = ways / factorial(np.maximum(degrees[:, None] - j, 0))
+    large = np.sum(ways * (-share[..., None]) ** j, axis=-1)
+    return np.where(a < LARGE, small, large) @ ANALYSIS

@@ -1,0 +1,107 @@
+"""Simulations of elastic robots and mechanisms under their feedforward, which know nothing of the trajectory."""
+
+import numpy as np
+import pytest
+
+import jounce as jn
+from jounce.planning import elastic_robot, link_errors
+
+DRIVES = {
+    "shoulder": jn.Drive(stiffness=500.0, damping=2.0, rotor_inertia=1e-4, gear_ratio=50),
+    "elbow": jn.Drive(stiffness=300.0, rotor_inertia=5e-5, gear_ratio=-80),
+}
+PLATFORM = "examples/sea_platform.yaml"
+
+
+def test_rotors_are_links_on_the_base(arm):
+    whole = elastic_robot(arm, DRIVES)
+    assert sorted(whole.joint_names) == ["elbow", "elbow_motor", "shoulder", "shoulder_motor"]
+    assert whole.joints["elbow_motor"].armature == pytest.approx(5e-5 * 6400)
+    assert (whole.joints["elbow"].damping, whole.joints["elbow"].armature) == (0.2, 0.0)
+    assert whole.mass == arm.mass
+
+
+@pytest.mark.parametrize("change, words", [({"rotor_inertia": 0.0}, "no inertia"), ({}, "no inertia")])
+def test_a_rotor_without_inertia_is_refused(arm, change, words):
+    with pytest.raises(jn.RobotError, match=words):
+        elastic_robot(arm, {"elbow": jn.Drive(stiffness=1.0, **change)})
+
+
+def test_what_does_not_fit_is_refused(arm):
+    with pytest.raises(jn.JounceError, match="itself"):
+        jn.simulate_elastic(arm, DRIVES, [0.0, 1.0], driven={"elbow": "t"})
+    with pytest.raises(jn.RobotError, match="shape"):
+        jn.simulate_elastic(arm, DRIVES, [0.0, 1.0], state=[0.0, 1.0])
+    with pytest.raises(jn.RobotError, match="law of time"):
+        jn.simulate_elastic(arm, DRIVES, [0.0, 1.0], {"elbow": [1.0]})
+    hinge = jn.load("examples/hooke_joint.yaml")
+    (name,) = hinge.drivers
+    spring = {name: jn.Drive(stiffness=1.0, rotor_inertia=1.0)}
+    with pytest.raises(jn.UnsupportedError, match="feedforward"):
+        jn.simulate_elastic(hinge, spring, [0.0, 0.1], state=np.zeros((2, 2, 1)))
+
+
+@pytest.mark.slow
+def test_links_of_an_arm_follow_to_rounding(arm, swing):
+    """Two joints, one damped: 2 s without feedback; without the acceleration of the springs a millimetre and more."""
+    found = link_errors(jn.feedforward(arm, swing, DRIVES))
+    assert found.units == ("rad", "rad")
+    assert found.exact.max() < 1e-11
+    assert found.rigid.max() > 1e-4
+
+
+@pytest.mark.slow
+def test_free_motion_keeps_its_energy_and_feedback_acts(arm):
+    """Motors and links swing freely: energy of springs included, nothing is lost."""
+    drives = {name: jn.Drive(stiffness=40.0, rotor_inertia=0.3) for name in DRIVES}
+    free = jn.simulate_elastic(arm, drives, np.linspace(0, 1, 11), None, [[0.3, -0.5], [0.0, 0.0]], losses=False)
+    columns = [free.robot.joint_names.index(name) for name in ("shoulder", "elbow", "shoulder_motor", "elbow_motor")]
+    q = free.q[:, 0, columns]
+    energy = free.energy + 20.0 * ((q[:, :2] - q[:, 2:]) ** 2).sum(axis=1)
+    np.testing.assert_allclose(energy, energy[0], rtol=0, atol=1e-11)
+    assert np.ptp(free.energy) > 0.1
+
+    def held(time, q, rate, theta, theta_rate):
+        return -200.0 * theta - 60.0 * theta_rate
+
+    run = jn.simulate_elastic(arm, drives, [0.0, 0.4, 0.8], held, [[0.3, -0.5], [0.0, 0.0]])
+    q, theta = run.q[..., columns[:2]], run.q[..., columns[2:]]
+    spring = 40.0 * (theta - q)[:, 0]
+    damping = np.array([0.1, 0.2])
+    tau = np.asarray(jn.inverse_dynamics(arm, q))[:, 0] + damping * q[:, 1]
+    np.testing.assert_allclose(spring, tau, rtol=0, atol=1e-11)
+    torque = held(0.0, q[:, 0], q[:, 1], theta[:, 0], theta[:, 1])
+    np.testing.assert_allclose(0.3 * theta[:, 2] + spring, torque, rtol=0, atol=1e-11)
+    assert np.abs(theta[-1, 0]).max() < 0.2
+
+
+@pytest.mark.slow
+def test_the_platform_on_springs_follows():
+    """Closed loops: six legs with springs, spindles and rotors. It is not stable without feedback: exp(5 t) or so."""
+    platform = jn.load(PLATFORM)
+    drives = jn.load_drives("examples/drives/sea_platform.yaml", platform)
+    found = link_errors(jn.feedforward(platform, np.linspace(0, 0.5, 26), drives), rigid=False)
+    assert (found.names, found.rigid) == (("platform",), None)
+    assert found.exact.max() < 1e-9
+    assert found.time[-1] == 0.5
+
+
+@pytest.mark.slow
+def test_a_crank_with_an_elastic_drive_and_a_rod_in_the_plane():
+    """A coordinate driver: a rod in gravity at an angle, against the pendulum of a robot."""
+    rod = jn.Body([0, 0], mass=1.0, inertia=1 / 12, center_of_mass=[0.5, 0])
+    pin = jn.planar.Revolute(("ground", "rod"), [0, 0], [0, 0])
+    driver = jn.drivers.CoordinateDriver(("ground", "rod"), "angle", motion="0.5*sin(2*t)")
+    crank = jn.Mechanism(
+        space="planar", bodies={"rod": rod}, joints={"O": pin}, drivers={"turn": driver}, gravity=[0, -9.81]
+    )
+    drive = jn.Drive(stiffness=100.0, damping=1.0, rotor_inertia=1e-4, gear_ratio=50)
+    found = jn.feedforward(crank, np.linspace(0, 1, 51), {"turn": drive})
+    inertia = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0], tensor=[0, 1 / 12, 1 / 12])
+    joint = jn.Joint("turn", "base", "rod", axis=[0, -1, 0])
+    arm = jn.Robot("arm", [jn.Link("base"), jn.Link("rod", inertia)], [joint])
+    law = jn.JointTrajectory({"turn": "0.5*sin(2*t)"}, 0.0, 1.0, times=np.linspace(0, 1, 51))
+    same = jn.feedforward(arm, law, {"turn": drive})
+    for field in ("position", "torque", "deflection", "motor_torque"):
+        np.testing.assert_allclose(getattr(found, field), getattr(same, field), rtol=0, atol=1e-10)
+    assert link_errors(found, rigid=False).exact.max() < 1e-11
