@@ -87,6 +87,7 @@ from jounce.integrate import (
     simulate_batch as simulate_batch,
 )
 from jounce.io import (
+    export_trajectory as export_trajectory,
     in_units as in_units,
     load as load,
     load_cam as load_cam,
@@ -141,8 +142,13 @@ from jounce.mechanism import (
 from jounce.planning import (
     Drive as Drive,
     Feedforward as Feedforward,
+    JointPoses as JointPoses,
     MotorMotion as MotorMotion,
+    ToolPath as ToolPath,
+    ToolPathMotion as ToolPathMotion,
     feedforward as feedforward,
+    follow_tool_path as follow_tool_path,
+    inverse_kinematics as inverse_kinematics,
     simulate_elastic as simulate_elastic,
 )
 from jounce.robot import (

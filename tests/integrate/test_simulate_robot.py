@@ -41,6 +41,59 @@ def test_spring_and_damper_in_closed_form_with_events():
 
 
 @pytest.mark.slow
+def test_wrenches_of_state_and_time_in_closed_form():
+    def spring(time, q, rate):
+        return jnp.array([-10 * q[0] - 4 * rate[0], 0.0, 3.0])
+
+    start = [[1.0], [-1.0]]
+    found = jn.simulate(slider(), TIME, 6, state=start, wrenches=[jn.Wrench("block", spring, point=[0.1, 0.2, 0.3])])
+    assert np.abs(found.q[:, :, 0] - swing(TIME, 6)).max() <= 1e-11
+    assert np.abs(found.torque).max() <= 1e-9  # nothing of it comes from the joint, at no rate
+    # a pendulum pushed at its end, across the link: a torque of 0.5 m times the force
+    rod = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0], tensor=[0, 1 / 12, 1 / 12])
+    pin = jn.Joint("pin", "base", "rod", axis=[0, -1, 0])
+    arm = jn.Robot("arm", [jn.Link("base"), jn.Link("rod", rod)], [pin])
+    push = jn.Wrench("rod", lambda t: jnp.array([0.0, 0.0, 2 * jnp.sin(3 * t)]), point=[0.5, 0, 0], frame="link")
+    pushed = jn.simulate(arm, TIME, 3, state=[[-1.5], [0.0]], wrenches=[push])
+    q, rate, second, third = pushed.q[:, :, 0].T
+    assert np.abs(second - 3 * (np.sin(3 * TIME) - 4.905 * np.cos(q))).max() <= 1e-11
+    assert np.abs(third - 3 * (3 * np.cos(3 * TIME) + 4.905 * np.sin(q) * rate)).max() <= 1e-11
+    assert np.abs(pushed.torque).max() <= 1e-10
+    work = np.trapezoid(np.sin(3 * (fine := np.linspace(0, 2, 4001))) * pushed.at(fine).q[:, 1, 0], fine)
+    assert np.isclose(pushed.energy[-1] - pushed.energy[0], work, rtol=0, atol=1e-6)
+    for bad, words in (
+        ([jn.Wrench("base", [1, 0, 0])], "fixed to the base"),
+        ([jn.Wrench("rod", [[1, 0, 0]])], "three finite numbers"),
+        ([jn.Wrench("rod", lambda t: t)], "three components"),
+    ):
+        with pytest.raises(jn.errors.RobotError, match=words):
+            jn.simulate(arm, TIME, 2, wrenches=bad)
+
+
+@pytest.mark.slow
+def test_force_on_a_free_base_moves_its_centre_of_mass():
+    robot = random_robot(4, 2)
+    links = [jn.Link(robot.base, random_inertia(np.random.default_rng(5))), *list(robot.links.values())[1:]]
+    robot = jn.Robot("free", links, list(robot.joints.values()), gravity=[0, 0, 0])
+    force = np.array([1.0, -2.0, 0.5])
+    base = jn.BaseMotion([0, 0, 0], [1, 0, 0, 0], np.zeros((1, 6)))
+    time = np.array([0.0, 0.3, 0.6])
+    found = jn.simulate(robot, time, 2, base=base, wrenches=[jn.Wrench(robot.moving_links[-1], force)])
+    own = jn.center_of_mass(robot, found.q[:, :1])[:, 0]
+    w, x, y, z = found.base.quaternion.T
+    turned = np.stack(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+    centre = found.base.position + np.einsum("ijt,tj->ti", turned, own)
+    expected = centre[0] + 0.5 * time[:, None] ** 2 * force / robot.mass
+    assert np.abs(centre - expected).max() <= 1e-12
+
+
+@pytest.mark.slow
 def test_pulse_and_jumps_are_not_passed_over():
     mass, width = 2.0, 1e-3
 

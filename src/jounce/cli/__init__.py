@@ -24,6 +24,7 @@ from jounce.cli.cams import cam
 from jounce.cli.conversion import convert
 from jounce.cli.curves import trace
 from jounce.cli.designs import optimize
+from jounce.cli.exports import export
 from jounce.cli.feedforward import feedforward
 from jounce.cli.figures import plot, report
 from jounce.cli.inspection import inspect
@@ -66,7 +67,7 @@ def completion(shell: Literal["bash", "zsh", "fish"], /, *, install: bool = Fals
 
 COMMANDS = (
     new, inspect, run, trace, simulate, optimize, sweep, tolerance, modes, plot, report, view, servo, cam, check,
-    torques, feedforward, convert, reproduce, schema, completion,
+    torques, feedforward, export, convert, reproduce, schema, completion,
 )  # fmt: skip
 LIGHT = (new, completion)  # they compute nothing
 FIRST = """\

@@ -66,7 +66,7 @@ def servo(
     from jounce.reporting.peaks import shown_peaks, table_peaks
 
     output.check()
-    frequency, told = _frequency(rate), heading.units
+    frequency, told = frequency_of(rate), heading.units
     mechanism = reading.mechanism(file)
     spare_inputs(output.out, overwrite=output.overwrite)
     names = list(dict.fromkeys(driver or mechanism.drivers))
@@ -90,7 +90,7 @@ def servo(
     return outcome(motion, file)
 
 
-def _frequency(text: str) -> float:
+def frequency_of(text: str) -> float:
     """Return a rate in 1/s."""
     from jounce.trajectory.units import parse_value
 

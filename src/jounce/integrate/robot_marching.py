@@ -19,6 +19,7 @@ from jounce.kinematics.compilation import compiled
 from jounce.robot.joint_laws import AbstractJointLaws
 from jounce.robot.motion_series import MotionSeries, motion_series
 from jounce.robot.tree_equations import Motion, TreeEquations, Unknowns, free_base
+from jounce.robot.wrench_laws import WrenchLaws
 from jounce.shapes import Numbers
 
 STUCK = 100  # steps cut so short one after the other: a force that switches without end; a jump needs some thirty
@@ -59,6 +60,8 @@ class RobotProblem(eqx.Module):
         What counts as one in a coordinate: 1 rad, or the size of the robot.
     length : float
         Size of the robot, m.
+    wrenches : WrenchLaws
+        That act on its links.
     """
 
     equations: TreeEquations
@@ -66,11 +69,12 @@ class RobotProblem(eqx.Module):
     prescribed: AbstractJointLaws
     scale: Float[Numbers, " n"]
     length: Float[Numbers, ""] | float
+    wrenches: WrenchLaws = WrenchLaws(())
 
     @property
     def blind(self) -> bool:
         """Whether nothing of it could be overlooked: no law changes."""
-        return not (self.forces.changing or self.prescribed.changing)
+        return not (self.forces.changing or self.prescribed.changing or self.wrenches.changing)
 
     def motion(self, state: RobotState) -> Motion:
         """Return where all bodies are."""
@@ -80,10 +84,11 @@ class RobotProblem(eqx.Module):
         return self.equations.motion(state.coordinates, state.rates, base)
 
     def applied(self, motion: Motion, time: Float[Numbers, "1 batch"]) -> tuple[Unknowns, tuple[Any, ...]]:
-        """Return the forces in a state; nothing pushes a free base, and what drives a joint is what it takes."""
+        """Return the forces and the wrenches in a state; what drives a joint is what it takes."""
         free = 1.0 - jnp.asarray(self.equations.driven)[:, None]
         forces = free * self.forces(time, motion.coordinates, motion.rates)
-        return Unknowns(forces, None if motion.base is None else jnp.zeros_like(motion.base.twist)), ()
+        pushes = self.wrenches(time[0], motion.coordinates, motion.rates)
+        return Unknowns(forces, None if motion.base is None else jnp.zeros_like(motion.base.twist)), pushes
 
     def series(self, state: RobotState, time: Float[Numbers, "1 batch"], order: int) -> MotionSeries:
         """Return the series of the motion; the order is that of the accelerations."""
@@ -130,8 +135,8 @@ class RobotProblem(eqx.Module):
             trial = trial._replace(joints=trial.joints + gap)
         else:
             gap = jnp.zeros_like(rates.rates)
-        forces, _ = self.applied(motion, time)
-        missing = jax.tree.map(jnp.subtract, forces, self.equations.needed(motion, trial))
+        forces, pushes = self.applied(motion, time)
+        missing = jax.tree.map(jnp.subtract, forces, self.equations.needed(motion, trial, pushes))
         change = self.equations.factored(motion).solve(missing)
         parts, scales = [change.joints + gap], [jnp.asarray(self.scale)[:, None]]
         sizes = [rates.rates]

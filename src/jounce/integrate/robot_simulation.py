@@ -1,10 +1,13 @@
 """The result of a simulation of a robot: coordinates with derivatives of any order, torques, energy and events."""
 
+import dataclasses
+import inspect
 import math
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
@@ -19,10 +22,13 @@ from jounce.integrate.robot_marching import (
     energy_at,
     forces_at,
 )
+from jounce.jet import Jet, compose
 from jounce.kinematics import Status
 from jounce.robot.base_motion import BaseMotion
 from jounce.robot.inverse_dynamics import inverse_dynamics
 from jounce.robot.robot import Robot
+from jounce.robot.wrench_laws import STATE
+from jounce.robot.wrenches import Wrench
 from jounce.shapes import ArrayLike
 
 WIDTHS = (64,)  # instants that are computed together: one program for few and for many
@@ -66,10 +72,11 @@ class RobotSimulation(Displayed):
         order: int,
         ending: tuple[Status, str] = (Status.OK, ""),
         events: list[list[float]] | None = None,
+        wrenches: tuple[Wrench, ...] = (),
     ):
         self.robot, self.time, self.order, self.steps = robot, instants, order, steps
         self.events = [] if events is None else events
-        self._problem, self._ending = problem, ending
+        self._problem, self._ending, self._wrenches = problem, ending, wrenches
         reached, state = _states(steps, instants)
         levels = max(order - 2, 0)
 
@@ -125,9 +132,44 @@ class RobotSimulation(Displayed):
         Those of driven joints are what it takes to drive them. Where drives count, they are the torques before
         armature, damping and friction.
         """
-        found = inverse_dynamics(self.robot, self.q, drives=self._problem.equations.drives, base=self._cut_base())
+        found = inverse_dynamics(
+            self.robot,
+            self.q,
+            drives=self._problem.equations.drives,
+            base=self._cut_base(),
+            wrenches=[self._told(wrench) for wrench in self._wrenches],
+            time=self.time if self._wrenches else None,
+        )
         found = found if self.base is None else found[..., 6:]
         return np.asarray(found)
+
+    def _told(self, wrench: Wrench) -> Wrench:
+        """Return a wrench with its values along the motion where it depends on the state."""
+        parts = {name: self._along(getattr(wrench, name)) for name in ("force", "torque")}
+        return dataclasses.replace(wrench, **parts)
+
+    def _along(self, given: Any) -> Any:
+        """Return the derivatives of a function of time and state along the motion, or what depends on time alone."""
+        if not callable(given) or len(inspect.signature(given).parameters) != STATE:
+            return given
+        levels = max(self.order - 1, 1)
+
+        factorials = jnp.array([math.factorial(k) for k in range(self.order + 1)], float)
+
+        def derivatives(time: Any, q: Any) -> Any:
+            shares = q / factorials[:, None]
+
+            def component(i: int, since: Any) -> Any:
+                place, rate = shares[-1], jnp.zeros(q.shape[1:])
+                for share in shares[-2::-1]:  # Horner's rule, and its derivative
+                    rate = rate * since + place
+                    place = place * since + share
+                return jnp.asarray(given(time + since, place, rate), float)[i]
+
+            zero = Jet.variable(jnp.zeros(()), levels - 1)
+            return jnp.stack([compose(partial(component, i), zero).derivatives() for i in range(3)], axis=-1)
+
+        return np.asarray(jax.vmap(derivatives)(jnp.asarray(self.time), jnp.asarray(self.q)))
 
     def _cut_base(self) -> BaseMotion | None:
         if self.base is None:
@@ -172,7 +214,9 @@ class RobotSimulation(Displayed):
         """
         instants = np.atleast_1d(np.asarray(time, float))
         order = self.order if order is None else order
-        return RobotSimulation(self.robot, self._problem, self.steps, instants, order, self._ending, self.events)
+        return RobotSimulation(
+            self.robot, self._problem, self.steps, instants, order, self._ending, self.events, self._wrenches
+        )
 
     @property
     def dataset(self) -> Any:

@@ -37,7 +37,7 @@ from jounce.shapes import ArrayLike, Numbers
 AHEAD = 1e-9  # of the time so far: where steps collapse, what is not finite lies that close
 FEW = 4  # derivatives that are looked at for one that is not finite
 STEPS = 64  # tried between two looks at progress and events
-ROBOT_OPTIONS = ("state", "torque", "driven", "drives", "base")
+ROBOT_OPTIONS = ("state", "torque", "driven", "drives", "base", "wrenches")
 TOLERANCES = (1e-17, 1e-2)  # below rounding there is still energy to be kept: what series leave out adds up
 
 
@@ -123,7 +123,9 @@ def simulate(
         sample, by operations of JAX, that returns n; or a mapping of joints to numbers, expressions of ``t``, of the
         names of joints and of their rates as ``NAME_d1``, motion laws, and functions that return one force. `driven`: a
         mapping of joints to laws of time that they follow, whatever it takes. `drives`: whether armature, damping and
-        friction count. `base`: the `BaseMotion` with which a base that moves freely begins.
+        friction count. `base`: the `BaseMotion` with which a base that moves freely begins. `wrenches`: a sequence of
+        `Wrench`, whose forces and torques are constant, functions of time, or functions of time, q and q', that return
+        three components.
 
     Returns
     -------

@@ -20,7 +20,10 @@ from jounce.robot.arguments import checked_state, floats
 from jounce.robot.base_motion import BaseMotion, base_arrays, base_body
 from jounce.robot.joint_laws import joint_laws
 from jounce.robot.robot import Robot
+from jounce.robot.robot_size import robot_size
 from jounce.robot.tree_equations import TreeEquations
+from jounce.robot.wrench_laws import wrench_laws
+from jounce.robot.wrenches import Wrench
 from jounce.trajectory.motion import AbstractMotion
 
 STEPS = 64  # taken between two looks at progress and events
@@ -37,6 +40,7 @@ def simulate_robot(
     driven: Mapping[str, Any] | None = None,
     drives: bool = False,
     base: BaseMotion | None = None,
+    wrenches: Sequence[Wrench] = (),
     method: AbstractMethod | None = None,
     tolerance: float = 1e-15,
     events: Sequence[JointEvent] = (),
@@ -48,7 +52,7 @@ def simulate_robot(
     if robot.closures:
         message = "this robot has loops; simulate the mechanism that it is: jn.simulate(robot.mechanism(...), ...)"
         raise RobotError(message, name=robot.name, value=list(robot.closures))
-    problem = _problem(robot, torque, driven, drives, base)
+    problem = _problem(robot, torque, driven, drives, base, wrenches)
     start = _start(robot, problem, state, base, float(instants[0]))
     for event in events:
         if not isinstance(event, JointEvent):
@@ -61,14 +65,20 @@ def simulate_robot(
     terms = (method or Taylor()).expansion_order(tolerance)
     run = _Run(problem, tolerance, longest_step, terms - 1, detectors)
     run.go(start, instants, progress)
-    simulation = RobotSimulation(robot, problem, run.steps, instants, order, run.ending, run.events.happened)
+    pushed = tuple(wrenches)
+    simulation = RobotSimulation(robot, problem, run.steps, instants, order, run.ending, run.events.happened, pushed)
     if strict and run.events.stopped_at is None:
         raise_for_status(simulation)
     return simulation
 
 
 def _problem(
-    robot: Robot, torque: Any, driven: Mapping[str, Any] | None, drives: bool, base: BaseMotion | None
+    robot: Robot,
+    torque: Any,
+    driven: Mapping[str, Any] | None,
+    drives: bool,
+    base: BaseMotion | None,
+    wrenches: Sequence[Wrench],
 ) -> RobotProblem:
     if any(isinstance(x, Tracer) for x in jax.tree.leaves(robot.tree)):
         raise UnsupportedError("simulations of robots are not differentiated; jn.forward_dynamics is", name=robot.name)
@@ -83,19 +93,12 @@ def _problem(
             raise RobotError(message, name=f"driven.{name}", value=law)
     prescribed = joint_laws(names, dict(given), "driven")
     mask = np.array([float(name in given) for name in names])
-    length = _length(robot)
+    length = robot_size(robot)
     scale = np.array([1.0 if robot.joints[name].turning else length for name in names])
     body = None if base is None else base_body(robot)
-    equations = TreeEquations(tree, mask, body, (), (), drives)
-    return RobotProblem(equations, joint_laws(names, torque), prescribed, scale, np.float64(length))
-
-
-def _length(robot: Robot) -> float:
-    """Return the size of a robot: the longest way from its base to a centre of mass, along the links; 1 m for none."""
-    tree = robot.tree
-    arms = np.linalg.norm(tree.position, axis=1)
-    ways = tree.ancestors[:-1] @ arms + np.linalg.norm(tree.center, axis=1)
-    return float(ways.max(initial=0.0)) or 1.0
+    pushes, places, global_axes = wrench_laws(robot, wrenches, free=base is not None)
+    equations = TreeEquations(tree, mask, body, places, global_axes, drives)
+    return RobotProblem(equations, joint_laws(names, torque), prescribed, scale, np.float64(length), pushes)
 
 
 def _start(robot: Robot, problem: RobotProblem, state: Any, base: BaseMotion | None, instant: float) -> RobotState:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
         write as write,
         write_parts as write_parts,
     )
+    from jounce.io.robots.controller_files import export_trajectory as export_trajectory
     from jounce.io.robots.drives import load_drives as load_drives
     from jounce.io.robots.limits import load_limits as load_limits
     from jounce.io.robots.loader import load_robot as load_robot
@@ -30,6 +31,7 @@ _HOMES = {
     "read": "results",
     "write": "results",
     "load_drives": "robots.drives",
+    "export_trajectory": "robots.controller_files",
     "load_limits": "robots.limits",
     "load_robot": "robots.loader",
     "load_trajectory": "robots.trajectories",

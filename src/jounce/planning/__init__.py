@@ -11,3 +11,8 @@ from jounce.planning.elastic.motor_motion import (
 from jounce.planning.elastic.robot import elastic_robot as elastic_robot
 from jounce.planning.elastic.simulation import simulate_elastic as simulate_elastic
 from jounce.planning.elastic.spring_deflection import SpringDeflection as SpringDeflection
+from jounce.planning.tool_paths.follow_tool_path import follow_tool_path as follow_tool_path
+from jounce.planning.tool_paths.inverse_kinematics import inverse_kinematics as inverse_kinematics
+from jounce.planning.tool_paths.joint_poses import JointPoses as JointPoses
+from jounce.planning.tool_paths.tool_path import ToolPath as ToolPath
+from jounce.planning.tool_paths.tool_path_motion import ToolPathMotion as ToolPathMotion

@@ -109,6 +109,34 @@ def read_columns(
     return times, found
 
 
+def column_names(path: str | Path, error_type: type[JounceError] = MechanismFileError) -> list[str]:
+    """Return the names in the first row of a CSV file, without their units; none where it has no such row."""
+    table = _Table(str(path), error_type)
+    return [] if table.header_line is None else list(table.header)
+
+
+def read_chosen(
+    path: str | Path, time: str, wanted: Sequence[str], error_type: type[JounceError] = MechanismFileError
+) -> tuple[Float[np.ndarray, " time"], Float[np.ndarray, "time column"]]:
+    """Read a column of increasing times, and others in the order given; what else there is may be anything.
+
+    Raises
+    ------
+    JounceError
+        Of the type given: a column does not exist, an entry is not a finite number, or times do not increase.
+    """
+    table = _Table(str(path), error_type)
+    for row_line, row in table.rows:
+        if len(row) != len(table.header):
+            message = f"each row has one value for each of the {len(table.header)} columns; this one has another number"
+            raise table.error(message, line=row_line, value=len(row))
+    times = np.array(table.column(table.find(time), (TIME,)))
+    for k in np.flatnonzero(np.diff(times) <= 0)[:1]:
+        message = f"times must increase; this one does not come after that of line {table.rows[k][0]}"
+        raise table.error(message, line=table.rows[k + 1][0], name=time, value=float(times[k + 1]))
+    return times, np.stack([table.column(table.find(name)) for name in wanted], axis=1)
+
+
 def rates(bases: Iterable[str], order: int) -> tuple[Dimension, ...]:
     """Return the dimensions of time derivatives of angles, lengths or others."""
     return tuple(dimension_of(**{base: 1, "time": -order}) for base in bases)

@@ -16,6 +16,7 @@ from jounce.io.files.located_data import Location, Source
 from jounce.io.files.reading import fault_of_number
 from jounce.io.files.samples import rates, read_columns, read_samples
 from jounce.io.files.source import read_source
+from jounce.io.robots.controller_files import is_message, read_message, read_table
 from jounce.shapes import ArrayLike
 from jounce.trajectory import (
     AbstractMotion,
@@ -38,9 +39,12 @@ _MOTION_KEYS = ("profile", "duration", "start_time", "from", "to", "limits")
 
 
 def load_trajectory(
-    path: str | PathLike[str], degree: int = 5, allow: Iterable[str | PathLike[str]] = ()
+    path: str | PathLike[str],
+    degree: int = 5,
+    allow: Iterable[str | PathLike[str]] = (),
+    joints: Iterable[str] | None = None,
 ) -> JointTrajectory:
-    """Read the trajectory of a robot from a CSV file of samples, or from a file of laws.
+    """Read the trajectory of a robot from a CSV file of samples, from a file of laws, or from one of a controller.
 
     A CSV file has a row of names, ``time, JOINT, JOINT, ...``, and below it numbers in s, m and rad; splines go through
     them. The columns ``JOINT_d1, JOINT_d2, ...`` of derivatives, which files of results have, are not read.
@@ -53,6 +57,10 @@ def load_trajectory(
     In the place of ``joints``, ``motion: {samples: FILE.csv, derivative: 2}`` gives each column to the joint of its
     name, ``initial`` then being a list for each joint, and ``time`` may be left out.
 
+    What controllers take (`export_trajectory`) is told by its content: tables with the columns ``q_d_0`` or
+    ``target_q_0``, and ROS messages with ``joint_names`` and ``points``. Polynomials go through their positions with
+    velocities and accelerations, where there are such.
+
     Parameters
     ----------
     path
@@ -61,6 +69,9 @@ def load_trajectory(
         Degree of the splines through samples, odd from 3 to 11.
     allow
         Folders besides its own that files named in it may be below.
+    joints
+        Names of the joints of a controller's file, in its order; ``joint_0``, ``joint_1``, ... in a table, which names
+        none, unless given.
 
     Returns
     -------
@@ -86,11 +97,23 @@ def load_trajectory(
         message = "the kind of a trajectory file is told by its ending"
         raise TrajectoryError(f"{message}; valid: {', '.join(('.csv', *DATA_FILES))}", path=name)
     if suffix == ".csv":
-        return _read_csv(name, degree)
-    return _LawFile(read_source(name, allow, kind="trajectory", error_type=TrajectoryError)).trajectory()
+        found = read_table(name, joints)
+        return _read_csv(name, degree, joints) if found is None else found
+    source = read_source(name, allow, kind="trajectory", error_type=TrajectoryError)
+    if is_message(source.at(())):
+        return read_message(source, joints)
+    _check_no_names(joints, name)
+    return _LawFile(source).trajectory()
 
 
-def _read_csv(path: str, degree: int) -> JointTrajectory:
+def _check_no_names(joints: object, path: str) -> None:
+    if joints is not None:
+        message = "this file names its joints; give names for what controllers take only"
+        raise TrajectoryError(message, path=path, name="joints")
+
+
+def _read_csv(path: str, degree: int, joints: object) -> JointTrajectory:
+    _check_no_names(joints, path)
     times, columns = read_columns(path, TrajectoryError)
     names = [name for name in columns if _DERIVATIVE.sub("", name) not in columns.keys() - {name}]
     try:

@@ -1,0 +1,87 @@
+"""The command that writes a trajectory as a controller takes it."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import Literal
+
+from jounce.cli.options import PLAIN_ROBOT, RobotReading, errors_about, spare_inputs
+from jounce.cli.servo import frequency_of
+from jounce.errors import SampleWarning
+from jounce.reporting.terminal import caution, say
+
+
+def export(
+    robot: Path,
+    trajectory: Path,
+    /,
+    *,
+    format: Literal["franka", "ur", "ros"],  # noqa: A002 - the name of the option
+    out: Path,
+    rate: str | None = None,
+    joints: str | None = None,
+    torques: bool = False,
+    header_units: bool = False,
+    reading: RobotReading = PLAIN_ROBOT,
+    overwrite: bool = False,
+) -> int:
+    r"""Write a trajectory as a controller takes it, at its rate.
+
+    Positions, velocities and accelerations, with --torques torques too.
+    jn.load_trajectory reads all three forms back.
+
+    Parameters
+    ----------
+    robot
+        Robot file: URDF (.urdf), MJCF (.xml) or SDF (.sdf).
+    trajectory
+        Samples (.csv), laws or a motion (.yaml, .toml, .json).
+    format
+        franka or ur, a table (.csv), or ros, a JointTrajectory (.yaml).
+    out
+        Write it to this file.
+    rate
+        Rows a second, as 1kHz; else 1 kHz, 500 Hz or 100 Hz.
+    joints
+        Their order for the controller, as shoulder,elbow; else as in the robot.
+    torques
+        Write torques, too.
+    header_units
+        Say units in the heading of a CSV.
+    overwrite
+        Let --out replace a file that is read here.
+
+    Examples
+    --------
+      jounce export examples/robots/panda.urdf \
+        examples/trajectories/panda_pick.yaml --format franka --out pick.csv
+      jounce export examples/robots/ur5.urdf \
+        examples/trajectories/ur5_stack.yaml --format ros --rate 50Hz \
+        --torques --out stack.yaml
+    """
+    from jounce.io import export_trajectory
+
+    frequency = None if rate is None else frequency_of(rate)
+    names = None if joints is None else [name.strip() for name in joints.split(",")]
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", SampleWarning)
+        model, motion = reading.robot(robot), reading.trajectory(trajectory)
+        spare_inputs(out, overwrite=overwrite)
+        with errors_about(trajectory, robot):
+            times = export_trajectory(
+                model,
+                motion,
+                out,
+                format,
+                frequency,
+                joints=names,
+                torques=torques,
+                header_units=header_units,
+                overwrite=overwrite,
+            )
+    for warning in caught:
+        caution(warning.message)
+    first, last = float(times[0]), float(times[-1])
+    say(f"{len(times)} rows from {first:g} s to {last:g} s written to {out}")
+    return 0

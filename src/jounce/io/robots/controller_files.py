@@ -1,0 +1,311 @@
+"""Trajectories in the forms that controllers take: written at their rates, and read back."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from os import PathLike
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.errors import TrajectoryError, check_name
+from jounce.io.files.located_data import Source
+from jounce.io.files.samples import column_names, read_chosen
+from jounce.io.files.writing import check_target, replacing
+from jounce.io.robots.controller_formats import FORMATS, ControllerFormat, checked_format, format_of, joint_count
+from jounce.robot import Robot, inverse_dynamics
+from jounce.trajectory import HermiteMotion, JointTrajectory
+
+UNITS = ("", "/s", "/s^2")
+STILL = 1e-9  # rad/s or m/s: slower is at rest
+UNFORCED = 1e-6  # rad/s^2 or m/s^2
+NANO = 1_000_000_000
+LEVELS = ("positions", "velocities", "accelerations")
+
+
+def export_trajectory(
+    robot: Robot,
+    trajectory: JointTrajectory,
+    path: str | PathLike[str],
+    format: str,  # noqa: A002 - what the command calls it, too
+    rate: float | None = None,
+    *,
+    joints: Sequence[str] | None = None,
+    torques: bool = False,
+    header_units: bool = False,
+    overwrite: bool = False,
+) -> Float[np.ndarray, " time"]:
+    """Write a trajectory as a controller takes it, at its rate.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot, with what it holds.
+    trajectory : JointTrajectory
+        Of its joints.
+    path
+        The file: .csv for ``franka`` and ``ur``, .yaml for ``ros``.
+    format : {"franka", "ur", "ros"}
+        Columns of libfranka's robot state (``q_d_0``, ``dq_d_0``, ``ddq_d_0``, ...), of Universal Robots' real-time
+        data exchange (``target_q_0``, ``target_qd_0``, ``target_qdd_0``, ...), or a ROS ``JointTrajectory`` message.
+    rate : float, optional
+        Rows a second; 1000 for ``franka``, 500 for ``ur``, 100 for ``ros`` unless given.
+    joints : sequence of str, optional
+        Joints in the order of the controller; those of the trajectory in the order of the robot unless given.
+    torques : bool, default False
+        Write torques, too: ``tau_J_d_0`` without gravity on the side of the links, and its rate ``dtau_J_d_0``;
+        ``target_moment_0``; ``effort``.
+    header_units : bool, default False
+        Tell units in the heading of a table, as ``q_d_0 [rad]``.
+    overwrite : bool, default False
+        Whether the file may be one that was read as an input.
+
+    Returns
+    -------
+    numpy.ndarray of shape (time,)
+        The instants written, s. Where the period does not divide the duration, the last row of a table holds the end
+        for the rest of its period, which asks for a trajectory that ends at rest; a ROS message ends at the end.
+
+    Raises
+    ------
+    TrajectoryError
+        If there is no such format, the joints or the rate do not fit it, or the end is not at rest where it must be.
+    OutputError
+        If the file cannot be written.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> robot = jn.load_robot("examples/robots/ur5.urdf")
+    >>> trajectory = jn.load_trajectory("examples/trajectories/ur5_stack.yaml")
+    >>> times = jn.export_trajectory(robot, trajectory, "stack.csv", "ur")  # doctest: +SKIP
+    """
+    known = FORMATS.get(checked_format(format))
+    check_target(path, (".csv",) if known else (".yaml", ".yml"), f"{format} trajectory", overwrite=overwrite)
+    names = _chosen(robot, trajectory, known, format, joints)
+    frequency = _checked_rate(known, format, rate)
+    if known is None:
+        text, times = _message(robot, trajectory, names, frequency, torques)
+    else:
+        text, times = _table(robot, trajectory, names, frequency, known, torques=torques, units=header_units)
+    with replacing(path, overwrite=overwrite) as scratch:
+        scratch.write_text(text, encoding="utf-8")
+    return times
+
+
+def _chosen(
+    robot: Robot, trajectory: JointTrajectory, known: ControllerFormat | None, name: str, joints: Sequence[str] | None
+) -> tuple[str, ...]:
+    """Return the joints to write, in the order of the controller."""
+    for joint in trajectory.names:
+        check_name("moving joint", joint, robot.joint_names, TrajectoryError, name="joint")
+    names = (
+        tuple(joint for joint in robot.joint_names if joint in trajectory.names) if joints is None else tuple(joints)
+    )
+    for k, joint in enumerate(names):
+        check_name("joint of the trajectory", joint, trajectory.names, TrajectoryError, name="joints")
+        if joint in names[:k]:
+            raise TrajectoryError("a joint is named twice", name="joints", value=joint)
+    if known is not None and len(names) != known.joints:
+        message = f"the format {name} has {known.joints} joints; name those that it is for, in its order"
+        raise TrajectoryError(message, name="joints", value=list(names))
+    return names
+
+
+def _checked_rate(known: ControllerFormat | None, name: str, rate: float | None) -> float:
+    if rate is None:
+        return known.rates[0] if known else 100.0
+    if not (np.isfinite(rate) and rate > 0):
+        raise TrajectoryError("must be greater than zero", name="rate", value=rate)
+    if known is not None and rate not in known.rates:
+        valid = " or ".join(f"{x:g}" for x in sorted(known.rates))
+        raise TrajectoryError(f"the format {name} takes {valid} rows a second", name="rate", value=rate)
+    return float(rate)
+
+
+def _values(
+    robot: Robot, trajectory: JointTrajectory, names: tuple[str, ...], times: Any, efforts: int, known: Any
+) -> list[np.ndarray]:
+    """Return positions, velocities and accelerations at instants, then torques and their rates; (time, joints) each."""
+    from jounce.dynamics.trajectories import FollowedTrajectory
+
+    order = max(2, efforts + 1)
+    followed = FollowedTrajectory(robot, trajectory)
+    q = followed.coordinates(times, order)
+    columns = [robot.joint_names.index(name) for name in names]
+    found = [q[:, k, columns] for k in range(3)]
+    if efforts:
+        felt = robot if known is None or known.gravity else robot.with_gravity([0.0, 0.0, 0.0])
+        tau = inverse_dynamics(felt, q, drives=known is None or known.drives)
+        found += [np.asarray(tau)[:, k, columns] for k in range(efforts)]
+    return found
+
+
+def _table(
+    robot: Robot,
+    trajectory: JointTrajectory,
+    names: tuple[str, ...],
+    frequency: float,
+    known: ControllerFormat,
+    *,
+    torques: bool,
+    units: bool,
+) -> tuple[str, np.ndarray]:
+    duration = trajectory.stop - trajectory.start
+    rows = int(np.floor(duration * frequency * (1 + 1e-12) + 1e-9))
+    exact = duration * frequency - rows <= 1e-6
+    times = trajectory.start + np.arange(rows + (1 if exact else 2)) / frequency
+    levels = (*known.levels, *(known.efforts if torques else ()))
+    inside = np.minimum(times, trajectory.stop)
+    values = _values(robot, trajectory, names, inside, len(known.efforts) if torques else 0, known)
+    fastest, hardest = (float(np.abs(level[-1]).max()) for level in values[1:3])
+    if not exact and (fastest > STILL or hardest > UNFORCED):
+        message = (
+            f"the period does not divide the duration of {duration:.9g} s, and at its end the joints move at up to "
+            f"{fastest:.3g} rad/s or m/s and accelerate at up to {hardest:.3g} rad/s^2 or m/s^2: a row after the end "
+            "would stop that at once; choose another rate, or let the trajectory end at rest"
+        )
+        raise TrajectoryError(message, name="rate", value=frequency)
+    kinds = [_units(robot, name) for name in names]
+    heading = [f"{known.time} [s]" if units else known.time]
+    for k, level in enumerate(levels):
+        told = [f" [{kind[k]}]" if units else "" for kind in kinds]
+        heading += [f"{level}_{j}{unit}" for j, unit in enumerate(told)]
+    table = np.column_stack([times, *values])
+    line = ",".join(["%.17g"] * table.shape[1])
+    return "\n".join([",".join(heading), *(line % tuple(row) for row in table.tolist()), ""]), times
+
+
+def _units(robot: Robot, name: str) -> list[str]:
+    turning = robot.joints[name].turning
+    base, effort = ("rad", "N*m") if turning else ("m", "N")
+    return [*(base + unit for unit in UNITS), effort, f"{effort}/s"]
+
+
+def _message(
+    robot: Robot, trajectory: JointTrajectory, names: tuple[str, ...], frequency: float, torques: bool
+) -> tuple[str, np.ndarray]:
+    """Return a ROS message as YAML; its times are whole nanoseconds, at which the values are taken."""
+    duration = round((trajectory.stop - trajectory.start) * NANO)
+    count = int(np.ceil(duration / NANO * frequency * (1 - 1e-12) - 1e-9))
+    ticks = [*(tick for k in range(count) if (tick := round(k * NANO / frequency)) < duration), duration]
+    times = np.minimum(trajectory.start + np.array(ticks) / NANO, trajectory.stop)
+    values = _values(robot, trajectory, names, times, int(torques), None)
+    keys = (*LEVELS, "effort")[: len(values)]
+    lines = [
+        "header: {stamp: {sec: 0, nanosec: 0}, frame_id: ''}",
+        f"joint_names: [{', '.join(map(_quoted, names))}]",
+        "points:",
+    ]
+    for row, tick in enumerate(ticks):
+        for k, (key, value) in enumerate(zip(keys, values, strict=True)):
+            numbers = ", ".join(map(_number, value[row].tolist()))
+            lines.append(f"{'- ' if k == 0 else '  '}{key}: [{numbers}]")
+        lines.append(f"  time_from_start: {{sec: {tick // NANO}, nanosec: {tick % NANO}}}")
+    return "\n".join([*lines, ""]), times
+
+
+def _number(value: float) -> str:
+    """Return a number with a point in it: without one, readers of YAML 1.1 take 1e-09 for text, and 0 for whole."""
+    mantissa, exponent, power = repr(value).partition("e")
+    return f"{mantissa if '.' in mantissa else mantissa + '.0'}{exponent}{power}"
+
+
+def _quoted(name: str) -> str:
+    return "'" + name.replace("'", "''") + "'"
+
+
+def read_table(path: str, joints: Iterable[str] | None = None) -> JointTrajectory | None:
+    """Return the trajectory of a table of a controller; None where it is another table.
+
+    Raises
+    ------
+    TrajectoryError
+        If columns are missing, names do not fit, or the times do not increase.
+    """
+    columns = column_names(path, TrajectoryError)
+    known = format_of(columns)
+    if known is None:
+        return None
+    count = joint_count(known, columns)
+    names = _named(joints, count, path)
+    levels = [level for level in known.levels if f"{level}_0" in columns]
+    wanted = [f"{level}_{j}" for level in levels for j in range(count)]
+    times, values = read_chosen(path, known.time, wanted, TrajectoryError)
+    table = values.reshape(len(times), len(levels), count)
+    return _through(times, table, names, path)
+
+
+def read_message(source: Source, joints: Iterable[str] | None = None) -> JointTrajectory:
+    """Return the trajectory of a ROS message; names given take the place of its own.
+
+    Raises
+    ------
+    TrajectoryError
+        If something in it is missing, or is none of the numbers it should be.
+    """
+    source.mapping((), ("header", "joint_names", "points"))
+    own = source.at(("joint_names",))
+    if not isinstance(own, list) or not own or not all(isinstance(name, str) for name in own):
+        raise source.error("must be a list of names", ("joint_names",), value=own)
+    names = tuple(own) if joints is None else _named(joints, len(own), source.path)
+    points = source.at(("points",))
+    if not isinstance(points, list) or len(points) < 2:
+        raise source.error("must be a list of two points at least", ("points",))
+    times, rows = [], []
+    levels = [level for level in LEVELS if isinstance(points[0], dict) and points[0].get(level)]
+    if "positions" not in levels:
+        raise source.error("positions are missing", ("points", 0))
+    for k, point in enumerate(points):
+        if not isinstance(point, dict) or set(point) - {*LEVELS, "effort", "time_from_start"}:
+            raise source.error("must be a point of a trajectory, with positions", ("points", k), value=point)
+        rows.append([_row(source, ("points", k, level), point.get(level), len(own)) for level in levels])
+        times.append(_seconds(source, ("points", k, "time_from_start"), point.get("time_from_start")))
+        if k and times[k] <= times[k - 1]:
+            raise source.error(
+                "must come after that of the point before", ("points", k, "time_from_start"), value=times[k]
+            )
+    return _through(np.array(times), np.array(rows), names, source.path)
+
+
+def _row(source: Source, at: Any, given: Any, count: int) -> list[float]:
+    numbers = isinstance(given, list) and all(isinstance(x, int | float) and not isinstance(x, bool) for x in given)
+    if not numbers or len(given) != count or not np.isfinite(given).all():
+        place = at if given is not None else at[:-1]
+        raise source.error(f"must be {count} finite numbers, one for each joint: {at[-1]}", place, value=given)
+    return [float(x) for x in given]
+
+
+def _seconds(source: Source, at: Any, given: Any) -> float:
+    parts = ("sec", "nanosec") if isinstance(given, dict) and "sec" in given else ("secs", "nsecs")
+    if not isinstance(given, dict) or set(given) - set(parts):
+        place = at if given is not None else at[:-1]
+        raise source.error("must hold sec and nanosec: time_from_start", place, value=given)
+    values = [given.get(part, 0) for part in parts]
+    for part, value in zip(parts, values, strict=True):
+        if isinstance(value, bool) or not isinstance(value, int) or value < 0:
+            raise source.error("must be a whole number, 0 or greater", (*at, part), value=value)
+    return values[0] + values[1] / NANO
+
+
+def _named(joints: Iterable[str] | None, count: int, path: str) -> tuple[str, ...]:
+    names = tuple(f"joint_{k}" for k in range(count)) if joints is None else tuple(joints)
+    if len(names) != count or len(set(names)) < count:
+        message = f"the file has {count} joints; give as many different names, in its order"
+        raise TrajectoryError(message, path=path, name="joints", value=list(names))
+    return names
+
+
+def _through(times: np.ndarray, table: np.ndarray, names: tuple[str, ...], path: str) -> JointTrajectory:
+    """Return polynomials through values with their derivatives at instants: (time, level, joint)."""
+    try:
+        laws = {name: HermiteMotion(times, table[:, :, k]) for k, name in enumerate(names)}
+        return JointTrajectory(laws, float(times[0]), float(times[-1]), times)
+    except TrajectoryError as error:
+        raise error.located(path=path) from None
+
+
+def is_message(data: Any) -> bool:
+    """Tell whether the data of a file are those of a ROS message."""
+    return isinstance(data, dict) and "joint_names" in data and "points" in data

@@ -1,0 +1,235 @@
+"""Joint motion along a path of a tool, with all derivatives: Negrean 2025, equation 60, and what redundancy leaves."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from jounce.errors import JounceError, RobotError, SingularityError, check_name
+from jounce.kinematics import Status
+from jounce.planning.tool_paths.inverse_kinematics import coordinate_scale, joint_ranges, middle, poses_within
+from jounce.planning.tool_paths.path_equations import PathEquations
+from jounce.planning.tool_paths.path_marching import Nodes, followed
+from jounce.planning.tool_paths.task_rank import LOOKS, random_coordinates, reachable_rows, task_columns
+from jounce.planning.tool_paths.tool_path import ToolPath
+from jounce.planning.tool_paths.tool_path_motion import ToolPathMotion
+from jounce.planning.tool_paths.tool_tasks import tool_of
+from jounce.robot.arguments import floats
+from jounce.robot.robot import Robot
+from jounce.shapes import ArrayLike
+from jounce.trajectory.joint_trajectory import JointTrajectory
+
+REACHED = 1e-10  # rad, or sizes of the robot
+
+
+def follow_tool_path(
+    robot: Robot,
+    link: str,
+    path: ToolPath,
+    time: ArrayLike | None = None,
+    order: int = 4,
+    *,
+    axis: ArrayLike = (0.0, 0.0, 1.0),
+    point: ArrayLike = (0.0, 0.0, 0.0),
+    start: ArrayLike | None = None,
+    hold: Mapping[str, Any] | None = None,
+    posture: ArrayLike | None = None,
+    weights: ArrayLike | None = None,
+    limits: bool = True,
+    strict: bool = True,
+) -> ToolPathMotion:
+    """Return the joint coordinates that lead a tool along a path, with derivatives of any order.
+
+    At each instant one factored matrix gives all derivatives, order after order. From the start on the path is followed
+    on one branch: over no interval can the coordinates come to another one.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    link : str
+        The link that carries the tool.
+    path : ToolPath
+        Of the tool.
+    time : array_like of shape (time,), optional
+        Instants within the path, s; 201 evenly spaced ones unless given.
+    order : int, default 4
+        Highest derivative.
+    axis, point : array_like of shape (3,)
+        Of the tool, in the frame of the link; m. The axis is the one that has a direction.
+    start : array_like of shape (n,), optional
+        Coordinates near those at the first instant, rad or m: they choose the branch. Found by `inverse_kinematics`
+        unless given.
+    hold : mapping of str to law, optional
+        Joints with a law of their own: a number, an expression of ``t``, or a motion.
+    posture : array_like of shape (n,), optional
+        Of a redundant robot: the coordinates are those of the task that are nearest to it, a function of the path
+        alone, so that a closed path ends where it began. The middle of the ranges of the joints unless given.
+    weights : array_like of shape (n,), optional
+        Of the squared distances of the joints from the posture; 1 unless given.
+    limits : bool, default True
+        Whether coordinates out of the ranges of the joints are failures.
+    strict : bool, default True
+        Raise where the path cannot be followed; otherwise those instants are NaN.
+
+    Returns
+    -------
+    ToolPathMotion
+        Coordinates with derivatives, and a status for each instant.
+
+    Raises
+    ------
+    RobotError
+        If an argument does not fit the robot, the start cannot be reached, or a joint leaves its range (with `strict`).
+    SingularityError
+        If the path runs into a singular position (with `strict`): the joints that lose a motion are named.
+    TrajectoryError
+        If an instant is outside the path, or it has no derivative so high.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> rod = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0])
+    >>> links = [jn.Link("base"), jn.Link("upper", rod), jn.Link("lower", rod)]
+    >>> joints = [jn.Joint("a", "base", "upper"), jn.Joint("b", "upper", "lower", position=[1, 0, 0])]
+    >>> arm = jn.Robot("arm", links, joints)
+    >>> path = jn.ToolPath(["1 + 0.2*sin(t)", "0.2*cos(t)", 0.0], start=0.0, stop=6.0)
+    >>> motion = jn.follow_tool_path(arm, "lower", path, order=3, point=[1, 0, 0], start=[-0.8, 1.7])
+    >>> there = jn.forward_kinematics(arm, motion.q[:1], "lower", [1, 0, 0]).position[0, :, 0]
+    >>> abs(there.round(9)).tolist()  # 1 + 0.2 sin(t) at t = 0, to jerk
+    [1.0, 0.2, 0.0, 0.2]
+    """
+    if not isinstance(path, ToolPath):
+        raise RobotError("must be a jn.ToolPath", name="path", value=type(path).__name__)
+    tool, n = tool_of(robot, link, point, axis), len(robot.joint_names)
+    scale = coordinate_scale(robot, tool)
+    ranges = joint_ranges(robot)
+    laws = _held(robot, hold, path)
+    held = tuple(robot.joint_names.index(name) for name in laws.names) if laws else ()
+    given = _numbers("posture", posture, n)
+    rest = middle(*ranges) if given is None else given
+    weight = _numbers("weights", weights, n)
+    weight = np.ones(n) if weight is None else weight
+    if (weight <= 0).any():
+        raise RobotError("must be greater than zero", name="weights", value=weight.tolist())
+    kinds = tuple(kind for kind in ("position", "rotation", "direction") if kind in path.kinds)
+    columns = task_columns(robot, tool, random_coordinates(*ranges, scale, LOOKS, 0), kinds, scale)
+    if held:
+        units = np.broadcast_to(np.eye(n)[list(held)], (len(columns), len(held), n))
+        columns = np.concatenate([columns, units], axis=1)
+    basis, whole = reachable_rows(columns)
+    equations = PathEquations(robot.tree, tool, basis, scale, weight, held, kinds, n)
+    if whole < min(basis.shape[1], n):
+        message = "the joints do not determine one another: some move the tool alike; hold others, or fewer"
+        raise RobotError(message, name="hold", value=list(laws.names) if laws else None)
+
+    def target(instants: np.ndarray, levels: int) -> dict[str, Any]:
+        found = path.series(instants, levels)
+        if laws:
+            jet = laws.derivatives(instants, levels)
+            found["held"] = _coefficients(jet) / scale[list(held)][:, None]
+        if equations.has_posture:
+            still = np.zeros((levels + 1, n, len(instants)))
+            still[0] = (rest / scale)[:, None]
+            found["posture"] = still
+        return found
+
+    begin = _start(robot, tool, path, ranges if limits else None, laws, start, scale, kinds, link)
+    u = np.concatenate([begin / scale, np.zeros(equations.size - n)])
+    if equations.has_posture:
+        u = _to_posture(equations, u, target, path.start, link)
+    nodes = followed(equations, u, target, path.start, path.stop, path.highest)
+    motion = ToolPathMotion(robot, link, path, equations, nodes, target, whole, ranges if limits else None, time, order)
+    if strict:
+        _raise_for(motion, nodes)
+    return motion
+
+
+def _start(
+    robot: Robot, tool: Any, path: ToolPath, ranges: Any, laws: Any, start: Any, scale: Any, kinds: Any, link: str
+) -> np.ndarray:
+    """Return coordinates with which the tool is at the beginning of the path."""
+    n = len(robot.joint_names)
+    lower, upper = (np.full(n, -np.inf), np.full(n, np.inf)) if ranges is None else (x.copy() for x in ranges)
+    if laws:
+        for name, value in zip(laws.names, laws.derivatives([path.start], 0)[0, 0], strict=True):
+            k = robot.joint_names.index(name)
+            lower[k] = upper[k] = value
+    near = _numbers("start", start, n)
+    goal = {kind: np.moveaxis(x[0], -1, 0) for kind, x in path.series(np.array([path.start]), 0).items()}
+    guess = middle(*joint_ranges(robot)) if near is None else near
+    found = poses_within(
+        robot, tool, {kind: goal[kind] for kind in kinds}, (lower, upper, scale), guess[None], 8 if near is None else 1
+    )
+    if not found[1][0] <= REACHED**2:
+        missed = float(np.sqrt(found[1][0]))
+        message = (
+            f"the beginning of the path is not reached: {missed:.3g} rad, or sizes of the robot, are left; move the "
+            "path, or give another start"
+        )
+        raise RobotError(message, name=link, value=goal["position"][0].tolist() if "position" in goal else None)
+    return found[0][0]
+
+
+def _to_posture(equations: PathEquations, u: np.ndarray, target: Any, begin: float, link: str) -> np.ndarray:
+    """Return the unknowns nearest to a posture, reached from given ones while the posture moves there from them."""
+    first = target(np.array([begin]), 0)
+    own, wanted = u[: equations.count], first["posture"][0, :, 0]
+
+    def moving(shares: np.ndarray, levels: int) -> dict[str, Any]:
+        found = {}
+        for kind, values in first.items():
+            found[kind] = np.zeros((levels + 1, *values.shape[1:-1], len(shares)))
+            found[kind][0] = values[0]
+        found["posture"][0] = own[:, None] + (wanted - own)[:, None] * shares
+        if levels:
+            found["posture"][1] = (wanted - own)[:, None]
+        return found
+
+    nodes = followed(equations, u, moving, 0.0, 1.0, 30)
+    if nodes.failed is not None:
+        message = (
+            "the coordinates nearest to the posture are not reached from the start: on the way, there is no nearest "
+            "one any more; give another posture, or a start nearer to it"
+        )
+        raise SingularityError(message, name=link)
+    return nodes.series[-1, 0]
+
+
+def _raise_for(motion: ToolPathMotion, nodes: Nodes) -> None:
+    bad = np.flatnonzero(motion.status != Status.OK)
+    if nodes.failed is None and not bad.size:
+        return
+    words = motion.explain(int(bad[0])) if bad.size else motion.ending
+    status = int(motion.status[bad[0]]) if bad.size else int(Status.SINGULAR)
+    error: type[JounceError] = SingularityError if status in (Status.SINGULAR, Status.NOT_REACHED) else RobotError
+    raise error(words, name=motion.link)
+
+
+def _held(robot: Robot, hold: Any, path: ToolPath) -> JointTrajectory | None:
+    if hold is None or (isinstance(hold, Mapping) and not hold):
+        return None
+    if not isinstance(hold, Mapping):
+        raise RobotError("must be a mapping of joints to laws", name="hold", value=hold)
+    for name in hold:
+        check_name("moving joint", name, robot.joint_names, RobotError, name="hold")
+    try:
+        return JointTrajectory(hold, path.start, path.stop)
+    except JounceError as error:
+        raise RobotError(error.message, name=(error.name or "").replace("laws", "hold"), value=error.value) from None
+
+
+def _numbers(name: str, value: Any, n: int) -> np.ndarray | None:
+    if value is None:
+        return None
+    array = np.asarray(floats(name, value))
+    if array.shape != (n,) or not np.isfinite(array).all():
+        raise RobotError(f"must hold {n} finite numbers, one for each joint", name=name, value=array.tolist())
+    return array
+
+
+def _coefficients(derivatives: np.ndarray) -> np.ndarray:
+    """Return Taylor coefficients, joints first and instants last, from (time, derivative, joint)."""
+    from jounce.jet.derivatives import taylor_coefficients
+
+    return np.asarray(taylor_coefficients(np.moveaxis(derivatives, 0, -1)))

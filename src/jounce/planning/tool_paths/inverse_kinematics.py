@@ -1,0 +1,271 @@
+"""Joint coordinates that bring a tool to poses, within the limits of the joints."""
+
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.errors import RobotError
+from jounce.kinematics import Status
+from jounce.planning.tool_paths.joint_poses import JointPoses
+from jounce.planning.tool_paths.pose_solver import solve_poses
+from jounce.planning.tool_paths.task_rank import LOOKS, SINGULAR, random_coordinates, reachable_rows, task_columns
+from jounce.planning.tool_paths.tool_tasks import Tool, rotation_matrices, tool_of, unit_vectors
+from jounce.robot.abstract_robot import AbstractRobot
+from jounce.robot.arguments import checked_position, floats, whole_number
+from jounce.robot.kinematics import forward_kinematics
+from jounce.robot.robot import Robot
+from jounce.shapes import ArrayLike
+
+STATIONARY = 1e-5  # of the slope that what is missed could have: less is none
+WIDTHS = {"position": (3,), "rotation": (3, 3), "direction": (3,)}
+SOON = 16  # steps in which most poses are reached; the others take twice as many, and so on
+FINER = 1e-3  # of the tolerance, to which steps go on
+
+
+def inverse_kinematics(
+    robot: Robot,
+    link: str,
+    position: ArrayLike | None = None,
+    orientation: Any = None,
+    *,
+    direction: ArrayLike | None = None,
+    axis: ArrayLike = (0.0, 0.0, 1.0),
+    point: ArrayLike = (0.0, 0.0, 0.0),
+    start: ArrayLike | None = None,
+    starts: int = 8,
+    limits: bool = True,
+    tolerance: float = 1e-10,
+    most_steps: int = 200,
+    seed: int = 0,
+) -> JointPoses:
+    """Return joint coordinates that bring a tool to poses, many at once.
+
+    Damped least squares (Levenberg-Marquardt, with the damping of Fan and Yuan 2005) within the limits of the joints,
+    with exact Jacobians. Poses that are not reached from the first start are tried from others.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    link : str
+        The link that carries the tool.
+    position : array_like of shape (..., 3), optional
+        Where `point` is to be, in the frame of the base, m; anywhere unless given.
+    orientation : array_like of shape (..., 4) or (..., 3, 3), or scipy Rotation, optional
+        That of the link in the frame of the base: unit quaternions, scalar first, or rotation matrices.
+    direction : array_like of shape (..., 3), optional
+        Where `axis` is to point, in the frame of the base, in the place of an orientation; turns about it are free.
+    axis, point : array_like of shape (3,)
+        Of the tool, in the frame of the link; m.
+    start : array_like of shape (..., n), optional
+        Where to begin, rad or m; the middle of the ranges of the joints unless given.
+    starts : int, default 8
+        How many starts are tried where the first fails, the others at random within the limits. Of several coordinates
+        found, those nearest to the first start count.
+    limits : bool, default True
+        Keep the limits of the joints, those of joints that follow others included.
+    tolerance : float, default 1e-10
+        Of what is missed, rad, or sizes of the robot.
+    most_steps : int, default 200
+        From each start.
+    seed : int, default 0
+        Of the other starts.
+
+    Returns
+    -------
+    JointPoses
+        Coordinates with a status for each pose, and what is missed.
+
+    Raises
+    ------
+    RobotError
+        If an argument does not fit the robot, nothing is wanted of the tool, or both an orientation and a direction.
+
+    Notes
+    -----
+    A redundant robot takes coordinates near those it starts from. Along a path, `follow_tool_path` keeps to one branch.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> rod = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0])
+    >>> links = [jn.Link("base"), jn.Link("upper", rod), jn.Link("lower", rod)]
+    >>> joints = [jn.Joint("a", "base", "upper"), jn.Joint("b", "upper", "lower", position=[1, 0, 0])]
+    >>> arm = jn.Robot("arm", links, joints)
+    >>> found = jn.inverse_kinematics(arm, "lower", [1.0, 1.0, 0.0], point=[1, 0, 0], start=[0.2, 1.0])
+    >>> abs(found.q.round(9)).tolist()
+    [0.0, 1.570796327]
+    """
+    tool = tool_of(robot, link, point, axis)
+    goal, lead = _checked_goal(position, orientation, direction)
+    lower, upper = joint_ranges(robot) if limits else (np.full(len(robot.joint_names), x) for x in (-np.inf, np.inf))
+    begin = middle(lower, upper) if start is None else np.asarray(checked_position(robot, start, "start"))[..., 0, :]
+    if not np.isfinite(begin).all():
+        raise RobotError("must be finite", name="start")
+    starts, most_steps = whole_number("starts", starts, 1), whole_number("most_steps", most_steps, 1)
+    within = float(floats("tolerance", tolerance)) if np.ndim(tolerance) == 0 else np.nan
+    if not within > 0:
+        raise RobotError("must be greater than zero", name="tolerance", value=tolerance)
+    try:
+        lead = np.broadcast_shapes(lead, begin.shape[:-1])
+    except ValueError:
+        message = f"does not fit the poses, of shape {lead}: its shape is {begin.shape}"
+        raise RobotError(message, name="start") from None
+    scale = coordinate_scale(robot, tool)
+    count, n = int(np.prod(lead)), len(lower)
+    begin = np.broadcast_to(begin, (*lead, n)).reshape(count, n)
+    goal = {kind: np.broadcast_to(x, (*lead, *WIDTHS[kind])).reshape(count, *WIDTHS[kind]) for kind, x in goal.items()}
+    found = poses_within(robot, tool, goal, (lower, upper, scale), begin, starts, within, most_steps, seed)
+    basis = task_columns(robot, tool, random_coordinates(lower, upper, scale, LOOKS, seed), tuple(goal), scale)
+    return _result(robot, link, point, found, goal, lead, within, (lower, upper, scale), reachable_rows(basis)[1], tool)
+
+
+def poses_within(
+    robot: Robot,
+    tool: Tool,
+    goal: dict[str, Any],
+    ranges: tuple[Any, Any, Any],
+    begin: Float[np.ndarray, "count n"],
+    starts: int = 8,
+    within: float = 1e-10,
+    most_steps: int = 200,
+    seed: int = 0,
+) -> list[np.ndarray]:
+    """Return what `solve_poses` finds within ranges of the coordinates, from the first start or from others."""
+    lower, upper, scale = ranges
+    constants = (tool, lower / scale, upper / scale, scale, np.float64(within * FINER))
+
+    def solved(begin: np.ndarray, chosen: Any) -> list[np.ndarray]:
+        wanted = [x[chosen] for x in goal.values()]
+        found = _marched(robot, begin, wanted, constants, tuple(goal), min(most_steps, SOON))
+        steps, slow = SOON, np.flatnonzero(found[3] > 0)
+        while slow.size and steps < most_steps:  # ever fewer go on by themselves
+            left = min(steps, most_steps - steps)
+            more = _marched(robot, found[0][slow], [x[slow] for x in wanted], constants, tuple(goal), left)
+            for whole, part in zip(found, more, strict=True):
+                whole[slow] = part
+            steps, slow = steps + left, slow[more[3] > 0]
+        return found
+
+    found = solved(begin, slice(None))
+    failed = np.flatnonzero(~(found[1] <= within**2))
+    if failed.size and starts > 1:
+        others = random_coordinates(lower, upper, scale, (starts - 1) * len(failed), seed)
+        again = solved(others, np.repeat(failed, starts - 1))
+        tried = [x.reshape(len(failed), starts - 1, *x.shape[1:]) for x in again]
+        away = (np.abs(tried[0] - begin[failed][:, None]) / scale).max(axis=-1)
+        good = tried[1] <= within**2
+        best = np.where(good.any(1), np.argmin(np.where(good, away, np.inf), 1), np.argmin(tried[1], 1))
+        rows = np.arange(len(failed))
+        nearer = tried[1][rows, best] < found[1][failed]
+        for whole, part in zip(found, tried, strict=True):
+            whole[failed[nearer]] = part[rows, best][nearer]
+    return found
+
+
+def _marched(robot: Robot, begin: Any, wanted: Any, constants: Any, kinds: tuple[str, ...], steps: int) -> list[Any]:
+    arrays = (begin[:, None], *(x[:, None] for x in wanted))
+    return [np.asarray(x)[:, 0] for x in solve_poses(robot, arrays, (*constants, np.int64(steps)), (kinds,))]
+
+
+def _result(
+    robot: Robot,
+    link: str,
+    point: Any,
+    found: Any,
+    goal: Any,
+    lead: Any,
+    within: float,
+    ranges: Any,
+    rank: int,
+    tool: Tool,
+) -> JointPoses:
+    q, square, level, _, values, shares = found
+    lower, upper, scale = ranges
+    status = np.where(level <= STATIONARY, int(Status.NOT_ASSEMBLED), int(Status.NOT_CONVERGED))
+    status = np.where(square <= within**2, int(Status.OK), status)
+    distance, angle = _away(robot, link, point, q, goal, tool)
+    values, shares = values[:, :rank], shares[:, max(rank - 1, 0)]
+    singular = values[:, -1] <= SINGULAR * values[:, 0] if rank else np.ones(len(q), bool)
+    near = 1e-9 * scale
+    limited = (q <= lower + near) | (q >= upper - near)
+    given = np.where((status == Status.OK)[:, None], q, np.nan)
+    parts = (given, status, q, distance, angle, singular, values, shares)
+    shaped = [x.reshape((*lead, *x.shape[1:])) for x in parts]
+    names = ("q", "status", "closest", "distance", "angle", "singular", "singular_values", "shares")
+    found = dict(zip(names, shaped, strict=True))
+    return JointPoses(**found, joint_names=robot.joint_names, limited=limited.reshape((*lead, -1)))
+
+
+def _away(robot: Robot, link: str, point: Any, q: Any, goal: Any, tool: Tool) -> tuple[Any, Any]:
+    """Return how far tools are from where they are to be, m, and by how much they are turned away, rad."""
+    motion = forward_kinematics(robot, q[:, None], link, point)
+    there, turned = np.asarray(motion.position)[:, 0], np.asarray(motion.rotation)[:, 0]
+    distance = np.linalg.norm(there - goal["position"], axis=-1) if "position" in goal else np.zeros(len(q))
+    chord = np.zeros(len(q))
+    if "rotation" in goal:
+        chord = np.linalg.norm(turned - goal["rotation"], axis=(1, 2)) / np.sqrt(2.0)
+    if "direction" in goal:
+        chord = np.linalg.norm(turned @ tool.axes[:, 2] - goal["direction"], axis=-1)
+    return distance, 2 * np.arcsin(np.minimum(0.5 * chord, 1.0))
+
+
+def _checked_goal(position: Any, orientation: Any, direction: Any) -> tuple[dict[str, Any], tuple[int, ...]]:
+    """Return what is wanted of a tool, by its kinds, and the shape of the batch."""
+    if orientation is not None and direction is not None:
+        raise RobotError("give an orientation or a direction, not both", name="direction")
+    goal: dict[str, Any] = {}
+    if position is not None:
+        goal["position"] = np.asarray(floats("position", position))
+        if goal["position"].ndim < 1 or goal["position"].shape[-1] != 3:
+            raise RobotError(f"must have the shape (..., 3), not {goal['position'].shape}", name="position")
+        if not np.isfinite(goal["position"]).all():
+            raise RobotError("must be finite", name="position")
+    if orientation is not None:
+        goal["rotation"] = rotation_matrices("orientation", orientation)
+    if direction is not None:
+        goal["direction"] = unit_vectors("direction", direction)
+    if not goal:
+        raise RobotError("nothing is wanted of the tool: give a position, an orientation or a direction")
+    leads = {kind: x.shape[: x.ndim - len(WIDTHS[kind])] for kind, x in goal.items()}
+    try:
+        return goal, np.broadcast_shapes(*leads.values())
+    except ValueError:
+        message = f"positions and orientations are not of the same number: {', '.join(map(str, leads.values()))}"
+        raise RobotError(message, name="orientation") from None
+
+
+def joint_ranges(robot: AbstractRobot) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
+    """Return the ranges of the coordinates, those of joints that follow others included; infinite without limits."""
+    lower, upper = (np.full(len(robot.joint_names), x) for x in (-np.inf, np.inf))
+    for joint in robot.moving_joints:
+        bounds = [(-np.inf if joint.limits.lower is None else joint.limits.lower)]
+        bounds.append(np.inf if joint.limits.upper is None else joint.limits.upper)
+        name = joint.name
+        if joint.mimic is not None:
+            name = joint.mimic.joint
+            if not joint.mimic.multiplier:
+                continue
+            bounds = sorted((x - joint.mimic.offset) / joint.mimic.multiplier for x in bounds)
+        k = robot.joint_names.index(name)
+        lower[k], upper[k] = max(lower[k], bounds[0]), min(upper[k], bounds[1])
+    crossed = lower > upper
+    if crossed.any():
+        name = robot.joint_names[int(np.argmax(crossed))]
+        message = "no coordinate keeps the limits of this joint and of those that follow it; give limits=False"
+        raise RobotError(message, name=name)
+    return lower, upper
+
+
+def middle(lower: np.ndarray, upper: np.ndarray) -> Float[np.ndarray, " n"]:
+    """Return the middle of ranges; zero, or the end nearest to it, where one has no end."""
+    known = np.isfinite(lower) & np.isfinite(upper)
+    ends = np.where(known, (lower, upper), 0.0)
+    return np.where(known, 0.5 * ends[0] + 0.5 * ends[1], np.clip(0.0, lower, upper))
+
+
+def coordinate_scale(robot: AbstractRobot, tool: Tool) -> Float[np.ndarray, " n"]:
+    """Return what counts as one in each coordinate: 1 rad, or the size of the robot."""
+    turning = np.array([robot.joints[name].turning for name in robot.joint_names])
+    return np.where(turning, 1.0, float(tool.length))

@@ -1,0 +1,162 @@
+"""Following a path from its start, node after node: each interval is looked at along its way before it counts."""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from jounce.kinematics.compilation import compiled
+from jounce.planning.tool_paths.path_equations import PathEquations
+
+ORDER = 6  # of the series from node to node
+PLACES = 8  # in an interval that are looked at
+FIRST = 32  # intervals to begin with
+BLOCK = 64  # nodes that are compiled for
+CHANGE = 0.5  # of the Jacobian over an interval, by its inverse at the beginning: less, and it cannot become singular
+NEAR = 0.05  # rad, or sizes of the robot: how far the equations may be from a series
+TAME = 0.1  # of the Jacobian over a correction
+GOOD = 1e-9  # of the last correction
+SHORTEST = 2.0**-16  # of the path: an interval that needs to be shorter ends it
+
+
+class Nodes(NamedTuple):
+    """Instants along a path with series of the unknowns, and how far they hold.
+
+    Attributes
+    ----------
+    time : array of shape (nodes,)
+        s.
+    series : array of shape (nodes, order + 1, unknowns)
+        Taylor coefficients.
+    failed : int or None
+        The interval that could not be passed; None where the path was followed to its end.
+    """
+
+    time: Float[np.ndarray, " nodes"]
+    series: Float[np.ndarray, "nodes order unknown"]
+    failed: int | None
+
+
+@compiled()
+def march(equations: PathEquations, start: Any, steps: Any, targets: Any, inner: Any) -> Any:
+    """Follow a path from node to node.
+
+    Parameters
+    ----------
+    equations : PathEquations
+        To be met.
+    start : array of shape (unknowns, 1)
+        At the first node, nearly.
+    steps : array of shape (nodes,)
+        To the next node, s.
+    targets, inner : dict of array
+        Series at the nodes, (nodes, order + 1, ..., 1), and values within the intervals, (nodes, 1, ..., places).
+
+    Returns
+    -------
+    guess : array of shape (unknowns, 1)
+        Where the series leads from the last node.
+    series : array of shape (nodes, order + 1, unknowns)
+    first, last : array of shape (nodes,)
+        Corrections at each node.
+    change, gap, tame : array of shape (nodes,)
+        What happens in the interval after it: the change of the Jacobian, the distance from the series, and the change
+        of the Jacobian over that distance.
+    """
+    shares = jnp.arange(1.0, PLACES + 1) / PLACES
+
+    def node(guess: Any, entry: Any) -> Any:
+        step, target, within = entry
+        found = equations.corrected(guess, target)
+        factor = found.factor
+        series = equations.series(found.u, factor, target, ORDER)
+        powers = (shares * step)[None] ** jnp.arange(ORDER + 1.0)[:, None]
+        places = jnp.sum(series * powers[:, None], axis=0)
+        other = equations.matrix(places, within) - factor.matrix
+        change = jnp.sum(factor.inverse[:, :, None] * other[None], axis=1)
+        change = jnp.max(jnp.sum(jnp.abs(change), axis=1))
+        gap = jnp.sum(factor.inverse * equations.residual(places[None], within)[0][None], axis=1)
+        gap = jnp.max(jnp.abs(gap))
+        moved = jnp.max(jnp.abs(places - found.u))
+        tame = change * gap / jnp.where(moved == 0, 1.0, moved)
+        told = series[..., 0], found.first[0], found.last[0], change, gap, tame
+        return places[:, -1:], told
+
+    return jax.lax.scan(node, start, (steps, targets, inner))
+
+
+def followed(
+    equations: PathEquations,
+    start: Float[np.ndarray, " unknown"],
+    target: Callable[[Float[np.ndarray, " time"], int], dict[str, Any]],
+    begin: float,
+    end: float,
+    order: int,
+) -> Nodes:
+    """Follow a path from its begin to its end; intervals that are too long are halved until they are passed.
+
+    Over an interval the Jacobian changes by less than half of itself, by its inverse at the beginning, and the
+    equations are met so near the series that Newton's corrections from there contract (Deuflhard 2011, Newton Methods
+    for Nonlinear Problems, theorem 2.3): the solution at its end is the one that the solution at its beginning becomes.
+    """
+    time = np.linspace(begin, end, FIRST + 1)
+    while True:
+        steps = np.diff(time)
+        found = _marched(equations, start, time, target, order)
+        series, first, last, change, gap, tame = found
+        with np.errstate(invalid="ignore"):
+            at_node = (last <= GOOD) & (first <= 2 * NEAR)
+            at_node[0] = last[0] <= GOOD
+            passed = (change[:-1] <= CHANGE) & (gap[:-1] <= NEAR) & (tame[:-1] <= TAME) & at_node[1:]
+        if not at_node[0]:
+            return Nodes(time[:1], series[:1], 0)
+        if passed.all():
+            return Nodes(time, series, None)
+        lost = ~at_node[1:]
+        until = int(np.argmax(lost)) + 1 if lost.any() else len(passed)  # what follows stands on nothing
+        bad = np.flatnonzero(~passed[:until])
+        short = bad[steps[bad] <= SHORTEST * (end - begin)]
+        if short.size:
+            k = int(short[0])
+            if k == bad[0]:
+                return Nodes(time[: k + 1], series[: k + 1], k)
+            bad = bad[bad < k]
+        time = np.sort(np.concatenate([time, time[bad] + 0.5 * steps[bad]]))
+
+
+def _marched(equations: PathEquations, start: Any, time: Any, target: Any, order: int) -> list[np.ndarray]:
+    """Return what `march` tells of nodes, whose number is filled up to one that is compiled for."""
+    count = BLOCK * -(-len(time) // BLOCK)
+    filled = np.concatenate([time, np.full(count - len(time), time[-1])])
+    steps = np.append(np.diff(filled), 0.0)
+    series = {kind: _filled(array, ORDER) for kind, array in target(filled, min(order, ORDER)).items()}
+    targets = {kind: np.moveaxis(array, -1, 0)[..., None] for kind, array in series.items()}
+    shares = np.arange(1, PLACES + 1) / PLACES
+    places = np.minimum((filled[:, None] + shares * steps[:, None]).ravel(), time[-1])
+    inner = {
+        kind: np.moveaxis(array.reshape(*array.shape[:-1], count, PLACES), -2, 0)
+        for kind, array in target(places, 0).items()
+    }
+    guess, parts = np.asarray(start)[:, None], []
+    for begin in range(0, count, BLOCK):
+        block = slice(begin, begin + BLOCK)
+        guess, found = march(equations, guess, steps[block], *jax.tree.map(lambda x, b=block: x[b], (targets, inner)))
+        parts.append(found)
+    return [np.concatenate(x)[: len(time)] for x in zip(*parts, strict=True)]
+
+
+def _filled(array: np.ndarray, order: int) -> np.ndarray:
+    """Return series with zeros for the orders that are not known: the series is as good as they are."""
+    missing = order + 1 - len(array)
+    return np.concatenate([array, np.zeros((missing, *array.shape[1:]))]) if missing > 0 else array
+
+
+def predicted(nodes: Nodes, time: Float[np.ndarray, " time"]) -> Float[np.ndarray, "time unknown"]:
+    """Return the unknowns at instants by the series of the nodes before."""
+    chosen = np.clip(np.searchsorted(nodes.time, time, side="right") - 1, 0, len(nodes.time) - 1)
+    since = time - nodes.time[chosen]
+    powers = since[:, None] ** np.arange(nodes.series.shape[1])
+    return np.einsum("tk,tku->tu", powers, nodes.series[chosen])

@@ -1,0 +1,102 @@
+"""Levenberg-Marquardt within the limits of joints, for batches of poses at once."""
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jounce.kinematics.linear import DenseFactor, singular_values
+from jounce.planning.tool_paths.tool_tasks import Goal, columns_of, misses
+from jounce.robot.batches import Batched
+from jounce.robot.tree import Tree
+
+FIRST = 1e-3  # damping, as part of the squares of what is missed: Fan and Yuan 2005, which keeps quadratic convergence
+LEAST = 1e-15  # damping, as part of the squares of the Jacobian: where joints are redundant nothing else holds them
+GROWTH = 4.0
+STALLED = 1e-15  # of a step, rad: nothing moves any more
+FLAT = 1e-8  # slope, as part of what it could be: there is nothing nearer
+STIFF = 1e12  # damping beyond which no step is worth trying
+
+
+class _Look(NamedTuple):
+    """What is missed at coordinates, and its Jacobian."""
+
+    x: Any
+    rows: Any
+    columns: Any
+    square: Any
+
+
+@Batched
+def solve_poses(tree: Tree, arrays: tuple[Any, ...], constants: Any, kinds: tuple[str, ...]) -> Any:
+    """Return coordinates nearest to a goal, what is missed, and how the joints move the tool there.
+
+    Projected Levenberg-Marquardt (Kanzow, Yamashita and Fukushima 2004): joints at a limit that are pushed outwards are
+    held, the others take the damped step, which is cut at the limits, and counts where it brings the tool nearer.
+
+    Returns
+    -------
+    q : array of shape (1, coordinates, batch)
+    square : array of shape (1, batch)
+        What is missed, squared and summed: rad, or sizes of the robot.
+    level : array of shape (1, batch)
+        Slope of that, as part of what it could be; small where nothing near is nearer.
+    active : array of shape (1, batch)
+        1 where more steps may help.
+    values, shares : array of shape (1, k, batch) and (1, k, coordinates, batch)
+        Singular values of the task, and its right singular vectors.
+    """
+    start, *wanted = arrays
+    tool, lower, upper, scale, enough, most = constants
+    goal: Goal = dict(zip(kinds, wanted, strict=True))
+    lower, upper, scale = (jnp.asarray(x)[:, None] for x in (lower, upper, scale))
+
+    def missed(x: Any) -> Any:
+        return misses(tree, tool, x * scale, goal)
+
+    def looked(x: Any) -> _Look:
+        rows = missed(x)
+        return _Look(x, rows, columns_of(missed, x), jnp.sum(rows * rows, axis=0))
+
+    def held(at: _Look) -> tuple[Any, Any]:
+        slope = jnp.sum(at.columns * at.rows[:, None], axis=0)
+        outward = ((at.x <= lower) & (slope > 0)) | ((at.x >= upper) & (slope < 0))
+        slope = jnp.where(outward, 0.0, slope)
+        size = jnp.sqrt(jnp.maximum(jnp.sum(at.columns**2, axis=(0, 1)) * at.square, np.finfo(float).tiny))
+        return slope, jnp.max(jnp.abs(slope), axis=0) / size
+
+    def step_from(at: _Look, damping: Any) -> Any:
+        slope, _ = held(at)
+        columns = at.columns * jnp.where(slope == 0, 0.0, 1.0)[None]
+        normal = jnp.sum(columns[:, :, None] * columns[:, None], axis=0)
+        size = jnp.max(jnp.sum(columns**2, axis=0), axis=0)
+        added = damping * at.square + LEAST * size + np.finfo(float).tiny
+        step = -DenseFactor.of(normal + jnp.eye(len(slope))[..., None] * added[None, None]).solve(slope, refined=False)
+        return jnp.clip(at.x + step, lower, upper)
+
+    def improved(carry: Any) -> Any:
+        best, x, damping, active, count = carry
+        trial = looked(x)  # the start in the first pass, which is better than nothing
+        better = (trial.square < best.square) & active
+        model = best.rows + jnp.sum(best.columns * (trial.x - best.x)[None], axis=1)
+        good = best.square - trial.square > 0.25 * (best.square - jnp.sum(model * model, axis=0))
+        changed = jnp.where(better & good, jnp.maximum(damping / GROWTH, FIRST * FIRST), damping * GROWTH)
+        damping = jnp.where(active & (count > 0), changed, damping)
+        best = jax.tree.map(
+            lambda a, b: jnp.where(jnp.reshape(better, (1,) * (a.ndim - 1) + better.shape), a, b), trial, best
+        )
+        x = step_from(best, damping)
+        moved = jnp.max(jnp.abs(x - best.x), axis=0)
+        active = active & (best.square > enough**2) & (moved > STALLED) & (damping < STIFF)
+        return best, x, damping, active & (held(best)[1] > FLAT), count + 1
+
+    x = jnp.clip(start[0] / scale, lower, upper)
+    rows = jax.eval_shape(missed, x).shape
+    nothing = _Look(x, jnp.zeros(rows), jnp.zeros((rows[0], *x.shape)), jnp.full(x.shape[1:], jnp.inf))
+    begin = nothing, x, jnp.full(x.shape[1:], FIRST), jnp.full(x.shape[1:], True), jnp.zeros((), int)
+    found = jax.lax.while_loop(lambda carry: jnp.any(carry[3]) & (carry[4] <= most), improved, begin)
+    best, active = found[0], found[3]
+    _, values, shares = singular_values(best.columns)
+    last = best.x * scale, best.square, held(best)[1], active.astype(float), values, jnp.swapaxes(shares, 0, 1)
+    return jax.tree.map(lambda part: part[None], last)

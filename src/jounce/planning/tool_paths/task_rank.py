@@ -1,0 +1,66 @@
+"""How many motions of a tool joints can bring about at all, and which joints lose one at a singular position."""
+
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+from scipy.stats import qmc
+
+from jounce.planning.tool_paths.tool_tasks import Goal, Tool, columns_of, task_rows
+from jounce.robot.abstract_robot import AbstractRobot
+from jounce.robot.batches import Batched
+from jounce.robot.kinematics import link_frame
+from jounce.robot.tree import Tree
+
+LOOKS = 16  # configurations at random that tell what joints can do in general
+RANK = 1e-9  # of the largest singular value: less is none
+SINGULAR = 1e-3  # of the largest singular value: a position where the least one is below is told as singular
+NOTABLE = 0.1  # of the largest share: joints with less have no part in a motion that is lost
+
+
+@Batched
+def _columns(tree: Tree, arrays: tuple[Any, ...], constants: Any, kinds: tuple[str, ...]) -> Any:
+    """Return the Jacobian of a task where it is done, by coordinates in their scale."""
+    tool, scale = constants
+    q = arrays[0][0]
+    frame = link_frame(tree, q[None], tool.place)
+    here = {
+        "position": frame.position.coefficients[0][None],
+        "rotation": jnp.stack([axis.coefficients[0] for axis in frame.axes], axis=1)[None],
+        "direction": frame.direction(tool.axes[:, 2]).coefficients[0][None],
+    }
+    goal: Goal = {kind: here[kind] for kind in kinds}
+    scale = scale[:, None]
+    return columns_of(lambda x: task_rows(tree, tool, (x * scale)[None], goal)[0], q / scale)[None]
+
+
+def task_columns(
+    robot: AbstractRobot, tool: Tool, q: Any, kinds: tuple[str, ...], scale: Any
+) -> Float[np.ndarray, "samples row column"]:
+    """Return the Jacobians of a task at coordinates, (samples, n), as if it were done there."""
+    return np.asarray(_columns(robot, (np.asarray(q)[:, None],), (tool, scale), (kinds,)))[:, 0]
+
+
+def random_coordinates(lower: Any, upper: Any, scale: Any, count: int, seed: int) -> Float[np.ndarray, "count n"]:
+    """Return coordinates spread over the range of joints, of half a turn to each side where it has no end."""
+    turn = 2 * np.pi * scale
+    low = np.where(np.isfinite(lower), lower, np.where(np.isfinite(upper), upper - turn, -0.5 * turn))
+    high = np.where(np.isfinite(upper), upper, low + turn)
+    return low + (high - low) * qmc.Halton(len(low), rng=seed).random(count)
+
+
+def reachable_rows(columns: Float[np.ndarray, "samples row column"]) -> tuple[Float[np.ndarray, "row some"], int]:
+    """Return a basis of the rows that joints can move anywhere, and how many of them they move in general."""
+    wide = np.concatenate(list(columns), axis=1)
+    u, s, _ = np.linalg.svd(wide, full_matrices=False)
+    basis = u[:, s > RANK * s[0]]
+    each = np.linalg.svd(columns, compute_uv=False)
+    return basis, int((each > RANK * each[:, :1]).sum(axis=1).max())
+
+
+def losing_joints(names: tuple[str, ...], shares: Float[np.ndarray, " n"]) -> list[str]:
+    """Return the joints whose motions cancel at the tool, those with the largest part first."""
+    sizes = np.abs(shares)
+    order = np.argsort(-sizes, kind="stable")
+    return [names[k] for k in order if sizes[k] >= NOTABLE * sizes.max()] if sizes.any() else []

@@ -1,0 +1,243 @@
+"""Paths of a tool: laws of its position, and of its orientation or of the direction of its axis."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from jounce.display import Displayed
+from jounce.errors import JounceError, TrajectoryError
+from jounce.jet import Jet, dot, sqrt
+from jounce.jet.algebra import stacked
+from jounce.planning.tool_paths.tool_tasks import Goal, rotation_matrices
+from jounce.rigid.attitude_samples import AttitudeSamples
+from jounce.rigid.rotations import check_sequence, rotation_matrix
+from jounce.shapes import ArrayLike
+from jounce.trajectory import SplineMotion
+from jounce.trajectory.checks import check_samples
+from jounce.trajectory.joint_trajectory import MAX_ORDER, JointTrajectory
+
+XYZ = ("x", "y", "z")
+ANGLES = ("angle_1", "angle_2", "angle_3")
+
+
+class ToolPath(Displayed):
+    """Where a tool is to be from a start to a stop, with derivatives of any order.
+
+    Parameters
+    ----------
+    position : sequence of three laws, optional
+        Of the point of the tool in the frame of the base, m: motions, expressions of ``t``, or numbers; anywhere unless
+        given.
+    orientation : optional
+        Of the link in the frame of the base: constant, as a unit quaternion, scalar first, a rotation matrix or a
+        rotation of SciPy; ``(SEQUENCE, [law, law, law])`` for Euler angles such as ``("ZYX", ["t", 0, 0])``, rad; or
+        `jounce.rigid.AttitudeSamples`.
+    direction : sequence of three laws, optional
+        Of a vector along which an axis of the link points, in the place of an orientation; of any length but zero.
+    start, stop : float
+        First and last instant, s.
+    progress : AbstractMotion, Expression or str, optional
+        Law of what stands in the place of ``t`` in all other laws, itself of ``t``: another time law along the same
+        path. `start` and `stop` are instants, not values of it.
+
+    Raises
+    ------
+    TrajectoryError
+        If there is nothing to follow, or a law is none.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> path = jn.ToolPath(["0.4 + 0.1*cos(t)", "0.1*sin(t)", 0.3], orientation=[0, 1, 0, 0], start=0.0, stop=6.0)
+    >>> abs(path.position([0.0], order=2)[0]).round(12).tolist()
+    [[0.5, 0.0, 0.3], [0.0, 0.1, 0.0], [0.1, 0.0, 0.0]]
+    """
+
+    def __init__(
+        self,
+        position: Sequence[Any] | None = None,
+        orientation: Any = None,
+        *,
+        direction: Sequence[Any] | None = None,
+        start: float,
+        stop: float,
+        progress: Any = None,
+    ):
+        if position is None and orientation is None and direction is None:
+            raise TrajectoryError("give a position, an orientation or a direction to follow", name="position")
+        if orientation is not None and direction is not None:
+            raise TrajectoryError("give an orientation or a direction, not both", name="direction")
+        self.start, self.stop = start, stop
+        self._progress = None if progress is None else _laws("progress", {"progress": progress}, start, stop)
+        if self._progress is not None:
+            reach = self._progress.derivatives(np.linspace(start, stop, 1025), 0)[:, 0, 0]
+            start, stop = float(reach.min()), float(reach.max())
+            if stop <= start:
+                raise TrajectoryError("must change from the start to the stop", name="progress", value=start)
+        self._position = None if position is None else _three("position", position, XYZ, start, stop)
+        self._direction = None if direction is None else _three("direction", direction, XYZ, start, stop)
+        self._attitude = None if orientation is None else _attitude(orientation, start, stop)
+
+    @classmethod
+    def through(
+        cls, times: ArrayLike, positions: ArrayLike, orientations: Any = None, degree: int = 7, **settings: Any
+    ) -> "ToolPath":
+        """Return the path of splines through poses at instants.
+
+        Parameters
+        ----------
+        times : array_like of shape (samples,)
+            Increasing, s.
+        positions : array_like of shape (samples, 3)
+            m, in the frame of the base.
+        orientations : optional
+            One for each instant, (samples, 4) or (samples, 3, 3), or a rotation of SciPy; a single one is kept.
+        degree : int, default 7
+            Of the splines, odd; derivatives to one less are continuous.
+        **settings
+            ``direction`` and ``progress``, as for the class.
+
+        Raises
+        ------
+        TrajectoryError
+            If there are too few samples, or they do not fit one another.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import jounce as jn
+        >>> t = np.linspace(0.0, 1.0, 41)
+        >>> path = jn.ToolPath.through(t, np.stack([t, t**2, 0 * t], axis=1), [1, 0, 0, 0])
+        >>> path.position([0.5], order=2)[0].round(6).tolist()
+        [[0.5, 0.25, 0.0], [1.0, 1.0, 0.0], [0.0, 2.0, 0.0]]
+        """
+        times, places = check_samples(times, positions)
+        if places.ndim != 2 or places.shape[1] != 3:
+            raise TrajectoryError(f"must have the shape (samples, 3), not {places.shape}", name="positions")
+        laws = [SplineMotion(times, column, degree) for column in places.T]
+        if orientations is not None:
+            turned = rotation_matrices("orientations", orientations)
+            if turned.ndim == 2:
+                orientations = turned
+            else:
+                orientations = AttitudeSamples.from_rotation_matrices(times, turned, degree)
+        bounds = {"start": float(times[0]), "stop": float(times[-1]), **settings}
+        return cls(laws, orientations, **bounds)
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """What is followed: "position", "rotation", "direction"."""
+        parts = {"position": self._position, "rotation": self._attitude, "direction": self._direction}
+        return tuple(kind for kind, part in parts.items() if part is not None)
+
+    @property
+    def highest(self) -> int:
+        """The highest derivative that is continuous, as far as splines decide it."""
+        laws = [law for part in (self._position, self._direction) if part is not None for law in part.laws.values()]
+        degrees = [law.degree for law in laws if type(law) is SplineMotion]
+        if isinstance(self._attitude, AttitudeSamples):
+            degrees.append(self._attitude.degree)
+        return min([MAX_ORDER, *(degree - 1 for degree in degrees)])
+
+    def judge(self, order: int) -> None:
+        """Warn where the samples of a law do not support its derivatives to an order, as `JointTrajectory` does."""
+        for part in (self._position, self._direction, self._progress):
+            if part is not None:
+                part.derivatives([part.start], order)
+
+    def __repr__(self) -> str:
+        return f"<ToolPath of {', '.join(self.kinds)}; {self.start:g} to {self.stop:g} s>"
+
+    def position(self, times: ArrayLike, order: int = 0) -> Float[np.ndarray, "time derivative 3"]:
+        """Return the position at instants with its derivatives, m by s.
+
+        Raises
+        ------
+        TrajectoryError
+            If the path has none, or an instant is outside.
+        """
+        if self._position is None:
+            raise TrajectoryError("this path has an orientation only", name="position")
+        if self._progress is None:
+            return self._position.derivatives(times, order)
+        from jounce.jet.derivatives import plain_derivatives
+
+        return np.moveaxis(
+            np.asarray(plain_derivatives(self.series(np.asarray(times, float), order)["position"])), -1, 0
+        )
+
+    def series(self, times: Float[np.ndarray, " time"], order: int) -> Goal:
+        """Return the Taylor coefficients of what is followed at instants, components first, the instants last.
+
+        Raises
+        ------
+        TrajectoryError
+            If an instant is outside, a law is not smooth there, or there is no derivative so high.
+        """
+        if order > self.highest:
+            message = f"the splines of this path have continuous derivatives to {self.highest}; give a higher degree"
+            raise TrajectoryError(message, name="order", value=order)
+        time = Jet.variable(jnp.asarray(times), order)
+        if self._progress is not None:
+            rates = self._progress.derivatives(times, order)[:, :, 0]
+            time = Jet.from_derivatives(np.moveaxis(rates, -1, 0))
+            inside = self._position or self._direction
+            if inside is not None:  # rounding may take it out of the range of the laws
+                first = jnp.clip(time.coefficients[0], inside.start, inside.stop)
+                time = Jet((first, *time.coefficients[1:]))
+        found: Goal = {}
+        if self._position is not None:
+            found["position"] = self._position(time)
+        if self._attitude is not None:
+            found["rotation"] = self._rotation(time)
+        if self._direction is not None:
+            vector = self._direction(time)
+            found["direction"] = vector / sqrt(dot(vector, vector))
+        series = {kind: np.asarray(stacked(jet)) for kind, jet in found.items()}
+        for kind, array in series.items():
+            if not np.isfinite(array).all():
+                bad = int(np.argwhere(~np.isfinite(array))[0, -1])
+                message = f"the law of the {kind} is not defined or not smooth at {times[bad]:.9g} s"
+                raise TrajectoryError(message, name=kind)
+        return series
+
+    def _rotation(self, time: Jet) -> Jet:
+        attitude = self._attitude
+        if isinstance(attitude, AttitudeSamples):
+            return attitude.attitude(time)
+        if isinstance(attitude, tuple):
+            return rotation_matrix(attitude[0], attitude[1](time))
+        still = jnp.broadcast_to(jnp.asarray(attitude)[..., None], (3, 3, *time.shape))
+        return Jet.constant(still, time.order)
+
+
+def _three(name: str, laws: Any, keys: tuple[str, ...], start: float, stop: float) -> JointTrajectory:
+    if isinstance(laws, str | Mapping) or not hasattr(laws, "__len__") or len(laws) != 3:
+        raise TrajectoryError("must be three laws, one for each component", name=name, value=laws)
+    return _laws(name, dict(zip(keys, laws, strict=True)), start, stop)
+
+
+def _laws(name: str, laws: Mapping[str, Any], start: float, stop: float) -> JointTrajectory:
+    try:
+        return JointTrajectory(laws, start, stop)
+    except JounceError as error:
+        inside = (error.name or "").removeprefix("laws").removeprefix(".")
+        place = f"{name}.{inside}" if error.name and error.name.startswith("laws") and inside != name else name
+        raise error.located(name=place if error.name and error.name.startswith("laws") else error.name) from None
+
+
+def _attitude(given: Any, start: float, stop: float) -> Any:
+    """Return an orientation: constant, as samples, or as a sequence with laws of its angles."""
+    if isinstance(given, AttitudeSamples):
+        return given
+    if isinstance(given, tuple) and len(given) == 2 and isinstance(given[0], str):
+        check_sequence(given[0], TrajectoryError, "orientation")
+        return given[0], _three("orientation", given[1], ANGLES, start, stop)
+    found = rotation_matrices("orientation", given)
+    if found.shape != (3, 3):
+        message = "a constant orientation is one quaternion or matrix; ToolPath.through takes one for each instant"
+        raise TrajectoryError(message, name="orientation", value=f"shape {found.shape}")
+    return found

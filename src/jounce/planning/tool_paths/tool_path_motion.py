@@ -1,0 +1,261 @@
+"""The result of following a path of a tool: coordinates with derivatives of any order, a status for each instant."""
+
+from collections.abc import Callable
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float, Int
+
+from jounce.display import Displayed
+from jounce.errors import TrajectoryError
+from jounce.kinematics import Status
+from jounce.kinematics.linear import singular_values
+from jounce.planning.tool_paths.path_equations import PathEquations
+from jounce.planning.tool_paths.path_marching import Nodes, predicted
+from jounce.planning.tool_paths.task_rank import SINGULAR, losing_joints
+from jounce.planning.tool_paths.tool_path import ToolPath
+from jounce.planning.tool_paths.tool_tasks import task_rows
+from jounce.robot.arguments import whole_number
+from jounce.robot.batches import Batched
+from jounce.robot.robot import Robot
+from jounce.robot.tree import Tree
+from jounce.shapes import ArrayLike
+from jounce.trajectory import HermiteMotion
+from jounce.trajectory.joint_trajectory import MAX_ORDER, JointTrajectory
+
+INSTANTS = 201
+MET = 1e-9  # rad, or sizes of the robot: what may be missed
+RATES = 1e-6  # of a derivative of the path that the tool has to have
+WEAK = 0.05  # of the largest singular value: where a path ends, less is why
+JUMP = 1e-3  # m or rad within the shortest interval
+LIMIT = 1e-9  # by which a coordinate may be out of its range
+
+
+@Batched
+def _along(
+    tree: Tree, arrays: tuple[Any, ...], constants: Any, names: tuple[str, ...], static: tuple[Any, ...], order: int
+) -> Any:
+    """Return the series of the coordinates, of what is missed, and singular values of the task."""
+    guess, *series = arrays
+    target = dict(zip(names, series, strict=True))
+    tool, basis, scale, weights = constants
+    equations = PathEquations(tree, tool, basis, scale, weights, *static)
+    found = equations.corrected(guess[0], target)
+    u = equations.series(found.u, found.factor, target, order)
+    x, scale = u[:, : equations.count], jnp.asarray(scale)[None, :, None]
+    goal = {kind: target[kind] for kind in equations.kinds}
+    _, values, shares = singular_values(found.factor.matrix[: equations.rows, : equations.count])
+    missed = task_rows(tree, tool, x * scale, goal)
+    return x * scale, missed, found.first[None], found.last[None], values[None], jnp.swapaxes(shares, 0, 1)[None]
+
+
+class ToolPathMotion(Displayed):
+    """Joint coordinates along a path of a tool.
+
+    Attributes
+    ----------
+    robot : Robot
+        As it was given.
+    link : str
+        That carries the tool.
+    path : ToolPath
+        That is followed.
+    time : numpy.ndarray of shape (time,)
+        s.
+    q : numpy.ndarray of shape (time, order + 1, n)
+        Coordinates and their derivatives, rad or m by s; NaN where the status is not OK.
+    status : numpy.ndarray of shape (time,)
+        A `Status` for each instant: SINGULAR where the path runs into a singular position, BRANCH_JUMP where it
+        jumps, NOT_REACHED after that,
+        NOT_ASSEMBLED where the tool cannot keep to the path, INADMISSIBLE where a joint leaves its range.
+    residual : numpy.ndarray of shape (time, order + 1)
+        The largest of what the tool misses, by derivatives: rad, or sizes of the robot, by s.
+    singular_values : numpy.ndarray of shape (time, rank)
+        Of the task, the largest first, lengths in sizes of the robot.
+    singular : numpy.ndarray of bool, shape (time,)
+        Whether the least of them is near zero: derivatives are large and lose digits there.
+    ending : str
+        Why the path could not be followed to its end; empty where it was.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        link: str,
+        path: ToolPath,
+        equations: PathEquations,
+        nodes: Nodes,
+        target: Callable[[np.ndarray, int], dict[str, Any]],
+        rank: int,
+        ranges: Any,
+        time: ArrayLike | None,
+        order: int,
+    ):
+        self.robot, self.link, self.path = robot, link, path
+        self._parts = (equations, nodes, target, rank, ranges)
+        self.order = whole_number("order", order, 0, MAX_ORDER)
+        self.time = _instants(path, time)
+        path.judge(min(self.order, path.highest))
+        lost, self.ending = (Status.OK, "") if nodes.failed is None else self._why()
+        until = nodes.time[-1] if nodes.failed is not None else np.inf
+        self._until = until
+        reached = self.time <= until
+        inside = np.where(reached, self.time, nodes.time[-1])
+        series = target(inside, self.order)
+        names = tuple(series)
+        arrays = (predicted(nodes, inside)[:, None], *(_by_instant(series[name]) for name in names))
+        constants = (equations.tool, equations.basis, equations.scale, equations.weights)
+        static = (equations.held, equations.kinds, equations.count)
+        found = [np.asarray(x) for x in _along(robot, arrays, constants, (names, static, self.order))]
+        self.q, missed, _, last, values, shares = found
+        self.residual: Float[np.ndarray, "time derivative"] = np.abs(missed).max(axis=-1)
+        self.singular_values = values[:, 0, :rank]
+        self._shares = shares[:, 0, max(rank - 1, 0)]
+        self.singular = self.singular_values[:, -1] <= SINGULAR * self.singular_values[:, 0]
+        self.status: Int[np.ndarray, " time"] = self._judged(series, reached, last[:, 0], lost)
+        for array in (self.q, self.residual, self.singular_values):
+            array[~reached] = np.nan
+        self.q[(self.status != Status.OK) & (self.status != Status.INADMISSIBLE)] = np.nan
+
+    def _judged(self, series: dict[str, Any], reached: np.ndarray, last: np.ndarray, lost: Status) -> np.ndarray:
+        equations, nodes, _, _, ranges = self._parts
+        status = np.full(len(self.time), int(Status.OK))
+        if ranges is not None:
+            slack = LIMIT * equations.scale
+            self._outside = (self.q[:, 0] < ranges[0] - slack) | (self.q[:, 0] > ranges[1] + slack)
+            status[self._outside.any(axis=1)] = int(Status.INADMISSIBLE)
+        sizes = [
+            np.abs(_by_instant(series[kind])).reshape(len(self.time), self.order + 1, -1) for kind in equations.kinds
+        ]
+        size = np.concatenate(sizes, axis=-1).max(axis=-1) / min(1.0, float(equations.tool.length))
+        off = self.residual > RATES * (np.maximum.accumulate(size, axis=1) + 1.0) * self._factorials()
+        off[:, 0] = self.residual[:, 0] > MET
+        status[off.any(axis=1)] = int(Status.NOT_ASSEMBLED)
+        status[~(last <= MET)] = int(Status.NOT_CONVERGED)
+        status[~np.isfinite(self.q).all(axis=(1, 2))] = int(Status.SINGULAR)
+        status[~reached] = int(Status.NOT_REACHED)
+        if nodes.failed is not None and (~reached).any():
+            status[np.flatnonzero(~reached)[np.argmin(self.time[~reached])]] = int(lost)
+        return status
+
+    def _factorials(self) -> np.ndarray:
+        import math
+
+        return np.array([float(math.factorial(k)) for k in range(self.order + 1)])
+
+    def _why(self) -> tuple[Status, str]:
+        """Return why the path ends before its end: what the joints lose there, or a jump of the path."""
+        equations, nodes, target, rank, _ = self._parts
+        time, u = nodes.time[-1], nodes.series[-1, 0]
+        gap = 2.0**-16 * (self.path.stop - self.path.start)
+        ends = target(np.array([time, min(time + gap, self.path.stop)]), 0)
+        jump = max(float(np.abs(ends[kind][0, ..., 1] - ends[kind][0, ..., 0]).max()) for kind in equations.kinds)
+        values, shares = _singular(self.robot, equations, u[: equations.count])
+        lost = ", ".join(losing_joints(self.robot.joint_names, shares[rank - 1]))
+        if values[rank - 1] <= WEAK * values[0]:
+            return Status.SINGULAR, (
+                f"the path runs into a singular position at t = {time:.6g} s, where the motions of {lost} cancel at "
+                f"the tool (singular values from {values[0]:.2g} down to {values[rank - 1]:.2g}); lead it past, or "
+                "begin on another branch"
+            )
+        if jump > JUMP:
+            return Status.BRANCH_JUMP, f"the path jumps at t = {time:.6g} s; its laws must be continuous"
+        if equations.has_posture or equations.held:
+            kind, other = (
+                ("posture", "posture, other weights") if equations.has_posture else ("joints held", "law of them")
+            )
+            return Status.SINGULAR, (
+                f"the path is singular with the {kind} at t = {time:.6g} s: the coordinates turn round there; give "
+                f"another {other}, or another start"
+            )
+        return Status.SINGULAR, (
+            f"the path could not be followed beyond t = {time:.6g} s: joints and tool do not go on together there"
+        )
+
+    def __repr__(self) -> str:
+        solved = int((self.status == Status.OK).sum())
+        return f"<ToolPathMotion of {self.robot.name}: {solved} of {len(self.time)} instants to order {self.order}>"
+
+    def explain(self, index: int) -> str:
+        """Return in words what is to be known of an instant: what failed and why, which joints lose a motion."""
+        status, time, words = Status(int(self.status[index])), float(self.time[index]), []
+        if status in (Status.SINGULAR, Status.BRANCH_JUMP, Status.NOT_REACHED):
+            return self.ending or f"singular at t = {time:.6g} s"
+        if status == Status.NOT_ASSEMBLED:
+            words.append(
+                f"the joints cannot keep the tool on the path at t = {time:.6g} s: {self.residual[index, 0]:.3g} rad, "
+                "or sizes of the robot, are missed, or a derivative; ask for less, as a direction in the place of an "
+                "orientation"
+            )
+        if status == Status.NOT_CONVERGED:
+            words.append(f"not converged at t = {time:.6g} s")
+        if status == Status.INADMISSIBLE:
+            k = int(np.argmax(self._outside[index]))
+            words.append(
+                f"{self.robot.joint_names[k]} leaves its range at t = {time:.6g} s, where it is "
+                f"{self.q[index, 0, k]:.6g}; choose another start, posture or path, or limits=False"
+            )
+        if self.singular[index]:
+            lost = ", ".join(losing_joints(self.robot.joint_names, self._shares[index]))
+            words.append(f"nearly singular at t = {time:.6g} s: the motions of {lost} cancel at the tool")
+        return "; ".join(words) or "followed"
+
+    def at(self, time: ArrayLike, order: int | None = None) -> "ToolPathMotion":
+        """Return the motion at other instants, without following the path again.
+
+        Parameters
+        ----------
+        time : array_like of shape (time,)
+            Within the path, s.
+        order : int, optional
+            Highest derivative; that of this motion unless given.
+        """
+        equations, nodes, target, rank, ranges = self._parts
+        order = self.order if order is None else order
+        return ToolPathMotion(self.robot, self.link, self.path, equations, nodes, target, rank, ranges, time, order)
+
+    def trajectory(self) -> JointTrajectory:
+        """Return the motion as laws of the joints, for all that takes a trajectory.
+
+        At the instants of this motion they have its derivatives; in between they are polynomials that meet them, whose
+        error falls with the spacing to the power of about the order and six more. `at` is exact everywhere.
+
+        Raises
+        ------
+        TrajectoryError
+            If an instant has no coordinates, or the instants do not increase.
+        """
+        if (self.status != Status.OK).any():
+            bad = int(np.argmax(self.status != Status.OK))
+            raise TrajectoryError(f"there are no coordinates: {self.explain(bad)}", name=f"time[{bad}]")
+        laws = {name: HermiteMotion(self.time, self.q[:, :, k]) for k, name in enumerate(self.robot.joint_names)}
+        return JointTrajectory(laws, float(self.time[0]), float(self.time[-1]), self.time)
+
+
+def _instants(path: ToolPath, time: Any) -> np.ndarray:
+    instants = np.linspace(path.start, path.stop, INSTANTS) if time is None else np.atleast_1d(np.asarray(time, float))
+    slack = 1e-9 * (path.stop - path.start)
+    outside = ~((instants >= path.start - slack) & (instants <= path.stop + slack))
+    if instants.ndim != 1 or outside.any():
+        value = float(instants[np.argmax(outside)]) if instants.ndim == 1 else f"shape {instants.shape}"
+        message = f"must be instants from {path.start:.9g} to {path.stop:.9g} s"
+        raise TrajectoryError(message, name="time", value=value)
+    return np.clip(instants, path.start, path.stop)
+
+
+def _by_instant(series: np.ndarray) -> np.ndarray:
+    """Return plain derivatives with the instants first, from Taylor coefficients with them last."""
+    from jounce.jet.derivatives import plain_derivatives
+
+    return np.moveaxis(np.asarray(plain_derivatives(series)), -1, 0)
+
+
+def _singular(robot: Robot, equations: PathEquations, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return singular values and right singular vectors of a task where it is done."""
+    from jounce.planning.tool_paths.task_rank import task_columns
+
+    columns = task_columns(robot, equations.tool, (x * equations.scale)[None], equations.kinds, equations.scale)[0]
+    columns = equations.basis.T @ np.concatenate([columns, np.eye(equations.count)[list(equations.held)]])
+    _, values, shares = np.linalg.svd(columns, full_matrices=False)
+    return values, shares

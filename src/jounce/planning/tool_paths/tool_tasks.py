@@ -1,0 +1,156 @@
+"""What a tool is to do: be at a place, have an orientation, or point in a direction; as rows that vanish, on jets."""
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from jounce.errors import RobotError, check_name
+from jounce.jet import Jet, concatenate, cross, dot
+from jounce.jet.algebra import stacked, total
+from jounce.rigid.inertia import finite_numbers
+from jounce.rigid.orientation import check_rotation
+from jounce.robot.abstract_robot import AbstractRobot
+from jounce.robot.arguments import floats
+from jounce.robot.kinematics import link_frame, place_of
+from jounce.robot.robot_size import robot_size
+from jounce.robot.tree import Frame, Tree, axes_with_z_along
+from jounce.shapes import ArrayLike, Numbers
+
+UNIT = 1e-6  # by which a quaternion or a direction may miss the length of one: printed digits
+
+Goal = dict[str, Any]
+"""Series of what is wanted: "position" and "direction" (order, 3, batch), "rotation" (order, 3, 3, batch)."""
+
+
+class Tool(NamedTuple):
+    """Where the tool is on its link, and what measures its error.
+
+    Attributes
+    ----------
+    place : Frame
+        Its point, on the moving body.
+    axes : array of shape (3, 3)
+        In the frame of the link; the last column is the axis that may have a direction.
+    length : float
+        What counts as much as 1 rad, m: the size of the robot.
+    """
+
+    place: Frame
+    axes: Any
+    length: Any
+
+
+def tool_of(robot: AbstractRobot, link: str, point: ArrayLike, axis: ArrayLike) -> Tool:
+    """Return the tool on a link that moves.
+
+    Raises
+    ------
+    RobotError
+        If there is no such link, it does not move, or the point or the axis is none.
+    """
+    check_name("link", link, robot.frames, RobotError, name="link")
+    if robot.frames[link].body < 0:
+        raise RobotError("this link is fixed to the base: no joint moves it", name="link", value=link)
+    axis = finite_numbers("axis", axis, (3,))
+    norm = float(np.linalg.norm(axis))
+    if not norm:
+        raise RobotError("must not be zero", name="axis", value=axis.tolist())
+    place = place_of(robot, link, point)
+    return Tool(place, axes_with_z_along(axis / norm), np.float64(robot_size(robot)))
+
+
+def task_rows(tree: Tree, tool: Tool, q: Any, goal: Goal) -> Float[Numbers, "order row batch"]:
+    """Return what the tool misses, as series: where all rows are zero, and the tool is near, the task is done.
+
+    Rows of the position are in sizes of the robot; those of an orientation are the sine of the angle that is left,
+    about its axis; those of a direction are two components of it across the axis.
+    """
+    frame = link_frame(tree, q, tool.place)
+    rows = []
+    if "position" in goal:
+        rows.append((frame.position - Jet(tuple(goal["position"]))) * (1.0 / tool.length))
+    if "rotation" in goal:
+        wanted = [Jet(tuple(goal["rotation"][:, :, j])) for j in range(3)]
+        rows.append(total(cross(d, a) for d, a in zip(wanted, frame.axes, strict=True)) * 0.5)
+    if "direction" in goal:
+        wanted = Jet(tuple(goal["direction"]))
+        rows += [dot(frame.direction(tool.axes[:, j]), wanted)[None] for j in range(2)]
+    return stacked(concatenate(rows))
+
+
+def misses(tree: Tree, tool: Tool, q: Any, goal: Goal) -> Float[Numbers, "row batch"]:
+    """Return what the tool misses at any distance, without derivatives: the sum of squares grows up to half a turn.
+
+    Differences of axes, whose squares add up to that of ``2 sin(angle / 2)`` for an orientation.
+    """
+    frame = link_frame(tree, q[None], tool.place)
+    rows = []
+    if "position" in goal:
+        rows.append((frame.position.coefficients[0] - goal["position"][0]) / tool.length)
+    if "rotation" in goal:
+        axes = jnp.stack([axis.coefficients[0] for axis in frame.axes], axis=1)
+        difference = (axes - goal["rotation"][0]) / np.sqrt(2.0)
+        rows.append(jnp.reshape(difference, (9, difference.shape[-1])))
+    if "direction" in goal:
+        rows.append(frame.direction(tool.axes[:, 2]).coefficients[0] - goal["direction"][0])
+    return jnp.concatenate(rows)
+
+
+def columns_of(function: Any, at: Float[Numbers, "column batch"]) -> Float[Numbers, "row column batch"]:
+    """Return the Jacobian of a function of coordinates, batch last, by its derivatives along each of them."""
+    units = jnp.broadcast_to(jnp.eye(len(at))[..., None], (len(at), *at.shape))
+    return jax.vmap(lambda unit: jax.jvp(function, (at,), (unit,))[1], out_axes=1)(units)
+
+
+def rotation_matrices(name: str, value: Any) -> Float[np.ndarray, "*batch 3 3"]:
+    """Return rotation matrices from such, from unit quaternions with the scalar first, or from SciPy's rotations.
+
+    Raises
+    ------
+    RobotError
+        If they are none.
+    """
+    from scipy.spatial.transform import Rotation
+
+    if hasattr(value, "as_matrix"):
+        return np.asarray(value.as_matrix(), float)
+    array = np.asarray(floats(name, value))
+    if array.ndim >= 2 and array.shape[-2:] == (3, 3):
+        flat = array.reshape(-1, 3, 3)
+        check_rotation(np.moveaxis(flat, 0, -1), name)
+        return Rotation.from_matrix(flat).as_matrix().reshape(array.shape)  # printed digits made orthonormal
+    if array.ndim >= 1 and array.shape[-1] == 4:
+        turned = Rotation.from_quat(np.roll(_units(name, array.reshape(-1, 4)), -1, axis=-1))
+        return turned.as_matrix().reshape(*array.shape[:-1], 3, 3)
+    message = f"must be unit quaternions, (..., 4), scalar first, or matrices, (..., 3, 3), not {array.shape}"
+    raise RobotError(message, name=name)
+
+
+def unit_vectors(name: str, value: Any) -> Float[np.ndarray, "*batch 3"]:
+    """Return directions of unit length.
+
+    Raises
+    ------
+    RobotError
+        If they are not vectors, or have no length.
+    """
+    array = np.asarray(floats(name, value))
+    if array.ndim < 1 or array.shape[-1] != 3:
+        raise RobotError(f"must have the shape (..., 3), not {array.shape}", name=name)
+    norm = np.linalg.norm(array, axis=-1, keepdims=True)
+    if not np.isfinite(norm).all() or not norm.all():
+        raise RobotError("must be finite and not zero", name=name)
+    return array / norm
+
+
+def _units(name: str, array: np.ndarray) -> np.ndarray:
+    norm = np.linalg.norm(array, axis=-1, keepdims=True)
+    far = ~(np.abs(norm[:, 0] - 1.0) <= UNIT)
+    if far.any():
+        first = int(np.argmax(far))
+        message = "a quaternion must be of unit length, scalar first; its length is"
+        raise RobotError(message, name=f"{name}[{first}]", value=float(norm[first, 0]))
+    return array / norm

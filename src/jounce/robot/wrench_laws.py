@@ -1,0 +1,107 @@
+"""Wrenches on links as functions of time and state, for simulations."""
+
+import inspect
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jounce.errors import RobotError, check_name
+from jounce.robot.arguments import floats
+from jounce.robot.kinematics import place_of
+from jounce.robot.robot import Robot
+from jounce.robot.tree import Frame
+from jounce.robot.wrenches import Wrench
+
+STATE = 3  # arguments of a function of time, coordinates and rates
+
+
+class _Part(eqx.Module):
+    """The force, or the torque, of a wrench."""
+
+    constant: Any
+    function: Callable[..., Any] | None = eqx.field(static=True)
+    of_state: bool = eqx.field(static=True)
+
+    def __call__(self, time: Any, q: Any, rate: Any) -> Any:
+        """Return three components at states, the batch last."""
+        if self.function is None:
+            return jnp.broadcast_to(jnp.asarray(self.constant)[:, None], (3, time.shape[-1]))
+        given = (time, q, rate) if self.of_state else (time,)
+        return jax.vmap(lambda *x: self.at(*x), in_axes=-1, out_axes=-1)(*given)
+
+    def at(self, *state: Any) -> Any:
+        """Return three components at one state."""
+        assert self.function is not None
+        return jnp.asarray(self.function(*state), float)
+
+
+class WrenchLaws(eqx.Module):
+    """Wrenches from outside as functions of time and state; see `wrench_laws`."""
+
+    parts: tuple[tuple[_Part, _Part], ...]
+
+    @property
+    def changing(self) -> bool:
+        """Whether one depends on anything but the pose of its link."""
+        return any(part.function is not None for both in self.parts for part in both)
+
+    def __call__(self, time: Any, q: Any, rate: Any) -> tuple[Any, ...]:
+        """Return force and torque of each wrench, (6, batch)."""
+        return tuple(jnp.concatenate([part(time, q, rate) for part in both]) for both in self.parts)
+
+
+def wrench_laws(
+    robot: Robot, wrenches: Sequence[Wrench], *, free: bool
+) -> tuple[WrenchLaws, tuple[Frame, ...], tuple[bool, ...]]:
+    """Return the laws of wrenches, where they act, and whether they are in the axes of the scene.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    wrenches : sequence of Wrench
+        Whose forces and torques are constant, or functions of time, or of time, coordinates and rates.
+    free : bool
+        Whether the base moves, and may be pushed.
+
+    Raises
+    ------
+    RobotError
+        If a link does not exist or does not move, or a force is neither constant nor such a function.
+    """
+    parts = []
+    for k, wrench in enumerate(wrenches):
+        where = f"wrenches[{k}]"
+        if not isinstance(wrench, Wrench):
+            raise RobotError("must be a jn.Wrench", name=where, value=type(wrench).__name__)
+        check_name("link", wrench.link, robot.frames, RobotError, name=f"{where}.link")
+        if robot.frames[wrench.link].body < 0 and not free:
+            message = "this link is fixed to the base: nothing moves it"
+            raise RobotError(message, name=f"{where}.link", value=wrench.link)
+        n = len(robot.joint_names)
+        parts.append(tuple(_part(f"{where}.{name}", getattr(wrench, name), n) for name in ("force", "torque")))
+    places = tuple(place_of(robot, wrench.link, wrench.point) for wrench in wrenches)
+    return WrenchLaws(tuple(parts)), places, tuple(wrench.frame == "base" for wrench in wrenches)
+
+
+def _part(where: str, given: Any, n: int) -> _Part:
+    if not callable(given):
+        value = np.asarray(floats(where, given))
+        if value.shape != (3,) or not np.isfinite(value).all():
+            message = "must be three finite numbers, or a function of time, or of time, q and rates"
+            raise RobotError(message, name=where, value=value.tolist())
+        return _Part(value, None, False)
+    of_state = len(inspect.signature(given).parameters) == STATE
+    state = (jnp.zeros(()), jnp.zeros(n), jnp.zeros(n)) if of_state else (jnp.zeros(()),)
+    try:
+        found = jax.eval_shape(lambda *x: jnp.asarray(given(*x), float), *state).shape
+    except TypeError as error:
+        message = f"must be a function of time, or of time, q and rates, by operations of JAX: {error}"
+        raise RobotError(message.splitlines()[0], name=where) from error
+    if found != (3,):
+        raise RobotError(f"the function must return three components, not the shape {found}", name=where)
+    return _Part(np.zeros(3), given, of_state)
