@@ -1,11 +1,14 @@
 """Optimised designs: what each problem of the literature or of the shop comes down to, from a poor start.
 
-``python benchmarks/designs.py [NAME ...]`` prints objective, conditions and parameters before and after; all of them
-unless some are named.
+``python benchmarks/designs.py [--figure FILE] [NAME ...]`` prints objective, conditions and parameters before and
+after, of all of them unless some are named. The figure shows the swing, the dwell, the press and the path of 18 points.
+
+Points, angles and bounds of the two problems of Cabrera, Simon and Prado are those that later work repeats, as cases 2
+and 12 of github.com/jmejia8/eca-four-bar-mechanisms.
 """
 
+import argparse
 import dataclasses
-import sys
 import time
 
 import numpy as np
@@ -84,12 +87,16 @@ def dwell():
 
 
 def press():
-    """Least peak yank of the motor of a knuckle press, at the stroke that it has."""
+    """Least peak yank of the motor of a knuckle press that has the same stroke, and the same lowest position."""
     mechanism = jn.load("examples/press.yaml")
     ram = jn.solve(mechanism, order=1).outputs["ram"][:, 0, 1]
-    bounds = {"rod": ("470 mm", "510 mm"), "upper": ("380 mm", "420 mm"), "throw": ("95 mm", "105 mm")}
-    stroke = f"span(ram_y) == {float(ram.max() - ram.min())!r}"
-    return jn.optimise(mechanism, "peak(torque, 1)", bounds, [stroke], starts=1)
+    bounds = {"rod": ("470 mm", "510 mm"), "upper": ("380 mm", "420 mm"), "lower": ("430 mm", "470 mm")}
+    conditions = [
+        f"span(ram_y) == {float(ram.max() - ram.min())!r}",
+        f"minimum(ram_y) == {float(ram.min())!r}",  # without it, none is as gentle as a press that does not press
+    ]
+    bounds |= {"throw": ("95 mm", "105 mm")}
+    return jn.optimise(mechanism, "peak(torque, 1)", bounds, conditions, starts=1)
 
 
 def law():
@@ -127,22 +134,54 @@ def eighteen_points():
     return jn.optimise(mechanism, "path_error(P, target)", bounds, curves=curves, starts=6)
 
 
+def drawn(found, path):
+    """Draw some designs before and after."""
+    import matplotlib.pyplot as plt
+
+    def curve(axes, case, of, **options):
+        for label, start in (("before", True), ("after", False)):
+            design = found[case]
+            first = {row.name: row.before for row in design.comparisons if row.kind == "parameter"}
+            mechanism = design.mechanism.with_parameters(**first) if start else design.mechanism
+            axes.plot(*of(jn.solve(mechanism, order=4)), "C0--" if start else "C1", lw=1.2, label=label, **options)
+        axes.legend()
+
+    figure, grid = plt.subplots(2, 2, figsize=(9, 7), layout="constrained")
+    curve(grid[0, 0], "swing", lambda m: (m.time, m.outputs["psi"][:, 4]))
+    grid[0, 0].set(title="Four-bar, swing of 60 degrees", xlabel="time, s", ylabel="jounce of the rocker, rad/s$^4$")
+    curve(grid[0, 1], "dwell", lambda m: (m.time, np.degrees(m.outputs["output_angle"][:, 0])))
+    grid[0, 1].set(title="Six-bar, dwell from 1/3 s to 1 s", xlabel="time, s", ylabel="output angle, deg")
+    curve(grid[1, 0], "press", lambda m: (m.time, m.outputs["torque"][:, 1] / 1e3))
+    grid[1, 0].set(title="Knuckle press", xlabel="time, s", ylabel="torque rate of the motor, kN m/s")
+    curve(grid[1, 1], "eighteen_points", lambda m: m.outputs["P"][:, 0].T)
+    grid[1, 1].plot(*EIGHTEEN.T, "ko", ms=4)
+    grid[1, 1].set(title="Path through 18 points", xlabel="x", ylabel="y", aspect="equal")
+    figure.savefig(path, dpi=110)
+
+
 CASES = (swing, hoekens, evans, dwell, press, law, five_points, eighteen_points)
 
 
-def main(names):
-    """Run cases and print what they come down to."""
+def main(names, figure=None):
+    """Run cases, print what they come down to, and draw some of them."""
+    found = {}
     for case in CASES:
         if names and case.__name__ not in names:
             continue
         start = time.process_time()
-        design = case()
+        design = found[case.__name__] = case()
         print(f"{case.__name__}: {case.__doc__}\n  {design.status}: {design.message}")
         for row in design.comparisons:
             print(f"  {row.name:40} {row.before:14.8g} {row.after:14.8g} {row.multiplier:12.5g}")
         print(f"  residual {design.residual:.1e}, grid {design.grid_error:.1e}, {design.evaluations} designs")
         print(f"  {time.process_time() - start:.0f} s of processor time", flush=True)
+    if figure:
+        drawn(found, figure)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("names", nargs="*", metavar="NAME")
+    parser.add_argument("--figure", metavar="FILE")
+    given = parser.parse_args()
+    main(given.names or ("swing dwell press eighteen_points".split() if given.figure else ()), given.figure)

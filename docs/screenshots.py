@@ -8,6 +8,7 @@ from pathlib import Path
 
 from playwright.sync_api import sync_playwright
 
+import jounce as jn
 from jounce.viewer import view
 from jounce.viewer.appearance import BodyPoint
 
@@ -44,6 +45,10 @@ def spatial(shown, _):
     shown.page.seek(0.6)
 
 
+def cam(shown, _):
+    shown.page.seek(2.7)
+
+
 def robot(shown, page):
     shown.arrows.trace(BodyPoint("panda_link7", (0.0, 0.0, 0.2), "hand"), (1, 2))
     forces(shown, page, ["forces of drivers"])
@@ -54,6 +59,7 @@ PICTURES = {
     "view_four_bar": (["examples/four_bar.yaml"], four_bar),
     "view_failure": (["examples/four_bar.yaml"], failure),
     "view_forces": (["examples/press.yaml"], forces),
+    "view_cam": ([jn.load_cam("examples/cams/intake.yaml")], cam),
     "view_spatial": (["examples/rsur.yaml"], spatial),
     "view_robot": (["examples/robots/panda.urdf", "examples/trajectories/panda_wave.yaml"], robot),
 }

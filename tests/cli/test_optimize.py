@@ -74,6 +74,9 @@ def test_points_of_a_file_are_gone_through(capsys, file):
     [
         (("--minimize", "peak(phi)", *VARY), "--minimize: unknown name 'phi'"),
         (("--minimize", "peak(angle)", "--vary", "a=1"), "NAME=LOW:HIGH"),
+        (("--minimize", "peak(angle)", *VARY, "--seed", -1), "--seed: must be a whole number, 0 or greater, got -1"),
+        (("--minimize", "peak(angle)", *VARY, "--clearance", -1), "--clearance: must be a number, zero or greater"),
+        (("--minimize", "peak(angle)", *VARY, "--iterations", 0), "--iterations: must be a whole number, 1 or greater"),
         (("--minimize", "peak(angle)", "--vary", "a=2:1"), "--vary a: bounds"),
         (("--minimize", "peak(angle)", "--vary", "r=1s:2s"), "--vary r: no mechanism can have this bound"),
         (("--minimize", "peak(angle)", *VARY, "--subject-to", "span(angle) <= 1 mm"), "--subject-to: span(angle)"),

@@ -89,6 +89,16 @@ def test_a_crank_through_points_has_their_mean_radius():
     assert found.objective == pytest.approx(radii.std(), abs=1e-9)
 
 
+def test_what_is_on_a_bound_is_the_bound_to_the_bit():
+    """0.1 + (0.3 - 0.1) is not 0.3, nor is what a search leaves a rounding short of its bound."""
+    bounds = {"a": (0.1, 0.3), "b": (-0.7, 0.1), "c": (0.1, 0.7)}
+    assert any(low + (high - low) != high for low, high in bounds.values())
+    problem = Problem(Goals(CRANK, "mean(angle)", [], tuple(bounds), {}, TIME), bounds)
+    for rounding in (0.0, 1e-15):
+        at_ends = [problem.values(np.full(3, place)) for place in (rounding, 1.0 - rounding)]
+        assert [tuple(end[name] for end in at_ends) for name in bounds] == list(bounds.values())
+
+
 @pytest.mark.slow
 def test_slopes_are_those_of_differences():
     """Of every measure, of forces too, at a design that is nothing special."""

@@ -1,5 +1,7 @@
 """Staying on the branch: near misses, dead points, change points, laws that jump, outputs without a value."""
 
+import dataclasses
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -181,3 +183,34 @@ def test_nearly_singular_factor_is_singular():
     ratio = DenseFactor.of(jnp.asarray(matrix)).pivot_ratio()
     yes = jnp.ones(1, bool)
     assert int(_status(jnp.zeros(1), yes, ratio, yes, yes, yes, 1e-12)[0]) == Status.SINGULAR
+
+
+EXCURSIONS = [
+    jn.SegmentedMotion(
+        [jn.Segment("dwell", 0.5), jn.Segment("cycloidal", 0.5, by=6.0), jn.Segment("cycloidal", 0.5, by=-6.0)], 0.52
+    ),
+    pytest.param(jn.Expression("0.52 + 6*exp(-(t - 1)**2/0.01)"), marks=pytest.mark.slow),
+    pytest.param(jn.Expression("0.52 + 6*t**6*(2 - t)**6"), marks=pytest.mark.slow),
+]
+
+
+def excursion(law):
+    """A four-bar at the same position at both instants, which is elsewhere between them."""
+    crank_rocker = jn.load("examples/four_bar.yaml")
+    driver = dataclasses.replace(crank_rocker.drivers["theta"], motion=law)
+    return dataclasses.replace(crank_rocker, drivers={"theta": driver}, time=[0.0, 2.0])
+
+
+@pytest.mark.parametrize("law", EXCURSIONS)
+def test_a_motion_that_begins_at_rest_and_comes_back_is_not_stepped_over(law):
+    """Between two instants of the same position lies one that cannot be reached; the series of the law is zero."""
+    mechanism = excursion(law)
+    assert list(jn.solve(mechanism).status) == [Status.OK] * 2
+    locking = mechanism.with_parameters(AB=0.12)  # no crank: it cannot pass the frame
+    assert list(jn.solve(locking, strict=False).status) == [Status.OK, Status.SINGULAR]
+
+
+@pytest.mark.slow
+def test_designs_that_lock_between_two_instants_at_rest_are_told():
+    designs = jn.solve_batch(excursion(EXCURSIONS[0]), {"AB": [0.04, 0.12]})
+    assert designs["status"].values.tolist() == [[Status.OK] * 2, [Status.OK, Status.SINGULAR]]

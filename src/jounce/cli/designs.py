@@ -19,7 +19,7 @@ from jounce.cli.options import (
 from jounce.errors import DesignError, JounceError
 from jounce.reporting.terminal import Bar, say, show_table
 
-OPTIONS = ("minimise", "subject_to", "vary", "curves", "starts", "samples", "assemblies")
+OPTIONS = tuple("minimise subject_to vary curves starts samples assemblies seed clearance iterations".split())
 SPELT = {"minimise": "minimize", "subject_to": "subject-to", "curves": "curve"}
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from jounce.cli.arguments import check_ending
-from jounce.cli.file_kinds import expecting
+from jounce.cli.file_kinds import expecting, kind_of
 from jounce.cli.options import PLAIN_MECHANISM, MechanismReading, allowed, errors_about
 from jounce.errors import JounceError
 from jounce.interrupts import raising
@@ -35,7 +35,7 @@ def view(
     Parameters
     ----------
     file
-        Mechanism file, or robot file: .urdf, .xml or .sdf.
+        Mechanism or cam file, or robot file: .urdf, .xml or .sdf.
     trajectory
         Of a robot (.csv, .yaml, .toml, .json); it swings without.
     port
@@ -68,13 +68,13 @@ def view(
     with errors_about(file):
         checked_order(order)
         if file.suffix.lower() in DATA_FILES:
-            subject = reading.mechanism(file)
+            subject = _cam(file, reading) if kind_of(file) == "cam" else reading.mechanism(file)
         elif reading.units:
             raise JounceError("is for mechanism files; what is shown of a robot is in SI", name="--units")
         elif reading.set_ or reading.import_:
             option = "--set" if reading.set_ else "--import"
             raise JounceError("is for mechanism files; a robot has no parameters", name=option)
-        with expecting(file, "mechanism", "robot"):
+        with expecting(file, "mechanism", "robot", "cam"):
             check_ending(file, (*DATA_FILES, *ROBOT_FILES))
             folders = allowed(reading.allow)
             for name, given in (("--without", without), ("--hold", hold)):
@@ -87,3 +87,12 @@ def view(
     with raising():
         page.wait()
     return 0
+
+
+def _cam(file: Path, reading: MechanismReading) -> object:
+    """Return the plate cam of a file."""
+    from jounce.io import load_cam
+
+    if reading.import_ or reading.units:
+        raise JounceError("is for mechanism files", name="--import" if reading.import_ else "--units")
+    return load_cam(file, allow=allowed(reading.allow), set_=reading.set_ or ())

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import numbers
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -14,6 +15,7 @@ from jounce.design.study import Asked, Study
 from jounce.errors import DesignError, JounceError, MechanismError, check_name, whole_number
 from jounce.kinematics import assemblies as all_assemblies
 from jounce.mechanism import Mechanism, build, check_mechanism, time_grid
+from jounce.mechanism.held_outputs import refuse_led_outputs
 from jounce.mechanism.preconditions import concrete
 from jounce.shapes import ArrayLike
 
@@ -106,8 +108,13 @@ def optimise(
     ('optimal', 0.15)
     """
     check_mechanism(mechanism)
+    refuse_led_outputs(mechanism, "designs are not optimised")
     bounds = _bounds(mechanism, vary)
     starts = whole_number("starts", starts, 1, error=MechanismError)
+    seed = whole_number("seed", seed, 0, error=MechanismError)
+    iterations = whole_number("iterations", iterations, 1, error=MechanismError)
+    if not (isinstance(clearance, numbers.Real) and 0 <= clearance < math.inf):
+        raise MechanismError("must be a number, zero or greater", name="clearance", value=clearance)
     instants = _instants(mechanism, time, bounds)
     targets = {name: _curve(name, given) for name, given in (curves or {}).items()}
     if isinstance(subject_to, str):

@@ -19,6 +19,7 @@ from jounce.mechanism import Mechanism
 from jounce.mechanism.modules import with_fields
 from jounce.mechanism.system import System
 
+ON_BOUND = 1e-12  # of the way between bounds: what is so near to one is on it
 LOCKS = (AssemblyError, MobilityError, SolveError)
 
 
@@ -68,7 +69,7 @@ class Problem:
     Attributes
     ----------
     names : tuple of str
-    low, width : array of shape (parameters,)
+    low, high, width : array of shape (parameters,)
     owner : array of int of shape (rows,)
         Of which extreme each row is; of the last evaluation.
     evaluations : int
@@ -77,8 +78,8 @@ class Problem:
 
     def __init__(self, goals: Goals, bounds: Mapping[str, tuple[float, float]]):
         self.goals, self.names = goals, tuple(bounds)
-        self.low = np.array([low for low, _ in bounds.values()])
-        self.width = np.array([high - low for low, high in bounds.values()])
+        self.low, self.high = (np.array([pair[k] for pair in bounds.values()]) for k in (0, 1))
+        self.width = self.high - self.low
         self.evaluations = 0
         self.owner = np.zeros(0, int)
         self._kept: dict[bytes, Evaluation] = {}
@@ -99,7 +100,8 @@ class Problem:
 
     def values(self, place: Float[np.ndarray, " parameter"]) -> dict[str, float]:
         """Return the parameters at a place, SI; those on a bound to the bit."""
-        found = np.where(place >= 1.0, self.low + self.width, self.low + self.width * place)
+        found = np.where(place >= 1.0 - ON_BOUND, self.high, self.low + self.width * place)
+        found = np.where(place <= ON_BOUND, self.low, found)
         return dict(zip(self.names, found.tolist(), strict=True))
 
     def place(self, values: Mapping[str, float]) -> Float[np.ndarray, " parameter"]:

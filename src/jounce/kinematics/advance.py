@@ -16,11 +16,18 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from jounce.jet import Jet
-from jounce.jet.algebra import stacked, total
+from jounce.jet.algebra import stacked
 from jounce.jet.turns import brought_near
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.factors import Factor, blank_factor, factored
 from jounce.kinematics.least_squares import LeastSquaresFactor
+from jounce.kinematics.predictions import (
+    SMALLEST_DEPARTURE,
+    hidden_by_laws,
+    laws_predictable,
+    near_prediction,
+    travel_of,
+)
 from jounce.kinematics.status import Status
 from jounce.kinematics.turnover import turnover_of
 from jounce.mechanism.system import System
@@ -36,8 +43,6 @@ MAX_ITERATIONS = 30
 CONVERGED = 1e-9  # a last correction above this is no convergence, however small the tolerance
 SAFE_FRACTION = 0.4  # of the time in which some Taylor term would move a body by a radian, or by the mechanism's size
 LARGEST_CONTRACTION = 0.25  # of the first simplified Newton corrections: Deuflhard 2011, section 5.1
-LARGEST_DEPARTURE = 0.05  # from a prediction, rad or sizes of the mechanism: beyond, a motion law jumps
-SMALLEST_DEPARTURE = 1e-6  # below this no prediction is called wrong
 SINGULAR_PIVOT = 1e-12  # of the largest; corrections tell before that they no longer converge
 LARGEST_GAP = 1e-9  # of redundant rows that agree, rad or sizes of the mechanism, or this many tolerances:
 GAP_TOLERANCES = 1e3
@@ -193,26 +198,6 @@ def _outputs(system: System, pose: Pose, angles: Sequence[Numbers], step: Lanes)
     return tuple(results)
 
 
-def _predictable(departure: Float[Numbers, "*batch"], travel: Float[Numbers, "*batch"]) -> Bool[Numbers, "*batch"]:
-    """Tell whether a departure from a prediction is small enough, for how far the prediction moves."""
-    return departure <= jnp.minimum(LARGEST_DEPARTURE, jnp.maximum(0.2 * travel, SMALLEST_DEPARTURE))
-
-
-def _travel(terms: Sequence[Numbers], step: Numbers) -> Any:
-    return total(term * jnp.abs(step) ** k for k, term in enumerate(terms, 1))
-
-
-def _laws_predictable(system: System, instant: Lanes, step: Lanes, order: int) -> Bool[Numbers, " batch"]:
-    """Tell whether the laws that may skip whole turns unseen keep to their own Taylor series over the step."""
-    start, end = Jet.variable((instant - step)[None], order), Jet([instant[None]])
-    result = np.ones(step.shape, bool)
-    for before, after in zip(system.laws(start), system.laws(end), strict=True):
-        away = jnp.abs(after.coefficients[0] - before.evaluate(step[None]))
-        travel = _travel([jnp.abs(c) for c in before.dense().coefficients[1:]], step[None])
-        result &= jnp.all(_predictable(away, travel), axis=0)
-    return result
-
-
 def _finite(jets: Sequence[Numbers], wanted: Int[Numbers, ""]) -> Bool[Numbers, "instance batch"]:
     """Tell where the coefficients of jets are finite up to the order wanted, for each instance: (instances, batch)."""
     found = []
@@ -330,7 +315,9 @@ def advance(
     turnover = jax.lax.cond(
         survey, lambda: turnover_of(system, pose_type, reached, factor, instant), lambda: np.zeros(1)
     )
-    return arrival._replace(turnover=turnover)
+    first = hidden_by_laws(system, arrival.status[:1], instant[:1], step[:1], order)
+    status = jnp.concatenate([jnp.where(survey, first, arrival.status[:1]), arrival.status[1:]])
+    return arrival._replace(turnover=turnover, status=status)
 
 
 def solved_batch(
@@ -360,11 +347,11 @@ def solved_batch(
     coordinates = {name: stacked(jet) for name, jet in reached.items()}
     departures = _departures(system, pose, predicted)
     departure = jnp.max(departures, axis=0)
-    travel = _travel(_terms(system, moving, pose_type.predictor), step)
+    travel = travel_of(_terms(system, moving, pose_type.predictor), step)
     found = _signs(
         system, factor, lambda: (pose_type.predicted_from(moving, 0.0 * step), Jet([(instant - step)[None]])), sign
     )
-    predictable = _predictable(departure, travel) & _laws_predictable(system, instant, step, order)
+    predictable = near_prediction(departure, travel) & laws_predictable(system, instant, step, order)
     predictable &= correction.contracts() & ((sign == 0) | (found == sign))
     admissible, pivot_ratio = system.admissible(time), factor.pivot_ratio()
     finite = _finite_results([coordinates[name] for name in pose_type.predictor], outputs, wanted)

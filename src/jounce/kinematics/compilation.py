@@ -131,8 +131,9 @@ class Compiled:
     def __call__(self, *arguments: Any, **keywords: Any) -> Any:
         """Call the compiled function."""
         check_process()
-        if any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves((arguments, keywords))):
-            return self._within(*arguments, **keywords)
+        if traced := [leaf for leaf in jax.tree.leaves((arguments, keywords)) if isinstance(leaf, Tracer)]:
+            whole = self.jitted if all(map(_runs_at_once, traced)) else self._within
+            return whole(*arguments, **keywords)
         if _store is None:
             return self.jitted(*arguments, **keywords)
         keywords |= zip(self._names[self._traced :], arguments[self._traced :], strict=False)
@@ -200,6 +201,19 @@ def _kind(leaf: Any) -> tuple[Any, ...] | None:
     if isinstance(leaf, jax.Array) and not isinstance(leaf, Tracer) and leaf.sharding == _home():
         return leaf.shape, str(leaf.dtype), leaf.weak_type
     return None
+
+
+def _runs_at_once(leaf: Tracer) -> bool:
+    """Tell whether what JAX does with a value that it traces runs at once, as under `jax.jvp` outside of `jax.jit`.
+
+    Then a program is a whole one, which takes options. What is not known, and what is run later, is part of another.
+    """
+    trace: Any = getattr(leaf, "_trace", None)
+    kinds = []
+    while trace is not None:
+        kinds.append(type(trace).__name__)
+        trace = getattr(trace, "parent_trace", None)
+    return kinds[-1:] == ["EvalTrace"] and {"JVPTrace", "BatchTrace"}.issuperset(kinds[:-1])
 
 
 @lru_cache(maxsize=1)

@@ -15,6 +15,7 @@ from jounce.kinematics.compilation import compiled
 from jounce.kinematics.designs import Coordinates, Designs
 from jounce.kinematics.legs import GROWTH, LARGEST_TURNOVER, PASSAGE, SLIVER
 from jounce.kinematics.path_following import SMALLEST_STEP, Solver
+from jounce.kinematics.predictions import hidden_by_laws
 from jounce.kinematics.status import Status
 from jounce.kinematics.threads import Threads
 from jounce.kinematics.turnover import turnovers_of
@@ -57,7 +58,8 @@ def advance_designs(
     arrival, factor, reached = solved_batch(
         system, coordinates, angles, sign, step, instant, *settings, pose_type=pose_type, order=order
     )
-    return arrival._replace(turnover=turnovers_of(system, pose_type, reached, factor, instant))
+    status = hidden_by_laws(system, arrival.status, instant, step, order)
+    return arrival._replace(turnover=turnovers_of(system, pose_type, reached, factor, instant), status=status)
 
 
 @compiled("pose_type", "order")

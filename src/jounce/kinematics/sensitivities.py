@@ -23,6 +23,7 @@ from jaxtyping import Float
 from jounce.errors import AssemblyError, MechanismError, MobilityError, SolveError
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked
+from jounce.kinematics.compilation import compiled
 from jounce.kinematics.jacobian_series import jacobian_series, solved_series
 from jounce.kinematics.motion import Motion
 from jounce.kinematics.status import Status
@@ -295,13 +296,12 @@ def _moved(
     return _change_along(system, slope, coordinates, instants, pose_type=pose_type, which=which)
 
 
-@partial(jax.jit, static_argnames=("pose_type", "which"))
+@compiled("pose_type", "which")
 def _change_along(
     system: System,
     slope: Sequence[Numbers],
     coordinates: dict[str, Numbers],
     instants: Float[Numbers, " batch"],
-    *,
     pose_type: type[Pose],
     which: tuple[int, ...],
 ) -> dict[str, Any]:

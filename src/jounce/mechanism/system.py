@@ -19,6 +19,7 @@ from jounce.rigid import SpatialPose
 from jounce.rigid.body_arrays import each_jet
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
+from jounce.trajectory import AbstractMotion
 
 POSITION_COMPONENTS = {"planar": 2, "spatial": 3}
 
@@ -93,6 +94,8 @@ class Group(eqx.Module):
         """Return the velocities that forces work on, and the forces."""
         poses = self._poses(pose)
         displacement, velocity = self.element.displacement(*poses, time), self.element.velocity(*poses, time)
+        # or XLA computes both again in all that a law makes of them
+        displacement, velocity = jax.lax.optimization_barrier((displacement, velocity))
         return with_rows(velocity), with_rows(self.element.force(displacement, velocity, time))
 
     def derivative_blocks(self, pose: Pose, time: Jet, scale: Float[Numbers, " coordinate"]) -> list[Any]:
@@ -201,9 +204,12 @@ class System(eqx.Module):
         parts = [jnp.broadcast_to(g.element.admissible(time), (g.instances, lanes)) for g in drivers]
         return jnp.concatenate([*parts, jnp.ones((0, lanes), bool)])
 
-    def laws(self, time: Jet) -> list[Jet]:
-        """Return the jets of the motion laws, in rad, whose drivers forget whole turns."""
-        return [group.element.motion(time) for group in self.groups if group.element.periodic]
+    def laws(self, time: Jet, *, periodic: bool = False) -> list[Jet]:
+        """Return the jets of the motion laws; `periodic` for those, in rad, whose drivers forget whole turns, alone."""
+        drivers = (group.element for group in self.groups if group.element.periodic or not periodic)
+        return [
+            driver.motion(time) for driver in drivers if isinstance(getattr(driver, "motion", None), AbstractMotion)
+        ]
 
     def applied_forces(self, pose: Pose, time: Jet) -> Float[Jet, "coordinate body batch"]:
         """Return what the applied forces do to all bodies, shape (coordinates, bodies, batch), the ground first.
@@ -216,7 +222,7 @@ class System(eqx.Module):
         shape = (count, *pose.position.shape[1:])
         if not self.forces:
             return Jet.constant(jnp.zeros(shape), order)
-        sizes = [stacked(group.force(pose, time)) for group in self.forces]
+        sizes = jax.lax.optimization_barrier([stacked(group.force(pose, time)) for group in self.forces])
         still, now = movable(pose.truncate(order)), time.truncate(order)
 
         def along(velocity: Any) -> list[Any]:

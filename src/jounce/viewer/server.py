@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from jounce.errors import JounceError
+from jounce.kinematics import PlateCam
 from jounce.mechanism import Mechanism
 from jounce.robot import Robot
 from jounce.viewer.local_server import AccessControl, check_installed, check_port, quiet_server, quiet_stop
@@ -124,7 +125,7 @@ def view(
 
     Parameters
     ----------
-    subject : Mechanism, Robot, or path of a file
+    subject : Mechanism, Robot, PlateCam, or path of a file of a mechanism or a robot
         A mechanism (.yaml, .yml, .toml or .json) with a time grid: it is solved, or simulated if it has initial
         conditions. A robot (.urdf, .sdf, or .xml for MJCF): its shapes are shown where the file has some.
     trajectory : JointTrajectory, or path of a file, optional
@@ -202,6 +203,12 @@ def subject_of(
     if isinstance(given, str | PathLike):
         path = Path(fspath(given))
         given = (load if path.suffix.lower() in MECHANISM_FILES else load_robot)(path, allow=allow)
+    if isinstance(given, PlateCam):
+        from jounce.viewer.cams import CamSubject
+
+        if trajectory is not None or modes.wanted:
+            raise JounceError("a cam turns, and has neither modes nor a trajectory", path=path, name="cam")
+        return CamSubject(given)
     if isinstance(given, Robot):
         if modes.wanted:
             if trajectory is not None:
@@ -210,7 +217,7 @@ def subject_of(
             return modes_subject(given, modes, path, allow)
         return robot_subject(given, trajectory, path, allow)
     if not isinstance(given, Mechanism):
-        message = "must be a mechanism, a robot or the path of a file of one"
+        message = "must be a mechanism, a robot, a cam, or the path of a file of a mechanism or a robot"
         raise JounceError(message, name="subject", value=type(given).__name__)
     if trajectory is not None:
         message = "a mechanism moves by its own drivers; a trajectory is for robots"

@@ -1,0 +1,66 @@
+"""How far motions and laws may be from their Taylor predictions, and what a law hides between two instants."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Bool, Float
+
+from jounce.jet import Jet
+from jounce.jet.algebra import total
+from jounce.kinematics.status import Status
+from jounce.mechanism.system import System
+from jounce.shapes import Numbers
+
+Lanes = Float[Numbers, " batch"]
+
+LARGEST_DEPARTURE = 0.05  # from a prediction, rad or sizes of the mechanism: beyond, a motion law jumps
+SMALLEST_DEPARTURE = 1e-6  # below this no prediction is called wrong
+PROBES = 32  # instants within a step at which laws are looked at,
+FINEST = 1e-9  # unless it is as short as this part of the time
+
+
+def near_prediction(departure: Float[Numbers, "*batch"], travel: Float[Numbers, "*batch"]) -> Bool[Numbers, "*batch"]:
+    """Tell whether a departure from a prediction is small enough, for how far the prediction moves."""
+    return departure <= jnp.minimum(LARGEST_DEPARTURE, jnp.maximum(0.2 * travel, SMALLEST_DEPARTURE))
+
+
+def travel_of(terms: Sequence[Numbers], step: Numbers) -> Any:
+    """Return how far Taylor terms, from the first on, move something over a step at most."""
+    return total(term * jnp.abs(step) ** k for k, term in enumerate(terms, 1))
+
+
+def laws_predictable(system: System, instant: Lanes, step: Lanes, order: int) -> Bool[Numbers, " batch"]:
+    """Tell whether the laws that may skip whole turns unseen keep to their own Taylor series over the step."""
+    start, end = Jet.variable((instant - step)[None], order), Jet([instant[None]])
+    result = np.ones(step.shape, bool)
+    for before, after in zip(system.laws(start, periodic=True), system.laws(end, periodic=True), strict=True):
+        away = jnp.abs(after.coefficients[0] - before.evaluate(step[None]))
+        travel = travel_of([jnp.abs(c) for c in before.dense().coefficients[1:]], step[None])
+        result &= jnp.all(near_prediction(away, travel), axis=0)
+    return result
+
+
+def hidden_by_laws(system: System, status: Numbers, instant: Lanes, step: Lanes, order: int) -> Numbers:
+    """Return the status of instants, BRANCH_JUMP where a law leaves its Taylor series somewhere on the way there.
+
+    A motion that begins with a dwell, or as smoothly as ``t**6``, has a series of zeros: where it comes back to where
+    it began, what lies between would be stepped over.
+    """
+    start, shares = instant - step, (np.arange(PROBES) + 0.5) / PROBES
+    near = np.ones(step.shape, bool)
+    size = SMALLEST_DEPARTURE * jnp.minimum(system.column_scale[0], 1.0)
+    ahead = shares[:, None, None] * step[None, None]
+
+    def values(share: Any) -> list[Any]:
+        return [law.coefficients[0] for law in system.laws(Jet([(start + share * step)[None]]))]
+
+    for before, value in zip(system.laws(Jet.variable(start[None], order)), jax.vmap(values)(shares), strict=True):
+        terms = [jnp.where(jnp.isfinite(c), c, 0.0)[None] for c in before.dense().coefficients]
+        away = jnp.abs(value - Jet(tuple(terms)).evaluate(ahead))
+        allowed = jnp.maximum(0.2 * travel_of([jnp.abs(c) for c in terms[1:]], ahead), size)
+        near &= jnp.all(away <= allowed, axis=(0, 1))
+    hidden = ~near & (step > FINEST * jnp.abs(instant))  # instants nearer to each other are told apart by rounding only
+    return jnp.where((status == int(Status.OK)) & hidden, int(Status.BRANCH_JUMP), status)
