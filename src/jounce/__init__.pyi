@@ -143,12 +143,16 @@ from jounce.planning import (
     Drive as Drive,
     Feedforward as Feedforward,
     JointPoses as JointPoses,
+    MotionLimits as MotionLimits,
     MotorMotion as MotorMotion,
+    PointLimits as PointLimits,
+    RetimedTrajectory as RetimedTrajectory,
     ToolPath as ToolPath,
     ToolPathMotion as ToolPathMotion,
     feedforward as feedforward,
     follow_tool_path as follow_tool_path,
     inverse_kinematics as inverse_kinematics,
+    retime as retime,
     simulate_elastic as simulate_elastic,
 )
 from jounce.robot import (

@@ -31,6 +31,7 @@ from jounce.cli.inspection import inspect
 from jounce.cli.mechanisms import run, schema, simulate
 from jounce.cli.options import WritingError
 from jounce.cli.papers import reproduce
+from jounce.cli.retiming import retime
 from jounce.cli.robots import check, torques
 from jounce.cli.servo import servo
 from jounce.cli.shell_completion import complete
@@ -67,7 +68,7 @@ def completion(shell: Literal["bash", "zsh", "fish"], /, *, install: bool = Fals
 
 COMMANDS = (
     new, inspect, run, trace, simulate, optimize, sweep, tolerance, modes, plot, report, view, servo, cam, check,
-    torques, feedforward, export, convert, reproduce, schema, completion,
+    torques, retime, feedforward, export, convert, reproduce, schema, completion,
 )  # fmt: skip
 LIGHT = (new, completion)  # they compute nothing
 FIRST = """\

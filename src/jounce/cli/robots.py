@@ -61,8 +61,9 @@ def check(
       jounce check examples/robots/panda.urdf \
         examples/trajectories/panda_wave.yaml --payload "panda_hand=3 kg"
     """
-    from jounce.dynamics.limits import check_limits
-    from jounce.io import load_limits
+    from jounce.io import load_motion_limits
+    from jounce.planning.retiming.limits import limits_of
+    from jounce.planning.retiming.motion_limits_check import check_motion
     from jounce.reporting.json_results import limits_result
     from jounce.reporting.summaries import limits_summary, verdict
     from jounce.reporting.tables import limits_table
@@ -71,16 +72,17 @@ def check(
         from jounce.plot import check_figure
 
         check_figure(out, overwrite=overwrite)
-    model, bounds = reading.robot(robot), None
+    model = reading.robot(robot)
+    bounds = limits_of(model, None)
     if limits is not None:
         with expecting(limits, "limits"):
-            bounds = load_limits(limits, model)
+            bounds = load_motion_limits(limits, model)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", SampleWarning)
         motion = reading.trajectory(trajectory)
         with errors_about(trajectory, robot):
             spare_inputs(out, overwrite=overwrite)
-            report = check_limits(model, motion, bounds)
+            report = check_motion(model, motion, bounds)
     if report.worst is None:
         raise JounceError("there are no limits to compare with; give a file of limits with --limits", path=robot)
     if not json:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from jounce.io.files.column_units import in_units as in_units
     from jounce.io.mechanisms.cam_files import load_cam as load_cam
+    from jounce.io.mechanisms.drive_limits import load_drive_limits as load_drive_limits
     from jounce.io.mechanisms.json_schema import json_schema as json_schema
     from jounce.io.mechanisms.loader import load as load
     from jounce.io.mechanisms.writer import write_mechanism as write_mechanism
@@ -18,8 +19,9 @@ if TYPE_CHECKING:
     )
     from jounce.io.robots.controller_files import export_trajectory as export_trajectory
     from jounce.io.robots.drives import load_drives as load_drives
-    from jounce.io.robots.limits import load_limits as load_limits
+    from jounce.io.robots.limits import load_limits as load_limits, load_motion_limits as load_motion_limits
     from jounce.io.robots.loader import load_robot as load_robot
+    from jounce.io.robots.paths import load_path as load_path
     from jounce.io.robots.trajectories import load_trajectory as load_trajectory
 
 _HOMES = {
@@ -32,7 +34,10 @@ _HOMES = {
     "write": "results",
     "load_drives": "robots.drives",
     "export_trajectory": "robots.controller_files",
+    "load_drive_limits": "mechanisms.drive_limits",
     "load_limits": "robots.limits",
+    "load_motion_limits": "robots.limits",
+    "load_path": "robots.paths",
     "load_robot": "robots.loader",
     "load_trajectory": "robots.trajectories",
     "write_mechanism": "mechanisms.writer",

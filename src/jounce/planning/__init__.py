@@ -11,6 +11,9 @@ from jounce.planning.elastic.motor_motion import (
 from jounce.planning.elastic.robot import elastic_robot as elastic_robot
 from jounce.planning.elastic.simulation import simulate_elastic as simulate_elastic
 from jounce.planning.elastic.spring_deflection import SpringDeflection as SpringDeflection
+from jounce.planning.retiming.limits import MotionLimits as MotionLimits, PointLimits as PointLimits
+from jounce.planning.retiming.retime import retime as retime
+from jounce.planning.retiming.retimed import RetimedTrajectory as RetimedTrajectory
 from jounce.planning.tool_paths.follow_tool_path import follow_tool_path as follow_tool_path
 from jounce.planning.tool_paths.inverse_kinematics import inverse_kinematics as inverse_kinematics
 from jounce.planning.tool_paths.joint_poses import JointPoses as JointPoses

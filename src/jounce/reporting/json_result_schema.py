@@ -191,6 +191,33 @@ class FeedforwardResult(Result):
     written: str | None
 
 
+class BindingLimit(TypedDict):
+    """A limit that binds somewhere, for how long, and what it costs."""
+
+    limit: str
+    unit: str
+    seconds: float
+    price: float
+
+
+class RetimeResult(Result):
+    """jounce retime --json; the trajectory is the file of the path, null for a mechanism."""
+
+    command: Literal["retime"]
+    robot: str
+    file: str
+    trajectory: str | None
+    time: Grid
+    written: str | None
+    duration: float
+    before: float | None
+    deviation: float
+    kept: bool
+    limits: list[LimitRow]
+    binding: list[BindingLimit]
+    figure: str | None
+
+
 class SweptPeak(TypedDict):
     """The least and the largest peak that a derivative of an output has among designs, and the designs."""
 
@@ -321,6 +348,7 @@ RESULTS: dict[str, Any] = {
     "check": CheckResult,
     "torques": TorquesResult,
     "feedforward": FeedforwardResult,
+    "retime": RetimeResult,
     "servo": ServoResult,
     "cam": CamResult,
     "modes": ModesResult,

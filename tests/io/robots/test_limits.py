@@ -3,10 +3,11 @@
 import math
 import pathlib
 
+import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.io.robots.limits import load_limits
+from jounce.io.robots.limits import load_limits, load_motion_limits
 from jounce.io.robots.loader import load_robot
 from jounce.io.robots.payloads import with_payloads
 
@@ -108,8 +109,8 @@ def test_toml_and_json_are_read_too(read):
         ("joints: {plate: {jerk: 1}}", "line 1, joints.plate: this joint is fixed and has no limits; leave it out"),
         ("joints:\n  pin:\n    speed: 1", "line 3, joints.pin.speed: unknown key; valid: acceleration, deceleration,"),
         ("joints:\n  pin:\n    velocty: 1", "line 3, joints.pin.velocty: unknown key; did you mean 'velocity'?"),
-        ("max_velocity: 1", "line 1, max_velocity: unknown key; valid: default, joints, title"),
-        ("title: none", "line 1: a limits file has the key 'joints', 'default', or both, got ['title']"),
+        ("max_velocity: 1", "line 1, max_velocity: unknown key; valid: default, joints, points, title"),
+        ("title: none", "line 1: a limits file has the keys 'joints', 'default' or 'points', got ['title']"),
         ("joints: {pin: 3}", "line 1, joints.pin: must be a mapping with at least one entry, got 3"),
         ("joints:", "line 1, joints: must be a mapping with at least one entry, got nothing"),
         ("- 1", "line 1: must be a mapping with at least one entry, got [1]"),
@@ -171,3 +172,25 @@ def test_what_a_payload_cannot_be(robot, text, message):
     with pytest.raises(jn.RobotError) as raised:
         with_payloads(robot, [text])
     assert message in str(raised.value)
+
+
+def test_limits_of_all_kinds_are_read_for_retiming(tmp_path):
+    robot = load_robot("examples/robots/panda.urdf")
+    found = load_motion_limits("examples/limits/panda_careful.yaml", robot)
+    assert found.jounce["panda_joint3"] == 1e5
+    assert "panda_finger_joint1" not in found.jounce  # it slides, and the default turns
+    np.testing.assert_allclose(found.varying["panda_joint1"]["velocity"](np.array([-3.0, 0.0, 2.55])), [0.3, 2.0, 1.15])
+    np.testing.assert_allclose(found.varying["panda_joint2"]["velocity"](np.array([0.0, 1.0])), [2.0, 1.5])
+    assert found.points[0].acceleration == 6.0
+    with pytest.raises(jn.errors.RobotError, match="load_motion_limits"):
+        load_limits("examples/limits/panda_careful.yaml", robot)
+    bad = tmp_path / "bad.yaml"
+    for text, message in (
+        ("points: {hand: {speed: 1 m/s}}", "line 1, points.hand"),
+        ("points: {panda_hand: {speed: 1 rad/s}}", "it is in m/s"),
+        ("joints: {panda_joint1: {velocity: {q: [1, 0], value: [1, 2]}}}", "increase"),
+        ("joints: {panda_joint1: {velocity: 2 - x*q}}", "unknown name 'x'"),
+    ):
+        bad.write_text(text)
+        with pytest.raises(jn.errors.RobotError, match=message):
+            load_motion_limits(bad, robot)

@@ -80,22 +80,11 @@ def read_columns(
         increase, or an entry is not a finite number.
     """
     table = _Table(str(path), error_type)
-    header, line = table.header, table.header_line
-    if line is None:
-        message = "the first row holds the names of the columns: time, then the joints"
-        raise table.error(message, line=table.rows[0][0], value=", ".join(table.rows[0][1]))
-    for k, name in enumerate(header):
-        if not name:
-            raise table.error(f"column {k + 1} has no name", line=line)
-        if name in header[:k]:
-            raise table.error("two columns have this name", line=line, value=name)
+    line = _check_named(table)
+    header = table.header
     time = table.find("time")
     if len(header) < 2:
         raise table.error("there is no column besides 'time'; give one for each joint", line=line)
-    for row_line, row in table.rows:
-        if len(row) != len(header):
-            message = f"each row has one value for each of the {len(header)} columns; this one has another number"
-            raise table.error(message, line=row_line, value=len(row))
     found = {}
     for k, name in enumerate(header):
         rate = _RATE.search(name)
@@ -135,6 +124,45 @@ def read_chosen(
         message = f"times must increase; this one does not come after that of line {table.rows[k][0]}"
         raise table.error(message, line=table.rows[k + 1][0], name=time, value=float(times[k + 1]))
     return times, np.stack([table.column(table.find(name)) for name in wanted], axis=1)
+
+
+def read_table(
+    path: str | Path, error_type: type[JounceError] = MechanismFileError
+) -> dict[str, Float[np.ndarray, " row"]]:
+    """Read the named columns of a CSV file that knows of no time: angles and lengths, in SI units or the one named.
+
+    Raises
+    ------
+    JounceError
+        Of the type given: the file cannot be read, names are missing or repeat, or an entry is not a finite number.
+    """
+    table = _Table(str(path), error_type)
+    _check_named(table)
+    return {name: np.array(table.column(k, rates(("angle", "length"), 0))) for k, name in enumerate(table.header)}
+
+
+def has_column(path: str | Path, name: str, error_type: type[JounceError] = MechanismFileError) -> bool:
+    """Tell whether a CSV file names a column, or does not name its columns at all."""
+    table = _Table(str(path), error_type)
+    return table.header_line is None or name in table.header
+
+
+def _check_named(table: _Table) -> int:
+    """Check that columns have names and rows an entry for each; return the line of the names."""
+    header, line = table.header, table.header_line
+    if line is None:
+        message = "the first row holds the names of the columns: time, then the joints"
+        raise table.error(message, line=table.rows[0][0], value=", ".join(table.rows[0][1]))
+    for k, name in enumerate(header):
+        if not name:
+            raise table.error(f"column {k + 1} has no name", line=line)
+        if name in header[:k]:
+            raise table.error("two columns have this name", line=line, value=name)
+    for row_line, row in table.rows:
+        if len(row) != len(header):
+            message = f"each row has one value for each of the {len(header)} columns; this one has another number"
+            raise table.error(message, line=row_line, value=len(row))
+    return line
 
 
 def rates(bases: Iterable[str], order: int) -> tuple[Dimension, ...]:

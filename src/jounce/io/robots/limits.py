@@ -4,24 +4,31 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 from collections.abc import Mapping
 from os import PathLike
 from typing import Any
 
-from jounce.errors import RobotError, did_you_mean
+import numpy as np
+
+from jounce.errors import RobotError, did_you_mean, no_such
 from jounce.io.files.located_data import Location, Source
 from jounce.io.files.source import read_source
+from jounce.jet import Jet
+from jounce.planning.retiming.limits import VARYING, MotionLimits, PointLimits, PositionLaw
 from jounce.robot.model import Joint, Limits
 from jounce.robot.robot import Robot
+from jounce.trajectory import Expression
 from jounce.trajectory.dimensions import Dimension, describe_dimension
 
-KEYS = tuple(field.name for field in dataclasses.fields(Limits))
+FIELDS = tuple(field.name for field in dataclasses.fields(Limits))
+KEYS = (*FIELDS, "jounce")
 RANGE = ("lower", "upper")
-POWERS = dict(zip(KEYS, (0, 0, 1, 2, 3, 2, 3, 2), strict=True))
+POWERS = dict(zip(KEYS, (0, 0, 1, 2, 3, 2, 3, 2, 4), strict=True))
 """Powers of 1/s in the units of each key."""
 EXAMPLES = {
-    True: ("rad", "rad", "rad/s", "rad/s^2", "rad/s^3", "N*m", "N*m/s", "rad/s^2"),
-    False: ("m", "m", "m/s", "m/s^2", "m/s^3", "N", "N/s", "m/s^2"),
+    True: ("rad", "rad", "rad/s", "rad/s^2", "rad/s^3", "N*m", "N*m/s", "rad/s^2", "rad/s^4"),
+    False: ("m", "m", "m/s", "m/s^2", "m/s^3", "N", "N/s", "m/s^2", "m/s^4"),
 }
 """Units of the keys for a joint that turns, and for one that slides."""
 
@@ -61,7 +68,50 @@ def load_limits(path: str | PathLike[str], robot: Robot) -> dict[str, Limits]:
     >>> limits["panda_joint2"].jerk
     3750.0
     """
-    return _LimitsFile(read_source(path, kind="limits", error_type=RobotError), robot).limits()
+    found = _LimitsFile(read_source(path, kind="limits", error_type=RobotError), robot)
+    limits = found.limits()
+    if found.jounce or found.varying or found.points():
+        message = "has limits of jounce, of points, or that depend on the position; read it with load_motion_limits"
+        raise found.source.error(message)
+    return limits
+
+
+def load_motion_limits(path: str | PathLike[str], robot: Robot) -> MotionLimits:
+    """Read limits of all kinds that `retime` and ``jounce check`` keep from a file.
+
+    Besides what `load_limits` reads, entries have the key ``jounce``; a limit of a joint may depend on its position
+    ``q``, as an expression or as a table, ``{q: [0, 1 rad], value: [2, 1 rad/s]}``, which is interpolated linearly;
+    and ``points`` gives links, with the keys ``point`` (in the frame of the link), ``speed`` and ``acceleration``.
+
+    Parameters
+    ----------
+    path
+        A file ending in .yaml, .yml, .toml or .json.
+    robot : Robot
+        The robot that the names of joints and links belong to.
+
+    Returns
+    -------
+    MotionLimits
+        Of every joint of `robot.joint_names`.
+
+    Raises
+    ------
+    RobotError
+        The file cannot be read or something in it is wrong: the message names the file, the line, the entry and the
+        value.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> robot = jn.load_robot("examples/robots/panda.urdf")
+    >>> limits = jn.io.load_motion_limits("examples/limits/panda_careful.yaml", robot)
+    >>> limits.points[0].link, limits.points[0].speed
+    ('panda_hand', 1.0)
+    """
+    found = _LimitsFile(read_source(path, kind="limits", error_type=RobotError), robot)
+    joints = found.limits()
+    return MotionLimits(joints, found.jounce, found.varying, found.points())
 
 
 class _LimitsFile:
@@ -69,12 +119,14 @@ class _LimitsFile:
 
     def __init__(self, source: Source, robot: Robot) -> None:
         self.source, self.robot = source, robot
+        self.jounce: dict[str, float] = {}
+        self.varying: dict[str, dict[str, PositionLaw]] = {}
 
     def limits(self) -> dict[str, Limits]:
         """Return the limits of every joint."""
-        data = self.source.mapping((), ("title", "default", "joints"))
-        if "default" not in data and "joints" not in data:
-            raise self.source.error("a limits file has the key 'joints', 'default', or both", value=list(data))
+        data = self.source.mapping((), ("title", "default", "joints", "points"))
+        if not data.keys() & {"default", "joints", "points"}:
+            raise self.source.error("a limits file has the keys 'joints', 'default' or 'points'", value=list(data))
         default = self.source.mapping(("default",), KEYS) if "default" in data else {}
         joints = self.source.mapping(("joints",)) if "joints" in data else {}
         for name in joints:
@@ -87,7 +139,7 @@ class _LimitsFile:
 
     def _of(self, name: str, default: Mapping[str, Any], own: Mapping[str, Any]) -> Limits:
         joint = self.robot.joints[name]
-        values = dataclasses.asdict(joint.limits)
+        values = dataclasses.asdict(joint.limits) | {"jounce": None}
         places: dict[str, Location] = {}
         for key, raw in default.items():
             if self._fits(raw, key, joint):
@@ -95,13 +147,73 @@ class _LimitsFile:
                 values[key] = self._value(raw, key, places[key], joint)
         for key, raw in own.items():
             places[key] = ("joints", name, key)
+            if key in VARYING and (law := self._law(raw, key, places[key], joint)):
+                self.varying.setdefault(name, {})[key] = law
+                continue
             values[key] = self._value(raw, key, places[key], joint)
         lower, upper = values["lower"], values["upper"]
-        if None not in (lower, upper) and lower > upper:
+        if lower is not None and upper is not None and lower > upper:
             at = places.get("lower") or places["upper"]
             message = f"the lower limit of {name}, {lower:g}, must not exceed the upper one, {upper:g}"
             raise self.source.error(f"{message}; the one not given in this file is the robot's own", at)
+        if (jounce := values.pop("jounce")) is not None:
+            self.jounce[name] = jounce
         return Limits(**values)
+
+    def _law(self, raw: Any, key: str, at: Location, joint: Joint) -> PositionLaw | None:
+        """Return a limit that depends on the position of its joint, from an expression of q or a table."""
+        if isinstance(raw, dict):
+            data = self.source.mapping(at, ("q", "value"))
+            columns = []
+            for part, kind in (("q", "lower"), ("value", key)):
+                entries = data.get(part)
+                if not isinstance(entries, list) or len(entries) < 2:
+                    raise self.source.error("must be a list of two values or more", (*at, part), value=entries)
+                found = [self._value(x, kind, (*at, part, k), joint) for k, x in enumerate(entries)]
+                columns.append(np.array(found, float))
+            q, values = columns
+            if len(q) != len(values) or not bool((np.diff(q) > 0).all()):
+                raise self.source.error("needs positions q that increase, and as many values", at)
+            return lambda position: np.interp(position, q, values)
+        if not isinstance(raw, str) or not re.search(r"\bq\b", raw):
+            return None
+        law = self.source.value(at, raw, "any", ("q",)).value
+        assert isinstance(law, Expression)
+
+        def limit(position: Any) -> Any:
+            value = law.evaluate({"q": Jet.constant(position, 0)})
+            return value.coefficients[0] if isinstance(value, Jet) else value
+
+        return limit
+
+    def points(self) -> tuple[PointLimits, ...]:
+        """Return the limits of points of links."""
+        data = self.source.mapping(("points",)) if "points" in self.source.data else {}
+        found = []
+        for link in data:
+            at: Location = ("points", link)
+            if link not in self.robot.frames:
+                raise self.source.error(no_such("link", link, self.robot.frames), at)
+            entry = self.source.mapping(at, ("point", "speed", "acceleration"))
+            values = {
+                k: self._measured(entry[k], p, (*at, k)) for p, k in ((1, "speed"), (2, "acceleration")) if k in entry
+            }
+            point = entry.get("point", [0.0, 0.0, 0.0])
+            if not isinstance(point, list) or len(point) != 3:
+                raise self.source.error("must be three lengths", (*at, "point"), value=point)
+            x, y, z = (self._measured(x, 0, (*at, "point", k)) for k, x in enumerate(point))
+            found.append(PointLimits(link, **values, point=(x, y, z)))
+        return tuple(found)
+
+    def _measured(self, raw: Any, rate: int, at: Location) -> float:
+        """Return a length by time to a power, greater than zero where it is a rate."""
+        number, dimension = self._parsed(raw, at)
+        wanted = tuple(sorted(({"length": 1} | ({"time": -rate} if rate else {})).items()))
+        if dimension and dimension != wanted:
+            raise self.source.error(f"{_wrong_unit(dimension)}; it is in {('m', 'm/s', 'm/s^2')[rate]}", at, value=raw)
+        if not math.isfinite(number) or (rate and number <= 0):
+            raise self.source.error("must be a finite number" + " greater than zero" * bool(rate), at, value=raw)
+        return number
 
     def _value(self, raw: Any, key: str, at: Location, joint: Joint) -> float | None:
         """Return a limit in SI units; None where there is none."""

@@ -1,0 +1,194 @@
+"""The command that finds the fastest motion along a path within the limits of a robot."""
+
+from __future__ import annotations
+
+import dataclasses
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from jounce.cli.file_kinds import expecting
+from jounce.cli.options import (
+    NO_TABLE,
+    PLAIN_ROBOT,
+    RobotReading,
+    TableOutput,
+    allowed,
+    errors_about,
+    spare_inputs,
+    written,
+)
+from jounce.cli.servo import frequency_of
+from jounce.errors import JounceError, SampleWarning
+from jounce.io.files import DATA_FILES
+from jounce.reporting.terminal import say, show_table
+
+if TYPE_CHECKING:
+    from jounce.planning import RetimedTrajectory
+
+ROWS = 3  # derivatives that are written
+
+
+def retime(
+    file: Path,
+    path: Path | None = None,
+    /,
+    *,
+    limits: Path | None = None,
+    repair: bool = False,
+    rate: str = "1 kHz",
+    order: int | None = None,
+    cells: int | None = None,
+    figure: Path | None = None,
+    reading: RobotReading = PLAIN_ROBOT,
+    output: TableOutput = NO_TABLE,
+) -> int:
+    r"""Find the fastest motion along a path within limits.
+
+    The limits are those of velocity, acceleration, jerk, jounce, torque
+    and torque rate, and of points of links. What is written of a robot
+    keeps them also where splines go through its rows. The path of a
+    mechanism is that of its drivers' laws. Needs Clarabel: pip install
+    'jounce[planning]'.
+
+    Parameters
+    ----------
+    file
+        Robot (.urdf, .xml, .sdf), or mechanism (.yaml, .toml, .json).
+    path
+        Waypoints or samples (.csv), expressions of s, laws (.yaml, ...).
+    limits
+        File of limits, which go before those of the robot file.
+    repair
+        Keep the times of a trajectory, and slow it where it must be.
+    rate
+        Of the rows, as 1kHz, 500Hz; a plain number is in Hz.
+    order
+        Highest derivative that is continuous [as the limits ask].
+    cells
+        Of the spline of the rate, 20 or more [160].
+    figure
+        Draw which limits bind where: .png, .svg or .pdf.
+
+    Examples
+    --------
+      jounce retime examples/robots/panda.urdf \
+        examples/trajectories/panda_too_fast.csv --out fast.csv \
+        --limits examples/limits/franka_panda.yaml --figure fast.png
+      jounce retime examples/robots/panda.urdf \
+        examples/trajectories/panda_too_fast.csv --repair --out slow.csv \
+        --limits examples/limits/franka_panda.yaml
+      jounce retime examples/press.yaml --out stroke.csv \
+        --limits examples/limits/press.yaml --figure stroke.png
+    """
+    output.check()
+    if figure is not None:
+        from jounce.plot import check_figure
+
+        check_figure(figure, overwrite=output.overwrite)
+    frequency = frequency_of(rate)
+    asked = {"order": order} | ({} if cells is None else {"cells": cells})
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SampleWarning)
+        if file.suffix.lower() in DATA_FILES:
+            if path is not None or repair:
+                name = "--repair" if repair else "path"
+                raise JounceError("the path of a mechanism is that of its drivers, which is not repaired", name=name)
+            result = _of_mechanism(file, limits, frequency, asked, reading)
+        else:
+            if path is None:
+                raise JounceError("a robot needs a path; give its file", name="path")
+            result = _of_robot(file, path, limits, frequency, asked | {"repair": repair}, reading, output)
+    _told(result, (file, path), figure, output)
+    return 0
+
+
+@dataclasses.dataclass(frozen=True)
+class _Result:
+    found: RetimedTrajectory
+    free: float  # duration before it was fitted to rows, s
+    before: float | None
+    read: Any = None
+
+
+def _of_mechanism(file: Path, limits: Path | None, rate: float, asked: Any, reading: RobotReading) -> _Result:
+    from jounce.io import load, load_drive_limits
+    from jounce.planning import retime as find
+
+    with expecting(file, "mechanism"):
+        mechanism = load(file, allow=allowed(reading.allow))
+    if limits is None:
+        raise JounceError("a mechanism has no limits of its own; give a file of limits with --limits", path=file)
+    bounds = load_drive_limits(limits, mechanism)
+    with errors_about(file):
+        found = find(mechanism, None, bounds, **asked)
+    import numpy as np
+
+    found.times = np.append(np.arange(0.0, found.stop, 1 / rate), found.stop)
+    return _Result(found, found.stop, found.path.stop - found.path.start)
+
+
+def _of_robot(
+    file: Path, path: Path, limits: Path | None, rate: float, asked: Any, reading: RobotReading, output: TableOutput
+) -> _Result:
+    from jounce.io import load_motion_limits, load_path
+    from jounce.planning import retime as find
+    from jounce.planning.retiming.limits import limits_of
+    from jounce.trajectory import JointTrajectory
+
+    model = reading.robot(file)
+    bounds = limits_of(model, None)
+    if limits is not None:
+        with expecting(limits, "limits"):
+            bounds = load_motion_limits(limits, model)
+    with expecting(path, "trajectory"):
+        given = load_path(path, reading.degree, allowed(reading.allow))
+    spare_inputs(output.out, overwrite=output.overwrite)
+    with errors_about(path, file):
+        found = find(model, given, bounds, **asked)
+        free, read = found.stop, None
+        if output.out is not None:
+            found, read = _at_rate(model, found, bounds, rate, reading.degree)
+    return _Result(found, free, given.stop - given.start if isinstance(given, JointTrajectory) else None, read)
+
+
+def _told(result: _Result, files: tuple[Path, Path | None], figure: Path | None, output: TableOutput) -> None:
+    """Print, draw and write a result."""
+    from jounce.reporting.retiming_facts import binding_table, retimed_words, retiming_result
+
+    found = result.found
+    for file in (output.out, figure):
+        spare_inputs(file, overwrite=output.overwrite)
+    if not output.json:
+        names = [file.name for file in files if file is not None]
+        say(retimed_words(found, result.before, result.free, names, result.read))
+        show_table(binding_table(found))
+    output.write(lambda: sampled(found))
+    if figure is not None:
+        from jounce.plot import save
+        from jounce.plot.retiming import draw_retiming
+
+        title = f"{found.report.robot}: {files[1].name}" if files[1] is not None else found.report.robot
+        written(lambda: save(draw_retiming(found, title), figure, overwrite=output.overwrite))
+    told = (output.out, figure)
+    output.tell("retime", lambda: retiming_result(found, result.before, result.free, files, told))
+
+
+def _at_rate(model: Any, found: RetimedTrajectory, bounds: Any, rate: float, degree: int) -> tuple[Any, Any]:
+    """Return the trajectory that rows at a rate describe, its limits kept by splines through them."""
+    from jounce.planning.retiming.sampling import fit_to_samples
+
+    try:
+        return fit_to_samples(model, found, bounds, rate, degree=degree)
+    except JounceError as error:
+        raise error.located(name="--rate") from None
+
+
+def sampled(found: RetimedTrajectory) -> Any:
+    """Return the positions of the joints, and their derivatives to jerk, at the instants of a trajectory."""
+    import xarray
+
+    values = found.derivatives(found.times, ROWS)
+    variables = {name: (("time", "derivative"), values[:, :, k]) for k, name in enumerate(found.names)}
+    axes = {"time": ("time", found.times, {"units": "s", "long_name": "time"}), "derivative": range(ROWS + 1)}
+    return xarray.Dataset(variables, coords=axes, attrs={"title": found.report.robot, "source": "jounce"})

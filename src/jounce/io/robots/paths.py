@@ -1,0 +1,79 @@
+"""Paths of robots from files: waypoints in CSV, waypoints or expressions of s in YAML, TOML or JSON, trajectories."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from os import PathLike, fspath
+from pathlib import Path as FilePath
+from typing import Any
+
+from jounce.errors import JounceError, TrajectoryError
+from jounce.io.files import DATA_FILES
+from jounce.io.files.samples import has_column, read_table
+from jounce.io.files.source import read_source
+from jounce.io.robots.trajectories import load_trajectory
+from jounce.planning.retiming.paths import Path, path_of
+from jounce.trajectory import JointTrajectory
+
+
+def load_path(
+    path: str | PathLike[str], degree: int = 5, allow: Iterable[str | PathLike[str]] = ()
+) -> Path | JointTrajectory:
+    """Read the path of a robot: a trajectory, of which only the geometry counts, or a path that knows of no time.
+
+    A CSV file with a column ``time`` is a trajectory; without it, its rows are waypoints, rad or m, its columns joints.
+    A YAML, TOML or JSON file has the key ``path``: for each joint an expression of ``s``, which runs from 0 to 1, or
+    the list of its positions at the waypoints; or it is a trajectory file.
+
+    Parameters
+    ----------
+    path
+        A file ending in .csv, .yaml, .yml, .toml or .json.
+    degree : int, default 5
+        Degree of the splines through samples of a trajectory.
+    allow
+        Folders besides its own that files named in it may be below.
+
+    Returns
+    -------
+    Path or JointTrajectory
+        As `retime` takes it.
+
+    Raises
+    ------
+    TrajectoryError
+        The file cannot be read or something in it is wrong: the message names the file, and the line or the entry.
+    """
+    name = str(fspath(path))
+    suffix = FilePath(name).suffix.lower()
+    if suffix == ".csv" and not has_column(name, "time", TrajectoryError):
+        columns = read_table(name, TrajectoryError)
+        return _placed(name, {joint: values.tolist() for joint, values in columns.items()})
+    if suffix in DATA_FILES:
+        source = read_source(name, allow, kind="trajectory", error_type=TrajectoryError)
+        if "path" in source.data:
+            data = source.mapping((), ("title", "path"))
+            given: dict[str, Any] = {}
+            for joint, raw in source.mapping(("path",)).items():
+                at = ("path", joint)
+                if isinstance(raw, list):
+                    given[joint] = [_number(source, entry, (*at, k)) for k, entry in enumerate(raw)]
+                else:
+                    given[joint] = raw if isinstance(raw, str) else str(_number(source, raw, at))
+            del data
+            return _placed(name, given)
+    return load_trajectory(path, degree, allow)
+
+
+def _number(source: Any, raw: Any, at: tuple[Any, ...]) -> float:
+    value = source.value(at, raw).value
+    if not isinstance(value, float):
+        raise source.error("must be a number", at, value=raw)
+    return value
+
+
+def _placed(name: str, given: dict[str, Any]) -> Path:
+    try:
+        return path_of(given)
+    except JounceError as error:
+        raise error.located(path=name) from None

@@ -1,0 +1,122 @@
+"""What bounds a motion along a path: limits of joints, also of jounce or depending on position, and of points."""
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.errors import RobotError, check_name
+from jounce.rigid.inertia import finite_numbers
+from jounce.robot.model import Limits
+from jounce.robot.robot import Robot
+
+VARYING = ("velocity", "acceleration", "deceleration", "jerk", "jounce", "effort", "effort_rate")
+
+PositionLaw = Callable[[Float[np.ndarray, " point"]], Any]
+"""Gives a limit for positions of its joint, rad or m."""
+
+
+@dataclasses.dataclass(frozen=True)
+class PointLimits:
+    """How fast a point of a link may be.
+
+    Parameters
+    ----------
+    link : str
+        Name of the link.
+    speed, acceleration : float or None
+        Largest magnitudes, m/s and m/s^2; None is no limit.
+    point : tuple of float
+        The point, m, in the frame of the link; its origin unless given.
+    """
+
+    link: str
+    speed: float | None = None
+    acceleration: float | None = None
+    point: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        for field in ("speed", "acceleration"):
+            _check_positive(field, getattr(self, field))
+        object.__setattr__(self, "point", tuple(finite_numbers("point", self.point, (3,)).tolist()))
+
+
+@dataclasses.dataclass(frozen=True)
+class MotionLimits:
+    """Limits of a robot's motion, as `retime` keeps them.
+
+    Parameters
+    ----------
+    joints : dict of str to Limits, optional
+        Limits of some joints, in place of those that the robot has.
+    jounce : dict of str to float, optional
+        Largest fourth derivatives of coordinates, rad/s^4 or m/s^4.
+    varying : dict of str to dict of str to callable, optional
+        Of a joint: velocity, acceleration, deceleration, jerk, jounce, effort or effort_rate as a function of its
+        position, which gets an array of positions. It goes before a constant limit.
+    points : tuple of PointLimits, optional
+        Limits of points of links, such as the tool.
+
+    Raises
+    ------
+    RobotError
+        If a limit is not greater than zero.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> slow = jn.MotionLimits(points=(jn.PointLimits("panda_hand", speed=0.25),))
+    >>> near_the_end = jn.MotionLimits(varying={"elbow": {"velocity": lambda q: 2.0 - 0.5 * q**2}})
+    """
+
+    joints: Mapping[str, Limits] = dataclasses.field(default_factory=dict)
+    jounce: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    varying: Mapping[str, Mapping[str, PositionLaw]] = dataclasses.field(default_factory=dict)
+    points: tuple[PointLimits, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name, value in self.jounce.items():
+            _check_positive(f"jounce.{name}", value)
+        for name, laws in self.varying.items():
+            for field, law in laws.items():
+                check_name("limit", field, VARYING, RobotError, name=f"varying.{name}")
+                if not callable(law):
+                    raise RobotError("must be a function of the position", name=f"varying.{name}.{field}", value=law)
+        for field in ("joints", "jounce", "varying"):
+            object.__setattr__(self, field, MappingProxyType(dict(getattr(self, field))))
+        object.__setattr__(self, "points", tuple(self.points))
+
+
+def limits_of(robot: Robot, limits: Any) -> MotionLimits:
+    """Return limits as `MotionLimits` whose joints are all of the robot's.
+
+    Raises
+    ------
+    RobotError
+        If a joint or link is not the robot's, or they are no limits.
+    """
+    given = MotionLimits() if limits is None else limits
+    if isinstance(given, Mapping):
+        given = MotionLimits(joints=given)
+    if not isinstance(given, MotionLimits):
+        raise RobotError(
+            "must be MotionLimits, or Limits of joints by name", name="limits", value=type(limits).__name__
+        )
+    for field in ("joints", "jounce", "varying"):
+        for name, entry in getattr(given, field).items():
+            check_name("moving joint", name, robot.joint_names, RobotError, name="limits")
+            if field == "joints" and not isinstance(entry, Limits):
+                raise RobotError("must be Limits", name=f"limits.{name}", value=entry)
+    for point in given.points:
+        check_name("link", point.link, robot.frames, RobotError, name="limits")
+    return dataclasses.replace(given, joints=dict(robot.limits) | dict(given.joints))
+
+
+def _check_positive(name: str, value: Any) -> None:
+    if value is None:
+        return
+    if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value) or value <= 0:
+        raise RobotError("must be a finite number greater than zero; None is no limit", name=name, value=value)

@@ -1,0 +1,111 @@
+"""The fastest motion of a driven mechanism along the path of its drivers, within limits of force and yank."""
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from jounce.dynamics.limits import LimitReport, LimitRow
+from jounce.errors import MechanismError, SolveError
+from jounce.mechanism import Mechanism
+from jounce.planning.retiming.fastest import fastest
+from jounce.planning.retiming.mechanism_quantities import MechanismQuantities, rate_motion
+from jounce.planning.retiming.paths import checked
+from jounce.planning.retiming.rate_law import Conditions, RateLaw
+from jounce.planning.retiming.retimed import RetimedTrajectory, active_limits
+from jounce.robot.model import Limits
+from jounce.trajectory import FollowingMotion
+
+EXPANSIONS = 4  # of forces about the last law
+STEADY = 3e-4  # of the duration: a change that ends them
+INSTANTS = 1501
+AROUND, SPREAD = 33, 2  # instants about the worst of each quantity, and over how many steps to each side
+SLOWINGS = 8
+
+
+def retime_mechanism(
+    mechanism: Mechanism, limits: Mapping[str, Limits], rates: tuple[float, float], order: int | None, cells: int
+) -> RetimedTrajectory:
+    """Return the fastest motion of the drivers of a mechanism along the path of their laws.
+
+    As `retime`, which calls it, says.
+    """
+    source = MechanismQuantities(mechanism, limits)
+    given = source.limits.values()
+    least = 2 if any(x.jerk is not None or x.effort_rate is not None for x in given) else 1
+    if order is not None and order < least:
+        message = f"the limits are kept by motions whose derivatives are continuous to {least} at least"
+        raise MechanismError(message, name="order", value=order)
+    conditions = Conditions(order or least, rates)
+    checked(source.path, conditions.order)
+    source.refer_to(None)
+    law, search = fastest(source, source.labels, source.path.start, source.path.stop, conditions, cells)
+    for _ in range(EXPANSIONS if source.loaded else 0):
+        duration = law.duration
+        source.refer_to(law)
+        law, search = fastest(source, source.labels, source.path.start, source.path.stop, conditions, cells)
+        if abs(law.duration - duration) < STEADY * duration:
+            break
+    told = ""
+    for _ in range(SLOWINGS):
+        found, report = _checked(source, mechanism, law)
+        over = 0.0 if report.worst is None else (report.worst.ratio or 0.0) - 1
+        if over <= 1e-9:
+            return RetimedTrajectory(
+                found.laws,
+                found.stop,
+                source.path,
+                found.progress,
+                report,
+                active_limits(search, law, rate_motion(law)),
+            )
+        if report.worst is not None:
+            told = f" of the {report.worst.quantity} of {report.worst.joint} by {over:.2g} of it"
+        if any(rates):
+            break
+        law = law.slowed(1 + 2 * over + 1e-7)
+    message = f"the law found breaks the limit{told}; try more cells, or smaller rates at the ends"
+    raise SolveError(message, name="cells", value=cells)
+
+
+@dataclasses.dataclass(frozen=True)
+class _Found:
+    laws: Any
+    stop: float
+    progress: Any
+
+
+def _checked(source: MechanismQuantities, mechanism: Mechanism, law: RateLaw) -> tuple[_Found, LimitReport]:
+    """Return the motion of a law, and its comparison with the limits by a solve of the mechanism in that motion."""
+    motion = rate_motion(law)
+    progress = FollowingMotion(law.parameter, motion)
+    found = _Found(
+        {name: FollowingMotion(own, progress) for name, own in source.laws.items()}, motion.duration, progress
+    )
+    times = np.linspace(0.0, motion.duration, INSTANTS)
+    _, _, ratios = source.ratios_of(progress, times)
+    step = times[1]
+    worst = times[np.argmax(ratios, axis=0)]
+    around = (worst[:, None] + step * SPREAD * np.linspace(-1, 1, AROUND)).reshape(-1)
+    times = np.unique(np.clip(np.concatenate([times, around]), 0.0, motion.duration))
+    times = times[np.append(True, np.diff(times) > 1e-9 * motion.duration)]
+    values, bounds, ratios = source.ratios_of(progress, times)
+    at = np.argmax(ratios, axis=0)
+    rows = tuple(
+        LimitRow(
+            label.owner,
+            label.word,
+            label.unit,
+            float(values[i, k]),
+            float(times[i]),
+            float(np.copysign(bounds[i, k], values[i, k])),
+            float(ratios[i, k]),
+        )
+        for k, (label, i) in enumerate(zip(source.labels.every, at.tolist(), strict=True))
+        if np.isfinite(bounds[i, k])
+    )
+    names = tuple(dict.fromkeys(label.owner for label in source.labels.every))
+    nothing = np.zeros((len(times), 6, 0))
+    report = LimitReport(mechanism.title or "mechanism", names, rows, {}, times, nothing, nothing)
+    return found, report

@@ -1,0 +1,131 @@
+"""Whether a trajectory keeps limits: those of `check_limits`, and those of jounce, of points, and of the position."""
+
+import dataclasses
+import warnings
+from typing import Any
+
+import numpy as np
+
+from jounce.dynamics.limits import LimitReport, LimitRow, check_limits
+from jounce.errors import SampleWarning
+from jounce.planning.retiming.limits import MotionLimits, limits_of
+from jounce.planning.retiming.paths import Path
+from jounce.planning.retiming.quantities import Curves
+from jounce.planning.retiming.robot_quantities import RobotQuantities
+from jounce.robot.model import Limits
+from jounce.robot.robot import Robot
+from jounce.trajectory import JointTrajectory
+
+EVEN = np.array([1.0, 0.0, 0.0, 0.0])  # z and its derivatives where the parameter is the time
+ZOOM, ZOOMS, PEAKS = 9, 8, 3
+
+
+def check_motion(
+    robot: Robot, trajectory: JointTrajectory, limits: MotionLimits, *, drives: bool = True
+) -> LimitReport:
+    """Compare a trajectory with limits of all kinds, as `check_limits` does with constant ones.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot, with what it holds.
+    trajectory : JointTrajectory
+        Joints that it does not name stand still.
+    limits : MotionLimits
+        With rows of their own in the report: limits of jounce, of points, and those that depend on the position.
+    drives : bool, default True
+        Whether torques contain armature inertia, damping and friction of the drives.
+
+    Returns
+    -------
+    LimitReport
+        The rows of limits that depend on the position stand in the place of those without a limit.
+    """
+    given = limits_of(robot, limits)
+    constant = {name: _without(entry, given.varying.get(name, {})) for name, entry in given.joints.items()}
+    report = check_limits(robot, trajectory, constant, drives=drives)
+    alone = {name: Limits() for name in robot.joint_names}
+    partner = {  # an acceleration and its deceleration are judged together
+        name: dataclasses.replace(alone[name], **_partners(given.joints[name], laws))
+        for name, laws in given.varying.items()
+    }
+    others = dataclasses.replace(given, joints=alone | partner)
+    if not (others.jounce or others.varying or others.points):
+        return report
+    extra = _rows(robot, trajectory, others, drives=drives)
+    told = {(row.joint, row.quantity) for row in extra}
+    rows = tuple(row for row in report.rows if (row.joint, row.quantity) not in told)
+    return dataclasses.replace(report, rows=(*rows, *extra))
+
+
+def _without(limits: Limits, varying: Any) -> Limits:
+    """Return limits without those that depend on the position."""
+    fields = set(varying) & {field.name for field in dataclasses.fields(Limits)}
+    if fields & {"acceleration", "deceleration"}:
+        fields |= {"acceleration", "deceleration"}
+    return dataclasses.replace(limits, **dict.fromkeys(fields))
+
+
+def _partners(limits: Limits, varying: Any) -> dict[str, float | None]:
+    pair = ("acceleration", "deceleration")
+    return {field: getattr(limits, field) for field in pair if set(varying) & set(pair) and field not in varying}
+
+
+def _rows(robot: Robot, trajectory: JointTrajectory, limits: MotionLimits, *, drives: bool) -> list[LimitRow]:
+    path = Path(dict(trajectory.laws), trajectory.start, trajectory.stop)
+    source = RobotQuantities(robot, path, limits, drives=drives)
+
+    def ratios(times: np.ndarray) -> np.ndarray:
+        return _curves(source, times).ratios(np.tile(EVEN[:, None], len(times)))
+
+    grid = np.unique(np.concatenate([trajectory.times, np.linspace(trajectory.start, trajectory.stop, 2001)]))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SampleWarning)
+        found = ratios(grid)
+        bounded = np.flatnonzero(found.max(axis=0) > 0)
+        order = np.argsort(-found, axis=0)[:PEAKS]
+        best, times = found.max(axis=0), grid[np.argmax(found, axis=0)]
+        for rank in range(PEAKS):
+            at = order[rank]
+            low, high = grid[np.maximum(at - 1, 0)], grid[np.minimum(at + 1, len(grid) - 1)]
+            every = np.arange(found.shape[1])
+            for _ in range(ZOOMS):
+                around = low + np.linspace(0, 1, ZOOM)[:, None] * (high - low)
+                here = ratios(around.reshape(-1)).reshape(*around.shape, -1)[:, every, every]
+                top = np.argmax(here, axis=0)
+                better = here[top, every] > best * (1 + 1e-12)
+                best, times = np.where(better, here[top, every], best), np.where(better, around[top, every], times)
+                low, high = around[np.maximum(top - 1, 0), every], around[np.minimum(top + 1, ZOOM - 1), every]
+    values, bounds = _at_peaks(source, times)
+    labels = source.labels.every
+    return [
+        LimitRow(
+            labels[k].owner,
+            labels[k].word,
+            labels[k].unit,
+            float(values[k]),
+            float(times[k]),
+            float(bounds[k]),
+            float(best[k]),
+        )
+        for k in bounded
+        if np.isfinite(bounds[k])
+    ]
+
+
+def _curves(source: RobotQuantities, times: np.ndarray) -> Curves:
+    shape = np.zeros((5, len(times)))
+    shape[0], shape[1] = times, 1.0
+    return Curves(source(times), shape)
+
+
+def _at_peaks(source: RobotQuantities, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the value of each curve at its own instant, and the bound there with the sign of the value."""
+    curves, q = _curves(source, times), None
+    values = np.concatenate(curves.values(np.tile(EVEN[:, None], len(times))), axis=1)
+    q = curves.quantities
+    second = curves.values(np.tile(EVEN[:, None], len(times)))[1]
+    side = np.where(second / q.upper >= second / q.lower, q.upper, -q.lower)
+    bounds = np.concatenate([q.first_bounds, side, q.rates, q.vector_bounds, q.fourth_bounds], axis=1)
+    value, bound = np.diagonal(values), np.diagonal(bounds)
+    return value, np.where(value < 0, -bound, bound)

@@ -1,0 +1,249 @@
+"""What is limited along a path: values that are polynomials of the rates of s, whose coefficients come from jets.
+
+With a path q(s), every quantity of the second order is ``F = m s'' + c s'^2 + d s' + g``, primes on s for time: the
+acceleration of a joint (m = dq/ds, c = d2q/ds2), its torque, the force of a driver, the acceleration of a point. Its
+rate follows from the derivatives of m, c, d and g along the path: jerk, torque rate, yank.
+"""
+
+import dataclasses
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from jaxtyping import Float, Int
+
+Array = Float[np.ndarray, "..."]
+M, C, D, G = range(4)
+
+
+@dataclasses.dataclass(frozen=True)
+class Quantity:
+    """The name of what is limited.
+
+    Parameters
+    ----------
+    owner : str
+        Joint, driver, or link.
+    word : str
+        velocity, acceleration, jerk, jounce, torque, torque rate, tool speed, ...
+    unit : str
+        Of values and limits.
+    """
+
+    owner: str
+    word: str
+    unit: str
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class PathQuantities:
+    """Coefficients of the limited quantities at points of a path, and their bounds; infinite where there is none.
+
+    Parameters
+    ----------
+    first : array of shape (point, k1)
+        Value of each quantity of the first order for a rate of s of 1.
+    first_bounds : array of shape (point, k1)
+        Its largest magnitude.
+    second : array of shape (point, k2, 8)
+        m, c, d, g and their derivatives along the path.
+    lower, upper, rates : array of shape (point, k2)
+        Range of the values, and the largest magnitude of their rates.
+    vectors : array of shape (point, k3, 3, 2)
+        m and c of vectors, whose magnitude is limited.
+    vector_bounds : array of shape (point, k3)
+        Largest magnitude.
+    fourth : array of shape (point, k4, 4)
+        First to fourth derivative by s of what has a limit of its fourth derivative by time.
+    fourth_bounds : array of shape (point, k4)
+        Its largest magnitude.
+    """
+
+    first: Array
+    first_bounds: Array
+    second: Array
+    lower: Array
+    upper: Array
+    rates: Array
+    vectors: Array
+    vector_bounds: Array
+    fourth: Array
+    fourth_bounds: Array
+
+
+@dataclasses.dataclass(frozen=True)
+class Labels:
+    """Names of the columns of `PathQuantities`."""
+
+    first: tuple[Quantity, ...]
+    second: tuple[Quantity, ...]
+    rates: tuple[Quantity, ...]
+    vectors: tuple[Quantity, ...]
+    fourth: tuple[Quantity, ...]
+
+    @property
+    def every(self) -> tuple[Quantity, ...]:
+        """Names of the curves in the order of `Curves.values`."""
+        return (*self.first, *self.second, *self.rates, *self.vectors, *self.fourth)
+
+
+class Curves:
+    """The limited quantities as functions of z, the square of the rate of u, and its derivatives by u.
+
+    Parameters
+    ----------
+    quantities : PathQuantities
+        At some points.
+    parameter : array of shape (5, point)
+        s at the points, and its derivatives by u.
+    """
+
+    def __init__(self, quantities: PathQuantities, parameter: Array):
+        self.quantities = quantities
+        _, s1, s2, s3, s4 = (x[:, None] for x in parameter)
+        q = quantities
+        self.speed = np.abs(q.first) * s1
+        m, c, d, g, m1, c1, d1, g1 = np.moveaxis(q.second, -1, 0)
+        # F = half z' + square z + single sqrt(z) + constant
+        self.value = np.stack([m * s1, m * s2 + c * s1**2, d * s1, g])
+        # F' = sqrt(z) (half z'' + slope z' / 2 + square z + constant) + single_half z' / 2 + single z
+        self.rate = np.stack(
+            [
+                m * s1,
+                3 * m * s2 + (m1 + 2 * c) * s1**2,
+                m * s3 + (m1 + 2 * c) * s1 * s2 + c1 * s1**3,
+                g1 * s1,
+                d * s1,
+                d * s2 + d1 * s1**2,
+            ]
+        )
+        m, c = np.moveaxis(q.vectors, -1, 0)
+        s1, s2 = s1[..., None], s2[..., None]
+        self.vector = np.stack([m * s1, m * s2 + c * s1**2])
+        q1, q2, q3, q4 = np.moveaxis(q.fourth, -1, 0)
+        s1, s2 = s1[..., 0], s2[..., 0]
+        # derivatives by u of what is limited: composition of the path with the parametrisation
+        self.fourth = np.stack(
+            [
+                q1 * s1,
+                q1 * s2 + q2 * s1**2,
+                q1 * s3 + 3 * q2 * s1 * s2 + q3 * s1**3,
+                q1 * s4 + q2 * (4 * s1 * s3 + 3 * s2**2) + 6 * q3 * s1**2 * s2 + q4 * s1**4,
+            ]
+        )
+
+    def values(self, law: Array) -> tuple[Array, Array, Array, Array, Array]:
+        """Return values for z and its derivatives, (4, point): first, second, rates, magnitudes of vectors, fourth."""
+        z, z1, z2, z3 = (x[:, None] for x in law)
+        w = np.sqrt(z)
+        half, square, single, constant = self.value
+        second = half * z1 / 2 + square * z + single * w + constant
+        top, slope, square, constant, single_half, single = self.rate
+        rates = w * (top * z2 / 2 + slope * z1 / 2 + square * z + constant) + single_half * z1 / 2 + single * z
+        half, square = self.vector
+        vectors = np.linalg.norm(half * z1[..., None] / 2 + square * z[..., None], axis=-1)
+        a, b, c, d = self.fourth
+        inner = a * z2 / 2 + 1.5 * b * z1 + c * z
+        fourth = z1 / 2 * inner + z * (a * z3 / 2 + 2 * b * z2 + 2.5 * c * z1 + d * z)
+        return self.speed * w, second, rates, vectors, fourth
+
+    def ratios(self, law: Array) -> Float[np.ndarray, "point curve"]:
+        """Return how much of its bound each quantity uses; 1 is at the bound, columns as in `Labels.every`."""
+        q = self.quantities
+        first, second, rates, vectors, fourth = self.values(law)
+        sides = np.maximum(_over(second, q.upper), _over(-second, -q.lower))
+        return np.concatenate(
+            [
+                first / q.first_bounds,
+                sides,
+                np.abs(rates) / q.rates,
+                vectors / q.vector_bounds,
+                np.abs(fourth) / q.fourth_bounds,
+            ],
+            axis=1,
+        )
+
+    def fourth_ratio(self, law: Array) -> float:
+        """Return the largest ratio of what is limited in the fourth order."""
+        return float(np.max(np.abs(self.values(law)[-1]) / self.quantities.fourth_bounds, initial=0.0))
+
+    @np.errstate(invalid="ignore")
+    def rows(self, law: Array, eased: float = 1.0) -> tuple[Array, Array, Int[np.ndarray, " row"]]:
+        """Return what linear bounds on z and its derivatives hold at a time law and, where theory allows, imply all.
+
+        A bound on a rate reads ``linear <= bound / sqrt(z)``: its right side is convex, and the tangent that takes its
+        place lies below it. What has no such form is expanded to first order.
+
+        Parameters
+        ----------
+        law : array of shape (4, point)
+            z and its derivatives.
+        eased : float, default 1
+            What the bounds of the fourth order are multiplied by, while a search comes near them.
+
+        Returns
+        -------
+        slopes : ndarray of shape (4, point, row)
+            Of z, z', z'', z'''.
+        right : ndarray of shape (point, row)
+            Bound on the sum, about 1; infinite where there is none.
+        curve : ndarray of shape (row,)
+            Which curve of `Labels.every` each row belongs to.
+        """
+        q = self.quantities
+        z, z1, z2, _ = (x[:, None] for x in law)
+        w = np.sqrt(z)
+        zero = np.zeros_like(self.speed)
+        made = [((self.speed / q.first_bounds) ** 2, zero, zero, zero, np.ones_like(zero))]
+        half, square, single, constant = self.value
+        none = np.zeros_like(half)
+        level = square + single / (2 * w)
+        for sign, bound in ((1, q.upper), (-1, -q.lower)):
+            right = bound - sign * (constant + single * w / 2)
+            size = np.where(bound > 0, bound, 1.0)
+            made.append((sign * level / size, sign * half / 2 / size, none, none, right / size))
+        top, slope, square, constant, single_half, single = self.rate
+        # (single_half z' / 2 + single z) / sqrt(z), expanded
+        mixed = (single_half * -z1 / (4 * w**3) + single / (2 * w), single_half / (2 * w))
+        rest = single_half * z1 / (4 * w) + single * w / 2
+        for sign in (1, -1):
+            size = q.rates / w
+            slopes = (sign * (square + mixed[0]) / size + 1 / (2 * z), sign * (slope / 2 + mixed[1]) / size)
+            made.append((*slopes, sign * top / 2 / size, none, 1.5 - sign * (constant + rest) / size))
+        # outer + z' inner / (2 z) <= bound / z, whose last part on the left is expanded
+        a, b, c, d = self.fourth
+        inner, share = a * z2 / 2 + 1.5 * b * z1 + c * z, z1 / (2 * z)
+        mixed = (share * c - share * inner / z, inner / (2 * z) + share * 1.5 * b, share * a / 2)
+        rest = share * inner - sum(x * y for x, y in zip(mixed, (z, z1, z2), strict=True))
+        size = eased * q.fourth_bounds / z
+        for sign in (1, -1):
+            slopes = (d + mixed[0], 2.5 * c + mixed[1], 2 * b + mixed[2], a / 2)
+            slopes = (sign * slopes[0] / size + 1 / z, *(sign * x / size for x in slopes[1:]))
+            made.append((*slopes, 2 - sign * rest / size))
+        slopes = np.stack([np.concatenate([part[k] for part in made], axis=1) for k in range(4)])
+        right = np.concatenate([part[4] for part in made], axis=1)
+        limits = (q.first_bounds, q.upper, q.lower, q.rates, q.rates, q.fourth_bounds, q.fourth_bounds)
+        limited = np.isfinite(np.concatenate(limits, axis=1))
+        slopes, right = np.where(limited, slopes, 0.0), np.where(limited, right, np.inf)
+        counts = [x.shape[1] for x in (zero, half, top, q.vector_bounds, a)]
+        starts = np.cumsum([0, *counts])
+        order = (0, 1, 1, 2, 2, 4, 4)
+        return slopes, right, np.concatenate([np.arange(counts[k]) + starts[k] for k in order])
+
+
+def _over(values: Array, bounds: Array) -> Array:
+    """Return values over positive bounds; of a bound that is not positive, how far beyond it they are."""
+    safe = np.where(bounds > 0, bounds, 1.0)
+    return np.where(bounds > 0, values / safe, values - bounds + 1.0)
+
+
+@runtime_checkable
+class Source(Protocol):
+    """Gives the quantities at values of s."""
+
+    def __call__(self, s: Float[np.ndarray, " point"]) -> PathQuantities:
+        """Return the quantities."""
+        ...
+
+    def place(self, s: float) -> str:
+        """Say where on the path a value of s is."""
+        ...

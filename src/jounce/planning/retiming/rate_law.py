@@ -1,0 +1,84 @@
+"""A rate along a path, and what is asked of it besides its limits."""
+
+import dataclasses
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.planning.retiming.rate_spline import Parametrisation, RateBasis
+
+_Points = Float[np.ndarray, " _"]  # of any length
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class RateLaw:
+    """A rate along a path: z, the square of the rate of u, as a spline over u.
+
+    Parameters
+    ----------
+    parameter : Parametrisation
+        s over u.
+    basis : RateBasis
+        Splines over u.
+    coefficients : ndarray of shape (coefficient,)
+        Of z, 1/s^2.
+    """
+
+    parameter: Parametrisation
+    basis: RateBasis
+    coefficients: _Points
+
+    def at(self, u: _Points) -> Float[np.ndarray, "4 point"]:
+        """Return z and its derivatives by u."""
+        return np.stack([matrix @ self.coefficients for matrix in self.basis.matrices(u)])
+
+    def slowed(self, factor: float) -> "RateLaw":
+        """Return the law of the same shape at a rate smaller by a factor."""
+        return dataclasses.replace(self, coefficients=self.coefficients / factor**2)
+
+    @property
+    def duration(self) -> float:
+        """Time from one end to the other, s."""
+        nodes, weights = quadrature(self.basis.cells, 8)
+        return float(weights @ (1 / np.sqrt(self.at(nodes)[0])))
+
+
+@dataclasses.dataclass(frozen=True)
+class Conditions:
+    """What is asked of a law besides the limits.
+
+    Parameters
+    ----------
+    order : int
+        Highest derivative by time that is continuous, also where the motion comes from rest.
+    rates : tuple of float or None
+        Rates of s at the ends, 1/s; zero is rest, and None is free.
+    highest : float or None
+        Rate of s that is not to be exceeded, 1/s; for a parametrisation by s itself.
+    """
+
+    order: int
+    rates: tuple[float | None, float | None] = (0.0, 0.0)
+    highest: float | None = None
+
+    @property
+    def rests(self) -> tuple[int, int]:
+        """How many derivatives of s by u vanish at the ends, the value counted."""
+        first, last = (self.order + 1 if rate == 0 else 1 for rate in self.rates)
+        return first, last
+
+
+def quadrature(cells: int, count: int) -> tuple[_Points, _Points]:
+    """Return nodes and weights of Gauss on each of some cells from 0 to 1."""
+    nodes, weights = np.polynomial.legendre.leggauss(count)
+    u = (np.arange(cells)[:, None] + (nodes + 1) / 2) / cells
+    return u.reshape(-1), np.tile(weights / 2 / cells, cells)
+
+
+def progress(law: RateLaw) -> tuple[_Points, _Points]:
+    """Return the share of the duration, and s, at the knots of a law."""
+    nodes, weights = quadrature(law.basis.cells, 8)
+    times = (weights / np.sqrt(law.at(nodes)[0])).reshape(law.basis.cells, -1).sum(axis=1)
+    share = np.append(0.0, np.cumsum(times))
+    s = law.parameter.derivatives(np.linspace(0, 1, law.basis.cells + 1), 0)[0]
+    return share / share[-1], s

@@ -1,0 +1,168 @@
+"""The motion of the parameter of a path in time, from the square of its rate: exact to rounding, to any order."""
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from jounce.errors import TrajectoryError
+from jounce.jet import Jet
+from jounce.shapes import ArrayLike
+from jounce.trajectory import AbstractMotion
+from jounce.trajectory.motion import SLACK
+
+NODES = 16  # of Gauss's quadrature on a piece
+NEWTON = 8  # steps: the time over a piece is smooth and grows everywhere
+EXACT = 1e-13  # of the time over a piece: what halves of it may differ by
+HALVINGS = 12
+
+
+class RateMotion(AbstractMotion):
+    """A parameter u over time, whose rate is the root of a piecewise polynomial z(u).
+
+    The time ``integral du / sqrt(z)`` is inverted by Newton's method; derivatives follow from ``u'' = z'(u) / 2``.
+
+    Parameters
+    ----------
+    begins : array_like of shape (pieces + 1,)
+        Where the pieces begin, and where the last one ends.
+    pieces : array_like of shape (powers, pieces)
+        Coefficients of z, 1/s^2, in powers of u less the beginning of the piece, lowest first.
+    exact : bool, default True
+        Halve pieces where the quadrature would not be exact to rounding.
+
+    Raises
+    ------
+    TrajectoryError
+        If z is not positive.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> from jounce.planning.retiming.rate_motion import RateMotion
+    >>> motion = RateMotion([0.0, 1.0], [[1.0], [2.0]])  # z = 1 + 2 u: u' = 1 + t
+    >>> [round(float(x), 12) for x in motion(jn.Jet.variable(0.5, order=3)).derivatives()]
+    [0.625, 1.5, 1.0, 0.0]
+    """
+
+    instants: Any
+    begins: Any
+    pieces: Any
+
+    def __init__(self, begins: ArrayLike, pieces: ArrayLike, *, exact: bool = True):
+        begins, pieces = np.asarray(begins, float), np.asarray(pieces, float)
+        begins, pieces = _halved(begins, pieces) if exact else (begins, pieces)
+        times = _times(pieces, np.diff(begins))
+        self.instants, self.begins, self.pieces = np.append(0.0, np.cumsum(times)), begins, pieces
+
+    @property
+    def duration(self) -> float:
+        """Time from the beginning of u to its end, s."""
+        return float(np.asarray(self.instants)[-1])
+
+    def check_instants(self, first: float, last: float) -> None:
+        """Raise TrajectoryError if some instants are before the beginning or after the end."""
+        stop = self.duration
+        if first < -SLACK * stop or last > (1 + SLACK) * stop:
+            message = f"the law goes from 0 to {stop:.9g} s, and says nothing of other instants; stay within them"
+            raise TrajectoryError(message, value=float(first if first < 0 else last))
+
+    def __call__(self, time: Jet) -> Jet:
+        """Return the jet of u at the instants of the time jet; NaN outside."""
+        at, order = time.coefficients[0], time.order
+        instants, begins, pieces = map(jnp.asarray, (self.instants, self.begins, self.pieces))
+        if instants.ndim == 1:
+            series = _series(instants, begins, pieces, at, order)
+        else:  # several laws of one kind, stacked along an axis before the batch: (pieces, laws, 1)
+            shared = jnp.broadcast_to(at, (instants.shape[1], at.shape[-1]))
+            stacked = jax.vmap(_series, in_axes=(1, 1, 2, 0, None), out_axes=0)
+            series = stacked(instants[..., 0], begins[..., 0], pieces[..., 0], shared, order)
+        rates = time.coefficients[1:]
+        if all(c is None for c in rates[1:]):  # time that goes evenly
+            rate = 1.0 if not rates else 0.0 if rates[0] is None else rates[0]
+            return Jet(a * rate**k for k, a in enumerate(series))
+        local = Jet((jnp.zeros_like(at), *rates))
+        value = Jet.constant(series[-1], order)
+        for a in series[-2::-1]:
+            value = value * local + a
+        return value
+
+
+def _series(instants: Any, begins: Any, pieces: Any, at: Any, order: int) -> tuple[Any, ...]:
+    """Return the Taylor coefficients of u at instants."""
+    slack = SLACK * instants[-1]
+    inside = jnp.clip(at, 0.0, instants[-1])
+    piece = jnp.clip(jnp.searchsorted(instants, inside, side="right") - 1, 0, len(instants) - 2)
+    c, begin = pieces[:, piece], begins[piece]
+    length, elapsed = begins[piece + 1] - begin, inside - instants[piece]
+    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+
+    def step(_: int, v: Any) -> Any:
+        places = v[None] * jnp.reshape((nodes + 1) / 2, (NODES, *(1,) * v.ndim))
+        time = v / 2 * jnp.tensordot(weights, 1 / jnp.sqrt(_value(c[:, None], places)), axes=1)
+        return jnp.clip(v + (elapsed - time) * jnp.sqrt(_value(c, v)), 0.0, length)
+
+    v = jax.lax.fori_loop(0, NEWTON, step, length * elapsed / (instants[piece + 1] - instants[piece]))
+    shifted = _shifted(c, v)
+    series = [begin + v]
+    if order:
+        series.append(jnp.sqrt(shifted[0]))
+    # the powers of u - u(t), whose coefficients are found one after the other as those of u are
+    powers: list[list[Any]] = [[None] for _ in range(max(len(shifted) - 2, 1))]
+    for k in range(order - 1):
+        slope = shifted[1] * (1.0 if k == 0 else 0.0)
+        if k:
+            powers[0].append(series[k])
+            for m in range(1, len(powers)):
+                powers[m].append(sum((series[i] * powers[m - 1][k - i] for i in range(1, k)), jnp.zeros_like(v)))
+            slope = sum((j * shifted[j] * powers[j - 2][k] for j in range(2, len(shifted))), slope)
+        series.append(slope / (2 * (k + 1) * (k + 2)))
+    outside = (at < -slack) | (at > instants[-1] + slack)
+    return tuple(jnp.where(outside, jnp.nan, a) for a in series)
+
+
+def _value(coefficients: Any, v: Any) -> Any:
+    value = coefficients[-1] + 0 * v
+    for c in coefficients[-2::-1]:
+        value = value * v + c
+    return value
+
+
+def _shifted(coefficients: Any, v: Any) -> list[Any]:
+    """Return the coefficients of a polynomial in powers of what its argument exceeds v by (Horner, again and again)."""
+    found = list(coefficients)
+    for k in range(len(found) - 1):
+        for j in range(len(found) - 2, k - 1, -1):
+            found[j] = found[j] + v * found[j + 1]
+    return found
+
+
+def _times(
+    pieces: Float[np.ndarray, "powers piece"], lengths: Float[np.ndarray, " piece"], parts: int = 1
+) -> Float[np.ndarray, " piece"]:
+    """Return the time over each piece."""
+    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    places = (np.arange(parts)[:, None] + (nodes + 1) / 2).reshape(-1, 1) / parts * lengths
+    z = _value(pieces, places)
+    if not (z > 0).all():
+        raise TrajectoryError("the square of a rate must be positive", value=float(z.min()))
+    return np.tile(weights, parts) @ (1 / np.sqrt(z)) * lengths / 2 / parts
+
+
+def _halved(begins: np.ndarray, pieces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the pieces, those halved on which the quadrature is not exact to rounding."""
+    for _ in range(HALVINGS):
+        lengths = np.diff(begins)
+        whole, halves = _times(pieces, lengths), _times(pieces, lengths, 2)
+        coarse = np.abs(whole - halves) > EXACT * halves
+        if not coarse.any():
+            break
+        ends = begins[-1]
+        middle = np.stack(_shifted(pieces[:, coarse], lengths[coarse] / 2))
+        starts = np.concatenate([begins[:-1], begins[:-1][coarse] + lengths[coarse] / 2])
+        order = np.argsort(starts, kind="stable")
+        begins = np.append(starts[order], ends)
+        pieces = np.concatenate([pieces, middle], axis=1)[:, order]
+    return begins, pieces

@@ -1,0 +1,123 @@
+"""The square of the rate along a path as a B-spline, and the parametrisation in which it is smooth also at rest."""
+
+import dataclasses
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.shapes import ArrayLike
+from jounce.trajectory import SplineMotion
+from jounce.trajectory.splines import local_powers
+
+SMOOTHNESS = 9  # degree of the parametrisation
+SPANS = 24  # of the parametrisation
+
+_Points = Float[np.ndarray, " _"]  # of any length
+
+
+class Parametrisation(SplineMotion):
+    """The parameter s of a path over u, which runs from 0 to 1: increasing, with derivatives that vanish at rest ends.
+
+    Where a motion starts from rest with a bounded derivative of order p, s grows as the p-th power of the time. With s
+    growing as the p-th power of u, u grows as the time itself: its rate is smooth, and not zero.
+
+    Parameters
+    ----------
+    u, s : array_like of shape (samples,)
+        What it is to be near, as of an approximate time law: u from 0 to 1, both increasing.
+    rests : tuple of int
+        How many derivatives of s, the value counted, vanish at the two ends; 0 or 1 where it does not rest.
+    """
+
+    def __init__(self, u: ArrayLike, s: ArrayLike, rests: tuple[int, int]):
+        from scipy.interpolate import BSpline
+
+        u, s = np.asarray(u, float), np.asarray(s, float)
+        knots = clamped(SPANS, SMOOTHNESS)
+        count = len(knots) - SMOOTHNESS - 1
+        greville = np.array([knots[k + 1 : k + 1 + SMOOTHNESS].mean() for k in range(count)])
+        # a spline with increasing coefficients increases; as many as are alike at an end, so many derivatives vanish
+        values = np.interp(greville, u, s)
+        for end, held in zip((slice(None), slice(None, None, -1)), rests, strict=True):
+            values[end][: max(held, 1)] = s[end][0]
+        spline = BSpline(knots, values, SMOOTHNESS)
+        pieces = np.linspace(0.0, 1.0, SPANS + 1)
+        self._set(pieces[:-1], local_powers(spline, pieces[:-1], SMOOTHNESS), 1.0, "continue")
+
+    def derivatives(self, u: _Points, order: int) -> Float[np.ndarray, "derivative point"]:
+        """Return s and its derivatives by u."""
+        begins, powers = np.asarray(self.breakpoints), np.asarray(self.coefficients)
+        piece = np.clip(np.searchsorted(begins, u, side="right") - 1, 0, None)
+        local, own = u - begins[piece], powers[:, piece]
+        return np.stack(
+            [np.polynomial.polynomial.polyval(local, _derived(own, k), tensor=False) for k in range(order + 1)]
+        )
+
+
+def _derived(powers: np.ndarray, times: int) -> np.ndarray:
+    return np.polynomial.polynomial.polyder(powers, times) if times else powers
+
+
+def clamped(spans: int, degree: int) -> _Points:
+    """Return evenly spaced knots from 0 to 1, those at the ends repeated."""
+    return np.concatenate([np.zeros(degree), np.linspace(0.0, 1.0, spans + 1), np.ones(degree)])
+
+
+@dataclasses.dataclass(frozen=True)
+class RateBasis:
+    """B-splines over u on cells of equal length.
+
+    Parameters
+    ----------
+    cells : int
+        How many.
+    degree : int
+        Of the splines.
+    """
+
+    cells: int
+    degree: int
+
+    @cached_property
+    def knots(self) -> _Points:
+        """Knots with the ends repeated."""
+        return clamped(self.cells, self.degree)
+
+    @property
+    def count(self) -> int:
+        """Number of splines."""
+        return self.cells + self.degree
+
+    def matrices(self, u: _Points, order: int = 3) -> list[Any]:
+        """Return the sparse matrices that make values and derivatives at points of the coefficients."""
+        from scipy import sparse
+        from scipy.interpolate import BSpline
+
+        found, change = [], sparse.identity(self.count, format="csr")
+        knots, u = self.knots, np.clip(u, 0.0, 1.0)
+        for level in range(order + 1):
+            degree = self.degree - level
+            if degree < 0:
+                found.append(sparse.csr_matrix((len(u), self.count)))
+                continue
+            own = knots[level : len(knots) - level]
+            design: Any = BSpline.design_matrix(u, own, degree)
+            found.append((design @ change).tocsr())
+            if degree:
+                widths = own[degree + 1 : -1] - own[1 : len(own) - degree - 1]
+                rows = len(widths)
+                down, up = (
+                    sparse.diags(sign * degree / widths, k, shape=(rows, rows + 1)) for k, sign in ((0, -1), (1, 1))
+                )
+                step: Any = down + up
+                change = step @ change
+        return found
+
+    def pieces(self, coefficients: _Points) -> Float[np.ndarray, "powers cell"]:
+        """Return the polynomials on the cells, as coefficients of powers of u less the beginning, lowest first."""
+        from scipy.interpolate import BSpline
+
+        begins = np.linspace(0.0, 1.0, self.cells + 1)[:-1]
+        return local_powers(BSpline(self.knots, coefficients, self.degree), begins, self.degree)

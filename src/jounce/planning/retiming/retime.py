@@ -1,0 +1,203 @@
+"""The fastest time law along a path within limits of velocity to jounce, torque and torque rate."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from jounce.errors import SolveError, TrajectoryError, whole_number
+from jounce.mechanism import Mechanism
+from jounce.planning.retiming.fastest import Search, fastest, slowed_only
+from jounce.planning.retiming.limits import MotionLimits
+from jounce.planning.retiming.mechanism import retime_mechanism
+from jounce.planning.retiming.motion_limits_check import check_motion
+from jounce.planning.retiming.paths import Path, checked, path_of
+from jounce.planning.retiming.program import require_solver
+from jounce.planning.retiming.quantities import Curves
+from jounce.planning.retiming.rate_law import Conditions, RateLaw
+from jounce.planning.retiming.rate_motion import RateMotion
+from jounce.planning.retiming.retimed import RetimedTrajectory, active_limits
+from jounce.planning.retiming.robot_quantities import RobotQuantities
+from jounce.robot.model import Limits
+from jounce.robot.robot import Robot
+from jounce.trajectory import FollowingMotion, JointTrajectory
+
+CELLS = 160
+ATTEMPTS = 4  # to keep limits as the derivatives in time tell them
+KEPT = 1e-9  # of a limit, which rounding may take
+HIGHEST_ORDER = 6
+SPEEDS = 1e-9  # of the largest: what is slower at an end of a trajectory is at rest
+
+
+def retime(
+    robot: Robot | Mechanism,
+    path: Any = None,
+    limits: Any = None,
+    *,
+    names: Sequence[str] | None = None,
+    rates: tuple[float, float] = (0.0, 0.0),
+    order: int | None = None,
+    cells: int = CELLS,
+    drives: bool = True,
+    repair: bool = False,
+) -> RetimedTrajectory:
+    """Return the fastest motion along a path that keeps limits.
+
+    The square of the rate along the path is a spline, found by a sequence of cone programs whose coefficients are exact
+    derivatives of the path and of the torques along it. What is returned is checked: no limit is exceeded by more than
+    a millionth, between samples either.
+
+    Parameters
+    ----------
+    robot : Robot or Mechanism
+        The robot, with what it holds; or a mechanism, whose drivers' laws, over its time, are the path.
+    path : JointTrajectory, dict, or array_like of shape (points, joints)
+        None for a mechanism. Waypoints, with splines of degree 5 through them; a mapping from names of joints to
+        waypoints or to expressions of ``s``, which runs from 0 to 1; or a trajectory, whose times do not count. Joints
+        that it does not name stand still.
+    limits : dict of str to Limits, or MotionLimits, optional
+        In place of those that the robot has. For a mechanism `Limits` by name of drivers (effort and effort_rate are
+        its force or torque, and yank) and of outputs, whose speed, acceleration and, for angles and distances, jerk
+        are limited.
+    names : sequence of str, optional
+        Joints of an array of waypoints, in the order of its columns; those of the robot unless given.
+    rates : tuple of float, default (0, 0)
+        Rates of s at the beginning and at the end, 1/s; 0 is rest.
+    order : int, optional
+        Highest derivative of the positions that is continuous, 1 to 6, also where the motion comes from rest. Unless
+        given, as many as the limits ask for: 3 with limits of jounce, 2 of jerk or torque rate, 1 otherwise.
+    cells : int, default 160
+        Cells of the spline, 20 or more.
+    drives : bool, default True
+        Whether torques contain armature inertia, damping and friction of the drives.
+    repair : bool, default False
+        Return the given trajectory, which must be one, with the smallest slowing that keeps the limits: it is nowhere
+        faster than it was, and as it was where that keeps them.
+
+    Returns
+    -------
+    RetimedTrajectory
+        A `JointTrajectory` that starts at 0 s, exact between samples. Its ``report`` is what `check_limits` finds, its
+        ``active`` tells which limit binds where, and what it costs.
+
+    Raises
+    ------
+    TrajectoryError
+        If the path has a kink or a repeated point, leaves the range of a joint, or needs more than a limit at rest: the
+        message says where, and which joint.
+    RobotError
+        If names or limits do not fit the robot.
+    SolveError
+        If no time law keeps the limits with the rates at the ends.
+    UnsupportedError
+        If Clarabel is not installed.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> limits = jn.Limits(velocity=1.0, acceleration=2.0)
+    >>> slider = jn.Joint("slide", "base", "cart", "prismatic", axis=[1, 0, 0], limits=limits)
+    >>> robot = jn.Robot("cart", [jn.Link("base"), jn.Link("cart", jn.Inertia(1.0))], [slider])
+    >>> fast = jn.retime(robot, [[0.0], [2.0]])
+    >>> round(fast.stop, 2)  # 2 m at 1 m/s, and 0.5 s for speeding up and slowing down
+    2.5
+    """
+    require_solver()
+    cells = whole_number("cells", cells, 20, 5000, error=TrajectoryError)
+    if isinstance(robot, Mechanism):
+        if path is not None or repair:
+            message = "the path of a mechanism is that of its drivers, which is not repaired; leave this out"
+            raise TrajectoryError(message, name="repair" if repair else "path")
+        return retime_mechanism(robot, _of_mechanism(limits), _rates(rates), order, cells)
+    if not isinstance(robot, Robot):
+        raise TrajectoryError("must be a Robot or a Mechanism", name="robot", value=type(robot).__name__)
+    if repair:
+        return _repaired(robot, path, limits, order, cells, drives)
+    found = path_of(path, names if names is not None else robot.joint_names)
+    source = RobotQuantities(robot, found, limits, drives=drives)
+    chosen = _order(order, source.limits, robot)
+    checked(found, chosen)
+    source.check_range()
+    conditions = Conditions(chosen, _rates(rates))
+    law, search = fastest(source, source.labels, found.start, found.stop, conditions, cells)
+    return _certified(robot, found, law, search, source, drives)
+
+
+def _repaired(
+    robot: Robot, trajectory: Any, limits: Any, order: int | None, cells: int, drives: bool
+) -> RetimedTrajectory:
+    if not isinstance(trajectory, JointTrajectory):
+        raise TrajectoryError("only a trajectory can be repaired", name="path", value=type(trajectory).__name__)
+    path = Path(dict(trajectory.laws), trajectory.start, trajectory.stop)
+    source = RobotQuantities(robot, path, limits, drives=drives)
+    chosen = _order(order, source.limits, robot)
+    checked(path, chosen)
+    source.check_range()
+    speeds = np.abs(path.derivatives(np.linspace(path.start, path.stop, 501), 1)[:, 1]).max(axis=1)
+    keeps = keeps_limits(source, np.array([path.start, path.stop])) & (speeds[[0, -1]] > SPEEDS * speeds.max())
+    first, last = (1.0 if as_it_was else None for as_it_was in keeps.tolist())
+    conditions = Conditions(chosen, (first, last), highest=1.0)
+    law, search = slowed_only(source, source.labels, path.start, path.stop, conditions, cells)
+    return _certified(robot, path, law, search, source, drives)
+
+
+def keeps_limits(source: RobotQuantities, s: np.ndarray) -> np.ndarray:
+    """Tell where a motion whose parameter is the time keeps its limits."""
+    shape, law = np.zeros((5, len(s))), np.zeros((4, len(s)))
+    shape[0], shape[1], law[0] = s, 1.0, 1.0
+    return np.all(Curves(source(s), shape).ratios(law) <= 1, axis=1)
+
+
+def _certified(
+    robot: Robot, path: Path, law: RateLaw, search: Search, source: RobotQuantities, drives: bool
+) -> RetimedTrajectory:
+    """Return the trajectory of a law, once it keeps the limits as its own derivatives in time tell them."""
+    for attempt in range(ATTEMPTS):
+        motion = RateMotion(np.linspace(0.0, 1.0, law.basis.cells + 1), law.basis.pieces(law.coefficients))
+        progress = FollowingMotion(law.parameter, motion)
+        laws = {name: FollowingMotion(own, progress) for name, own in path.laws.items()}
+        bare = JointTrajectory(laws, 0.0, motion.duration, np.linspace(0.0, motion.duration, law.basis.cells + 1))
+        report = check_motion(robot, bare, source.limits, drives=drives)
+        over = (report.worst.ratio or 0.0) - 1 if report.worst else 0.0
+        if over <= KEPT:
+            return RetimedTrajectory(laws, bare.stop, path, progress, report, active_limits(search, law, motion))
+        if attempt == ATTEMPTS - 1:
+            told = "" if report.worst is None else f" of the {report.worst.quantity} of {report.worst.joint}"
+            message = f"the time law found breaks the limit{told}; try more cells"
+            raise SolveError(message, name="cells", value=law.basis.cells)
+        law = search.tightened(law, over)
+    raise AssertionError
+
+
+def _of_mechanism(limits: Any) -> dict[str, Limits]:
+    if not isinstance(limits, Mapping) or not limits:
+        raise TrajectoryError("must be Limits of drivers and outputs by name", name="limits", value=limits)
+    return dict(limits)
+
+
+def _order(order: int | None, limits: MotionLimits, robot: Robot) -> int:
+    """Return up to which derivative a motion must be continuous."""
+    least = 1
+    given = [limits.joints[name] for name in robot.joint_names]
+    varying = {field for laws in limits.varying.values() for field in laws}
+    if any(x.jerk is not None or x.effort_rate is not None for x in given) or varying & {"jerk", "effort_rate"}:
+        least = 2
+    if limits.jounce or "jounce" in varying:
+        least = 3
+    if order is None:
+        return least
+    asked = whole_number("order", order, 1, HIGHEST_ORDER, error=TrajectoryError)
+    if asked < least:
+        message = f"the limits are kept by motions whose derivatives are continuous to {least} at least"
+        raise TrajectoryError(message, name="order", value=order)
+    return asked
+
+
+def _rates(rates: Any) -> tuple[float, float]:
+    try:
+        first, last = (float(x) for x in rates)
+    except (TypeError, ValueError):
+        raise TrajectoryError("must be two numbers", name="rates", value=rates) from None
+    if not (np.isfinite([first, last]).all() and min(first, last) >= 0):
+        raise TrajectoryError("must be finite and not negative", name="rates", value=rates)
+    return first, last

@@ -1,0 +1,83 @@
+"""Trajectories that were retimed, and what limits them where."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from jounce.dynamics.limits import LimitReport
+from jounce.planning.retiming.fastest import Search
+from jounce.planning.retiming.paths import Path
+from jounce.planning.retiming.rate_law import RateLaw
+from jounce.planning.retiming.rate_motion import RateMotion
+from jounce.trajectory import AbstractMotion, FollowingMotion, JointTrajectory
+
+BINDS = 1e-2  # of a limit: where less is left, it binds
+
+
+class RetimedTrajectory(JointTrajectory):
+    """A trajectory along a path, from 0 s, with a record of its limits. Returned by `retime`.
+
+    Parameters
+    ----------
+    laws : dict of str to AbstractMotion
+        The law of each joint.
+    stop : float
+        Duration, s.
+    path : Path
+        Where it leads.
+    progress : FollowingMotion
+        The parameter s of the path over time.
+    report : LimitReport
+        Comparison of the trajectory with its limits, as `check_limits` makes it.
+    active : xarray.Dataset
+        Over ``s`` and ``limit`` (such as "panda_joint1 torque rate"): ``share`` of the limit that is used; ``binds``,
+        whether less than a hundredth of it is left; ``price``, by how much the duration would fall, s, were this limit
+        raised along the path by a share of 1, divided among its points. Over ``s``: ``time``.
+    """
+
+    def __init__(
+        self,
+        laws: Mapping[str, AbstractMotion],
+        stop: float,
+        path: Path,
+        progress: FollowingMotion,
+        report: LimitReport,
+        active: Any,
+    ):
+        super().__init__(laws, 0.0, stop, np.linspace(0.0, stop, 201))
+        self.path, self.progress, self.report, self.active = path, progress, report, active
+
+    def slower(self, factor: float) -> "RetimedTrajectory":
+        """Return the same motion, slower by a factor; its report is that of this one."""
+        parameter, motion = self.progress.parts
+        assert isinstance(motion, RateMotion)
+        slow = RateMotion(motion.begins, np.asarray(motion.pieces) / factor**2)
+        progress = FollowingMotion(parameter, slow)
+        laws = {name: FollowingMotion(own, progress) for name, own in self.path.laws.items()}
+        return RetimedTrajectory(laws, slow.duration, self.path, progress, self.report, self.active)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (dict(self.laws), self.stop, self.path, self.progress, self.report, self.active)
+
+    def __repr__(self) -> str:
+        return f"RetimedTrajectory({', '.join(self.names)}; {self.stop:g} s)"
+
+
+def active_limits(search: Search, law: RateLaw, motion: RateMotion) -> Any:
+    """Return which limits bind where, and what they cost, labelled."""
+    import xarray
+
+    shares = search.curves.ratios(law.at(search.points))
+    u, s = search.points, search.shape[0]
+    knots = np.interp(u, motion.begins, motion.instants)  # near enough to tell the time of a point to a figure
+    names = [f"{label.owner} {label.word}" for label in search.labels.every]
+    variables = {
+        "share": (("s", "limit"), shares),
+        "binds": (("s", "limit"), shares > 1 - BINDS),
+        "price": (("s", "limit"), search.prices, {"units": "s"}),
+        "time": (("s",), knots, {"units": "s"}),
+        "unit": (("limit",), [label.unit for label in search.labels.every]),
+    }
+    limited = np.flatnonzero((shares > 0).any(axis=0))
+    return xarray.Dataset(variables, coords={"s": s, "limit": names}).isel(limit=limited)

@@ -1,0 +1,203 @@
+"""The limited quantities of a robot on a path: of its joints, their torques, and points of its links."""
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.dynamics.limits import REST, SLIDING, TURNING
+from jounce.dynamics.trajectories import FollowedTrajectory
+from jounce.errors import RobotError, TrajectoryError
+from jounce.planning.retiming.limits import MotionLimits, limits_of
+from jounce.planning.retiming.paths import Path
+from jounce.planning.retiming.quantities import Labels, PathQuantities, Quantity
+from jounce.robot.inverse_dynamics import inverse_dynamics
+from jounce.robot.kinematics import forward_kinematics
+from jounce.robot.robot import Robot
+from jounce.trajectory import JointTrajectory
+
+ORDER = 4  # derivatives of the path that are needed
+CASES = np.array([[1.0, 0.0], [2.0, 0.0], [3.0, 0.0], [1.0, 1.0]])
+"""Rates of s, and their derivatives by time, for which torques are taken: they are polynomials of these."""
+_Points = Float[np.ndarray, " _"]  # of any length
+_Table = Float[np.ndarray, "point column"]
+
+
+class RobotQuantities:
+    """Gives the limited quantities of a robot at points of a path.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot, with what it holds.
+    path : Path
+        Joints that it does not name stand still.
+    limits : MotionLimits, dict of str to Limits, or None
+        As `retime` takes them.
+    drives : bool
+        Whether torques contain armature inertia, damping and friction of the drives.
+
+    Raises
+    ------
+    RobotError, TrajectoryError
+        If names do not fit the robot, or nothing that moves has a limit.
+    """
+
+    def __init__(self, robot: Robot, path: Path, limits: MotionLimits | None, *, drives: bool = True):
+        self.robot, self.path, self.drives = robot, path, drives
+        self.limits = limits_of(robot, limits)
+        followed = FollowedTrajectory(robot, JointTrajectory(dict(path.laws), path.start, path.stop))
+        self.columns, self.held = followed.columns, followed.held
+        names = robot.joint_names
+        self.moved = [k for k, name in enumerate(names) if name not in self.held]
+        self.with_velocity = self._limited("velocity")
+        self.with_acceleration = self._limited("acceleration", "deceleration", "jerk")
+        self.with_jounce = [k for k in self.moved if self._has(names[k], "jounce")]
+        self.with_effort = [k for k in range(len(names)) if self._has(names[k], "effort", "effort_rate")]
+        self.labels = self._labels()
+
+    def __call__(self, s: _Points) -> PathQuantities:
+        """Return the quantities at values of s."""
+        q = self.coordinates(s)
+        first, bounds = self._first(q)
+        second, lower, upper, rates = self._second(q)
+        vectors, vector_bounds = self._vectors(q)
+        chosen = self.with_jounce
+        fourth = np.moveaxis(q[:, 1:, chosen], 1, 2)
+        fourth_bounds = self._bounds("jounce", chosen, q)
+        return PathQuantities(first, bounds, second, lower, upper, rates, vectors, vector_bounds, fourth, fourth_bounds)
+
+    def coordinates(self, s: _Points) -> Float[np.ndarray, "point 5 joint"]:
+        """Return the positions of all joints and their derivatives by s."""
+        q = np.zeros((len(s), ORDER + 1, len(self.robot.joint_names)))
+        for name, value in self.held.items():
+            q[:, 0, self.robot.joint_names.index(name)] = value
+        q[:, :, self.columns] = self.path.derivatives(s, ORDER)
+        return q
+
+    def place(self, s: float) -> str:
+        """Say where on the path a value of s is."""
+        q = self.path.derivatives(np.array([s]), 0)[0, 0]
+        return f"s = {s:.6g} (q = {', '.join(f'{x:.4g}' for x in q)})"
+
+    def _first(self, q: np.ndarray) -> tuple[_Table, _Table]:
+        values, bounds = [q[:, 1, self.with_velocity]], [self._bounds("velocity", self.with_velocity, q)]
+        for point in self.limits.points:
+            if point.speed is not None:
+                values.append(np.linalg.norm(self._point(q, point)[:, 1], axis=-1)[:, None])
+                bounds.append(np.full((len(q), 1), point.speed))
+        return np.concatenate(values, axis=1), np.concatenate(bounds, axis=1)
+
+    def _second(self, q: np.ndarray) -> tuple[np.ndarray, _Table, _Table, _Table]:
+        chosen = self.with_acceleration
+        motion = q[:, :, chosen]
+        nothing = np.zeros_like(motion[:, 0])
+        parts = (motion[:, 1], motion[:, 2], nothing, nothing, motion[:, 2], motion[:, 3], nothing, nothing)
+        faster, slower = self._bounds("acceleration", chosen, q), self._bounds("deceleration", chosen, q)
+        given = np.isfinite(slower)
+        slower = np.where(given, slower, faster)
+        at_rest = np.abs(motion[:, 1]) <= REST * np.abs(motion[:, 1]).max(axis=0, initial=0.0)
+        ahead = motion[:, 1] > 0
+        upper = np.where(at_rest | ahead, faster, slower)
+        lower = -np.where(at_rest | ~ahead, faster, slower)
+        tables = [(np.stack(parts, axis=-1), lower, upper, self._bounds("jerk", chosen, q))]
+        if self.with_effort:
+            efforts = self._bounds("effort", self.with_effort, q)
+            rates = self._bounds("effort_rate", self.with_effort, q)
+            tables.append((self._torques(q)[:, self.with_effort], -efforts, efforts, rates))
+        second, lower, upper, rates = (np.concatenate(x, axis=1) for x in zip(*tables, strict=True))
+        return second, lower, upper, rates
+
+    def _torques(self, q: np.ndarray) -> Float[np.ndarray, "point joint 8"]:
+        """Return the coefficients of the torques: exact values for a few rates of s, and the polynomials they are."""
+        first, second = (x[:, None, None] for x in CASES.T)
+        _, q1, q2, q3, _ = np.moveaxis(q, 1, 0)
+        at = np.broadcast_to(q[:, 0], (len(CASES), *q[:, 0].shape))
+        moving = (at, q1 * first, q1 * second + q2 * first**2, 3 * q2 * first * second + q3 * first**3)
+        found = np.asarray(inverse_dynamics(self.robot, np.stack(moving, axis=2), drives=self.drives))
+        speeds = CASES[:3, 0]
+        values, rates = np.moveaxis(found, 2, 0)  # of cases, points, joints
+        g, d, c = np.einsum("ij,jpn->ipn", np.linalg.inv(np.vander(speeds, increasing=True)), values[:3])
+        g1, d1, c1 = np.einsum("ij,jpn->ipn", np.linalg.inv(speeds[:, None] ** [1, 2, 3]), rates[:3])
+        m = values[3] - values[0]
+        m1 = rates[3] - rates[0] - 2 * c - d
+        return np.stack([m, c, d, g, m1, c1, d1, g1], axis=-1)
+
+    def _vectors(self, q: np.ndarray) -> tuple[np.ndarray, _Table]:
+        chosen = [point for point in self.limits.points if point.acceleration is not None]
+        if not chosen:
+            return np.zeros((len(q), 0, 3, 2)), np.zeros((len(q), 0))
+        moved = [np.moveaxis(self._point(q, point)[:, 1:3], 1, -1) for point in chosen]
+        return np.stack(moved, axis=1), np.tile(np.array([point.acceleration for point in chosen], float), (len(q), 1))
+
+    def _point(self, q: np.ndarray, point: object) -> Float[np.ndarray, "point 3 3"]:
+        return np.asarray(forward_kinematics(self.robot, q[:, :3], point.link, point.point).position)  # type: ignore[attr-defined]
+
+    def _has(self, name: str, *fields: str) -> bool:
+        """Whether a joint has one of some limits."""
+        constant, varying = self.limits.joints[name], self.limits.varying.get(name, {})
+        others = {"jounce": self.limits.jounce.get(name)}
+        return any(f in varying or others.get(f, getattr(constant, f, None)) is not None for f in fields)
+
+    def _limited(self, *fields: str) -> list[int]:
+        return [k for k in self.moved if self._has(self.robot.joint_names[k], *fields)]
+
+    def _bounds(self, field: str, chosen: list[int], q: np.ndarray) -> _Table:
+        """Return the limits of some joints at points, infinite where there is none."""
+        found = np.full((len(q), len(chosen)), np.inf)
+        for column, k in enumerate(chosen):
+            name = self.robot.joint_names[k]
+            law = self.limits.varying.get(name, {}).get(field)
+            if law is not None:
+                found[:, column] = self._law_values(name, field, law, q[:, 0, k])
+                continue
+            constant = self.limits.jounce.get(name) if field == "jounce" else getattr(self.limits.joints[name], field)
+            if constant is not None:
+                found[:, column] = constant
+        return found
+
+    def _law_values(self, name: str, field: str, law: object, positions: _Points) -> _Points:
+        values = np.broadcast_to(np.asarray(law(positions), float), positions.shape)  # type: ignore[operator]
+        bad = np.flatnonzero(~(values > 0))
+        if len(bad):
+            message = (
+                f"this limit must be greater than zero on the path, and is not at the position {positions[bad[0]]:.6g}"
+            )
+            raise RobotError(message, name=f"limits.{name}.{field}", value=float(values[bad[0]]))
+        return values
+
+    def _labels(self) -> Labels:
+        names = self.robot.joint_names
+
+        def label(k: int, field: str) -> Quantity:
+            turning = self.robot.joints[names[k]].turning
+            units = (TURNING if turning else SLIDING) | {"jounce": "rad/s^4" if turning else "m/s^4"}
+            word = field.replace("effort", "torque" if turning else "force").replace("_", " ")
+            return Quantity(names[k], word, units[field])
+
+        points = self.limits.points
+        first = [label(k, "velocity") for k in self.with_velocity]
+        first += [Quantity(p.link, "speed of the point", "m/s") for p in points if p.speed is not None]
+        second, rates = (
+            [label(k, motion) for k in self.with_acceleration] + [label(k, effort) for k in self.with_effort]
+            for motion, effort in (("acceleration", "effort"), ("jerk", "effort_rate"))
+        )
+        vectors = [Quantity(p.link, "acceleration of the point", "m/s^2") for p in points if p.acceleration is not None]
+        fourth = [label(k, "jounce") for k in self.with_jounce]
+        return Labels(*map(tuple, (first, second, rates, vectors, fourth)))
+
+    def check_range(self) -> None:
+        """Raise TrajectoryError where the path leaves the range of a joint: no time law can mend that."""
+        s = np.linspace(self.path.start, self.path.stop, 2001)
+        q = self.path.derivatives(s, 0)[:, 0]
+        for column, name in enumerate(self.path.names):
+            limits = self.limits.joints[name]
+            for bound, sign, word in ((limits.upper, 1, "above"), (limits.lower, -1, "below")):
+                if bound is None:
+                    continue
+                over = sign * (q[:, column] - bound)
+                worst = int(np.argmax(over))
+                if over[worst] > 1e-9 * max(1.0, abs(bound)):
+                    message = (
+                        f"the path leaves the range of this joint: {q[worst, column]:.6g} at s = {s[worst]:.6g} is "
+                        f"{word} {bound:g}; no time law mends that, choose another path"
+                    )
+                    raise TrajectoryError(message, name=name)

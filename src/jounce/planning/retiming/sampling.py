@@ -1,0 +1,85 @@
+"""Retimed trajectories as samples for a controller: whole periods, and limits kept by splines through the samples."""
+
+import warnings
+
+import numpy as np
+
+from jounce.dynamics.limits import LimitReport
+from jounce.errors import SampleWarning, TrajectoryError
+from jounce.planning.retiming.limits import MotionLimits
+from jounce.planning.retiming.motion_limits_check import check_motion
+from jounce.planning.retiming.retimed import RetimedTrajectory
+from jounce.robot.robot import Robot
+from jounce.trajectory import JointTrajectory
+
+WHOLE = 1e-9  # of a period
+ATTEMPTS = 12
+LEAST = 11  # samples
+
+
+def fit_to_samples(
+    robot: Robot,
+    trajectory: RetimedTrajectory,
+    limits: MotionLimits,
+    rate: float,
+    *,
+    degree: int = 5,
+    drives: bool = True,
+) -> tuple[RetimedTrajectory, LimitReport]:
+    """Return a trajectory slowed until it lasts whole periods, and splines through its samples keep the limits too.
+
+    Between samples such splines swing where a limited derivative bends, by about a percent at 1 kHz.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot, with what it holds.
+    trajectory : RetimedTrajectory
+        As `retime` returned it.
+    limits : MotionLimits
+        Those that it keeps.
+    rate : float
+        Samples a second.
+    degree : int, default 5
+        Of the splines that a reader puts through the samples.
+    drives : bool, default True
+        Whether torques contain armature inertia, damping and friction of the drives.
+
+    Returns
+    -------
+    RetimedTrajectory
+        Its `times` are the instants of the samples.
+    LimitReport
+        Of the splines through the samples.
+
+    Raises
+    ------
+    TrajectoryError
+        If the rate gives too few samples, or the splines cannot be made to keep the limits.
+    """
+    period = 1 / rate
+    if trajectory.stop < LEAST * period:
+        raise TrajectoryError(f"gives fewer than {LEAST} samples in {trajectory.stop:g} s; choose more", value=rate)
+    slowed = 1.0
+    told = ""
+    for _ in range(ATTEMPTS):
+        periods = np.ceil(slowed * trajectory.stop / period - WHOLE)
+        found = trajectory.slower(periods * period / trajectory.stop)
+        times = np.linspace(0.0, found.stop, int(periods) + 1)
+        found.times = times
+        positions = found.derivatives(times, 0)[:, 0]
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SampleWarning)
+            read = JointTrajectory.from_samples(times, positions, found.names, degree)
+            report = check_motion(robot, read, limits, drives=drives)
+        if report.kept:
+            found.report = check_motion(robot, found, limits, drives=drives)
+            return found, report
+        over = ((report.worst.ratio or 1.0) if report.worst else 1.0) - 1
+        told = "" if report.worst is None else f" of the {report.worst.quantity} of {report.worst.joint}"
+        slowed = max(slowed, float(periods) * period / trajectory.stop) * (1 + min(over / 2, 0.05)) + period / 10
+    message = (
+        f"splines of degree {degree} through samples at this rate break the limit{told}; "
+        f"choose a higher rate, or a smoother motion (order)"
+    )
+    raise TrajectoryError(message, value=rate)

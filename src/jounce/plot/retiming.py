@@ -1,0 +1,91 @@
+"""Which limits bind a retimed trajectory, over its time: a bar for each limit, and the rate along the path."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from jounce.errors import TrajectoryError
+from jounce.plot.style import GREY, LINE_COLOURS, blank_figure, set_ticks, shown_name, style
+
+__all__ = ["draw_retiming"]
+
+WIDTH, BAR, RATE = 7.0, 0.24, 1.7  # inches
+MOST = 24  # bars: those of the highest price
+
+
+def draw_retiming(found: Any, title: str = "") -> Any:
+    """Draw which limits bind a trajectory where, with their prices, above the rate along its path.
+
+    Parameters
+    ----------
+    found : RetimedTrajectory
+        As `retime` returns it.
+    title : str, optional
+        The name of the robot unless given.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Bars where nothing is left of a limit, one row for each; on the right by how many ms the duration would fall
+        were it one percent higher.
+
+    Raises
+    ------
+    TrajectoryError
+        If no limit binds.
+    """
+    active = found.active
+    binds, price = active["binds"].values, active["price"].values.sum(axis=0)
+    bound = np.flatnonzero(binds.any(axis=0))
+    if not bound.size:
+        raise TrajectoryError("no limit binds this trajectory; there is nothing to draw", name="active")
+    chosen = sorted(bound[np.argsort(-price[bound])][:MOST].tolist())
+    names = [str(x) for x in active["limit"].values]
+    words = list(dict.fromkeys(_quantity(name) for name in names))
+    times = active["time"].values * found.stop / active["time"].values[-1]
+    edges = np.concatenate([times[:1], (times[1:] + times[:-1]) / 2, times[-1:]])
+    with style():
+        figure = blank_figure(WIDTH, RATE + BAR * len(chosen) + 1.0, title or found.report.robot, h_pad=0.06)
+        rate, bars = figure.subplots(2, 1, sharex=True, height_ratios=[RATE, BAR * len(chosen) + 0.3])
+        _draw_rate(found, rate)
+        for row, k in enumerate(chosen):
+            colour = LINE_COLOURS[words.index(_quantity(names[k])) % len(LINE_COLOURS)]
+            for first, last in _runs(binds[:, k]):
+                span = max(edges[last + 1] - edges[first], 0.002 * found.stop)
+                bars.broken_barh([(edges[first], span)], (row - 0.36, 0.72), facecolors=colour)
+            told = f"{10 * price[k]:.2g} ms" if price[k] > 0 else "0"
+            bars.text(1.01, row, told, transform=bars.get_yaxis_transform(), va="center", fontsize=7, color=GREY)
+        bars.set_yticks(range(len(chosen)), [shown_name(names[k]) for k in chosen], fontsize=7)
+        bars.set_ylim(len(chosen) - 0.4, -0.6)
+        bars.set_xlabel("time  $t$  (s)")
+        bars.set_title("limits that bind; right: saved if 1 % higher", loc="left", fontsize=7.5, color=GREY, pad=4)
+        set_ticks(bars.xaxis, 6)
+        bars.set_xlim(0, found.stop)
+    return figure
+
+
+def _draw_rate(found: Any, axes: Any) -> None:
+    import jax.numpy as jnp
+
+    from jounce.jet import Jet
+
+    times = np.linspace(0.0, found.stop, 1001)
+    s = np.asarray(found.progress(Jet.variable(jnp.asarray(times), 1)).derivatives())
+    length = found.path.stop - found.path.start
+    axes.plot(times, s[1] / length, color=LINE_COLOURS[0])
+    axes.set_ylabel("rate along the path\n(1/s)")
+    axes.set_ylim(0, None)
+    set_ticks(axes.yaxis, 4, least=3)
+
+
+def _quantity(name: str) -> str:
+    """Return the words of a limit after the name of its joint."""
+    return name.partition(" ")[2]
+
+
+def _runs(flags: np.ndarray) -> list[tuple[int, int]]:
+    """Return the first and the last index of each run of what is true."""
+    steps = np.diff(np.concatenate([[0], flags.astype(int), [0]]))
+    return list(zip(np.flatnonzero(steps == 1).tolist(), (np.flatnonzero(steps == -1) - 1).tolist(), strict=True))

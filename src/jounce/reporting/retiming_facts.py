@@ -1,0 +1,94 @@
+"""What is told of a trajectory that was retimed: how long it takes, and which limits bind it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from jounce.dynamics.limits import LimitReport
+from jounce.planning import RetimedTrajectory
+from jounce.reporting.json_results import limits_result
+from jounce.reporting.summaries import count
+from jounce.reporting.tables import Table, number
+
+
+def binding_facts(found: RetimedTrajectory) -> list[dict[str, Any]]:
+    """Return the limits that bind, the dearest first: for how long, s, and by how much the duration would fall, s.
+
+    The price is for a limit raised by a share of 1; a hundredth of it is what a percent more brings.
+    """
+    active = found.active
+    at = active["time"].values
+    spans = np.gradient(at)
+    rows = [
+        {
+            "limit": str(name),
+            "unit": str(active["unit"].values[k]),
+            "seconds": float(spans @ active["binds"].values[:, k]),
+            "price": float(active["price"].values[:, k].sum()),
+        }
+        for k, name in enumerate(active["limit"].values)
+    ]
+    return sorted((row for row in rows if row["seconds"] > 0), key=lambda row: -row["price"])
+
+
+def binding_table(found: RetimedTrajectory) -> Table:
+    """Return the limits that bind as a table."""
+    rows = [
+        [
+            row["limit"],
+            row["unit"],
+            number(row["seconds"]),
+            f"{100 * row['seconds'] / found.stop:.1f}",
+            f"{10 * row['price']:.4g}",
+        ]
+        for row in binding_facts(found)
+    ]
+    headings = ("limit that binds", "unit", "for s", "% of time", "ms saved if 1 % higher")
+    return Table("", headings, rows, (2, 3, 4))
+
+
+def retimed_words(
+    found: RetimedTrajectory, before: float | None, free: float, files: list[str], read: LimitReport | None
+) -> str:
+    """Word how long the motion takes, and that it keeps its limits."""
+    was = "" if before is None else f", {before:.6g} s before"
+    what = "joint" if found.report.held or len(found.report.values[0, 0]) else "driver"
+    lines = [f"{found.report.robot}: {count(len(found.names), what)} ({', '.join(files)})", f"{free:.6g} s{was}"]
+    if read is not None:
+        lines.append(
+            f"written: {found.stop:.6g} s in {len(found.times)} rows; splines through them keep the limits too "
+            f"({100 * (found.stop / free - 1):.2f} % slower)"
+        )
+    if found.path.deviation > 1e-12:
+        lines.append(f"the path passes the samples within {found.path.deviation:.1e} rad or m")
+    worst = found.report.worst
+    if worst is not None and worst.ratio is not None:
+        lines.append(
+            f"all {len(found.report.limited)} limits kept, between rows too; nearest: {worst.joint} {worst.quantity}, "
+            f"{worst.ratio:.6f} of its limit at t = {worst.time:.5g} s"
+        )
+    return "\n".join(lines)
+
+
+def retiming_result(
+    found: RetimedTrajectory,
+    before: float | None,
+    free: float,
+    files: tuple[Path, Path | None],
+    written: tuple[Path | None, Path | None],
+) -> dict[str, Any]:
+    """Return what `jounce retime` tells."""
+    told = limits_result(found.report, files[0], files[1] or files[0], written[0])
+    del told["held"], told["broken"]
+    return {
+        **told,
+        "trajectory": files[1],
+        "duration": free,
+        "before": before,
+        "deviation": found.path.deviation,
+        "binding": binding_facts(found),
+        "figure": written[1],
+    }

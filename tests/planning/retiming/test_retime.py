@@ -1,0 +1,241 @@
+"""Retimed motions of one joint, and of a pendulum, against closed forms and laws of mechanics."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+import jounce as jn
+from jounce.errors import JounceError, RobotError, SolveError, TrajectoryError
+
+LENGTH, SPEED, ACCELERATION, JERK, JOUNCE = 2.0, 1.0, 2.0, 10.0, 200.0
+
+
+def cart(**limits):
+    slide = jn.Joint("slide", "base", "cart", "prismatic", axis=[1, 0, 0], limits=jn.Limits(**limits))
+    return jn.Robot("cart", [jn.Link("base"), jn.Link("cart", jn.Inertia(1.0))], [slide])
+
+
+def pendulum(**limits):
+    rod = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0], tensor=[0, 1 / 12, 1 / 12])
+    pin = jn.Joint("pin", "base", "rod", axis=[0, -1, 0], limits=jn.Limits(**limits))
+    return jn.Robot("pendulum", [jn.Link("base"), jn.Link("rod", rod)], [pin])
+
+
+LINE = [[0.0], [LENGTH]]
+TRAPEZOID = LENGTH / SPEED + SPEED / ACCELERATION
+
+
+def test_a_trapezoid_takes_as_long_as_its_closed_form_says():
+    found = jn.retime(cart(velocity=SPEED, acceleration=ACCELERATION), LINE)
+    assert TRAPEZOID * (1 - 1e-9) < found.stop < TRAPEZOID * 1.003
+    assert found.report.kept
+    assert isinstance(found, jn.JointTrajectory)
+
+
+@pytest.mark.parametrize(
+    "limits, duration",
+    [
+        ({"velocity": SPEED, "acceleration": ACCELERATION}, TRAPEZOID),
+        ({"velocity": SPEED, "effort": ACCELERATION}, TRAPEZOID),  # of a mass of 1 kg
+        ({"acceleration": ACCELERATION}, 2 * np.sqrt(LENGTH / ACCELERATION)),
+        ({"velocity": SPEED, "acceleration": 2.0, "deceleration": 1.0}, 2.75),
+        ({"velocity": SPEED, "acceleration": ACCELERATION, "jerk": JERK}, TRAPEZOID + ACCELERATION / JERK),
+        ({"velocity": SPEED, "effort": ACCELERATION, "effort_rate": JERK}, TRAPEZOID + ACCELERATION / JERK),
+        ({"jerk": JERK}, (32 * LENGTH / JERK) ** (1 / 3)),
+    ],
+    ids=lambda x: "-".join(x) if isinstance(x, dict) else "",
+)
+@pytest.mark.slow
+def test_durations_are_those_of_closed_forms(limits, duration):
+    found = jn.retime(cart(**limits), LINE)
+    assert duration * (1 - 1e-9) < found.stop < duration * 1.003
+    assert found.report.kept
+    np.testing.assert_allclose(found.derivatives([0.0, found.stop], 1)[:, :, 0], [[0, 0], [LENGTH, 0]], atol=1e-9)
+
+
+@pytest.mark.slow
+def test_a_limit_of_jounce_rounds_the_jerk():
+    robot = cart(velocity=SPEED, acceleration=ACCELERATION, jerk=JERK)
+    found = jn.retime(robot, LINE, jn.MotionLimits(jounce={"slide": JOUNCE}))
+    duration = TRAPEZOID + ACCELERATION / JERK + JERK / JOUNCE
+    assert duration * (1 - 1e-9) < found.stop < duration * 1.003
+    assert np.abs(found.derivatives(np.linspace(0, found.stop, 4001), 4)[:, 4]).max() <= JOUNCE * (1 + 1e-6)
+    assert [row.quantity for row in found.report.rows][-1] == "jounce"
+
+
+@pytest.mark.slow
+def test_the_speed_of_a_point_and_a_speed_that_depends_on_the_position():
+    robot = cart(velocity=SPEED, acceleration=ACCELERATION)
+    point = jn.retime(robot, LINE, jn.MotionLimits(points=(jn.PointLimits("cart", speed=0.7, acceleration=1.5),)))
+    assert point.stop == pytest.approx(LENGTH / 0.7 + 0.7 / 1.5, rel=2e-3)
+    varying = jn.MotionLimits(varying={"slide": {"velocity": lambda q: 0.3 + 0.2 * (q - 1) ** 2}})
+    found = jn.retime(robot, LINE, varying)
+    q, v = found.derivatives(np.linspace(0, found.stop, 3001), 1)[:, :, 0].T
+    assert (v / (0.3 + 0.2 * (q - 1) ** 2)).max() == pytest.approx(1.0, abs=1e-3)
+    assert found.report.kept
+
+
+@pytest.mark.slow
+def test_rates_at_the_ends_are_kept():
+    robot = cart(velocity=SPEED, acceleration=ACCELERATION)
+    found = jn.retime(robot, LINE, rates=(0.25, 0.1))  # 0.5 and 0.2 m/s
+    np.testing.assert_allclose(found.derivatives([0.0, found.stop], 1)[:, 1, 0], [0.5, 0.2], rtol=1e-6)
+    up, down = (SPEED - 0.5) / ACCELERATION, (SPEED - 0.2) / ACCELERATION
+    duration = up + down + (LENGTH - up * 0.75 - down * 0.6) / SPEED
+    assert duration * (1 - 1e-9) < found.stop < duration * 1.003
+
+
+@pytest.mark.slow
+def test_scaling_reversal_and_looser_limits():
+    path = [[-1.0], [0.3], [1.2]]
+    limits = {"velocity": 3.0, "effort": 7.0, "effort_rate": 60.0}
+    found = jn.retime(pendulum(**limits), path).stop
+    assert jn.retime(pendulum(**limits), path[::-1]).stop == pytest.approx(found, rel=2e-3)
+    looser = jn.retime(pendulum(**limits | {"effort": 8.0}), path).stop
+    assert looser < found
+    kinematic = {"velocity": 1.0, "acceleration": 2.0, "jerk": 9.0}
+    faster = {"velocity": 2.0, "acceleration": 8.0, "jerk": 72.0}
+    slow, fast = (jn.retime(pendulum(**x), path).stop for x in (kinematic, faster))
+    assert slow == pytest.approx(2 * fast, rel=2e-4)
+
+
+@pytest.mark.slow
+def test_torque_and_its_rate_are_kept_by_the_closed_form_of_a_pendulum():
+    limits = {"velocity": 3.0, "effort": 7.0, "effort_rate": 60.0}
+    found = jn.retime(pendulum(**limits), [[-1.0], [0.3], [1.2]])
+    q, v, a, j = found.derivatives(np.linspace(0, found.stop, 20001), 3)[:, :, 0].T
+    torque, rate = a / 3 + 9.81 / 2 * np.cos(q), j / 3 - 9.81 / 2 * np.sin(q) * v
+    assert np.abs(v).max() <= 3 * (1 + 1e-6)
+    assert 0.999 < np.abs(torque).max() / 7 <= 1 + 1e-6
+    assert 0.99 < np.abs(rate).max() / 60 <= 1 + 1e-6
+
+
+@pytest.mark.slow
+def test_what_binds_has_a_price_that_a_looser_limit_earns():
+    limits = {"velocity": SPEED, "acceleration": ACCELERATION, "jerk": JERK}
+    found = jn.retime(cart(**limits), LINE)
+    price = found.active["price"].sum("s").to_series()
+    # of d/v + v/a + a/j, by a share of each limit
+    expected = {
+        "slide velocity": LENGTH / SPEED - SPEED / ACCELERATION,
+        "slide acceleration": SPEED / ACCELERATION - ACCELERATION / JERK,
+        "slide jerk": ACCELERATION / JERK,
+    }
+    for name, value in expected.items():
+        assert price[name] == pytest.approx(value, rel=0.05)
+    assert bool(found.active["binds"].sel(limit="slide velocity").any())
+
+
+@pytest.mark.slow
+def test_the_order_asked_for_is_that_of_the_continuity_from_rest():
+    found = jn.retime(cart(velocity=SPEED, acceleration=ACCELERATION, jerk=JERK), LINE, order=4)
+    np.testing.assert_allclose(found.derivatives([0.0], 4)[0, :, 0], 0.0, atol=1e-6)
+    assert found.stop == pytest.approx(2.7, rel=5e-3)
+
+
+@pytest.mark.slow
+def test_a_result_is_a_trajectory_like_others():
+    robot = cart(velocity=SPEED, acceleration=ACCELERATION)
+    found = jn.retime(robot, {"slide": "2*s**2 + 0.1*sin(s)*0"})
+    assert isinstance(found, jn.JointTrajectory)
+    again = pickle.loads(pickle.dumps(found))
+    np.testing.assert_array_equal(again.derivatives([0.3], 3), found.derivatives([0.3], 3))
+    assert jn.check_limits(robot, found).kept
+    step = 1e-4
+    values = found.derivatives(0.7 + step * np.arange(-1, 2), 2)[:, :, 0]
+    np.testing.assert_allclose((values[2] - values[0])[:2] / (2 * step), values[1, 1:], rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "path, message",
+    [
+        ([[0.0], [0.0]], "does not move"),
+        ([[0.0], [1.0], [1.0], [2.0]], "waypoint 3 is the same"),
+        ([[0.0], [np.nan]], "finite"),
+        ({"slide": "abs(s - 0.3)"}, "kink"),
+        ({"slide": "s + q"}, "unknown name 'q'"),
+        ({"slid": "s"}, "did you mean 'slide'"),
+        ([[0.0, 1.0], [1.0, 1.0]], "shape"),
+        ([[0.0], [9.0]], "leaves the range"),
+    ],
+)
+def test_bad_paths_are_told(path, message):
+    with pytest.raises(JounceError, match=message):
+        jn.retime(cart(velocity=SPEED, acceleration=ACCELERATION, lower=-3.0, upper=3.0), path)
+
+
+@pytest.mark.slow
+def test_a_jump_of_curvature_is_refused_only_where_rates_are_limited():
+    bent = {"slide": jn.PiecewiseMotion(["t", "t + (t - 0.5)**2"], until=[0.5])}
+    assert jn.retime(cart(velocity=SPEED, acceleration=ACCELERATION), bent).report.kept
+    with pytest.raises(TrajectoryError, match=r"curvature at s = 0\.5"):
+        jn.retime(cart(velocity=SPEED, acceleration=ACCELERATION, jerk=JERK), bent)
+
+
+def test_a_static_torque_above_its_limit_is_told_with_its_place():
+    with pytest.raises(
+        TrajectoryError, match=r"pin: no time law exists: at s = 0\.\d+ \(q = .*4\.9\d* N m to stand.*4 N m"
+    ):
+        jn.retime(pendulum(effort=4.0, velocity=1.0), {"pin": "1.2*(1 - 2*s)"})
+
+
+def test_limits_that_allow_anything_or_nothing_are_told():
+    with pytest.raises(TrajectoryError, match="nothing that has a limit moves"):
+        jn.retime(cart(), LINE)
+    with pytest.raises(SolveError, match="rates at the ends"):
+        jn.retime(cart(velocity=SPEED, acceleration=ACCELERATION), LINE, rates=(1.0, 0.0))
+    with pytest.raises(RobotError, match="greater than zero"):
+        jn.retime(cart(velocity=SPEED), LINE, jn.MotionLimits(varying={"slide": {"velocity": lambda q: 1 - q}}))
+    with pytest.raises(TrajectoryError, match="order"):
+        jn.retime(cart(velocity=SPEED, jerk=JERK), LINE, order=1)
+
+
+@pytest.mark.slow
+def test_a_repaired_trajectory_is_nowhere_faster_and_keeps_what_kept():
+    limits = {"velocity": 1.0, "acceleration": 3.0}
+    given = jn.JointTrajectory.point_to_point(["slide"], [0.0], [1.0], duration=2.0)
+    robot = cart(**limits)
+    same = jn.retime(robot, given, repair=True)
+    assert same.stop == pytest.approx(2.0, abs=1e-9)
+    np.testing.assert_allclose(same.derivatives([0.3], 3), given.derivatives([0.3], 3), rtol=1e-9)
+    slow = jn.retime(cart(**limits | {"velocity": 0.9}), given, repair=True)
+    _, rate = np.asarray(slow.progress(jn.Jet.variable(np.linspace(0, slow.stop, 2001), 1)).derivatives())
+    assert rate.max() <= 1 + 1e-9
+    assert np.abs(slow.derivatives(slow.times, 1)[:, 1]).max() <= 0.9 * (1 + 1e-6)
+    # the time of the stretch that is too fast, at the speed allowed
+    v = given.derivatives(np.linspace(0, 2, 20001), 1)[:, 1, 0]
+    assert 2.0 < slow.stop < np.sum(np.maximum(v / 0.9, 1.0)) * 1e-4 * 1.003
+    with pytest.raises(TrajectoryError, match="only a trajectory"):
+        jn.retime(robot, LINE, repair=True)
+
+
+@pytest.mark.slow
+def test_a_trajectory_gives_its_geometry():
+    robot = cart(velocity=SPEED, acceleration=ACCELERATION)
+    times = np.linspace(0, 3, 301)
+    given = jn.JointTrajectory.from_samples(times, LENGTH * (1 - np.cos(np.pi * times / 3))[:, None] / 2, ["slide"])
+    found = jn.retime(robot, given)
+    assert found.stop == pytest.approx(TRAPEZOID, rel=3e-3)
+    assert found.path.deviation < 1e-12
+
+
+@pytest.mark.slow
+def test_the_drivers_of_a_mechanism_keep_force_yank_and_the_speed_of_an_output():
+    # a wheel of 0.5 kg m^2 whose rim must not be faster than 1 m/s: torque 0.5 a, yank 0.5 j
+    wheel = jn.Mechanism(
+        space="planar",
+        bodies={"wheel": jn.Body([0, 0], mass=2.0, inertia=0.5)},
+        joints={"O": jn.planar.Revolute(("ground", "wheel"), [0, 0], [0, 0])},
+        drivers={"turn": jn.drivers.CoordinateDriver(("ground", "wheel"), "angle", motion="2*t + 0.1*t**2")},
+        outputs={"rim": jn.PointOutput("wheel", [0.5, 0])},
+        time=jn.TimeGrid(0.0, 2.0, 0.01),
+    )
+    limits = {"turn": jn.Limits(effort=1.0, effort_rate=5.0), "rim": jn.Limits(velocity=1.0)}
+    found = jn.retime(wheel, None, limits)
+    duration = 4.4 / 2 + 2 / 2 + 2 / 10  # d/v + v/a + a/j
+    assert duration * (1 - 1e-6) < found.stop < duration * 1.005
+    q, v, a, j = found.derivatives(np.linspace(0, found.stop, 5001), 3)[:, :, 0].T
+    assert q[-1] == pytest.approx(4.4, abs=1e-9)
+    for values, limit in ((v, 2.0), (a, 2.0), (j, 10.0)):
+        assert np.abs(values).max() <= limit * (1 + 1e-6)
