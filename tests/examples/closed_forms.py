@@ -167,6 +167,26 @@ def delta(t):
     return {"platform": minus(plus(centers[0], foot), scaled(normal, drop))}
 
 
+def delta_pick(t):
+    """Return the angles of the motors on the way there: each arm meets the sphere of its rods about the platform."""
+    base, platform, arm, rod, reach, lift, belt, aside = mm("200 50 300 700 150 25 650 20")
+
+    def risen(start, stop):
+        u = (t - mpf(start)) / (mpf(stop) - mpf(start))
+        return u**4 * (35 - 84 * u + 70 * u**2 - 20 * u**3)  # 4-5-6-7
+
+    up = risen("0", "0.06") if t.c[0] < mpf("0.06") else 1 + 0 * t if t.c[0] < mpf("0.14") else 1 - risen("0.14", "0.2")
+    x, y, z = 2 * reach * risen("0.03", "0.17") - reach, aside + 0 * t, lift * up - belt
+    angles = {}
+    for k in range(3):
+        turn = 2 * k * PI / 3
+        out = x * cos(turn) + y * sin(turn) + platform - base
+        side = y * cos(turn) - x * sin(turn)
+        along = (out * out + side * side + z * z + arm * arm - rod * rod) / (2 * arm)
+        angles[f"motor{k + 1}"] = atan2(-z, out) - atan2(sqrt(out * out + z * z - along * along), along)
+    return angles
+
+
 def valve_train(t):
     base, lift, rod, height, half, tip, top = mm("16 6.5 200 240 25 35 20")
     tappet = base + lift * ((1 + cos(50 * PI * t + PI / 2)) / 2) ** 4

@@ -177,6 +177,12 @@ def test_delta_robot_meets_three_spheres_and_stays_level():
 
 
 @pytest.mark.slow
+def test_motors_of_the_delta_robot_follow_its_platform():
+    angles = ("motor1", "motor2", "motor3")
+    agrees("delta_pick", closed_forms.delta_pick, [0.04, 0.1, 0.15], *angles, tolerance=1e-11)
+
+
+@pytest.mark.slow
 def test_torques_of_the_human_arm_by_virtual_work():
     robot = jn.load_robot(EXAMPLES / "robots" / "human_arm.xml")
     reach = jn.load_trajectory(EXAMPLES / "trajectories" / "human_arm_reach.yaml")
