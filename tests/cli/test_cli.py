@@ -202,6 +202,7 @@ def test_import_needs_a_python_file_that_exists(run, tmp_path):
     assert run("run", FOUR_BAR, "--import", FOUR_BAR)[0] == 2
 
 
+@pytest.mark.slow
 def test_a_solve_that_fails_on_the_way_keeps_the_good_instants(run, tmp_path):
     path = tmp_path / "motion.csv"
     status, out, err = run("run", FOUR_BAR, "--set", "AB=8 cm", "--out", path)

@@ -50,6 +50,7 @@ def test_stretches_change_nothing(run, file, tmp_path, monkeypatch, motion, stat
     xarray.testing.assert_identical(*written)
 
 
+@pytest.mark.slow
 def test_an_interrupt_between_stretches_leaves_no_file(run, file, tmp_path, monkeypatch):
     monkeypatch.setattr("jounce.kinematics.long_grids.STRETCH", 1100)
     path, seen = file(WHOLE), []

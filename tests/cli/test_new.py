@@ -102,6 +102,7 @@ def solved(name):
     return move(mechanism, order=2)
 
 
+@pytest.mark.slow
 def test_gears_turn_by_the_formula_of_willis():
     """A ring that is held, and gears whose ring is the ground: the bodies of one kind of joint are of mixed places."""
     motion = solved("gear-train")

@@ -24,6 +24,7 @@ def drive(tmp_path_factory):
     return rows(out)
 
 
+@pytest.mark.slow
 def test_a_row_for_each_period_position_to_jerk_in_the_units_asked_for(drive):
     assert drive[0] == ["time [s]", "motor [deg]", "motor_d1 [deg/s]", "motor_d2 [deg/s^2]", "motor_d3 [deg/s^3]"]
     assert len(drive) == 1 + 121

@@ -78,6 +78,7 @@ def test_frames_are_those_of_the_joints_in_turn(robot, data):
         near(motion.position[0, 0], (expected[link] @ [0.1, -0.2, 0.3, 1])[:3], 1e-13)
 
 
+@pytest.mark.slow
 @hypothesis.given(data=strategies.data())
 def test_derivatives_follow_each_other(robot, data):
     step = 1e-3  # the terms left out are below the tolerances

@@ -35,6 +35,7 @@ def test_a_window_within_one_cell_is_no_other():
     assert float(jnp.max(largest(sine(TIME), cells))) == pytest.approx(np.sin(3 * 0.502), abs=1e-14)
 
 
+@pytest.mark.slow
 def test_points_are_compared_with_the_nearest_place_of_a_path_or_with_that_at_their_times():
     series = jnp.stack([sine(TIME + np.pi / 6), sine(TIME)], axis=1)  # a circle of radius 1
     points = np.array([[1.2, 0.0], [0.0, 0.5], [-2.0, 2.0]])

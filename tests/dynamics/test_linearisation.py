@@ -52,6 +52,7 @@ def test_hanging_chain_has_the_frequencies_of_its_closed_form(count):
     assert small.coordinates == tuple(f"rod{k}.angle" for k in range(count))
 
 
+@pytest.mark.slow
 def test_chain_of_masses_has_its_matrices_and_complex_modes():
     masses, springs, dampers = [1.0, 2.0, 3.0], [5.0, 7.0, 9.0, 4.0], [0.1, 0.4, 0.0, 0.3]
     small = jn.linearise(chain(masses, springs, dampers, right_wall=True))

@@ -32,6 +32,7 @@ def test_power_balance_of_the_bank(name):
     assert (left <= 3e-13).all(), left.values
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["slider_crank", pytest.param("hooke_joint", marks=pytest.mark.slow)])
 def test_every_body_obeys_newton_and_euler(name):
     mechanism = massed_example(name)

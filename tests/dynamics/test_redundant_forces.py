@@ -35,6 +35,7 @@ def of_both(motion, derivative=0):
     return [part.sel(derivative=derivative).values for r in reactions for part in (r.force, r.torque)]
 
 
+@pytest.mark.slow
 def test_what_two_hinges_share_has_no_unique_reaction():
     motion = jn.solve(door(), TIMES, order=4)
     for force, torque in zip(*[iter(of_both(motion))] * 2, strict=True):
@@ -107,6 +108,7 @@ def test_a_stiffness_must_be_above_zero():
         jn.joint_reaction(motion, "lower")
 
 
+@pytest.mark.slow
 def test_the_least_norm_is_that_of_a_pseudo_inverse_whatever_the_frames_and_units():
     """Of all forces and couples at both hinges, over a length, those that balance the weight with the least squares."""
     motion = jn.solve(door(law="0*t", redundant_reactions="least_norm"), TIMES, order=4)

@@ -229,6 +229,7 @@ def test_right_sides_of_the_seven_mechanisms_at_any_state(name):
         assert float(nu[0]) == pytest.approx(2 * f[0] * f[1] if "distance" in name else f[1], rel=1e-13)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", with_slow(*list(MECHANISMS)[1:]))
 def test_right_sides_along_the_motions_of_the_seven_mechanisms(name):
     mechanism = jn.load(example(name))

@@ -96,6 +96,7 @@ def test_klanns_foot_is_where_circles_meet():
     agrees("klann_leg", closed_forms.klann, [0.0, 0.31, 0.7, 1.2, 1.77], "foot", "knee")
 
 
+@pytest.mark.slow
 def test_stephenson_six_bar_dwells():
     time = np.linspace(0.0, 2.0, 121)
     motion = solved("six_bar_stephenson", time)

@@ -34,6 +34,7 @@ def height(value=0.0, **keywords):
     return jn.Event(jn.PointOutput("stone", [0, 0]), value, component=1, **keywords)
 
 
+@pytest.mark.slow
 def test_values_are_crossed_when_the_closed_form_says():
     found = happened(height(1.0), height(1.0, direction=1), height(1.0, direction=-1), height(2.0))
     roots = (5 + np.array([-1, 1]) * np.sqrt(5)) / 10

@@ -64,6 +64,7 @@ def test_circuits_and_branches_of_four_bars():
     assert [(x.circuit, x.branch) for x in crossing] == [(1, 1), (1, 2)]
 
 
+@pytest.mark.slow
 def test_what_is_found_does_not_depend_on_the_seed():
     first, second = (jn.assemblies(four_bar(1.0, 3.0, 2.5, 3.2), seed=k, circuits=False) for k in (0, 5))
     for one, other in zip(first, second, strict=True):

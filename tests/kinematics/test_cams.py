@@ -51,6 +51,7 @@ DISCS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name, sense", DISCS)
 def test_an_eccentric_disc_comes_back_from_its_law(name, sense):
     follower = FOLLOWERS[name]

@@ -72,6 +72,7 @@ def test_slider_driven_beyond_its_reach():
     assert "t = 2.5 s" in str(failure(slider_crank("3.52 + 0.2*t"), time))
 
 
+@pytest.mark.slow
 def test_crank_that_leaves_the_region_of_assembly():
     mechanism = four_bar(0.0, 2.0, "t", AB=0.2, AD=0.3, BC=0.1, CD=0.15)
     time = np.linspace(0, 3, 31)
@@ -82,6 +83,7 @@ def test_crank_that_leaves_the_region_of_assembly():
     assert failure(mechanism, time).motion.status[~reached].all()
 
 
+@pytest.mark.slow
 def test_dead_centre_passed_smoothly_keeps_to_the_motion():
     """The law touches the dead centre and returns; the crank goes on through it, in one smooth motion."""
     time = np.linspace(0, 3, 31)

@@ -48,6 +48,7 @@ def test_one_that_locks_or_cannot_be_assembled_stops_no_other():
     assert np.isnan(family["psi"].values[3]).all()
 
 
+@pytest.mark.slow
 def test_bad_designs_are_told():
     with pytest.raises(jn.MechanismError, match=r"greater than zero.*design 1: BC = -0\.14"):
         jn.solve_batch(FOUR_BAR, {"BC": [0.14, -0.14]}, TIME, order=2)

@@ -101,6 +101,7 @@ def slope():
     return jax.grad(jounce)(BC)
 
 
+@pytest.mark.slow
 def test_the_value_is_that_of_a_solution():
     value, _ = jax.value_and_grad(jounce)(BC)
     assert float(value) == pytest.approx(jounce(BC), rel=1e-14)
@@ -207,6 +208,7 @@ def test_what_is_not_traced_is_told():
     assert told.value.name == "time"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("transformed", [jax.grad, jax.jit])
 def test_redundant_constraints_are_refused(transformed):
     bennett = jn.load(example("bennett"))

@@ -28,6 +28,7 @@ def spatial():
     return jn.solve(spindle(law(0.4, wave=1.0), axis=(1.0, 2.0, 2.0)), TIME)
 
 
+@pytest.mark.slow
 def test_dataset_has_names_dimensions_and_units(planar):
     dataset = planar.dataset
     assert dataset["psi"].dims == ("time", "derivative")
@@ -120,6 +121,7 @@ def test_what_cannot_be_asked_for(planar, ask, message):
         ask(planar)
 
 
+@pytest.mark.slow
 def test_planar_angle_of_a_spatial_body(spatial):
     with pytest.raises(jn.MechanismError, match="planar"):
         spatial.angle("spindle")

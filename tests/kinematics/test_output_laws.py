@@ -46,6 +46,7 @@ def test_the_driver_follows_with_all_derivatives(motion):
     np.testing.assert_allclose(motion.outputs["stroke"][:, 1:, 0], wanted, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_forces_are_those_of_the_driver_not_of_the_output(motion):
     balance = jn.power_balance(motion)
     assert float(np.abs(balance["residual"] / balance["scale"]).max()) < 1e-13

@@ -18,6 +18,7 @@ def slider_position(angle):
     return np.cos(angle) + np.sqrt(9 - np.sin(angle) ** 2)
 
 
+@pytest.mark.slow
 def test_coarse_grid_follows_the_motion_over_turns():
     time = np.array([0.0, 10.0, 40.0])
     motion = jn.solve(slider_crank(), time, order=1)

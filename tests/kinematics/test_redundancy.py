@@ -45,6 +45,7 @@ def moves_as_told(case, times=TIMES, order=4, tolerance=1e-12):
     return motion
 
 
+@pytest.mark.slow
 def test_a_bennett_linkage_moves_as_its_closed_form():
     moves_as_told(overconstrained.bennett(), order=6)
 

@@ -18,6 +18,7 @@ def results(motion):
     return np.concatenate([values.ravel() for values in (*motion.outputs.values(), motion.status)])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mechanism", [four_bar(), slider_crank("4 - 0.5*cos(t)**2")], ids=["four-bar", "passes"])
 def test_results_do_not_depend_on_the_number_of_threads(mechanism):
     one, two, three = (results(jn.solve(mechanism, LONG, order=3, strict=False, threads=count)) for count in (1, 2, 3))

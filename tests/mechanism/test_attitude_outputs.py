@@ -150,6 +150,7 @@ def test_dataset_has_axes_of_its_own_for_each_form(turning):
     np.testing.assert_allclose((outer.inv() * relative).as_matrix(), by_pin.as_matrix(), rtol=0, atol=1e-13)
 
 
+@pytest.mark.slow
 def test_tables_and_files_keep_every_number(turning, tmp_path):
     for suffix in ("csv", "nc"):
         path = tmp_path / f"motion.{suffix}"

@@ -196,6 +196,7 @@ def test_sweeps_are_tables_too(small_run):
         np.testing.assert_array_equal([[float(row["jerk"]), float(row["jounce"])] for row in chosen], errors)
 
 
+@pytest.mark.slow
 def test_comparison_puts_printed_errors_beside_ours(small_run):
     text = (small_run[0] / "comparison.md").read_text()
     row = next(line for line in text.splitlines() if line.startswith("| four_bar |") and "| jerk |" in line)

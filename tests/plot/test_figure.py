@@ -77,6 +77,7 @@ def test_large_numbers_are_scaled_in_the_label(four_bar):
     assert max(abs(limit) for limit in axes.get_ylim()) < 1000
 
 
+@pytest.mark.slow
 def test_a_constant_is_drawn_flat_not_magnified(rsur):
     grid = panels(draw(rsur, ["B"]))
     low, high = grid[0, 0].get_ylim()

@@ -72,6 +72,7 @@ def test_moments_are_drawn_where_a_joint_carries_one():
     np.testing.assert_allclose(line.get_ydata(), 10.0, rtol=1e-12)  # 20 N at half a metre
 
 
+@pytest.mark.slow
 def test_power_goes_where_it_should(lift):
     figure = draw_power(lift)
     found = lines(figure.axes[0])

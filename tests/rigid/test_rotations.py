@@ -179,6 +179,7 @@ def test_identities_of_any_motion(sequence, angles, rates):
     np.testing.assert_allclose(found["turned"], found["velocities"]["global"], atol=1e-12)
 
 
+@pytest.mark.slow
 @FEW
 @given(angles=ANGLES, rates=RATES)
 def test_round_trips(sequence, angles, rates):

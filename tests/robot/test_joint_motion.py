@@ -45,6 +45,7 @@ def test_round_trip_to_order_four(motion):
     assert found.singular.tolist() == [False, False]
 
 
+@pytest.mark.slow
 def test_singular_values_are_those_of_the_jacobian(motion):
     q, operational = motion
     found = jn.joint_motion(UR5, q[:, 0], operational, *TOOL)

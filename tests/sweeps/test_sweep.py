@@ -44,6 +44,7 @@ def marks(folder):
     return folder / "chunks" / "digest" / "c"
 
 
+@pytest.mark.slow
 def test_every_design_has_the_statistics_of_its_own_motion(done):
     _, found = done
     mechanism = jn.load(FILE)

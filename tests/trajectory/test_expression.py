@@ -186,6 +186,7 @@ def test_arrays_tracers_and_floats_agree():
     np.testing.assert_allclose(traced, plain, rtol=1e-15)
 
 
+@pytest.mark.slow
 def test_jets_carry_the_derivatives():
     law = Expression(LAW)
     derivatives = law.evaluate({**NAMES, "t": Jet.variable(0.3, order=3)}).derivatives()

@@ -38,6 +38,7 @@ def quintic(t, k):
     return law.deriv(k)(t) if k else law(t)
 
 
+@pytest.mark.slow
 def test_each_law_as_if_alone():
     laws = {
         "a": "0.3*sin(2*t) + 1",

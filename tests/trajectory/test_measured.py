@@ -178,6 +178,7 @@ def follower(folder, initial="[x0, v0/2]", x0=-0.075, v0=1.0):
     return path
 
 
+@pytest.mark.slow
 def test_what_is_known_at_the_first_sample_follows_the_parameters(tmp_path):
     first = jn.load(follower(tmp_path))
     np.testing.assert_allclose(

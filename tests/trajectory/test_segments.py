@@ -89,6 +89,7 @@ def test_limits_are_kept_by_a_trapezoidal_segment():
     assert law.stop == pytest.approx(7.0)
 
 
+@pytest.mark.slow
 def test_slopes_in_durations_and_ways_are_those_of_differences():
     def acceleration(duration, way):
         law = SegmentedMotion([Segment("modified_trapezoid", duration, by=way), Segment("polynomial", 1.0, to=0.0)])

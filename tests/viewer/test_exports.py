@@ -178,5 +178,5 @@ def test_bad_input_ends_with_status_two_and_a_message(arguments, words, capsys):
 
 
 def test_what_is_no_mechanism_is_refused():
-    with pytest.raises(jn.JounceError, match="must be a mechanism, a robot or the path"):
+    with pytest.raises(jn.JounceError, match="must be a mechanism, a robot, a cam, or the path"):
         view(3, open_page=False)

@@ -90,6 +90,7 @@ def test_units_and_names_of_peaks(motion):
     assert told["E1", "first rate"] == "J/s^3"
 
 
+@pytest.mark.slow
 def test_files_written_and_read(path, motion, tmp_path):
     io.write(motion.dataset, tmp_path / "motion.csv")
     back = io.read(tmp_path / "motion.csv")

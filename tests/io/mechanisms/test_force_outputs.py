@@ -71,6 +71,7 @@ def test_files_of_results(motion, tmp_path, suffix):
         np.testing.assert_array_equal(back[name], motion.dataset[name])
 
 
+@pytest.mark.slow
 def test_peaks_are_named_torque_yank_and_second_rate(motion):
     named = [(p.output, p.derivative, p.unit) for p in peaks(motion)]
     torque = [("T", "torque", "N*m"), ("T", "yank", "N*m/s"), ("T", "second rate", "N*m/s^2")]

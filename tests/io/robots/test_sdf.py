@@ -157,6 +157,7 @@ def test_a_gearbox_and_a_mimic(tmp_path):
     assert (mimic.joint, mimic.multiplier, mimic.offset) == ("in", 3.0, 1.0 - 3.0 * 0.5)
 
 
+@pytest.mark.slow
 def test_four_bar_with_a_pin_that_closes_it(tmp_path):
     """Crank 1, coupler 3, rocker 2.5, base 3.2: closed by a revolute joint, against its closed form."""
     text = model(

@@ -118,6 +118,7 @@ def test_derivatives_alone_give_the_same(arm, swing):
         np.testing.assert_allclose(getattr(found, field), getattr(along, field), rtol=1e-12, atol=1e-13)
 
 
+@pytest.mark.slow
 def test_the_expansion_alone_is_refused_until_it_is_good_enough(arm, swing):
     damped = {name: dataclasses.replace(drive, damping=0.5) for name, drive in DRIVES.items()}
     with pytest.raises(jn.RobotError, match="more derivatives"):
@@ -206,6 +207,7 @@ def test_loops_followers_and_shapes_are_refused(arm):
         jn.feedforward(arm, jn.JointTrajectory({"elbow": "t"}, 0.0, 1.0), DRIVES, times=[0.5, 1.5])
 
 
+@pytest.mark.slow
 def test_the_table_has_what_both_sides_of_the_gear_do(arm, swing):
     found = jn.feedforward(arm, swing, DRIVES, rates=1)
     table = found.dataset

@@ -113,6 +113,7 @@ def test_posture_makes_a_redundant_arm_a_function_of_its_path():
     assert np.allclose(slope, motion.at([0.4], order=5).q[0, 1:], rtol=1e-8, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_held_joints_keep_their_laws():
     arm = planar_chain([0.5, 0.4, 0.3])
     path = jn.ToolPath(["0.7 + 0.1*t", "0.1 + 0.2*t", 0.0], start=0.0, stop=1.0)
@@ -161,6 +162,7 @@ def test_singular_position_ends_the_path_and_names_the_joints():
         jn.follow_tool_path(arm, "link_1", path, point=[0.6, 0, 0], start=[-0.5, 1.2])
 
 
+@pytest.mark.slow
 def test_limits_jumps_and_starts_are_told():
     arm = planar_chain([0.7, 0.6], lower=-1.0, upper=1.8)
     settings = {"point": [0.6, 0, 0], "start": [-0.8, 1.6], "order": 1}

@@ -32,6 +32,7 @@ def test_two_links_reach_what_their_closed_form_says():
     assert "joint_1" in far.explain(0)
 
 
+@pytest.mark.slow
 def test_wrist_arm_meets_its_closed_form_in_any_frames():
     arm, parts = wrist_arm(3)
     generator = np.random.default_rng(1)

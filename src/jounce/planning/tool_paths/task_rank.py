@@ -5,7 +5,6 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
-from scipy.stats import qmc
 
 from jounce.planning.tool_paths.tool_tasks import Goal, Tool, columns_of, task_rows
 from jounce.robot.abstract_robot import AbstractRobot
@@ -44,6 +43,8 @@ def task_columns(
 
 def random_coordinates(lower: Any, upper: Any, scale: Any, count: int, seed: int) -> Float[np.ndarray, "count n"]:
     """Return coordinates spread over the range of joints, of half a turn to each side where it has no end."""
+    from scipy.stats import qmc
+
     turn = 2 * np.pi * scale
     low = np.where(np.isfinite(lower), lower, np.where(np.isfinite(upper), upper - turn, -0.5 * turn))
     high = np.where(np.isfinite(upper), upper, low + turn)
