@@ -12,19 +12,20 @@ IDLE = 1e-9  # of its largest value: what moves by less does not move
 
 
 def check_possible(source: Source, labels: Labels, start: float, stop: float, *, bounded: bool = False) -> None:
-    """Raise TrajectoryError where what is needed to stand still is beyond a limit, or nothing limited moves."""
+    """Raise TrajectoryError where standing still breaks a limit, or nothing that has one moves."""
     s = np.linspace(start, stop, LOOKS)
     found = source(s)
     still = found.second[:, :, G]
-    spare = np.minimum(found.upper - still, still - found.lower) / np.maximum(np.abs(still), 1.0)
+    spare = np.minimum(_spare(found.upper, still), _spare(-found.lower, -still))
     if spare.size and spare.min() <= STATIC:
         at, column = np.unravel_index(np.argmin(spare), spare.shape)
         label, value = labels.second[column], float(still[at, column])
         limit = float((found.upper if value > 0 else found.lower)[at, column])
         where = source.place(float(s[at]))
         message = (
-            f"no time law exists: at {where} this joint needs a {label.word} of {value:.6g} {label.unit} to stand "
-            f"still, and its limit is {limit:.6g} {label.unit}; choose another path, or a smaller load"
+            f"no time law exists that could halt everywhere: at {where} standing still needs a {label.word} of "
+            f"{value:.6g} {label.unit}, and the limit is {limit:.6g} {label.unit}; what only momentum could carry past "
+            "is not sought; choose another path, or a smaller load"
         )
         raise TrajectoryError(message, name=label.owner)
     if bounded:
@@ -35,6 +36,13 @@ def check_possible(source: Source, labels: Labels, start: float, stop: float, *,
         where = source.place(float(s[still_there[0]]))
         message = f"nothing that has a limit moves at {where}, so that no law is the fastest; give more limits"
         raise TrajectoryError(message, name="limits")
+
+
+@np.errstate(invalid="ignore")
+def _spare(bound: np.ndarray, still: np.ndarray) -> np.ndarray:
+    """Return what is left up to an upper bound, as a share of the larger of both; infinite where there is none."""
+    size = np.maximum(np.maximum(np.abs(bound), np.abs(still)), np.finfo(float).tiny)
+    return np.where(np.isfinite(bound), (bound - still) / size, np.inf)
 
 
 def bounded_everywhere(source: Source, start: float, stop: float) -> bool:
