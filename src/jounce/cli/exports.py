@@ -9,7 +9,7 @@ from typing import Literal
 from jounce.cli.options import PLAIN_ROBOT, RobotReading, errors_about, spare_inputs
 from jounce.cli.servo import frequency_of
 from jounce.errors import SampleWarning
-from jounce.reporting.terminal import caution, say
+from jounce.reporting.terminal import recorded_cautions, say
 
 
 def export(
@@ -80,8 +80,7 @@ def export(
                 header_units=header_units,
                 overwrite=overwrite,
             )
-    for warning in caught:
-        caution(warning.message)
+    recorded_cautions(caught)
     first, last = float(times[0]), float(times[-1])
     say(f"{len(times)} rows from {first:g} s to {last:g} s written to {out}")
     return 0

@@ -20,7 +20,7 @@ from jounce.cli.options import (
     written,
 )
 from jounce.errors import JounceError, SampleWarning
-from jounce.reporting.terminal import caution, say, show_table
+from jounce.reporting.terminal import recorded_cautions, say, show_table
 
 MOST_RATES = 24  # of torques of motors
 ROBOTS = (".urdf", ".xml", ".sdf")
@@ -99,8 +99,7 @@ def feedforward(
         show_table(facts.drives_table(report), "bold red")
         if (table := facts.expansion_table(found)) is not None:
             show_table(table)
-    for warning in caught:
-        caution(warning.message, json=output.json)
+    recorded_cautions(caught, json=output.json)
     if not output.json:
         say(f"\n{facts.drives_verdict(report)}")
         if errors is not None:

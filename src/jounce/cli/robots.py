@@ -17,7 +17,7 @@ from jounce.cli.options import (
     written,
 )
 from jounce.errors import JounceError, SampleWarning
-from jounce.reporting.terminal import caution, say, show_peaks, show_table
+from jounce.reporting.terminal import recorded_cautions, say, show_peaks, show_table
 
 MOST_RATES = 28  # of torques: the highest derivative of a law is 30
 
@@ -88,8 +88,7 @@ def check(
     if not json:
         say(limits_summary(report, motion, robot, trajectory))
         show_table(limits_table(report), "bold red")
-    for warning in caught:
-        caution(warning.message, json=json)
+    recorded_cautions(caught, json=json)
     if not json:
         say(f"\n{verdict(report)}")
     if out is not None:

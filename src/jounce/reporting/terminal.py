@@ -200,6 +200,12 @@ def caution(warning: object, *, json: bool = False) -> None:
     _tell("warning", "bold yellow", warning, json)
 
 
+def recorded_cautions(caught: Sequence[warnings.WarningMessage], *, json: bool = False) -> None:
+    """Print warnings that were recorded, each once."""
+    for message in {str(warning.message): warning.message for warning in caught}.values():
+        caution(message, json=json)
+
+
 @contextmanager
 def cautions(*, json: bool = False) -> Iterator[None]:
     """Print warnings as the command prints its errors, each once and without its place in the code."""
