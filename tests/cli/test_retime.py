@@ -28,7 +28,7 @@ def test_a_trajectory_that_breaks_limits_comes_back_as_one_that_passes_check(run
     assert figure.stat().st_size > 10_000
     rows = io.read(out)
     np.testing.assert_allclose(np.diff(rows["time"].values), 1e-3, rtol=1e-9)
-    still = 1.42e-7 if options else 1e-9  # rad/s: the spline through the rounded samples ends at 1.41e-7, repaired or not
+    still = 1.42e-7 if options else 1e-9  # rad/s: the spline through the rounded samples ends at 1.41e-7
     np.testing.assert_allclose(rows["panda_joint1"].values[[0, -1], 1], 0, atol=still)
     assert run("check", PANDA, out, "--limits", LIMITS)[0] == 0
 
