@@ -1,5 +1,7 @@
 """The limited quantities of a robot on a path: of its joints, their torques, and points of its links."""
 
+from collections.abc import Mapping
+
 import numpy as np
 from jaxtyping import Float
 
@@ -11,6 +13,7 @@ from jounce.planning.retiming.paths import Path
 from jounce.planning.retiming.quantities import Labels, PathQuantities, Quantity
 from jounce.robot.inverse_dynamics import inverse_dynamics
 from jounce.robot.kinematics import forward_kinematics
+from jounce.robot.model import Limits
 from jounce.robot.robot import Robot
 from jounce.trajectory import JointTrajectory
 
@@ -41,7 +44,9 @@ class RobotQuantities:
         If names do not fit the robot, or nothing that moves has a limit.
     """
 
-    def __init__(self, robot: Robot, path: Path, limits: MotionLimits | None, *, drives: bool = True):
+    def __init__(
+        self, robot: Robot, path: Path, limits: MotionLimits | Mapping[str, Limits] | None, *, drives: bool = True
+    ):
         self.robot, self.path, self.drives = robot, path, drives
         self.limits = limits_of(robot, limits)
         followed = FollowedTrajectory(robot, JointTrajectory(dict(path.laws), path.start, path.stop))
