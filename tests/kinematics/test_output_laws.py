@@ -93,32 +93,94 @@ def test_what_needs_the_law_beforehand_says_so(motion):
     for ask in (jn.simulate, jn.linearise, jn.trace):
         with pytest.raises(jn.JounceError, match=r"follows from the output 'stroke_x'.*motion\.actuated"):
             ask(mechanism)
-    with pytest.raises(jn.UnsupportedError, match="not differentiated where the law of a driver follows"):
-        jax.grad(lambda r: jn.solve(mechanism.with_parameters(r=r), GRID).outputs["theta"][-1, 0])(0.05)
-    with pytest.raises(jn.UnsupportedError, match="families are not solved where"):
-        jn.solve_batch(mechanism, {"r": [0.05, 0.051]}, GRID)
+    with pytest.raises(jn.UnsupportedError, match="go through numbers"):
+        jax.grad(lambda r: jn.solve(mechanism.with_parameters(r=r), GRID).actuated)(0.05)
     with pytest.raises(jn.MechanismError, match="the coordinate of this driver is an angle"):
         dataclasses.replace(motion.mechanism, outputs={"x": jn.DriverDisplacementOutput("theta")})
 
 
 @pytest.mark.slow
-def test_in_space_the_torque_is_that_of_the_motor():
-    """A rod of 0.2 m turns about z, and its tip is held to y = 0.2 sin(theta): theta = arcsin(5 y)."""
+@pytest.mark.parametrize("forces", [True, False], ids=["one by one", "side by side"])
+def test_families_are_designs_solved_alone(forces):
+    mechanism = slider_crank("0.17 + 0.015*cos(3*t)")
+    if not forces:
+        kept = {name: output for name, output in mechanism.outputs.items() if name != "torque"}
+        mechanism = dataclasses.replace(mechanism, outputs=kept)
+    lengths = [0.05, 0.052, 0.01]  # of the crank; the last one does not reach the stroke
+    family = jn.solve_batch(mechanism, {"r": lengths}, GRID[:4], order=3)
+    assert (family["status"].values != 0).tolist() == [[False] * 4, [False] * 4, [True] * 4]
+    for k in range(2):
+        alone = jn.solve(mechanism.with_parameters(r=lengths[k]), GRID[:4], order=3).outputs
+        for name, values in alone.items():
+            np.testing.assert_allclose(family[name].values[k], values, rtol=1e-11, atol=1e-12 * np.abs(values).max())
+
+
+@pytest.mark.slow
+def test_gradients_of_the_driver_and_of_its_torque():
+    """As of `test_in_space_the_torque_is_that_of_the_motor`, by the length of the rod and the swing of its tip."""
+    mechanism = rod_on_a_hinge({"length": 0.2, "swing": 0.1})
+    values = np.array([0.2, 0.1])
+
+    def outputs(values):
+        design = mechanism.with_parameters(length=values[0], swing=values[1])
+        return jn.solve(design, GRID, order=1).outputs
+
+    def angle(t, length, swing):
+        return mp.asin((swing * mp.sin(2 * t) + mp.mpf("0.05")) / length)
+
+    found = jax.tree.map(np.asarray, jax.jacfwd(outputs)(values))
+    with mp.workdps(40):
+        at = [(mp.mpf(t), mp.mpf("0.2"), mp.mpf("0.1")) for t in GRID]
+        exact = [[[float(mp.diff(angle, x, (k, *by))) for by in ((1, 0), (0, 1))] for k in range(4)] for x in at]
+    exact = np.array(exact)
+    scale = np.abs(exact).max(axis=0)
+    assert np.abs((found["angle"] - exact[:, :2]) / scale[:2]).max() < 1e-11
+    assert np.abs((found["torque"] - 0.01 * exact[:, 2:]) / (0.01 * scale[2:])).max() < 1e-10
+
+
+@pytest.mark.slow
+def test_the_least_torque_of_a_driver_that_follows():
+    """The longer the rod, the less its hinge turns for the same tip, and the less torque that takes."""
+    mechanism = jn.Mechanism(
+        space="planar",
+        parameters={"length": 0.2},
+        bodies={"rod": jn.Body([0, 0], angle=0.2, mass=2.0, inertia=0.01)},
+        joints={"hinge": jn.planar.Revolute(("ground", "rod"), [0, 0], [0, 0])},
+        drivers={
+            "motor": jn.drivers.CoordinateDriver(
+                ("ground", "rod"), "angle", jn.OutputMotion("tip_y", "0.1*sin(2*t) + 0.05")
+            )
+        },
+        outputs={"tip": jn.PointOutput("rod", ["length", 0]), "torque": jn.DriverTorqueOutput("motor")},
+    )
+    found = jn.optimise(mechanism, "peak(torque)", {"length": (0.18, 0.25)}, starts=1, time=GRID[:5])
+    assert found.status == "optimal"
+    assert found.parameters["length"] == 0.25
+
+
+def rod_on_a_hinge(parameters):
+    """A rod that turns about z, whose tip is held to a law of y; its motor carries an inertia of 0.01 kg m^2 only."""
     rod = jn.Body([0, 0, 0], orientation=[math.cos(0.1), 0, 0, math.sin(0.1)], mass=2.0, inertia=[0.0, 0.01, 0.01])
     hinge = jn.spatial.Revolute(("ground", "rod"), [0, 0, 0], [0, 0, 0], axis_i=[0, 0, 1], axis_j=[0, 0, 1])
-    motor = jn.drivers.RotationDriver(("ground", "rod"), [0, 0, 1], jn.OutputMotion("tip_y", "0.1*sin(2*t) + 0.05"))
-    mechanism = jn.Mechanism(
+    motor = jn.drivers.RotationDriver(("ground", "rod"), [0, 0, 1], jn.OutputMotion("tip_y", "swing*sin(2*t) + 0.05"))
+    return jn.Mechanism(
         space="spatial",
+        parameters=parameters,
         bodies={"rod": rod},
         joints={"hinge": hinge},
         drivers={"motor": motor},
         outputs={
-            "tip": jn.PointOutput("rod", [0.2, 0, 0]),
+            "tip": jn.PointOutput("rod", ["length", 0, 0]),
             "angle": jn.DriverAngleOutput("motor"),
             "torque": jn.DriverTorqueOutput("motor"),
         },
     )
-    motion = jn.solve(mechanism, GRID, order=3)
+
+
+@pytest.mark.slow
+def test_in_space_the_torque_is_that_of_the_motor():
+    """A rod of 0.2 m turns about z, and its tip is held to y = 0.2 sin(theta): theta = arcsin(5 y)."""
+    motion = jn.solve(rod_on_a_hinge({"length": 0.2, "swing": 0.1}), GRID, order=3)
 
     def angle(t):
         return mp.asin(5 * (mp.sin(2 * t) / 10 + mp.mpf("0.05")))

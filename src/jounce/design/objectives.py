@@ -39,6 +39,7 @@ from jounce.errors import ExpressionError, did_you_mean
 from jounce.jet.derivatives import taylor_coefficients
 from jounce.kinematics.solve import HIGHEST_ORDER
 from jounce.mechanism import Mechanism
+from jounce.mechanism.held_outputs import with_outputs
 
 BEYOND = 5  # derivatives beyond those asked for, by which a quantity is known between instants
 
@@ -135,7 +136,7 @@ class Goals:
         kept = {
             name: x for name, x in mechanism.outputs.items() if name in {a[0] for a in self.quantities.atoms.values()}
         }
-        self.mechanism = dataclasses.replace(mechanism, outputs={**kept, **self.quantities.added})
+        self.mechanism = with_outputs(mechanism, {**kept, **self.quantities.added})
 
     def set_instants(self, instants: Float[np.ndarray, " time"]) -> None:
         """Take another grid."""

@@ -14,8 +14,7 @@ from jounce.design.result import OptimisedDesign
 from jounce.design.study import Asked, Study
 from jounce.errors import DesignError, JounceError, MechanismError, check_name, whole_number
 from jounce.kinematics import assemblies as all_assemblies
-from jounce.mechanism import Mechanism, build, check_mechanism, time_grid
-from jounce.mechanism.held_outputs import refuse_led_outputs
+from jounce.mechanism import Mechanism, build, check_mechanism, time_grid, with_outputs_held
 from jounce.mechanism.preconditions import concrete
 from jounce.shapes import ArrayLike
 
@@ -108,7 +107,6 @@ def optimise(
     ('optimal', 0.15)
     """
     check_mechanism(mechanism)
-    refuse_led_outputs(mechanism, "designs are not optimised")
     bounds = _bounds(mechanism, vary)
     starts = whole_number("starts", starts, 1, error=MechanismError)
     seed = whole_number("seed", seed, 0, error=MechanismError)
@@ -169,7 +167,7 @@ def _bound(mechanism: Mechanism, name: str, given: Any) -> float:
     try:
         changed = mechanism.with_parameters(**{name: given})
         value = float(changed.parameter_values[name])
-        build(changed)
+        build(with_outputs_held(changed))
     except JounceError as error:
         message = f"no mechanism can have this bound: {error}"
         raise type(error)(message, name=f"vary.{name}", value=given) from None

@@ -138,7 +138,7 @@ class Problem:
             motion = solve(goals.mechanism.with_parameters(**given), goals.instants, goals.order, strict=False)
             pose_type, coordinates = motion.poses
             matrix = _jacobian(
-                _bare(motion.model.system), cut(coordinates, 0), jnp.asarray(motion.time), pose_type=pose_type
+                _bare(motion.solved_model.system), cut(coordinates, 0), jnp.asarray(motion.time), pose_type=pose_type
             )
             found = dict(motion.outputs), matrix
             return found, (*found, motion.status)

@@ -1,6 +1,5 @@
 """Tolerances: how far every output and derivative spreads when parameters deviate, and which parameter matters."""
 
-import dataclasses
 import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -16,6 +15,7 @@ from jounce.design.variations import Variation, read_variations, reader_of, spre
 from jounce.errors import MechanismError, UnsupportedError, check_name, did_you_mean, whole_number
 from jounce.kinematics import Motion, Status, solve, solve_batch
 from jounce.mechanism import Mechanism, check_mechanism, time_grid
+from jounce.mechanism.held_outputs import with_outputs
 from jounce.mechanism.preconditions import concrete
 
 TOGETHER = 256  # designs that are solved in one program
@@ -108,16 +108,17 @@ def tolerance(
     samples = whole_number("samples", samples, 0, error=MechanismError)
     if indices:
         check_salib(samples)
+    wanted = tuple(mechanism.outputs)
     if of is not None:
         chosen = [column_of(mechanism, name) for name in of]
         order = max((found[2] for found in chosen), default=0)
         outputs = {name: output for name, output in mechanism.outputs.items() if name in {c[0] for c in chosen}}
-        mechanism = dataclasses.replace(mechanism, outputs=outputs)
+        wanted, mechanism = tuple(outputs), with_outputs(mechanism, outputs)
     if not mechanism.outputs:
         raise MechanismError("there is no output whose spread could be told", name="outputs")
     instants = time_grid(mechanism.time if time is None else time, mechanism.parameter_values)
     nominal = solve(mechanism, instants, order)
-    found = _Spread(nominal, variations)
+    found = _Spread(nominal, variations, wanted)
     if linear:
         found.add_gradients()
     if samples:
@@ -173,14 +174,15 @@ def _labels(quantity: Any) -> list[str]:
 class _Spread:
     """What is known of the spread of the outputs of a mechanism about its nominal motion."""
 
-    def __init__(self, nominal: Motion, variations: Mapping[str, Variation]):
+    def __init__(self, nominal: Motion, variations: Mapping[str, Variation], wanted: tuple[str, ...]):
         self.nominal, self.mechanism = nominal, nominal.mechanism
         self.names, self.variations = tuple(variations), spreads(variations)
         self.space = dict(self.mechanism.parameter_values)
         self.deviations = np.array([variation.deviation() for variation in self.variations.values()])
         whole = nominal.dataset
+        whole = whole.drop_vars([name for name in self.mechanism.outputs if name not in wanted])
         self._variables: dict[str, Any] = {str(name): whole[name].variable for name in whole.data_vars}
-        self._outputs = tuple(name for name in self._variables if name in self.mechanism.outputs)
+        self._outputs = wanted
         self._solved: np.ndarray | None = None
         for name in self._outputs:
             peak = abs(whole[name]).max("time", skipna=False)

@@ -16,9 +16,16 @@ from jounce.kinematics.path_following import Solver
 from jounce.kinematics.solve import LOWEST_ORDER, checked_settings, lost_orders, solve
 from jounce.kinematics.status import Status
 from jounce.kinematics.threads import thread_count
-from jounce.mechanism import AbstractMotionOutput, Mechanism, Model, build, check_mechanism, time_grid
+from jounce.mechanism import (
+    AbstractMotionOutput,
+    Mechanism,
+    Model,
+    build,
+    check_mechanism,
+    time_grid,
+    with_outputs_held,
+)
 from jounce.mechanism.axis_angles import measures_angle
-from jounce.mechanism.held_outputs import refuse_led_outputs
 from jounce.mechanism.law_checks import check_laws
 from jounce.mechanism.preconditions import concrete
 from jounce.shapes import ArrayLike
@@ -113,7 +120,6 @@ def solve_batch(
     0
     """
     check_mechanism(mechanism)
-    refuse_led_outputs(mechanism, "families are not solved")
     values = checked_values(mechanism, parameters, "design")
     names, rows = tuple(values), np.stack(list(values.values()), axis=-1)
     order = checked_settings(mechanism, order, tolerance)
@@ -137,13 +143,21 @@ class _Family:
         progress: Callable[[int, int], None] | None,
     ):
         self.mechanism, self.names, self.rows, self.instants = mechanism, names, rows, instants
+        self.held = with_outputs_held(mechanism)  # what is solved side by side
         self.order, self.tolerance, self.progress = order, tolerance, progress
         self.status: Int[np.ndarray, "design time"] = np.full((len(rows), len(instants)), int(Status.NOT_REACHED))
         self.outputs: dict[str, np.ndarray] = {}
 
     def design(self, k: int) -> Mechanism:
         """Return one of the designs."""
-        return self.mechanism.with_parameters(**dict(zip(self.names, self.rows[k].tolist(), strict=True)))
+        return self.mechanism.with_parameters(**self._values(k))
+
+    def held_design(self, k: int) -> Mechanism:
+        """Return one of the designs, its outputs held to their laws."""
+        return self.held.with_parameters(**self._values(k))
+
+    def _values(self, k: int) -> dict[str, float]:
+        return dict(zip(self.names, self.rows[k].tolist(), strict=True))
 
     def solve(self, threads: int, *, alone: bool = True) -> None:
         """Solve all designs: most side by side, the others alone, if they are wanted."""
@@ -203,7 +217,7 @@ class _Family:
         system = model.system
         if any(map(measures_angle, (*system.groups, *system.outputs))) or system.shape[0] != system.shape[1]:
             return self._assembled_alone(solver, threads)
-        designs = Designs(self.mechanism, model, self.names, self.rows)
+        designs = Designs(self.held, model, self.names, self.rows)
         driven = np.array([[name.startswith("drivers.")] for name in model.rows])
         every = np.arange(count)
         found = put_together(
@@ -221,7 +235,7 @@ class _Family:
         """Return the model of the first design that can be put together, and which it is."""
         for k in range(len(self.rows)):
             try:
-                return assemble(build(self.design(k)), instant, self.tolerance)[0], k
+                return assemble(build(self.held_design(k)), instant, self.tolerance)[0], k
             except SPOILED:
                 continue
             except JounceError as error:
@@ -233,7 +247,7 @@ class _Family:
         found, which = [], []
         for k in range(len(self.rows)):
             try:
-                found.append(assemble(build(self.design(k)), float(self.instants[0]), self.tolerance))
+                found.append(assemble(build(self.held_design(k)), float(self.instants[0]), self.tolerance))
                 which.append(k)
             except SPOILED:
                 continue
@@ -241,7 +255,7 @@ class _Family:
                 raise self._located(error, k) from None
         chosen = np.array(which)
         models = [model for model, _ in found]
-        designs = Designs.of_models(self.mechanism, models, self.names, self.rows[chosen])
+        designs = Designs.of_models(self.held, models, self.names, self.rows[chosen])
         coordinates = {
             name: np.concatenate([np.asarray(place[name]) for _, place in found], axis=-1) for name in found[0][1]
         }

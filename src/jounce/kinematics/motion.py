@@ -78,7 +78,9 @@ class Motion(Displayed):
     mechanism : Mechanism
         What was solved.
     model : Model
-        The numeric model that was solved.
+        The numeric model, with the drivers of the mechanism.
+    solved_model : Model
+        The one that was solved: the same, unless drivers follow from outputs, which are held there in their place.
     time : numpy.ndarray of shape (time,)
         Instants, s.
     order : int
@@ -114,7 +116,7 @@ class Motion(Displayed):
         self.faults = faults
         self.change_points = np.zeros(0) if change_points is None else change_points
         self.derived: dict[str, Any] = {}
-        self.model, self.history = model, history
+        self.model, self.solved_model, self.history = model, model, history
         self._bodies, groups = state
         self._groups = dict(zip(model.outputs, groups, strict=True))
         self._actuated: Mechanism | None = None  # with laws, where those of drivers follow from outputs
@@ -151,7 +153,7 @@ class Motion(Displayed):
         state = self._bodies, tuple(self._groups.values())
         outcome = self.status, self.faults, self.change_points, self.history
         motion = Motion(self.mechanism, model, self.time, self.order, state, *outcome)
-        motion._actuated = actuated
+        motion._actuated, motion.solved_model = actuated, self.model
         return motion
 
     @property

@@ -27,12 +27,13 @@ from jounce.kinematics.compilation import compiled
 from jounce.kinematics.jacobian_series import jacobian_series, solved_series
 from jounce.kinematics.motion import Motion
 from jounce.kinematics.status import Status
-from jounce.mechanism import Mechanism, Model
+from jounce.mechanism import Mechanism, Model, with_outputs_held
 from jounce.mechanism.axis_angles import measures_angle
 from jounce.mechanism.builder import grouped_elements
+from jounce.mechanism.held_outputs import led_outputs, with_laws_left_out
 from jounce.mechanism.modules import with_fields
 from jounce.mechanism.system import System, movable
-from jounce.mechanism.traced import Angles, angles_of, template, traced_model, traced_values
+from jounce.mechanism.traced import Angles, Part, angles_of, template, traced_model, traced_values
 from jounce.rigid import PlanarPose, SpatialPose
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
@@ -55,7 +56,9 @@ class Solved(NamedTuple):
     length : array of shape ()
         Size of the mechanism, m.
     angles : Angles
-        About axes.
+        About axes, of the model that was solved.
+    driven : tuple of array of shape (instances, 1)
+        Angles about axes of joints and drivers of the model of the drivers: others where outputs are held to laws.
     continued : tuple of array of shape (components, instances, time)
         Values of the outputs that are angles in a range, made continuous, for each group of such.
     """
@@ -64,13 +67,17 @@ class Solved(NamedTuple):
     status: Any
     length: Any
     angles: Angles
+    driven: Part
     continued: tuple[Any, ...]
 
 
 def differentiable_motion(
     mechanism: Mechanism, instants: Float[np.ndarray, " time"], levels: int, solve: Solve
-) -> tuple[Solved, Model]:
-    """Return the motion of a mechanism, and its model, as functions of the values that JAX traces in it.
+) -> tuple[Solved, tuple[Model, Model]]:
+    """Return the motion of a mechanism, and its models, as functions of the values that JAX traces in it.
+
+    The first model is the one that is solved, in which outputs are held to laws where drivers follow from them; the
+    second has the drivers, for their forces. They are one where no driver does.
 
     Parameters
     ----------
@@ -84,18 +91,23 @@ def differentiable_motion(
         Solves a mechanism of plain numbers at the instants, strictly or not. What it raises where JAX knows the numbers
         is raised; elsewhere a motion that cannot be begun is NaN.
     """
-    made, built = template(mechanism), _builder(mechanism)
+    made, held = template(mechanism), _builder(mechanism, with_outputs_held)
+    driven = _builder(mechanism, with_laws_left_out) if led_outputs(mechanism) else held
     values = tuple(x if x.dtype == np.float64 else x.astype(float) for x in traced_values(mechanism))
     shapes = _shapes(mechanism, len(instants), levels)
 
     def on_the_host(strict: bool, values: Values) -> Solved:
         try:
-            return _solved(solve(made(values), strict))
+            motion = solve(made(values), strict)
         except (AssemblyError, MobilityError, SolveError) as error:
             if strict:
                 raise
             status = np.full(len(instants), float(getattr(error, "status", None) or Status.NOT_REACHED))
-            return jax.tree.map(lambda x: np.full(x.shape, np.nan), shapes)._replace(status=status)
+        else:
+            if np.any(motion.status == Status.OK):  # else nothing is known of drivers that follow from outputs
+                return _solved(motion)
+            status = motion.status.astype(float)
+        return jax.tree.map(lambda x: np.full(x.shape, np.nan), shapes)._replace(status=status)
 
     @jax.custom_jvp
     def solution(values: Values) -> Solved:
@@ -109,10 +121,15 @@ def differentiable_motion(
         (values,), (changes,) = primals, tangents
         solved = solution(values)
         still = jax.tree.map(jnp.zeros_like, solved)
-        return solved, still._replace(coordinates=_change(built, values, changes, solved, instants))
+        return solved, still._replace(coordinates=_change(held, values, changes, solved, instants))
 
     solved = solution(values)
-    return solved, built(values, solved.length, solved.angles, _first(solved.coordinates))
+    first = _first(solved.coordinates)
+    model = held(values, solved.length, solved.angles, first)
+    if driven is held:
+        return solved, (model, model)
+    angles = solved.angles._replace(angle=(solved.driven, *solved.angles.angle[1:]))
+    return solved, (model, driven(values, solved.length, angles, first))
 
 
 def _shapes(mechanism: Mechanism, count: int, levels: int) -> Solved:
@@ -124,28 +141,30 @@ def _shapes(mechanism: Mechanism, count: int, levels: int) -> Solved:
     bodies = len(mechanism.bodies) + 1
     if mechanism.space == "planar":
         coordinates = {"position": of(levels, 2, bodies, count), "angle": of(levels, bodies, count)}
-        return Solved(coordinates, of(count), of(), Angles(((), (), ()), ((), ())), ())
+        return Solved(coordinates, of(count), of(), Angles(((), (), ()), ((), ())), (), ())
     coordinates = {
         "position": of(levels, 3, bodies, count),
         "quaternion": of(levels, 4, bodies, count),
         "angular_velocity": of(levels - 1, 3, bodies, count),
     }
-    parts = [groups for groups, _ in grouped_elements(mechanism)]
-    measuring = [[group.instances for group in groups if measures_angle(group)] for groups in parts]
+    parts = [groups for groups, _ in grouped_elements(with_outputs_held(mechanism))]
+    (driven, _), *_ = grouped_elements(with_laws_left_out(mechanism))
+    measuring = [[group.instances for group in groups if measures_angle(group)] for groups in (*parts, driven)]
     angle: Any = tuple(tuple(of(n, 1) for n in part) for part in measuring)
-    near: Any = tuple(tuple(of(n, count) for n in part) for part in measuring[1:])
+    near: Any = tuple(tuple(of(n, count) for n in part) for part in measuring[1:3])
     wrapping = [group for group in parts[2] if getattr(group.element, "wraps", ())]
     continued = tuple(of(len(group.element.wraps), group.instances, count) for group in wrapping)
-    return Solved(coordinates, of(count), of(), Angles(angle, near), continued)
+    return Solved(coordinates, of(count), of(), Angles(angle[:3], near), angle[3], continued)
 
 
 def _solved(motion: Motion) -> Solved:
     """Return what is kept of a motion, as arrays of NumPy."""
     coordinates = jax.tree.map(np.asarray, dict(motion.poses[1]))
-    angles = angles_of(motion.model, (motion.forces, motion.counted_outputs))
+    counted = motion.forces, motion.counted_outputs
+    angles, driven = angles_of(motion.solved_model, counted), angles_of(motion.model, counted).angle[0]
     near = jax.tree.map(lambda x: np.broadcast_to(x, (x.shape[0], len(motion.time))), angles.near)
     length, angles = np.float64(motion.model.length), angles._replace(near=near)
-    return Solved(coordinates, motion.status.astype(float), length, angles, motion.continued_outputs)
+    return Solved(coordinates, motion.status.astype(float), length, angles, driven, motion.continued_outputs)
 
 
 def _one_by_one(solve: Callable[[Values], Solved], shapes: Solved, sizes: Sequence[int], values: Values) -> Solved:
@@ -183,10 +202,12 @@ class _Builder:
     ----------
     mechanism : Mechanism
         Some of its values are traced.
+    change : callable
+        What the model is made of, for the mechanism.
     """
 
-    def __init__(self, mechanism: Mechanism):
-        self._made, self._kept = template(mechanism), {}
+    def __init__(self, mechanism: Mechanism, change: Callable[[Mechanism], Mechanism]):
+        self._made, self._change, self._kept = template(mechanism), change, {}
         self._compiled = jax.jit(self._numbers, static_argnames="counted")
         self.uses = 0
 
@@ -210,7 +231,7 @@ class _Builder:
         return dataclasses.replace(model, system=jax.tree.unflatten(structure, whole))
 
     def _numbers(self, values: Values, length: Any, angles: Any, first: Any, *, counted: bool) -> list[Any]:
-        model = traced_model(self._made(values), length, angles, first)
+        model = traced_model(self._change(self._made(values)), length, angles, first)
         check_not_redundant(model)
         leaves, structure = jax.tree.flatten(model.system)
         which = tuple(k for k, leaf in enumerate(leaves) if isinstance(leaf, Tracer))
@@ -225,7 +246,7 @@ MOST_BUILDERS = 16
 _builders: dict[Any, _Builder] = {}
 
 
-def _builder(mechanism: Mechanism) -> _Builder:
+def _builder(mechanism: Mechanism, change: Callable[[Mechanism], Mechanism]) -> _Builder:
     """Return what makes the model of a mechanism: the same for one that differs in the values of its parameters.
 
     It is compiled where it is used again: a mechanism whose joints are made anew each time is not.
@@ -235,12 +256,12 @@ def _builder(mechanism: Mechanism) -> _Builder:
     fields = [field.name for field in dataclasses.fields(mechanism) if field.name != "parameters"]
     held = [getattr(mechanism, name) for name in fields]
     if traced_values(held):
-        return _Builder(mechanism)
-    key = (tuple(map(id, held)), tuple(mechanism.parameters), plain)
+        return _Builder(mechanism, change)
+    key = (change, tuple(map(id, held)), tuple(mechanism.parameters), plain)
     if key not in _builders:
         while len(_builders) >= MOST_BUILDERS:
             _builders.pop(next(iter(_builders)))
-        _builders[key] = _Builder(mechanism)  # which holds what the key is made of
+        _builders[key] = _Builder(mechanism, change)  # which holds what the key is made of
     found = _builders[key]
     found.uses += 1
     return found

@@ -25,7 +25,7 @@ from jounce.kinematics.threads import thread_count
 from jounce.kinematics.traced_motion import TracedMotion
 from jounce.mechanism import Mechanism, build, check_mechanism, time_grid, with_outputs_held
 from jounce.mechanism.axis_angles import measures_angle
-from jounce.mechanism.held_outputs import led_outputs, refuse_led_outputs
+from jounce.mechanism.held_outputs import led_outputs
 from jounce.mechanism.law_checks import check_laws
 from jounce.mechanism.preconditions import concrete
 from jounce.mechanism.system import Group
@@ -40,7 +40,6 @@ def _differentiated(solve: Callable[..., Motion], given: Mapping[str, Any]) -> M
     """Solve a mechanism of which JAX traces some values."""
     mechanism = given["mechanism"]
     check_mechanism(mechanism)
-    refuse_led_outputs(mechanism, "a motion is not differentiated")
     options = {name: value for name, value in given.items() if name not in ("mechanism", "time", "order", "strict")}
     order = checked_settings(mechanism, given.get("order", 4), options.get("tolerance", 1e-12))
     time = mechanism.time if given.get("time") is None else given["time"]
@@ -56,8 +55,8 @@ def _differentiated(solve: Callable[..., Motion], given: Mapping[str, Any]) -> M
     def solved(mechanism: Mechanism, known: bool) -> Motion:
         return solve(mechanism, instants, order, **options, strict=known and given.get("strict", True))
 
-    found, model = differentiable_motion(mechanism, instants, levels, solved)
-    return TracedMotion(mechanism, model, instants, order, found)
+    found, models = differentiable_motion(mechanism, instants, levels, solved)
+    return TracedMotion(mechanism, models, instants, order, found)
 
 
 def lost_orders(mechanism: Mechanism) -> int:

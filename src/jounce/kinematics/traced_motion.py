@@ -14,6 +14,7 @@ from jounce.kinematics.motion import Motion, output_series
 from jounce.kinematics.sensitivities import Solved
 from jounce.kinematics.status import Status
 from jounce.mechanism import AbstractMotionOutput, AbstractOutput, Mechanism, Model
+from jounce.mechanism.held_outputs import led_outputs
 from jounce.mechanism.system import Group
 from jounce.shapes import Numbers
 
@@ -28,7 +29,8 @@ class TracedMotion(Motion):
 
     traced = True
 
-    def __init__(self, mechanism: Mechanism, model: Model, time: np.ndarray, order: int, solved: Solved):
+    def __init__(self, mechanism: Mechanism, models: tuple[Model, Model], time: np.ndarray, order: int, solved: Solved):
+        held, model = models
         outputs = [output_series(group, solved.coordinates, model.pose_type) for group in model.system.outputs]
         wrapping = iter(solved.continued)
         for k, group in enumerate(model.system.outputs):
@@ -37,6 +39,7 @@ class TracedMotion(Motion):
                 outputs[k] = jnp.concatenate([counted[None], outputs[k][1:]])
         status: Any = solved.status.astype(int)
         super().__init__(mechanism, model, time, order, (solved.coordinates, tuple(outputs)), status, {})
+        self.solved_model = held
 
     def __repr__(self) -> str:
         return f"<Motion of a design that JAX traces, {len(self.time)} instants, order {self.order}>"
@@ -51,6 +54,20 @@ class TracedMotion(Motion):
             Always: a dataset holds numbers.
         """
         raise UnsupportedError("a dataset holds numbers, and JAX traces this motion; take motion.outputs[name]")
+
+    @property
+    def actuated(self) -> Mechanism:
+        """The mechanism, unless laws of drivers follow from outputs.
+
+        Raises
+        ------
+        UnsupportedError
+            If they do: the laws found go through numbers.
+        """
+        if led_outputs(self.mechanism):
+            message = "the laws found go through numbers, and JAX traces this motion; solve it with numbers for them"
+            raise UnsupportedError(message, name="motion.actuated")
+        return self.mechanism
 
     def evaluate(self, output: AbstractOutput | AbstractMotionOutput, name: str = "output") -> Any:
         """Return any output, as an `xarray.DataArray` whose ``.data`` is an array that JAX traces.

@@ -1,6 +1,7 @@
 """Outputs that are held to a law in the place of drivers, whose laws then follow from the motion."""
 
 import dataclasses
+from collections.abc import Mapping
 from typing import Any
 
 from jounce.constraints import AbstractConstraint
@@ -12,10 +13,11 @@ from jounce.constraints.drivers import (
     SpatialDistanceDriver,
     SpatialSlideDriver,
 )
-from jounce.errors import MechanismError, UnsupportedError, no_such
+from jounce.errors import MechanismError, no_such
 from jounce.mechanism.mechanism import GROUND, Mechanism
 from jounce.mechanism.outputs import (
     AbstractMotionOutput,
+    AbstractQuantity,
     AngleOutput,
     DistanceOutput,
     PlanarRelativeAngleOutput,
@@ -32,11 +34,18 @@ def led_outputs(mechanism: Mechanism) -> dict[str, OutputMotion]:
     return {name: motion for name, motion in motions.items() if isinstance(motion, OutputMotion)}
 
 
-def refuse_led_outputs(mechanism: Mechanism, what: str) -> None:
-    """Raise UnsupportedError where laws of drivers follow from those of outputs, which `what` does not do."""
-    for name in led_outputs(mechanism):
-        message = f"{what} where the law of a driver follows from an output; go on with the mechanism that"
-        raise UnsupportedError(f"{message} motion.actuated is, of a jn.solve", name=f"drivers.{name}.motion")
+def with_outputs(mechanism: Mechanism, outputs: Mapping[str, AbstractQuantity]) -> Mechanism:
+    """Return the mechanism with other outputs, and with those of its own that drivers follow from."""
+    followed = {motion.output for motion in led_outputs(mechanism).values()}
+    followed |= {name.rpartition("_")[0] for name in followed}
+    kept = {name: output for name, output in mechanism.outputs.items() if name in followed}
+    return dataclasses.replace(mechanism, outputs={**kept, **outputs})
+
+
+def with_laws_left_out(mechanism: Mechanism) -> Mechanism:
+    """Return the mechanism with laws of zero for the drivers that follow from outputs, to which a law adds only."""
+    led = {name: dataclasses.replace(mechanism.drivers[name], motion=0.0) for name in led_outputs(mechanism)}
+    return dataclasses.replace(mechanism, drivers={**mechanism.drivers, **led}) if led else mechanism
 
 
 def with_outputs_held(mechanism: Mechanism) -> Mechanism:

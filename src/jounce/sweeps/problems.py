@@ -20,7 +20,15 @@ from jounce.integrate.simulate import checked_options, instants_of
 from jounce.kinematics import Motion, Status, solve, solve_batch
 from jounce.kinematics.motion import output_group
 from jounce.kinematics.solve import checked_settings
-from jounce.mechanism import AbstractMotionOutput, AbstractOutput, Mechanism, build, check_mechanism, time_grid
+from jounce.mechanism import (
+    AbstractMotionOutput,
+    AbstractOutput,
+    Mechanism,
+    build,
+    check_mechanism,
+    time_grid,
+    with_outputs_held,
+)
 from jounce.mechanism.builder import pose_at
 from jounce.rigid.inertia import Inertia
 from jounce.robot.robot import Robot
@@ -208,7 +216,7 @@ def outputs_of(mechanism: Mechanism, instants: Float[np.ndarray, " time"], order
     """Return the outputs of a mechanism as quantities; it is solved only where there are forces or energies."""
     if not mechanism.outputs:
         raise MechanismError("the mechanism has no outputs, so that there is nothing to keep", name="outputs")
-    model = build(mechanism)
+    model = build(with_outputs_held(mechanism))
     pose = pose_at(model.guess, model.pose_type)
     still = np.zeros_like(pose.position.coefficients[0])
     pose = pose.extended(still, None if mechanism.space == "planar" else still)  # for outputs that are rates
