@@ -73,7 +73,7 @@ def test_a_signal_at_any_time(number, command, tmp_path):
     draw = random.Random(f"{number} {command}")
     name = {"run": "motion.nc", "plot": "film.mp4", "report": "page.html"}[command[0]]
     ended = 0
-    for _ in range(8):
+    for _ in range(4):
         arguments = [*COMMAND, *command, FOUR_BAR, "--out", name]
         status, _, err = stopped(number, draw.uniform(0.0, 6.0), *arguments, cwd=tmp_path)
         assert err == ""

@@ -27,7 +27,7 @@ from tests.problems.drawings import (
     with_all_outputs,
 )
 
-ORDER = 4
+ORDER = 3
 INSTANTS = [0.0, 0.3, 0.8]
 DRAWINGS = {
     "as the ground": [1, 0, 0, 0],

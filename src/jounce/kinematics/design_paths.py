@@ -4,12 +4,15 @@ What decides about a step of one design alone decides here too, lane by lane; se
 out of the ordinary, as it comes to a singular position, is left to be solved alone.
 """
 
+import itertools
 from typing import Any, NamedTuple
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from jounce.jet.derivatives import plain_derivatives
 from jounce.kinematics.advance import SAFE_FRACTION, Arrival, SolvedState, solved_batch
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.designs import Coordinates, Designs
@@ -73,12 +76,19 @@ def _solve_designs(
     pose_type: type[Pose],
     order: int,
 ) -> tuple[tuple[Any, ...], Any]:
-    """Solve an instant of each of many designs from one solved before: outputs and status."""
+    """Solve an instant of each of many designs from one solved before.
+
+    Returns
+    -------
+    tuple of tuple of array of shape (batch, order + 1, components), and array of shape (batch,)
+        Derivatives of the outputs, for each instance of each group, and status.
+    """
     coordinates, angles, sign = known
     arrival, _, _ = solved_batch(
         system, coordinates, angles, sign, step, instant, *settings, pose_type=pose_type, order=order
     )
-    return arrival.outputs, arrival.status
+    rows = [jnp.transpose(plain_derivatives(jets), (2, 3, 0, 1)) for jets in arrival.outputs]
+    return tuple(tuple(row) for row in rows), arrival.status
 
 
 class DesignPaths:
@@ -138,17 +148,18 @@ class DesignPaths:
             active = ~self.apart & (places.instant < last) | ~self.apart & ~begun
         self.apart |= active
 
-    def solved(self, threads: int) -> tuple[list[np.ndarray], Int[np.ndarray, "design time"]]:
-        """Return the outputs of all designs, (order + 1, components, instances, designs, time), and their status.
+    def solved(self, threads: int) -> tuple[list[list[np.ndarray]], Int[np.ndarray, "design time"]]:
+        """Return the outputs of all designs, and their status.
 
-        A design of which an instant is not solved at once is left to be solved alone, too.
+        Outputs are arrays of shape (designs, time, order + 1, components), for each instance of each group. A design of
+        which an instant is not solved at once is left to be solved alone, too.
         """
         count, times = len(self.apart), len(self.instants)
         design = np.repeat(np.flatnonzero(~self.apart), times)
         instant = np.tile(self.instants, count - int(self.apart.sum()))
-        groups, levels = self.solver.model.system.outputs, self.solver.wanted + 1
+        levels = self.solver.wanted + 1
         status = np.full((count, times), int(Status.NOT_REACHED))
-        outputs: list[np.ndarray] = [np.zeros(0)] * len(groups)
+        outputs: list[list[np.ndarray]] = []
         if not design.size:
             return outputs, status
         owners, at, store = self._store()
@@ -167,15 +178,16 @@ class DesignPaths:
             found = _solve_designs(
                 system, known, away[some], instant[some], self._settings, pose_type=kind, order=self.solver.order
             )
-            return jax.tree.map(lambda x: np.asarray(x)[..., : len(lot)], found)
+            return jax.tree.map(lambda x: np.asarray(x)[: len(lot)], found)
 
         with Threads(threads) as pool:
             for lot, (found, outcome) in zip(lots, pool.map(solve, lots), strict=True):
-                status[design[lot], where[lot]] = outcome
-                for k, jet in enumerate(found):
-                    if not outputs[k].size:
-                        outputs[k] = np.full((levels, *jet.shape[1:-1], count, times), np.nan)
-                    outputs[k][..., design[lot], where[lot]] = jet[:levels]
+                if not outputs:
+                    outputs = [[np.full((count, times, levels, x.shape[2]), np.nan) for x in group] for group in found]
+                at_lot = design[lot], where[lot]
+                status[at_lot] = outcome
+                for into, rows in zip(itertools.chain(*outputs), itertools.chain(*found), strict=True):
+                    into[at_lot] = rows[:, :levels]
         self.apart |= (status != Status.OK).any(axis=1)
         return outputs, status
 

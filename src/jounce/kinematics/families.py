@@ -1,5 +1,6 @@
 """Families: many designs of one mechanism solved in one program, each with an outcome of its own at every instant."""
 
+import itertools
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -7,7 +8,6 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from jounce.errors import AssemblyError, JounceError, MechanismError, MobilityError, SolveError, check_name
-from jounce.jet.derivatives import plain_derivatives
 from jounce.kinematics.assembly import assemble
 from jounce.kinematics.design_paths import DesignPaths
 from jounce.kinematics.designs import Designs, put_together
@@ -276,11 +276,10 @@ class _Family:
         outputs, status = paths.solved(threads)
         whole = ~paths.apart
         self.status[chosen[whole]] = status[whole]
-        for names, jets in zip(solver.model.outputs, outputs, strict=True):
-            for k, name in enumerate(names):
-                if jets.size:
-                    found = np.moveaxis(np.asarray(plain_derivatives(jets[:, :, k])), (0, 1), (2, 3))
-                    self._put(name, chosen[whole], found[whole])
+        names = itertools.chain(*solver.model.outputs)
+        for name, found in zip(names, itertools.chain(*outputs), strict=bool(outputs)):
+            found[paths.apart] = np.nan
+            self._put(name, chosen, found)
         if self.progress is not None:
             self.progress(int(whole.sum()), len(self.rows))
         return np.setdiff1d(np.arange(len(self.rows)), chosen[whole])
@@ -300,12 +299,14 @@ class _Family:
             self._put(name, np.array([k]), values[None] if values.ndim == 3 else values[None, ..., None])
 
     def _put(self, name: str, designs: np.ndarray, values: np.ndarray) -> None:
-        """Keep the values of an output, (designs, time, derivative, component)."""
-        single = values.shape[-1] == 1
+        """Keep the values of an output, (designs, time, derivative, component), of some designs in their order."""
+        values = values[..., 0] if values.shape[-1] == 1 else values
         if name not in self.outputs:
-            shape = (len(self.rows), *values.shape[1:3], *(() if single else values.shape[3:]))
-            self.outputs[name] = np.full(shape, np.nan)
-        self.outputs[name][designs] = values[..., 0] if single else values
+            if len(designs) == len(self.rows):
+                self.outputs[name] = values
+                return
+            self.outputs[name] = np.full((len(self.rows), *values.shape[1:]), np.nan)
+        self.outputs[name][designs] = values
 
     def _located(self, error: JounceError, k: int) -> JounceError:
         """Return an error that says of which design it is."""
