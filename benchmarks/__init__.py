@@ -36,6 +36,7 @@ BENCHMARKS = {
     "forward": Benchmark("forward", "Accelerations of an arm from torques, beside Pinocchio and MuJoCo"),
     "feedforward": Benchmark("feedforward", "Motor torques behind springs, beside differences of Pinocchio's torques"),
     "inverse-kinematics": Benchmark("inverse_kinematics", "Coordinates of an arm for poses, beside Pinocchio"),
+    "retiming": Benchmark("retiming", "Paths of an arm retimed within limits, beside TOPP-RA"),
     "joints": Benchmark("joints", "Torque with two rates against the number of joints"),
     "frames": Benchmark("frames", "Hand, Jacobian and energy of an arm, beside Pinocchio; splines beside SciPy"),
     "pendulum": Benchmark("pendulum", "Double pendulum: time against error, beside SciPy, diffrax, heyoka and Exudyn"),

@@ -9,7 +9,8 @@ Each path goes through five random waypoints within its joints' ranges. Three ta
 - straight lines in joint space with limits of velocity, acceleration and jerk: durations against Ruckig in the one
   coordinate along the line. (Its joints synchronised in phase leave the line where that is faster.)
 
-Run: ``python benchmarks/retiming.py [--count 50] [--seed 0]``. Needs the extras ``planning`` and ``bench``.
+Run: ``python benchmarks/retiming.py [--count 50] [--seed 0]`` for the table of all paths; ``python -m benchmarks --only
+retiming`` times some of them. Needs the extras ``planning`` and ``bench``.
 """
 
 import argparse
@@ -18,6 +19,7 @@ import logging
 import sys
 import time
 import warnings
+from importlib.util import find_spec
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -29,7 +31,7 @@ use_one_core()
 import numpy as np  # noqa: E402
 
 import jounce as jn  # noqa: E402
-from benchmarks.cases import EXAMPLES  # noqa: E402
+from benchmarks.cases import EXAMPLES, Case, Cases, Contestant, ready  # noqa: E402
 from jounce.errors import JounceError  # noqa: E402
 from jounce.io import load_limits  # noqa: E402
 from jounce.planning.retiming.paths import Path as JointPath, path_of  # noqa: E402
@@ -41,17 +43,59 @@ LINES = 20
 SMOOTHED = 10  # paths on which TOPP-RA is smoothed, which takes long
 
 
+def cases(quick: bool) -> Cases:
+    """Yield the three tasks, on a few paths."""
+    robot, limits, names = panda()
+    rng = np.random.default_rng(0)
+    paths = random_paths(robot, limits, names, 2 if quick else 10, rng)
+    bare = without_jerk(limits)
+
+    def longer(found: np.ndarray) -> float:
+        return float(np.max(found / theirs() - 1)) if find_spec("toppra") else np.nan
+
+    def retimed(limits: dict[str, jn.Limits]) -> list[jn.JointTrajectory]:
+        return [jn.retime(robot, path, limits) for path in paths]
+
+    def ours() -> np.ndarray:
+        return np.array([found.stop for found in retimed(bare)])
+
+    def theirs() -> np.ndarray:
+        return np.array([toppra_rate(path, bare, names)[0][-1] for path in paths])
+
+    rivals = [Contestant("jounce", ready(ours), longer), Contestant("TOPP-RA", ready(theirs), longer, "toppra")]
+    work = {"count": len(paths), "unit": "path", "rounds": 3}
+    name = "paths of the Panda retimed, velocity and acceleration"
+    yield Case(name, rivals, reference="the duration by TOPP-RA on 2001 points, relative", **work)
+
+    def exceeded(found: list[jn.JointTrajectory]) -> float:
+        return max(jn.check_limits(robot, each, limits).worst.ratio - 1 for each in found)
+
+    name = "paths of the Panda retimed, with jerk, torque and torque rate"
+    with_all = [Contestant("jounce", ready(lambda: retimed(limits)), exceeded)]
+    yield Case(name, with_all, reference="what the limits are exceeded by, relative", **work)
+
+
+def panda() -> tuple[jn.Robot, dict[str, jn.Limits], list[str]]:
+    """Return the arm, its limits, and its joints without those of the fingers."""
+    logging.disable(logging.WARNING)
+    warnings.simplefilter("ignore")
+    robot = jn.load_robot(EXAMPLES / "robots" / "panda.urdf")
+    limits = load_limits(EXAMPLES / "limits" / "franka_panda.yaml", robot)
+    return robot, limits, [name for name in robot.joint_names if "finger" not in name]
+
+
+def without_jerk(limits: dict[str, jn.Limits]) -> dict[str, jn.Limits]:
+    """Return the limits of velocity and acceleration alone."""
+    return {name: jn.Limits(velocity=x.velocity, acceleration=x.acceleration) for name, x in limits.items()}
+
+
 def main() -> int:
     """Print the table; return 1 if a limit is broken, or a duration or a time is beyond what was promised."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--count", type=int, default=50, help="paths")
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
-    logging.disable(logging.WARNING)
-    warnings.simplefilter("ignore")
-    robot = jn.load_robot(EXAMPLES / "robots" / "panda.urdf")
-    limits = load_limits(EXAMPLES / "limits" / "franka_panda.yaml", robot)
-    names = [name for name in robot.joint_names if "finger" not in name]
+    robot, limits, names = panda()
     rng = np.random.default_rng(options.seed)
     paths = random_paths(robot, limits, names, options.count, rng)
     bad = without_rates(robot, limits, names, paths)
@@ -102,7 +146,7 @@ def toppra_rate(path: JointPath, limits, names) -> tuple[np.ndarray, np.ndarray]
 
 
 def without_rates(robot, limits, names, paths) -> bool:
-    bare = {name: jn.Limits(velocity=x.velocity, acceleration=x.acceleration) for name, x in limits.items()}
+    bare = without_jerk(limits)
     excess, ours, theirs = [], [], []
     jn.retime(robot, paths[0], bare)
     for path in paths:

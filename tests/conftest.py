@@ -49,6 +49,13 @@ def pytest_configure(config):
     keep_programs(folder)
 
 
+def pytest_collection_finish():
+    """Leave thousands of collected tests out of the search for garbage, and search less often: tracing makes little."""
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(100_000, 20, 20)
+
+
 @pytest.fixture(autouse=True, scope="module")
 def _few_programs():
     """Forget compiled programs in time: they take memory, and memory maps, without which XLA dies.

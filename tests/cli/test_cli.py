@@ -356,6 +356,7 @@ def test_version_and_help(run):
         assert "Examples:" in out
 
 
+@pytest.mark.slow
 def test_a_process_of_its_own_imports_no_more_than_it_needs():
     program = (
         "import sys; from jounce.cli import main; status = main(['run', sys.argv[1]]);"

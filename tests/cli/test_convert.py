@@ -13,7 +13,7 @@ from jounce.io.files.source import read_source
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 FOUR_BAR = ROOT / "examples" / "four_bar.yaml"
 ROBOTS = ROOT / "examples" / "robots"
-SOLVED = ("human_arm", "solo12", "ur5")  # and the SCARA, with rates; the others compile for long
+SOLVED = ("human_arm", "solo12")  # and the SCARA, with rates; the others compile for long
 
 
 @pytest.fixture(autouse=True)

@@ -66,6 +66,7 @@ def test_an_interrupt_between_stretches_leaves_no_file(run, file, tmp_path, monk
     assert [p.name for p in tmp_path.iterdir()] == ["linkage.yaml"]
 
 
+@pytest.mark.slow
 def test_a_result_that_cannot_be_written_is_told(run, file, tmp_path, monkeypatch):
     monkeypatch.setattr("jounce.kinematics.long_grids.STRETCH", 1100)
 

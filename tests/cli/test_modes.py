@@ -69,6 +69,7 @@ def test_a_robot_hangs_and_swings(run):
     assert len(found["modes"]) == 2
 
 
+@pytest.mark.slow
 def test_bad_input_is_named(run):
     for arguments, told in (
         ((EXAMPLES / "press.yaml",), "release it (motor)"),

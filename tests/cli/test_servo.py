@@ -40,6 +40,7 @@ def test_a_row_for_each_period_position_to_jerk_in_the_units_asked_for(drive):
     assert all(abs(x - row[2]) < 0.01 * 600 for x, row in zip(speeds, table[1:], strict=False))
 
 
+@pytest.mark.slow
 def test_json_is_in_si_and_tells_the_continuity(capsys):
     assert main(["servo", PRESS, "--rate", "100", "--units", "angle=deg", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)

@@ -149,6 +149,7 @@ def test_multipliers_balance_forces_and_inertia_with_rates(linkage_motion):
     np.testing.assert_array_less(np.abs(work - expected).max(axis=0) / scale, 1e-12)
 
 
+@pytest.mark.slow
 def test_mass_matrix_and_multipliers_make_the_equations_of_motion(linkage_motion):
     equations = jn.constraint_equations(linkage_motion).isel(time=0)
     matrix = equations.mass_matrix.values

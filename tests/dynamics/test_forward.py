@@ -289,6 +289,7 @@ def test_lanes_of_a_batch_are_runs_of_their_own():
             assert np.allclose(a[..., 0], b[..., lane], rtol=1e-13, atol=1e-13 * np.abs(a).max())
 
 
+@pytest.mark.slow
 def test_free_fall_has_no_higher_coefficients():
     _, found = expansion(dynamics.thrown_stone(), 8)
     place = np.zeros((9, 2))

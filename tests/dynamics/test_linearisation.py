@@ -285,6 +285,7 @@ def test_forces_are_inputs_by_component_and_rates_of_outputs_feed_through():
     assert small.D.shape == (6, 4)
 
 
+@pytest.mark.slow
 def test_bad_input_is_named():
     pendulum = jn.load(example("double_pendulum"))
     four_bar = sprung_four_bar(driven=True)

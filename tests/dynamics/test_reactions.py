@@ -18,13 +18,13 @@ BANK = (
     *("inverted_slider_crank_distance", "inverted_slider_crank_slide", "screw_press", "hooke_joint", "rssr", "rccc"),
     *("swash_plate", "rspu_slide", "rspu_distance", "stewart_platform"),
 )
-SECOND_RATE = ("slider_crank", "epicyclic", "rolling_disc", "screw_press", "rssr")  # of power; the others to the first
+SECOND_RATE = ("slider_crank", "epicyclic", "rolling_disc", "rssr")  # of power; the others to the first
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", BANK)
 def test_power_balance_of_the_bank(name):
-    # the two sides share no code but the motion; 2e-15 measured, 6e-14 at the second rate of the screw press
+    # the two sides share no code but the motion; 2e-15 measured
     order = 4 if name in SECOND_RATE else 3
     balance = jn.power_balance(jn.solve(massed_example(name), TIME, order=order))
     left = (np.abs(balance["residual"]) / balance["scale"].max("time")).max("time")
@@ -36,7 +36,7 @@ def test_power_balance_of_the_bank(name):
 @pytest.mark.parametrize("name", ["slider_crank", pytest.param("hooke_joint", marks=pytest.mark.slow)])
 def test_every_body_obeys_newton_and_euler(name):
     mechanism = massed_example(name)
-    motion = jn.solve(mechanism, TIME, order=4)
+    motion = jn.solve(mechanism, TIME, order=2)
     elements = {**mechanism.joints, **mechanism.drivers}
     for body, given in mechanism.bodies.items():
         spatial = mechanism.space == "spatial"
@@ -63,6 +63,7 @@ def test_every_body_obeys_newton_and_euler(name):
         np.testing.assert_allclose(torque, moment, atol=1e-12 * sizes)
 
 
+@pytest.mark.slow
 def test_rates_are_those_of_differenced_multipliers_at_the_order_of_the_difference():
     # central differences err by h^2 f''' / 6: halving h must divide the error by four, at every rate
     mechanism = massed_example("slider_crank")

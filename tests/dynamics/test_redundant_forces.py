@@ -80,6 +80,7 @@ def test_elastic_hinges_share_the_weight_by_their_stiffness(share):
     np.testing.assert_array_equal(asked.force.values[0, 0], found[5:8])
 
 
+@pytest.mark.slow
 def test_stiffnesses_that_decide_nothing_are_refused():
     with pytest.raises(jn.MechanismError, match="leaves reactions open"):
         jn.joint_reaction(jn.solve(door(redundant_reactions={"turn": {"torque": 1.0}}), TIMES, order=4), "lower")

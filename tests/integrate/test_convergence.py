@@ -66,6 +66,7 @@ def test_measured_order_is_that_of_theory(name, space):
         assert np.all(found < wanted + (1.5 if wanted >= 8 and stop < 0 else 0.5)), (stop, errors, found)
 
 
+@pytest.mark.slow
 def test_the_exact_runs_are_exact():
     time, kinds = dynamics.dynamic_reference("double_pendulum")
     ready = consistent_start(dynamics.double_pendulum(), 0.0)

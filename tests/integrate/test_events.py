@@ -42,6 +42,7 @@ def test_values_are_crossed_when_the_closed_form_says():
         assert times == pytest.approx(list(wanted), abs=1e-14)
 
 
+@pytest.mark.slow
 def test_derivatives_are_crossed():
     assert happened(height(derivative=1), height(3.0, derivative=1))[0] == pytest.approx([0.5], abs=1e-14)
     assert happened(height(3.0, derivative=1))[0] == pytest.approx([0.2], abs=1e-14)

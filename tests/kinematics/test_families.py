@@ -60,6 +60,7 @@ def test_bad_designs_are_told():
         jn.solve_batch(FOUR_BAR, {"BC": [0.14, 0.15], "AB": [0.04]}, TIME)
 
 
+@pytest.mark.slow
 def test_one_instant_and_one_design():
     family = jn.solve_batch(FOUR_BAR, {"BC": [0.14]}, [0.3], order=2)
     check(FOUR_BAR, {"BC": [0.14]}, family, [0.3], 2)
@@ -82,7 +83,7 @@ def test_kinds_of_mechanisms(name, parameter):
     key = parameter or next(iter(numbers))
     parameters = {key: mechanism.parameter_values[key] * np.linspace(0.995, 1.005, 4)}
     time = np.linspace(0.0, 1.5, 7)
-    check(mechanism, parameters, jn.solve_batch(mechanism, parameters, time, order=4), time, 4, 1e-11)
+    check(mechanism, parameters, jn.solve_batch(mechanism, parameters, time, order=3), time, 3, 1e-11)
 
 
 @pytest.mark.slow

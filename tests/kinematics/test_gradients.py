@@ -77,7 +77,7 @@ def test_a_four_bar_in_fifty_digits():
         ("gear_pair", ["R1", "AB", "BC"], 4),  # offsets that follow from the starting guess
         ("rolling_disc", ["R", "rod"], 4),
         ("rsur", ["BC"], 8),  # angles about axes
-        ("screw_press", ["lead"], 3),
+        ("screw_press", ["lead"], 2),
         ("rspu_distance", ["OD"], 3),
     ],
 )

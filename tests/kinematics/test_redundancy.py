@@ -83,6 +83,7 @@ def test_a_parallelogram_with_three_cranks_moves_on_through_its_flat_positions()
     np.testing.assert_allclose(motion.outputs["coupler"][:, 4, 1], np.sin(0.7 + motion.time), atol=1e-9)
 
 
+@pytest.mark.slow
 def test_random_bennett_linkages_from_bad_guesses_in_any_unit():
     """One program serves all of them: only numbers differ."""
     random = np.random.default_rng(0)

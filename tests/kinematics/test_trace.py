@@ -44,7 +44,7 @@ def test_limit_positions_of_random_four_bars(number):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", limit_study.FAMILIES)
 def test_limit_positions_of_many_random_linkages(name):
-    for seed, number in [*((3, number) for number in range(25)), (0, 828)]:  # the last misses a crossing by 1e-6
+    for seed, number in [*((3, number) for number in range(12)), (0, 828)]:  # the last misses a crossing by 1e-6
         linkage = limit_study.random_linkage(name, seed, number)
         assert limit_study.judged(linkage).error < limit_study.LARGEST_ERROR, linkage
 
@@ -203,6 +203,7 @@ def test_the_dataset_names_its_points():
     np.testing.assert_allclose(np.abs(away).min(axis=1), 0.0, atol=1e-13)
 
 
+@pytest.mark.slow
 def test_a_dead_point_of_a_motion_says_where_it_is_and_where_the_other_branch_leads():
     with pytest.raises(jn.SolveError, match=r"drive can go no further than 4 m: .* leads to 2 m"):
         jn.solve(slider_crank("3.52 + 0.2*t"), np.linspace(0, 4, 9))

@@ -164,6 +164,7 @@ def test_tables_and_files_keep_every_number(turning, tmp_path):
     assert {"p_e0", "p_e3_d4", "A_xx", "A_zy_d2", "by_pin_gamma"} <= set(header)
 
 
+@pytest.mark.slow
 def test_parallel_axes_are_undefined_and_near_them_derivatives_hold():
     """The middle angle passes zero at t = 0.5: there the outer two are not determined, and from there on the principal
     middle angle grows again, the others shifted by half a turn."""

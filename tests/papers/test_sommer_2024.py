@@ -204,6 +204,7 @@ def test_comparison_puts_printed_errors_beside_ours(small_run):
     assert text.count("1.07e-13") == 2, "there, and in the verdict on figure 2"
 
 
+@pytest.mark.slow
 def test_comparison_says_what_is_chosen_before_any_number(small_run):
     text = (small_run[0] / "comparison.md").read_text()
     chosen = text.index("stand-ins")

@@ -82,6 +82,7 @@ def test_equations_050_and_051_all_orders_share_one_slope(seed):
         close(case.dw[m - 1, :, m], case.turns[0])
 
 
+@pytest.mark.slow
 @SEEDS
 def test_equations_052_and_054_rate_of_the_slope_of_position(seed):
     case = case_of(seed)

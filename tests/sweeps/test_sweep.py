@@ -67,6 +67,7 @@ def test_every_design_has_the_statistics_of_its_own_motion(done):
     assert found["psi_peak"].attrs["units"] == "rad"
 
 
+@pytest.mark.slow
 def test_a_design_that_fails_has_a_status_and_no_statistics(done):
     _, found = done
     bad = found["first_status"].values != 0

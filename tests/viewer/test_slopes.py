@@ -41,6 +41,7 @@ def test_the_page_tells_them_and_follows_a_slider():
         assert view.slopes.text.content != before
 
 
+@pytest.mark.slow
 def test_what_has_no_slopes():
     motion = jn.solve(FOUR_BAR, [0.0, 0.1], order=1)
     with pytest.raises(JounceError, match="psi"):

@@ -74,8 +74,8 @@ def traced_simulation(simulate: Callable[..., Simulation], given: Mapping[str, A
     coordinates = {name: known[name] + (x - jax.lax.stop_gradient(x)) for name, x in coordinates.items()}
     angles = _angles(simulation)
     status = jnp.asarray(simulation.status.astype(float))
-    solved = Solved(coordinates, status, model.length, angles, simulation.continued_outputs)
-    return TracedMotion(mechanism, model, simulation.time, simulation.order, solved)
+    solved = Solved(coordinates, status, model.length, angles, angles.angle[0], simulation.continued_outputs)
+    return TracedMotion(mechanism, (model, model), simulation.time, simulation.order, solved)
 
 
 def _recorded(simulate: Callable[..., Simulation], mechanism: Mechanism, options: Mapping[str, Any]) -> Simulation:
