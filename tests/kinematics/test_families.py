@@ -74,7 +74,6 @@ def test_one_instant_and_one_design():
         ("six_bar_watt", None),
         ("radial_engine", "r"),
         ("rsur", "BC"),  # angles about axes
-        ("screw_press", "rod"),
     ],
 )
 def test_kinds_of_mechanisms(name, parameter):
