@@ -44,7 +44,7 @@ SMOOTHED = 10  # paths on which TOPP-RA is smoothed, which takes long
 
 
 def cases(quick: bool) -> Cases:
-    """Yield the three tasks, on a few paths."""
+    """Yield the first two tasks, on a few paths."""
     robot, limits, names = panda()
     rng = np.random.default_rng(0)
     paths = random_paths(robot, limits, names, 2 if quick else 10, rng)
@@ -76,7 +76,7 @@ def cases(quick: bool) -> Cases:
 
 
 def panda() -> tuple[jn.Robot, dict[str, jn.Limits], list[str]]:
-    """Return the arm, its limits, and its joints without those of the fingers."""
+    """Return the arm, its limits, and its joints without those of the fingers; warnings are not told from here on."""
     logging.disable(logging.WARNING)
     warnings.simplefilter("ignore")
     robot = jn.load_robot(EXAMPLES / "robots" / "panda.urdf")
