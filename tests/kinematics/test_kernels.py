@@ -39,7 +39,7 @@ def test_sums_of_every_size_are_those_of_numpy(size):
         x, count = carry
         return jnp.sum(matrix * x[None], axis=1), count + 1
 
-    @compiled(further=kernels.WITHOUT_LIBRARIES)
+    @compiled(without=kernels.LIBRARIES)
     def found(x):
         return kernels.in_one_piece(lambda c: jax.lax.while_loop(lambda c: c[1] < 5, body, c), (x, 0))
 

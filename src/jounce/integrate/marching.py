@@ -14,7 +14,7 @@ from jounce.integrate.methods import AbstractMethod, Number, near_singular
 from jounce.integrate.projection import projected
 from jounce.integrate.turns import AnglesOfForces, followed, measured
 from jounce.kinematics.compilation import compiled
-from jounce.kinematics.kernels import WITHOUT_LIBRARIES, in_one_piece
+from jounce.kinematics.kernels import LIBRARIES, in_one_piece
 from jounce.shapes import Numbers
 
 SMALLEST_STEP = 1e-13  # of the span, or of the time itself
@@ -108,7 +108,7 @@ def begin_march(equations: Equations, state: State, time: Lanes, *, order: int) 
     return IntegratorState(time, expansion, jnp.zeros(time.shape, int), outcome, nothing, time, *known, none, angles)
 
 
-@compiled("count", "keep", further=WITHOUT_LIBRARIES)
+@compiled("count", "keep", without=LIBRARIES)
 def march(
     equations: Equations,
     current: IntegratorState,

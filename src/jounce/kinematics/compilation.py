@@ -9,7 +9,7 @@ import inspect
 import pickle
 import threading
 import zlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cached_property, lru_cache, partial, update_wrapper
 from typing import Any, Protocol, runtime_checkable
@@ -69,12 +69,23 @@ def keep_programs(store: Store | None) -> None:
     _store = store
 
 
-def compiler_options() -> dict[str, Any] | None:
+UNENDING = ("simplify-while-loops", "while-loop-invariant-code-motion", "while-loop-constant-sinking")
+"""XLA's passes over loops that undo each other's work, some thirty times; our loops have nothing for them to do."""
+
+
+def compiler_options(without: Iterable[str] = ()) -> dict[str, Any] | None:
     """Return options that halve XLA's compile time of long chains of small operations, without making them slower.
 
     They are private to XLA, and a release that does not know them refuses them: then there are none, as on a GPU.
+
+    Parameters
+    ----------
+    without : iterable of str, optional
+        Further passes of XLA to leave out.
     """
-    return _processor_options() if on_processor() else None
+    if not on_processor() or (options := _processor_options()) is None:
+        return None
+    return options | {"xla_disable_hlo_passes": ",".join((*UNENDING, *without))}
 
 
 @lru_cache(maxsize=1)
@@ -98,8 +109,8 @@ class Compiled:
         Names of the static arguments.
     made_of : tuple of callable, optional
         Functions of the package that say what it computes, where it is none of them itself.
-    further : mapping, optional
-        Further options of XLA.
+    without : tuple of str, optional
+        Passes of XLA to leave out.
     """
 
     def __init__(
@@ -107,10 +118,10 @@ class Compiled:
         function: Callable[..., Any],
         static: tuple[str, ...],
         made_of: tuple[Callable[..., Any], ...] = (),
-        further: Mapping[str, Any] | None = None,
+        without: tuple[str, ...] = (),
     ):
         self.function, self.static, self.made_of = function, static, made_of or (function,)
-        self.further = further or {}
+        self.without = without
         self._programs: dict[Any, Callable[..., Any]] = {}
         self._names = tuple(inspect.signature(function).parameters)
         self._traced = min([self._names.index(name) for name in static], default=len(self._names))
@@ -119,9 +130,7 @@ class Compiled:
     @cached_property
     def jitted(self) -> Any:
         """The function as `jax.jit` returns it."""
-        options = compiler_options()
-        options = None if options is None else {**options, **self.further}
-        return jax.jit(self.function, static_argnames=self.static, compiler_options=options)
+        return jax.jit(self.function, static_argnames=self.static, compiler_options=compiler_options(self.without))
 
     @cached_property
     def _within(self) -> Any:
@@ -222,6 +231,6 @@ def _home() -> jax.sharding.Sharding:
     return jax.sharding.SingleDeviceSharding(jax.devices()[0])
 
 
-def compiled(*static: str, further: Mapping[str, Any] | None = None) -> Callable[[Callable[..., Any]], Compiled]:
-    """Compile the decorated function at its first call, with these static arguments, and further options of XLA."""
-    return lambda function: Compiled(function, static, further=further)
+def compiled(*static: str, without: tuple[str, ...] = ()) -> Callable[[Callable[..., Any]], Compiled]:
+    """Compile the decorated function at its first call, with these static arguments, without some passes of XLA."""
+    return lambda function: Compiled(function, static, without=without)

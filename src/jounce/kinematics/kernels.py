@@ -10,8 +10,8 @@ from jax.extend.core import Jaxpr, jaxpr_as_fun, jaxprs_in_params
 
 from jounce.kinematics.compilation import compiler_options
 
-WITHOUT_LIBRARIES = {"xla_disable_hlo_passes": "dot-library-rewriter"}
-"""Options, beside `compiler_options`, of programs with such functions: XLA puts sums into a library as well."""
+LIBRARIES = ("dot-library-rewriter",)
+"""Passes of XLA to leave out of programs with such functions: they put sums into a library as well."""
 
 TRIED = (0, 10)  # releases of jaxlib: of others it is not known whether they break off
 LARGEST = 6000  # operations: of twice as many LLVM makes one function in a minute, and many in ten seconds
@@ -38,7 +38,7 @@ def in_one_piece(function: Callable[[Any], Any], argument: Any) -> Any:
     ----------
     function : callable
         Of a pytree of arrays, such as a loop whose length is known only when it runs. In a program compiled with
-        `compiler_options` and `WITHOUT_LIBRARIES`: neither the newer code of XLA for fused operations nor its
+        `compiler_options`, `without` the `LIBRARIES`: neither the newer code of XLA for fused operations nor its
         libraries can be part of such a function.
     argument : pytree
         Of arrays.
