@@ -143,10 +143,15 @@ def test_initial_conditions_place_the_bodies(facts):
 
 @pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.yaml")), ids=lambda p: p.stem)
 @pytest.mark.slow
-def test_every_example_can_start(facts, path):
+def test_every_example_can_start_and_runs_to_its_end(facts, run, path, tmp_path):
     status, data, err = facts("inspect", path)
     assert (status, err) == (0, "")
     assert data["ok"]
+    command = "simulate" if jn.load(path).initial else "run"  # degrees of freedom are left: forces move it
+    status, out, err = run(command, path, "--out", tmp_path / "motion.csv")
+    assert (status, err) == (0, ""), out
+    time = np.loadtxt(tmp_path / "motion.csv", delimiter=",", skiprows=1, usecols=0)
+    assert len(time) > 1 and (np.diff(time) > 0).all()
 
 
 def test_a_robot(facts, run):
