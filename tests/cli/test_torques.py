@@ -100,3 +100,14 @@ def test_bad_files(run, files, tmp_path):
     status, _, complaint = run(robot, samples, "--out", samples)
     assert (status, samples.read_text()) == (2, before)
     assert "samples.csv" in complaint
+
+
+@pytest.mark.parametrize("trajectory", ["joints: {pin: 30 mm}\n", "joints: {pin: {samples: s.csv, value: pin}}\n"])
+def test_a_length_is_no_coordinate_of_a_joint_that_turns(run, files, trajectory):
+    """It was taken for as many rad."""
+    robot, law = files
+    law.write_text(trajectory + "time: {stop: 0.5, step: 0.1}\n")
+    (law.parent / "s.csv").write_text("time,pin [mm]\n" + "".join(f"{k},{k}\n" for k in range(9)))
+    status, _, complaint = run(robot, law)
+    assert status == 2
+    assert all(word in complaint for word in ("law.yaml", "pin", "turns", "length"))

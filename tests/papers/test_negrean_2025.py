@@ -13,6 +13,7 @@ from jounce.errors import OutputError
 from jounce.papers import negrean_2025
 from jounce.papers.negrean_2025 import CASES, case, closed_forms, comparison, reproduce, segment
 from jounce.papers.negrean_2025.history import difference, history
+from jounce.papers.negrean_2025.measured_data import given_cases
 from tests.oracles import negrean_energies
 
 ROUNDING = 1e-14  # of the largest value over time
@@ -159,12 +160,22 @@ def test_measurements_of_ones_own(tmp_path, run):
     assert "not those of the" not in text
 
 
+def test_measurements_say_their_unit(tmp_path):
+    samples = tmp_path / "mine.csv"
+    samples.write_text("time [ms],slow [deg/s^2]\n" + "".join(f"{100 * k},90\n" for k in range(9)))
+    case = given_cases(samples, None)["slow"]
+    np.testing.assert_allclose(case.samples(), np.pi / 2, rtol=1e-15)
+    np.testing.assert_allclose(case.knots, 0.1 * np.arange(9), rtol=1e-15)
+
+
 @pytest.mark.parametrize(
     "samples, link, words",
     [
         ("time,a\n0,1\n1,x\n", None, ("mine.csv", "line 3", "a", "x")),
         ("time,a\n0,1\n", None, ("mine.csv", "a")),
         ("t,a\n0,1\n1,2\n", None, ("mine.csv", "time")),
+        ("time,a [deg]\n0,1\n1,2\n", None, ("mine.csv", "a", "deg")),
+        ("time,a [m/s^2]\n0,1\n1,2\n", None, ("mine.csv", "a", "angular")),
         (None, LINK.replace("mass: 4 kg\n", ""), ("link.yaml", "mass", "missing")),
         (None, LINK.replace("4 kg", "4 m"), ("link.yaml", "line 1", "mass", "4 m")),
         (None, LINK.replace("4 kg", "-4 kg"), ("link.yaml", "mass", "-4")),

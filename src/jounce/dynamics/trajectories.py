@@ -42,7 +42,7 @@ class FollowedTrajectory:
     Raises
     ------
     RobotError, TrajectoryError
-        If the robot has no joints, or the trajectory names one that it does not have.
+        If the robot has no joints, or the trajectory names one that it does not have, or that moves otherwise.
     """
 
     def __init__(self, robot: Robot, trajectory: JointTrajectory):
@@ -51,6 +51,7 @@ class FollowedTrajectory:
         for name in trajectory.names:
             if name not in robot.joint_names:
                 raise TrajectoryError(why_not(robot, name), name="joint", value=name)
+        check_measures(robot, trajectory)
         self.robot, self.trajectory = robot, trajectory
         self.columns = [robot.joint_names.index(name) for name in trajectory.names]
         self.held = {name: _rest(robot.limits[name]) for name in robot.joint_names if name not in trajectory.names}
@@ -171,6 +172,19 @@ def why_not(robot: Robot, name: str) -> str:
     if joint.mimic is not None:
         return f"this joint follows {joint.mimic.joint}; leave it out"
     return "this joint is fixed; leave it out"
+
+
+def check_measures(robot: Robot, trajectory: JointTrajectory) -> None:
+    """Raise TrajectoryError where the units of a trajectory are not those of the joints of the robot."""
+    for name, measured in trajectory.measures.items():
+        turning = robot.joints[name].turning
+        if measured != ("angle" if turning else "length"):
+            message = (
+                "this joint turns, its coordinate is an angle, but its law has the unit of a length"
+                if turning
+                else "this joint slides, its coordinate is a length, but its law has the unit of an angle"
+            )
+            raise TrajectoryError(message, name=name)
 
 
 def _rest(limits: Limits) -> float:

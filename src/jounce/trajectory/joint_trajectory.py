@@ -36,6 +36,8 @@ class JointTrajectory(Displayed):
         First and last instant, s.
     times : array_like of shape (samples,), optional
         Instants at which the trajectory is meant to be looked at; 201 evenly spaced ones when not given.
+    measures : dict of str to {"angle", "length"}, optional
+        What joints move by, where it is known, as from the units of a file: a robot whose joint does not is refused.
 
     Raises
     ------
@@ -53,7 +55,14 @@ class JointTrajectory(Displayed):
     [0.5, 1.0, 1.0, 0.0]
     """
 
-    def __init__(self, laws: Mapping[str, object], start: float, stop: float, times: ArrayLike | None = None):
+    def __init__(
+        self,
+        laws: Mapping[str, object],
+        start: float,
+        stop: float,
+        times: ArrayLike | None = None,
+        measures: Mapping[str, str] | None = None,
+    ):
         if not isinstance(laws, Mapping) or not laws:
             raise TrajectoryError("a trajectory needs a law for at least one joint", name="laws", value=laws)
         self.laws: Mapping[str, AbstractMotion] = MappingProxyType({name: _law(name, x) for name, x in laws.items()})
@@ -65,6 +74,7 @@ class JointTrajectory(Displayed):
                 raise TrajectoryError(error.message, name=f"laws.{name}", value=error.value) from None
         instants = np.linspace(self.start, self.stop, 201) if times is None else check_samples(times, times)[0]
         self.times = self._inside(instants)
+        self.measures = MappingProxyType(dict(measures or {}))
 
     @classmethod
     def from_samples(
@@ -186,7 +196,7 @@ class JointTrajectory(Displayed):
         return tuple(self.laws)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (dict(self.laws), self.start, self.stop, self.times)
+        return type(self), (dict(self.laws), self.start, self.stop, self.times, dict(self.measures))
 
     def __repr__(self) -> str:
         return f"JointTrajectory({', '.join(self.names)}; {self.start:g} to {self.stop:g} s)"

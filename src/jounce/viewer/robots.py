@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Float
 from xarray import Dataset
 
+from jounce.dynamics.trajectories import check_measures
 from jounce.errors import RobotError, SampleWarning, check_name
 from jounce.reporting.peaks import derivative_name
 from jounce.rigid.euler_parameters import from_rotation_matrices
@@ -124,6 +125,8 @@ class RobotSubject:
             raise RobotError("nothing moves: the robot has no moving joint", name=robot.name)
         for name in trajectory.names if trajectory is not None else ():
             check_name("moving joint", name, robot.joint_names, RobotError, name="trajectory")
+        if trajectory is not None:
+            check_measures(robot, trajectory)
         self.robot, self.appearance, self.trajectory = robot, appearance, trajectory
         self.name, self.loaded = robot.name, has_masses(robot)
         self.driven, share = self.joints_driven()

@@ -1,5 +1,7 @@
 """Files of trajectories: what they hold, and what is said when they are wrong."""
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -109,6 +111,36 @@ def test_bytes_that_are_no_text(tmp_path):
     path.write_bytes(b"time,a\n0,\xff\xfe\n")
     with pytest.raises(TrajectoryError, match="cannot be read"):
         load_trajectory(path)
+
+
+def test_the_units_of_columns_are_kept(tmp_path):
+    rows = ["time,a [deg],b [mm],c,a_d1 [deg/s]", *(f"{k},{k},{k},{k},1" for k in range(8))]
+    assert load_trajectory(write(tmp_path, rows)).measures == {"a": "angle", "b": "length"}
+
+
+@pytest.mark.parametrize(
+    "text, measures",
+    [
+        ("parameters: {A: 2 cm}\njoints: {a: A*sin(t), b: 20*deg*t, c: 1 m, d: t**2}\n", "length, None, length, None"),
+        (
+            "point_to_point: {duration: 1 s, from: {a: 0, b: 0, c: 0}, to: {a: 9 deg, b: 0, c: 1 mm}}\n",
+            "angle, None, length",
+        ),
+        ("motion: {samples: m.csv, derivative: 2, initial: {b: [0, 2 mm/s]}}\n", "angle, length, None"),
+        ("joints: {a: {samples: m.csv, value: a, derivative: 2}, b: {samples: m.csv, value: c}}\n", "angle, None"),
+    ],
+)
+def test_the_units_of_laws_are_kept(tmp_path, text, measures):
+    write(tmp_path, ["time,a [deg/s^2],b,c", *(f"0.{k},{k},{k},{k}" for k in range(8))], "m.csv")
+    trajectory = load_trajectory(write(tmp_path, text + "time: {stop: 0.5, step: 0.1}\n", "motion.yaml"))
+    assert [str(trajectory.measures.get(name)) for name in trajectory.names] == measures.split(", ")
+    assert pickle.loads(pickle.dumps(trajectory)).measures == trajectory.measures
+
+
+def test_a_joint_is_not_both_angle_and_length(tmp_path):
+    text = PICK.replace("a: 0,", "a: 1 m,")
+    with pytest.raises(TrajectoryError, match=r"motion.yaml, line 1, point_to_point.to.a: .* 'a' .* length"):
+        load_trajectory(write(tmp_path, text, "motion.yaml"))
 
 
 GRID = "time: {start: 0 s, stop: 1 s, step: 0.1 s}\n"

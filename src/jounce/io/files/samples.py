@@ -13,7 +13,7 @@ from jaxtyping import Float
 from jounce.errors import JounceError, MechanismFileError, UnitError, did_you_mean, no_such
 from jounce.io.files.column_units import name_and_unit
 from jounce.io.files.reading import fault_of_number, known_name, read_rows
-from jounce.trajectory.dimensions import TIME, Dimension, describe_dimension, dimension_of
+from jounce.trajectory.dimensions import NUMBER, TIME, Dimension, describe_dimension, dimension_of
 from jounce.trajectory.shown_units import unit_size
 
 _RATE = re.compile(r"_d([0-9]{1,2})$")
@@ -53,6 +53,31 @@ def read_samples(
         Of the type given: the file cannot be read, a column does not exist, an entry is not a finite number, or a unit
         is none, or measures something else.
     """
+    table, first, second = _sampled(path, time, value, error_type)
+    return table.column(first, allowed[0]), table.column(second, allowed[1])
+
+
+def sampled_dimension(
+    path: str | Path,
+    time: str | None = None,
+    value: str | None = None,
+    error_type: type[JounceError] = MechanismFileError,
+) -> Dimension:
+    """Return what the unit measures that the column of values says, which `read_samples` reads; a number without one.
+
+    Raises
+    ------
+    JounceError
+        As for `read_samples`.
+    """
+    table, _, second = _sampled(path, time, value, error_type)
+    return table.unit(second)[1]
+
+
+def _sampled(
+    path: str | Path, time: str | None, value: str | None, error_type: type[JounceError]
+) -> tuple[_Table, int, int]:
+    """Return a table of samples, and the numbers of the columns of time and value."""
     table = _Table(str(path), error_type)
     if len(table.header) < 2:
         raise table.error("samples need a column of times and one of values", line=1)
@@ -61,17 +86,17 @@ def read_samples(
         others = [column for k, column in enumerate(table.header) if k != first]
         message = f"has several columns besides the time, name that of the value; {did_you_mean('', others)}"
         raise table.error(message, line=1)
-    second = 1 - first if value is None else table.find(value)
-    return table.column(first, allowed[0]), table.column(second, allowed[1])
+    return table, first, 1 - first if value is None else table.find(value)
 
 
 def read_columns(
     path: str | Path, error_type: type[JounceError] = MechanismFileError, derivative: int = 0
-) -> tuple[Float[np.ndarray, " time"], dict[str, Float[np.ndarray, " time"]]]:
+) -> tuple[Float[np.ndarray, " time"], dict[str, Float[np.ndarray, " time"]], dict[str, Dimension]]:
     """Read the column ``time``, which increases, and all others from a CSV file, whose first row names them.
 
     Values are in SI units unless the name of a column says another: ``elbow [deg]``, ``elbow_d1 [deg/s]``. They are of
-    angles and lengths, or of a derivative of such, and of one more for each that the name of a column tells.
+    angles and lengths, or of a derivative of such, and of one more for each that the name of a column tells. Last, what
+    the units of the columns measure that say one.
 
     Raises
     ------
@@ -95,7 +120,7 @@ def read_columns(
         what = "repeats" if times[k + 1] == times[k] else "comes before"
         message = f"times must increase; this one {what} that of line {table.rows[k][0]}"
         raise table.error(message, line=table.rows[k + 1][0], name="time", value=float(times[k + 1]))
-    return times, found
+    return times, found, {name: table.unit(header.index(name))[1] for name in found if table.units[header.index(name)]}
 
 
 def column_names(path: str | Path, error_type: type[JounceError] = MechanismFileError) -> list[str]:
@@ -233,11 +258,11 @@ class _Table:
             raise self.error(no_such("column", column, self.header), line=self.header_line or 1, value=column)
         return self.header.index(column)
 
-    def size(self, number: int, allowed: Sequence[Dimension]) -> float:
-        """Return the size of the unit that a column says, in SI units; one where it says none."""
+    def unit(self, number: int, allowed: Sequence[Dimension] = ()) -> tuple[float, Dimension]:
+        """Return the size of the unit that a column says, in SI units, and what it measures; one where it says none."""
         unit = self.units[number]
         if unit is None:
-            return 1.0
+            return 1.0, NUMBER
         place = {"line": self.header_line, "name": self.header[number], "value": unit}
         try:
             size, dimension = unit_size(unit)
@@ -246,11 +271,11 @@ class _Table:
         if allowed and dimension not in allowed:
             words = " or ".join(map(describe_dimension, allowed))
             raise self.error(f"the unit measures {describe_dimension(dimension)}, not {words}", **place)
-        return size
+        return size, dimension
 
     def column(self, number: int, allowed: Sequence[Dimension] = ()) -> list[float]:
         """Return the numbers of a column, in SI units."""
-        size = self.size(number, allowed)
+        size, _ = self.unit(number, allowed)
         found = []
         for line, row in self.rows:
             text = row[number] if number < len(row) else ""

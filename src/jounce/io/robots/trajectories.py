@@ -14,7 +14,7 @@ from jounce.errors import JounceError, TrajectoryError, no_such, show_value
 from jounce.io.files import DATA_FILES
 from jounce.io.files.located_data import Location, Source
 from jounce.io.files.reading import fault_of_number
-from jounce.io.files.samples import rates, read_columns, read_samples
+from jounce.io.files.samples import rates, read_columns, read_samples, sampled_dimension
 from jounce.io.files.source import read_source
 from jounce.io.robots.controller_files import is_message, read_message, read_table
 from jounce.shapes import ArrayLike
@@ -114,12 +114,19 @@ def _check_no_names(joints: object, path: str) -> None:
 
 def _read_csv(path: str, degree: int, joints: object) -> JointTrajectory:
     _check_no_names(joints, path)
-    times, columns = read_columns(path, TrajectoryError)
+    times, columns, units = read_columns(path, TrajectoryError)
     names = [name for name in columns if _DERIVATIVE.sub("", name) not in columns.keys() - {name}]
+    measures = {name: found for name in names if (found := _measured(units.get(name)))}
     try:
-        return JointTrajectory.from_samples(times, np.stack([columns[n] for n in names], axis=1), names, degree)
+        found = JointTrajectory.from_samples(times, np.stack([columns[n] for n in names], axis=1), names, degree)
+        return JointTrajectory(found.laws, found.start, found.stop, found.times, measures)
     except TrajectoryError as error:
         raise error.located(path=path) from None
+
+
+def _measured(dimension: Dimension | None) -> str | None:
+    """Return which of an angle and a length a coordinate is whose value, or a rate of it, has a dimension."""
+    return next((base for base, _ in dimension or () if base in ("angle", "length")), None)
 
 
 def _order(data: Mapping[str, Any]) -> int:
@@ -139,6 +146,7 @@ class _LawFile:
             raise source.error(message, value=list(self.data))
         self.parameters: dict[str, float] = {}
         self.dimensions: dict[str, Dimension] = {}
+        self.measures: dict[str, str] = {}  # of joints whose laws say a unit
         for name, raw in (source.mapping(("parameters",)) if "parameters" in self.data else {}).items():
             self._add_parameter(name, raw)
 
@@ -165,29 +173,34 @@ class _LawFile:
     def _law(self, at: Location, raw: Any) -> AbstractMotion | float:
         """Return the law of a joint: an expression, a number, or samples of a column of a file."""
         if not isinstance(raw, dict):
-            value = self._value(raw, "any", at, ("t",))
+            value = self._value(raw, "any", at, ("t",), joint=at[-1])
             return ExpressionMotion(value, self.parameters) if isinstance(value, Expression) else value
         data = self.source.mapping(at, (*_SAMPLE_KEYS, "time", "value"))
-        columns = {key: self._text(data[key], (*at, key)) for key in ("time", "value") if key in data}
+        columns: dict[str, Any] = {key: self._text(data[key], (*at, key)) for key in ("time", "value") if key in data}
         allowed = rates(("angle", "length"), _order(data))
-        times, values = self._samples(
-            at, lambda path: read_samples(path, **columns, error_type=TrajectoryError, allowed=((TIME,), allowed))
-        )
-        return self._spline(at, data, times, values, (*at, "initial"))
+        columns["error_type"] = TrajectoryError
+        times, values = self._samples(at, lambda path: read_samples(path, **columns, allowed=((TIME,), allowed)))
+        self._note(at[-1], self._samples(at, lambda path: sampled_dimension(path, **columns)), at)
+        return self._spline(at, data, times, values, (*at, "initial"), at[-1])
 
     def _sampled_motion(self) -> JointTrajectory:
         """Return the trajectory whose joints are the columns of a file of samples."""
         at: Location = ("motion",)
         data = self.source.mapping(at, _SAMPLE_KEYS)
-        times, columns = self._samples(at, lambda path: read_columns(path, TrajectoryError, _order(data)))
+        times, columns, units = self._samples(at, lambda path: read_columns(path, TrajectoryError, _order(data)))
         for name in self.source.mapping((*at, "initial")) if "initial" in data else ():
             if name not in columns:
                 raise self.source.error(no_such("column", name, columns), (*at, "initial", name))
-        laws = {name: self._spline(at, data, times, values, (*at, "initial", name)) for name, values in columns.items()}
+        for name, dimension in units.items():
+            self._note(name, dimension, at)
+        laws = {
+            name: self._spline(at, data, times, values, (*at, "initial", name), name)
+            for name, values in columns.items()
+        }
         return self._on_grid(laws, self._times() if "time" in self.data else times)
 
     def _on_grid(self, laws: Mapping[str, Any], times: np.ndarray) -> JointTrajectory:
-        return self._placed(("time",), lambda: JointTrajectory(laws, times[0], times[-1], times))
+        return self._placed(("time",), lambda: JointTrajectory(laws, times[0], times[-1], times, self.measures))
 
     def _samples(self, at: Location, read: Callable[[str], Any]) -> Any:
         """Return what is read from the file of samples that an entry names."""
@@ -197,7 +210,7 @@ class _LawFile:
         return self.source.read_named(self._text(self.source.at(place), place), place, read)
 
     def _spline(
-        self, at: Location, data: Mapping[str, Any], times: ArrayLike, values: ArrayLike, place: Location
+        self, at: Location, data: Mapping[str, Any], times: ArrayLike, values: ArrayLike, place: Location, joint: Any
     ) -> SplineMotion:
         """Return the spline through samples of a coordinate, or the integral of one through those of a derivative."""
         degree, derivative = (self._whole(data.get(key, usual), (*at, key)) for key, usual in _ORDERS)
@@ -207,7 +220,7 @@ class _LawFile:
         if len(initial) > derivative:
             message = f"must have at most {derivative} values: the coordinate and what is below the measured derivative"
             raise self.source.error(message, place, value=initial)
-        known = [self._number(raw, "any", (*place, k), k) for k, raw in enumerate(initial)]
+        known = [self._number(raw, "any", (*place, k), k, joint) for k, raw in enumerate(initial)]
         if derivative:
             return self._placed(at, lambda: MeasuredMotion(times, values, derivative, known, degree))
         return self._placed(at, lambda: SplineMotion(times, values, degree))
@@ -232,15 +245,15 @@ class _LawFile:
                 if name not in there:
                     message = f"the joint {show_value(name)} is missing; 'from' and 'to' name the same joints"
                     raise self.source.error(message, (*at, key))
-        start = [self._number(first[name], "any", (*at, "from", name)) for name in first]
-        end = [self._number(last[name], "any", (*at, "to", name)) for name in first]
+        start = [self._number(first[name], "any", (*at, "from", name), joint=name) for name in first]
+        end = [self._number(last[name], "any", (*at, "to", name), joint=name) for name in first]
         times = {key: self._number(data[key], "time", (*at, key)) for key in ("duration", "start_time") if key in data}
         profile = self._text(data.get("profile", "minimum_jerk"), (*at, "profile"))
         limits = self._limits((*at, "limits")) if "limits" in data else None
         motion = self._placed(
             at, lambda: JointTrajectory.point_to_point(list(first), start, end, profile, limits=limits, **times)
         )
-        return self._on_grid(motion.laws, self._times()) if "time" in self.data else motion
+        return self._on_grid(motion.laws, self._times() if "time" in self.data else motion.times)
 
     def _check_given(self, at: Location, keys: Iterable[str]) -> None:
         for key in keys:
@@ -268,9 +281,9 @@ class _LawFile:
             raise self.source.error(message, ("time",))
         return times
 
-    def _number(self, raw: Any, kind: str, at: Location, per_time: int = 0) -> float:
+    def _number(self, raw: Any, kind: str, at: Location, per_time: int = 0, joint: Any = None) -> float:
         """Return a number in SI units; "any" is a coordinate, per s to the power of `per_time`."""
-        return self._finite(self._value(raw, kind, at, (), per_time), raw, at)
+        return self._finite(self._value(raw, kind, at, (), per_time, joint), raw, at)
 
     def _finite(self, value: float | Expression, raw: Any, at: Location) -> float:
         number = self._placed(at, lambda: value.evaluate(self.parameters)) if isinstance(value, Expression) else value
@@ -279,14 +292,23 @@ class _LawFile:
         return float(number)
 
     def _value(
-        self, raw: Any, kind: str, at: Location, names: Iterable[str] = (), per_time: int = 0
+        self, raw: Any, kind: str, at: Location, names: Iterable[str] = (), per_time: int = 0, joint: Any = None
     ) -> float | Expression:
         """Return a number in SI units, or an expression of the parameters and of other names."""
         value = self.source.value(at, raw, kind, (*self.parameters, *names), self.dimensions)
         if kind == "any" and value.dimension and not is_rate(value.dimension, ("angle", "length"), per_time):
             what = f"must be an angle or a length{per_seconds(per_time)}, not {describe_dimension(value.dimension)}"
             raise self.source.error(what, at, value=raw)
+        if joint is not None:
+            self._note(joint, value.dimension, at)
         return value.value
+
+    def _note(self, joint: Any, dimension: Dimension | None, at: Location) -> None:
+        """Keep whether a unit of the law of a joint says that its coordinate is an angle or a length."""
+        measured = _measured(dimension)
+        if measured and self.measures.setdefault(joint, measured) != measured:
+            message = f"the units of {show_value(joint)} are those of an angle here and of a length there"
+            raise self.source.error(message, at)
 
     def _placed(self, at: Location, make: Callable[[], Any]) -> Any:
         """Return what is made; an error from within gets the place in the file."""

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from jounce.errors import JounceError
+from jounce.errors import JounceError, MechanismFileError
 from jounce.io.files.samples import read_columns
 from jounce.io.files.source import read_source
 from jounce.papers.negrean_2025.case import CASES, STAND_IN, Case, Link, law
@@ -35,7 +35,10 @@ def given_cases(samples: Path | None, masses: Path | None) -> dict[str, Case]:
     link = STAND_IN if masses is None else read_link(masses)
     if samples is None:
         return {name: dataclasses.replace(case, link=link) for name, case in CASES.items()}
-    times, columns = read_columns(samples)
+    times, columns, units = read_columns(samples, derivative=2)
+    for name in units:
+        if any(base == "length" for base, _ in units[name]):
+            raise MechanismFileError("the unit must be that of an angular acceleration", path=samples, name=name)
     found = {}
     for name, values in columns.items():
         accelerations = np.array(values)

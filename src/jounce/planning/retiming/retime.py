@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from jounce.dynamics.trajectories import FollowedTrajectory
 from jounce.errors import SolveError, TrajectoryError, whole_number
 from jounce.mechanism import Mechanism
 from jounce.planning.retiming.fastest import Search, fastest, slowed_only
@@ -111,6 +112,8 @@ def retime(
         return retime_mechanism(robot, _of_mechanism(limits), _rates(rates), order, cells)
     if not isinstance(robot, Robot):
         raise TrajectoryError("must be a Robot or a Mechanism", name="robot", value=type(robot).__name__)
+    if isinstance(path, JointTrajectory):
+        FollowedTrajectory(robot, path)  # checks its joints and units
     if repair:
         return _repaired(robot, path, limits, order, cells, drives)
     found = path_of(path, names if names is not None else robot.joint_names)
