@@ -57,6 +57,8 @@ def test_of_a_lower_bound_the_sides_are_turned():
         ("peak(force(A))", [], JounceError, "mass"),
         ("peak(torque(phi))", [], ExpressionError, "drivers: theta; joints: A, D, BC"),
         ("peak(psi)", ["span(psi) <= 5 mm"], UnitError, "cannot have the unit"),
+        ("peak(psi)", ["BC <= 13 deg"], UnitError, "BC cannot have the unit"),
+        ("peak(psi)", ["2*span(C_x)/3 <= 13 deg"], UnitError, "cannot have the unit"),
         ("peak(psi)", ["span(psi)"], ExpressionError, "a condition is a comparison"),
         ("peak(psi)", ["span(psi) <= 5 mmm"], JounceError, "mmm"),
         ("__import__('os')", [], ExpressionError, "a string is not allowed|unknown function"),
@@ -75,6 +77,7 @@ def test_what_cannot_be_read_is_told_before_anything_is_solved(minimise, subject
         ({"BC": (0.2, 0.1)}, "the lower one first"),
         ({"BC": 0.2}, "a lower and an upper bound"),
         ({"BC": (-0.1, 0.2)}, "no mechanism can have this bound: joints.BC.length"),
+        ({"BC": "16cm:12cm"}, "the lower one first"),
         ({"BC": ("1 s", "2 s")}, "no mechanism can have this bound"),
         ({"BC": (0.1, float("nan"))}, "finite"),
     ],
@@ -82,6 +85,11 @@ def test_what_cannot_be_read_is_told_before_anything_is_solved(minimise, subject
 def test_bounds_are_checked(vary, words):
     with pytest.raises(JounceError, match=words):
         jn.optimise(FOUR_BAR, "peak(psi)", vary)
+
+
+def test_bounds_may_be_one_text_as_on_the_command_line():
+    with pytest.raises(ExpressionError, match="unknown name 'psii'"):
+        jn.optimise(FOUR_BAR, "peak(psii)", {"BC": "12cm:16cm"})
 
 
 def test_instants_must_be_the_same_in_all_designs():

@@ -4,7 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jounce.design.measures import Cells, gaps, integral, largest, square, value
+from jounce.design.measures import Cells, at_instants, gaps, integral, largest, square, value
 
 TIME = np.linspace(0.0, 2.0, 41)
 ORDER = 9
@@ -33,6 +33,19 @@ def test_a_window_ends_where_it_is_said_to():
 def test_a_window_within_one_cell_is_no_other():
     cells = Cells.of(TIME, 0.501, 0.502)
     assert float(jnp.max(largest(sine(TIME), cells))) == pytest.approx(np.sin(3 * 0.502), abs=1e-14)
+
+
+def test_no_series_goes_on_beyond_a_knot():
+    """A rate of 1 - t from a knot on, and of zero before it: it is largest at the knot, and half of it in the mean."""
+    knots = np.array([0.5])
+    time = at_instants([0.5, 0.9], TIME / 2, knots)
+    assert np.count_nonzero(np.abs(time - 0.5) < 1e-9) == 1  # asked for, of the grid, and a knot
+    series = jnp.asarray(np.stack([np.where(time >= 0.5, 1.0 - time, 0.0), np.where(time >= 0.5, -1.0, 0.0)]))
+    cells = Cells.of(time, knots=knots)
+    assert float(jnp.max(largest(series, cells))) == pytest.approx(0.5, abs=1e-12)
+    assert float(integral(series, cells)) == pytest.approx(0.125, abs=1e-12)
+    assert float(jnp.max(largest(series, Cells.of(time, 0.0, 0.5, knots)))) == 0.0
+    assert float(jnp.max(largest(-series, Cells.of(time, 0.5, 1.0, knots)))) == pytest.approx(0.0, abs=1e-12)
 
 
 @pytest.mark.slow

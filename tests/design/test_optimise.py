@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import jounce as jn
+from jounce.design.law_knots import law_knots
 from jounce.design.objectives import Goals
 from jounce.design.problem import Problem
 
@@ -133,6 +134,49 @@ def test_slopes_are_those_of_differences():
         difference = (numbers(place + shift)[0] - numbers(place - shift)[0]) / (2 * step)
         scale = 1.0 + np.abs(difference)
         assert (np.abs(slopes[:, k] - difference) / scale).max() < 1e-7
+
+
+LIFT = dataclasses.replace(
+    CRANK,
+    parameters={"lift": 0.2, "T": 0.5, "r": 0.3, "x": 0.0},
+    drivers={
+        "theta": jn.drivers.CoordinateDriver(
+            ("ground", "crank"),
+            "angle",
+            motion=jn.SegmentedMotion([
+                jn.Segment("dwell", 0.2), jn.Segment("polynomial_3_4_5", "T", to="lift"), jn.Segment("dwell", 0.3),
+            ]),
+        )
+    },
+    time=np.linspace(0.0, 1.0, 21),
+)  # fmt: skip
+
+
+def test_knots_are_those_that_no_design_moves():
+    assert law_knots(LIFT, {"lift": (0.1, 0.3)}, 0.0, 1.0).tolist() == pytest.approx([0.2, 0.7])
+    assert law_knots(LIFT, {"T": (0.4, 0.6)}, 0.0, 1.0).tolist() == pytest.approx([0.2])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("dwell", [0.2, 0.2123])
+def test_a_peak_at_a_knot_of_the_law_is_that_of_the_handbook(dwell):
+    """Jerk of 3-4-5 is 60 at both ends, where it jumps: no series goes on beyond, at a knot of the grid or another."""
+    law = jn.SegmentedMotion([jn.Segment("dwell", dwell), jn.Segment("polynomial_3_4_5", 0.5, to="lift")])
+    driver = jn.drivers.CoordinateDriver(("ground", "crank"), "angle", motion=law)
+    mechanism = dataclasses.replace(LIFT, drivers={"theta": driver})
+    found = jn.optimise(mechanism, "peak(angle, 3)", {"lift": (0.1, 0.3)}, starts=1)
+    assert found.success, found.message
+    assert found.objective == pytest.approx(60 * 0.1 / 0.5**3, rel=1e-10)
+
+
+@pytest.mark.slow
+def test_points_that_are_met_exactly_are_an_optimum():
+    """What is left of the distance is rounding, which no finer grid repeats."""
+    angles = np.array([-0.6, 0.0, 0.4])
+    points = 0.25 * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    found = jn.optimise(CRANK, "path_error(tip, p)", {"r": (0.2, 0.5)}, curves={"p": points}, starts=1)
+    assert found.objective < 1e-9
+    assert found.success, found.message
 
 
 @pytest.mark.slow

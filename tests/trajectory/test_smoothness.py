@@ -46,6 +46,15 @@ def test_what_follows_jumps_where_its_leader_passes_the_knots():
     assert turning.derivatives[3].count == 20
 
 
+@pytest.mark.parametrize("leader", ["2*pi*t", "2*pi - 2*pi*t"])
+def test_a_leader_that_begins_or_ends_at_a_knot_passes_it(leader):
+    """As the same law of the time does: acceleration of a harmonic rise jumps at its beginning and at its end."""
+    rise = [jn.Segment("harmonic", math.pi, by=0.02), jn.Segment("dwell", math.pi)]
+    for beyond, count in (("hold", 2), ("advance", 3)):
+        found = jn.continuity(jn.FollowingMotion(jn.SegmentedMotion(rise, beyond=beyond), leader), 0.0, 1.0)
+        assert (found.smoothness, found.derivatives[2].count) == (1, count)
+
+
 def test_pieces_splines_and_expressions():
     pieces = jn.PiecewiseMotion(["t**3", "3*t - 2"], until=[1.0])
     told = jn.continuity(pieces, 0.0, 2.0)

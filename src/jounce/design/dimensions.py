@@ -17,9 +17,15 @@ def check_dimensions(relation: Relation, quantities: Quantities) -> None:
 
 
 def _dimension(node: Node, quantities: Quantities) -> Dimension | None:
-    """Return the dimension of a measure of one quantity, None where it is not known."""
+    """Return the dimension of a parameter, or of a measure of one quantity, None where it is not known."""
+    if node.kind == "name":
+        return next(iter(quantities.mechanism.dimensions.get(node.word, ())), None)
     if node.kind != "call" or not node.parts:
         return None
+    if node.word in ("*", "/") and node.parts[1].kind == "number":
+        return _dimension(node.parts[0], quantities)
+    if node.word == "*" and node.parts[0].kind == "number":
+        return _dimension(node.parts[1], quantities)
     if node.word.startswith("path"):
         return LENGTH
     if node.word not in MEASURES:

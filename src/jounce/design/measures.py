@@ -13,13 +13,17 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from jounce.jet import Jet
 from jounce.shapes import Numbers
 
 SAMPLES = 9  # of a cell, in which its largest value is looked for
 ROUNDS = 6  # of Newton's method from the best of them
+
+NO_KNOTS = np.zeros(0)
+NEAR = 1e-9  # of a span of time: instants so near to each other are one
+AFTER = 1e-13  # of a span of time: so far after a knot its instant is, whose derivatives are those from the right
 
 Series = Float[Numbers, "order *cell"]
 """Taylor coefficients about the instants of a grid."""
@@ -45,13 +49,22 @@ class Cells:
     high: Float[np.ndarray, " cell"]
 
     @classmethod
-    def of(cls, instants: Float[np.ndarray, " time"], start: float | None = None, stop: float | None = None) -> "Cells":
-        """Return the cells of a grid within a window, all of it unless given."""
-        middles = (instants[1:] + instants[:-1]) / 2
+    def of(
+        cls,
+        instants: Float[np.ndarray, " time"],
+        start: float | None = None,
+        stop: float | None = None,
+        knots: Float[np.ndarray, " knots"] = NO_KNOTS,
+    ) -> "Cells":
+        """Return the cells of a grid within a window, all of it unless given.
+
+        The series about an instant that is a knot of a motion law is that from the right: its cell begins there.
+        """
+        middles = np.where(_near(instants[1:], knots, instants), instants[1:], (instants[1:] + instants[:-1]) / 2)
         first, last = instants[0] if start is None else start, instants[-1] if stop is None else stop
         low = np.maximum(np.concatenate([instants[:1], middles]), first)
         high = np.minimum(np.concatenate([middles, instants[-1:]]), last)
-        (index,) = np.nonzero((high > low) | ((high == low) & (first == last)))
+        (index,) = np.nonzero((high - low > 2 * _after(instants)) | ((high == low) & (first == last)))
         if not index.size:  # a window of one instant, at which two cells meet
             index = np.array([int(np.argmin(np.abs(instants - first)))])
             low[index] = high[index] = first
@@ -184,9 +197,26 @@ def environment(
     return {**parameters, "t": Jet.variable(instants, order), **{name: Jet(tuple(x)) for name, x in series.items()}}
 
 
-def at_instants(values: Sequence[float], instants: Float[np.ndarray, " given"]) -> Float[np.ndarray, " time"]:
-    """Return a grid that has the instants at which something is asked, too."""
+def at_instants(
+    values: Sequence[float], instants: Float[np.ndarray, " given"], knots: Float[np.ndarray, " knots"] = NO_KNOTS
+) -> Float[np.ndarray, " time"]:
+    """Return a grid that has the instants at which something is asked, and those just after the knots of laws."""
     wanted = np.unique(np.concatenate([instants, np.asarray(values, float)]))
     gaps = np.diff(wanted)
-    close = np.concatenate([[False], gaps < 1e-9 * (wanted[-1] - wanted[0] or 1.0)])
-    return wanted[~close]
+    close = np.concatenate([[False], gaps < NEAR * (wanted[-1] - wanted[0] or 1.0)])
+    wanted = wanted[~close]
+    inside = knots[(knots > wanted[0]) & (knots < wanted[-1]) & ~_near(knots, wanted[[0, -1]], wanted)]
+    after = inside + _after(wanted)
+    return np.unique(np.concatenate([wanted[~_near(wanted, inside, wanted)], after]))
+
+
+def _after(grid: Float[np.ndarray, " time"]) -> float:
+    return AFTER * float(grid[-1] - grid[0] + np.abs(grid).max())
+
+
+def _near(
+    some: Float[np.ndarray, " some"], others: Float[np.ndarray, " others"], grid: Float[np.ndarray, " time"]
+) -> Bool[np.ndarray, " some"]:
+    """Tell which instants are one with one of some others."""
+    apart = np.abs(some[:, None] - others).min(axis=1, initial=np.inf)
+    return apart < NEAR * (grid[-1] - grid[0] or 1.0)

@@ -21,6 +21,7 @@ from jounce.design.language import (
     varying_message,
 )
 from jounce.design.measures import (
+    NO_KNOTS,
     Cells,
     Curve,
     at_instants,
@@ -86,6 +87,8 @@ class Goals:
         Points for paths, by name.
     instants : array of shape (time,)
         s.
+    knots : array of shape (knots,), optional
+        Where derivatives of motion laws jump in all designs, s.
 
     Attributes
     ----------
@@ -114,8 +117,9 @@ class Goals:
         varied: Sequence[str],
         curves: Mapping[str, Curve],
         instants: Float[np.ndarray, " time"],
+        knots: Float[np.ndarray, " knots"] = NO_KNOTS,
     ):
-        self._original, self._curves = mechanism, curves
+        self._original, self._curves, self._knots = mechanism, curves, knots
         self.quantities = Quantities(mechanism, set(varied))
         self._extremes: list[Callable[[Mapping[str, Any], Cells], Any]] = []
         self._windows: list[tuple[float | None, float | None]] = []
@@ -140,9 +144,9 @@ class Goals:
 
     def set_instants(self, instants: Float[np.ndarray, " time"]) -> None:
         """Take another grid."""
-        self.instants = at_instants(self._arguments.asked, instants)
-        self._cells = [Cells.of(self.instants, *window) for window in self._windows]
-        self._whole = Cells.of(self.instants)
+        self.instants = at_instants(self._arguments.asked, instants, self._knots)
+        self._cells = [Cells.of(self.instants, *window, self._knots) for window in self._windows]
+        self._whole = Cells.of(self.instants, knots=self._knots)
 
     def series(self, outputs: Mapping[str, Any]) -> dict[str, Any]:
         """Return the Taylor coefficients of the quantities, (order + 1, time), from outputs of a motion."""
@@ -263,7 +267,7 @@ class Goals:
         self, series: Callable[..., Any], window: tuple[Any, Any], *, root: bool, squared: bool = False
     ) -> Quantity:
         def found(names: Mapping[str, Any]) -> Any:
-            cells, values = Cells.of(self.instants, *window), series(names)
+            cells, values = Cells.of(self.instants, *window, self._knots), series(names)
             length = float(np.sum(cells.high - cells.low))
             mean = integral(square(values) if root else values, cells) / length
             return safe_root(mean) if root and not squared else mean

@@ -95,7 +95,7 @@ class Search:
         self.bounded = np.flatnonzero(problem.goals.bounded)
         self.equal = np.array([c.relation.equal for c in problem.goals.conditions], bool)
         self.sizes = np.ones(len(self.equal))
-        self.scale = 1.0
+        self.scale = self.asked_scale = 1.0
 
     def from_place(self, place: Vector, *, elastic: bool = False) -> Found:
         """Search from a place that does not lock.
@@ -200,6 +200,7 @@ class Search:
         objective, _, sides = self.problem.asked(here.place, here)
         numbers, _ = self.problem.numbers(here.place, extremes, here.smooth)
         self.scale = abs(float(numbers[0])) or abs(objective) or 1.0
+        self.asked_scale = abs(objective) or self.scale
         self.sizes = np.array([max(map(abs, pair)) or 1.0 for pair in sides])
         self.extreme_sizes = np.array([_size(here.rows[self.problem.owner == k]) for k in range(len(extremes))])
 

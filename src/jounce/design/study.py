@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from jounce.design.law_knots import law_knots
 from jounce.design.measures import Curve
 from jounce.design.objectives import Goals
 from jounce.design.problem import LOCKS, Locked, Problem
 from jounce.design.result import Comparison, OptimisedDesign
 from jounce.design.samples import Samples, sampled
-from jounce.design.search import HELD, Found, Search
+from jounce.design.search import HELD, SMALL, Found, Search
 from jounce.errors import DesignError, SolveError
 from jounce.kinematics import Status, assemblies as all_assemblies, solve
 from jounce.mechanism import Mechanism
@@ -51,10 +52,12 @@ class Study:
         self.mechanism, self.asked, self.seed, self.progress = mechanism, asked, seed, progress
         self.all_instants = asked.instants
         arguments = asked.minimise, asked.subject_to, tuple(asked.bounds), asked.curves
-        self.goals = Goals(mechanism, *arguments, _thinned(asked.instants, GRID))
+        knots = law_knots(mechanism, asked.bounds, float(asked.instants[0]), float(asked.instants[-1]))
+        self.goals = Goals(mechanism, *arguments, _thinned(asked.instants, GRID), knots)
         self.problem = Problem(self.goals, asked.bounds)
         self.search = Search(self.problem, clearance, iterations, self._watch)
         self.done, self.total, self.least = 0, 1, math.inf
+        self.size = math.inf  # of the objective, as searches begin with it
         self.notes: list[str] = []
         self.searches: list[float] = []
 
@@ -95,6 +98,8 @@ class Study:
             self.notes.append(f"the mechanism as it is cannot be moved: {lock}")
         self.total = len(places)
         ends = list(self._ends(places))
+        if not ends:
+            raise DesignError("every search began at a design that locks; give a starting guess within the bounds")
         feasible = [end for end in ends if end.feasible]
         if not feasible:
             feasible = self._made_feasible(ends)
@@ -107,6 +112,7 @@ class Study:
                 end = self.search.from_place(place)
             except Locked:  # a sample that moves may be one of another assembly when it is solved alone
                 continue
+            self.size = min(self.size, self.search.asked_scale)
             objective = self.problem.asked(end.place, end.evaluation)[0]
             self.searches.append(objective if end.feasible else math.nan)
             self.done += 1
@@ -163,7 +169,7 @@ class Study:
             objective, fine, _ = self._on(_split(self.goals.instants, FINER), self.problem.values(found.place))
         except LOCKS:
             return math.inf
-        scale = abs(coarse) or self.search.scale
+        scale = abs(coarse) if abs(coarse) > SMALL * self.size else self.size  # what is zero has no size of its own
         errors = [abs(objective - coarse) / scale, *(np.abs(fine - numbers) / self.search.sizes)]
         return float(max(errors))
 

@@ -16,6 +16,7 @@ HIGHEST = 10  # derivative that is looked at
 MOST_CROSSINGS = 10_000
 LOOKS = 4000  # at a leader, for where it passes a knot of the law that follows it
 STEPS = 60  # of bisection
+SLACK = 1e-6  # of the time between two looks, by which a crossing at an end may be beyond it
 
 
 @dataclasses.dataclass(frozen=True)
@@ -109,6 +110,27 @@ def continuity(law: AbstractMotion, first: float, last: float, order: int = 4, *
     return Continuity(tuple(found), unknown)
 
 
+def knots(law: AbstractMotion, first: float, last: float) -> Float[np.ndarray, " knots"]:
+    """Return the instants from a first to a last one at which a derivative up to the tenth is known to jump.
+
+    Parameters
+    ----------
+    law : AbstractMotion
+        With numbers in the place of parameters.
+    first, last : float
+        s.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> law = jn.SegmentedMotion([jn.Segment("dwell", 0.5), jn.Segment("cycloidal", 0.5, by=0.1)])
+    >>> knots(law, 0.0, 2.0).tolist()
+    [0.5, 1.0]
+    """
+    instants, jumps, _ = _jumps(law, first, last)
+    return np.unique(instants[np.any(jumps != 0, axis=0)])
+
+
 def _jumps(law: AbstractMotion, first: float, last: float) -> tuple[np.ndarray, Float[np.ndarray, "levels knots"], str]:
     """Return the instants in a time at which derivatives jump, by how much, and what is not known."""
     none = np.zeros(0), np.zeros((HIGHEST + 1, 0))
@@ -180,12 +202,17 @@ def _followed(
     peaks = Jet(np.max(np.abs(c)) for c in leader(Jet.variable(looks, HIGHEST)).dense().coefficients)
     peaks = Jet((0.0, *peaks.coefficients[1:]))
     instants, sizes = [], []
+    step = (last - first) / LOOKS  # a knot at which the leader begins or ends is passed on the way there, or from there
+    looks = np.concatenate([[first - step], looks, [last + step]])
+    values = np.asarray(leader(Jet([looks])).coefficients[0])
     for knot, jump in zip(knots, jumps.T, strict=True):
         if not jump.any():
             continue
         away = values - knot
         crossing = np.flatnonzero((away[:-1] < 0) != (away[1:] < 0))
         times = _crossings(leader, knot, looks[crossing], looks[crossing + 1])
+        inside = (times > first - SLACK * step) & (times < last + SLACK * step)
+        crossing, times = crossing[inside], np.clip(times[inside], first, last)
         passing = leader(Jet.variable(times, HIGHEST)).dense().coefficients
         change = _composed(jump, Jet((np.zeros_like(times), *passing[1:])))  # at the knot, not near it
         bound = _composed(np.abs(jump), peaks)[:, None]

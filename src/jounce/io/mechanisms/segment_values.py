@@ -115,7 +115,7 @@ def piecewise(raw: dict[str, Any], quantity: str, info: Any, variables: dict[str
     """Return the law of expressions that follow each other."""
     entries = raw["piecewise"]
     if not isinstance(entries, list | tuple) or not entries:
-        raise problem("must be a list such as [{until: 1 s, expression: t^2}, {expression: 1}]", "piecewise")
+        raise problem("must be a list such as [{until: 1 s, expression: t**2}, {expression: 1}]", "piecewise")
     if set(variables) != {"t"}:
         raise problem("a law of other variables than t is given by one expression", "piecewise", value=UNSET)
     laws, ends = [], []
