@@ -71,6 +71,57 @@ def test_the_motion_is_that_of_the_simulation():
     assert float(value) == pytest.approx(angles(VALUES.tolist())[-1, 1], rel=1e-14)
 
 
+@pytest.mark.slow
+def test_forces_that_are_zero_and_a_body_in_even_motion():
+    """Forces push the body by x'' = (F sin(30 t) - c x') / 2: the series of the motion itself ends with its speed."""
+    mechanism = jn.Mechanism(
+        space="planar",
+        parameters={"F": 0.0, "v": 1.0, "c": 0.0},
+        bodies={"body": jn.Body([0, 0], mass=2.0, inertia=0.5)},
+        forces={"push": jn.forces.PointForce("body", [0, 0], ["F*sin(30*t) - c*vx", "0"])},
+        initial={
+            name: jn.drivers.CoordinateDriver(("ground", "body"), name, motion=motion)
+            for name, motion in {"x": "v*t", "y": "0", "angle": "0"}.items()
+        },
+        outputs={"place": jn.PointOutput("body", [0, 0])},
+    )
+
+    def place(values):
+        by_name = dict(zip("Fvc", values, strict=True))
+        return jn.simulate(mechanism.with_parameters(**by_name), [0.0, 3.0], order=1).outputs["place"][-1, 0, 0]
+
+    expected = [(3.0 / 30 - np.sin(90.0) / 900) / 2, 3.0, -(3.0**2) / 4]
+    np.testing.assert_allclose(jax.jacfwd(place)(jnp.array([0.0, 1.0, 0.0])), expected, rtol=1e-11)
+
+
+@pytest.mark.slow
+def test_a_pendulum_that_hangs_still():
+    arm, mass = 1.0, 2.0
+    frequency = np.sqrt(mass * GRAVITY * arm / (INERTIA + mass * arm**2))
+
+    def angle(lift):
+        mechanism = PENDULUM.with_parameters(lift=lift)
+        return jn.simulate(mechanism, [0.0, 3.0], order=1).outputs["angle"][-1]
+
+    slope = jax.jacfwd(angle)(-np.pi / 2)
+    expected = [np.cos(3 * frequency), -frequency * np.sin(3 * frequency)]
+    np.testing.assert_allclose(slope, expected, rtol=1e-10)
+
+
+@pytest.mark.slow
+def test_second_derivatives_by_a_mass():
+    def angle(mass):
+        mechanism = PENDULUM.with_parameters(m=mass)
+        return jn.simulate(mechanism, [0.0, 0.2], order=1, method=jn.Taylor(4, step=0.1)).outputs["angle"][-1, 0]
+
+    def slope(mass):
+        return jax.jvp(angle, (mass,), (1.0,))[1]
+
+    step = 1e-3
+    expected = (slope(2.0 + step) - slope(2.0 - step)) / (2 * step)
+    assert float(jax.jvp(slope, (2.0,), (1.0,))[1]) == pytest.approx(float(expected), rel=1e-5)
+
+
 def test_what_cannot_be_traced_is_told():
     with pytest.raises(jn.UnsupportedError, match="number of its steps"):
         jax.jit(angles)(jnp.array(VALUES))

@@ -35,6 +35,20 @@ def test_designs_are_those_solved_alone():
     assert family["tau"].dims == ("design",)
 
 
+def test_no_array_takes_the_name_of_another():
+    parameters = {**FOUR_BAR.parameters, "psi": 1.0, "time": 2.0}
+    named = dataclasses.replace(FOUR_BAR, parameters=parameters)
+    family = jn.solve_batch(named, {"psi": [1.0, 3.0], "time": [2.0, 4.0], "BC": [0.14, 0.15]}, [0.0], order=0)
+    assert family["psi"].dims == ("design", "time", "derivative")
+    np.testing.assert_array_equal(family["parameter_psi"], [1.0, 3.0])
+    np.testing.assert_array_equal(family["parameter_time"], [2.0, 4.0])
+    np.testing.assert_array_equal(family["time"], [0.0])
+    for name in ("status", "design"):
+        other = dataclasses.replace(FOUR_BAR, outputs={name: FOUR_BAR.outputs["psi"]})
+        with pytest.raises(jn.MechanismError, match=f"name '{name}' is that of an array of a family"):
+            jn.solve_batch(other, {"BC": [0.14, 0.15]}, [0.0], order=0)
+
+
 @pytest.mark.slow
 def test_one_that_locks_or_cannot_be_assembled_stops_no_other():
     parameters = {"AB": np.array([0.04, 0.1, 0.05, 0.9])}

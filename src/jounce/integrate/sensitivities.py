@@ -1,7 +1,7 @@
 """The motion of a simulation as a function of what JAX traces in a mechanism: its steps once more, with lengths held.
 
 What was decided on the way, how long steps are and where they end, is taken from the simulation, and so are all states:
-the program here adds to them how they change. It expands the motion at the beginning of each step, evaluates the series
+the program here adds to them how they change. Steps are divided where a change moves faster than the motion. It expands the motion at the beginning of each step, evaluates the series
 at its end, and puts it on the constraints, as the integrator does. The corrections that put it there vanish but for
 rounding, so that the matrices that they are found with need no derivatives.
 """
@@ -21,6 +21,7 @@ from jounce.dynamics.forward import Equations, Instants, State, expand
 from jounce.dynamics.masses import gravity_of, masses_of
 from jounce.dynamics.start import initial_as_drivers
 from jounce.errors import UnsupportedError
+from jounce.integrate.divided_steps import Pieces, divided_steps
 from jounce.integrate.events import pose_coordinates
 from jounce.integrate.methods import Taylor, evaluated
 from jounce.integrate.projection import normalised
@@ -35,6 +36,7 @@ from jounce.mechanism.traced import Angles, angles_of, template, traced_model, t
 from jounce.shapes import Numbers
 
 AT_REST = 1e-12  # m/s and rad/s
+CONVERGED = 1e-13  # what is left out of the series of a change in a step, by the change
 AS_GUESSED = 1e-9  # rad or sizes of the mechanism
 
 
@@ -61,7 +63,7 @@ def traced_simulation(simulate: Callable[..., Simulation], given: Mapping[str, A
         mechanism = dataclasses.replace(mechanism, initial=dict(given["initial"]))
     if options.get("events") or not isinstance(options.get("method") or Taylor(), Taylor):
         raise UnsupportedError("a simulation is differentiated with jn.Taylor() and without events", name="mechanism")
-    simulation = _recorded(simulate, mechanism, options)
+    simulation, made = _recorded(simulate, mechanism, options)
     check_not_redundant(simulation.model)
     if any(map(measures_angle, simulation.model.system.forces)):
         message = "a simulation is not differentiated where forces count the turns of an angle about an axis in space"
@@ -69,7 +71,8 @@ def traced_simulation(simulate: Callable[..., Simulation], given: Mapping[str, A
     model, equations = _model_of(mechanism, simulation)
     start = _start(mechanism, simulation, equations)
     order = simulation.poses[1]["position"].shape[0] - 1
-    coordinates = _coordinates(simulation, equations, start, order)
+    pieces = _pieces(simulation, equations, _model_of(made, simulation)[1], _allowed(options))
+    coordinates = _coordinates(simulation, equations, pieces, start, order)
     known = {name: np.asarray(x) for name, x in simulation.poses[1].items()}
     coordinates = {name: known[name] + (x - jax.lax.stop_gradient(x)) for name, x in coordinates.items()}
     angles = _angles(simulation)
@@ -78,8 +81,10 @@ def traced_simulation(simulate: Callable[..., Simulation], given: Mapping[str, A
     return TracedMotion(mechanism, (model, model), simulation.time, simulation.order, solved)
 
 
-def _recorded(simulate: Callable[..., Simulation], mechanism: Mechanism, options: Mapping[str, Any]) -> Simulation:
-    """Return the simulation at the values that JAX traces, where it knows them."""
+def _recorded(
+    simulate: Callable[..., Simulation], mechanism: Mechanism, options: Mapping[str, Any]
+) -> tuple[Simulation, Mechanism]:
+    """Return the simulation at the values that JAX traces, where it knows them, and the mechanism that has these."""
     made, found = template(mechanism), []
 
     @jax.custom_jvp
@@ -90,7 +95,8 @@ def _recorded(simulate: Callable[..., Simulation], mechanism: Mechanism, options
                 "jax.jit and jax.vmap, as the number of its steps follows from the values; see jn.simulate_batch",
                 name="mechanism",
             )
-        found.append(simulate(made(values), **options))
+        known = made(values)
+        found.append((simulate(known, **options), known))
         return jnp.zeros(())
 
     @record.defjvp
@@ -129,6 +135,21 @@ def _first(simulation: Simulation) -> dict[str, Any]:
     return {name: found[name] for name in found if name != "angular_velocity"}
 
 
+def _allowed(options: Mapping[str, Any]) -> float | None:
+    """Return the relative error of a step in a change, or None where steps are chosen, not controlled."""
+    if not (options.get("method") or Taylor()).controlled:
+        return None
+    return max(CONVERGED, 100.0 * float(options.get("tolerance") or 0.0))
+
+
+def _pieces(simulation: Simulation, equations: Equations, plain: Equations, allowed: float | None) -> Pieces:
+    """Return the steps of a simulation, divided as what is traced in its equations asks; `plain` are their numbers."""
+    leaves, structure = jax.tree.flatten(equations)
+    assert structure == jax.tree.structure(plain)
+    moving = [k for k, leaf in enumerate(leaves) if isinstance(leaf, Tracer)]
+    return divided_steps(simulation.dense_output, plain, moving, float(simulation.model.length), _expanded, allowed)
+
+
 def _start(mechanism: Mechanism, simulation: Simulation, equations: Equations) -> State:
     """Return the state at the start: it changes so that joints, drivers and initial conditions go on holding."""
     known = simulation.dense_output.polynomial.map(lambda part: jnp.asarray(part)[0, 0, ..., None])
@@ -138,7 +159,7 @@ def _start(mechanism: Mechanism, simulation: Simulation, equations: Equations) -
     whole = dataclasses.replace(equations, system=with_fields(begun.system, outputs=(), forces=(), **scales))
     rows, columns = whole.system.shape
     if rows == columns:
-        return _corrected(whole, known, instant)
+        return _corrected(whole, _corrected(whole, known, instant), instant)  # twice, for second derivatives
     _check_guessed(mechanism, simulation, known)
     guess = traced_model(mechanism, simulation.model.length).guess
     position = guess["position"][:, 1:]
@@ -169,20 +190,18 @@ def _check_guessed(mechanism: Mechanism, simulation: Simulation, known: State) -
         )
 
 
-def _coordinates(simulation: Simulation, equations: Equations, start: State, order: int) -> dict[str, Any]:
+def _coordinates(
+    simulation: Simulation, equations: Equations, pieces: Pieces, start: State, order: int
+) -> dict[str, Any]:
     """Return the Taylor coefficients of the coordinates at the instants, as the steps lead there from a start."""
-    dense, instants = simulation.dense_output, simulation.time
-    chosen = simulation.steps_at(instants)
-    count = 1 << (len(dense.start) - 1).bit_length()  # few lengths of programs are compiled
-    fill = np.minimum(np.arange(count), len(dense.start) - 1)
-    steps = np.where(np.arange(count) < len(dense.start), dense.length[fill], 0.0)
-    polynomial = dense.polynomial.map(lambda part: np.moveaxis(part[fill], 1, 0))  # (order + 1, steps, ...)
-    known = polynomial.map(lambda part: part[0][..., None])
-    kept = np.any([np.any(part != 0, axis=tuple(range(2, part.ndim))) for part in polynomial], axis=0)
-    since = instants - dense.start[chosen]
-    highest = len(polynomial.position) - 1
+    instants = simulation.time
+    chosen = pieces.at(instants)
+    since = instants - pieces.start[chosen]
+    pieces = pieces.padded()
+    known = pieces.state.map(lambda part: part[..., None])
+    highest = pieces.kept.shape[1] - 1
     state = _marched(
-        equations, start, known, kept.T, dense.start[fill], steps, chosen, since, instants, order=order, highest=highest
+        equations, start, known, *pieces[3:], *pieces[:2], chosen, since, instants, order=order, highest=highest
     )
     return _with_ground(state)
 
@@ -251,15 +270,24 @@ def _with_value(x: Any, value: Any) -> Any:
 
 def _expanded(equations: Equations, state: State, time: Instants, order: int) -> State:
     """Return the series of the motion through a state."""
-    inverse = jax.lax.stop_gradient(equations.factored(state, time).inverse())
-    matrix = equations.matrix(state, time)
+    inverse = _inverse(equations.matrix(state, time), jax.lax.stop_gradient(equations.factored(state, time).inverse()))
+    return expand(equations, state, time, order, inverse, reversible=True).state
+
+
+@jax.custom_jvp
+def _inverse(matrix: Any, known: Any) -> Any:  # noqa: ARG001 - what it is differentiated by
+    """Return the inverse of matrices, which is known, with the derivatives that it has."""
+    return known
+
+
+@_inverse.defjvp
+def _change_of_inverse(primals: tuple[Any, Any], tangents: tuple[Any, Any]) -> tuple[Any, Any]:
+    inverse = _inverse(*primals)
 
     def product(a: Any, b: Any) -> Any:
         return jnp.sum(a[:, :, None] * b[None], axis=1)
 
-    # its value is the inverse, and its derivative that of an inverse
-    inverse = 2.0 * inverse - product(product(inverse, matrix), inverse)
-    return expand(equations, state, time, order, inverse, reversible=True).state
+    return inverse, -product(product(inverse, tangents[0]), inverse)
 
 
 def _corrected(equations: Equations, state: State, time: Instants) -> State:

@@ -101,8 +101,8 @@ def solve_batch(
     -------
     xarray.Dataset
         Outputs with the dimensions design, time, derivative, and component where there are some, SI; the values of the
-        parameters are coordinates of the designs. ``status`` (design, time) tells the outcome, see `Status`: where it
-        is not 0, outputs are NaN.
+        parameters are coordinates of the designs, ``parameter_NAME`` where something else has the NAME. ``status``
+        (design, time) tells the outcome, see `Status`: where it is not 0, outputs are NaN.
 
     Raises
     ------
@@ -121,6 +121,10 @@ def solve_batch(
     """
     check_mechanism(mechanism)
     values = checked_values(mechanism, parameters, "design")
+    for name in ("design", "status"):
+        if name in mechanism.outputs:
+            message = f"the name {name!r} is that of an array of a family; give the output another name"
+            raise MechanismError(message, name=f"outputs.{name}")
     names, rows = tuple(values), np.stack(list(values.values()), axis=-1)
     order = checked_settings(mechanism, order, tolerance)
     instants = time_grid(mechanism.time if time is None else time, mechanism.parameter_values)
@@ -191,7 +195,9 @@ class _Family:
             variables[name] = (dims, found, {"units": output.unit, "long_name": name})
         words = {"long_name": "outcome", "flag_values": list(map(int, Status)), "flag_meanings": _flags()}
         variables["status"] = (("design", "time"), self.status, words)
-        coordinates |= {name: ("design", value) for name, value in values.items() if name not in variables}
+        taken = {*variables, *coordinates}
+        named = {name: name if name not in taken else f"parameter_{name}" for name in values}
+        coordinates |= {named[name]: ("design", value, {"long_name": name}) for name, value in values.items()}
         attributes = {"title": self.mechanism.title or "designs of a mechanism", "source": "jounce"}
         dataset = xarray.Dataset(variables, coordinates, attributes)
         dataset["time"].attrs = {"units": "s", "long_name": "time"}

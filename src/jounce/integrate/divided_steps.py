@@ -1,0 +1,188 @@
+"""Steps of a simulation, divided where what is differentiated moves faster than the motion itself.
+
+A body at rest, or in even motion, is simulated in steps as long as the span: its series ends, whatever forces would do
+to it. The series by which it changes with a mass or a force does not end, and carries only so far. So each step is
+looked at by how its series changes with the state at its beginning and with each value that is traced, and is divided
+until all of these converge within it.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from jounce.dynamics.forward import Equations, State
+from jounce.errors import UnsupportedError
+from jounce.integrate.marching import DenseOutput
+from jounce.integrate.methods import LOWEST_ORDER, evaluated
+
+MOST_STEPS = 2**17
+MOST_DIRECTIONS = 16
+HALVINGS = 17
+
+Expand = Callable[..., State]
+
+
+class Pieces(NamedTuple):
+    """Steps, or parts of steps, one after the other.
+
+    Attributes
+    ----------
+    start, length : array of shape (steps,)
+        s; lengths are negative backward in time.
+    state : State
+        At the start of each, (steps, components, bodies).
+    kept : array of bool, shape (steps, order + 1)
+        Which coefficients of the series are used.
+    """
+
+    start: Float[np.ndarray, " step"]
+    length: Float[np.ndarray, " step"]
+    state: State
+    kept: Bool[np.ndarray, "step order"]
+
+    def at(self, instants: Float[np.ndarray, " time"]) -> Int[np.ndarray, " time"]:
+        """Return in which of them instants are."""
+        sign = -1.0 if self.length[0] < 0 else 1.0
+        found = np.searchsorted(sign * self.start, sign * instants, "right") - 1
+        return np.clip(found, 0, len(self.start) - 1)
+
+    def padded(self) -> "Pieces":
+        """Return as many as a power of two, the last again and again with no length: few lengths are compiled."""
+        count = len(self.start)
+        fill = np.minimum(np.arange(1 << (count - 1).bit_length()), count - 1)
+        length = np.where(np.arange(len(fill)) < count, self.length[fill], 0.0)
+        return Pieces(self.start[fill], length, self.state.map(lambda part: part[fill]), self.kept[fill])
+
+
+def divided_steps(
+    dense: DenseOutput,
+    equations: Equations,
+    moving: Sequence[int],
+    length: float,
+    expand: Expand,
+    allowed: float | None,
+) -> Pieces:
+    """Return the steps of a simulation, divided so that the series of all changes converge within each.
+
+    Parameters
+    ----------
+    dense : DenseOutput
+        The steps.
+    equations : Equations
+        Of plain numbers.
+    moving : sequence of int
+        Which of their leaves are traced.
+    length : float
+        Size of the mechanism, m.
+    expand : callable
+        Returns the series of the motion through states, from equations, states, instants (1, steps) and the order.
+    allowed : float, optional
+        Error of a step in a change, relative; the steps are not divided unless given.
+
+    Raises
+    ------
+    UnsupportedError
+        If there would be too many.
+    """
+    order = dense.polynomial.position.shape[1] - 1
+    probe = _probe(equations, tuple(moving), order, length, expand)
+    kept, span = _kept(dense), abs(dense.end - float(dense.start[0]))
+    count = np.ones(len(dense.start), int)
+    while True:
+        found, which = _parts(dense, kept, count)
+        if allowed is None:
+            return found
+        sizes = np.asarray(probe(found.padded()))[..., : len(found.start)]
+        parts = count.copy()
+        np.maximum.at(parts, which, count[which] * _needed(sizes, found, span, allowed))
+        if (parts == count).all():
+            return found
+        if parts.sum() > MOST_STEPS:
+            message = f"changes of this motion are so fast that more than {MOST_STEPS} steps are needed; simulate less"
+            raise UnsupportedError(message, name="time")
+        count = parts
+
+
+def _kept(dense: DenseOutput) -> Bool[np.ndarray, "step order"]:
+    """Return which coefficients steps were taken with: all, where the series ended before it could be cut."""
+    used = np.any([np.any(np.asarray(part) != 0, axis=tuple(range(2, part.ndim))) for part in dense.polynomial], axis=0)
+    orders = np.arange(used.shape[1])
+    last = np.max(np.where(used, orders, 0), axis=1, keepdims=True)
+    return (orders <= last) | (last < LOWEST_ORDER)
+
+
+def _parts(
+    dense: DenseOutput, kept: Bool[np.ndarray, "step order"], count: Int[np.ndarray, " step"]
+) -> tuple[Pieces, Int[np.ndarray, " part"]]:
+    """Return the parts that steps have, and of which step each is."""
+    which = np.repeat(np.arange(len(count)), count)
+    part = np.concatenate([np.arange(number) for number in count])
+    length = np.asarray(dense.length)[which] / count[which]
+    polynomial = dense.polynomial.map(lambda c: np.moveaxis(np.asarray(c)[which], (0, 1), (-1, 0)))
+    state = evaluated(polynomial, part * length).map(lambda x: np.moveaxis(np.asarray(x), -1, 0))
+    return Pieces(np.asarray(dense.start)[which] + part * length, length, state, kept[which]), which
+
+
+def _needed(
+    sizes: Float[np.ndarray, "part order direction step"], pieces: Pieces, span: float, allowed: float
+) -> Int[np.ndarray, " step"]:
+    """Return into how many parts, powers of two, steps are to be divided.
+
+    What is left out of a series is what follows the orders that are kept: the sizes known of it, or, where all are kept,
+    as much less than the last two terms as those are less than the two before. It counts by the largest change, that of
+    velocities over the whole span.
+    """
+    places, velocities = sizes
+    orders = np.arange(len(places))[:, None, None]
+    beyond, whole = ~pieces.kept.T[:, None], pieces.kept.all(axis=1)
+    found = np.full(len(pieces.length), 2**HALVINGS)
+    for parts in 2 ** np.arange(HALVINGS)[::-1]:
+        powers = (np.abs(pieces.length) / parts) ** orders
+        terms = places * powers
+        largest = np.maximum(terms, span * velocities * powers).max(axis=0)
+        last, before = terms[-2:].max(axis=0), terms[-4:-2].max(axis=0)
+        following = last * np.minimum(last / np.maximum(before, 1e-300), 1.0)
+        left_out = np.where(whole, following, np.where(beyond, terms, 0.0).max(axis=0))
+        found[(left_out <= allowed * largest).all(axis=0)] = parts
+    return found
+
+
+def _probe(equations: Equations, moving: tuple[int, ...], order: int, length: float, expand: Expand) -> Callable:
+    """Return what gives the sizes of series of changes, of places and of velocities, (2, order + 1, directions, steps)."""
+    leaves, structure = jax.tree.flatten(equations)
+    numbers = [jnp.asarray(leaves[k], float) for k in moving]
+    random = np.random.default_rng(0)
+    count = min(len(numbers), MOST_DIRECTIONS)
+
+    def random_like(x: Any, direction: int, k: int) -> np.ndarray:
+        return random.normal(size=np.shape(x)) * (k % max(count, 1) == direction)
+
+    directions = [[random_like(x, d, k) for d in range(count + 1)] for k, x in enumerate(numbers)]
+    along = [np.stack(each) for each in directions]
+
+    @jax.jit
+    def sizes(pieces: Pieces) -> Any:
+        state = pieces.state.map(lambda part: jnp.moveaxis(jnp.asarray(part), 0, -1))
+
+        def series(numbers: Any, state: State) -> Any:
+            whole = list(leaves)
+            for k, number in zip(moving, numbers, strict=True):
+                whole[k] = number
+            found = expand(jax.tree.unflatten(structure, whole), state, pieces.start[None], order)
+            scaled = found._replace(position=found.position / length, velocity=found.velocity / length)
+            flat = scaled.map(lambda part: part.reshape(order + 1, -1, len(pieces.start)))
+            return jnp.concatenate(flat[:2], axis=1), jnp.concatenate(flat[2:], axis=1)
+
+        def change(along: Any, turn: Any) -> Any:
+            moved = jax.tree.map(lambda x: turn * jnp.ones_like(x), state)
+            changes = jax.jvp(series, (numbers, state), (along, moved))[1]
+            return jnp.stack([jnp.max(jnp.abs(x), axis=1) for x in changes])
+
+        return jax.vmap(change, out_axes=2)(along, np.eye(count + 1)[count])
+
+    return sizes
