@@ -78,6 +78,7 @@ def test_forces_that_are_zero_and_a_body_in_even_motion():
         space="planar",
         parameters={"F": 0.0, "v": 1.0, "c": 0.0},
         bodies={"body": jn.Body([0, 0], mass=2.0, inertia=0.5)},
+        joints={},
         forces={"push": jn.forces.PointForce("body", [0, 0], ["F*sin(30*t) - c*vx", "0"])},
         initial={
             name: jn.drivers.CoordinateDriver(("ground", "body"), name, motion=motion)

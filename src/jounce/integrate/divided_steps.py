@@ -6,7 +6,6 @@ looked at by how its series changes with the state at its beginning and with eac
 until all of these converge within it.
 """
 
-import math
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -19,10 +18,13 @@ from jounce.dynamics.forward import Equations, State
 from jounce.errors import UnsupportedError
 from jounce.integrate.marching import DenseOutput
 from jounce.integrate.methods import LOWEST_ORDER, evaluated
+from jounce.kinematics.compilation import compiled
+from jounce.shapes import Numbers
 
 MOST_STEPS = 2**17
 MOST_DIRECTIONS = 16
 HALVINGS = 17
+FINER = 100.0  # times less is left out of the series of parts than of those of steps, which are fewer
 
 Expand = Callable[..., State]
 
@@ -90,18 +92,26 @@ def divided_steps(
         If there would be too many.
     """
     order = dense.polynomial.position.shape[1] - 1
-    probe = _probe(equations, tuple(moving), order, length, expand)
+    leaves = jax.tree.leaves(equations)
+    along, turns = _directions([leaves[k] for k in moving])
+    settings = {"moving": tuple(moving), "order": order, "expand": expand}
     kept, span = _kept(dense), abs(dense.end - float(dense.start[0]))
     count = np.ones(len(dense.start), int)
     while True:
         found, which = _parts(dense, kept, count)
         if allowed is None:
             return found
-        sizes = np.asarray(probe(found.padded()))[..., : len(found.start)]
-        parts = count.copy()
-        np.maximum.at(parts, which, count[which] * _needed(sizes, found, span, allowed))
-        if (parts == count).all():
+        sizes = _sizes(equations, found.padded(), along, turns, np.asarray(length), **settings)
+        sizes = np.stack(sizes)[..., : len(found.start)]
+        lacking = which[_needed(sizes, found, span, allowed) > 1]
+        if not lacking.size:
             return found
+        if not kept[lacking].all():  # a body that hardly moves took a long step of low order: first with all orders
+            kept[lacking] = True
+            continue
+        parts = count.copy()
+        needed = np.where(np.isin(which, lacking), _needed(sizes, found, span, allowed / FINER), 1)
+        np.maximum.at(parts, which, count[which] * needed)
         if parts.sum() > MOST_STEPS:
             message = f"changes of this motion are so fast that more than {MOST_STEPS} steps are needed; simulate less"
             raise UnsupportedError(message, name="time")
@@ -133,9 +143,9 @@ def _needed(
 ) -> Int[np.ndarray, " step"]:
     """Return into how many parts, powers of two, steps are to be divided.
 
-    What is left out of a series is what follows the orders that are kept: the sizes known of it, or, where all are kept,
-    as much less than the last two terms as those are less than the two before. It counts by the largest change, that of
-    velocities over the whole span.
+    What is left out of a series is what follows the orders that are kept: the sizes known of it, or, where all are
+    kept, as much less than the last two terms as those are less than the two before. It counts by the largest change,
+    that of velocities over the whole span.
     """
     places, velocities = sizes
     orders = np.arange(len(places))[:, None, None]
@@ -152,37 +162,48 @@ def _needed(
     return found
 
 
-def _probe(equations: Equations, moving: tuple[int, ...], order: int, length: float, expand: Expand) -> Callable:
-    """Return what gives the sizes of series of changes, of places and of velocities, (2, order + 1, directions, steps)."""
-    leaves, structure = jax.tree.flatten(equations)
-    numbers = [jnp.asarray(leaves[k], float) for k in moving]
+def _directions(numbers: Sequence[Any]) -> tuple[list[np.ndarray], np.ndarray]:
+    """Return in which directions values change, (directions, ...) each, and by how much the state does in these.
+
+    Some values change at a time, by random numbers, and last the state alone.
+    """
     random = np.random.default_rng(0)
     count = min(len(numbers), MOST_DIRECTIONS)
+    chosen = np.eye(count + 1)[:, np.arange(len(numbers)) % max(count, 1)]
+    return [
+        random.normal(size=np.shape(x)) * chosen[:, k].reshape(-1, *[1] * np.ndim(x)) for k, x in enumerate(numbers)
+    ], np.eye(count + 1)[count]
 
-    def random_like(x: Any, direction: int, k: int) -> np.ndarray:
-        return random.normal(size=np.shape(x)) * (k % max(count, 1) == direction)
 
-    directions = [[random_like(x, d, k) for d in range(count + 1)] for k, x in enumerate(numbers)]
-    along = [np.stack(each) for each in directions]
+@compiled("moving", "order", "expand")
+def _sizes(
+    equations: Equations,
+    pieces: Pieces,
+    along: list[Numbers],
+    turns: Float[Numbers, " direction"],
+    length: Float[Numbers, ""],
+    *,
+    moving: tuple[int, ...],
+    order: int,
+    expand: Expand,
+) -> tuple[Numbers, Numbers]:
+    """Return the sizes of the series of changes, of places and of velocities: (order + 1, directions, steps) each."""
+    leaves, structure = jax.tree.flatten(equations)
+    state = pieces.state.map(lambda part: jnp.moveaxis(part, 0, -1))
 
-    @jax.jit
-    def sizes(pieces: Pieces) -> Any:
-        state = pieces.state.map(lambda part: jnp.moveaxis(jnp.asarray(part), 0, -1))
+    def series(numbers: Any, state: State) -> Any:
+        whole = list(leaves)
+        for k, number in zip(moving, numbers, strict=True):
+            whole[k] = number
+        found = expand(jax.tree.unflatten(structure, whole), state, pieces.start[None], order)
+        scaled = found._replace(position=found.position / length, velocity=found.velocity / length)
+        flat = scaled.map(lambda part: part.reshape(order + 1, -1, len(pieces.start)))
+        return jnp.concatenate(flat[:2], axis=1), jnp.concatenate(flat[2:], axis=1)
 
-        def series(numbers: Any, state: State) -> Any:
-            whole = list(leaves)
-            for k, number in zip(moving, numbers, strict=True):
-                whole[k] = number
-            found = expand(jax.tree.unflatten(structure, whole), state, pieces.start[None], order)
-            scaled = found._replace(position=found.position / length, velocity=found.velocity / length)
-            flat = scaled.map(lambda part: part.reshape(order + 1, -1, len(pieces.start)))
-            return jnp.concatenate(flat[:2], axis=1), jnp.concatenate(flat[2:], axis=1)
+    def change(along: Any, turn: Any) -> Any:
+        moved = jax.tree.map(lambda x: turn * jnp.ones_like(x), state)
+        numbers = [jnp.asarray(leaves[k], float) for k in moving]
+        changes = jax.jvp(series, (numbers, state), (along, moved))[1]
+        return tuple(jnp.max(jnp.abs(x), axis=1) for x in changes)
 
-        def change(along: Any, turn: Any) -> Any:
-            moved = jax.tree.map(lambda x: turn * jnp.ones_like(x), state)
-            changes = jax.jvp(series, (numbers, state), (along, moved))[1]
-            return jnp.stack([jnp.max(jnp.abs(x), axis=1) for x in changes])
-
-        return jax.vmap(change, out_axes=2)(along, np.eye(count + 1)[count])
-
-    return sizes
+    return jax.vmap(change, out_axes=1)(along, turns)
