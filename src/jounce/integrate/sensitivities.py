@@ -1,9 +1,9 @@
 """The motion of a simulation as a function of what JAX traces in a mechanism: its steps once more, with lengths held.
 
 What was decided on the way, how long steps are and where they end, is taken from the simulation, and so are all
-states: the program here adds to them how they change. Steps are divided where a change moves faster than the motion. The
-program expands the motion at the beginning of each step, evaluates the series at its end, and puts it on the
-constraints, as the integrator does. The corrections that put it there vanish but for rounding, so that the matrices
+states: the program here adds to them how they change. Steps are divided where a change moves faster than the motion.
+The motion is expanded at the beginning of each step, its series evaluated at the end, and the result put on the
+constraints, as the integrator does it. The corrections that put it there vanish but for rounding, so that the matrices
 that they are found with need no derivatives.
 """
 
