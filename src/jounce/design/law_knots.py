@@ -37,6 +37,6 @@ def law_knots(
 
 def _of_design(mechanism: Mechanism, first: float, last: float) -> Float[np.ndarray, " knots"]:
     values, laws = mechanism.parameter_values, with_outputs_held(mechanism).drivers.values()
-    motions = [driver.motion for driver in laws if getattr(driver, "motion", None) is not None]
-    each = [knots(resolve_motion(motion, values), first, last) for motion in motions]
+    motions = (getattr(driver, "motion", None) for driver in laws)
+    each = [knots(resolve_motion(motion, values), first, last) for motion in motions if motion is not None]
     return np.unique(np.concatenate([np.zeros(0), *each]))
