@@ -2,6 +2,7 @@
 
 import logging
 import multiprocessing
+import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from itertools import islice
@@ -160,7 +161,9 @@ def _local(count: int) -> Any:
     settings: dict[str, Any] = {"dashboard_address": None, "memory_limit": 0, "silence_logs": logging.CRITICAL}
     lean = {
         "distributed.worker.profile.enabled": False,  # it looks at all stacks a hundred times a second
-        "distributed.nanny.pre-spawn-environ": {},  # MALLOC_TRIM_THRESHOLD_ gives every large array new pages
+        # a worker has one core: threads of XLA would take it from the others. Dask's own MALLOC_TRIM_THRESHOLD_ is left
+        # out, which gives every large array new pages
+        "distributed.nanny.pre-spawn-environ": {"PJRT_NPROC": os.environ.get("PJRT_NPROC", "1")},
     }
     try:
         with dask.config.set(lean):
