@@ -30,6 +30,7 @@ SPAN_POINTS = 8192  # in the whole run, at least, where steps are few
 HARMLESS = 1e-12  # rad or sizes of the mechanism: what is overlooked may move a body by this
 SHAKE = 2.0**-51  # relative change of state and time by which the rounding of a force is measured
 SPARSE = 5  # of so many nodes, one is used for that
+_SHAKEN = (NODES[::SPARSE], np.full(len(NODES[::SPARSE]), SHAKE))
 NOISE = 16.0  # times what it changes by is rounding still
 FAINT = 1e-13  # of a force: rounding of the polynomial through it
 SHORTEST = 1e-12  # of the run: a step over a jump of a force is not made shorter
@@ -117,20 +118,23 @@ def look_ahead(
         return jnp.where(low > 0, high - low > NEAR * low, high * jnp.abs(step) > 0.25 * shortest)
 
     def narrowed(carry: Any) -> tuple[Any, ...]:
-        low, high, best = carry
-        trial = jnp.where(open_(low, high), jnp.where(low > 0, 0.5 * (low + high), 0.5 * high), low)
-        look = seen(trial)
-        better = look.resolved & (trial > low)
-        best = jax.tree.map(lambda new, old: jnp.where(better, new, old), look, best)
+        low, high, best, begun = carry
+        inside = jnp.where(open_(low, high), jnp.where(low > 0, 0.5 * (low + high), 0.5 * high), low)
+        look = seen(jnp.where(begun, inside, 1.0))
+        better = look.resolved & (look.step > low)
+        best = jax.tree.map(lambda new, old: jnp.where(better | ~begun, new, old), look, best)
         limiting = jnp.where(look.resolved, best.limiting, look.limiting)
-        return jnp.where(better, trial, low), jnp.where(look.resolved, high, trial), best._replace(limiting=limiting)
+        high = jnp.where(look.resolved, high, look.step)
+        return jnp.where(better, look.step, low), high, best._replace(limiting=limiting), jnp.ones((), bool)
 
     def unfinished(carry: Any) -> Any:
-        return jnp.any(open_(*carry[:2]))
+        low, high, _, begun = carry
+        return ~begun | jnp.any(open_(low, high))
 
-    one = jnp.ones(step.shape)
-    whole = seen(one)
-    low, high, best = jax.lax.while_loop(unfinished, narrowed, (jnp.where(whole.resolved, one, 0.0), one, whole))
+    # the whole step is the first round of the loop, so that what is seen is a part of the program once, and a large one
+    none, whole = jnp.zeros(step.shape), jnp.ones(step.shape)
+    nothing = Lookahead(none, jnp.zeros(step.shape, bool), blank, blank)
+    low, high, best, _ = jax.lax.while_loop(unfinished, narrowed, (none, whole, nothing, jnp.zeros((), bool)))
     kink = jnp.where(best.resolved, best.kink, -1)
     return Lookahead(step * jnp.where(low > 0, low, high), low > 0, kink, best.limiting)
 
@@ -162,8 +166,9 @@ class _Signals:
         What may be rounding is taken off. The second is in rad or sizes of the mechanism:
         of a force, what its departure over the step moves bodies by in the whole run.
         """
-        knots = jax.vmap(lambda s: self._values(s * step, 0.0))(NODES)
-        shaken = jax.vmap(lambda s: self._values(s * step, SHAKE))(NODES[::SPARSE])
+        places, shakes = (np.concatenate(parts) for parts in zip((NODES, 0.0 * NODES), _SHAKEN, strict=True))
+        found = jax.vmap(lambda s, shake: self._values(s * step, shake))(places, shakes)
+        knots, shaken = found[: len(NODES)], found[len(NODES) :]
         coefficients = _combined(INTERPOLATION, knots)
         wanted = jnp.max(jnp.where(span > 0, jnp.abs(step) / span, 0.0)) * (SPAN_POINTS / POINTS)
         rounds = jnp.clip(jnp.ceil(wanted), 1, SPAN_POINTS // POINTS)
@@ -196,7 +201,7 @@ class _Signals:
             first += group.instances
         return jnp.concatenate(parts)
 
-    def _values(self, since: Lanes, shake: float) -> Float[Numbers, "component instance batch"]:
+    def _values(self, since: Lanes, shake: Float[Numbers, ""] | float) -> Float[Numbers, "component instance batch"]:
         """Return forces and laws a time after the beginning of the step.
 
         With `shake`, time and all coordinates are changed relatively by so much, this way and that.
