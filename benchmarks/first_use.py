@@ -1,11 +1,12 @@
 """Commands in fresh processes: with an empty folder of compiled programs, and with the one that this left."""
 
+import compileall
 import sys
 import tempfile
 from collections.abc import Callable
 from typing import Any
 
-from benchmarks.cases import Case, Cases, Contestant, Told
+from benchmarks.cases import ROOT, Case, Cases, Contestant, Told
 from benchmarks.processes import command
 
 FILES = {
@@ -34,6 +35,7 @@ def filled(words: list[str]) -> Callable[[], Any]:
 
 def cases(quick: bool) -> Cases:
     """Yield `jounce run` and `jounce simulate` of examples, and `jounce check` of a robot."""
+    compileall.compile_dir(ROOT / "src", quiet=1)  # what an installation has, and some settings forbid to write
     commands = [[name, f"examples/{file}"] for name, files in FILES.items() for file in files]
     commands.append(["check", "examples/robots/panda.urdf", "examples/trajectories/panda_good.csv"])
     for words in commands[:1] if quick else commands:

@@ -71,6 +71,7 @@ COMMANDS = (
     torques, retime, feedforward, export, convert, reproduce, schema, completion,
 )  # fmt: skip
 LIGHT = (new, completion)  # they compute nothing
+GARBAGE = 50_000  # new objects before the collector looks: imports and traces leave none, and 700 take 0.2 s of a run
 FIRST = """\
   jounce new four-bar                          # a commented starter file
   jounce inspect four-bar.yaml                 # what is in it, can it move?
@@ -106,6 +107,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if arguments is None:
         end_on_signals()
         gc.freeze()  # the collector need not look at the libraries again: 0.15 s of a short run
+        gc.set_threshold(GARBAGE)
     for name in ("COLUMNS", "LINES"):
         if not re.fullmatch("[1-9][0-9]{0,3}", os.environ.get(name, "1")):  # 0 is "unknown" to some, nothing to others
             del os.environ[name]

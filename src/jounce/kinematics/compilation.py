@@ -18,6 +18,7 @@ import jax
 import numpy as np
 from jax.core import Tracer
 from jax.experimental import serialize_executable
+from jaxlib.mlir.passmanager import PassManager
 
 from jounce.kinematics.device import on_processor
 from jounce.kinematics.structure import UndescribedError, being_debugged, program_key, settings
@@ -177,10 +178,24 @@ class Compiled:
             except Exception:  # noqa: BLE001 - whatever is wrong with it, it is compiled again
                 store.drop(key)
         with compiling_anew():
-            program = self.jitted.lower(*arguments, **keywords, **static).compile()
+            lowered = self.jitted.lower(*arguments, **keywords, **static)
+            _forget_sources(lowered.compiler_ir())
+            program = lowered.compile()
         if (packed := _packed(program, tree)) is not None:
             store.put(key, packed)
         return program, program(*arguments, **keywords)
+
+
+def _forget_sources(module: Any) -> None:
+    """Take the lines of Python out of a module of MLIR: a fourth of the time in which its program is read again.
+
+    Parameters
+    ----------
+    module : jaxlib.mlir.ir.Module
+        Changed in place.
+    """
+    with module.context:
+        PassManager.parse("builtin.module(strip-debuginfo)").run(module.operation)
 
 
 def _packed(program: Any, tree: Any) -> bytes | None:
