@@ -121,7 +121,7 @@ def keep_programs(directory: Path) -> bool:
     if known := hasattr(compilation_cache, "get_file_cache"):
         compilation_cache.get_file_cache = file_cache
     jax.config.update("jax_compilation_cache_dir", str(directory))
-    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.05)
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.01)
     jax.config.update("jax_persistent_cache_min_entry_size_bytes", 0)
     jax.config.update("jax_persistent_cache_enable_xla_caches", "none")  # those are for GPUs
     return known

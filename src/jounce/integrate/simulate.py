@@ -326,7 +326,7 @@ class _Run:
         self.sense = sense = np.sign(instants[-1] - instants[0])
         order = self.method.expansion_order(self.tolerance)
         current = unexpanded(equations, self.start.state, instants[:1], order=order)
-        while int(current.outcome[0]) in MOVING and self.events.stopped_at is None:
+        while current.outcome.item() in MOVING and self.events.stopped_at is None:
             current, steps, tried = march(
                 equations, current, stop, self.tolerance, self.longest, method=self.method, count=STEPS
             )
@@ -335,10 +335,10 @@ class _Run:
             if len(taken):
                 self.parts.append(self.events.noted(jax.tree.map(lambda x, k=taken: np.asarray(x)[k][..., 0], found)))
             if progress is not None:
-                progress(int(np.sum(sense * instants <= sense * float(current.time[0]))), len(instants))
+                progress(int(np.sum(sense * instants <= sense * current.time.item())), len(instants))
         if not self.parts:
             self._stand(current)
-        if int(current.outcome[0]) in (Outcome.COLLAPSED, Outcome.LOST):
+        if current.outcome.item() in (Outcome.COLLAPSED, Outcome.LOST):
             self.ending = self._explained(current)
 
     def _stand(self, current: IntegratorState) -> None:
@@ -349,9 +349,9 @@ class _Run:
 
     def _explained(self, current: IntegratorState) -> tuple[Status, str]:
         """Return why steps did not go on, and where to look: a force that is not finite, or the most urgent body."""
-        series, time = current.expansion.state, float(current.time[0])
+        series, time = current.expansion.state, current.time.item()
         here = self.start._replace(equations=self.start.equations.near(current.angles))
-        onwards = self.sense * AHEAD * max(abs(time), abs(time - float(current.begun[0])))
+        onwards = self.sense * AHEAD * max(abs(time), abs(time - current.begun.item()))
         ahead = evaluated(series, np.array([onwards]))
         for state, instant in ((series.map(lambda part: part[0]), time), (ahead, time + onwards)):
             finite = all(np.isfinite(part).all() for part in state)
@@ -359,7 +359,7 @@ class _Run:
                 return Status.INADMISSIBLE, f"{names} at t = {instant:g} s"
         if names := unfit_rates(here, pose_coordinates(series), time):
             return Status.INADMISSIBLE, f"a derivative of {names} at t = {time:g} s"
-        if (blocked := int(current.blocked[0])) >= 0:
+        if (blocked := current.blocked.item()) >= 0:
             return Status.COLLAPSED, f"{watched_names(self.start.model)[blocked]} at t = {time:g} s"
         acceleration = np.abs(np.asarray(current.expansion.acceleration[0])[..., 0])
         scale = np.asarray(self.start.equations.system.column_scale)[:, None]
