@@ -18,7 +18,6 @@ import jax
 import numpy as np
 from jax.core import Tracer
 from jax.experimental import serialize_executable
-from jaxlib.mlir.passmanager import PassManager
 
 from jounce.kinematics.device import on_processor
 from jounce.kinematics.structure import UndescribedError, being_debugged, program_key, settings
@@ -192,10 +191,15 @@ def _forget_sources(module: Any) -> None:
     Parameters
     ----------
     module : jaxlib.mlir.ir.Module
-        Changed in place.
+        Changed in place; left as it is by a release of JAX that has not what this needs, which is private to it.
     """
-    with module.context:
-        PassManager.parse("builtin.module(strip-debuginfo)").run(module.operation)
+    try:
+        from jaxlib.mlir.passmanager import PassManager
+
+        with module.context:
+            PassManager.parse("builtin.module(strip-debuginfo)").run(module.operation)
+    except (ImportError, AttributeError, ValueError):
+        return
 
 
 def _packed(program: Any, tree: Any) -> bytes | None:

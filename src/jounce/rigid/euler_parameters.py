@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from functools import reduce
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
 from jounce.errors import MechanismError, did_you_mean, show_value
-from jounce.rigid.rotations import AXES, check_sequence
+from jounce.rigid.rotations import check_sequence
 
 __all__ = [
     "FORMS",
@@ -148,9 +147,11 @@ def from_axis_angle(axis: Sequence[float], angle: float) -> Quaternion:
     >>> [round(e, 12) for e in from_axis_angle([0.0, 0.0, 3.0], pi)]
     [0.0, 0.0, 0.0, 1.0]
     """
-    x, y, z = _unit(axis, "the axis")  # not by SciPy, which takes half a second to import
-    sine = math.sin(0.5 * angle)
-    return (math.cos(0.5 * angle), sine * x, sine * y, sine * z)
+    from scipy.spatial.transform import Rotation
+
+    turn = Rotation.from_rotvec(angle * np.array(_unit(axis, "the axis")))
+    e0, e1, e2, e3 = turn.as_quat(scalar_first=True).tolist()
+    return (e0, e1, e2, e3)
 
 
 def from_rotation_matrices(matrices: Float[np.ndarray, "*batch 3 3"]) -> Float[np.ndarray, "*batch 4"]:
@@ -185,19 +186,7 @@ def from_euler(sequence: str, angles: Sequence[float]) -> Quaternion:
     [0.5, 0.5, 0.5, 0.5]
     """
     check_sequence(sequence, MechanismError, name=None)
-    turns = [
-        from_axis_angle([float(axis == letter) for axis in AXES], angle)
-        for letter, angle in zip(sequence.lower(), angles, strict=True)
-    ]
-    return reduce(_product, turns if sequence.isupper() else turns[::-1])
+    from scipy.spatial.transform import Rotation
 
-
-def _product(a: Quaternion, b: Quaternion) -> Quaternion:
-    """Return the Euler parameters of the turn b, seen in axes that the turn a has moved: Hamilton's product."""
-    (a0, a1, a2, a3), (b0, b1, b2, b3) = a, b
-    return (
-        a0 * b0 - a1 * b1 - a2 * b2 - a3 * b3,
-        a0 * b1 + a1 * b0 + a2 * b3 - a3 * b2,
-        a0 * b2 + a2 * b0 + a3 * b1 - a1 * b3,
-        a0 * b3 + a3 * b0 + a1 * b2 - a2 * b1,
-    )
+    e0, e1, e2, e3 = Rotation.from_euler(sequence, list(angles)).as_quat(scalar_first=True).tolist()
+    return (e0, e1, e2, e3)
