@@ -1,5 +1,6 @@
 """Limits of robots: the worst instants of closed forms, ratios, ranges, joints held still, and what is refused."""
 
+import dataclasses
 import warnings
 
 import numpy as np
@@ -274,6 +275,26 @@ def test_joints_that_follow_or_are_fixed_are_no_part_of_a_trajectory():
             check_limits(robot, JointTrajectory({"one": "t", name: "t"}, start=0.0, stop=1.0))
         with pytest.raises(jn.RobotError, match=message):
             check_limits(robot, JointTrajectory({"one": "t"}, start=0.0, stop=1.0), {name: jn.Limits(velocity=1.0)})
+
+
+def gripper(**limits):
+    """Return a jaw, and a tip that slides back three times as fast from half a metre, with limits of its own."""
+    body, lead = jn.Inertia(1.0), jn.Limits(lower=0.0, upper=1.0, velocity=1.0, deceleration=4.0, effort=9.0)
+    tip = jn.Joint("tip", "jaw", "tip", "prismatic", mimic=jn.Mimic("jaw", -3.0, 0.5), limits=jn.Limits(**limits))
+    joints = [jn.Joint("jaw", "base", "jaw", "prismatic", limits=lead), tip]
+    return jn.Robot("gripper", [jn.Link("base"), jn.Link("jaw", body), jn.Link("tip", body)], joints)
+
+
+def test_limits_of_joints_that_follow_bind_the_joint_that_they_follow():
+    robot = gripper(lower=-1.0, upper=0.2, velocity=0.6, acceleration=1.5, jerk=30.0, effort=1.0)
+    found = [getattr(robot.limits["jaw"], field.name) for field in dataclasses.fields(jn.Limits)]
+    np.testing.assert_allclose(np.array(found, float), [0.1, 0.5, 0.2, 0.5, 10.0, 9.0, np.nan, 0.5], rtol=1e-14)
+    report = check_limits(robot, JointTrajectory({"jaw": "0.2 + 0.4*t"}, start=0.0, stop=1.0), times=[0.0, 1.0])
+    broken = {row.quantity: (row.value, row.limit) for row in report.broken}
+    assert (broken["position"], broken["velocity"]) == (pytest.approx((0.6, 0.5)), pytest.approx((0.4, 0.2)))
+    assert gripper().limits["jaw"] == robot.joints["jaw"].limits
+    with pytest.raises(jn.RobotError, match="jaw: no coordinate keeps the range of this joint and of those"):
+        check_limits(gripper(lower=1.0), JointTrajectory({"jaw": "t"}, start=0.0, stop=1.0))
 
 
 def test_limits_and_times_are_checked():

@@ -14,7 +14,7 @@ from jounce.display import Displayed
 from jounce.errors import RobotError, check_name, did_you_mean
 from jounce.rigid.inertia import Inertia, TracedInertia, finite_numbers
 from jounce.robot.floating_base import floating_joints
-from jounce.robot.model import Closure, Joint, Limits, Link
+from jounce.robot.model import Closure, Joint, Limits, Link, limits_with_followers
 from jounce.robot.tree import Tree, arrange, ordered, turn_about
 
 Made = TypeVar("Made", bound="AbstractRobot")
@@ -112,8 +112,18 @@ class AbstractRobot(Displayed, abc.ABC):
 
     @property
     def limits(self) -> dict[str, Limits]:
-        """Limits of the joints in `joint_names`."""
-        return {name: self.joints[name].limits for name in self.joint_names}
+        """Limits of the joints in `joint_names`, which keep those of joints that follow them too.
+
+        Raises
+        ------
+        RobotError
+            If no coordinate is within the range of a joint and of those that follow it.
+        """
+        followers: dict[str, list[Joint]] = {name: [] for name in self.joint_names}
+        for joint in self.moving_joints:
+            if joint.mimic is not None:
+                followers[joint.mimic.joint].append(joint)
+        return {name: limits_with_followers(self.joints[name], others) for name, others in followers.items()}
 
     @property
     def base_inertia(self) -> Inertia | None:

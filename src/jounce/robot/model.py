@@ -3,7 +3,7 @@
 import dataclasses
 import math
 import numbers
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -207,6 +207,47 @@ class Joint:
     def turning(self) -> bool:
         """Whether the coordinate is an angle."""
         return self.type in ("revolute", "continuous")
+
+
+def limits_with_followers(joint: Joint, followers: Iterable[Joint]) -> Limits:
+    """Return the limits of a joint that keep those of the joints that follow it too.
+
+    A follower moves as the joint does, times its multiplier. Its torque is borne by what drives the joint, and has no
+    limit of its own.
+
+    Raises
+    ------
+    RobotError
+        If no coordinate is within all ranges.
+    """
+    every = [(joint.limits, Mimic(joint.name))]
+    every += [(other.limits, other.mimic) for other in followers if other.mimic and other.mimic.multiplier]
+    if len(every) == 1:
+        return joint.limits
+
+    def least(*fields: str) -> float | None:
+        """Return the least of the limits, of each joint that of the first field that it has."""
+        given = [(next((x for f in fields if (x := getattr(own, f)) is not None), None), mimic) for own, mimic in every]
+        return min((x / abs(mimic.multiplier) for x, mimic in given if x is not None), default=None)
+
+    lower, upper = -math.inf, math.inf
+    for own, mimic in every:
+        ends = (-math.inf if own.lower is None else own.lower, math.inf if own.upper is None else own.upper)
+        low, high = sorted((x - mimic.offset) / mimic.multiplier for x in ends)
+        lower, upper = max(lower, low), min(upper, high)
+    if lower > upper:
+        message = "no coordinate keeps the range of this joint and of those that follow it; correct their limits"
+        raise RobotError(message, name=joint.name, value=[lower, upper])
+    slowing = any(own.deceleration is not None for own, _ in every)
+    return dataclasses.replace(
+        joint.limits,
+        lower=lower if math.isfinite(lower) else None,
+        upper=upper if math.isfinite(upper) else None,
+        velocity=least("velocity"),
+        acceleration=least("acceleration"),
+        jerk=least("jerk"),
+        deceleration=least("deceleration", "acceleration") if slowing else None,
+    )
 
 
 CLOSURES = ("connect", "weld", "pin", "slider")

@@ -118,7 +118,7 @@ class _LimitsFile:
     """Reads limits from the plain data of a file; every error names the file, the line and the entry."""
 
     def __init__(self, source: Source, robot: Robot) -> None:
-        self.source, self.robot = source, robot
+        self.source, self.robot, self.had = source, robot, robot.limits
         self.jounce: dict[str, float] = {}
         self.varying: dict[str, dict[str, PositionLaw]] = {}
 
@@ -139,7 +139,7 @@ class _LimitsFile:
 
     def _of(self, name: str, default: Mapping[str, Any], own: Mapping[str, Any]) -> Limits:
         joint = self.robot.joints[name]
-        values = dataclasses.asdict(joint.limits) | {"jounce": None}
+        values = dataclasses.asdict(self.had[name]) | {"jounce": None}
         places: dict[str, Location] = {}
         for key, raw in default.items():
             if self._fits(raw, key, joint):

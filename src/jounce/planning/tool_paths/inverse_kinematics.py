@@ -237,24 +237,10 @@ def _checked_goal(position: Any, orientation: Any, direction: Any) -> tuple[dict
 
 
 def joint_ranges(robot: AbstractRobot) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
-    """Return the ranges of the coordinates, those of joints that follow others included; infinite without limits."""
-    lower, upper = (np.full(len(robot.joint_names), x) for x in (-np.inf, np.inf))
-    for joint in robot.moving_joints:
-        bounds = [(-np.inf if joint.limits.lower is None else joint.limits.lower)]
-        bounds.append(np.inf if joint.limits.upper is None else joint.limits.upper)
-        name = joint.name
-        if joint.mimic is not None:
-            name = joint.mimic.joint
-            if not joint.mimic.multiplier:
-                continue
-            bounds = sorted((x - joint.mimic.offset) / joint.mimic.multiplier for x in bounds)
-        k = robot.joint_names.index(name)
-        lower[k], upper[k] = max(lower[k], bounds[0]), min(upper[k], bounds[1])
-    crossed = lower > upper
-    if crossed.any():
-        name = robot.joint_names[int(np.argmax(crossed))]
-        message = "no coordinate keeps the limits of this joint and of those that follow it; give limits=False"
-        raise RobotError(message, name=name)
+    """Return the ranges of the coordinates, infinite without limits."""
+    limits = robot.limits.values()
+    lower = np.array([-np.inf if own.lower is None else own.lower for own in limits], float)
+    upper = np.array([np.inf if own.upper is None else own.upper for own in limits], float)
     return lower, upper
 
 
