@@ -41,6 +41,22 @@ def test_what_does_not_fit_is_refused(arm):
         jn.simulate_elastic(hinge, spring, [0.0, 0.1], state=np.zeros((2, 2, 1)))
 
 
+@pytest.mark.parametrize(
+    "drive, armatures",
+    [(jn.Drive(stiffness=40.0), {"lead_motor": 0.5}), (jn.Drive(rotor_inertia=0.2), {"lead": 0.2})],
+    ids=["elastic", "rigid"],
+)
+def test_armature_and_friction_of_a_joint_that_follows_count_once(drive, armatures):
+    rod = jn.Inertia(1.0, center_of_mass=[0.1, 0, 0])
+    tip = jn.Joint("tip", "arm", "tip", mimic=jn.Mimic("lead", -2.0), armature=0.1, friction=0.3)
+    lead = jn.Joint("lead", "base", "arm", armature=0.1, friction=0.4)
+    robot = jn.Robot("gripper", [jn.Link("base"), jn.Link("arm", rod), jn.Link("tip", rod)], [lead, tip])
+    whole = elastic_robot(robot, {"lead": drive})
+    found = dict(zip(whole.joint_names, whole.tree.armature, strict=True))
+    assert {name: value for name, value in found.items() if value} == pytest.approx(armatures)  # 0.1 + 2^2 * 0.1
+    assert whole.tree.friction.sum() == pytest.approx(1.0)  # 0.4 + 2 * 0.3
+
+
 @pytest.mark.slow
 def test_links_of_an_arm_follow_to_rounding(arm, swing):
     """Two joints, one damped: 2 s without feedback; without the acceleration of the springs a millimetre and more."""

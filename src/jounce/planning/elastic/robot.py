@@ -65,13 +65,15 @@ def elastic_robot(robot: Robot, drives: Mapping[str, Drive], *, losses: bool = T
     joints: list[Joint] = []
     rubs = losses and friction
     for joint in robot.joints.values():
-        k = columns.get(joint.name)
         armature, rubbing = joint.armature, joint.friction if rubs else 0.0
         damping = joint.damping if losses else 0.0
-        if k is not None and arrays.elastic[k]:
-            armature = rubbing = 0.0
-        elif k is not None and drives.get(joint.name, Drive()).rotor_inertia is not None:
-            armature = float(arrays.inertia[k])
+        if joint.moving:  # armature and friction of joints that follow another are among those of its motor
+            leader = joint.name if joint.mimic is None else joint.mimic.joint
+            k = columns[leader]
+            if arrays.elastic[k]:
+                armature = rubbing = 0.0
+            elif drives.get(leader, Drive()).rotor_inertia is not None:
+                armature = float(arrays.inertia[k]) if joint.mimic is None else 0.0
         joints.append(dataclasses.replace(joint, armature=armature, damping=damping, friction=rubbing))
     links = list(robot.links.values())
     for k in np.flatnonzero(arrays.elastic):
