@@ -76,8 +76,22 @@ def integrated(pieces: _Pieces, lengths: Float[np.ndarray, " pieces"]) -> Float[
     """Return the integral of piecewise polynomials from their beginning, as local Taylor coefficients."""
     raised = pieces / np.arange(1, len(pieces) + 1)[:, None]
     gains = (raised * lengths ** np.arange(1, len(raised) + 1)[:, None]).sum(axis=0)
-    values = [math.fsum(gains[:k]) for k in range(len(gains))]
-    return np.concatenate([[values], raised])
+    return np.concatenate([[_sums_before(gains.tolist())], raised])
+
+
+def _sums_before(terms: list[float]) -> list[float]:
+    """Return the sums of the terms before each, to rounding however many there are.
+
+    What each addition loses is added up beside (the two-sum of Knuth).
+    """
+    found, total, lost = [], 0.0, 0.0
+    for term in terms:
+        found.append(total + lost)
+        raised = total + term
+        own = raised - total
+        lost += (total - (raised - own)) + (term - own)
+        total = raised
+    return found
 
 
 def _interpolated(times: _Samples, values: _Samples, degree: int, **ends: Any) -> tuple[_Breakpoints, _Pieces]:
