@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.dynamics.masses import Gravity, Masses, gravity_of, required_masses, second_moments
-from jounce.dynamics.motion_values import Coordinates, cut, held, labelled, pose_of
+from jounce.dynamics.motion_values import Coordinates, check_motion, cut, held, labelled, pose_of
 from jounce.errors import MechanismError
 from jounce.jet import Jet, dot
 from jounce.jet.algebra import stacked, total
@@ -288,6 +288,7 @@ def potential_energy(motion: Motion) -> Any:
     >>> energy.values[1].round(9).tolist()  # energy and power
     [60.0, 60.0]
     """
+    check_motion(motion)
     return labelled(motion, potential_coefficients(motion)[: motion.order + 1].sum(axis=1), "J")
 
 
@@ -331,6 +332,7 @@ def stored_energy(motion: Motion) -> Any:
     >>> jn.dynamics.stored_energy(jn.solve(sled, [0.0, 2.0], order=1)).values.round(12).tolist()  # 5/2 t^4
     [0.0, 40.0]
     """
+    check_motion(motion)
     pose_type, coordinates = motion.poses
     stored = _stored(motion.forces, cut(coordinates, 1), motion.time[None], pose_type)
     return labelled(motion, held(motion, stored)[None], "J")[:, 0].drop_vars("derivative")

@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
+from jounce.errors import MechanismError
 from jounce.jet import Jet
 from jounce.jet.derivatives import plain_derivatives
 from jounce.kinematics import Motion, Status
@@ -21,6 +22,12 @@ Coordinates = Mapping[str, Float[Numbers, "_ ... _"]]
 Found = TypeVar("Found")
 
 WIDTHS = (512,)  # instants: one program serves a motion, its peaks and a long grid; one of 64 saves a millisecond
+
+
+def check_motion(motion: object) -> None:
+    """Raise MechanismError unless this is a motion."""
+    if not isinstance(motion, Motion):
+        raise MechanismError("must be a jn.Motion, as jn.solve and jn.simulate give it", name="motion", value=motion)
 
 
 def in_chunks(

@@ -10,7 +10,7 @@ from jaxtyping import Float
 from jounce.dynamics.forward import Lanes
 from jounce.dynamics.inverse import MotionForces
 from jounce.dynamics.masses import Gravity, Masses
-from jounce.dynamics.motion_values import Coordinates, labelled, pose_of
+from jounce.dynamics.motion_values import Coordinates, check_motion, labelled, pose_of
 from jounce.jet import Jet, dot
 from jounce.jet.algebra import stacked, total
 from jounce.kinematics import Motion
@@ -63,6 +63,7 @@ def power_balance(motion: Motion) -> Any:
     >>> bool((abs(balance["residual"]) <= 1e-12 * balance["scale"]).all())
     True
     """
+    check_motion(motion)
     import xarray
 
     forces = MotionForces.of(motion)

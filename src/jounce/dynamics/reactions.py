@@ -4,6 +4,7 @@ import copy
 import dataclasses
 from typing import Any
 
+from jounce.dynamics.motion_values import check_motion
 from jounce.dynamics.outputs import (
     AppliedForceOutput,
     AppliedTorqueOutput,
@@ -59,6 +60,7 @@ def driver_force(motion: Motion, name: str, *, redundant: Any = None) -> Any:
     >>> torque.values.round(12).tolist(), torque.attrs["units"]
     ([[24.0, 24.0, 12.0]], 'N*m')
     """
+    check_motion(motion)
     driver = motion.mechanism.drivers.get(name)
     kind = DriverTorqueOutput if driver is not None and is_turning(driver) else DriverForceOutput
     return _choosing(motion, redundant).evaluate(kind(name), name)
@@ -134,6 +136,7 @@ def joint_reaction(
     >>> pin.force.sel(derivative=0).values.round(12).tolist()  # centripetal, and the weight
     [[-9.0, 20.0]]
     """
+    check_motion(motion)
     force = JointForceOutput(name, body, frame)
     torque = JointTorqueOutput(name, body, frame, point)
     chosen = _choosing(motion, redundant)
@@ -186,6 +189,7 @@ def applied_force(motion: Motion, name: str) -> Any:
     >>> jn.driver_force(motion, "push").values.round(12).tolist()
     [[20.0, 20.0, 10.0]]
     """
+    check_motion(motion)
     force = motion.mechanism.forces.get(name)
     kind = AppliedTorqueOutput if force is not None and force.unit != "N" else AppliedForceOutput
     return motion.evaluate(kind(name), name)

@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from jounce.dynamics.motion_values import in_chunks
 from jounce.errors import RobotError, SampleWarning, TrajectoryError, did_you_mean
-from jounce.robot.arguments import whole_number
+from jounce.robot.arguments import joints_of, whole_number
 from jounce.robot.inverse_dynamics import inverse_dynamics
 from jounce.robot.model import Limits
 from jounce.robot.robot import Robot
@@ -46,7 +46,7 @@ class FollowedTrajectory:
     """
 
     def __init__(self, robot: Robot, trajectory: JointTrajectory):
-        if not robot.joint_names:
+        if not joints_of(robot):
             raise RobotError("the robot has no moving joint; nothing can follow the trajectory", name="joints")
         for name in trajectory.names:
             if name not in robot.joint_names:

@@ -35,15 +35,28 @@ def floats(name: str, values: object) -> Float[Numbers, "..."]:
 whole_number = partial(errors.whole_number, error=RobotError)
 
 
+def joints_of(robot: object) -> tuple[str, ...]:
+    """Return the names of the joints of what must be a robot.
+
+    Raises
+    ------
+    RobotError
+        If it is none.
+    """
+    if not isinstance(robot, AbstractRobot):
+        raise RobotError("must be a jn.Robot, as jn.load_robot gives it", name="robot", value=robot)
+    return robot.joint_names
+
+
 def checked_position(robot: AbstractRobot, q: object, name: str = "q") -> Float[Numbers, "*batch 1 joint"]:
     """Return coordinates without derivatives as those of order zero.
 
     Raises
     ------
     RobotError
-        If their shape, (..., n), does not fit the robot.
+        If there is no robot, or their shape, (..., n), does not fit it.
     """
-    q, n = floats(name, q), len(robot.joint_names)
+    n, q = len(joints_of(robot)), floats(name, q)
     if q.ndim < 1 or q.shape[-1] != n:
         raise RobotError(f"must have the shape (..., n) with n = {n}, not {q.shape}", name=name)
     return q[..., None, :]
@@ -55,9 +68,9 @@ def checked_state(robot: AbstractRobot, state: object) -> Float[Numbers, "*batch
     Raises
     ------
     RobotError
-        If their shape, (..., 2, n), does not fit the robot.
+        If there is no robot, or their shape, (..., 2, n), does not fit it.
     """
-    state, n = floats("state", state), len(robot.joint_names)
+    n, state = len(joints_of(robot)), floats("state", state)
     if state.ndim < 2 or state.shape[-2:] != (2, n):
         message = f"must hold q and q', the shape (..., 2, {n}) for the joints of {robot.name}, not {state.shape}"
         raise RobotError(message, name="state")
@@ -72,10 +85,9 @@ def checked_coordinates(
     Raises
     ------
     RobotError
-        If their shape does not fit the robot or the derivatives are too few.
+        If there is no robot, their shape does not fit it, or the derivatives are too few.
     """
-    q = floats("q", q)
-    n = len(robot.joint_names)
+    n, q = len(joints_of(robot)), floats("q", q)
     if q.ndim < 2 or q.shape[-1] != n:
         joints = f"{robot.name} has {n} {'joint' if n == 1 else 'joints'}"
         raise RobotError(f"must have the shape (..., order + 1, n), not {q.shape}; {joints}: n = {n}", name="q")

@@ -11,7 +11,7 @@ from jax.core import Tracer
 from jaxtyping import Float
 
 from jounce.errors import RobotError, SingularityError, check_name
-from jounce.robot.arguments import checked_state, floats
+from jounce.robot.arguments import checked_state, floats, joints_of
 from jounce.robot.articulated_bodies import LEAST_INERTIA
 from jounce.robot.base_motion import BaseMotion, base_arrays, base_body
 from jounce.robot.batches import Batched
@@ -123,6 +123,7 @@ def forward_dynamics(
     >>> jn.forward_dynamics(pendulum, state, [[5.905], [2.0]]).round(12).tolist()  # torque and torque rate
     [[0.0], [1.0], [3.0], [6.0]]
     """
+    joints_of(robot)
     if robot.closures:
         message = (
             "the loops of this robot make its coordinates depend on one another; jn.simulate(robot.mechanism(...)) "

@@ -13,7 +13,7 @@ from jounce.jet.algebra import stacked, total
 from jounce.rigid.inertia import finite_numbers
 from jounce.rigid.orientation import check_rotation
 from jounce.robot.abstract_robot import AbstractRobot
-from jounce.robot.arguments import floats
+from jounce.robot.arguments import floats, joints_of
 from jounce.robot.kinematics import link_frame, place_of
 from jounce.robot.robot_size import robot_size
 from jounce.robot.tree import Frame, Tree, axes_with_z_along
@@ -51,6 +51,7 @@ def tool_of(robot: AbstractRobot, link: str, point: ArrayLike, axis: ArrayLike) 
     RobotError
         If there is no such link, it does not move, or the point or the axis is none.
     """
+    joints_of(robot)
     check_name("link", link, robot.frames, RobotError, name="link")
     if robot.frames[link].body < 0:
         raise RobotError("this link is fixed to the base: no joint moves it", name="link", value=link)

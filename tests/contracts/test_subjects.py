@@ -1,0 +1,44 @@
+"""What is about a robot or a motion says so where it is given something else, before it looks into it."""
+
+import json
+import subprocess
+import sys
+
+CALLS = """
+import json
+import numpy as np
+import jounce as jn
+
+q, law = np.zeros((3, 2)), jn.JointTrajectory({"pin": "t"}, start=0.0, stop=1.0)
+path = jn.ToolPath(["t", 0.0, 0.0], start=0.0, stop=1.0)
+calls = {
+    "mass_matrix": (q[0],), "bias_forces": (q,), "inverse_dynamics": (q,), "forward_dynamics": (q[:2], q[:1]),
+    "forward_kinematics": (q, "hand"), "jacobian": (q, "hand"), "center_of_mass": (q,), "joint_wrenches": (q,),
+    "kinetic_energy": (q,), "energy_terms": (q,), "inverse_kinematics": ("hand", [0, 0, 0]),
+    "follow_tool_path": ("hand", path), "check_limits": (law,),
+    "driver_force": ("theta",), "joint_reaction": ("A",), "applied_force": ("spring",), "power_balance": (),
+    "potential_energy": (),
+}
+told = {}
+for name, arguments in calls.items():
+    for other in (jn.load("examples/four_bar.yaml"), "arm.urdf", None):
+        try:
+            getattr(jn, name)(other, *arguments)
+        except jn.JounceError as error:
+            told.setdefault(name, set()).add(str(error).partition(", got ")[0])
+print(json.dumps({name: sorted(words) for name, words in told.items()}))
+"""
+OF_MOTIONS = {"driver_force", "joint_reaction", "applied_force", "power_balance", "potential_energy"}
+
+
+def test_robots_and_motions_are_asked_for():
+    """In a process of its own: the tests check annotations, which nothing does in use."""
+    done = subprocess.run([sys.executable, "-c", CALLS], capture_output=True, text=True, check=False)
+    assert not done.returncode, done.stderr
+    told = json.loads(done.stdout)
+    assert len(told) == 18
+    for name, words in told.items():
+        if name in OF_MOTIONS:
+            assert words == ["motion: must be a jn.Motion, as jn.solve and jn.simulate give it"], name
+        else:
+            assert words == ["robot: must be a jn.Robot, as jn.load_robot gives it"], name
