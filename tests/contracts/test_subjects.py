@@ -26,6 +26,10 @@ for name, arguments in calls.items():
             getattr(jn, name)(other, *arguments)
         except jn.JounceError as error:
             told.setdefault(name, set()).add(str(error).partition(", got ")[0])
+try:
+    jn.bias_forces(jn.load_robot("examples/robots/ur5.urdf"), np.zeros((2, 6)), parts=None)
+except jn.RobotError as error:
+    told["parts"] = {str(error)}
 print(json.dumps({name: sorted(words) for name, words in told.items()}))
 """
 OF_MOTIONS = {"driver_force", "joint_reaction", "applied_force", "power_balance", "potential_energy"}
@@ -36,6 +40,7 @@ def test_robots_and_motions_are_asked_for():
     done = subprocess.run([sys.executable, "-c", CALLS], capture_output=True, text=True, check=False)
     assert not done.returncode, done.stderr
     told = json.loads(done.stdout)
+    assert told.pop("parts") == ["parts: no such part, got nothing; valid: centrifugal, coriolis, gravity"]
     assert len(told) == 18
     for name, words in told.items():
         if name in OF_MOTIONS:

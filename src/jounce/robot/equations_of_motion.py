@@ -5,7 +5,7 @@ matrix is their products weighted by the masses, and the work along them is the 
 the rates of the joints are the accelerations that remain where those of the joints are zero.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import jax
@@ -258,7 +258,7 @@ def bias_forces(
     >>> jn.bias_forces(robot, q, parts="centrifugal").round(12).tolist()  # -3^2
     [0.0, -9.0]
     """
-    chosen = (parts,) if isinstance(parts, str) else tuple(parts)
+    chosen = (parts,) if isinstance(parts, str) or not isinstance(parts, Iterable) else tuple(parts)
     for part in chosen:
         if part not in PARTS:
             raise RobotError(f"no such part; {did_you_mean(str(part), PARTS)}", name="parts", value=part)

@@ -128,6 +128,7 @@ def test_direction_leaves_the_turn_about_it_free():
         ({}, "nothing is wanted"),
         ({"position": [0, 0]}, r"\(\.\.\., 3\)"),
         ({"position": [0, 0, np.nan]}, "finite"),
+        ({"position": np.zeros((0, 3))}, "no pose to reach"),
         ({"orientation": [2, 0, 0, 0]}, "unit length"),
         ({"orientation": [1, 0, 0]}, "scalar first"),
         ({"orientation": 2 * np.eye(3)}, "orthonormal"),

@@ -114,6 +114,8 @@ def inverse_kinematics(
         raise RobotError(message, name="start") from None
     scale = coordinate_scale(robot, tool)
     count, n = int(np.prod(lead)), len(lower)
+    if not count:
+        raise RobotError("there is no pose to reach; give at least one", value=f"shape {lead}")
     begin = np.broadcast_to(begin, (*lead, n)).reshape(count, n)
     goal = {kind: np.broadcast_to(x, (*lead, *WIDTHS[kind])).reshape(count, *WIDTHS[kind]) for kind, x in goal.items()}
     found = poses_within(robot, tool, goal, (lower, upper, scale), begin, starts, within, most_steps, seed)
