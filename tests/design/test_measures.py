@@ -35,6 +35,7 @@ def test_a_window_within_one_cell_is_no_other():
     assert float(jnp.max(largest(sine(TIME), cells))) == pytest.approx(np.sin(3 * 0.502), abs=1e-14)
 
 
+@pytest.mark.slow
 def test_no_series_goes_on_beyond_a_knot():
     """A rate of 1 - t from a knot on, and of zero before it: it is largest at the knot, and half of it in the mean."""
     knots = np.array([0.5])

@@ -35,6 +35,7 @@ def test_designs_are_those_solved_alone():
     assert family["tau"].dims == ("design",)
 
 
+@pytest.mark.slow
 def test_no_array_takes_the_name_of_another():
     parameters = {**FOUR_BAR.parameters, "psi": 1.0, "time": 2.0}
     named = dataclasses.replace(FOUR_BAR, parameters=parameters)

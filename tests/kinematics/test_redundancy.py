@@ -95,6 +95,7 @@ def test_random_bennett_linkages_from_bad_guesses_in_any_unit():
         moves_as_told(case, TIMES[1:3], order=6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])
 def test_what_is_nearly_a_bennett_linkage_is_refused_and_what_is_one_to_rounding_is_not(size):
     joints = "joints.R3, joints.R1, joints.R4, joints.R2 stay open, by .* mm and .* deg"

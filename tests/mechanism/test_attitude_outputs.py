@@ -188,6 +188,7 @@ def test_parallel_axes_are_undefined_and_near_them_derivatives_hold():
         np.testing.assert_allclose(found[k, 1], [7, 1, 1], rtol=0, atol=1e-11)
 
 
+@pytest.mark.slow
 def test_angles_without_a_value_are_refused_afterwards_too(turning):
     """The outer ring turns about z only, where the first and the last axis of ZXZ are one."""
     with pytest.raises(jn.MechanismError, match="t = 0 s"):

@@ -204,6 +204,7 @@ def test_what_is_known_at_the_first_sample_follows_the_parameters(tmp_path):
     assert np.array_equal(jn.solve(again, order=3).outputs["x"], jn.solve(fresh, order=3).outputs["x"])
 
 
+@pytest.mark.slow
 def test_gradients_with_respect_to_what_is_known_at_the_first_sample():
     law = jn.MeasuredMotion(T, polynomial(T, 2), initial=["x0", "v0/2"])
     time = jn.Jet.variable(np.array([0.5, 1.25]), order=2)

@@ -22,6 +22,7 @@ def two_links():
     return jn.follow_tool_path(planar_chain([0.7, 0.6]), "link_1", path, order=6, point=[0.6, 0, 0], start=[-0.8, 1.6])
 
 
+@pytest.mark.slow
 def test_two_links_have_the_derivatives_of_their_closed_form():
     motion = two_links()
     assert (motion.status == Status.OK).all()
