@@ -123,7 +123,9 @@ class Search:
                 if radius <= SMALLEST_REGION:
                     break
             elif inside or (not better and moved < ACTIVE):
-                break
+                if elastic or radius <= SMALLEST_REGION or self.found(best).residual <= FITTED:
+                    break
+                radius /= 4  # no optimum: from here on in shorter steps, which lock less
             else:
                 radius *= 4
         return self.found(best)
