@@ -55,6 +55,13 @@ def test_a_leader_that_begins_or_ends_at_a_knot_passes_it(leader):
         assert (found.smoothness, found.derivatives[2].count) == (1, count)
 
 
+@pytest.mark.parametrize("leader", ["sqrt(t)", "sqrt(1 - t)"])
+def test_a_leader_that_has_no_value_beyond_its_ends_passes_nothing_there(leader):
+    rise = [jn.Segment("dwell", 0.5), jn.Segment("harmonic", 0.3, by=0.02), jn.Segment("dwell", 0.7)]
+    found = jn.continuity(jn.FollowingMotion(jn.SegmentedMotion(rise), leader), 0.0, 1.0)
+    assert (found.smoothness, found.derivatives[2].count) == (1, 2)
+
+
 def test_pieces_splines_and_expressions():
     pieces = jn.PiecewiseMotion(["t**3", "3*t - 2"], until=[1.0])
     told = jn.continuity(pieces, 0.0, 2.0)

@@ -209,7 +209,8 @@ def _followed(
         if not jump.any():
             continue
         away = values - knot
-        crossing = np.flatnonzero((away[:-1] < 0) != (away[1:] < 0))
+        known = np.isfinite(away)  # a leader need not go on beyond the ends, as sqrt(t)
+        crossing = np.flatnonzero(((away[:-1] < 0) != (away[1:] < 0)) & known[:-1] & known[1:])
         times = _crossings(leader, knot, looks[crossing], looks[crossing + 1])
         inside = (times > first - SLACK * step) & (times < last + SLACK * step)
         crossing, times = crossing[inside], np.clip(times[inside], first, last)
