@@ -1,5 +1,7 @@
 """Loops compiled as one function: the same numbers, and only where XLA can."""
 
+import re
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -72,3 +74,22 @@ def test_large_loops_are_not(tried, monkeypatch):
 def test_nothing_is_marked_for_releases_that_were_not_tried(monkeypatch):
     monkeypatch.setattr(kernels, "TRIED", (0, 1))
     assert not marked(halved(lambda x: 0.5 * jnp.sin(x)), jnp.ones(3))
+
+
+def test_all_that_is_given_is_one_argument_which_is_used():
+    """XLA ends the process over an argument that is without effect, as it does not find its memory."""
+
+    def loop(argument):
+        x, _, steps, going = argument
+        return jax.lax.while_loop(lambda c: going & (c[1] < steps), lambda c: (0.5 * c[0] + 1.0, c[1] + 1), (x, 0))
+
+    def function(x):
+        return kernels.in_one_piece(loop, (x, jnp.full((7, 1), 3.0) * x[0], jnp.int32(40), jnp.bool_(True)))
+
+    found = compiled(without=kernels.LIBRARIES)(function)
+    (begin,) = re.findall(r"func.func private @whole\((.*?)\) ->", jax.jit(function).lower(np.ones(3)).as_text())
+    assert begin == "%arg0: tensor<12xf64>"
+    result, count = found(np.array([0.0, 1.0, 5.0]))
+    np.testing.assert_allclose(result, 2.0, rtol=1e-11)
+    assert count == 40
+    assert count.dtype == int

@@ -1,12 +1,14 @@
 """Loops over small arrays as one function of machine code."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import accumulate
 from typing import Any
 
 import jax
+import jax.numpy as jnp
 import jaxlib.version
 from jax.experimental.xla_metadata import set_xla_metadata
-from jax.extend.core import Jaxpr, jaxpr_as_fun, jaxprs_in_params
+from jax.extend.core import ClosedJaxpr, Jaxpr, jaxpr_as_fun, jaxprs_in_params
 
 from jounce.kinematics.compilation import compiler_options
 
@@ -44,13 +46,36 @@ def in_one_piece(function: Callable[[Any], Any], argument: Any) -> Any:
         Of arrays.
     """
     program, shape = jax.make_jaxpr(function, return_shape=True)(argument)
-    whole = jaxpr_as_fun(program)
+    leaves = jax.tree.leaves(argument)
     if _tried() and _suits(program.jaxpr):
+        given = tuple(map(jnp.asarray, (*program.consts, *leaves)))
+
+        def whole(numbers: jax.Array) -> Any:
+            parts = _parted(numbers, given)
+            constants = len(program.consts)
+            return jaxpr_as_fun(ClosedJaxpr(program.jaxpr, parts[:constants]))(*parts[constants:])
+
         with set_xla_metadata(xla_cpu_small_call="true", inlineable="false"):
-            found = jax.jit(whole)(*jax.tree.leaves(argument))
+            found = jax.jit(whole)(_joined(given))
     else:
-        found = whole(*jax.tree.leaves(argument))
+        found = jaxpr_as_fun(program)(*leaves)
     return jax.tree.unflatten(jax.tree.structure(shape), found)
+
+
+def _joined(arrays: Iterable[jax.Array]) -> jax.Array:
+    """Return arrays as one of numbers: counts and choices are numbers, too, of which doubles hold 53 bits.
+
+    XLA finds the memory of what such a function is given where it is used, and ends the process where an argument is
+    used nowhere, after it has left out what has no effect. One argument for all is used.
+    """
+    return jnp.concatenate([array.astype(float).ravel() for array in arrays])
+
+
+def _parted(numbers: jax.Array, arrays: Sequence[jax.Array]) -> list[jax.Array]:
+    """Return the arrays that were joined."""
+    ends = list(accumulate(array.size for array in arrays))
+    parts = [numbers[end - array.size : end] for array, end in zip(arrays, ends, strict=True)]
+    return [part.reshape(array.shape).astype(array.dtype) for part, array in zip(parts, arrays, strict=True)]
 
 
 def _tried() -> bool:
