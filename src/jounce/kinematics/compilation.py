@@ -6,6 +6,7 @@ everything.
 """
 
 import inspect
+import os
 import pickle
 import threading
 import zlib
@@ -73,7 +74,7 @@ UNENDING = ("simplify-while-loops", "while-loop-invariant-code-motion", "while-l
 """XLA's passes over loops that undo each other's work, some thirty times; our loops have nothing for them to do."""
 
 
-def compiler_options(without: Iterable[str] = ()) -> dict[str, Any] | None:
+def compiler_options(without: Iterable[str] = (), *, narrow: bool = False) -> dict[str, Any] | None:
     """Return options that halve XLA's compile time of long chains of small operations, without making them slower.
 
     They are private to XLA, and a release that does not know them refuses them: then there are none, as on a GPU.
@@ -82,10 +83,19 @@ def compiler_options(without: Iterable[str] = ()) -> dict[str, Any] | None:
     ----------
     without : iterable of str, optional
         Further passes of XLA to leave out.
+    narrow : bool, default False
+        Whether arrays are so short that most of the time is that of calling operations: then LLVM need not do more
+        than the first level of its optimisations, a fifth of the time in which a program is compiled.
     """
     if not on_processor() or (options := _processor_options()) is None:
         return None
-    return options | {"xla_disable_hlo_passes": ",".join((*UNENDING, *without))}
+    options = options | {"xla_disable_hlo_passes": ",".join((*UNENDING, *without))}
+    return options | {"xla_backend_optimization_level": 1} if narrow and not _level_is_set() else options
+
+
+def _level_is_set() -> bool:
+    """Tell whether the environment says how much LLVM is to optimise."""
+    return "xla_backend_optimization_level" in os.environ.get("XLA_FLAGS", "")
 
 
 @lru_cache(maxsize=1)
@@ -111,6 +121,8 @@ class Compiled:
         Functions of the package that say what it computes, where it is none of them itself.
     without : tuple of str, optional
         Passes of XLA to leave out.
+    narrow : bool, optional
+        Whether its arrays are short, as `compiler_options` has it.
     """
 
     def __init__(
@@ -119,9 +131,11 @@ class Compiled:
         static: tuple[str, ...],
         made_of: tuple[Callable[..., Any], ...] = (),
         without: tuple[str, ...] = (),
+        *,
+        narrow: bool = False,
     ):
         self.function, self.static, self.made_of = function, static, made_of or (function,)
-        self.without = without
+        self.without, self.narrow = without, narrow
         self._programs: dict[Any, Callable[..., Any]] = {}
         self._names = tuple(inspect.signature(function).parameters)
         self._traced = min([self._names.index(name) for name in static], default=len(self._names))
@@ -130,7 +144,8 @@ class Compiled:
     @cached_property
     def jitted(self) -> Any:
         """The function as `jax.jit` returns it."""
-        return jax.jit(self.function, static_argnames=self.static, compiler_options=compiler_options(self.without))
+        options = compiler_options(self.without, narrow=self.narrow)
+        return jax.jit(self.function, static_argnames=self.static, compiler_options=options)
 
     @cached_property
     def _within(self) -> Any:
@@ -250,6 +265,8 @@ def _home() -> jax.sharding.Sharding:
     return jax.sharding.SingleDeviceSharding(jax.devices()[0])
 
 
-def compiled(*static: str, without: tuple[str, ...] = ()) -> Callable[[Callable[..., Any]], Compiled]:
-    """Compile the decorated function at its first call, with these static arguments, without some passes of XLA."""
-    return lambda function: Compiled(function, static, without=without)
+def compiled(
+    *static: str, without: tuple[str, ...] = (), narrow: bool = False
+) -> Callable[[Callable[..., Any]], Compiled]:
+    """Compile the decorated function at its first call, with these static arguments, as `compiler_options` has it."""
+    return lambda function: Compiled(function, static, without=without, narrow=narrow)

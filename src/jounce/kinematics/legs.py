@@ -117,7 +117,7 @@ class Leg(NamedTuple):
 _batch = jax.jit(advance.function, static_argnames=("pose_type", "order"))  # traced once, for its shapes and in a loop
 
 
-@compiled("pose_type", "order", "batches")
+@compiled("pose_type", "order", "batches", narrow=True)
 def leg(
     system: System,
     way: Way,
