@@ -138,13 +138,13 @@ def at_rest(model: Model, coordinates: dict[str, np.ndarray]) -> State:
     return State(position, attitude, np.zeros_like(position), spin)
 
 
-@compiled()
+@compiled(narrow=True)
 def with_rates(equations: Equations, state: State, time: Instants) -> State:
     """Return the state with the least change of its velocities that fulfils the rates of all constraints."""
     return equations.with_rates(equations.factored(state, time), state, time)
 
 
-@compiled()
+@compiled(narrow=True)
 def _rates(equations: Equations, state: State, time: Instants) -> Float[Numbers, "row 1"]:
     """Return the rates of all rows."""
     return equations.system.residual(equations.pose(state), Jet.variable(time, 1)).dense().coefficients[1]
@@ -162,7 +162,7 @@ def _check_rates(equations: Equations, model: Model, state: State, instant: floa
         raise AssemblyError(f"{message}; correct the laws of those named", status=Status.INCONSISTENT)
 
 
-@compiled()
+@compiled(narrow=True)
 def _matrices(
     equations: Equations, state: State, time: Instants
 ) -> tuple[Float[Numbers, "size size"], Float[Numbers, " entry"]]:

@@ -267,7 +267,7 @@ def _unfit(start: ConsistentStart, state: State, instant: float) -> str:
     return ", ".join(f"forces.{n}" for n, good in zip(force_names(start.model), fit, strict=True) if not good)
 
 
-@compiled()
+@compiled(narrow=True)
 def _finite_forces(equations: Equations, state: State, time: Instants) -> Bool[Numbers, "force 1"]:
     return equations.system.finite_forces(equations.pose(state), Jet.variable(time, 1))
 

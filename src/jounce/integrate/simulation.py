@@ -230,7 +230,7 @@ def _at(equations: Equations, dense: DenseOutput, instants: np.ndarray, chosen: 
     return in_chunks(chunk, len(instants), WIDTHS)
 
 
-@compiled("order")
+@compiled("order", narrow=True)
 def expanded(
     equations: Equations, polynomial: State, step: Lanes, instants: Lanes, *, order: int
 ) -> tuple[State, AnglesOfForces]:

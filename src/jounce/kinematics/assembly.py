@@ -39,7 +39,7 @@ MAX_DATUMS = 100
 SETTLED = 1e-12  # rad, by which the angles of drivers may be counted otherwise
 
 
-@compiled("pose_type")
+@compiled("pose_type", narrow=True)
 def _moved(
     system: System,
     coordinates: dict[str, Numbers],
