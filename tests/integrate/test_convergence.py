@@ -13,17 +13,14 @@ BODIES = {"plane": dynamics.double_pendulum, "space": dynamics.spatial_double_pe
 METHODS = {  # steps in s, between those that are too long for the leading term of the error and rounding
     "Taylor 4": (jn.Taylor(4, step=BIG), [1 / 64, 1 / 96, 1 / 128]),
     "Taylor 5": (jn.Taylor(5, step=BIG), [1 / 64, 1 / 96, 1 / 128]),
-    "Taylor 6": (jn.Taylor(6, step=BIG), [1 / 64, 1 / 96, 1 / 128]),
     "Taylor 8": (jn.Taylor(8, step=BIG), [1 / 48, 1 / 64, 1 / 96]),
-    "Taylor 10": (jn.Taylor(10, step=BIG), [1 / 32, 1 / 40, 1 / 48]),
     "Taylor 12": (jn.Taylor(12, step=BIG), [1 / 24, 1 / 32]),
     "Obreshkov 2": (jn.Obreshkov(2, step=BIG), [1 / 64, 1 / 96, 1 / 128]),
     "Obreshkov 4": (jn.Obreshkov(4, step=BIG), [1 / 32, 1 / 48, 1 / 64]),
-    "Obreshkov 6": (jn.Obreshkov(6, step=BIG), [1 / 32, 1 / 48, 1 / 64]),
     "Obreshkov 8": (jn.Obreshkov(8, step=BIG), [1 / 24, 1 / 32, 1 / 40]),
 }
 QUICK = {("Taylor 5", "plane"), ("Obreshkov 4", "plane")}
-SPATIAL = ("Taylor 8", "Obreshkov 4")  # these stand for the others: programs in space compile for long
+SPATIAL = ("Taylor 5", "Obreshkov 4")  # these stand for the others: programs in space compile for long
 CASES = [
     pytest.param(method, space, marks=() if (method, space) in QUICK else pytest.mark.slow)
     for method in METHODS
@@ -79,9 +76,7 @@ def test_the_exact_runs_are_exact():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "method", [jn.Taylor(), jn.Obreshkov(8), jn.Obreshkov(4)], ids=["Taylor", "Obreshkov 8", "Obreshkov 4"]
-)
+@pytest.mark.parametrize("method", [jn.Taylor(), jn.Obreshkov(4)], ids=["Taylor", "Obreshkov 4"])
 def test_back_in_time_to_the_start(method):
     prepared = ready("plane")
     tolerance = 1e-12 if method != jn.Obreshkov(4) else 1e-9
