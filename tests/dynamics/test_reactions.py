@@ -12,13 +12,12 @@ from tests.problems import small
 from tests.problems.massed import arm, massed, massed_example
 
 TIME = np.array([0.1, 0.35, 0.6, 0.85])
-# every type of joint and driver is in one of these
+# every type of joint and driver is in one of these: the forces of each are compiled once for all mechanisms
 BANK = (
-    *("slider_crank", "four_bar", "epicyclic", "rolling_disc", "scotch_yoke", "quick_return", "rack_pinion"),
-    *("inverted_slider_crank_distance", "inverted_slider_crank_slide", "screw_press", "hooke_joint", "rssr", "rccc"),
-    *("swash_plate", "rspu_slide", "rspu_distance", "stewart_platform"),
+    *("slider_crank", "epicyclic", "rolling_disc", "rack_pinion", "screw_press", "rccc", "swash_plate", "rspu_slide"),
+    "stewart_platform",
 )
-SECOND_RATE = ("slider_crank", "epicyclic", "rolling_disc", "rssr")  # of power; the others to the first
+SECOND_RATE = ("slider_crank", "epicyclic", "rolling_disc")  # of power; the others to the first
 
 
 @pytest.mark.slow
@@ -33,7 +32,7 @@ def test_power_balance_of_the_bank(name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["slider_crank", pytest.param("hooke_joint", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", ["slider_crank", pytest.param("rspu_slide", marks=pytest.mark.slow)])
 def test_every_body_obeys_newton_and_euler(name):
     mechanism = massed_example(name)
     motion = jn.solve(mechanism, TIME, order=2)
@@ -77,11 +76,11 @@ def test_rates_are_those_of_differenced_multipliers_at_the_order_of_the_differen
 
 
 @pytest.mark.parametrize(
-    "name", ["slider_crank", *[pytest.param(n, marks=pytest.mark.slow) for n in ("screw_press", "rccc", "rsur")]]
+    "name", ["slider_crank", *[pytest.param(n, marks=pytest.mark.slow) for n in ("screw_press", "rspu_slide")]]
 )
 def test_a_joint_does_to_one_body_the_opposite_of_what_it_does_to_the_other(name):
     mechanism = massed_example(name)
-    motion = jn.solve(mechanism, TIME, order=4)
+    motion = jn.solve(mechanism, TIME, order=3)
     zero = [0.0] * len(mechanism.gravity)
     for joint, element in mechanism.joints.items():
         one, two = element.bodies
@@ -89,7 +88,7 @@ def test_a_joint_does_to_one_body_the_opposite_of_what_it_does_to_the_other(name
         size = max(float(np.abs(first.force).max()), float(np.abs(first.torque).max()))
         np.testing.assert_allclose(first.force, -second.force, atol=1e-12 * size)
         lever, force = position(motion, two, zero) - position(motion, one, zero), second.force.values
-        for k in range(3):  # the rates of lever x force, by the rule of Leibniz
+        for k in range(2):  # the rates of lever x force, by the rule of Leibniz
             moment = sum(math.comb(k, j) * cross(lever[:, j], force[:, k - j]) for j in range(k + 1))
             np.testing.assert_allclose(first.torque[:, k], -second.torque[:, k] - moment, atol=1e-11 * size)
 
@@ -105,7 +104,7 @@ def position(motion, body, point):
     """Position of a point of a body that may be the ground, (time, derivative, component)."""
     if body != "ground":
         return motion.point(body, point).values
-    return np.zeros((len(TIME), 5, len(point)))
+    return np.zeros((len(TIME), 4, len(point)))
 
 
 def test_frames_and_points_of_a_reaction_agree():

@@ -230,8 +230,9 @@ def test_right_sides_of_the_seven_mechanisms_at_any_state(name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", with_slow(*list(MECHANISMS)[1:]))
-def test_right_sides_along_the_motions_of_the_seven_mechanisms(name):
+@pytest.mark.parametrize("name", ["four_bar", "inverted_slider_crank_distance", "rsur", "rspu_slide"])
+def test_right_sides_along_motions(name):
+    """In the plane and in space, driven by a rotation, for which S 103 needs a common axis, a distance and a slide."""
     mechanism = jn.load(example(name))
     instants = np.array([0.0, 0.37, 1.1])
     equations = jn.constraint_equations(jn.solve(mechanism, instants, order=ORDER))

@@ -26,12 +26,8 @@ def factored(equations, state):
     return matrix, factor.solve(np.arange(1.0, len(matrix) + 1)[:, None]), factor.inverse()
 
 
-@pytest.fixture(params=["double_pendulum", "free_four_bar", "spatial_slider_crank", "gear_pair"])
-def mechanism(request):
-    return getattr(dynamics, request.param)()
-
-
-def start_in_fronts(mechanism, monkeypatch):
+def start_in_fronts(name, monkeypatch):
+    mechanism = getattr(dynamics, name)()
     monkeypatch.setattr("jounce.dynamics.saddle_fronts.FRONT_COST", 0.0)
     start = consistent_start(mechanism, 0.0)
     assert start.equations.saddle is not None
@@ -39,8 +35,9 @@ def start_in_fronts(mechanism, monkeypatch):
 
 
 @pytest.mark.slow
-def test_solutions_and_inverses_are_those_of_the_whole_matrix(mechanism, monkeypatch):
-    start = start_in_fronts(mechanism, monkeypatch)
+@pytest.mark.parametrize("name", ["free_four_bar", "gear_pair"])
+def test_solutions_and_inverses_are_those_of_the_whole_matrix(name, monkeypatch):
+    start = start_in_fronts(name, monkeypatch)
     matrix, solution, inverse = (np.asarray(x) for x in factored(start.equations, start.state))
     matrix, inverse = matrix[..., 0], inverse[..., 0]
     size = np.abs(matrix).sum(axis=1).max()
@@ -50,10 +47,11 @@ def test_solutions_and_inverses_are_those_of_the_whole_matrix(mechanism, monkeyp
 
 
 @pytest.mark.slow
-def test_expansions_are_those_of_dense_elimination(mechanism, monkeypatch):
-    start = start_in_fronts(mechanism, monkeypatch)
+@pytest.mark.parametrize("name", ["free_four_bar", "spatial_double_pendulum"])
+def test_expansions_are_those_of_dense_elimination(name, monkeypatch):
+    start = start_in_fronts(name, monkeypatch)
     dense = dataclasses.replace(start.equations, saddle=None)
-    found, wanted = (expanded(e, start.state, CLOCK, order=6) for e in (start.equations, dense))
+    found, wanted = (expanded(e, start.state, CLOCK, order=4) for e in (start.equations, dense))
     for x, y in zip(jax.tree.leaves(found), jax.tree.leaves(wanted), strict=True):
         np.testing.assert_allclose(x, y, atol=1e-11 * max(1.0, np.abs(y).max()))
 

@@ -34,7 +34,7 @@ def pade(p, z):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("order", [2, 4, 6, 8])
+@pytest.mark.parametrize("order", [4, 8])
 def test_one_step_of_an_oscillator_is_the_diagonal_approximation_of_its_exponential(order):
     method = jn.Obreshkov(order, step=1.0)
     expansion = begin_march(disc().equations, widened(disc().state, 3), jnp.zeros(3), order=order // 2).expansion
@@ -97,7 +97,7 @@ def test_steps_of_given_length_are_cut_only_where_the_iteration_does_not_converg
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("order", [4, 6, 8])
+@pytest.mark.parametrize("order", [4, 8])
 def test_steps_by_the_error_reach_what_is_asked(order):
     time, kinds = dynamics.dynamic_reference("double_pendulum")
     motion = jn.simulate(

@@ -279,8 +279,15 @@ def test_solver_makes_the_four_bar_reference_again():
                 assert abs(got - d) < mpf("1e-32") * (1 + abs(d))
 
 
+# in the plane, where it takes no time, the platform, which has no closed form, and one more in space
+MADE_AGAIN = [
+    *(name for name in MECHANISMS if "space: planar" in example(name).read_text(encoding="utf-8")),
+    *("hooke_joint", "stewart_platform"),
+]
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("name", MECHANISMS)
+@pytest.mark.parametrize("name", MADE_AGAIN)
 def test_references_are_made_again(name):
     stored = json.loads((REFERENCES / f"{name}.json").read_text(encoding="utf-8"))
     again = make(example(name))

@@ -177,9 +177,9 @@ def test_free_base_is_that_of_slides_and_turns():
 
 @pytest.mark.slow
 def test_gradients_of_accelerations_and_their_rates():
-    robot = random_robot(2, 3, prismatic=0.4)
+    robot = random_robot(2, 2, prismatic=0.4)
     q, step = motion(robot, 4)[0], 1e-5
-    torque, change = np.array([[1.0, -2.0, 0.5], [3.0, 1.0, 2.0]]), motion(robot, 4, 7)[0]
+    torque, change = np.array([[1.0, -2.0], [3.0, 1.0]]), motion(robot, 4, 7)[0]
 
     def last(state, torque):
         return jn.forward_dynamics(robot, state, torque)[-1, 0]

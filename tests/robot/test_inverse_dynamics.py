@@ -185,7 +185,7 @@ def test_more_orders_change_none_before(torque):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("order", [5, 6, 7, 8])
+@pytest.mark.parametrize("order", [5, 8])
 def test_rates_of_high_order_follow_each_other(order, torque):
     """The rate of torque k at t + h is the sum of those above it at t: by the last two orders, to what is left out."""
     q = np.random.default_rng(order).uniform(-1, 1, (1, order + 1, 7))
@@ -212,12 +212,14 @@ def test_jit_vmap_and_two_ways_of_differentiation_agree(torque):
     found = jax.jit(jax.vmap(call))(Q[:, :4])
     assert isinstance(found, jax.Array)
     near(found, torque[:, :2])
-    forward, reverse = (way(call)(jnp.asarray(Q[0, :4])) for way in (jax.jacfwd, jax.jacrev))
-    assert forward.shape == (2, 7, 4, 7)
+    arm, q = random_robot(3, 3), Q[0, :4, :3]
+    ways = [way(lambda q: jn.inverse_dynamics(arm, q))(jnp.asarray(q)) for way in (jax.jacfwd, jax.jacrev)]
+    forward, reverse = ways
+    assert forward.shape == (2, 3, 4, 3)
     near(forward, reverse)
     near(forward[0, :, 2], forward[0, :, 2].T)  # the mass matrix
-    rate = sum(np.einsum("ij,j->i", forward[0, :, k], Q[0, k + 1]) for k in range(3))
-    near(torque[0, 1], rate)  # the rate of torque is the slope of torque along the motion
+    rate = sum(np.einsum("ij,j->i", forward[0, :, k], q[k + 1]) for k in range(3))
+    near(jn.inverse_dynamics(arm, q)[1], rate)  # the rate of torque is the slope of torque along the motion
 
 
 @pytest.mark.slow
