@@ -25,7 +25,7 @@ PENDULUM = jn.Mechanism(
 
 
 def angles(values):
-    return jn.simulate(PENDULUM.with_parameters(**dict(zip(NAMES, values, strict=True))), TIME, order=2).outputs[
+    return jn.simulate(PENDULUM.with_parameters(**dict(zip(NAMES, values, strict=True))), TIME, order=1).outputs[
         "angle"
     ]
 
@@ -99,14 +99,10 @@ def test_forces_that_are_zero_and_a_body_in_even_motion():
 def test_a_pendulum_that_hangs_still():
     arm, mass = 1.0, 2.0
     frequency = np.sqrt(mass * GRAVITY * arm / (INERTIA + mass * arm**2))
-
-    def angle(lift):
-        mechanism = PENDULUM.with_parameters(lift=lift)
-        return jn.simulate(mechanism, [0.0, 3.0], order=1).outputs["angle"][-1]
-
-    slope = jax.jacfwd(angle)(-np.pi / 2)
-    expected = [np.cos(3 * frequency), -frequency * np.sin(3 * frequency)]
-    np.testing.assert_allclose(slope, expected, rtol=1e-10)
+    slope = jax.jacfwd(angles)(jnp.array([-np.pi / 2, mass, arm]))[..., 0]
+    phase = frequency * np.array(TIME)
+    expected = np.stack([np.cos(phase), -frequency * np.sin(phase)], axis=-1)
+    np.testing.assert_allclose(slope, expected, rtol=1e-10, atol=1e-14)
 
 
 @pytest.mark.slow
