@@ -3,7 +3,6 @@
 import importlib.util
 import pathlib
 
-import jax
 import numpy as np
 import pytest
 from mpmath import mp
@@ -14,15 +13,6 @@ from tests.oracles import mp_robot
 
 EXAMPLES = pathlib.Path(__file__).parents[2] / "examples"
 ORDER = 4
-
-
-@pytest.fixture(autouse=True, scope="module")
-def _quick_to_compile():
-    """Each file is compiled once to be run once; what it computes is the same to rounding."""
-    before = jax.config.read("jax_disable_most_optimizations")
-    jax.config.update("jax_disable_most_optimizations", True)
-    yield
-    jax.config.update("jax_disable_most_optimizations", before)
 
 
 @pytest.fixture(autouse=True)
