@@ -87,7 +87,6 @@ def test_one_instant_and_one_design():
     [
         ("gear_pair", "AB"),  # offsets that follow from a guess that differs
         ("six_bar_watt", None),
-        ("radial_engine", "r"),
         ("rsur", "BC"),  # angles about axes
     ],
 )
@@ -97,7 +96,7 @@ def test_kinds_of_mechanisms(name, parameter):
     key = parameter or next(iter(numbers))
     parameters = {key: mechanism.parameter_values[key] * np.linspace(0.995, 1.005, 4)}
     time = np.linspace(0.0, 1.5, 7)
-    check(mechanism, parameters, jn.solve_batch(mechanism, parameters, time, order=3), time, 3, 1e-11)
+    check(mechanism, parameters, jn.solve_batch(mechanism, parameters, time, order=4), time, 4, 1e-11)
 
 
 @pytest.mark.slow

@@ -159,7 +159,7 @@ def test_a_flatter_cusp_than_series_find_is_not_called_shaky():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name, count", [("bennett", -2), ("bricard", 0), ("goldberg", -1), ("sarrus", 0)])
+@pytest.mark.parametrize("name, count", [("bennett", -2), ("goldberg", -1)])
 def test_overconstrained_linkages_are_finite(name, count):
     case = getattr(overconstrained, name)()
     found = jn.mobility(case.mechanism, order=10)

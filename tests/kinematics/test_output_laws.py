@@ -118,7 +118,7 @@ def test_families_are_designs_solved_alone(forces):
 @pytest.mark.slow
 def test_gradients_of_the_driver_and_of_its_torque():
     """As of `test_in_space_the_torque_is_that_of_the_motor`, by the length of the rod and the swing of its tip."""
-    mechanism = rod_on_a_hinge({"length": 0.2, "swing": 0.1})
+    mechanism = rod_in_the_plane({"length": 0.2, "swing": 0.1})
     values = np.array([0.2, 0.1])
 
     def outputs(values):
@@ -141,24 +141,30 @@ def test_gradients_of_the_driver_and_of_its_torque():
 @pytest.mark.slow
 def test_the_least_torque_of_a_driver_that_follows():
     """The longer the rod, the less its hinge turns for the same tip, and the less torque that takes."""
-    mechanism = jn.Mechanism(
-        space="planar",
-        parameters={"length": 0.2},
-        bodies={"rod": jn.Body([0, 0], angle=0.2, mass=2.0, inertia=0.01)},
-        joints={"hinge": jn.planar.Revolute(("ground", "rod"), [0, 0], [0, 0])},
-        drivers={
-            "motor": jn.drivers.CoordinateDriver(
-                ("ground", "rod"), "angle", jn.OutputMotion("tip_y", "0.1*sin(2*t) + 0.05")
-            )
-        },
-        outputs={"tip": jn.PointOutput("rod", ["length", 0]), "torque": jn.DriverTorqueOutput("motor")},
-    )
+    mechanism = rod_in_the_plane({"length": 0.2, "swing": 0.1})
     found = jn.optimise(mechanism, "peak(torque)", {"length": (0.18, 0.25)}, starts=1, time=GRID[:5])
     assert found.status == "optimal"
     assert found.parameters["length"] == 0.25
 
 
-def rod_on_a_hinge(parameters):
+def rod_in_the_plane(parameters):
+    """The rod of `rod_in_space`, in the plane."""
+    law = jn.OutputMotion("tip_y", "swing*sin(2*t) + 0.05")
+    return jn.Mechanism(
+        space="planar",
+        parameters=parameters,
+        bodies={"rod": jn.Body([0, 0], angle=0.2, mass=2.0, inertia=0.01)},
+        joints={"hinge": jn.planar.Revolute(("ground", "rod"), [0, 0], [0, 0])},
+        drivers={"motor": jn.drivers.CoordinateDriver(("ground", "rod"), "angle", law)},
+        outputs={
+            "tip": jn.PointOutput("rod", ["length", 0]),
+            "angle": jn.DriverAngleOutput("motor"),
+            "torque": jn.DriverTorqueOutput("motor"),
+        },
+    )
+
+
+def rod_in_space(parameters):
     """A rod that turns about z, whose tip is held to a law of y; its motor carries an inertia of 0.01 kg m^2 only."""
     rod = jn.Body([0, 0, 0], orientation=[math.cos(0.1), 0, 0, math.sin(0.1)], mass=2.0, inertia=[0.0, 0.01, 0.01])
     hinge = jn.spatial.Revolute(("ground", "rod"), [0, 0, 0], [0, 0, 0], axis_i=[0, 0, 1], axis_j=[0, 0, 1])
@@ -180,7 +186,7 @@ def rod_on_a_hinge(parameters):
 @pytest.mark.slow
 def test_in_space_the_torque_is_that_of_the_motor():
     """A rod of 0.2 m turns about z, and its tip is held to y = 0.2 sin(theta): theta = arcsin(5 y)."""
-    motion = jn.solve(rod_on_a_hinge({"length": 0.2, "swing": 0.1}), GRID, order=3)
+    motion = jn.solve(rod_in_space({"length": 0.2, "swing": 0.1}), GRID, order=3)
 
     def angle(t):
         return mp.asin(5 * (mp.sin(2 * t) / 10 + mp.mpf("0.05")))

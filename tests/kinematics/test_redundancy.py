@@ -52,12 +52,11 @@ def test_a_bennett_linkage_moves_as_its_closed_form():
 
 @pytest.mark.slow
 def test_fronts_and_dense_least_squares_find_the_same(monkeypatch):
-    times = np.linspace(0, 1, 5)
-    dense = jn.solve(overconstrained.sarrus().mechanism, times)
+    dense = jn.solve(overconstrained.sarrus().mechanism, TIMES)
     assert dense.model.system.fronts is None
     monkeypatch.setattr("jounce.mechanism.fronts.MOST_DENSE", 0)
     builder._layout.cache_clear()
-    fronts = jn.solve(overconstrained.sarrus().mechanism, times)
+    fronts = jn.solve(overconstrained.sarrus().mechanism, TIMES)
     builder._layout.cache_clear()
     assert fronts.model.system.fronts is not None
     np.testing.assert_allclose(fronts.outputs["lift"], dense.outputs["lift"], atol=1e-11)
@@ -66,7 +65,7 @@ def test_fronts_and_dense_least_squares_find_the_same(monkeypatch):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "case",
-    ["bricard", "goldberg", "sarrus", "hooke_twice", "double_cardan", "scott_russell", "four_hinges"],
+    ["bricard", "sarrus", "hooke_twice", "double_cardan", "scott_russell", "four_hinges"],
 )
 def test_overconstrained_linkages_move_as_their_closed_forms(case):
     moves_as_told(getattr(overconstrained, case)())
@@ -92,7 +91,7 @@ def test_random_bennett_linkages_from_bad_guesses_in_any_unit():
         twists = (first, first + random.uniform(0.3, 1.2))
         start, size = random.uniform(0.5, 2.5), 10.0 ** random.uniform(-4, 4)
         case = overconstrained.bennett(twists, start, size=size, guess=0.1, seed=int(random.integers(1000)))
-        moves_as_told(case, TIMES[1:3], order=6)
+        moves_as_told(case, order=6)
 
 
 @pytest.mark.slow
@@ -109,8 +108,8 @@ def test_what_is_nearly_a_bennett_linkage_is_refused_and_what_is_one_to_rounding
 def test_a_tolerance_admits_numbers_of_few_digits():
     case = overconstrained.bennett(off=1e-6)
     with pytest.raises(jn.AssemblyError):
-        jn.solve(case.mechanism, TIMES)
-    motion = jn.solve(case.mechanism, TIMES, tolerance=1e-8)
+        jn.solve(case.mechanism, TIMES, order=6)
+    motion = jn.solve(case.mechanism, TIMES, order=6, tolerance=1e-8)
     np.testing.assert_allclose(motion.outputs["out"][:, 0], exact(case.motion, TIMES, 0)[:, 0], atol=1e-5)
 
 
@@ -148,10 +147,11 @@ def test_a_structure_that_is_locked_can_rest_and_not_move():
     random = np.random.default_rng(3)
     axes = random.normal(size=(3, 3))
     hinges = [(np.zeros(3), np.array(Z)), *zip(random.normal(size=(3, 3)), axes, strict=True)]
-    resting = jn.solve(overconstrained.hinged_loop(hinges, "0*t"), [0.0, 1.0])
+    driven = [overconstrained.hinged_loop(hinges, jn.ExpressionMotion("rate*t", {"rate": x})) for x in (0.0, 0.1)]
+    resting = jn.solve(driven[0], [0.0, 1.0])
     assert (resting.status == Status.OK).all()
     with pytest.raises(jn.SolveError, match=r"in their rates\): inconsistent"):
-        jn.solve(overconstrained.hinged_loop(hinges, "0.1*t"), [0.0, 1.0])
+        jn.solve(driven[1], [0.0, 1.0])
 
 
 @pytest.mark.slow
@@ -193,9 +193,8 @@ def test_who_repeats_whom_follows_from_the_combinations_that_vanish():
 
 @pytest.mark.slow
 def test_a_long_grid_in_threads_is_that_of_one():
-    case = overconstrained.bennett(law="3*t", turn=lambda t: 3 * t)
-    times = np.linspace(0, 6, 1500)
-    one, two = (jn.solve(case.mechanism, times, order=2, threads=count) for count in (1, 2))
+    case, times = overconstrained.bennett(), np.linspace(0, 2, 1500)
+    one, two = (jn.solve(case.mechanism, times, order=6, threads=count) for count in (1, 2))
     np.testing.assert_array_equal(one.outputs["out"], two.outputs["out"])
     few = slice(None, None, 100)
     np.testing.assert_allclose(one.outputs["out"][few, 0], exact(case.motion, times[few], 0)[:, 0], atol=1e-13)

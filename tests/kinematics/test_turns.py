@@ -150,7 +150,7 @@ def test_bodies_that_a_gear_couples_go_back_by_whole_turns_together():
         assert found[3] == pytest.approx(3.8 - 2 * found[2], abs=1e-11)
 
 
-GRIDS = [[0, 5, 10], np.linspace(0, 10, 41), [0, 10], [10]]
+GRIDS = [[0, 5, 10], np.linspace(0, 10, 41), [10]]
 LAWS = {"from within half a turn": (0.5, 1.0), "from the second turn": (7.5, 1.0), "back": (-7.5, -3.0)}
 SPRING = {"stiffness": 2.0, "angle": 0.3, "damping": 0.1}
 
@@ -176,23 +176,22 @@ def wound(start, rate, space="spatial"):
 
 
 def angles_of_law(start, rate, wave, time):
-    """The law of `wound` and its derivatives to the fifth, (time, derivative)."""
-    phase = np.pi * time[:, None] + np.arange(6) * np.pi / 2
-    return np.stack([start + rate * time, 0 * time + rate, *[0 * time] * 4], axis=-1) + wave * np.pi ** np.arange(
-        6
-    ) * np.sin(phase)
+    """The law of `wound` and its derivatives to the third, (time, derivative)."""
+    k = np.arange(4)
+    even = np.stack([start + rate * time, 0 * time + rate, 0 * time, 0 * time], axis=-1)
+    return even + wave * np.pi**k * np.sin(np.pi * time[:, None] + k * np.pi / 2)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("start, rate", LAWS.values(), ids=LAWS)
 def test_springs_in_space_count_turns_on_any_grid_as_in_the_plane(start, rate):
-    plane = jn.solve(wound(start, rate, "planar"), GRIDS[1]).outputs
+    plane = jn.solve(wound(start, rate, "planar"), GRIDS[1], order=2).outputs
     for grid in GRIDS:
-        motion = jn.solve(wound(start, rate), grid)
+        motion = jn.solve(wound(start, rate), grid, order=2)
         found, time = motion.outputs, np.array(grid, float)
         first, second = angles_of_law(start, rate, 0.4, time), angles_of_law(0.2, -2 * rate, 0.1, time)
         for name, angle in (("first", first), ("second", second), ("between", second - first)):
-            expected = -2.0 * angle[:, :5] - 0.1 * angle[:, 1:]
+            expected = -2.0 * angle[:, :3] - 0.1 * angle[:, 1:]
             expected[:, 0] += 2.0 * 0.3
             size = np.abs(expected).max(axis=0)
             assert (np.abs(found[f"{name}_spring"] - expected) <= 1e-13 * size).all()
@@ -205,7 +204,7 @@ def test_springs_in_space_count_turns_on_any_grid_as_in_the_plane(start, rate):
 @pytest.mark.slow
 def test_energies_and_powers_have_the_turns_of_the_forces():
     start, rate = LAWS["from the second turn"]
-    motion = jn.solve(wound(start, rate), GRIDS[0])
+    motion = jn.solve(wound(start, rate), GRIDS[0], order=2)
     time = np.array(GRIDS[0], float)
     first, second = angles_of_law(start, rate, 0.4, time)[:, 0], angles_of_law(0.2, -2 * rate, 0.1, time)[:, 0]
     expected = sum((angle - 0.3) ** 2 for angle in (first, second, second - first))
@@ -237,7 +236,7 @@ def test_about_axes_that_tilt_too_and_for_outputs_asked_for_later(turn):
 def test_instants_that_failed_have_no_torque():
     mechanism = wound(0.5, 1.0)
     motors = {**mechanism.drivers, "motor_first": drivers.RotationDriver(("ground", "first"), Z, "7*t + sqrt(4 - t)")}
-    motion = jn.solve(dataclasses.replace(mechanism, drivers=motors), [0.0, 3.0, 5.0], strict=False)
+    motion = jn.solve(dataclasses.replace(mechanism, drivers=motors), [0.0, 3.0, 5.0], order=2, strict=False)
     assert motion.status[-1] != 0
     torque = motion.outputs["first_spring"]
     assert np.isnan(torque[-1]).all()

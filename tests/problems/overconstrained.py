@@ -142,11 +142,11 @@ def bricard_angle(twist):
 LAW, TURN = "0.3*t + 0.4*sin(t)", lambda t: mp.mpf("0.3") * t + mp.mpf("0.4") * mp.sin(t)
 
 
-def bennett(twists=(0.9, 1.4), start=1.2, law=LAW, turn=TURN, **given):
+def bennett(twists=(0.9, 1.4), start=1.2, law=LAW, **given):
     """A Bennett linkage: four hinges whose axes are neither parallel nor meet."""
     second = bennett_second(*twists)
     loop = hinged_loop(bennett_hinges(start, twists), law, **given)
-    return Case(loop, 3, "out", lambda t: second(mp.mpf(start)) - second(start + turn(t)))
+    return Case(loop, 3, "out", lambda t: second(mp.mpf(start)) - second(start + TURN(t)))
 
 
 def bricard(twist=1.2, start=1.0, **given):
