@@ -17,8 +17,9 @@ MECHANISMS = {
     "double pendulum": lambda: dynamics.double_pendulum(0.4, 1.3, 1.0, -2.0),
     "spatial double pendulum": dynamics.spatial_double_pendulum,
 }
-APART = {("Obreshkov 4", "double pendulum"), ("Obreshkov 6", "double pendulum")}  # each compiles for half a minute
-APART |= {(f"Obreshkov {order}", "spatial double pendulum") for order in (4, 6, 8)}
+# each compiles for half a minute: the implicit ones move a closed loop, with the lowest and the highest of their orders
+APART = {(f"Obreshkov {order}", name) for order in (4, 6, 8) for name in MECHANISMS if name != "free four-bar"}
+APART |= {("Obreshkov 6", "free four-bar")}
 CASES = [
     pytest.param(method, name, marks=pytest.mark.slow)  # a minute each; tests/integrate has quick ones
     for name in MECHANISMS
@@ -57,7 +58,7 @@ def test_laws_of_a_simulation(method, name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", ["Taylor", "Obreshkov 6"])
 def test_forward_and_back_again(method):
     kind, tolerance = METHODS[method]
     there = jn.simulate(dynamics.simple_pendulum(0.3, 1.0), [0.0, 2.0], 1, method=kind, tolerance=tolerance)

@@ -207,7 +207,7 @@ def test_simulated_angles_are_continuous_over_turns():
         initial={"spin": jn.drivers.RotationDriver(("ground", "rotor"), [0, 0, 1.0], motion="0.2 + 11*t")},
         outputs={"turn": jn.EulerAnglesOutput("rotor", "ZYX"), "p": jn.EulerParametersOutput("rotor")},
     )
-    motion = jn.simulate(mechanism, [0.0, 2.0, 5.0], order=1)
+    motion = jn.simulate(mechanism, [0.0, 2.0, 5.0], order=1, method=jn.Taylor(8))
     np.testing.assert_allclose(motion.outputs["turn"][:, 0, 0], [0.2, 22.2, 55.2], rtol=0, atol=1e-9)
     np.testing.assert_allclose(motion.outputs["turn"][:, 1], [[11.0, 0, 0]] * 3, rtol=0, atol=1e-9)
     half = np.array([0.1, 11.1, 27.6])
@@ -231,9 +231,9 @@ def test_simulated_angles_without_a_value_are_told():
         outputs=outputs,
     )
     with pytest.raises(jn.SolveError, match="output turn") as caught:
-        jn.simulate(mechanism, [0.0, 2.0], order=1)
+        jn.simulate(mechanism, [0.0, 2.0], order=1, method=jn.Taylor(8))
     assert (caught.value.motion.status == jn.Status.UNDEFINED).all()
-    batch = jn.simulate_batch(mechanism, {"tilt": [0.0, 0.1]}, [0.0, 0.1], order=1)
+    batch = jn.simulate_batch(mechanism, {"tilt": [0.0, 0.1]}, [0.0, 0.1], order=1, method=jn.Taylor(8))
     assert (batch.status[0] == jn.Status.UNDEFINED).all()
     assert (batch.status[1] == jn.Status.OK).all()
     assert np.isfinite(batch.outputs["turn"][1]).all()

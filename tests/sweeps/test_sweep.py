@@ -291,7 +291,8 @@ def test_simulations_start_and_weigh_as_each_design_says(tmp_path):
         outputs={"place": jn.PointOutput("mass", [0, 0])},
     )
     vary = {"lift": "0:1:3", "m": [1.0, 3.0]}
-    found = jn.sweep(swing, vary, tmp_path / "a.zarr", [0.0, 0.5, 1.0], 2, simulate=True, workers=0, histories=True)
+    settings = {"simulate": True, "method": jn.Taylor(8), "workers": 0, "histories": True}
+    found = jn.sweep(swing, vary, tmp_path / "a.zarr", [0.0, 0.5, 1.0], 2, **settings)
     fall = found["lift"].values[:, None] - 9.81 / 2 * np.array([0.0, 0.5, 1.0]) ** 2
     assert np.allclose(found["place"].sel(component="y", derivative=0), fall, atol=1e-12)
     assert found["failed_instants"].values.tolist() == [0] * 6

@@ -115,7 +115,7 @@ def test_a_simulation_has_them_too(tmp_path):
     path = tmp_path / "falling.yaml"
     text = re.sub(r"drivers:.*?outputs:", "outputs:", FILE, flags=re.DOTALL)
     path.write_text(text.replace("order: 2}", "order: 1}"))
-    motion = jn.simulate(jn.load(path), order=1)
+    motion = jn.simulate(jn.load(path), order=1, method=jn.Taylor(8))
     found = motion.outputs
     assert np.abs(found["T"][:, 1] + found["V"][:, 1]).max() <= 1e-12 * np.abs(found["T"][:, 1]).max()
 
