@@ -67,14 +67,19 @@ def test_a_signal_ends_the_command_with_its_status_and_without_a_word(number, tm
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.parametrize("command", [["run"], ["plot"], ["report"]])
-def test_a_signal_at_any_time(number, command, tmp_path):
+@pytest.mark.parametrize(
+    "number, command, name",
+    [
+        (signal.SIGINT, "run", "motion.nc"),
+        (signal.SIGTERM, "plot", "film.mp4"),
+        (signal.SIGINT, "report", "page.html"),
+    ],
+)
+def test_a_signal_at_any_time(number, command, name, tmp_path):
     draw = random.Random(f"{number} {command}")
-    name = {"run": "motion.nc", "plot": "film.mp4", "report": "page.html"}[command[0]]
     ended = 0
     for _ in range(4):
-        arguments = [*COMMAND, *command, FOUR_BAR, "--out", name]
+        arguments = [*COMMAND, command, FOUR_BAR, "--out", name]
         status, _, err = stopped(number, draw.uniform(0.0, 6.0), *arguments, cwd=tmp_path)
         assert err == ""
         if status is not None and status != 0:  # 0: it was done while the signal was on its way
