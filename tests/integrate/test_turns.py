@@ -57,6 +57,21 @@ def test_a_spring_wound_up_by_three_turns_swings_three_turns_to_either_side(kind
 
 
 @pytest.mark.slow
+def test_in_the_plane_where_nothing_but_the_angle_moves():
+    """Of what the program of the march is given, much is without effect here, and XLA leaves it out."""
+    mechanism = jn.Mechanism(
+        space="planar",
+        bodies={"rotor": jn.Body([0, 0], mass=1.0, inertia=INERTIA)},
+        joints={},
+        forces={"twist": forces.TorsionalSpring(BODIES, STIFFNESS)},
+        initial={"start": drivers.CoordinateDriver(BODIES, "angle", WOUND)},
+        outputs={"angle": jn.AngleOutput("rotor")},
+    )
+    found = jn.simulate(mechanism, TIME, order=4)
+    np.testing.assert_allclose(found.outputs["angle"], closed_form(TIME, 5), rtol=0, atol=1e-12)
+
+
+@pytest.mark.slow
 def test_its_power_balance_closes():
     balance = jn.power_balance(released())
     assert float((abs(balance["residual"]) / balance["scale"]).max()) < 1e-13
