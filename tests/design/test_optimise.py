@@ -109,7 +109,7 @@ def test_slopes_are_those_of_differences():
         "span(tip_x*angle_d1, 1, -0.5, 0.53)",
         "rms(tip_y, 1)",
     ]
-    asked += ["mean(abs(angle + 2))*r", "at(tip_x, 2, 0.123)", "peak(torque(theta))", "peak(force(O))"]
+    asked += ["mean(abs(angle + 2))*r", "at(tip_x, 2, 0.123)", "peak(torque(theta), 1)", "peak(force(O))"]
     asked += ["rms(force_x(O))", "path_error(tip, ring)", "path_deviation(tip, ring)", "path_error(tip, timed)"]
     points = np.array([[0.3, 0.2], [0.5, 0.1], [0.1, -0.3]])
     curves = {"ring": points, "timed": (np.array([-0.7, 0.0, 0.456]), points)}

@@ -5,6 +5,7 @@ import pytest
 
 import jounce as jn
 from jounce.errors import MechanismError, RobotError
+from tests.problems.closed_robots import FIVE_BAR
 
 MASS, LENGTH, INERTIA = 1.2, 0.4, 0.03
 
@@ -89,3 +90,24 @@ def test_held_joints_have_the_torques_of_inverse_dynamics_and_given_torques_move
     torque = np.asarray(jn.inverse_dynamics(robot, np.stack([rest, 0 * rest, 0 * rest])))[0, 1]
     assert rest[0] == pytest.approx(0.3, abs=1e-12)
     assert torque == pytest.approx(0.4, abs=1e-12)
+
+
+@pytest.mark.slow
+def test_a_robot_with_loops_has_the_stiffness_of_the_torques_that_hold_it():
+    robot = jn.load_robot(FIVE_BAR)
+    small = jn.linearise(robot)
+    names = small.coordinates
+    assert len(names) == 2
+
+    def torques(moved):
+        held = jn.equilibrium(robot, q=moved, hold=names)
+        return np.array([float(jn.driver_force(held.motion, f"{name}_drive")[0, 0]) for name in names])
+
+    step = 1e-5
+    for k in range(2):
+        places = [{name: s * step * (name == names[k]) for name in names} for s in (1, -1)]
+        slope = (torques(places[0]) - torques(places[1])) / (2 * step)
+        assert np.allclose(slope, small.stiffness[:, k], atol=1e-7)
+    other = jn.linearise(robot, coordinates=["left_motor", "right_motor"])
+    values = [np.sort(np.linalg.eigvals(np.linalg.solve(x.mass, x.stiffness)).real) for x in (small, other)]
+    assert values[0].shape == values[1].shape == (2,)
