@@ -77,6 +77,8 @@ def test_a_four_bar_in_fifty_digits():
         ("gear_pair", ["R1", "AB", "BC"], 4),  # offsets that follow from the starting guess
         ("rolling_disc", ["R", "rod"], 4),
         ("rsur", ["BC"], 4),  # angles about axes
+        ("screw_press", ["lead"], 2),
+        ("rspu_distance", ["OD"], 3),
     ],
 )
 def test_high_orders_in_fifty_digits(name, parameters, order):
