@@ -9,7 +9,6 @@ that they are found with need no derivatives.
 
 import dataclasses
 from collections.abc import Callable, Mapping
-from functools import partial
 from typing import Any
 
 import jax
@@ -28,6 +27,7 @@ from jounce.integrate.methods import Taylor, evaluated
 from jounce.integrate.projection import normalised
 from jounce.integrate.simulation import Simulation
 from jounce.jet import Jet
+from jounce.kinematics.compilation import compiled
 from jounce.kinematics.sensitivities import Solved, check_not_redundant
 from jounce.kinematics.traced_motion import TracedMotion
 from jounce.mechanism import Mechanism, Model
@@ -165,11 +165,21 @@ def _start(mechanism: Mechanism, simulation: Simulation, equations: Equations) -
     guess = traced_model(mechanism, simulation.model.length).guess
     position = guess["position"][:, 1:]
     attitude = guess["angle"][None, 1:] if "angle" in guess else guess["quaternion"][:, 1:]
-    held = simulation.equations
-    jacobian = np.asarray(held.system.jacobian(held.still(known.position, known.attitude), Jet([instant])))[..., 0]
+    return _assembled(simulation.equations, equations, known, position, attitude, instant)
+
+
+@compiled(narrow=True)
+def _assembled(
+    held: Equations, equations: Equations, known: State, position: Any, attitude: Any, instant: Instants
+) -> State:
+    """Return a known state as it changes with the starting guess: by the shortest step, as that of the assembly.
+
+    `held` are the equations of motion as numbers.
+    """
+    jacobian = held.system.jacobian(held.still(known.position, known.attitude), Jet([instant]))[..., 0]
     still = equations.still(position, attitude)
     gap = equations.system.residual(still, Jet([instant])).coefficients[0]
-    column = -(np.linalg.pinv(jacobian) @ gap)  # the shortest step, as that of the assembly
+    column = -(jnp.linalg.pinv(jacobian) @ gap)
     pose = still.displaced(*equations.system.coordinates(column, still.shifts))
     state = known._replace(position=pose.position.coefficients[0][:, 1:], attitude=equations.attitude_of(pose))
     factor = jax.lax.stop_gradient(equations).factored(known, instant)
@@ -216,7 +226,7 @@ def _with_ground(state: State) -> dict[str, Any]:
     return {"position": position, "quaternion": attitude.at[0, 0, 0].set(1.0), "angular_velocity": spin[:-1]}
 
 
-@partial(jax.jit, static_argnames=("order", "highest"))
+@compiled("order", "highest", narrow=True)
 def _marched(
     equations: Equations,
     start: State,
@@ -291,6 +301,7 @@ def _change_of_inverse(primals: tuple[Any, Any], tangents: tuple[Any, Any]) -> t
     return inverse, -product(product(inverse, tangents[0]), inverse)
 
 
+@compiled(narrow=True)
 def _corrected(equations: Equations, state: State, time: Instants) -> State:
     """Return the state after one correction onto the constraints and their rates; see `projected`."""
     state = state._replace(attitude=normalised(state.attitude))
