@@ -30,6 +30,7 @@ from jounce.shapes import Numbers
 ANCHOR_ORDER = 8  # of the series at the anchors, at least: few carry many instants
 MOST_STEPS = 10_000  # of a design; one that needs more is left to be solved alone
 WIDEST = 512  # lanes
+LOTS = 8  # of so many, solved in one call
 
 Lanes = Float[np.ndarray, " design"]
 Indices = Int[np.ndarray, " lane"]
@@ -65,30 +66,62 @@ def advance_designs(
     return arrival._replace(turnover=turnovers_of(system, pose_type, reached, factor, instant), status=status)
 
 
-@compiled("pose_type", "order")
+@compiled("varied", "pose_type", "order")
 def _solve_designs(
     system: System,
     known: Any,
-    step: Float[Numbers, " batch"],
-    instant: Float[Numbers, " batch"],
+    step: Float[Numbers, " lane"],
+    instant: Float[Numbers, " lane"],
     settings: tuple[Any, Any, Any],
+    lots: Int[Numbers, ""],
     *,
+    varied: tuple[int, ...],
     pose_type: type[Pose],
     order: int,
 ) -> tuple[tuple[Any, ...], Any]:
-    """Solve an instant of each of many designs from one solved before.
+    """Solve an instant in each lane, of one design or another, from one solved before: lot after lot of `WIDEST`.
+
+    Parameters
+    ----------
+    lots : int
+        Those that are solved; lanes beyond them are left at zero.
+    varied : tuple of int
+        Which leaves of the system have lanes.
 
     Returns
     -------
-    tuple of tuple of array of shape (batch, order + 1, components), and array of shape (batch,)
+    tuple of tuple of array of shape (lane, order + 1, components), and array of shape (lane,)
         Derivatives of the outputs, for each instance of each group, and status.
     """
-    coordinates, angles, sign = known
-    arrival, _, _ = solved_batch(
-        system, coordinates, angles, sign, step, instant, *settings, pose_type=pose_type, order=order
-    )
-    rows = [jnp.transpose(plain_derivatives(jets), (2, 3, 0, 1)) for jets in arrival.outputs]
-    return tuple(tuple(row) for row in rows), arrival.status
+    leaves, structure = jax.tree.flatten(system)
+    width = min(WIDEST, len(step))
+
+    def solved(lot: Any) -> Any:
+        def some(x: Any) -> Any:
+            return jax.lax.dynamic_slice_in_dim(x, lot * width, width, axis=-1)
+
+        own = [some(leaf) if k in varied else leaf for k, leaf in enumerate(leaves)]
+        coordinates, angles, sign = jax.tree.map(some, known)
+        arrival, _, _ = solved_batch(
+            jax.tree.unflatten(structure, own),
+            coordinates,
+            angles,
+            sign,
+            some(step),
+            some(instant),
+            *settings,
+            pose_type=pose_type,
+            order=order,
+        )
+        rows = [jnp.transpose(plain_derivatives(jets), (2, 3, 0, 1)) for jets in arrival.outputs]
+        return tuple(tuple(row) for row in rows), arrival.status
+
+    def go_on(lot: Any, found: Any) -> Any:
+        put = jax.lax.dynamic_update_slice_in_dim
+        return jax.tree.map(lambda whole, part: put(whole, part, lot * width, 0), found, solved(lot))
+
+    blank = jax.tree.map(lambda x: jnp.zeros((len(step), *x.shape[1:]), x.dtype), jax.eval_shape(solved, 0))
+    return jax.lax.fori_loop(0, lots, go_on, blank)
 
 
 class DesignPaths:
@@ -168,26 +201,36 @@ class DesignPaths:
         order = np.argsort(np.abs(away), kind="stable")  # lanes that take as many iterations go together
         where = np.tile(np.arange(times), count - int(self.apart.sum()))
         width = min(WIDEST, max(16, 1 << (len(order) - 1).bit_length()))
-        lots = [order[k : k + width] for k in range(0, len(order), width)]
+        at_once = width * LOTS if len(order) > width else width
+        parts = [order[k : k + at_once] for k in range(0, len(order), at_once)]
+        varied, kind = self.designs.varied, self.solver.model.pose_type
 
-        def solve(lot: Indices) -> Any:
-            some = _filled(lot, width)
+        def solve(part: Indices) -> Any:
+            some = _filled(part, at_once)
             known = jax.tree.map(lambda x: x[..., source[some]], store)
             system = self.designs.system(design[some])
-            kind = self.solver.model.pose_type
+            lots = np.asarray(-(-len(part) // width))
             found = _solve_designs(
-                system, known, away[some], instant[some], self._settings, pose_type=kind, order=self.solver.order
+                system,
+                known,
+                away[some],
+                instant[some],
+                self._settings,
+                lots,
+                varied=varied,
+                pose_type=kind,
+                order=self.solver.order,
             )
-            return jax.tree.map(lambda x: np.asarray(x)[: len(lot)], found)
+            return jax.tree.map(lambda x: np.asarray(x)[: len(part)], found)
 
         with Threads(threads) as pool:
-            for lot, (found, outcome) in zip(lots, pool.map(solve, lots), strict=True):
+            for part, (found, outcome) in zip(parts, pool.map(solve, parts), strict=True):
                 if not outputs:
                     outputs = [[np.full((count, times, levels, x.shape[2]), np.nan) for x in group] for group in found]
-                at_lot = design[lot], where[lot]
-                status[at_lot] = outcome
+                these = design[part], where[part]
+                status[these] = outcome
                 for into, rows in zip(itertools.chain(*outputs), itertools.chain(*found), strict=True):
-                    into[at_lot] = rows[:, :levels]
+                    into[these] = rows[:, :levels]
         self.apart |= (status != Status.OK).any(axis=1)
         return outputs, status
 

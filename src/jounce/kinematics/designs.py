@@ -1,6 +1,7 @@
 """Many designs of one mechanism as one system whose values have a lane for each, and where each is put together."""
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import jax
@@ -96,6 +97,13 @@ class Designs:
         leaves = [next(values)[..., lanes] if leaf is None else leaf for leaf in self._fixed]
         groups, outputs = jax.tree.unflatten(self._structure, leaves)
         return with_fields(self.model.system, groups=groups, outputs=outputs, forces=())
+
+    @cached_property
+    def varied(self) -> tuple[int, ...]:
+        """Which leaves of their system have an entry for each lane."""
+        groups, outputs = jax.tree.unflatten(self._structure, [leaf is None for leaf in self._fixed])
+        held = jax.tree.map(lambda _: False, with_fields(self.model.system, forces=()))
+        return tuple(np.flatnonzero(jax.tree.leaves(with_fields(held, groups=groups, outputs=outputs))).tolist())
 
     def unfit(self) -> Bool[np.ndarray, " design"]:
         """Tell which designs have a value that no mechanism may have: they are refused in words when solved alone."""
