@@ -27,7 +27,7 @@ from jounce.mechanism.system import System
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
 
-ANCHOR_ORDER = 8  # of the series at the anchors, at least: few carry many instants
+ANCHOR_ORDER = 6  # of the series at the anchors, at least: few carry many instants
 MOST_STEPS = 10_000  # of a design; one that needs more is left to be solved alone
 WIDEST = 512  # lanes
 LOTS = 8  # of so many, solved in one call
