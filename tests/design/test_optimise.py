@@ -56,6 +56,14 @@ def test_the_least_mean_square_is_that_of_legendre():
 
 
 @pytest.mark.slow
+def test_goals_of_time_and_parameters_alone_are_to_the_order_that_they_need():
+    found = jn.optimise(CRANK, "rms(r*exp(t), 1)", {"r": (0.1, 0.5)}, ["mean(r*t**2) >= 0.1"], starts=1)
+    assert found.success
+    assert found.parameters["r"] == pytest.approx(0.3, abs=1e-9)
+    assert found.objective == pytest.approx(0.3 * np.sqrt((np.e**2 - np.e**-2) / 4), rel=1e-9)
+
+
+@pytest.mark.slow
 def test_a_condition_is_kept_and_its_multiplier_is_the_slope_of_the_optimum():
     """The least mean square with the rate at the end held is that of linear equations, and so is its slope."""
     powers = np.array([1, 2, 0])  # of a, b and c

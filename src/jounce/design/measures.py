@@ -190,10 +190,9 @@ class Curve:
 
 
 def environment(
-    instants: Float[np.ndarray, " time"], parameters: Mapping[str, Any], series: Mapping[str, Any]
+    instants: Float[np.ndarray, " time"], parameters: Mapping[str, Any], series: Mapping[str, Any], order: int
 ) -> dict[str, Any]:
-    """Return what names mean: time and quantities are jets along the grid, parameters are numbers."""
-    order = max((len(each) for each in series.values()), default=1) - 1
+    """Return what names mean: time, to an order, and quantities are jets along the grid, parameters are numbers."""
     return {**parameters, "t": Jet.variable(instants, order), **{name: Jet(tuple(x)) for name, x in series.items()}}
 
 

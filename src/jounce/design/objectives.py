@@ -166,7 +166,7 @@ class Goals:
         outputs : dict of str to array of shape (time, derivative) or (time, derivative, component)
             Of a motion.
         """
-        names = environment(self.instants, self._values(parameters), self.series(outputs))
+        names = environment(self.instants, self._values(parameters), self.series(outputs), self.order)
         rows = [extreme(names, cells) for extreme, cells in zip(self._extremes, self._cells, strict=True)]
         smooth = [jnp.asarray(measure(names), float).reshape(-1) for measure in self._smooth]
         return rows, jnp.concatenate([*smooth, jnp.zeros(0)])
