@@ -55,6 +55,7 @@ from jounce.dynamics import (
 )
 from jounce.errors import (
     AssemblyError as AssemblyError,
+    DamageWarning as DamageWarning,
     DesignError as DesignError,
     ExpressionError as ExpressionError,
     JounceError as JounceError,

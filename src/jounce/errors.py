@@ -285,6 +285,10 @@ class UnitWarning(UserWarning):
     """A number without a unit is likely meant in another unit than that of SI."""
 
 
+class DamageWarning(UserWarning):
+    """Files of a result were lost or changed after they were written; what they held is computed again."""
+
+
 class OutputError(JounceError):
     """A file of results cannot be written or read."""
 

@@ -3,6 +3,7 @@
 import json
 import os
 import pathlib
+import shutil
 import signal
 import subprocess
 import sys
@@ -104,6 +105,23 @@ def test_only_what_is_missing_is_computed_again_to_the_same_bits(done, tmp_path)
     told.clear()
     assert swept(tmp_path / "a.zarr", progress=lambda *x: told.append(x)).attrs["checksum"] == whole
     assert told == [(27, COUNT)]
+
+
+@pytest.mark.parametrize("damage", ["lost", "changed", "broken"])
+def test_what_was_lost_or_changed_on_the_disk_is_told_and_computed_again(done, tmp_path, damage):
+    folder = tmp_path / "a.zarr"
+    shutil.copytree(done[0], folder)
+    part = folder / "psi_peak" / "c" / "1" / "0"
+    if damage == "lost":
+        part.unlink()
+    elif damage == "changed":  # well formed, but of other numbers
+        shutil.copy(folder / "psi_rms" / "c" / "1" / "0", part)
+    else:
+        part.write_bytes(part.read_bytes()[:30] + b"xx" + part.read_bytes()[32:])
+    with pytest.warns(jn.DamageWarning, match="files of 11 designs"):
+        again = swept(folder, histories=True)
+    assert again.attrs["checksum"] == done[1].attrs["checksum"]
+    assert again["psi_peak"].identical(done[1]["psi_peak"])
 
 
 def test_another_sweep_is_refused_and_nothing_of_the_first_is_lost(done, tmp_path):

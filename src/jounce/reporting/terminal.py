@@ -11,14 +11,19 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from jounce.errors import RobotWarning, SampleWarning, UnitWarning
+from jounce.errors import DamageWarning, RobotWarning, SampleWarning, UnitWarning
 from jounce.interrupts import undoing
 
 if TYPE_CHECKING:
     from jounce.reporting.peaks import Peak
     from jounce.reporting.tables import Table
 
-OURS = (RobotWarning, SampleWarning, UnitWarning)  # warnings of this package, which nobody may turn off by mistake
+OURS = (
+    DamageWarning,
+    RobotWarning,
+    SampleWarning,
+    UnitWarning,
+)  # warnings of this package, which nobody may turn off by mistake
 WIDTH = 80  # of tables that do not go to a terminal
 WIDEST = 9999
 SHOW_CURSOR = b"\r\x1b[2K\x1b[?25h"  # on a cleared line; a progress bar hides it

@@ -60,12 +60,9 @@ class Store:
         OutputError
             The disk is full, or what else the system says.
         """
-        digest, written = hashlib.sha256(), []
+        written = []
         try:
-            for name in sorted(arrays):
-                values = np.ascontiguousarray(arrays[name])
-                digest.update(f"{name} {values.dtype.str} {values.shape} ".encode())
-                digest.update(values.data)
+            for name, values in arrays.items():
                 target = self._arrays[name]
                 target[start : start + len(values)] = values
                 key = target.metadata.encode_chunk_key((chunk, *[0] * (values.ndim - 1)))
@@ -77,14 +74,30 @@ class Store:
         except OSError as error:
             raise OutputError(f"cannot be written: {reason_of(error)}", path=str(self.folder)) from error
         with replacing(mark) as scratch:
-            scratch.write_bytes(digest.digest())
+            scratch.write_bytes(_digest(arrays))
 
     def is_done(self, chunk: int) -> bool:
         """Tell whether a chunk is on the disk."""
         return self._mark(chunk).exists()
 
+    def is_whole(self, chunk: int, start: int, count: int) -> bool:
+        """Tell whether the arrays of a chunk that is done, of so many designs, are those that were written."""
+        try:
+            arrays = {
+                name: array[start : start + count]
+                for name, array in self._arrays.items()
+                if (array.metadata.dimension_names or ("",))[0] == "design"
+            }
+            return _digest(arrays) == self._mark(chunk).read_bytes()
+        except Exception:  # noqa: BLE001 - whatever is wrong with its files, it is computed again
+            return False
+
+    def forget(self, chunk: int) -> None:
+        """Have a chunk computed again."""
+        self._mark(chunk).unlink(missing_ok=True)
+
     def done(self, count: int) -> np.ndarray:
-        """Tell which of the chunks are on the disk."""
+        """Tell which of the chunks were put on the disk."""
         found = np.zeros(count, bool)
         with suppress(FileNotFoundError), os.scandir(self._mark(0).parent) as entries:
             found[[int(entry.name) for entry in entries if entry.name.isdecimal()]] = True
@@ -147,6 +160,16 @@ class Store:
 
     def _mark(self, chunk: int) -> Path:
         return self.folder / "chunks" / "digest" / "c" / str(chunk)
+
+
+def _digest(arrays: Mapping[str, np.ndarray]) -> bytes:
+    """Return the digest of arrays by name; what is not a number is NaN, whatever bits it has."""
+    digest = hashlib.sha256()
+    for name in sorted(arrays):
+        values = np.ascontiguousarray(arrays[name])
+        digest.update(f"{name} {values.dtype.str} {values.shape} ".encode())
+        digest.update((np.where(np.isnan(values), np.nan, values) if values.dtype.kind == "f" else values).data)
+    return digest.digest()
 
 
 def find(folder: Path) -> Store | None:

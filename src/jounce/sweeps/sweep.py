@@ -1,6 +1,7 @@
 """A sweep: all designs of a grid or a sample, on all cores or on a cluster, to a folder that a call goes on with."""
 
 import math
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import contextmanager
 from os import PathLike, fspath
@@ -8,10 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from jaxtyping import Bool
 
 from jounce.design.design_space import sample_space
 from jounce.design.variations import read_variations
-from jounce.errors import JounceError, MechanismError, OutputError, TrajectoryError, whole_number
+from jounce.errors import DamageWarning, JounceError, MechanismError, OutputError, TrajectoryError, whole_number
 from jounce.integrate.methods import AbstractMethod
 from jounce.io.files.reading import recording
 from jounce.mechanism import Mechanism
@@ -192,7 +194,7 @@ def run(
     """
     store = plan.store
     with store.locked():
-        done = store.done(plan.chunks)
+        done = _whole(plan)
         told = _Told(plan, sum(map(plan.size, np.flatnonzero(done).tolist())), progress)
         left = (chunk for chunk in range(plan.chunks) if not done[chunk])
         if not done.all():
@@ -206,7 +208,22 @@ def run(
                     processes = None if workers is None else whole_number("workers", workers, 1, error=JounceError)
                     where = {"scheduler": scheduler, "workers": processes, "timeout": timeout}
                     compute_on_cluster(plan, left, told, **where, user_files=user_files, prepare=prepare_worker)
-        return store.manifest["checksum"] or store.finish(plan.chunks)
+        return store.manifest["checksum"] if done.all() and store.manifest["checksum"] else store.finish(plan.chunks)
+
+
+def _whole(plan: Plan) -> Bool[np.ndarray, " chunk"]:
+    """Tell which chunks are on the disk as they were written; others are forgotten, and told in a warning."""
+    store = plan.store
+    done = store.done(plan.chunks)
+    damaged = [k for k in np.flatnonzero(done).tolist() if not store.is_whole(k, k * plan.chunk, plan.size(k))]
+    for chunk in damaged:
+        store.forget(chunk)
+        done[chunk] = False
+    if damaged:
+        count = sum(map(plan.size, damaged))
+        message = f"{plan.folder}: files of {count} designs were lost or changed since, which are computed again"
+        warnings.warn(DamageWarning(message), stacklevel=2)
+    return done
 
 
 def opened(folder: Path) -> Any:
