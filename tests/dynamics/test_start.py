@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce import drivers, planar
+from jounce import drivers, forces, planar
 from jounce.dynamics.start import consistent_start
 from tests.problems.dynamics import simple_pendulum
 
@@ -75,6 +75,32 @@ def test_a_massless_body_that_can_move_is_named():
     pin = planar.Revolute(("ground", "dust"), [0, 0], [0, 0])
     loose = dataclasses.replace(mechanism, bodies=bodies, joints={**mechanism.joints, "pin": pin})
     refused(jn.MechanismError, "bodies.dust.(mass|inertia): the body can move but has no", loose)
+
+
+def machine(mass, inertia, size=1.0):
+    """Return a heavy pendulum and, on its own pivot, a disc on a torsional spring of 10 rad/s."""
+    return jn.Mechanism(
+        space="planar",
+        gravity=[0, -9.81 * size],
+        bodies={
+            "heavy": jn.Body([0, 0], angle=0.3, mass=mass, inertia=mass * size**2, center_of_mass=[size, 0]),
+            "disc": jn.Body([2 * size, 0], mass=1e4 * inertia, inertia=inertia),
+        },
+        joints={
+            "O": planar.Revolute(("ground", "heavy"), [0, 0], [0, 0]),
+            "P": planar.Revolute(("ground", "disc"), [2 * size, 0], [0, 0]),
+        },
+        forces={"spring": forces.TorsionalSpring(("ground", "disc"), stiffness=100 * inertia, angle=1.0)},
+        outputs={"disc": jn.AngleOutput("disc")},
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("given", [(2e4, 1e-8), (2e10, 1e-10), (1.0, 1.0, 1e-6), (1.0, 1.0, 1e6)])
+def test_a_small_inertia_beside_large_ones_is_not_none(given):
+    found = jn.simulate(machine(*given), [0.0, 1.0], order=3).outputs["disc"][-1]
+    exact = [1 - np.cos(10), 10 * np.sin(10), 100 * np.cos(10), -1000 * np.sin(10)]
+    assert found == pytest.approx(exact, rel=1e-13)
 
 
 def turning(moments):

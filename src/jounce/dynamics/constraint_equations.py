@@ -19,7 +19,7 @@ from jounce.dynamics.loads import mass_matrices
 from jounce.dynamics.masses import Masses, masses_of
 from jounce.dynamics.mechanism_state import MotionAtState, at_state
 from jounce.dynamics.motion_values import Coordinates, cut, derivatives_along, in_chunks, pose_of
-from jounce.dynamics.saddle_point import Jacobian, MassMatrix, block_diagonal, saddle_point
+from jounce.dynamics.saddle_point import Jacobian, MassMatrix, block_diagonal, even_scale, saddle_point
 from jounce.errors import MechanismError
 from jounce.jet import Jet
 from jounce.jet.derivatives import plain_derivatives
@@ -294,6 +294,8 @@ def _determined(
         mass = mass * scale[:, None] * scale
         mass = mass / (np.max(np.abs(mass)) or 1.0)
         whole = np.asarray(saddle_point(mass[..., None], whole[..., None]))[..., 0]
+        even = even_scale(whole, len(scale))
+        whole = whole * even * even[:, None]
     return int(np.linalg.matrix_rank(whole, rtol=RANK_TOLERANCE)) == len(whole)
 
 

@@ -29,6 +29,20 @@ def saddle_point(mass: MassMatrix, jacobian: Jacobian) -> Float[Numbers, "size s
     return jnp.concatenate([above, below])
 
 
+def even_scale(whole: Float[np.ndarray, "size size"], columns: int) -> Float[np.ndarray, " size"]:
+    """Return by what to scale rows and columns of such a matrix, to tell whether it is singular.
+
+    Each of the first columns is measured by its own mass, or moment of inertia, and each row of the Jacobian by its
+    size then: a small mass beside large ones is not none.
+    """
+    mass = np.abs(np.diag(whole))[:columns]
+    scale = np.ones(len(whole))
+    scale[:columns] = 1 / np.sqrt(np.where(mass > 0, mass, 1.0))
+    rows = np.linalg.norm(whole[columns:, :columns] * scale[:columns], axis=1)
+    scale[columns:] = 1 / np.where(rows > 0, rows, 1.0)
+    return scale
+
+
 def block_diagonal(blocks: BodyMatrices, scale: Float[Numbers, " coordinate"]) -> MassMatrix:
     """Return the mass matrix of all bodies from those of each, both its rows and its columns scaled."""
     size, _, bodies, lanes = blocks.shape

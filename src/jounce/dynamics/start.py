@@ -10,6 +10,7 @@ from jaxtyping import Float
 from jounce.dynamics.forward import Equations, Instants, State
 from jounce.dynamics.masses import Masses, gravity_of, required_masses
 from jounce.dynamics.saddle_fronts import SaddleFronts
+from jounce.dynamics.saddle_point import even_scale
 from jounce.errors import AssemblyError, JounceError, MechanismError, MobilityError
 from jounce.jet import Jet
 from jounce.kinematics.advance import LARGEST_CONTRADICTION
@@ -177,7 +178,7 @@ def _explain(equations: Equations, model: Model, state: State, instant: float) -
     whole, entries = (np.asarray(x) for x in _matrices(equations, state, np.array([[instant]])))
     jacobian = HostJacobian.of(model.system.pattern, entries).scaled(np.asarray(model.system.row_scale)[:, 0])
     columns = jacobian.shape[1]
-    loose = _loose(whole)
+    loose = _loose(whole, columns)
     if len(loose):
         mass, _, moments = map(np.asarray, equations.masses)
         by_body = np.linalg.norm(loose[:, :columns].reshape(len(loose), len(model.bodies), -1), axis=(0, 2))
@@ -199,13 +200,15 @@ def _explain(equations: Equations, model: Model, state: State, instant: float) -
     return f"{free} {noun}: {freely_moving(model, jacobian.free_directions)}"
 
 
-def _loose(whole: Float[np.ndarray, "size size"]) -> Float[np.ndarray, "direction size"]:
-    """Return the unknowns that the matrix of the equations leaves open."""
-    tolerance = 1e-3 * RANK_TOLERANCE
-    if is_clearly_regular(whole, tolerance):
+def _loose(whole: Float[np.ndarray, "size size"], columns: int) -> Float[np.ndarray, "direction size"]:
+    """Return the unknowns that the matrix of the equations leaves open, the first of which belong to columns."""
+    scale, tolerance = even_scale(whole, columns), 1e-3 * RANK_TOLERANCE
+    even = whole * scale * scale[:, None]
+    if is_clearly_regular(even, tolerance):
         return np.zeros((0, len(whole)))
-    _, sizes, right = np.linalg.svd(whole)
-    return right[sizes <= tolerance * sizes.max()]
+    _, sizes, right = np.linalg.svd(even)
+    found = right[sizes <= tolerance * sizes.max()] * scale
+    return found / np.linalg.norm(found, axis=1, keepdims=True)
 
 
 def _check_energy(model: Model, mass: Float[np.ndarray, "column column"], jacobian: HostJacobian) -> None:
