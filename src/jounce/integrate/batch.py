@@ -13,6 +13,7 @@ from jaxtyping import Float, Int
 from jounce.display import Displayed
 from jounce.dynamics.forward import Equations, State
 from jounce.dynamics.start import consistent_start, initial_as_drivers
+from jounce.errors import MechanismError
 from jounce.integrate.batch_equations import BatchStart, ParametricMechanism, Turns
 from jounce.integrate.events import pose_coordinates
 from jounce.integrate.marching import DenseOutput, IntegratorState, Outcome, begin_march, march
@@ -24,7 +25,7 @@ from jounce.jet.turns import whole_periods
 from jounce.kinematics import Status
 from jounce.kinematics.families import checked_values
 from jounce.kinematics.motion import output_series
-from jounce.mechanism import Mechanism, TimeGrid, build, check_mechanism
+from jounce.mechanism import AbstractMotionOutput, Mechanism, TimeGrid, build, check_mechanism
 from jounce.mechanism.axis_angles import with_turns
 from jounce.mechanism.builder import with_reference
 from jounce.mechanism.law_checks import check_laws
@@ -93,7 +94,8 @@ def simulate_batch(
     Raises
     ------
     MechanismError
-        If a parameter does not exist, or values are not finite or of unequal number; and as `simulate`.
+        If a parameter does not exist, or values are not finite or of unequal number; if an output is a force or an
+        energy; and as `simulate`.
 
     Examples
     --------
@@ -111,6 +113,7 @@ def simulate_batch(
     (3, 2, 5)
     """
     check_mechanism(mechanism)
+    check_outputs(mechanism)
     values = checked_values(mechanism, parameters, "run")
     names, rows = tuple(values), np.stack(list(values.values()), axis=-1)
     first = mechanism.with_parameters(**dict(zip(names, rows[0].tolist(), strict=True)))
@@ -139,6 +142,14 @@ def simulate_batch(
         while len(runs.moving):
             list(pool.map(runs.advance, runs.lots(runs.moving)))
     return Batch(instants, values, runs.outputs, runs.status, runs.steps)
+
+
+def check_outputs(mechanism: Mechanism) -> None:
+    """Raise MechanismError if an output is a force or an energy, which follows from a whole motion."""
+    for name, output in mechanism.outputs.items():
+        if isinstance(output, AbstractMotionOutput):
+            message = "forces and energies are not computed in batches of simulations; leave this output out"
+            raise MechanismError(message, name=f"outputs.{name}")
 
 
 class _Runs:

@@ -74,7 +74,7 @@ class FollowingMotion(_MadeOfOthers):
     Raises
     ------
     TrajectoryError
-        If one of them is no law.
+        If one of them is no law, or the leader has the law of an output.
 
     Examples
     --------
@@ -90,6 +90,11 @@ class FollowingMotion(_MadeOfOthers):
     def __init__(self, law: AbstractMotion, leader: Law):
         if not isinstance(law, AbstractMotion):
             raise TrajectoryError("must be a motion law", name="law", value=law)
+        if isinstance(leader, OutputMotion):
+            raise TrajectoryError(
+                f"the leader has the law of the output {leader.output}, and its own is known by solving only; solve the "
+                "mechanism without this law, and take the law found, motion.driver_law"
+            )
         self._take([law, leader])
 
     def resolved(self, parameters: Mapping[str, Any]) -> "FollowingMotion":

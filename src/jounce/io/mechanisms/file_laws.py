@@ -61,6 +61,12 @@ class FileLaws:
             message = f"drivers follow each other in a circle: {' -> '.join(circle)}"
             raise self.source.error(message, (*location, "of"), value=name)
         given = self.law(("drivers", name, "motion"), self.drivers[name]["motion"], circle)
+        if isinstance(given, OutputMotion):
+            message = (
+                f"this driver has the law of the output {given.output}, and its own is known by solving only; solve the "
+                f'mechanism without this law, and give {name} the law found, motion.driver_law("{name}")'
+            )
+            raise self.source.error(message, (*location, "of"), value=name)
         return given if isinstance(given, AbstractMotion | Expression) else Expression(repr(float(given)))
 
     def _spline(self, location: Location, samples: Any) -> SplineMotion:
