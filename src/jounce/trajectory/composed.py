@@ -92,7 +92,7 @@ class FollowingMotion(_MadeOfOthers):
             raise TrajectoryError("must be a motion law", name="law", value=law)
         if isinstance(leader, OutputMotion):
             raise TrajectoryError(
-                f"the leader has the law of the output {leader.output}, and its own is known by solving only; solve the "
+                f"the leader has the law of the output {leader.output}; its own is found by solving only: solve the "
                 "mechanism without this law, and take the law found, motion.driver_law"
             )
         self._take([law, leader])

@@ -63,7 +63,7 @@ class FileLaws:
         given = self.law(("drivers", name, "motion"), self.drivers[name]["motion"], circle)
         if isinstance(given, OutputMotion):
             message = (
-                f"this driver has the law of the output {given.output}, and its own is known by solving only; solve the "
+                f"this driver has the law of the output {given.output}; its own is found by solving only: solve the "
                 f'mechanism without this law, and give {name} the law found, motion.driver_law("{name}")'
             )
             raise self.source.error(message, (*location, "of"), value=name)
