@@ -92,8 +92,8 @@ class FollowingMotion(_MadeOfOthers):
             raise TrajectoryError("must be a motion law", name="law", value=law)
         if isinstance(leader, OutputMotion):
             raise TrajectoryError(
-                f"the leader has the law of the output {leader.output}; its own is found by solving only: solve the "
-                "mechanism without this law, and take the law found, motion.driver_law"
+                f"the leader has the law of the output {leader.output}, and none of its own; solve the "
+                "mechanism without the follower, and take the law that is found, motion.driver_law"
             )
         self._take([law, leader])
 

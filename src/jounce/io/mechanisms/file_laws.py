@@ -63,8 +63,8 @@ class FileLaws:
         given = self.law(("drivers", name, "motion"), self.drivers[name]["motion"], circle)
         if isinstance(given, OutputMotion):
             message = (
-                f"this driver has the law of the output {given.output}; its own is found by solving only: solve the "
-                f'mechanism without this law, and give {name} the law found, motion.driver_law("{name}")'
+                f"has the law of the output {given.output}, and none of its own; solve the mechanism "
+                f'without this driver, and give {name} the law that is found, motion.driver_law("{name}")'
             )
             raise self.source.error(message, (*location, "of"), value=name)
         return given if isinstance(given, AbstractMotion | Expression) else Expression(repr(float(given)))
