@@ -106,7 +106,7 @@ def test_a_driver_that_has_the_law_of_an_output_is_not_followed(tmp_path):
     text = FILE.replace("motion: speed*t", "motion: {output: y, law: 0.1*t}")
     assert text != FILE
     with pytest.raises(
-        jn.MechanismFileError, match="has the law of the output y, and none of its own, got .shaft_angle."
+        jn.MechanismFileError, match=r"law of the output y, and none of its own, got .shaft_angle."
     ) as e:
         loaded(tmp_path, text)
     assert e.value.line is not None
