@@ -97,6 +97,21 @@ def test_a_trajectory_that_is_too_fast_ends_with_1_and_its_rows_are_marked(run):
     assert "* broken" in out
 
 
+def test_what_is_infinite_by_a_jump_is_told_printed_drawn_and_null_in_json(run, files, tmp_path):
+    law = "joints: {pin: 0.1*abs(t - 0.98765)}\ntime: {stop: 2, step: 0.1}"
+    limits = "joints: {pin: {acceleration: 5 rad/s^2, velocity: 1 rad/s}}"
+    robot, trajectory, bounds = files(pendulum_urdf=PENDULUM, corner_yaml=law, limits_yaml=limits)
+    figure = tmp_path / "corner.png"
+    status, out, err = run(robot, trajectory, "--limits", bounds, "--out", figure)
+    assert (status, err, figure.stat().st_size > 10_000) == (1, "", True)
+    assert "pin acceleration rad/s^2 infinite 5 inf* 0.98765" in [" ".join(line.split()) for line in out.splitlines()]
+    assert "2 of 4 limits broken.\nWorst: pin acceleration, infinite by a jump at t = 0.98765 s\n" in out
+    status, out, _ = run(robot, trajectory, "--limits", bounds, "--json")
+    row = next(x for x in json.loads(out)["limits"] if x["quantity"] == "acceleration")
+    assert (status, row["worst"], row["ratio"], row["broken"], row["limit"]) == (1, None, None, True, 5.0)
+    assert row["at"] == pytest.approx(0.98765, abs=1e-9)
+
+
 @pytest.mark.slow
 def test_the_text_is_plain_and_fits_80_columns(run):
     for trajectory in (GOOD, TOO_FAST, WAVE):
