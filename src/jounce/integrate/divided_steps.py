@@ -6,7 +6,7 @@ looked at by how its series changes with the state at its beginning and with eac
 until all of these converge within it.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Any, NamedTuple
 
 import jax
@@ -16,6 +16,7 @@ from jaxtyping import Bool, Float, Int
 
 from jounce.dynamics.forward import Equations, State
 from jounce.errors import UnsupportedError
+from jounce.integrate.breaks import Break
 from jounce.integrate.marching import DenseOutput
 from jounce.integrate.methods import LOWEST_ORDER, evaluated
 from jounce.kinematics.compilation import compiled
@@ -26,7 +27,28 @@ MOST_DIRECTIONS = 16
 HALVINGS = 17
 FINER = 100.0  # times less is left out of the series of parts than of those of steps, which are fewer
 
+ROUNDS = 3  # each makes a state behind a kink and its instant better by as much as the time to it is short
+
 Expand = Callable[..., State]
+
+
+class Kinks(NamedTuple):
+    """Which pieces lead over kinks.
+
+    Attributes
+    ----------
+    begins : array of shape (steps,)
+        From when on instants belong to a piece, s: behind a kink to the one after it.
+    back : array of bool, shape (steps,)
+        Whether a piece begins behind a kink and goes back to it.
+    velocity, spin : array of shape (steps, components, bodies)
+        Weights of `Break`.
+    """
+
+    begins: Float[np.ndarray, " step"]
+    back: Bool[np.ndarray, " step"]
+    velocity: Float[np.ndarray, "step component body"]
+    spin: Float[np.ndarray, "step component body"]
 
 
 class Pieces(NamedTuple):
@@ -40,25 +62,54 @@ class Pieces(NamedTuple):
         At the start of each, (steps, components, bodies).
     kept : array of bool, shape (steps, order + 1)
         Which coefficients of the series are used.
+    kinks : Kinks, optional
+        Where there are some.
     """
 
     start: Float[np.ndarray, " step"]
     length: Float[np.ndarray, " step"]
     state: State
     kept: Bool[np.ndarray, "step order"]
+    kinks: Kinks | None = None
 
     def at(self, instants: Float[np.ndarray, " time"]) -> Int[np.ndarray, " time"]:
         """Return in which of them instants are."""
         sign = -1.0 if self.length[0] < 0 else 1.0
-        found = np.searchsorted(sign * self.start, sign * instants, "right") - 1
+        begins = self.start if self.kinks is None else self.kinks.begins
+        found = np.searchsorted(sign * begins, sign * instants, "right") - 1
         return np.clip(found, 0, len(self.start) - 1)
 
     def padded(self) -> "Pieces":
         """Return as many as a power of two, the last again and again with no length: few lengths are compiled."""
         count = len(self.start)
         fill = np.minimum(np.arange(1 << (count - 1).bit_length()), count - 1)
-        length = np.where(np.arange(len(fill)) < count, self.length[fill], 0.0)
-        return Pieces(self.start[fill], length, self.state.map(lambda part: part[fill]), self.kept[fill])
+        return self.chosen(fill)._replace(length=np.where(np.arange(len(fill)) < count, self.length[fill], 0.0))
+
+    def chosen(self, which: Int[np.ndarray, " chosen"]) -> "Pieces":
+        """Return some of them."""
+        return jax.tree.map(lambda part: part[which], self)
+
+    def over(self, kinks: dict[int, Break]) -> "Pieces":
+        """Return pieces of which some, by index, go to kinks only, and the next begin behind these all the same.
+
+        So none begins at a kink, where rounding would decide on which side it is. In between are pieces that go back
+        to the kink, where the two sides meet.
+        """
+        if not kinks:
+            return self
+        places = np.array(sorted(kinks))
+        before, first = np.isin(np.arange(len(self.start)), places), np.isin(np.arange(len(self.start)), places + 1)
+        which = np.repeat(np.arange(len(self.start)), np.where(first, 1 + ROUNDS, 1))
+        back = np.append(which[1:] == which[:-1], False)
+        length, begins = self.length.copy(), self.start.copy()
+        remaining, weights = np.zeros(len(length)), [np.zeros(part.shape) for part in self.state[2:]]
+        for place, kink in kinks.items():
+            remaining[place + 1], length[place] = length[place] - kink.since, kink.since
+            begins[place + 1] = self.start[place] + kink.since
+            weights[0][place + 1], weights[1][place + 1] = kink.velocity, kink.spin
+        whole = self._replace(length=length, kept=self.kept | (before | first)[:, None]).chosen(which)
+        over = Kinks(begins[which], back, *(part[which] for part in weights))
+        return whole._replace(length=np.where(back, -remaining[which], whole.length), kinks=over)
 
 
 def divided_steps(
@@ -68,6 +119,7 @@ def divided_steps(
     length: float,
     expand: Expand,
     allowed: float | None,
+    kinks: Collection[Break] = (),
 ) -> Pieces:
     """Return the steps of a simulation, divided so that the series of all changes converge within each.
 
@@ -85,6 +137,8 @@ def divided_steps(
         Returns the series of the motion through states, from equations, states, instants (1, steps) and the order.
     allowed : float, optional
         Error of a step in a change, relative; the steps are not divided unless given.
+    kinks : collection of Break, optional
+        Of forces, that steps go over; these are not divided.
 
     Raises
     ------
@@ -99,13 +153,15 @@ def divided_steps(
     count = np.ones(len(dense.start), int)
     while True:
         found, which = _parts(dense, kept, count)
+        over = {int(np.searchsorted(which, kink.step)): kink for kink in kinks}
         if allowed is None:
             return found
         sizes = _sizes(equations, found.padded(), along, turns, np.asarray(length), **settings)
         sizes = np.stack(sizes)[..., : len(found.start)]
         lacking = which[_needed(sizes, found, span, allowed) > 1]
+        lacking = lacking[~np.isin(lacking, [kink.step for kink in kinks])]
         if not lacking.size:
-            return found
+            return found.over(over)
         if not kept[lacking].all():  # a body that hardly moves took a long step of low order: first with all orders
             kept[lacking] = True
             continue

@@ -5,6 +5,9 @@ states: the program here adds to them how they change. Steps are divided where a
 The motion is expanded at the beginning of each step, its series evaluated at the end, and the result put on the
 constraints, as the integrator does it. The corrections that put it there vanish but for rounding, so that the matrices
 that they are found with need no derivatives.
+
+Over a kink of a force the state is carried to the instant of the kink by the series of one side, and on from there by
+that of the other, and the instant changes with the state: it is where the accelerations of both sides agree.
 """
 
 import dataclasses
@@ -21,9 +24,12 @@ from jounce.dynamics.forward import Equations, Instants, State, expand
 from jounce.dynamics.masses import gravity_of, masses_of
 from jounce.dynamics.start import initial_as_drivers
 from jounce.errors import UnsupportedError
-from jounce.integrate.divided_steps import Pieces, divided_steps
+from jounce.integrate.breaks import Break, breaks
+from jounce.integrate.divided_steps import Kinks, Pieces, divided_steps
 from jounce.integrate.events import pose_coordinates
+from jounce.integrate.lookahead import watched_names
 from jounce.integrate.methods import Taylor, evaluated
+from jounce.integrate.over_kinks import Kinked, met, shifted, with_value
 from jounce.integrate.projection import normalised
 from jounce.integrate.simulation import Simulation
 from jounce.jet import Jet
@@ -55,7 +61,7 @@ def traced_simulation(simulate: Callable[..., Simulation], given: Mapping[str, A
     ------
     UnsupportedError
         Within `jax.jit` and `jax.vmap`, where the number of steps is not known; for a method other than `Taylor`, for
-        events, and for forces that count turns of an angle about an axis.
+        events, for forces that count turns of an angle about an axis, and where a force or a velocity jumps.
     MechanismError
         If constraints are redundant.
     """
@@ -69,10 +75,12 @@ def traced_simulation(simulate: Callable[..., Simulation], given: Mapping[str, A
     if any(map(measures_angle, simulation.model.system.forces)):
         message = "a simulation is not differentiated where forces count the turns of an angle about an axis in space"
         raise UnsupportedError(message, name="forces")
+    allowed = _allowed(options)
+    kinks = [] if allowed is None else _kinks(simulation)
     model, equations = _model_of(mechanism, simulation)
     start = _start(mechanism, simulation, equations)
     order = simulation.poses[1]["position"].shape[0] - 1
-    pieces = _pieces(simulation, equations, _model_of(made, simulation)[1], _allowed(options))
+    pieces = _pieces(simulation, equations, _model_of(made, simulation)[1], allowed, kinks)
     coordinates = _coordinates(simulation, equations, pieces, start, order)
     known = {name: np.asarray(x) for name, x in simulation.poses[1].items()}
     coordinates = {name: known[name] + (x - jax.lax.stop_gradient(x)) for name, x in coordinates.items()}
@@ -143,12 +151,31 @@ def _allowed(options: Mapping[str, Any]) -> float | None:
     return max(CONVERGED, 100.0 * float(options.get("tolerance") or 0.0))
 
 
-def _pieces(simulation: Simulation, equations: Equations, plain: Equations, allowed: float | None) -> Pieces:
+def _kinks(simulation: Simulation) -> list[Break]:
+    """Return the kinks of forces along a simulation, or raise UnsupportedError if a force or a velocity jumps."""
+    dense, found = simulation.dense_output, breaks(simulation.dense_output, float(simulation.model.length))
+    names = watched_names(simulation.model)
+    for order, what in ((1, "has a kink, so that velocities jump"), (2, "jumps")):
+        for jump in found:
+            if jump.order == order:
+                name, time = names[int(dense.kink[jump.step])], float(dense.start[jump.step] + jump.since)
+                message = (
+                    f"the law {what} at t = {time:.10g} s; how that instant moves is not known, so that a simulation "
+                    "is not differentiated over it: give the law a steep passage, such as tanh(x/width)"
+                )
+                raise UnsupportedError(message, name=name)
+    return found
+
+
+def _pieces(
+    simulation: Simulation, equations: Equations, plain: Equations, allowed: float | None, kinks: list[Break]
+) -> Pieces:
     """Return the steps of a simulation, divided as what is traced in its equations asks; `plain` are their numbers."""
     leaves, structure = jax.tree.flatten(equations)
     assert structure == jax.tree.structure(plain)
     moving = [k for k, leaf in enumerate(leaves) if isinstance(leaf, Tracer)]
-    return divided_steps(simulation.dense_output, plain, moving, float(simulation.model.length), _expanded, allowed)
+    length = float(simulation.model.length)
+    return divided_steps(simulation.dense_output, plain, moving, length, _expanded, allowed, kinks)
 
 
 def _start(mechanism: Mechanism, simulation: Simulation, equations: Equations) -> State:
@@ -211,9 +238,8 @@ def _coordinates(
     pieces = pieces.padded()
     known = pieces.state.map(lambda part: part[..., None])
     highest = pieces.kept.shape[1] - 1
-    state = _marched(
-        equations, start, known, *pieces[3:], *pieces[:2], chosen, since, instants, order=order, highest=highest
-    )
+    path = pieces.kept, *pieces[:2], pieces.kinks
+    state = _marched(equations, start, known, *path, chosen, since, instants, order=order, highest=highest)
     return _with_ground(state)
 
 
@@ -234,6 +260,7 @@ def _marched(
     kept: Any,
     begun: Float[Numbers, " step"],
     steps: Float[Numbers, " step"],
+    kinks: Kinks | None,
     chosen: Int[Numbers, " time"],
     since: Float[Numbers, " time"],
     instants: Float[Numbers, " time"],
@@ -249,34 +276,40 @@ def _marched(
         At the beginning of all steps, (steps, ..., 1): what comes of the march here has these values.
     kept : array of bool, shape (steps, highest + 1)
         Which coefficients of the series the steps were taken with.
+    kinks : Kinks, optional
+        Which of the steps lead over kinks.
     """
 
-    def ended(state: State, kept: Any, time: Any, step: Any) -> State:
-        series = _expanded(equations, state, time[None], highest).map(
+    def series(state: State, kept: Any, time: Any) -> State:
+        return _expanded(equations, state, time[None], highest).map(
             lambda part: jnp.where(kept[:, None, None], part, 0.0)
         )
-        return _corrected(equations, evaluated(series, step), (time + step)[None])
 
     @jax.checkpoint
-    def march(state: State, step: Any) -> tuple[State, State]:
-        here, kept, time, length = step
-        state = jax.tree.map(_with_value, state, here)
-        return ended(state, kept[:, None], time[None], length[None]), state
+    def march(carry: Any, step: Any) -> tuple[Any, State]:
+        state, kinked = carry
+        here, kept, time, length, over = step
+        time, length, state = time[None], length[None], jax.tree.map(with_value, state, here)
+        found = series(state, kept[:, None], time)
+        arrived, end = evaluated(found, length), time + length
+        if over is not None:
+            behind, late = met(state, found, length, kinked, over)
+            left = Kinked(shifted(found, length), jnp.zeros_like(length))
+            back = (behind, time, kinked._replace(late=late))
+            arrived, end, kinked = jax.tree.map(lambda a, b: jnp.where(over.back, a, b), back, (arrived, end, left))
+        return (_corrected(equations, arrived, end[None]), kinked), state
 
-    _, states = jax.lax.scan(march, start, (known, kept, begun, steps))
+    none = None if kinks is None else Kinked(shifted(start.map(lambda part: part[None])), jnp.zeros(1))
+    _, states = jax.lax.scan(march, (start, none), (known, kept, begun, steps, kinks))
     chosen_states = states.map(lambda part: jnp.moveaxis(part[chosen, ..., 0], 0, -1))
     time = instants - since
 
     @jax.checkpoint
     def arrive(state: State) -> State:
-        arrived = ended(state, kept[chosen].T, time, since)
-        return _expanded(equations, arrived, instants[None], order)
+        arrived = evaluated(series(state, kept[chosen].T, time), since)
+        return _expanded(equations, _corrected(equations, arrived, instants[None]), instants[None], order)
 
     return arrive(chosen_states)
-
-
-def _with_value(x: Any, value: Any) -> Any:
-    return value + (x - jax.lax.stop_gradient(x))
 
 
 def _expanded(equations: Equations, state: State, time: Instants, order: int) -> State:

@@ -11,6 +11,7 @@ from jounce.dynamics.energies import body_energy, energy_of_forces
 from jounce.dynamics.forward import Equations, Instants, Lanes, State, expand
 from jounce.dynamics.motion_values import Coordinates, cut, in_chunks, pose_of
 from jounce.dynamics.start import ConsistentStart
+from jounce.integrate.breaks import breaks
 from jounce.integrate.events import NODES, WIDTHS, at_nodes, pose_coordinates, series_of
 from jounce.integrate.lookahead import watched_names
 from jounce.integrate.marching import DenseOutput
@@ -127,7 +128,10 @@ class Simulation(Motion):
         before = [length[max(k - APPROACH, 0) : k].max(initial=0.0) for k in range(len(length) - 1)]
         short = MUCH_LONGER * length[:-1]
         places = np.flatnonzero((kink[:-1] >= 0) & (length[1:] > short) & (np.array(before) > short))
-        return [(float(self.dense_output.start[k] + self.dense_output.length[k]), names[kink[k]]) for k in places]
+        since = {int(k): float(self.dense_output.length[k]) for k in places}
+        # series that do not go on as the next tell when it was; and after a long approach they alone tell that it was
+        since |= {x.step: x.since for x in breaks(self.dense_output, float(self.model.length)) if kink[x.step] >= 0}
+        return [(float(self.dense_output.start[k] + since[k]), names[kink[k]]) for k in sorted(since)]
 
     @property
     def ended_at(self) -> float:
