@@ -13,6 +13,8 @@ from jounce.reporting.json_results import limits_result
 from jounce.reporting.summaries import count
 from jounce.reporting.tables import Table, number
 
+TOLD = 1e-9  # rad or m: how far from a trajectory its path is told to pass; less comes of rounding
+
 
 def binding_facts(found: RetimedTrajectory) -> list[dict[str, Any]]:
     """Return the limits that bind, the dearest first: for how long, s, and by how much the duration would fall, s.
@@ -62,8 +64,8 @@ def retimed_words(
             f"written: {found.stop:.6g} s in {len(found.times)} rows; splines through them keep the limits too "
             f"({100 * (found.stop / free - 1):.2f} % slower)"
         )
-    if found.path.deviation > 1e-12:
-        lines.append(f"the path passes the samples within {found.path.deviation:.1e} rad or m")
+    if found.path.deviation > TOLD:
+        lines.append(f"the path passes the given trajectory within {found.path.deviation:.1e} rad or m")
     worst = found.report.worst
     if worst is not None and worst.ratio is not None:
         lines.append(

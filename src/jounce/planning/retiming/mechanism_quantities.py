@@ -20,7 +20,7 @@ from jounce.kinematics import Motion, solve
 from jounce.mechanism import Mechanism
 from jounce.mechanism.driver_outputs import is_turning
 from jounce.mechanism.time import instants_of
-from jounce.planning.retiming.paths import Path
+from jounce.planning.retiming.path import Path
 from jounce.planning.retiming.quantities import Labels, PathQuantities, Quantity
 from jounce.planning.retiming.rate_law import RateLaw
 from jounce.planning.retiming.rate_motion import RateMotion

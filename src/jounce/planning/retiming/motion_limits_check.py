@@ -9,7 +9,7 @@ import numpy as np
 from jounce.dynamics.limits import LimitReport, LimitRow, check_limits
 from jounce.errors import SampleWarning
 from jounce.planning.retiming.limits import MotionLimits, limits_of
-from jounce.planning.retiming.paths import Path
+from jounce.planning.retiming.path import Path
 from jounce.planning.retiming.quantities import Curves
 from jounce.planning.retiming.robot_quantities import RobotQuantities
 from jounce.robot.model import Limits

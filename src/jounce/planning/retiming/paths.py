@@ -1,7 +1,5 @@
 """Paths of joints: positions as functions of a parameter that says nothing of time."""
 
-import dataclasses
-import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -10,56 +8,18 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.dynamics.motion_values import in_chunks
-from jounce.errors import JounceError, SampleWarning, TrajectoryError
+from jounce.errors import JounceError, TrajectoryError
 from jounce.jet import Jet
+from jounce.planning.retiming.path import Path
+from jounce.planning.retiming.trajectory_paths import path_of_trajectory
 from jounce.trajectory import AbstractMotion, Expression, JointTrajectory, PiecewiseMotion, SplineMotion
 from jounce.trajectory.knots import knot_jumps
-from jounce.trajectory.stacking import law_derivatives
 
-BLOCK = 2048  # places evaluated at once
 DEGREE = 5  # of the splines through waypoints
-SAMPLES = 1001  # of a law whose parameter is not fit to be that of a path
-THINNEST = 1 / 250  # of the length of a path: samples that are nearer to each other than this are left out
-STILL = 1e-3  # of the largest speed in the parameter, below which a law stands still there
 LOOKS = 2000  # cells in which kinks are looked for
 BENT = 0.2  # of the change over a cell: what the slopes do not account for, where it is a jump
 FAINT = 1e-5  # of the largest value: a smaller jump is none
 REPEATED = 1e-9  # of the length of a path: waypoints that are nearer to each other are one
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Path:
-    """The positions of joints along a path, over a parameter s that runs from `start` to `stop`.
-
-    Parameters
-    ----------
-    laws : dict of str to AbstractMotion
-        Position of each joint over s, rad or m.
-    start, stop : float
-        Ends of s.
-    deviation : float, default 0
-        How far the path passes by samples that it was made of, rad or m.
-    """
-
-    laws: Mapping[str, AbstractMotion]
-    start: float
-    stop: float
-    deviation: float = 0.0
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the joints."""
-        return tuple(self.laws)
-
-    def derivatives(self, s: Float[np.ndarray, " point"], order: int) -> Float[np.ndarray, "point derivative joint"]:
-        """Return positions and derivatives by s."""
-        laws = list(self.laws.values())
-
-        def block(some: np.ndarray) -> np.ndarray:
-            return np.moveaxis(np.asarray(law_derivatives(laws, jnp.asarray(s[some]), order)), -1, 0)
-
-        return in_chunks(block, len(s), (BLOCK,), axis=0)  # always as many at once, so that all is compiled once
 
 
 class PathExpression(AbstractMotion):
@@ -81,7 +41,7 @@ class PathExpression(AbstractMotion):
         )
 
 
-def path_of(path: Any, names: Sequence[str] | None = None) -> Path:
+def path_of(path: Any, names: Sequence[str] | None = None, order: int = 1) -> Path:
     """Return the path that was given as waypoints, as expressions, or as a trajectory whose times do not count.
 
     Parameters
@@ -91,6 +51,8 @@ def path_of(path: Any, names: Sequence[str] | None = None) -> Path:
         its positions at the waypoints. Splines of degree 5 go through waypoints.
     names : sequence of str, optional
         Of the joints of an array, in the order of its columns.
+    order : int, default 1
+        To which derivatives a path is to be continuous where a trajectory stops at a corner.
 
     Raises
     ------
@@ -100,7 +62,7 @@ def path_of(path: Any, names: Sequence[str] | None = None) -> Path:
     if isinstance(path, Path):
         return path
     if isinstance(path, JointTrajectory):
-        return _geometry(path)
+        return checked(path_of_trajectory(path, order))
     if isinstance(path, Mapping):
         given = {str(name): x for name, x in path.items()}
         if any(isinstance(x, str | AbstractMotion) for x in given.values()):
@@ -117,71 +79,23 @@ def path_of(path: Any, names: Sequence[str] | None = None) -> Path:
     return through(points, names)
 
 
-def through(points: Float[np.ndarray, "point joint"], names: Sequence[str], *, thin: bool = False) -> Path:
-    """Return the path of splines through points, over the length of the chords between them.
-
-    With `thin`, points that crowd are left out, as where samples in time come to rest.
-    """
+def through(points: Float[np.ndarray, "point joint"], names: Sequence[str]) -> Path:
+    """Return the path of splines through points, over the length of the chords between them."""
     chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
     total = float(chords.sum())
     if not total > 0:
         raise TrajectoryError("the path does not move: all its points are the same", name="path")
-    if thin:
-        kept = _thinned(points, THINNEST * total)
-    else:
-        same = np.flatnonzero(chords <= REPEATED * total)
-        if len(same):
-            message = f"waypoint {same[0] + 2} is the same as the one before; leave it out"
-            raise TrajectoryError(message, name=f"path[{same[0] + 1}]", value=points[same[0] + 1].tolist())
-        kept = np.arange(len(points))
-    chosen = points[kept]
-    lengths = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(chosen, axis=0), axis=1)))
+    same = np.flatnonzero(chords <= REPEATED * total)
+    if len(same):
+        message = f"waypoint {same[0] + 2} is the same as the one before; leave it out"
+        raise TrajectoryError(message, name=f"path[{same[0] + 1}]", value=points[same[0] + 1].tolist())
+    lengths = np.append(0.0, np.cumsum(chords))
     lengths /= lengths[-1]
-    degree = next(d for d in (DEGREE, 3, 2, 1) if len(chosen) > d)
+    degree = next(d for d in (DEGREE, 3, 2, 1) if len(points) > d)
     laws: dict[str, AbstractMotion] = {
-        name: SplineMotion(lengths, column, degree) for name, column in zip(names, chosen.T, strict=True)
+        name: SplineMotion(lengths, column, degree) for name, column in zip(names, points.T, strict=True)
     }
-    path = Path(laws, 0.0, 1.0)
-    return path if not thin else dataclasses.replace(path, deviation=_deviation(path, points))
-
-
-def _geometry(trajectory: JointTrajectory) -> Path:
-    """Return where a trajectory leads, over its time where that is fit, or over the length of the path."""
-    path = Path(dict(trajectory.laws), trajectory.start, trajectory.stop)
-    s = np.linspace(trajectory.start, trajectory.stop, LOOKS + 1)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", SampleWarning)
-        values = trajectory.derivatives(s, 1)
-    speed = np.linalg.norm(values[:, 1], axis=1)
-    if not speed.max() > 0:
-        raise TrajectoryError("the path does not move: all its points are the same", name="path")
-    if speed.min() > STILL * speed.max():
-        return checked(path)
-    own = trajectory.times if len(trajectory.times) >= SAMPLES else np.linspace(path.start, path.stop, SAMPLES)
-    return through(path.derivatives(own, 0)[:, 0], path.names, thin=True)
-
-
-def _thinned(points: np.ndarray, least: float) -> np.ndarray:
-    """Return which points stand at least so far from the one before and from the last one; both ends are kept."""
-    kept = [0]
-    apart = np.linalg.norm(points[-1] - points, axis=1)
-    far = np.cumsum(np.append(0.0, np.linalg.norm(np.diff(points, axis=0), axis=1)))
-    for k in range(1, len(points) - 1):
-        if far[k] - far[kept[-1]] >= least and (far[-1] - far[k] >= least or apart[k] >= least):
-            kept.append(k)
-    return np.array([*kept, len(points) - 1])
-
-
-def _deviation(path: Path, points: np.ndarray) -> float:
-    """Return how far points are from a path, by the nearest of many places and the tangent there."""
-    s = np.linspace(path.start, path.stop, 20 * SAMPLES)
-    values = path.derivatives(s, 1)
-    from scipy.spatial import KDTree
-
-    _, near = KDTree(values[:, 0]).query(points)
-    off, tangent = points - values[near, 0], values[near, 1]
-    along = np.sum(off * tangent, axis=1, keepdims=True) / np.maximum(np.sum(tangent**2, axis=1, keepdims=True), 1e-300)
-    return float(np.linalg.norm(off - along * tangent, axis=1).max())
+    return Path(laws, 0.0, 1.0)
 
 
 def checked(path: Path, order: int = 1) -> Path:

@@ -9,10 +9,11 @@ from jounce.dynamics.trajectories import FollowedTrajectory
 from jounce.errors import SolveError, TrajectoryError, whole_number
 from jounce.mechanism import Mechanism
 from jounce.planning.retiming.fastest import Search, fastest, slowed_only
-from jounce.planning.retiming.limits import MotionLimits
+from jounce.planning.retiming.limits import MotionLimits, limits_of
 from jounce.planning.retiming.mechanism import retime_mechanism
 from jounce.planning.retiming.motion_limits_check import check_motion
-from jounce.planning.retiming.paths import Path, checked, path_of
+from jounce.planning.retiming.path import Path
+from jounce.planning.retiming.paths import checked, path_of
 from jounce.planning.retiming.program import require_solver
 from jounce.planning.retiming.quantities import Curves
 from jounce.planning.retiming.rate_law import Conditions, RateLaw
@@ -54,8 +55,8 @@ def retime(
         The robot, with what it holds; or a mechanism, whose drivers' laws, over its time, are the path.
     path : JointTrajectory, dict, or array_like of shape (points, joints)
         None for a mechanism. Waypoints, with splines of degree 5 through them; a mapping from names of joints to
-        waypoints or to expressions of ``s``, which runs from 0 to 1; or a trajectory, whose times do not count. Joints
-        that it does not name stand still.
+        waypoints or to expressions of ``s``, which runs from 0 to 1; or a trajectory, whose times do not count: the
+        motion stops where it turns back or stops at a corner. Joints that it does not name stand still.
     limits : dict of str to Limits, or MotionLimits, optional
         In place of those that the robot has. For a mechanism `Limits` by name of drivers (effort and effort_rate are
         its force or torque, and yank) and of outputs, whose speed, acceleration and, for angles and distances, jerk
@@ -116,9 +117,9 @@ def retime(
         FollowedTrajectory(robot, path)  # checks its joints and units
     if repair:
         return _repaired(robot, path, limits, order, cells, drives)
-    found = path_of(path, names if names is not None else robot.joint_names)
+    chosen = _order(order, limits_of(robot, limits), robot)
+    found = path_of(path, names if names is not None else robot.joint_names, chosen)
     source = RobotQuantities(robot, found, limits, drives=drives)
-    chosen = _order(order, source.limits, robot)
     checked(found, chosen)
     source.check_range()
     conditions = Conditions(chosen, _rates(rates))

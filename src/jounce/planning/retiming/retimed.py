@@ -7,7 +7,7 @@ import numpy as np
 
 from jounce.dynamics.limits import LimitReport
 from jounce.planning.retiming.fastest import Search
-from jounce.planning.retiming.paths import Path
+from jounce.planning.retiming.path import Path
 from jounce.planning.retiming.rate_law import RateLaw
 from jounce.planning.retiming.rate_motion import RateMotion
 from jounce.trajectory import AbstractMotion, FollowingMotion, JointTrajectory

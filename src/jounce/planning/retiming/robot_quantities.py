@@ -9,7 +9,7 @@ from jounce.dynamics.limits import REST, SLIDING, TURNING
 from jounce.dynamics.trajectories import FollowedTrajectory
 from jounce.errors import RobotError, TrajectoryError
 from jounce.planning.retiming.limits import MotionLimits, limits_of
-from jounce.planning.retiming.paths import Path
+from jounce.planning.retiming.path import Path
 from jounce.planning.retiming.quantities import Labels, PathQuantities, Quantity
 from jounce.robot.inverse_dynamics import inverse_dynamics
 from jounce.robot.kinematics import forward_kinematics

@@ -1,0 +1,276 @@
+"""Where a trajectory leads: its path over a parameter in which it turns back, and stops at corners, smoothly.
+
+The length of the path is a parameter that does not depend on the times of the trajectory, but at a turning point the
+positions have a tip over it. Near a turning point the length is therefore a square of the parameter, near a corner at
+which the trajectory stands still a higher power: the positions are smooth over that parameter, and a motion whose
+parameter goes on there stops exactly as long as it has to.
+"""
+
+import dataclasses
+import itertools
+import warnings
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from jounce.errors import SampleWarning, TrajectoryError
+from jounce.planning.retiming.path import Path
+from jounce.trajectory import AbstractMotion, FollowingMotion, JointTrajectory, SplineMotion
+
+STILL = 1e-3  # of the largest speed: a trajectory that is slower than this at its ends stands still there
+RESTING = 1e-5  # of the largest speed: what is slower within stands still
+SLOW = 0.2  # of the largest speed: where the lowest speed is sought closely
+LOOKS = 4000  # intervals in which a trajectory is looked at to begin with
+ZOOM, ZOOMS = 9, 20  # instants about each lowest speed, and how often they are laid closer
+NODES = (250, 500, 1000, 2000)  # of the splines along the whole path; more where fewer do not come near
+PART = 24  # of them at least between two stops
+NEAR = 1e-9  # of the length: as near as the splines are to come
+GAIN = 8.0  # by which twice the nodes have to come nearer, or they are not worth it
+AWAY = 1e-7  # of the length: how far from a stop its directions are taken
+BEND = 2e-3  # rad: a smaller change of direction at a stop is none
+BACK = 0.05  # rad: so near to half a turn it is a reversal
+WIDEST = 0.1  # of the length: how far a power reaches on each side of a stop
+FLAT = 4  # derivatives to which a power joins the length
+DEGREE = 5
+TURNING = 1e-2  # of the largest acceleration: more at a rest turns a trajectory smoothly
+NEWTON = 12  # steps
+HALVINGS = 60  # of the interval in which a trajectory leaves a stop
+PLACES, WEIGHTS = np.polynomial.legendre.leggauss(6)
+
+
+class Stops(NamedTuple):
+    """Turning points and corners of a trajectory: how far along the path, and the change of direction, rad."""
+
+    lengths: Float[np.ndarray, " stop"]
+    turns: Float[np.ndarray, " stop"]
+
+
+class JoinedPieces(SplineMotion):
+    """Polynomials that follow one another; where they meet, derivatives may jump.
+
+    Parameters
+    ----------
+    begins : array_like of shape (pieces,)
+        Where they begin, increasing.
+    powers : array_like of shape (powers, pieces)
+        Coefficients, lowest power first, of what the argument exceeds the beginning by.
+    stop : float
+        Where the last one ends.
+    """
+
+    def __init__(self, begins: np.ndarray, powers: np.ndarray, stop: float):
+        self._set(begins, powers, stop, "refuse")
+
+
+class Ramps:
+    """A parameter that grows as the length but near some places, where the length is a power of it.
+
+    Parameters
+    ----------
+    places : array of shape (place,)
+        Lengths, increasing.
+    widths : array of shape (place,)
+        How far the power reaches, by length.
+    power : int
+        2 or higher.
+    """
+
+    def __init__(self, places: np.ndarray, widths: np.ndarray, power: int):
+        polynomial = np.polynomial.Polynomial
+        slope = (polynomial([0.0] * (power - 2) + [1.0]) * polynomial([1.0, 0.0, -1.0]) ** FLAT).integ()
+        self.power, self.share = power, (slope / slope(1.0)).integ()
+        self.places, self.widths = places, widths
+        self.reach = widths / self.share(1.0)
+        self.gained = np.append(0.0, np.cumsum(2 * (self.reach - widths)))
+        self.centres = places + self.gained[:-1] + self.reach - widths
+
+    def parameter(self, lengths: np.ndarray) -> Float[np.ndarray, " length"]:
+        """Return the parameter at lengths."""
+        found = lengths + self.gained[np.searchsorted(self.places, lengths)]
+        if not len(self.places):
+            return found
+        near = np.argmin(np.abs(lengths[:, None] - self.places), axis=1)
+        away = lengths - self.places[near]
+        wanted = np.minimum(np.abs(away), self.widths[near]) / self.reach[near]
+        share = np.minimum((self.power * wanted) ** (1 / self.power), 1.0)  # Newton's steps go down to the root
+        slope = self.share.deriv()
+        for _ in range(NEWTON):
+            share = np.maximum(share - (self.share(share) - wanted) / np.maximum(slope(share), 1e-300), 0.0)
+        inside = np.abs(away) < self.widths[near]
+        return np.where(inside, self.centres[near] + np.sign(away) * self.reach[near] * share, found)
+
+    def motion(self, total: float) -> JoinedPieces:
+        """Return the length over the parameter, up to a total length."""
+        begins, pieces = [0.0], [np.polynomial.Polynomial([0.0, 1.0])]
+        for place, centre, reach, width in zip(self.places, self.centres, self.reach, self.widths, strict=True):
+            before, after = np.polynomial.Polynomial([1.0, -1.0 / reach]), np.polynomial.Polynomial([0.0, 1.0 / reach])
+            begins += [centre - reach, centre, centre + reach]
+            pieces += [place - reach * self.share(before), place + reach * self.share(after)]
+            pieces.append(np.polynomial.Polynomial([place + width, 1.0]))
+        height = max(len(piece.coef) for piece in pieces)
+        powers = np.stack([np.pad(piece.coef, (0, height - len(piece.coef))) for piece in pieces], axis=1)
+        return JoinedPieces(np.array(begins), powers, total + float(self.gained[-1]))
+
+
+def path_of_trajectory(trajectory: JointTrajectory, order: int) -> Path:
+    """Return where a trajectory leads: over its time, where that is fit, or over about the length of the path.
+
+    Parameters
+    ----------
+    trajectory : JointTrajectory
+        Its times do not count.
+    order : int
+        To which derivatives of the path are to be continuous where it stops at a corner.
+
+    Raises
+    ------
+    TrajectoryError
+        If it does not move.
+    """
+    path = Path(dict(trajectory.laws), trajectory.start, trajectory.stop)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SampleWarning)
+        times = _instants(path, trajectory.times)
+        speeds = _speeds(path, times)
+        largest = float(np.nanmax(speeds))
+        if not largest > 0:
+            raise TrajectoryError("the path does not move: all its points are the same", name="path")
+        rests = _rests(path, times, speeds, RESTING * largest)
+        if min(speeds[0], speeds[-1]) > STILL * largest and _turns_well(path, times, rests):
+            return path
+        times = np.union1d(times, rests)
+        lengths = np.append(0.0, np.cumsum(_between(path, times[:-1], times[1:])))
+        stops = _stops(path, times, lengths, rests)
+        best = None
+        for count in NODES:
+            found = _splined(path, times, lengths, stops, order, count)
+            if best is not None and found.deviation * GAIN > best.deviation:
+                break
+            best = found
+            if found.deviation <= NEAR * lengths[-1]:
+                break
+    assert best is not None
+    return best
+
+
+def _instants(path: Path, own: np.ndarray) -> Float[np.ndarray, " time"]:
+    """Return many instants, and all at which pieces of laws meet."""
+    knots = [np.asarray(law.breakpoints) for law in path.laws.values() if isinstance(law, SplineMotion)]
+    every = np.concatenate([np.linspace(path.start, path.stop, LOOKS + 1), own, *knots])
+    found = np.unique(every[(every >= path.start) & (every <= path.stop)])
+    apart = np.diff(found, append=np.inf) > 1e-12 * (path.stop - path.start)
+    return found[apart]
+
+
+def _speeds(path: Path, times: np.ndarray) -> Float[np.ndarray, " time"]:
+    return np.linalg.norm(path.derivatives(times, 1)[:, 1], axis=1)
+
+
+def _rests(path: Path, times: np.ndarray, speeds: np.ndarray, still: float) -> Float[np.ndarray, " rest"]:
+    """Return the instants within at which a trajectory stands still: of a stay many."""
+    before, at, after = speeds[:-2], speeds[1:-1], speeds[2:]
+    resting = 1 + np.flatnonzero(at <= still)
+    lowest = 1 + np.flatnonzero((at <= before) & (at <= after) & (at > still) & (at < SLOW * speeds.max()))
+    if not len(lowest):
+        return times[resting]
+    low, high, best, least = times[lowest - 1], times[lowest + 1], times[lowest], speeds[lowest]
+    share, every = np.linspace(0.0, 1.0, ZOOM)[:, None], np.arange(len(lowest))
+    for _ in range(ZOOMS):
+        laid = low + share * (high - low)
+        found = _speeds(path, laid.reshape(-1)).reshape(laid.shape)
+        top = np.argmin(found, axis=0)
+        better = found[top, every] < least
+        best, least = np.where(better, laid[top, every], best), np.where(better, found[top, every], least)
+        reach = (high - low) / (ZOOM - 1)
+        low, high = np.maximum(best - reach, low), np.minimum(best + reach, high)
+    return np.union1d(times[resting], best[least <= still])
+
+
+def _turns_well(path: Path, times: np.ndarray, rests: np.ndarray) -> bool:
+    """Whether a trajectory accelerates wherever it stands still: its own time is then fit to be the parameter."""
+    if not len(rests):
+        return True
+    typical = np.linalg.norm(path.derivatives(times, 2)[:, 2], axis=1).max()
+    there = np.linalg.norm(path.derivatives(rests, 2)[:, 2], axis=1)
+    return bool(there.min() > TURNING * typical)
+
+
+def _between(path: Path, begins: np.ndarray, ends: np.ndarray) -> Float[np.ndarray, " interval"]:
+    """Return lengths of the path from instants to others, by Gauss's quadrature."""
+    half = (ends - begins) / 2
+    laid = begins[:, None] + half[:, None] * (1 + PLACES)
+    return half * (_speeds(path, laid.reshape(-1)).reshape(laid.shape) @ WEIGHTS)
+
+
+def _stops(path: Path, times: np.ndarray, lengths: np.ndarray, rests: np.ndarray) -> Stops:
+    """Return the rests at which the direction changes, each once, however long the trajectory stays there."""
+    away = AWAY * lengths[-1]
+    at = lengths[np.searchsorted(times, rests)]
+    within = (at > 8 * away) & (at < lengths[-1] - 8 * away)
+    rests, at = rests[within], at[within]
+    if not len(rests):
+        return Stops(at, at)
+    group = np.cumsum(np.diff(at, prepend=-np.inf) > away)
+    slowest = np.lexsort((_speeds(path, rests), group))
+    once = slowest[np.flatnonzero(np.diff(group[slowest], prepend=0))]
+    rests, at = rests[once], at[once]
+    middle = path.derivatives(rests, 0)[:, 0]
+    beyond = np.searchsorted(lengths, at - 4 * away) - 1, np.searchsorted(lengths, at + 4 * away)
+    directions = []
+    for side, index in zip((-1.0, 1.0), beyond, strict=True):
+        inner, outer = rests, times[index]
+        for _ in range(HALVINGS):
+            laid = (inner + outer) / 2
+            gone = np.linalg.norm(path.derivatives(laid, 0)[:, 0] - middle, axis=1) >= away
+            inner, outer = np.where(gone, inner, laid), np.where(gone, laid, outer)
+        moved = side * (path.derivatives(outer, 0)[:, 0] - middle)
+        directions.append(moved / np.linalg.norm(moved, axis=1, keepdims=True))
+    turns = 2 * np.arcsin(np.clip(np.linalg.norm(directions[1] - directions[0], axis=1) / 2, 0.0, 1.0))
+    return Stops(at[turns > BEND], turns[turns > BEND])
+
+
+def _splined(path: Path, times: np.ndarray, lengths: np.ndarray, stops: Stops, order: int, count: int) -> Path:
+    """Return a path through about so many places, and through all stops exactly."""
+    total = float(lengths[-1])
+    edges = np.concatenate([[0.0], stops.lengths, [total]])
+    widths = np.minimum(WIDEST * total, np.minimum(np.diff(edges)[:-1], np.diff(edges)[1:]) / 2)
+    back = stops.turns > np.pi - BACK
+    ramps = Ramps(stops.lengths[back], widths[back], 2)
+    own = ramps.parameter(lengths)
+    edges = ramps.parameter(edges)
+    counts = np.maximum(PART, np.ceil(count * np.diff(edges) / edges[-1]).astype(int))
+    parts = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(edges[:-1], edges[1:], counts, strict=True)]
+    wanted = np.append(np.concatenate(parts), edges[-1])
+    breaks = np.append(0, np.cumsum(counts))
+    instants = np.interp(wanted, own, times)
+    instants[breaks] = times[np.searchsorted(own, edges)]
+    before = np.clip(np.searchsorted(times, instants, side="right") - 1, 0, len(times) - 1)
+    knots = ramps.parameter(lengths[before] + _between(path, times[before], instants))
+    knots[breaks] = edges
+    points = path.derivatives(instants, 0)[:, 0]
+    laws: dict[str, AbstractMotion]
+    if back.all():
+        scale = edges[-1]
+        laws = {name: SplineMotion(knots / scale, x, DEGREE) for name, x in zip(path.names, points.T, strict=True)}
+        found, at = Path(laws, 0.0, 1.0), own / scale
+    else:
+        joined = breaks[np.concatenate([[True], ~back, [True]])]
+        corners = Ramps(edges[1:-1][~back], widths[~back], order + 1)
+        leader = corners.motion(float(edges[-1]))
+        columns = zip(path.names, points.T, strict=True)
+        laws = {name: FollowingMotion(_joined(knots, column, joined), leader) for name, column in columns}
+        found, at = Path(laws, 0.0, float(leader.stop)), corners.parameter(own)
+    at = np.clip(at, found.start, found.stop)
+    off = np.linalg.norm(found.derivatives(at, 0)[:, 0] - path.derivatives(times, 0)[:, 0], axis=1)
+    return dataclasses.replace(found, deviation=float(off.max()))
+
+
+def _joined(knots: np.ndarray, values: np.ndarray, breaks: Int[np.ndarray, " break"]) -> JoinedPieces:
+    """Return splines from one break to the next."""
+    begins, powers = [], []
+    for first, last in itertools.pairwise(breaks.tolist()):
+        spline = SplineMotion(knots[first : last + 1], values[first : last + 1], DEGREE)
+        begins.append(np.asarray(spline.breakpoints))
+        powers.append(np.asarray(spline.coefficients))
+    return JoinedPieces(np.concatenate(begins), np.concatenate(powers, axis=1), float(knots[-1]))
