@@ -8,6 +8,7 @@ from jaxtyping import Float
 from jounce.errors import TrajectoryError, check_choice
 from jounce.shapes import ArrayLike
 from jounce.trajectory.checks import finite_numbers
+from jounce.trajectory.knots import Jumps, knot_jumps
 from jounce.trajectory.motion import SplineMotion
 
 BEYOND = ("refuse", "hold", "continue")
@@ -18,12 +19,13 @@ class HermiteMotion(SplineMotion):
     """A motion law through instants with the value and the derivatives at each.
 
     At an instant it has the derivatives given there. In between it is a polynomial, which begins with all
-    derivatives of the instant before and meets the first five of the instant after it.
+    derivatives of the instant before and meets the first five of the instant after it. An instant that is given twice
+    has the derivatives of the first row from the left and those of the second from the right, which `jumps` tells.
 
     Parameters
     ----------
     times : array_like of shape (instants,)
-        Increasing, s.
+        Increasing, s; an instant within may be given twice.
     derivatives : array_like of shape (instants, order + 1)
         The law and its time derivatives, lowest first: m or rad by s to the power of the order.
     beyond : {"refuse", "hold", "continue"}, default "refuse"
@@ -48,9 +50,16 @@ class HermiteMotion(SplineMotion):
         shape = np.shape(derivatives)
         columns = shape[1] if len(shape) == 2 and shape[1] else 1
         table = finite_numbers("derivatives", derivatives, (len(instants), columns))
-        if (np.diff(instants) <= 0).any():
+        steps = np.diff(instants)
+        twice = steps == 0
+        if (steps < 0).any() or (twice[1:] & twice[:-1]).any() or twice[:1].any() or twice[-1:].any():
             raise TrajectoryError("must increase", name="times", value=instants.tolist()[:5])
-        self._set(instants, _pieces(instants, table), instants[-1], beyond)
+        begins = np.append(~twice, True)  # of an instant that is given twice the second row begins a piece
+        self._set(instants[begins], _pieces(instants, table)[:, begins], instants[-1], beyond)
+
+    def jumps(self, order: int = 4) -> Jumps:
+        """Return the instants, and by how much derivatives to an order jump there, as for `SegmentedMotion`."""
+        return knot_jumps(self, order)
 
 
 def _pieces(
@@ -61,6 +70,7 @@ def _pieces(
     factorials = np.array([math.factorial(k) for k in range(levels)], float)
     taylor = (derivatives / factorials).T
     steps = np.diff(times)
+    steps = np.where(steps > 0, steps, 1.0)
     scaled = taylor[:, :-1] * steps ** np.arange(levels)[:, None]  # in units of the step
     ends = taylor[:met, 1:] * steps ** np.arange(met)[:, None]
     missing = ends - _binomials(met, np.arange(levels)) @ scaled

@@ -18,6 +18,7 @@ from jounce.shapes import ArrayLike
 from jounce.trajectory import SplineMotion
 from jounce.trajectory.checks import check_samples
 from jounce.trajectory.joint_trajectory import MAX_ORDER, JointTrajectory
+from jounce.trajectory.smoothness import knots
 
 XYZ = ("x", "y", "z")
 ANGLES = ("angle_1", "angle_2", "angle_3")
@@ -141,6 +142,17 @@ class ToolPath(Displayed):
         if isinstance(self._attitude, AttitudeSamples):
             degrees.append(self._attitude.degree)
         return min([MAX_ORDER, *(degree - 1 for degree in degrees)])
+
+    @property
+    def knots(self) -> Float[np.ndarray, " knots"]:
+        """Instants within at which a derivative of a law is known to jump; those of `abs` in expressions are not."""
+        if self._progress is not None:  # what the other laws are of is no time
+            return knots(self._progress.laws["progress"], self.start, self.stop)
+        turning = self._attitude[1] if isinstance(self._attitude, tuple) else None
+        parts = [part for part in (self._position, self._direction, turning) if part is not None]
+        found = [knots(law, self.start, self.stop) for part in parts for law in part.laws.values()]
+        every = np.unique(np.concatenate([np.zeros(0), *found]))
+        return every[(every > self.start) & (every < self.stop)]
 
     def judge(self, order: int) -> None:
         """Warn where the samples of a law do not support its derivatives to an order, as `JointTrajectory` does."""

@@ -8,9 +8,11 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from jounce.display import Displayed
+from jounce.dynamics.motion_values import in_chunks
 from jounce.errors import TrajectoryError
 from jounce.kinematics import Status
 from jounce.kinematics.linear import singular_values
+from jounce.planning.tool_paths.joint_laws import followed_closely
 from jounce.planning.tool_paths.path_equations import PathEquations
 from jounce.planning.tool_paths.path_marching import Nodes, predicted
 from jounce.planning.tool_paths.task_rank import SINGULAR, losing_joints
@@ -25,6 +27,8 @@ from jounce.trajectory import HermiteMotion
 from jounce.trajectory.joint_trajectory import MAX_ORDER, JointTrajectory
 
 INSTANTS = 201
+BLOCKS = (256, 1024)  # instants at once, so that little is compiled
+LEAST = 3  # order of the derivatives that laws of joints are made of
 MET = 1e-9  # rad, or sizes of the robot: what may be missed
 RATES = 1e-6  # of a derivative of the path that the tool has to have
 WEAK = 0.05  # of the largest singular value: where a path ends, less is why
@@ -218,19 +222,39 @@ class ToolPathMotion(Displayed):
     def trajectory(self) -> JointTrajectory:
         """Return the motion as laws of the joints, for all that takes a trajectory.
 
-        At the instants of this motion they have its derivatives; in between they are polynomials that meet them, whose
-        error falls with the spacing to the power of about the order and six more. `at` is exact everywhere.
+        At the instants of this motion they have its derivatives; in between they are polynomials, which are compared
+        with the exact motion at eight places of each interval: where they would be further from it than 1e-9 rad or m
+        (or of the largest coordinate), instants are added. At a corner of the path the velocities of the laws jump, as
+        those of the tool do, and `retime` refuses them as a kink. `at` is exact everywhere.
 
         Raises
         ------
         TrajectoryError
-            If an instant has no coordinates, or the instants do not increase.
+            If there are no coordinates at an instant, the instants do not increase, or the path has a jump or a spike
+            that is too narrow to be followed: the message names the instant.
         """
         if (self.status != Status.OK).any():
             bad = int(np.argmax(self.status != Status.OK))
             raise TrajectoryError(f"there are no coordinates: {self.explain(bad)}", name=f"time[{bad}]")
-        laws = {name: HermiteMotion(self.time, self.q[:, :, k]) for k, name in enumerate(self.robot.joint_names)}
-        return JointTrajectory(laws, float(self.time[0]), float(self.time[-1]), self.time)
+        order = max(self.order, min(LEAST, self.path.highest))
+        times, q = followed_closely(self._exact(order), self.time, self.path.knots)
+        laws = {name: HermiteMotion(times, q[:, :, k]) for k, name in enumerate(self.robot.joint_names)}
+        return JointTrajectory(laws, float(times[0]), float(times[-1]), np.unique(times))
+
+    def _exact(self, order: int) -> Callable[[np.ndarray], np.ndarray]:
+        """Return the function that gives coordinates and their derivatives at instants."""
+
+        def exact(instants: np.ndarray) -> np.ndarray:
+            return in_chunks(lambda some: known(instants[some]), len(instants), BLOCKS, axis=0)
+
+        def known(instants: np.ndarray) -> np.ndarray:
+            found = self.at(instants, order)
+            if (found.status != Status.OK).any():
+                bad = int(np.argmax(found.status != Status.OK))
+                raise TrajectoryError(f"there are no coordinates: {found.explain(bad)}", name="time")
+            return found.q
+
+        return exact
 
 
 def _instants(path: ToolPath, time: Any) -> np.ndarray:

@@ -1,0 +1,206 @@
+"""Instants through which laws of joints follow an exact motion closely, and kinks between them."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.errors import TrajectoryError
+from jounce.trajectory import HermiteMotion
+from jounce.trajectory.motion import SplineMotion
+
+LOOKS = np.array([0.04, 0.15, 0.29, 0.43, 0.57, 0.71, 0.85, 0.96])  # in an interval, where laws are compared
+NEAR = 1e-9  # rad or m, or of the largest coordinate: what laws may miss
+SHORT = 2.0**-17  # of the time: where an interval would have to be shorter, a kink is sought in it
+SIDE = 1e-9  # of the time: how far from a kink its sides are looked at
+ROUNDS = 64
+MOST = 20000  # instants
+KINKED = 1e-6  # of the largest derivative: what jumps by less is smooth
+STEPS = 4  # of Newton's method
+
+_Times = Float[np.ndarray, " _"]  # of any length
+_Motion = Float[np.ndarray, "_ derivative joint"]
+
+
+def followed_closely(exact: Callable[[_Times], _Motion], times: _Times, known: _Times) -> tuple[_Times, _Motion]:
+    """Return instants and derivatives whose `HermiteMotion` is near an exact motion everywhere.
+
+    Parameters
+    ----------
+    exact : callable
+        Gives coordinates and their derivatives at instants.
+    times : array of shape (time,)
+        To begin with, increasing.
+    known : array of shape (kinks,)
+        Where derivatives may jump.
+
+    Returns
+    -------
+    times : array of shape (instants,)
+        An instant at which derivatives jump is there twice: the first row is from the left.
+    q : array of shape (instants, derivative, joint)
+
+    Raises
+    ------
+    TrajectoryError
+        If the instants do not increase, or polynomials come not near the motion: the message says where.
+    """
+    if len(times) < 2 or (np.diff(times) <= 0).any():
+        raise TrajectoryError("laws need two instants at least, which increase", name="time", value=times.tolist()[:5])
+    span = float(times[-1] - times[0])
+    given = exact(times)
+    near = NEAR * max(1.0, float(np.abs(given[:, 0]).max()))
+    side = SIDE * span
+    first, last = exact(times[[0, -1]] + [side, -side])[:, None]
+    inside = np.concatenate([_shifted(first, -side), _shifted(last, side)])
+    outside = np.flatnonzero(_jumped(given[[0, -1]], inside))  # a law that is held at its end says what it is then
+    given[-outside] = inside[outside]
+    kinks = _Kinks(exact, side)
+    kinks.add(known[(known > times[0] + 2 * side) & (known < times[-1] - 2 * side)], only_if_kinked=True)
+    nodes, q = times, given
+    done = np.zeros((0, 2))  # intervals that were found to be near
+    for _ in range(ROUNDS):
+        joined, rows = kinks.among(nodes, q)
+        intervals = np.stack([joined[:-1], joined[1:]], axis=1)
+        open_ = (intervals[:, 1] > intervals[:, 0]) & ~_among(intervals, done)
+        if not open_.any():
+            return joined, rows
+        missed, worst = _missed(exact, joined, rows, open_)
+        bad = np.flatnonzero(open_)[missed > near]
+        done = np.concatenate([done, intervals[open_][missed <= near]])
+        if not len(bad):
+            return joined, rows
+        short = bad[intervals[bad, 1] - intervals[bad, 0] <= SHORT * span]
+        if len(short):
+            found = np.array([_kink(exact, joined[k : k + 2], rows[k : k + 2], near) for k in short.tolist()])
+            kinks.add(found)
+            keep = _clear(nodes, times, found)  # what was laid about them is no longer needed
+            nodes, q = nodes[keep], q[keep]
+        bad = np.setdiff1d(bad, short)
+        if not len(short) and len(bad):
+            between = worst[np.isin(np.flatnonzero(open_), bad)]  # what was seen there is not lost again
+            nodes, order = np.unique(np.concatenate([nodes, between]), return_index=True)
+            q = np.concatenate([q, exact(between)])[order]
+        if len(nodes) > MOST:
+            break
+    message = (
+        f"laws of the joints would need more than {MOST} instants to follow this path; give fewer waves, or use `at`"
+    )
+    raise TrajectoryError(message, name="time", value=len(nodes))
+
+
+class _Kinks:
+    """Instants at which derivatives jump, and derivatives on both sides of them."""
+
+    def __init__(self, exact: Callable[[_Times], _Motion], side: float):
+        self.exact, self.side = exact, side
+        self.times: _Times = np.zeros(0)
+        self.before: np.ndarray = np.zeros((0, 0, 0))
+        self.after: np.ndarray = self.before
+
+    def add(self, times: _Times, *, only_if_kinked: bool = False) -> None:
+        """Add instants; if asked for, only those at which a derivative jumps."""
+        times = np.unique(times)
+        times = times[np.diff(times, prepend=-np.inf) > 2 * self.side]
+        new = times[(np.abs(times[:, None] - self.times) > 2 * self.side).all(axis=1)]
+        if not len(new):
+            return
+        sides = self.exact(np.concatenate([new - self.side, new + self.side]))
+        before, after = _shifted(sides[: len(new)], self.side), _shifted(sides[len(new) :], -self.side)
+        if only_if_kinked:
+            jumped = _jumped(before, after)
+            new, before, after = new[jumped], before[jumped], after[jumped]
+        if len(self.times):
+            before, after = np.concatenate([self.before, before]), np.concatenate([self.after, after])
+        self.times, self.before, self.after = np.concatenate([self.times, new]), before, after
+
+    def among(self, nodes: _Times, q: _Motion) -> tuple[_Times, _Motion]:
+        """Return instants and derivatives with the kinks among them, each twice; an instant at a kink is left out."""
+        if not len(self.times):
+            return nodes, q
+        apart = (np.abs(nodes[:, None] - self.times) > 2 * self.side).all(axis=1)
+        times = np.concatenate([nodes[apart], self.times, self.times])
+        rows = np.concatenate([q[apart], self.before, self.after])
+        order = np.argsort(times, kind="stable")  # the left side stays before the right one
+        return times[order], rows[order]
+
+
+def _jumped(before: _Motion, after: _Motion) -> np.ndarray:
+    """Tell where derivatives differ by more than rounding."""
+    size = np.maximum(np.abs(before), np.abs(after)).max(axis=(0, 2))
+    size = np.maximum.accumulate(np.append(1.0, size))[1:, None]
+    return np.any(np.abs(after - before) > KINKED * size, axis=(1, 2))
+
+
+def _shifted(q: _Motion, by: float) -> _Motion:
+    """Return derivatives a little later, by their Taylor series."""
+    levels = q.shape[1]
+    powers = [[by ** (j - k) / math.factorial(j - k) if j >= k else 0.0 for j in range(levels)] for k in range(levels)]
+    return np.einsum("kj,tjn->tkn", np.array(powers), q)
+
+
+def _missed(
+    exact: Callable[[_Times], _Motion], times: _Times, q: _Motion, open_: np.ndarray
+) -> tuple[Float[np.ndarray, " open"], Float[np.ndarray, " open"]]:
+    """Return how far laws are from the motion in some of the intervals, and where they are."""
+    chosen = np.flatnonzero(open_)
+    steps = times[chosen + 1] - times[chosen]
+    looks = times[chosen, None] + LOOKS * steps[:, None]
+    wanted = exact(looks.reshape(-1))[:, 0].reshape(len(chosen), len(LOOKS), -1)
+    found = [_within(HermiteMotion(times, column), looks) for column in np.moveaxis(q, -1, 0)]
+    missed = np.abs(np.stack(found, axis=-1) - wanted).max(axis=2)
+    worst = np.argmax(missed, axis=1)[:, None]
+    return np.take_along_axis(missed, worst, axis=1)[:, 0], np.take_along_axis(looks, worst, axis=1)[:, 0]
+
+
+def _within(law: SplineMotion, looks: np.ndarray) -> np.ndarray:
+    """Return the values of a law at places, by its polynomials."""
+    begins, powers = np.asarray(law.breakpoints), np.asarray(law.coefficients)
+    piece = np.clip(np.searchsorted(begins, looks, side="right") - 1, 0, len(begins) - 1)
+    local, value = looks - begins[piece], powers[-1][piece]
+    for row in powers[-2::-1]:
+        value = value * local + row[piece]
+    return value
+
+
+def _kink(exact: Callable[[_Times], _Motion], ends: Float[np.ndarray, " 2"], q: _Motion, near: float) -> float:
+    """Return where the series of the ends of a short interval meet: there the velocity jumps.
+
+    Raises
+    ------
+    TrajectoryError
+        If they do not meet, or the motion is not near them.
+    """
+    joint = int(np.argmax(np.abs(q[1, 1] - q[0, 1])))
+    at = float(ends.mean())
+    for _ in range(STEPS):
+        left, right = _shifted(q[:1], at - ends[0])[0], _shifted(q[1:], at - ends[1])[0]
+        slope = right[1, joint] - left[1, joint]
+        at = float(np.clip(at - (right[0, joint] - left[0, joint]) / slope, *ends)) if slope else at
+    looks = np.sort(np.append(ends[0] + LOOKS * (ends[1] - ends[0]), at))
+    left, right = (
+        np.concatenate([_shifted(q[k : k + 1], float(by))[:, 0] for by in looks - ends[k]]) for k in range(2)
+    )
+    off = np.where(looks[:, None] <= at, left, right) - exact(looks)[:, 0]
+    if not max(np.abs(off).max(), np.abs(left - right)[looks == at].max()) <= near:
+        message = (
+            f"the joints jump, or the path has a spike that is too narrow to be followed, at t = {ends.mean():.9g} s: "
+            "give laws that are continuous there, and instants about it"
+        )
+        raise TrajectoryError(message, name="time", value=float(ends.mean()))
+    return at
+
+
+def _clear(nodes: _Times, times: _Times, kinks: _Times) -> np.ndarray:
+    """Tell which instants were given, or are not in an interval between given ones that has a kink."""
+    cells = np.clip(np.searchsorted(times, kinks, side="right") - 1, 0, len(times) - 2)
+    inside = np.clip(np.searchsorted(times, nodes, side="right") - 1, 0, len(times) - 2)
+    return np.isin(nodes, times) | ~np.isin(inside, np.concatenate([cells - 1, cells]))
+
+
+def _among(intervals: Float[np.ndarray, "interval 2"], done: Float[np.ndarray, "known 2"]) -> np.ndarray:
+    """Tell which intervals are among others."""
+    known = np.sort(done[:, 0] + 1j * done[:, 1])
+    asked = intervals[:, 0] + 1j * intervals[:, 1]
+    return np.isin(asked, known)
