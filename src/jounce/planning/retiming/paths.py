@@ -19,6 +19,12 @@ DEGREE = 5  # of the splines through waypoints
 LOOKS = 2000  # cells in which kinks are looked for
 BENT = 0.2  # of the change over a cell: what the slopes do not account for, where it is a jump
 FAINT = 1e-5  # of the largest value: a smaller jump is none
+CELLS = (160, 320, 640, 1280)  # of the spline of a time law
+LOOKS_IN_CELL = 4
+FINEST = 4 * LOOKS_IN_CELL * CELLS[-1]  # places at which a path is looked at
+RESOLVED = 0.05  # of the range of a derivative: what straight lines between looks may miss
+SLIGHT = 1e-3  # of what the length of the path makes of it: a derivative this small does not matter
+ENDS = 0.02  # of a path
 REPEATED = 1e-9  # of the length of a path: waypoints that are nearer to each other are one
 
 
@@ -135,6 +141,38 @@ def checked(path: Path, order: int = 1) -> Path:
     return path
 
 
+def cells_needed(path: Path, order: int) -> int:
+    """Return how many cells resolve how a path varies: twice as many as 160, again and again.
+
+    The derivative of the given order, which is continuous, is compared at the finest places with what straight lines
+    between the places of a coarser grid make of it.
+
+    Raises
+    ------
+    TrajectoryError
+        If it needs more than are sensible: the message says where.
+    """
+    s = np.linspace(path.start, path.stop, FINEST + 1)
+    values = path.derivatives(s, order + 1)  # as `checked` has them, so that nothing else is compiled
+    span = path.stop - path.start
+    inside = slice(int(ENDS * FINEST), int((1 - ENDS) * FINEST))
+    curves, scale = values[:, order], np.abs(values[:, 1]).max() / span ** (order - 1)
+    size = np.ptp(curves[inside], axis=0).max() + SLIGHT * scale
+    for cells in CELLS:
+        step = FINEST // (cells * LOOKS_IN_CELL)
+        ends = curves[::step]
+        off = np.abs(curves[step // 2 :: step] - (ends[1:] + ends[:-1]) / 2) / size
+        off[: int(ENDS * len(off))] = off[int((1 - ENDS) * len(off)) :] = 0.0  # cells are narrow at the ends
+        if off.max() <= RESOLVED:
+            return cells
+    at, joint = np.unravel_index(int(np.argmax(off)), off.shape)
+    message = (
+        f"the path waves or bends too finely at s = {s[step // 2 + at * step]:.6g} for a time law that keeps limits: "
+        f"{CELLS[-1]} cells do not resolve it; smooth it, or retime shorter parts of it"
+    )
+    raise TrajectoryError(message, name=path.names[joint])
+
+
 def _jumps(law: AbstractMotion, order: int) -> Any:
     if isinstance(law, SplineMotion):
         instants, sizes = knot_jumps(law, order)
@@ -146,7 +184,11 @@ def _jumps(law: AbstractMotion, order: int) -> Any:
 
 
 def _kink(s: float, order: int, name: str) -> TrajectoryError:
-    what = {0: "jumps", 1: "has a kink (its direction jumps)", 2: "has a jump of curvature"}.get(order, "is not smooth")
+    what = {
+        0: "jumps",
+        1: "has a kink (its direction jumps, or turns too sharply to be resolved)",
+        2: "has a jump of curvature, or bends too sharply to be resolved,",
+    }.get(order, "is not smooth")
     limits = "" if order < 2 else ", where what is limited would be infinite"
     message = f"the path {what} at s = {s:.6g}{limits}; round it, or stop there and retime both parts"
     return TrajectoryError(message, name=name)

@@ -13,7 +13,7 @@ from jounce.planning.retiming.limits import MotionLimits, limits_of
 from jounce.planning.retiming.mechanism import retime_mechanism
 from jounce.planning.retiming.motion_limits_check import check_motion
 from jounce.planning.retiming.path import Path
-from jounce.planning.retiming.paths import checked, path_of
+from jounce.planning.retiming.paths import cells_needed, checked, path_of
 from jounce.planning.retiming.program import require_solver
 from jounce.planning.retiming.quantities import Curves
 from jounce.planning.retiming.rate_law import Conditions, RateLaw
@@ -39,7 +39,7 @@ def retime(
     names: Sequence[str] | None = None,
     rates: tuple[float, float] = (0.0, 0.0),
     order: int | None = None,
-    cells: int = CELLS,
+    cells: int | None = None,
     drives: bool = True,
     repair: bool = False,
 ) -> RetimedTrajectory:
@@ -68,8 +68,8 @@ def retime(
     order : int, optional
         Highest derivative of the positions that is continuous, 1 to 6, also where the motion comes from rest. Unless
         given, as many as the limits ask for: 3 with limits of jounce, 2 of jerk or torque rate, 1 otherwise.
-    cells : int, default 160
-        Cells of the spline, 20 or more.
+    cells : int, optional
+        Cells of the spline, 20 or more. Unless given, 160, or as many as resolve how the path waves, up to 1280.
     drives : bool, default True
         Whether torques contain armature inertia, damping and friction of the drives.
     repair : bool, default False
@@ -105,12 +105,13 @@ def retime(
     2.5
     """
     require_solver()
-    cells = whole_number("cells", cells, 20, 5000, error=TrajectoryError)
+    if cells is not None:
+        cells = whole_number("cells", cells, 20, 5000, error=TrajectoryError)
     if isinstance(robot, Mechanism):
         if path is not None or repair:
             message = "the path of a mechanism is that of its drivers, which is not repaired; leave this out"
             raise TrajectoryError(message, name="repair" if repair else "path")
-        return retime_mechanism(robot, _of_mechanism(limits), _rates(rates), order, cells)
+        return retime_mechanism(robot, _of_mechanism(limits), _rates(rates), order, cells or CELLS)
     if not isinstance(robot, Robot):
         raise TrajectoryError("must be a Robot or a Mechanism", name="robot", value=type(robot).__name__)
     if isinstance(path, JointTrajectory):
@@ -122,13 +123,14 @@ def retime(
     source = RobotQuantities(robot, found, limits, drives=drives)
     checked(found, chosen)
     source.check_range()
+    cells = cells or cells_needed(found, chosen)
     conditions = Conditions(chosen, _rates(rates))
     law, search = fastest(source, source.labels, found.start, found.stop, conditions, cells)
     return _certified(robot, found, law, search, source, drives)
 
 
 def _repaired(
-    robot: Robot, trajectory: Any, limits: Any, order: int | None, cells: int, drives: bool
+    robot: Robot, trajectory: Any, limits: Any, order: int | None, cells: int | None, drives: bool
 ) -> RetimedTrajectory:
     if not isinstance(trajectory, JointTrajectory):
         raise TrajectoryError("only a trajectory can be repaired", name="path", value=type(trajectory).__name__)
@@ -137,6 +139,7 @@ def _repaired(
     chosen = _order(order, source.limits, robot)
     checked(path, chosen)
     source.check_range()
+    cells = cells or cells_needed(path, chosen)
     speeds = np.abs(path.derivatives(np.linspace(path.start, path.stop, 501), 1)[:, 1]).max(axis=1)
     keeps = keeps_limits(source, np.array([path.start, path.stop])) & (speeds[[0, -1]] > SPEEDS * speeds.max())
     first, last = (1.0 if as_it_was else None for as_it_was in keeps.tolist())
