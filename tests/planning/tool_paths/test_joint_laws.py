@@ -40,7 +40,9 @@ def test_a_corner_is_kept_and_its_velocities_jump(laws, kink):
     found = laws.derivatives(times, 1)
     np.testing.assert_allclose(found[:, 0], wanted[:, 0], rtol=0, atol=2e-9)
     np.testing.assert_allclose(found[smooth, 1], wanted[smooth, 1], rtol=0, atol=1e-6)
-    instants, jumps = laws.laws["x"].jumps(1)
+    law = laws.laws["x"]
+    assert isinstance(law, jn.HermiteMotion)
+    instants, jumps = law.jumps(1)
     broken = jumps[1] != 0
     assert instants[broken] == pytest.approx([kink], abs=1e-9)
     after, before = wanted[times > kink + 1e-8][0, 1, 0], wanted[times < kink - 1e-8][-1, 1, 0]

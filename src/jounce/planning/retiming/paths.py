@@ -158,14 +158,15 @@ def cells_needed(path: Path, order: int) -> int:
     inside = slice(int(ENDS * FINEST), int((1 - ENDS) * FINEST))
     curves, scale = values[:, order], np.abs(values[:, 1]).max() / span ** (order - 1)
     size = np.ptp(curves[inside], axis=0).max() + SLIGHT * scale
+    at, joint, step = 0, 0, 1
     for cells in CELLS:
         step = FINEST // (cells * LOOKS_IN_CELL)
         ends = curves[::step]
         off = np.abs(curves[step // 2 :: step] - (ends[1:] + ends[:-1]) / 2) / size
         off[: int(ENDS * len(off))] = off[int((1 - ENDS) * len(off)) :] = 0.0  # cells are narrow at the ends
-        if off.max() <= RESOLVED:
+        at, joint = divmod(int(np.argmax(off)), off.shape[1])
+        if off[at, joint] <= RESOLVED:
             return cells
-    at, joint = np.unravel_index(int(np.argmax(off)), off.shape)
     message = (
         f"the path waves or bends too finely at s = {s[step // 2 + at * step]:.6g} for a time law that keeps limits: "
         f"{CELLS[-1]} cells do not resolve it; smooth it, or retime shorter parts of it"
@@ -187,7 +188,7 @@ def _kink(s: float, order: int, name: str) -> TrajectoryError:
     what = {
         0: "jumps",
         1: "has a kink (its direction jumps, or turns too sharply to be resolved)",
-        2: "has a jump of curvature, or bends too sharply to be resolved,",
+        2: "has a jump of curvature",
     }.get(order, "is not smooth")
     limits = "" if order < 2 else ", where what is limited would be infinite"
     message = f"the path {what} at s = {s:.6g}{limits}; round it, or stop there and retime both parts"
