@@ -242,9 +242,11 @@ class Search:
             if over > HOPELESS:
                 break
             law = self.tightened(law, over)
-        raise SolveError(
-            "the time law found cannot be made to keep its limits; smooth the path where it bends sharply, or try another number of cells"
+        message = (
+            "the time law found cannot be made to keep its limits; smooth the path where it bends sharply, or try "
+            "another number of cells"
         )
+        raise SolveError(message)
 
     def tightened(self, law: RateLaw, over: float) -> RateLaw:
         """Return a law that uses less of its limits by a share: slower as a whole, where no rate is given at an end."""
