@@ -11,6 +11,7 @@ from scipy.optimize import minimize_scalar
 import jounce as jn
 from jounce.dynamics.limits import check_limits
 from jounce.dynamics.trajectories import BLOCK
+from jounce.robot.model import leaders
 from jounce.trajectory import JointTrajectory, motion_profile
 
 GRAVITY, LENGTH, MASS = 9.81, 0.5, 2.0
@@ -295,6 +296,44 @@ def test_limits_of_joints_that_follow_bind_the_joint_that_they_follow():
     assert gripper().limits["jaw"] == robot.joints["jaw"].limits
     with pytest.raises(jn.RobotError, match="jaw: no coordinate keeps the range of this joint and of those"):
         check_limits(gripper(lower=1.0), JointTrajectory({"jaw": "t"}, start=0.0, stop=1.0))
+
+
+def chain_of_followers():
+    """Return a robot whose joint c follows b, which follows a: q_b = -2 q_a, q_c = 3 q_b + 0.3 = 0.3 - 6 q_a."""
+    body = jn.Inertia(1.0, [0.1, 0, 0], [0.1, 0.1, 0.1])
+    follows = leaders({"b": jn.Mimic("a", -2.0), "c": jn.Mimic("b", 3.0, 0.3)})
+    own = {"a": {}, "b": {"velocity": 1.0}, "c": {"lower": -0.9, "upper": 1.5, "jerk": 12.0}}
+    joints = [jn.Joint(x, "base", x, mimic=follows.get(x), limits=jn.Limits(**own[x])) for x in "abc"]
+    return jn.Robot("chain", [jn.Link("base"), *(jn.Link(x, body) for x in "abc")], joints)
+
+
+def test_limits_that_are_given_leave_those_of_joints_that_follow():
+    robot, given = chain_of_followers(), {"a": jn.Limits(lower=-3.0, upper=0.1, velocity=5.0, acceleration=9.0)}
+    found = [getattr(robot.limits_with(given)["a"], field.name) for field in dataclasses.fields(jn.Limits)]
+    np.testing.assert_allclose(
+        np.array(found, float), [-0.2, 0.1, 0.5, 9.0, 2.0, np.nan, np.nan, np.nan], rtol=0, atol=1e-15
+    )
+    trajectory = JointTrajectory({"a": "-0.3*sin(2*t)"}, start=0.0, stop=0.5)
+    report = check_limits(robot, trajectory, given)
+    ratios = {row.quantity: row.ratio for row in report.limited}  # the range is 0.3 wide about -0.05
+    expected = {
+        "position": (0.3 * np.sin(1.0) - 0.05) / 0.15,
+        "velocity": 0.6 / 0.5,
+        "acceleration": 1.2 * np.sin(1.0) / 9.0,
+        "jerk": 2.4 / 2.0,
+    }
+    assert ratios == pytest.approx(expected, rel=1e-10)
+    with pytest.raises(jn.RobotError, match="a: no coordinate keeps the range of this joint and of those"):
+        check_limits(robot, trajectory, {"a": jn.Limits(lower=0.5)})
+
+
+def test_a_joint_held_still_stands_where_those_that_follow_it_may_be():
+    robot = gripper(lower=-1.0, upper=-0.1)  # q_tip = 0.5 - 3 q_jaw
+    links, joints = [*robot.links.values(), jn.Link("arm", jn.Inertia(1.0))], [*robot.joints.values()]
+    arm = jn.Robot("arm", links, [*joints, jn.Joint("arm", "base", "arm")])
+    assert dict(check_limits(arm, JointTrajectory({"arm": "t"}, start=0.0, stop=1.0)).held) == {
+        "jaw": pytest.approx(0.2, rel=1e-15)
+    }
 
 
 def test_limits_and_times_are_checked():

@@ -157,7 +157,7 @@ def check_limits(
         Joints that it does not name stand still at zero, or at the end of their range that is nearest to it; of them
         only torques are compared.
     limits : dict of str to Limits, optional
-        Limits of some joints, in place of those that the robot has.
+        Limits of some joints, in place of those that the robot has; those of joints that follow them hold as well.
     times : array_like of shape (time,), optional
         Increasing instants to look at, s, instead of those above.
     drives : bool, default True
@@ -366,7 +366,7 @@ def _merged(robot: Robot, limits: Mapping[str, Limits] | None) -> dict[str, Limi
             raise RobotError(why_not(robot, name), name="limits", value=name)
         if not isinstance(entry, Limits):
             raise RobotError("must be Limits", name=f"limits.{name}", value=entry)
-    return robot.limits | given
+    return robot.limits_with(given)
 
 
 def _grid(trajectory: JointTrajectory) -> Float[np.ndarray, " time"]:

@@ -91,12 +91,12 @@ def _random_coordinates(
     robot: Robot, start: Place, random: np.random.Generator, q: GivenCoordinates, hold: str | Sequence[str]
 ) -> Coordinates:
     """Return where the bodies of a robot are at random coordinates of the joints that are not held."""
-    values = given_coordinates(robot, q)
+    values, limits = given_coordinates(robot, q), robot.limits
     held = robot.joint_names if hold == "all" else (hold,) if isinstance(hold, str) else hold
     for k, name in enumerate(robot.joint_names):
         joint = robot.joints[name]
         reach = np.pi if joint.turning else start.model.length
-        ends = (joint.limits.lower, joint.limits.upper)
+        ends = (limits[name].lower, limits[name].upper)
         low, high = (own if own is not None else reach * sign for own, sign in zip(ends, (-1, 1), strict=True))
         if name not in held:
             values[k] = random.uniform(low, high)

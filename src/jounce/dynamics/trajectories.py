@@ -54,9 +54,9 @@ class FollowedTrajectory:
         check_measures(robot, trajectory)
         self.robot, self.trajectory = robot, trajectory
         self.columns = [robot.joint_names.index(name) for name in trajectory.names]
-        self.held = {
-            name: _rest(robot.joints[name].limits) for name in robot.joint_names if name not in trajectory.names
-        }
+        still = [name for name in robot.joint_names if name not in trajectory.names]
+        limits = robot.limits if still else {}
+        self.held = {name: _rest(limits[name]) for name in still}
         self.doubts: list[str] = []
 
     def coordinates(self, times: Float[np.ndarray, " time"], order: int) -> Float[np.ndarray, "time {order}+1 joint"]:

@@ -119,11 +119,43 @@ class AbstractRobot(Displayed, abc.ABC):
         RobotError
             If no coordinate is within the range of a joint and of those that follow it.
         """
+        return self.limits_with({})
+
+    def limits_with(self, given: Mapping[str, Limits]) -> dict[str, Limits]:
+        """Return the limits of the joints in `joint_names` with others in the place of their own.
+
+        Joints that follow others keep their own limits: of what is given to the joint that they follow and of these,
+        the tighter one holds.
+
+        Parameters
+        ----------
+        given : dict of str to Limits
+            Of some of the joints in `joint_names`.
+
+        Raises
+        ------
+        RobotError
+            If no coordinate is within the range of a joint and of those that follow it.
+
+        Examples
+        --------
+        >>> import jounce as jn
+        >>> left = jn.Joint("left", "base", "a", "prismatic")
+        >>> follows = {"limits": jn.Limits(velocity=1.0), "mimic": jn.Mimic("left", -2.0)}
+        >>> right = jn.Joint("right", "base", "b", "prismatic", **follows)
+        >>> links = [jn.Link(name, jn.Inertia(1.0)) for name in ("base", "a", "b")]
+        >>> gripper = jn.Robot("gripper", links, [left, right])
+        >>> gripper.limits_with({"left": jn.Limits(velocity=5.0)})["left"].velocity
+        0.5
+        """
         followers: dict[str, list[Joint]] = {name: [] for name in self.joint_names}
         for joint in self.moving_joints:
             if joint.mimic is not None:
                 followers[joint.mimic.joint].append(joint)
-        return {name: limits_with_followers(self.joints[name], others) for name, others in followers.items()}
+        return {
+            name: limits_with_followers(name, given.get(name, self.joints[name].limits), others)
+            for name, others in followers.items()
+        }
 
     @property
     def base_inertia(self) -> Inertia | None:

@@ -209,8 +209,8 @@ class Joint:
         return self.type in ("revolute", "continuous")
 
 
-def limits_with_followers(joint: Joint, followers: Iterable[Joint]) -> Limits:
-    """Return the limits of a joint that keep those of the joints that follow it too.
+def limits_with_followers(name: str, limits: Limits, followers: Iterable[Joint]) -> Limits:
+    """Return limits of a joint that keep those of the joints that follow it too.
 
     A follower moves as the joint does, times its multiplier. Its torque is borne by what drives the joint, and has no
     limit of its own.
@@ -220,10 +220,10 @@ def limits_with_followers(joint: Joint, followers: Iterable[Joint]) -> Limits:
     RobotError
         If no coordinate is within all ranges.
     """
-    every = [(joint.limits, Mimic(joint.name))]
+    every = [(limits, Mimic(name))]
     every += [(other.limits, other.mimic) for other in followers if other.mimic and other.mimic.multiplier]
     if len(every) == 1:
-        return joint.limits
+        return limits
 
     def least(*fields: str) -> float | None:
         """Return the least of the limits, of each joint that of the first field that it has."""
@@ -237,10 +237,10 @@ def limits_with_followers(joint: Joint, followers: Iterable[Joint]) -> Limits:
         lower, upper = max(lower, low), min(upper, high)
     if lower > upper:
         message = "no coordinate keeps the range of this joint and of those that follow it; correct their limits"
-        raise RobotError(message, name=joint.name, value=[lower, upper])
+        raise RobotError(message, name=name, value=[lower, upper])
     slowing = any(own.deceleration is not None for own, _ in every)
     return dataclasses.replace(
-        joint.limits,
+        limits,
         lower=lower if math.isfinite(lower) else None,
         upper=upper if math.isfinite(upper) else None,
         velocity=least("velocity"),

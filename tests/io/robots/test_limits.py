@@ -49,6 +49,19 @@ def refused(read):
     return call
 
 
+def test_joints_that_follow_keep_their_limits_beside_those_of_the_file(tmp_path):
+    lead = jn.Joint("lead", "base", "a", limits=jn.Limits(lower=-3.0, upper=3.0, velocity=5.0))
+    own = jn.Limits(lower=-1.0, upper=1.0, velocity=1.0, deceleration=3.0)
+    follow = jn.Joint("follow", "base", "b", limits=own, mimic=jn.Mimic("lead", -2.0))
+    pair = jn.Robot("pair", [jn.Link("base"), jn.Link("a"), jn.Link("b")], [lead, follow], strict=False)
+    path = tmp_path / "limits.yaml"
+    path.write_text("joints: {lead: {velocity: 4, lower: -0.2, upper: null, acceleration: 9}}", encoding="utf-8")
+    assert load_limits(path, pair)["lead"] == jn.Limits(-0.2, 0.5, 0.5, 9.0, deceleration=1.5)
+    path.write_text("title: far\njoints:\n  lead: {lower: 0.6}", encoding="utf-8")
+    with pytest.raises(jn.RobotError, match=r"line 3, joints\.lead: no coordinate keeps the range of this joint"):
+        load_limits(path, pair)
+
+
 def test_the_franka_arm_has_its_published_limits():
     robot = load_robot(ROOT / "examples" / "robots" / "panda.urdf")
     limits = load_limits(FRANKA, robot)

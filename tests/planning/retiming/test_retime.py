@@ -7,6 +7,8 @@ import pytest
 
 import jounce as jn
 from jounce.errors import JounceError, RobotError, SolveError, TrajectoryError
+from jounce.planning.retiming.limits import limits_of
+from jounce.planning.retiming.motion_limits_check import check_motion
 
 LENGTH, SPEED, ACCELERATION, JERK, JOUNCE = 2.0, 1.0, 2.0, 10.0, 200.0
 
@@ -22,6 +24,17 @@ def pendulum(**limits):
     return jn.Robot("pendulum", [jn.Link("base"), jn.Link("rod", rod)], [pin])
 
 
+def led_cart(multiplier, **limits):
+    """Return a cart without limits, and one that follows it with its own."""
+    follower = jn.Joint(
+        "follow", "base", "led", "prismatic", mimic=jn.Mimic("slide", multiplier), limits=jn.Limits(**limits)
+    )
+    joints = [jn.Joint("slide", "base", "cart", "prismatic"), follower]
+    return jn.Robot(
+        "carts", [jn.Link("base"), jn.Link("cart", jn.Inertia(1.0)), jn.Link("led", jn.Inertia(1.0))], joints
+    )
+
+
 LINE = [[0.0], [LENGTH]]
 TRAPEZOID = LENGTH / SPEED + SPEED / ACCELERATION
 
@@ -31,6 +44,30 @@ def test_a_trapezoid_takes_as_long_as_its_closed_form_says():
     assert TRAPEZOID * (1 - 1e-9) < found.stop < TRAPEZOID * 1.003
     assert found.report.kept
     assert isinstance(found, jn.JointTrajectory)
+
+
+def test_joints_that_follow_keep_their_limits_beside_those_that_are_given():
+    robot = led_cart(-4.0, velocity=4 * SPEED)
+    found = jn.retime(robot, LINE, {"slide": jn.Limits(velocity=9.0, acceleration=ACCELERATION)})
+    assert TRAPEZOID * (1 - 1e-9) < found.stop < TRAPEZOID * 1.003
+    assert found.report.kept
+
+
+def test_a_limit_that_depends_on_the_position_leaves_those_of_joints_that_follow():
+    robot = led_cart(2.0, velocity=1.0, acceleration=3.0, deceleration=1.0)
+    laws = {"slide": {"velocity": lambda q: 0.25 + q, "acceleration": lambda q: 1 + 0 * q}}
+    own = {"slide": jn.Limits(velocity=0.1, jerk=7.0)}
+    found = limits_of(robot, limits_of(robot, jn.MotionLimits(own, varying=laws)))
+    q = np.array([0.0, 0.125, 2.0])
+    varying = {field: law(q).tolist() for field, law in found.varying["slide"].items()}
+    assert varying == {"velocity": [0.25, 0.375, 0.5], "acceleration": [1.0] * 3, "deceleration": [0.5] * 3}
+    assert found.joints["slide"].jerk == 7.0
+    trajectory = jn.JointTrajectory({"slide": "0.6*t"}, start=0.0, stop=2.0)
+    ratios = {row.quantity: row.ratio for row in check_motion(robot, trajectory, found).limited}
+    assert ratios["velocity"] == pytest.approx(0.6 / 0.25, rel=1e-9)
+    later = jn.JointTrajectory({"slide": "0.6*t"}, start=1.0, stop=2.0)
+    ratios = {row.quantity: row.ratio for row in check_motion(robot, later, found).limited}
+    assert ratios["velocity"] == pytest.approx(0.6 / 0.5, rel=1e-9)
 
 
 @pytest.mark.parametrize(

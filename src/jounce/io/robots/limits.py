@@ -39,7 +39,8 @@ def load_limits(path: str | PathLike[str], robot: Robot) -> dict[str, Limits]:
     The file has the keys ``joints``, with an entry for each joint, and ``default``, for all joints; each entry has some
     of the keys ``lower``, ``upper``, ``velocity``, ``acceleration``, ``deceleration``, ``jerk``, ``effort`` (torque or
     force) and ``effort_rate``. A value is a number in SI units or a number with a unit; ``null`` takes a limit away. An
-    entry of a joint goes before ``default``, and that before the robot's own. A default with a unit of angle or torque
+    entry of a joint goes before ``default``, and that before the robot's own; limits of joints that follow others hold
+    as well. A default with a unit of angle or torque
     is for the joints that turn, one with a unit of length or force for those that slide.
 
     Parameters
@@ -118,7 +119,7 @@ class _LimitsFile:
     """Reads limits from the plain data of a file; every error names the file, the line and the entry."""
 
     def __init__(self, source: Source, robot: Robot) -> None:
-        self.source, self.robot, self.had = source, robot, robot.limits
+        self.source, self.robot = source, robot
         self.jounce: dict[str, float] = {}
         self.varying: dict[str, dict[str, PositionLaw]] = {}
 
@@ -135,11 +136,16 @@ class _LimitsFile:
             self.source.mapping(("joints", name), KEYS)
         for key in default:
             self._check_default(key)
-        return {name: self._of(name, default, joints.get(name, {})) for name in self.robot.joint_names}
+        found = {name: self._of(name, default, joints.get(name, {})) for name in self.robot.joint_names}
+        try:
+            return self.robot.limits_with(found)
+        except RobotError as error:
+            at: Location = ("joints", error.name) if error.name in joints else ("default",)
+            raise self.source.error(error.message, at, value=error.value) from None
 
     def _of(self, name: str, default: Mapping[str, Any], own: Mapping[str, Any]) -> Limits:
         joint = self.robot.joints[name]
-        values = dataclasses.asdict(self.had[name]) | {"jounce": None}
+        values = dataclasses.asdict(joint.limits) | {"jounce": None}
         places: dict[str, Location] = {}
         for key, raw in default.items():
             if self._fits(raw, key, joint):

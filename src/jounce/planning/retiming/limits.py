@@ -51,12 +51,13 @@ class MotionLimits:
     Parameters
     ----------
     joints : dict of str to Limits, optional
-        Limits of some joints, in place of those that the robot has.
+        Limits of some joints, in place of those that the robot has; those of joints that follow them hold as well.
     jounce : dict of str to float, optional
         Largest fourth derivatives of coordinates, rad/s^4 or m/s^4.
     varying : dict of str to dict of str to callable, optional
         Of a joint: velocity, acceleration, deceleration, jerk, jounce, effort or effort_rate as a function of its
-        position, which gets an array of positions. It goes before a constant limit.
+        position, which gets an array of positions. It goes before a constant limit, but for one of a joint that
+        follows.
     points : tuple of PointLimits, optional
         Limits of points of links, such as the tool.
 
@@ -112,7 +113,27 @@ def limits_of(robot: Robot, limits: Any) -> MotionLimits:
                 raise RobotError("must be Limits", name=f"limits.{name}", value=entry)
     for point in given.points:
         check_name("link", point.link, robot.frames, RobotError, name="limits")
-    return dataclasses.replace(given, joints=dict(robot.limits) | dict(given.joints))
+    own = {name: given.joints.get(name, robot.joints[name].limits) for name in robot.joint_names}
+    alone = {name: dataclasses.replace(x, **_nothing(given.varying.get(name, {}))) for name, x in own.items()}
+    joints = robot.limits_with(alone)  # in whose place there is a law: then those of the joints that follow
+    varying = {name: _with_followers(laws, alone[name], joints[name]) for name, laws in given.varying.items()}
+    return dataclasses.replace(given, joints=joints, varying=varying)
+
+
+def _nothing(laws: Mapping[str, PositionLaw]) -> dict[str, None]:
+    return {field: None for field in laws if field != "jounce"}
+
+
+def _with_followers(laws: Mapping[str, PositionLaw], own: Limits, joined: Limits) -> dict[str, PositionLaw]:
+    """Return laws of a joint that are nowhere above the limits of the joints that follow it."""
+    whole = dict(laws)
+    if "acceleration" in laws and own.deceleration is None and joined.deceleration is not None:
+        whole.setdefault("deceleration", laws["acceleration"])
+    return {field: _least(law, getattr(joined, field, None)) for field, law in whole.items()}
+
+
+def _least(law: PositionLaw, bound: float | None) -> PositionLaw:
+    return law if bound is None else lambda position: np.minimum(law(position), bound)
 
 
 def _check_positive(name: str, value: Any) -> None:
