@@ -28,6 +28,19 @@ def test_segments_jump_as_their_formulas_say(profile):
     assert all(x.count == 0 for x in found.derivatives[:order])
 
 
+def test_profiles_jump_as_their_formulas_say():
+    for rest in (1, 2, 3):  # the derivative above the rest is (2 r + 1)! / r! of the way, at both ends
+        law = jn.RestToRestMotion(1.0, 3.0, duration=0.5, start_time=0.25, rest=rest)
+        found = jn.continuity(law, 0.0, 1.0)
+        told = found.derivatives[rest + 1]
+        size = 2.0 * math.factorial(2 * rest + 1) / math.factorial(rest) / 0.5 ** (rest + 1)
+        assert (found.smoothness, told.count, found.unknown) == (rest, 2, "")
+        assert (told.size, told.instant) == (pytest.approx(size), 0.25)
+        assert jn.continuity(law, 0.3, 0.7).smoothness is None
+    cycloid = jn.continuity(jn.CycloidalMotion(0.0, -1.0, duration=2.0), -1.0, 3.0)
+    assert (cycloid.smoothness, cycloid.derivatives[3].size) == (2, pytest.approx(-(math.pi**2) / 2))
+
+
 def test_what_follows_jumps_where_its_leader_passes_the_knots():
     lift = jn.SegmentedMotion([jn.Segment("harmonic", math.pi, to=0.02), jn.Segment("harmonic", math.pi, to=0.0)])
     law = jn.FollowingMotion(lift, "2*pi*t + 0.1*sin(2*pi*t)")

@@ -6,8 +6,10 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
+from jounce.dynamics.highest import local_maxima
+from jounce.dynamics.limit_jumps import Infinite, infinite_quantities, jumps_of
 from jounce.dynamics.trajectories import FollowedTrajectory, why_not
 from jounce.errors import RobotError, SampleWarning, TrajectoryError
 from jounce.robot.model import Limits
@@ -44,7 +46,7 @@ class LimitRow:
     unit : str
         Of the value and the limit.
     value : float
-        What the trajectory has there.
+        What the trajectory has there; infinite where a lower derivative jumps.
     time : float
         The instant, s.
     limit : float or None
@@ -68,6 +70,11 @@ class LimitRow:
     def broken(self) -> bool:
         """Whether the limit is broken, by more than rounding."""
         return self.ratio is not None and self.ratio > 1 + ROUNDING
+
+    @property
+    def infinite(self) -> bool:
+        """Whether the value is infinite, as where a lower derivative jumps."""
+        return not np.isfinite(self.value)
 
 
 class LimitRows:
@@ -149,6 +156,11 @@ def check_limits(
     2000 in all or more. Around the highest peaks of each curve the step is then refined to less than a millionth of
     the duration: what is reported are true values of the curves.
 
+    Where a derivative of a law jumps within the trajectory, those above it are infinite, and so may be torques and
+    their rates: a limit of them is broken there. Where pieces of laws meet is known; jumps and kinks of expressions and
+    of Python functions are looked for between the instants. There, what is below 1e-5 of the largest value or a fourth
+    of the change from one instant to the next is not found, nor a second one between the same two.
+
     Parameters
     ----------
     robot : Robot
@@ -203,6 +215,7 @@ def check_limits(
     grid = _grid(trajectory) if times is None else _checked_times(times)
     values = curves(grid)
     bounds = _Bounds(robot, merged, REST * np.abs(values[:, 1]).max(axis=0))
+    infinite = infinite_quantities(followed, jumps_of(followed, grid, values[:, : ORDER + 1]), drives)
     wanted = [
         (quantity, joint)
         for joint, name in enumerate(robot.joint_names)
@@ -211,7 +224,7 @@ def check_limits(
     ]
     at, found, shown = worst_instants(curves, bounds, grid, values, np.array(wanted))
     rows = tuple(
-        _row(robot, bounds, quantity, joint, *worst)
+        _row(robot, bounds, quantity, joint, *bounds.or_infinite(infinite, quantity, joint, *worst))
         for (quantity, joint), *worst in zip(wanted, at.tolist(), found.tolist(), shown.tolist(), strict=True)
     )
     for message in followed.doubts:
@@ -264,6 +277,18 @@ class _Bounds:
     def measure(self, values: np.ndarray, at: Any = ...) -> np.ndarray:
         """Return what is worst where it is largest: the ratio, or the magnitude where there is no limit."""
         return np.where(self.limited[at], np.maximum(*self.sides(values, at)), np.abs(values))
+
+    def or_infinite(
+        self, infinite: Infinite, quantity: int, joint: int, time: float, value: float, weight: float
+    ) -> tuple[float, float, float]:
+        """Return the instant, value and weight of a quantity, those of the first where it is infinite if it is."""
+        weights = self.weights(infinite.before)[:, quantity, joint]
+        at = np.flatnonzero((infinite.signs[:, quantity, joint] != 0) & (weights > 0))
+        if not len(at):
+            return time, value, weight
+        first = at[0]
+        value = np.copysign(np.inf, infinite.signs[first, quantity, joint])
+        return float(infinite.times[first]), float(value), float(weights[first])
 
     def shares(self, values: np.ndarray) -> np.ndarray:
         """Return the ratios with the sign of the bound that is nearer, NaN where there is no limit."""
@@ -319,30 +344,6 @@ def worst_instants(
         low = np.take_along_axis(around, np.maximum(top - 1, 0)[None], axis=0)[0]
         high = np.take_along_axis(around, np.minimum(top + 1, POINTS - 1)[None], axis=0)[0]
     return times, found, weight
-
-
-def local_maxima(measures: Float[np.ndarray, "time curve"], count: int) -> Int[np.ndarray, "{count} curve"]:
-    """Return the indices of the highest local maxima of curves, the best first."""
-    height = local_heights(measures)
-    order = highest_of(height, count)
-    usable = np.isfinite(np.take_along_axis(height, order, axis=0))
-    return np.where(usable, order, np.argmax(measures, axis=0))
-
-
-def local_heights(measures: Float[np.ndarray, "time curve"]) -> Float[np.ndarray, "time curve"]:
-    """Return curves where they have a local maximum, of a plateau its first instant, and -inf elsewhere."""
-    edge = np.full((1, measures.shape[1]), -np.inf)
-    before, after = np.concatenate([edge, measures[:-1]]), np.concatenate([measures[1:], edge])
-    return np.where((measures > before) & (measures >= after), measures, -np.inf)
-
-
-def highest_of(height: Float[np.ndarray, "time curve"], count: int) -> Int[np.ndarray, "{count} curve"]:
-    """Return the indices of the highest values of curves, the best first, of equal ones the earlier."""
-    left, every, order = height.copy(), np.arange(height.shape[1]), []
-    for _ in range(count):
-        order.append(np.argmax(left, axis=0))
-        left[order[-1], every] = -np.inf
-    return np.stack(order)
 
 
 def _row(

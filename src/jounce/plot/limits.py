@@ -17,6 +17,7 @@ __all__ = ["draw_limits"]
 DASHES = ("-", (0, (4, 1.5)), (0, (1, 1.2)), (0, (5, 1.2, 1, 1.2)), (0, (8, 2)), (0, (2, 2)))
 BROKEN, FORBIDDEN = "#B22222", "#EDEDED"
 WIDTH, ROW = 7.0, 1.75  # inches
+BEYOND = 1.3  # times what is drawn, where what is infinite is marked
 DRAWN = 4000  # instants at most, or files of lines grow large; the worst ones are marked exactly
 
 
@@ -96,7 +97,8 @@ def _draw_panel(report: LimitReport, quantity: int, joints: list[int], axes: Any
     for joint in joints:
         axes.plot(report.times[chosen], shares[:, joint], **_line_style(joint))
     worst = max(_rows_of(report, quantity), key=lambda row: row.ratio or 0.0)
-    at = (worst.ratio or 0.0) * (1 if _is_upper(report, worst) else -1)
+    side = 1 if _is_upper(report, worst) else -1
+    at = side * BEYOND * max(1.0, float(np.nanmax(np.abs(shares)))) if worst.infinite else side * (worst.ratio or 0.0)
     low, high = min(-1.0, at, float(np.nanmin(shares))), max(1.0, at, float(np.nanmax(shares)))
     margin = 0.08 * (high - low)
     axes.set_ylim(low - margin, high + margin)
@@ -105,13 +107,15 @@ def _draw_panel(report: LimitReport, quantity: int, joints: list[int], axes: Any
         axes.axhline(sign, color=GREY, linewidth=1.1, zorder=1.5)
         axes.axhspan(sign, sign * (abs(low) + abs(high) + margin), color=FORBIDDEN, linewidth=0, zorder=0)
     axes.axhline(0.0, color=PALE_GREY, linewidth=0.7, zorder=1)
-    axes.plot([worst.time], [at], marker="o", markersize=4, color="black", fillstyle="none", zorder=5, clip_on=False)
+    mark = ("^" if side > 0 else "v") if worst.infinite else "o"
+    axes.plot([worst.time], [at], marker=mark, markersize=4, color="black", fillstyle="none", zorder=5, clip_on=False)
     set_ticks(axes.yaxis, 5, least=3)
     set_ticks(axes.xaxis, 6)
     words = " / ".join(dict.fromkeys(row.quantity for row in _rows_of(report, quantity)))
     axes.set_ylabel(f"{words}\n(share of limit)")
     name = shown_name(worst.joint)
-    told = f"worst: {name}, {worst.value:.5g} {unit_label(worst.unit, 0)} (limit {worst.limit:.5g})"
+    size = "infinite" if worst.infinite else f"{worst.value:.5g} {unit_label(worst.unit, 0)}"
+    told = f"worst: {name}, {size} (limit {worst.limit:.5g})"
     axes.set_title(told, loc="left", pad=4, fontsize=7.5, color=BROKEN if worst.broken else GREY)
 
 

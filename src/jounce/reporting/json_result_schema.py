@@ -116,12 +116,12 @@ class CamResult(Result, CamFacts):
 
 
 class LimitRow(TypedDict):
-    """The worst instant of a joint and quantity; without a limit, its ratio is null."""
+    """The worst instant of a joint and quantity; without a limit, its ratio is null, and both where it is infinite."""
 
     joint: str
     quantity: str
     unit: str
-    worst: float
+    worst: float | None
     limit: float | None
     ratio: float | None
     at: float

@@ -164,7 +164,8 @@ def verdict(report: LimitReport) -> str:
     """Word whether the limits are kept, and the place that is nearest to breaking one or breaks one most."""
     number, worst = len(report.limited), report.worst
     assert worst is not None
-    place = f"{worst.joint} {worst.quantity}, {worst.ratio:.4g} of its limit at t = {worst.time:.5g} s"
+    size = "infinite by a jump" if worst.infinite else f"{worst.ratio:.4g} of its limit"
+    place = f"{worst.joint} {worst.quantity}, {size} at t = {worst.time:.5g} s"
     if report.kept:
         return f"All limits kept ({number}).\nClosest: {place}"
     return f"{len(report.broken)} of {count(number, 'limit')} broken.\nWorst: {place}"

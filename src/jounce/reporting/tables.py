@@ -136,8 +136,8 @@ def peaks_table(found: Sequence[Peak]) -> Table:
 def limits_table(report: LimitReport) -> Table:
     """Return the worst instant of each joint and quantity that has a limit; broken limits stand out."""
     rows = [
-        [row.joint, row.quantity, row.unit, number(row.value), number(row.limit or 0.0), f"{row.ratio or 0.0:.4f}",
-         f"{row.time:.5g}"]
+        [row.joint, row.quantity, row.unit, "infinite" if row.infinite else number(row.value), number(row.limit or 0.0),
+         f"{row.ratio or 0.0:.4f}", f"{row.time:.5g}"]
         for row in report.limited
     ]  # fmt: skip
     marks = [[5] if row.broken else [] for row in report.limited]

@@ -11,12 +11,14 @@ from jounce.trajectory.checks import whole_number
 from jounce.trajectory.composed import FollowingMotion, OutputMotion, PiecewiseMotion
 from jounce.trajectory.knots import Jumps, knot_jumps
 from jounce.trajectory.motion import AbstractMotion, ExpressionMotion, FunctionMotion, SplineMotion
+from jounce.trajectory.profiles import AbstractProfile
 
 HIGHEST = 10  # derivative that is looked at
 MOST_CROSSINGS = 10_000
 LOOKS = 4000  # at a leader, for where it passes a knot of the law that follows it
 STEPS = 60  # of bisection
 SLACK = 1e-6  # of the time between two looks, by which a crossing at an end may be beyond it
+ROUNDING = 1e-9  # of the way of a profile by its duration to the power of the order: a smaller jump is none
 
 
 @dataclasses.dataclass(frozen=True)
@@ -131,19 +133,55 @@ def knots(law: AbstractMotion, first: float, last: float) -> Float[np.ndarray, "
     return np.unique(instants[np.any(jumps != 0, axis=0)])
 
 
-def _jumps(law: AbstractMotion, first: float, last: float) -> tuple[np.ndarray, Float[np.ndarray, "levels knots"], str]:
+def known_jumps(
+    law: AbstractMotion, first: float, last: float, order: int
+) -> tuple[Float[np.ndarray, " knots"], Float[np.ndarray, "levels knots"], bool]:
+    """Return the instants at which derivatives up to an order are known to jump, by how much, and if these are all.
+
+    Parameters
+    ----------
+    law : AbstractMotion
+        With numbers in the place of parameters.
+    first, last : float
+        s.
+    order : int
+        Highest derivative.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> instants, sizes, all_of_them = known_jumps(jn.PiecewiseMotion(["t", "2*t - 1"], until=[1.0]), 0.0, 2.0, 2)
+    >>> instants.tolist(), sizes[:, 0].tolist(), all_of_them  # expressions may have kinks of their own
+    ([1.0], [0.0, 1.0, 0.0], False)
+    """
+    instants, sizes, _ = _jumps(law, first, last, order)
+    return instants, sizes, _is_of_polynomials(law)
+
+
+def _is_of_polynomials(law: AbstractMotion) -> bool:
+    """Tell whether a law is made of smooth pieces whose ends are known."""
+    if isinstance(law, PiecewiseMotion):
+        return all(map(_is_of_polynomials, law.parts))
+    return isinstance(law, SplineMotion | AbstractProfile)
+
+
+def _jumps(
+    law: AbstractMotion, first: float, last: float, order: int = HIGHEST
+) -> tuple[np.ndarray, Float[np.ndarray, "levels knots"], str]:
     """Return the instants in a time at which derivatives jump, by how much, and what is not known."""
-    none = np.zeros(0), np.zeros((HIGHEST + 1, 0))
+    none = np.zeros(0), np.zeros((order + 1, 0))
     match law:
         case OutputMotion() if law.parts:
-            return _jumps(law.parts[0], first, last)
+            return _jumps(law.parts[0], first, last, order)
         case FollowingMotion() if law.parts:
             following, leader = law.parts
-            return _followed(following, leader, first, last)
+            return _followed(following, leader, first, last, order)
         case PiecewiseMotion() if law.parts:
-            return _of_pieces(law, first, last)
+            return _of_pieces(law, first, last, order)
         case SplineMotion():
-            return *_repeated(law, knot_jumps(law, HIGHEST), first, last), ""
+            return *_repeated(law, knot_jumps(law, order), first, last), ""
+        case AbstractProfile():
+            return *_within(*_profile_jumps(law, order), first, last), ""
         case ExpressionMotion():
             kinks = "abs" in str(
                 law.expression.folded(lambda _: "", lambda _: "", lambda word, parts: f"{word} {parts}")
@@ -165,20 +203,34 @@ def _repeated(
         since = since[: max(MOST_CROSSINGS // len(instants), 1)]
         instants = (instants + period * since[:, None]).ravel()
         sizes = np.tile(sizes, (1, len(since)))
+    return _within(instants, sizes, first, last)
+
+
+def _within(instants: np.ndarray, sizes: np.ndarray, first: float, last: float) -> tuple[np.ndarray, np.ndarray]:
     slack = 1e-12 * max(abs(first), abs(last))
     inside = (instants >= first - slack) & (instants <= last + slack)
     return instants[inside], sizes[:, inside]
 
 
-def _of_pieces(law: PiecewiseMotion, first: float, last: float) -> tuple[np.ndarray, np.ndarray, str]:
+def _profile_jumps(law: AbstractProfile, order: int) -> Jumps:
+    """Return the jumps at the beginning and at the end of a profile, which is the same backward but for the sign."""
+    begin = np.asarray(law(Jet.variable(np.asarray(law.start_time, float), order)).dense().derivatives(), float)
+    least = ROUNDING * abs(law.end - law.start) / law.duration ** np.arange(order + 1)
+    begin = np.where(np.abs(begin) <= least, 0.0, begin)
+    begin[0] = 0.0
+    ends = np.array([law.start_time, law.stop_time], float)
+    return ends, np.stack([begin, begin * (-1.0) ** np.arange(order + 1)], axis=1)
+
+
+def _of_pieces(law: PiecewiseMotion, first: float, last: float, order: int) -> tuple[np.ndarray, np.ndarray, str]:
     """Return the jumps between pieces, and those that pieces have themselves."""
-    instants, sizes = law.jumps(HIGHEST)
+    instants, sizes = law.jumps(order)
     inside = (instants >= first) & (instants <= last)
     found = [(instants[inside], sizes[:, inside], "")]
     begins, ends = (-np.inf, *law.until), (*law.until, np.inf)
     for part, begin, end in zip(law.parts, begins, ends, strict=True):
         if first < end and last > begin:
-            own, jumps, unknown = _jumps(part, max(first, begin), min(last, end))
+            own, jumps, unknown = _jumps(part, max(first, begin), min(last, end), order)
             within = (own > begin) & (own < end)
             found.append((own[within], jumps[:, within], unknown))
     parts = list(zip(*found, strict=True))
@@ -186,20 +238,25 @@ def _of_pieces(law: PiecewiseMotion, first: float, last: float) -> tuple[np.ndar
 
 
 def _followed(
-    law: AbstractMotion, leader: AbstractMotion, first: float, last: float
+    law: AbstractMotion, leader: AbstractMotion, first: float, last: float, order: int
 ) -> tuple[np.ndarray, np.ndarray, str]:
     """Return the jumps of a law of what a leader prescribes, where the leader passes its knots.
 
     The jump is a polynomial of how far the leader is from the knot, so that its derivatives by time follow from the jet
     of the leader there.
     """
-    looks = np.linspace(first, last, LOOKS + 1)
-    values = np.asarray(leader(Jet([looks])).coefficients[0])
-    own, _, unknown = _jumps(leader, first, last)
+    none = np.zeros(0), np.zeros((order + 1, 0))
+    own, _, unknown = _jumps(leader, first, last, order)
     if len(own):
         unknown = "its leader has jumps of its own"
-    knots, jumps, less = _jumps(law, float(values.min()), float(values.max()))
-    peaks = Jet(np.max(np.abs(c)) for c in leader(Jet.variable(looks, HIGHEST)).dense().coefficients)
+    if isinstance(law, SplineMotion) and not knot_jumps(law, order)[1].any():
+        return *none, unknown
+    looks = np.linspace(first, last, LOOKS + 1)
+    values = np.asarray(leader(Jet([looks])).coefficients[0])
+    knots, jumps, less = _jumps(law, float(values.min()), float(values.max()), order)
+    if not jumps.any():
+        return *none, unknown or less
+    peaks = Jet(np.max(np.abs(c)) for c in leader(Jet.variable(looks, order)).dense().coefficients)
     peaks = Jet((0.0, *peaks.coefficients[1:]))
     instants, sizes = [], []
     step = (last - first) / LOOKS  # a knot at which the leader begins or ends is passed on the way there, or from there
@@ -214,23 +271,23 @@ def _followed(
         times = _crossings(leader, knot, looks[crossing], looks[crossing + 1])
         inside = (times > first - SLACK * step) & (times < last + SLACK * step)
         crossing, times = crossing[inside], np.clip(times[inside], first, last)
-        passing = leader(Jet.variable(times, HIGHEST)).dense().coefficients
+        passing = leader(Jet.variable(times, order)).dense().coefficients
         change = _composed(jump, Jet((np.zeros_like(times), *passing[1:])))  # at the knot, not near it
         bound = _composed(np.abs(jump), peaks)[:, None]
         forward = np.where(away[crossing] < 0, 1.0, -1.0)
         instants.append(times)
         sizes.append(np.where(np.abs(change) <= 1e-9 * bound, 0.0, forward * change))
     if not instants:
-        return np.zeros(0), np.zeros((HIGHEST + 1, 0)), unknown or less
+        return *none, unknown or less
     times, found = np.concatenate(instants), np.concatenate(sizes, axis=1)
-    order = np.argsort(times)
-    return times[order], found[:, order], unknown or less
+    sequence = np.argsort(times)
+    return times[sequence], found[:, sequence], unknown or less
 
 
 def _composed(jump: Float[np.ndarray, " levels"], away: Jet) -> np.ndarray:
     """Return the derivatives by time of a polynomial, given by its derivatives at zero, of how far a leader is."""
-    change = Jet.constant(np.zeros_like(np.asarray(away.coefficients[0])), HIGHEST)
-    for level in range(HIGHEST, -1, -1):
+    change = Jet.constant(np.zeros_like(np.asarray(away.coefficients[0])), len(jump) - 1)
+    for level in range(len(jump) - 1, -1, -1):
         change = change * away + jump[level] / math.factorial(level)
     return np.asarray(change.derivatives())
 

@@ -71,6 +71,24 @@ def test_a_limit_that_depends_on_the_position_leaves_those_of_joints_that_follow
 
 
 @pytest.mark.parametrize(
+    "law, jumps",
+    [
+        (jn.PiecewiseMotion(["t", "2*t - 1"], [1.0]), {"jerk", "jounce", "acceleration of the point"}),
+        (jn.PiecewiseMotion(["t**3", "3*t**2 - 3*t + 1"], [1.0]), {"jounce"}),  # of which only jerk jumps
+        (jn.PiecewiseMotion(["t**4", "4*t**3 - 6*t**2 + 4*t - 1"], [1.0]), set()),
+    ],
+)
+def test_limits_of_all_kinds_are_broken_where_something_below_jumps(law, jumps):
+    limits = jn.MotionLimits(
+        points=(jn.PointLimits("cart", speed=99.0, acceleration=999.0),),
+        jounce={"slide": 999.0},
+        varying={"slide": {"jerk": lambda q: 999.0 + 0 * q}},
+    )
+    report = check_motion(cart(), jn.JointTrajectory({"slide": law}, start=0.0, stop=2.0), limits)
+    assert {(row.quantity, row.time, row.ratio) for row in report.broken} == {(x, 1.0, np.inf) for x in jumps}
+
+
+@pytest.mark.parametrize(
     "limits, duration",
     [
         ({"velocity": SPEED, "acceleration": ACCELERATION}, TRAPEZOID),

@@ -2,11 +2,14 @@
 
 import dataclasses
 import warnings
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
+from jounce.dynamics.limit_jumps import jumps_of
 from jounce.dynamics.limits import LimitReport, LimitRow, check_limits
+from jounce.dynamics.trajectories import FollowedTrajectory
 from jounce.errors import SampleWarning
 from jounce.planning.retiming.limits import MotionLimits, limits_of
 from jounce.planning.retiming.path import Path
@@ -18,6 +21,9 @@ from jounce.trajectory import JointTrajectory
 
 EVEN = np.array([1.0, 0.0, 0.0, 0.0])  # z and its derivatives where the parameter is the time
 ZOOM, ZOOMS, PEAKS = 9, 8, 3
+SMALL = 1e-9  # of the size of a velocity of a point: a smaller jump is rounding
+
+_Infinite = Mapping[tuple[str, str], float]  # when a quantity of a joint is infinite, s
 
 
 def check_motion(
@@ -44,6 +50,7 @@ def check_motion(
     given = limits_of(robot, limits)
     constant = {name: _without(entry, given.varying.get(name, {})) for name, entry in given.joints.items()}
     report = check_limits(robot, trajectory, constant, drives=drives)
+    infinite = {(row.joint, row.quantity): row.time for row in report.rows if row.infinite}
     alone = {name: Limits() for name in robot.joint_names}
     partner = {  # an acceleration and its deceleration are judged together
         name: dataclasses.replace(alone[name], **_partners(given.joints[name], laws))
@@ -52,7 +59,7 @@ def check_motion(
     others = dataclasses.replace(given, joints=alone | partner)
     if not (others.jounce or others.varying or others.points):
         return report
-    extra = _rows(robot, trajectory, others, drives=drives)
+    extra = _rows(robot, trajectory, others, infinite, drives=drives)
     told = {(row.joint, row.quantity) for row in extra}
     rows = tuple(row for row in report.rows if (row.joint, row.quantity) not in told)
     return dataclasses.replace(report, rows=(*rows, *extra))
@@ -71,7 +78,9 @@ def _partners(limits: Limits, varying: Any) -> dict[str, float | None]:
     return {field: getattr(limits, field) for field in pair if set(varying) & set(pair) and field not in varying}
 
 
-def _rows(robot: Robot, trajectory: JointTrajectory, limits: MotionLimits, *, drives: bool) -> list[LimitRow]:
+def _rows(
+    robot: Robot, trajectory: JointTrajectory, limits: MotionLimits, infinite: _Infinite, *, drives: bool
+) -> list[LimitRow]:
     path = Path(dict(trajectory.laws), trajectory.start, trajectory.stop)
     source = RobotQuantities(robot, path, limits, drives=drives)
 
@@ -82,7 +91,7 @@ def _rows(robot: Robot, trajectory: JointTrajectory, limits: MotionLimits, *, dr
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SampleWarning)
         found = ratios(grid)
-        bounded = np.flatnonzero(found.max(axis=0) > 0)
+        used = found.max(axis=0) > 0
         order = np.argsort(-found, axis=0)[:PEAKS]
         best, times = found.max(axis=0), grid[np.argmax(found, axis=0)]
         for rank in range(PEAKS):
@@ -98,6 +107,11 @@ def _rows(robot: Robot, trajectory: JointTrajectory, limits: MotionLimits, *, dr
                 low, high = around[np.maximum(top - 1, 0), every], around[np.minimum(top + 1, ZOOM - 1), every]
     values, bounds = _at_peaks(source, times)
     labels = source.labels.every
+    when = np.array([infinite.get((label.owner, label.word), np.nan) for label in labels])
+    when = np.where(np.isnan(when), _jumps(source, trajectory), when)
+    jumped = np.isfinite(when)
+    times, bounds = np.where(jumped, when, times), np.where(jumped, np.abs(bounds), bounds)
+    values, best = (np.where(jumped, np.inf, x) for x in (values, best))
     return [
         LimitRow(
             labels[k].owner,
@@ -108,9 +122,37 @@ def _rows(robot: Robot, trajectory: JointTrajectory, limits: MotionLimits, *, dr
             float(bounds[k]),
             float(best[k]),
         )
-        for k in bounded
+        for k in np.flatnonzero(used | jumped)
         if np.isfinite(bounds[k])
     ]
+
+
+def _jumps(source: RobotQuantities, trajectory: JointTrajectory) -> np.ndarray:
+    """Return when jounce, and speeds and accelerations of points, are first infinite; NaN where they are not."""
+    labels, points = source.labels, source.limits.points
+    when = np.full(len(labels.every), np.nan)
+    if not (points or source.with_jounce):
+        return when
+    followed = FollowedTrajectory(source.robot, trajectory)
+    grid = np.linspace(trajectory.start, trajectory.stop, 2001)
+    jumps = jumps_of(followed, grid, followed.coordinates(grid, 4))
+    if not len(jumps.times):
+        return when
+    changes = [np.abs(source.point(jumps.after, p) - source.point(jumps.before, p))[:, :2].max(axis=-1) for p in points]
+    sizes = [np.abs(source.point(jumps.after, p))[:, :2].max(axis=-1) for p in points]
+    moved = [change > SMALL * (size + change) for change, size in zip(changes, sizes, strict=True)]
+    fast = [x[:, 0] for x, p in zip(moved, points, strict=True) if p.speed is not None]
+    forced = [x.any(axis=1) for x, p in zip(moved, points, strict=True) if p.acceleration is not None]
+    fourth = [x != 0 for x in jumps.above(4)[:, source.with_jounce].T]
+    for found, last in ((fast, len(labels.first)), (fourth, len(labels.every))):
+        when[last - len(found) : last] = [_first(jumps.times, x) for x in found]
+    last = len(labels.every) - len(labels.fourth)
+    when[last - len(forced) : last] = [_first(jumps.times, x) for x in forced]
+    return when
+
+
+def _first(times: np.ndarray, some: np.ndarray) -> float:
+    return float(times[np.argmax(some)]) if some.any() else np.nan
 
 
 def _curves(source: RobotQuantities, times: np.ndarray) -> Curves:

@@ -14,11 +14,10 @@ from jounce.planning.retiming.path import Path
 from jounce.planning.retiming.trajectory_paths import path_of_trajectory
 from jounce.trajectory import AbstractMotion, Expression, JointTrajectory, PiecewiseMotion, SplineMotion
 from jounce.trajectory.knots import knot_jumps
+from jounce.trajectory.seen_jumps import level_sizes, unexplained
 
 DEGREE = 5  # of the splines through waypoints
 LOOKS = 2000  # cells in which kinks are looked for
-BENT = 0.2  # of the change over a cell: what the slopes do not account for, where it is a jump
-FAINT = 1e-5  # of the largest value: a smaller jump is none
 CELLS = (160, 320, 640, 1280)  # of the spline of a time law
 LOOKS_IN_CELL = 4
 FINEST = 4 * LOOKS_IN_CELL * CELLS[-1]  # places at which a path is looked at
@@ -125,17 +124,10 @@ def checked(path: Path, order: int = 1) -> Path:
         raise TrajectoryError(message, name=path.names[joint])
     if not np.abs(values[:, 1]).max() > 0:
         raise TrajectoryError("the path does not move: all its points are the same", name="path")
-    sizes = np.abs(values).max(axis=(0, 2))
+    sizes = level_sizes(np.abs(values).max(axis=2, keepdims=True), path.stop - path.start)
+    found = unexplained(s, values, sizes)
     for level in range(order + 1):
-        # what is small beside a lower derivative over the whole path is no more than its rounding
-        size = max(sizes[k] / (path.stop - path.start) ** (level - k) for k in range(min(level, 1), level + 1))
-        change = np.diff(values[:, level], axis=0)
-        slopes = values[:, level + 1]
-        step = s[1] - s[0]
-        off = np.abs(change - (slopes[1:] + slopes[:-1]) * step / 2)  # what no slope accounts for jumped
-        bends = step * np.abs(np.diff(slopes, axis=0))  # more than that comes of a jump of the slope
-        far = (off > BENT * np.abs(change)) & (off > FAINT * size)
-        jumps = np.argwhere(far & (off > bends))
+        jumps = np.argwhere(found[:, level])
         if len(jumps):
             raise _kink(float(s[jumps[0][0]] + (s[1] - s[0]) / 2), level, path.names[jumps[0][1]])
     return path

@@ -168,7 +168,7 @@ def _certified(
         over = (report.worst.ratio or 0.0) - 1 if report.worst else 0.0
         if over <= KEPT:
             return RetimedTrajectory(laws, bare.stop, path, progress, report, active_limits(search, law, motion))
-        if attempt == ATTEMPTS - 1:
+        if attempt == ATTEMPTS - 1 or not np.isfinite(over):
             told = "" if report.worst is None else f" of the {report.worst.quantity} of {report.worst.joint}"
             message = f"the time law found breaks the limit{told}; try more cells"
             raise SolveError(message, name="cells", value=law.basis.cells)

@@ -87,7 +87,7 @@ class RobotQuantities:
         values, bounds = [q[:, 1, self.with_velocity]], [self._bounds("velocity", self.with_velocity, q)]
         for point in self.limits.points:
             if point.speed is not None:
-                values.append(np.linalg.norm(self._point(q, point)[:, 1], axis=-1)[:, None])
+                values.append(np.linalg.norm(self.point(q, point)[:, 1], axis=-1)[:, None])
                 bounds.append(np.full((len(q), 1), point.speed))
         return np.concatenate(values, axis=1), np.concatenate(bounds, axis=1)
 
@@ -130,10 +130,11 @@ class RobotQuantities:
         chosen = [point for point in self.limits.points if point.acceleration is not None]
         if not chosen:
             return np.zeros((len(q), 0, 3, 2)), np.zeros((len(q), 0))
-        moved = [np.moveaxis(self._point(q, point)[:, 1:3], 1, -1) for point in chosen]
+        moved = [np.moveaxis(self.point(q, point)[:, 1:3], 1, -1) for point in chosen]
         return np.stack(moved, axis=1), np.tile(np.array([point.acceleration for point in chosen], float), (len(q), 1))
 
-    def _point(self, q: np.ndarray, point: object) -> Float[np.ndarray, "point 3 3"]:
+    def point(self, q: np.ndarray, point: object) -> Float[np.ndarray, "point 3 3"]:
+        """Return the position, velocity and acceleration of a point for coordinates with derivatives."""
         return np.asarray(forward_kinematics(self.robot, q[:, :3], point.link, point.point).position)  # type: ignore[attr-defined]
 
     def _has(self, name: str, *fields: str) -> bool:

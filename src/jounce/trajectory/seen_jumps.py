@@ -1,0 +1,109 @@
+"""Jumps of derivatives that show in their values: for laws of which nothing says where they have any."""
+
+from collections.abc import Callable
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+BENT = 0.2  # of the change over a cell: what the slopes do not account for, where it is a jump
+FAINT = 1e-5  # of the largest value: a smaller jump is none
+CONSTANT = 1e-9  # of the size of the positions, by time to the power of the order: what is smaller is their rounding
+SHORTEST = 1e-11  # of the whole time: cells in which a jump is still one
+HALVINGS = 40
+
+Evaluation = Callable[[Float[np.ndarray, " time"]], Float[np.ndarray, "time level joint"]]
+
+
+def level_sizes(values: Float[np.ndarray, "time level joint"], span: float) -> Float[np.ndarray, "level joint"]:
+    """Return the size of each derivative: what is small beside a lower one over the whole time is its rounding."""
+    largest = np.abs(values).max(axis=0)
+    sizes = largest.copy()
+    for level in range(2, len(sizes)):
+        sizes[level] = np.maximum(largest[level], sizes[level - 1] / span)
+    return sizes
+
+
+def unexplained(
+    instants: Float[np.ndarray, " time"],
+    values: Float[np.ndarray, "time level joint"],
+    sizes: Float[np.ndarray, "level #joint"],
+) -> Bool[np.ndarray, "cell level-1 joint"]:
+    """Tell in which cells derivatives change by what their slopes at both ends do not account for.
+
+    Parameters
+    ----------
+    instants : array of shape (time,)
+        The ends of the cells.
+    values : array of shape (time, level, joint)
+        Derivatives there; the highest one serves as slope only.
+    sizes : array of shape (level, joint) or (level, 1)
+        Of the derivatives, as `level_sizes` gives them.
+    """
+    step = np.diff(instants)[:, None, None]
+    change, slopes = np.diff(values[:, :-1], axis=0), values[:, 1:]
+    off = np.abs(change - (slopes[1:] + slopes[:-1]) * step / 2)  # what no slope accounts for jumped
+    bends = step * np.abs(np.diff(slopes, axis=0))  # more than that comes of a jump of the slope
+    return (off > BENT * np.abs(change)) & (off > FAINT * sizes[:-1]) & (off > bends)
+
+
+def seen_jumps(
+    evaluate: Evaluation, instants: Float[np.ndarray, " time"], values: Float[np.ndarray, "time level joint"]
+) -> tuple[Float[np.ndarray, " jump"], Float[np.ndarray, "jump level-1 joint"]]:
+    """Return where derivatives jump, by their values, and by how much; zero where one does not.
+
+    A cell over which one changes by what its slopes do not account for is halved again and again: what is steep becomes
+    flat, a jump stays.
+
+    Parameters
+    ----------
+    evaluate : callable
+        Maps instants, (time,), to derivatives, (time, level, joint).
+    instants : array of shape (time,)
+        At which to begin, s.
+    values : array of shape (time, level, joint)
+        What `evaluate` gives there; the highest derivative serves as slope only.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> def kink(t):
+    ...     return np.stack([np.abs(t - 0.3), np.sign(t - 0.3), 0 * t], axis=1)[..., None]
+    >>> t = np.linspace(0.0, 1.0, 101) ** 1.1
+    >>> where, sizes = seen_jumps(kink, t, kink(t))
+    >>> where.round(9).tolist(), sizes[..., 0].round(9).tolist()
+    ([0.3], [[0.0, 2.0]])
+    """
+    span = float(instants[-1] - instants[0])
+    levels, joints = values.shape[1] - 1, values.shape[2]
+    if len(instants) < 2:
+        return np.zeros(0), np.zeros((0, levels, joints))
+    sizes = level_sizes(values, span)
+    least = CONSTANT * sizes[0] / span ** np.arange(levels + 1)[:, None]
+    sizes = np.maximum(sizes, least / FAINT)
+    cells = np.flatnonzero(unexplained(instants, values, sizes).any(axis=(1, 2)))
+    low, high = instants[cells], instants[cells + 1]
+    left, right = values[cells], values[cells + 1]
+    for _ in range(HALVINGS):
+        if not len(cells) or (high - low).max() <= SHORTEST * span:
+            break
+        middle = (low + high) / 2
+        between = evaluate(middle)
+        usable = np.isfinite(between).all(axis=(1, 2))  # beside a kink there may be no derivatives
+        first = _surprise(low, middle, left, between, sizes) >= _surprise(middle, high, between, right, sizes)
+        earlier, later = usable & first, usable & ~first
+        low, high = np.where(later, middle, low), np.where(earlier, middle, high)
+        left, right = np.where(later[:, None, None], between, left), np.where(earlier[:, None, None], between, right)
+    change = right[:, :-1] - left[:, :-1]
+    explained = (right[:, 1:] + left[:, 1:]) * (high - low)[:, None, None] / 2
+    jumped = (np.abs(change) > FAINT * sizes[:-1]) & (np.abs(change - explained) > BENT * np.abs(change))
+    some = jumped.any(axis=(1, 2))
+    return high[some], np.where(jumped, change, 0.0)[some]
+
+
+def _surprise(
+    low: np.ndarray, high: np.ndarray, left: np.ndarray, right: np.ndarray, sizes: np.ndarray
+) -> Float[np.ndarray, " cell"]:
+    """Return the largest change over cells that slopes do not account for, as a share of the sizes."""
+    step = (high - low)[:, None, None]
+    off = np.abs(right[:, :-1] - left[:, :-1] - (right[:, 1:] + left[:, 1:]) * step / 2)
+    return np.max(off / np.maximum(sizes[:-1], np.finfo(float).tiny), axis=(1, 2))
