@@ -69,7 +69,9 @@ def retime(
         Highest derivative of the positions that is continuous, 1 to 6, also where the motion comes from rest. Unless
         given, as many as the limits ask for: 3 with limits of jounce, 2 of jerk or torque rate, 1 otherwise.
     cells : int, optional
-        Cells of the spline, 20 or more. Unless given, 160, or as many as resolve how the path waves, up to 1280.
+        Cells of the spline, 20 or more. Unless given, 160, or as many as resolve how the path waves, up to 1280. With a
+        number that is given, and for a mechanism, which has 160, that is not looked at: between the instants of the
+        check a path that waves more finely than these may exceed limits.
     drives : bool, default True
         Whether torques contain armature inertia, damping and friction of the drives.
     repair : bool, default False
