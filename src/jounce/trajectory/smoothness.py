@@ -4,7 +4,7 @@ import dataclasses
 import math
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from jounce.jet import Jet
 from jounce.trajectory.checks import whole_number
@@ -258,45 +258,51 @@ def _followed(
         return *none, unknown or less
     peaks = Jet(np.max(np.abs(c)) for c in leader(Jet.variable(looks, order)).dense().coefficients)
     peaks = Jet((0.0, *peaks.coefficients[1:]))
-    instants, sizes = [], []
     step = (last - first) / LOOKS  # a knot at which the leader begins or ends is passed on the way there, or from there
     looks = np.concatenate([[first - step], looks, [last + step]])
     values = np.asarray(leader(Jet([looks])).coefficients[0])
-    for knot, jump in zip(knots, jumps.T, strict=True):
-        if not jump.any():
-            continue
-        away = values - knot
-        known = np.isfinite(away)  # a leader need not go on beyond the ends, as sqrt(t)
-        crossing = np.flatnonzero(((away[:-1] < 0) != (away[1:] < 0)) & known[:-1] & known[1:])
-        times = _crossings(leader, knot, looks[crossing], looks[crossing + 1])
-        inside = (times > first - SLACK * step) & (times < last + SLACK * step)
-        crossing, times = crossing[inside], np.clip(times[inside], first, last)
-        passing = leader(Jet.variable(times, order)).dense().coefficients
-        change = _composed(jump, Jet((np.zeros_like(times), *passing[1:])))  # at the knot, not near it
-        bound = _composed(np.abs(jump), peaks)[:, None]
-        forward = np.where(away[crossing] < 0, 1.0, -1.0)
-        instants.append(times)
-        sizes.append(np.where(np.abs(change) <= 1e-9 * bound, 0.0, forward * change))
-    if not instants:
+    jumping = jumps.any(axis=0)
+    knots, jumps = knots[jumping], jumps[:, jumping]
+    which, crossing = _passed(values, knots)
+    if not len(which):
         return *none, unknown or less
-    times, found = np.concatenate(instants), np.concatenate(sizes, axis=1)
-    sequence = np.argsort(times)
-    return times[sequence], found[:, sequence], unknown or less
+    times = _crossings(leader, knots[which], looks[crossing], looks[crossing + 1])
+    inside = (times > first - SLACK * step) & (times < last + SLACK * step)
+    sequence = np.flatnonzero(inside)[np.argsort(times[inside])]
+    which, crossing, times = which[sequence], crossing[sequence], np.clip(times[sequence], first, last)
+    passing = leader(Jet.variable(times, order)).dense().coefficients
+    change = _composed(jumps[:, which], Jet((np.zeros_like(times), *passing[1:])))  # at the knot, not near it
+    bound = _composed(np.abs(jumps), peaks)[:, which]
+    forward = np.where(values[crossing] < knots[which], 1.0, -1.0)
+    return times, np.where(np.abs(change) <= 1e-9 * bound, 0.0, forward * change), unknown or less
 
 
-def _composed(jump: Float[np.ndarray, " levels"], away: Jet) -> np.ndarray:
-    """Return the derivatives by time of a polynomial, given by its derivatives at zero, of how far a leader is."""
-    change = Jet.constant(np.zeros_like(np.asarray(away.coefficients[0])), len(jump) - 1)
+def _passed(
+    values: Float[np.ndarray, " look"], knots: Float[np.ndarray, " knot"]
+) -> tuple[Int[np.ndarray, " crossing"], Int[np.ndarray, " crossing"]]:
+    """Return which knots lie between two values in sequence, and after which value; what is not finite passes none."""
+    sequence = np.argsort(knots)
+    low, high = np.minimum(values[:-1], values[1:]), np.maximum(values[:-1], values[1:])
+    first, beyond = (np.searchsorted(knots[sequence], x, side="right") for x in (low, high))
+    count = np.where(np.isfinite(low) & np.isfinite(high), beyond - first, 0)
+    crossing = np.repeat(np.arange(len(count)), count)
+    place = np.arange(len(crossing)) - np.repeat(np.cumsum(count) - count, count)
+    return sequence[first[crossing] + place], crossing
+
+
+def _composed(jump: Float[np.ndarray, "levels crossing"], away: Jet) -> Float[np.ndarray, "levels crossing"]:
+    """Return the derivatives by time of polynomials, given by their derivatives at zero, of how far a leader is."""
+    change = Jet.constant(np.zeros(jump.shape[1]), len(jump) - 1)
     for level in range(len(jump) - 1, -1, -1):
         change = change * away + jump[level] / math.factorial(level)
     return np.asarray(change.derivatives())
 
 
-def _crossings(leader: AbstractMotion, knot: float, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Return when a leader passes a value, between instants before and after, by bisection."""
+def _crossings(leader: AbstractMotion, knots: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Return when a leader passes values, each between an instant before and one after, by bisection."""
 
     def away(instants: np.ndarray) -> np.ndarray:
-        return np.asarray(leader(Jet([instants])).coefficients[0]) - knot
+        return np.asarray(leader(Jet([instants])).coefficients[0]) - knots
 
     below = away(low) < 0
     for _ in range(STEPS):

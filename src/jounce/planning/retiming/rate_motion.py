@@ -1,5 +1,6 @@
 """The motion of the parameter of a path in time, from the square of its rate: exact to rounding, to any order."""
 
+from functools import partial
 from typing import Any
 
 import jax
@@ -90,6 +91,7 @@ class RateMotion(AbstractMotion):
         return value
 
 
+@partial(jax.jit, static_argnames="order")  # outside of a program the loop would be compiled at each call
 def _series(instants: Any, begins: Any, pieces: Any, at: Any, order: int) -> tuple[Any, ...]:
     """Return the Taylor coefficients of u at instants."""
     slack = SLACK * instants[-1]
