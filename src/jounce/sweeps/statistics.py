@@ -118,16 +118,17 @@ def statistics(
     """
     low, high = values.min(axis=1), values.max(axis=1)
     size = np.abs(values)
-    peak = size.max(axis=1)
-    unknown = np.isnan(peak)
-    when = instants[np.argmax(size, axis=1)]
+    at = np.argmax(size, axis=1)
+    peak = np.take_along_axis(size, at[:, None], axis=1)[:, 0]
+    unknown, when = np.isnan(peak), instants[at]
     if pace is not None:
         when = instants[0] + (when - instants[0]) / pace.reshape(-1, *[1] * (when.ndim - 1))
     weight = _weights(instants)
     scale = np.where(peak > 0, peak, 1.0)  # squares of large numbers would overflow
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
-        mean = np.einsum("t,dt...->d...", weight, (size / scale[:, None]) ** 2)
+        size /= scale[:, None]
+        mean = np.einsum("t,dt...,dt...->d...", weight, size, size)
     return {
         "peak": peak,
         "peak_time": np.where(unknown, np.nan, when),

@@ -28,7 +28,7 @@ from jounce.sweeps.store import Store, create, find
 from jounce.trajectory.joint_trajectory import JointTrajectory
 
 LARGEST_CHUNK, SMALLEST_CHUNK = 1024, 16
-NUMBERS = 2_000_000  # of the histories of a chunk
+NUMBERS = 4_000_000  # of the histories of a chunk
 LEAST_CHUNKS = 8  # so that several workers have something to do
 
 
