@@ -192,21 +192,32 @@ def _start(mechanism: Mechanism, simulation: Simulation, equations: Equations) -
     guess = traced_model(mechanism, simulation.model.length).guess
     position = guess["position"][:, 1:]
     attitude = guess["angle"][None, 1:] if "angle" in guess else guess["quaternion"][:, 1:]
-    return _assembled(simulation.equations, equations, known, position, attitude, instant)
+    inverse = np.linalg.pinv(np.asarray(_jacobian(simulation.equations, known, instant)))
+    return _assembled(equations, known, (position, attitude), inverse, instant)
+
+
+@compiled(narrow=True)
+def _jacobian(equations: Equations, state: State, instant: Instants) -> Float[Numbers, "row column"]:
+    """Return the Jacobian at a state."""
+    return equations.system.jacobian(equations.still(state.position, state.attitude), Jet([instant]))[..., 0]
 
 
 @compiled(narrow=True)
 def _assembled(
-    held: Equations, equations: Equations, known: State, position: Any, attitude: Any, instant: Instants
+    equations: Equations,
+    known: State,
+    guess: tuple[Any, Any],
+    inverse: Float[Numbers, "column row"],
+    instant: Instants,
 ) -> State:
-    """Return a known state as it changes with the starting guess: by the shortest step, as that of the assembly.
+    """Return a known state as it changes with positions and attitudes of the starting guess.
 
-    `held` are the equations of motion as numbers.
+    It changes by the shortest step onto the constraints, as that of the assembly: `inverse` is that of the Jacobian.
     """
-    jacobian = held.system.jacobian(held.still(known.position, known.attitude), Jet([instant]))[..., 0]
+    position, attitude = guess
     still = equations.still(position, attitude)
     gap = equations.system.residual(still, Jet([instant])).coefficients[0]
-    column = -(jnp.linalg.pinv(jacobian) @ gap)
+    column = -(inverse @ gap)
     pose = still.displaced(*equations.system.coordinates(column, still.shifts))
     state = known._replace(position=pose.position.coefficients[0][:, 1:], attitude=equations.attitude_of(pose))
     factor = jax.lax.stop_gradient(equations).factored(known, instant)
