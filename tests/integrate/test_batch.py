@@ -1,6 +1,5 @@
 """Batches: every run is what it is alone; a run that fails leaves the others as they are."""
 
-import dataclasses
 import functools
 
 import numpy as np
@@ -101,9 +100,3 @@ def test_runs_in_several_chunks():
 def test_bad_parameters(values, words):
     with pytest.raises(jn.MechanismError, match=words):
         jn.simulate_batch(pendulum(), values, TIME)
-
-
-def test_outputs_that_follow_from_whole_motions_are_refused():
-    outputs = {"load": jn.JointForceOutput("A"), "angle": jn.AngleOutput("upper")}
-    with pytest.raises(jn.MechanismError, match=r"outputs.load: forces and energies are not computed in batches"):
-        jn.simulate_batch(dataclasses.replace(pendulum(), outputs=outputs), {"rise": [0.1, 0.2]}, TIME)

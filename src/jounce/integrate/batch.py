@@ -13,7 +13,6 @@ from jaxtyping import Float, Int
 from jounce.display import Displayed
 from jounce.dynamics.forward import Equations, State
 from jounce.dynamics.start import consistent_start, initial_as_drivers
-from jounce.errors import MechanismError
 from jounce.integrate.batch_equations import BatchStart, ParametricMechanism, Turns
 from jounce.integrate.events import pose_coordinates
 from jounce.integrate.marching import DenseOutput, IntegratorState, Outcome, begin_march, march
@@ -25,7 +24,7 @@ from jounce.jet.turns import whole_periods
 from jounce.kinematics import Status
 from jounce.kinematics.families import checked_values
 from jounce.kinematics.motion import output_series
-from jounce.mechanism import AbstractMotionOutput, Mechanism, TimeGrid, build, check_mechanism
+from jounce.mechanism import Mechanism, TimeGrid, build, check_mechanism
 from jounce.mechanism.axis_angles import with_turns
 from jounce.mechanism.builder import with_reference
 from jounce.mechanism.law_checks import check_laws
@@ -48,7 +47,7 @@ class Batch(Displayed):
         What the runs differ in.
     outputs : dict of str to numpy.ndarray
         Outputs of the mechanism with derivatives, (runs, time, order + 1) or (runs, time, order + 1, component), SI;
-        NaN where a run did not get so far.
+        NaN where a run did not get so far. Forces and energies, which follow from a whole motion, are left out.
     status : numpy.ndarray of int, shape (runs, time)
         See `Status`.
     steps : numpy.ndarray of int, shape (runs,)
@@ -94,8 +93,7 @@ def simulate_batch(
     Raises
     ------
     MechanismError
-        If a parameter does not exist, or values are not finite or of unequal number; if an output is a force or an
-        energy; and as `simulate`.
+        If a parameter does not exist, or values are not finite or of unequal number; and as `simulate`.
 
     Examples
     --------
@@ -113,7 +111,6 @@ def simulate_batch(
     (3, 2, 5)
     """
     check_mechanism(mechanism)
-    check_outputs(mechanism)
     values = checked_values(mechanism, parameters, "run")
     names, rows = tuple(values), np.stack(list(values.values()), axis=-1)
     first = mechanism.with_parameters(**dict(zip(names, rows[0].tolist(), strict=True)))
@@ -142,14 +139,6 @@ def simulate_batch(
         while len(runs.moving):
             list(pool.map(runs.advance, runs.lots(runs.moving)))
     return Batch(instants, values, runs.outputs, runs.status, runs.steps)
-
-
-def check_outputs(mechanism: Mechanism) -> None:
-    """Raise MechanismError if an output is a force or an energy, which follows from a whole motion."""
-    for name, output in mechanism.outputs.items():
-        if isinstance(output, AbstractMotionOutput):
-            message = "forces and energies are not computed in batches of simulations; leave this output out"
-            raise MechanismError(message, name=f"outputs.{name}")
 
 
 class _Runs:

@@ -15,7 +15,6 @@ from jounce.design.variations import Reader, reader_of
 from jounce.dynamics.trajectories import FollowedTrajectory
 from jounce.errors import MechanismError, RobotError, check_name
 from jounce.integrate import simulate_batch
-from jounce.integrate.batch import check_outputs
 from jounce.integrate.methods import AbstractMethod
 from jounce.integrate.simulate import checked_options, instants_of
 from jounce.kinematics import Motion, Status, solve, solve_batch
@@ -183,7 +182,10 @@ class Simulations(_OfMechanism):
     def __post_init__(self) -> None:
         check_mechanism(self.mechanism)
         checked_options(self.order, self.method, self.tolerance, self.longest_step)
-        check_outputs(self.mechanism)
+        for name, output in self.mechanism.outputs.items():
+            if isinstance(output, AbstractMotionOutput):
+                message = "forces and energies are not computed in batches of simulations; leave this output out"
+                raise MechanismError(message, name=f"outputs.{name}")
 
     @functools.cached_property
     def instants(self) -> Float[np.ndarray, " time"]:
