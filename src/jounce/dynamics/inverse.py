@@ -7,9 +7,10 @@ on the poses of the bodies that it joins, so that all mechanisms share it.
 import copy
 import dataclasses
 from collections.abc import Callable, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
+import jax
 import numpy as np
 from jaxtyping import Float
 
@@ -18,7 +19,7 @@ from jounce.dynamics.constraint_forces import Multipliers, Slope, Slopes
 from jounce.dynamics.forward import Lanes
 from jounce.dynamics.loads import loads, mass_matrices
 from jounce.dynamics.masses import Gravity, Masses, check_loads, gravity_of, masses_of
-from jounce.dynamics.motion_values import Coordinates, along_motion, cut, pose_of
+from jounce.dynamics.motion_values import Coordinates, along_motion, cut, in_lots, pose_of
 from jounce.dynamics.redundant_forces import OPEN, OpenMultipliers, least_multipliers
 from jounce.errors import MechanismError
 from jounce.jet import Jet, cross
@@ -33,6 +34,8 @@ from jounce.mechanism.redundant_reactions import resolved_reactions
 from jounce.mechanism.system import System, with_rows
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
+
+LOT = 16  # instants whose dense matrices are factored together
 
 
 @dataclasses.dataclass(frozen=True)
@@ -108,12 +111,13 @@ class MotionForces:
 
         Where constraints are redundant, those of least norm, or by the stiffnesses that the mechanism has for it.
         """
-        found = self._balancing(np.zeros(len(self.model.rows)), 1.0)
+        found = self._balancing[0]
         self.check_finite(found)
         return found
 
-    def _balancing(self, bent: np.ndarray, weight: float) -> Numbers:
-        """Return the multipliers that balance the loads times a weight; `bent` is for redundant rows."""
+    @cached_property
+    def _balancing(self) -> Float[Numbers, "case level row time"]:
+        """Multipliers that balance the loads; after them some that balance none, where any are looked for."""
         system = dataclasses.replace(self.model.system, outputs=())
         nothing = Pattern.of((), (), system.pattern.width, system.body_count)
         unjoined = dataclasses.replace(
@@ -121,6 +125,9 @@ class MotionForces:
         )
         square = system.shape[0] == system.shape[1]
         compliance = None if system.rank is None else self.open.compliance
+        cases = [(1.0, np.zeros(len(self.model.rows)))]
+        if self._looks_for_open:
+            cases.append((0.0, self.open.chance()))
 
         def chunk(lanes: np.ndarray) -> Any:
             blocks = self._blocks(lanes)
@@ -129,9 +136,10 @@ class MotionForces:
             load, finite = _loads(forces, bodies, instants, self.masses, self.gravity, self.pose_type)
             self._check_finite(finite, lanes)
             if compliance is not None:
-                return _least_multipliers(system, blocks, weight * load, compliance, bent)
+                weights, bent = (np.array(x) for x in zip(*cases, strict=True))
+                return _least_multipliers(system, blocks, load, compliance, weights, bent)
             still = None if square else self.coordinates_at(None, lanes, 1)
-            return _multipliers(system, blocks, load, still, self.masses, self.pose_type)
+            return _multipliers(system, blocks, load, still, self.masses, self.pose_type)[None]
 
         return self.in_chunks(chunk)
 
@@ -170,15 +178,19 @@ class MotionForces:
     @cached_property
     def loose(self) -> "MotionForces | None":
         """Forces of chance that balance no load, where redundant constraints leave some open and none are chosen."""
-        if self.model.system.rank is None or self.motion.mechanism.redundant_reactions != "unique":
+        if not self._looks_for_open:
             return None
         twin = copy.copy(self)
         twin._kept = {}
-        found = self._balancing(self.open.chance(), 0.0)
+        found = self._balancing[1]
         solved = self.motion.status == Status.OK
         size = np.abs(found[0][:, solved] * self.open.weights[:, None]).max(initial=0.0)
         twin.__dict__["multipliers"] = found / (size or 1.0)
         return twin
+
+    @property
+    def _looks_for_open(self) -> bool:
+        return self.model.system.rank is not None and self.motion.mechanism.redundant_reactions == "unique"
 
     @cached_property
     def open(self) -> OpenMultipliers:
@@ -354,7 +366,9 @@ def _multipliers(
     pose_type: type[Pose],
 ) -> Any:
     mass = None if still is None else mass_matrices(pose_of(still, pose_type, 0), masses)[:, :, 1:]
-    return constraint_forces.multipliers(system, blocks, load, mass)
+    of_lot = partial(constraint_forces.multipliers, system)
+    dense = mass is not None or system.fronts is None
+    return in_lots(of_lot, LOT, blocks, load, mass) if dense else of_lot(blocks, load, mass)
 
 
 @compiled()
@@ -363,9 +377,16 @@ def _least_multipliers(
     blocks: Slopes,
     load: Float[Numbers, "levels coordinate body batch"],
     compliance: Float[Numbers, " row"],
-    bent: Float[Numbers, " row"],
+    weights: Float[Numbers, " case"],
+    bent: Float[Numbers, "case row"],
 ) -> Any:
-    return least_multipliers(system, blocks, load, compliance, bent)
+    def of_lot(blocks: Slopes, load: Numbers) -> Any:
+        def of_case(weight: Any, bent: Numbers) -> Any:
+            return least_multipliers(system, blocks, weight * load, compliance, bent)
+
+        return jax.vmap(of_case)(weights, bent)  # all cases by one factorisation
+
+    return in_lots(of_lot, LOT, blocks, load)
 
 
 @compiled()
