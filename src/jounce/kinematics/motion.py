@@ -356,7 +356,7 @@ class Motion(Displayed):
             values = values.reshape(*values.shape[:2], *(len(labels) for _, labels in axes))
         dims = tuple(coordinates)
         attributes = {"units": output.unit, "long_name": name}
-        if isinstance(output, AbstractMotionOutput) and (remark := output.remark(self, values)):
+        if isinstance(output, AbstractMotionOutput) and not self.traced and (remark := output.remark(self, values)):
             attributes["comment"] = remark
         return xarray.DataArray(values, dims=dims, coords=coordinates, name=name, attrs=attributes)
 
