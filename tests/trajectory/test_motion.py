@@ -89,6 +89,15 @@ class TestSplineMotion:
         found = derivatives(law, 0, jnp.asarray(self.times)[None])
         np.testing.assert_allclose(found[0, 0], values, atol=1e-14)
 
+    @pytest.mark.parametrize("degree", [1, 3, 5, 7])
+    @pytest.mark.parametrize("held", [0.3, -1e6 / 3])
+    def test_samples_that_all_agree_are_at_rest_exactly(self, degree, held):
+        """Friction takes its sign from the velocity: rounding in its place would be all of the friction."""
+        times = np.cumsum(np.random.default_rng(1).uniform(0.5, 1.5, 60)) / 7
+        found = derivatives(jn.SplineMotion(times, np.full(60, held), degree), 3, jnp.linspace(times[0], times[-1], 97))
+        assert (found[0] == held).all()
+        assert (found[1:] == 0).all()
+
     def test_outside_the_samples_the_end_pieces_go_on_where_they_are_to(self):
         law = jn.SplineMotion(self.times, self.times**3, 3, beyond="continue")
         np.testing.assert_allclose(derivatives(law, 0, jnp.asarray([[-0.5, 1.5]])), [[[-0.125, 3.375]]], rtol=1e-11)

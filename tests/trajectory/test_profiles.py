@@ -71,6 +71,13 @@ def test_cycloid():
     close(found[4], -way / DURATION * w**3 * np.sin(w * t))
 
 
+def test_cycloids_begin_and_end_at_rest_exactly():
+    """Friction takes its sign from the velocity: rounding in its place would be all of the friction."""
+    for start, end, duration, beginning in np.random.default_rng(2).uniform(0.1, 3.0, (20, 4)):
+        law = CycloidalMotion(start, end, duration, beginning)
+        assert not derivatives(law, 2, np.array([beginning, beginning + duration]))[1:].any()
+
+
 LAWS = {
     "cycloidal": (lambda: CycloidalMotion(START, END, DURATION, BEGINNING), 2),
     "cubic": (lambda: RestToRestMotion(START, END, DURATION, BEGINNING, 1), 1),

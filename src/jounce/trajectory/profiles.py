@@ -163,8 +163,8 @@ class CycloidalMotion(AbstractProfile):
 
     def first_half(self, share: Jet) -> Jet:
         """Return the share of the way done after a share of the time."""
-        turn = 2 * math.pi
-        return share - sin(share * turn) / turn
+        angle = share * (2 * math.pi)
+        return (angle - sin(angle)) / (2 * math.pi)  # exactly at rest where it begins
 
     @property
     def peaks(self) -> tuple[float, float, float]:

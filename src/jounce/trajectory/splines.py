@@ -99,10 +99,12 @@ def _interpolated(times: _Samples, values: _Samples, degree: int, **ends: Any) -
     from scipy.interpolate import make_interp_spline  # here, since importing SciPy takes half a second
 
     scale = (times[-1] - times[0]) / (len(times) - 1)  # in steps, so that high powers stay of one size
-    spline = make_interp_spline((times - times[0]) / scale, values, k=degree, **ends)
-    inside = np.unique(spline.t[degree : len(spline.t) - degree])
+    first = values[0]  # through what is added to it: samples that all agree are at rest exactly, not up to rounding
     with np.errstate(over="ignore", invalid="ignore"):
+        spline = make_interp_spline((times - times[0]) / scale, values - first, k=degree, **ends)
+        inside = np.unique(spline.t[degree : len(spline.t) - degree])
         powers = local_powers(spline, inside[:-1], degree) / scale ** np.arange(degree + 1)[:, None]
+    powers[0] += first
     if not np.isfinite(powers).all():
         raise ValueError("derivatives beyond the range of numbers")
     breakpoints = times[0] + inside * scale
