@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import jounce as jn
+from jounce.robot.wrenches import check_wrenches
 from tests.problems.robots import random_robot, robot_named
 
 ROBOT = random_robot(2, 7)
@@ -141,6 +142,14 @@ FINGER = jn.Robot("one", [jn.Link("base"), jn.Link("rod", jn.Inertia(1.0))], [jn
             "wrench.frame: no such frame, got 'world'; valid: base, link",
         ),
         (lambda: jn.Wrench("rod", point=[0, 0]), "wrench.point: must have the shape (3,), not (2,)"),
+        (
+            lambda: check_wrenches(FINGER, jn.Wrench("rod"), free=False),  # tests check the callers' types
+            "wrenches: must be a list of jn.Wrench, got 'Wrench'",
+        ),
+        (
+            lambda: check_wrenches(FINGER, ["rod"], free=False),
+            "wrenches[0]: must be a jn.Wrench, got 'str'",
+        ),
         (
             lambda: jn.inverse_dynamics(FINGER, np.zeros((3, 1)), wrenches=[jn.Wrench("rood")]),
             "wrenches[0].link: no link has this name, got 'rood'; did you mean 'rod'? valid: base, rod",

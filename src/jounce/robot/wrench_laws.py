@@ -9,12 +9,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jounce.errors import RobotError, check_name
+from jounce.errors import RobotError
 from jounce.robot.arguments import floats
 from jounce.robot.kinematics import place_of
 from jounce.robot.robot import Robot
 from jounce.robot.tree import Frame
-from jounce.robot.wrenches import Wrench
+from jounce.robot.wrenches import Wrench, check_wrenches
 
 STATE = 3  # arguments of a function of time, coordinates and rates
 
@@ -71,19 +71,13 @@ def wrench_laws(
     Raises
     ------
     RobotError
-        If a link does not exist or does not move, or a force is neither constant nor such a function.
+        If a wrench is none, a link does not exist or does not move, or a force is neither constant nor such a function.
     """
-    parts = []
+    check_wrenches(robot, wrenches, free=free)
+    parts, n = [], len(robot.joint_names)
     for k, wrench in enumerate(wrenches):
-        where = f"wrenches[{k}]"
-        if not isinstance(wrench, Wrench):
-            raise RobotError("must be a jn.Wrench", name=where, value=type(wrench).__name__)
-        check_name("link", wrench.link, robot.frames, RobotError, name=f"{where}.link")
-        if robot.frames[wrench.link].body < 0 and not free:
-            message = "this link is fixed to the base: nothing moves it"
-            raise RobotError(message, name=f"{where}.link", value=wrench.link)
-        n = len(robot.joint_names)
-        parts.append(tuple(_part(f"{where}.{name}", getattr(wrench, name), n) for name in ("force", "torque")))
+        each = ("force", "torque")
+        parts.append(tuple(_part(f"wrenches[{k}].{name}", getattr(wrench, name), n) for name in each))
     places = tuple(place_of(robot, wrench.link, wrench.point) for wrench in wrenches)
     return WrenchLaws(tuple(parts)), places, tuple(wrench.frame == "base" for wrench in wrenches)
 

@@ -65,21 +65,32 @@ def wrench_arrays(
     Raises
     ------
     RobotError
-        If a link does not exist, the base is pushed, a shape does not fit the samples, or a function has no time.
+        If a wrench is none, a link does not exist, the base is pushed, a shape does not fit the samples, or a function
+        has no time.
     """
+    check_wrenches(robot, wrenches, free=free)
     arrays = []
     for k, wrench in enumerate(wrenches):
         where = f"wrenches[{k}]"
-        check_name("link", wrench.link, robot.frames, RobotError, name=f"{where}.link")
-        if robot.frames[wrench.link].body < 0 and not free:
-            raise RobotError(
-                "this link is fixed to the base: nothing moves it", name=f"{where}.link", value=wrench.link
-            )
         parts = [
             _derivatives(f"{where}.{name}", getattr(wrench, name), lead, levels, time) for name in ("force", "torque")
         ]
         arrays.append(jnp.concatenate(parts, axis=-1) if _traced(parts) else np.concatenate(parts, axis=-1))
     return tuple(arrays)
+
+
+def check_wrenches(robot: Robot, wrenches: Any, *, free: bool) -> None:
+    """Raise RobotError unless these are wrenches on links that move; on the base where it is free."""
+    if not isinstance(wrenches, Sequence) or isinstance(wrenches, str):
+        raise RobotError("must be a list of jn.Wrench", name="wrenches", value=type(wrenches).__name__)
+    for k, wrench in enumerate(wrenches):
+        where = f"wrenches[{k}]"
+        if not isinstance(wrench, Wrench):
+            raise RobotError("must be a jn.Wrench", name=where, value=type(wrench).__name__)
+        check_name("link", wrench.link, robot.frames, RobotError, name=f"{where}.link")
+        if robot.frames[wrench.link].body < 0 and not free:
+            message = "this link is fixed to the base: nothing moves it"
+            raise RobotError(message, name=f"{where}.link", value=wrench.link)
 
 
 def _derivatives(where: str, value: Any, lead: tuple[int, ...], levels: int, time: Any) -> Any:
