@@ -2,11 +2,13 @@
 
 import functools
 
+import jax
 import numpy as np
 import pinocchio
 import pytest
 
 import jounce as jn
+from jounce.robot.equations_of_motion import centrifugal
 from tests.problems.published_robots import Pair, difference, files, floating_root, random_states
 from tests.problems.robots import FILES, random_robot, robot_named
 
@@ -161,3 +163,16 @@ def test_loops_are_refused():
     for function in (jn.mass_matrix, jn.bias_forces):
         with pytest.raises(jn.RobotError, match="loops"):
             function(closed, np.zeros((2, len(robot.joint_names))))
+
+
+@pytest.mark.slow
+def test_memory_of_centrifugal_forces_grows_with_the_square_of_the_number_of_joints():
+    """With its cube, 150 joints took 4 GB for one sample: a batch of them ended the process."""
+
+    def memory(joints):
+        tree = random_robot(3, joints).tree
+        q = jax.ShapeDtypeStruct((2, joints, 8), float)
+        compiled = jax.jit(lambda q: centrifugal(tree, q)).lower(q).compile()
+        return compiled.memory_analysis().temp_size_in_bytes
+
+    assert memory(48) <= 5 * memory(24)

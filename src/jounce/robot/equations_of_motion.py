@@ -26,6 +26,7 @@ from jounce.robot.tree_scan import BodySeries, Series, joint_coordinates, to_coo
 from jounce.shapes import ArrayLike, Numbers
 
 PARTS = ("coriolis", "centrifugal", "gravity")
+ABREAST = 8  # coordinates by which the mass matrix is differentiated side by side
 
 
 def centers_of(tree: Tree, frames: Frames) -> Jet:
@@ -120,11 +121,15 @@ def centrifugal(tree: Tree, q: Series) -> Float[Numbers, "order-1 coordinate bat
     rate = Jet(tuple(q)).differentiate()
     q = q[:-1]
     _, slope = jax.linearize(lambda q: mass_jet(tree, q), q)
-    directions = np.zeros((tree.shape.coordinates, *q.shape[:2], 1))
-    directions[np.arange(tree.shape.coordinates), 0, np.arange(tree.shape.coordinates)] = 1.0
-    # levels, k, i, j, batch: dM_ij / dq_k
-    slopes = jax.vmap(slope, out_axes=1)(jnp.broadcast_to(directions, (tree.shape.coordinates, *q.shape)))
-    symbols = jnp.einsum("ljijs->lijs", slopes) - 0.5 * jnp.einsum("lijjs->lijs", slopes)
+
+    def by_coordinate(k: Any) -> Any:
+        """Return how the coordinate k changes its own column of the matrix, and the diagonal."""
+        change = slope(jnp.zeros_like(q).at[0, k].set(1.0))
+        return change[:, :, k], jnp.einsum("ljjs->ljs", change)
+
+    # a few at a time: all slopes at once take the cube of the number of coordinates in memory, 4 GB for 150
+    columns, diagonals = jax.lax.map(by_coordinate, jnp.arange(tree.shape.coordinates), batch_size=ABREAST)
+    symbols = jnp.moveaxis(columns, 0, 2) - 0.5 * jnp.moveaxis(diagonals, 0, 1)  # levels, i, j, batch
     forces = Jet(tuple(symbols)) * (rate * rate)[None]
     return stacked(forces.map(lambda c: jnp.sum(c, axis=1)))
 
