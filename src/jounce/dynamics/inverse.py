@@ -1,41 +1,25 @@
-"""Inverse dynamics of mechanisms: multipliers, forces of drivers and wrenches of joints over a whole motion.
-
-Long motions go through in chunks of instants. What differs between mechanisms, the residuals, is compiled type by type
-on the poses of the bodies that it joins, so that all mechanisms share it.
-"""
+"""Inverse dynamics of mechanisms: multipliers, forces of drivers and wrenches of joints over a whole motion."""
 
 import copy
 import dataclasses
-from collections.abc import Callable, Sequence
-from functools import cached_property, partial
+from collections.abc import Callable
+from functools import cached_property
 from typing import Any
 
-import jax
 import numpy as np
 from jaxtyping import Float
 
-from jounce.dynamics import constraint_forces
-from jounce.dynamics.constraint_forces import Multipliers, Slope, Slopes
-from jounce.dynamics.forward import Lanes
-from jounce.dynamics.loads import loads, mass_matrices
-from jounce.dynamics.masses import Gravity, Masses, check_loads, gravity_of, masses_of
-from jounce.dynamics.motion_values import Coordinates, along_motion, cut, in_lots, pose_of
-from jounce.dynamics.redundant_forces import OPEN, OpenMultipliers, least_multipliers
+from jounce.dynamics import force_programs as programs
+from jounce.dynamics.masses import check_loads, gravity_of, masses_of
+from jounce.dynamics.motion_values import along_motion, cut
+from jounce.dynamics.redundant_forces import OPEN, OpenMultipliers
 from jounce.errors import MechanismError
-from jounce.jet import Jet, cross
-from jounce.jet.algebra import stacked
 from jounce.kinematics import Motion, Status
-from jounce.kinematics.compilation import compiled
-from jounce.kinematics.jacobian_series import slopes
 from jounce.mechanism import Model
 from jounce.mechanism.axis_angles import at_lanes
 from jounce.mechanism.pattern import Pattern
 from jounce.mechanism.redundant_reactions import resolved_reactions
-from jounce.mechanism.system import System, with_rows
-from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
-
-LOT = 16  # instants whose dense matrices are factored together
 
 
 @dataclasses.dataclass(frozen=True)
@@ -133,13 +117,13 @@ class MotionForces:
             blocks = self._blocks(lanes)
             bodies, instants = self.coordinates_at(None, lanes, self.levels + 2), self.motion.time[lanes]
             forces = dataclasses.replace(unjoined, forces=at_lanes(self.forces, lanes))
-            load, finite = _loads(forces, bodies, instants, self.masses, self.gravity, self.pose_type)
+            load, finite = programs.body_loads(forces, bodies, instants, self.masses, self.gravity, self.pose_type)
             self._check_finite(finite, lanes)
             if compliance is not None:
                 weights, bent = (np.array(x) for x in zip(*cases, strict=True))
-                return _least_multipliers(system, blocks, load, compliance, weights, bent)
+                return programs.least_multipliers(system, blocks, load, compliance, weights, bent)
             still = None if square else self.coordinates_at(None, lanes, 1)
-            return _multipliers(system, blocks, load, still, self.masses, self.pose_type)[None]
+            return programs.multipliers(system, blocks, load, still, self.masses, self.pose_type)[None]
 
         return self.in_chunks(chunk)
 
@@ -198,7 +182,7 @@ class MotionForces:
         model = self.model
         lanes = np.flatnonzero(self.motion.status == Status.OK)[:1]
         lanes = lanes if len(lanes) else np.zeros(1, int)
-        scaled = _jacobian(dataclasses.replace(model.system, outputs=(), forces=()), self._blocks(lanes))
+        scaled = programs.scaled_jacobian(dataclasses.replace(model.system, outputs=(), forces=()), self._blocks(lanes))
         mechanism = self.motion.mechanism
         wanted = resolved_reactions(mechanism.redundant_reactions, mechanism.parameter_values)
         return OpenMultipliers(model, np.asarray(scaled)[..., 0], wanted)
@@ -214,7 +198,8 @@ class MotionForces:
 
         def chunk(lanes: np.ndarray) -> Any:
             element, poses = self.model.system.groups[place.group].element, self._poses(place.group, lanes)
-            return _exerted(element, poses, self.motion.time[lanes], self._of_group(place)[..., lanes], self.pose_type)
+            exerting = self._of_group(place)[..., lanes]
+            return programs.exerted(element, poses, self.motion.time[lanes], exerting, self.pose_type)
 
         return self._once(chunk, "driver", place.group)[:, place.instance : place.instance + 1]
 
@@ -226,7 +211,7 @@ class MotionForces:
         place = self.indices[name]
 
         def chunk(lanes: np.ndarray) -> Any:
-            return _wrenches(self._slopes(place.group, slot, lanes), self._of_group(place)[..., lanes])
+            return programs.wrenches(self._slopes(place.group, slot, lanes), self._of_group(place)[..., lanes])
 
         return self._once(chunk, "joint", place.group, slot)[:, :, place.instance]
 
@@ -271,7 +256,7 @@ class MotionForces:
         def chunk(lanes: np.ndarray) -> Any:
             (group,) = at_lanes((self.motion.forces[index],), lanes)
             poses = tuple(self.coordinates_at(slot, lanes, self.levels + 1) for slot in group.bodies)
-            return _applied(group.element, poses, self.motion.time[lanes], self.pose_type, self.levels)
+            return programs.applied(group.element, poses, self.motion.time[lanes], self.pose_type, self.levels)
 
         return self._once(chunk, "force", index)[:, :, self.model.forces[index].index(name)]
 
@@ -297,7 +282,7 @@ class MotionForces:
         def chunk(lanes: np.ndarray) -> Any:
             bodies = (body,) if frame is None else (body, frame)
             taken = [self.coordinates_at((b,), lanes, self.levels) for b in bodies]
-            return _expressed(work[:, :, lanes], taken, point[:, None, None], self.pose_type)
+            return programs.expressed(work[:, :, lanes], taken, point[:, None, None], self.pose_type)
 
         return self.in_chunks(chunk)
 
@@ -329,108 +314,10 @@ class MotionForces:
     def _slopes(self, index: int, slot: int, lanes: np.ndarray) -> Any:
         element = self.model.system.groups[index].element
         poses, instants = self._poses(index, lanes), self.motion.time[lanes]
-        return _slopes(element, poses, instants, self.pose_type, slot, self.levels)
+        return programs.element_slopes(element, poses, instants, self.pose_type, slot, self.levels)
 
     def _of_group(self, place: ElementIndex) -> Float[Numbers, "order row instance time"]:
         """Return the multipliers of a group."""
         found = self.multipliers[:, place.rows]
         instances = self.model.system.groups[place.group].instances
         return found.reshape(len(found), -1, instances, found.shape[-1])
-
-
-@compiled("pose_type", "slot", "levels")
-def _slopes(
-    element: Any, poses: Sequence[Coordinates], instants: Lanes, pose_type: type[Pose], slot: int, levels: int
-) -> Any:
-    time = Jet.variable(instants[None], levels - 1)
-    return slopes(element, [pose_of(pose, pose_type, levels - 1) for pose in poses], time, slot)
-
-
-@compiled("pose_type")
-def _loads(
-    system: System, bodies: Coordinates, instants: Lanes, masses: Masses, gravity: Gravity, pose_type: type[Pose]
-) -> tuple[Any, Any]:
-    order = len(bodies["position"]) - 1
-    pose = pose_of(bodies, pose_type, order)
-    time = Jet.variable(instants[None], order)
-    return loads(system, pose, time, masses, gravity), system.finite_forces(pose, time)
-
-
-@compiled("pose_type")
-def _multipliers(
-    system: System,
-    blocks: Slopes,
-    load: Float[Numbers, "levels coordinate body batch"],
-    still: Coordinates | None,
-    masses: Masses,
-    pose_type: type[Pose],
-) -> Any:
-    mass = None if still is None else mass_matrices(pose_of(still, pose_type, 0), masses)[:, :, 1:]
-    of_lot = partial(constraint_forces.multipliers, system)
-    dense = mass is not None or system.fronts is None
-    return in_lots(of_lot, LOT, blocks, load, mass) if dense else of_lot(blocks, load, mass)
-
-
-@compiled()
-def _least_multipliers(
-    system: System,
-    blocks: Slopes,
-    load: Float[Numbers, "levels coordinate body batch"],
-    compliance: Float[Numbers, " row"],
-    weights: Float[Numbers, " case"],
-    bent: Float[Numbers, "case row"],
-) -> Any:
-    def of_lot(blocks: Slopes, load: Numbers) -> Any:
-        def of_case(weight: Any, bent: Numbers) -> Any:
-            return least_multipliers(system, blocks, weight * load, compliance, bent)
-
-        return jax.vmap(of_case)(weights, bent)  # all cases by one factorisation
-
-    return in_lots(of_lot, LOT, blocks, load)
-
-
-@compiled()
-def _jacobian(system: System, blocks: Slopes) -> Any:
-    return constraint_forces.jacobian_of(system, blocks)
-
-
-@compiled("pose_type")
-def _exerted(
-    driver: Any, poses: Sequence[Coordinates], instants: Lanes, forces: Multipliers, pose_type: type[Pose]
-) -> Any:
-    order = len(forces) - 1
-    built = [pose_of(pose, pose_type, order) for pose in poses]
-    return constraint_forces.exerted(driver, built, Jet.variable(instants[None], order), forces)
-
-
-@compiled("pose_type", "levels")
-def _applied(force: Any, poses: Sequence[Coordinates], instants: Lanes, pose_type: type[Pose], levels: int) -> Any:
-    built = [pose_of(pose, pose_type, levels) for pose in poses]
-    time = Jet.variable(instants[None], levels)
-    found = force.force(force.displacement(*built, time), force.velocity(*built, time), time).truncate(levels - 1)
-    return stacked(with_rows(found))
-
-
-@compiled()
-def _wrenches(slope: Slope, forces: Multipliers) -> Any:
-    return constraint_forces.wrench(slope, forces)
-
-
-@compiled("pose_type")
-def _expressed(
-    work: Float[Numbers, "levels coordinate batch"],
-    bodies: Sequence[Coordinates],
-    point: Float[Numbers, "component 1 1"],
-    pose_type: type[Pose],
-) -> tuple[Any, Any]:
-    order = len(work) - 1
-    pose, *frame = (pose_of(body, pose_type, order) for body in bodies)
-    force, moment = (Jet(tuple(part[:, :, None])) for part in (work[:, : pose.shifts], work[:, pose.shifts :]))
-    if pose.turns == 1:
-        moment = moment - cross(pose.direction(point), force)[None]
-    else:
-        moment = pose.direction(moment - cross(point, pose.to_body(force)))
-    for other in frame:
-        force = other.to_body(force)
-        moment = moment if pose.turns == 1 else other.to_body(moment)
-    return tuple(stacked(jet)[:, :, 0] for jet in (force, moment))

@@ -1,0 +1,136 @@
+"""What is compiled of inverse dynamics.
+
+What differs between mechanisms, the residuals, is compiled type by type on the poses of the bodies that it joins, so
+that all mechanisms share it.
+"""
+
+from collections.abc import Sequence
+from functools import partial
+from typing import Any
+
+import jax
+from jaxtyping import Float
+
+from jounce.dynamics import constraint_forces, redundant_forces
+from jounce.dynamics.constraint_forces import Multipliers, Slope, Slopes
+from jounce.dynamics.forward import Lanes
+from jounce.dynamics.loads import loads, mass_matrices
+from jounce.dynamics.masses import Gravity, Masses
+from jounce.dynamics.motion_values import Coordinates, in_lots, pose_of
+from jounce.jet import Jet, cross
+from jounce.jet.algebra import stacked
+from jounce.kinematics.compilation import compiled
+from jounce.kinematics.jacobian_series import slopes
+from jounce.mechanism.system import System, with_rows
+from jounce.rigid.pose import Pose
+from jounce.shapes import Numbers
+
+LOT = 16  # instants whose dense matrices are factored together
+
+
+@compiled("pose_type", "slot", "levels")
+def element_slopes(
+    element: Any, poses: Sequence[Coordinates], instants: Lanes, pose_type: type[Pose], slot: int, levels: int
+) -> Any:
+    """Return how the residual of a joint or driver changes with the body in a slot, as `slopes` does."""
+    time = Jet.variable(instants[None], levels - 1)
+    return slopes(element, [pose_of(pose, pose_type, levels - 1) for pose in poses], time, slot)
+
+
+@compiled("pose_type")
+def body_loads(
+    system: System, bodies: Coordinates, instants: Lanes, masses: Masses, gravity: Gravity, pose_type: type[Pose]
+) -> tuple[Any, Any]:
+    """Return what the constraints have to balance, and at which instants each applied force is finite."""
+    order = len(bodies["position"]) - 1
+    pose = pose_of(bodies, pose_type, order)
+    time = Jet.variable(instants[None], order)
+    return loads(system, pose, time, masses, gravity), system.finite_forces(pose, time)
+
+
+@compiled("pose_type")
+def multipliers(
+    system: System,
+    blocks: Slopes,
+    load: Float[Numbers, "levels coordinate body batch"],
+    still: Coordinates | None,
+    masses: Masses,
+    pose_type: type[Pose],
+) -> Any:
+    """Return the multipliers that balance a load, Taylor coefficients, (levels, rows, time)."""
+    mass = None if still is None else mass_matrices(pose_of(still, pose_type, 0), masses)[:, :, 1:]
+    of_lot = partial(constraint_forces.multipliers, system)
+    dense = mass is not None or system.fronts is None
+    return in_lots(of_lot, LOT, blocks, load, mass) if dense else of_lot(blocks, load, mass)
+
+
+@compiled()
+def least_multipliers(
+    system: System,
+    blocks: Slopes,
+    load: Float[Numbers, "levels coordinate body batch"],
+    compliance: Float[Numbers, " row"],
+    weights: Float[Numbers, " case"],
+    bent: Float[Numbers, "case row"],
+) -> Any:
+    """Return multipliers of redundant rows for some cases: a weight of the load, and what is bent, in each."""
+
+    def of_lot(blocks: Slopes, load: Numbers) -> Any:
+        def of_case(weight: Any, bent: Numbers) -> Any:
+            return redundant_forces.least_multipliers(system, blocks, weight * load, compliance, bent)
+
+        return jax.vmap(of_case)(weights, bent)  # all cases by one factorisation
+
+    return in_lots(of_lot, LOT, blocks, load)
+
+
+@compiled()
+def scaled_jacobian(system: System, blocks: Slopes) -> Any:
+    """Return the Jacobian of scaled rows and columns."""
+    return constraint_forces.jacobian_of(system, blocks)
+
+
+@compiled("pose_type")
+def exerted(
+    driver: Any, poses: Sequence[Coordinates], instants: Lanes, forces: Multipliers, pose_type: type[Pose]
+) -> Any:
+    """Return what drivers exert along what they prescribe, Taylor coefficients."""
+    order = len(forces) - 1
+    built = [pose_of(pose, pose_type, order) for pose in poses]
+    return constraint_forces.exerted(driver, built, Jet.variable(instants[None], order), forces)
+
+
+@compiled("pose_type", "levels")
+def applied(force: Any, poses: Sequence[Coordinates], instants: Lanes, pose_type: type[Pose], levels: int) -> Any:
+    """Return what applied forces exert, Taylor coefficients."""
+    built = [pose_of(pose, pose_type, levels) for pose in poses]
+    time = Jet.variable(instants[None], levels)
+    found = force.force(force.displacement(*built, time), force.velocity(*built, time), time).truncate(levels - 1)
+    return stacked(with_rows(found))
+
+
+@compiled()
+def wrenches(slope: Slope, forces: Multipliers) -> Any:
+    """Return what joints do to the body in a slot: force, global, and moment about its origin, in its axes."""
+    return constraint_forces.wrench(slope, forces)
+
+
+@compiled("pose_type")
+def expressed(
+    work: Float[Numbers, "levels coordinate batch"],
+    bodies: Sequence[Coordinates],
+    point: Float[Numbers, "component 1 1"],
+    pose_type: type[Pose],
+) -> tuple[Any, Any]:
+    """Return force and moment about a point of a body, in its axes or in those of another one."""
+    order = len(work) - 1
+    pose, *frame = (pose_of(body, pose_type, order) for body in bodies)
+    force, moment = (Jet(tuple(part[:, :, None])) for part in (work[:, : pose.shifts], work[:, pose.shifts :]))
+    if pose.turns == 1:
+        moment = moment - cross(pose.direction(point), force)[None]
+    else:
+        moment = pose.direction(moment - cross(point, pose.to_body(force)))
+    for other in frame:
+        force = other.to_body(force)
+        moment = moment if pose.turns == 1 else other.to_body(moment)
+    return tuple(stacked(jet)[:, :, 0] for jet in (force, moment))
