@@ -128,7 +128,7 @@ def test_columns_have_names(crank):
     assert column_of(mechanism, "tip") == ("tip", "", 0)
     assert column_of(mechanism, "tip_y_d12") == ("tip", "y", 12)
     assert column_of(mechanism, "angle_d3") == ("angle", "", 3)
-    for name in ("tap", "tip_z_d", "tip_q", "_d3", "tip_d333"):
+    for name in ("tap", "tip_z", "tip_z_d", "tip_q", "_d3", "tip_d333"):
         with pytest.raises(JounceError, match="no output has this name"):
             column_of(mechanism, name)
 

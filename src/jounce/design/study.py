@@ -146,8 +146,10 @@ class Study:
             self.goals.conditions, numbers, least.broken, sides, strict=True
         ):
             if broken > HELD:
-                text = condition.relation.text
-                words.append(f"meets '{text}': nearest is {left:.6g} against {right:.6g}, off by {abs(number):.3g}")
+                text, near, bound = condition.relation.text, left, right
+                if condition.relation.bound_left:
+                    near, bound = right, left
+                words.append(f"meets '{text}': nearest is {near:.6g} against {bound:.6g}, off by {abs(number):.3g}")
         if least.near_singular > HELD:
             words.append("stays clear of a singular position at all instants")
         where = ", ".join(f"{name} = {x:.6g}" for name, x in self.problem.values(least.place).items())
@@ -261,7 +263,7 @@ class Study:
         rows = zip(self.goals.conditions, before[2], after[2], found.multipliers, strict=True)
         for condition, first, last, multiplier in rows:
             relation = condition.relation
-            fixed_left = relation.left.kind == "number"
+            fixed_left = relation.bound_left
             measure, bound = (1, last[0]) if fixed_left else (0, last[1])
             low = bound if relation.equal or fixed_left else None
             high = bound if relation.equal or not fixed_left else None

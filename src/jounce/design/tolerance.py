@@ -1,6 +1,5 @@
 """Tolerances: how far every output and derivative spreads when parameters deviate, and which parameter matters."""
 
-import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
@@ -12,6 +11,7 @@ from jaxtyping import Float
 
 from jounce.design.design_space import Sobol
 from jounce.design.variations import Variation, read_variations, reader_of, spreads
+from jounce.dynamics.outputs import component_labels
 from jounce.errors import MechanismError, UnsupportedError, check_name, did_you_mean, whole_number
 from jounce.kinematics import Motion, Status, solve, solve_batch
 from jounce.mechanism import Mechanism, check_mechanism, time_grid
@@ -147,7 +147,7 @@ def column_of(mechanism: Mechanism, name: str) -> tuple[str, str, int]:
     for output, quantity in mechanism.outputs.items():
         if plain == output:
             return output, "", order
-        if plain.startswith(f"{output}_") and plain[len(output) + 1 :] in _labels(quantity):
+        if plain.startswith(f"{output}_") and plain[len(output) + 1 :] in component_labels(mechanism, quantity):
             return output, plain[len(output) + 1 :], order
     known = [*mechanism.outputs]
     message = f"no output has this name; {did_you_mean(plain, known)}; components and derivatives as in C_x_d3"
@@ -164,11 +164,6 @@ def check_salib(samples: int) -> None:
     if samples < 2 or samples & (samples - 1):
         message = "Sobol's indices need a power of two of samples, 2 or more"
         raise MechanismError(message, name="samples", value=samples)
-
-
-def _labels(quantity: Any) -> list[str]:
-    axes = quantity.axes or (("component", quantity.labels),)
-    return ["".join(found) for found in itertools.product(*(labels for _, labels in axes))]
 
 
 class _Spread:
