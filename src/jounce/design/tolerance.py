@@ -221,7 +221,7 @@ class _Spread:
             solved[start:stop] = found["status"].values == Status.OK
             for name in self._outputs:
                 if name in found:
-                    whole[name][start:stop] = found[name].values
+                    whole[name][start:stop] = self._near_nominal(name, found[name].values)
         self._solved = solved.sum(axis=0)
         for name, values in whole.items():
             dims = self._variables[name].dims
@@ -251,7 +251,7 @@ class _Spread:
                 message = f"{share}, and indices need all of them; narrow the spread"
                 raise MechanismError(message, name="indices")
             for name in self._outputs:
-                peaks[name].append(np.abs(found[name].values).max(axis=1))
+                peaks[name].append(np.abs(self._near_nominal(name, found[name].values)).max(axis=1))
         for name, parts in peaks.items():
             whole = np.concatenate(parts)
             flat = whole.reshape(len(whole), -1)
@@ -282,6 +282,19 @@ class _Spread:
         count = len(next(iter(values.values())))
         filled = {name: np.concatenate([x, np.repeat(x[-1:], TOGETHER - count)]) for name, x in values.items()}
         return solve_batch(self.mechanism, filled, self.nominal.time, self.nominal.order).isel(design=slice(count))
+
+    def _near_nominal(
+        self, name: str, values: Float[np.ndarray, "sample time derivative *axes"]
+    ) -> Float[np.ndarray, "sample time derivative *axes"]:
+        """Return samples of an output with the whole turns that begin nearest to the nominal motion.
+
+        Euler angles begin within half a turn of zero in every design, so that next to half a turn both signs occur.
+        """
+        wraps = np.array(getattr(self.mechanism.outputs[name], "wraps", ()))
+        if wraps.any():
+            away = values[:, 0, 0] - self._variables[name].values[0, 0]
+            values[:, :, 0] -= (2 * math.pi * np.round(away / (2 * math.pi)) * wraps)[:, None]
+        return values
 
     def _add_statistics(self, name: str, of: str, dims: tuple[str, ...], values: np.ndarray) -> None:
         """Keep the statistics of samples, those that are not known left out."""
