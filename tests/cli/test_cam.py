@@ -57,6 +57,12 @@ def test_an_undercut_cam_is_told_and_the_status_says_so(capsys):
         ("offset: -2 mm", "arm: 2 mm", "follower.arm", "unknown key"),
         ("offset: -2 mm", "offset: -60 mm", "follower.offset", "misses the cam"),
         ("duration: 60 deg, to: lift", "duration: 60 s, to: lift", "law.profile[1].duration", "an angle"),
+        (
+            "_4_5_6_7, duration: 60 deg, to: 0}",
+            ", duration: 60 deg, to: 0, end: [1 mm/s]}",
+            "law.profile[2].end[0]",
+            "per rad",
+        ),
         ("to: lift", "to: 9 deg", "law.profile[1].to", "a length"),
         ("to: 0}", "to: 1 mm}", "law", "do not end where they begin"),
         ("duration: 120 deg}\n  beyond", "duration: 100 deg}\n  beyond", "law", "period"),

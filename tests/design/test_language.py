@@ -87,6 +87,55 @@ def test_bounds_are_checked(vary, words):
         jn.optimise(FOUR_BAR, "peak(psi)", vary)
 
 
+LIKE_NAMED = jn.Mechanism(
+    space="planar",
+    parameters={"angle": 0.3, "tip_x": 0.1, "rate": 2.0, "other_d2": 1.0, "L": 0.2},
+    bodies={"crank": jn.Body([0.0, 0.0])},
+    joints={"O": jn.planar.Revolute(("ground", "crank"), [0, 0], [0, 0])},
+    drivers={"theta": jn.drivers.CoordinateDriver(("ground", "crank"), "angle", motion="angle + rate*t")},
+    outputs={
+        "angle": jn.AngleOutput("crank"),
+        "other": jn.AngleOutput("crank"),
+        "tip": jn.PointOutput("crank", ["L", 0]),
+    },
+    time=jn.TimeGrid(0.0, 1.0, count=5),
+)
+
+
+@pytest.mark.parametrize(
+    "minimise, words",
+    [
+        ("peak(angle, 1)", "'angle' is a parameter and an output of this mechanism; give one of them another name"),
+        ("rate*angle", "'angle' is a parameter and an output"),
+        ("mean(rate*tip_x)", "'tip_x' is a parameter and a component of tip"),
+        ("peak(other_d2)", "'other_d2' is a parameter and a derivative of other"),
+        ("peak(other_d29)", "derivatives go up to the order 28, got 29 of 'other_d29'"),
+        ("peak(other_d20 + t, 9)", "got 29 of"),
+        ("peak(other_d9999)", "unknown name 'other_d9999'"),
+    ],
+)
+def test_names_that_mean_two_things_and_derivatives_that_are_too_high_are_refused(minimise, words):
+    with pytest.raises(ExpressionError, match=words):
+        jn.optimise(LIKE_NAMED, minimise, {"rate": (1.0, 3.0)})
+
+
+@pytest.mark.parametrize(
+    "text, bound_left",
+    [
+        ("span(psi) >= 0.5", True),
+        ("span(psi) >= 2*3", True),
+        ("span(psi) <= limit/2", False),
+        ("peak(psi) >= limit", True),
+        ("BC <= 0.5", False),
+        ("BC >= 0.5", True),
+        ("peak(psi) <= 2*peak(phi)", False),
+    ],
+)
+def test_the_side_without_a_measure_is_the_bound(text, bound_left):
+    (relation,) = parsed_relations(text)
+    assert relation.bound_left is bound_left
+
+
 def test_bounds_may_be_one_text_as_on_the_command_line():
     with pytest.raises(ExpressionError, match="unknown name 'psii'"):
         jn.optimise(FOUR_BAR, "peak(psii)", {"BC": "12cm:16cm"})

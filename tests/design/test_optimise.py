@@ -214,6 +214,16 @@ def test_the_better_of_two_assemblies_is_found_and_asked_for(four_bar):
     assert np.max(jn.solve(found.mechanism, order=0).outputs["psi"][:, 0]) == pytest.approx(found.objective, abs=1e-5)
 
 
+@pytest.mark.slow
+def test_the_second_assembly_is_asked_for_where_it_is_the_better_one(four_bar):
+    """Both turn about the same fixed pivots: the pin of the rocker is above the ground in one, below in the other."""
+    found = jn.optimise(four_bar, "maximum(C_y)", {"BC": (0.14, 0.145)}, starts=1, assemblies="all")
+    assert found.objective < 0
+    assert np.max(jn.solve(found.mechanism, order=0).outputs["C"][:, 0, 1]) == pytest.approx(found.objective, abs=1e-4)
+    as_given = np.max(jn.solve(four_bar, order=0).outputs["C"][:, 0, 1])
+    assert found.comparisons[0].before == pytest.approx(as_given, abs=1e-4)
+
+
 @pytest.fixture
 def four_bar():
     return dataclasses.replace(jn.load("examples/four_bar.yaml"), time=np.linspace(0.0, 2.0, 121))

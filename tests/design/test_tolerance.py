@@ -123,12 +123,34 @@ def test_the_command_tells_what_matters_and_draws_it(crank, tmp_path, capsys, sp
     assert len(draw_bands(spread, [("tip", "y", 2), ("angle", "", 0)]).axes) == 6
 
 
+@pytest.mark.slow
+def test_euler_angles_next_to_half_a_turn_have_the_spread_of_any_others():
+    """The rod is turned by e + t/2 about z, and e is 180 degrees, give or take."""
+    rod = jn.Body([0, 0, 0], orientation=[0, 0, 0, 1])
+    rod_pin = jn.spatial.Revolute(("ground", "rod"), [0, 0, 0], [0, 0, 0], [0, 0, 1], [0, 0, 1])
+    vectors = {"vector_i": [1, 0, 0], "vector_j": [1, 0, 0]}
+    motor = jn.drivers.RotationDriver(("ground", "rod"), [0, 0, 1], motion="e + 0.5*t", **vectors)
+    mechanism = jn.Mechanism(
+        space="spatial",
+        parameters={"e": np.pi},
+        bodies={"rod": rod},
+        joints={"O": rod_pin},
+        drivers={"turn": motor},
+        outputs={"attitude": jn.EulerAnglesOutput("rod", "zyx")},
+    )
+    spread = jn.tolerance(mechanism, {"e": "normal:0.02"}, [0.0, 1.0], 0, samples=16, linear=False)
+    alpha = spread.sel(euler_angle="alpha", derivative=0)
+    assert np.allclose(alpha["attitude_std"], 0.02, rtol=0.1)
+    assert np.allclose(alpha["attitude_mean"], alpha["attitude"], atol=3e-3)
+    assert float(alpha["attitude_peak_std"]) == pytest.approx(0.02, rel=0.1)
+
+
 def test_columns_have_names(crank):
     mechanism = jn.load(crank)
     assert column_of(mechanism, "tip") == ("tip", "", 0)
     assert column_of(mechanism, "tip_y_d12") == ("tip", "y", 12)
     assert column_of(mechanism, "angle_d3") == ("angle", "", 3)
-    for name in ("tap", "tip_z_d", "tip_q", "_d3", "tip_d333"):
+    for name in ("tap", "tip_z", "tip_z_d", "tip_q", "_d3", "tip_d333"):
         with pytest.raises(JounceError, match="no output has this name"):
             column_of(mechanism, name)
 

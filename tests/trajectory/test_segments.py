@@ -74,6 +74,19 @@ def test_a_polynomial_meets_what_it_is_given_at_both_ends():
     np.testing.assert_allclose(pieces[:3, 1], [2.0, 0.5, 4.0], rtol=1e-11)
 
 
+def test_a_polynomial_begins_with_the_acceleration_that_the_one_before_was_free_to_end_with():
+    """3.5 t^3 - 2.5 t^4 comes to 1 with the velocity 0.5, and with the acceleration 21 - 30."""
+    first = Segment("polynomial", 1.0, to=1.0, begin=[0.0, 0.0], end=[0.5])
+    law = SegmentedMotion([first, Segment("polynomial", 0.5, to=2.0), Segment("dwell", 1.0)])
+    before, after = derivatives(law, [np.nextafter(1.0, 0), 1.0], 2).T
+    np.testing.assert_allclose(after, [1.0, 0.5, -9.0], rtol=1e-12)
+    np.testing.assert_allclose(before, after, rtol=1e-12)
+    assert law.smoothness == 2
+    free = Segment("polynomial", 1.0, to=1.0, begin=[0.0], end=[])  # t^2, on as 2 t - 1 + (t - 1)^2 + ...
+    after = derivatives(SegmentedMotion([free, Segment("polynomial", 1.0, to=0.0)]), [1.0], 2)[:, 0]
+    np.testing.assert_allclose(after, [1.0, 2.0, 2.0], rtol=1e-12)
+
+
 def test_it_rests_before_and_after_or_goes_on_from_where_it_ended():
     turn = [Segment("cycloidal", 0.3, by=math.pi / 3), Segment("dwell", 0.2)]
     held, going = SegmentedMotion(turn, 1.0), SegmentedMotion(turn, 1.0, beyond="advance")

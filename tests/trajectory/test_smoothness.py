@@ -95,6 +95,27 @@ def test_pieces_splines_and_expressions():
         jn.continuity(pieces, 0.0, 1.0, order=11)
 
 
+@pytest.mark.parametrize("law", ["0.01*(1 - cos(t))", "0.2*sin(3*t) - 0.1*sin(t)**2"])
+def test_rounding_is_no_jump_where_a_smooth_law_begins_again(law):
+    """sin(2 pi) is 2e-16 and not zero: a derivative that vanishes where laws meet is rounding of any size."""
+    told = jn.continuity(jn.ExpressionMotion(law), 0.0, 2 * math.pi, order=6, periodic=True)
+    assert told.smoothness is None
+
+
+def test_rounding_is_no_jump_between_pieces():
+    law = jn.PiecewiseMotion(["sin(pi*t)", "pi*(1 - t)", "-pi + sin(t - 2)**3"], until=[1.0, 2.0])
+    told = jn.continuity(law, 0.0, 3.0)
+    assert [x.count for x in told.derivatives] == [0, 1, 0, 2, 0]
+    assert told.derivatives[1].size == pytest.approx(math.pi)
+    assert told.derivatives[3].size == pytest.approx(-(math.pi**3))
+    share = "(t/0.7)"
+    rise = f"10*{share}**3 - 15*{share}**4 + 6*{share}**5"
+    for after in ("1", jn.SplineMotion(np.linspace(0.7, 0.9, 11), np.ones(11))):  # these say nothing after 0.9 s
+        told = jn.continuity(jn.PiecewiseMotion([rise, after], until=[0.7]), 0.0, 0.9)
+        assert told.smoothness == 2
+        assert told.derivatives[3].size == pytest.approx(-60 / 0.7**3)
+
+
 @pytest.mark.parametrize("levels", [1, 3, 5, 9])
 def test_hermite_laws_keep_all_derivatives_and_are_as_good_as_their_order(levels):
     def exact(t):

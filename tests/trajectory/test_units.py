@@ -56,6 +56,8 @@ def test_table_of_common_units_agrees_with_pint(name):
         ("90 arcmin", math.pi / 120),
         ("1e-3", 1e-3),
         ("2*pi", 2 * math.pi),
+        ("0.36/pi", 0.36 / math.pi),
+        ("1 / pi**2", 1 / math.pi**2),
         ("30*deg", math.pi / 6),
     ],
 )

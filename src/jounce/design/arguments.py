@@ -6,6 +6,8 @@ from jounce.design.language import EXERTED, MEASURES, Node, operated
 from jounce.errors import ExpressionError
 from jounce.kinematics.solve import HIGHEST_ORDER
 
+HIGHEST_DERIVATIVE = HIGHEST_ORDER - 2  # that goals may ask for: its rate and how that bends are needed, too
+
 
 class Arguments:
     """Reads the arguments of measures, which are the same in all designs.
@@ -49,8 +51,9 @@ class Arguments:
     def derivative(self, node: Node) -> int:
         """Return the order of a derivative."""
         order = self.argument(node, "the derivative")
-        if order != int(order) or not 0 <= order <= HIGHEST_ORDER - 2:
-            raise ExpressionError(f"the derivative must be a whole number from 0 to {HIGHEST_ORDER - 2}, got {order:g}")
+        if order != int(order) or not 0 <= order <= HIGHEST_DERIVATIVE:
+            message = f"the derivative must be a whole number from 0 to {HIGHEST_DERIVATIVE}, got {order:g}"
+            raise ExpressionError(message)
         return int(order)
 
     def instant(self, node: Node) -> float:

@@ -59,6 +59,11 @@ class Node:
             return f"{self.word}({', '.join(words)})"
         return f"({words[0]} {self.word} {words[1]})"
 
+    @property
+    def is_measured(self) -> bool:
+        """Whether a measure of the motion is in it."""
+        return self.word in MEASURES or any(part.is_measured for part in self.parts)
+
     def names(self) -> set[str]:
         """Return the names in it."""
         found = {self.word} if self.kind == "name" else set()
@@ -85,6 +90,13 @@ class Relation:
     right: Node
     equal: bool
     dimensions: tuple[Dimension | None, Dimension | None] = (None, None)
+
+    @property
+    def bound_left(self) -> bool:
+        """Whether the left side is what the right one is compared with: a number, or the side without a measure."""
+        if self.left.is_measured != self.right.is_measured:
+            return self.right.is_measured
+        return self.left.kind == "number"
 
 
 def parsed(text: str) -> Node:

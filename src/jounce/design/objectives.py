@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.design.arguments import Arguments
+from jounce.design.arguments import HIGHEST_DERIVATIVE, Arguments
 from jounce.design.dimensions import check_dimensions
 from jounce.design.language import (
     EXERTED,
@@ -195,6 +195,9 @@ class Goals:
         lost = max(
             (self.quantities.atoms[name][2] for name in node.names() if name in self.quantities.atoms), default=0
         )
+        if order + lost > HIGHEST_DERIVATIVE:
+            message = f"derivatives go up to the order {HIGHEST_DERIVATIVE}, got {order + lost} of '{node.text}'"
+            raise ExpressionError(message)
         self.order = max(self.order, order + lost)
 
         def found(names: Mapping[str, Any]) -> Any:
@@ -212,6 +215,7 @@ class Goals:
         if node.kind == "number":
             return lambda *_: float(node.word)
         if node.kind == "name":
+            self.quantities.check_meaning(node.word)
             if self.quantities.known.get(node.word) == "parameters":
                 return lambda names, *_: names[node.word]
             if node.word == "t" or node.word in self.quantities.known:

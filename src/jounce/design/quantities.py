@@ -57,13 +57,23 @@ class Quantities:
         found |= dict.fromkeys(self.mechanism.parameters, "parameters")
         return found
 
+    def check_meaning(self, name: str) -> None:
+        """Raise ExpressionError for a name that means several things: whichever was taken could be the wrong one."""
+        stem, order = _derivative_name(name)
+        meanings = ["the time"] * (name == "t") + ["a parameter"] * (name in self.mechanism.parameters)
+        meanings += ["an output"] * (name in self.mechanism.outputs)
+        for output, quantity in self.mechanism.outputs.items():
+            labels = [f"{output}_{label}" for label in component_labels(self.mechanism, quantity)]
+            meanings += [f"a component of {output}"] * (name in labels)
+            differentiated = order and (stem in labels or (stem == output and not labels))
+            meanings += [f"a derivative of {stem}"] * bool(differentiated)
+        if len(meanings) > 1:
+            told = f"{', '.join(meanings[:-1])} and {meanings[-1]}"
+            raise ExpressionError(f"'{name}' is {told} of this mechanism; give one of them another name")
+
     def atom(self, text: str) -> Quantity:
         """Return a quantity of the mechanism by its name, with a derivative such as ``psi_d2``."""
-        name, lost = text, 0
-        if text not in self.known and "_d" in text:
-            stem, _, digits = text.rpartition("_d")
-            if digits.isdigit():
-                name, lost = stem, int(digits)
+        name, lost = (text, 0) if text in self.known else _derivative_name(text)
         if self.known.get(name) == "points and vectors":
             labels = component_labels(self.mechanism, self.mechanism.outputs[name])
             message = f"'{name}' has components; take {' or '.join(f'{name}_{label}' for label in labels)}"
@@ -118,6 +128,7 @@ class Quantities:
         if node.kind == "number":
             return lambda _: float(node.word)
         if node.kind == "name":
+            self.check_meaning(node.word)
             if node.word in self.atoms or node.word == "t":
                 return lambda names: names[node.word]
             if node.word in self.mechanism.parameters and self.known[node.word] == "parameters":
@@ -129,6 +140,12 @@ class Quantities:
             return self._exerted(node)
         parts = [self.jet(part) for part in node.parts]
         return lambda names: operated(node.word, [part(names) for part in parts])
+
+
+def _derivative_name(text: str) -> tuple[str, int]:
+    """Return the name of a quantity and the order of the derivative of it that a name such as ``psi_d2`` means."""
+    stem, _, digits = text.rpartition("_d")
+    return (stem, int(digits)) if stem and digits.isdecimal() and len(digits) < 4 else (text, 0)
 
 
 def _independent(mechanism: Mechanism, varied: set[str]) -> dict[str, float]:

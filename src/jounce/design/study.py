@@ -16,14 +16,16 @@ from jounce.design.result import Comparison, OptimisedDesign
 from jounce.design.samples import Samples, sampled
 from jounce.design.search import HELD, SMALL, Found, Search
 from jounce.errors import DesignError, SolveError
-from jounce.kinematics import Status, assemblies as all_assemblies, solve
+from jounce.kinematics import Motion, Status, assemblies as all_assemblies, solve
 from jounce.mechanism import Mechanism
+from jounce.mechanism.held_outputs import with_outputs
 
 GRID = 121  # instants that a search works with at first, at most
 FINER = 4  # times as many, on which its end is looked at
 AGREED = 1e-6  # of objective and conditions on both grids, relative
 REFINEMENTS = 3
 OPTIMAL = 1e-5  # of the residual of the first-order conditions
+SAME_PLACE = 1e-6  # of the spread of the bodies, or rad
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -146,8 +148,10 @@ class Study:
             self.goals.conditions, numbers, least.broken, sides, strict=True
         ):
             if broken > HELD:
-                text = condition.relation.text
-                words.append(f"meets '{text}': nearest is {left:.6g} against {right:.6g}, off by {abs(number):.3g}")
+                text, near, bound = condition.relation.text, left, right
+                if condition.relation.bound_left:
+                    near, bound = right, left
+                words.append(f"meets '{text}': nearest is {near:.6g} against {bound:.6g}, off by {abs(number):.3g}")
         if least.near_singular > HELD:
             words.append("stays clear of a singular position at all instants")
         where = ", ".join(f"{name} = {x:.6g}" for name, x in self.problem.values(least.place).items())
@@ -165,16 +169,19 @@ class Study:
     def grid_error(self, found: Found) -> float:
         """Return by how much objective and conditions differ on a finer grid, relative; infinite if that one locks."""
         coarse, numbers, _ = self.problem.asked(found.place, found.evaluation)
+        values = self.problem.values(found.place)
         try:
-            objective, fine, _ = self._on(_split(self.goals.instants, FINER), self.problem.values(found.place))
+            objective, fine, _ = self._on(_split(self.goals.instants, FINER), self.goals.mechanism, values)
         except LOCKS:
             return math.inf
         scale = abs(coarse) if abs(coarse) > SMALL * self.size else self.size  # what is zero has no size of its own
         errors = [abs(objective - coarse) / scale, *(np.abs(fine - numbers) / self.search.sizes)]
         return float(max(errors))
 
-    def _on(self, instants: Any, values: dict[str, float]) -> tuple[float, np.ndarray, list[tuple[float, float]]]:
-        """Return objective and conditions of a design on another grid.
+    def _on(
+        self, instants: Any, mechanism: Mechanism, values: dict[str, float]
+    ) -> tuple[float, np.ndarray, list[tuple[float, float]]]:
+        """Return objective and conditions of a design of a mechanism, with the outputs of the goals, on another grid.
 
         Raises
         ------
@@ -184,7 +191,7 @@ class Study:
         goals, kept = self.goals, self.goals.instants
         try:
             goals.set_instants(instants)
-            motion = solve(goals.mechanism.with_parameters(**values), goals.instants, goals.order, strict=False)
+            motion = solve(mechanism.with_parameters(**values), goals.instants, goals.order, strict=False)
             if (failed := motion.status[motion.status != Status.OK]).size:
                 raise SolveError(Status(int(failed[0])).advice, status=Status(int(failed[0])))
             rows, smooth = goals.measured(values, motion.outputs)
@@ -211,7 +218,7 @@ class Study:
         mechanism = self._assembled(original.with_parameters(**parameters), found, assembly)
         status, message = self._judged(found, error, infeasible=infeasible)
         try:
-            after = self._on(fine, parameters)
+            after = self._on(fine, self.goals.mechanism, parameters)
         except LOCKS:
             after = self.problem.asked(found.place, found.evaluation)
         return OptimisedDesign(
@@ -220,7 +227,7 @@ class Study:
             after[0],
             status,
             message,
-            tuple(self._comparisons(found, after)),
+            tuple(self._comparisons(original, found, after)),
             float(np.sqrt(found.evaluation.margins.min(initial=np.inf))),
             found.residual,
             error,
@@ -246,12 +253,15 @@ class Study:
         where = f"; the best of {len(self.searches)} searches" if len(self.searches) > 1 else ""
         return "optimal", f"no design nearby is better, and all conditions hold{where}"
 
-    def _comparisons(self, found: Found, after: tuple[float, np.ndarray, list[Any]]) -> Iterator[Comparison]:
-        """Return objective, conditions and parameters, before and after."""
+    def _comparisons(
+        self, original: Mechanism, found: Found, after: tuple[float, np.ndarray, list[Any]]
+    ) -> Iterator[Comparison]:
+        """Return objective, conditions and parameters, of the mechanism as it was given and of what was found."""
+        known = original.parameter_values  # also outside of the bounds
+        given = {name: float(known[name]) for name in self.problem.names}
+        as_given = with_outputs(original, self.goals.mechanism.outputs)  # put together as it is, not as this study does
         try:
-            known = self.mechanism.parameter_values  # also outside of the bounds
-            given = {name: float(known[name]) for name in self.problem.names}
-            before = self._on(_split(self.goals.instants, FINER), given)
+            before = self._on(_split(self.goals.instants, FINER), as_given, given)
         except LOCKS:
             nothing = [(math.nan, math.nan)] * len(self.goals.conditions)
             before = math.nan, np.full(len(self.goals.conditions), math.nan), nothing
@@ -261,27 +271,26 @@ class Study:
         rows = zip(self.goals.conditions, before[2], after[2], found.multipliers, strict=True)
         for condition, first, last, multiplier in rows:
             relation = condition.relation
-            fixed_left = relation.left.kind == "number"
+            fixed_left = relation.bound_left
             measure, bound = (1, last[0]) if fixed_left else (0, last[1])
             low = bound if relation.equal or fixed_left else None
             high = bound if relation.equal or not fixed_left else None
             slope = float(multiplier * factor * (1.0 if fixed_left else -1.0))
             yield Comparison("condition", relation.text, first[measure], last[measure], low, high, slope)
-        values, original = self.problem.values(found.place), self.mechanism.parameter_values
+        values = self.problem.values(found.place)
         for k, (name, (low, high)) in enumerate(self.asked.bounds.items()):
             slope = float(found.bound_multipliers[k]) * factor / float(self.problem.width[k])
-            yield Comparison("parameter", name, float(original[name]), values[name], low, high, slope)
+            yield Comparison("parameter", name, given[name], values[name], low, high, slope)
 
     def _assembled(self, mechanism: Mechanism, found: Found, assembly: int | None) -> Mechanism:
         """Return a mechanism that asks for the assembly that was optimised, by its number in the design found."""
         if assembly is None:
             return mechanism
         first = self.goals.instants[:1]
-        wanted = solve(self.problem.design(found.place), first, 0).poses[1]["position"]
+        wanted = _placed(solve(self.problem.design(found.place), first, 0))
         for each in all_assemblies(mechanism, float(first[0]), circuits=False):
             chosen = dataclasses.replace(mechanism, assembly=each.number)
-            poses = solve(chosen, first, 0).poses[1]["position"]
-            if np.allclose(poses[0], wanted[0], rtol=0, atol=1e-6 * (np.ptp(wanted[0]) or 1.0)):
+            if np.abs(_placed(solve(chosen, first, 0)) - wanted).max() <= SAME_PLACE:
                 return chosen
         message = "the assembly of the best design is none of those that are found of it"
         raise DesignError(message, name="assemblies", value=assembly)
@@ -292,6 +301,20 @@ def _nothing_moves(lock: Locked | None, taken: Samples) -> DesignError:
     why = "" if lock is None else f"; the mechanism as it is: {lock}"
     bounds = "give bounds within which it can be, or a starting guess nearer to them"
     return DesignError(f"none of {taken.count} designs within the bounds can be put together and moved; {bounds}{why}")
+
+
+def _placed(motion: Motion) -> Float[np.ndarray, " entry"]:
+    """Return where all bodies of a motion are at first: positions by their spread, and attitudes without their turns.
+
+    Bodies on fixed pivots have the same position in all assemblies.
+    """
+    coordinates = {name: np.asarray(x[0]) for name, x in motion.poses[1].items()}
+    if "angle" in coordinates:
+        attitude = np.stack([np.cos(coordinates["angle"]), np.sin(coordinates["angle"])])
+    else:  # a quaternion and its negative are one attitude
+        attitude = coordinates["quaternion"][:, None] * coordinates["quaternion"]
+    position = coordinates["position"]
+    return np.concatenate([position.ravel() / (np.ptp(position) or 1.0), attitude.ravel()])
 
 
 def _thinned(instants: Float[np.ndarray, " given"], most: int) -> Float[np.ndarray, " time"]:

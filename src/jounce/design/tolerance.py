@@ -1,6 +1,5 @@
 """Tolerances: how far every output and derivative spreads when parameters deviate, and which parameter matters."""
 
-import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
@@ -12,6 +11,7 @@ from jaxtyping import Float
 
 from jounce.design.design_space import Sobol
 from jounce.design.variations import Variation, read_variations, reader_of, spreads
+from jounce.dynamics.outputs import component_labels
 from jounce.errors import MechanismError, UnsupportedError, check_name, did_you_mean, whole_number
 from jounce.kinematics import Motion, Status, solve, solve_batch
 from jounce.mechanism import Mechanism, check_mechanism, time_grid
@@ -147,7 +147,7 @@ def column_of(mechanism: Mechanism, name: str) -> tuple[str, str, int]:
     for output, quantity in mechanism.outputs.items():
         if plain == output:
             return output, "", order
-        if plain.startswith(f"{output}_") and plain[len(output) + 1 :] in _labels(quantity):
+        if plain.startswith(f"{output}_") and plain[len(output) + 1 :] in component_labels(mechanism, quantity):
             return output, plain[len(output) + 1 :], order
     known = [*mechanism.outputs]
     message = f"no output has this name; {did_you_mean(plain, known)}; components and derivatives as in C_x_d3"
@@ -164,11 +164,6 @@ def check_salib(samples: int) -> None:
     if samples < 2 or samples & (samples - 1):
         message = "Sobol's indices need a power of two of samples, 2 or more"
         raise MechanismError(message, name="samples", value=samples)
-
-
-def _labels(quantity: Any) -> list[str]:
-    axes = quantity.axes or (("component", quantity.labels),)
-    return ["".join(found) for found in itertools.product(*(labels for _, labels in axes))]
 
 
 class _Spread:
@@ -226,7 +221,7 @@ class _Spread:
             solved[start:stop] = found["status"].values == Status.OK
             for name in self._outputs:
                 if name in found:
-                    whole[name][start:stop] = found[name].values
+                    whole[name][start:stop] = self._near_nominal(name, found[name].values)
         self._solved = solved.sum(axis=0)
         for name, values in whole.items():
             dims = self._variables[name].dims
@@ -256,7 +251,7 @@ class _Spread:
                 message = f"{share}, and indices need all of them; narrow the spread"
                 raise MechanismError(message, name="indices")
             for name in self._outputs:
-                peaks[name].append(np.abs(found[name].values).max(axis=1))
+                peaks[name].append(np.abs(self._near_nominal(name, found[name].values)).max(axis=1))
         for name, parts in peaks.items():
             whole = np.concatenate(parts)
             flat = whole.reshape(len(whole), -1)
@@ -287,6 +282,19 @@ class _Spread:
         count = len(next(iter(values.values())))
         filled = {name: np.concatenate([x, np.repeat(x[-1:], TOGETHER - count)]) for name, x in values.items()}
         return solve_batch(self.mechanism, filled, self.nominal.time, self.nominal.order).isel(design=slice(count))
+
+    def _near_nominal(
+        self, name: str, values: Float[np.ndarray, "sample time derivative *axes"]
+    ) -> Float[np.ndarray, "sample time derivative *axes"]:
+        """Return samples of an output with the whole turns that begin nearest to the nominal motion.
+
+        Euler angles begin within half a turn of zero in every design, so that next to half a turn both signs occur.
+        """
+        wraps = np.array(getattr(self.mechanism.outputs[name], "wraps", ()))
+        if wraps.any():
+            away = values[:, 0, 0] - self._variables[name].values[0, 0]
+            values[:, :, 0] -= (2 * math.pi * np.round(away / (2 * math.pi)) * wraps)[:, None]
+        return values
 
     def _add_statistics(self, name: str, of: str, dims: tuple[str, ...], values: np.ndarray) -> None:
         """Keep the statistics of samples, those that are not known left out."""

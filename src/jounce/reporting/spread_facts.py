@@ -76,7 +76,7 @@ def chosen(spread: Any, variable: str, column: Column) -> np.ndarray:
     labels = ["".join(map(str, x)) for x in itertools.product(*(found[axis].values for axis in axes))]
     kept = [dim for dim in ("parameter", "time") if dim in found.dims]
     values = found.transpose(*axes, *kept).values
-    return values.reshape(-1, *values.shape[len(axes) :])[labels.index(component)]
+    return np.asarray(values.reshape(-1, *values.shape[len(axes) :])[labels.index(component)])
 
 
 def spread_summary(facts: dict[str, Any], name: str, samples: int) -> str:

@@ -9,13 +9,12 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Float
 
-from jounce.errors import TrajectoryError
+from jounce.errors import MechanismError, TrajectoryError
 from jounce.jet import Jet
 from jounce.trajectory.checks import finite
 from jounce.trajectory.expression import Expression
+from jounce.trajectory.knots import SMOOTH, derivative_sizes
 from jounce.trajectory.motion import AbstractMotion, ExpressionMotion, Untraced
-
-SMOOTH = 1e-9  # of a derivative: a smaller jump is rounding
 
 Law = AbstractMotion | Expression | str
 """A law, or an expression of ``t`` and of parameters."""
@@ -270,6 +269,7 @@ class PiecewiseMotion(_MadeOfOthers):
         >>> jn.PiecewiseMotion(["t**3", "0"], until=[0.0]).jumps(3)[1][:, 0].tolist()
         [0.0, 0.0, 0.0, -6.0]
         """
+        sizes = self._sizes(order) if self.until else []
         found = []
         for k, instant in enumerate(self.until):
             left, right = (
@@ -277,5 +277,18 @@ class PiecewiseMotion(_MadeOfOthers):
                 for part in self._known_parts()[k : k + 2]
             )
             jump = right - left
-            found.append(np.where(np.abs(jump) <= SMOOTH * np.maximum(np.abs(left), np.abs(right)), 0.0, jump))
+            found.append(np.where(np.abs(jump) <= SMOOTH * np.maximum(*sizes[k : k + 2]), 0.0, jump))
         return np.array(self.until), np.stack(found, axis=-1) if found else np.zeros((order + 1, 0))
+
+    def _sizes(self, order: int) -> list[Float[np.ndarray, " levels"]]:
+        """Return how large the derivatives of each law are; the first and the last go as far as their neighbours."""
+        lengths = np.diff(self.until) if len(self.until) > 1 else [abs(self.until[0]) or 1.0]
+        borders = [self.until[0] - lengths[0], *self.until, self.until[-1] + lengths[-1]]
+        found = []
+        for part, begin, end in zip(self._known_parts(), borders, borders[1:], strict=False):
+            try:
+                found.append(derivative_sizes(part, begin, end, order))
+            except MechanismError:  # samples that end before: what they are where laws meet is known
+                instant = begin if begin == self.until[-1] else end
+                found.append(derivative_sizes(part, instant, instant, order))
+        return found

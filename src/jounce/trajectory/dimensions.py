@@ -104,14 +104,18 @@ def check_dimension(dimension: Dimension, kind: str, what: str, *, exactly: bool
         raise UnitError(f"expected {words}, but {what} is {describe_dimension(dimension)}")
 
 
-def is_rate(dimension: Dimension, bases: Iterable[str], order: int) -> bool:
-    """Tell whether a dimension is that of a time derivative of one of some base quantities."""
-    return any(dimension == dimension_of(**{base: 1, "time": -order}) for base in bases)
+def is_rate(dimension: Dimension, bases: Iterable[str], order: int, by: str = "time") -> bool:
+    """Tell whether a dimension is that of a derivative of one of some base quantities by the time, or by another one.
+
+    By an angle or a length, powers of angles do not count: mm, mm/rad and mm/deg^2 are rates of a cam by its angle.
+    """
+    rates = [times(dimension_of(**{base: 1}), dimension_of(**{by: 1}), -order) for base in bases]
+    return dimension in rates if by == "time" else without_angles(dimension) in map(without_angles, rates)
 
 
-def per_seconds(order: int) -> str:
-    """Word the unit of time of a derivative, as it follows the unit of what is derived."""
-    return ("", " per s")[order] if order < 2 else f" per s^{order}"
+def per_power(order: int, unit: str = "s") -> str:
+    """Word what a derivative is by, as it follows the unit of what is derived."""
+    return ("", f" per {unit}")[order] if order < 2 else f" per {unit}^{order}"
 
 
 def check_one_of(dimension: Dimension, allowed: tuple[Dimension, ...], *, exactly: bool = True) -> None:

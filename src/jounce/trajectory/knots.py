@@ -5,9 +5,11 @@ import math
 import numpy as np
 from jaxtyping import Float
 
-from jounce.trajectory.motion import SplineMotion
+from jounce.jet import Jet
+from jounce.trajectory.motion import AbstractMotion, SplineMotion
 
 SMOOTH = 1e-9  # of the peak of a derivative: a smaller jump is rounding
+LOOKS = 33  # at a law of which no pieces are known, for these peaks
 
 Jumps = tuple[Float[np.ndarray, " knots"], Float[np.ndarray, "levels knots"]]
 """Where derivatives may jump, and by how much: the value from the right less that from the left, by order."""
@@ -40,6 +42,16 @@ def knot_jumps(law: SplineMotion, order: int) -> Jumps:
         found, instants = np.column_stack([ends[0], found, ends[1]]), np.concatenate([begins[:1], instants, [stop]])
     peaks = _largest(powers, sines, lengths, law, order)[:, None]
     return instants, np.where(np.abs(found) <= SMOOTH * peaks, 0.0, found)
+
+
+def derivative_sizes(law: AbstractMotion, first: float, last: float, order: int) -> Float[np.ndarray, " levels"]:
+    """Return the largest derivatives that are seen of a law from a first to a last instant; infinite ones do not count.
+
+    The derivatives where two laws meet are no measure of rounding there: one that vanishes is nothing but rounding.
+    """
+    looks = np.linspace(first, last, LOOKS)
+    found = [np.abs(np.asarray(x, float)) for x in law(Jet.variable(looks, order)).dense().derivatives()]
+    return np.array([np.max(x, initial=0.0, where=np.isfinite(x)) for x in found])
 
 
 def _derivatives(

@@ -116,8 +116,10 @@ def _of_segment(
             default if x is None else [number_of_value(f"{name}.{key}", entry) for entry in x]
             for key, x, default in (("begin", segment.begin, derivatives), ("end", segment.end, rest))
         ]
-        polynomial = Piece(_meeting([value, *given[0]], [target, *given[1]], duration), length=duration)
-        return [polynomial], target, [*given[1], 0.0, 0.0][:2]
+        powers = _meeting([value, *given[0]], [target, *given[1]], duration)
+        # what is not given at the end is what the polynomial makes of it, and the next one begins with that
+        free = [_derivative(powers, order, duration) for order in range(len(given[1]) + 1, len(rest) + 1)]
+        return [Piece(powers, length=duration)], target, [*given[1], *free][: len(rest)]
     pieces = [piece.stretched(way, duration).lifted(value) for piece in _shape(segment.profile)]
     last = [0.0, -(math.pi**2) / 2 * way / duration**2] if segment.profile == "harmonic" else rest
     return pieces, target, last
@@ -156,6 +158,11 @@ def _meeting(begin: list[Value], end: list[Value], duration: Value) -> list[Valu
     inverse = np.linalg.inv(matrix)
     upper = [sum(float(a) * x for a, x in zip(row, rest, strict=True)) for row in inverse]
     return [c / duration**k for k, c in enumerate([*first, *upper])]
+
+
+def _derivative(powers: list[Value], order: int, at: Value) -> Value:
+    """Return a derivative of a polynomial."""
+    return sum(c * math.perm(k, order) * at ** (k - order) for k, c in enumerate(powers) if k >= order)
 
 
 # accelerations by parts: share of the duration, constant, and amplitude, frequency and phase of a sine

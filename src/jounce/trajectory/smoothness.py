@@ -9,7 +9,7 @@ from jaxtyping import Float, Int
 from jounce.jet import Jet
 from jounce.trajectory.checks import whole_number
 from jounce.trajectory.composed import FollowingMotion, OutputMotion, PiecewiseMotion
-from jounce.trajectory.knots import Jumps, knot_jumps
+from jounce.trajectory.knots import SMOOTH, Jumps, derivative_sizes, knot_jumps
 from jounce.trajectory.motion import AbstractMotion, ExpressionMotion, FunctionMotion, SplineMotion
 from jounce.trajectory.profiles import AbstractProfile
 
@@ -99,7 +99,8 @@ def continuity(law: AbstractMotion, first: float, last: float, order: int = 4, *
     instants, jumps, unknown = _jumps(law, first, last)
     if periodic and getattr(law, "beyond", "") != "repeat":
         ends = [np.asarray(law(Jet.variable(np.asarray(at, float), HIGHEST)).derivatives()) for at in (last, first)]
-        closing = np.where(np.abs(ends[1] - ends[0]) <= 1e-9 * np.abs(ends).max(axis=0), 0.0, ends[1] - ends[0])
+        rounding = SMOOTH * derivative_sizes(law, first, last, HIGHEST)
+        closing = np.where(np.abs(ends[1] - ends[0]) <= rounding, 0.0, ends[1] - ends[0])
         instants, jumps = np.append(instants, first), np.column_stack([jumps, closing])
     broken = np.flatnonzero(np.any(jumps != 0, axis=1))
     told = max(order, int(broken[0])) if len(broken) else order

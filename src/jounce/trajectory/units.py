@@ -260,9 +260,9 @@ def _parse_text(
 
 
 def _divided_by_a_name(unit: str, known: Collection[str]) -> bool:
-    """Tell whether what follows a number is a division by a parameter or a variable: 1/t is no number per tonne."""
+    """Tell whether what follows a number is a division by a name of an expression: 1/t is no number per tonne."""
     first = re.match(_ATOM, unit.lstrip("/ "))
-    return unit.startswith("/") and first is not None and first.group() in known
+    return unit.startswith("/") and first is not None and (first.group() in known or first.group() == "pi")
 
 
 def _parse_with_unit(number: str, unit: str, *, kind: str, known: Collection[str]) -> Value:

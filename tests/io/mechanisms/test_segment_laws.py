@@ -51,6 +51,19 @@ def values(law, parameters, instants):
     return np.asarray(jet.derivatives())
 
 
+def with_end(derivatives):
+    """The last segment, and what ends with derivatives in its place."""
+    return "polynomial_3_4_5, duration: 180 deg", f"polynomial, duration: 180 deg, end: [{derivatives}]"
+
+
+def test_derivatives_of_a_law_of_an_angle_are_by_that_angle(tmp_path):
+    """2 mm/deg at the end, 360 deg/s: 0.72 m/s."""
+    for end in ("2 mm/deg", "0.36/pi"):
+        law = loaded(tmp_path, FILE.replace(*with_end(end)).replace("beyond: repeat", ""))
+        found = values(law.drivers["cam"].motion, law.parameter_values, [np.nextafter(1.0, 0)])
+        assert found[1, 0] == pytest.approx(0.72)
+
+
 def test_files_hold_them_and_are_the_same_after_they_were_written(tmp_path):
     mechanism = loaded(tmp_path, FILE)
     parameters, instants = mechanism.parameter_values, [0.1, 1 / 3, 0.4, 0.9, 7.4]
@@ -86,8 +99,13 @@ def test_samples_may_be_those_of_a_cam(tmp_path):
         ("profile: modified_sine", "profile: modified_sin", "drivers.cam.motion.profile[1].profile", "modified_sine"),
         ("duration: 60 deg", "duration: 60 deg, too: 1", "drivers.cam.motion.profile[0].too", "unknown key"),
         ("of: shaft_angle", "of: shaft", "drivers.cam.motion.of", "shaft"),
-        ("of: shaft_angle", "of: cam", "drivers.cam.motion.of", "circle: cam -> cam"),
+        ("motion: speed*t", "motion: {profile: [{profile: dwell, duration: 1 mm}], of: cam}", "drivers", "in a circle"),
         ("to: 50 mm", "to: 51 mm", "drivers.cam.motion", "do not end where they begin"),
+        ("duration: 60 deg", "duration: 60 s", "drivers.cam.motion.profile[0].duration", "an angle"),
+        ("duration: 60 deg", "duration: 60 mm", "drivers.cam.motion.profile[0].duration", "an angle"),
+        ("beyond: repeat", "start: 1 s", "drivers.cam.motion.start", "an angle"),
+        (*with_end("2 mm/s"), "drivers.cam.motion.profile[2].end[0]", "must be length per rad, got '2 mm/s'"),
+        (*with_end("0, 2 mm/s^2"), "drivers.cam.motion.profile[2].end[1]", r"must be length per rad\^2"),
         ("by: lift", "by: 20 deg", "drivers.cam.motion.profile[1].by", "a length"),
         ("until: 0.5 s", "until: 0.5 m", "drivers.index.motion.piecewise[0].until", "a time"),
         ("until: 0.5 s, ", "", "drivers.index.motion.piecewise[0]", "expression and until"),

@@ -110,7 +110,7 @@ def _validate(source: Source, space: str) -> dict[str, Any]:
         "bodies": dict.fromkeys(("ground", *(bodies if isinstance(bodies, dict) else ()))),
         "dimensions": _dimensions(parameters) if names else {},
         "uses": dict.fromkeys(names, ()),
-        "drivers": dict.fromkeys(drivers if isinstance(drivers := source.data.get("drivers"), dict) else ()),
+        "drivers": _driven_quantities(source.data.get("drivers"), space),
         "outputs": outputs if isinstance(outputs := source.data.get("outputs"), dict) else {},
     }
     try:
@@ -120,6 +120,19 @@ def _validate(source: Source, space: str) -> dict[str, Any]:
     uses = {name: allowed for name, allowed in context["uses"].items() if allowed}
     dimensions = uses | {name: (dimension,) for name, dimension in context["dimensions"].items()}
     return _plain(model) | {"dimensions": dimensions}
+
+
+def _driven_quantities(drivers: object, space: str) -> dict[str, str]:
+    """Return what drivers drive, by their names: an angle, a length, or anything where that is not known (yet)."""
+    kinds, found = dict(catalogue(space, "driver")), {}
+    for name, raw in drivers.items() if isinstance(drivers, dict) else ():
+        given = raw if isinstance(raw, dict) else {}
+        kind = kinds.get(str(given.get("type")))
+        quantity = next((key.quantity for key in file_keys(kind) if key.kind == "motion"), "any") if kind else "any"
+        if quantity == "of coordinate":
+            quantity = "angle" if given.get("coordinate") == "angle" else "length"
+        found[name] = quantity
+    return found
 
 
 def _dimensions(parameters: dict[str, Any]) -> dict[str, Any]:

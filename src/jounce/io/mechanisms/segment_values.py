@@ -8,13 +8,15 @@ from typing import Any
 from jounce.errors import UNSET, TrajectoryError, did_you_mean, show_value
 from jounce.io.mechanisms.values import ANY_VALUE, defined, list_schema, object_schema, parse, problem, scalar_schema
 from jounce.trajectory import AbstractMotion, Expression, FollowingMotion, PiecewiseMotion, Segment, SegmentedMotion
-from jounce.trajectory.dimensions import Dimension, is_rate, per_seconds
+from jounce.trajectory.dimensions import Dimension, is_rate, per_power
 from jounce.trajectory.segment_pieces import SEGMENT_PROFILES
 from jounce.trajectory.segments import BEYOND, MOST_CONDITIONS
 
 PROFILE_KEYS = ("profile", "initial", "start", "beyond", "of")
 SEGMENT_KEYS = tuple(field.name for field in dataclasses.fields(Segment))
 PIECEWISE_KEYS = ("piecewise",)
+LAPSES = {"time": "s", "angle": "rad", "length": "m"}
+"""What a law may be of, and its unit."""
 LEADER_SCHEMA = {
     "description": "name of a driver, or an expression of t: its coordinate takes the place of the time",
     "type": "string",
@@ -57,10 +59,8 @@ def segmented(raw: dict[str, Any], quantity: str, info: Any) -> AbstractMotion |
     entries, by = raw["profile"], leader(raw, info)
     if not isinstance(entries, list | tuple) or not entries:
         raise problem("must be a list of segments, such as {profile: cycloidal, duration: 1 s, to: 20 mm}", "profile")
-    own = (info.context or {}).get("lapse")  # of a cam, whose laws are of its angle
-    lapse = own or ("time" if by is None else "any")
-    timed = by is None and own is None
-    segments = [_segment(entry, k, quantity, lapse, info, timed=timed) for k, entry in enumerate(entries)]
+    lapse = _lapse(by, info)
+    segments = [_segment(entry, k, quantity, lapse, info) for k, entry in enumerate(entries)]
     initial = parse(raw.get("initial", 0.0), quantity, info, "initial").value
     start = parse(raw.get("start", 0.0), lapse, info, "start").value
     beyond = raw.get("beyond", BEYOND[0])
@@ -81,7 +81,15 @@ def _place(name: str | None) -> tuple[str | int, ...]:
     return ("profile", *([int(number)] if number else []), *([key] if key else []))
 
 
-def _segment(entry: object, k: int, quantity: str, lapse: str, info: Any, *, timed: bool) -> Segment:
+def _lapse(by: str | Expression | None, info: Any) -> str:
+    """Return what a law is of: the time, unless it is that of a cam or of the coordinate of a driver."""
+    context = info.context or {}
+    if by is None:
+        return context.get("lapse", "time")
+    return context["drivers"][by] if isinstance(by, str) else "any"
+
+
+def _segment(entry: object, k: int, quantity: str, lapse: str, info: Any) -> Segment:
     if not isinstance(entry, dict):
         raise problem("must be a segment, such as {profile: dwell, duration: 1 s}", "profile", k, value=entry)
     for key in entry.keys() - set(SEGMENT_KEYS):
@@ -102,12 +110,7 @@ def _segment(entry: object, k: int, quantity: str, lapse: str, info: Any, *, tim
             if not isinstance(entry[key], list | tuple):
                 raise problem("must be a list of values", "profile", k, key, value=entry[key])
             orders = enumerate(entry[key])
-            found[key] = [
-                rate(x, n + 1, quantity, info, "profile", k, key, n)
-                if timed
-                else parse(x, "any", info, "profile", k, key, n).value
-                for n, x in orders
-            ]
+            found[key] = [rate(x, n + 1, quantity, info, "profile", k, key, n, by=lapse) for n, x in orders]
     return Segment(**found)
 
 
@@ -127,7 +130,7 @@ def piecewise(raw: dict[str, Any], quantity: str, info: Any, variables: dict[str
         law = parse(entry["expression"], quantity, info, "piecewise", k, "expression", variables=variables).value
         laws.append(law if isinstance(law, Expression) else Expression(repr(law)))
         if "until" in entry:
-            end = parse(entry["until"], "time", info, "piecewise", k, "until").value
+            end = parse(entry["until"], _lapse(None, info), info, "piecewise", k, "until").value
             if isinstance(end, Expression):
                 raise problem("must be a number: it cannot depend on parameters", "piecewise", k, "until")
             ends.append(end)
@@ -137,14 +140,14 @@ def piecewise(raw: dict[str, Any], quantity: str, info: Any, variables: dict[str
         raise problem(error.message, "piecewise", value=UNSET if error.value is None else error.value) from None
 
 
-def rate(raw: object, order: int, quantity: str, info: Any, *at: str | int) -> float | Expression:
-    """Return a derivative of a driven quantity, in SI units per s to the power of its order."""
+def rate(raw: object, order: int, quantity: str, info: Any, *at: str | int, by: str = "time") -> float | Expression:
+    """Return a derivative of a driven quantity by the time or another one, in SI units."""
     value = parse(raw, quantity if order == 0 else "any", info, *at)
     if order and value.dimension:
-        known = bases(quantity, info)
-        if not is_rate(value.dimension, known, order):
-            words = f"must be {' or '.join(known) or 'a number'}{per_seconds(order)}"
-            raise problem(words, *at, value=raw)
+        known, lapses = bases(quantity, info), [by] if by in LAPSES else LAPSES
+        if not any(is_rate(value.dimension, known, order, lapse) for lapse in lapses):
+            per = " or".join(per_power(order, LAPSES[lapse]) for lapse in lapses)
+            raise problem(f"must be {' or '.join(known) or 'a number'}{per}", *at, value=raw)
     return value.value
 
 

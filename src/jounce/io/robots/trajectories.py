@@ -26,7 +26,7 @@ from jounce.trajectory import (
     MeasuredMotion,
     SplineMotion,
 )  # fmt: skip
-from jounce.trajectory.dimensions import TIME, Dimension, describe_dimension, is_rate, per_seconds
+from jounce.trajectory.dimensions import TIME, Dimension, describe_dimension, is_rate, per_power
 from jounce.trajectory.expression import RESERVED
 from jounce.trajectory.trapezoid import LIMITS
 
@@ -297,7 +297,7 @@ class _LawFile:
         """Return a number in SI units, or an expression of the parameters and of other names."""
         value = self.source.value(at, raw, kind, (*self.parameters, *names), self.dimensions)
         if kind == "any" and value.dimension and not is_rate(value.dimension, ("angle", "length"), per_time):
-            what = f"must be an angle or a length{per_seconds(per_time)}, not {describe_dimension(value.dimension)}"
+            what = f"must be an angle or a length{per_power(per_time)}, not {describe_dimension(value.dimension)}"
             raise self.source.error(what, at, value=raw)
         if joint is not None:
             self._note(joint, value.dimension, at)
