@@ -103,6 +103,23 @@ def test_a_small_inertia_beside_large_ones_is_not_none(given):
     assert found == pytest.approx(exact, rel=1e-13)
 
 
+@pytest.mark.slow
+def test_a_wheel_of_which_only_the_inertia_is_known_turns():
+    wheel = jn.Mechanism(
+        space="planar",
+        bodies={"wheel": jn.Body([0, 0], mass=0.0, inertia="J")},
+        joints={"O": planar.Revolute(("ground", "wheel"), [0, 0], [0, 0])},
+        forces={"motor": forces.Torque(("ground", "wheel"), "0.3*t")},
+        outputs={"turn": jn.AngleOutput("wheel")},
+        parameters={"J": 0.1},
+    )
+    exact = [4.0, 6.0, 6.0, 3.0]  # 0.3 t^3 / (6 J) at 2 s
+    assert jn.simulate(wheel, [0.0, 2.0], order=3).outputs["turn"][-1] == pytest.approx(exact, rel=1e-14)
+    runs = jn.simulate_batch(wheel, {"J": [0.05, 0.1]}, [0.0, 2.0], order=3).outputs["turn"][:, -1]
+    assert runs == pytest.approx(np.outer([2, 1], exact), rel=1e-14)
+    refused(jn.MechanismError, "bodies.wheel.mass: the body can move but has no", dataclasses.replace(wheel, joints={}))
+
+
 def turning(moments):
     """Return a body that turns about its own x axis."""
     inertia = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0], tensor=moments, strict=False)

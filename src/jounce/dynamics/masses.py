@@ -28,6 +28,10 @@ class Masses(NamedTuple):
     center: Float[Numbers, "component body #batch"]
     moments: Float[Numbers, "component component body #batch"]
 
+    def scale(self, length: float) -> np.float64:
+        """Return what masses are measured by: the largest, or the largest moment by the square of a length, kg."""
+        return np.float64(np.max(self.mass) or np.max(self.moments) / length**2)
+
 
 def masses_of(mechanism: Mechanism) -> Masses:
     """Return the masses of all bodies, zero where none are given; parameters may be traced by JAX.
@@ -68,10 +72,11 @@ def required_masses(mechanism: Mechanism, what: str = "energies") -> Masses:
     Raises
     ------
     MechanismError
-        If no body has a mass, or a body has an inertia without a mass.
+        If no body has a mass or an inertia, or a body has an inertia and no mass is given.
     """
     found = masses_of(mechanism)
-    if not isinstance(found.mass, Tracer) and not np.any(found.mass):
+    known = [part for part in (found.mass, found.moments) if not isinstance(part, Tracer)]
+    if len(known) == 2 and not any(map(np.any, known)):
         raise MechanismError(f"no body has a mass; {what} need some", name="bodies")
     return found
 

@@ -94,7 +94,7 @@ def consistent_start(mechanism: Mechanism, instant: float) -> ConsistentStart:
 
 def equations_of(mechanism: Mechanism, model: Model, masses: Masses) -> Equations:
     """Return the equations of motion of a mechanism."""
-    system, scale = with_fields(model.system, outputs=()), np.float64(np.max(masses.mass))
+    system, scale = with_fields(model.system, outputs=()), masses.scale(model.length)
     saddle = SaddleFronts.of(system.pattern)
     return Equations(system, masses, gravity_of(mechanism), scale, model.pose_type, saddle)
 

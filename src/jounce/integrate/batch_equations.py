@@ -56,7 +56,7 @@ class ParametricMechanism:
 
     def __init__(self, mechanism: Mechanism, model: Model, names: tuple[str, ...]):
         self.mechanism, self.model, self.names = mechanism, model, names
-        self.scale = np.float64(np.max(masses_of(mechanism).mass))
+        self.scale = masses_of(mechanism).scale(model.length)
         self.saddle = SaddleFronts.of(model.system.pattern)
         self._moved: list[bool] = []
         self._leaves, self._structure = jax.tree.flatten(self._made(mechanism, model))

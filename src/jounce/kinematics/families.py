@@ -102,7 +102,8 @@ def solve_batch(
     xarray.Dataset
         Outputs with the dimensions design, time, derivative, and component where there are some, SI; the values of the
         parameters are coordinates of the designs, ``parameter_NAME`` where something else has the NAME. ``status``
-        (design, time) tells the outcome, see `Status`: where it is not 0, outputs are NaN.
+        (design, time) tells the outcome, see `Status`: where it is not 0, outputs are NaN. An output that no design has
+        is left out.
 
     Raises
     ------
