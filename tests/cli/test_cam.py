@@ -47,6 +47,15 @@ def test_an_undercut_cam_is_told_and_the_status_says_so(capsys):
     assert "UNDERCUT from 2." in capsys.readouterr().out
 
 
+@pytest.mark.slow
+def test_a_flat_face_is_pressed_straight_and_no_rounding_is_told(tmp_path, capsys):
+    text = pathlib.Path(INTAKE).read_text().replace("shape: roller, radius: roller, offset: -2 mm", "shape: flat_face")
+    file = tmp_path / "flat.yaml"
+    file.write_text(text)
+    main(["cam", str(file), "--set", "lift=1 mm"])
+    assert "largest pressure angle: zero throughout" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     "old, new, name, words",
     [

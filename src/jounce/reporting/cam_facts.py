@@ -10,6 +10,8 @@ from jounce.kinematics import Extreme, PlateCam
 from jounce.reporting.law_facts import JumpFacts, jump_facts, law_words
 from jounce.trajectory.shown_units import ShownUnits
 
+ROUNDING = 1e-12  # rad
+
 
 class ExtremeFacts(TypedDict):
     """A value, m or rad, and the cam angle where it is, rad."""
@@ -99,8 +101,10 @@ def cam_words(facts: dict[str, Any], units: ShownUnits) -> str:
         f"{facts['follower']} follower, {facts['shape'].replace('_', ' ')}; base radius "
         f"{worded(facts['base_radius'], 'm')}, turning {facts['sense']}",
         f"rise: {worded(facts['rise'], lift, 'lift')}",
-        f"largest pressure angle: {told(facts['pressure_angle'], 'rad', 'pressure_angle')}",
     ]
+    pressed = abs(facts["pressure_angle"]["value"]) > ROUNDING
+    pressure = told(facts["pressure_angle"], "rad", "pressure_angle") if pressed else "zero throughout"
+    lines.append(f"largest pressure angle: {pressure}")
     for key, word in (("least_radius", "convex"), ("least_concave_radius", "concave")):
         if facts[key] is not None:
             lines.append(f"least radius of curvature, {word}: {told(facts[key], 'm')}")
