@@ -73,7 +73,7 @@ def cases(quick: bool) -> Cases:
             Contestant(
                 "one program", ready(lambda: jn.solve_batch(six_bar, {"r": radii}, time)["output_angle"].values), error
             ),
-            Contestant("a loop of solutions", ready(loop), error, aim=0.1),
+            Contestant("a loop of solutions", ready(loop), error),
         ],
         count=designs,
         unit="design",
