@@ -1,5 +1,7 @@
 """Derivatives of simulations by masses, lengths and initial conditions, against variational equations."""
 
+import dataclasses
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -116,13 +118,43 @@ def test_second_derivatives_by_a_mass():
 
     step = 1e-3
     expected = (slope(2.0 + step) - slope(2.0 - step)) / (2 * step)
-    assert float(jax.jvp(slope, (2.0,), (1.0,))[1]) == pytest.approx(float(expected), rel=1e-5)
+    found = float(jax.jvp(slope, (2.0,), (1.0,))[1])
+    assert found == pytest.approx(float(expected), rel=1e-5)
+    # JAX computes again in reverse what it did not keep, and forgets rules of derivatives there
+    assert float(jax.jvp(jax.grad(angle), (2.0,), (1.0,))[1]) == pytest.approx(found, rel=1e-12)
+
+
+@pytest.mark.slow
+def test_simulations_are_compiled_and_mapped():
+    def last(lift, m=2.0):
+        mechanism = PENDULUM.with_parameters(lift=lift, m=m)
+        return jn.simulate(mechanism, [0.0, 0.2], order=1, method=jn.Taylor(4, step=0.1)).outputs["angle"][-1]
+
+    value, slope = last(0.4), jax.jacfwd(last)(0.4)
+    np.testing.assert_allclose(jax.jit(last)(0.4), value, rtol=1e-14)
+    np.testing.assert_allclose(jax.jit(jax.jacfwd(last))(0.4), slope, rtol=1e-13)
+    np.testing.assert_allclose(jax.jacrev(jax.jit(last))(0.4), slope, rtol=1e-13)
+    lifts = jnp.array([0.4, 0.9])
+    np.testing.assert_allclose(jax.vmap(last)(lifts), [value, last(0.9)], rtol=1e-14)
+    np.testing.assert_allclose(jax.vmap(jax.jacfwd(last))(lifts)[0], slope, rtol=1e-13)
+    with pytest.raises(jax.errors.JaxRuntimeError, match="must not be negative"):
+        jax.block_until_ready(jax.jit(last)(0.4, -5.0))
+
+
+@pytest.mark.slow
+def test_what_is_not_reached_is_nan_within_compiled_programs():
+    motor = jn.forces.Torque(("ground", "rod"), "k/(0.1 - t)")
+    driven = dataclasses.replace(PENDULUM, forces={"motor": motor}, parameters={**PENDULUM.parameters, "k": 0.5})
+
+    def motion(k):
+        return jn.simulate(driven.with_parameters(k=k), [0.0, 0.05, 0.2], order=1)
+
+    found = jax.jit(lambda k: (motion(k).outputs["angle"], motion(k).status))(0.5)
+    np.testing.assert_array_equal(found[1] == 0, [True, True, False])
+    np.testing.assert_array_equal(np.isfinite(found[0]).all(axis=1), [True, True, False])
 
 
 def test_what_cannot_be_traced_is_told():
-    with pytest.raises(jn.UnsupportedError, match="number of its steps"):
-        jax.jit(angles)(jnp.array(VALUES))
-
     def by_formulas(m):
         return jn.simulate(PENDULUM.with_parameters(m=m), TIME, method=jn.Obreshkov()).outputs["angle"][-1, 0]
 

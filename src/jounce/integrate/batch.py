@@ -17,7 +17,7 @@ from jounce.integrate.batch_equations import BatchStart, ParametricMechanism, Tu
 from jounce.integrate.events import pose_coordinates
 from jounce.integrate.marching import DenseOutput, IntegratorState, Outcome, begin_march, march
 from jounce.integrate.methods import AbstractMethod
-from jounce.integrate.simulate import checked_options, instants_of
+from jounce.integrate.options import checked_options, instants_of
 from jounce.integrate.simulation import expanded
 from jounce.jet.derivatives import plain_derivatives
 from jounce.jet.turns import whole_periods

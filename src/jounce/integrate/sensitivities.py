@@ -12,29 +12,36 @@ that of the other, and the instant changes with the state: it is where the accel
 
 import dataclasses
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
+from jax.errors import ConcretizationTypeError
 from jaxtyping import Float, Int
 
 from jounce.dynamics.forward import Equations, Instants, State, expand
 from jounce.dynamics.masses import gravity_of, masses_of
 from jounce.dynamics.start import initial_as_drivers
-from jounce.errors import UnsupportedError
+from jounce.errors import AssemblyError, MobilityError, SolveError, UnsupportedError
 from jounce.integrate.breaks import Break, breaks
 from jounce.integrate.divided_steps import Kinks, Pieces, divided_steps
 from jounce.integrate.events import pose_coordinates
+from jounce.integrate.host_calls import called
 from jounce.integrate.lookahead import watched_names
 from jounce.integrate.methods import Taylor, evaluated
+from jounce.integrate.options import instants_of
 from jounce.integrate.over_kinks import Kinked, met, shifted, with_value
 from jounce.integrate.projection import normalised
 from jounce.integrate.simulation import Simulation
 from jounce.jet import Jet
 from jounce.kinematics.compilation import compiled
-from jounce.kinematics.sensitivities import Solved, check_not_redundant
+from jounce.kinematics.jacobian_series import solver
+from jounce.kinematics.sensitivities import Solved, check_not_redundant, failed, first_of, solved_shapes
+from jounce.kinematics.solve import checked_order, lost_orders
+from jounce.kinematics.status import Status
 from jounce.kinematics.traced_motion import TracedMotion
 from jounce.mechanism import Mechanism, Model
 from jounce.mechanism.axis_angles import measures_angle
@@ -60,8 +67,8 @@ def traced_simulation(simulate: Callable[..., Simulation], given: Mapping[str, A
     Raises
     ------
     UnsupportedError
-        Within `jax.jit` and `jax.vmap`, where the number of steps is not known; for a method other than `Taylor`, for
-        events, for forces that count turns of an angle about an axis, and where a force or a velocity jumps.
+        For a method other than `Taylor`, for events, for forces that count turns of an angle about an axis, and where a
+        force or a velocity jumps.
     MechanismError
         If constraints are redundant.
     """
@@ -70,7 +77,9 @@ def traced_simulation(simulate: Callable[..., Simulation], given: Mapping[str, A
         mechanism = dataclasses.replace(mechanism, initial=dict(given["initial"]))
     if options.get("events") or not isinstance(options.get("method") or Taylor(), Taylor):
         raise UnsupportedError("a simulation is differentiated with jn.Taylor() and without events", name="mechanism")
-    simulation, made = _recorded(simulate, mechanism, options)
+    if (recorded := _recorded(simulate, mechanism, options)) is None:
+        return _called(simulate, mechanism, options)
+    simulation, made = recorded
     check_not_redundant(simulation.model)
     if any(map(measures_angle, simulation.model.system.forces)):
         message = "a simulation is not differentiated where forces count the turns of an angle about an axis in space"
@@ -84,36 +93,66 @@ def traced_simulation(simulate: Callable[..., Simulation], given: Mapping[str, A
     coordinates = _coordinates(simulation, equations, pieces, start, order)
     known = {name: np.asarray(x) for name, x in simulation.poses[1].items()}
     coordinates = {name: known[name] + (x - jax.lax.stop_gradient(x)) for name, x in coordinates.items()}
-    angles = _angles(simulation)
-    status = jnp.asarray(simulation.status.astype(float))
-    solved = Solved(coordinates, status, model.length, angles, angles.angle[0], simulation.continued_outputs)
+    solved = _solved(simulation, coordinates)
     return TracedMotion(mechanism, (model, model), simulation.time, simulation.order, solved)
 
 
 def _recorded(
     simulate: Callable[..., Simulation], mechanism: Mechanism, options: Mapping[str, Any]
-) -> tuple[Simulation, Mechanism]:
-    """Return the simulation at the values that JAX traces, where it knows them, and the mechanism that has these."""
+) -> tuple[Simulation, Mechanism] | None:
+    """Return the simulation at the values that JAX traces, and the mechanism that has them; None if it knows none."""
     made, found = template(mechanism), []
 
     @jax.custom_jvp
     def record(values: tuple[Any, ...]) -> Any:
-        if any(isinstance(value, Tracer) for value in values):
-            raise UnsupportedError(
-                "jn.simulate is differentiated by jax.grad, jvp, vjp, jacfwd and jacrev, but not compiled or mapped by "
-                "jax.jit and jax.vmap, as the number of its steps follows from the values; see jn.simulate_batch",
-                name="mechanism",
-            )
-        known = made(values)
-        found.append((simulate(known, **options), known))
+        if not any(isinstance(value, Tracer) for value in values):
+            known = made(values)
+            found.append((simulate(known, **options), known))
         return jnp.zeros(())
 
     @record.defjvp
     def held(primals: tuple[Any], _: tuple[Any]) -> tuple[Any, Any]:
         return record(*primals), jnp.zeros(())
 
-    record(tuple(jnp.asarray(value, float) for value in traced_values(mechanism)))
-    return found[-1]
+    record(_values(mechanism))
+    return found[-1] if found else None
+
+
+def _values(mechanism: Mechanism) -> tuple[Any, ...]:
+    return tuple(jnp.asarray(value, float) for value in traced_values(mechanism))
+
+
+def _called(simulate: Callable[..., Any], mechanism: Mechanism, options: Mapping[str, Any]) -> TracedMotion:
+    """Return a simulation within `jax.jit` or `jax.vmap`: what is compiled calls it, one mechanism after another."""
+    order = checked_order(options.get("order", 4))
+    time = mechanism.time if options.get("time") is None else options["time"]
+    try:
+        instants = instants_of(time, mechanism.parameter_values)
+    except ConcretizationTypeError:
+        raise UnsupportedError("the instants depend on values that JAX traces; give them", name="time") from None
+    made, levels = template(mechanism), order + max(lost_orders(mechanism), 1) + 1
+    shapes = solved_shapes(mechanism, len(instants), levels)
+    options = {**options, "time": instants, "strict": False}
+
+    def found(values: tuple[Any, ...]) -> Solved:
+        try:
+            motion = simulate(made(values), **options)
+        except (AssemblyError, MobilityError, SolveError) as error:
+            status = np.full(len(instants), float(getattr(error, "status", None) or Status.NOT_REACHED))
+            return failed(shapes, status)
+        return motion.solved if motion.traced else _solved(motion, dict(motion.poses[1]))
+
+    solved = called(found, shapes, _values(mechanism))
+    model = traced_model(mechanism, solved.length, solved.angles, first_of(solved.coordinates))
+    check_not_redundant(model)
+    return TracedMotion(mechanism, (model, model), instants, order, solved)
+
+
+def _solved(simulation: Simulation, coordinates: dict[str, Any]) -> Solved:
+    """Return what is kept of a simulation, with these coordinates."""
+    angles, status = _angles(simulation), simulation.status.astype(float)
+    length = np.float64(simulation.model.length)
+    return Solved(coordinates, status, length, angles, angles.angle[0], simulation.continued_outputs)
 
 
 def _angles(simulation: Simulation) -> Angles:
@@ -329,20 +368,19 @@ def _expanded(equations: Equations, state: State, time: Instants, order: int) ->
     return expand(equations, state, time, order, inverse, reversible=True).state
 
 
-@jax.custom_jvp
-def _inverse(matrix: Any, known: Any) -> Any:  # noqa: ARG001 - what it is differentiated by
-    """Return the inverse of matrices, which is known, with the derivatives that it has."""
-    return known
+def _inverse(matrix: Any, known: Any) -> Any:
+    """Return the inverse of matrices, which is known, with the derivatives that it has.
 
-
-@_inverse.defjvp
-def _change_of_inverse(primals: tuple[Any, Any], tangents: tuple[Any, Any]) -> tuple[Any, Any]:
-    inverse = _inverse(*primals)
+    As the solution of equations: of a rule by `jax.custom_jvp` JAX keeps nothing where it computes again what it did
+    not keep (`jax.checkpoint`), so that derivatives of gradients were wrong.
+    """
 
     def product(a: Any, b: Any) -> Any:
         return jnp.sum(a[:, :, None] * b[None], axis=1)
 
-    return inverse, -product(product(inverse, tangents[0]), inverse)
+    unit = jnp.broadcast_to(jnp.eye(len(matrix))[:, :, None], matrix.shape)
+    transposed = jnp.swapaxes(known, 0, 1)
+    return solver(partial(product, matrix), partial(product, known), partial(product, transposed))(unit)
 
 
 @compiled(narrow=True)

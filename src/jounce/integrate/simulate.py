@@ -7,7 +7,7 @@ from typing import Any, overload
 
 import jax
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool
 
 from jounce.constraints import AbstractConstraint
 from jounce.dynamics.forward import Equations, Instants, State
@@ -18,7 +18,8 @@ from jounce.errors import JounceError, MechanismError, SolveError, did_you_mean
 from jounce.integrate.events import Event, EventDetector, EventLog, pose_coordinates
 from jounce.integrate.lookahead import watched_names
 from jounce.integrate.marching import MOVING, DenseOutput, IntegratorState, Outcome, march, unexpanded
-from jounce.integrate.methods import AbstractMethod, Taylor, evaluated
+from jounce.integrate.methods import AbstractMethod, evaluated
+from jounce.integrate.options import checked_options, instants_of
 from jounce.integrate.robot_simulation import RobotSimulation
 from jounce.integrate.sensitivities import traced_simulation
 from jounce.integrate.simulate_robot import simulate_robot
@@ -27,8 +28,7 @@ from jounce.jet import Jet
 from jounce.kinematics import Status, raise_for_status
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.motion import check_output, output_group
-from jounce.kinematics.solve import checked_order
-from jounce.mechanism import Mechanism, TimeGrid, check_mechanism, time_grid
+from jounce.mechanism import Mechanism, TimeGrid, check_mechanism
 from jounce.mechanism.law_checks import check_laws
 from jounce.mechanism.preconditions import concrete
 from jounce.robot import BaseMotion, Robot
@@ -38,7 +38,6 @@ AHEAD = 1e-9  # of the time so far: where steps collapse, what is not finite lie
 FEW = 4  # derivatives that are looked at for one that is not finite
 STEPS = 64  # tried between two looks at progress and events
 ROBOT_OPTIONS = ("state", "torque", "driven", "drives", "base", "wrenches")
-TOLERANCES = (1e-17, 1e-2)  # below rounding there is still energy to be kept: what series leave out adds up
 
 
 @overload
@@ -142,7 +141,7 @@ def simulate(
     SolveError
         If the motion cannot be followed to an instant (with `strict`); it holds the motion up to there.
     UnsupportedError
-        If JAX traces anything but values of the mechanism, or is to compile or to map the simulation.
+        If JAX traces anything but values of the mechanism.
 
     Examples
     --------
@@ -199,35 +198,6 @@ def _check_names(mechanism: Mechanism | Robot, given: Mapping[str, Any], initial
             raise MechanismError(message, name=name)
     if isinstance(mechanism, Robot) and initial is not None:
         raise JounceError("belongs to simulations of mechanisms; a robot begins in a `state`", name="initial")
-
-
-def checked_options(
-    order: object, method: object, tolerance: object, longest_step: object
-) -> tuple[int, AbstractMethod]:
-    """Return order and method of a simulation, or raise MechanismError for an option that is not valid."""
-    order = checked_order(order)
-    method = Taylor() if method is None else method
-    if not isinstance(method, AbstractMethod):
-        raise MechanismError("must be a method, such as jn.Taylor()", name="method", value=method)
-    low, high = TOLERANCES
-    if not (isinstance(tolerance, int | float) and low <= tolerance <= high):
-        message = f"the tolerance must be a number from {low:g} to {high:g}"
-        raise MechanismError(message, name="tolerance", value=tolerance)
-    if isinstance(longest_step, bool) or not (isinstance(longest_step, int | float) and longest_step > 0):
-        raise MechanismError("must be greater than zero", name="longest_step", value=longest_step)
-    return order, method
-
-
-def instants_of(time: Any, parameters: Mapping[str, Any]) -> Float[np.ndarray, " time"]:
-    """Return the instants of a run, which may go backward."""
-    if not isinstance(time, (list, tuple, np.ndarray)) or np.ndim(time) != 1 or len(time) < 2:
-        return time_grid(time, parameters)
-    try:
-        backward = bool(time[-1] < time[0])
-    except TypeError:
-        backward = False  # no numbers: told below
-    instants = time_grid(list(time)[::-1] if backward else time, parameters)
-    return instants[::-1] if backward else instants
 
 
 def _check_event(event: object, mechanism: Mechanism) -> None:

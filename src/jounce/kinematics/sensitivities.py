@@ -94,7 +94,7 @@ def differentiable_motion(
     made, held = template(mechanism), _builder(mechanism, with_outputs_held)
     driven = _builder(mechanism, with_laws_left_out) if led_outputs(mechanism) else held
     values = tuple(x if x.dtype == np.float64 else x.astype(float) for x in traced_values(mechanism))
-    shapes = _shapes(mechanism, len(instants), levels)
+    shapes = solved_shapes(mechanism, len(instants), levels)
 
     def on_the_host(strict: bool, values: Values) -> Solved:
         try:
@@ -107,7 +107,7 @@ def differentiable_motion(
             if np.any(motion.status == Status.OK):  # else nothing is known of drivers that follow from outputs
                 return _solved(motion)
             status = motion.status.astype(float)
-        return jax.tree.map(lambda x: np.full(x.shape, np.nan), shapes)._replace(status=status)
+        return failed(shapes, status)
 
     @jax.custom_jvp
     def solution(values: Values) -> Solved:
@@ -124,7 +124,7 @@ def differentiable_motion(
         return solved, still._replace(coordinates=_change(held, values, changes, solved, instants))
 
     solved = solution(values)
-    first = _first(solved.coordinates)
+    first = first_of(solved.coordinates)
     model = held(values, solved.length, solved.angles, first)
     if driven is held:
         return solved, (model, model)
@@ -132,7 +132,7 @@ def differentiable_motion(
     return solved, (model, driven(values, solved.length, angles, first))
 
 
-def _shapes(mechanism: Mechanism, count: int, levels: int) -> Solved:
+def solved_shapes(mechanism: Mechanism, count: int, levels: int) -> Solved:
     """Return the shapes of a solution."""
 
     def of(*shape: int) -> jax.ShapeDtypeStruct:
@@ -157,6 +157,11 @@ def _shapes(mechanism: Mechanism, count: int, levels: int) -> Solved:
     return Solved(coordinates, of(count), of(), Angles(angle[:3], near), angle[3], continued)
 
 
+def failed(shapes: Solved, status: Float[np.ndarray, " time"]) -> Solved:
+    """Return a solution of which only the status is known."""
+    return jax.tree.map(lambda x: np.full(x.shape, np.nan), shapes)._replace(status=status)
+
+
 def _solved(motion: Motion) -> Solved:
     """Return what is kept of a motion, as arrays of NumPy."""
     coordinates = jax.tree.map(np.asarray, dict(motion.poses[1]))
@@ -179,7 +184,7 @@ def _one_by_one(solve: Callable[[Values], Solved], shapes: Solved, sizes: Sequen
     return jax.tree.map(lambda shape, *xs: np.stack(xs).reshape(*batch, *shape.shape), shapes, *found)
 
 
-def _first(coordinates: Mapping[str, Any]) -> dict[str, Any]:
+def first_of(coordinates: Mapping[str, Any]) -> dict[str, Any]:
     """Return the coordinates at the first instant, (..., bodies, 1)."""
     return {name: coordinates[name][0, ..., :1] for name in coordinates if name != "angular_velocity"}
 
@@ -272,7 +277,7 @@ def _change(built: _Builder, values: Values, changes: Values, solved: Solved, in
     regular = solved.status == int(Status.OK)
     coordinates = {name: _where(regular, c, c[..., :1]) for name, c in solved.coordinates.items()}
     instants = jnp.where(regular, instants, instants[0])
-    first = _first(coordinates)
+    first = first_of(coordinates)
     moved = {name: jnp.zeros_like(x) for name, x in first.items()}
     if any(solved.angles.angle):  # they are counted from the first position, which moves too
         system, slope, which = _linear(built, (solved.length, None), values, changes, first, moved)

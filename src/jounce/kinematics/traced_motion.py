@@ -39,7 +39,7 @@ class TracedMotion(Motion):
                 outputs[k] = jnp.concatenate([counted[None], outputs[k][1:]])
         status: Any = solved.status.astype(int)
         super().__init__(mechanism, model, time, order, (solved.coordinates, tuple(outputs)), status, {})
-        self.solved_model = held
+        self.solved_model, self.solved = held, solved
 
     def __repr__(self) -> str:
         return f"<Motion of a design that JAX traces, {len(self.time)} instants, order {self.order}>"

@@ -16,7 +16,7 @@ from jounce.dynamics.trajectories import FollowedTrajectory
 from jounce.errors import MechanismError, RobotError, check_name
 from jounce.integrate import simulate_batch
 from jounce.integrate.methods import AbstractMethod
-from jounce.integrate.simulate import checked_options, instants_of
+from jounce.integrate.options import checked_options, instants_of
 from jounce.kinematics import Motion, Status, solve, solve_batch
 from jounce.kinematics.motion import output_group
 from jounce.kinematics.solve import checked_settings
