@@ -157,7 +157,7 @@ def solved_shapes(mechanism: Mechanism, count: int, levels: int) -> Solved:
     return Solved(coordinates, of(count), of(), Angles(angle[:3], near), angle[3], continued)
 
 
-def failed(shapes: Solved, status: Float[np.ndarray, " time"]) -> Solved:
+def failed(shapes: Solved, status: Float[Numbers, " time"]) -> Solved:
     """Return a solution of which only the status is known."""
     return jax.tree.map(lambda x: np.full(x.shape, np.nan), shapes)._replace(status=status)
 
