@@ -97,7 +97,7 @@ def law_words(laws: Sequence[Mapping[str, Any]], by: str = "s") -> list[str]:
         for x in broken:
             several = f" ({x['jumps']} jumps)" if x["jumps"] > 1 else ""
             unit = derivative_unit(law["unit"], x["order"]) if by == "s" else f"{law['unit']}/{by}^{x['order']}"
-            words += f"; {derivative_name(x['order'])} jumps by {x['largest']:.6g} {unit}"
-            words += f" at {x['at']:.6g} {by}{several}"
+            jump = "has no finite value" if x["largest"] is None else f"jumps by {x['largest']:.6g} {unit}"
+            words += f"; {derivative_name(x['order'])} {jump} at {x['at']:.6g} {by}{several}"
         lines.append(f"law of {law['of']}: {words}{'; ' if law['remark'] else ''}{law['remark']}")
     return lines
