@@ -112,8 +112,15 @@ def cam_words(facts: dict[str, Any], units: ShownUnits) -> str:
         low, high = facts["face"]
         width = worded(high["value"] - low["value"], "m")
         lines.append(f"face: at least {width} wide, from {told(low, 'm')} to {told(high, 'm')}")
-    law = {"of": "the follower", "unit": lift, **{k: facts[k] for k in ("continuous_to", "derivatives", "remark")}}
-    lines += law_words([law], by="rad")
+    unit, factor = (lift, 1.0) if lift == "rad" else units.of(lift, "lift")  # a derivative by rad is none of degrees
+    jumps = [{**x, "largest": x["largest"] and x["largest"] * factor} for x in facts["derivatives"]]
+    law = {
+        "of": "the follower",
+        "unit": unit,
+        "derivatives": jumps,
+        **{k: facts[k] for k in ("continuous_to", "remark")},
+    }
+    lines += law_words([law], by="rad", shown=units.of("rad", "angle"))
     if not facts["undercut"]:
         lines.append("not undercut: the profile gives the follower its law")
     for part in facts["undercuts"]:

@@ -76,8 +76,17 @@ def _number(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def law_words(laws: Sequence[Mapping[str, Any]], by: str = "s") -> list[str]:
+def law_words(laws: Sequence[Mapping[str, Any]], by: str = "s", shown: tuple[str, float] | None = None) -> list[str]:
     """Word to which derivative laws are continuous, by the time or by an angle, a line for each.
+
+    Parameters
+    ----------
+    laws : sequence of mapping
+        `LawFacts` of each.
+    by : str
+        Unit of what they are laws of.
+    shown : tuple of str and float, optional
+        Another unit in which places are told, and how many of it are one of the former.
 
     Examples
     --------
@@ -86,6 +95,7 @@ def law_words(laws: Sequence[Mapping[str, Any]], by: str = "s") -> list[str]:
     ['law of theta: continuous to acceleration; jerk jumps by -120 rad/s^3 at 0.5 s (2 jumps)']
     """
     lines = []
+    at, factor = shown or (by, 1.0)
     for law in laws:
         broken = [x for x in law["derivatives"] if x["jumps"]]
         if law["continuous_to"] is None:
@@ -98,6 +108,6 @@ def law_words(laws: Sequence[Mapping[str, Any]], by: str = "s") -> list[str]:
             several = f" ({x['jumps']} jumps)" if x["jumps"] > 1 else ""
             unit = derivative_unit(law["unit"], x["order"]) if by == "s" else f"{law['unit']}/{by}^{x['order']}"
             jump = "has no finite value" if x["largest"] is None else f"jumps by {x['largest']:.6g} {unit}"
-            words += f"; {derivative_name(x['order'])} {jump} at {x['at']:.6g} {by}{several}"
+            words += f"; {derivative_name(x['order'])} {jump} at {x['at'] * factor:.6g} {at}{several}"
         lines.append(f"law of {law['of']}: {words}{'; ' if law['remark'] else ''}{law['remark']}")
     return lines
