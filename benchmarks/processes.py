@@ -16,9 +16,10 @@ SECONDS_TO_ANSWER = 900.0
 
 
 class Usage(NamedTuple):
-    """What a command took: seconds on all cores together, and bytes at the peak."""
+    """What a command took: seconds on all cores together, seconds that one waits, and bytes at the peak."""
 
     processor: float
+    wall: float
     memory: float
 
 
@@ -30,6 +31,7 @@ def command(words: Sequence[str], environment: Mapping[str, str] | None = None) 
     CannotRunError
         If it ends with another status than 0; with the last line that it wrote.
     """
+    start = time.perf_counter()
     child = subprocess.Popen(
         words, cwd=ROOT, env=os.environ | (environment or {}), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
     )
@@ -39,7 +41,8 @@ def command(words: Sequence[str], environment: Mapping[str, str] | None = None) 
     child.returncode = os.waitstatus_to_exitcode(status)
     if child.returncode:
         raise CannotRunError(f"`{' '.join(words[1:4])}` ended with {child.returncode}: {told.rpartition(chr(10))[2]}")
-    return Usage(used.ru_utime + used.ru_stime, used.ru_maxrss * (1 if sys.platform == "darwin" else 1024))
+    wall = time.perf_counter() - start
+    return Usage(used.ru_utime + used.ru_stime, wall, used.ru_maxrss * (1 if sys.platform == "darwin" else 1024))
 
 
 class Worker:

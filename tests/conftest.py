@@ -17,10 +17,12 @@ from jounce.cli.compiled_programs import keep_programs
 from jounce.constraints import base  # importing jounce switches on double precision
 
 # Most of the time of the tests goes into compiling. It is halved without XLA's last optimisations, without its passes
-# over loops, which go round some thirty times, and in one thread, of which the other worker has the next. The same is
-# asked of the results; the examples, the study of branches and the benchmarks run as users do.
+# over loops, which go round some thirty times, and in one thread, of which the other worker has the next. Its newer
+# emitters, which the solver's programs leave out too, take twice as long for an operation alone. The same is asked of
+# the results; the examples, the study of branches and the benchmarks run as users do.
 _QUICK_TO_COMPILE = (
     "--xla_backend_optimization_level=0",
+    "--xla_cpu_use_fusion_emitters=false",
     "--xla_cpu_parallel_codegen_split_count=1",
     "--xla_disable_hlo_passes=simplify-while-loops,while-loop-invariant-code-motion,while-loop-constant-sinking",
 )

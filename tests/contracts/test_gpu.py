@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.kinematics import path_following
+from jounce.kinematics import wide_batches
 from jounce.kinematics.device import on_processor
 from jounce.robot import batches
 from tests.problems.mechanisms import example, reference
@@ -93,8 +93,8 @@ def test_a_default_device_is_asked_before_the_first_backend():
 def test_the_wide_batches_of_a_gpu_give_the_same_motion(monkeypatch):
     mechanism, grid = jn.load(example("four_bar")), np.linspace(0.0, 2.0, 1500)
     expected = jn.solve(mechanism, grid).outputs["psi"]
-    monkeypatch.setattr(path_following, "on_processor", lambda: False)
-    monkeypatch.setattr(path_following, "GPU_BATCH", 2**10)
+    monkeypatch.setattr(wide_batches, "on_processor", lambda: False)
+    monkeypatch.setattr(wide_batches, "GPU_WIDTH", 2**10)
     found = jn.solve(mechanism, grid).outputs["psi"]
     assert np.all(peaks_apart(found, expected, 1) < ROUNDING)
 

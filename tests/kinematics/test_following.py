@@ -13,7 +13,7 @@ from jounce.kinematics import Status
 from jounce.kinematics.advance import _status
 from jounce.kinematics.assembly import assemble
 from jounce.kinematics.linear import DenseFactor
-from jounce.kinematics.path_following import Solver
+from jounce.kinematics.solver import Solver
 from jounce.mechanism import build
 from tests.problems.small import crank, distance_slider, four_bar, slider_crank
 

@@ -6,7 +6,7 @@ import pytest
 import jounce as jn
 from jounce.kinematics import Status
 from jounce.kinematics.device import on_processor
-from jounce.kinematics.path_following import large_batch
+from jounce.kinematics.wide_batches import lot_width
 from jounce.mechanism import build
 from tests.problems.small import four_bar, slider_crank
 
@@ -70,4 +70,4 @@ def test_a_large_mechanism_is_solved_fewer_instants_side_by_side():
     many = jn.Mechanism(
         space="planar", bodies={f"b{k}": jn.Body([k, 0]) for k in range(30)}, joints=pins, drivers=drivers
     )
-    assert large_batch(build(many).system) < large_batch(build(four_bar()).system)
+    assert lot_width(build(many).system) < lot_width(build(four_bar()).system)

@@ -6,8 +6,8 @@ import pytest
 
 import jounce as jn
 from jounce.jet import Jet
-from jounce.kinematics.advance import advance
 from jounce.kinematics.legs import leg
+from jounce.kinematics.wide_batches import advance_in_lots
 from jounce.mechanism import build
 from tests.problems.small import crank, four_bar, law, screw, slider_crank, spindle
 
@@ -113,7 +113,7 @@ def test_long_grid_is_the_short_one_and_progress_is_told():
 
 
 def compilations():
-    return advance.jitted._cache_size() + leg.jitted._cache_size()
+    return advance_in_lots.jitted._cache_size() + leg.jitted._cache_size()
 
 
 def test_parameters_and_number_of_instants_compile_nothing_again():

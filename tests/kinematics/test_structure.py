@@ -22,7 +22,7 @@ DIFFERENT = [
     None, False, True, 0, 1, -1, 0.0, -0.0, 1.0, float("nan"), 1j, "", "1", "None", "int 1", b"1", (), [], {}, (1,),
     [1], (1, 2), ((1,), 2), (1, (2,)), ("a, str 'b'",), ("a", "b"), {"a": 1}, {"b": 1}, {1: "a"}, {"a": 1, "b": 2},
     {"b": 2, "a": 1}, frozenset({1}), frozenset({1, 2}), np.array([1]), np.array([1.0]), np.array([[1.0]]),
-    np.array([-1.0]), np.float64(1.0), np.int64(1), PlanarPose, SpatialPose, advance.function, Status.OK,
+    np.array([-1.0]), np.float64(1.0), np.int64(1), PlanarPose, SpatialPose, advance, Status.OK,
     Status.SINGULAR, Expression("t"), Expression("2*t"), Expression("t*2"), Untraced(1), jn.forces.ExpressionLaw,
 ]  # fmt: skip
 
@@ -90,14 +90,14 @@ def test_a_program_is_named_by_all_that_it_depends_on():
     told = {
         program_key((function,), tree, kinds, static)
         for function, kinds, static in itertools.product(
-            (advance.function, tree_description),
+            (advance, tree_description),
             (leaves, (((4,), "float64", False), ("float",)), (((3,), "float64", True), ("float",))),
             ({"order": 4}, {"order": 5}, {"pose_type": PlanarPose}),
         )
     }
     assert len(told) == 18
     with jax.default_matmul_precision("float32"):
-        assert program_key((advance.function,), tree, leaves, {"order": 4}) not in told
+        assert program_key((advance,), tree, leaves, {"order": 4}) not in told
 
 
 @pytest.mark.slow

@@ -56,8 +56,8 @@ def test_programs_of_long_grids_hold_no_lapack(monkeypatch, name):
 
     monkeypatch.setattr(Compiled, "__call__", told)
     jn.solve(jn.load(f"examples/{name}.yaml"), LONG[:1100], strict=False)
-    assert {"leg", "advance"} <= texts.keys()
-    assert "lapack" not in texts["leg"] + texts["advance"]
+    assert {"leg", "advance_in_lots"} <= texts.keys()
+    assert "lapack" not in texts["leg"] + texts["advance_in_lots"]
 
 
 def test_items_are_mapped_in_order_and_an_error_comes_through():

@@ -28,6 +28,7 @@ from jounce.jet import Jet
 from jounce.kinematics import Status, raise_for_status
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.motion import check_output, output_group
+from jounce.kinematics.rehearsal import first_time, rehearsed
 from jounce.mechanism import Mechanism, TimeGrid, check_mechanism
 from jounce.mechanism.law_checks import check_laws
 from jounce.mechanism.preconditions import concrete
@@ -36,6 +37,7 @@ from jounce.shapes import ArrayLike, Numbers
 
 AHEAD = 1e-9  # of the time so far: where steps collapse, what is not finite lies that close
 FEW = 4  # derivatives that are looked at for one that is not finite
+REHEARSED = 2  # instants: steps are evaluated at many of them together, however few there are
 STEPS = 64  # tried between two looks at progress and events
 ROBOT_OPTIONS = ("state", "torque", "driven", "drives", "base", "wrenches")
 
@@ -181,7 +183,7 @@ def simulate(
     _check_forces(start, float(instants[0]))
     detectors = [_detector_of(event, mechanism, start) for event in events]
     run = _Run(start, method, float(tolerance), float(longest_step), detectors)
-    run.go(instants, progress)
+    run.go(instants, progress, lambda dense: Simulation(mechanism, start, dense, instants[:REHEARSED], order))
     simulation = Simulation(mechanism, start, run.dense_output, instants, order, run.ending, run.events.happened)
     if strict and run.events.stopped_at is None:
         raise_for_status(simulation)
@@ -290,26 +292,43 @@ class _Run:
         """All steps taken."""
         return jax.tree.map(lambda *parts: np.concatenate(parts), *self.parts)
 
-    def go(self, instants: np.ndarray, progress: Callable[[int, int], None] | None) -> None:
-        """March from the first to the last instant."""
+    def go(
+        self,
+        instants: np.ndarray,
+        progress: Callable[[int, int], None] | None,
+        evaluate: Callable[[DenseOutput], Any],
+    ) -> None:
+        """March from the first to the last instant; steps are to be evaluated afterwards, which is rehearsed."""
         equations, stop = self.start.equations, instants[-1]
         self.sense = sense = np.sign(instants[-1] - instants[0])
         order = self.method.expansion_order(self.tolerance)
         current = unexpanded(equations, self.start.state, instants[:1], order=order)
-        while current.outcome.item() in MOVING and self.events.stopped_at is None:
-            current, steps, tried = march(
-                equations, current, stop, self.tolerance, self.longest, method=self.method, count=STEPS
-            )
-            found, taken = steps
-            taken = np.flatnonzero(np.asarray(taken)[: int(tried), 0])
-            if len(taken):
-                self.parts.append(self.events.noted(jax.tree.map(lambda x, k=taken: np.asarray(x)[k][..., 0], found)))
-            if progress is not None:
-                progress(int(np.sum(sense * instants <= sense * current.time.item())), len(instants))
+        how, options = (stop, self.tolerance, self.longest), {"method": self.method, "count": STEPS}
+        new = first_time("march", (equations, current), self.method)
+        with rehearsed(lambda: evaluate(self._standing(current, stop)), wanted=new):
+            while current.outcome.item() in MOVING and self.events.stopped_at is None:
+                current, steps, tried = march(equations, current, *how, **options)
+                found, taken = steps
+                taken = np.flatnonzero(np.asarray(taken)[: int(tried), 0])
+                if len(taken):
+                    part = jax.tree.map(lambda x, k=taken: np.asarray(x)[k][..., 0], found)
+                    self.parts.append(self.events.noted(part))
+                if progress is not None:
+                    progress(int(np.sum(sense * instants <= sense * current.time.item())), len(instants))
         if not self.parts:
             self._stand(current)
         if current.outcome.item() in (Outcome.COLLAPSED, Outcome.LOST):
             self.ending = self._explained(current)
+
+    def _standing(self, current: IntegratorState, stop: float) -> DenseOutput:
+        """Return one step of the whole length, at rest, in the form of those that will be taken."""
+        expansion, time = current.expansion, np.asarray(current.time)
+        form = jax.eval_shape(self.method.polynomial, expansion, expansion, current.time)
+        still = jax.tree.map(lambda x: np.zeros((1, *x.shape[:-1])), form)
+        for part, known in zip(still, expansion.state, strict=True):
+            part[0, 0] = np.asarray(known)[0, ..., 0]
+        angles = tuple(np.asarray(part).T for part in current.angles)
+        return DenseOutput(time, stop - time, still, np.full(1, -1), angles)
 
     def _stand(self, current: IntegratorState) -> None:
         """Keep the start as a step of no length."""

@@ -18,7 +18,6 @@ from jaxtyping import Bool, Float, Int
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked
 from jounce.jet.turns import brought_near
-from jounce.kinematics.compilation import compiled
 from jounce.kinematics.factors import Factor, blank_factor, factored
 from jounce.kinematics.least_squares import LeastSquaresFactor
 from jounce.kinematics.predictions import (
@@ -269,7 +268,6 @@ def _status(
     return status
 
 
-@compiled("pose_type", "order")
 def advance(
     system: System,
     coordinates: dict[str, Numbers],

@@ -12,7 +12,8 @@ import jax
 import numpy as np
 from jaxtyping import Float
 
-from jounce.kinematics.path_following import Anchor, ChangePoint, FollowedPath, Solver, follow
+from jounce.kinematics.path_following import Anchor, ChangePoint, FollowedPath, follow
+from jounce.kinematics.solver import Solver
 from jounce.kinematics.status import Status
 
 ROUNDING = 1e-16

@@ -43,7 +43,7 @@ class Store(Protocol):
 
 
 _store: Store | None = None
-_anew = threading.local()
+_thread = threading.local()
 
 
 @contextmanager
@@ -52,16 +52,30 @@ def compiling_anew() -> Iterator[None]:
 
     What XLA has read from bytes it cannot write again: it loses functions on the way.
     """
-    _anew.active = True
+    _thread.anew = True
     try:
         yield
     finally:
-        _anew.active = False
+        _thread.anew = False
 
 
 def compiles_anew() -> bool:
     """Tell whether this thread is to compile, and takes nothing from JAX's own store."""
-    return getattr(_anew, "active", False)
+    return getattr(_thread, "anew", False)
+
+
+class StoppedError(Exception):
+    """What this thread compiles is of no use any more."""
+
+
+@contextmanager
+def stopped_by(event: threading.Event) -> Iterator[None]:
+    """Have this thread raise StoppedError in the place of a program that it wants after an event."""
+    _thread.enough = event
+    try:
+        yield
+    finally:
+        del _thread.enough
 
 
 def keep_programs(store: Store | None) -> None:
@@ -155,6 +169,8 @@ class Compiled:
     def __call__(self, *arguments: Any, **keywords: Any) -> Any:
         """Call the compiled function."""
         check_process()
+        if (enough := getattr(_thread, "enough", None)) is not None and enough.is_set():
+            raise StoppedError
         if traced := [leaf for leaf in jax.tree.leaves((arguments, keywords)) if isinstance(leaf, Tracer)]:
             whole = self.jitted if all(map(_runs_at_once, traced)) else self._within
             return whole(*arguments, **keywords)

@@ -17,8 +17,9 @@ from jounce.kinematics.advance import SAFE_FRACTION, Arrival, SolvedState, solve
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.designs import Coordinates, Designs
 from jounce.kinematics.legs import GROWTH, LARGEST_TURNOVER, PASSAGE, SLIVER
-from jounce.kinematics.path_following import SMALLEST_STEP, Solver
+from jounce.kinematics.path_following import SMALLEST_STEP
 from jounce.kinematics.predictions import hidden_by_laws
+from jounce.kinematics.solver import Solver
 from jounce.kinematics.status import Status
 from jounce.kinematics.threads import Threads
 from jounce.kinematics.turnover import turnovers_of

@@ -12,8 +12,8 @@ from jounce.kinematics.assembly import assemble
 from jounce.kinematics.design_paths import DesignPaths
 from jounce.kinematics.designs import Designs, put_together
 from jounce.kinematics.motion import Motion
-from jounce.kinematics.path_following import Solver
 from jounce.kinematics.solve import LOWEST_ORDER, checked_settings, lost_orders, solve
+from jounce.kinematics.solver import Solver
 from jounce.kinematics.status import Status
 from jounce.kinematics.threads import thread_count
 from jounce.mechanism import (

@@ -16,12 +16,11 @@ from jounce.kinematics.advance import Arrival, SolvedState
 from jounce.kinematics.change_points import LARGEST_DISAGREEMENT, bridged, half_width, spoiled_width
 from jounce.kinematics.path_following import (
     PASSABLE,
-    SMALL_BATCH,
     ChangePoint,
     FollowedPath,
-    Solver,
     follow,
 )
+from jounce.kinematics.solver import SMALL_BATCH, Solver
 from jounce.kinematics.status import Status
 from jounce.kinematics.threads import Threads
 from jounce.mechanism.time import nearest_instants
@@ -71,13 +70,16 @@ class GridSolver:
         """
         count = len(self.time)
         reached = self.time < self.path.ended_at
-        width = self.solver.large_batch if count > LONG_GRID else SMALL_BATCH
+        width, most = SMALL_BATCH, 1
+        if count > LONG_GRID:
+            width, most = self.solver.width, self.solver.together // self.solver.width
         left = reached & (self.status != Status.OK)
         done = count - int(np.count_nonzero(left))
         with Threads(threads) as pool:
             for lanes, distance in _levels(left, len(self._anchors), width):
                 source = self._sources(lanes, distance)
-                batches = [(lanes[k : k + width], source[k : k + width]) for k in range(0, len(lanes), width)]
+                size = width * _lots(len(lanes), width, most, threads)
+                batches = [(lanes[k : k + size], source[k : k + size]) for k in range(0, len(lanes), size)]
                 for (batch, _), arrival in zip(batches, pool.map(self._solved, batches), strict=True):
                     self._take(batch, arrival)
                     done += len(batch)
@@ -171,6 +173,13 @@ class GridSolver:
         arrival = self.solver(last.state, instant - last.instant, instant)
         if arrival.status[0] == Status.INADMISSIBLE:  # the fault is the law's, not that of the position before
             self.status[lost], self.faults[lost] = Status.INADMISSIBLE, self.solver.fault(arrival, 0)
+
+
+def _lots(count: int, width: int, most: int, threads: int) -> int:
+    """Return how many lots go into a call, so that all threads have as many of them to solve."""
+    lots = -(-count // width)
+    rounds = -(-lots // (most * threads))
+    return max(1, -(-lots // (rounds * threads))) if lots else 1
 
 
 def _slice_of(indices: Indices) -> slice | Indices:

@@ -81,7 +81,7 @@ class Way(NamedTuple):
 
     known: SolvedState  # what a prediction needs of the last anchor, in all lanes
     place: Place  # of the last anchor
-    step: Number  # to be tried next, s
+    step: Number  # to be tried next, s; zero to solve the first instant itself
     away: Float[Numbers, " batch"]  # time from the last anchor that each lane is solved at, s
     instant: Float[Numbers, " batch"]  # when that is, s
     planned: Bool[Numbers, ""]  # whether they are decided
@@ -114,7 +114,7 @@ class Leg(NamedTuple):
     count: Int[Numbers, ""]  # of batches solved
 
 
-_batch = jax.jit(advance.function, static_argnames=("pose_type", "order"))  # traced once, for its shapes and in a loop
+_batch = jax.jit(advance, static_argnames=("pose_type", "order"))  # traced once, for its shapes and in a loop
 
 
 @compiled("pose_type", "order", "batches", narrow=True)
@@ -215,7 +215,8 @@ def _after(
     target, status, lanes = way.instant[0], arrival.status[0], len(way.instant) - 1
     there = Place(target, arrival.safe_step[0], arrival.radius[0], arrival.turnover[0])
     passable = (status == int(Status.OK)) | (status == int(Status.UNDEFINED))
-    accepted = passable & (way.step * jnp.abs(there.turnover) <= LARGEST_TURNOVER)
+    begins = way.step == 0
+    accepted = passable & (begins | (way.step * jnp.abs(there.turnover) <= LARGEST_TURNOVER))
     within = accepted & (_next_up(way, grid) <= target)
     lane = jnp.where(within, way.next_up + np.arange(lanes), -1)
     way = way._replace(next_up=way.next_up + jnp.sum(within))
@@ -231,7 +232,7 @@ def _after(
         known=jax.tree.map(lambda x: jnp.broadcast_to(x[..., :1], x.shape), known),
         place=there,
         may_pass=jnp.ones((), bool),
-        largest=GROWTH * way.step,
+        largest=jnp.where(begins, way.largest, GROWTH * way.step),
     )
     halved = ~accepted & ~stuck
     step = jnp.where(halved, 0.5 * way.step, way.step)

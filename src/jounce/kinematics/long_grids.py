@@ -8,7 +8,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from jounce.kinematics.grid import GridSolver
-from jounce.kinematics.path_following import FollowedPath, Solver
+from jounce.kinematics.path_following import FollowedPath
+from jounce.kinematics.solver import Solver
 from jounce.mechanism.time import Instants
 
 STRETCH = 2**16  # instants

@@ -8,22 +8,16 @@ the other side to rounding, and is told.
 
 import bisect
 import dataclasses
-import math
-from collections.abc import Sequence
-from functools import cached_property
-from typing import Any
 
 import jax
 import numpy as np
-from jaxtyping import Float, Int, Shaped
+from jaxtyping import Float, Int
 
-from jounce.kinematics.advance import LARGEST_GAP, Arrival, SolvedState, advance, predictor
-from jounce.kinematics.device import on_processor
-from jounce.kinematics.legs import Ending, Leg, Limits, Place, Settings, Way, leg
+from jounce.kinematics.advance import Arrival, SolvedState
+from jounce.kinematics.legs import Ending, Leg, Way
+from jounce.kinematics.solver import NO_GRID, Solver
 from jounce.kinematics.status import Status
-from jounce.mechanism import Model
 from jounce.mechanism.axis_angles import AttitudeHistory
-from jounce.mechanism.system import System
 
 PASSABLE = (Status.OK, Status.UNDEFINED)
 SMALLEST_STEP = 1e-10  # of the span
@@ -32,150 +26,6 @@ PASSAGE_DEVIATION = 1e-8  # from that series, as a part of the way: two branches
 NEARLY_SINGULAR = 1e-6  # of the span: a motion that ends so short before a singular position ends at it
 NEARBY = 0.1  # radii: a singular position nearer than this spoils high derivatives, if the motion is smooth there
 PLACES = 8  # in each step at which attitudes are looked at for turns: nowhere between them a body turns by half a turn
-SMALL_BATCH = 16  # lanes; a batch width compiles once, so a short grid uses one, and so do anchors
-LARGE_BATCHES = 128, 512  # lanes of a long grid: as many as the cache holds, within these bounds
-CACHED_ENTRIES = 2**16  # of the factors of a batch: half a megabyte
-LONGEST_LEG = 32  # batches
-LEG_ENTRIES = 2**19  # of what a leg keeps: a large mechanism has shorter ones
-GPU_BATCH = 2**15  # the large one of a GPU
-NO_GRID = np.empty(0)
-
-
-def large_batch(system: System) -> int:
-    """Return how many instants of a long grid are solved side by side: a power of two.
-
-    On a processor so many that the factors of their Jacobians fit into the cache, on a GPU so many that they fill it.
-    """
-    if not on_processor():
-        return GPU_BATCH
-    entries = math.prod(system.shape if system.fronts is None else system.fronts.shape)
-    least, most = LARGE_BATCHES
-    return max(least, min(most, 2 ** int(math.log2(max(1, CACHED_ENTRIES // max(1, entries))))))
-
-
-@dataclasses.dataclass(frozen=True)
-class Solver:
-    """A model with the settings under which it is solved."""
-
-    model: Model
-    order: int
-    tolerance: float
-    refine: bool = True
-    wanted: int = 0  # highest derivative that must be finite
-
-    def __call__(
-        self,
-        known: SolvedState,
-        step: Float[np.ndarray, " batch"],
-        instant: Float[np.ndarray, " batch"],
-        *,
-        survey: bool = False,
-    ) -> Arrival:
-        """Solve instants from known neighbours, as many as fit into a batch; `survey` looks for singular positions."""
-        lanes = len(instant)
-        if lanes <= SMALL_BATCH:
-            known, step, instant = jax.tree.map(
-                lambda x: _filled(x, SMALL_BATCH), (self._predictor(known), step, instant)
-            )
-            way = _way(known, (0.0,) * 4, away=step, instant=instant, planned=True)
-            arrival = self._leg(way, NO_GRID, _limits(0.0, 0.0, 1), survey=survey).last
-        else:
-            filled = jax.tree.map(lambda x: _filled(x, self.large_batch), (*self._predictor(known), step, instant))
-            settings = self._settings._replace(survey=np.asarray(survey))
-            arrival = advance(self.model.system, *filled, *settings, pose_type=self.model.pose_type, order=self.order)
-        return jax.tree.map(lambda x: np.asarray(x)[..., :lanes], arrival)
-
-    def leg(self, way: Way, grid: Float[np.ndarray, " time"], stop: float, smallest: float) -> Leg:
-        """Go on along a way with the next instants of a grid, as far as they fit; see `legs.leg`."""
-        way = way._replace(next_up=np.zeros((), int))
-        return self._leg(way, grid, _limits(stop, smallest, self._batches), survey=True)
-
-    def way(self, start: "Anchor", largest: float, crawled: int = 0) -> Way:
-        """Return the way that begins at an anchor, with a largest first step, s."""
-        known = jax.tree.map(lambda x: _filled(x, SMALL_BATCH), self._predictor(start.state))
-        place = start.instant, start.safe_step, start.radius, start.turnover
-        return _way(known, place, largest=largest, crawled=crawled)
-
-    @cached_property
-    def large_batch(self) -> int:
-        """How many instants of a long grid are solved side by side."""
-        return large_batch(self.model.system)
-
-    @cached_property
-    def _batches(self) -> int:
-        """How many batches a leg may have; static, so that each mechanism compiles one program."""
-        entries = (self.order + 1) * SMALL_BATCH * sum(x.size for x in self.model.guess.values())
-        return min(LONGEST_LEG, max(1, LEG_ENTRIES // entries))
-
-    @cached_property
-    def _settings(self) -> Settings:
-        return Settings(*map(np.asarray, (self.tolerance, self.refine, True, self.wanted)))
-
-    def _leg(self, way: Way, grid: Float[np.ndarray, " time"], limits: Limits, *, survey: bool) -> Leg:
-        room = (self._batches + 1) * (SMALL_BATCH - 1)
-        window = np.full(room, np.inf)
-        window[: len(grid)] = grid[:room]
-        settings, kind = self._settings._replace(survey=np.asarray(survey)), self.model.pose_type
-        return leg(
-            self.model.system, way, window, limits, settings, pose_type=kind, order=self.order, batches=self._batches
-        )
-
-    def fault(self, arrival: Arrival, lane: int) -> str:
-        """Return where to look for the fault: a driver without a permitted value, an output, the farthest body."""
-        refused = np.flatnonzero(~arrival.admissible[:, lane])
-        if refused.size:
-            return ", ".join(self.model.drivers[k] for k in refused)
-        if arrival.status[lane] == Status.INCONSISTENT:
-            return self._contradicting(np.asarray(arrival.gaps[..., lane]))
-        if arrival.status[lane] == Status.UNDEFINED and arrival.finite[0, lane]:
-            names = [name for group in self.model.outputs for name in group]
-            return f"output {names[int(np.argmin(arrival.finite[1:, lane]))]}"
-        return f"body {self.model.bodies[int(arrival.body[lane])]}"
-
-    def _contradicting(self, gaps: Float[np.ndarray, "2 row"]) -> str:
-        """Name the joints and drivers that contradict each other, and by how much they are open."""
-        size, over = gaps
-        names = dict.fromkeys(self.model.rows[k] for k in np.argsort(-over) if over[k] > 0.1 * over.max())
-        wide = size.max()
-        told = f"open by {wide:.2g} rad, or sizes of the mechanism" if wide > LARGEST_GAP else "in their rates"
-        return f"{', '.join(list(names)[:4])} ({told})"
-
-    def _predictor(self, known: SolvedState) -> SolvedState:
-        return predictor(self.model.system, self.model.pose_type, known)
-
-
-def _way(known: SolvedState, place: Sequence[float], **given: Any) -> Way:
-    """Return a way that begins; of one type whatever is given, so that it is compiled once."""
-    lanes, nothing, no = np.zeros(SMALL_BATCH), np.zeros(()), np.zeros((), bool)
-    way = Way(
-        known,
-        Place(*map(np.asarray, place)),
-        step=nothing,
-        away=lanes,
-        instant=lanes,
-        planned=no,
-        may_pass=~no,
-        next_up=np.zeros((), int),
-        largest=np.asarray(np.inf),
-        crawled=np.zeros((), int),
-        refused=np.asarray(np.nan),
-        ending=np.zeros((), int),
-    )
-    return way._replace(**{name: np.asarray(value) for name, value in given.items()})
-
-
-def _limits(stop: float, smallest: float, batches: int) -> Limits:
-    return Limits(*map(np.asarray, (stop, smallest, batches)))
-
-
-def _filled(x: Shaped[np.ndarray, "*rest batch"], width: int) -> Shaped[np.ndarray, "*rest width"]:
-    """Repeat the last lane up to the width of a batch."""
-    lanes = x.shape[-1]
-    if lanes == width:
-        return x
-    filled = np.empty((*x.shape[:-1], width), x.dtype)
-    filled[..., :lanes], filled[..., lanes:] = x, x[..., -1:]
-    return filled
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -208,6 +58,11 @@ class Anchor:
         """Build the anchor from the first lane of a batch that was surveyed."""
         safe_step, radius, turnover = (float(x[0]) for x in (arrival.safe_step, arrival.radius, arrival.turnover))
         return cls(float(instant), arrival.state(slice(1)), safe_step, radius, turnover, Status(int(arrival.status[0])))
+
+    @property
+    def place(self) -> tuple[float, float, float, float]:
+        """Instant, safe step, radius and turnover, as a leg wants them."""
+        return self.instant, self.safe_step, self.radius, self.turnover
 
     @property
     def reach(self) -> float:
@@ -297,7 +152,7 @@ class FollowedPath:
 
 def follow(
     solver: Solver,
-    start: Anchor,
+    start: Anchor | Way,
     stop: float,
     span: float,
     first_step: float = np.inf,
@@ -309,25 +164,30 @@ def follow(
     ----------
     solver : Solver
         What solves an instant from another.
-    start : Anchor
-        Where to begin.
+    start : Anchor or Way
+        Where to begin: a solved instant, or the way that begins with solving one; no anchor is found if that fails.
     stop : float
         Instant to arrive at, s.
     span : float
         Duration of the whole motion, by which steps are too small, s.
     first_step : float, optional
-        Longest first step, s.
+        Longest first step from an anchor, s.
     grid : array of shape (time,), optional
-        Instants to be solved on the way, s.
+        Instants to be solved on the way, s, from where it begins.
     """
-    path, way = FollowedPath([start]), solver.way(start, first_step)
-    before, first = (int(np.searchsorted(grid, start.instant, side=side)) for side in ("left", "right"))
-    if first > before and start.status == Status.OK:
-        path.on_the_way.append((np.arange(before, first), start.state))
-    while path.anchors[-1].instant < stop:
+    if isinstance(start, Anchor):
+        path, way = FollowedPath([start]), solver.way(start.state, start.place, first_step)
+    else:
+        path, way = FollowedPath([]), start
+    first = 0
+    while not path.anchors or path.anchors[-1].instant < stop:
         done = solver.leg(way, grid[first:], stop, SMALLEST_STEP * span)
         path.add(done, first)
-        way, here = jax.tree.map(np.asarray, done.way), path.anchors[-1]
+        way = jax.tree.map(np.asarray, done.way)
+        if not path.anchors:
+            arrival = jax.tree.map(np.asarray, done.last)
+            return path.ended(Status(int(arrival.status[0])), float(way.instant[0]), solver.fault(arrival, 0))
+        here = path.anchors[-1]
         ending = int(way.ending)
         first += int(way.next_up)
         if ending == Ending.PASSAGE:
@@ -339,7 +199,7 @@ def follow(
             far_side, change_point = passed
             path.anchors.append(far_side)
             path.change_points.append(change_point)
-            way = solver.way(far_side, float(way.largest), int(way.crawled))
+            way = solver.way(far_side.state, far_side.place, float(way.largest), int(way.crawled))
             first = int(np.searchsorted(grid, far_side.instant, side="right"))
         elif ending == Ending.COLLAPSED:
             beyond = float(np.nextafter(here.instant, np.inf))

@@ -5,26 +5,30 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
+import jax
 import numpy as np
 from jax.errors import ConcretizationTypeError
 from jaxtyping import Float
 
 from jounce.errors import AssemblyError, MechanismError, MobilityError, SolveError, UnsupportedError
 from jounce.kinematics.actuation import actuated
+from jounce.kinematics.advance import SolvedState
 from jounce.kinematics.assembly import assemble
 from jounce.kinematics.curves.choice import chosen
 from jounce.kinematics.dead_ends import dead_end_words
 from jounce.kinematics.grid import LONG_GRID
 from jounce.kinematics.long_grids import solve_grid
 from jounce.kinematics.motion import Motion
-from jounce.kinematics.path_following import NO_GRID, PASSABLE, Anchor, FollowedPath, Solver, follow
+from jounce.kinematics.path_following import FollowedPath, follow
+from jounce.kinematics.rehearsal import first_time, rehearsed
 from jounce.kinematics.sensitivities import differentiable_motion
+from jounce.kinematics.solver import NO_GRID, Solver
 from jounce.kinematics.status import Status
 from jounce.kinematics.stretches import Stretches
 from jounce.kinematics.threads import thread_count
 from jounce.kinematics.traced_motion import TracedMotion
-from jounce.mechanism import Mechanism, build, check_mechanism, time_grid, with_outputs_held
-from jounce.mechanism.axis_angles import measures_angle
+from jounce.mechanism import AbstractMotionOutput, Mechanism, build, check_mechanism, time_grid, with_outputs_held
+from jounce.mechanism.axis_angles import AttitudeHistory, measures_angle
 from jounce.mechanism.held_outputs import led_outputs
 from jounce.mechanism.law_checks import check_laws
 from jounce.mechanism.preconditions import concrete
@@ -34,6 +38,7 @@ from jounce.mechanism.time import Instants, instants_of
 LOWEST_ORDER = 4  # of the jets inside: predictions need some, also where the user wants positions only
 HIGHEST_ORDER = 30
 LARGEST_TOLERANCE = 1e-2
+REHEARSED = 2  # instants: forces are computed for many at a time, however few there are
 
 
 def _differentiated(solve: Callable[..., Motion], given: Mapping[str, Any]) -> Motion:
@@ -215,9 +220,43 @@ def _followed(
             error.message += f"; the driver {name} follows from the output {motion.output}, which must determine it"
         raise
     solver = Solver(model, max(order + lost, LOWEST_ORDER), float(tolerance), refine, order)
-    start = _first(solver, coordinates, np.array([first]))
+    still = _still(solver, coordinates)
+    start = solver.beginning(still, first)
     on_the_way = np.asarray(instants) if len(instants) <= LONG_GRID else NO_GRID
-    return solver, follow(solver, start, last, last - first, grid=on_the_way)
+    new = first_time("leg", solver.model.system, solver.order, len(instants) > LONG_GRID)
+    with rehearsed(partial(_rehearse, mechanism, solver, still, instants), wanted=new):
+        path = follow(solver, start, last, last - first, grid=on_the_way)
+    if not path.anchors:
+        where = f"t = {first:g} s, {path.fault}"
+        raise SolveError(f"{where}: {_words(path.status)}: {path.status.advice}", status=path.status)
+    return solver, path
+
+
+def _rehearse(mechanism: Mechanism, solver: Solver, still: SolvedState, instants: Instants) -> None:
+    """Use the programs of wide batches, and those of outputs that are forces, with the bodies at rest where they are.
+
+    What drivers exert that follow from outputs is found with another model, which only the motion tells.
+    """
+    count, known = min(len(instants), REHEARSED), still
+    if len(instants) > LONG_GRID:
+        solver(_repeated(known, solver.width), np.zeros(solver.width), np.asarray(instants[: solver.width]))
+    outputs = [x for x in mechanism.outputs.values() if isinstance(x, AbstractMotionOutput) and x.of_forces]
+    if outputs and not led_outputs(mechanism):
+        coordinates, *_ = _repeated(still, count)
+        groups = tuple(np.zeros((solver.order + 1, 1, group.instances, count)) for group in solver.model.system.outputs)
+        history = None
+        if "quaternion" in coordinates:
+            coordinates["angular_velocity"] = np.zeros_like(coordinates["position"][1:])
+            history = AttitudeHistory(coordinates["quaternion"][0, ..., :1], np.zeros(1))
+        state, status = (coordinates, groups), np.zeros(count, int)
+        order, times = solver.order - lost_orders(mechanism), np.asarray(instants[:count])
+        motion = Motion(mechanism, solver.model, times, order, state, status, {}, history=history)
+        for output in outputs:
+            output.coefficients(motion)
+
+
+def _repeated(known: SolvedState, count: int) -> Any:
+    return jax.tree.map(lambda x: np.repeat(x, count, axis=-1), known)
 
 
 def raise_for_status(motion: Any) -> None:
@@ -246,17 +285,11 @@ def checked_order(order: Any) -> int:
     return int(order)
 
 
-def _first(solver: Solver, coordinates: dict[str, np.ndarray], instant: Float[np.ndarray, " 1"]) -> Anchor:
-    """Solve the first instant with its derivatives, from its assembled position."""
+def _still(solver: Solver, coordinates: dict[str, np.ndarray]) -> SolvedState:
+    """Return what is known of the first instant before it is solved: its position."""
     levels = solver.order + 1
     still = {name: np.stack([x, *[np.zeros_like(x)] * (levels - 1)]) for name, x in coordinates.items()}
-    angles = tuple(_known_angles(group, levels) for group in solver.model.system.outputs)
-    arrival = solver((still, angles, np.zeros(1)), np.zeros(1), instant, survey=True)
-    status = Status(int(arrival.status[0]))
-    if status not in PASSABLE:
-        where = f"t = {instant[0]:g} s, {solver.fault(arrival, 0)}"
-        raise SolveError(f"{where}: {_words(status)}: {status.advice}", status=status)
-    return Anchor.of(arrival, instant[0])
+    return still, tuple(_known_angles(group, levels) for group in solver.model.system.outputs), np.zeros(1)
 
 
 def _known_angles(group: Group, levels: int) -> Float[np.ndarray, "order 1 instance 1"]:

@@ -9,7 +9,8 @@ from jounce.kinematics import long_grids
 from jounce.kinematics.actuation import actuated
 from jounce.kinematics.long_grids import stretches
 from jounce.kinematics.motion import Motion
-from jounce.kinematics.path_following import FollowedPath, Solver
+from jounce.kinematics.path_following import FollowedPath
+from jounce.kinematics.solver import Solver
 from jounce.kinematics.status import Status
 from jounce.mechanism import Mechanism
 from jounce.mechanism.time import Instants, instants_of

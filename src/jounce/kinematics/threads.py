@@ -5,7 +5,7 @@ import os
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from typing import Any, TypeVar
 
 import jax
@@ -36,6 +36,12 @@ def thread_count(given: Any = None) -> int:
     return int(count)
 
 
+def callers_device() -> Callable[[], AbstractContextManager[Any]]:
+    """Return what makes the context of another thread: what `with jax.default_device` says holds for one only."""
+    device: Any = getattr(jax.config, "jax_default_device", None)
+    return nullcontext if device is None else lambda: jax.default_device(device)
+
+
 class Threads:
     """Threads that compute one batch each, started when there is more than one to compute; to be closed after use.
 
@@ -48,9 +54,7 @@ class Threads:
     def __init__(self, count: int):
         self.count = count
         self._pool: ThreadPoolExecutor | None = None
-        # what `with jax.default_device` says holds for one thread only
-        device: Any = getattr(jax.config, "jax_default_device", None)
-        self._context = nullcontext if device is None else lambda: jax.default_device(device)
+        self._context = callers_device()
 
     def __enter__(self) -> "Threads":
         return self

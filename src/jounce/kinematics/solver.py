@@ -1,0 +1,168 @@
+"""A mechanism with the settings under which it is solved: what turns known neighbours into solved instants."""
+
+import dataclasses
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
+
+import jax
+import numpy as np
+from jaxtyping import Float, Shaped
+
+from jounce.kinematics.advance import LARGEST_GAP, Arrival, SolvedState, predictor
+from jounce.kinematics.legs import Leg, Limits, Place, Settings, Way, leg
+from jounce.kinematics.status import Status
+from jounce.kinematics.wide_batches import advance_in_lots, lot_width, lots_in_a_call
+from jounce.mechanism import Model
+
+SMALL_BATCH = 16  # lanes; a batch width compiles once, so a short grid uses one, and so do anchors
+LONGEST_LEG = 32  # batches
+LEG_ENTRIES = 2**19  # of what a leg keeps: a large mechanism has shorter ones
+NO_GRID = np.empty(0)
+
+
+@dataclasses.dataclass(frozen=True)
+class Solver:
+    """A model with the settings under which it is solved."""
+
+    model: Model
+    order: int
+    tolerance: float
+    refine: bool = True
+    wanted: int = 0  # highest derivative that must be finite
+
+    def __call__(
+        self,
+        known: SolvedState,
+        step: Float[np.ndarray, " batch"],
+        instant: Float[np.ndarray, " batch"],
+        *,
+        survey: bool = False,
+    ) -> Arrival:
+        """Solve instants from known neighbours, `together` at most; of a few, `survey` looks for singular positions."""
+        lanes = len(instant)
+        if lanes <= SMALL_BATCH:
+            known, step, instant = jax.tree.map(
+                lambda x: _filled(x, SMALL_BATCH), (self._predictor(known), step, instant)
+            )
+            way = _way(known, (0.0,) * 4, away=step, instant=instant, planned=True)
+            arrival = self._leg(way, NO_GRID, _limits(0.0, 0.0, 1), survey=survey).last
+        else:
+            arrival = self._wide(self._predictor(known), step, instant)
+        return jax.tree.map(lambda x: np.asarray(x)[..., :lanes], arrival)
+
+    def _wide(
+        self, known: SolvedState, step: Float[np.ndarray, " batch"], instant: Float[np.ndarray, " batch"]
+    ) -> Arrival:
+        lots = -(-len(instant) // self.width)
+        given = jax.tree.map(lambda x: _filled(x, lots * self.width, self.together), (known, step, instant))
+        tolerance, refine, _, wanted = self._settings
+        settings, kind = (tolerance, refine, wanted), self.model.pose_type
+        return advance_in_lots(
+            self.model.system, *given, settings, np.asarray(lots), pose_type=kind, order=self.order, width=self.width
+        )
+
+    def leg(self, way: Way, grid: Float[np.ndarray, " time"], stop: float, smallest: float) -> Leg:
+        """Go on along a way with the next instants of a grid, as far as they fit; see `legs.leg`."""
+        way = way._replace(next_up=np.zeros((), int))
+        return self._leg(way, grid, _limits(stop, smallest, self._batches), survey=True)
+
+    def way(self, solved: SolvedState, place: Sequence[float], largest: float, crawled: int = 0) -> Way:
+        """Return the way that begins at a solved instant, the place of an anchor, with a largest first step, s."""
+        known = jax.tree.map(lambda x: _filled(x, SMALL_BATCH), self._predictor(solved))
+        return _way(known, place, largest=largest, crawled=crawled)
+
+    def beginning(self, guess: SolvedState, instant: float) -> Way:
+        """Return the way that begins with solving an instant, from a position put together there."""
+        known = jax.tree.map(lambda x: _filled(x, SMALL_BATCH), self._predictor(guess))
+        return _way(known, (instant, 0.0, 0.0, 0.0), instant=np.full(SMALL_BATCH, instant), planned=True)
+
+    @cached_property
+    def width(self) -> int:
+        """How many instants of a long grid are solved side by side."""
+        return lot_width(self.model.system)
+
+    @cached_property
+    def together(self) -> int:
+        """How many instants of a long grid are solved in one call at most."""
+        return self.width * lots_in_a_call(self.width, self._entries)
+
+    @cached_property
+    def _batches(self) -> int:
+        """How many batches a leg may have; static, so that each mechanism compiles one program."""
+        return min(LONGEST_LEG, max(1, LEG_ENTRIES // (SMALL_BATCH * self._entries)))
+
+    @cached_property
+    def _entries(self) -> int:
+        """How many numbers the motion of all bodies has at an instant."""
+        return (self.order + 1) * sum(x.size for x in self.model.guess.values())
+
+    @cached_property
+    def _settings(self) -> Settings:
+        return Settings(*map(np.asarray, (self.tolerance, self.refine, True, self.wanted)))
+
+    def _leg(self, way: Way, grid: Float[np.ndarray, " time"], limits: Limits, *, survey: bool) -> Leg:
+        room = (self._batches + 1) * (SMALL_BATCH - 1)
+        window = np.full(room, np.inf)
+        window[: len(grid)] = grid[:room]
+        settings, kind = self._settings._replace(survey=np.asarray(survey)), self.model.pose_type
+        return leg(
+            self.model.system, way, window, limits, settings, pose_type=kind, order=self.order, batches=self._batches
+        )
+
+    def fault(self, arrival: Arrival, lane: int) -> str:
+        """Return where to look for the fault: a driver without a permitted value, an output, the farthest body."""
+        refused = np.flatnonzero(~arrival.admissible[:, lane])
+        if refused.size:
+            return ", ".join(self.model.drivers[k] for k in refused)
+        if arrival.status[lane] == Status.INCONSISTENT:
+            return self._contradicting(np.asarray(arrival.gaps[..., lane]))
+        if arrival.status[lane] == Status.UNDEFINED and arrival.finite[0, lane]:
+            names = [name for group in self.model.outputs for name in group]
+            return f"output {names[int(np.argmin(arrival.finite[1:, lane]))]}"
+        return f"body {self.model.bodies[int(arrival.body[lane])]}"
+
+    def _contradicting(self, gaps: Float[np.ndarray, "2 row"]) -> str:
+        """Name the joints and drivers that contradict each other, and by how much they are open."""
+        size, over = gaps
+        names = dict.fromkeys(self.model.rows[k] for k in np.argsort(-over) if over[k] > 0.1 * over.max())
+        wide = size.max()
+        told = f"open by {wide:.2g} rad, or sizes of the mechanism" if wide > LARGEST_GAP else "in their rates"
+        return f"{', '.join(list(names)[:4])} ({told})"
+
+    def _predictor(self, known: SolvedState) -> SolvedState:
+        return predictor(self.model.system, self.model.pose_type, known)
+
+
+def _way(known: SolvedState, place: Sequence[float], **given: Any) -> Way:
+    """Return a way that begins; of one type whatever is given, so that it is compiled once."""
+    lanes, nothing, no = np.zeros(SMALL_BATCH), np.zeros(()), np.zeros((), bool)
+    way = Way(
+        known,
+        Place(*map(np.asarray, place)),
+        step=nothing,
+        away=lanes,
+        instant=lanes,
+        planned=no,
+        may_pass=~no,
+        next_up=np.zeros((), int),
+        largest=np.asarray(np.inf),
+        crawled=np.zeros((), int),
+        refused=np.asarray(np.nan),
+        ending=np.zeros((), int),
+    )
+    return way._replace(**{name: np.asarray(value) for name, value in given.items()})
+
+
+def _limits(stop: float, smallest: float, batches: int) -> Limits:
+    return Limits(*map(np.asarray, (stop, smallest, batches)))
+
+
+def _filled(x: Shaped[np.ndarray, "*rest batch"], width: int, room: int = 0) -> Shaped[np.ndarray, "*rest room"]:
+    """Repeat the last lane up to a width; what lies beyond it, where there is more room, is not looked at."""
+    lanes, room = x.shape[-1], max(width, room)
+    if lanes == room:
+        return x
+    filled = np.empty((*x.shape[:-1], room), x.dtype)
+    filled[..., :lanes], filled[..., lanes:width] = x, x[..., -1:]
+    return filled

@@ -1,0 +1,138 @@
+"""What is compiled beside the first program is what comes later, and whatever goes wrong there leaves no trace."""
+
+import gc
+import sys
+import threading
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+
+import jounce as jn
+from jounce.kinematics.compilation import Compiled, StoppedError, compiled, stopped_by
+from jounce.kinematics.rehearsal import first_time, rehearsed
+from jounce.kinematics.threads import VARIABLE
+from tests.problems.dynamics import double_pendulum, spatial_slider_crank
+from tests.problems.small import four_bar
+
+SPATIAL = ("bennett", "delta_robot", "sarrus", "sea_platform", "stewart_forces", "four_bar_in_space")
+
+
+def compilations():
+    """Return how many programs each compiled function of the package has."""
+    return {x.__name__: x.jitted._cache_size() for x in gc.get_objects() if isinstance(x, Compiled)}
+
+
+@pytest.fixture
+def compiled_later(monkeypatch):
+    """Rehearse first, in this thread and with its errors; tell what was compiled in the place of that afterwards."""
+    before = {}
+
+    @contextmanager
+    def first(rehearsal, *, wanted):
+        rehearsal()  # also where another test has had the programs
+        before.update(compilations())
+        yield
+
+    monkeypatch.setattr(sys.modules["jounce.kinematics.solve"], "rehearsed", first)
+    monkeypatch.setattr(sys.modules["jounce.integrate.simulate"], "rehearsed", first)
+    return lambda: {name for name, count in compilations().items() if count > before[name]}
+
+
+@pytest.mark.parametrize(
+    "name", ["press", *(pytest.param(name, marks=pytest.mark.slow) for name in (*SPATIAL, "excavator"))]
+)
+def test_forces_of_a_motion_are_rehearsed(name, compiled_later):
+    motion = jn.solve(jn.load(f"examples/{name}.yaml"), order=3)
+    assert all(np.isfinite(values).any() for values in motion.outputs.values())
+    assert compiled_later() <= {"leg"}
+
+
+def test_long_grids_are_rehearsed(compiled_later):
+    jn.solve(four_bar(), np.linspace(0, 2, 1500), order=5)
+    assert compiled_later() <= {"leg"}
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("compiled_later")
+def test_a_rehearsal_does_no_harm_where_drivers_follow_from_outputs():
+    """Their forces are those of another model, which only the motion tells."""
+    motion = jn.solve(jn.load("examples/servo_press.yaml"), order=3)
+    assert np.isfinite(motion.outputs["torque"]).all()
+
+
+@pytest.mark.parametrize(
+    "mechanism, method",
+    [
+        (double_pendulum(), None),
+        pytest.param(double_pendulum(), jn.Obreshkov(4, step=1 / 64), marks=pytest.mark.slow),
+        pytest.param(spatial_slider_crank(stiffness=40.0), None, marks=pytest.mark.slow),
+    ],
+)
+def test_the_evaluation_of_steps_is_rehearsed(mechanism, method, compiled_later):
+    simulation = jn.simulate(mechanism, np.linspace(0, 0.2, 5), order=3, method=method)
+    assert all(np.isfinite(values).all() for values in simulation.outputs.values())
+    assert compiled_later() <= {"march"}
+
+
+def test_what_goes_wrong_in_a_rehearsal_is_not_told():
+    called = threading.Event()
+
+    def wrong():
+        called.set()
+        raise ZeroDivisionError
+
+    with rehearsed(wrong, wanted=True):
+        pass
+    assert called.is_set()
+
+
+def test_nothing_is_rehearsed_where_it_is_not_wanted_or_one_thread_computes(monkeypatch):
+    called = []
+    with rehearsed(lambda: called.append(1), wanted=False):
+        pass
+    monkeypatch.setenv(VARIABLE, "1")
+    with rehearsed(lambda: called.append(1), wanted=True):
+        pass
+    assert not called
+
+
+def test_an_error_ends_a_rehearsal_before_its_next_program():
+    asked, failed, ended = (threading.Event() for _ in range(3))
+    reached = []
+    program = compiled()(np.negative)
+
+    def rehearsal():
+        asked.set()
+        assert failed.wait(60)
+        try:
+            program(np.ones(2))
+            reached.append("compiled")
+        except StoppedError:
+            reached.append("stopped")
+        ended.set()
+
+    def failing():
+        with rehearsed(rehearsal, wanted=True):
+            assert asked.wait(60)
+            threading.Timer(0.2, failed.set).start()  # after the error has left the context
+            raise KeyError
+
+    with pytest.raises(KeyError):
+        failing()
+    assert ended.wait(60)
+    assert reached == ["stopped"]
+
+
+def test_programs_run_again_when_what_stopped_them_is_over():
+    program, stop = compiled()(lambda x: 2 * x), threading.Event()
+    stop.set()
+    with stopped_by(stop), pytest.raises(StoppedError):
+        program(np.ones(2))
+    np.testing.assert_array_equal(program(np.ones(2)), [2, 2])
+
+
+def test_a_program_is_new_once_for_arguments_of_one_form():
+    name = "a program of this test"
+    assert [first_time(name, (np.ones(2), 1.0), 3), first_time(name, (np.zeros(2), 2.0), 3)] == [True, False]
+    assert [first_time(name, (np.ones(3), 1.0), 3), first_time(name, (np.ones(2), 1.0), 4)] == [True, True]
