@@ -18,7 +18,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from benchmarks.timing import use_one_core
 
-use_one_core()
+if __name__ == "__main__":  # before JAX is imported; not of a process that takes the cases only
+    use_one_core()
 
 import numpy as np  # noqa: E402
 
