@@ -25,10 +25,10 @@ from benchmarks.timing import use_one_core
 if __name__ == "__main__":  # before JAX is imported; not of a process that takes the cases only
     use_one_core()
 
-import numpy as np  # noqa: E402
+import numpy as np
 
-from tests.problems.branch_study import FAMILIES, ORDERS, Case, judged, random_cases, solved  # noqa: E402
-from tests.problems.linkages import NEAREST  # noqa: E402
+from tests.problems.branch_study import FAMILIES, ORDERS, Case, judged, random_cases, solved
+from tests.problems.linkages import NEAREST
 
 LARGEST_SHARE_GIVEN_UP = 1e-3  # of the instants farther than 1e-4 from singular positions
 HEADINGS = ("mechanisms", "instants", "OK", "wrong", "given up", "of them near", "rightly refused", "us/instant", "ms")

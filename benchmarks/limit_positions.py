@@ -21,12 +21,12 @@ from benchmarks.timing import use_one_core
 if __name__ == "__main__":  # before JAX is imported; not of a process that takes the cases only
     use_one_core()
 
-import numpy as np  # noqa: E402
+import numpy as np
 
-import jounce as jn  # noqa: E402
-from tests.oracles.six_bar_assemblies import crank_angles  # noqa: E402
-from tests.problems.branch_study import FAMILIES as LINKAGES  # noqa: E402
-from tests.problems.limit_study import FAMILIES, LARGEST_ERROR, judged, random_linkage  # noqa: E402
+import jounce as jn
+from tests.oracles.six_bar_assemblies import crank_angles
+from tests.problems.branch_study import FAMILIES as LINKAGES
+from tests.problems.limit_study import FAMILIES, LARGEST_ERROR, judged, random_linkage
 
 STEPHENSON = "Stephenson III at the link"
 NAMES = ("a", "b", "c", "d", "px", "py", "l", "r", "qx", "qy")

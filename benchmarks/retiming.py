@@ -29,14 +29,14 @@ from benchmarks.timing import use_one_core
 if __name__ == "__main__":  # before JAX is imported; not of a process that takes the cases only
     use_one_core()
 
-import numpy as np  # noqa: E402
+import numpy as np
 
-import jounce as jn  # noqa: E402
-from benchmarks.cases import EXAMPLES, Case, Cases, Contestant, ready  # noqa: E402
-from jounce.errors import JounceError  # noqa: E402
-from jounce.io import load_limits  # noqa: E402
-from jounce.planning.retiming.paths import Path as JointPath, path_of  # noqa: E402
-from jounce.planning.retiming.robot_quantities import RobotQuantities  # noqa: E402
+import jounce as jn
+from benchmarks.cases import EXAMPLES, Case, Cases, Contestant, ready
+from jounce.errors import JounceError
+from jounce.io import load_limits
+from jounce.planning.retiming.paths import Path as JointPath, path_of
+from jounce.planning.retiming.robot_quantities import RobotQuantities
 
 WINDOWS = (0.02, 0.05, 0.1)  # s, of the moving averages
 SHARE = 0.5  # of the joints' ranges, about their middles
