@@ -214,7 +214,9 @@ def random_state(mechanism, random, order=ORDER - 1, size=0.1):
     return {name: body() for name in mechanism.bodies}
 
 
-@pytest.mark.parametrize("name", with_slow("inverted_slider_crank_distance", "rssr", "rspu_distance"))
+@pytest.mark.parametrize(
+    "name", with_slow("inverted_slider_crank_distance", "rssr", "rspu_distance", "rspu_slide", "rsur")
+)
 def test_right_sides_of_the_seven_mechanisms_at_any_state(name):
     """S 21-111 as one system, away from the constraints, so that no term can hide; S 103 needs a common axis."""
     mechanism = jn.load(example(name))

@@ -72,6 +72,7 @@ def pendulums(count, length=0.1):
     )
 
 
+@pytest.mark.slow
 def test_a_long_chain_goes_through_fronts_and_balances_its_weight():
     count = 30
     mechanism = pendulums(count)

@@ -42,6 +42,7 @@ def exact(values):
     return jnp.stack([v0 / rate * jnp.sin(rate * since), v0 * jnp.cos(rate * since)])
 
 
+@pytest.mark.slow
 def test_kinks_are_found_to_rounding_and_none_is_left_out():
     for stop in (0.5, 2.0):
         kinks = jn.simulate(sled(k=400.0), [0.0, stop], 1).kinks

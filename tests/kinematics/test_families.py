@@ -25,6 +25,7 @@ def check(mechanism, parameters, family, time, order, error=1e-12):
             np.testing.assert_allclose(found / (size + 1e-300), wanted / (size + 1e-300), atol=error, rtol=0)
 
 
+@pytest.mark.slow
 def test_designs_are_those_solved_alone():
     parameters = {"BC": np.linspace(0.125, 0.16, 5), "tau": np.linspace(1.8, 2.2, 5)}
     family = jn.solve_batch(FOUR_BAR, parameters, TIME, order=2)

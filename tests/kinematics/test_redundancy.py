@@ -125,6 +125,7 @@ def turned(first, second):
     )
 
 
+@pytest.mark.slow
 def test_drivers_that_agree_are_solved_and_others_refused():
     motion = jn.solve(turned("t", "t"), [0.0, 1.0], order=2)
     np.testing.assert_allclose(motion.outputs["angle"], [[0, 1, 0], [1, 1, 0]], atol=1e-15)

@@ -89,8 +89,9 @@ class Problem:
     def _compile(self) -> None:
         """Compile what follows from a motion, for the grid of the goals."""
         self._kept.clear()
-        self._measured = jax.jit(self._with_slopes)
-        self._numbers = jax.jit(self._goals_with_slopes)
+        # as functions of their own: JAX takes a method for the same as before, whatever its object holds by now
+        self._measured = jax.jit(lambda *known: self._with_slopes(*known))
+        self._numbers = jax.jit(lambda *known: self._goals_with_slopes(*known))
         self._each = jax.jit(jax.vmap(self._alone))
 
     def set_instants(self, instants: Float[np.ndarray, " time"]) -> None:

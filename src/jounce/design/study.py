@@ -5,6 +5,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
+import jax
 import numpy as np
 from jaxtyping import Float
 
@@ -194,7 +195,8 @@ class Study:
             motion = solve(mechanism.with_parameters(**values), goals.instants, goals.order, strict=False)
             if (failed := motion.status[motion.status != Status.OK]).size:
                 raise SolveError(Status(int(failed[0])).advice, status=Status(int(failed[0])))
-            rows, smooth = goals.measured(values, motion.outputs)
+            outputs = {name: np.asarray(x) for name, x in motion.outputs.items()}
+            rows, smooth = jax.jit(lambda *known: goals.measured(*known))(values, outputs)
             extremes = np.array([float(np.max(x)) for x in rows])
             numbers = np.asarray(goals.numbers(values, extremes, np.asarray(smooth), as_asked=True))
             return float(numbers[0]), numbers[1:], goals.sides(values, extremes, np.asarray(smooth))

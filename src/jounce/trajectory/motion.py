@@ -207,13 +207,19 @@ class SplineMotion(AbstractMotion):
             If an instant is beyond the samples and the law is not told what it is there; in what JAX traces, where
             nothing can be raised, it is NaN.
         """
+        where = self.breakpoints, self.stop, time.coefficients[0]
+        if self.beyond == "refuse" and np.ndim(self.stop) == 0 and not _traced(where) and np.size(where[2]):
+            self.check_instants(float(np.min(where[2])), float(np.max(where[2])))
+        # one program where the law is called alone; within a program it is a part of that
+        return (SplineMotion._evaluated if _traced((self, time)) else _evaluated_alone)(self, time)
+
+    def _evaluated(self, time: Jet) -> Jet:
+        """Return the jet of the law, NaN at instants that it refuses."""
         instants = time.coefficients[0]
         first, stop = jnp.asarray(self.breakpoints)[0], jnp.asarray(self.stop)
         slack = SLACK * (stop - first)
         outside = (instants < first - slack) | (instants > stop + slack)
         if self.beyond == "refuse":
-            if not isinstance(outside, Tracer) and bool(outside.any()) and jnp.ndim(first) == 0:
-                self.check_instants(float(jnp.min(instants)), float(jnp.max(instants)))
             return self._within(time).dense().map(lambda c: jnp.where(outside, jnp.nan, c))
         if self.beyond == "hold":
             held = [jnp.clip(instants, first, stop), *(jnp.zeros_like(instants),) * time.order]
@@ -247,3 +253,10 @@ class SplineMotion(AbstractMotion):
         piece = jnp.clip(search(breakpoints[..., 0], rows), 0, None)
         start = jnp.take_along_axis(breakpoints[..., 0], piece.T, axis=0).T
         return start, jnp.swapaxes(jnp.take_along_axis(table[..., 0], piece.T[None], axis=1), 1, 2)
+
+
+_evaluated_alone = jax.jit(SplineMotion._evaluated)
+
+
+def _traced(values: Any) -> bool:
+    return any(isinstance(x, Tracer) for x in jax.tree.leaves(values))

@@ -42,6 +42,7 @@ def test_a_path_that_no_cells_resolve_is_refused(law, message):
         jn.retime(SLIDER, {"x": law}, {"x": jn.Limits(jerk=60.0)})
 
 
+@pytest.mark.slow
 def test_a_jerk_is_kept_between_samples_on_a_path_with_a_hundred_waves():
     found = jn.retime(SLIDER, {"x": "0.5*s + 0.001*sin(200*pi*s)"}, {"x": jn.Limits(jerk=60.0)})
     jerk = np.abs(found.derivatives(np.linspace(0.0, found.stop, 100001), 3)[:, 3, 0]).max()

@@ -45,6 +45,7 @@ def test_two_links_have_the_derivatives_of_their_closed_form():
                 assert (np.abs(motion.q[index, :, joint] - exact) <= 2e-12 * scale).all()
 
 
+@pytest.mark.slow
 def test_other_instants_and_laws_of_the_joints():
     motion = two_links()
     times = np.array([0.123456, 1.7, 3.999])

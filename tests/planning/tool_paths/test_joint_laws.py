@@ -26,9 +26,9 @@ def along(*laws, order=4):
 @pytest.mark.parametrize(
     "laws, kink",
     [
-        (["0.5*abs(t - 0.987)", "t", "0.1*t"], 0.987),
+        pytest.param(["0.5*abs(t - 0.987)", "t", "0.1*t"], 0.987, marks=pytest.mark.slow),
         (["0.5*abs(t - 1)", "t", "0.1*t"], 1.0),
-        ([*CORNER, 0.0], 1.0),
+        pytest.param([*CORNER, 0.0], 1.0, marks=pytest.mark.slow),
     ],
     ids=["between instants", "at one of them", "known"],
 )
@@ -49,7 +49,7 @@ def test_a_corner_is_kept_and_its_velocities_jump(laws, kink):
     assert jumps[1][broken] == pytest.approx([after - before], abs=1e-6)
 
 
-@pytest.mark.parametrize("order", [0, 4])
+@pytest.mark.parametrize("order", [0, pytest.param(4, marks=pytest.mark.slow)])
 def test_a_spike_between_instants_is_followed(order):
     _, path, laws = along("0.5*t + 0.3*exp(-((t - 0.9871)/0.002)**2)", "t", 0.0, order=order)
     times = np.linspace(0.0, 2.0, 20001)
