@@ -64,6 +64,23 @@ def test_circuits_and_branches_of_four_bars():
     assert [(x.circuit, x.branch) for x in crossing] == [(1, 1), (1, 2)]
 
 
+def test_a_kite_has_two_assemblies_on_one_circuit():
+    kite = jn.Mechanism(  # crank and rod alike, rocker and ground alike: folded, crank and rod turn as one body
+        space="planar",
+        bodies={"crank": jn.Body([0, 0], 0.7), "rod": jn.Body([0.76, 0.64], 0.76), "rocker": jn.Body([2, 0], 2.5)},
+        joints={
+            "A": planar.Revolute(("ground", "crank"), [0, 0], [0, 0]),
+            "B": planar.Revolute(("crank", "rod"), [1, 0], [0, 0]),
+            "C": planar.Revolute(("rod", "rocker"), [1, 0], [2, 0]),
+            "D": planar.Revolute(("ground", "rocker"), [2, 0], [0, 0]),
+        },
+        drivers={"turn": drivers.CoordinateDriver(("ground", "crank"), "angle", motion="0.7 + t")},
+    )
+    found = jn.assemblies(kite, 0.0, count=8)
+    assert len(found) == 2
+    assert len(found.circuits) == 1
+
+
 @pytest.mark.slow
 def test_what_is_found_does_not_depend_on_the_seed():
     first, second = (jn.assemblies(four_bar(1.0, 3.0, 2.5, 3.2), seed=k, circuits=False) for k in (0, 5))

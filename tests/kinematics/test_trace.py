@@ -7,6 +7,7 @@ import pytest
 
 import jounce as jn
 from jounce.kinematics.curves import path
+from jounce.kinematics.curves.limits import roots
 from tests.problems import limit_study
 from tests.problems.linkages import FourBar
 from tests.problems.six_bars import SixBar
@@ -115,6 +116,13 @@ def test_the_folded_branch_of_a_kite():
     assert other.closed
     np.testing.assert_allclose(np.ptp(other.outputs["C"][:, 0], axis=0), 0.0, atol=1e-12)
     np.testing.assert_allclose(other.length, 2 * np.pi, rtol=1e-12)
+
+
+@pytest.mark.parametrize("place", [-8.0, -1.1, 0.25, 1.0, 1.1, 8.0])
+def test_rounding_at_the_end_of_a_series_makes_no_roots(place):
+    for last in (-3e-18, 3e-18, 1e-17):  # of the largest coefficient
+        series = max(1.0, abs(place)) * np.array([-place / abs(place), 1 / abs(place), last])
+        np.testing.assert_allclose(roots(series), [place] if 0 <= place <= 1 else [], rtol=0, atol=1e-15)
 
 
 @pytest.mark.parametrize("gap", [1e-2, 1e-5, -1e-5, 1e-8])

@@ -12,6 +12,8 @@ Kind = Literal["maximum", "minimum", "stationary"]
 ON_THE_CURVE = 1e-7  # of a step: imaginary part of a root that rounding may have made of a double one
 STANDING = 1e-10  # rate of the value, in its unit
 FLAT = 1e-9  # of the largest term: a slope that vanishes for all that is known
+ROUNDING = float(np.finfo(float).eps)  # of the largest term: smaller ones tell nothing within a step
+VANISHING = 1e-12  # of the largest term: what is left where a root is located, a double one to half the digits
 
 
 @dataclasses.dataclass(frozen=True)
@@ -61,8 +63,12 @@ def limits_between(place: Place, stop: float, unit: float) -> list[LimitPosition
 
 
 def roots(coefficients: Float[np.ndarray, " order"]) -> list[float]:
-    """Return the real roots of a polynomial in [0, 1], each once."""
-    significant = np.flatnonzero(np.abs(coefficients) > 1e-18 * np.max(np.abs(coefficients)))
+    """Return the real roots of a polynomial in [0, 1], each once.
+
+    Last coefficients that are rounding would spoil the eigenvalues that the roots are, and make some where none are.
+    """
+    size = np.max(np.abs(coefficients))
+    significant = np.flatnonzero(np.abs(coefficients) > ROUNDING * size)
     coefficients = coefficients[: significant[-1] + 1]
     slopes = (coefficients * np.arange(len(coefficients)))[1:]
     found: list[float] = []
@@ -76,7 +82,8 @@ def roots(coefficients: Float[np.ndarray, " order"]) -> list[float]:
             if not abs(change) < ON_THE_CURVE:
                 break
             part -= change
-        if all(abs(part - other) > 2 * ON_THE_CURVE for other in found):
+        vanishes = abs(_value(coefficients, part)) <= VANISHING * size
+        if vanishes and all(abs(part - other) > 2 * ON_THE_CURVE for other in found):
             found.append(part)
     return sorted(found)
 
