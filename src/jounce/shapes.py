@@ -6,9 +6,11 @@ then `derivative`, then `joint`, `row`, `column` or a component. An axis `order`
 """
 
 from collections.abc import Sequence
+from typing import Any
 
 import jax
 import numpy as np
+from jax.core import Tracer
 
 Numbers = jax.Array | np.ndarray
 """An array of JAX or NumPy."""
@@ -18,3 +20,8 @@ ArrayLike = Numbers | Sequence | np.floating | np.integer | float | int
 
 Real = Numbers | np.floating | np.integer | float | int
 """Real numbers: an array or one number."""
+
+
+def is_traced(values: Any) -> bool:
+    """Tell whether JAX traces an array in a pytree: then there are no numbers to check or to choose by."""
+    return any(isinstance(x, Tracer) for x in jax.tree.leaves(values))

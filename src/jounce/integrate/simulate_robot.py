@@ -5,7 +5,6 @@ from typing import Any
 
 import jax
 import numpy as np
-from jax.core import Tracer
 
 from jounce.errors import RobotError, UnsupportedError, check_name
 from jounce.integrate.events import EventLog
@@ -24,6 +23,7 @@ from jounce.robot.robot_size import robot_size
 from jounce.robot.tree_equations import TreeEquations
 from jounce.robot.wrench_laws import wrench_laws
 from jounce.robot.wrenches import Wrench
+from jounce.shapes import is_traced
 from jounce.trajectory.motion import AbstractMotion
 
 STEPS = 64  # taken between two looks at progress and events
@@ -80,7 +80,7 @@ def _problem(
     base: BaseMotion | None,
     wrenches: Sequence[Wrench],
 ) -> RobotProblem:
-    if any(isinstance(x, Tracer) for x in jax.tree.leaves(robot.tree)):
+    if is_traced(robot.tree):
         raise UnsupportedError("simulations of robots are not differentiated; jn.forward_dynamics is", name=robot.name)
     names, tree = robot.joint_names, robot.tree
     given = {} if driven is None else driven

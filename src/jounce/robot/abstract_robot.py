@@ -6,9 +6,7 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, TypeVar
 
-import jax
 import numpy as np
-from jax.core import Tracer
 
 from jounce.display import Displayed
 from jounce.errors import RobotError, check_name, did_you_mean
@@ -16,6 +14,7 @@ from jounce.rigid.inertia import Inertia, TracedInertia, finite_numbers
 from jounce.robot.floating_base import floating_joints
 from jounce.robot.model import Closure, Joint, Limits, Link, limits_with_followers
 from jounce.robot.tree import Tree, arrange, ordered, turn_about
+from jounce.shapes import is_traced
 
 Made = TypeVar("Made", bound="AbstractRobot")
 
@@ -241,7 +240,7 @@ class AbstractRobot(Displayed, abc.ABC):
         mass = held.mass if mass is None else mass
         center_of_mass = held.center_of_mass if center_of_mass is None else center_of_mass
         tensor = held.tensor if tensor is None else tensor
-        traced = any(isinstance(x, Tracer) for x in jax.tree.leaves((mass, center_of_mass, tensor)))
+        traced = is_traced((mass, center_of_mass, tensor))
         if traced or isinstance(held, TracedInertia):
             inertia = TracedInertia(mass, center_of_mass, tensor)
         else:

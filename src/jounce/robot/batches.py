@@ -8,7 +8,6 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.core import Tracer
 
 from jounce.jet.derivatives import plain_derivatives, taylor_coefficients
 from jounce.kinematics.compilation import Compiled
@@ -16,6 +15,7 @@ from jounce.kinematics.device import on_processor
 from jounce.kinematics.threads import Threads, thread_count
 from jounce.mechanism.preconditions import check_process
 from jounce.robot.abstract_robot import AbstractRobot
+from jounce.shapes import is_traced
 
 CHUNK = 128  # samples that are computed side by side; a GPU computes a block at once
 WIDTHS = (8, CHUNK, 16 * CHUNK)  # sizes of blocks: each compiles once for a kind of robot
@@ -52,7 +52,7 @@ class Batched:
         check_process()
         lead = arrays[0].shape[:-2]
         axes, count = len(lead), math.prod(lead)
-        if any(isinstance(x, Tracer) for x in jax.tree.leaves((arrays, constants, robot.tree))):
+        if is_traced((arrays, constants, robot.tree)):
             flat = tuple(jnp.reshape(x, (count, *x.shape[axes:])) for x in arrays)
             found = self.nested(robot.tree, flat, constants, static)
             return jax.tree.map(lambda x: jnp.reshape(x, (*lead, *x.shape[1:])), found)

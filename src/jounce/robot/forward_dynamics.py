@@ -7,7 +7,6 @@ from typing import Any, overload
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.core import Tracer
 from jaxtyping import Float
 
 from jounce.errors import RobotError, SingularityError, check_name
@@ -21,7 +20,7 @@ from jounce.robot.robot import Robot
 from jounce.robot.tree import Tree
 from jounce.robot.tree_equations import TreeEquations, Unknowns, free_base
 from jounce.robot.wrenches import Wrench, wrench_arrays
-from jounce.shapes import ArrayLike, Numbers
+from jounce.shapes import ArrayLike, Numbers, is_traced
 
 WIDE = 32  # samples side by side where there are rates: their histories shall stay in the cache
 
@@ -142,7 +141,7 @@ def forward_dynamics(
     moved = () if base is None else (*base_arrays(base, lead, 1), at_base)
     arrays = (state, forces, *moved, *pushes)
     constants = (mask, places, None if base is None else base_body(robot))
-    traced = any(isinstance(x, Tracer) for x in jax.tree.leaves((arrays, robot.tree, constants)))
+    traced = is_traced((arrays, robot.tree, constants))
     static = (tuple(wrench.frame == "base" for wrench in wrenches), bool(drives), traced)
     q, margin, *found = _moved(robot, arrays, constants, static)
     if strict and not traced:

@@ -8,13 +8,13 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.core import Tracer
 
 from jounce.errors import RobotError, check_name, did_you_mean
 from jounce.jet import Jet, compose
 from jounce.rigid.inertia import finite_numbers
 from jounce.robot.arguments import floats
 from jounce.robot.robot import Robot
+from jounce.shapes import is_traced
 
 FRAMES = ("base", "link")
 
@@ -75,7 +75,7 @@ def wrench_arrays(
         parts = [
             _derivatives(f"{where}.{name}", getattr(wrench, name), lead, levels, time) for name in ("force", "torque")
         ]
-        arrays.append(jnp.concatenate(parts, axis=-1) if _traced(parts) else np.concatenate(parts, axis=-1))
+        arrays.append(jnp.concatenate(parts, axis=-1) if is_traced(parts) else np.concatenate(parts, axis=-1))
     return tuple(arrays)
 
 
@@ -122,7 +122,3 @@ def _derivatives(where: str, value: Any, lead: tuple[int, ...], levels: int, tim
 
 def _component(function: Any, index: int, time: Any) -> Any:
     return jnp.asarray(function(time)[index], float)
-
-
-def _traced(arrays: Sequence[Any]) -> bool:
-    return any(isinstance(x, Tracer) for x in arrays)

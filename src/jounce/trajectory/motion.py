@@ -9,12 +9,11 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.core import Tracer
 from jaxtyping import Float
 
 from jounce.errors import MechanismError, check_choice
 from jounce.jet import Jet, compose
-from jounce.shapes import ArrayLike, Numbers, Real
+from jounce.shapes import ArrayLike, Numbers, Real, is_traced
 from jounce.trajectory.expression import Expression
 from jounce.trajectory.sample_errors import derivative_errors
 from jounce.trajectory.splines import spline_through
@@ -208,10 +207,10 @@ class SplineMotion(AbstractMotion):
             nothing can be raised, it is NaN.
         """
         where = self.breakpoints, self.stop, time.coefficients[0]
-        if self.beyond == "refuse" and np.ndim(self.stop) == 0 and not _traced(where) and np.size(where[2]):
+        if self.beyond == "refuse" and np.ndim(self.stop) == 0 and not is_traced(where) and np.size(where[2]):
             self.check_instants(float(np.min(where[2])), float(np.max(where[2])))
         # one program where the law is called alone; within a program it is a part of that
-        return (SplineMotion._evaluated if _traced((self, time)) else _evaluated_alone)(self, time)
+        return (SplineMotion._evaluated if is_traced((self, time)) else _evaluated_alone)(self, time)
 
     def _evaluated(self, time: Jet) -> Jet:
         """Return the jet of the law, NaN at instants that it refuses."""
@@ -256,7 +255,3 @@ class SplineMotion(AbstractMotion):
 
 
 _evaluated_alone = jax.jit(SplineMotion._evaluated)
-
-
-def _traced(values: Any) -> bool:
-    return any(isinstance(x, Tracer) for x in jax.tree.leaves(values))

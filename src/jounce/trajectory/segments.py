@@ -4,15 +4,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.core import Tracer
 from jaxtyping import Float
 
 from jounce.errors import TrajectoryError, check_choice, check_name
 from jounce.jet import Jet, sin
-from jounce.shapes import Numbers
+from jounce.shapes import Numbers, is_traced
 from jounce.trajectory.expression import Expression
 from jounce.trajectory.knots import knot_jumps
 from jounce.trajectory.motion import SplineMotion, Untraced
@@ -102,7 +100,7 @@ class SegmentedMotion(SplineMotion):
             _array(advance),
         )
         self.sines = _array([piece.sine for piece in pieces]).T
-        if any(isinstance(x, Tracer) for x in (self.breakpoints, self.coefficients)):
+        if is_traced((self.breakpoints, self.coefficients)):
             self.recipe = Untraced(((), 0.0, 0.0, beyond))  # a tracer must not outlive its trace
 
     @property
@@ -203,7 +201,7 @@ class SegmentedMotion(SplineMotion):
 
 def _check_closed(values: list[Value]) -> None:
     """Raise TrajectoryError unless a law that is to repeat ends where it begins."""
-    if any(isinstance(x, Tracer) for x in values):
+    if is_traced(values):
         return
     away = values[-1] - values[0]
     if abs(away) > CLOSED * (max(values) - min(values)):
@@ -218,7 +216,7 @@ def _values(segment: Segment) -> list[Value]:
 
 def _array(values: Any) -> Numbers:
     """Return an array of nested lists of numbers, or of what JAX traces among them."""
-    traced = any(isinstance(x, Tracer) for x in jax.tree.leaves(values))
+    traced = is_traced(values)
     return jnp.array(values, float) if traced else np.array(values, float)
 
 
