@@ -55,6 +55,7 @@ from jounce.dynamics import (
 )
 from jounce.errors import (
     AssemblyError as AssemblyError,
+    AssemblyWarning as AssemblyWarning,
     DamageWarning as DamageWarning,
     DesignError as DesignError,
     ExpressionError as ExpressionError,

@@ -15,6 +15,7 @@ from typing import Any
 
 __all__ = [
     "AssemblyError",
+    "AssemblyWarning",
     "DesignError",
     "ExpressionError",
     "JounceError",
@@ -283,6 +284,10 @@ class SampleWarning(UserWarning):
 
 class UnitWarning(UserWarning):
     """A number without a unit is likely meant in another unit than that of SI."""
+
+
+class AssemblyWarning(UserWarning):
+    """Bodies were put together with a part turned over in its joint, unlike in the starting guess."""
 
 
 class DamageWarning(UserWarning):

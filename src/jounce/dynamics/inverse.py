@@ -17,6 +17,7 @@ from jounce.errors import MechanismError
 from jounce.kinematics import Motion, Status
 from jounce.mechanism import Model
 from jounce.mechanism.axis_angles import at_lanes
+from jounce.mechanism.builder import group_rows
 from jounce.mechanism.pattern import Pattern
 from jounce.mechanism.redundant_reactions import resolved_reactions
 from jounce.shapes import Numbers
@@ -34,16 +35,11 @@ class ElementIndex:
 
 def element_indices(model: Model) -> dict[str, ElementIndex]:
     """Return the indices of all joints and drivers, by name."""
-    found, first = {}, 0
-    for index, group in enumerate(model.system.groups):
-        names = model.rows[first : first + group.instances]
-        last = first
-        while model.rows[last : last + group.instances] == names:
-            last += group.instances
-        for instance, name in enumerate(names):
-            own = range(first + instance, last, group.instances)
-            found[name.partition(".")[2]] = ElementIndex(index, instance, slice(first, last), own)
-        first = last
+    found = {}
+    for index, (group, rows) in enumerate(zip(model.system.groups, group_rows(model), strict=True)):
+        for instance, name in enumerate(model.rows[rows][: group.instances]):
+            own = range(rows.start + instance, rows.stop, group.instances)
+            found[name.partition(".")[2]] = ElementIndex(index, instance, rows, own)
     return found
 
 

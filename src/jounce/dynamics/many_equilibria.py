@@ -10,10 +10,10 @@ from jounce.dynamics.start import TOLERANCE
 from jounce.dynamics.static_equilibrium import Equilibrium, as_mechanism, at_rest_from, told
 from jounce.dynamics.statics import displaced, placed, search
 from jounce.errors import MechanismError, whole_number
-from jounce.kinematics.assembly import put_together
-from jounce.kinematics.curves.senses import senses
+from jounce.kinematics.gauss_newton import put_together
 from jounce.kinematics.initial_turns import Coordinates
-from jounce.mechanism import Mechanism, Model, build
+from jounce.kinematics.senses import senses
+from jounce.mechanism import Mechanism, build
 from jounce.mechanism.preconditions import concrete
 from jounce.robot import Robot
 from jounce.robot.closures import GivenCoordinates, given_coordinates
@@ -121,14 +121,10 @@ def _closed(start: Place, coordinates: Coordinates) -> Place | None:
     if model.rows:
         trial = put_together(model, instant, TOLERANCE, coordinates)
         drawn = {name: x[0] for name, x in start.coordinates.items()}
-        if not trial.closed or not np.array_equal(_senses(model, trial.coordinates), _senses(model, drawn)):
+        if not trial.closed or not np.array_equal(senses(model.system, trial.coordinates), senses(model.system, drawn)):
             return None
         coordinates = trial.coordinates
     return placed(start.mechanism, model, coordinates, instant)
-
-
-def _senses(model: Model, coordinates: dict[str, np.ndarray]) -> np.ndarray:
-    return senses(model.system, {name: np.asarray(x)[..., 0] for name, x in coordinates.items()})
 
 
 def _same(one: Place, other: Place) -> bool:

@@ -11,7 +11,7 @@ from jounce.dynamics.start import TOLERANCE
 from jounce.dynamics.statics import displaced
 from jounce.errors import MechanismError, SolveError
 from jounce.kinematics import Motion, Status
-from jounce.kinematics.assembly import put_together
+from jounce.kinematics.gauss_newton import put_together
 from jounce.kinematics.motion import output_series
 
 

@@ -16,8 +16,8 @@ from jounce.dynamics.variations import LEVELS, at_rest, clock_at, residuals_at, 
 from jounce.errors import SolveError
 from jounce.jet import Jet
 from jounce.kinematics import Status
-from jounce.kinematics.assembly import put_together
 from jounce.kinematics.compilation import compiled
+from jounce.kinematics.gauss_newton import put_together
 from jounce.kinematics.host_jacobian import RANK_TOLERANCE
 from jounce.kinematics.initial_turns import Coordinates
 from jounce.mechanism import Mechanism, Model

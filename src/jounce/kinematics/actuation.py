@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 
 from jounce.jet.derivatives import plain_derivatives
-from jounce.kinematics.assembly import mover
+from jounce.kinematics.gauss_newton import mover
 from jounce.kinematics.motion import Motion
 from jounce.kinematics.status import Status
 from jounce.mechanism import Model, build

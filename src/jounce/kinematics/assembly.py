@@ -1,82 +1,37 @@
 """The first assembly: bodies put together from the starting guess, and degrees of freedom counted and explained."""
 
 import dataclasses
-from typing import Any, NamedTuple
+import warnings
 
-import jax
 import numpy as np
 from jaxtyping import Float
 
 from jounce.constraints.drivers import DistanceDriver
 from jounce.constraints.planar import DoubleRevolute
 from jounce.constraints.spatial import DoubleSpherical
-from jounce.errors import AssemblyError, MobilityError
+from jounce.errors import AssemblyError, AssemblyWarning, MobilityError
 from jounce.jet import Jet
-from jounce.kinematics.compilation import compiled
 from jounce.kinematics.device import resident
+from jounce.kinematics.gauss_newton import Trial, mover, put_together
 from jounce.kinematics.host_jacobian import HostJacobian
 from jounce.kinematics.initial_turns import (
     Coordinates,
     DriverLag,
-    Mover,
     Place,
     driver_lag,
     nearest_turns,
     turned_to_laws,
 )
 from jounce.kinematics.redundancy import Redundancy, redundancy
+from jounce.kinematics.senses import drawn_senses, pair_names, senses, senses_to_seek, starts_with
 from jounce.kinematics.status import Status
 from jounce.mechanism import Model
 from jounce.mechanism.axis_angles import measures_angle, with_angles, with_datums
-from jounce.mechanism.builder import pose_at, with_reference
+from jounce.mechanism.builder import group_rows, with_reference
 from jounce.mechanism.modules import with_fields
-from jounce.mechanism.system import System
-from jounce.rigid.pose import Pose
-from jounce.shapes import Numbers
 
-MAX_STEPS = 100
 MAX_DATUMS = 100
 SETTLED = 1e-12  # rad, by which the angles of drivers may be counted otherwise
-
-
-@compiled("pose_type", narrow=True)
-def _moved(
-    system: System,
-    coordinates: dict[str, Numbers],
-    increment: Float[Numbers, " column"],
-    instant: Float[Numbers, ""],
-    pose_type: type[Pose],
-) -> Any:
-    """Return the coordinates after an increment, with residual and entries of the Jacobian, for one instant."""
-    pose = pose_at(coordinates, pose_type)
-    pose = pose.displaced(*system.coordinates(increment[:, None], pose.shifts))
-    time = Jet([instant[None, None]])
-    moved = {name: jet.coefficients[0] for name, jet in pose.coordinates().items()}
-    return moved, system.residual(pose, time).coefficients[0][:, 0], system.entries(pose, time)[:, 0]
-
-
-class Trial(NamedTuple):
-    """How far bodies could be put together.
-
-    Attributes
-    ----------
-    coordinates : dict of str to array
-        Of all bodies, the ground first: assembled, or as near to it as they came.
-    scale : array of shape (rows,)
-        By which the rows are multiplied.
-    gaps : array of shape (rows,)
-        By how much each row is open, rad or sizes of the mechanism.
-    jacobian : HostJacobian
-        Scaled, there.
-    closed : bool
-        Whether all gaps are closed, to the tolerance of the last correction.
-    """
-
-    coordinates: Coordinates
-    scale: Float[np.ndarray, " row"]
-    gaps: Float[np.ndarray, " row"]
-    jacobian: HostJacobian
-    closed: bool
 
 
 def assemble(model: Model, instant: float, tolerance: float, *, free: bool = False) -> tuple[Model, Coordinates]:
@@ -116,16 +71,41 @@ def assemble(model: Model, instant: float, tolerance: float, *, free: bool = Fal
         return dataclasses.replace(model, system=resident(model.system)), model.guess
     model, found = settled(model, instant, tolerance)
     check_assembled(model, found, instant, free=free)
+    warn_of_parts_turned_over(model, found)
     model, told = redundancy_of(model, found, instant)
     check_mobility(model, found.jacobian, told, free=free)
     return dataclasses.replace(model, system=resident(model.system)), found.coordinates
 
 
 def settled(model: Model, instant: float, tolerance: float) -> tuple[Model, Trial]:
-    """Put the bodies together, and count the angles about axes from the position found.
+    """Put the bodies together with no part turned over in its joint, if that goes, and count angles from there.
 
-    Where the axes were tilted against each other in the starting guess, the angles in the position found are others
-    than those counted from the guess, and it takes another turn to get to those that the drivers prescribe.
+    A guess in which directions that joints hold parallel are far from it may lead to a part that lies turned over, or
+    nowhere: then the directions are drawn together first, in some ways until one does not end in a singular position.
+    """
+    best = _nearby(model, instant, tolerance)
+    found = best[1]
+    sought = senses_to_seek(model, found)
+    rank = found.jacobian.rank - 1 if sought and found.closed else -1  # of the best so far
+    for wanted in sought:
+        for start in starts_with(model, wanted, instant, tolerance):
+            drawn, _ = with_reference(dataclasses.replace(model, guess=start), start, instant, model.prescribed)
+            other, trial = _nearby(drawn, instant, tolerance)
+            as_wanted = trial.closed and np.array_equal(senses(model.system, trial.coordinates), wanted)
+            if as_wanted and trial.jacobian.rank > rank:
+                best, rank = (dataclasses.replace(other, guess=model.guess), trial), trial.jacobian.rank
+            if rank == trial.jacobian.shape[1]:
+                return best
+        if best[1] is not found:
+            break
+    return best
+
+
+def _nearby(model: Model, instant: float, tolerance: float) -> tuple[Model, Trial]:
+    """Put the bodies together from the starting guess, and count the angles about axes from the position found.
+
+    Where the axes were tilted against each other in the guess, the angles in the position found are others than those
+    counted from the guess, and it takes another turn to get to those that the drivers prescribe.
     """
     guessed = mover(model, instant)(model.guess, np.zeros(model.system.shape[1]))
     lag, told = driver_lag(model, instant, guessed[1]), model.prescribed
@@ -147,6 +127,20 @@ def settled(model: Model, instant: float, tolerance: float) -> tuple[Model, Tria
             return model, found
         found = put_together(model, instant, tolerance, found.coordinates)
     return with_reference(model, found.coordinates, instant, told, keep=True)[0], found
+
+
+def warn_of_parts_turned_over(model: Model, found: Trial) -> None:
+    """Warn of joints whose parts are held the other way round than the starting guess means."""
+    there = senses(model.system, found.coordinates)
+    if there.all() or not (odd := there != drawn_senses(model)).any():
+        return
+    names = [name for name, is_odd in zip(pair_names(model), odd, strict=True) if is_odd]
+    message = (
+        f"{', '.join(dict.fromkeys(names))}: put together only with parts turned over: directions that are held "
+        "parallel point opposite ways, unlike in the starting guess; guess the pose of the bodies more closely, or "
+        "give one of the two directions the other sign"
+    )
+    warnings.warn(AssemblyWarning(message), stacklevel=3)
 
 
 def _turned(
@@ -186,76 +180,6 @@ def nearest_to_guess(model: Model, found: Trial, instant: float) -> Trial:
     return found._replace(coordinates=nearest_turns(model.guess, found.coordinates, residual_at))
 
 
-def mover(model: Model, instant: float) -> Mover:
-    """Return what takes coordinates and an increment to coordinates, residual and Jacobian, all on the host."""
-    system = with_fields(model.system, outputs=(), forces=(), fronts=None, pattern=None)  # all that the program needs
-    pattern, scale = model.system.pattern, np.asarray(model.system.row_scale)[:, 0]
-
-    def moved(coordinates: dict[str, Any], increment: np.ndarray) -> Any:
-        result = _moved(system, coordinates, increment, np.float64(instant), model.pose_type)
-        to, residual, entries = jax.tree.map(np.asarray, result)
-        return to, residual, HostJacobian.of(pattern, entries).scaled(scale)
-
-    return moved
-
-
-def put_together(
-    model: Model,
-    instant: float,
-    tolerance: float,
-    start: Coordinates | None = None,
-    *,
-    lag: DriverLag | None = None,
-    known: Place | None = None,
-) -> Trial:
-    """Return how far the bodies can be put together at one instant; nothing is refused.
-
-    Parameters
-    ----------
-    model : Model
-        The mechanism, with at least one row.
-    instant : float
-        s.
-    tolerance : float
-        Of the last correction, rad or sizes of the mechanism.
-    start : dict of str to array, optional
-        Coordinates to start from instead of the guess.
-    lag : DriverLag, optional
-        What drivers may still lack.
-    known : Place, optional
-        Where to start from, in the place of coordinates, if it is known whole.
-    """
-    still, free = np.zeros(model.system.shape[1]), mover(model, instant)
-
-    def opened(place: Place) -> Place:
-        return place if lag is None else (place[0], lag.open(place[1], 1.0), place[2])
-
-    known = free(model.guess if start is None else start, still) if known is None else known
-    coordinates, residual, jacobian = opened(known)
-    scale = jacobian.row_scale
-    for _ in range(MAX_STEPS):
-        step = jacobian.step(residual)
-        if step is None:
-            break  # told by name
-        size = np.max(np.abs(step), initial=0.0)
-        step *= min(1.0, 0.5 / max(size, 1e-300))  # at most half a radian, or half the mechanism, at a time
-        now = np.linalg.norm(scale * residual)
-        for _halving in range(12):
-            trial = opened(free(coordinates, step))
-            if np.linalg.norm(scale * trial[1]) < now or size <= tolerance:
-                break
-            step *= 0.5
-        else:
-            break
-        coordinates, residual, jacobian = trial
-        scale = jacobian.row_scale
-        if size <= tolerance:
-            break
-    gaps = np.where(jacobian.finite(), scale * residual, np.nan)
-    closed = bool(np.all(np.abs(gaps) <= max(1e3 * tolerance, 1e-9)))
-    return Trial(coordinates, scale, gaps, jacobian.scaled(scale), closed)
-
-
 def check_assembled(model: Model, found: Trial, instant: float, *, free: bool = False) -> None:
     """Raise AssemblyError, with the joints concerned and by how much they stay open, where gaps are not closed.
 
@@ -278,6 +202,8 @@ def check_assembled(model: Model, found: Trial, instant: float, *, free: bool = 
         f"{'stays' if len(open_rows) == 1 else 'stay'} open, by {', '.join(wide[name] for name in open_rows[:4])}; "
         "check lengths and positions, or guess the pose of the bodies more closely"
     )
+    if not free:
+        message += " (`assembly: nearest` looks from random starts)"
     extra = _structural_excess(model, found, instant)
     if extra:
         message += (
@@ -325,20 +251,17 @@ def _widths(model: Model, found: Trial, instant: float) -> dict[str, str]:
 
 def _squared_lengths(model: Model, instant: float) -> dict[str, float]:
     """Return the squares of the distances that joints and drivers keep between two points, by name, m^2."""
-    found, first = {}, 0
-    clock = Jet([np.full((1, 1), instant)])
-    for group in model.system.groups:
-        element, names = group.element, model.rows[first : first + group.instances]
-        kind = type(element)
-        first += len([name for name in model.rows if name in set(names)])
-        if kind in (DoubleRevolute, DoubleSpherical):
+    found, clock = {}, Jet([np.full((1, 1), instant)])
+    for group, rows in zip(model.system.groups, group_rows(model), strict=True):
+        element = group.element
+        if type(element) in (DoubleRevolute, DoubleSpherical):
             lengths = element.length
         elif isinstance(element, DistanceDriver):
             lengths = element.motion(clock).coefficients[0]
         else:
             continue
         lengths = np.broadcast_to(lengths, (group.instances, 1))[:, 0]
-        found |= {name: float(length) ** 2 for name, length in zip(names, lengths, strict=True)}
+        found |= {name: float(length) ** 2 for name, length in zip(model.rows[rows], lengths, strict=False)}
     return found
 
 

@@ -12,9 +12,9 @@ from jaxtyping import Bool, Float, Int
 
 from jounce.constraints.base import field_kind, value_fields
 from jounce.jet import Jet
-from jounce.kinematics.assembly import MAX_STEPS
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.factors import factored
+from jounce.kinematics.gauss_newton import MAX_STEPS
 from jounce.mechanism import Mechanism, Model
 from jounce.mechanism.builder import pose_at, starting_guess
 from jounce.mechanism.modules import with_fields

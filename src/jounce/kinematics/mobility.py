@@ -12,7 +12,8 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.errors import MechanismError, whole_number
-from jounce.kinematics.assembly import Trial, check_assembled, mover, put_together, redundancy_of
+from jounce.kinematics.assembly import check_assembled, redundancy_of, settled
+from jounce.kinematics.gauss_newton import Trial, mover, put_together
 from jounce.kinematics.host_jacobian import HostJacobian
 from jounce.kinematics.initial_turns import Coordinates, Mover
 from jounce.kinematics.mobility_series import SINGULAR, ReducedConstraints
@@ -191,7 +192,7 @@ def _released(mechanism: Mechanism, time: float) -> tuple[Model, Coordinates, Tr
     model = build(held)
     coordinates = model.guess
     if model.rows:
-        found = put_together(model, time, TOLERANCE)
+        model, found = settled(model, time, TOLERANCE)
         check_assembled(model, found, time, free=True)
         coordinates = found.coordinates
     model = build(dataclasses.replace(held, drivers={}, forces={}))

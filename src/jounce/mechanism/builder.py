@@ -87,6 +87,18 @@ class Model:
     history: AttitudeHistory | None = None
 
 
+def group_rows(model: Model) -> list[slice]:
+    """Return where the rows of each group stand: those of all its instances in turn, once for each row of the joint."""
+    found, first = [], 0
+    for group in model.system.groups:
+        names, last = model.rows[first : first + group.instances], first
+        while model.rows[last : last + group.instances] == names:
+            last += group.instances
+        found.append(slice(first, last))
+        first = last
+    return found
+
+
 def build(mechanism: Mechanism, like: Model | None = None) -> Model:
     """Return the numeric model of a mechanism.
 

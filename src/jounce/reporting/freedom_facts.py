@@ -11,16 +11,18 @@ from typing_extensions import TypedDict
 from jounce.dynamics.start import initial_as_drivers
 from jounce.errors import JounceError, MobilityError
 from jounce.kinematics.assembly import (
-    Trial,
     check_assembled,
     check_mobility,
     freely_moving,
-    put_together,
     redundancy_of,
+    settled,
+    warn_of_parts_turned_over,
 )
+from jounce.kinematics.gauss_newton import put_together
 from jounce.kinematics.host_jacobian import HostJacobian
 from jounce.kinematics.mobility import facts_of, independent, mobility
 from jounce.mechanism import Mechanism, Model, build
+from jounce.mechanism.builder import with_reference
 from jounce.reporting.summaries import freedom_words
 
 TOLERANCE = 1e-12
@@ -103,28 +105,27 @@ class StartingState:
         whole = joints.rank == equations
         return facts_of(independent(columns, equations) if whole else mobility(self.mechanism, self.instant))
 
-    def _trial(self, model: Model) -> Trial | None:
-        return put_together(model, self.instant, TOLERANCE) if model.rows else None
-
     def _assembled(self) -> tuple[dict[str, Any] | None, dict[str, Any]]:
         told = {"status": "assembled", "message": None, "at": self.instant, "open": None}
         model = build(initial_as_drivers(self.mechanism)) if self.mechanism.initial else self.model
-        trial = self._trial(model)
-        if trial is None:
+        if not model.rows:
             return model.guess, told
+        model, trial = settled(model, self.instant, TOLERANCE)
         told["open"] = float(np.max(np.abs(trial.gaps))) if np.isfinite(trial.gaps).all() else None
         try:
             check_assembled(model, trial, self.instant)
         except JounceError as error:
             return None, told | {"status": "open", "message": error.message}
+        warn_of_parts_turned_over(model, trial)
         return trial.coordinates, told
 
     def _counted(self) -> dict[str, Any]:
-        mechanism, model = self.mechanism, self.model
+        mechanism, model, place = self.mechanism, self.model, self.coordinates
         columns = int(model.system.shape[1])
-        if self.coordinates is not None:
-            model = dataclasses.replace(model, guess=self.coordinates)
-        trial, told, message = self._trial(model), None, None
+        if place is not None:
+            model, _ = with_reference(dataclasses.replace(model, guess=place), place, self.instant)
+        trial = put_together(model, self.instant, TOLERANCE) if model.rows else None
+        told = message = None
         pattern = model.system.pattern
         jacobian = HostJacobian.of(pattern, np.zeros(pattern.entry_count))
         if trial is not None and trial.jacobian.finite().all():

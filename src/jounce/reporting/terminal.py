@@ -11,7 +11,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from jounce.errors import DamageWarning, RobotWarning, SampleWarning, UnitWarning
+from jounce.errors import AssemblyWarning, DamageWarning, RobotWarning, SampleWarning, UnitWarning
 from jounce.interrupts import undoing
 
 if TYPE_CHECKING:
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from jounce.reporting.tables import Table
 
 OURS = (
+    AssemblyWarning,
     DamageWarning,
     RobotWarning,
     SampleWarning,

@@ -12,17 +12,17 @@ from jounce.kinematics.assembly import (
     check_assembled,
     check_mobility,
     nearest_to_guess,
-    put_together,
     redundancy_of,
     settled,
 )
 from jounce.kinematics.curves.curve import Curve, posed
-from jounce.kinematics.curves.senses import senses
 from jounce.kinematics.curves.start import first_instant
 from jounce.kinematics.curves.starts import put_together_side_by_side
 from jounce.kinematics.curves.tracing import check_number, traced
 from jounce.kinematics.curves.walker import Walker
 from jounce.kinematics.device import resident
+from jounce.kinematics.gauss_newton import put_together
+from jounce.kinematics.senses import drawn_senses, senses
 from jounce.mechanism import Mechanism, build, check_mechanism
 from jounce.mechanism.modules import with_fields
 from jounce.mechanism.preconditions import concrete
@@ -224,8 +224,7 @@ class _Search:
         self.model = dataclasses.replace(self.first, system=system)
         self.walker = Walker(self.model, driven=False)
         self.found: list[_Found] = []
-        as_drawn = trial.coordinates if trial.closed else model.guess
-        self.senses = senses(self.system, {name: np.asarray(x)[..., 0] for name, x in as_drawn.items()})
+        self.senses = senses(self.system, trial.coordinates) if trial.closed else drawn_senses(model)
         self.starts = self.since_last_new = self.movable = 0
         if trial.closed:
             check_mobility(self.model, trial.jacobian, redundancy_of(self.first, trial, instant)[1])
@@ -282,7 +281,8 @@ class _Search:
 
     def add(self, coordinates: dict[str, np.ndarray], hits: int = 1) -> bool:
         """Add an assembly, and tell whether it is new; one with a part turned over in its joint is none."""
-        if not np.array_equal(senses(self.system, coordinates), self.senses):
+        there = {name: x[..., None] for name, x in coordinates.items()}
+        if not np.array_equal(senses(self.system, there), self.senses):
             return False
         for known in self.found:
             same = SAME if known.smallest > NEARLY_SINGULAR else SAME_IF_SINGULAR
