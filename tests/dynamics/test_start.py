@@ -54,6 +54,36 @@ def test_velocities_left_open_are_those_of_least_kinetic_energy():
     assert np.allclose(spin, 3.0 * wanted / wanted.sum(), rtol=1e-13)
 
 
+def two_rods(**initial):
+    rods = {
+        "upper": jn.Body([0, 0], angle=0.3, mass=2.0, inertia=0.5),
+        "lower": jn.Body([1, 0.3], angle=-0.4, mass=1.0, inertia=0.2),
+    }
+    joints = {
+        "A": planar.Revolute(("ground", "upper"), [0, 0], [0, 0]),
+        "B": planar.Revolute(("upper", "lower"), [1, 0], [0, 0]),
+    }
+    return jn.Mechanism(space="planar", bodies=rods, joints=joints, initial=initial)
+
+
+def reach(law):
+    return drivers.DistanceDriver(("ground", "lower"), [0, 0], [0.8, 0], law)
+
+
+def test_a_speed_in_the_limit_of_a_reach_is_refused():
+    """The tip is 1.8 m away, as far as it goes; rounding hides that no joint can move it on, at 1e7 rad/s or more."""
+    words = "dead point.*do not determine the velocities of .*lower"
+    refused(jn.MobilityError, words, two_rods(r=reach("1.8 + 0.3*t")))
+    refused(jn.MobilityError, words, two_rods(r=reach("1.8 - 0.3*t")))
+    still = consistent_start(two_rods(r=reach("1.8")), 0.0).state
+    assert not still.spin.any()
+    assert still.attitude[0, 0, 0] == pytest.approx(still.attitude[0, 1, 0], abs=1e-7)
+    near = consistent_start(two_rods(r=reach("1.8 - 1e-8 - 0.3*t")), 0.0).state
+    bend = np.sqrt(2e-8 * 1.8 / 0.8)  # 1.8^2 - r^2 = 2 * 0.8 (1 - cos bend)
+    wanted = 0.3 * 1.8 / (0.8 * np.sin(bend))
+    assert abs(near.spin[0, 1, 0] - near.spin[0, 0, 0]) == pytest.approx(wanted, rel=1e-6)
+
+
 def refused(kind, words, mechanism):
     with pytest.raises(kind, match=words):
         consistent_start(mechanism, 0.0)
@@ -181,3 +211,19 @@ def test_options_are_checked_before_any_computing(keywords, words, monkeypatch):
     monkeypatch.setattr(sys.modules[jn.simulate.__module__], "consistent_start", None)
     with pytest.raises(jn.MechanismError, match=words):
         jn.simulate(simple_pendulum(), **{"time": [0.0, 1.0], **keywords})
+
+
+def test_gears_of_a_high_ratio_start_at_the_rates_told():
+    pin, ratio = jn.planar.Revolute, 1e7
+    mechanism = jn.Mechanism(
+        space="planar",
+        bodies={"a": jn.Body([0, 0], mass=1, inertia=1), "b": jn.Body([1, 0], mass=1, inertia=1)},
+        joints={
+            "A": pin(("ground", "a"), [0, 0], [0, 0]),
+            "B": pin(("ground", "b"), [1, 0], [0, 0]),
+            "gears": jn.planar.Gear(("a", "b", "ground"), ratio),
+        },
+        initial={"a": jn.drivers.CoordinateDriver(("ground", "a"), "angle", "2*t")},
+    )
+    spin = consistent_start(mechanism, 0.0).state.spin[0, :, 0]
+    assert spin == pytest.approx([2.0, 2.0 * ratio], rel=1e-11)

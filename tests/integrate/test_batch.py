@@ -100,3 +100,26 @@ def test_runs_in_several_chunks():
 def test_bad_parameters(values, words):
     with pytest.raises(jn.MechanismError, match=words):
         jn.simulate_batch(pendulum(), values, TIME)
+
+
+def test_a_run_whose_initial_conditions_cannot_be_met_says_so():
+    """Two rods reach 1.8 m: 2.5 m and a speed at 1.8 m are out of reach, and just below it Newton's steps are slow."""
+    reach = jn.drivers.DistanceDriver(("ground", "lower"), [0, 0], [0.8, 0], "r + 0.3*t")
+    rods = jn.Mechanism(
+        space="planar",
+        parameters={"r": 1.5},
+        bodies={
+            "upper": jn.Body([0, 0], angle=0.3, mass=2.0, inertia=0.5),
+            "lower": jn.Body([1, 0.3], angle=-0.4, mass=1.0, inertia=0.2),
+        },
+        joints={
+            "A": jn.planar.Revolute(("ground", "upper"), [0, 0], [0, 0]),
+            "B": jn.planar.Revolute(("upper", "lower"), [1, 0], [0, 0]),
+        },
+        initial={"reach": reach},
+        outputs={"away": jn.DistanceOutput(("ground", "lower"), [0, 0], [0.8, 0])},
+    )
+    found = jn.simulate_batch(rods, {"r": [1.5, 2.5, 1.8, 1.799999]}, [0.0, 1e-6], order=1)
+    assert found.status[:, 0].tolist() == [0, jn.Status.NOT_ASSEMBLED, jn.Status.SINGULAR, 0]
+    assert np.isnan(found.outputs["away"][[1, 2]]).all()
+    assert found.outputs["away"][[0, 3], 0] == pytest.approx(np.array([[1.5, 0.3], [1.799999, 0.3]]), rel=1e-12)

@@ -189,9 +189,10 @@ class Equations(eqx.Module):
         forces = inertia / self.scale + conjugate(loosened, still, multipliers)[:, 1:]
         applied = self.system.applied_forces(moving, clock.truncate(1)).coefficients[0]
         forces = forces - applied[:, 1:] / self.scale
-        return forces, second, self._attitude_rate(state)
+        return forces, second, self.attitude_rate(state)
 
-    def _attitude_rate(self, state: State) -> Attitudes:
+    def attitude_rate(self, state: State) -> Attitudes:
+        """Return how the attitude of a state moves."""
         if self.pose_type is PlanarPose:
             return state.spin
         spins = quaternion_spins(state.attitude)

@@ -1,7 +1,7 @@
 """The state a simulation starts from: consistent positions and velocities from partial ones, and what can move."""
 
 import dataclasses
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
@@ -24,6 +24,8 @@ from jounce.mechanism.modules import with_fields
 from jounce.shapes import Numbers
 
 TOLERANCE = 1e-12  # of the assembled positions, rad or sizes of the mechanism
+ROUNDING = 1e-15  # of residuals, rad or sizes of the mechanism
+LARGEST_CHANGE = 1e-2  # of velocities, as a part of them, by what rounding leaves open of the position
 
 
 class ConsistentStart(NamedTuple):
@@ -68,7 +70,7 @@ def consistent_start(mechanism: Mechanism, instant: float) -> ConsistentStart:
     AssemblyError
         If joints, drivers and initial conditions cannot all be fulfilled, or redundant ones have other rates.
     MobilityError
-        If the start is a singular position.
+        If the start is a singular position, or one at which rates would come out as rounding has it.
     """
     mechanism = chosen(mechanism, instant)
     masses = required_masses(mechanism, "the equations of motion")
@@ -76,7 +78,7 @@ def consistent_start(mechanism: Mechanism, instant: float) -> ConsistentStart:
     if mechanism.initial:
         whole, coordinates = _assembled(mechanism, instant)
         driven = equations_of(mechanism, whole, masses)
-        state = with_rates(driven, at_rest(whole, coordinates), np.array([[instant]]))
+        state = _set_in_motion(driven, whole, coordinates, instant)
         _check_rates(driven, whole, state, instant)
         system = with_fields(model.system, forces=whole.system.forces, outputs=whole.system.outputs)
         model = dataclasses.replace(
@@ -84,8 +86,10 @@ def consistent_start(mechanism: Mechanism, instant: float) -> ConsistentStart:
         )
     model, coordinates = assemble(model, instant, TOLERANCE, free=True)
     equations = jax.device_put(equations_of(mechanism, model, masses))
-    state = at_rest(model, coordinates) if state is None else state
-    state = jax.tree.map(np.asarray, with_rates(equations, state, np.array([[instant]])))
+    if state is None:
+        state = _set_in_motion(equations, model, coordinates, instant)
+    else:
+        state = jax.tree.map(np.asarray, with_rates(equations, state, np.array([[instant]])))
     if not all(np.isfinite(part).all() for part in state):
         _explain(equations, model, state, instant)
     _check_rates(equations, model, state, instant)
@@ -142,13 +146,56 @@ def at_rest(model: Model, coordinates: dict[str, np.ndarray]) -> State:
 @compiled(narrow=True)
 def with_rates(equations: Equations, state: State, time: Instants) -> State:
     """Return the state with the least change of its velocities that fulfils the rates of all constraints."""
-    return equations.with_rates(equations.factored(state, time), state, time)
+    return _moving(equations, state, time)
+
+
+@compiled(narrow=True)
+def _with_rates_told(equations: Equations, state: State, time: Instants) -> tuple[State, Any, Any]:
+    """Return the state of bodies at rest with velocities, what rates they fulfil, and how the attitude moves."""
+    moving = _moving(equations, state, time)
+    return moving, _row_rates(equations, state, time), equations.attitude_rate(moving)
+
+
+def _moving(equations: Equations, state: State, time: Instants) -> State:
+    """Return a state with velocities, corrected once: masses that gears weight unlike each other cost digits."""
+    factor = equations.factored(state, time)
+    return jax.lax.fori_loop(0, 2, lambda _, moving: equations.with_rates(factor, moving, time), state)
+
+
+def _set_in_motion(equations: Equations, model: Model, coordinates: dict[str, np.ndarray], instant: float) -> State:
+    """Return the assembled bodies with the velocities that laws prescribe, or raise where rounding would decide them.
+
+    At a limit position, such as an arm stretched out, a residual changes with the square of a displacement: what
+    rounding leaves of it hides a place 1e-8 away, at which the velocities are others, and finite.
+    """
+    still, time = at_rest(model, coordinates), np.array([[instant]])
+    state, rates, turning = jax.tree.map(np.asarray, _with_rates_told(equations, still, time))
+    speeds = np.concatenate([state.velocity / model.length, state.spin])[..., 0]
+    size, told = (float(np.max(np.abs(x), initial=0.0)) for x in (speeds, rates))
+    if not (np.isfinite(size) and size > 0 and told > 0):
+        return state
+    away = ROUNDING / told  # s, at those velocities
+    there = still._replace(position=still.position + away * state.velocity, attitude=still.attitude + away * turning)
+    other = jax.tree.map(np.asarray, _with_rates_told(equations, there, time)[0])
+    change = np.concatenate([(other.velocity - state.velocity) / model.length, other.spin - state.spin])[..., 0]
+    if np.max(np.abs(change)) <= LARGEST_CHANGE * size:
+        return state
+    message = (
+        f"the start is a singular position (a dead point) at t = {instant:g} s, where the rates of the laws do not "
+        f"determine the velocities of {freely_moving(model, speeds.T.reshape(1, -1))}: start at another instant, or "
+        "with another position"
+    )
+    raise MobilityError(message)
+
+
+def _row_rates(equations: Equations, state: State, time: Instants) -> Float[Numbers, "row 1"]:
+    return equations.system.residual(equations.pose(state), Jet.variable(time, 1)).dense().coefficients[1]
 
 
 @compiled(narrow=True)
 def _rates(equations: Equations, state: State, time: Instants) -> Float[Numbers, "row 1"]:
     """Return the rates of all rows."""
-    return equations.system.residual(equations.pose(state), Jet.variable(time, 1)).dense().coefficients[1]
+    return _row_rates(equations, state, time)
 
 
 def _check_rates(equations: Equations, model: Model, state: State, instant: float) -> None:

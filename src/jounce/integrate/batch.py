@@ -138,7 +138,10 @@ def simulate_batch(
             runs.advance(runs.lots(runs.moving)[0])
         while len(runs.moving):
             list(pool.map(runs.advance, runs.lots(runs.moving)))
-    return Batch(instants, values, runs.outputs, runs.status, runs.steps)
+    status = runs.status
+    for run, reason in starts.failed.items():
+        status[run, 0] = int(reason)
+    return Batch(instants, values, runs.outputs, status, runs.steps)
 
 
 class _Runs:

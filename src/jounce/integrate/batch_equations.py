@@ -14,11 +14,13 @@ from jounce.dynamics.forward import Equations, State
 from jounce.dynamics.masses import gravity_of, masses_of
 from jounce.dynamics.saddle_fronts import SaddleFronts
 from jounce.dynamics.start import consistent_start, with_rates
+from jounce.errors import JounceError, MobilityError
 from jounce.integrate.events import pose_coordinates
 from jounce.integrate.projection import projected
 from jounce.jet import Jet
 from jounce.jet.turns import brought_near
 from jounce.kinematics.compilation import compiled
+from jounce.kinematics.status import Status
 from jounce.mechanism import Mechanism, Model, build
 from jounce.mechanism.axis_angles import measures_angle, raw_angles
 from jounce.mechanism.builder import starting_guess
@@ -147,6 +149,8 @@ class BatchStart:
     ):
         self._parametric, self._begun, self._state, self._instant = parametric, begun, state, instant
         self._own: State | None = None
+        self._rows = rows
+        self.failed: dict[int, Status] = {}  # runs that have no start, and why
         equations, coordinates = begun.model.system.shape
         rank = begun.model.system.rank
         if (equations if rank is None else rank) < coordinates and parametric.guesses_differ(rows):
@@ -180,15 +184,34 @@ class BatchStart:
         still = self._state._replace(velocity=np.zeros_like(self._state.velocity), spin=np.zeros_like(self._state.spin))
         state = still.map(lambda part: np.repeat(np.asarray(part), len(runs), axis=-1))
         stages = [self._begun.picked(made, runs)[0] for made in self._stages]
+        together = np.ones(len(runs), bool)
         for stage in stages:
-            state = _followed(stage, state, clock)
+            state, reached = _followed(stage, state, clock)
+            together &= np.asarray(reached)
             if measuring:
                 coordinates = pose_coordinates(state.map(lambda part: np.asarray(part)[None]))
                 raw = raw_angles(measuring, {"quaternion": coordinates["quaternion"][0]})
                 angles = [brought_near(angle, near) for near, angle in zip(angles, raw, strict=True)]
         count = len([group for group in equations.system.forces if measures_angle(group)])
         turns = Turns(tuple(angles[:count]), tuple(angles[count:]))
-        return jax.tree.map(np.asarray, with_rates(stages[-1], state, clock)), turns
+        found = jax.tree.map(np.array, (with_rates(stages[-1], state, clock), turns))
+        for place in np.flatnonzero(~together).tolist():
+            self._put_alone(found, place, int(runs[place]))
+        return found
+
+    def _put_alone(self, found: tuple[State, Turns], place: int, run: int) -> None:
+        """Put a run to which no way from the first was found together from its own guess; NaN where that fails."""
+        try:
+            start = consistent_start(self._parametric.varied(self._rows[run].tolist()), self._instant)
+        except JounceError as error:
+            reason = Status.SINGULAR if isinstance(error, MobilityError) else Status.INADMISSIBLE
+            self.failed[run] = getattr(error, "status", None) or reason
+            for part in found[0]:
+                part[..., place] = np.nan
+            return
+        own = start.state, _turns_of(start.model.system.forces, start.model.system.outputs)
+        for whole, part in zip(jax.tree.leaves(found), jax.tree.leaves(own), strict=True):
+            whole[..., place] = part[..., 0]
 
 
 def _turns_of(forces: Sequence[Group], outputs: Sequence[Group]) -> Turns:
@@ -198,6 +221,8 @@ def _turns_of(forces: Sequence[Group], outputs: Sequence[Group]) -> Turns:
 
 
 @compiled()
-def _followed(equations: Equations, state: State, clock: Any) -> State:
-    followed = projected(equations, state, clock)[0]
-    return followed._replace(velocity=jnp.zeros_like(state.velocity), spin=jnp.zeros_like(state.spin))
+def _followed(equations: Equations, state: State, clock: Any) -> tuple[State, Any]:
+    """Return states at rest on the constraints, and which of them could be put there."""
+    followed, distance, _ = projected(equations, state, clock)
+    at_rest = followed._replace(velocity=jnp.zeros_like(state.velocity), spin=jnp.zeros_like(state.spin))
+    return at_rest, jnp.isfinite(distance)
