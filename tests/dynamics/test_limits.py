@@ -75,6 +75,7 @@ def test_worst_values_are_those_of_the_closed_form():
         ({"acceleration": 4.0, "deceleration": 1.0}, 1.0, 1.5, np.sin(2.0) / 2, -4.0),  # speeds up
         ({"acceleration": 4.0, "deceleration": 1.0}, 0.0, 1.5, 2.0, -1.0),
         ({"acceleration": 1.0, "deceleration": 4.0}, 0.0, 1.5, 2.0, -1.0),
+        ({"acceleration": 1.0, "deceleration": 4.0}, 0.0, np.pi / 4, 0.5, -4.0),  # slows down until it is at rest
         ({"deceleration": 1.0}, 1.0, 1.5, 0.0, None),
         ({"acceleration": 4.0}, 0.0, 0.6, np.sin(1.2) / 2, -4.0),
     ],
@@ -86,14 +87,24 @@ def test_an_acceleration_against_the_velocity_may_have_a_limit_of_its_own(limits
     assert bound is None or row.limit == pytest.approx(bound, rel=1e-15)
 
 
-def test_a_joint_that_starts_and_ends_at_rest_speeds_up_there():
+def test_a_joint_that_starts_at_rest_speeds_up_there_and_one_that_ends_at_rest_slows_down():
     limits = {"acceleration": 6.0, "deceleration": 3.0}  # q'' = 6 - 12 t, which slows down from t = 1/2 on
     trajectory = JointTrajectory({"pin": "3*t**2 - 2*t**3"}, start=0.0, stop=1.0)
     report = check_limits(pendulum(**limits), trajectory)
     row = rows_of(report)["pin", "acceleration"]
     assert row.ratio == pytest.approx(2.0, rel=1e-5)
     assert row.value == pytest.approx(-6.0, rel=1e-5)
-    assert report.shares[0, 2, 0] == pytest.approx(1.0, rel=1e-12)
+    assert report.shares[[0, -1], 2, 0] == pytest.approx([1.0, -2.0], rel=1e-12)
+
+
+def test_the_highest_of_many_peaks_is_found_where_another_has_the_highest_sample():
+    law = "sin(397*t)*(1 + 0.0015*exp(-((t - 0.52)/0.01)**2))"  # 63 waves of 32 samples each
+    report = check_limits(pendulum(velocity=397.5), JointTrajectory({"pin": law}, start=0.0, stop=1.0))
+    t = np.linspace(0.5, 0.54, 100_001)
+    bump = 0.0015 * np.exp(-(((t - 0.52) / 0.01) ** 2))
+    speeds = 397 * np.cos(397 * t) * (1 + bump) - np.sin(397 * t) * bump * (t - 0.52) / 0.01**2 * 2
+    assert abs(rows_of(report)["pin", "velocity"].value) == pytest.approx(np.abs(speeds).max(), rel=1e-8)
+    assert not report.kept
 
 
 def test_units_and_words_tell_turning_from_sliding():

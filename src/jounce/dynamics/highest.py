@@ -3,13 +3,29 @@
 import numpy as np
 from jaxtyping import Float, Int
 
+LEAST, MOST = 3, 50  # local maxima of a curve
 
-def local_maxima(measures: Float[np.ndarray, "time curve"], count: int) -> Int[np.ndarray, "{count} curve"]:
-    """Return the indices of the highest local maxima of curves, the best first."""
-    height = local_heights(measures)
-    order = highest_of(height, count)
+
+def local_maxima(measures: Float[np.ndarray, "time curve"]) -> Int[np.ndarray, "peak curve"]:
+    """Return the indices of local maxima of curves, the best first: all that may be higher than every sample, or three.
+
+    How high a curve is between instants that are about evenly spaced is read off the parabola through three of them.
+    """
+    height = local_heights(measures) + _above_samples(measures)
+    reaching = np.sum(height >= measures.max(axis=0), axis=0).max(initial=0)
+    order = highest_of(height, int(np.clip(reaching, LEAST, MOST)))
     usable = np.isfinite(np.take_along_axis(height, order, axis=0))
     return np.where(usable, order, np.argmax(measures, axis=0))
+
+
+def _above_samples(measures: Float[np.ndarray, "time curve"]) -> Float[np.ndarray, "time curve"]:
+    """Return how far the tops of parabolas are above their middle samples, 0 at the ends and where they have none."""
+    found = np.zeros_like(measures)
+    before, middle, after = measures[:-2], measures[1:-1], measures[2:]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        top = (after - before) ** 2 / 8 / (2 * middle - before - after)
+    found[1:-1] = np.where((middle >= before) & (middle >= after) & np.isfinite(top), top, 0.0)
+    return found
 
 
 def local_heights(measures: Float[np.ndarray, "time curve"]) -> Float[np.ndarray, "time curve"]:

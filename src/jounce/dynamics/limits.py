@@ -28,7 +28,6 @@ REST = 1e-9  # of the largest velocity of a joint, below which it is at rest
 ROUNDING = 1e-9  # by which a ratio may exceed 1
 INSTANTS = 2000  # at least, over the trajectory
 BETWEEN = 4  # intervals at least, from one instant of the trajectory to the next
-PEAKS = 3  # of each curve that are searched
 POINTS = 9  # instants around each
 ROUNDS = 8  # times the step is divided
 
@@ -150,7 +149,7 @@ def check_limits(
     """Compare a trajectory, and the torques and torque rates that it needs, with the limits of the joints.
 
     An acceleration against the velocity is compared with the limit of deceleration, where there is one; a joint at rest
-    counts as one that speeds up.
+    counts as one that speeds up, and where the trajectory ends as one that has slowed down.
 
     All values are exact derivatives of the trajectory, at its own instants and at least three between each two of them,
     2000 in all or more. Around the highest peaks of each curve the step is then refined to less than a millionth of
@@ -214,7 +213,7 @@ def check_limits(
     merged = _merged(robot, limits)
     grid = _grid(trajectory) if times is None else _checked_times(times)
     values = curves(grid)
-    bounds = _Bounds(robot, merged, REST * np.abs(values[:, 1]).max(axis=0))
+    bounds = _Bounds(robot, merged, REST * np.abs(values[:, 1]).max(axis=0), trajectory.stop)
     infinite = infinite_quantities(followed, jumps_of(followed, grid, values[:, : ORDER + 1]), drives)
     wanted = [
         (quantity, joint)
@@ -229,17 +228,17 @@ def check_limits(
     )
     for message in followed.doubts:
         warnings.warn(SampleWarning(message), stacklevel=2)
-    return LimitReport(robot.name, robot.joint_names, rows, held, grid, values, bounds.shares(values))
+    return LimitReport(robot.name, robot.joint_names, rows, held, grid, values, bounds.shares(values, grid))
 
 
 class _Bounds:
     """What is allowed, in arrays of shape (6, joints), infinite where there is no bound.
 
     Accelerations are held against one bound, whether they speed a joint up or slow it down, each weighted by that bound
-    over its own.
+    over its own. What is at rest is going to speed up, but for the end of the trajectory, at `stop`.
     """
 
-    def __init__(self, robot: Robot, limits: Mapping[str, Limits], rest: np.ndarray):
+    def __init__(self, robot: Robot, limits: Mapping[str, Limits], rest: np.ndarray, stop: float):
         every = [limits[name] for name in robot.joint_names]
 
         def table(*fields: str, missing: float = np.inf) -> np.ndarray:
@@ -249,7 +248,7 @@ class _Bounds:
         largest, (slower,) = table(*FIELDS[1:]), table("deceleration")
         faster, given = largest[ACCELERATION - 1].copy(), np.isfinite(slower)
         bound = np.where(np.isfinite(faster), faster, slower)
-        largest[ACCELERATION - 1], self.rest = bound, rest
+        largest[ACCELERATION - 1], self.rest, self.stop = bound, rest, stop
         self.speeding = np.where(given & ~np.isfinite(faster), 0.0, 1.0)
         self.slowing = np.divide(bound, slower, out=np.ones(len(every)), where=given)
         self.upper = np.concatenate([table("upper"), largest])
@@ -261,10 +260,11 @@ class _Bounds:
         unit = np.where(np.isfinite(size) & (size > 0), size, 1.0)
         self.scale = np.where(np.isfinite(half) & (half > 0), half, unit)
 
-    def weights(self, values: np.ndarray) -> np.ndarray:
-        """Return by how much values of shape (..., 6, joints) count against the bounds."""
+    def weights(self, values: np.ndarray, times: np.ndarray) -> np.ndarray:
+        """Return by how much values of shape (..., 6, joints) at instants (...,) count against the bounds."""
         velocity, acceleration = values[..., 1, :], values[..., ACCELERATION, :]
-        slows = (velocity * acceleration < 0) & (np.abs(velocity) > self.rest)
+        ends = (times == self.stop)[..., None]
+        slows = np.where(np.abs(velocity) > self.rest, velocity * acceleration < 0, ends)
         found = np.ones_like(values)
         found[..., ACCELERATION, :] = np.where(slows, self.slowing, self.speeding)
         return found
@@ -282,7 +282,7 @@ class _Bounds:
         self, infinite: Infinite, quantity: int, joint: int, time: float, value: float, weight: float
     ) -> tuple[float, float, float]:
         """Return the instant, value and weight of a quantity, those of the first where it is infinite if it is."""
-        weights = self.weights(infinite.before)[:, quantity, joint]
+        weights = self.weights(infinite.before, infinite.times)[:, quantity, joint]
         at = np.flatnonzero((infinite.signs[:, quantity, joint] != 0) & (weights > 0))
         if not len(at):
             return time, value, weight
@@ -290,9 +290,9 @@ class _Bounds:
         value = np.copysign(np.inf, infinite.signs[first, quantity, joint])
         return float(infinite.times[first]), float(value), float(weights[first])
 
-    def shares(self, values: np.ndarray) -> np.ndarray:
+    def shares(self, values: np.ndarray, times: np.ndarray) -> np.ndarray:
         """Return the ratios with the sign of the bound that is nearer, NaN where there is no limit."""
-        above, below = self.sides(values * self.weights(values))
+        above, below = self.sides(values * self.weights(values, times))
         return np.where(self.limited, np.where(above >= below, np.maximum(above, 0), -np.maximum(below, 0)), np.nan)
 
 
@@ -305,8 +305,8 @@ def worst_instants(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the worst instant of each wanted curve, its value there and the weight of that.
 
-    Around the highest peaks on the grid, the best of a few instants becomes the middle of a shorter interval, again and
-    again. A jump between two instants is found from the side on which the curve is worse.
+    Around the peaks that may be the highest, the best of a few instants becomes the middle of a shorter interval, again
+    and again. A jump between two instants is found from the side on which the curve is worse.
 
     Parameters
     ----------
@@ -320,20 +320,20 @@ def worst_instants(
         Quantity and joint of each.
     """
     at = tuple(wanted.T)
-    weights = bounds.weights(values)
+    weights = bounds.weights(values, grid)
     measures = bounds.measure(values * weights)[:, *at]
     every = np.arange(len(wanted))
     best = np.argmax(measures, axis=0)
     times, sizes = grid[best], measures[best, every]
     found, weight = values[best, *at], weights[best, *at]
-    peaks = local_maxima(measures, PEAKS)
+    peaks = local_maxima(measures)
     low, high = grid[np.maximum(peaks - 1, 0)], grid[np.minimum(peaks + 1, len(grid) - 1)]
     share = np.linspace(0.0, 1.0, POINTS)
     peak, curve = np.indices(low.shape)
     for _ in range(ROUNDS):
         around = low + share[:, None, None] * (high - low)
         there = curves(around.reshape(-1)).reshape(*around.shape, *values.shape[1:])
-        own, weights = (x[:, peak, curve, *at] for x in (there, bounds.weights(there)))
+        own, weights = (x[:, peak, curve, *at] for x in (there, bounds.weights(there, around)))
         measured = bounds.measure(own * weights, at)
         top = np.argmax(measured, axis=0)
         chosen = np.argmax(np.max(measured, axis=0), axis=0)  # of the peaks of each curve

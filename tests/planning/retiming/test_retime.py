@@ -70,6 +70,13 @@ def test_a_limit_that_depends_on_the_position_leaves_those_of_joints_that_follow
     assert ratios["velocity"] == pytest.approx(0.6 / 0.5, rel=1e-9)
 
 
+def test_what_arrives_has_slowed_down_also_where_the_limits_depend_on_the_position():
+    limits = {"acceleration": lambda q: 1.0 + 0 * q, "deceleration": lambda q: 4.0 + 0 * q}
+    trajectory = jn.JointTrajectory({"slide": "1 - (1 - t)**2"}, start=0.0, stop=1.0)
+    report = check_motion(cart(), trajectory, jn.MotionLimits(varying={"slide": limits}))
+    assert report.worst.ratio == pytest.approx(0.5, rel=1e-12)
+
+
 @pytest.mark.parametrize(
     "law, jumps",
     [
@@ -95,6 +102,7 @@ def test_limits_of_all_kinds_are_broken_where_something_below_jumps(law, jumps):
         ({"velocity": SPEED, "effort": ACCELERATION}, TRAPEZOID),  # of a mass of 1 kg
         ({"acceleration": ACCELERATION}, 2 * np.sqrt(LENGTH / ACCELERATION)),
         ({"velocity": SPEED, "acceleration": 2.0, "deceleration": 1.0}, 2.75),
+        ({"velocity": SPEED, "acceleration": 1.0, "deceleration": 2.0}, 2.75),
         ({"velocity": SPEED, "acceleration": ACCELERATION, "jerk": JERK}, TRAPEZOID + ACCELERATION / JERK),
         ({"velocity": SPEED, "effort": ACCELERATION, "effort_rate": JERK}, TRAPEZOID + ACCELERATION / JERK),
         ({"jerk": JERK}, (32 * LENGTH / JERK) ** (1 / 3)),

@@ -8,6 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import jounce as jn
+from jounce.errors import TrajectoryError
 from jounce.kinematics import Status
 from tests.planning.tool_paths.arms import planar_chain, wrist_arm
 from tests.problems.robots import robot_named
@@ -64,6 +65,20 @@ def test_another_time_law_along_the_same_path():
     q, rate, second = slow.q[0]  # by s = 4 t^2: s' = 4, s'' = 8 at t = 0.5
     assert np.allclose(fast.q[0], [q, 4 * rate, 16 * second + 8 * rate], rtol=0, atol=1e-11)
     assert np.allclose(again.position([0.5], 1)[0, 1], 4 * np.array([-0.4 * np.sin(2), 0.6 * np.cos(2), 0]), atol=1e-14)
+
+
+@pytest.mark.parametrize("law", ["2*t", jn.SplineMotion(np.linspace(0, 2, 21), 2 * np.linspace(0, 2, 21))])
+def test_progress_that_turns_between_all_instants_that_are_looked_at_goes_as_far_as_its_law(law):
+    path = jn.ToolPath([law, 0, 0], start=0.0, stop=3.0, progress="2*sin(t)**4")
+    times = np.pi / 2 + np.array([-1e-3, 0.0, 1e-4, 1e-3])
+    np.testing.assert_allclose(path.position(times)[:, 0, 0], 4 * np.sin(times) ** 4, rtol=1e-15)
+
+
+def test_progress_with_a_spike_that_was_not_seen_is_refused_there():
+    spike = "t + exp(-((t - 0.31234567)/1e-6)**2)"
+    path = jn.ToolPath(["t", 0, 0], start=0.0, stop=1.0, progress=spike)
+    with pytest.raises(TrajectoryError, match=r"progress: has a spike at 0\.31234567 s"):
+        path.position([0.31234567])
 
 
 @pytest.mark.slow

@@ -264,8 +264,9 @@ class _Bounds:
     def __init__(self, limits: Float[np.ndarray, "3 joint"]):
         self.limits = np.where(np.isnan(limits), 1.0, limits)
 
-    def weights(self, values: np.ndarray) -> np.ndarray:
+    def weights(self, values: np.ndarray, times: np.ndarray) -> np.ndarray:
         """Return ones: all instants count alike."""
+        del times
         return np.ones_like(values)
 
     def measure(self, values: np.ndarray, at: Any = ...) -> np.ndarray:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from jounce.dynamics.highest import local_maxima
 from jounce.dynamics.limit_jumps import jumps_of
 from jounce.dynamics.limits import LimitReport, LimitRow, check_limits
 from jounce.dynamics.trajectories import FollowedTrajectory
@@ -20,7 +21,7 @@ from jounce.robot.robot import Robot
 from jounce.trajectory import JointTrajectory
 
 EVEN = np.array([1.0, 0.0, 0.0, 0.0])  # z and its derivatives where the parameter is the time
-ZOOM, ZOOMS, PEAKS = 9, 8, 3
+ZOOM, ZOOMS = 9, 8
 SMALL = 1e-9  # of the size of a velocity of a point: a smaller jump is rounding
 
 _Infinite = Mapping[tuple[str, str], float]  # when a quantity of a joint is infinite, s
@@ -92,10 +93,8 @@ def _rows(
         warnings.simplefilter("ignore", SampleWarning)
         found = ratios(grid)
         used = found.max(axis=0) > 0
-        order = np.argsort(-found, axis=0)[:PEAKS]
         best, times = found.max(axis=0), grid[np.argmax(found, axis=0)]
-        for rank in range(PEAKS):
-            at = order[rank]
+        for at in local_maxima(found):
             low, high = grid[np.maximum(at - 1, 0)], grid[np.minimum(at + 1, len(grid) - 1)]
             every = np.arange(found.shape[1])
             for _ in range(ZOOMS):

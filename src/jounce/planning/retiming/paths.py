@@ -53,11 +53,11 @@ def path_of(path: Any, names: Sequence[str] | None = None, order: int = 1) -> Pa
     ----------
     path : Path, JointTrajectory, dict of str, or array_like of shape (points, joints)
         A trajectory gives its geometry. A mapping gives each joint an expression of ``s``, which runs from 0 to 1, or
-        its positions at the waypoints. Splines of degree 5 go through waypoints.
+        its positions at the waypoints. Splines of degree 5 go through waypoints, of a lower one through five or fewer.
     names : sequence of str, optional
         Of the joints of an array, in the order of its columns.
     order : int, default 1
-        To which derivatives a path is to be continuous where a trajectory stops at a corner.
+        To which derivatives a path is to be continuous: at corners where a trajectory stops, and at few waypoints.
 
     Raises
     ------
@@ -81,11 +81,14 @@ def path_of(path: Any, names: Sequence[str] | None = None, order: int = 1) -> Pa
         wanted = "" if names is None else f" with {len(names)} joints: {', '.join(names)}"
         message = f"waypoints have the shape (points, joints){wanted}; or give a mapping from names to positions"
         raise TrajectoryError(message, name="path", value=f"shape {points.shape}")
-    return through(points, names)
+    return through(points, names, order)
 
 
-def through(points: Float[np.ndarray, "point joint"], names: Sequence[str]) -> Path:
-    """Return the path of splines through points, over the length of the chords between them."""
+def through(points: Float[np.ndarray, "point joint"], names: Sequence[str], order: int = 1) -> Path:
+    """Return the path of splines through points, over the length of the chords between them.
+
+    Five points are given a cubic spline, unless more derivatives than its two are to be continuous: a quartic then.
+    """
     chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
     total = float(chords.sum())
     if not total > 0:
@@ -96,7 +99,8 @@ def through(points: Float[np.ndarray, "point joint"], names: Sequence[str]) -> P
         raise TrajectoryError(message, name=f"path[{same[0] + 1}]", value=points[same[0] + 1].tolist())
     lengths = np.append(0.0, np.cumsum(chords))
     lengths /= lengths[-1]
-    degree = next(d for d in (DEGREE, 3, 2, 1) if len(points) > d)
+    smooth = 4 if order > 2 else 3
+    degree = next(d for d in (DEGREE, smooth, 3, 2, 1) if len(points) > d)
     laws: dict[str, AbstractMotion] = {
         name: SplineMotion(lengths, column, degree) for name, column in zip(names, points.T, strict=True)
     }

@@ -63,7 +63,7 @@ class RobotQuantities:
         """Return the quantities at values of s."""
         q = self.coordinates(s)
         first, bounds = self._first(q)
-        second, lower, upper, rates = self._second(q)
+        second, lower, upper, rates = self._second(q, s == self.path.stop)
         vectors, vector_bounds = self._vectors(q)
         chosen = self.with_jounce
         fourth = np.moveaxis(q[:, 1:, chosen], 1, 2)
@@ -91,7 +91,7 @@ class RobotQuantities:
                 bounds.append(np.full((len(q), 1), point.speed))
         return np.concatenate(values, axis=1), np.concatenate(bounds, axis=1)
 
-    def _second(self, q: np.ndarray) -> tuple[np.ndarray, _Table, _Table, _Table]:
+    def _second(self, q: np.ndarray, ends: np.ndarray) -> tuple[np.ndarray, _Table, _Table, _Table]:
         chosen = self.with_acceleration
         motion = q[:, :, chosen]
         nothing = np.zeros_like(motion[:, 0])
@@ -100,6 +100,7 @@ class RobotQuantities:
         given = np.isfinite(slower)
         slower = np.where(given, slower, faster)
         at_rest = np.abs(motion[:, 1]) <= REST * np.abs(motion[:, 1]).max(axis=0, initial=0.0)
+        faster = np.where(at_rest & ends[:, None], slower, faster)  # what arrives has slowed down
         ahead = motion[:, 1] > 0
         upper = np.where(at_rest | ahead, faster, slower)
         lower = -np.where(at_rest | ~ahead, faster, slower)

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.display import Displayed
+from jounce.dynamics.highest import local_maxima
 from jounce.errors import JounceError, TrajectoryError
 from jounce.jet import Jet, dot, sqrt
 from jounce.jet.algebra import stacked
@@ -22,6 +23,8 @@ from jounce.trajectory.smoothness import knots
 
 XYZ = ("x", "y", "z")
 ANGLES = ("angle_1", "angle_2", "angle_3")
+LOOKS, POINTS, ROUNDS = 1025, 9, 9  # at a law of progress: over the time, around its extremes, and how often
+ROUNDING = 1e-9  # of what a law of progress goes through
 
 
 class ToolPath(Displayed):
@@ -74,8 +77,7 @@ class ToolPath(Displayed):
         self.start, self.stop = start, stop
         self._progress = None if progress is None else _laws("progress", {"progress": progress}, start, stop)
         if self._progress is not None:
-            reach = self._progress.derivatives(np.linspace(start, stop, 1025), 0)[:, 0, 0]
-            start, stop = float(reach.min()), float(reach.max())
+            start, stop = _reach(self._progress)
             if stop <= start:
                 raise TrajectoryError("must change from the start to the stop", name="progress", value=start)
         self._position = None if position is None else _three("position", position, XYZ, start, stop)
@@ -198,8 +200,13 @@ class ToolPath(Displayed):
             time = Jet.from_derivatives(np.moveaxis(rates, -1, 0))
             inside = self._position or self._direction
             if inside is not None:  # rounding may take it out of the range of the laws
-                first = jnp.clip(time.coefficients[0], inside.start, inside.stop)
-                time = Jet((first, *time.coefficients[1:]))
+                first = np.asarray(time.coefficients[0])
+                nearest = np.clip(first, inside.start, inside.stop)
+                beyond = np.abs(first - nearest) > ROUNDING * (inside.stop - inside.start)
+                if beyond.any():
+                    message = f"has a spike at {times[beyond][0]:.9g} s, too narrow to have been seen"
+                    raise TrajectoryError(message, name="progress", value=float(first[beyond][0]))
+                time = Jet((jnp.asarray(nearest), *time.coefficients[1:]))
         found: Goal = {}
         if self._position is not None:
             found["position"] = self._position(time)
@@ -239,6 +246,25 @@ def _laws(name: str, laws: Mapping[str, Any], start: float, stop: float) -> Join
         inside = (error.name or "").removeprefix("laws").removeprefix(".")
         place = f"{name}.{inside}" if error.name and error.name.startswith("laws") and inside != name else name
         raise error.located(name=place if error.name and error.name.startswith("laws") else error.name) from None
+
+
+def _reach(progress: JointTrajectory) -> tuple[float, float]:
+    """Return the least and the largest value of a law of progress, also between the instants that are looked at."""
+
+    def both(times: Float[np.ndarray, " time"]) -> Float[np.ndarray, "time 2"]:
+        values = progress.derivatives(times, 0)[:, 0, 0]
+        return np.stack([-values, values], axis=-1)
+
+    grid = np.linspace(progress.start, progress.stop, LOOKS)
+    measures = both(grid)
+    peaks, found = local_maxima(measures), measures.max(axis=0)
+    low, high = grid[np.maximum(peaks - 1, 0)], grid[np.minimum(peaks + 1, LOOKS - 1)]
+    for _ in range(ROUNDS):
+        near = np.linspace(low, high, POINTS)
+        there = both(near.ravel()).reshape(*near.shape, 2)[:, :, [0, 1], [0, 1]]
+        found, top = np.maximum(found, there.max(axis=(0, 1))), np.argmax(there, axis=0)
+        low, high = (np.take_along_axis(near, np.clip(top + step, 0, POINTS - 1)[None], axis=0)[0] for step in (-1, 1))
+    return float(-found[0]), float(found[1])
 
 
 def _attitude(given: Any, start: float, stop: float) -> Any:
