@@ -53,7 +53,7 @@ def errors(name, parameters, order, count=3):
         return jn.solve(changed, times, order=order).outputs
 
     point = jnp.array([mechanism.parameter_values[parameter] for parameter in parameters])
-    found, worst = jax.jacfwd(outputs)(point), np.zeros(order + 1)
+    found, worst = jax.jit(jax.jacfwd(outputs))(point), np.zeros(order + 1)
     for k, parameter in enumerate(parameters):
         for output, truth in told[parameter][1].items():
             got = np.asarray(found[output])[..., k]

@@ -128,7 +128,7 @@ def test_gradients_of_the_driver_and_of_its_torque():
     def angle(t, length, swing):
         return mp.asin((swing * mp.sin(2 * t) + mp.mpf("0.05")) / length)
 
-    found = jax.tree.map(np.asarray, jax.jacfwd(outputs)(values))
+    found = jax.tree.map(np.asarray, jax.jit(jax.jacfwd(outputs))(values))
     with mp.workdps(40):
         at = [(mp.mpf(t), mp.mpf("0.2"), mp.mpf("0.1")) for t in GRID]
         exact = [[[float(mp.diff(angle, x, (k, *by))) for by in ((1, 0), (0, 1))] for k in range(4)] for x in at]

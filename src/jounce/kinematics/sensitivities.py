@@ -23,7 +23,7 @@ from jaxtyping import Float
 from jounce.errors import AssemblyError, MechanismError, MobilityError, SolveError
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked
-from jounce.kinematics.compilation import compiled
+from jounce.kinematics.compilation import Compiled, compiled
 from jounce.kinematics.jacobian_series import jacobian_series, solved_series
 from jounce.kinematics.motion import Motion
 from jounce.kinematics.status import Status
@@ -121,7 +121,7 @@ def differentiable_motion(
         (values,), (changes,) = primals, tangents
         solved = solution(values)
         still = jax.tree.map(jnp.zeros_like, solved)
-        return solved, still._replace(coordinates=_change(held, values, changes, solved, instants))
+        return solved, still._replace(coordinates=held.change(values, changes, solved, instants))
 
     solved = solution(values)
     first = first_of(solved.coordinates)
@@ -207,14 +207,23 @@ class _Builder:
     ----------
     mechanism : Mechanism
         Some of its values are traced.
-    change : callable
+    made_of : callable
         What the model is made of, for the mechanism.
+    again : bool
+        Whether it is used again, so that compiling is worth while.
+
+    Attributes
+    ----------
+    change : callable
+        Returns how the coordinates of a motion change as values of the design do.
     """
 
-    def __init__(self, mechanism: Mechanism, change: Callable[[Mechanism], Mechanism]):
-        self._made, self._change, self._kept = template(mechanism), change, {}
-        self._compiled = jax.jit(self._numbers, static_argnames="counted")
-        self.uses = 0
+    def __init__(self, mechanism: Mechanism, made_of: Callable[[Mechanism], Mechanism], *, again: bool):
+        self._made, self._made_of, self._kept = template(mechanism), made_of, {}
+        self._make, self.change = self._numbers, self._change
+        if again:
+            self._make = jax.jit(self._numbers, static_argnames="counted")
+            self.change = Compiled(self._change, ())
 
     def __call__(self, values: Values, length: Any, angles: Angles | None, first: Any) -> Model:
         """Return the model; see `traced_model`."""
@@ -223,8 +232,7 @@ class _Builder:
 
     def numbers(self, values: Values, length: Any, angles: Angles | None, first: Any) -> tuple[list[Any], Any]:
         """Return those numbers of a system that depend on what is traced, and which of its leaves they are."""
-        make = self._compiled if self.uses > 1 else self._numbers
-        found = make(values, length, angles, first, counted=angles is not None)
+        found = self._make(values, length, angles, first, counted=angles is not None)
         return found, self._kept[angles is not None][2]
 
     def model(self, numbers: Sequence[Any], which: tuple[int, ...], counted: bool) -> Model:
@@ -236,7 +244,7 @@ class _Builder:
         return dataclasses.replace(model, system=jax.tree.unflatten(structure, whole))
 
     def _numbers(self, values: Values, length: Any, angles: Any, first: Any, *, counted: bool) -> list[Any]:
-        model = traced_model(self._change(self._made(values)), length, angles, first)
+        model = traced_model(self._made_of(self._made(values)), length, angles, first)
         check_not_redundant(model)
         leaves, structure = jax.tree.flatten(model.system)
         which = tuple(k for k, leaf in enumerate(leaves) if isinstance(leaf, Tracer))
@@ -246,47 +254,44 @@ class _Builder:
         self._kept[counted] = kept, fixed, which, structure
         return [leaves[k] for k in which]
 
+    def _change(self, values: Values, changes: Values, solved: Solved, instants: Any) -> dict[str, Any]:
+        """Return how the coordinates of a motion change, as Taylor coefficients, as values of the design do."""
+        regular = solved.status == int(Status.OK)
+        coordinates = {name: _where(regular, c, c[..., :1]) for name, c in solved.coordinates.items()}
+        instants = jnp.where(regular, instants, instants[0])
+        first = first_of(coordinates)
+        moved = {name: jnp.zeros_like(x) for name, x in first.items()}
+        if any(solved.angles.angle):  # they are counted from the first position, which moves too
+            system, slope, which = _linear(self, (solved.length, None), values, changes, first, moved)
+            start = {name: x[None] for name, x in first.items()}
+            moved = _moved(system, slope, which, start, instants[:1])
+            moved = {name: moved[name][0] for name in first}
+        system, slope, which = _linear(self, (solved.length, solved.angles), values, changes, first, moved)
+        found = _moved(system, slope, which, coordinates, instants)
+        return {name: _where(regular, change, jnp.zeros_like(change)) for name, change in found.items()}
+
 
 MOST_BUILDERS = 16
 _builders: dict[Any, _Builder] = {}
 
 
-def _builder(mechanism: Mechanism, change: Callable[[Mechanism], Mechanism]) -> _Builder:
+def _builder(mechanism: Mechanism, made_of: Callable[[Mechanism], Mechanism]) -> _Builder:
     """Return what makes the model of a mechanism: the same for one that differs in the values of its parameters.
 
-    It is compiled where it is used again: a mechanism whose joints are made anew each time is not.
+    One whose joints are made anew each time is not compiled: that would be done each time.
     """
     numbers = {name: value for name, value in mechanism.parameters.items() if not isinstance(value, Tracer)}
     plain = tuple((n, x if isinstance(x, str | Expression) else float(x)) for n, x in numbers.items())
     fields = [field.name for field in dataclasses.fields(mechanism) if field.name != "parameters"]
     held = [getattr(mechanism, name) for name in fields]
     if traced_values(held):
-        return _Builder(mechanism, change)
-    key = (change, tuple(map(id, held)), tuple(mechanism.parameters), plain)
+        return _Builder(mechanism, made_of, again=False)
+    key = (made_of, tuple(map(id, held)), tuple(mechanism.parameters), plain)
     if key not in _builders:
         while len(_builders) >= MOST_BUILDERS:
             _builders.pop(next(iter(_builders)))
-        _builders[key] = _Builder(mechanism, change)  # which holds what the key is made of
-    found = _builders[key]
-    found.uses += 1
-    return found
-
-
-def _change(built: _Builder, values: Values, changes: Values, solved: Solved, instants: Any) -> dict[str, Any]:
-    """Return how the coordinates of a motion change, as Taylor coefficients, as values of the design do."""
-    regular = solved.status == int(Status.OK)
-    coordinates = {name: _where(regular, c, c[..., :1]) for name, c in solved.coordinates.items()}
-    instants = jnp.where(regular, instants, instants[0])
-    first = first_of(coordinates)
-    moved = {name: jnp.zeros_like(x) for name, x in first.items()}
-    if any(solved.angles.angle):  # they are counted from the first position, which moves too
-        system, slope, which = _linear(built, (solved.length, None), values, changes, first, moved)
-        start = {name: x[None] for name, x in first.items()}
-        moved = _moved(system, slope, which, start, instants[:1])
-        moved = {name: moved[name][0] for name in first}
-    system, slope, which = _linear(built, (solved.length, solved.angles), values, changes, first, moved)
-    found = _moved(system, slope, which, coordinates, instants)
-    return {name: _where(regular, change, jnp.zeros_like(change)) for name, change in found.items()}
+        _builders[key] = _Builder(mechanism, made_of, again=True)  # which holds what the key is made of
+    return _builders[key]
 
 
 def _where(regular: Any, values: Any, others: Any) -> Any:
