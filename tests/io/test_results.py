@@ -72,6 +72,16 @@ def test_columns_of_a_table(tmp_path):
     )
 
 
+def test_a_column_of_another_unit_is_no_component(tmp_path):
+    path = tmp_path / "motion.csv"
+    path.write_text("time [s],C_x [mm],C_y [mm],C_z [deg]\n0,1,2,3\n")
+    found = read(path)
+    assert {name: (x.attrs["units"], x.values.ravel().tolist()) for name, x in found.data_vars.items()} == {
+        "C": ("mm", [1.0, 2.0]),
+        "C_z": ("deg", [3.0]),
+    }
+
+
 def test_orders_of_two_digits_keep_their_names(tmp_path):
     path = tmp_path / "motion.csv"
     written = dataset(np.arange(24.0).reshape(2, 12))

@@ -174,6 +174,11 @@ class TestParameters:
         with pytest.raises(jn.MechanismError, match="did you mean 'AB'"):
             four_bar().with_parameters(ab=0.05)
 
+    @pytest.mark.parametrize("value", [True, np.True_, None, np.nan, 1j, [0.05]])
+    def test_that_is_no_number(self, value):
+        with pytest.raises(jn.MechanismError, match=r"parameters\.AB.*number"):
+            jn.solve(four_bar().with_parameters(AB=value), [0.0])
+
 
 def test_offset_that_is_not_given_follows_from_the_starting_guess():
     def pair(offset):

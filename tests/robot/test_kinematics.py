@@ -107,6 +107,11 @@ NOTHING = jn.Robot("frame", [jn.Link("base")], [])
             "link: no link has this name, got 'rood'; did you mean 'rod'? valid: base, rod",
         ),
         (lambda: jn.forward_kinematics(PIN, [[0.0]], "rod", [0, 1]), "point: must have the shape (3,), not (2,)"),
+        (
+            lambda: jn.forward_kinematics(PIN, np.zeros((500, 1)), "rod"),
+            "q: must have at most 30 derivatives along its last axis but one, not 499; positions at many instants "
+            "alone have the shape (..., 1, n), as q[..., None, :]",
+        ),
         (lambda: jn.jacobian(PIN, [[0.0]], "rod", [0, 1, np.nan]), "point: must be finite, got [0.0, 1.0, nan]"),
         (lambda: jn.jacobian(PIN, [[0.0]], "pin"), "link: no link has this name, got 'pin'; valid: base, rod"),
         (

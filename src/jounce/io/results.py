@@ -309,8 +309,8 @@ def read(path: str | PathLike[str]) -> xarray.Dataset:
     """Read a file that `write` wrote back into a dataset; values come back to the bit.
 
     A CSV file may say units in its heading, which become those of the variables: values stay as they are. It does not
-    say what is a vector: neighbouring columns ``NAME_x, NAME_y`` (and ``NAME_z``) become the vector NAME, and those of
-    Euler parameters, Euler angles and rotation matrices likewise.
+    say what is a vector: neighbouring columns ``NAME_x, NAME_y`` (and ``NAME_z``) of one unit become the vector NAME,
+    and those of Euler parameters, Euler angles and rotation matrices likewise.
 
     Returns
     -------
@@ -342,7 +342,7 @@ def read(path: str | PathLike[str]) -> xarray.Dataset:
     for line, row in enumerate(rows, start=2):
         if len(row) != len(header):
             raise OutputError(f"must have {len(header)} entries", path=name, line=line, value=len(row))
-    dataset = _from_columns(header, np.array(rows))
+    dataset = _from_columns(header, np.array(rows), units)
     for name, variable in dataset.data_vars.items():
         if (unit := units.get(str(name), units.get(f"{name}_{AXES.get(variable.dims[2:], ('',))[0]}"))) is not None:
             variable.attrs["units"] = unit
@@ -355,8 +355,8 @@ def _named_columns(header: list[str]) -> tuple[list[str], dict[str, str]]:
     return [name for name, _ in pairs], {name: unit for name, unit in pairs if unit is not None}
 
 
-def _from_columns(header: list[str], table: Float[np.ndarray, "time columns"]) -> xarray.Dataset:
-    """Build the dataset of a table."""
+def _from_columns(header: list[str], table: Float[np.ndarray, "time columns"], units: dict[str, str]) -> xarray.Dataset:
+    """Build the dataset of a table; what its heading says to have other units is no component of the same."""
     import xarray
 
     stems: dict[str, list[np.ndarray]] = {}
@@ -365,7 +365,7 @@ def _from_columns(header: list[str], table: Float[np.ndarray, "time columns"]) -
     variables: dict[str, Any] = {}
     coordinates: dict[str, Any] = {"time": ("time", table[:, 0], {"units": "s"})}
     coordinates["derivative"] = np.arange(max(map(len, stems.values()), default=0))
-    for name, group in itertools.groupby(stems, _name_of):
+    for (name, _), group in itertools.groupby(stems, lambda column: (_name_of(column), units.get(column))):
         members = list(group)
         for axes, labels in AXES.items():
             counts = (2, 3) if axes == ("component",) else (len(labels),)

@@ -10,6 +10,7 @@ from jounce import errors
 from jounce.errors import RobotError
 from jounce.robot.abstract_robot import AbstractRobot
 from jounce.shapes import Numbers
+from jounce.trajectory.joint_trajectory import MAX_ORDER
 
 
 def floats(name: str, values: object) -> Float[Numbers, "..."]:
@@ -85,7 +86,7 @@ def checked_coordinates(
     Raises
     ------
     RobotError
-        If there is no robot, their shape does not fit it, or the derivatives are too few.
+        If there is no robot, their shape does not fit it, or the derivatives are too few or too many.
     """
     n, q = len(joints_of(robot)), floats("q", q)
     if q.ndim < 2 or q.shape[-1] != n:
@@ -95,5 +96,11 @@ def checked_coordinates(
         names = ", ".join(["q", "q'", "q''"][: least + 1])
         lacks = f"must hold {names}" if least < 3 else f"needs derivatives of q to order {least}"
         message = f"{lacks} along its last axis but one: the shape (..., order + 1, n), not {q.shape}"
+        raise RobotError(message, name="q")
+    if q.shape[-2] > MAX_ORDER + 1:
+        message = (
+            f"must have at most {MAX_ORDER} derivatives along its last axis but one, not {q.shape[-2] - 1}; positions "
+            "at many instants alone have the shape (..., 1, n), as q[..., None, :]"
+        )
         raise RobotError(message, name="q")
     return q if most is None else q[..., : most + 1, :]
