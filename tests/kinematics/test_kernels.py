@@ -13,13 +13,13 @@ from jounce.kinematics.compilation import compiled
 MARK = "xla_cpu_small_call"
 
 
-def halved(body):
+def halved(body, **limits):
     """Return a loop that goes on until its value, which `body` halves, is small."""
 
     def loop(x):
         return jax.lax.while_loop(lambda x: jnp.max(x) > 1e-3, body, x)
 
-    return lambda x: kernels.in_one_piece(loop, x)
+    return lambda x: kernels.in_one_piece(loop, x, **limits)
 
 
 def marked(function, x) -> bool:
@@ -66,9 +66,9 @@ def test_loops_for_which_a_library_is_called_are_not(tried, body):
     assert not marked(halved(body), jnp.ones(3))
 
 
-def test_large_loops_are_not(tried, monkeypatch):
-    monkeypatch.setattr(kernels, "LARGEST", 3)
-    assert not marked(halved(lambda x: 0.5 * jnp.sin(x) + 0.1 * x), jnp.ones(3))
+@pytest.mark.parametrize("largest", [0, 3])
+def test_large_loops_are_not(tried, largest):
+    assert not marked(halved(lambda x: 0.5 * jnp.sin(x) + 0.1 * x, largest=largest), jnp.ones(3))
 
 
 def test_nothing_is_marked_for_releases_that_were_not_tried(monkeypatch):

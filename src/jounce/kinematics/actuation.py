@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 
 from jounce.jet.derivatives import plain_derivatives
-from jounce.kinematics.gauss_newton import mover
+from jounce.kinematics.gauss_newton import Displacements
 from jounce.kinematics.motion import Motion
 from jounce.kinematics.status import Status
 from jounce.mechanism import Model, build
@@ -40,7 +40,7 @@ def _law(motion: Motion, name: str) -> HermiteMotion:
 
 def _counted(model: Model, held: Model, instant: float) -> Model:
     """Return the model of the drivers with all that was found when the outputs were held."""
-    _, _, jacobian = mover(model, instant)(held.reference, np.zeros(model.system.shape[1]))
+    _, _, jacobian = Displacements(model, instant).at(held.reference)
     system = with_fields(
         model.system,
         groups=counted_as_in(model.system.groups, held),

@@ -19,6 +19,7 @@ from jounce.jet import Jet
 from jounce.jet.algebra import stacked
 from jounce.jet.turns import brought_near
 from jounce.kinematics.factors import Factor, blank_factor, factored
+from jounce.kinematics.kernels import in_one_piece
 from jounce.kinematics.least_squares import LeastSquaresFactor
 from jounce.kinematics.predictions import (
     SMALLEST_DEPARTURE,
@@ -94,8 +95,26 @@ class Correction(NamedTuple):
         return (self.simplified <= LARGEST_CONTRACTION * self.first) | (self.first <= SMALLEST_DEPARTURE)
 
 
+class Pieces(NamedTuple):
+    """Most operations of what is to be one piece of machine code (see `kernels`): it runs faster, and compiles longer.
+
+    The program must be compiled without the `LIBRARIES` where one is above zero.
+    """
+
+    corrections: int
+    derivatives: int
+
+
+XLA_S_OWN = Pieces(0, 0)
+
+
 def newton_raphson(
-    system: System, pose: Pose, time: Float[Jet, "1 batch"], tolerance: Float[Numbers, ""], refine: Bool[Numbers, ""]
+    system: System,
+    pose: Pose,
+    time: Float[Jet, "1 batch"],
+    tolerance: Float[Numbers, ""],
+    refine: Bool[Numbers, ""],
+    largest_piece: int,
 ) -> tuple[Pose, Factor, Correction]:
     """Return the assembled pose, the factored Jacobian there, and how large the corrections were.
 
@@ -136,22 +155,28 @@ def newton_raphson(
     unknown = np.full(lanes, np.inf)
     blank = blank_factor(system, lanes)
     state = (pose, blank, Correction(unknown, unknown, np.zeros(lanes)), np.zeros(lanes, bool), 0)
-    pose, factor, correction, _, _ = jax.lax.while_loop(unfinished, iterate, state)
+    largest_piece = 0 if system.fronts is not None else largest_piece  # fronts scatter what they leave over
+    state = in_one_piece(lambda state: jax.lax.while_loop(unfinished, iterate, state), state, largest_piece)
+    pose, factor, correction, _, _ = state
     return pose, factor, correction
 
 
-def differentiated(system: System, pose: Pose, factor: Factor, time: Float[Jet, "1 batch"]) -> Pose:
+def differentiated(system: System, pose: Pose, factor: Factor, time: Float[Jet, "1 batch"], largest_piece: int) -> Pose:
     """Return the pose with all derivatives that the time jet has: order after order, one solve each.
 
     The coefficient of order k of the residual is affine in the unknown (r[k], w'[k-1] / k) with the Jacobian as its
     slope, so that it is found from the coefficient with the unknown set to zero.
     """
-    for k in range(1, time.order + 1):
-        trial = pose.extended(None, None)
-        right = -system.residual(trial, time.truncate(k)).dense().coefficients[k]
-        pose = pose.extended(*system.coordinates(factor.solve(right), pose.shifts))
-        pose = jax.lax.optimization_barrier(pose)  # or XLA computes it again in everything that uses it
-    return pose
+
+    def order_after_order(pose: Any) -> Any:
+        for k in range(1, time.order + 1):
+            trial = pose.extended(None, None)
+            right = -system.residual(trial, time.truncate(k)).dense().coefficients[k]
+            pose = pose.extended(*system.coordinates(factor.solve(right), pose.shifts))
+            pose = jax.lax.optimization_barrier(pose)  # or XLA computes it again in everything that uses it
+        return pose
+
+    return in_one_piece(order_after_order, pose, largest_piece)
 
 
 def _departures(system: System, pose: Pose, predicted: Any) -> Float[Numbers, "body batch"]:
@@ -282,6 +307,7 @@ def advance(
     *,
     pose_type: type[Pose],
     order: int,
+    pieces: Pieces = XLA_S_OWN,
 ) -> Arrival:
     """Solve a batch of instants, each from a neighbour solved before.
 
@@ -306,10 +332,11 @@ def advance(
         Highest derivative that must be finite.
     pose_type, order
         PlanarPose or SpatialPose; derivatives wanted.
+    pieces : Pieces, optional
+        Which parts are to be one piece of machine code.
     """
-    arrival, factor, reached = solved_batch(
-        system, coordinates, angles, sign, step, instant, tolerance, refine, wanted, pose_type=pose_type, order=order
-    )
+    given = coordinates, angles, sign, step, instant, tolerance, refine, wanted
+    arrival, factor, reached = solved_batch(system, *given, pose_type=pose_type, order=order, pieces=pieces)
     turnover = jax.lax.cond(
         survey, lambda: turnover_of(system, pose_type, reached, factor, instant), lambda: np.zeros(1)
     )
@@ -331,14 +358,17 @@ def solved_batch(
     *,
     pose_type: type[Pose],
     order: int,
+    pieces: Pieces = XLA_S_OWN,
 ) -> tuple[Arrival, Factor, dict[str, Jet]]:
     """Return what `advance` does but for the turnover, with the factored Jacobian and the jets of the pose."""
     # what a law makes infinite, such as the third derivative of t**2.5 at t = 0, is of no use to a prediction
     moving = {name: Jet(tuple(jnp.where(jnp.isfinite(c), c, 0.0))) for name, c in coordinates.items()}
     predicted = pose_type.predicted_from(moving, step)
     time = Jet.variable(instant[None], order)
-    pose, factor, correction = newton_raphson(system, predicted, time.truncate(0), tolerance, refine)
-    pose = differentiated(system, pose, factor, time)
+    pose, factor, correction = newton_raphson(
+        system, predicted, time.truncate(0), tolerance, refine, pieces.corrections
+    )
+    pose = differentiated(system, pose, factor, time, pieces.derivatives)
 
     outputs = _outputs(system, pose, angles, step)
     reached = pose.coordinates()

@@ -12,12 +12,11 @@ from jounce.constraints.spatial import DoubleSpherical
 from jounce.errors import AssemblyError, AssemblyWarning, MobilityError
 from jounce.jet import Jet
 from jounce.kinematics.device import resident
-from jounce.kinematics.gauss_newton import Trial, mover, put_together
+from jounce.kinematics.gauss_newton import Displacements, Trial, put_together
 from jounce.kinematics.host_jacobian import HostJacobian
 from jounce.kinematics.initial_turns import (
     Coordinates,
     DriverLag,
-    Place,
     driver_lag,
     nearest_turns,
     turned_to_laws,
@@ -107,13 +106,17 @@ def _nearby(model: Model, instant: float, tolerance: float) -> tuple[Model, Tria
     Where the axes were tilted against each other in the guess, the angles in the position found are others than those
     counted from the guess, and it takes another turn to get to those that the drivers prescribe.
     """
-    guessed = mover(model, instant)(model.guess, np.zeros(model.system.shape[1]))
-    lag, told = driver_lag(model, instant, guessed[1]), model.prescribed
-    model, start = _turned(model, instant, tolerance, guessed, lag)
-    found = put_together(model, instant, tolerance, start, known=guessed if start is None else None)
+    moved, told = Displacements(model, instant), model.prescribed
+    residual, found = moved.closed(model.guess, tolerance)
+    lag = driver_lag(model, instant, residual)
+    model, start = _turned(model, instant, tolerance, lag)
+    if start is not None:
+        found = put_together(model, instant, tolerance, start)
+    elif found is None:
+        found = put_together(model, instant, tolerance, known=moved.at(model.guess))
     if not found.closed and any(map(measures_angle, model.system.groups)):
         # angles counted from a tilted guess may be far off: first the joints alone, with the drivers as they are
-        begin = found if lag is None else put_together(model, instant, tolerance, lag=lag, known=guessed)
+        begin = found if lag is None else put_together(model, instant, tolerance, lag=lag)
         if begin.closed:
             model, _ = with_reference(model, begin.coordinates, instant, told)
             found = put_together(model, instant, tolerance, begin.coordinates)
@@ -143,9 +146,7 @@ def warn_of_parts_turned_over(model: Model, found: Trial) -> None:
     warnings.warn(AssemblyWarning(message), stacklevel=3)
 
 
-def _turned(
-    model: Model, instant: float, tolerance: float, guessed: Place, lag: DriverLag | None
-) -> tuple[Model, Coordinates | None]:
+def _turned(model: Model, instant: float, tolerance: float, lag: DriverLag | None) -> tuple[Model, Coordinates | None]:
     """Return the model and the coordinates to start from where laws begin more than half a turn from the guess.
 
     The drivers are turned from the guess to their laws then, and all angles count their turns; None where none is so
@@ -153,10 +154,10 @@ def _turned(
     """
     if lag is None or not np.pi < lag.angle < np.inf:
         return model, None
-    begin = put_together(model, instant, tolerance, lag=lag, known=guessed)
+    begin = put_together(model, instant, tolerance, lag=lag)
     if not begin.closed:
         return model, None
-    found = turned_to_laws(model, lag, begin.coordinates, mover(model, instant))
+    found = turned_to_laws(model, lag, begin.coordinates, Displacements(model, instant))
     if found is None:
         return model, None
     coordinates, history = found
@@ -172,10 +173,10 @@ def _turned(
 
 def nearest_to_guess(model: Model, found: Trial, instant: float) -> Trial:
     """Return planar bodies put together, with every angle shifted by whole turns to be nearest to the guess."""
-    moved, still = mover(model, instant), np.zeros(model.system.shape[1])
+    moved = Displacements(model, instant)
 
     def residual_at(angle: np.ndarray) -> np.ndarray:
-        return found.scale * moved({**found.coordinates, "angle": angle}, still)[1]
+        return found.scale * moved.at({**found.coordinates, "angle": angle})[1]
 
     return found._replace(coordinates=nearest_turns(model.guess, found.coordinates, residual_at))
 
@@ -223,7 +224,7 @@ def _structural_excess(model: Model, found: Trial, instant: float) -> int:
     Bodies that do not reach each other come to rest where equations depend on each other too, but only there.
     """
     anywhere = 0.1 * np.random.default_rng(1).standard_normal(model.system.shape[1])
-    jacobian = mover(model, instant)(found.coordinates, anywhere)[2]
+    jacobian = Displacements(model, instant)(found.coordinates, anywhere)[2]
     return len(model.rows) - jacobian.scaled(jacobian.row_scale).rank if jacobian.finite().all() else 0
 
 
@@ -268,7 +269,7 @@ def _squared_lengths(model: Model, instant: float) -> dict[str, float]:
 def redundancy_of(model: Model, found: Trial, instant: float) -> tuple[Model, Redundancy]:
     """Return a model that was put together with its rows scaled, and which of them follow from others."""
     model = dataclasses.replace(model, system=with_fields(model.system, row_scale=found.scale[:, None]))
-    told = redundancy(model, found.coordinates, found.jacobian, lambda *place: mover(model, instant)(*place))
+    told = redundancy(model, found.coordinates, found.jacobian, Displacements(model, instant))
     rank = told.rank if told.count else None
     return dataclasses.replace(model, system=with_fields(model.system, rank=rank)), told
 

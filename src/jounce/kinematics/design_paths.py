@@ -16,6 +16,7 @@ from jounce.jet.derivatives import plain_derivatives
 from jounce.kinematics.advance import SAFE_FRACTION, Arrival, SolvedState, solved_batch
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.designs import Coordinates, Designs
+from jounce.kinematics.kernels import LIBRARIES
 from jounce.kinematics.legs import GROWTH, LARGEST_TURNOVER, PASSAGE, SLIVER
 from jounce.kinematics.path_following import SMALLEST_STEP
 from jounce.kinematics.predictions import hidden_by_laws
@@ -23,6 +24,7 @@ from jounce.kinematics.solver import Solver
 from jounce.kinematics.status import Status
 from jounce.kinematics.threads import Threads
 from jounce.kinematics.turnover import turnovers_of
+from jounce.kinematics.wide_batches import PIECES
 from jounce.mechanism.axis_angles import measures_angle
 from jounce.mechanism.system import System
 from jounce.rigid.pose import Pose
@@ -67,7 +69,7 @@ def advance_designs(
     return arrival._replace(turnover=turnovers_of(system, pose_type, reached, factor, instant), status=status)
 
 
-@compiled("varied", "pose_type", "order")
+@compiled("varied", "pose_type", "order", without=LIBRARIES)
 def _solve_designs(
     system: System,
     known: Any,
@@ -113,6 +115,7 @@ def _solve_designs(
             *settings,
             pose_type=pose_type,
             order=order,
+            pieces=PIECES,
         )
         rows = [jnp.transpose(plain_derivatives(jets), (2, 3, 0, 1)) for jets in arrival.outputs]
         return tuple(tuple(row) for row in rows), arrival.status

@@ -1,15 +1,18 @@
 """Bodies put together at one instant, from a starting guess, by damped Gauss-Newton on the host."""
 
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import jax
+import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float, Int
 
 from jounce.jet import Jet
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.host_jacobian import HostJacobian
-from jounce.kinematics.initial_turns import Coordinates, DriverLag, Mover, Place
+from jounce.kinematics.initial_turns import Coordinates, DriverLag, Place
+from jounce.kinematics.linear import DenseFactor
 from jounce.mechanism import Model
 from jounce.mechanism.builder import pose_at
 from jounce.mechanism.modules import with_fields
@@ -19,6 +22,22 @@ from jounce.shapes import Numbers
 
 MAX_STEPS = 100
 NEXT_STEP = 1e-3  # of the tolerance: a step that would be this short, as residuals fall, is left out
+LONGEST_STEP = 0.5  # rad, or sizes of the mechanism
+REGULAR = 1e-4  # smallest pivot over the largest, from where on a matrix is inverted instead of decomposed
+
+
+class _Going(NamedTuple):
+    """How Newton-Raphson stands between two steps, for one instant."""
+
+    coordinates: dict[str, Numbers]
+    increment: Float[Numbers, " column"]  # to be made next
+    begun: Float[Numbers, " row"]  # residual at the first position
+    residual: Float[Numbers, " row"]
+    entries: Float[Numbers, " entry"]
+    row_scale: Float[Numbers, " row"]
+    size: Float[Numbers, ""]  # of the increment
+    closed: Bool[Numbers, ""]
+    left: Int[Numbers, ""]  # steps that may follow; below zero none does
 
 
 @compiled("pose_type", narrow=True)
@@ -27,14 +46,47 @@ def _moved(
     coordinates: dict[str, Numbers],
     increment: Float[Numbers, " column"],
     instant: Float[Numbers, ""],
+    steps: Int[Numbers, ""],
+    tolerance: Float[Numbers, ""],
     pose_type: type[Pose],
 ) -> Any:
-    """Return the coordinates after an increment, with residual and entries of the Jacobian, for one instant."""
-    pose = pose_at(coordinates, pose_type)
-    pose = pose.displaced(*system.coordinates(increment[:, None], pose.shifts))
+    """Return the coordinates after an increment, with residual and entries of the Jacobian.
+
+    With a pattern, by which a square Jacobian is a dense matrix, some steps may follow, as long as those of
+    Newton-Raphson are those of `put_together`: short, from regular positions, and with residuals that fall. The
+    residual before them is returned too, and whether they closed it.
+    """
     time = Jet([instant[None, None]])
-    moved = {name: jet.coefficients[0] for name, jet in pose.coordinates().items()}
-    return moved, system.residual(pose, time).coefficients[0][:, 0], system.entries(pose, time)[:, 0]
+
+    def there(coordinates: dict[str, Numbers], increment: Float[Numbers, " column"]) -> Any:
+        pose = pose_at(coordinates, pose_type)
+        pose = pose.displaced(*system.coordinates(increment[:, None], pose.shifts))
+        moved = {name: jet.coefficients[0] for name, jet in pose.coordinates().items()}
+        return moved, system.residual(pose, time).coefficients[0][:, 0], system.entries(pose, time)[:, 0]
+
+    def stepped(going: _Going) -> _Going:
+        moved, residual, entries = there(going.coordinates, going.increment)
+        before, now = (jnp.sqrt(jnp.sum((going.row_scale * x) ** 2)) for x in (going.residual, residual))
+        first, small = going.left == steps, going.size <= tolerance
+        falls = first | small | (now < before)
+        closed = ~first & falls & (small | (going.size * now <= NEXT_STEP * tolerance * before))
+        matrix = system.pattern.dense(entries[:, None])
+        row_scale = 1 / jnp.max(jnp.abs(matrix), axis=(1, 2))
+        factor = DenseFactor.of(row_scale[:, None, None] * matrix)
+        step = factor.solve(-(row_scale * residual)[:, None])[:, 0]
+        size = jnp.max(jnp.abs(step))
+        goes_on = falls & (size <= LONGEST_STEP) & (factor.pivot_ratio()[0] >= REGULAR)
+        left = jnp.where(goes_on, going.left - 1, -1)
+        begun = jnp.where(first, residual, going.begun)
+        return _Going(moved, step, begun, residual, entries, row_scale, size, closed, left)
+
+    if system.pattern is None:
+        moved, residual, entries = there(coordinates, increment)
+        return moved, residual, entries, residual, np.zeros((), bool)
+    rows, entries = np.zeros(system.shape[0]), np.zeros(system.pattern.entry_count)
+    start = _Going(coordinates, increment, rows, rows, entries, rows, np.zeros(()), np.zeros((), bool), steps)
+    end = jax.lax.while_loop(lambda going: ~going.closed & (going.left >= 0), stepped, jax.tree.map(jnp.asarray, start))
+    return end.coordinates, end.residual, end.entries, end.begun, end.closed
 
 
 class Trial(NamedTuple):
@@ -61,17 +113,45 @@ class Trial(NamedTuple):
     closed: bool
 
 
-def mover(model: Model, instant: float) -> Mover:
-    """Return what takes coordinates and an increment to coordinates, residual and Jacobian, all on the host."""
-    system = with_fields(model.system, outputs=(), forces=(), fronts=None, pattern=None)  # all that the program needs
-    pattern, scale = model.system.pattern, np.asarray(model.system.row_scale)[:, 0]
+class Displacements:
+    """Moves the bodies of a model at an instant, s, in compiled code: from and to the host.
 
-    def moved(coordinates: dict[str, Any], increment: np.ndarray) -> Any:
-        result = _moved(system, coordinates, increment, np.float64(instant), model.pose_type)
-        to, residual, entries = jax.tree.map(np.asarray, result)
-        return to, residual, HostJacobian.of(pattern, entries).scaled(scale)
+    Called with coordinates and an increment, it returns the place after that.
+    """
 
-    return moved
+    def __init__(self, model: Model, instant: float):
+        self._model, self._instant = model, np.float64(instant)
+        rows, columns = model.system.shape
+        self._dense, self._still = rows == columns and model.system.fronts is None, np.zeros(columns)
+
+    def __call__(self, coordinates: Coordinates, increment: Float[np.ndarray, " column"]) -> Place:
+        """Return the place after an increment."""
+        return self._moved(coordinates, increment, 0, 0.0)[0]
+
+    def closed(self, start: Coordinates, tolerance: float) -> tuple[Float[np.ndarray, " row"], Trial | None]:
+        """Return the residual at some coordinates, and the bodies put together from there if no step needs a check."""
+        there, begun, closed = self._moved(start, self._still, MAX_STEPS if self._dense else 0, tolerance)
+        return begun, _trial(*there, there[2].row_scale, tolerance) if closed else None
+
+    def at(self, coordinates: Coordinates) -> Place:
+        """Return the place with some coordinates."""
+        return self(coordinates, self._still)
+
+    def _moved(
+        self, coordinates: Coordinates, increment: Float[np.ndarray, " column"], steps: int, tolerance: float
+    ) -> tuple[Place, Float[np.ndarray, " row"], bool]:
+        settings = self._instant, np.int64(steps), np.float64(tolerance)
+        found = _moved(self._system, coordinates, increment, *settings, self._model.pose_type)
+        to, residual, entries, begun, closed = jax.tree.map(np.asarray, found)
+        system = self._model.system
+        jacobian = HostJacobian.of(system.pattern, entries).scaled(np.asarray(system.row_scale)[:, 0])
+        return (to, residual, jacobian), begun, bool(closed)
+
+    @cached_property
+    def _system(self) -> System:
+        """All that the program needs."""
+        pattern = self._model.system.pattern if self._dense else None
+        return with_fields(self._model.system, outputs=(), forces=(), fronts=None, pattern=pattern)
 
 
 def put_together(
@@ -100,12 +180,16 @@ def put_together(
     known : Place, optional
         Where to start from, in the place of coordinates, if it is known whole.
     """
-    still, free = np.zeros(model.system.shape[1]), mover(model, instant)
+    moved = Displacements(model, instant)
 
     def opened(place: Place) -> Place:
         return place if lag is None else (place[0], lag.open(place[1], 1.0), place[2])
 
-    known = free(model.guess if start is None else start, still) if known is None else known
+    if known is None:
+        begin = model.guess if start is None else start
+        if lag is None and (found := moved.closed(begin, tolerance)[1]) is not None:
+            return found
+        known = moved.at(begin)
     coordinates, residual, jacobian = opened(known)
     scale = jacobian.row_scale
     for _ in range(MAX_STEPS):
@@ -113,10 +197,10 @@ def put_together(
         if step is None:
             break  # told by name
         size = np.max(np.abs(step), initial=0.0)
-        step *= min(1.0, 0.5 / max(size, 1e-300))  # at most half a radian, or half the mechanism, at a time
+        step *= min(1.0, LONGEST_STEP / max(size, 1e-300))
         now = np.linalg.norm(scale * residual)
         for _halving in range(12):
-            trial = opened(free(coordinates, step))
+            trial = opened(moved(coordinates, step))
             left = np.linalg.norm(scale * trial[1])
             if left < now or size <= tolerance:
                 break
@@ -127,6 +211,16 @@ def put_together(
         scale = jacobian.row_scale
         if size <= tolerance or size * left <= NEXT_STEP * tolerance * now:
             break
+    return _trial(coordinates, residual, jacobian, scale, tolerance)
+
+
+def _trial(
+    coordinates: Coordinates,
+    residual: Float[np.ndarray, " row"],
+    jacobian: HostJacobian,
+    scale: Float[np.ndarray, " row"],
+    tolerance: float,
+) -> Trial:
     gaps = np.where(jacobian.finite(), scale * residual, np.nan)
     closed = bool(np.all(np.abs(gaps) <= max(1e3 * tolerance, 1e-9)))
     return Trial(coordinates, scale, gaps, jacobian.scaled(scale), closed)

@@ -16,7 +16,7 @@ LIBRARIES = ("dot-library-rewriter",)
 """Passes of XLA to leave out of programs with such functions: they put sums into a library as well."""
 
 TRIED = (0, 10)  # releases of jaxlib: of others it is not known whether they break off
-LARGEST = 6000  # operations: of twice as many LLVM makes one function in a minute, and many in ten seconds
+LARGEST = 6000  # operations: of a march of twice as many LLVM makes one function in a minute, and many in ten seconds
 
 # not among them: products of matrices, convolutions, sorting and what is foreign, for which XLA calls libraries that
 # such a function cannot reach, and scatter, for which it has no code there
@@ -30,7 +30,7 @@ SUPPORTED = frozenset(
 )
 
 
-def in_one_piece(function: Callable[[Any], Any], argument: Any) -> Any:
+def in_one_piece(function: Callable[[Any], Any], argument: Any, largest: int = LARGEST) -> Any:
     """Return the value of a function that XLA compiles into one piece of machine code where it can.
 
     XLA calls each operation on a processor as a function of its own, which takes longer than arithmetic on small
@@ -44,10 +44,14 @@ def in_one_piece(function: Callable[[Any], Any], argument: Any) -> Any:
         libraries can be part of such a function.
     argument : pytree
         Of arrays.
+    largest : int, optional
+        Most operations of such a piece; of more, XLA makes what it makes by itself.
     """
+    if not largest:
+        return function(argument)
     program, shape = jax.make_jaxpr(function, return_shape=True)(argument)
     leaves = jax.tree.leaves(argument)
-    if _tried() and _suits(program.jaxpr):
+    if _tried() and _suits(program.jaxpr, largest):
         given = tuple(map(jnp.asarray, (*program.consts, *leaves)))
 
         def whole(numbers: jax.Array) -> Any:
@@ -91,7 +95,7 @@ def _operations(program: Jaxpr) -> Iterator[str]:
             yield from _operations(part)
 
 
-def _suits(program: Jaxpr) -> bool:
+def _suits(program: Jaxpr, largest: int) -> bool:
     """Tell whether XLA compiles all operations of a program by itself, and as one function before long."""
     names = list(_operations(program))
-    return len(names) <= LARGEST and SUPPORTED.issuperset(names)
+    return len(names) <= largest and SUPPORTED.issuperset(names)

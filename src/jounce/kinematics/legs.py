@@ -10,6 +10,7 @@ not fit into it are solved from the same anchor, in more batches, or from the ne
 """
 
 import enum
+from functools import partial
 from typing import Any, NamedTuple
 
 import jax
@@ -17,8 +18,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from jounce.kinematics.advance import SAFE_FRACTION, Arrival, SolvedState, advance, predictor
+from jounce.kinematics.advance import SAFE_FRACTION, Arrival, Pieces, SolvedState, advance, predictor
 from jounce.kinematics.compilation import compiled
+from jounce.kinematics.kernels import LIBRARIES
 from jounce.kinematics.status import Status
 from jounce.mechanism.system import System
 from jounce.rigid.pose import Pose
@@ -114,10 +116,13 @@ class Leg(NamedTuple):
     count: Int[Numbers, ""]  # of batches solved
 
 
-_batch = jax.jit(advance, static_argnames=("pose_type", "order"))  # traced once, for its shapes and in a loop
+PIECES = Pieces(
+    corrections=3000, derivatives=0
+)  # a tenth of a second longer to compile; of larger ones, XLA makes no faster code
+_batch = jax.jit(partial(advance, pieces=PIECES), static_argnames=("pose_type", "order"))  # traced once
 
 
-@compiled("pose_type", "order", "batches", narrow=True)
+@compiled("pose_type", "order", "batches", narrow=True, without=LIBRARIES)
 def leg(
     system: System,
     way: Way,

@@ -13,7 +13,7 @@ from jaxtyping import Float
 
 from jounce.errors import MechanismError, whole_number
 from jounce.kinematics.assembly import check_assembled, redundancy_of, settled
-from jounce.kinematics.gauss_newton import Trial, mover, put_together
+from jounce.kinematics.gauss_newton import Displacements, Trial, put_together
 from jounce.kinematics.host_jacobian import HostJacobian
 from jounce.kinematics.initial_turns import Coordinates, Mover
 from jounce.kinematics.mobility_series import SINGULAR, ReducedConstraints
@@ -183,7 +183,7 @@ def mobility(mechanism: Mechanism, time: float | None = None, order: int = 10) -
         return independent(columns, rows)
     constraints = ReducedConstraints.at(model, coordinates, matrix, order)
     told = redundancy_of(model, found, time)[1]
-    return dataclasses.replace(_analysed(constraints, mover(model, time)), repetitions=told.repetitions)
+    return dataclasses.replace(_analysed(constraints, Displacements(model, time)), repetitions=told.repetitions)
 
 
 def _released(mechanism: Mechanism, time: float) -> tuple[Model, Coordinates, Trial]:

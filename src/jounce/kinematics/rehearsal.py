@@ -28,6 +28,13 @@ def first_time(program: str, arguments: Any, *static: Any) -> bool:
 
 
 @contextlib.contextmanager
+def tried() -> Iterator[None]:
+    """Drop what goes wrong: it will be told by what is rehearsed here, when it is called with what was found."""
+    with contextlib.suppress(Exception), np.errstate(all="ignore"):
+        yield
+
+
+@contextlib.contextmanager
 def rehearsed(rehearsal: Callable[[], Any], *, wanted: bool) -> Iterator[None]:
     """Call a function in another thread meanwhile, for what it compiles; what it returns or raises is dropped.
 
@@ -44,8 +51,7 @@ def rehearsed(rehearsal: Callable[[], Any], *, wanted: bool) -> Iterator[None]:
     enough, context = threading.Event(), callers_device()
 
     def rehearse() -> None:
-        # whatever goes wrong will be told by what is rehearsed here, when it is called with what was found
-        with contextlib.suppress(Exception), np.errstate(all="ignore"), context(), stopped_by(enough):
+        with tried(), context(), stopped_by(enough):
             rehearsal()
 
     thread = threading.Thread(target=rehearse, name="jounce-rehearsal")

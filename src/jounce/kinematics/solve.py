@@ -1,5 +1,6 @@
 """From a mechanism and a time grid to its motion."""
 
+import dataclasses
 import numbers
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -16,11 +17,12 @@ from jounce.kinematics.advance import SolvedState
 from jounce.kinematics.assembly import assemble
 from jounce.kinematics.curves.choice import chosen
 from jounce.kinematics.dead_ends import dead_end_words
+from jounce.kinematics.device import resident
 from jounce.kinematics.grid import LONG_GRID
 from jounce.kinematics.long_grids import solve_grid
 from jounce.kinematics.motion import Motion
 from jounce.kinematics.path_following import FollowedPath, follow
-from jounce.kinematics.rehearsal import first_time, rehearsed
+from jounce.kinematics.rehearsal import first_time, rehearsed, tried
 from jounce.kinematics.sensitivities import differentiable_motion
 from jounce.kinematics.solver import NO_GRID, Solver
 from jounce.kinematics.status import Status
@@ -213,23 +215,36 @@ def _followed(
     lost = lost_orders(mechanism)
     of_forces = any(output.of_forces for output in mechanism.outputs.values())
     check_laws(mechanism, np.array([first, last]), order + lost, forces=of_forces)
-    try:
-        model, coordinates = assemble(build(chosen(with_outputs_held(mechanism), first)), first, tolerance)
-    except (AssemblyError, MobilityError) as error:
-        for name, motion in led_outputs(mechanism).items():
-            error.message += f"; the driver {name} follows from the output {motion.output}, which must determine it"
-        raise
-    solver = Solver(model, max(order + lost, LOWEST_ORDER), float(tolerance), refine, order)
-    still = _still(solver, coordinates)
+    guessed = build(chosen(with_outputs_held(mechanism), first))
+    solver = Solver(guessed, max(order + lost, LOWEST_ORDER), float(tolerance), refine, order)
+    new = first_time("leg", guessed.system, solver.order, len(instants) > LONG_GRID)
+    beside = new and thread_count() > 1
+    with rehearsed(partial(_prepare, solver, first), wanted=beside):
+        try:
+            model, coordinates = assemble(guessed, first, tolerance)
+        except (AssemblyError, MobilityError) as error:
+            for name, motion in led_outputs(mechanism).items():
+                error.message += f"; the driver {name} follows from the output {motion.output}, which must determine it"
+            raise
+        solver = dataclasses.replace(solver, model=model)
+        still = _still(solver, coordinates)
+        if beside:
+            with tried():
+                _rehearse(mechanism, solver, still, instants)
     start = solver.beginning(still, first)
     on_the_way = np.asarray(instants) if len(instants) <= LONG_GRID else NO_GRID
-    new = first_time("leg", solver.model.system, solver.order, len(instants) > LONG_GRID)
-    with rehearsed(partial(_rehearse, mechanism, solver, still, instants), wanted=new):
-        path = follow(solver, start, last, last - first, grid=on_the_way)
+    path = follow(solver, start, last, last - first, grid=on_the_way)
     if not path.anchors:
         where = f"t = {first:g} s, {path.fault}"
         raise SolveError(f"{where}: {_words(path.status)}: {path.status.advice}", status=path.status)
     return solver, path
+
+
+def _prepare(solver: Solver, instant: float) -> None:
+    """Have the program compiled that follows a motion, before the bodies are put together."""
+    model = dataclasses.replace(solver.model, system=resident(solver.model.system))
+    solver = dataclasses.replace(solver, model=model)
+    solver.prepare(_still(solver, model.guess), instant)
 
 
 def _rehearse(mechanism: Mechanism, solver: Solver, still: SolvedState, instants: Instants) -> None:

@@ -67,6 +67,10 @@ class Solver:
         way = way._replace(next_up=np.zeros((), int))
         return self._leg(way, grid, _limits(stop, smallest, self._batches), survey=True)
 
+    def prepare(self, guess: SolvedState, instant: float) -> None:
+        """Have the program of legs compiled; nothing is solved."""
+        self._leg(self.beginning(guess, instant), NO_GRID, _limits(instant, 0.0, 0), survey=True)
+
     def way(self, solved: SolvedState, place: Sequence[float], largest: float, crawled: int = 0) -> Way:
         """Return the way that begins at a solved instant, the place of an anchor, with a largest first step, s."""
         known = jax.tree.map(lambda x: _filled(x, SMALL_BATCH), self._predictor(solved))

@@ -74,10 +74,9 @@ class Pattern(eqx.Module):
 
     def dense(self, entries: Float[Numbers, "entry batch"]) -> Float[Numbers, "row column batch"]:
         """Return the matrices with these entries."""
-        (rows, columns), count = self.shape, self.entry_count
-        cells = jnp.full((rows, self.body_count, self.width), count, jnp.int32)
-        cells = cells.at[np.arange(rows)[:, None], self.bodies].set(self.places, mode="drop", unique_indices=True)
-        return _with_zero(entries)[cells.reshape(rows, columns)]
+        bodies = np.arange(self.body_count, dtype=np.int32)[None, None, :, None]
+        places = jnp.where(self.bodies[:, :, None, None] == bodies, self.places[:, :, None], self.entry_count)
+        return _with_zero(entries)[jnp.min(places, axis=1).reshape(self.shape)]
 
     def product(
         self, entries: Float[Numbers, "entry #batch"], columns: Float[Numbers, "column batch"]

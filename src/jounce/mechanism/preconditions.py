@@ -4,7 +4,7 @@ import dataclasses
 import functools
 import inspect
 from collections.abc import Callable, Mapping
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
@@ -91,8 +91,10 @@ def _traced(given: Mapping[str, Any]) -> str | None:
         names = _fields(type(value))
         if names is None:
             entries = [(f".{key}", entry) for key, entry in value.items()]
-        elif names:
-            entries = [(name, getattr(value, name[1:], None)) for name in names]
+        elif names:  # those of an object are looked up at once: Equinox has a slow way of its own for each
+            own = getattr(value, "__dict__", None)
+            held = partial(getattr, value) if own is None else own.get
+            entries = [(name, held(name[1:], None)) for name in names]
         elif isinstance(value, (list, tuple)):
             entries = [(f"[{k}]", entry) for k, entry in enumerate(value)]
         else:
