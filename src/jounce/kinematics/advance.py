@@ -18,11 +18,11 @@ from jaxtyping import Bool, Float, Int
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked
 from jounce.jet.turns import brought_near
-from jounce.kinematics.factors import Factor, blank_factor, factored
+from jounce.kinematics.factors import Factor, factored
 from jounce.kinematics.kernels import in_one_piece
 from jounce.kinematics.least_squares import LeastSquaresFactor
+from jounce.kinematics.newton_raphson import newton_raphson
 from jounce.kinematics.predictions import (
-    SMALLEST_DEPARTURE,
     hidden_by_laws,
     laws_predictable,
     near_prediction,
@@ -39,15 +39,12 @@ Truths = Bool[Numbers, " batch"]
 SolvedState = tuple[Mapping[str, Numbers], tuple[Numbers, ...], Numbers]
 """What a solved instant hands on: jets of coordinates, by name, and of outputs, and the sign of the determinant."""
 
-MAX_ITERATIONS = 30
 CONVERGED = 1e-9  # a last correction above this is no convergence, however small the tolerance
 SAFE_FRACTION = 0.4  # of the time in which some Taylor term would move a body by a radian, or by the mechanism's size
-LARGEST_CONTRACTION = 0.25  # of the first simplified Newton corrections: Deuflhard 2011, section 5.1
 SINGULAR_PIVOT = 1e-12  # of the largest; corrections tell before that they no longer converge
 LARGEST_GAP = 1e-9  # of redundant rows that agree, rad or sizes of the mechanism, or this many tolerances:
 GAP_TOLERANCES = 1e3
 LARGEST_CONTRADICTION = 1e-6  # of derivatives in redundant rows, as a part of what the motion's own could be
-ROUNDING = 4e-15  # a correction this small (in rad, or in sizes of the mechanism) leaves the Jacobian as good as new
 
 
 class Arrival(NamedTuple):
@@ -83,18 +80,6 @@ def _size(increment: Float[Numbers, "component body batch"]) -> Float[Numbers, "
     return jnp.max(jnp.abs(increment), axis=0)
 
 
-class Correction(NamedTuple):
-    """How Newton-Raphson went."""
-
-    last: Lanes  # size of the last correction, rad or sizes of the mechanism
-    first: Lanes
-    simplified: Lanes  # size of the second, with the Jacobian of the first
-
-    def contracts(self) -> Bool[Numbers, " batch"]:
-        """Tell whether the simplified Newton iteration contracts, as it must where one solution only is near."""
-        return (self.simplified <= LARGEST_CONTRACTION * self.first) | (self.first <= SMALLEST_DEPARTURE)
-
-
 class Pieces(NamedTuple):
     """Most operations of what is to be one piece of machine code (see `kernels`): it runs faster, and compiles longer.
 
@@ -106,59 +91,6 @@ class Pieces(NamedTuple):
 
 
 XLA_S_OWN = Pieces(0, 0)
-
-
-def newton_raphson(
-    system: System,
-    pose: Pose,
-    time: Float[Jet, "1 batch"],
-    tolerance: Float[Numbers, ""],
-    refine: Bool[Numbers, ""],
-    largest_piece: int,
-) -> tuple[Pose, Factor, Correction]:
-    """Return the assembled pose, the factored Jacobian there, and how large the corrections were.
-
-    An instant is accepted when its correction is at most the tolerance. With `refine` that correction is still made,
-    and one more unless it was rounding already, so that quadratic convergence brings the pose to rounding.
-    """
-
-    def sized(pose: Any, step: Any) -> Any:
-        shift, turn = system.coordinates(step, pose.shifts)
-        away = jnp.max(jnp.abs(pose.position.coefficients[0]), axis=(0, 1), keepdims=True)
-        shift = shift / jnp.maximum(system.column_scale[0], away)  # what is far away is known no better
-        return jnp.maximum(jnp.max(jnp.abs(shift), axis=(0, 1)), jnp.max(jnp.abs(turn), axis=(0, 1)))
-
-    def unfinished(state: Any) -> Any:
-        _, _, correction, accepted_before, count = state
-        size = correction.last
-        done = jnp.where(refine, (size <= ROUNDING) | accepted_before, size <= tolerance)
-        hopeful = jnp.isfinite(size) | (count == 0)  # what is not finite never will be
-        return jnp.any(~done & hopeful) & (count < MAX_ITERATIONS)
-
-    def iterate(state: Any) -> Any:
-        pose, before, correction, _, count = state
-        residual = system.residual(pose, time).coefficients[0]
-        again = jax.lax.cond(
-            count == 1, lambda: sized(pose, before.solve(residual, refined=False)), lambda: correction.simplified
-        )
-        accepted = correction.last <= tolerance
-        simplified = jnp.where(refine | ~accepted, again, correction.simplified)  # else the pose was left as it was
-        factor = factored(system, pose, time)
-        step = factor.solve(-residual, refined=False)
-        size = sized(pose, step)
-        step = jnp.where(refine | ~(size <= tolerance), step, 0.0)
-        pose = pose.displaced(*system.coordinates(step, pose.shifts))
-        first = jnp.where(count == 0, size, correction.first)
-        return pose, factor, Correction(size, first, simplified), accepted, count + 1
-
-    lanes = time.coefficients[0].shape[-1]
-    unknown = np.full(lanes, np.inf)
-    blank = blank_factor(system, lanes)
-    state = (pose, blank, Correction(unknown, unknown, np.zeros(lanes)), np.zeros(lanes, bool), 0)
-    largest_piece = 0 if system.fronts is not None else largest_piece  # fronts scatter what they leave over
-    state = in_one_piece(lambda state: jax.lax.while_loop(unfinished, iterate, state), state, largest_piece)
-    pose, factor, correction, _, _ = state
-    return pose, factor, correction
 
 
 def differentiated(system: System, pose: Pose, factor: Factor, time: Float[Jet, "1 batch"], largest_piece: int) -> Pose:

@@ -3,14 +3,20 @@
 With redundant constraints, which agree, it has more rows than columns, and its equations are solved in least squares.
 """
 
+import jax
+import jax.numpy as jnp
+from jaxtyping import Bool
+
 from jounce.jet import Jet
 from jounce.kinematics.frontal import FrontalFactor
 from jounce.kinematics.least_squares import LeastSquaresFactor
 from jounce.kinematics.linear import DenseFactor
 from jounce.mechanism.system import System
 from jounce.rigid.pose import Pose
+from jounce.shapes import Numbers
 
 Factor = DenseFactor | FrontalFactor | LeastSquaresFactor
+STALE = 1e-9  # part by which solutions may be off before they are refined, which squares it
 
 
 def factored(system: System, pose: Pose, time: Jet) -> Factor:
@@ -18,6 +24,20 @@ def factored(system: System, pose: Pose, time: Jet) -> Factor:
     if system.fronts is None:
         return _dense(system).of(system.jacobian(pose, time))
     return FrontalFactor.of(system.fronts, system.entries(pose, time), system.row_scale)
+
+
+def refactored(system: System, pose: Pose, time: Jet, known: Factor, anew: Bool[Numbers, ""]) -> Factor:
+    """Return the factored Jacobian at a pose of order zero, near to which it was factored before.
+
+    Unless it is to be factored anew, what was factored there is kept, with the matrices of here, where refinement by
+    these brings solutions to rounding.
+    """
+    if not isinstance(known, DenseFactor):
+        return factored(system, pose, time)
+    matrix = system.jacobian(pose, time)
+    kept = known.refining(matrix)
+    stale = jnp.any(kept.defect() > STALE)
+    return jax.lax.cond(anew | stale, lambda: DenseFactor.of(matrix), lambda: kept)
 
 
 def blank_factor(system: System, lanes: int) -> Factor:

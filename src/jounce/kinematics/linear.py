@@ -61,6 +61,19 @@ class DenseFactor(eqx.Module):
         matrix, column = np.zeros((*shape, lanes)), np.zeros((shape[0], lanes))
         return cls(matrix, matrix, column.astype(np.int32), column)
 
+    def refining(self, matrix: Matrices) -> "DenseFactor":
+        """Return these factors for matrices near to those that were factored, by which solutions are refined."""
+        return DenseFactor(matrix, self.eliminated, self.order, self.pivots)
+
+    def defect(self) -> Float[Numbers, " batch"]:
+        """Return by which part solutions are off that are not refined, as one of known solution tells, shape (batch,).
+
+        Refined, they are off by its square. It is NaN where a matrix is singular.
+        """
+        known = np.where(np.arange(len(self.order)) % 3 == 1, -1.0, 1.0)
+        right = jnp.sum(self.matrix * known[None, :, None], axis=1)
+        return jnp.max(jnp.abs(self.solve(right, refined=False) - known[:, None]), axis=0)
+
     def solve(self, right: Columns, *, refined: bool = True) -> Columns:
         """Return the solution for right-hand sides of shape (rows, batch); it is NaN where a matrix is singular.
 
