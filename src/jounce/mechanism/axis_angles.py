@@ -269,8 +269,7 @@ def _inverse(p: Quaternions) -> Quaternions:
 
 
 def _product(p: Quaternions, q: Quaternions) -> Quaternions:
-    e0 = p[:1] * q[:1] - (p[1:] * q[1:]).sum(axis=0, keepdims=True)
-    return np.concatenate([e0, p[:1] * q[1:] + q[:1] * p[1:] + _cross(p[1:], q[1:])])
+    return _bilinear(_HAMILTON, p, q)
 
 
 def _turned(p: Quaternions, vector: Vectors) -> Vectors:
@@ -279,5 +278,37 @@ def _turned(p: Quaternions, vector: Vectors) -> Vectors:
 
 
 def _cross(a: Vectors, b: Vectors) -> Any:
-    """Return the cross products along the first axis, in a fraction of the time that NumPy's takes for few."""
-    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+    """Return the cross products along the first axis."""
+    return _bilinear(_LEVI_CIVITA, a, b)
+
+
+def _bilinear(signs: np.ndarray, a: Numbers, b: Numbers) -> Any:
+    """Return sums of products of components along the first axis: five calls of NumPy, where each takes a microsecond.
+
+    Parameters
+    ----------
+    signs : array of shape (components, components squared)
+        Of the product of component i of one and j of the other, in column i times components plus j.
+    """
+    products = np.asarray(a)[:, None] * np.asarray(b)[None]
+    return (signs @ products.reshape(signs.shape[1], -1)).reshape(len(signs), *products.shape[2:])
+
+
+def _levi_civita() -> np.ndarray:
+    signs = np.zeros((3, 3, 3))
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        signs[i, j, k], signs[i, k, j] = 1.0, -1.0
+    return signs
+
+
+def _hamilton() -> np.ndarray:
+    """Return the signs of the products of quaternions (e0, e): ``p0 q0 - p.q`` and ``p0 q + q0 p + p x q``."""
+    signs = np.zeros((4, 4, 4))
+    signs[0, 0, 0] = 1.0
+    for k in (1, 2, 3):
+        signs[0, k, k], signs[k, 0, k], signs[k, k, 0] = -1.0, 1.0, 1.0
+    signs[1:, 1:, 1:] = _levi_civita()
+    return signs
+
+
+_LEVI_CIVITA, _HAMILTON = _levi_civita().reshape(3, 9), _hamilton().reshape(4, 16)
