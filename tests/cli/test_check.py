@@ -204,7 +204,7 @@ BAD_TRAJECTORIES = {
     "empty": ("csv", "", "motion.csv: the file of samples is empty"),
     "a law without a value": ("yaml", HOLD.replace("0.5", "1/t"), "the law is not defined or not smooth at 0 s"),
     "unknown key": ("yaml", f"speed: 3\n{HOLD}", "motion.yaml, line 1, speed: unknown key"),
-    "unknown ending": ("txt", HOLD, "the kind of a trajectory file is told by its ending"),
+    "unknown ending": ("txt", HOLD, "the kind of a trajectory file is given by its extension"),
 }
 
 
@@ -254,7 +254,7 @@ def test_a_robot_as_no_real_one_is_warned_of_in_one_line_and_refused_if_strict(r
 BAD_OPTIONS = {
     "no such joint in limits": (["--limits", "FILE"], "joints.pim: pendulum has no moving joint of this name"),
     "no file of limits": (["--limits", "none.yaml"], "none.yaml: file not found"),
-    "figure of another kind": (["--out", "limits.gif"], "limits.gif: the kind of a figure is told by its ending"),
+    "figure of another kind": (["--out", "limits.gif"], "limits.gif: the kind of a figure is given by its extension"),
     "no such link": (["--payload", "hand=3 kg"], "--payload: no link has this name, got 'hand'"),
     "even degree": (["--degree", "4"], "degree: the degree of the splines is odd"),
 }

@@ -81,7 +81,7 @@ def test_samples_go_with_the_file_to_another_folder(call, tmp_path):
         ((FOUR_BAR, "a.txt"), "valid: .yaml, .yml, .toml, .json"),
         ((FOUR_BAR, "no/where/a.json"), "does not exist"),
         (("none.yaml", "a.json"), "file not found"),
-        (("none.stl", "a.json"), "told by its ending"),
+        (("none.stl", "a.json"), "given by its extension"),
         ((ROOT / "examples" / "broken" / "unknown_type.yaml", "a.json"), "unknown_type.yaml, line"),
         ((FOUR_BAR, "a.json", "--hold"), "--hold: is for robots"),
         ((ROBOTS / "scara.urdf", "a.yaml", "--drive", "elbo=1"), "did you mean 'elbow'"),

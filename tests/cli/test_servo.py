@@ -58,7 +58,7 @@ def test_json_is_in_si_and_tells_the_continuity(capsys):
         (["--driver", "moto"], "--driver: no driver has this name, got 'moto'; did you mean 'motor'?"),
         (["--units", "angle=mm"], "--units angle: measures a length, not an angle"),
         (["--units", "angle"], "--units: units are given by NAME=UNIT"),
-        (["--header-units", "--plain-header"], "--plain-header: goes against --header-units"),
+        (["--header-units", "--plain-header"], "--plain-header: cannot be given together with --header-units"),
     ],
 )
 def test_what_is_wrong_is_told_with_the_option(capsys, options, words):

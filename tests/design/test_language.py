@@ -50,7 +50,7 @@ def test_of_a_lower_bound_the_sides_are_turned():
         ("peak(psi, BC)", [], ExpressionError, "the same in all designs"),
         ("at(psi, 3)", [], ExpressionError, "not within the motion, which is from 0 to 2 s"),
         ("peak(psi, 4, 1, 0.5)", [], ExpressionError, "must end after it begins"),
-        ("peak(psi - mean(psi))", [], ExpressionError, "is one number, and stands within another"),
+        ("peak(psi - mean(psi))", [], ExpressionError, "is one number and cannot stand within another"),
         ("path_error(psi, target)", [], ExpressionError, "must be an output that is a point"),
         ("path_error(C, target)", [], ExpressionError, "no points have the name 'target'"),
         ("peak(torque(theta))", [], JounceError, "mass"),

@@ -190,8 +190,8 @@ def test_check_writable_leaves_no_trace(tmp_path):
 @pytest.mark.parametrize(
     "name, words",
     [
-        ("motion.txt", "the kind of an output is told by its ending; valid: .csv, .nc"),
-        ("motion", "the kind of an output is told by its ending; valid: .csv, .nc"),
+        ("motion.txt", "the kind of an output is given by its extension; valid: .csv, .nc"),
+        ("motion", "the kind of an output is given by its extension; valid: .csv, .nc"),
         ("no/motion.csv", "does not exist"),
         ("folder.csv", "is a directory, the name of a file is needed"),
         ("file.csv/motion.csv", "does not exist"),
@@ -237,7 +237,7 @@ def test_names_that_netcdf_cannot_hold(tmp_path):
     [
         ("a.csv", None, "file not found"),
         ("a.nc", None, "file not found"),
-        ("a.txt", b"", "the kind of results is told by the ending; valid: .csv, .nc"),
+        ("a.txt", b"", "the kind of results is given by the extension; valid: .csv, .nc"),
         ("a.csv", b"", "is not a table of results"),
         ("a.csv", b"time,a\n", "is not a table of results"),
         ("a.csv", b"a,b\n1,2\n", "is not a table of results"),

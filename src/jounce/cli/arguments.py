@@ -47,4 +47,6 @@ def check_ending(path: Path, valid: Sequence[str]) -> None:
     """Raise MechanismFileError unless a file has one of the endings; what a folder is, its reader says."""
     suffix = path.suffix.lower()
     if suffix not in valid and not path.is_dir():
-        raise MechanismFileError(f"the kind of a file is told by its ending; {did_you_mean(suffix, valid)}", path=path)
+        raise MechanismFileError(
+            f"the kind of a file is given by its extension; {did_you_mean(suffix, valid)}", path=path
+        )

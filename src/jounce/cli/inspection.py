@@ -63,7 +63,7 @@ def inspect(
         if reading.set_:
             raise JounceError("is for mechanism files; a robot file has no parameters", name="--set", path=file)
         if reading.units:
-            raise JounceError("is for mechanism files; what is told of a robot is in SI", name="--units", path=file)
+            raise JounceError("is for mechanism files; results for robots are in SI units", name="--units", path=file)
         from jounce.reporting.robot_facts import inspected_robot
 
         facts = inspected_robot(RobotReading(strict=strict, allow=reading.allow).robot(file), file)

@@ -204,7 +204,7 @@ class Heading:
             Both are asked for.
         """
         if self.header_units and self.plain_header:
-            raise JounceError("goes against --header-units; give one of them", name="--plain-header")
+            raise JounceError("cannot be given together with --header-units", name="--plain-header")
         return True if self.header_units else False if self.plain_header else None
 
 

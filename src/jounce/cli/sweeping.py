@@ -152,7 +152,7 @@ def _problem(
     if file.suffix.lower() in ROBOT_FILES:
         if simulate or reading.set_ or given:
             raise JounceError(
-                "of a robot torques are computed; --simulate, --set and --tolerance are of mechanisms", path=file
+                "a sweep of a robot computes torques; --simulate, --set and --tolerance are for mechanisms", path=file
             )
         robot = RobotReading(payload=payload, allow=reading.allow)
         model = robot.robot(file)

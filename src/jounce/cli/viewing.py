@@ -70,7 +70,7 @@ def view(
         if file.suffix.lower() in DATA_FILES:
             subject = _cam(file, reading) if kind_of(file) == "cam" else reading.mechanism(file)
         elif reading.units:
-            raise JounceError("is for mechanism files; what is shown of a robot is in SI", name="--units")
+            raise JounceError("is for mechanism files; results for robots are in SI units", name="--units")
         elif reading.set_ or reading.import_:
             option = "--set" if reading.set_ else "--import"
             raise JounceError("is for mechanism files; a robot has no parameters", name=option)

@@ -135,7 +135,8 @@ class Quantities:
                 return lambda names: names[node.word]
             return self.atom(node.word)
         if node.word in MEASURES:
-            raise ExpressionError(f"'{node.text}' is one number, and stands within another measure; ask for them apart")
+            message = f"'{node.text}' is one number and cannot stand within another measure; write two measures"
+            raise ExpressionError(message)
         if node.word in EXERTED:
             return self._exerted(node)
         parts = [self.jet(part) for part in node.parts]

@@ -294,7 +294,7 @@ class Study:
             chosen = dataclasses.replace(mechanism, assembly=each.number)
             if np.abs(_placed(solve(chosen, first, 0)) - wanted).max() <= SAME_PLACE:
                 return chosen
-        message = "the assembly of the best design is none of those that are found of it"
+        message = "the assembly of the best design was not found again among the assemblies of that design"
         raise DesignError(message, name="assemblies", value=assembly)
 
 

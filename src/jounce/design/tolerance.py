@@ -115,7 +115,7 @@ def tolerance(
         outputs = {name: output for name, output in mechanism.outputs.items() if name in {c[0] for c in chosen}}
         wanted, mechanism = tuple(outputs), with_outputs(mechanism, outputs)
     if not mechanism.outputs:
-        raise MechanismError("there is no output whose spread could be told", name="outputs")
+        raise MechanismError("there is no output whose spread could be computed", name="outputs")
     instants = time_grid(mechanism.time if time is None else time, mechanism.parameter_values)
     nominal = solve(mechanism, instants, order)
     found = _Spread(nominal, variations, wanted)

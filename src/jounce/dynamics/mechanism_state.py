@@ -65,7 +65,7 @@ def _coordinates(mechanism: Mechanism, model: Model, state: object) -> Coordinat
             )
     missing = [name for name in mechanism.bodies if name not in state]
     if missing:
-        raise MechanismError("is missing: a state tells of every moving body", name=f"state.{missing[0]}")
+        raise MechanismError("is missing: a state must contain every moving body", name=f"state.{missing[0]}")
     read = [_body_state(f"state.{name}", state[name], model.pose_type) for name in mechanism.bodies]
     orders = {len(body["position"]) - 1: name for body, name in zip(read, mechanism.bodies, strict=True)}
     if len(orders) > 1:

@@ -151,7 +151,7 @@ def place_along(motion: Motion, time: Any) -> Place:
     place = Place(mechanism, motion.model, equations, found, clock_at(float(motion.time[lane]), held=False))
     left = place.free.T @ place.loads.sum(axis=0)
     if not np.abs(left).max(initial=0.0) <= 1e3 * BALANCED * max(np.abs(place.loads).max(initial=0.0), 1e-300):
-        message = f"is none that the forces cause; nothing balances {remains(Found(place, left, False))}"
+        message = f"does not follow from the forces: {remains(Found(place, left, False))} remains unbalanced"
         raise MechanismError(message, name="motion", value=motion)
     return place
 
@@ -201,11 +201,11 @@ def _check(reduction: Reduction) -> None:
         body = place.model.bodies[chosen]
         lacks = "mass" if place.mechanism.bodies[body].mass is None else "inertia"
         moved = freely_moving(place.model, moving[None])
-        message = f"{moved} can move without moving a mass, so that nothing determines how; give it one"
+        message = f"{moved} can move without moving a mass, so its acceleration is not determined; give it a mass"
         raise MechanismError(message, name=f"bodies.{body}.{lacks}")
     if names := kinked(reduction):
         message = (
-            "the force has a kink or a jump there, or bends within a millionth of the mechanism's size: no linear law "
-            "stands for it; smooth its law, or linearise elsewhere"
+            "the force has a kink or a jump there, or bends within a millionth of the mechanism's size: it cannot "
+            "be linearised; smooth its law, or linearise elsewhere"
         )
         raise MechanismError(message, name=f"forces.{names[0]}")

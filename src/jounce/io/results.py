@@ -327,7 +327,7 @@ def read(path: str | PathLike[str]) -> xarray.Dataset:
     name = fspath(path)
     suffix = Path(name).suffix.lower()
     if suffix not in SUFFIXES:
-        raise OutputError(f"the kind of results is told by the ending; valid: {', '.join(SUFFIXES)}", path=name)
+        raise OutputError(f"the kind of results is given by the extension; valid: {', '.join(SUFFIXES)}", path=name)
     content = read_file(name, None, error=OutputError, is_input=False)
     try:
         if suffix == ".nc":

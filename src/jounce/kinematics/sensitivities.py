@@ -194,8 +194,8 @@ def check_not_redundant(model: Model) -> None:
     rows, columns = model.system.shape
     if rows > columns or model.system.rank is not None:
         raise MechanismError(
-            "gradients of mechanisms with redundant constraints are not there yet; take joints that leave out the "
-            "equations that follow from others, as jn.mobility tells them",
+            "gradients of mechanisms with redundant constraints are not supported yet; use joints without "
+            "the equations that follow from others, which jn.mobility lists",
             name="joints",
         )
 

@@ -30,7 +30,7 @@ class _DriverCoordinateOutput(AbstractMotionOutput):
         check_name("driver", self.driver, mechanism.drivers, MechanismError, name="driver")
         driver = mechanism.drivers[self.driver]
         if not hasattr(driver, "evaluate"):
-            message = "the class of this driver does not say what its coordinate is; give it a method evaluate"
+            message = "the class of this driver does not define its coordinate; give it a method evaluate"
             raise MechanismError(message, name="driver", value=self.driver)
         if is_turning(driver) != (self.unit == "rad"):
             word = "an angle" if is_turning(driver) else "a displacement"

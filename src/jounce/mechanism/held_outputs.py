@@ -66,7 +66,7 @@ def with_outputs_held(mechanism: Mechanism) -> Mechanism:
     for name, motion in led.items():
         place = f"drivers.{name}.motion"
         if not hasattr(mechanism.drivers[name], "evaluate"):
-            message = "the class of this driver does not say what its coordinate is; give it a method evaluate"
+            message = "the class of this driver does not define its coordinate; give it a method evaluate"
             raise MechanismError(message, name=place, value=type(mechanism.drivers[name]).__name__)
         twice = [other for other, its in led.items() if its.output == motion.output and other != name]
         if twice:

@@ -82,7 +82,7 @@ class Body:
     def __post_init__(self):
         if isinstance(self.inertia, Inertia):
             if self.mass is not None or self.center_of_mass is not None:
-                message = "an Inertia tells the mass and the centre of mass; give neither beside it"
+                message = "an Inertia contains the mass and the centre of mass; do not give them besides"
                 raise MechanismError(message, name="inertia")
             whole, planar = self.inertia, len(self.position) == 2
             tensor = float(whole.tensor[2, 2]) if planar else whole.tensor

@@ -32,8 +32,8 @@ def check_process() -> None:
     """
     if left_behind():
         raise UnsupportedError(
-            "this process was forked from one in which JAX had already computed, and would wait for ever for threads "
-            "that are not here; start processes by 'spawn' or 'forkserver' (multiprocessing.get_context), or fork "
+            "this process was forked after JAX had already computed, and would wait forever for threads that a fork "
+            "does not have; start processes by 'spawn' or 'forkserver' (multiprocessing.get_context), or fork "
             "before the first computation"
         )
 
@@ -71,8 +71,8 @@ def concrete(
             raise UnsupportedError(WHAT_IS_NOT_TRACED.format(function.__name__), name=place)
         if place is not None:
             raise UnsupportedError(
-                f"jn.{function.__name__} decides by values, and cannot yet be used with values that jax.jit, jax.grad "
-                "or jax.vmap trace; call it with numbers, one design after another",
+                f"jn.{function.__name__} cannot yet be used with values that jax.jit, jax.grad or jax.vmap trace, "
+                "because it decides by values; call it with numbers, one design after another",
                 name=place,
             )
         with eval_context():  # ensure_compile_time_eval would compile each constant inside on its own

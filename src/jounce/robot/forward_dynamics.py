@@ -230,11 +230,11 @@ def _check_margins(robot: Robot, margin: Any, driven: np.ndarray) -> None:
     names = [joint.name for joint in robot.moving_joints] if robot.tree.shape.direct else []
     joints = np.flatnonzero(bad[sample, : len(names)])
     if not joints.size:
-        message = f"nothing resists some motion of the joints, or of the free base{where}: no acceleration follows"
+        message = f"some motion of the joints or of the free base has no inertia{where}: it has no acceleration"
         raise SingularityError(f"{message}; give the links and the base inertias", name=robot.name)
     message = (
-        f"nothing resists this joint{where}: what it moves has no inertia about its axis, so that no acceleration "
-        "follows; give the link an inertia, or the joint an armature with drives=True, or drive it"
+        f"the bodies that this joint moves have no inertia about its axis{where}, so that its acceleration is not "
+        "determined; give the link an inertia, or the joint an armature with drives=True, or drive it"
     )
     # the outermost one: what carries it is not known there either
     raise SingularityError(message, name=names[int(joints[-1])])

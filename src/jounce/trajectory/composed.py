@@ -176,8 +176,8 @@ class OutputMotion(_MadeOfOthers):
             Always.
         """
         message = (
-            f"follows from the output '{self.output}' by solving the mechanism, which this does not do; solve it by "
-            "jn.solve, and go on with motion.actuated, whose drivers have the laws found"
+            f"is known only once the mechanism is solved, as it follows from the output '{self.output}'; call "
+            "jn.solve, and use motion.actuated, whose drivers have the resulting laws"
         )
         raise TrajectoryError(message)
 

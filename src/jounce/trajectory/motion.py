@@ -192,8 +192,8 @@ class SplineMotion(AbstractMotion):
         if first < start - slack or last > stop + slack:
             asked = last if last > stop + slack else first
             message = (
-                f"the samples go from {start:.9g} to {stop:.9g} s, and say nothing of other instants"
-                "; stay within them, or choose what is beyond: hold or repeat"
+                f"the samples go from {start:.9g} to {stop:.9g} s, and the law is not defined beyond them"
+                "; stay within them, or choose beyond: hold or repeat"
             )
             raise MechanismError(message, value=float(asked))
 

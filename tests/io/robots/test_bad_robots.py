@@ -148,8 +148,8 @@ def test_content_that_is_no_robot(tmp_path, content, says):
             "robot.urdf.xacro",
             "is a xacro file, from which a URDF has yet to be made; run: xacro FILE.urdf.xacro > FILE",
         ),
-        ("robot.yaml", "the kind of a robot file is told by its ending; valid: .urdf, .xml"),
-        ("robot", "the kind of a robot file is told by its ending; valid: .urdf, .xml"),
+        ("robot.yaml", "the kind of a robot file is given by its extension; valid: .urdf, .xml"),
+        ("robot", "the kind of a robot file is given by its extension; valid: .urdf, .xml"),
         ("a\0b.urdf", "cannot be read: "),
     ],
 )

@@ -160,7 +160,7 @@ def test_messages_name_line_entry_and_value(text, message, refused):
 def test_a_file_that_is_none(robot, tmp_path):
     with pytest.raises(jn.RobotError, match="file not found"):
         load_limits(tmp_path / "none.yaml", robot)
-    with pytest.raises(jn.RobotError, match=r"the kind of a limits file is told by its ending; valid: \.yaml"):
+    with pytest.raises(jn.RobotError, match=r"the kind of a limits file is given by its extension; valid: \.yaml"):
         load_limits(tmp_path / "limits.txt", robot)
 
 

@@ -223,7 +223,8 @@ def test_bad_laws(tmp_path, text, message):
 
 
 @pytest.mark.parametrize(
-    "name, message", [("none.csv", "not found"), ("none.yaml", "file not found"), ("none.txt", "told by its ending")]
+    "name, message",
+    [("none.csv", "not found"), ("none.yaml", "file not found"), ("none.txt", "given by its extension")],
 )
 def test_no_such_file(tmp_path, name, message):
     with pytest.raises(TrajectoryError, match=message):

@@ -244,7 +244,7 @@ def test_a_static_torque_above_its_limit_is_told_with_its_place():
 
 
 def test_limits_that_allow_anything_or_nothing_are_told():
-    with pytest.raises(TrajectoryError, match="nothing that has a limit moves"):
+    with pytest.raises(TrajectoryError, match="nothing with a limit moves"):
         jn.retime(cart(), LINE)
     with pytest.raises(SolveError, match="rates at the ends"):
         jn.retime(cart(velocity=SPEED, acceleration=ACCELERATION), LINE, rates=(1.0, 0.0))

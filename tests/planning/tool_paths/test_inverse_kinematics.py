@@ -125,7 +125,7 @@ def test_direction_leaves_the_turn_about_it_free():
 @pytest.mark.parametrize(
     "settings, words",
     [
-        ({}, "nothing is wanted"),
+        ({}, "no goal for the tool"),
         ({"position": [0, 0]}, r"\(\.\.\., 3\)"),
         ({"position": [0, 0, np.nan]}, "finite"),
         ({"position": np.zeros((0, 3))}, "no pose to reach"),

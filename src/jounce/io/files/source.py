@@ -71,7 +71,9 @@ def read_source(
         raise error_type("the name of a file is needed", value=name)
     suffix = Path(name).suffix.lower()
     if suffix not in DATA_FILES and not Path(name).is_dir():
-        raise error_type(f"the kind of a {kind} file is told by its ending; valid: {', '.join(DATA_FILES)}", path=name)
+        raise error_type(
+            f"the kind of a {kind} file is given by its extension; valid: {', '.join(DATA_FILES)}", path=name
+        )
     reader = {".toml": parsers.read_toml, ".json": parsers.read_json}.get(suffix, parsers.read_yaml)
     try:
         source = reader(name, _decode(name, read_file(name)))

@@ -50,7 +50,7 @@ def ask_pint(name: str) -> tuple[float, Dimension] | None:
     Raises
     ------
     UnitError
-        The unit measures nothing that a mechanism has, has no fixed zero, or has a prefix that it never has.
+        The unit has a dimension that no mechanism uses, has no fixed zero, or has a prefix that it never has.
     """
     registry = _registry()
     try:
@@ -70,7 +70,7 @@ def ask_pint(name: str) -> tuple[float, Dimension] | None:
     whole = all(Fraction(power).denominator == 1 for power in powers.values())
     dimension = dimension_of(**{base: int(power) for base, power in powers.items()}) if whole else None
     if dimension is None or (dimension not in _MECHANICAL and not (dimension == NUMBER and unit in _PURE)):
-        message = f"the unit '{shown}' ({unit}) measures nothing that a mechanism has"
+        message = f"the unit '{shown}' ({unit}) has a dimension that no mechanism uses"
         raise UnitError(f"{message}; {nearest_unit(name)}".rstrip("; "))
     if prefix and (unit not in _PREFIXABLE | _TO_KILO or (unit in _TO_KILO and prefix in _LARGE)):
         raise UnitError(

@@ -46,7 +46,7 @@ def check_target(
     """
     name = fspath(path)
     if suffixes and Path(name).suffix.lower() not in suffixes:
-        raise OutputError(f"the kind of {kind} is told by its ending; valid: {', '.join(suffixes)}", path=name)
+        raise OutputError(f"the kind of {kind} is given by its extension; valid: {', '.join(suffixes)}", path=name)
     try:
         target = Path(os.path.realpath(name))
         _check_replaceable(target, overwrite)

@@ -180,7 +180,7 @@ def expanded(given: dict[str, Any], parameters: dict[str, Any], *, planar: bool)
     form, mass = given["inertia"], given["mass"]
     if "pseudo" in form:
         if mass is not None or given["center_of_mass"] is not None:
-            message = "a pseudo-inertia tells mass and centre of mass; give neither beside it"
+            message = "a pseudo-inertia contains mass and centre of mass; do not give them besides"
             raise MechanismError(message, name="pseudo")
         return _from_pseudo(form["pseudo"], parameters, planar=planar)
     words, kind = ("solid", "axis", "density"), form["solid"]

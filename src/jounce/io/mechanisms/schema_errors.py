@@ -124,7 +124,7 @@ def _unknown_output(source: Source, space: str, at: Location, entry: dict[str, A
             message = f"a {holder} has no such quantity; {did_you_mean(quantity, valid)}"
             return source.error(message, place, value=quantity)
     if quantity in ("force", "torque", "reaction"):
-        message = "of what? name a driver, joint or force, as in {driver: theta, quantity: torque}"
+        message = "name a driver, joint or force, as in {driver: theta, quantity: torque}"
         return source.error(message, place, value=quantity)
     if isinstance(quantity, str) and quantity in quantities:
         body = "bodies: [i, j]" if "bodies" not in entry else "body"

@@ -126,7 +126,7 @@ class _DrivesFile:
     def _drive(self, values: Mapping[str, Any], places: Mapping[str, Location], turning: bool) -> Drive:
         motor = turning or values.get("lead") is not None
         if turning and values.get("lead") is not None:
-            message = "belongs to what slides; this turns, and has a gear_ratio"
+            message = "is for joints and drivers that slide; this one turns, give a gear_ratio"
             raise self.source.error(message, (*places["lead"], "lead"), value=values["lead"])
         numbers = {key: self._number(raw, key, (*places[key], key), turning, motor) for key, raw in values.items()}
         try:

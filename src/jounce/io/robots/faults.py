@@ -59,8 +59,8 @@ class Faults:
             return None
         parts = [f"{heading}: {_listed(names)}" for heading, names in self.names.items()]
         message = (
-            f"{self.path}: no real robot is like this, and all is computed with the numbers of the file; "
-            f"{'; '.join(parts)}; mend the file, or make this an error with strict=True (--strict)"
+            f"{self.path}: values that no real robot has are used as they are in the file; "
+            f"{'; '.join(parts)}; correct the file, or make this an error with strict=True (--strict)"
         )
         return RobotWarning(message)
 

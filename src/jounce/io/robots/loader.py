@@ -84,7 +84,7 @@ def load_robot(
     if suffix == ".xacro":
         raise RobotFileError(XACRO, path=name)
     if suffix not in ROBOT_FILES and not Path(name).is_dir():
-        message = f"the kind of a robot file is told by its ending; valid: {', '.join(ROBOT_FILES)}"
+        message = f"the kind of a robot file is given by its extension; valid: {', '.join(ROBOT_FILES)}"
         raise RobotFileError(message, path=name)
     root, faults = read_markup(name), Faults(name, strict)
     if root.tag == "robot":

@@ -199,7 +199,7 @@ class _Reader:
                 continue
             if kind != int(kinds.mjEQ_JOINT):
                 word = kinds(int(kind)).name.removeprefix("mjEQ_").lower()
-                message = f"an active equality of type {word} ties parts together as no joint or closure can"
+                message = f"an active equality of type {word} has no equivalent joint or closure"
                 raise RobotFileError(f"{message}; remove it, or set active='false'", **place)
             first, second = int(model.eq_obj1id[k]), int(model.eq_obj2id[k])
             coefficients = model.eq_data[k][:5]

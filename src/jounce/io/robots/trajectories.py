@@ -94,7 +94,7 @@ def load_trajectory(
     name = str(fspath(path))
     suffix = Path(name).suffix.lower()
     if suffix not in (".csv", *DATA_FILES):
-        message = "the kind of a trajectory file is told by its ending"
+        message = "the kind of a trajectory file is given by its extension"
         raise TrajectoryError(f"{message}; valid: {', '.join(('.csv', *DATA_FILES))}", path=name)
     if suffix == ".csv":
         found = read_table(name, joints)

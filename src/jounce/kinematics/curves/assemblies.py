@@ -240,7 +240,7 @@ class _Search:
             raise AssemblyError(f"no assembly was found from {self.starts} starts at t = {self.instant:g} s")
         if not self.found:
             message = (
-                f"at t = {self.instant:g} s the mechanism can move with its drivers held: there is no end of assemblies"
+                f"at t = {self.instant:g} s the mechanism can move with its drivers held: infinitely many assemblies"
             )
             raise MobilityError(message)
 

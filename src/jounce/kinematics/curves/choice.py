@@ -51,7 +51,7 @@ def _by_wish(found: Assemblies, wish: Mapping[str, str]) -> Assembly:
         left = [x for x, size in zip(left, sizes, strict=True) if size > sizes.max() - APART * _size(left[0].mechanism)]
     if len(left) > 1:
         numbers = " and ".join(str(x.number) for x in left)
-        message = f"the wish does not tell assemblies {numbers} apart: add one about another body, or give a number"
+        message = f"assemblies {numbers} fit equally well: add the side of another body, or give a number"
         raise AssemblyError(message, name="assembly", value=dict(wish))
     return left[0]
 

@@ -76,7 +76,7 @@ class Drive:
         if self.gear_ratio == 0:
             raise RobotError("must not be zero", name="gear_ratio", value=0.0)
         if self.lead is not None and self.gear_ratio != 1.0:
-            raise RobotError("goes against the lead; give one of them", name="gear_ratio", value=self.gear_ratio)
+            raise RobotError("cannot be given together with a lead", name="gear_ratio", value=self.gear_ratio)
         for field in ("damping", "deflection_limit"):
             if self.stiffness is None and getattr(self, field):
                 message = "belongs to a spring; give the stiffness too, or leave it out for a rigid joint"
@@ -178,7 +178,7 @@ class DriveArrays:
             if not isinstance(drive, Drive):
                 raise RobotError("must be a jn.Drive", name=f"drives.{name}", value=drive)
             if drive.lead is not None and turning[names.index(name)]:
-                message = "belongs to what slides; this turns, and has a gear_ratio"
+                message = "is for joints and drivers that slide; this one turns, give a gear_ratio"
                 raise RobotError(message, name=f"drives.{name}.lead", value=drive.lead)
         each = [drives.get(name, Drive()) for name in names]
         inertia = [

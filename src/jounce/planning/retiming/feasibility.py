@@ -24,8 +24,8 @@ def check_possible(source: Source, labels: Labels, start: float, stop: float, *,
         where = source.place(float(s[at]))
         message = (
             f"no time law exists that could halt everywhere: at {where} standing still needs a {label.word} of "
-            f"{value:.6g} {label.unit}, and the limit is {limit:.6g} {label.unit}; what only momentum could carry past "
-            "is not sought; choose another path, or a smaller load"
+            f"{value:.6g} {label.unit}, and the limit is {limit:.6g} {label.unit}; motions that "
+            "pass only by momentum are not sought; choose another path, or a smaller load"
         )
         raise TrajectoryError(message, name=label.owner)
     if bounded:
@@ -34,7 +34,7 @@ def check_possible(source: Source, labels: Labels, start: float, stop: float, *,
     still_there = np.flatnonzero(moving < IDLE)
     if len(still_there):
         where = source.place(float(s[still_there[0]]))
-        message = f"nothing that has a limit moves at {where}, so that no law is the fastest; give more limits"
+        message = f"nothing with a limit moves at {where}, so that there is no fastest law; give more limits"
         raise TrajectoryError(message, name="limits")
 
 

@@ -67,7 +67,7 @@ class RateMotion(AbstractMotion):
         """Raise TrajectoryError if some instants are before the beginning or after the end."""
         stop = self.duration
         if first < -SLACK * stop or last > (1 + SLACK) * stop:
-            message = f"the law goes from 0 to {stop:.9g} s, and says nothing of other instants; stay within them"
+            message = f"the law is defined from 0 to {stop:.9g} s only; choose instants within"
             raise TrajectoryError(message, value=float(first if first < 0 else last))
 
     def __call__(self, time: Jet) -> Jet:

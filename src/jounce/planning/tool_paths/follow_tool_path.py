@@ -120,7 +120,7 @@ def follow_tool_path(
     basis, whole = reachable_rows(columns)
     equations = PathEquations(robot.tree, tool, basis, scale, weight, held, kinds, n)
     if whole < min(basis.shape[1], n):
-        message = "the joints do not determine one another: some move the tool alike; hold others, or fewer"
+        message = "the held joints and the tool do not determine the other joints; hold others, or fewer"
         raise RobotError(message, name="hold", value=list(laws.names) if laws else None)
 
     def target(instants: np.ndarray, levels: int) -> dict[str, Any]:
@@ -189,8 +189,8 @@ def _to_posture(equations: PathEquations, u: np.ndarray, target: Any, begin: flo
     nodes = followed(equations, u, moving, 0.0, 1.0, 30)
     if nodes.failed is not None:
         message = (
-            "the coordinates nearest to the posture are not reached from the start: on the way, there is no nearest "
-            "one any more; give another posture, or a start nearer to it"
+            "the coordinates nearest to the posture are not reached from the start: on the way, these "
+            "coordinates cease to exist; give another posture, or a start nearer to it"
         )
         raise SingularityError(message, name=link)
     return nodes.series[-1, 0]

@@ -229,7 +229,7 @@ def _checked_goal(position: Any, orientation: Any, direction: Any) -> tuple[dict
     if direction is not None:
         goal["direction"] = unit_vectors("direction", direction)
     if not goal:
-        raise RobotError("nothing is wanted of the tool: give a position, an orientation or a direction")
+        raise RobotError("no goal for the tool: give a position, an orientation or a direction")
     leads = {kind: x.shape[: x.ndim - len(WIDTHS[kind])] for kind, x in goal.items()}
     try:
         return goal, np.broadcast_shapes(*leads.values())
