@@ -17,16 +17,20 @@ from jounce.cli.compiled_programs import keep_programs
 from jounce.constraints import base  # importing jounce switches on double precision
 
 # Most of the time of the tests goes into compiling. It is halved without XLA's last optimisations, without its passes
-# over loops, which go round some thirty times, and in one thread, of which the other worker has the next. Its newer
-# emitters, which the solver's programs leave out too, take twice as long for an operation alone. The same is asked of
-# the results; the examples, the study of branches and the benchmarks run as users do.
+# over loops and reshapes, which go round some thirty times, and in one thread, of which the other worker has the next.
+# Its newer emitters, which the solver's programs leave out too, take twice as long for an operation alone. The same is
+# asked of the results; the examples, the study of branches and the benchmarks run as users do.
 _QUICK_TO_COMPILE = (
     "--xla_backend_optimization_level=0",
     "--xla_cpu_use_fusion_emitters=false",
     "--xla_cpu_parallel_codegen_split_count=1",
-    "--xla_disable_hlo_passes=simplify-while-loops,while-loop-invariant-code-motion,while-loop-constant-sinking",
+    "--xla_disable_hlo_passes=simplify-while-loops,while-loop-invariant-code-motion,while-loop-constant-sinking"
+    ",reshape-mover",
 )
 os.environ.setdefault("XLA_FLAGS", " ".join(_QUICK_TO_COMPILE))
+# There is a worker for each core: threads beside it take a sixth more time of the processor, as two work on the same
+# memory and ask for the same lock. Tests of threads and of rehearsals ask for two; the examples run with all cores.
+os.environ.setdefault("JOUNCE_THREADS", "1")
 # The lines of Python from which each operation comes, which only dumps of programs show, take a twelfth of the time.
 jax.config.update("jax_include_full_tracebacks_in_locations", False)
 jax.config.update("jax_traceback_in_locations_limit", 0)
@@ -68,7 +72,19 @@ def _few_programs():
     Those that are needed again are read from their files.
     """
     yield
-    if _memory() > LARGEST_MEMORY or _memory_maps() > 0.5 * MEMORY_MAPS:
+    _forget_programs(LARGEST_MEMORY)
+
+
+@pytest.fixture(autouse=True)
+def _fewer_programs():
+    """Forget them before the end of a file that compiles very many."""
+    yield
+    if _memory() > 1.25 * LARGEST_MEMORY:
+        _forget_programs(LARGEST_MEMORY)
+
+
+def _forget_programs(memory):
+    if _memory() > memory or _memory_maps() > 0.5 * MEMORY_MAPS:
         jax.clear_caches()
         gc.collect()
         getattr(ctypes.CDLL(None), "malloc_trim", lambda _: None)(0)  # glibc keeps what was freed

@@ -27,6 +27,7 @@ def compilations():
 def compiled_later(monkeypatch):
     """Rehearse first, in this thread and with its errors; tell what was compiled in the place of that afterwards."""
     before = {}
+    monkeypatch.setenv(VARIABLE, "2")
 
     @contextmanager
     def first(rehearsal, *, wanted):
@@ -44,6 +45,16 @@ def test_forces_of_a_motion_are_rehearsed(name, compiled_later):
     motion = jn.solve(jn.load(f"examples/{name}.yaml"), order=3)
     assert all(np.isfinite(values).any() for values in motion.outputs.values())
     assert compiled_later() <= {"leg"}
+
+
+def test_results_with_a_rehearsal_beside_are_those_without(monkeypatch):
+    press, found = jn.load("examples/press.yaml"), []
+    for threads in ("1", "2"):
+        monkeypatch.setenv(VARIABLE, threads)
+        monkeypatch.setattr(sys.modules["jounce.kinematics.rehearsal"], "_had", set())
+        found.append(jn.solve(press, order=3).outputs)
+    for name, values in found[0].items():
+        np.testing.assert_array_equal(found[1][name], values)
 
 
 def test_long_grids_are_rehearsed(compiled_later):

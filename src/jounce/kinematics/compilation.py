@@ -84,8 +84,9 @@ def keep_programs(store: Store | None) -> None:
     _store = store
 
 
-UNENDING = ("simplify-while-loops", "while-loop-invariant-code-motion", "while-loop-constant-sinking")
-"""XLA's passes over loops that undo each other's work, some thirty times; our loops have nothing for them to do."""
+UNENDING = ("simplify-while-loops", "while-loop-invariant-code-motion", "while-loop-constant-sinking", "reshape-mover")
+"""XLA's passes that undo each other's work, some twenty or thirty times: those over loops, which have nothing for them
+to do here, and one that moves reshapes to where its simplifier does not want them."""
 
 
 def compiler_options(without: Iterable[str] = (), *, narrow: bool = False) -> dict[str, Any] | None:
