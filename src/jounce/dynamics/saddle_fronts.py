@@ -7,6 +7,7 @@ fewer multipliers than others have some that are zero instead.
 
 import itertools
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any
 
 import equinox as eqx
@@ -56,6 +57,13 @@ class SaddleFronts(eqx.Module):
     @classmethod
     def of(cls, pattern: Pattern) -> "SaddleFronts | None":
         """Plan the elimination from the pattern of the Jacobian; None where a dense one is less work."""
+        arrays = (np.asarray(pattern.bodies), np.asarray(pattern.places))
+        told = tuple((x.shape, x.dtype.str, x.tobytes()) for x in arrays)
+        return _planned(told, pattern.body_count, pattern.entry_count, FRONT_COST)
+
+    @classmethod
+    def anew(cls, pattern: Pattern) -> "SaddleFronts | None":
+        """Plan it, as `of` does, which keeps the plans."""
         size, width, count = sum(pattern.shape), pattern.width, pattern.body_count
         bodies, places = np.asarray(pattern.bodies), np.asarray(pattern.places)
         owners = _owners(bodies.tolist(), count)
@@ -150,6 +158,18 @@ class SaddleInverse(eqx.Module):
         forces = diagonal[:columns]
         largest = jnp.max(forces, axis=0, keepdims=True)
         return jnp.sqrt(forces * largest), jnp.max(diagonal[columns:], axis=0, initial=0.0)
+
+
+@lru_cache(maxsize=100)
+def _planned(
+    told: tuple[tuple[tuple[int, ...], str, bytes], ...], body_count: int, entry_count: int, _: float
+) -> SaddleFronts | None:
+    """Return the plan for a pattern of these arrays: the same for all values, so is kept."""
+    bodies, places = (np.frombuffer(data, kind).reshape(shape) for shape, kind, data in told)
+    found = SaddleFronts.anew(Pattern(bodies, places, body_count, entry_count))
+    for array in jax.tree.leaves(found):
+        array.setflags(write=False)  # many equations share it
+    return found
 
 
 Meeting = list[dict[int, dict[int, int]]]
