@@ -18,11 +18,12 @@ from jaxtyping import Bool, Float, Int
 
 from jounce.dynamics.loads import inertia_forces, mass_matrices
 from jounce.dynamics.masses import Gravity, Masses
-from jounce.dynamics.saddle_fronts import SaddleFactor, SaddleFronts
+from jounce.dynamics.saddle_fronts import SaddleFactor, SaddleFronts, SaddleInverse
 from jounce.dynamics.saddle_point import (
     BodyMatrices,
     ByBody,
     Column,
+    DenseInverse,
     Jacobian,
     MassMatrix,
     ReducedFactor,
@@ -50,8 +51,10 @@ Lanes = Float[Numbers, " batch"]
 Flags = Bool[Numbers, " batch"]
 Indices = Int[Numbers, " batch"]
 Factor = DenseFactor | SaddleFactor | ReducedFactor
+Inverse = DenseInverse | SaddleInverse
+"""Of the equations' matrix, for many right sides that come one by one."""
 Matrices = Float[Numbers, "size size batch"]
-"""Of the equations of motion, or their inverses."""
+"""Of the equations of motion."""
 Rows = Float[Numbers, "row batch"]
 Shifts = Float[Numbers, "shift body batch"]
 """One vector for each body, such as a position or a velocity."""
@@ -285,23 +288,9 @@ def conjugate(variation: Callable[[Pose], Any], pose: Pose, weights: Float[Numbe
     return transposed(weights)[0]
 
 
-def multiplied(matrix: Float[Numbers, "row size batch"], column: Float[Numbers, "size batch"]) -> Rows:
-    """Return the product of matrices and columns, in a loop over the size.
-
-    XLA would otherwise compute the column anew for every row: a loop has its arguments made before it starts.
-    """
-    rows, size, lanes = matrix.shape
-    block = min(8, (size + 1) // 2)
-    count = -(-size // block)
-    matrix = jnp.pad(matrix, ((0, 0), (0, count * block - size), (0, 0)))
-    column = jnp.pad(column, ((0, count * block - size), (0, 0)))
-
-    def added(i: Any, found: Any) -> Any:
-        a = jax.lax.dynamic_slice_in_dim(matrix, i * block, block, 1)
-        b = jax.lax.dynamic_slice_in_dim(column, i * block, block)
-        return found + total(a[:, j] * b[j][None] for j in range(block))
-
-    return jax.lax.fori_loop(0, count, added, jnp.zeros((rows, lanes)))
+def inverted(factor: Factor) -> Inverse:
+    """Return what solves with factors for many right sides that come one by one."""
+    return factor.inverted() if isinstance(factor, SaddleFactor) else DenseInverse(factor.inverse())
 
 
 def begun_series(coefficients: list[Any], levels: int) -> Any:
@@ -315,7 +304,7 @@ def expand(
     state: State,
     time: Instants,
     order: int,
-    inverse: Matrices | None = None,
+    inverse: Inverse | None = None,
     *,
     reversible: bool = False,
 ) -> Expansion:
@@ -331,15 +320,15 @@ def expand(
         The instant, s.
     order : int
         Highest coefficient of positions and velocities, at least 1.
-    inverse : array of shape (size, size, batch), optional
+    inverse : DenseInverse or SaddleInverse, optional
         Of the equations' matrix at this state, where it is known.
     reversible : bool, default False
         Whether JAX may differentiate it in reverse mode.
     """
     count, bodies, lanes = equations.coordinates, *state.position.shape[1:]
-    known = equations.factored(state, time).inverse() if inverse is None else inverse
+    known = inverted(equations.factored(state, time)) if inverse is None else inverse
     rows = equations.system.row_scale.shape[0]
-    solved = partial(equations.unknowns, partial(multiplied, known))
+    solved = partial(equations.unknowns, known.solve)
 
     def program(*leaves: Any) -> Any:
         position, attitude, velocity, spin, acceleration, multipliers, clock = leaves

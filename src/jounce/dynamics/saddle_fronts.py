@@ -7,6 +7,7 @@ fewer multipliers than others have some that are zero instead.
 
 import itertools
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any
 
 import equinox as eqx
@@ -17,6 +18,7 @@ from jaxtyping import Float, Int
 
 from jounce.dynamics.saddle_point import BodyMatrices
 from jounce.kinematics.frontal import FrontalFactor
+from jounce.kinematics.frontal_inverse import FrontalInverse, InversePlan
 from jounce.mechanism.fronts import Fronts
 from jounce.mechanism.pattern import Pattern
 from jounce.shapes import Numbers
@@ -32,21 +34,36 @@ class SaddleFronts(eqx.Module):
 
     Attributes
     ----------
-    fronts : Fronts
+    plan : InversePlan
         Of a matrix whose entries are those of the mass matrices, of the Jacobian, and one.
     places : array of int, shape (size,)
         Where each unknown, the coordinates first, and its equation stand in it.
+    unknowns : array of int, shape (rows of the whole matrix,)
+        Which unknown stands there; one beyond the last where there is none.
     rows : array of int, shape (entries,)
         The row of each entry of the Jacobian, any where it is of the ground.
     """
 
-    fronts: Fronts
+    plan: InversePlan
     places: Int[Numbers, " size"]
+    unknowns: Int[Numbers, " row"]
     rows: Int[Numbers, " entry"]
+
+    @property
+    def fronts(self) -> Fronts:
+        """Those of the whole matrix."""
+        return self.plan.fronts
 
     @classmethod
     def of(cls, pattern: Pattern) -> "SaddleFronts | None":
         """Plan the elimination from the pattern of the Jacobian; None where a dense one is less work."""
+        arrays = (np.asarray(pattern.bodies), np.asarray(pattern.places))
+        told = tuple((x.shape, x.dtype.str, x.tobytes()) for x in arrays)
+        return _planned(told, pattern.body_count, pattern.entry_count, FRONT_COST)
+
+    @classmethod
+    def anew(cls, pattern: Pattern) -> "SaddleFronts | None":
+        """Plan it, as `of` does, which keeps the plans."""
         size, width, count = sum(pattern.shape), pattern.width, pattern.body_count
         bodies, places = np.asarray(pattern.bodies), np.asarray(pattern.places)
         owners = _owners(bodies.tolist(), count)
@@ -67,7 +84,10 @@ class SaddleFronts(eqx.Module):
         row_of = np.zeros(pattern.entry_count + 1, np.int32)
         row_of[places] = np.arange(len(bodies))[:, None, None]
         coordinates = (np.arange(count)[:, None] * whole + np.arange(width)).ravel()
-        return cls(fronts, np.concatenate([coordinates, where]).astype(np.int32), row_of[:-1])
+        at = np.concatenate([coordinates, where]).astype(np.int32)
+        unknowns = np.full(count * whole, size, np.int32)
+        unknowns[at] = np.arange(size)
+        return cls(InversePlan.of(fronts), at, unknowns, row_of[:-1])
 
     def factored(
         self,
@@ -81,33 +101,75 @@ class SaddleFronts(eqx.Module):
         lanes = entries.shape[-1]
         flat = jnp.broadcast_to(masses, (*masses.shape[:-1], lanes)).reshape(-1, lanes)
         whole = jnp.concatenate([flat, entries * row_scale[self.rows], jnp.ones((1, lanes))])
-        return SaddleFactor(FrontalFactor.of(self.fronts, whole, jnp.ones((self.fronts.row_count, 1))), self.places)
+        return SaddleFactor(FrontalFactor.of(self.fronts, whole, jnp.ones((self.fronts.row_count, 1))), self)
 
     def blank(self, lanes: int) -> "SaddleFactor":
         """Return a placeholder for the factors of a batch, to start a loop with."""
-        return SaddleFactor(FrontalFactor.blank(self.fronts, lanes), self.places)
+        return SaddleFactor(FrontalFactor.blank(self.fronts, lanes), self)
+
+    def spread(self, right: Unknowns) -> Float[Numbers, "row batch"]:
+        """Return right sides in the order of the coordinates and rows as those of the whole matrix."""
+        right = jnp.concatenate([right, jnp.zeros((1, right.shape[-1]))])
+        return right.at[self.unknowns].get(mode="promise_in_bounds")
 
 
 class SaddleFactor(eqx.Module):
     """The factors of a batch of such matrices."""
 
     factor: FrontalFactor
-    places: Int[Numbers, " size"]
+    saddle: SaddleFronts
 
     def solve(self, right: Unknowns) -> Unknowns:
         """Return the solutions for right sides in the order of the coordinates and rows."""
-        wide = jnp.zeros((self.factor.fronts.row_count, right.shape[-1])).at[self.places].set(right)
-        return self.factor.solve(wide)[self.places]
+        return self.factor.solve(self.saddle.spread(right))[self.saddle.places]
 
     def inverse(self) -> Float[Numbers, "size size batch"]:
-        """Return the inverse matrices, for many right sides that come one by one."""
-        size = len(self.places)
+        """Return the inverse matrices as dense ones."""
+        size = len(self.saddle.places)
 
         def one(lane: Any) -> Any:
             found = jax.tree.map(lambda x: jax.lax.dynamic_slice_in_dim(x, lane, 1, x.ndim - 1), self.factor.arrays)
-            return SaddleFactor(FrontalFactor(self.factor.fronts, *found), self.places).solve(jnp.eye(size))
+            return SaddleFactor(FrontalFactor(self.factor.fronts, *found), self.saddle).solve(jnp.eye(size))
 
         return jnp.moveaxis(jax.lax.map(one, jnp.arange(self.factor.inverted.shape[-1])), 0, -1)
+
+    def inverted(self) -> "SaddleInverse":
+        """Return what solves for many right sides that come one by one."""
+        return SaddleInverse(FrontalInverse.of(self.saddle.plan, self.factor), self.saddle)
+
+
+class SaddleInverse(eqx.Module):
+    """The inverses of a batch of such matrices, whose size grows with the number of bodies, not with its square."""
+
+    inverse: FrontalInverse
+    saddle: SaddleFronts
+
+    def solve(self, right: Unknowns) -> Unknowns:
+        """Return the solutions for right sides in the order of the coordinates and rows."""
+        return self.inverse.solve(self.saddle.spread(right))[self.saddle.places]
+
+    def responses(self, columns: int) -> tuple[Float[Numbers, "column batch"], Float[Numbers, " batch"]]:
+        """Return the largest response to a force on each coordinate, or more, and to a gap of the rows.
+
+        The inverse is not negative on the coordinates, and not positive on the rows: no entry of a column is larger
+        than the root of the product of its diagonal entry and of the largest of those.
+        """
+        diagonal = jnp.abs(self.inverse.diagonal()[self.saddle.places])
+        forces = diagonal[:columns]
+        largest = jnp.max(forces, axis=0, keepdims=True)
+        return jnp.sqrt(forces * largest), jnp.max(diagonal[columns:], axis=0, initial=0.0)
+
+
+@lru_cache(maxsize=100)
+def _planned(
+    told: tuple[tuple[tuple[int, ...], str, bytes], ...], body_count: int, entry_count: int, _: float
+) -> SaddleFronts | None:
+    """Return the plan for a pattern of these arrays: the same for all values, so is kept."""
+    bodies, places = (np.frombuffer(data, kind).reshape(shape) for shape, kind, data in told)
+    found = SaddleFronts.anew(Pattern(bodies, places, body_count, entry_count))
+    for array in jax.tree.leaves(found):
+        array.setflags(write=False)  # many equations share it
+    return found
 
 
 Meeting = list[dict[int, dict[int, int]]]

@@ -3,11 +3,15 @@
 Coordinates of bodies are shifts and turns, those of one body after those of another; the ground has none.
 """
 
+from typing import Any
+
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.jet.algebra import total
 from jounce.kinematics.linear import DenseFactor
 from jounce.shapes import Numbers
 
@@ -99,6 +103,40 @@ class ReducedFactor(eqx.Module):
         return jnp.concatenate([wide[:, :columns], right], axis=1)
 
 
+class DenseInverse(eqx.Module):
+    """The inverses of a batch of such matrices as they are."""
+
+    matrix: Float[Numbers, "size size batch"]
+
+    def solve(self, right: Float[Numbers, "size batch"]) -> Float[Numbers, "size batch"]:
+        """Return the solutions for right sides of all coordinates and rows."""
+        return multiplied(self.matrix, right)
+
+    def responses(self, columns: int) -> tuple[Float[Numbers, "column batch"], Float[Numbers, " batch"]]:
+        """Return the largest response to a force on each coordinate, and to a gap of the rows."""
+        forces = jnp.max(jnp.abs(self.matrix[:columns, :columns]), axis=0)
+        return forces, jnp.max(jnp.abs(self.matrix[columns:, columns:]), axis=(0, 1), initial=0.0)
+
+
 def in_basis(basis: Float[Numbers, "row rank batch"], jacobian: Jacobian) -> Float[Numbers, "rank column batch"]:
     """Return the combinations of the rows of a Jacobian that a basis tells."""
     return jnp.sum(basis[:, :, None] * jacobian[:, None], axis=0)
+
+
+def multiplied(matrix: Float[Numbers, "row size batch"], column: Float[Numbers, "size batch"]) -> Float[Numbers, "row batch"]:
+    """Return the product of matrices and columns, in a loop over the size.
+
+    XLA would otherwise compute the column anew for every row: a loop has its arguments made before it starts.
+    """
+    rows, size, lanes = matrix.shape
+    block = min(8, (size + 1) // 2)
+    count = -(-size // block)
+    matrix = jnp.pad(matrix, ((0, 0), (0, count * block - size), (0, 0)))
+    column = jnp.pad(column, ((0, count * block - size), (0, 0)))
+
+    def added(i: Any, found: Any) -> Any:
+        a = jax.lax.dynamic_slice_in_dim(matrix, i * block, block, 1)
+        b = jax.lax.dynamic_slice_in_dim(column, i * block, block)
+        return found + total(a[:, j] * b[j][None] for j in range(block))
+
+    return jax.lax.fori_loop(0, count, added, jnp.zeros((rows, lanes)))

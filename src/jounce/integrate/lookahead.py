@@ -13,7 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.dynamics.forward import Equations, Flags, Indices, Lanes, Matrices, State, with_ground
+from jounce.dynamics.forward import Equations, Flags, Indices, Inverse, Lanes, State, with_ground
 from jounce.dynamics.inverse import force_names
 from jounce.integrate.events import INTERPOLATION, NODES
 from jounce.integrate.methods import evaluated
@@ -54,14 +54,15 @@ class Lookahead(NamedTuple):
     limiting: Indices  # index of the one for which it was shortened
 
 
-def mobility_of(equations: Equations, inverse: Matrices) -> Mobility:
+def mobility_of(equations: Equations, inverse: Inverse) -> Mobility:
     """Return how readily generalised forces on each body move the mechanism, from the inverse of the matrix.
 
     The largest acceleration, in rad or sizes of the mechanism by s^2, by a force of one on one of the scaled
-    coordinates of the body.
+    coordinates of the body; of a large mechanism, a bound for it.
     """
     columns, count = equations.system.shape[1], equations.coordinates
-    responses = jnp.max(jnp.abs(inverse[:columns, :columns]), axis=0).reshape(-1, count, inverse.shape[-1])
+    responses = inverse.responses(columns)[0]
+    responses = responses.reshape(-1, count, responses.shape[-1])
     return with_ground(jnp.max(responses, axis=1)[None])[0] / equations.scale
 
 

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from jounce.dynamics.forward import Equations, Expansion, Flags, Indices, Lanes, State, begun_series, expand
+from jounce.dynamics.forward import Equations, Expansion, Flags, Indices, Lanes, State, begun_series, expand, inverted
 from jounce.integrate.lookahead import HARMLESS, SHORTEST, Lookahead, look_ahead, mobility_of
 from jounce.integrate.methods import AbstractMethod, Number, near_singular
 from jounce.integrate.projection import projected
@@ -100,7 +100,7 @@ def begin_march(equations: Equations, state: State, time: Lanes, *, order: int) 
     """
     angles = measured(equations, state)
     equations = equations.near(angles)
-    inverse = equations.factored(state, time[None]).inverse()
+    inverse = inverted(equations.factored(state, time[None]))
     expansion = _kept(expand(equations, state, time[None], order, inverse))
     outcome = jnp.where(_finite(expansion), int(Outcome.RUNNING), int(Outcome.LOST))
     none, nothing = jnp.full(time.shape, -1), jnp.zeros(time.shape)

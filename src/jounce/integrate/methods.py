@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float
 
-from jounce.dynamics.forward import Equations, Expansion, Flags, Lanes, Matrices, State
+from jounce.dynamics.forward import Equations, Expansion, Flags, Inverse, Lanes, State
 from jounce.errors import JounceError
 from jounce.shapes import Numbers
 
@@ -103,10 +103,9 @@ def _horner(
     return value
 
 
-def near_singular(equations: Equations, inverse: Matrices) -> Flags:
+def near_singular(equations: Equations, inverse: Inverse) -> Flags:
     """Tell where rows of the constraints are about to depend on each other, from the inverse of the matrix."""
-    columns = equations.system.shape[1]
-    return jnp.max(jnp.abs(inverse[columns:, columns:]), axis=(0, 1), initial=0.0) > BRACED
+    return inverse.responses(equations.system.shape[1])[1] > BRACED
 
 
 def _drowned(sizes: Sizes) -> Flags:

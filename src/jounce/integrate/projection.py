@@ -5,7 +5,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
-from jounce.dynamics.forward import Attitudes, Equations, Instants, Lanes, Matrices, State
+from jounce.dynamics.forward import Attitudes, Equations, Instants, Inverse, Lanes, State, inverted
 from jounce.jet import Jet
 
 MOST_ITERATIONS = 10
@@ -16,7 +16,7 @@ CLOSE = 4e-15  # so near to where the matrix was inverted, in the same unit, the
 ROUNDING = 1e-15  # a correction this small, in rad or sizes of the mechanism, leaves nothing to correct
 
 
-def projected(equations: Equations, state: State, time: Instants) -> tuple[State, Lanes, Matrices]:
+def projected(equations: Equations, state: State, time: Instants) -> tuple[State, Lanes, Inverse]:
     """Return the nearest state that fulfils the constraints and their rates, and how far positions moved.
 
     The correction of positions is that of least kinetic energy, were it a velocity; that of velocities likewise.
@@ -37,7 +37,7 @@ def projected(equations: Equations, state: State, time: Instants) -> tuple[State
     distance : array of shape (batch,)
         Size of the first correction of positions, rad or sizes of the mechanism; not finite where it failed, or
         redundant constraints contradict each other.
-    inverse : array of shape (rows, rows, batch)
+    inverse : DenseInverse or SaddleInverse
         Of the equations' matrix at this state, which `expand` takes.
     """
     clock, lanes = Jet([time]), time.shape[-1]
@@ -71,7 +71,7 @@ def projected(equations: Equations, state: State, time: Instants) -> tuple[State
     if equations.system.rank is not None:
         gap = equations.system.residual(equations.still(position, attitude), clock).coefficients[0]
         fulfilled &= jnp.max(jnp.abs(gap), axis=0) <= LARGEST_GAP
-    return moving, jnp.where(fulfilled, first, jnp.inf), factor.inverse()
+    return moving, jnp.where(fulfilled, first, jnp.inf), inverted(factor)
 
 
 def normalised(attitude: Attitudes) -> Attitudes:

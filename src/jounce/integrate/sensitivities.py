@@ -23,6 +23,7 @@ from jax.errors import ConcretizationTypeError
 from jaxtyping import Float, Int
 
 from jounce.dynamics.forward import Equations, Instants, State, expand
+from jounce.dynamics.saddle_point import DenseInverse
 from jounce.dynamics.masses import gravity_of, masses_of
 from jounce.dynamics.start import initial_as_drivers
 from jounce.errors import AssemblyError, MobilityError, SolveError, UnsupportedError
@@ -365,7 +366,7 @@ def _marched(
 def _expanded(equations: Equations, state: State, time: Instants, order: int) -> State:
     """Return the series of the motion through a state."""
     inverse = _inverse(equations.matrix(state, time), jax.lax.stop_gradient(equations.factored(state, time).inverse()))
-    return expand(equations, state, time, order, inverse, reversible=True).state
+    return expand(equations, state, time, order, DenseInverse(inverse), reversible=True).state
 
 
 def _inverse(matrix: Any, known: Any) -> Any:

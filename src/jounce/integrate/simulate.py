@@ -23,7 +23,7 @@ from jounce.integrate.options import checked_options, instants_of
 from jounce.integrate.robot_simulation import RobotSimulation
 from jounce.integrate.sensitivities import traced_simulation
 from jounce.integrate.simulate_robot import simulate_robot
-from jounce.integrate.simulation import Simulation
+from jounce.integrate.simulation import FEW_INSTANTS, Simulation
 from jounce.jet import Jet
 from jounce.kinematics import Status, raise_for_status
 from jounce.kinematics.compilation import compiled
@@ -37,7 +37,6 @@ from jounce.shapes import ArrayLike, Numbers
 
 AHEAD = 1e-9  # of the time so far: where steps collapse, what is not finite lies that close
 FEW = 4  # derivatives that are looked at for one that is not finite
-REHEARSED = 2  # instants: steps are evaluated at many of them together, however few there are
 STEPS = 64  # tried between two looks at progress and events
 ROBOT_OPTIONS = ("state", "torque", "driven", "drives", "base", "wrenches")
 
@@ -183,7 +182,7 @@ def simulate(
     _check_forces(start, float(instants[0]))
     detectors = [_detector_of(event, mechanism, start) for event in events]
     run = _Run(start, method, float(tolerance), float(longest_step), detectors)
-    run.go(instants, progress, lambda dense: Simulation(mechanism, start, dense, instants[:REHEARSED], order))
+    run.go(instants, progress, lambda dense: Simulation(mechanism, start, dense, instants[: FEW_INSTANTS + 1], order))
     simulation = Simulation(mechanism, start, run.dense_output, instants, order, run.ending, run.events.happened)
     if strict and run.events.stopped_at is None:
         raise_for_status(simulation)

@@ -30,6 +30,7 @@ from jounce.shapes import ArrayLike
 MUCH_LONGER = (
     1e3  # than the step over a jump or a kink are one of those before and the next; a steep force takes several
 )
+FEW_INSTANTS = 8  # evaluated together, where there are no more: the end of a long run, say
 PLACES = 16  # in each step at which attitudes are looked at for turns
 APPROACH = 4  # steps to such a place, each much shorter than the one before
 
@@ -231,7 +232,7 @@ def _at(equations: Equations, dense: DenseOutput, instants: np.ndarray, chosen: 
         begun = equations.near(tuple(part[steps].T for part in dense.angles))
         return expanded(begun, polynomial, now - dense.start[steps], now, order=order)
 
-    return in_chunks(chunk, len(instants), WIDTHS)
+    return in_chunks(chunk, len(instants), (FEW_INSTANTS, *WIDTHS))
 
 
 @compiled("order", narrow=True)
