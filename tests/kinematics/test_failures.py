@@ -236,3 +236,12 @@ def test_gaps_of_what_cannot_be_assembled_are_lengths_and_angles():
     with pytest.raises(jn.AssemblyError, match=r"11\.\d* deg, 11\.\d* deg") as caught:
         jn.solve(dataclasses.replace(base, joints=base.joints | both, drivers={}), [0.0])
     assert "missing" not in str(caught.value)
+
+
+def test_the_gap_of_two_points_in_one_place_is_a_length():
+    """The square of a distance has no slope where the distance is zero: nothing but its kind tells its unit."""
+    reach = jn.drivers.DistanceDriver(("ground", "crank"), [1, 0], [1, 0], motion="0.5 + t")
+    pin = jn.planar.Revolute(("ground", "crank"), [0, 0], [0, 0])
+    crank = jn.Mechanism("planar", bodies={"crank": jn.Body([0, 0])}, joints={"O": pin}, drivers={"reach": reach})
+    with pytest.raises(jn.AssemblyError, match=r"drivers\.reach stays open, by 500 mm"):
+        jn.solve(crank, [0.0])
