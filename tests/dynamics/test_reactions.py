@@ -206,3 +206,38 @@ def test_a_force_that_is_not_finite_is_named_with_its_time():
     motion = jn.solve(mechanism, TIME, order=4)
     with pytest.raises(MechanismError, match=r"forces\.brake: has no finite value at t = 0\.6 s; check its law"):
         jn.driver_force(motion, "turn")
+
+
+def test_forces_at_a_change_point_are_not_told():
+    """A parallelogram in circular translation: its weight on the crank in closed form, but where it is stretched out.
+
+    There the Jacobian is singular, and what rounding makes of the torque looks like any other number.
+    """
+    bodies = {
+        "crank": jn.Body([0, 0], angle=0.5, mass=1.0, inertia=0.01, center_of_mass=[0.1, 0]),
+        "coupler": jn.Body([0.2 * math.cos(0.5), 0.2 * math.sin(0.5)], mass=2.0, inertia=0.05),
+        "rocker": jn.Body([0.5, 0], angle=0.5, mass=1.0, inertia=0.01, center_of_mass=[0.1, 0]),
+    }
+    pins = {
+        "O": jn.planar.Revolute(("ground", "crank"), [0, 0], [0, 0]),
+        "A": jn.planar.Revolute(("crank", "coupler"), [0.2, 0], [0, 0]),
+        "B": jn.planar.Revolute(("coupler", "rocker"), [0.5, 0], [0.2, 0]),
+        "C": jn.planar.Revolute(("ground", "rocker"), [0.5, 0], [0, 0]),
+    }
+    turn = {"turn": jn.drivers.CoordinateDriver(("ground", "crank"), "angle", motion="0.5 + (pi - 0.5)*t")}
+    linkage = jn.Mechanism(space="planar", gravity=[0, -9.81], bodies=bodies, joints=pins, drivers=turn)
+    motion = jn.solve(linkage, [0.0, 0.9, 1.0 - 1e-4, 1.0, 1.1, 1.9], order=3)
+    assert not motion.status.any()
+    np.testing.assert_allclose(motion.change_points, [1.0], rtol=0, atol=1e-9)
+    torque = jn.driver_force(motion, "turn").values
+    expected = 9.81 * (0.1 + 0.1 + 0.4) * np.cos(0.5 + (np.pi - 0.5) * motion.time)
+    told = [0, 1, 2, 4, 5]
+    np.testing.assert_allclose(torque[told, 0], expected[told], rtol=0, atol=1e-9)
+    assert np.isnan(torque[3]).all()
+    assert np.isnan(jn.joint_reaction(motion, "B").force.values[3]).all()
+    equations = jn.constraint_equations(motion).isel(time=3)
+    assert np.isnan(equations.multipliers).all()
+    assert np.isfinite(equations.jacobian).all()
+    inertia = jn.dynamics.gibbs_appell(motion).values[:, 0, 0]
+    np.testing.assert_allclose(inertia[[0, 1, 4, 5]], 0, rtol=0, atol=1e-9)  # at a steady speed
+    assert np.isnan(inertia[3])

@@ -98,6 +98,15 @@ def test_change_point_of_a_parallelogram_is_passed_on_the_same_branch():
     np.testing.assert_allclose(motion.outputs["psi"], np.stack([time, np.ones(15)], axis=1), rtol=1e-11)
 
 
+@pytest.mark.parametrize("beyond", [-1e-11, 0.0, 1e-9, 1e-8])
+def test_a_motion_that_ends_at_a_change_point_has_no_derivatives_there(beyond):
+    """Stretched out: whether it goes on as a parallelogram cannot be seen, and rounding decides all rates."""
+    time = np.array([0.5, 2.0, np.pi + beyond])
+    mechanism = four_bar("0.5", "0.5", "t", AB=0.1, CD=0.1, AD=0.2, BC=0.2)
+    error = failure(mechanism, time, order=1)
+    assert list(error.motion.status) == [Status.OK, Status.OK, Status.SINGULAR]
+
+
 @pytest.mark.parametrize("time", [[0.0, 0.5, 1.0, 1.5], [0.0, 0.3, 0.7, 1.1]])
 def test_distance_driver_that_reaches_zero(time):
     error = failure(distance_slider("0.5 - 0.5*t"), time)
@@ -236,3 +245,12 @@ def test_gaps_of_what_cannot_be_assembled_are_lengths_and_angles():
     with pytest.raises(jn.AssemblyError, match=r"11\.\d* deg, 11\.\d* deg") as caught:
         jn.solve(dataclasses.replace(base, joints=base.joints | both, drivers={}), [0.0])
     assert "missing" not in str(caught.value)
+
+
+def test_the_gap_of_two_points_in_one_place_is_a_length():
+    """The square of a distance has no slope where the distance is zero: nothing but its kind tells its unit."""
+    reach = jn.drivers.DistanceDriver(("ground", "crank"), [1, 0], [1, 0], motion="0.5 + t")
+    pin = jn.planar.Revolute(("ground", "crank"), [0, 0], [0, 0])
+    crank = jn.Mechanism(space="planar", bodies={"crank": jn.Body([0, 0])}, joints={"O": pin}, drivers={"reach": reach})
+    with pytest.raises(jn.AssemblyError, match=r"drivers\.reach stays open, by 500 mm"):
+        jn.solve(crank, [0.0])

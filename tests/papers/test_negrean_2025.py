@@ -160,6 +160,12 @@ def test_measurements_of_ones_own(tmp_path, run):
     assert "not those of the" not in text
 
 
+def test_two_samples_make_one_segment_without_jumps(tmp_path):
+    samples = tmp_path / "mine.csv"
+    samples.write_text("time,slow\n0,0\n0.5,2\n")
+    assert not comparison.jumps(history(given_cases(samples, None)["slow"])).any()
+
+
 def test_measurements_say_their_unit(tmp_path):
     samples = tmp_path / "mine.csv"
     samples.write_text("time [ms],slow [deg/s^2]\n" + "".join(f"{100 * k},90\n" for k in range(9)))

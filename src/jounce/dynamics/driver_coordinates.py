@@ -23,6 +23,7 @@ from jounce.errors import MechanismError
 from jounce.jet import Jet
 from jounce.jet.algebra import total
 from jounce.kinematics import Motion
+from jounce.kinematics.change_points import spoiled
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.factors import Factor, factored
 from jounce.mechanism.system import System
@@ -63,7 +64,7 @@ def in_driver_coordinates(
     Returns
     -------
     xarray.DataArray
-        Dimensions time, derivative and driver; NaN at instants that were not solved.
+        Dimensions time, derivative and driver; NaN at instants that were not solved, and at change points.
 
     Raises
     ------
@@ -83,7 +84,9 @@ def in_driver_coordinates(
         still = {name: values[..., lanes] for name, values in start.items()}
         return _evaluated(model.system, still, motion.time[lanes], masses, pose_type, order, least, form, static)
 
-    return labelled(motion, in_chunks(chunk, len(motion.time)), driver=names)
+    values = in_chunks(chunk, len(motion.time))
+    values = np.where(spoiled(motion.passages, motion.time, least), np.nan, values)
+    return labelled(motion, values, driver=names)
 
 
 def drivers_of(motion: Motion) -> tuple[str, ...]:

@@ -15,6 +15,7 @@ from jounce.dynamics.motion_values import along_motion, cut
 from jounce.dynamics.redundant_forces import OPEN, OpenMultipliers
 from jounce.errors import MechanismError
 from jounce.kinematics import Motion, Status
+from jounce.kinematics.change_points import spoiled
 from jounce.mechanism import Model
 from jounce.mechanism.axis_angles import at_lanes
 from jounce.mechanism.builder import group_rows
@@ -89,10 +90,15 @@ class MotionForces:
     def multipliers(self) -> Numbers:
         """Multipliers of the rows of all residuals, as Taylor coefficients, (levels, rows, time).
 
-        Where constraints are redundant, those of least norm, or by the stiffnesses that the mechanism has for it.
+        Where constraints are redundant, those of least norm, or by the stiffnesses that the mechanism has for it. NaN
+        at change points, where they are not determined, and next to them where rounding decides them.
         """
         found = self._balancing[0]
         self.check_finite(found)
+        passages, time = self.motion.passages, self.motion.time
+        if passages:  # a distance d away they grow as 1 / d, and so does what rounding makes of them
+            unknown = [spoiled(passages, time, level + 1) for level in range(len(found))]
+            found = np.where(np.array(unknown)[:, None], np.nan, found)
         return found
 
     @cached_property

@@ -232,10 +232,10 @@ def _widths(model: Model, found: Trial, instant: float) -> dict[str, str]:
     """Return by how much each joint and driver is open, as a length or as an angle, whichever it closes."""
     shifts, entries = model.pose_type.shifts, np.abs(found.jacobian.blocks)
     by_shift, by_turn = (np.max(part, axis=(1, 2)) for part in (entries[:, :, :shifts], entries[:, :, shifts:]))
-    lengthy = by_shift > 1e-9 * by_turn
+    squares = _squared_lengths(model, instant)  # of two points in one place the slopes are all zero
+    lengthy = (by_shift > 1e-9 * by_turn) | np.isin(model.rows, list(squares))
     unit = np.where(lengthy, 1e3 * model.length, np.degrees(1.0))
     open_by = np.abs(found.gaps) * unit / np.maximum(np.where(lengthy, by_shift, by_turn), 1e-300)
-    squares = _squared_lengths(model, instant)
     for row, name in enumerate(model.rows):
         if name in squares:  # the residual is the square of a distance less this
             square = max(found.gaps[row] / found.scale[row] + squares[name], 0.0)

@@ -6,11 +6,12 @@ a little way off on both sides, where they are good, determine it in between: tw
 """
 
 import math
+from collections.abc import Iterable
 from typing import Any
 
 import jax
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from jounce.kinematics.path_following import Anchor, ChangePoint, FollowedPath, follow
 from jounce.kinematics.solver import Solver
@@ -32,6 +33,16 @@ def half_width(point: ChangePoint, order: int) -> float:
 def spoiled_width(point: ChangePoint, order: int) -> float:
     """Return within what distance of a change point a derivative of an order is mostly rounding, s."""
     return point.radius * (ROUNDING * math.factorial(order) / LARGEST_NOISE) ** (1 / (order + 1))
+
+
+def spoiled(
+    points: Iterable[ChangePoint], instants: Float[np.ndarray, " time"], order: int
+) -> Bool[np.ndarray, " time"]:
+    """Tell at which instants what follows from the factored Jacobian is mostly rounding at an order."""
+    found = np.zeros(len(instants), bool)
+    for point in points:
+        found |= np.abs(instants - point.instant) < spoiled_width(point, order)
+    return found
 
 
 def bridged(

@@ -1,7 +1,7 @@
 """The result of a solve: outputs and any point of any body, with their derivatives, at every instant."""
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -15,6 +15,7 @@ from jounce.jet import Jet
 from jounce.jet.algebra import stacked
 from jounce.jet.derivatives import plain_derivatives
 from jounce.kinematics.compilation import compiled
+from jounce.kinematics.path_following import ChangePoint
 from jounce.kinematics.status import Status
 from jounce.mechanism import (
     AbstractMotionOutput,
@@ -93,7 +94,10 @@ class Motion(Displayed):
         Attitudes that all bodies in space went through, by which turns are counted; None where none are kept.
     change_points : numpy.ndarray of shape (points,)
         When the motion passed a singular position smoothly, where assembly branches cross, s: there another motion
-        could have branched off, and forces are not determined.
+        could have branched off, and forces are not determined: they are NaN there, and so are their rates where
+        rounding decides them.
+    passages : tuple of ChangePoint
+        The same, each with the radius of the Taylor series of the motion there.
     derived : dict
         What was computed of the motion and may be wanted again, by name: the forces, for one.
     """
@@ -109,12 +113,13 @@ class Motion(Displayed):
         state: tuple[dict[str, Any] | Callable[[], dict[str, Any]], tuple[Any, ...]],
         status: Numbers,
         faults: dict[int, str],
-        change_points: np.ndarray | None = None,
+        passages: Sequence[ChangePoint] = (),
         history: AttitudeHistory | None = None,
     ):
         self.mechanism, self.time, self.order, self.status = mechanism, time, order, status
         self.faults = faults
-        self.change_points = np.zeros(0) if change_points is None else change_points
+        self.passages = tuple(passages)
+        self.change_points = np.array([point.instant for point in self.passages])
         self.derived: dict[str, Any] = {}
         self.model, self.solved_model, self.history = model, model, history
         self._bodies, groups = state
@@ -151,7 +156,7 @@ class Motion(Displayed):
     def moved_by(self, model: Model, actuated: Mechanism) -> "Motion":
         """Return the same motion of the same bodies, with a model of the drivers that move them, and their laws."""
         state = self._bodies, tuple(self._groups.values())
-        outcome = self.status, self.faults, self.change_points, self.history
+        outcome = self.status, self.faults, self.passages, self.history
         motion = Motion(self.mechanism, model, self.time, self.order, state, *outcome)
         motion._actuated, motion.solved_model = actuated, self.model
         return motion

@@ -8,6 +8,7 @@ the other side to rounding, and is told.
 
 import bisect
 import dataclasses
+import itertools
 
 import jax
 import numpy as np
@@ -24,6 +25,7 @@ SMALLEST_STEP = 1e-10  # of the span
 PASSAGE_ORDER = 4  # of the series that leads through: rounding spoils higher derivatives near a singular position
 PASSAGE_DEVIATION = 1e-8  # from that series, as a part of the way: two branches a gap of g apart deviate by (g / way)^2
 NEARLY_SINGULAR = 1e-6  # of the span: a motion that ends so short before a singular position ends at it
+LEAST_PASSAGE = 0.2  # of the way to a change point: how far the motion must go on beyond it
 NEARBY = 0.1  # radii: a singular position nearer than this spoils high derivatives, if the motion is smooth there
 PLACES = 8  # in each step at which attitudes are looked at for turns: nowhere between them a body turns by half a turn
 
@@ -141,13 +143,23 @@ class FollowedPath:
 
     def singular_positions_outside(self) -> list[ChangePoint]:
         """Return where the motion would be singular just before its start or after its end, and smooth all the same."""
-        first, last = self.anchors[0], self.anchors[-1]
-        found = [
-            ChangePoint(anchor.instant + sense * anchor.reach, anchor.radius)
-            for anchor, sense in ((first, -1), (last, 1))
-            if sense * anchor.turnover < 0 and anchor.reach < NEARBY * anchor.radius
-        ]
-        return found if self.status == Status.OK else found[:1]
+        first = self.anchors[0]
+        found = []
+        if first.turnover > 0 and first.reach < NEARBY * first.radius:
+            found.append(ChangePoint(first.instant - first.reach, first.radius))
+        return [*found, *self._just_ahead()]
+
+    def _just_ahead(self) -> list[ChangePoint]:
+        """Return the singular position that the motion was nearing when it ended.
+
+        Where it ends next to it, or just beyond, rounding spoils what is known there: it is told from farther off.
+        """
+        end, passed = self.anchors[-1].instant, self.change_points[-1].instant if self.change_points else -np.inf
+        since = itertools.takewhile(lambda anchor: anchor.instant > passed, reversed(self.anchors))
+        nearing = [x for x in since if x.turnover < 0 and x.reach < NEARBY * x.radius]
+        ahead = [x for x in nearing if end - (x.instant + x.reach) < LEAST_PASSAGE * x.reach]
+        largest = max((x.radius for x in ahead), default=0.0)
+        return [ChangePoint(x.instant + x.reach, x.radius) for x in ahead if x.radius >= 0.5 * largest][:1]
 
 
 def follow(
@@ -231,7 +243,7 @@ def _passed(solver: Solver, here: Anchor, stop: float) -> tuple[Anchor, ChangePo
     """
     middle = here.instant + here.reach
     target = min(middle + here.reach, stop)
-    if target - middle < 0.2 * here.reach:
+    if target - middle < LEAST_PASSAGE * here.reach:
         return None  # the motion stops before
     coordinates, outputs, sign = here.state
     shortened = jax.tree.map(_shortened, (coordinates, outputs))

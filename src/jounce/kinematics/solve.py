@@ -142,9 +142,8 @@ def solve(
     instants = time_grid(mechanism.time if time is None else time, mechanism.parameter_values)
     solver, path = _followed(mechanism, instants, order, tolerance, refine=refine)
     found = solve_grid(solver, path, instants, progress, count, keep=keep)
-    change_points = np.array([point.instant for point in path.change_points])
-    state, outcome = (found.coordinates, found.outputs), (found.status, found.faults)
-    motion = actuated(Motion(mechanism, solver.model, instants, order, state, *outcome, change_points, path.history()))
+    state, outcome = (found.coordinates, found.outputs), (found.status, found.faults, path.change_points)
+    motion = actuated(Motion(mechanism, solver.model, instants, order, state, *outcome, path.history()))
     if strict:
         raise_for_status(motion)
     return motion

@@ -64,10 +64,8 @@ class Stretches:
             failed = np.flatnonzero(part.status != Status.OK)
             self.status[first + failed] = part.status[failed]
             self.faults |= {first + lane: fault for lane, fault in part.faults.items()}
-            outcome = part.status, part.faults
-            yield actuated(
-                Motion(self.mechanism, model, part.time, self.order, part.state, *outcome, self.change_points, history)
-            )
+            outcome = part.status, part.faults, self._path.change_points
+            yield actuated(Motion(self.mechanism, model, part.time, self.order, part.state, *outcome, history))
 
 
 def takes_stretches(mechanism: Mechanism) -> bool:

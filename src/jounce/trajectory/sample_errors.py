@@ -95,12 +95,12 @@ def unsupported_derivative(errors: Float[np.ndarray, " derivative"], order: int)
 
 def unsupported_words(name: str, order: int, error: float, degree: int) -> str:
     """Word why samples do not support a derivative, and what to do."""
-    size = "cannot be told from them" if error >= 1 else f"about {100 * error:.0f} %"
+    size = "cannot be told from them" if error >= 1 else f"is about {100 * error:.0f} %"
     if order >= degree:
         cause = f"splines of degree {degree} have continuous derivatives to order {degree - 1}; choose a higher degree"
     else:
         cause = "sample more often or more exactly, or smooth the samples"
-    return f"samples of '{name}' do not support its derivative of order {order}: its error is {size}; {cause}"
+    return f"samples of '{name}' do not support its derivative of order {order}: its error {size}; {cause}"
 
 
 def noise(times: Float[np.ndarray, " samples"], values: Float[np.ndarray, " samples"]) -> float:

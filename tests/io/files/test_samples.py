@@ -32,6 +32,9 @@ def test_columns_are_found(tmp_path, text, names):
     "text, names, words",
     [
         ("", {}, "the file of samples is empty"),
+        ("time;lift\n0;1\n1;2,5\n", {}, "line 1: entries are separated by commas, here by semicolons"),
+        ("0,0;1,5\n1,0;2,5\n", {}, "line 1: entries are separated by commas, here by semicolons"),
+        ("time\tlift\n0\t1\n", {}, "line 1: entries are separated by commas, here by tabs"),
         ("time\n1\n", {}, "line 1: samples need a column of times and one of values"),
         ("time,a,b\n0,1,2\n", {}, "line 1: has several columns besides the time, name that of the value; valid: a, b"),
         ("time,lift\n0,1\n", {"value": "lfit"}, "line 1: no column has this name, got 'lfit'; did you mean 'lift'?"),

@@ -16,6 +16,9 @@ from jounce.io.files.reading import fault_of_number, known_name, read_rows
 from jounce.trajectory.dimensions import NUMBER, TIME, Dimension, describe_dimension, dimension_of
 from jounce.trajectory.shown_units import unit_size
 
+SEPARATORS = {";": "semicolons", "\t": "tabs"}
+"""What other programs put between entries, and its name."""
+
 _RATE = re.compile(r"_d([0-9]{1,2})$")
 
 
@@ -240,6 +243,7 @@ class _Table:
         self.rows = [(line, row) for line, row in read_rows(path, error_type) if any(row)]
         if not self.rows:
             raise self.error("the file of samples is empty")
+        self._check_commas()
         self.header_line: int | None = None
         self.header = [f"column {k + 1}" for k in range(len(self.rows[0][1]))]
         self.units: list[str | None] = [None] * len(self.header)
@@ -250,6 +254,15 @@ class _Table:
 
     def error(self, message: str, **place: object) -> JounceError:
         return self.error_type(message, path=self.path, **place)  # type: ignore[arg-type]
+
+    def _check_commas(self) -> None:
+        """Refuse a file in which semicolons or tabs are between the entries, as spreadsheets of many countries do."""
+        line, row = self.rows[0]
+        for mark, name in SEPARATORS.items():
+            parts = [part for entry in row for part in entry.split(mark)]
+            if len(parts) > len(row) and (len(row) == 1 or all(_number(part) is not None for part in parts)):
+                message = f"entries are separated by commas, here by {name}; write commas, and points in decimals"
+                raise self.error(message, line=line)
 
     def find(self, column: str) -> int:
         """Return the number of a column by its name, with its unit or without."""

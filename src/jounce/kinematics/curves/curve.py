@@ -317,7 +317,7 @@ class Curve(Displayed):
         groups = model.system.outputs if history is None else history.counting(model.system.outputs, instants)
         series = tuple(np.asarray(output_series(group, coordinates, model.pose_type)) for group in groups)
         status = np.full(len(instants), int(Status.OK))
-        return Motion(mechanism, model, instants, self._order, (coordinates, series), status, {}, None, history)
+        return Motion(mechanism, model, instants, self._order, (coordinates, series), status, {}, (), history)
 
     @cached_property
     def _history(self) -> AttitudeHistory | None:

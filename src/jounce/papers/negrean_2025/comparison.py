@@ -89,5 +89,6 @@ def jumps(history: History) -> Float[np.ndarray, "6"]:
     for k in range(6):
         pieces = [np.polynomial.Polynomial(c).deriv(k) for c in law.coefficients.T]
         ends = [piece(step) for piece, step in zip(pieces, np.diff(law.knots), strict=True)]
-        found.append(max(abs(end - piece(0.0)) for end, piece in zip(ends[:-1], pieces[1:], strict=True)))
+        steps = [abs(end - piece(0.0)) for end, piece in zip(ends[:-1], pieces[1:], strict=True)]
+        found.append(max(steps, default=0.0))  # one segment has none
     return np.array(found)
