@@ -123,7 +123,9 @@ def in_basis(basis: Float[Numbers, "row rank batch"], jacobian: Jacobian) -> Flo
     return jnp.sum(basis[:, :, None] * jacobian[:, None], axis=0)
 
 
-def multiplied(matrix: Float[Numbers, "row size batch"], column: Float[Numbers, "size batch"]) -> Float[Numbers, "row batch"]:
+def multiplied(
+    matrix: Float[Numbers, "row size batch"], column: Float[Numbers, "size batch"]
+) -> Float[Numbers, "row batch"]:
     """Return the product of matrices and columns, in a loop over the size.
 
     XLA would otherwise compute the column anew for every row: a loop has its arguments made before it starts.

@@ -23,8 +23,8 @@ from jax.errors import ConcretizationTypeError
 from jaxtyping import Float, Int
 
 from jounce.dynamics.forward import Equations, Instants, State, expand
-from jounce.dynamics.saddle_point import DenseInverse
 from jounce.dynamics.masses import gravity_of, masses_of
+from jounce.dynamics.saddle_point import DenseInverse
 from jounce.dynamics.start import initial_as_drivers
 from jounce.errors import AssemblyError, MobilityError, SolveError, UnsupportedError
 from jounce.integrate.breaks import Break, breaks
