@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.dynamics.forward import expand
+from jounce.dynamics.forward import expand, inverted
 from jounce.dynamics.saddle_fronts import SaddleFronts
 from jounce.dynamics.start import consistent_start
 from jounce.kinematics.compilation import compiled
@@ -46,6 +46,34 @@ def test_solutions_and_inverses_are_those_of_the_whole_matrix(name, monkeypatch)
     assert np.abs(matrix @ inverse - np.eye(len(matrix))).max() < 1e-14 * size * np.abs(inverse).max()
 
 
+@compiled()
+def through_fronts(equations, state, right):
+    """The matrix, a solution through fronts, and the largest responses to forces and gaps."""
+    inverse = inverted(equations.factored(state, CLOCK))
+    responses = inverse.responses(equations.system.shape[1])
+    return equations.matrix(state, CLOCK), inverse.solve(right), *responses
+
+
+@pytest.mark.parametrize("name", ["free_four_bar", "gear_pair", "spatial_double_pendulum", "chain", "tree"])
+def test_products_through_fronts_are_those_with_the_inverse_of_the_whole_matrix(name, monkeypatch):
+    """A loop, a pair, chains and a tree; the bounds for responses hold, and are met by the most mobile coordinate."""
+    monkeypatch.setattr("jounce.dynamics.saddle_fronts.FRONT_COST", 0.0)
+    made = {"chain": lambda: pendulums(7), "tree": branches}
+    start = consistent_start(made.get(name, getattr(dynamics, name, None))(), 0.0)
+    rows, columns = start.equations.system.shape
+    right = np.cos(np.arange(rows + columns))[:, None]
+    found = (np.asarray(x)[..., 0] for x in through_fronts(start.equations, start.state, right))
+    matrix, solution, forces, gaps = found
+    inverse = np.linalg.inv(matrix)
+    condition = np.linalg.cond(matrix)
+    np.testing.assert_allclose(solution, inverse @ right[:, 0], atol=1e-15 * condition * np.abs(solution).max())
+    largest = np.abs(inverse[:columns, :columns]).max(axis=0)
+    rounding = 1e-15 * condition * np.abs(inverse).max()
+    assert (forces >= largest - rounding).all()
+    np.testing.assert_allclose(forces.max(), largest.max(), atol=rounding)
+    np.testing.assert_allclose(gaps, np.abs(inverse[columns:, columns:]).max(), atol=rounding)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["free_four_bar", "spatial_double_pendulum"])
 def test_expansions_are_those_of_dense_elimination(name, monkeypatch):
@@ -69,6 +97,25 @@ def pendulums(count, length=0.1):
         bodies={name: jn.Body((k * way).tolist(), **rod) for k, name in enumerate(names[1:])},
         joints={f"pin{k}": jn.planar.Revolute(pair, [length * (k > 0), 0], [0, 0]) for k, pair in enumerate(pairs)},
         outputs={"tip": jn.PointOutput(names[-1], [length, 0])},
+    )
+
+
+def branches():
+    """A tree: a rod that carries two others, one of which carries two more."""
+    rod = {"mass": 0.3, "inertia": 0.002, "center_of_mass": [0.1, 0.0]}
+    carried = {"trunk": "ground", "left": "trunk", "right": "trunk", "twig": "left", "leaf": "left"}
+    places = {"trunk": (0.0, 0.0, 1.0), "left": (0.2 * np.cos(1.0), 0.2 * np.sin(1.0), 2.0)}
+    places["right"] = (*places["left"][:2], 0.3)
+    tip = places["left"][0] + 0.2 * np.cos(2.0), places["left"][1] + 0.2 * np.sin(2.0)
+    places |= {"twig": (*tip, 2.5), "leaf": (*tip, 0.9)}
+    return jn.Mechanism(
+        space="planar",
+        gravity=[0, -9.81],
+        bodies={name: jn.Body([x, y], angle, **rod) for name, (x, y, angle) in places.items()},
+        joints={
+            name: jn.planar.Revolute((base, name), [0.2 * (base != "ground"), 0], [0, 0])
+            for name, base in carried.items()
+        },
     )
 
 

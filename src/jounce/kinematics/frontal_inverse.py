@@ -32,14 +32,14 @@ class InversePlan(eqx.Module):
     responses : array of int, shape (fronts, columns, left rows)
         Of the columns of neighbours and what the front leaves over: which entry of all blocks of the inverse, by front,
         column and row, tells how the column responds; one beyond the last where there is none.
-    diagonal : array of int, shape (rows,)
-        The entry of these blocks in which the row meets its own column.
+    diagonal : array of int, shape (rows of the matrix,)
+        The entry of these blocks in which a row meets its own column.
     """
 
     fronts: Fronts
     sources: Int[Numbers, "front row"]
     responses: Int[Numbers, "front column left"]
-    diagonal: Int[Numbers, " row"]
+    diagonal: Int[Numbers, " size"]
 
     @classmethod
     def of(cls, fronts: Fronts) -> "InversePlan":
