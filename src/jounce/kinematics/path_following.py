@@ -144,10 +144,10 @@ class FollowedPath:
     def singular_positions_outside(self) -> list[ChangePoint]:
         """Return where the motion would be singular just before its start or after its end, and smooth all the same."""
         first = self.anchors[0]
-        found = []
+        found = self._just_ahead() if self.status == Status.OK else []
         if first.turnover > 0 and first.reach < NEARBY * first.radius:
             found.append(ChangePoint(first.instant - first.reach, first.radius))
-        return [*found, *self._just_ahead()]
+        return found
 
     def _just_ahead(self) -> list[ChangePoint]:
         """Return the singular position that the motion was nearing when it ended.

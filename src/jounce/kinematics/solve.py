@@ -29,7 +29,15 @@ from jounce.kinematics.status import Status
 from jounce.kinematics.stretches import Stretches
 from jounce.kinematics.threads import thread_count
 from jounce.kinematics.traced_motion import TracedMotion
-from jounce.mechanism import AbstractMotionOutput, Mechanism, build, check_mechanism, time_grid, with_outputs_held
+from jounce.mechanism import (
+    AbstractMotionOutput,
+    Mechanism,
+    Model,
+    build,
+    check_mechanism,
+    time_grid,
+    with_outputs_held,
+)
 from jounce.mechanism.axis_angles import AttitudeHistory, measures_angle
 from jounce.mechanism.held_outputs import led_outputs
 from jounce.mechanism.law_checks import check_laws
@@ -227,9 +235,10 @@ def _followed(
             raise
         solver = dataclasses.replace(solver, model=model)
         still = _still(solver, coordinates)
-        if beside:
-            with tried():
-                _rehearse(mechanism, solver, still, instants)
+        with rehearsed(partial(_prepare, solver, first), wanted=beside and _rank_is_open(guessed)):
+            if beside:
+                with tried():
+                    _rehearse(mechanism, solver, still, instants)
     start = solver.beginning(still, first)
     on_the_way = np.asarray(instants) if len(instants) <= LONG_GRID else NO_GRID
     path = follow(solver, start, last, last - first, grid=on_the_way)
@@ -239,8 +248,16 @@ def _followed(
     return solver, path
 
 
+def _rank_is_open(model: Model) -> bool:
+    """Tell whether constraints are redundant by a number that only the assembled bodies show; programs depend on it."""
+    rows, columns = model.system.shape
+    return rows > columns and model.system.rank is None
+
+
 def _prepare(solver: Solver, instant: float) -> None:
-    """Have the program compiled that follows a motion, before the bodies are put together."""
+    """Compile the program that follows a motion, if all that it depends on is known already."""
+    if _rank_is_open(solver.model):
+        return
     model = dataclasses.replace(solver.model, system=resident(solver.model.system))
     solver = dataclasses.replace(solver, model=model)
     solver.prepare(_still(solver, model.guess), instant)
