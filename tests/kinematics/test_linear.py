@@ -118,3 +118,18 @@ def test_no_operation_is_left_to_lapack():
         )
 
     assert "custom_call" not in jax.jit(everything).lower(jnp.ones((4, 4, 3))).as_text()
+
+
+@pytest.mark.parametrize("departure", [1e-6, 1e-9])
+def test_factors_of_a_near_matrix_are_off_by_the_square_of_what_is_told(departure):
+    random = np.random.default_rng(5)
+    matrix = random.normal(size=(12, 12, 7))
+    near = matrix + departure * random.normal(size=matrix.shape)
+    known = random.normal(size=(12, 7))
+    right = np.einsum("rcb,cb->rb", near, known)
+    kept = DenseFactor.of(matrix).refining(near)
+    told = np.asarray(kept.defect())
+    off = np.abs(np.asarray(kept.solve(right, refined=False)) - known).max(axis=0)
+    assert ((off < 30 * told) & (told < 30 * off)).all()
+    condition = np.array([np.linalg.cond(near[..., k]) for k in range(7)])
+    assert (np.abs(np.asarray(kept.solve(right)) - known).max(axis=0) < 1e3 * told**2 + 1e-15 * condition).all()

@@ -5,6 +5,7 @@ import sys
 import threading
 from contextlib import contextmanager
 
+import jax
 import numpy as np
 import pytest
 
@@ -47,9 +48,11 @@ def test_forces_of_a_motion_are_rehearsed(name, compiled_later):
     assert compiled_later() <= {"leg"}
 
 
+@pytest.mark.slow
 def test_results_with_a_rehearsal_beside_are_those_without(monkeypatch):
     press, found = jn.load("examples/press.yaml"), []
     for threads in ("1", "2"):
+        jax.clear_caches()  # or there is nothing to rehearse
         monkeypatch.setenv(VARIABLE, threads)
         monkeypatch.setattr(sys.modules["jounce.kinematics.rehearsal"], "_had", set())
         found.append(jn.solve(press, order=3).outputs)
