@@ -8,8 +8,8 @@ from jaxtyping import Float, Int
 
 from jounce.constraints.angles import Datum, angle_of
 from jounce.jet.turns import counted_on, principal, whole_periods
-from jounce.mechanism.modules import with_fields
-from jounce.mechanism.system import Group
+from jounce.mechanism.modules import unchecked, with_fields
+from jounce.mechanism.system import Group, holding
 from jounce.mechanism.time import nearest_instants
 from jounce.shapes import Numbers
 
@@ -144,7 +144,7 @@ def with_turns(groups: Sequence[Group], near: Sequence[Any]) -> tuple[Group, ...
 def _with_data(groups: Sequence[Group], values: Sequence[Any], put: Callable[[Datum, Any], Datum]) -> tuple[Group, ...]:
     """Return groups with other data, one value for each that measures an angle about an axis."""
     found = iter(values)
-    return tuple(g.holding("datum", put(g.element.datum, next(found))) if measures_angle(g) else g for g in groups)
+    return tuple(holding(g, "datum", put(g.element.datum, next(found))) if measures_angle(g) else g for g in groups)
 
 
 def at_lanes(groups: Sequence[Group], lanes: Int[np.ndarray, " lane"]) -> tuple[Group, ...]:
@@ -173,7 +173,8 @@ def _with_datum(group: Group, coordinates: Coordinates, prescribed: Sequence[Pre
     # a driver or a force acts about the axis, wherever its vector on body j points beside it
     acts = element.vector_i is not None and hasattr(element, "role")
     across = _across(np.asarray(element.vector_j), attitude, axis) if acts else None
-    return group.holding("datum", Datum(attitude, angle, angle, across))
+    values = {"attitude": attitude, "angle": angle, "near": angle, "across": across}
+    return holding(group, "datum", unchecked(Datum, values))
 
 
 def with_datum_of(group: Group, known: Group) -> Group:
@@ -182,7 +183,7 @@ def with_datum_of(group: Group, known: Group) -> Group:
     if datum.across is not None:
         across = _across(group.element.vector_j, np.asarray(datum.attitude), axis_of(known))
         datum = with_fields(datum, across=across)
-    return group.holding("datum", datum)
+    return holding(group, "datum", datum)
 
 
 def departure(before: Sequence[Group], after: Sequence[Group]) -> float:

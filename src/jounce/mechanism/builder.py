@@ -30,7 +30,7 @@ from jounce.mechanism.modules import with_fields
 from jounce.mechanism.outputs import AbstractMotionOutput
 from jounce.mechanism.pattern import Pattern
 from jounce.mechanism.resolve import resolve, resolved
-from jounce.mechanism.system import POSITION_COMPONENTS, Group, System, group_elements
+from jounce.mechanism.system import POSITION_COMPONENTS, Group, System, group_elements, holding
 from jounce.rigid import PlanarPose, SpatialPose
 from jounce.rigid.euler_parameters import euler_parameters
 from jounce.rigid.pose import Pose
@@ -318,13 +318,13 @@ def with_offsets(group: Group, pose_type: type[Pose], guess: dict[str, Any]) -> 
     if "offset" not in fields or group.element.offset is not None:
         return group
     offset = _fulfilling_offset(group, guess, pose_type)
-    return group.holding("offset", offset if isinstance(offset, Tracer) else np.asarray(offset))
+    return holding(group, "offset", offset if isinstance(offset, Tracer) else np.asarray(offset))
 
 
 @partial(jax.jit, static_argnames="pose_type")
 def _fulfilling_offset(group: Group, guess: dict[str, Any], pose_type: type[Pose]) -> Float[Numbers, "instance 1"]:
     def residual(offset: Any) -> Any:
-        trial = group.holding("offset", offset)
+        trial = holding(group, "offset", offset)
         return trial.residual(pose_at(guess, pose_type), Jet([jnp.zeros((1, 1))])).coefficients[0]
 
     zero = jnp.zeros((group.instances, 1))
@@ -338,7 +338,7 @@ def with_sense(group: Group, pose_type: type[Pose], guess: dict[str, Any]) -> Gr
         return group
     pose = pose_at(guess, pose_type)
     sense = group.element.sense_at(*(pose.take(indices) for indices in group.bodies))
-    return group.holding("sense", sense if sense is None or isinstance(sense, Tracer) else np.asarray(sense))
+    return holding(group, "sense", sense if sense is None or isinstance(sense, Tracer) else np.asarray(sense))
 
 
 def _with_found_of(group: Group, known: Group) -> Group:
@@ -346,10 +346,10 @@ def _with_found_of(group: Group, known: Group) -> Group:
     if measures_angle(group):
         return with_datum_of(group, known)
     if hasattr(group.element, "sense"):
-        return group.holding("sense", known.element.sense)
+        return holding(group, "sense", known.element.sense)
     if "offset" not in value_fields(type(group.element)) or group.element.offset is not None:
         return group
-    return group.holding("offset", known.element.offset)
+    return holding(group, "offset", known.element.offset)
 
 
 def _size(groups: tuple[Group, ...], guess: dict[str, Any]) -> float:

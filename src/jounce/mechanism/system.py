@@ -43,10 +43,6 @@ class Group(eqx.Module):
         """Number of joints, drivers, forces or outputs in the group."""
         return len(self.bodies[0])
 
-    def holding(self, name: str, value: Any) -> "Group":
-        """Return the group with another value in a field of its elements."""
-        return with_fields(self, element=with_fields(self.element, **{name: value}))
-
     @property
     def is_driver(self) -> bool:
         """Whether the group prescribes motion."""
@@ -133,6 +129,14 @@ class Group(eqx.Module):
 
     def _poses(self, pose: Pose) -> list[Any]:
         return [pose.take(indices) for indices in self.bodies]
+
+
+def holding(group: Group, name: str, value: Any) -> Group:
+    """Return a group with another value in a field of its elements.
+
+    It is no method, as Equinox makes an object of each method that is looked up, which takes longer than the rest.
+    """
+    return with_fields(group, element=with_fields(group.element, **{name: value}))
 
 
 def with_rows(jet: Jet) -> Jet:

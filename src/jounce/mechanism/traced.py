@@ -32,7 +32,7 @@ from jounce.mechanism.mechanism import Mechanism
 from jounce.mechanism.modules import with_fields
 from jounce.mechanism.preconditions import PLAIN
 from jounce.mechanism.resolve import resolve
-from jounce.mechanism.system import Group
+from jounce.mechanism.system import Group, holding
 from jounce.rigid import PlanarPose, SpatialPose
 from jounce.trajectory import Expression
 
@@ -209,13 +209,13 @@ def _with_datum(group: Group, pose: SpatialPose, known: Any, near: Any) -> Group
     axis = axis / length_of(axis)[None]
     if element.vector_i is None:
         angle, told = angle_of(attitude, axis)
-        return group.holding("datum", Datum(attitude, jnp.where(told, brought_near(angle, known), known), near))
+        return holding(group, "datum", Datum(attitude, jnp.where(told, brought_near(angle, known), known), near))
     across = None
     if hasattr(element, "role"):  # a driver or a force acts about the axis, see `axis_angles`
         second = jnp.asarray(element.vector_j)
         along = body_j.to_body(body_i.direction(axis)).coefficients[0]
         across = second - (second * along).sum(axis=0, keepdims=True) * along
-    return group.holding("datum", Datum(attitude, known, near, across))
+    return holding(group, "datum", Datum(attitude, known, near, across))
 
 
 def angles_of(model: Model, counted: tuple[tuple[Group, ...], tuple[Group, ...]]) -> Angles:
