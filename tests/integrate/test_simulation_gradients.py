@@ -183,5 +183,5 @@ def test_redundant_constraints_are_refused():
     def last(mass):
         return jn.simulate(door.with_parameters(m=mass), [0.0, 0.1], order=1).outputs["corner"][-1, 0, 0]
 
-    with pytest.raises(jn.MechanismError, match="gradients of mechanisms with redundant constraints are not there"):
+    with pytest.raises(jn.MechanismError, match="gradients of mechanisms with redundant constraints"):
         jax.grad(last)(3.0)

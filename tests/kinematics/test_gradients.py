@@ -216,7 +216,7 @@ def test_redundant_constraints_are_refused(transformed):
     def angle(length):
         return jn.solve(bennett.with_parameters(a=length), [0.0, 0.2], order=2).outputs["D_angle"][1, 2]
 
-    with pytest.raises(jn.MechanismError, match="gradients of mechanisms with redundant constraints are not there"):
+    with pytest.raises(jn.MechanismError, match="gradients of mechanisms with redundant constraints"):
         transformed(angle)(0.1)
 
 
