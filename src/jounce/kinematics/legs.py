@@ -116,9 +116,8 @@ class Leg(NamedTuple):
     count: Int[Numbers, ""]  # of batches solved
 
 
-PIECES = Pieces(
-    corrections=3000, derivatives=0
-)  # a tenth of a second longer to compile; of larger ones, XLA makes no faster code
+# the corrections take a tenth of a second longer to compile; larger pieces are no faster on batches this narrow
+PIECES = Pieces(corrections=3000, derivatives=0)
 _batch = jax.jit(partial(advance, pieces=PIECES), static_argnames=("pose_type", "order"))  # traced once
 
 
