@@ -102,6 +102,7 @@ def test_bad_choices_are_refused(wanted, message):
         door(redundant_reactions=wanted)
 
 
+@pytest.mark.slow
 def test_a_stiffness_must_be_above_zero():
     motion = jn.solve(door(redundant_reactions={"lower": {"force": "0*3"}}), TIMES, order=4)
     with pytest.raises(

@@ -54,7 +54,10 @@ def through_fronts(equations, state, right):
     return equations.matrix(state, CLOCK), inverse.solve(right), *responses
 
 
-@pytest.mark.parametrize("name", ["free_four_bar", "gear_pair", "spatial_double_pendulum", "chain", "tree"])
+@pytest.mark.parametrize(
+    "name",
+    ["free_four_bar", "gear_pair", pytest.param("spatial_double_pendulum", marks=pytest.mark.slow), "chain", "tree"],
+)
 def test_products_through_fronts_are_those_with_the_inverse_of_the_whole_matrix(name, monkeypatch):
     """A loop, a pair, chains and a tree; the bounds for responses hold, and are met by the most mobile coordinate."""
     monkeypatch.setattr("jounce.dynamics.saddle_fronts.FRONT_COST", 0.0)

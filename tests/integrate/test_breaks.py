@@ -55,6 +55,7 @@ def test_kinks_are_found_to_rounding_and_none_is_left_out():
     np.testing.assert_allclose([time for time, _ in in_time], [0.3], rtol=1e-13)
 
 
+@pytest.mark.slow
 def test_what_jumps_is_told_from_what_bends_and_from_what_is_smooth():
     def orders(**values):
         run = jn.simulate(sled(**values), [0.0, 0.45], 1)

@@ -1,6 +1,7 @@
 """Corrections with one Jacobian as long as they shrink fast: poses to rounding, and factors that solve there."""
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -18,31 +19,41 @@ LINKAGES = ["four_bar", "rsur", "bennett"]  # the last with a redundant constrai
 
 @pytest.fixture(scope="module", params=LINKAGES)
 def assembled(request):
-    """Return the system of a mechanism assembled at the start, its pose there, the time, and what corrects poses."""
+    """Return the system of a mechanism assembled at the start, its pose there, and what corrects and judges poses."""
     model, coordinates = assemble(build(jn.load(f"examples/{request.param}.yaml")), 0.0, TOLERANCE)
     wide = {name: np.repeat(values, LANES, axis=-1) for name, values in coordinates.items()}
     system, time = model.system, Jet([np.zeros((1, LANES))])
-    solved = jax.jit(lambda guess, refine: newton_raphson(system, guess, time, np.asarray(TOLERANCE), refine, 0))
-    return system, pose_at(wide, model.pose_type), time, solved
+    begun = pose_at(wide, model.pose_type)
+
+    @jax.jit
+    def solved(step, refine):
+        guess = begun.displaced(*system.coordinates(step, begun.shifts))
+        return newton_raphson(system, guess, time, np.asarray(TOLERANCE), refine, 0)
+
+    @jax.jit
+    def judged(pose, factor, known):
+        jacobian = system.jacobian(pose, time)
+        right = jnp.sum(jacobian * known[None], axis=1)
+        return system.residual(pose, time).coefficients[0], jacobian, factor.solve(right)
+
+    return system, begun, solved, judged
 
 
 def corrected(assembled, away, *, refine=True):
     """Return what comes of poses that are off by up to `away`, each in another direction."""
-    system, pose, _, solved = assembled
-    step = away * np.random.default_rng(3).uniform(-1, 1, (system.shape[1], LANES))
-    return solved(pose.displaced(*system.coordinates(step, pose.shifts)), np.asarray(refine))
+    system, _, solved, _ = assembled
+    return solved(away * np.random.default_rng(3).uniform(-1, 1, (system.shape[1], LANES)), np.asarray(refine))
 
 
 @pytest.mark.parametrize("away", [1e-2, 1e-3, 1e-5, 1e-8, 1e-11, 0.0])
 def test_poses_are_corrected_to_rounding_and_factors_solve_there(assembled, away):
-    system, _, time, _ = assembled
+    system, *_, judged = assembled
     pose, factor, correction = corrected(assembled, away)
-    assert np.abs(system.residual(pose, time).coefficients[0]).max() < 5e-15
+    known = np.random.default_rng(4).normal(size=(system.shape[1], LANES))
+    residual, jacobian, found = map(np.asarray, judged(pose, factor, known))
+    assert np.abs(residual).max() < 5e-15
     assert correction.contracts().all()
     assert (correction.last <= TOLERANCE).all()
-    jacobian = np.asarray(system.jacobian(pose, time))
-    known = np.random.default_rng(4).normal(size=(system.shape[1], LANES))
-    found = factor.solve(np.einsum("rcb,cb->rb", jacobian, known))
     np.testing.assert_allclose(found, known, rtol=0, atol=3e-15 * np.linalg.cond(jacobian[..., 0]))
 
 

@@ -93,6 +93,7 @@ def test_a_hinge_drawn_with_opposite_axes_stays_so():
     assert [round(x, 9) for x in cosines(mechanism, start).values()] == [-1, 1, -1, 1]
 
 
+@pytest.mark.slow
 def test_a_hinge_that_can_only_be_turned_over_is_named():
     mechanism = jn.load("examples/four_bar_in_space.yaml")
     odd = dataclasses.replace(mechanism.joints["C"], axis_j=(0.0, 0.0, -1.0))  # with the others along z

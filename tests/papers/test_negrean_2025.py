@@ -160,6 +160,7 @@ def test_measurements_of_ones_own(tmp_path, run):
     assert "not those of the" not in text
 
 
+@pytest.mark.slow
 def test_two_samples_make_one_segment_without_jumps(tmp_path):
     samples = tmp_path / "mine.csv"
     samples.write_text("time,slow\n0,0\n0.5,2\n")

@@ -2,6 +2,8 @@
 
 import abc
 import dataclasses
+from collections.abc import Mapping
+from functools import lru_cache
 from typing import Annotated, Any, ClassVar
 
 import equinox as eqx
@@ -140,9 +142,16 @@ def rows(*parts: Jet) -> Jet:
     return concatenate(whole)
 
 
-def value_fields(kind: type[Any]) -> dict[str, dataclasses.Field]:
+@lru_cache(maxsize=1000)
+def value_fields(kind: type[Any]) -> Mapping[str, dataclasses.Field]:
     """Return the fields of a joint, driver or force that a user gives, by name; `bodies` is not among them."""
     return {field.name: field for field in dataclasses.fields(kind) if field.name != "bodies" and field.init}
+
+
+@lru_cache(maxsize=1000)
+def field_kinds(kind: type[Any]) -> Mapping[str, str]:
+    """Return the kinds of the fields that a user gives, by name; see `field_kind`."""
+    return {name: field_kind(field) for name, field in value_fields(kind).items()}
 
 
 def field_kind(field: dataclasses.Field) -> str:

@@ -1,7 +1,8 @@
 """The state a simulation starts from: consistent positions and velocities from partial ones, and what can move."""
 
 import dataclasses
-from typing import Any, NamedTuple
+from functools import cached_property
+from typing import Any
 
 import jax
 import numpy as np
@@ -28,7 +29,8 @@ ROUNDING = 1e-15  # of residuals, rad or sizes of the mechanism
 LARGEST_CHANGE = 1e-2  # of velocities, as a part of them, by what rounding leaves open of the position
 
 
-class ConsistentStart(NamedTuple):
+@dataclasses.dataclass(frozen=True)
+class ConsistentStart:
     """A mechanism ready to move.
 
     Attributes
@@ -39,14 +41,23 @@ class ConsistentStart(NamedTuple):
         Its equations of motion.
     state : State
         That fulfils joints, drivers and initial conditions with their rates; a batch of one.
-    mobility : str
-        Degrees of freedom and the bodies that have them, in words.
+    jacobian : HostJacobian
+        Of its constraints there.
     """
 
     model: Model
     equations: Equations
     state: State
-    mobility: str
+    jacobian: HostJacobian
+
+    @cached_property
+    def mobility(self) -> str:
+        """Degrees of freedom and the bodies that have them, in words."""
+        free = self.jacobian.shape[1] - self.jacobian.rank
+        if not free:
+            return "no degree of freedom: all motion is prescribed"
+        noun = "degree of freedom" if free == 1 else "degrees of freedom"
+        return f"{free} {noun}: {freely_moving(self.model, self.jacobian.free_directions)}"
 
 
 def consistent_start(mechanism: Mechanism, instant: float) -> ConsistentStart:
@@ -90,10 +101,9 @@ def consistent_start(mechanism: Mechanism, instant: float) -> ConsistentStart:
         state = _set_in_motion(equations, model, coordinates, instant)
     else:
         state = jax.tree.map(np.asarray, with_rates(equations, state, np.array([[instant]])))
-    if not all(np.isfinite(part).all() for part in state):
-        _explain(equations, model, state, instant)
+    jacobian = _checked_jacobian(equations, model, state, instant)
     _check_rates(equations, model, state, instant)
-    return ConsistentStart(model, equations, state, _explain(equations, model, state, instant))
+    return ConsistentStart(model, equations, state, jacobian)
 
 
 def equations_of(mechanism: Mechanism, model: Model, masses: Masses) -> Equations:
@@ -219,8 +229,8 @@ def _matrices(
     return equations.matrix(state, time)[..., 0], equations.system.entries(pose, Jet([time]))[..., 0]
 
 
-def _explain(equations: Equations, model: Model, state: State, instant: float) -> str:
-    """Return the mobility in words, or raise for a body whose acceleration nothing determines."""
+def _checked_jacobian(equations: Equations, model: Model, state: State, instant: float) -> HostJacobian:
+    """Return the Jacobian, or raise for a body whose acceleration nothing determines, or of negative energy."""
     state = state._replace(velocity=np.zeros_like(state.velocity), spin=np.zeros_like(state.spin))
     whole, entries = (np.asarray(x) for x in _matrices(equations, state, np.array([[instant]])))
     jacobian = HostJacobian.of(model.system.pattern, entries).scaled(np.asarray(model.system.row_scale)[:, 0])
@@ -239,12 +249,9 @@ def _explain(equations: Equations, model: Model, state: State, instant: float) -
                 raise MechanismError(f"{message}; {advice}", name=f"bodies.{name}.{lacks}")
         names = freely_moving(model, loose[:, :columns])
         raise MobilityError(f"the equations of motion are singular at t = {instant:g} s: {names}")
-    free = columns - jacobian.rank
-    if not free:
-        return "no degree of freedom: all motion is prescribed"
-    _check_energy(model, whole[:columns, :columns], jacobian)
-    noun = "degree of freedom" if free == 1 else "degrees of freedom"
-    return f"{free} {noun}: {freely_moving(model, jacobian.free_directions)}"
+    if not _is_solid(equations.masses):
+        _check_energy(model, whole[:columns, :columns], jacobian)
+    return jacobian
 
 
 def _loose(whole: Float[np.ndarray, "size size"], columns: int) -> Float[np.ndarray, "direction size"]:
@@ -258,12 +265,21 @@ def _loose(whole: Float[np.ndarray, "size size"], columns: int) -> Float[np.ndar
     return found / np.linalg.norm(found, axis=1, keepdims=True)
 
 
+def _is_solid(masses: Masses) -> bool:
+    """Tell whether no body has a negative mass or moment of inertia: then no motion has a negative kinetic energy.
+
+    The least moment about an axis through the centre of mass is the sum of the two lowest second moments.
+    """
+    mass, _, moments = map(np.asarray, masses)
+    return bool(np.all(mass >= 0) and np.all(np.linalg.eigvalsh(moments[..., 0].T)[:, :2].sum(axis=1) >= 0))
+
+
 def _check_energy(model: Model, mass: Float[np.ndarray, "column column"], jacobian: HostJacobian) -> None:
     """Refuse masses and moments by which a motion that is free would have negative kinetic energy."""
     count = len(model.bodies)
     by_body = np.einsum("bibj->bij", mass.reshape(count, -1, count, mass.shape[0] // count))
     lowest = np.linalg.eigvalsh(by_body)
-    if lowest.min() >= 0:
+    if lowest.min() >= 0 or jacobian.rank == mass.shape[0]:
         return
     free = jacobian.free_directions
     if len(free) == mass.shape[0] - jacobian.rank:

@@ -338,7 +338,7 @@ class _Run:
     def _explained(self, current: IntegratorState) -> tuple[Status, str]:
         """Return why steps did not go on, and where to look: a force that is not finite, or the most urgent body."""
         series, time = current.expansion.state, current.time.item()
-        here = self.start._replace(equations=self.start.equations.near(current.angles))
+        here = dataclasses.replace(self.start, equations=self.start.equations.near(current.angles))
         onwards = self.sense * AHEAD * max(abs(time), abs(time - current.begun.item()))
         ahead = evaluated(series, np.array([onwards]))
         for state, instant in ((series.map(lambda part: part[0]), time), (ahead, time + onwards)):

@@ -1,6 +1,7 @@
 """From named values to arrays: parameters and expressions evaluated, values checked, instances of a type stacked."""
 
 import dataclasses
+import math
 import numbers
 from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
@@ -12,7 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
 
-from jounce.constraints.base import field_kind, value_fields
+from jounce.constraints.base import field_kinds, value_fields
 from jounce.errors import JounceError, MechanismError
 from jounce.forces import AbstractForce, AbstractLaw, ExpressionLaw, FunctionLaw, TimeLaw, VectorLaw
 from jounce.jet import Jet
@@ -39,6 +40,8 @@ def resolve(value: Any, parameters: Mapping[str, Any]) -> Any:
     if isinstance(value, np.ndarray | jax.Array) and not isinstance(value, Tracer):
         return np.asarray(value, float) if value.dtype.kind in "fiu" else value
     if isinstance(value, Sequence):
+        if set(map(type, value)) <= {int, float}:
+            return np.array(value, float)
         entries = [resolve(entry, parameters) for entry in value]
         if any(isinstance(entry, Tracer) for entry in entries):
             return jnp.stack([jnp.asarray(entry, float) for entry in entries])
@@ -177,14 +180,12 @@ def check_value(field: str, kind: str, value: Any, components: int, sign: str = 
         return
     size = components
     shapes = {"scalar": ((),), "vector": ((size,),), "tensor": ((size,), (size, size))}[kind]
-    if (
-        not isinstance(value, float | np.ndarray)
-        or np.shape(value) not in shapes
-        or np.asarray(value).dtype.kind != "f"
-    ):
+    array = value if isinstance(value, np.ndarray) and value.dtype.kind == "f" else None
+    if (array is None and not isinstance(value, float)) or (() if array is None else array.shape) not in shapes:
         wanted = "one number" if kind == "scalar" else f"a vector of {size} numbers"
         raise MechanismError(f"must be {wanted}", value=_plain(value))
-    if not np.isfinite(value).all():
+    entries = [value] if array is None else array.ravel().tolist()  # of so few numbers Python tells sooner than NumPy
+    if not all(map(math.isfinite, entries)):
         raise MechanismError("must be finite", value=_plain(value))
     word = field.removesuffix("_i").removesuffix("_j")
     if sign == "not negative" and value < 0:
@@ -193,7 +194,7 @@ def check_value(field: str, kind: str, value: Any, components: int, sign: str = 
         raise MechanismError("must be greater than zero", value=_plain(value))
     if word == "lead" and value == 0:
         raise MechanismError("must not be zero", value=_plain(value))
-    if word in NONZERO and not np.any(value):
+    if word in NONZERO and not any(entries):
         raise MechanismError("must not be of zero length", value=_plain(value))
 
 
@@ -214,8 +215,9 @@ def _plain(value: Any) -> Any:
 def resolve_element(element: Element, parameters: Mapping[str, Any], components: int, name: str) -> dict[str, Any]:
     """Return the values of a joint, driver, force or output as arrays, by field, checked."""
     values, signs = {}, getattr(element, "signs", {})
+    kinds = field_kinds(type(element))
     for field_name, field in value_fields(type(element)).items():
-        kind, value = field_kind(field), getattr(element, field_name)
+        kind, value = kinds[field_name], getattr(element, field_name)
         try:
             if kind == "motion":
                 value = resolve_motion(value, parameters)
@@ -250,7 +252,7 @@ def _check_sideways(values: Mapping[str, Any], name: str) -> None:
     """Raise MechanismError where a normal, or a vector of an angle, is parallel to the axis it must stand off from."""
     for axis_name, others in (("axis_i", ("normal_i", "vector_i")), ("axis_j", ("normal_j",)), ("axis", ("vector_i",))):
         axis = values.get(axis_name)
-        for other in others:
+        for other in others if axis is not None else ():
             vector = values.get(other)
             if isinstance(axis, np.ndarray) and isinstance(vector, np.ndarray):
                 first, second = (v / np.max(np.abs(v)) for v in (axis, vector))  # no overflow in the squares
@@ -275,6 +277,9 @@ def group_key(element: Element, values: Mapping[str, Any]) -> Any:
     static = static_fields(type(element))
     words = tuple(getattr(element, name) for name in static)
     numbers_only = {name: value for name, value in values.items() if name not in static}
+    if all(type(value) in (float, np.ndarray) for value in numbers_only.values()):
+        shapes = tuple((name, np.shape(value)) for name, value in numbers_only.items())
+        return type(element), words, shapes  # which is all that there is to tell, told without JAX
     leaves, structure = jax.tree.flatten(numbers_only)
     return type(element), words, structure, tuple(np.shape(leaf) for leaf in leaves)
 

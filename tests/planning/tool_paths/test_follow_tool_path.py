@@ -57,6 +57,7 @@ def test_other_instants_and_laws_of_the_joints():
     assert np.allclose(laws.derivatives(times, 3), exact.q, rtol=0, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_another_time_law_along_the_same_path():
     again = jn.ToolPath(CIRCLE, start=0.0, stop=1.0, progress="4*t**2")
     arm = planar_chain([0.7, 0.6])
