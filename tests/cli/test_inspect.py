@@ -143,12 +143,32 @@ def test_initial_conditions_place_the_bodies(facts):
 
 @pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.yaml")), ids=lambda p: p.stem)
 @pytest.mark.slow
-def test_every_example_can_start_and_runs_to_its_end(facts, run, path, tmp_path):
+def test_every_example_can_start(facts, path):
     status, data, err = facts("inspect", path)
     assert (status, err) == (0, "")
     assert data["ok"]
+
+
+RUN_ELSEWHERE = {  # over the whole grid of their files
+    "tests/papers/test_sommer_2024.py": "four_bar inverted_slider_crank_slide inverted_slider_crank_distance rsur rssr "
+    "rspu_distance rspu_slide",
+    "tests/examples/test_gallery.py": "peaucellier pantograph jansen_leg klann_leg six_bar_stephenson radial_engine "
+    "wolfrom_train epicyclic excavator double_cardan delta_robot delta_pick",
+    "tests/integrate/test_published.py": "andrews double_four_bar double_pendulum simple_pendulum flyball_governor "
+    "spatial_slider_crank_free stewart_forces",
+    "tests/io/mechanisms/test_writer.py": "six_bar_watt press",
+    "test_reactions_that_are_not_unique_are_nan_and_told": "four_bar_in_space",
+    "docs/output_laws.md": "servo_press",
+}
+RUN_HERE = sorted({path.stem for path in EXAMPLES.glob("*.yaml")} - set(" ".join(RUN_ELSEWHERE.values()).split()))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", RUN_HERE)
+def test_examples_run_to_their_end(run, name, tmp_path):
+    path = EXAMPLES / f"{name}.yaml"
     command = "simulate" if jn.load(path).initial else "run"  # degrees of freedom are left: forces move it
-    status, out, err = run(command, path, "--out", tmp_path / "motion.csv")
+    status, out, err = run(command, path, "--order", 1, "--out", tmp_path / "motion.csv")
     assert (status, err) == (0, ""), out
     time = np.loadtxt(tmp_path / "motion.csv", delimiter=",", skiprows=1, usecols=0)
     assert len(time) > 1
@@ -332,10 +352,7 @@ def test_mobility_is_told_in_words_and_as_data(facts, run):
 
 @pytest.mark.slow
 def test_reactions_that_are_not_unique_are_nan_and_told(run, tmp_path):
-    text = (EXAMPLES / "four_bar_in_space.yaml").read_text()
-    path = tmp_path / "a.yaml"
-    path.write_text(text.replace("stop: 2, step: 0.01", "stop: 0.1, step: 0.1"))
-    out = tmp_path / "a.csv"
+    path, out = EXAMPLES / "four_bar_in_space.yaml", tmp_path / "a.csv"
     for choice, open_ in (("unique", True), ("least_norm", False)):
         status, told, _ = run("run", path, "--order", 2, "--redundant-reactions", choice, "--out", out, "--overwrite")
         assert status == 0
@@ -343,6 +360,7 @@ def test_reactions_that_are_not_unique_are_nan_and_told(run, tmp_path):
             "bearing: not unique, as constraints are redundant: joint D repeats 3" in " ".join(told.split())
         ) == open_
         header, *lines = out.read_text().splitlines()
+        assert len(lines) == 201
         table = {name: [line.split(",")[k] for line in lines] for k, name in enumerate(header.split(","))}
         for name, nan in (("bearing_x", open_), ("bearing_z", False), ("torque", False)):
             assert all((text in ("", "nan", "NaN")) == nan for text in table[name]), name

@@ -83,7 +83,7 @@ def test_a_condition_is_kept_and_its_multiplier_is_the_slope_of_the_optimum():
 @pytest.mark.slow
 def test_conditions_that_cannot_be_met_are_told_with_how_far_they_are():
     with pytest.raises(jn.DesignError, match=r"'at\(angle, 1, 1\) == 12': nearest is 9 against 12, off by 3 ") as error:
-        jn.optimise(CRANK, "mean(angle**2)", CUBIC, ["at(angle, 1, 1) == 12"], starts=1, iterations=10)
+        jn.optimise(CRANK, "mean(angle**2)", CUBIC, ["at(angle, 1, 1) == 12"], starts=1, iterations=4)
     assert error.value.design.status == "infeasible"
     assert list(error.value.design.parameters.values())[:2] == pytest.approx([2.0, 2.0], abs=1e-6)
 
@@ -204,22 +204,15 @@ def test_designs_that_lock_are_kept_away_from(four_bar):
 
 
 @pytest.mark.slow
-def test_the_better_of_two_assemblies_is_found_and_asked_for(four_bar):
-    narrow = {"BC": (0.14, 0.145)}
-    found = jn.optimise(four_bar, "maximum(psi)", narrow, starts=1, assemblies="all")
-    assert found.success
-    assert found.mechanism.assembly in (1, 2)
-    other = dataclasses.replace(found.mechanism, assembly=3 - found.mechanism.assembly)
-    assert np.max(jn.solve(other, order=0).outputs["psi"][:, 0]) > found.objective + 0.1
-    assert np.max(jn.solve(found.mechanism, order=0).outputs["psi"][:, 0]) == pytest.approx(found.objective, abs=1e-5)
-
-
-@pytest.mark.slow
 def test_the_second_assembly_is_asked_for_where_it_is_the_better_one(four_bar):
     """Both turn about the same fixed pivots: the pin of the rocker is above the ground in one, below in the other."""
     found = jn.optimise(four_bar, "maximum(C_y)", {"BC": (0.14, 0.145)}, starts=1, assemblies="all")
+    assert found.success
+    assert found.mechanism.assembly in (1, 2)
     assert found.objective < 0
     assert np.max(jn.solve(found.mechanism, order=0).outputs["C"][:, 0, 1]) == pytest.approx(found.objective, abs=1e-4)
+    other = dataclasses.replace(found.mechanism, assembly=3 - found.mechanism.assembly)
+    assert np.max(jn.solve(other, order=0).outputs["C"][:, 0, 1]) > found.objective + 0.1
     as_given = np.max(jn.solve(four_bar, order=0).outputs["C"][:, 0, 1])
     assert found.comparisons[0].before == pytest.approx(as_given, abs=1e-4)
 

@@ -11,7 +11,6 @@ from tests.problems.marches import LENIENT, ends, marched, onwards, orders
 BIG = 100.0  # s: a fixed step, which the steps of the single runs cut short
 BODIES = {"plane": dynamics.double_pendulum, "space": dynamics.spatial_double_pendulum}
 METHODS = {  # steps in s, between those that are too long for the leading term of the error and rounding
-    "Taylor 4": (jn.Taylor(4, step=BIG), [1 / 64, 1 / 96, 1 / 128]),
     "Taylor 5": (jn.Taylor(5, step=BIG), [1 / 64, 1 / 96, 1 / 128]),
     "Taylor 8": (jn.Taylor(8, step=BIG), [1 / 48, 1 / 64, 1 / 96]),
     "Taylor 12": (jn.Taylor(12, step=BIG), [1 / 24, 1 / 32]),

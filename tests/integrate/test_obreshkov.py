@@ -97,12 +97,9 @@ def test_steps_of_given_length_are_cut_only_where_the_iteration_does_not_converg
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("order", [4, 8])
-def test_steps_by_the_error_reach_what_is_asked(order):
+def test_steps_by_the_error_reach_what_is_asked():
     time, kinds = dynamics.dynamic_reference("double_pendulum")
-    motion = jn.simulate(
-        dynamics.double_pendulum(), [0.0, float(time[0])], 2, method=jn.Obreshkov(order), tolerance=1e-11
-    )
+    motion = jn.simulate(dynamics.double_pendulum(), [0.0, float(time[0])], 2, method=jn.Obreshkov(4), tolerance=1e-11)
     for name in "ab":
         found, wanted = motion.outputs[name][1], kinds["angles"][name][0, :3]
         assert np.allclose(found[1:], wanted[1:], rtol=0, atol=1e-7)
