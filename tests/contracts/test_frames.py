@@ -39,9 +39,9 @@ LAW = "0.4 + 0.7*t + 0.4*sin(2*t)"
 
 
 def rates_of_law():
-    """Derivatives 2 to 4 of the law, at the instants, from its closed form."""
+    """Derivatives 2 and 3 of the law, at the instants, from its closed form."""
     t = np.array(INSTANTS)
-    return np.stack([0.4 * 2**k * np.sin(2 * t + k * np.pi / 2) for k in (2, 3, 4)], axis=-1)
+    return np.stack([0.4 * 2**k * np.sin(2 * t + k * np.pi / 2) for k in (2, 3)], axis=-1)
 
 
 def law_at_instants():
@@ -75,7 +75,7 @@ def rotor(quaternion, vectors=None, tilt=0.0):
 @pytest.mark.parametrize("tilt", [0.0, 0.2], ids=["guess assembled", "guess tilted"])
 @pytest.mark.parametrize("quaternion", DRAWINGS.values(), ids=DRAWINGS)
 def test_the_bearing_of_a_driven_rotor_carries_nothing(quaternion, tilt):
-    found = jn.solve(rotor(quaternion, tilt=tilt), INSTANTS, order=2).outputs
+    found = jn.solve(rotor(quaternion, tilt=tilt), INSTANTS, order=1).outputs
     torque = 2.0 * rates_of_law()
     scale = np.abs(torque).max(axis=0)
     assert (np.abs(found["motor"] - torque) <= 1e-13 * scale).all()
@@ -89,7 +89,7 @@ def test_the_bearing_of_a_driven_rotor_carries_nothing(quaternion, tilt):
 @pytest.mark.parametrize("tilt", [0.0, 0.2], ids=["guess assembled", "guess tilted"])
 def test_nor_does_it_where_a_vector_of_the_driver_points_beside_the_plane_of_the_turn(tilt):
     driven = rotor(DRAWINGS["x along the axle"], ([1, 0, 0.4], [0.6, 0.8, 1.5]), tilt)
-    found = jn.solve(driven, INSTANTS, order=2).outputs
+    found = jn.solve(driven, INSTANTS, order=1).outputs
     torque = 2.0 * rates_of_law()
     scale = np.abs(torque).max(axis=0)
     assert (np.abs(found["motor"] - torque) <= 1e-13 * scale).all()
@@ -128,20 +128,18 @@ ZERO, A, B, C, Z = [0.0, 0.0, 0.0], [1.0, 0.2, -0.1], [-0.2, 1.0, 0.1], [0.3, 0.
 
 
 def arm():
-    """An arm on two hinges with a tube that turns and slides on it."""
+    """A rotor on a hinge with a tube that turns and slides on it."""
     return in_space(
         5,
-        {"rotor": [0, 0, 0], "arm": [0.5, 0.1, 0.2], "tube": [0.9, 0.2, 0.3]},
+        {"rotor": [0, 0, 0], "tube": [0.9, 0.2, 0.3]},
         joints={
             "axle": spatial.Revolute(("ground", "rotor"), ZERO, ZERO, Z, Z),
-            "elbow": spatial.Revolute(("rotor", "arm"), [0.5, 0.1, 0.2], ZERO, A, A),
-            "sleeve": spatial.Cylindrical(("arm", "tube"), [0.2, 0, 0], ZERO, B, B),
+            "sleeve": spatial.Cylindrical(("rotor", "tube"), [0.7, 0.1, 0.2], ZERO, B, B),
         },
         drivers={
             "spin": drivers.RotationDriver(("ground", "rotor"), Z, wave(0.4, 0.7, 0.4, 2.0), A, [1.0, 0.3, 0.5]),
-            "bend": drivers.RotationDriver(("rotor", "arm"), A, wave(0.2, 0.1, 0.3, 2.0)),
-            "roll": drivers.RotationDriver(("tube", "arm"), B, wave(0.1, -0.3, 0.2, 1.5)),
-            "extend": drivers.SpatialSlideDriver(("arm", "tube"), [0.2, 0, 0], ZERO, B, wave(0.1, 0, 0.05, 3.0)),
+            "roll": drivers.RotationDriver(("tube", "rotor"), B, wave(0.1, -0.3, 0.2, 1.5)),
+            "extend": drivers.SpatialSlideDriver(("rotor", "tube"), [0.7, 0.1, 0.2], ZERO, B, wave(0.1, 0, 0.05, 3.0)),
         },
         forces={
             "slide_spring": forces.SlideSpring(("ground", "tube"), ZERO, C, B, 5.0, 0.1, 0.2),
@@ -346,7 +344,7 @@ def test_an_angle_between_bodies_in_any_motion_changes_by_a_constant_with_their_
     assert np.abs(found[0][1:]).min() > 1e-4
 
 
-RATELESS = ("arm", "screw")  # forces alone: their rates take long to compile
+ORDERS = {"plane": 2, "cross": 2, "linkage": 1}  # rates of forces; of the others forces alone, which compile long
 MECHANISMS = {"plane": all_in_the_plane, "arm": arm, "cross": cross, "linkage": linkage, "screw": screw}
 
 
@@ -371,11 +369,17 @@ def residual(mechanism):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", MECHANISMS)
 def test_no_quantity_depends_on_how_frames_are_drawn(name):
-    """Every body and the ground with other random frames: the same motion and the same forces, with their rates."""
+    """Every body and the ground with other random frames: the same motion and the same forces, with their rates.
+
+    Their powers balance the rates of the energies, which share no code with the forces but the motion.
+    """
     mechanism, random = with_all_outputs(MECHANISMS[name]()), np.random.default_rng(2)
-    same, order = dict.fromkeys(counted(mechanism), 0.0), 2 if name in RATELESS else ORDER
+    same, order = dict.fromkeys(counted(mechanism), 0.0), ORDERS.get(name, 0)
     kept = jn.solve(redrawn(mechanism, as_drawn(mechanism), same), INSTANTS, order)
-    for _ in range(3):
+    balance = jn.power_balance(kept)
+    assert float(balance["scale"].min()) > 0
+    assert (np.abs(balance["residual"]) <= 1e-12 * balance["scale"].max("time")).all(), balance["residual"].values
+    for _ in range(2):
         drawings = random_drawings(mechanism, random)
         moved = shifts(mechanism, kept.poses[1], drawings)
         found = jn.solve(redrawn(at(mechanism, kept.poses[1]), drawings, moved), INSTANTS, order)

@@ -1,4 +1,4 @@
-"""Laws that every integrator keeps, on mechanisms of the bank: a closed loop, an open chain, one in space."""
+"""Laws that every integrator keeps, on mechanisms of the bank: a closed loop, an open chain in space."""
 
 import numpy as np
 import pytest
@@ -8,17 +8,15 @@ from tests.problems import dynamics
 
 METHODS = {
     "Taylor": (jn.Taylor(), 1e-15),
-    "Obreshkov 4": (jn.Obreshkov(4), 1e-9),
     "Obreshkov 6": (jn.Obreshkov(6), 1e-12),
     "Obreshkov 8": (jn.Obreshkov(8), 1e-13),
 }
 MECHANISMS = {
     "free four-bar": dynamics.free_four_bar,
-    "double pendulum": lambda: dynamics.double_pendulum(0.4, 1.3, 1.0, -2.0),
     "spatial double pendulum": dynamics.spatial_double_pendulum,
 }
-# each compiles for half a minute: the implicit ones move a closed loop, with the lowest and the highest of their orders
-APART = {(f"Obreshkov {order}", name) for order in (4, 6, 8) for name in MECHANISMS if name != "free four-bar"}
+# each compiles for half a minute: the implicit ones move a closed loop, with the highest of their orders
+APART = {(f"Obreshkov {order}", name) for order in (6, 8) for name in MECHANISMS if name != "free four-bar"}
 APART |= {("Obreshkov 6", "free four-bar")}
 CASES = [
     pytest.param(method, name, marks=pytest.mark.slow)  # a minute each; tests/integrate has quick ones

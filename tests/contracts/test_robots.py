@@ -15,7 +15,11 @@ ORDER = 5  # of q, everywhere, so that each function is compiled once for a robo
 QUICK = ("mimic", "floating_solo12")
 
 
-@pytest.fixture(scope="module", params=[n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in NAMES])
+# floating_solo12 holds what solo12 does, and panda and serial are chains of hinges as ur5 is
+SLOW = tuple(name for name in NAMES if name not in (*QUICK, "solo12", "ur5"))
+
+
+@pytest.fixture(scope="module", params=[*QUICK, *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW)])
 def robot(request):
     return robot_named(request.param)
 

@@ -42,7 +42,7 @@ def arm_on_a_sled(push="0.3 + 0.2*t**2", turn="0.5*t + 0.1*t**3"):
 
 @functools.cache
 def sled():
-    return jn.solve(arm_on_a_sled(), TIMES, order=5)
+    return jn.solve(arm_on_a_sled(), TIMES, order=3)
 
 
 def robot():
@@ -60,7 +60,7 @@ def laws():
     return np.moveaxis(np.array([push, turn]), (0, 1, 2), (2, 1, 0))
 
 
-FORMS = {  # the others, and rates, are judged with the closed loop
+FORMS = {  # the others, and their rates, are judged with the closed loop
     "lagrange": lambda system, *q: lagrange(system, *q),
     "mangeron": lambda system, *q: mangeron_nielsen(system, *q),
     "energy_slope": lambda system, *q: jn.energy_slope(system, *q, m=1, order=2),
@@ -94,13 +94,12 @@ def four_bar():
 
 @pytest.mark.slow
 def test_a_closed_loop_agrees_with_the_force_of_its_driver():
-    rates = 1
-    motion = jn.solve(four_bar(), TIMES, order=4)
-    force = jn.driver_force(motion, "theta").values[:, : rates + 1]  # by multipliers
-    bound = 1e-12 * np.abs(force).max(axis=0)
-    assert (np.abs(lagrange(motion, rates=rates)[..., 0] - force) <= bound).all()
-    assert (np.abs(gibbs_appell(motion)[..., 0] - force[:, :1]) <= bound[:1]).all()
-    assert (np.abs(higher_order(motion, k=rates + 1)[:, 0] - force[:, rates]) <= 10 * bound[rates]).all()
+    motion = jn.solve(four_bar(), TIMES, order=3)
+    force = jn.driver_force(motion, "theta").values[:, :1]  # by multipliers
+    bound = 1e-12 * np.abs(force).max()
+    assert (np.abs(lagrange(motion)[..., 0] - force) <= bound).all()
+    assert (np.abs(gibbs_appell(motion)[..., 0] - force) <= bound).all()
+    assert (np.abs(higher_order(motion, k=1) - force) <= 10 * bound).all()
 
 
 @pytest.mark.slow
@@ -109,7 +108,7 @@ def test_a_loop_in_space_agrees_with_the_force_of_its_driver():
 
     masses = {"coupler": {"mass": 0.8, "inertia": [0.02, 0.03, 0.04], "center_of_mass": [0.02, 0.05, 0.01]}}
     masses["rocker"] = {"mass": 0.6, "inertia": 0.03, "center_of_mass": [0.05, 0.0, 0.01]}
-    motion = jn.solve(with_masses("rsur", masses), TIMES, order=4)
+    motion = jn.solve(with_masses("rsur", masses), TIMES, order=2)
     (name,) = motion.mechanism.drivers
     force = jn.driver_force(motion, name).values
     scale = np.abs(force).max(axis=0)

@@ -144,7 +144,6 @@ def test_a_wheel_of_which_only_the_inertia_is_known_turns():
         parameters={"J": 0.1},
     )
     exact = [4.0, 6.0, 6.0, 3.0]  # 0.3 t^3 / (6 J) at 2 s
-    assert jn.simulate(wheel, [0.0, 2.0], order=3).outputs["turn"][-1] == pytest.approx(exact, rel=1e-14)
     runs = jn.simulate_batch(wheel, {"J": [0.05, 0.1]}, [0.0, 2.0], order=3).outputs["turn"][:, -1]
     assert runs == pytest.approx(np.outer([2, 1], exact), rel=1e-14)
     refused(jn.MechanismError, "bodies.wheel.mass: the body can move but has no", dataclasses.replace(wheel, joints={}))

@@ -47,7 +47,7 @@ def test_all_assemblies_of_a_stephenson_linkage():
 @pytest.mark.slow
 def test_all_assemblies_of_many_stephenson_linkages():
     counts = []
-    for number in range(1, 5):
+    for number in range(1, 3):
         mechanism, angles = six_bar(number)
         assert agree(jn.assemblies(mechanism, 0.0, circuits=False), angles), number
         counts.append(len(angles))
@@ -101,7 +101,7 @@ def test_a_slider_that_lies_turned_over_in_its_guide_is_no_assembly():
 
 @pytest.mark.slow
 def test_a_spatial_linkage():
-    linkage = jn.assemblies(jn.load("examples/rsur.yaml"))  # the coupler also turned over in its cross
+    linkage = jn.assemblies(jn.load("examples/rsur.yaml"), circuits=False)  # the coupler also turned over in its cross
     spins = [2 * np.arccos(min(abs(_turn_between(linkage[0], other)), 1.0)) for other in linkage[:2]]
     np.testing.assert_allclose(spins, [0.0, np.pi], atol=1e-7)
     assert len(linkage) == 4

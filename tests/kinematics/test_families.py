@@ -97,7 +97,7 @@ def test_kinds_of_mechanisms(name, parameter):
     key = parameter or next(iter(numbers))
     parameters = {key: mechanism.parameter_values[key] * np.linspace(0.995, 1.005, 4)}
     time = np.linspace(0.0, 1.5, 7)
-    check(mechanism, parameters, jn.solve_batch(mechanism, parameters, time, order=4), time, 4, 1e-11)
+    check(mechanism, parameters, jn.solve_batch(mechanism, parameters, time, order=2), time, 2, 1e-11)
 
 
 @pytest.mark.slow
@@ -141,6 +141,6 @@ def test_redundant_constraints_and_assemblies_are_those_of_designs_alone():
     bennett = dataclasses.replace(bennett, outputs={"C": bennett.outputs["C"]})  # none of forces
     crossed = dataclasses.replace(FOUR_BAR, assembly=2)
     for mechanism, parameters in ((bennett, {"a": np.array([0.1, 0.12])}), (crossed, {"BC": np.array([0.14, 0.15])})):
-        family = jn.solve_batch(mechanism, parameters, TIME[:3], order=2)
+        family = jn.solve_batch(mechanism, parameters, TIME[:3], order=1)
         assert not family["status"].values.any()
-        check(mechanism, parameters, family, TIME[:3], 2)
+        check(mechanism, parameters, family, TIME[:3], 1)

@@ -44,7 +44,7 @@ def test_fifty_turns_with_three_instants_after_the_first():
 def test_rotation_driver_over_turns_and_back(vectors):
     time = np.array([0.0, 0.5, 1.0])
     mechanism = spindle(law(0.3, wave=5 * TURN), vectors=vectors)
-    motion = jn.solve(mechanism, time, order=2)
+    motion = jn.solve(mechanism, time, order=1)
     expected = 0.3 + TURN * 5 * np.sin(np.pi * time)
     np.testing.assert_allclose(motion.outputs["angle"][:, 0], expected, atol=1e-12)
     np.testing.assert_allclose(motion.outputs["between"][:, 0], expected, atol=1e-12)
@@ -55,7 +55,7 @@ def test_rotation_driver_over_turns_and_back(vectors):
 @pytest.mark.slow
 def test_rotation_about_an_oblique_axis():
     axis = np.array([1.0, 2.0, -3.0])
-    motion = jn.solve(spindle(law(rate=3 * TURN), axis=axis), [0.0, 0.5, 1.0], order=2)
+    motion = jn.solve(spindle(law(rate=3 * TURN), axis=axis), [0.0, 0.5, 1.0], order=1)
     expected = 3 * TURN * axis / np.linalg.norm(axis)
     np.testing.assert_allclose(motion.outputs["spin"][:, 0], np.tile(expected, (3, 1)), rtol=1e-13)
     np.testing.assert_allclose(motion.outputs["body_spin"][:, 0], np.tile(expected, (3, 1)), rtol=1e-13)
@@ -63,12 +63,12 @@ def test_rotation_about_an_oblique_axis():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("lead", [0.01, -0.01])
-def test_screw_keeps_count_of_its_turns(lead):
+def test_screw_keeps_count_of_its_turns():
     time = np.array([0.0, 0.4, 1.0])
-    motion = jn.solve(screw(lead, law(rate=30 * TURN)), time, order=1)
-    np.testing.assert_allclose(motion.outputs["p"][:, 0, 2], 30 * lead * time, atol=1e-14)
-    np.testing.assert_allclose(motion.outputs["p"][:, 1, 2], 30 * lead, rtol=1e-13)
+    for lead in (0.01, -0.01):
+        motion = jn.solve(screw(lead, law(rate=30 * TURN)), time, order=1)
+        np.testing.assert_allclose(motion.outputs["p"][:, 0, 2], 30 * lead * time, atol=1e-14)
+        np.testing.assert_allclose(motion.outputs["p"][:, 1, 2], 30 * lead, rtol=1e-13)
 
 
 @pytest.mark.slow

@@ -52,11 +52,11 @@ def test_a_bennett_linkage_moves_as_its_closed_form():
 
 @pytest.mark.slow
 def test_fronts_and_dense_least_squares_find_the_same(monkeypatch):
-    dense = jn.solve(overconstrained.sarrus().mechanism, TIMES)
+    dense = jn.solve(overconstrained.sarrus().mechanism, TIMES, order=1)
     assert dense.model.system.fronts is None
     monkeypatch.setattr("jounce.mechanism.fronts.MOST_DENSE", 0)
     builder._layout.cache_clear()
-    fronts = jn.solve(overconstrained.sarrus().mechanism, TIMES)
+    fronts = jn.solve(overconstrained.sarrus().mechanism, TIMES, order=1)
     builder._layout.cache_clear()
     assert fronts.model.system.fronts is not None
     np.testing.assert_allclose(fronts.outputs["lift"], dense.outputs["lift"], atol=1e-11)
@@ -65,10 +65,10 @@ def test_fronts_and_dense_least_squares_find_the_same(monkeypatch):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "case",
-    ["bricard", "sarrus", "hooke_twice", "double_cardan", "scott_russell", "four_hinges"],
+    ["bricard", "sarrus", "double_cardan", "scott_russell"],
 )
 def test_overconstrained_linkages_move_as_their_closed_forms(case):
-    moves_as_told(getattr(overconstrained, case)())
+    moves_as_told(getattr(overconstrained, case)(), order=2)
 
 
 @pytest.mark.slow
@@ -149,10 +149,10 @@ def test_a_structure_that_is_locked_can_rest_and_not_move():
     axes = random.normal(size=(3, 3))
     hinges = [(np.zeros(3), np.array(Z)), *zip(random.normal(size=(3, 3)), axes, strict=True)]
     driven = [overconstrained.hinged_loop(hinges, jn.ExpressionMotion("rate*t", {"rate": x})) for x in (0.0, 0.1)]
-    resting = jn.solve(driven[0], [0.0, 1.0])
+    resting = jn.solve(driven[0], [0.0, 1.0], order=1)
     assert (resting.status == Status.OK).all()
     with pytest.raises(jn.SolveError, match=r"in their rates\): inconsistent"):
-        jn.solve(driven[1], [0.0, 1.0])
+        jn.solve(driven[1], [0.0, 1.0], order=1)
 
 
 @pytest.mark.slow
@@ -163,7 +163,7 @@ def test_a_dead_point_is_no_redundancy():
     driven = dataclasses.replace(
         linkage, drivers={"turn": jn.drivers.RotationDriver(("ground", "rocker"), Z, f"{rocker} + t")}
     )
-    motion = jn.solve(driven, np.linspace(0, 2, 21), strict=False)
+    motion = jn.solve(driven, np.linspace(0, 2, 21), order=1, strict=False)
     angle = float(np.arccos((2.0**2 - 2.5**2 - 2.0**2) / (2 * 2.5 * 2.0)))  # crank and coupler overlap, 3 - 1 = 2 long
     solved = motion.status == Status.OK
     np.testing.assert_array_equal(solved, motion.time < angle - rocker)
@@ -179,7 +179,7 @@ def test_a_dead_point_is_no_redundancy():
     dead = dataclasses.replace(linkage, bodies=bodies, drivers={"turn": law})
     told = "18 of them independent; joint D repeats 3 equations of A, B, C, .* a singular position"
     with pytest.raises(jn.MobilityError, match=told):
-        jn.solve(dead, [0.0])
+        jn.solve(dead, [0.0], order=1)
 
 
 def test_who_repeats_whom_follows_from_the_combinations_that_vanish():
@@ -195,7 +195,7 @@ def test_who_repeats_whom_follows_from_the_combinations_that_vanish():
 @pytest.mark.slow
 def test_a_long_grid_in_threads_is_that_of_one():
     case, times = overconstrained.bennett(), np.linspace(0, 2, 1500)
-    one, two = (jn.solve(case.mechanism, times, order=6, threads=count) for count in (1, 2))
+    one, two = (jn.solve(case.mechanism, times, order=2, threads=count) for count in (1, 2))
     np.testing.assert_array_equal(one.outputs["out"], two.outputs["out"])
     few = slice(None, None, 100)
     np.testing.assert_allclose(one.outputs["out"][few, 0], exact(case.motion, times[few], 0)[:, 0], atol=1e-13)

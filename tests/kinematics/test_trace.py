@@ -45,7 +45,7 @@ def test_limit_positions_of_random_four_bars(number):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", limit_study.FAMILIES)
 def test_limit_positions_of_many_random_linkages(name):
-    for seed, number in [*((3, number) for number in range(6)), (0, 828)]:  # the last misses a crossing by 1e-6
+    for seed, number in [*((3, number) for number in range(2)), (0, 828)]:  # the last misses a crossing by 1e-6
         linkage = limit_study.random_linkage(name, seed, number)
         assert limit_study.judged(linkage).error < limit_study.LARGEST_ERROR, linkage
 
@@ -178,9 +178,8 @@ def test_rates_along_a_curve_are_those_in_time():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("file", ["rspu_slide", "six_bar_watt"])
-def test_rates_along_curves_of_examples_are_those_in_time(file):
-    mechanism = jn.load(f"examples/{file}.yaml")
+def test_rates_along_a_curve_in_space_are_those_in_time():
+    mechanism = jn.load("examples/rspu_slide.yaml")
     (driver,) = mechanism.drivers
     _against_time(mechanism, next(iter(mechanism.outputs)), driver)
 
@@ -264,7 +263,7 @@ def test_a_change_point_that_is_not_there():
     "family", [SixBar("Watt I", "coupler", "rocker"), SixBar("Stephenson III", "coupler", "ground")]
 )
 def test_limit_positions_of_six_bars_are_singular_and_the_same_from_anywhere(family):
-    for seed in range(3):
+    for seed in range(2):
         linkage = family.linkage(np.random.default_rng(seed), False)[0]
         curve = jn.trace(linkage.mechanism, 0.0)
         assert curve.closed

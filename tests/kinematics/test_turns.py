@@ -60,10 +60,10 @@ def test_angles_about_axes_have_the_turns_of_the_law(turn, rate):
 @pytest.mark.slow
 def test_half_a_turn_is_pi_whatever_its_last_digit_says():
     for sign in (1, -1):
-        mechanism = spindle("pi")
+        mechanism = spindle(law(np.pi))
         body = dataclasses.replace(mechanism.bodies["spindle"], orientation=[sign * 1e-17, 0, 0, 1])
         mechanism = dataclasses.replace(mechanism, bodies={"spindle": body})
-        found = jn.solve(mechanism, [0.0], order=1).outputs
+        found = jn.solve(mechanism, [0.0], order=0).outputs
         assert found["angle"][0, 0] == pytest.approx(np.pi, abs=1e-12)
 
 
@@ -176,22 +176,26 @@ def wound(start, rate, space="spatial"):
 
 
 def angles_of_law(start, rate, wave, time):
-    """The law of `wound` and its derivatives to the third, (time, derivative)."""
-    k = np.arange(4)
-    even = np.stack([start + rate * time, 0 * time + rate, 0 * time, 0 * time], axis=-1)
+    """The law of `wound` and its derivatives to the second, (time, derivative)."""
+    k = np.arange(3)
+    even = np.stack([start + rate * time, 0 * time + rate, 0 * time], axis=-1)
     return even + wave * np.pi**k * np.sin(np.pi * time[:, None] + k * np.pi / 2)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("start, rate", LAWS.values(), ids=LAWS)
-def test_springs_in_space_count_turns_on_any_grid_as_in_the_plane(start, rate):
-    plane = jn.solve(wound(start, rate, "planar"), GRIDS[1], order=2).outputs
+def test_springs_in_space_count_turns_on_any_grid_as_in_the_plane():
+    for start, rate in LAWS.values():
+        count_turns_on_any_grid_as_in_the_plane(start, rate)
+
+
+def count_turns_on_any_grid_as_in_the_plane(start, rate):
+    plane = jn.solve(wound(start, rate, "planar"), GRIDS[1], order=1).outputs
     for grid in GRIDS:
-        motion = jn.solve(wound(start, rate), grid, order=2)
+        motion = jn.solve(wound(start, rate), grid, order=1)
         found, time = motion.outputs, np.array(grid, float)
         first, second = angles_of_law(start, rate, 0.4, time), angles_of_law(0.2, -2 * rate, 0.1, time)
         for name, angle in (("first", first), ("second", second), ("between", second - first)):
-            expected = -2.0 * angle[:, :3] - 0.1 * angle[:, 1:]
+            expected = -2.0 * angle[:, :2] - 0.1 * angle[:, 1:]
             expected[:, 0] += 2.0 * 0.3
             size = np.abs(expected).max(axis=0)
             assert (np.abs(found[f"{name}_spring"] - expected) <= 1e-13 * size).all()
@@ -214,8 +218,12 @@ def test_energies_and_powers_have_the_turns_of_the_forces():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("turn", [0.0, 7.5, -100.0])
-def test_about_axes_that_tilt_too_and_for_outputs_asked_for_later(turn):
+def test_about_axes_that_tilt_too_and_for_outputs_asked_for_later():
+    for turn in (0.0, 7.5, -100.0):
+        hold_about_axes_that_tilt_too_and_for_outputs_asked_for_later(turn)
+
+
+def hold_about_axes_that_tilt_too_and_for_outputs_asked_for_later(turn):
     mechanism = shafts(law(turn, 1.0))
     slope, twist = 0.3, {}
     about = [np.cos(slope), np.sin(slope), 0], [-np.sin(slope), np.cos(slope), 0], [0, 1, 0]
@@ -223,7 +231,7 @@ def test_about_axes_that_tilt_too_and_for_outputs_asked_for_later(turn):
     twist["back"] = forces.SpatialTorque(("first", "ground"), [-2, 0, 0], "-x", [0, 1, 0], [0, 1, 0.2])
     mechanism = dataclasses.replace(mechanism, forces=twist)
     for grid in ([0.0, 5.0, 10.0], [0.0, 0.4, 10.0], [10.0]):
-        motion = jn.solve(mechanism, grid, order=2)
+        motion = jn.solve(mechanism, grid, order=1)
         for name, output in mechanism.outputs.items():
             np.testing.assert_allclose(motion.evaluate(output).values, motion.outputs[name], rtol=0, atol=1e-12)
             if name in twist:
@@ -234,9 +242,10 @@ def test_about_axes_that_tilt_too_and_for_outputs_asked_for_later(turn):
 
 @pytest.mark.slow
 def test_instants_that_failed_have_no_torque():
-    mechanism = wound(0.5, 1.0)
-    motors = {**mechanism.drivers, "motor_first": drivers.RotationDriver(("ground", "first"), Z, "7*t + sqrt(4 - t)")}
-    motion = jn.solve(dataclasses.replace(mechanism, drivers=motors), [0.0, 3.0, 5.0], order=2, strict=False)
+    mechanism = wound(0.5, 1.0, "planar")
+    driver = drivers.CoordinateDriver(("ground", "first"), "angle", "7*t + sqrt(4 - t)")
+    motors = {**mechanism.drivers, "motor_first": driver}
+    motion = jn.solve(dataclasses.replace(mechanism, drivers=motors), [0.0, 3.0, 5.0], order=1, strict=False)
     assert motion.status[-1] != 0
     torque = motion.outputs["first_spring"]
     assert np.isnan(torque[-1]).all()

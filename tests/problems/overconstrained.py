@@ -225,28 +225,6 @@ def parallelogram(cranks=3):
     return Case(mechanism, cranks - 2, "coupler", lambda t: mp.sin(mp.mpf("0.7") + TURN(t)), 1)
 
 
-def hooke_twice(bend=0.5):
-    """A Hooke joint whose shafts both have bearings in the ground: the cross holds their places a second time."""
-    along = [float(np.cos(bend)), float(np.sin(bend)), 0.0]
-    far = [2.0 * x for x in along]
-    mechanism = jn.Mechanism(
-        space="spatial",
-        bodies={"input": jn.Body(ORIGIN, mass=1.0), "output": jn.Body(ORIGIN, mass=1.0)},
-        joints={
-            "front": spatial.Revolute(("ground", "input"), [-1.0, 0, 0], [-1.0, 0, 0], X, X),
-            "back": spatial.Revolute(("ground", "output"), far, far, along, along),
-            "cross": spatial.Universal(("input", "output"), ORIGIN, ORIGIN, Z, [-along[1], along[0], 0.0]),
-        },
-        drivers={"turn": drivers.RotationDriver(("ground", "input"), X, LAW)},
-        outputs={"angle": jn.RelativeAngleOutput(("ground", "output"), along)},
-    )
-
-    def motion(t):  # the arm of the input shaft stands across the plane of the shafts at the start
-        return mp.atan2(mp.cos(mp.mpf(bend)) * mp.sin(TURN(t)), mp.cos(TURN(t)))
-
-    return Case(mechanism, 3, "angle", motion)
-
-
 def double_cardan(shift=0.6):
     """Two parallel shafts in bearings and one between them with two Hooke joints: both turn alike."""
     middle = np.array([1.0, shift, 0.0]) / np.hypot(1.0, shift)
@@ -346,13 +324,3 @@ def closing(crank, coupler, ground, rocker, angle):
     first = atan2(y, x) + inner
     up, right = crank * lib.sin(angle) + coupler * lib.sin(first), crank * lib.cos(angle) + coupler * lib.cos(first)
     return first, atan2(up, right - ground)
-
-
-def four_hinges():
-    """A planar four-bar of four hinges in space, with the height of its last pin."""
-
-    def motion(t):
-        _, angle = closing(mp.mpf(1), mp.mpf(3), mp.mpf("2.5"), mp.mpf(2), mp.mpf("0.7") + TURN(t))
-        return 2 * mp.sin(angle)
-
-    return Case(four_bar_of_hinges(), 3, "C", motion, 1, (2,))
