@@ -2,10 +2,12 @@
 
 import pickle
 
+import numpy as np
 import pytest
 
+import jounce as jn
 from jounce import errors
-from jounce.errors import JounceError, MechanismError, MechanismFileError, SolveError, did_you_mean, show_value
+from jounce.errors import JounceError, MechanismError, MechanismFileError, SolveError, did_you_mean, flag, show_value
 
 
 def test_message_puts_place_problem_value_and_advice_in_order():
@@ -66,3 +68,12 @@ def test_suggestions_come_before_the_list():
     assert did_you_mean("A", ["a"]) == "did you mean 'a'? valid: a"
     assert did_you_mean("q", [str(k) for k in range(100)]) == ""
     assert did_you_mean("q", []) == "none is defined"
+
+
+def test_a_flag_is_true_or_false_and_nothing_that_only_counts_as_one():
+    for value in (True, np.bool_(True)):
+        assert flag("drives", value, error=jn.RobotError) is True
+    assert flag("drives", np.bool_(False), error=jn.RobotError) is False
+    for value in ("no", 2, 0, None, np.array([True]), np.float64(1.0)):
+        with pytest.raises(jn.RobotError, match=r"drives.*True or False"):
+            flag("drives", value, error=jn.RobotError)

@@ -139,6 +139,13 @@ def whole_number(name: str, value: object, least: int = 0, most: int | None = No
     return whole
 
 
+def flag(name: str, value: object, *, error: type[JounceError]) -> bool:
+    """Return True or False, or raise an error: any other value, such as "no", would count as one of them."""
+    if type(value).__name__ != "bool":  # so is NumPy's called, which need not be imported for it
+        raise error("must be True or False", name=name, value=value)
+    return bool(value)
+
+
 def did_you_mean(name: object, valid: Iterable[str], limit: int = 20) -> str:
     """Word a suggestion: the nearest valid name, and the valid names when they are few.
 

@@ -176,3 +176,12 @@ def test_memory_of_centrifugal_forces_grows_with_the_square_of_the_number_of_joi
         return compiled.memory_analysis().temp_size_in_bytes
 
     assert memory(24) <= 5 * memory(12)
+
+
+@pytest.mark.parametrize("name, value", [("rates", 2), ("drives", "no")])
+def test_flags_are_true_or_false(name, value):
+    robot = robot_named("panda")
+    still = np.zeros((2, len(robot.joint_names)))
+    for function, q in ((jn.mass_matrix, still[0]), (jn.bias_forces, still)):
+        with pytest.raises((jn.RobotError, TypeError), match=name):  # TypeError by the checker of the tests
+            function(robot, q, **{name: value})

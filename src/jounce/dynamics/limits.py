@@ -11,7 +11,7 @@ from jaxtyping import Float
 from jounce.dynamics.highest import local_maxima
 from jounce.dynamics.limit_jumps import Infinite, infinite_quantities, jumps_of
 from jounce.dynamics.trajectories import FollowedTrajectory, why_not
-from jounce.errors import RobotError, SampleWarning, TrajectoryError
+from jounce.errors import RobotError, SampleWarning, TrajectoryError, flag
 from jounce.robot.model import Limits
 from jounce.robot.robot import Robot
 from jounce.shapes import ArrayLike
@@ -202,6 +202,7 @@ def check_limits(
     >>> report.kept, [(row.quantity, round(row.ratio, 4), round(row.time, 4)) for row in report.limited]
     (False, [('velocity', 0.5, 0.0), ('torque', 1.2263, 0.0)])
     """
+    drives = flag("drives", drives, error=RobotError)
     followed = FollowedTrajectory(robot, trajectory)
     held = followed.held
 

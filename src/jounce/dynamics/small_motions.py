@@ -15,7 +15,7 @@ from jounce.dynamics.robot_states import DRIVE, through_state
 from jounce.dynamics.static_equilibrium import Equilibrium, equilibrium
 from jounce.dynamics.statics import BALANCED, Found, remains
 from jounce.dynamics.variations import clock_at
-from jounce.errors import MechanismError, MobilityError, check_name
+from jounce.errors import MechanismError, MobilityError, RobotError, check_name, flag
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.assembly import freely_moving
 from jounce.mechanism import Mechanism
@@ -88,7 +88,7 @@ def linearise(
     """
     about = None
     if isinstance(subject, Robot):
-        return _of_robot(subject, q, coordinates, drives)
+        return _of_robot(subject, q, coordinates, flag("drives", drives, error=RobotError))
     if q is not None:
         raise MechanismError("is for robots; a mechanism has its own guess", name="q")
     if isinstance(subject, Mechanism):

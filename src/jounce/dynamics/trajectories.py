@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.dynamics.motion_values import in_chunks
-from jounce.errors import RobotError, SampleWarning, TrajectoryError, did_you_mean
+from jounce.errors import RobotError, SampleWarning, TrajectoryError, did_you_mean, flag
 from jounce.robot.arguments import joints_of, whole_number
 from jounce.robot.inverse_dynamics import inverse_dynamics
 from jounce.robot.model import Limits
@@ -147,7 +147,7 @@ def trajectory_torques(
     """
     import xarray
 
-    rates = whole_number("rates", rates)
+    rates, drives = whole_number("rates", rates), flag("drives", drives, error=RobotError)
     followed = FollowedTrajectory(robot, trajectory)
     instants = trajectory.times if times is None else np.atleast_1d(np.asarray(times, float))
     values = followed.torques(followed.coordinates(instants, rates + 2), instants, drives)

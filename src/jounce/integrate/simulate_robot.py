@@ -6,7 +6,7 @@ from typing import Any
 import jax
 import numpy as np
 
-from jounce.errors import RobotError, UnsupportedError, check_name
+from jounce.errors import RobotError, UnsupportedError, check_name, flag
 from jounce.integrate.events import EventLog
 from jounce.integrate.joint_events import JointEvent, JointEventDetector
 from jounce.integrate.marching import Outcome
@@ -52,7 +52,7 @@ def simulate_robot(
     if robot.closures:
         message = "this robot has loops; simulate the mechanism that it is: jn.simulate(robot.mechanism(...), ...)"
         raise RobotError(message, name=robot.name, value=list(robot.closures))
-    problem = _problem(robot, torque, driven, drives, base, wrenches)
+    problem = _problem(robot, torque, driven, flag("drives", drives, error=RobotError), base, wrenches)
     start = _start(robot, problem, state, base, float(instants[0]))
     for event in events:
         if not isinstance(event, JointEvent):

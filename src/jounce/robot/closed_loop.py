@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from jounce.errors import JounceError, RobotError, check_name, did_you_mean
+from jounce.errors import JounceError, RobotError, check_name, did_you_mean, flag
 from jounce.forces import AbstractForce
 from jounce.jet import Jet
 from jounce.mechanism import Body, Mechanism, time_grid
@@ -89,6 +89,7 @@ def mechanism(
     >>> motion.outputs["pin"].round(12).tolist()
     [[0.0, 0.0, 1.0], [0.5, 1.0, 1.0]]
     """
+    drives = flag("drives", drives, error=RobotError)
     if time is None:
         time = getattr(drivers, "times", None)
     laws = {"drivers": getattr(drivers, "laws", drivers) or {}, "initial": initial or {}}

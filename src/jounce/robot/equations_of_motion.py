@@ -13,7 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.errors import RobotError, did_you_mean
+from jounce.errors import RobotError, did_you_mean, flag
 from jounce.jet import Jet, components, cross, dot
 from jounce.jet.algebra import stacked, total
 from jounce.rigid.frames import Frames
@@ -209,8 +209,9 @@ def mass_matrix(
     >>> jn.mass_matrix(robot, [[0.3, 0.5], [0.0, 2.0]], rates=True)[1].round(12).tolist()  # 2 * 1 * 2
     [[4.0, 0.0], [0.0, 0.0]]
     """
+    rates, drives = flag("rates", rates, error=RobotError), flag("drives", drives, error=RobotError)
     q = checked_coordinates(robot, q) if rates else checked_position(robot, q)
-    found = _mass_matrix(robot, (q,), (), (bool(drives),))
+    found = _mass_matrix(robot, (q,), (), (drives,))
     return found if rates else found[..., 0, :, :]
 
 
@@ -267,6 +268,7 @@ def bias_forces(
     for part in chosen:
         if part not in PARTS:
             raise RobotError(f"no such part; {did_you_mean(str(part), PARTS)}", name="parts", value=part)
+    rates, drives = flag("rates", rates, error=RobotError), flag("drives", drives, error=RobotError)
     q = checked_coordinates(robot, q, 1, most=None if rates else 1)
-    found = _bias(robot, (q,), (), (frozenset(chosen), bool(drives)))
+    found = _bias(robot, (q,), (), (frozenset(chosen), drives))
     return found if rates else found[..., 0, :]

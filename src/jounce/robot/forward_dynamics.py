@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.errors import RobotError, SingularityError, check_name
+from jounce.errors import RobotError, SingularityError, check_name, flag
 from jounce.robot.arguments import checked_state, floats, joints_of
 from jounce.robot.articulated_bodies import LEAST_INERTIA
 from jounce.robot.base_motion import BaseMotion, base_arrays, base_body
@@ -129,6 +129,7 @@ def forward_dynamics(
             "gives its motion under forces, robot.opened() the tree without closures"
         )
         raise RobotError(message, name=robot.name, value=list(robot.closures))
+    drives, strict = flag("drives", drives, error=RobotError), flag("strict", strict, error=RobotError)
     state = checked_state(robot, state)
     forces, at_base = _checked_forces(robot, tau, state.shape[:-2], base is not None)
     lead, levels, count = state.shape[:-2], forces.shape[-2], len(robot.joint_names)
@@ -142,7 +143,7 @@ def forward_dynamics(
     arrays = (state, forces, *moved, *pushes)
     constants = (mask, places, None if base is None else base_body(robot))
     traced = is_traced((arrays, robot.tree, constants))
-    static = (tuple(wrench.frame == "base" for wrench in wrenches), bool(drives), traced)
+    static = (tuple(wrench.frame == "base" for wrench in wrenches), drives, traced)
     q, margin, *found = _moved(robot, arrays, constants, static)
     if strict and not traced:
         _check_margins(robot, margin, mask)

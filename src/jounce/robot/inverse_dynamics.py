@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.errors import RobotError, did_you_mean
+from jounce.errors import RobotError, did_you_mean, flag
 from jounce.jet import Jet, concatenate, cross, matvec
 from jounce.jet.algebra import stacked, total
 from jounce.robot.arguments import checked_coordinates
@@ -76,6 +76,7 @@ def inverse_dynamics(
     [[5.905], [2.0]]
     """
     q = checked_coordinates(robot, q, 2)
+    drives = flag("drives", drives, error=RobotError)
     arrays, static = _applied(robot, q, wrenches, time, free=base is not None)
     if base is None:
         return _generalised_forces(robot, arrays[0], arrays[1], (*static, drives))

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from jounce.dynamics.trajectories import FollowedTrajectory
-from jounce.errors import SolveError, TrajectoryError, whole_number
+from jounce.errors import SolveError, TrajectoryError, flag, whole_number
 from jounce.mechanism import Mechanism
 from jounce.planning.retiming.fastest import Search, fastest, slowed_only
 from jounce.planning.retiming.limits import MotionLimits, limits_of
@@ -116,6 +116,7 @@ def retime(
         return retime_mechanism(robot, _of_mechanism(limits), _rates(rates), order, cells or CELLS)
     if not isinstance(robot, Robot):
         raise TrajectoryError("must be a Robot or a Mechanism", name="robot", value=type(robot).__name__)
+    drives, repair = flag("drives", drives, error=TrajectoryError), flag("repair", repair, error=TrajectoryError)
     if isinstance(path, JointTrajectory):
         FollowedTrajectory(robot, path)  # checks its joints and units
     if repair:
