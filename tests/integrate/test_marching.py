@@ -19,7 +19,8 @@ def test_what_a_run_begins_with_is_compiled_for_once():
         joints={},
         forces={"spring": jn.forces.Spring(("ground", "mass"), [0, 0], [0, 0], 3.0, 0.5)},
     )
-    equations, state = consistent_start(mass, 0.0)[1:3]
+    start = consistent_start(mass, 0.0)
+    equations, state = start.equations, start.state
     begun = jax.eval_shape(partial(unexpanded.function, order=4), equations, state, np.zeros(1))
     going = partial(march.function, method=jn.Taylor(4), count=1)
     onwards = jax.eval_shape(going, equations, begun, 1.0, 1e-9, np.inf)[0]
