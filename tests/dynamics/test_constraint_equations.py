@@ -170,6 +170,7 @@ def test_mass_matrix_and_multipliers_make_the_equations_of_motion(linkage_motion
     assert forces[2] == pytest.approx(arm[0] * weight[1] - arm[1] * weight[0], abs=1e-12)
 
 
+@pytest.mark.slow
 def test_a_state_of_a_motion_has_the_equations_of_the_motion(linkage_motion):
     moving = jn.constraint_equations(linkage_motion).isel(time=[1])
     state = {}

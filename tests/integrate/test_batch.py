@@ -102,6 +102,7 @@ def test_bad_parameters(values, words):
         jn.simulate_batch(pendulum(), values, TIME)
 
 
+@pytest.mark.slow
 def test_a_run_whose_initial_conditions_cannot_be_met_says_so():
     """Two rods reach 1.8 m: 2.5 m and a speed at 1.8 m are out of reach, and just below it Newton's steps are slow."""
     reach = jn.drivers.DistanceDriver(("ground", "lower"), [0, 0], [0.8, 0], "r + 0.3*t")

@@ -66,6 +66,7 @@ def test_what_jumps_is_told_from_what_bends_and_from_what_is_smooth():
     assert orders(c=40.0) == orders(A=3e3) == orders(A=3e3, w=1e-4) == []
 
 
+@pytest.mark.slow
 def test_a_jump_is_refused():
     def place(x0):
         return jn.simulate(sled(J=5.0).with_parameters(x0=x0), [0.0, END], order=1).outputs["x"][-1, 0, 0]

@@ -64,6 +64,7 @@ def test_circuits_and_branches_of_four_bars():
     assert [(x.circuit, x.branch) for x in crossing] == [(1, 1), (1, 2)]
 
 
+@pytest.mark.slow
 def test_a_kite_has_two_assemblies_on_one_circuit():
     kite = jn.Mechanism(  # crank and rod alike, rocker and ground alike: folded, crank and rod turn as one body
         space="planar",

@@ -58,6 +58,7 @@ def test_results_with_a_rehearsal_beside_are_those_without(monkeypatch):
         np.testing.assert_array_equal(found[1][name], values)
 
 
+@pytest.mark.slow
 def test_long_grids_are_rehearsed(compiled_later):
     jn.solve(four_bar(), np.linspace(0, 2, 1500), order=5)
     assert compiled_later() <= {"leg"}

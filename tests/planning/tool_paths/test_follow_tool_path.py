@@ -175,6 +175,7 @@ def test_more_rows_than_joints_that_agree_and_that_do_not():
     assert "cannot keep the tool" in found.explain(1)
 
 
+@pytest.mark.slow
 def test_singular_position_ends_the_path_and_names_the_joints():
     path = jn.ToolPath(["0.9 + 0.5*t", 0.1, 0.0], start=0.0, stop=1.0)
     arm = planar_chain([0.7, 0.6])
