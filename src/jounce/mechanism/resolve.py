@@ -277,9 +277,9 @@ def group_key(element: Element, values: Mapping[str, Any]) -> Any:
     static = static_fields(type(element))
     words = tuple(getattr(element, name) for name in static)
     numbers_only = {name: value for name, value in values.items() if name not in static}
-    if all(type(value) in (float, np.ndarray) for value in numbers_only.values()):
+    if all(isinstance(value, float | np.ndarray | jax.Array) for value in numbers_only.values()):  # traced ones too
         shapes = tuple((name, np.shape(value)) for name, value in numbers_only.items())
-        return type(element), words, shapes  # which is all that there is to tell, told without JAX
+        return type(element), words, shapes  # which is all that there is to tell, told without flattening
     leaves, structure = jax.tree.flatten(numbers_only)
     return type(element), words, structure, tuple(np.shape(leaf) for leaf in leaves)
 
