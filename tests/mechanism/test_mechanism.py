@@ -10,6 +10,7 @@ import pytest
 import jounce as jn
 from jounce import planar, spatial
 from jounce.mechanism import build, time_grid
+from jounce.mechanism.builder import grouped_elements
 from jounce.mechanism.time import instants_of
 from tests.problems.small import crank, four_bar
 
@@ -299,3 +300,25 @@ def test_what_models_of_one_structure_share_cannot_be_written():
     assert first.system.pattern is second.system.pattern
     with pytest.raises(ValueError, match="read-only"):
         first.system.pattern.places[0] = 0
+
+
+def test_elements_of_which_some_values_are_traced_are_grouped_as_those_of_numbers():
+    mechanism = jn.Mechanism(
+        space="planar",
+        parameters={"L": 0.3},
+        bodies={"one": jn.Body([0, 0]), "two": jn.Body(["L", 0])},
+        joints={
+            "A": jn.planar.Revolute(("ground", "one"), [0, 0], [0, 0]),
+            "B": jn.planar.Revolute(("one", "two"), ["L", 0], [0, 0]),
+            "rod": jn.planar.DoubleRevolute(("ground", "two"), [0, 0], [0, 0], "L"),
+            "stay": jn.planar.DoubleRevolute(("one", "two"), [0, 0], [0, 0], 0.3),
+        },
+    )
+
+    def bodies(mechanism):
+        return [group.bodies for group in grouped_elements(mechanism)[0][0]]
+
+    traced = []
+    jax.eval_shape(lambda length: traced.append(bodies(mechanism.with_parameters(L=length))) or length, 0.3)
+    assert traced == [bodies(mechanism)]
+    assert [len(slots[0]) for slots in bodies(mechanism)] == [2, 2]
