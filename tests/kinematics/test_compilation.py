@@ -10,7 +10,6 @@ import pytest
 import jounce as jn
 from jounce.kinematics import compilation
 from jounce.kinematics.compilation import Compiled, compiles_anew
-from jounce.kinematics.garbage import OFTEN_ENOUGH, RareCollection
 
 
 class Shelf(dict):
@@ -142,40 +141,3 @@ def test_a_motion_is_the_same_with_kept_programs(shelf):
     assert len(shelf) == count
     for name, values in before.outputs.items():
         np.testing.assert_array_equal(after.outputs[name], values)
-
-
-def test_while_a_program_is_traced_garbage_is_looked_for_rarely_and_then_as_before():
-    seen = []
-
-    def noted(x, *, wrong=False):
-        seen.append(gc.get_threshold())
-        if wrong:
-            raise ValueError("cannot be traced")
-        return x + 1.0
-
-    inner = Compiled(noted, ("wrong",))
-    outer = Compiled(lambda x: inner(x) + inner(2.0 * x), ())
-    before = gc.get_threshold()
-    inner(np.ones(3))
-    outer(np.ones(3))
-    with pytest.raises(ValueError, match="cannot be traced"):
-        inner(np.ones(3), wrong=True)
-    assert len(seen) >= 3
-    assert {often for often, *_ in seen} == {max(OFTEN_ENOUGH, before[0])}
-    assert gc.get_threshold() == before
-
-
-@pytest.mark.parametrize("first", [0, 700])
-def test_garbage_is_looked_for_as_the_last_thread_found_it(first):
-    before = gc.get_threshold()
-    try:
-        gc.set_threshold(first, 10, 10)
-        rarely = RareCollection()
-        with rarely, rarely:
-            assert gc.get_threshold() == (OFTEN_ENOUGH if first else 0, 10, 10)
-        assert gc.get_threshold() == (first, 10, 10)
-        with rarely:
-            gc.set_threshold(5, 4, 3)  # what someone asks for meanwhile is left
-        assert gc.get_threshold() == (5, 4, 3)
-    finally:
-        gc.set_threshold(*before)

@@ -12,7 +12,7 @@ import threading
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from functools import cached_property, lru_cache, partial, update_wrapper, wraps
+from functools import cached_property, lru_cache, partial, update_wrapper
 from typing import Any, Protocol, runtime_checkable
 
 import jax
@@ -21,7 +21,6 @@ from jax.core import Tracer
 from jax.experimental import serialize_executable
 
 from jounce.kinematics.device import on_processor
-from jounce.kinematics.garbage import RARELY
 from jounce.kinematics.structure import UndescribedError, being_debugged, program_key, settings
 from jounce.mechanism.preconditions import check_process
 
@@ -161,40 +160,16 @@ class Compiled:
     def jitted(self) -> Any:
         """The function as `jax.jit` returns it."""
         options = compiler_options(self.without, narrow=self.narrow)
-        return jax.jit(self._begins_a_program, static_argnames=self.static, compiler_options=options)
+        return jax.jit(self.function, static_argnames=self.static, compiler_options=options)
 
     @cached_property
     def _within(self) -> Any:
         """The function within a program of which it is a part: JAX takes options for the whole only."""
         return jax.jit(self.function, static_argnames=self.static)
 
-    @cached_property
-    def _begins_a_program(self) -> Callable[..., Any]:
-        """The function, which runs to be traced: until the call that compiles it ends, collections are rare."""
-
-        @wraps(self.function)
-        def traced(*arguments: Any, **keywords: Any) -> Any:
-            if not getattr(_thread, "tracing", True):
-                _thread.tracing = True
-                RARELY.__enter__()
-            return self.function(*arguments, **keywords)
-
-        return traced
-
     def __call__(self, *arguments: Any, **keywords: Any) -> Any:
         """Call the compiled function."""
         check_process()
-        if hasattr(_thread, "tracing"):  # a part of what another one calls
-            return self._called(arguments, keywords)
-        _thread.tracing = False
-        try:
-            return self._called(arguments, keywords)
-        finally:
-            if _thread.tracing:
-                RARELY.__exit__()
-            del _thread.tracing
-
-    def _called(self, arguments: tuple[Any, ...], keywords: dict[str, Any]) -> Any:
         if (enough := getattr(_thread, "enough", None)) is not None and enough.is_set():
             raise StoppedError
         if traced := [leaf for leaf in jax.tree.leaves((arguments, keywords)) if isinstance(leaf, Tracer)]:
