@@ -71,6 +71,7 @@ def test_a_peer_that_fails_is_told_and_the_others_run():
     assert third["ratio"] is None, "there is nothing to compare with"
 
 
+@pytest.mark.slow
 def test_tables_and_figures_of_all_rows(tmp_path):
     errors = {"error": lambda found: 1e-9, "aim": 2.0}
     found = []

@@ -40,6 +40,7 @@ def table_rows(text):
     return rows
 
 
+@pytest.mark.slow
 def test_run_tabulates_the_extremes_of_every_output_and_derivative(run, four_bar):
     status, out, err = run("run", FOUR_BAR)
     assert (status, err) == (0, "")

@@ -38,6 +38,7 @@ def simulate(run):
     return functools.partial(run, "simulate")
 
 
+@pytest.mark.slow
 def test_summary_table_and_file(simulate, file, tmp_path):
     path = tmp_path / "out.csv"
     status, out, err = simulate(file, "--out", path)

@@ -4,6 +4,8 @@ import json
 import subprocess
 import sys
 
+import pytest
+
 CALLS = """
 import json
 import numpy as np
@@ -35,6 +37,7 @@ print(json.dumps({name: sorted(words) for name, words in told.items()}))
 OF_MOTIONS = {"driver_force", "joint_reaction", "applied_force", "power_balance", "potential_energy"}
 
 
+@pytest.mark.slow
 def test_robots_and_motions_are_asked_for():
     """In a process of its own: the tests check annotations, which nothing does in use."""
     done = subprocess.run([sys.executable, "-c", CALLS], capture_output=True, text=True, check=False)

@@ -218,6 +218,7 @@ def test_redundant_rows_are_all_there():
     assert equations.right_side.sel(derivative=1, row="turn.1").item() == 3.0
 
 
+@pytest.mark.slow
 def test_bodies_without_joints_and_motions_without_derivatives():
     free = jn.Mechanism(space="spatial", bodies={"stone": jn.Body([0, 0, 2.0], mass=2.0, inertia=[1, 2, 3])}, joints={})
     equations = jn.constraint_equations(free)
@@ -243,6 +244,7 @@ def test_a_free_body_without_a_mass_leaves_multipliers_open():
     assert np.isfinite(found.sel(derivative=0)).all()
 
 
+@pytest.mark.slow
 def test_instants_that_were_not_solved_are_nan():
     """A crank pushed away from a point farther than it reaches."""
     reach = jn.drivers.DistanceDriver(("ground", "crank"), [1, 0], [1, 0], motion="0.5 + 2*t")

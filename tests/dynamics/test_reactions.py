@@ -202,6 +202,7 @@ def test_a_force_that_is_not_finite_is_named_with_its_time():
         jn.driver_force(motion, "turn")
 
 
+@pytest.mark.slow
 def test_forces_at_a_change_point_are_not_told():
     """A parallelogram in circular translation: its weight on the crank in closed form, but where it is stretched out.
 

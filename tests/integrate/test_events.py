@@ -49,6 +49,7 @@ def test_derivatives_are_crossed():
     assert happened(height(-10.0, derivative=2)) == [[]]  # at the value always, never across it
 
 
+@pytest.mark.slow
 def test_what_begins_at_the_value_does_not_cross_it():
     assert happened(height(0.0))[0] == pytest.approx([1.0], abs=1e-14)  # the landing, not the throw
     assert happened(height(0.0, derivative=1), mechanism=stone(speed=0.0)) == [[]]

@@ -53,6 +53,7 @@ def test_kink_of_a_motion_law_is_no_jump():
     np.testing.assert_allclose(motion.outputs["angle"][:, 0], np.where(GRID < 1, GRID, 2 * GRID - 1), atol=1e-13)
 
 
+@pytest.mark.slow
 def test_slider_driven_to_its_dead_centre_is_singular():
     error = failure(slider_crank("3.5 + 0.5*t"), np.linspace(0, 1, 5))
     assert error.status == Status.SINGULAR

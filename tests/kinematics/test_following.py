@@ -147,6 +147,7 @@ def test_law_that_jumps_is_refused_at_any_size(jump):
     assert Status.BRANCH_JUMP in motion.status
 
 
+@pytest.mark.slow
 def test_output_without_a_rate_is_not_ok_and_the_motion_goes_on():
     mechanism = jn.Mechanism(
         space="planar",

@@ -66,6 +66,7 @@ def errors(name, parameters, order, count=3):
     return worst
 
 
+@pytest.mark.slow
 def test_a_four_bar_in_fifty_digits():
     assert errors("four_bar", ["BC"], 4, 2).max() < 1e-11
 

@@ -41,6 +41,7 @@ def test_dataset_has_names_dimensions_and_units(planar):
     assert list(dataset["derivative"].values) == [0, 1, 2, 3, 4]
 
 
+@pytest.mark.slow
 def test_points_and_angles_asked_for_later_are_the_outputs(planar):
     np.testing.assert_allclose(planar.point("rocker", [0.2031, 0.0]).values, planar.outputs["C"], rtol=1e-13)
     np.testing.assert_allclose(planar.angle("rocker").values, planar.outputs["psi"], rtol=1e-13)

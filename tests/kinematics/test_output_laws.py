@@ -36,6 +36,7 @@ def crank_angle(t):
     return mp.atan2(e, x) + mp.acos((r * r + d * d - rod * rod) / (2 * r * d))
 
 
+@pytest.mark.slow
 def test_the_driver_follows_with_all_derivatives(motion):
     with mp.workdps(50):
         exact = np.array([[float(mp.diff(crank_angle, mp.mpf(t), k)) for k in range(ORDER + 1)] for t in GRID])

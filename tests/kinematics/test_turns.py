@@ -90,6 +90,7 @@ def test_planar_bodies_end_at_the_turn_nearest_to_the_guess():
     assert max(kept) <= np.pi + 1e-12
 
 
+@pytest.mark.slow
 def test_a_torsional_spring_sees_the_angle_that_the_guess_says():
     torques = []
     for turns in (-1, 0, 1):

@@ -31,6 +31,7 @@ def test_a_call_takes_no_more_memory_than_it_should(entries):
     assert lots == 1 or lots * 128 * entries <= CALL_ENTRIES
 
 
+@pytest.mark.slow
 def test_results_do_not_depend_on_how_many_lots_go_together(monkeypatch):
     together = jn.solve(four_bar(), GRID, threads=1)
     monkeypatch.setattr(wide_batches, "MOST_LOTS", 1)

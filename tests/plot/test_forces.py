@@ -83,6 +83,7 @@ def test_power_goes_where_it_should(lift):
     assert [axes.get_ylabel() for axes in figure.axes] == ["power  (W)", "rate  (W/s)", "second rate  (W/s$^2$)"]
 
 
+@pytest.mark.slow
 def test_what_has_no_forces_is_told(lift):
     bare = jn.solve(jn.load(ROOT / "examples" / "four_bar.yaml"), [0.0, 0.1], order=2)
     for figure in (draw_reactions, draw_energy, draw_power):

@@ -58,6 +58,7 @@ def test_ordinals_of_derivatives():
     assert [derivative_name(k) for k in (11, 12, 13, 21, 23)] == ["11th", "12th", "13th", "21st", "23rd"]
 
 
+@pytest.mark.slow
 def test_instants_are_solved_together_or_one_by_one(monkeypatch):
     motion, again = (jn.solve(CRANK, np.linspace(0.0, 1.0, 3), order=1) for _ in range(2))
     together = peaks(motion)

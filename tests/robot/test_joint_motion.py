@@ -84,6 +84,7 @@ def test_a_redundant_arm_moves_with_the_least_norm():
     np.testing.assert_allclose(found.q[:, 2], np.einsum("sij,sj->si", inverse, lacking), rtol=0, atol=1e-12 * scale)
 
 
+@pytest.mark.slow
 def test_position_and_orientation_tasks():
     q = np.random.default_rng(2).uniform(0.5, 1, (2, 4, 2))
     operational = jn.operational_accelerations(ARM, q, *TIP)

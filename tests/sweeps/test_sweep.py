@@ -193,6 +193,7 @@ def test_what_cannot_be_swept_is_refused_before_anything_is_written(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_a_full_disk_loses_nothing(done, tmp_path, monkeypatch):
     from jounce.sweeps import store
 

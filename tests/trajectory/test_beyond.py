@@ -188,6 +188,7 @@ def test_laws_of_three_kinds_side_by_side():
         np.testing.assert_allclose(motion.outputs[name][1], np.cos([3.0, 3 + math.pi / 2, 3 + math.pi]), atol=1e-6)
 
 
+@pytest.mark.slow
 def test_noisy_samples_of_a_driver_warn_as_those_of_a_trajectory_do():
     generator = np.random.default_rng(3)
     clean = np.sin(3 * TIMES)

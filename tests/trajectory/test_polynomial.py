@@ -153,6 +153,7 @@ def test_linear_highest_derivative_integrates_in_closed_form():
     close(derivatives(law, 0, t)[0], 1 + 0.5 * t + 3 * t**2 - t**3, 1e-15)
 
 
+@pytest.mark.slow
 def test_it_drives_a_mechanism():
     law = PolynomialMotion(KNOTS, VALUES, 4)
     found = jn.solve(crank(law), KNOTS[1:4], order=3).outputs["angle"]

@@ -80,6 +80,7 @@ def test_peaks_are_named_torque_yank_and_second_rate(motion):
     assert [entry[1] for entry in named if entry[0] == "angle"] == ["position", "velocity", "acceleration"]
 
 
+@pytest.mark.slow
 def test_figures_draw_forces_beside_accelerations(motion):
     axes = np.reshape(draw(motion, ["angle", "T"]).axes, (3, 2))
     assert [a.get_visible() and a.axison for a in axes[:, 1]] == [False, False, True]

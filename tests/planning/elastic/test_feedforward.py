@@ -110,6 +110,7 @@ def test_a_gear_changes_what_the_motor_does_and_not_the_joint(arm, swing):
     np.testing.assert_allclose(power, 1.0, rtol=1e-13)
 
 
+@pytest.mark.slow
 def test_derivatives_alone_give_the_same(arm, swing):
     along = jn.feedforward(arm, swing, DRIVES, rates=2, times=TIMES)
     found = jn.feedforward(arm, swing.derivatives(TIMES, 6), DRIVES, rates=2)

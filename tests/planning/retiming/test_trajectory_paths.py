@@ -74,6 +74,7 @@ def test_a_ramp_and_its_motion_are_inverse(power):
     np.testing.assert_allclose(found, lengths, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_motion_there_and_back_takes_as_long_as_its_closed_form_says():
     robot = jn.Robot(
         "p", [jn.Link("base"), jn.Link("a", jn.Inertia(1.0))], [jn.Joint("j", "base", "a", "prismatic", axis=[1, 0, 0])]

@@ -10,6 +10,7 @@ from tests.planning.tool_paths.arms import planar_chain, wrist_arm
 from tests.problems.robots import robot_named
 
 
+@pytest.mark.slow
 def test_two_links_reach_what_their_closed_form_says():
     arm, generator = planar_chain([0.7, 0.5]), np.random.default_rng(0)
     radius, angle = generator.uniform(0.25, 1.15, 40), generator.uniform(-3, 3, 40)

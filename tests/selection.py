@@ -1,0 +1,67 @@
+"""Which of the collected tests run: dear examples of docstrings are slow tests, of which a run may take a share.
+
+The slow tests take forty minutes, nine tenths of it in JAX and XLA, which compile each mechanism anew. A check before
+each submission has not that long: it runs one share of them, by turns, and whoever changes what they test runs all.
+"""
+
+import argparse
+
+import pytest
+
+SLOW_EXAMPLES = frozenset(
+    """
+    jounce.design.optimise.optimise
+    jounce.design.tolerance.tolerance
+    jounce.integrate.batch.simulate_batch
+    jounce.integrate.diffrax_term.ode_term
+    jounce.integrate.simulate.simulate
+    jounce.io.results.write_parts
+    jounce.kinematics.curves.assemblies.assemblies
+    jounce.kinematics.curves.limits.LimitPosition
+    jounce.kinematics.families.solve_batch
+    jounce.kinematics.solve.solve_in_stretches
+    jounce.planning.tool_paths.follow_tool_path.follow_tool_path
+    jounce.plot.bands.draw_bands
+    jounce.plot.forces.draw_power
+    jounce.robot.closed_loop.mechanism
+    jounce.sweeps.sweep.sweep
+    jounce.trajectory.composed.OutputMotion
+    jounce.viewer.cams.cam_mechanism
+    """.split()
+)
+"""Docstrings whose examples take more than two seconds, most of them to compile."""
+
+
+def share(text):
+    """Return which share is meant by K/N."""
+    try:
+        which, count = map(int, text.split("/"))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"a share is K/N, such as 1/3, got {text!r}") from None
+    if not 1 <= which <= count:
+        raise argparse.ArgumentTypeError(f"of {count} shares, K is 1 to {count}, got {which}")
+    return which, count
+
+
+def pytest_addoption(parser):
+    """Add the option of a share."""
+    parser.addoption("--share", type=share, default=(1, 1), metavar="K/N", help="the K-th of N shares of the tests")
+
+
+@pytest.hookimpl(tryfirst=True)  # before pytest selects by marks
+def pytest_collection_modifyitems(config, items):
+    """Mark dear examples, and leave out the files of other shares: those of one file share compiled programs."""
+    for item in items:
+        if item.name in SLOW_EXAMPLES:
+            item.add_marker(pytest.mark.slow)
+    slow = {item for item in items if item.get_closest_marker("slow")}
+    left_out = slow & elsewhere(slow, *config.getoption("share"))
+    if left_out:
+        config.hook.pytest_deselected(items=list(left_out))
+        items[:] = [item for item in items if item not in left_out]
+
+
+def elsewhere(items, which, count):
+    """Return the tests of other shares: the files are dealt out in the order of their names."""
+    files = sorted({item.path for item in items})
+    return {item for item in items if files.index(item.path) % count != which - 1}
