@@ -1,5 +1,6 @@
 """Long grids in several threads: the same to the last bit, whoever calls; errors and interrupts come through."""
 
+import threading
 from concurrent.futures import ThreadPoolExecutor
 
 import jax
@@ -68,6 +69,14 @@ def test_items_are_mapped_in_order_and_an_error_comes_through():
         assert list(threads.map(inverse, range(1, 40))) == [1 / k for k in range(1, 40)]
         with pytest.raises(ZeroDivisionError):
             list(threads.map(inverse, [2, 1, 0, 3, 4]))
+
+
+def test_two_items_run_side_by_side_as_soon_as_a_first_one_has_compiled():
+    meeting = threading.Barrier(2)
+    with Threads(2) as pool:
+        assert list(pool.map(abs, [-1])) == [1]
+        ends = list(pool.map(lambda _: meeting.wait(timeout=20), range(2)))  # in turn, the first would wait for ever
+    assert sorted(ends) == [0, 1]
 
 
 def test_the_default_device_of_the_caller_is_that_of_its_threads():

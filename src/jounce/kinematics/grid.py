@@ -104,16 +104,17 @@ class GridSolver:
         return np.where(nearer & (self.status[neighbour] == Status.OK), neighbour, source)
 
     def _solved(self, batch: tuple[Indices, Indices]) -> Arrival:
-        """Return what comes of a batch of instants, with their sources; nothing here is changed by it."""
+        """Return what comes of a batch of instants, with their sources; nothing is kept but the state at its lanes."""
         lanes, source = batch
         chosen = _slice_of(source)
         known = jax.tree.map(lambda x: x[..., chosen], self._store)
-        return self.solver(known, self.time[lanes] - self._instants[source], self.time[lanes])
+        arrival = self.solver(known, self.time[lanes] - self._instants[source], self.time[lanes])
+        self._keep(_slice_of(lanes), arrival.state(slice(None)))
+        return arrival
 
     def _take(self, lanes: Indices, arrival: Arrival) -> None:
-        """Keep what came of a batch, and follow the motion to the instants that failed."""
+        """Keep the outcome of a batch, and follow the motion to the instants that failed."""
         self.status[lanes] = arrival.status
-        self._keep(_slice_of(lanes), arrival.state(slice(None)))
         for k in np.flatnonzero(arrival.status != Status.OK).tolist():
             self.faults[int(lanes[k])] = self.solver.fault(arrival, k)
             if arrival.status[k] not in PASSABLE:

@@ -54,6 +54,7 @@ class Threads:
     def __init__(self, count: int):
         self.count = count
         self._pool: ThreadPoolExecutor | None = None
+        self._compiled = False
         self._context = callers_device()
 
     def __enter__(self) -> "Threads":
@@ -66,7 +67,8 @@ class Threads:
     def map(self, function: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
         """Yield what a function returns for each item, in their order; it may compute a few of them beforehand."""
         items = deque(items)
-        if items and (self.count == 1 or self._pool is None):  # what the first one compiles, the others find
+        if items and not self._compiled:  # what the first one compiles, the others find
+            self._compiled = True
             yield function(items.popleft())
         if self.count == 1 or len(items) < 2:
             yield from map(function, items)
