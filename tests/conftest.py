@@ -15,7 +15,7 @@ import tests.type_checks  # isort: skip # noqa: F401 - before jounce
 from jounce.cli import main
 from jounce.cli.compiled_programs import keep_programs
 from jounce.constraints import base  # importing jounce switches on double precision
-from tests.selection import pytest_addoption, pytest_collection_modifyitems  # noqa: F401 - found here by pytest
+from tests.shares_of_tests import pytest_addoption, pytest_collection_modifyitems  # noqa: F401 - found here by pytest
 
 # Most of the time of the tests goes into compiling. It is halved without XLA's last optimisations, without its passes
 # over loops and reshapes, which go round some thirty times, and in one thread, of which the other worker has the next.

@@ -6,7 +6,7 @@ import pathlib
 
 import pytest
 
-from tests.selection import SLOW_EXAMPLES, elsewhere, share
+from tests.shares_of_tests import SLOW_EXAMPLES, elsewhere, share
 
 
 class Item:
