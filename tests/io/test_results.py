@@ -96,6 +96,16 @@ def test_names_that_need_quotes(tmp_path):
     same_bits(read(tmp_path / "motion.csv")['a "b", c'], written['a "b", c'])
 
 
+@pytest.mark.parametrize("name", ["a_d1", "a_d1_d2", "a [deg]", "C_d1 [m]"])
+def test_names_that_end_as_a_derivative_or_a_unit_does(tmp_path, name):
+    written = example().rename({"psi": name})
+    write(written, tmp_path / "motion.csv")
+    found = read(tmp_path / "motion.csv")
+    assert set(found.data_vars) == {name, "C"}
+    same_bits(found[name], written[name])
+    same_bits(found["C"], written["C"])
+
+
 def test_variables_that_are_not_outputs_stay_out_of_the_table(tmp_path):
     written = example().assign(status=("time", np.zeros(4, int)))
     write(written, tmp_path / "motion.csv")

@@ -26,8 +26,8 @@ from jounce.shapes import Numbers
 SMALLEST_COSINE = 1e-6  # of half the tilt of the axis: below it the tilt is half a turn, and no angle is told
 
 
-Vectors = Float[Numbers, "3 *batch"]
-"""A vector of each instance, fixed in a body."""
+Vectors = Float[Numbers, "3 *#batch"]
+"""A vector of each instance, fixed in a body; the same in all lanes or one for each."""
 
 
 class Datum(eqx.Module):

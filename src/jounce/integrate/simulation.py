@@ -23,7 +23,7 @@ from jounce.jet.turns import brought_near, counted_by_rates
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.compilation import compiled
 from jounce.mechanism import Mechanism
-from jounce.mechanism.axis_angles import with_turns
+from jounce.mechanism.axis_angles import AttitudeHistory, measures_angle, with_turns
 from jounce.mechanism.system import Group
 from jounce.shapes import ArrayLike
 
@@ -173,17 +173,25 @@ class Simulation(Motion):
         """The applied forces, in the groups of the model, with the turns of angles about axes at every instant."""
         return with_turns(self.model.system.forces, self._angles)
 
-    def _attitudes(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return instants along the steps, and the Euler parameters of all bodies there, (4, bodies, places)."""
-        dense, series = self.dense_output, self.dense_output.polynomial.attitude
-        since = dense.length[:, None] * (np.arange(PLACES) / PLACES)
-        place = np.zeros((*series.shape[:1], *series.shape[2:], PLACES))
+    @cached_property
+    def _attitudes(self) -> AttitudeHistory:
+        """The attitudes of all bodies in space along the steps; there are none of states that another solver gave."""
+        dense = self.dense_output
+        if not dense.length.any():
+            return AttitudeHistory(self._attitudes_at(dense.start), dense.start)
+        instants = (dense.start[:, None] + dense.length[:, None] * (np.arange(PLACES) / PLACES)).ravel()
+        instants = np.append(instants, dense.end)
+        return AttitudeHistory(self._attitudes_at(instants), instants, between=self._attitudes_at)
+
+    def _attitudes_at(self, instants: Float[np.ndarray, " time"]) -> Float[np.ndarray, "4 bodies time"]:
+        dense, chosen = self.dense_output, self.steps_at(instants)
+        series, since = dense.polynomial.attitude[chosen], instants - dense.start[chosen]
+        place = np.zeros((len(instants), *series.shape[2:]))
         for k in range(series.shape[1])[::-1]:
-            place = place * since[:, None, None] + series[:, k, ..., None]
-        place = np.moveaxis(place, 0, -2).reshape(*series.shape[2:], -1)
-        ground = np.zeros((4, 1, place.shape[-1]))
+            place = place * since[:, None, None] + series[:, k]
+        ground = np.zeros((4, 1, len(instants)))
         ground[0] = 1.0
-        return (dense.start[:, None] + since).ravel(), np.concatenate([ground, place], axis=1)
+        return np.concatenate([ground, np.moveaxis(place, 0, -1)], axis=1)
 
     def _coefficients(self, group: Group) -> np.ndarray:
         pose_type, coordinates = self.poses
@@ -196,6 +204,10 @@ class Simulation(Motion):
         series, dense = series_of(group, coordinates, pose_type), self.dense_output
         if not group.element.turning or not dense.length.any():  # no steps: states that another solver gave
             return continuous(group, series, instants)
+        if measures_angle(group):
+            (counted,) = self._attitudes.counting((group,), instants)
+            series[0, 0] = brought_near(series[0, 0], counted.element.datum.near)
+            return series
         nodes = (dense.start[:, None] + dense.length[:, None] * NODES).ravel()
         known = at_nodes(group, dense.polynomial, dense.length, 1, self._start.model.pose_type)[:2]
         known = known.reshape(*known.shape[:3], -1)

@@ -267,7 +267,9 @@ def _write_rows(dataset: xarray.Dataset, stream: TextIO, header_units: bool | No
     line = ",".join(["%.17g"] * rows.shape[1]) + "\n"
     if headed:
         units = _column_units(dataset, table)
-        told = not all(map(is_si, units)) if header_units is None else header_units
+        told = header_units
+        if told is None:  # a name that ends in brackets reads as one with a unit, unless its own unit follows
+            told = not all(map(is_si, units)) or any(name_and_unit(name)[1] is not None for name in table)
         names = [heading(name, unit) if told and unit else name for name, unit in zip(table, units, strict=True)]
         csv.writer(stream, lineterminator="\n").writerow(map(written_name, names))
     for start in range(0, len(rows), 1000):
@@ -359,12 +361,11 @@ def _from_columns(header: list[str], table: Float[np.ndarray, "time columns"], u
     """Build the dataset of a table; what its heading says to have other units is no component of the same."""
     import xarray
 
-    stems: dict[str, list[np.ndarray]] = {}
-    for column, values in zip(header[1:], table.T[1:], strict=True):
-        stems.setdefault(re.sub(r"_d[0-9]+$", "", column), []).append(values)
+    levels = _derivative_count(header[1:])
+    stems = {header[k]: list(table.T[k : k + levels]) for k in range(1, len(header), levels)}
     variables: dict[str, Any] = {}
     coordinates: dict[str, Any] = {"time": ("time", table[:, 0], {"units": "s"})}
-    coordinates["derivative"] = np.arange(max(map(len, stems.values()), default=0))
+    coordinates["derivative"] = np.arange(levels)
     for (name, _), group in itertools.groupby(stems, lambda column: (_name_of(column), units.get(column))):
         members = list(group)
         for axes, labels in AXES.items():
@@ -380,6 +381,18 @@ def _from_columns(header: list[str], table: Float[np.ndarray, "time columns"], u
         else:
             variables |= {member: (("time", "derivative"), np.stack(stems[member], axis=1)) for member in members}
     return xarray.Dataset(variables, coords=coordinates)
+
+
+def _derivative_count(columns: list[str]) -> int:
+    """Return how many columns each quantity has: itself and its derivatives, one after the other, alike for all.
+
+    A name may itself end as those of derivatives do.
+    """
+    for count in range(len(columns), 1, -1):
+        starts = range(0, len(columns), count) if len(columns) % count == 0 else ()
+        if starts and all(columns[k + j] == f"{columns[k]}_d{j}" for k in starts for j in range(1, count)):
+            return count
+    return 1
 
 
 def _name_of(column: str) -> str:

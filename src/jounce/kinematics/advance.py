@@ -30,7 +30,8 @@ from jounce.kinematics.predictions import (
 )
 from jounce.kinematics.status import Status
 from jounce.kinematics.turnover import turnover_of
-from jounce.mechanism.system import System
+from jounce.mechanism.axis_angles import measures_angle
+from jounce.mechanism.system import Group, System
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers, Real
 
@@ -69,10 +70,19 @@ class Arrival(NamedTuple):
         return jax.tree.map(lambda x: x[..., lanes], (self.coordinates, self.outputs, self.sign))
 
 
+def predicts_turns(group: Group) -> bool:
+    """Tell whether outputs are angles whose turns follow from a prediction.
+
+    Those about axes have theirs counted along the attitudes of the bodies: they turn by half a turn at once where
+    bodies pass near an attitude that tells no angle, and no series of theirs carries past it.
+    """
+    return group.element.turning and not measures_angle(group)
+
+
 def predictor(system: System, pose_type: type[Pose], solved: SolvedState) -> SolvedState:
     """Return what a prediction needs of solved instants: jets of the pose and of turning angles, and the sign."""
     coordinates, outputs, sign = solved
-    angles = [output for output, group in zip(outputs, system.outputs, strict=True) if group.element.turning]
+    angles = [output for output, group in zip(outputs, system.outputs, strict=True) if predicts_turns(group)]
     return {name: coordinates[name] for name in pose_type.predictor}, tuple(angles), sign
 
 
@@ -146,7 +156,7 @@ def _outputs(system: System, pose: Pose, angles: Sequence[Numbers], step: Lanes)
     results, known = [], iter(angles)
     for group in system.outputs:
         result = group.evaluate(pose)
-        if group.element.turning:
+        if predicts_turns(group):
             expected = next(known)
             expected = Jet(tuple(jnp.where(jnp.isfinite(expected), expected, 0.0)))
             result = brought_near(result, expected.evaluate(step))

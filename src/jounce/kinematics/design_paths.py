@@ -5,6 +5,7 @@ out of the ordinary, as it comes to a singular position, is left to be solved al
 """
 
 import itertools
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import jax
@@ -13,8 +14,10 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from jounce.jet.derivatives import plain_derivatives
-from jounce.kinematics.advance import SAFE_FRACTION, Arrival, SolvedState, solved_batch
+from jounce.jet.turns import brought_near
+from jounce.kinematics.advance import SAFE_FRACTION, Arrival, SolvedState, predicts_turns, solved_batch
 from jounce.kinematics.compilation import compiled
+from jounce.kinematics.design_turns import counted_angles
 from jounce.kinematics.designs import Coordinates, Designs
 from jounce.kinematics.kernels import LIBRARIES
 from jounce.kinematics.legs import GROWTH, LARGEST_TURNOVER, PASSAGE, SLIVER
@@ -154,7 +157,7 @@ class DesignPaths:
         self._order = max(solver.order, ANCHOR_ORDER)
         self._width = min(WIDEST, max(16, 1 << (count - 1).bit_length()))
         self._anchors: list[tuple[Indices, Float[np.ndarray, " lane"], SolvedState]] = []
-        self._turning = [k for k, group in enumerate(solver.model.system.outputs) if group.element.turning]
+        self._turning = [k for k, group in enumerate(solver.model.system.outputs) if predicts_turns(group)]
 
     def follow(self, coordinates: Coordinates, plain: Bool[np.ndarray, " design"]) -> None:
         """Follow the designs from where they are put together, those that are plain."""
@@ -235,22 +238,36 @@ class DesignPaths:
                 status[these] = outcome
                 for into, rows in zip(itertools.chain(*outputs), itertools.chain(*found), strict=True):
                     into[these] = rows[:, :levels]
+        self._count_turns(outputs, (owners, at, store[0]), (design, where, instant))
         self.apart |= (status != Status.OK).any(axis=1)
         return outputs, status
+
+    def _count_turns(
+        self,
+        outputs: list[list[np.ndarray]],
+        anchors: tuple[Int[np.ndarray, " anchor"], Float[np.ndarray, " anchor"], Mapping[str, Any]],
+        lanes: tuple[Indices, Indices, Float[np.ndarray, " lane"]],
+    ) -> None:
+        """Give angles about axes the turns that they make along the anchors; lanes are designs, indices, instants."""
+        (owners, at, coordinates), (design, where, instant) = anchors, lanes
+        system = self.designs.system(owners)
+        for group, found in zip(system.outputs, outputs, strict=True):
+            if not measures_angle(group):
+                continue
+            series = np.nan_to_num(coordinates["quaternion"], nan=0.0, posinf=0.0, neginf=0.0)
+            known = counted_angles(group, owners, at, series, len(self.apart))
+            self.apart |= known.doubtful
+            nearest = _nearest(known.owner, known.instant, design, instant)
+            for values, angle in zip(found, known.angle, strict=True):
+                values[design, where, 0, 0] = brought_near(values[design, where, 0, 0], angle[nearest])
 
     def _known_at_the_start(self, coordinates: Coordinates) -> SolvedState:
         """Return what the first instant is predicted from: bodies at rest, and the turns that are known of angles."""
         levels, count = self._order + 1, len(self.apart)
         names = self.solver.model.pose_type.predictor
         still = {n: np.stack([coordinates[n], *[np.zeros_like(coordinates[n])] * (levels - 1)]) for n in names}
-        angles = []
-        system = self.designs.system(np.arange(count))
-        for k in self._turning:
-            group = system.outputs[k]
-            known = np.zeros((levels, 1, group.instances, count))
-            if measures_angle(group):
-                known[0, 0] = group.element.datum.angle
-            angles.append(known)
+        groups = self.solver.model.system.outputs
+        angles = (np.zeros((levels, 1, groups[k].instances, count)) for k in self._turning)
         return still, tuple(angles), np.zeros(count)
 
     def _advanced(self, known: SolvedState, step: Lanes, target: Lanes, lanes: Indices) -> Arrival:

@@ -14,6 +14,7 @@ from jounce.errors import MechanismError, check_name
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked
 from jounce.jet.derivatives import plain_derivatives
+from jounce.jet.turns import brought_near
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.path_following import ChangePoint
 from jounce.kinematics.status import Status
@@ -29,8 +30,8 @@ from jounce.mechanism import (
     Model,
     PointOutput,
 )
-from jounce.mechanism.attitude_outputs import continued
-from jounce.mechanism.axis_angles import AttitudeHistory, attitudes_of
+from jounce.mechanism.attitude_outputs import continued, euler_angles_of
+from jounce.mechanism.axis_angles import AttitudeHistory, attitudes_of, measures_angle
 from jounce.mechanism.builder import counted_as_in
 from jounce.mechanism.driver_outputs import is_turning
 from jounce.mechanism.mechanism import GROUND
@@ -314,23 +315,25 @@ class Motion(Displayed):
     def _continued(
         self, group: Group, coefficients: Float[Numbers, "order component instance time"]
     ) -> Float[Numbers, "order component instance time"]:
-        """Return the Taylor coefficients of outputs, of which angles in a range are made continuous."""
+        """Return the Taylor coefficients of outputs, of which angles have the turns made along the motion."""
         element = group.element
-        if not getattr(element, "wraps", ()):
+        if not (measures_angle(group) or getattr(element, "wraps", ())) or (history := self._attitudes) is None:
             return coefficients
         coefficients = np.array(coefficients)
-        instants, quaternion = self._attitudes()
+        if measures_angle(group):
+            (counted,) = history.counting((group,), self.time)
+            coefficients[0, 0] = brought_near(coefficients[0, 0], counted.element.datum.near)
+            return coefficients
         for k, bodies in enumerate(zip(*group.bodies, strict=True)):
             angles = np.where(self.status == Status.OK, coefficients[0, :, k], np.nan)
-            passed = instants, attitudes_of(bodies, quaternion)
+            passed = history.looked_at(lambda q, b=bodies: euler_angles_of(element.sequence, attitudes_of(b, q)))
             coefficients[0, :, k] = continued(element, angles, self.time, passed)
         return coefficients
 
-    def _attitudes(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return instants along the motion, and the Euler parameters of all bodies there, (4, bodies, places)."""
-        if self.history is None:
-            return np.zeros(0), np.zeros((4, len(self.mechanism.bodies) + 1, 0))
-        return self.history.time, self.history.quaternion
+    @property
+    def _attitudes(self) -> AttitudeHistory | None:
+        """The attitudes of all bodies along the motion, where they are known."""
+        return self.history
 
     def _coefficients(self, group: Group) -> Float[np.ndarray, "order component instance time"]:
         """Return the Taylor coefficients of outputs, (order + 1, components, instances, time)."""

@@ -9,6 +9,7 @@ the other side to rounding, and is told.
 import bisect
 import dataclasses
 import itertools
+from functools import partial
 
 import jax
 import numpy as np
@@ -122,19 +123,15 @@ class FollowedPath:
         return self.anchors[max(min(begin, len(self.anchors) - 1), 0) : end + 1]
 
     def history(self) -> AttitudeHistory | None:
-        """Return the attitudes of all bodies in space along the motion: at the anchors, and by their series beyond."""
+        """Return the attitudes of all bodies in space along the motion: at the anchors, and by their series between."""
         if "quaternion" not in self.anchors[0].state[0]:
             return None
         times = np.array([anchor.instant for anchor in self.anchors])
-        series = np.concatenate([anchor.state[0]["quaternion"] for anchor in self.anchors], axis=-1)[..., None]
-        series = np.where(np.isfinite(series), series, 0.0)
-        since = np.diff(times, append=times[-1])[:, None] * (np.arange(PLACES) / PLACES)
-        place = np.zeros((*series.shape[1:-1], PLACES))
-        for coefficient in series[::-1]:
-            place = place * since + coefficient
-        count = (len(times) - 1) * PLACES + 1  # the last anchor is the end
-        place = place.reshape(*place.shape[:2], -1)[..., :count]
-        return AttitudeHistory(place, (times[:, None] + since).ravel()[:count])
+        series = np.concatenate([anchor.state[0]["quaternion"] for anchor in self.anchors], axis=-1)
+        between = partial(attitudes_between, times, np.where(np.isfinite(series), series, 0.0))
+        since = np.diff(times)[:, None] * (np.arange(PLACES) / PLACES)
+        instants = np.append((times[:-1, None] + since).ravel(), times[-1])
+        return AttitudeHistory(between(instants), instants, between=between)
 
     def ended(self, status: Status, instant: float, fault: str) -> "FollowedPath":
         """Return the path, with where and why it could not be followed any further."""
@@ -256,6 +253,40 @@ def _passed(solver: Solver, here: Anchor, stop: float) -> tuple[Anchor, ChangePo
         return None
     located = 0.5 * (middle + target - beyond.reach)  # what each side errs by cancels to the second order
     return beyond, ChangePoint(located, min(here.radius, beyond.radius))
+
+
+def attitudes_between(
+    times: Float[np.ndarray, " anchor"],
+    series: Float[np.ndarray, "order 4 bodies anchor"],
+    instants: Float[np.ndarray, " time"],
+) -> Float[np.ndarray, "4 bodies time"]:
+    """Return attitudes at instants between anchors in order of time, by their series."""
+    after = np.clip(np.searchsorted(times, instants, side="right"), 1, max(len(times) - 1, 1))
+    return blended_attitudes(times, series, (after - 1, np.minimum(after, len(times) - 1)), instants)
+
+
+def blended_attitudes(
+    times: Float[np.ndarray, " anchor"],
+    series: Float[np.ndarray, "order 4 bodies anchor"],
+    neighbours: tuple[Int[np.ndarray, " time"], Int[np.ndarray, " time"]],
+    instants: Float[np.ndarray, " time"],
+) -> Float[np.ndarray, "4 bodies time"]:
+    """Return attitudes at instants by the series of the anchors before and after each, by index.
+
+    A share s of the way from one to the other, their errors are as s^n and (1 - s)^n, and so are the weights of the
+    other one.
+    """
+    before, after = neighbours
+    whole = times[after] - times[before]
+    share = np.clip((instants - times[before]) / np.where(whole > 0, whole, 1.0), 0.0, 1.0)
+    late, early = share ** len(series), (1.0 - share) ** len(series)
+    found = np.zeros((*series.shape[1:-1], len(instants)))
+    for anchor, weight in ((before, early / (early + late)), (after, late / (early + late))):
+        part = np.zeros_like(found)
+        for coefficient in series[::-1]:
+            part = part * (instants - times[anchor]) + coefficient[..., anchor]
+        found += weight * part
+    return found
 
 
 def _shortened(jet: Float[np.ndarray, "order *rest"]) -> Float[np.ndarray, "order *rest"]:

@@ -9,7 +9,6 @@ from typing import Any
 import jax
 import numpy as np
 from jax.errors import ConcretizationTypeError
-from jaxtyping import Float
 
 from jounce.errors import AssemblyError, MechanismError, MobilityError, SolveError, UnsupportedError
 from jounce.kinematics.actuation import actuated
@@ -38,11 +37,10 @@ from jounce.mechanism import (
     time_grid,
     with_outputs_held,
 )
-from jounce.mechanism.axis_angles import AttitudeHistory, measures_angle
+from jounce.mechanism.axis_angles import AttitudeHistory
 from jounce.mechanism.held_outputs import led_outputs
 from jounce.mechanism.law_checks import check_laws
 from jounce.mechanism.preconditions import concrete
-from jounce.mechanism.system import Group
 from jounce.mechanism.time import Instants, instants_of
 
 LOWEST_ORDER = 4  # of the jets inside: predictions need some, also where the user wants positions only
@@ -320,15 +318,7 @@ def _still(solver: Solver, coordinates: dict[str, np.ndarray]) -> SolvedState:
     """Return what is known of the first instant before it is solved: its position."""
     levels = solver.order + 1
     still = {name: np.stack([x, *[np.zeros_like(x)] * (levels - 1)]) for name, x in coordinates.items()}
-    return still, tuple(_known_angles(group, levels) for group in solver.model.system.outputs), np.zeros(1)
-
-
-def _known_angles(group: Group, levels: int) -> Float[np.ndarray, "order 1 instance 1"]:
-    """Return what is known of angles at the first instant: whole turns, where the assembly counted them."""
-    known = np.zeros((levels, 1, group.instances, 1))
-    if measures_angle(group):
-        known[0, 0] = group.element.datum.angle
-    return known
+    return still, tuple(np.zeros((levels, 1, g.instances, 1)) for g in solver.model.system.outputs), np.zeros(1)
 
 
 def _words(status: Status) -> str:

@@ -107,7 +107,7 @@ def continued(
     output: EulerAnglesOutput,
     angles: Float[np.ndarray, "3 time"],
     instants: Float[np.ndarray, " time"],
-    passed: tuple[Float[np.ndarray, " place"], Float[np.ndarray, "4 place"]],
+    passed: tuple[Float[np.ndarray, " place"], Float[np.ndarray, "3 place"]],
 ) -> Float[np.ndarray, "3 time"]:
     """Return angles made continuous along a motion, rad, (3, time).
 
@@ -120,11 +120,11 @@ def continued(
     instants : array of shape (time,)
         s.
     passed : tuple
-        Instants in the order of the motion, (places,), and the relative attitude of the bodies there, Euler parameters
-        (4, places): near enough to each other that no turn is lost between them.
+        Instants in the order of the motion, (places,), and the angles there, up to whole turns, (3, places): near
+        enough to each other that no turn is lost between them.
     """
-    between, attitudes = passed
-    whole = np.concatenate([_angles_of(output.sequence, attitudes), angles], axis=1)
+    between, known = passed
+    whole = np.concatenate([known, angles], axis=1)
     times = np.concatenate([between, instants])
     order = np.argsort(-times if between.size > 1 and between[-1] < between[0] else times, kind="stable")
     order = order[np.isfinite(whole[:, order]).all(axis=0)]
@@ -134,8 +134,8 @@ def continued(
     return whole[:, between.size :]
 
 
-def _angles_of(sequence: str, attitudes: np.ndarray) -> np.ndarray:
-    """Return the Euler angles of Euler parameters, (3, places)."""
+def euler_angles_of(sequence: str, attitudes: Float[np.ndarray, "4 place"]) -> Float[np.ndarray, "3 place"]:
+    """Return the Euler angles of Euler parameters, rad."""
     if not attitudes.size:
         return np.zeros((3, 0))
     import warnings

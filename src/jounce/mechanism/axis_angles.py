@@ -18,6 +18,8 @@ Quaternions = Float[np.ndarray, "4 *#rest"]
 Vectors = Float[np.ndarray, "3 *#rest"]
 Angles = Float[np.ndarray, "instance batch"]
 PARALLEL = 1e-9  # largest sine between axes that are one
+LARGEST_CHANGE = np.pi / 4  # of an angle from place to place: more, and it is looked at between them
+HALVINGS = 24  # of the time between two places: down to what passes 1e-9 beside an attitude that tells no angle
 
 
 class PrescribedAngle(NamedTuple):
@@ -39,7 +41,7 @@ class PrescribedAngle(NamedTuple):
 
 
 class AttitudeHistory(NamedTuple):
-    """Attitudes that all bodies went through, so close to each other that no turn in between is lost.
+    """Attitudes that all bodies went through, so close to each other that no body makes half a turn in between.
 
     Attributes
     ----------
@@ -49,23 +51,50 @@ class AttitudeHistory(NamedTuple):
         When, s; zeros where it was no motion.
     period, repeated : int
         The last places make a turn, of which so many more follow.
+    between : callable, optional
+        Returns the attitudes at any instants, (4, bodies, instants).
     """
 
     quaternion: Float[np.ndarray, "4 bodies place"]
     time: Float[np.ndarray, " place"]
     period: int = 1
     repeated: int = 0
+    between: Callable[[Float[np.ndarray, " time"]], Float[np.ndarray, "4 bodies time"]] | None = None
 
-    def angles(self, groups: Sequence[Group]) -> list[np.ndarray]:
-        """Return the angles about axes that groups measure, (instances, places) each, counted on from their data."""
-        measuring = [group for group in groups if measures_angle(group)]
-        raw = raw_angles(measuring, {"quaternion": self.quaternion})
-        begun = [np.asarray(group.element.datum.near)[..., 0] for group in measuring]
-        return [counted_on(np.column_stack(pair))[:, 1:] for pair in zip(begun, raw, strict=True)]
+    def looked_at(
+        self, measure: Callable[[Float[np.ndarray, "4 bodies place"]], Float[np.ndarray, "angle place"]]
+    ) -> tuple[Float[np.ndarray, " place"], Float[np.ndarray, "angle place"]]:
+        """Return instants, and angles there that are known up to whole turns, so close that none is lost in between.
+
+        An angle may turn by half a turn while hardly anything moves, where bodies pass near an attitude that tells
+        none: there, more places are looked at.
+
+        Parameters
+        ----------
+        measure : callable
+            Returns the angles, rad, of attitudes of all bodies, (4, bodies, places).
+        """
+        time, angles = self.time, measure(self.quaternion)
+        if self.between is None:
+            return time, angles
+        for _ in range(HALVINGS):
+            wide = np.flatnonzero((np.abs(principal(np.diff(angles))) > LARGEST_CHANGE).any(axis=0))
+            if not wide.size:
+                break
+            middle = 0.5 * (time[wide] + time[wide + 1])
+            found = measure(self.between(middle))
+            time, angles = np.insert(time, wide + 1, middle), np.insert(angles, wide + 1, found, axis=1)
+        return time, angles
+
+    def angles(self, group: Group) -> tuple[Float[np.ndarray, " place"], Float[np.ndarray, "instance place"]]:
+        """Return instants, and the angles about axes that a group measures there, counted on from its datum."""
+        time, raw = self.looked_at(lambda quaternion: raw_angles([group], {"quaternion": quaternion})[0])
+        begun = np.asarray(group.element.datum.near)[..., 0]
+        return time, counted_on(np.column_stack([begun, raw]))[:, 1:]
 
     def last_angles(self, groups: Sequence[Group]) -> list[np.ndarray]:
         """Return the angles at the end, (instances, 1) each, with the turns that are repeated."""
-        found = self.angles(groups)
+        found = [self.angles(group)[1] for group in groups if measures_angle(group)]
         if not self.repeated:
             return [angle[:, -1:] for angle in found]
         ends = [(angle[:, -1:], angle[:, -1 - self.period, None]) for angle in found]
@@ -73,10 +102,12 @@ class AttitudeHistory(NamedTuple):
 
     def counting(self, groups: Sequence[Group], instants: Float[np.ndarray, " time"]) -> tuple[Group, ...]:
         """Return groups that have the turns of each instant, from the place nearest to it in time."""
-        if not any(map(measures_angle, groups)):
-            return tuple(groups)
-        nearest = nearest_instants(self.time, instants)
-        return with_turns(groups, [angle[:, nearest] for angle in self.angles(groups)])
+        counted = []
+        for time, angles in (self.angles(group) for group in groups if measures_angle(group)):
+            backward = time[-1] < time[0]
+            known, angles = (time[::-1], angles[:, ::-1]) if backward else (time, angles)
+            counted.append(angles[:, nearest_instants(known, instants)])
+        return with_turns(groups, counted)
 
 
 def measures_angle(group: Group) -> bool:
