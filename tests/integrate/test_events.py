@@ -203,3 +203,42 @@ def test_events_that_do_not_fit_are_refused(events, words):
 def test_an_event_needs_an_output_of_poses():
     with pytest.raises(jn.MechanismError, match="an event watches an output of the poses"):
         jn.Event("angle")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("miss", [1.0, 0.1, 1e-3, 1e-6])
+def test_points_that_pass_each_other_in_a_small_part_of_a_step(miss):
+    along = jn.drivers.CoordinateDriver(("ground", "point"), "x", motion="-5 + 2*t")
+    beside = jn.drivers.CoordinateDriver(("ground", "point"), "y", motion="miss")
+    flight = jn.Mechanism(
+        space="planar",
+        parameters={"miss": miss},
+        bodies={"point": jn.Body([-5, "miss"], mass=1.0, inertia=1.0)},
+        joints={},
+        initial={"along": along, "beside": beside},
+    )
+    distance = jn.DistanceOutput(("ground", "point"), [0, 0], [0, 0])
+    values = [1.001 * miss, 2 * miss, 3.0]
+    found = jn.simulate(flight, [0.0, 5.0], 1, events=[jn.Event(distance, value) for value in values])
+    for times, value in zip(found.events, values, strict=True):
+        half = np.sqrt(value**2 - miss**2) / 2
+        np.testing.assert_allclose(times, [2.5 - half, 2.5 + half], rtol=0, atol=1e-12)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("miss", [0.3, 0.02, 1e-4])
+def test_an_angle_about_an_axis_that_its_vector_passes(miss):
+    ball = jn.Mechanism(
+        space="spatial",
+        parameters={"miss": miss},
+        bodies={"ball": jn.Body([0, 0, 0], mass=1.0, inertia=[1.0, 1.0, 1.0])},
+        joints={"pin": jn.spatial.Spherical(("ground", "ball"), [0, 0, 0], [0, 0, 0])},
+        initial={"spin": jn.drivers.RotationDriver(("ground", "ball"), [0, "cos(miss)", "sin(miss)"], "3*t")},
+    )
+    angle = jn.RelativeAngleOutput(("ground", "ball"), [0, 0, 1], [1, 0, 0], [1, 0, 0])
+    values = [1.0, 2.5, 4.0, 7.0]
+    found = jn.simulate(ball, [0.0, 3.0], 1, events=[jn.Event(angle, value) for value in values])
+    for times, value in zip(found.events, values, strict=True):
+        turn = np.arctan2(np.sin(value) / np.sin(miss), np.cos(value))  # tan(value) = sin(miss) tan(turn)
+        turn += 2 * np.pi * np.round((value - turn) / (2 * np.pi))
+        np.testing.assert_allclose(times, [turn / 3], rtol=0, atol=1e-11)

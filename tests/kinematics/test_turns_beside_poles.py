@@ -63,16 +63,19 @@ def test_designs_count_as_they_do_alone():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("miss", [0.1, 0.02, 0.001])
-def test_simulations_count_them_forward_and_backward(miss):
-    axis = [0, np.cos(miss), np.sin(miss)]
+def test_simulations_count_them_forward_and_backward_alone_and_side_by_side():
+    misses = [0.1, 0.02, 0.001]
     ball = jn.Mechanism(
         space="spatial",
+        parameters={"miss": 0.1},
         bodies={"ball": jn.Body(ORIGIN, mass=1.0, inertia=[1.0, 1.0, 1.0])},
         joints={"pin": spatial.Spherical(("ground", "ball"), ORIGIN, ORIGIN)},
-        initial={"spin": drivers.RotationDriver(("ground", "ball"), axis, f"{RATE}*t")},
+        initial={"spin": drivers.RotationDriver(("ground", "ball"), [0, "cos(miss)", "sin(miss)"], f"{RATE}*t")},
         outputs={"angle": jn.RelativeAngleOutput(("ground", "ball"), Z, X, X)},
     )
     for time in (TIME, -TIME):
-        found = jn.simulate(ball, time, order=2).outputs["angle"][:, 0]
-        np.testing.assert_allclose(found, swept(RATE * time, miss), rtol=0, atol=1e-8)
+        together = jn.simulate_batch(ball, {"miss": misses}, time, order=2).outputs["angle"]
+        for miss, beside in zip(misses, together, strict=True):
+            alone = jn.simulate(ball.with_parameters(miss=miss), time, order=2).outputs["angle"]
+            for found in (alone, beside):
+                np.testing.assert_allclose(found[:, 0], swept(RATE * time, miss), rtol=0, atol=1e-8)

@@ -14,18 +14,20 @@ from jounce.display import Displayed
 from jounce.dynamics.forward import Equations, State
 from jounce.dynamics.start import consistent_start, initial_as_drivers
 from jounce.integrate.batch_equations import BatchStart, ParametricMechanism, Turns
+from jounce.integrate.batch_turns import counted_angles
 from jounce.integrate.events import pose_coordinates
 from jounce.integrate.marching import DenseOutput, IntegratorState, Outcome, begin_march, march
 from jounce.integrate.methods import AbstractMethod
 from jounce.integrate.options import checked_options, instants_of
 from jounce.integrate.simulation import expanded
+from jounce.integrate.turns import attitudes_at
 from jounce.jet.derivatives import plain_derivatives
-from jounce.jet.turns import whole_periods
+from jounce.jet.turns import brought_near, whole_periods
 from jounce.kinematics import Status
 from jounce.kinematics.families import checked_values
 from jounce.kinematics.motion import output_series
 from jounce.mechanism import Mechanism, TimeGrid, build, check_mechanism
-from jounce.mechanism.axis_angles import with_turns
+from jounce.mechanism.axis_angles import measures_angle, raw_angles, with_turns
 from jounce.mechanism.builder import with_reference
 from jounce.mechanism.law_checks import check_laws
 from jounce.mechanism.preconditions import concrete
@@ -171,6 +173,7 @@ class _Runs:
         self._begun = np.full(len(rows), instants[0])  # the time at which the last step began
         self._angles: dict[int, np.ndarray] = {}  # the series of turning outputs there
         self._turns: tuple[np.ndarray, ...] = ()  # their angles about axes at the start, (instances, runs)
+        self._turns_reached: tuple[np.ndarray, ...] = ()  # and where the last step ended
 
     @property
     def moving(self) -> np.ndarray:
@@ -214,8 +217,9 @@ class _Runs:
         self._put(runs, current)
         if not self._turns:
             self._turns = tuple(np.zeros((len(angle), len(self.steps))) for angle in angles.outputs)
-        for whole, part in zip(self._turns, angles.outputs, strict=True):
-            whole[:, runs] = part
+            self._turns_reached = tuple(map(np.zeros_like, self._turns))
+        for whole, reached, part in zip(self._turns, self._turns_reached, angles.outputs, strict=True):
+            whole[:, runs] = reached[:, runs] = part
         self._note(runs, np.zeros(len(runs), int), current.expansion.state, time, current.angles, {})
         lost = runs[current.outcome == Outcome.LOST]
         self._reached[lost] = False
@@ -241,6 +245,8 @@ class _Runs:
         step = step[instant, lane]
         polynomial = steps.polynomial.map(lambda part: np.moveaxis(part[step, ..., lane], 0, -1))
         before = {which: series[..., step, lane] for which, series in angles.items()}
+        since = self.instants[near[instant]] - steps.start[step, lane]
+        before |= self._counted_about_axes(runs, steps, taken, (step, lane, since / steps.length[step, lane]))
         known = tuple(part[step, :, lane].T for part in steps.angles)
         self._note(runs[lane], near[instant], polynomial, steps.start[step, lane], known, before)
 
@@ -265,7 +271,7 @@ class _Runs:
         every = np.tile(runs, len(steps.start))
         _, outputs = self._picked(every, Turns((), self._begun_with(every)))
         for which, group in enumerate(outputs):
-            if group.element.turning:
+            if group.element.turning and not measures_angle(group):
                 state = steps.polynomial.map(lambda part: np.moveaxis(part[:, :3], 0, -2))
                 state = state.map(lambda part: part.reshape(*part.shape[:-2], -1))
                 series = np.array(output_series(group, pose_coordinates(state), self.parametric.model.pose_type))
@@ -275,6 +281,34 @@ class _Runs:
                 series[0] -= np.cumsum(turned(whole[..., :-1, :], whole[..., 1:, :], np.diff(time, axis=0)), axis=-2)
                 last[..., runs] = series[..., -1, :]
                 found[which] = series
+        return found
+
+    def _counted_about_axes(
+        self, runs: np.ndarray, steps: DenseOutput, taken: np.ndarray, places: tuple[np.ndarray, np.ndarray, np.ndarray]
+    ) -> dict[int, np.ndarray]:
+        """Return angles about axes near places, (instances, places) for each group of outputs, and count them on.
+
+        The places are given by step, lane and share of the step.
+        """
+        lane, step = np.nonzero(taken.T)
+        if not lane.size:
+            return {}
+        number = np.zeros(taken.shape, int)
+        number[step, lane] = np.arange(len(lane))
+        last = np.append(lane[1:] != lane[:-1], True)  # of the steps of a run
+        found = {}
+        measuring = [which for which, group in enumerate(self._made[1]) if measures_angle(group)]
+        for which, turns in zip(measuring, self._turns_reached, strict=True):
+
+            def measured(which_step: np.ndarray, share: np.ndarray, which: int = which) -> np.ndarray:
+                at, of = step[which_step], lane[which_step]
+                attitudes = attitudes_at(steps.polynomial.attitude[at, ..., of], share * steps.length[at, of])
+                _, outputs = self._picked(runs[of], Turns((), self._begun_with(runs[of])))
+                return raw_angles([outputs[which]], {"quaternion": attitudes})[0]
+
+            counted = counted_angles(measured, lane, turns[:, runs[lane]])
+            found[which] = counted.near(number[places[0], places[1]], places[2])
+            turns[:, runs[lane[last]]] = counted.near(np.flatnonzero(last), np.ones(last.sum()))
         return found
 
     def _note(
@@ -288,7 +322,8 @@ class _Runs:
     ) -> None:
         """Keep the outputs of runs at instants, given by number, a time into steps that began at others.
 
-        What forces measure where the steps begin is known, and so are the series of turning outputs, but at the start.
+        What forces measure where the steps begin is known, and so are the series of turning outputs there, and angles
+        about axes near the instants, but at the start.
         """
         for lanes in self.lots(np.arange(len(runs))):
             known = Turns(tuple(angle[:, lanes] for angle in angles), self._begun_with(runs[lanes]))
@@ -299,7 +334,9 @@ class _Runs:
             coordinates = pose_coordinates(expanded(equations, started, since, time, order=self._expansion)[0])
             for which, group in enumerate(outputs):
                 series = np.array(output_series(group, coordinates, self.parametric.model.pose_type))
-                if which in before:
+                if which in before and measures_angle(group):
+                    series[0, 0] = brought_near(series[0, 0], before[which][:, lanes])
+                elif which in before:
                     series[0] -= turned(before[which][..., lanes], series, since)
                 values = np.moveaxis(series[: self.order + 1], -1, 0)
                 if which not in self._values:

@@ -3,12 +3,12 @@
 import dataclasses
 import itertools
 import math
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from jounce.dynamics.forward import State
 from jounce.dynamics.motion_values import Coordinates, in_chunks
@@ -20,8 +20,16 @@ from jounce.mechanism.system import Group
 from jounce.robot.arguments import whole_number
 
 _ANGLES = np.pi * (np.arange(20)[::-1] + 0.5) / 20
-NODES = 0.5 + 0.5 * np.cos(_ANGLES)  # of Chebyshev, in a step: steps reach a small part of where their series converge
+NODES = 0.5 + 0.5 * np.cos(_ANGLES)  # of Chebyshev, in a step or a piece of one
 INTERPOLATION = np.cos(np.arange(20)[:, None] * _ANGLES) * np.where(np.arange(20) == 0, 0.05, 0.1)[:, None]
+ENDS = np.array([0.0, 1.0])  # where polynomials are compared with what they stand for
+AT_ENDS = np.stack([(-1.0) ** np.arange(20), np.ones(20)])  # of the polynomials of Chebyshev
+LAST = 4  # coefficients of a polynomial, which tell how exact it is, too,
+RESOLVED = 1e-12  # as parts of the largest value in a piece,
+LEAST = 1e-3  # or this part of that in the step: below it, what is resolved is rounding;
+BLURRED = 1e-8  # below it they are rounding if they are no smaller on half a piece
+SPLITS = 40  # of a step in halves: to where a distance has a kink, or an angle half a turn at once
+MOST_PIECES = 256  # of a step on average
 WIDTHS = (64,)  # instants evaluated together: one program for few and for many
 REAL = 1e-4  # of a step: an imaginary part below may be that of a real root of several, blurred by rounding
 FAINT = 1e-14  # of a polynomial's coefficients: values below are rounding
@@ -111,12 +119,41 @@ def series_of(
     return in_chunks(chunk, coordinates["position"].shape[-1], WIDTHS)
 
 
-def at_nodes(
-    group: Group, polynomial: State, length: Float[np.ndarray, " step"], order: int, pose_type: type
-) -> Float[np.ndarray, "levels component instance step node"]:
-    """Return outputs at the nodes of steps as Taylor coefficients.
+class Pieces(NamedTuple):
+    """Outputs at the nodes of pieces of steps, in the order of the steps.
 
-    A few at many places cost less than many at one: the program for high orders of an angle takes minutes to compile.
+    Attributes
+    ----------
+    step : array of int, shape (pieces,)
+    begin, end : array of shape (pieces,)
+        Of each piece, as shares of its step.
+    series : array of shape (levels, components, instances, pieces, nodes)
+        Taylor coefficients of the outputs.
+    """
+
+    step: Int[np.ndarray, " piece"]
+    begin: Float[np.ndarray, " piece"]
+    end: Float[np.ndarray, " piece"]
+    series: Float[np.ndarray, "levels component instance piece node"]
+
+    def time(self, start: Float[np.ndarray, " step"], length: Float[np.ndarray, " step"]) -> Any:
+        """Return the times of all nodes one after another, from where steps begin and how long they are, s."""
+        share = self.begin[:, None] + (self.end - self.begin)[:, None] * NODES
+        return (start[self.step][:, None] + share * length[self.step][:, None]).ravel()
+
+
+def in_pieces(
+    group: Group,
+    polynomial: State,
+    length: Float[np.ndarray, " step"],
+    order: int,
+    pose_type: type,
+    judged: Callable[[np.ndarray], Float[np.ndarray, "*quantity piece node"]],
+) -> Pieces:
+    """Return outputs in pieces of steps, so short that polynomials through their nodes are the outputs.
+
+    Steps reach a small part of where the series of the motion converge, not those of outputs: the distance of points
+    that pass each other, or an angle about an axis that a vector passes, changes in a small part of a step.
 
     Parameters
     ----------
@@ -127,11 +164,58 @@ def at_nodes(
     length : array of shape (steps,)
         Of the steps, s.
     order : int
-        Highest coefficient; what is shorter by nature is as long as it can be.
+        Highest coefficient of the outputs; what is shorter by nature is as long as it can be.
     pose_type : type
         PlanarPose or SpatialPose.
+    judged : callable
+        Returns of their series what polynomials must follow, the nodes last.
     """
-    since = length[:, None] * NODES
+    count = len(length)
+    step, begin, end = np.arange(count), np.zeros(count), np.ones(count)
+    size, before, whole = None, np.full(count, np.inf), []
+    for split in range(SPLITS + 1):
+        share = begin[:, None] + (end - begin)[:, None] * np.concatenate([NODES, ENDS])
+        series = _at(
+            group, polynomial.map(lambda part, of=step: part[of]), length[step][:, None] * share, order, pose_type
+        )
+        size, left = _unresolved(judged(series).reshape(-1, *share.shape), step, size)
+        wide = (left > RESOLVED) & ~((left < BLURRED) & (left > 0.25 * before))
+        if split == SPLITS or len(step) + np.count_nonzero(wide) > MOST_PIECES * count:
+            wide[:] = False
+        whole.append(Pieces(step[~wide], begin[~wide], end[~wide], series[..., ~wide, :-2]))
+        if not wide.any():
+            break
+        middle = 0.5 * (begin[wide] + end[wide])
+        begin, end = np.concatenate([begin[wide], middle]), np.concatenate([middle, end[wide]])
+        step, before = np.tile(step[wide], 2), np.tile(left[wide], 2)
+    step, begin, end = (np.concatenate([getattr(part, name) for part in whole]) for name in ("step", "begin", "end"))
+    series, turn = np.concatenate([part.series for part in whole], axis=-2), np.lexsort((begin, step))
+    return Pieces(step[turn], begin[turn], end[turn], series[..., turn, :])
+
+
+def _unresolved(
+    values: Float[np.ndarray, "quantity piece places"], step: Int[np.ndarray, " piece"], size: Any
+) -> tuple[Float[np.ndarray, "quantity step"], Float[np.ndarray, " piece"]]:
+    """Return how far polynomials through the nodes of pieces are from quantities, as a part of these.
+
+    Also return how large the quantities are in the steps, which is found from the steps themselves, where it is None.
+    """
+    coefficients = values[..., :-2] @ INTERPOLATION.T
+    local = np.abs(coefficients).max(axis=-1)
+    size = local if size is None else size
+    beside = np.abs(coefficients @ AT_ENDS.T - values[..., -2:]).max(axis=-1)
+    last = np.abs(coefficients[..., -LAST:]).max(axis=-1)
+    scale = np.maximum(np.maximum(local, LEAST * size[..., step]), 1e-300)
+    return size, (np.maximum(last, beside) / scale).max(axis=0, initial=0.0)
+
+
+def _at(
+    group: Group, polynomial: State, since: Float[np.ndarray, "piece node"], order: int, pose_type: type
+) -> Float[np.ndarray, "levels component instance piece node"]:
+    """Return outputs at times into steps as Taylor coefficients.
+
+    A few at many places cost less than many at one: the program for high orders of an angle takes minutes to compile.
+    """
     count = polynomial.position.shape[1]
     j, k = np.arange(order + 1)[:, None], np.arange(count)
     powers = since ** np.maximum(k - j, 0)[:, :, None, None]
@@ -170,23 +254,28 @@ class EventDetector:
         part : DenseOutput
             Steps; their start, length and polynomial count.
         """
-        start, length, polynomial = part.start, part.length, part.polynomial
+        start, length = part.start, part.length
         derivative, element = self.event.derivative, self._group.element
-        order = derivative + element.lost_orders + 1
-        series = at_nodes(self._group, polynomial, length, order, self._pose_type)[:, self.event.component, 0]
+        order, component = derivative + element.lost_orders + 1, self.event.component
+        smooth = max(derivative, 1) if element.turning else derivative  # rates have no whole turns
+        pieces = in_pieces(
+            self._group, part.polynomial, length, order, self._pose_type, lambda x: x[smooth : smooth + 1, component, 0]
+        )
+        series = pieces.series[:, component, 0]
         if len(series) <= derivative:
             raise MechanismError("the output has no such derivative", name="events.derivative", value=derivative)
         if element.turning:
-            time = (start[:, None] + length[:, None] * NODES).ravel()
+            time = pieces.time(start, length)
             history = np.concatenate([self._angle, [time, series[0].ravel(), series[1].ravel()]], axis=1)
             history[1] = counted_by_rates(history[1], history[2], history[0])
             series[0] = history[1, -len(time) :].reshape(series[0].shape)
             self._angle = history[:, -1:]
         values = series[derivative] * math.factorial(derivative) - self.event.value
         found = []
-        for k, coefficients in enumerate(values @ INTERPOLATION.T):
-            for root, sense in crossings(coefficients, first=k == 0 and not self._begun):
-                after, rising = float(root * length[k]), float(sense * np.sign(length[k]))
+        for place, coefficients in enumerate(values @ INTERPOLATION.T):
+            k, begin, end = int(pieces.step[place]), pieces.begin[place], pieces.end[place]
+            for root, sense in crossings(coefficients, first=place == 0 and not self._begun):
+                after, rising = float((begin + root * (end - begin)) * length[k]), float(sense * np.sign(length[k]))
                 again = self._last[1] == rising and abs(start[k] + after - self._last[0]) < 2 * EDGE * abs(length[k])
                 self._last = float(start[k] + after), rising
                 if not again and self.event.direction * rising >= 0:

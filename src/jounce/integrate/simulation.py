@@ -12,12 +12,12 @@ from jounce.dynamics.forward import Equations, Instants, Lanes, State, expand
 from jounce.dynamics.motion_values import Coordinates, cut, in_chunks, pose_of
 from jounce.dynamics.start import ConsistentStart
 from jounce.integrate.breaks import breaks
-from jounce.integrate.events import NODES, WIDTHS, at_nodes, pose_coordinates, series_of
+from jounce.integrate.events import WIDTHS, in_pieces, pose_coordinates, series_of
 from jounce.integrate.lookahead import watched_names
 from jounce.integrate.marching import DenseOutput
 from jounce.integrate.methods import evaluated
 from jounce.integrate.projection import projected
-from jounce.integrate.turns import AnglesOfForces, followed, measured
+from jounce.integrate.turns import PLACES, AnglesOfForces, attitudes_at, followed, measured
 from jounce.jet import Jet, dot
 from jounce.jet.turns import brought_near, counted_by_rates
 from jounce.kinematics import Motion, Status
@@ -31,7 +31,6 @@ MUCH_LONGER = (
     1e3  # than the step over a jump or a kink are one of those before and the next; a steep force takes several
 )
 FEW_INSTANTS = 8  # evaluated together, where there are no more: the end of a long run, say
-PLACES = 16  # in each step at which attitudes are looked at for turns
 APPROACH = 4  # steps to such a place, each much shorter than the one before
 
 
@@ -185,13 +184,7 @@ class Simulation(Motion):
 
     def _attitudes_at(self, instants: Float[np.ndarray, " time"]) -> Float[np.ndarray, "4 bodies time"]:
         dense, chosen = self.dense_output, self.steps_at(instants)
-        series, since = dense.polynomial.attitude[chosen], instants - dense.start[chosen]
-        place = np.zeros((len(instants), *series.shape[2:]))
-        for k in range(series.shape[1])[::-1]:
-            place = place * since[:, None, None] + series[:, k]
-        ground = np.zeros((4, 1, len(instants)))
-        ground[0] = 1.0
-        return np.concatenate([ground, np.moveaxis(place, 0, -1)], axis=1)
+        return attitudes_at(dense.polynomial.attitude[chosen], instants - dense.start[chosen])
 
     def _coefficients(self, group: Group) -> np.ndarray:
         pose_type, coordinates = self.poses
@@ -208,8 +201,9 @@ class Simulation(Motion):
             (counted,) = self._attitudes.counting((group,), instants)
             series[0, 0] = brought_near(series[0, 0], counted.element.datum.near)
             return series
-        nodes = (dense.start[:, None] + dense.length[:, None] * NODES).ravel()
-        known = at_nodes(group, dense.polynomial, dense.length, 1, self._start.model.pose_type)[:2]
+        kind = self._start.model.pose_type
+        pieces = in_pieces(group, dense.polynomial, dense.length, 1, kind, lambda x: x[1:2])
+        nodes, known = pieces.time(dense.start, dense.length), pieces.series[:2]
         known = known.reshape(*known.shape[:3], -1)
         counted = counted_by_rates(known[0], known[1], nodes)
         near = np.abs(nodes[None] - instants[:, None]).argmin(axis=1)

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Float
 
 from jounce.dynamics.forward import Equations, Lanes, State
@@ -84,3 +85,15 @@ def followed(equations: Equations, angles: AnglesOfForces, path: State, step: La
 
     _, found = jax.lax.scan(onwards, angles, jnp.arange(1.0, PLACES + 1) / PLACES)
     return Angles(tuple(jnp.concatenate([a[None], b]) for a, b in zip(angles, found, strict=True)), step)
+
+
+def attitudes_at(
+    series: Float[Numbers, "place order 4 bodies"], since: Float[np.ndarray, " place"]
+) -> Float[np.ndarray, "4 bodies+1 place"]:
+    """Return the Euler parameters of all bodies, the ground first, a time into steps of known Taylor coefficients."""
+    found = np.zeros((len(since), *series.shape[2:]))
+    for k in range(series.shape[1])[::-1]:
+        found = found * since[:, None, None] + np.asarray(series[:, k])
+    ground = np.zeros((4, 1, len(since)))
+    ground[0] = 1.0
+    return np.concatenate([ground, np.moveaxis(found, 0, -1)], axis=1)
