@@ -62,6 +62,7 @@ def samples(law, count=101, names="pin"):
     return "\n".join([f"time,{names}", *rows])
 
 
+@pytest.mark.slow
 def test_a_good_trajectory_ends_with_0_and_the_table_has_the_worst_values(run):
     status, out, err = run(PANDA, GOOD, "--limits", FRANKA)
     assert (status, err) == (0, "")

@@ -385,6 +385,7 @@ def test_python_m_jounce_keeps_compiled_programs_for_the_next_call(tmp_path):
     assert {path.name for path in cache.iterdir() if path.name.startswith("jit_advance")} <= kept
 
 
+@pytest.mark.slow
 def test_a_cache_that_cannot_be_made_does_no_harm(tmp_path):
     (tmp_path / "file").write_text("")
     done = process("run", "none.yaml", cwd=tmp_path, JOUNCE_CACHE_DIR=str(tmp_path / "file" / "cache"))

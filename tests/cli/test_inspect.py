@@ -228,6 +228,7 @@ def test_run_as_json(facts, tmp_path):
     assert data["failures"] == []
 
 
+@pytest.mark.slow
 def test_a_solve_that_fails_on_the_way_as_json(facts):
     status, data, err = facts("run", FOUR_BAR, "--order", 2, "--set", "AB=8 cm")
     assert status == 1

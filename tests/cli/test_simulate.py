@@ -73,6 +73,7 @@ def test_set_step_and_netcdf(simulate, file, tmp_path):
         assert data["angle"].values[0].tolist() == pytest.approx([0.3, -2.0])
 
 
+@pytest.mark.slow
 def test_a_longest_step_bounds_all_steps(simulate, file):
     status, out, _ = simulate(file, "--order", 1, "--longest-step", 0.01)
     assert status == 0

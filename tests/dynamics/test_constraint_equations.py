@@ -12,6 +12,7 @@ def along(jacobian, velocities):
     return xarray.dot(jacobian, velocities, dim="column")
 
 
+@pytest.mark.slow
 def test_rows_and_columns_are_those_of_the_file_whatever_the_types():
     """The solver keeps joints of one type together; the rows of the file stand as they are written."""
     mechanism = jn.load(example("inverted_slider_crank_slide"))

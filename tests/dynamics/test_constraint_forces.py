@@ -114,6 +114,7 @@ def test_multipliers_solve_the_equations_of_motion():
         np.testing.assert_allclose(found[:, k], expected, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_multipliers_balance_loads_to_every_order_by_the_coefficients_that_it_needs():
     bar = jn.Mechanism(
         space="planar",

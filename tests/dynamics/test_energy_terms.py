@@ -111,6 +111,7 @@ def test_equations_083_to_106_closed_forms_of_first_order(about):
             close(terms.rotation[sample, 0, -1], whole)
 
 
+@pytest.mark.slow
 def test_equations_089_to_102_of_one_particle():
     rho, mass = np.array([0.3, -0.2, 0.5]), 0.7
     robot = free_body(rho[None], np.array([mass]))

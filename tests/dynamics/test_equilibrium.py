@@ -136,6 +136,7 @@ def test_a_column_under_a_follower_force_flutters_at_the_load_of_ziegler(load, w
     assert np.allclose([p["angle"] for p in found.poses.values()], 0.0, atol=1e-14)
 
 
+@pytest.mark.slow
 def test_damping_makes_a_column_flutter_sooner():
     # both springs damped alike: the load of flutter falls to 41/28 k / l as damping goes to zero
     small = 1e-4 * np.sqrt(2.0 * 0.4 * 0.5**2)

@@ -29,6 +29,7 @@ def rates(function, times, count=3):
         return np.array([[float(mpmath.diff(function, mpmath.mpf(t), k)) for k in range(count)] for t in times])
 
 
+@pytest.mark.slow
 def test_driven_pendulum_against_its_closed_form():
     motion = jn.solve(arm(mass=2.0, inertia=0.3, center_of_mass=[0.5, 0.0]), TIME, order=4)
 

@@ -70,6 +70,7 @@ def reach(law):
     return drivers.DistanceDriver(("ground", "lower"), [0, 0], [0.8, 0], law)
 
 
+@pytest.mark.slow
 def test_a_speed_in_the_limit_of_a_reach_is_refused():
     """The tip is 1.8 m away, as far as it goes; rounding hides that no joint can move it on, at 1e7 rad/s or more."""
     words = "dead point.*do not determine the velocities of .*lower"
@@ -212,6 +213,7 @@ def test_options_are_checked_before_any_computing(keywords, words, monkeypatch):
         jn.simulate(simple_pendulum(), **{"time": [0.0, 1.0], **keywords})
 
 
+@pytest.mark.slow
 def test_gears_of_a_high_ratio_start_at_the_rates_told():
     pin, ratio = jn.planar.Revolute, 1e7
     mechanism = jn.Mechanism(

@@ -24,6 +24,7 @@ def pendulum_derivatives(angle, rate, w=GRAVITY):
     return np.array([angle, rate, second, third, w * (np.cos(angle) * rate**2 + np.sin(angle) * second)]).T
 
 
+@pytest.mark.slow
 def test_derivatives_obey_the_equation_of_motion(swing):
     found = swing.outputs["angle"]
     assert np.allclose(found, pendulum_derivatives(found[:, 0], found[:, 1]), rtol=1e-13, atol=1e-12)

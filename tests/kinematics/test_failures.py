@@ -20,6 +20,7 @@ def failure(mechanism, time, **keywords):
     return caught.value
 
 
+@pytest.mark.slow
 def test_jump_of_a_motion_law_is_reported_with_time_and_body():
     error = failure(crank(lambda t: jnp.where(t < 1, t, t + 1.0)), GRID)
     assert error.status == Status.BRANCH_JUMP
@@ -48,6 +49,7 @@ def test_without_strict_good_instants_are_kept_and_the_rest_is_nan():
     assert "10 of 21" in repr(motion)
 
 
+@pytest.mark.slow
 def test_kink_of_a_motion_law_is_no_jump():
     motion = jn.solve(crank(lambda t: jnp.where(t < 1, t, 2 * t - 1)), GRID, order=1)
     np.testing.assert_allclose(motion.outputs["angle"][:, 0], np.where(GRID < 1, GRID, 2 * GRID - 1), atol=1e-13)
@@ -92,6 +94,7 @@ def test_dead_centre_passed_smoothly_keeps_to_the_motion():
     assert (np.diff(angle) < 0).all()
 
 
+@pytest.mark.slow
 def test_change_point_of_a_parallelogram_is_passed_on_the_same_branch():
     time = np.linspace(0.5, 4, 15)
     mechanism = four_bar("0.5", "0.5", "t", AB=0.1, CD=0.1, AD=0.2, BC=0.2)

@@ -93,6 +93,7 @@ def turns(branch, *names):
     return found / found[0]
 
 
+@pytest.mark.slow
 def test_three_hinges_in_a_line_are_shaky():
     found = jn.mobility(hinges_in_line(0.7))
     assert (found.kind, found.count, found.instantaneous, found.finite, found.blocked) == ("shaky", 0, 1, 0, 2)

@@ -92,6 +92,7 @@ def test_points_are_consistent_with_the_angular_velocity(spatial):
     np.testing.assert_allclose(point[:, 2], acceleration, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_no_outputs_at_all():
     motion = jn.solve(crank("t", outputs={}), [0.0, 1.0])
     assert motion.outputs == {}

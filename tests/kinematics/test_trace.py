@@ -231,6 +231,7 @@ def test_more_than_one_degree_of_freedom():
         jn.trace(dataclasses.replace(jn.load("examples/double_pendulum.yaml"), initial={}))
 
 
+@pytest.mark.slow
 def test_nothing_that_moves():
     braced = four_bar(1.7, 2.0, 1.4, 2.2)
     hinges = {**braced.joints, "brace": jn.planar.Parallel1(("ground", "crank"), [1.0, 0.0], [1.0, 0.0])}

@@ -262,6 +262,7 @@ class TestTimeGrid:
         np.testing.assert_allclose(jn.solve(timed).time, [0, 0.5, 1])
 
 
+@pytest.mark.slow
 def test_gears_of_a_carrier_in_any_order_with_the_ground_among_them():
     """A held ring of 60 teeth, a sun of 24: the carrier makes 24/84 of the sun's turns (Willis)."""
     pins = {name: jn.planar.Revolute(("ground", name), [0, 0], [0, 0]) for name in ("sun", "carrier")}

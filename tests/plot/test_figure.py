@@ -30,6 +30,7 @@ def panels(figure):
     return np.array(figure.axes, dtype=object).reshape(shape)
 
 
+@pytest.mark.slow
 def test_panels_show_the_outputs_row_by_row(four_bar):
     grid = panels(draw(four_bar))
     assert grid.shape == (5, 2)

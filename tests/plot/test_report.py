@@ -34,6 +34,7 @@ def data_of(path):
     return json.loads(found)
 
 
+@pytest.mark.slow
 def test_values_are_those_of_the_motion(page, four_bar):
     data = data_of(page)
     assert [output["name"] for output in data["outputs"]] == ["psi", "C"]

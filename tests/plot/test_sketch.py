@@ -59,6 +59,7 @@ def test_every_example_has_all_its_bodies_and_joints(path):
     assert upper > lower
 
 
+@pytest.mark.slow
 def test_links_and_pins_are_where_the_bodies_are(four_bar):
     figure = sketch(four_bar, 0.52)  # nearest: t = 0.5 s
     (bar,) = artists(figure, "bodies.rocker")

@@ -291,6 +291,7 @@ def test_wrenches_of_joints_change_the_momentum_of_each_body():
         near(net_moment, angular[:, 1 : levels + 1], 1e-12)
 
 
+@pytest.mark.slow
 def test_wrenches_in_axes_of_link_and_base():
     base, link = (jn.joint_wrenches(ROBOT, Q, frame=frame) for frame in ("base", "link"))
     for k, name in enumerate(ROBOT.moving_links):

@@ -46,6 +46,7 @@ def expected_change(force, turning, link=LINK, point=POINT):
     return -product(jacobian, np.concatenate([force, turning], axis=-1), "sij,si->sj")
 
 
+@pytest.mark.slow
 def test_a_wrench_takes_its_work_off_the_torques(torque):
     wrench = jn.Wrench(LINK, FORCE, TORQUE, POINT)
     near(jn.inverse_dynamics(ROBOT, Q, wrenches=[wrench]) - torque, expected_change(FORCE, TORQUE))

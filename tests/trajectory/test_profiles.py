@@ -168,6 +168,7 @@ def test_quickest_of_each_profile_reaches_a_limit(name):
         motion_profile(name, 0.2, 1.5, duration=0.9 * float(law.duration), limits=limits.tolist())
 
 
+@pytest.mark.slow
 def test_profiles_drive_a_mechanism():
     times = [0.0, 0.5, 1.0, 1.9, 2.5]
     law = RestToRestMotion(START, END, DURATION, BEGINNING)

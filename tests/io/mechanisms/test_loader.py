@@ -330,6 +330,7 @@ def test_importing_the_package_leaves_the_heavy_libraries_alone(module):
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
+@pytest.mark.slow
 def test_reading_a_file_needs_no_pint_and_no_scipy():
     path = ROOT / "examples" / "four_bar.yaml"
     check = "assert not {'pint', 'scipy'} & sys.modules.keys()"

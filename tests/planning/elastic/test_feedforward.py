@@ -59,6 +59,7 @@ def test_a_pendulum_to_the_third_rate_of_the_torque():
                 assert abs(found.motor_torque[row, k, 0] - exact / 60) < 1e-12 * max(1, abs(exact))
 
 
+@pytest.mark.slow
 def test_a_damped_pendulum_is_solved_along_the_trajectory():
     """Against quadrature of 30 digits from the same start, and its own equation."""
     drive = jn.Drive(stiffness=90.0, damping=9.0, rotor_inertia=2e-4, gear_ratio=60)

@@ -39,6 +39,7 @@ LINE = [[0.0], [LENGTH]]
 TRAPEZOID = LENGTH / SPEED + SPEED / ACCELERATION
 
 
+@pytest.mark.slow
 def test_a_trapezoid_takes_as_long_as_its_closed_form_says():
     found = jn.retime(cart(velocity=SPEED, acceleration=ACCELERATION), LINE)
     assert TRAPEZOID * (1 - 1e-9) < found.stop < TRAPEZOID * 1.003

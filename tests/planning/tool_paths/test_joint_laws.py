@@ -61,6 +61,7 @@ def test_a_spike_too_narrow_to_be_followed_is_told_with_its_instant():
         along("0.5*t + 0.3*exp(-((t - 0.9871)/0.0000005)**2)", "t", 0.0)
 
 
+@pytest.mark.slow
 def test_a_corner_is_no_path_to_be_retimed():
     gantry, _, laws = along("0.5*abs(t - 0.987)", "t", 0.0)
     with pytest.raises(TrajectoryError, match=r"kink.*s = 0\.987"):
