@@ -245,8 +245,9 @@ class _Runs:
         step = step[instant, lane]
         polynomial = steps.polynomial.map(lambda part: np.moveaxis(part[step, ..., lane], 0, -1))
         before = {which: series[..., step, lane] for which, series in angles.items()}
-        since = self.instants[near[instant]] - steps.start[step, lane]
-        before |= self._counted_about_axes(runs, steps, taken, (step, lane, since / steps.length[step, lane]))
+        since, length = self.instants[near[instant]] - steps.start[step, lane], steps.length[step, lane]
+        share = since / np.where(length == 0.0, 1.0, length)
+        before |= self._counted_about_axes(runs, steps, taken, (step, lane, share))
         known = tuple(part[step, :, lane].T for part in steps.angles)
         self._note(runs[lane], near[instant], polynomial, steps.start[step, lane], known, before)
 

@@ -65,7 +65,10 @@ class Threads:
             self._pool.shutdown(cancel_futures=True)
 
     def map(self, function: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
-        """Yield what a function returns for each item, in their order; it may compute a few of them beforehand."""
+        """Yield what a function returns for each item, in their order; it may compute a few of them beforehand.
+
+        It is one function, or one compiled program, for all items that these threads map.
+        """
         items = deque(items)
         if items and not self._compiled:  # what the first one compiles, the others find
             self._compiled = True
