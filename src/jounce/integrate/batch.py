@@ -14,13 +14,12 @@ from jounce.display import Displayed
 from jounce.dynamics.forward import Equations, State
 from jounce.dynamics.start import consistent_start, initial_as_drivers
 from jounce.integrate.batch_equations import BatchStart, ParametricMechanism, Turns
-from jounce.integrate.batch_turns import counted_angles
 from jounce.integrate.events import pose_coordinates
 from jounce.integrate.marching import DenseOutput, IntegratorState, Outcome, begin_march, march
 from jounce.integrate.methods import AbstractMethod
 from jounce.integrate.options import checked_options, instants_of
 from jounce.integrate.simulation import expanded
-from jounce.integrate.turns import attitudes_at
+from jounce.integrate.turns import PLACES, attitudes_at
 from jounce.jet.derivatives import plain_derivatives
 from jounce.jet.turns import brought_near, whole_periods
 from jounce.kinematics import Status
@@ -31,6 +30,7 @@ from jounce.mechanism.axis_angles import measures_angle, raw_angles, with_turns
 from jounce.mechanism.builder import with_reference
 from jounce.mechanism.law_checks import check_laws
 from jounce.mechanism.preconditions import concrete
+from jounce.mechanism.turn_counting import counted_along
 from jounce.shapes import ArrayLike
 
 LANES = 64  # runs marched together: more fall out of the cache
@@ -307,7 +307,7 @@ class _Runs:
                 _, outputs = self._picked(runs[of], Turns((), self._begun_with(runs[of])))
                 return raw_angles([outputs[which]], {"quaternion": attitudes})[0]
 
-            counted = counted_angles(measured, lane, turns[:, runs[lane]])
+            counted = counted_along(measured, lane, turns[:, runs[lane]], PLACES)
             found[which] = counted.near(number[places[0], places[1]], places[2])
             turns[:, runs[lane[last]]] = counted.near(np.flatnonzero(last), np.ones(last.sum()))
         return found

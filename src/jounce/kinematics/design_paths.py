@@ -17,19 +17,19 @@ from jounce.jet.derivatives import plain_derivatives
 from jounce.jet.turns import brought_near
 from jounce.kinematics.advance import SAFE_FRACTION, Arrival, SolvedState, predicts_turns, solved_batch
 from jounce.kinematics.compilation import compiled
-from jounce.kinematics.design_turns import counted_angles
 from jounce.kinematics.designs import Coordinates, Designs
 from jounce.kinematics.kernels import LIBRARIES
 from jounce.kinematics.legs import GROWTH, LARGEST_TURNOVER, PASSAGE, SLIVER
-from jounce.kinematics.path_following import SMALLEST_STEP
+from jounce.kinematics.path_following import PLACES, SMALLEST_STEP, blended_attitudes
 from jounce.kinematics.predictions import hidden_by_laws
 from jounce.kinematics.solver import Solver
 from jounce.kinematics.status import Status
 from jounce.kinematics.threads import Threads
 from jounce.kinematics.turnover import turnovers_of
 from jounce.kinematics.wide_batches import PIECES
-from jounce.mechanism.axis_angles import measures_angle
-from jounce.mechanism.system import System
+from jounce.mechanism.axis_angles import measures_angle, raw_angles
+from jounce.mechanism.system import Group, System
+from jounce.mechanism.turn_counting import counted_along
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
 
@@ -250,15 +250,29 @@ class DesignPaths:
     ) -> None:
         """Give angles about axes the turns that they make along the anchors; lanes are designs, indices, instants."""
         (owners, at, coordinates), (design, where, instant) = anchors, lanes
-        system = self.designs.system(owners)
-        for group, found in zip(system.outputs, outputs, strict=True):
-            if not measures_angle(group):
-                continue
-            series = np.nan_to_num(coordinates["quaternion"], nan=0.0, posinf=0.0, neginf=0.0)
-            known = counted_angles(group, owners, at, series, len(self.apart))
-            self.apart |= known.doubtful
-            nearest = _nearest(known.owner, known.instant, design, instant)
-            for values, angle in zip(found, known.angle, strict=True):
+        pairs = zip(self.designs.system(owners).outputs, outputs, strict=True)
+        measuring = [(group, found) for group, found in pairs if measures_angle(group)]
+        if not measuring:
+            return
+        series = np.nan_to_num(coordinates["quaternion"], nan=0.0, posinf=0.0, neginf=0.0)
+        here = np.arange(len(owners))
+        following = np.where(np.append(owners[1:] != owners[:-1], True), here, here + 1)  # or itself, the last one
+
+        def instants(anchor: Indices, share: Lanes) -> Lanes:
+            return at[anchor] + share * (at[following[anchor]] - at[anchor])
+
+        for group, found in measuring:
+
+            def measured(anchor: Indices, share: Lanes, group: Group = group) -> Float[np.ndarray, "angle lane"]:
+                ends = anchor, following[anchor]
+                attitudes = blended_attitudes(at, series, ends, instants(anchor, share))
+                own = jax.tree.map(lambda leaf: leaf if np.shape(leaf)[-1] == 1 else leaf[..., anchor], group)
+                return raw_angles([own], {"quaternion": attitudes})[0]
+
+            begun = np.broadcast_to(group.element.datum.near, (group.instances, len(owners)))
+            places = counted_along(measured, owners, begun, PLACES)
+            nearest = _nearest(owners[places.path], instants(places.path, places.share), design, instant)
+            for values, angle in zip(found, places.angle, strict=True):
                 values[design, where, 0, 0] = brought_near(values[design, where, 0, 0], angle[nearest])
 
     def _known_at_the_start(self, coordinates: Coordinates) -> SolvedState:

@@ -11,6 +11,7 @@ from jounce.jet.turns import counted_on, principal, whole_periods
 from jounce.mechanism.modules import unchecked, with_fields
 from jounce.mechanism.system import Group, holding
 from jounce.mechanism.time import nearest_instants
+from jounce.mechanism.turn_counting import closer_places
 from jounce.shapes import Numbers
 
 Coordinates = Mapping[str, Any]  # of all bodies, the ground first, by name: (..., bodies, batch)
@@ -18,8 +19,6 @@ Quaternions = Float[np.ndarray, "4 *#rest"]
 Vectors = Float[np.ndarray, "3 *#rest"]
 Angles = Float[np.ndarray, "instance batch"]
 PARALLEL = 1e-9  # largest sine between axes that are one
-LARGEST_CHANGE = np.pi / 4  # of an angle from place to place: more, and it is looked at between them
-HALVINGS = 24  # of the time between two places: down to what passes 1e-9 beside an attitude that tells no angle
 
 
 class PrescribedAngle(NamedTuple):
@@ -66,25 +65,17 @@ class AttitudeHistory(NamedTuple):
     ) -> tuple[Float[np.ndarray, " place"], Float[np.ndarray, "angle place"]]:
         """Return instants, and angles there that are known up to whole turns, so close that none is lost in between.
 
-        An angle may turn by half a turn while hardly anything moves, where bodies pass near an attitude that tells
-        none: there, more places are looked at.
-
         Parameters
         ----------
         measure : callable
             Returns the angles, rad, of attitudes of all bodies, (4, bodies, places).
         """
-        time, angles = self.time, measure(self.quaternion)
-        if self.between is None:
-            return time, angles
-        for _ in range(HALVINGS):
-            wide = np.flatnonzero((np.abs(principal(np.diff(angles))) > LARGEST_CHANGE).any(axis=0))
-            if not wide.size:
-                break
-            middle = 0.5 * (time[wide] + time[wide + 1])
-            found = measure(self.between(middle))
-            time, angles = np.insert(time, wide + 1, middle), np.insert(angles, wide + 1, found, axis=1)
-        return time, angles
+        between = self.between
+        if between is None:
+            return self.time, measure(self.quaternion)
+        whole = np.zeros(len(self.time), int)  # one path, along which instants are measured
+        found = closer_places(lambda _, instants: measure(between(instants)), whole, self.time)
+        return found.share, found.angle
 
     def angles(self, group: Group) -> tuple[Float[np.ndarray, " place"], Float[np.ndarray, "instance place"]]:
         """Return instants, and the angles about axes that a group measures there, counted on from its datum."""
