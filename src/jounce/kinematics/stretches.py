@@ -33,6 +33,8 @@ class Stretches:
         For the instants that failed so far, by index, as those of a `Motion`.
     change_points : numpy.ndarray of shape (points,)
         When the motion passes a singular position smoothly, s, as those of a `Motion`; known from the start.
+    passages : tuple of ChangePoint
+        The change points, with how far the motion carries as a Taylor series at each, as those of a `Motion`.
     derived : dict
         What was computed of the stretches and may be wanted again, by name.
     """
@@ -51,7 +53,8 @@ class Stretches:
         self.faults: dict[int, str] = {}
         self.derived: dict[str, Any] = {}
         (self._solver, self._path), self._progress, self._threads = followed, progress, threads
-        self.change_points = np.array([point.instant for point in self._path.change_points])
+        self.passages = tuple(self._path.change_points)
+        self.change_points = np.array([point.instant for point in self.passages])
 
     def __len__(self) -> int:
         """Return the number of instants."""
@@ -64,7 +67,7 @@ class Stretches:
             failed = np.flatnonzero(part.status != Status.OK)
             self.status[first + failed] = part.status[failed]
             self.faults |= {first + lane: fault for lane, fault in part.faults.items()}
-            outcome = part.status, part.faults, self._path.change_points
+            outcome = part.status, part.faults, self.passages
             yield actuated(Motion(self.mechanism, model, part.time, self.order, part.state, *outcome, history))
 
 

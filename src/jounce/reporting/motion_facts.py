@@ -10,6 +10,7 @@ from typing_extensions import TypedDict
 from jounce.integrate import Simulation
 from jounce.kinematics import Motion, Status, Stretches
 from jounce.mechanism import AbstractMotionOutput, build, with_outputs_held
+from jounce.reporting.unbounded import unbounded_outputs
 
 
 class Span(TypedDict):
@@ -111,17 +112,22 @@ def motion_facts(motion: Motion | Stretches) -> dict[str, Any]:
         "equations_of_drivers": drives,
         "change_points": np.asarray(motion.change_points, float).tolist(),
         "coordinates": len(mechanism.bodies) * (3 if mechanism.space == "planar" else 6),
-        "remarks": _remarks(motion) if isinstance(motion, Motion) else [],
+        "remarks": _remarks(motion),
     }
     return facts | _simulated(motion) if isinstance(motion, Simulation) else facts
 
 
-def _remarks(motion: Motion) -> list[str]:
+def _remarks(motion: Motion | Stretches) -> list[str]:
     """Return what is to be said of outputs, such as why their values are NaN: one line for those that have it alike."""
     names: dict[str, list[str]] = {}
-    for name, output in motion.mechanism.outputs.items():
-        if isinstance(output, AbstractMotionOutput) and (remark := output.remark(motion, motion.outputs[name])):
+    for name, values in (motion.outputs if isinstance(motion, Motion) else {}).items():  # stretches are not kept
+        output = motion.mechanism.outputs[name]
+        if isinstance(output, AbstractMotionOutput) and (remark := output.remark(motion, values)):
             names.setdefault(remark, []).append(name)
+    for name, instants in unbounded_outputs(motion).items():
+        where = ", ".join(f"{instant:g} s" for instant in instants[:6]) + (", ..." if len(instants) > 6 else "")
+        remark = f"grows without bound towards t = {where}, its extremes say only how near an instant comes"
+        names.setdefault(remark, []).append(name)
     return [f"{', '.join(those)}: {remark}" for remark, those in names.items()]
 
 

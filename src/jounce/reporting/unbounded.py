@@ -1,0 +1,54 @@
+"""Outputs that grow without bound towards the change points of a motion, so that no largest value says anything.
+
+A motion passes a change point smoothly. What follows from its factored Jacobian can have a pole there: reactions do.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from jounce.kinematics import Motion, Stretches, solve
+from jounce.mechanism import AbstractMotionOutput
+
+DISTANCES = 4.0 ** -np.arange(5, 9)  # radii of the Taylor series from a change point; forces have three digits there
+POLE = 3.0  # least growth of a pole from one distance to the next; one of first order grows fourfold
+LIKENESS = 0.05  # of these growths
+
+
+def unbounded_outputs(motion: Motion | Stretches) -> dict[str, list[float]]:
+    """Return the outputs that grow without bound, and towards which instants, s, where a motion passes change points.
+
+    Parameters
+    ----------
+    motion : Motion or Stretches
+        Solved; it is solved again near its change points.
+    """
+    first, last = float(motion.time[0]), float(motion.time[-1])
+    points = [point for point in motion.passages if first <= point.instant <= last]
+    forces = {n: x for n, x in motion.mechanism.outputs.items() if isinstance(x, AbstractMotionOutput)}
+    if not points or not forces:
+        return {}
+    sides = np.array([[p.instant + side * p.radius * DISTANCES for side in (-1, 1)] for p in points])
+    inside = (sides >= first) & (sides <= last)
+    instants = np.unique(np.append(sides[inside], (first, last)))  # the same motion, from its start through all points
+    # the value alone: derivatives are all rounding so near, and grow where it does
+    near = solve(dataclasses.replace(motion.mechanism, outputs=forces), instants, order=0, strict=False)
+    places = np.searchsorted(instants, np.where(inside, sides, first))
+    found: dict[str, list[float]] = {}
+    for name, values in near.outputs.items():
+        sizes = np.abs(values[:, 0].reshape(len(instants), -1))[places]
+        grows = (inside.all(axis=-1) & _poles(sizes)).any(axis=-1)
+        if grows.any():
+            found[name] = [points[k].instant for k in np.flatnonzero(grows)]
+    return found
+
+
+def _poles(sizes: Float[np.ndarray, "point side distance component"]) -> Bool[np.ndarray, "point side"]:
+    """Tell where a magnitude grows as that of a pole does: by the same factor from each distance to the next."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        growth = sizes[:, :, 1:] / sizes[:, :, :-1]
+        alike = np.abs(growth / growth[:, :, -1:] - 1.0) < LIKENESS
+    return np.any(((growth > POLE) & alike).all(axis=2), axis=-1)
