@@ -106,6 +106,15 @@ def test_names_that_end_as_a_derivative_or_a_unit_does(tmp_path, name):
     same_bits(found["C"], written["C"])
 
 
+def test_an_output_that_reads_as_the_derivative_of_another_is_refused(tmp_path):
+    written = example(0)[["psi"]].rename({"psi": "a"})
+    written["a_d1"] = 2 * written["a"]
+    with pytest.raises(OutputError, match="'a_d1'"):
+        write(written, tmp_path / "motion.csv")
+    write(written, tmp_path / "motion.nc")
+    same_bits(read(tmp_path / "motion.nc")["a_d1"], written["a_d1"])
+
+
 def test_variables_that_are_not_outputs_stay_out_of_the_table(tmp_path):
     written = example().assign(status=("time", np.zeros(4, int)))
     write(written, tmp_path / "motion.csv")

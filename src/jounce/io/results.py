@@ -4,36 +4,24 @@ from __future__ import annotations
 
 import csv
 import io
-import itertools
-import re
 from collections.abc import Iterable, Iterator
 from os import PathLike, fspath
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 import numpy as np
-from jaxtyping import Float
 
 from jounce.errors import OutputError
 from jounce.io.files.column_units import heading, is_si, name_and_unit
 from jounce.io.files.netcdf_parts import NetcdfParts
 from jounce.io.files.reading import known_name, read_file, reason_of, written_name
 from jounce.io.files.writing import check_target, replacing
-from jounce.mechanism import EulerAnglesOutput, EulerParametersOutput, RotationMatrixOutput
-from jounce.trajectory.shown_units import derivative_unit
+from jounce.io.result_columns import AXES, column_units, columns, dataset_of
 
 if TYPE_CHECKING:
     import xarray
 
 SUFFIXES = (".csv", ".nc")
-ALONG = ("time", "angle", "point")  # what the rows of a table follow: of a motion, of a cam, of a curve
-CURVE_AXES = ("arc_length", "driver_value")  # first columns of a curve of configurations
-AXES = {  # of outputs that are more than one number, and the labels along them
-    ("component",): ("x", "y", "z"),
-    ("euler_parameter",): EulerParametersOutput.labels,
-    ("euler_angle",): EulerAnglesOutput.labels,
-    ("row_axis", "column_axis"): RotationMatrixOutput.labels,
-}
 
 
 class _SourceError(Exception):
@@ -201,56 +189,6 @@ def _put_netcdf(parts: Iterator[tuple[int, xarray.Dataset]], path: Path, count: 
             file.put(part, first)
 
 
-def columns(dataset: xarray.Dataset) -> dict[str, Float[np.ndarray, " time"]]:
-    """Return the columns of a table of a dataset, by name, each of shape (time,).
-
-    Raises
-    ------
-    OutputError
-        Two columns would have the same name.
-    """
-    from xarray import Variable
-
-    along = next(name for name in ALONG if name in dataset.dims)
-    first = (name for name in CURVE_AXES if name in dataset.coords) if along == "point" else (along,)
-    found = {name: np.asarray(dataset[name], float) for name in first}
-    for name, variable in dataset.data_vars.items():
-        if variable.dims == (along,) and along == "angle":
-            found[str(name)] = np.asarray(variable, float)
-        axes = tuple(dim for dim in variable.dims if dim not in (along, "derivative"))
-        if not {along, "derivative"} <= set(variable.dims) or (axes and axes not in AXES):
-            continue
-        parts: list[tuple[str, Any]] = [(str(name), variable)]
-        if axes:
-            labels = ["".join(map(str, found)) for found in itertools.product(*(variable[a].values for a in axes))]
-            flat = variable.transpose(*axes, "derivative", along)
-            whole = flat.values.reshape(-1, *flat.shape[-2:])
-            dims = ("derivative", along)
-            parts = [(f"{name}_{label}", Variable(dims, part)) for label, part in zip(labels, whole, strict=True)]
-        for stem, part in parts:
-            values = part.transpose("derivative", along).values
-            for order, row in zip(dataset["derivative"].values, values, strict=True):
-                column = f"{stem}_d{order}" if order else stem
-                if column in found:
-                    raise OutputError(f"two outputs make a column of the same name, '{column}'")
-                found[column] = np.asarray(row, float)
-    return found
-
-
-def _column_units(dataset: xarray.Dataset, names: Iterable[str]) -> list[str | None]:
-    """Return the units of columns of a table; None where they are not known."""
-    found = []
-    for name in names:
-        stem, order = re.fullmatch(r"(.*?)(?:_d([0-9]+))?", name, re.DOTALL).groups()  # type: ignore[union-attr]
-        holder = next((n for n in (name, stem, stem.rpartition("_")[0]) if n in dataset.variables), None)
-        unit = dataset[holder].attrs.get("units") if holder is not None else None
-        unit = "s" if unit is None and name == "time" else unit
-        if unit and order and CURVE_AXES[0] in dataset.coords:
-            unit = None  # its derivatives are by arc length
-        found.append(derivative_unit(unit, int(order or 0)) if unit else None)
-    return found
-
-
 def _write_csv(dataset: xarray.Dataset, path: Path, header_units: bool | None) -> None:
     with path.open("w", newline="", encoding="utf-8") as stream:
         _write_rows(dataset, stream, header_units)
@@ -266,7 +204,7 @@ def _write_rows(dataset: xarray.Dataset, stream: TextIO, header_units: bool | No
     rows = np.stack(list(table.values()), axis=1)
     line = ",".join(["%.17g"] * rows.shape[1]) + "\n"
     if headed:
-        units = _column_units(dataset, table)
+        units = column_units(dataset, table)
         told = header_units
         if told is None:  # a name that ends in brackets reads as one with a unit, unless its own unit follows
             told = not all(map(is_si, units)) or any(name_and_unit(name)[1] is not None for name in table)
@@ -344,7 +282,7 @@ def read(path: str | PathLike[str]) -> xarray.Dataset:
     for line, row in enumerate(rows, start=2):
         if len(row) != len(header):
             raise OutputError(f"must have {len(header)} entries", path=name, line=line, value=len(row))
-    dataset = _from_columns(header, np.array(rows), units)
+    dataset = dataset_of(header, np.array(rows), units)
     for name, variable in dataset.data_vars.items():
         if (unit := units.get(str(name), units.get(f"{name}_{AXES.get(variable.dims[2:], ('',))[0]}"))) is not None:
             variable.attrs["units"] = unit
@@ -355,47 +293,3 @@ def _named_columns(header: list[str]) -> tuple[list[str], dict[str, str]]:
     """Return the names of columns, and the units of those that say one."""
     pairs = [name_and_unit(known_name(entry)) for entry in header]
     return [name for name, _ in pairs], {name: unit for name, unit in pairs if unit is not None}
-
-
-def _from_columns(header: list[str], table: Float[np.ndarray, "time columns"], units: dict[str, str]) -> xarray.Dataset:
-    """Build the dataset of a table; what its heading says to have other units is no component of the same."""
-    import xarray
-
-    levels = _derivative_count(header[1:])
-    stems = {header[k]: list(table.T[k : k + levels]) for k in range(1, len(header), levels)}
-    variables: dict[str, Any] = {}
-    coordinates: dict[str, Any] = {"time": ("time", table[:, 0], {"units": "s"})}
-    coordinates["derivative"] = np.arange(levels)
-    for (name, _), group in itertools.groupby(stems, lambda column: (_name_of(column), units.get(column))):
-        members = list(group)
-        for axes, labels in AXES.items():
-            counts = (2, 3) if axes == ("component",) else (len(labels),)
-            if members in ([f"{name}_{label}" for label in labels[:count]] for count in counts):
-                sizes = (len(members),) if len(axes) == 1 else (3, 3)
-                values = np.stack([np.stack(stems[member], axis=1) for member in members], axis=2)
-                variables[name] = (("time", "derivative", *axes), values.reshape(*values.shape[:2], *sizes))
-                for axis in axes:
-                    known = labels[: sizes[0]] if len(axes) == 1 else AXES[("component",)]
-                    coordinates[axis] = list(max(known, tuple(coordinates.get(axis, ())), key=len))
-                break
-        else:
-            variables |= {member: (("time", "derivative"), np.stack(stems[member], axis=1)) for member in members}
-    return xarray.Dataset(variables, coords=coordinates)
-
-
-def _derivative_count(columns: list[str]) -> int:
-    """Return how many columns each quantity has: itself and its derivatives, one after the other, alike for all.
-
-    A name may itself end as those of derivatives do.
-    """
-    for count in range(len(columns), 1, -1):
-        starts = range(0, len(columns), count) if len(columns) % count == 0 else ()
-        if starts and all(columns[k + j] == f"{columns[k]}_d{j}" for k in starts for j in range(1, count)):
-            return count
-    return 1
-
-
-def _name_of(column: str) -> str:
-    """Return the name of the output that a column may be a component of."""
-    stem, _, label = column.rpartition("_")
-    return stem if stem and any(label in labels for labels in AXES.values()) else column
