@@ -9,7 +9,6 @@ where the mechanism is put together, its `Datum`.
 
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -20,6 +19,7 @@ from jounce.errors import MechanismError
 from jounce.jet import Jet, components, cross, dot, stack, wrap
 from jounce.jet.algebra import total
 from jounce.jet.turns import brought_near, principal
+from jounce.modules import Module
 from jounce.rigid.spatial import SpatialPose, body_axes
 from jounce.shapes import Numbers
 
@@ -30,7 +30,7 @@ Vectors = Float[Numbers, "3 *#batch"]
 """A vector of each instance, fixed in a body; the same in all lanes or one for each."""
 
 
-class Datum(eqx.Module):
+class Datum(Module):
     """A relative attitude of two bodies at which the angle about an axis is known.
 
     Parameters

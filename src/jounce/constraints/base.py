@@ -11,6 +11,7 @@ import jax.numpy as jnp
 
 from jounce.errors import MechanismError, check_choice
 from jounce.jet import Jet, concatenate
+from jounce.modules import Module
 
 Scalar = Annotated[Any, "scalar"]
 Vector = Annotated[Any, "vector"]
@@ -54,7 +55,7 @@ def register(kind: type[Any], type: str, space: str, role: str) -> None:  # noqa
         free[type] = kind
 
 
-class AbstractConstraint(eqx.Module):
+class AbstractConstraint(Module):
     """A joint or driver: one residual, written on the jets of its bodies, that vanishes when it holds.
 
     A subclass lists its values as fields and defines `residual`; nothing else. Jacobian, right-hand sides of every

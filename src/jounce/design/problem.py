@@ -16,8 +16,8 @@ from jounce.errors import AssemblyError, MobilityError, SolveError
 from jounce.jet import Jet
 from jounce.kinematics import Status, solve
 from jounce.mechanism import Mechanism
-from jounce.mechanism.modules import with_fields
 from jounce.mechanism.system import System
+from jounce.modules import with_fields
 
 ON_BOUND = 1e-12  # of the way between bounds: what is so near to one is on it
 LOCKS = (AssemblyError, MobilityError, SolveError)

@@ -27,11 +27,12 @@ from jounce.kinematics.change_points import spoiled
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.factors import Factor, factored
 from jounce.mechanism.system import System
+from jounce.modules import Module
 from jounce.rigid.pose import Pose
 from jounce.shapes import ArrayLike, Numbers
 
 
-class ChangedLaw(eqx.Module):
+class ChangedLaw(Module):
     """The laws of a group of drivers, changed by jets."""
 
     law: Any

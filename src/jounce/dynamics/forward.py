@@ -40,6 +40,7 @@ from jounce.kinematics.least_squares import range_basis
 from jounce.kinematics.linear import DenseFactor
 from jounce.mechanism.axis_angles import with_turns
 from jounce.mechanism.system import System
+from jounce.modules import Module
 from jounce.rigid import PlanarPose, SpatialPose
 from jounce.rigid.pose import Pose
 from jounce.rigid.spatial import body_axes, quaternion_spins
@@ -95,7 +96,7 @@ class Expansion(NamedTuple):
     multipliers: Float[Numbers, "order row batch"]  # of the scaled rows, over the scale of the masses
 
 
-class Equations(eqx.Module):
+class Equations(Module):
     """The equations of motion of a mechanism.
 
     Parameters

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -21,6 +20,7 @@ from jounce.kinematics.frontal import FrontalFactor
 from jounce.kinematics.frontal_inverse import FrontalInverse, InversePlan
 from jounce.mechanism.fronts import Fronts
 from jounce.mechanism.pattern import Pattern
+from jounce.modules import Module
 from jounce.shapes import Numbers
 
 FRONT_COST = 20.0  # of an operation in fronts, by that of one in dense elimination, as measured for one run
@@ -29,7 +29,7 @@ MOST_NEIGHBOURS = 16  # of a body; with more, its rows would be long
 Unknowns = Float[Numbers, "size batch"]
 
 
-class SaddleFronts(eqx.Module):
+class SaddleFronts(Module):
     """Which entries of masses and Jacobian meet in which front.
 
     Attributes
@@ -113,7 +113,7 @@ class SaddleFronts(eqx.Module):
         return right.at[self.unknowns].get(mode="promise_in_bounds")
 
 
-class SaddleFactor(eqx.Module):
+class SaddleFactor(Module):
     """The factors of a batch of such matrices."""
 
     factor: FrontalFactor
@@ -138,7 +138,7 @@ class SaddleFactor(eqx.Module):
         return SaddleInverse(FrontalInverse.of(self.saddle.plan, self.factor), self.saddle)
 
 
-class SaddleInverse(eqx.Module):
+class SaddleInverse(Module):
     """The inverses of a batch of such matrices, whose size grows with the number of bodies, not with its square."""
 
     inverse: FrontalInverse

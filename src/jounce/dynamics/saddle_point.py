@@ -5,7 +5,6 @@ Coordinates of bodies are shifts and turns, those of one body after those of ano
 
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -13,6 +12,7 @@ from jaxtyping import Float
 
 from jounce.jet.algebra import total
 from jounce.kinematics.linear import DenseFactor
+from jounce.modules import Module
 from jounce.shapes import Numbers
 
 ByBody = Float[Numbers, "coordinate body batch"]
@@ -65,7 +65,7 @@ def by_body(column: Column, scale: Float[Numbers, " coordinate"]) -> ByBody:
     return jnp.swapaxes(column.reshape(-1, len(scale), column.shape[-1]), 0, 1) * scale[:, None, None]
 
 
-class ReducedFactor(eqx.Module):
+class ReducedFactor(Module):
     """The factors of such matrices where rows are redundant: of as many combinations of rows as are independent.
 
     Right sides and solutions have all rows; of the multipliers, which are not unique, they are those of least norm.
@@ -103,7 +103,7 @@ class ReducedFactor(eqx.Module):
         return jnp.concatenate([wide[:, :columns], right], axis=1)
 
 
-class DenseInverse(eqx.Module):
+class DenseInverse(Module):
     """The inverses of a batch of such matrices as they are."""
 
     matrix: Float[Numbers, "size size batch"]

@@ -20,8 +20,8 @@ from jounce.kinematics import Motion, Status
 from jounce.kinematics.assembly import freely_moving
 from jounce.mechanism import Mechanism
 from jounce.mechanism.axis_angles import at_lanes
-from jounce.mechanism.modules import with_fields
 from jounce.mechanism.preconditions import concrete
+from jounce.modules import with_fields
 from jounce.robot import Robot
 
 INSTANT = 1e-9  # of the time between the ends of a motion: an instant as near to one of its own is that one

@@ -21,7 +21,7 @@ from jounce.kinematics.curves.choice import chosen
 from jounce.kinematics.host_jacobian import RANK_TOLERANCE, HostJacobian, is_clearly_regular
 from jounce.kinematics.status import Status
 from jounce.mechanism import Mechanism, Model, build
-from jounce.mechanism.modules import with_fields
+from jounce.modules import with_fields
 from jounce.shapes import Numbers
 
 TOLERANCE = 1e-12  # of the assembled positions, rad or sizes of the mechanism

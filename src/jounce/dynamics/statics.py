@@ -22,7 +22,7 @@ from jounce.kinematics.host_jacobian import RANK_TOLERANCE
 from jounce.kinematics.initial_turns import Coordinates
 from jounce.mechanism import Mechanism, Model
 from jounce.mechanism.builder import pose_at, with_reference
-from jounce.mechanism.modules import with_fields
+from jounce.modules import with_fields
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
 

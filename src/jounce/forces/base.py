@@ -9,12 +9,13 @@ import jax.numpy as jnp
 
 from jounce.constraints.base import catalogue, check_bodies, register
 from jounce.jet import Jet
+from jounce.modules import Module
 
 Law = Annotated[Any, "law"]
 Laws = Annotated[Any, "laws"]
 
 
-class AbstractForce(eqx.Module):
+class AbstractForce(Module):
     """An applied force or torque: a displacement on which it does work, and its size.
 
     A subclass lists its values as fields and defines `displacement` and `force`; nothing else. What it does to its

@@ -9,10 +9,11 @@ import jax.numpy as jnp
 
 from jounce.jet import Jet, stack
 from jounce.jet.algebra import Quantity
+from jounce.modules import Module
 from jounce.trajectory import AbstractMotion, Expression
 
 
-class AbstractLaw(eqx.Module):
+class AbstractLaw(Module):
     """A law of a force: maps displacement, velocity and time, all jets, to the jet of the force, in SI units."""
 
     @abc.abstractmethod

@@ -12,6 +12,7 @@ from jaxtyping import Bool, Float
 
 from jounce.dynamics.forward import Equations, Expansion, Flags, Inverse, Lanes, State
 from jounce.errors import JounceError
+from jounce.modules import Module
 from jounce.shapes import Numbers
 
 Number = float | Float[Numbers, ""]
@@ -26,7 +27,7 @@ ROUGH = 1e-11  # tolerance of a step there, rad or sizes of the mechanism
 ROUNDING = 1e-14  # relative error of an acceleration that is no sign of a step too long
 
 
-class AbstractMethod(eqx.Module):
+class AbstractMethod(Module):
     """A one-step method on Taylor expansions of the constrained motion.
 
     Every step starts from the expansion of the motion at its beginning, ends on the constraints, and is accepted where

@@ -6,7 +6,6 @@ shows where the equations of motion give other accelerations on the way than the
 
 from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Bool, Float, Int
@@ -16,6 +15,7 @@ from jounce.integrate.marching import MARGIN, Outcome
 from jounce.integrate.methods import ROUNDING, Lanes, furthest
 from jounce.jet.series import Recursion
 from jounce.kinematics.compilation import compiled
+from jounce.modules import Module
 from jounce.robot.joint_laws import AbstractJointLaws
 from jounce.robot.motion_series import MotionSeries, motion_series
 from jounce.robot.tree_equations import Motion, TreeEquations, Unknowns, free_base
@@ -45,7 +45,7 @@ class RobotState(NamedTuple):
     twist: Any = None
 
 
-class RobotProblem(eqx.Module):
+class RobotProblem(Module):
     """What moves a robot.
 
     Attributes

@@ -46,8 +46,8 @@ from jounce.kinematics.status import Status
 from jounce.kinematics.traced_motion import TracedMotion
 from jounce.mechanism import Mechanism, Model
 from jounce.mechanism.axis_angles import measures_angle
-from jounce.mechanism.modules import with_fields
 from jounce.mechanism.traced import Angles, angles_of, template, traced_model, traced_values
+from jounce.modules import with_fields
 from jounce.shapes import Numbers
 
 AT_REST = 1e-12  # m/s and rad/s

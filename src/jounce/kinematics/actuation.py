@@ -11,7 +11,7 @@ from jounce.kinematics.status import Status
 from jounce.mechanism import Model, build
 from jounce.mechanism.builder import counted_as_in
 from jounce.mechanism.held_outputs import led_outputs
-from jounce.mechanism.modules import with_fields
+from jounce.modules import with_fields
 from jounce.trajectory import HermiteMotion
 
 

@@ -27,7 +27,7 @@ from jounce.kinematics.status import Status
 from jounce.mechanism import Model
 from jounce.mechanism.axis_angles import measures_angle, with_angles, with_datums
 from jounce.mechanism.builder import group_rows, with_reference
-from jounce.mechanism.modules import with_fields
+from jounce.modules import with_fields
 
 MAX_DATUMS = 100
 SETTLED = 1e-12  # rad, by which the angles of drivers may be counted otherwise

@@ -17,10 +17,10 @@ from jounce.kinematics.factors import factored
 from jounce.kinematics.gauss_newton import MAX_STEPS
 from jounce.mechanism import Mechanism, Model
 from jounce.mechanism.builder import pose_at, starting_guess
-from jounce.mechanism.modules import with_fields
 from jounce.mechanism.resolve import NONZERO, POSITIVE
 from jounce.mechanism.system import POSITION_COMPONENTS, System
 from jounce.mechanism.traced import traced_model
+from jounce.modules import with_fields
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
 

@@ -2,7 +2,6 @@
 
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -10,10 +9,11 @@ from jaxtyping import Float
 
 from jounce.kinematics.linear import Columns
 from jounce.mechanism.fronts import Fronts
+from jounce.modules import Module
 from jounce.shapes import Numbers
 
 
-class FrontalFactor(eqx.Module):
+class FrontalFactor(Module):
     """A batch of matrices, factored front by front into reflections and triangles.
 
     Solutions are as good as substitution makes them, without refinement: reflections keep lengths. Where rows are more

@@ -7,7 +7,6 @@ fronts, where a dense inverse takes its square.
 
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -17,10 +16,11 @@ from jounce.jet.coefficients import total
 from jounce.kinematics.frontal import FrontalFactor
 from jounce.kinematics.linear import Columns
 from jounce.mechanism.fronts import Fronts
+from jounce.modules import Module
 from jounce.shapes import Numbers
 
 
-class InversePlan(eqx.Module):
+class InversePlan(Module):
     """Where fronts find what they need for products with the inverse.
 
     Attributes
@@ -65,7 +65,7 @@ class InversePlan(eqx.Module):
         return cls(fronts, sources, responses, diagonal)
 
 
-class FrontalInverse(eqx.Module):
+class FrontalInverse(Module):
     """The inverses of a batch of square matrices.
 
     Attributes

@@ -15,8 +15,8 @@ from jounce.kinematics.initial_turns import Coordinates, DriverLag, Place
 from jounce.kinematics.linear import DenseFactor
 from jounce.mechanism import Model
 from jounce.mechanism.builder import pose_at
-from jounce.mechanism.modules import with_fields
 from jounce.mechanism.system import System
+from jounce.modules import with_fields
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
 

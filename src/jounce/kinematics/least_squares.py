@@ -6,20 +6,20 @@ all the same: that of least squares. The multipliers of the rows are many then; 
 
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
 from jounce.kinematics.linear import DenseFactor
+from jounce.modules import Module
 from jounce.shapes import Numbers
 
 Basis = Float[Numbers, "row column batch"]
 Triangle = Float[Numbers, "column column batch"]
 
 
-class LeastSquaresFactor(eqx.Module):
+class LeastSquaresFactor(Module):
     """A batch of matrices with independent columns, factored into orthonormal columns and a triangle.
 
     Columns are made orthogonal one after another, twice, which is enough (Giraud, Langou, Rozloznik and van den Eshof

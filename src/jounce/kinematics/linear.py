@@ -2,19 +2,19 @@
 
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
+from jounce.modules import Module
 from jounce.shapes import Numbers
 
 Matrices = Float[Numbers, "row row batch"]
 Columns = Float[Numbers, "row batch"]
 
 
-class DenseFactor(eqx.Module):
+class DenseFactor(Module):
     """A batch of small dense matrices, factored by Gauss-Jordan elimination with partial pivoting; the batch is last.
 
     Each operation is one on the whole batch, and none is LAPACK's, so that programs with it may run in several threads:

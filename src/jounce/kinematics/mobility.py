@@ -21,8 +21,8 @@ from jounce.kinematics.redundancy import Repetition, closed_nearby
 from jounce.kinematics.tangent_cone import Curve, curves
 from jounce.mechanism import Mechanism, Model, build, check_mechanism, time_grid
 from jounce.mechanism.builder import with_reference
-from jounce.mechanism.modules import with_fields
 from jounce.mechanism.preconditions import concrete
+from jounce.modules import with_fields
 
 Kind = Literal["regular", "rigid", "shaky", "cusp", "singular", "change point"]
 HIGHEST_ORDER = 20

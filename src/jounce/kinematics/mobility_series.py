@@ -20,8 +20,8 @@ from jounce.kinematics.compilation import compiled
 from jounce.kinematics.initial_turns import Coordinates
 from jounce.mechanism import Model
 from jounce.mechanism.builder import pose_at
-from jounce.mechanism.modules import with_fields
 from jounce.mechanism.system import System
+from jounce.modules import with_fields
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
 

@@ -106,11 +106,10 @@ class FollowedPath:
         leaves, structure = jax.tree.flatten((records.coordinates, records.outputs, records.sign))
         steps = np.flatnonzero(records.taken)
         taken = [x[steps, ..., :1] for x in leaves]  # copies: an anchor is kept for long, the other lanes are not
-        for number, k in enumerate(steps.tolist()):
-            state = jax.tree.unflatten(structure, [x[number] for x in taken])
-            instant, safe_step, radius, turnover = (float(x[k]) for x in records.place)
-            status = Status(int(records.status[k, 0]))
-            self.anchors.append(Anchor(instant, state, safe_step, radius, turnover, status))
+        places = zip(*(x[steps].tolist() for x in (*records.place, records.status[:, 0])), strict=True)
+        for parts, (instant, safe_step, radius, turnover, status) in zip(zip(*taken, strict=True), places, strict=True):
+            state = jax.tree.unflatten(structure, parts)
+            self.anchors.append(Anchor(instant, state, safe_step, radius, turnover, Status(status)))
         solved = (records.lane >= 0) & (records.status == Status.OK)
         if solved.any():
             found = [np.moveaxis(x, 0, -2)[..., solved] for x in leaves]

@@ -7,7 +7,6 @@ no assembly that anybody means, and no motion leads from one to the other.
 from collections.abc import Iterator
 from typing import Any, ClassVar
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -21,6 +20,7 @@ from jounce.kinematics.initial_turns import Coordinates
 from jounce.mechanism import Model
 from jounce.mechanism.builder import group_rows, model_of
 from jounce.mechanism.system import Group, System
+from jounce.modules import Module
 
 AXES, NORMALS, VECTORS = ("axis_i", "axis_j"), ("normal_i", "normal_j"), ("vector_i", "vector_j")
 HELD_PARALLEL = (  # a user's own joint may have axes that are not
@@ -35,7 +35,7 @@ Senses = Bool[np.ndarray, " pair"]
 """Of each pair of directions that joints hold parallel, whether they point the same way."""
 
 
-class SameDirection(eqx.Module):
+class SameDirection(Module):
     """Two unit vectors that point the same way, not opposite ways: rows grow without bound as they come to do so.
 
     The rows have the size of the tangent of half the angle between the vectors.

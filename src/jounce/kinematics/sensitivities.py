@@ -31,9 +31,9 @@ from jounce.mechanism import Mechanism, Model, with_outputs_held
 from jounce.mechanism.axis_angles import measures_angle
 from jounce.mechanism.builder import grouped_elements
 from jounce.mechanism.held_outputs import led_outputs, with_laws_left_out
-from jounce.mechanism.modules import with_fields
 from jounce.mechanism.system import System, movable
 from jounce.mechanism.traced import Angles, Part, angles_of, template, traced_model, traced_values
+from jounce.modules import with_fields
 from jounce.rigid import PlanarPose, SpatialPose
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers

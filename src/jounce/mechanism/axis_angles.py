@@ -8,10 +8,10 @@ from jaxtyping import Float, Int
 
 from jounce.constraints.angles import Datum, angle_of
 from jounce.jet.turns import counted_on, principal, whole_periods
-from jounce.mechanism.modules import unchecked, with_fields
 from jounce.mechanism.system import Group, holding
 from jounce.mechanism.time import nearest_instants
 from jounce.mechanism.turn_counting import closer_places
+from jounce.modules import unchecked, with_fields
 from jounce.shapes import Numbers
 
 Coordinates = Mapping[str, Any]  # of all bodies, the ground first, by name: (..., bodies, batch)

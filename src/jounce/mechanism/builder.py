@@ -26,11 +26,11 @@ from jounce.mechanism.axis_angles import (
 )
 from jounce.mechanism.fronts import Fronts, elimination
 from jounce.mechanism.mechanism import GROUND, Mechanism
-from jounce.mechanism.modules import with_fields
 from jounce.mechanism.outputs import AbstractMotionOutput
 from jounce.mechanism.pattern import Pattern
 from jounce.mechanism.resolve import resolve, resolved
 from jounce.mechanism.system import POSITION_COMPONENTS, Group, System, group_elements, holding
+from jounce.modules import with_fields
 from jounce.rigid import PlanarPose, SpatialPose
 from jounce.rigid.euler_parameters import euler_parameters
 from jounce.rigid.pose import Pose

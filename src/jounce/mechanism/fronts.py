@@ -16,6 +16,7 @@ import numpy as np
 from jaxtyping import Int
 
 from jounce.mechanism.pattern import Pattern
+from jounce.modules import Module
 from jounce.shapes import Numbers
 
 MOST_DENSE = 100  # columns of a matrix with more rows: a dense elimination is dearer, but knows its orientation
@@ -23,7 +24,7 @@ FRONT_COST = 4.0  # of an operation in fronts, by that of one in dense eliminati
 Row = tuple[int, int]  # the front that left it over, and its place there; -1 and its number if it is one of the matrix
 
 
-class Fronts(eqx.Module):
+class Fronts(Module):
     """Which rows and columns meet in which front; index arrays, that a program takes as input.
 
     Attributes

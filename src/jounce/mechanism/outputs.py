@@ -9,10 +9,11 @@ from jounce.constraints.angles import relative_angle
 from jounce.constraints.base import Vector, check_bodies
 from jounce.errors import MechanismError, check_choice
 from jounce.jet import Jet, sqrt
+from jounce.modules import Module
 from jounce.rigid.orientation import FRAMES
 
 
-class AbstractQuantity(eqx.Module):
+class AbstractQuantity(Module):
     """What may be asked of a motion: a quantity with its unit, of the poses of some bodies or of the whole motion."""
 
     unit: ClassVar[str] = "m"

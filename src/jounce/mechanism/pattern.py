@@ -9,10 +9,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
+from jounce.modules import Module
 from jounce.shapes import Numbers
 
 
-class Pattern(eqx.Module):
+class Pattern(Module):
     """The bodies that each row of a matrix touches, and where its entries stand in a list of them.
 
     Attributes

@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -17,10 +16,10 @@ from jounce.constraints.base import field_kinds, value_fields
 from jounce.errors import JounceError, MechanismError
 from jounce.forces import AbstractForce, AbstractLaw, ExpressionLaw, FunctionLaw, TimeLaw, VectorLaw
 from jounce.jet import Jet
-from jounce.mechanism.modules import unchecked
+from jounce.modules import Module, unchecked
 from jounce.trajectory import AbstractMotion, Expression, ExpressionMotion, FunctionMotion
 
-Element = eqx.Module
+Element = Module
 """A joint, driver, force or output."""
 
 POSITIVE = ("length", "radius")
@@ -65,7 +64,8 @@ def resolve_motion(motion: Any, parameters: Mapping[str, Any]) -> AbstractMotion
         motion = Expression(motion)
     if isinstance(motion, Expression):
         _check_names(motion, {"t"}, parameters)
-        return ExpressionMotion(motion, {name: parameters[name] for name in sorted(motion.names - {"t"})})
+        known = {name: parameters[name] for name in sorted(motion.names - {"t"})}
+        return unchecked(ExpressionMotion, {"expression": motion, "parameters": known})
     if callable(motion):
         return _traceable(FunctionMotion(motion))
     raise MechanismError("a motion is an expression, a function of time or a motion law", value=motion)

@@ -12,9 +12,9 @@ from jaxtyping import Bool, Float
 from jounce.jet import Jet, concatenate
 from jounce.jet.algebra import stacked
 from jounce.mechanism.fronts import Fronts
-from jounce.mechanism.modules import unchecked, with_fields
 from jounce.mechanism.pattern import Pattern
 from jounce.mechanism.resolve import group_key, resolve_element, stack_elements
+from jounce.modules import Module, unchecked, with_fields
 from jounce.rigid import SpatialPose
 from jounce.rigid.body_arrays import each_jet
 from jounce.rigid.pose import Pose
@@ -24,7 +24,7 @@ from jounce.trajectory import AbstractMotion
 POSITION_COMPONENTS = {"planar": 2, "spatial": 3}
 
 
-class Group(eqx.Module):
+class Group(Module):
     """All joints, drivers, forces or outputs of one type, evaluated together.
 
     Parameters
@@ -161,7 +161,7 @@ def group_elements(
     return tuple(groups), tuple(names)
 
 
-class System(eqx.Module):
+class System(Module):
     """All constraints and forces of a mechanism as functions on one pose of all its bodies, the ground first.
 
     Coordinates of positions are scaled by a length of the mechanism, and rows by the size of their derivatives, so

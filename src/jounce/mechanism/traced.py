@@ -29,10 +29,10 @@ from jounce.mechanism.builder import (
     with_sense,
 )
 from jounce.mechanism.mechanism import Mechanism
-from jounce.mechanism.modules import with_fields
 from jounce.mechanism.preconditions import PLAIN
 from jounce.mechanism.resolve import resolve
 from jounce.mechanism.system import Group, holding
+from jounce.modules import with_fields
 from jounce.rigid import PlanarPose, SpatialPose
 from jounce.trajectory import Expression
 

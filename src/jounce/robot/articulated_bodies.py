@@ -6,7 +6,6 @@ the origin of each body, so that a step from joint to joint is a shift and no tu
 
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Float
@@ -14,6 +13,7 @@ from jaxtyping import Float
 from jounce.jet import cross
 from jounce.jet.algebra import total
 from jounce.kinematics.linear import DenseFactor
+from jounce.modules import Module
 from jounce.robot.tree import Tree
 from jounce.robot.tree_scan import fill_slots, materialised, read_slot, write_slot
 from jounce.robot.tree_sums import BaseVector, BodyVectors
@@ -25,7 +25,7 @@ BodyTensors = Float[Numbers, "3 3 body batch"]
 LEAST_INERTIA = 1e-13  # of a joint, of that of the articulated body that it moves: less is rounding
 
 
-class RigidInertia(eqx.Module):
+class RigidInertia(Module):
     """Inertia of bodies in the axes of the base: mass, centre of mass from the origin, tensor about the centre."""
 
     mass: Float[Numbers, "*body 1"]
@@ -43,7 +43,7 @@ class RigidInertia(eqx.Module):
         return about, coupling, unit * mass * jnp.ones_like(x)[None, None]
 
 
-class ArticulatedBodies(eqx.Module):
+class ArticulatedBodies(Module):
     """What the joints of a tree resist with, ready to be solved for; driven joints do not give way.
 
     Attributes

@@ -12,6 +12,7 @@ from jaxtyping import Float
 
 from jounce.errors import JounceError, RobotError, check_name
 from jounce.jet import Jet
+from jounce.modules import Module
 from jounce.robot.arguments import floats
 from jounce.shapes import Numbers
 from jounce.trajectory.expression import Expression
@@ -21,7 +22,7 @@ from jounce.trajectory.motion import AbstractMotion
 RATE = "_d1"  # as columns of files name rates
 
 
-class _Expressed(eqx.Module):
+class _Expressed(Module):
     """An expression of time, coordinates and rates by the names of joints."""
 
     expression: Expression = eqx.field(static=True)
@@ -33,7 +34,7 @@ class _Expressed(eqx.Module):
         return self.expression.evaluate({"t": time, **known})
 
 
-class _OfTime(eqx.Module):
+class _OfTime(Module):
     """A motion law, read as a force of time."""
 
     law: AbstractMotion
@@ -42,7 +43,7 @@ class _OfTime(eqx.Module):
         return self.law(Jet([time])).coefficients[0]
 
 
-class _Feedback(eqx.Module):
+class _Feedback(Module):
     """A function of a user, of one sample."""
 
     function: Callable[..., Any] = eqx.field(static=True)
@@ -54,7 +55,7 @@ class _Feedback(eqx.Module):
         return jax.vmap(number, in_axes=-1, out_axes=-1)(time, q, rate)
 
 
-class AbstractJointLaws(eqx.Module):
+class AbstractJointLaws(Module):
     """Forces of all joints, of whole batches at once."""
 
     @property

@@ -15,6 +15,7 @@ from jaxtyping import Float
 from jounce.jet import Jet, cross
 from jounce.jet.algebra import total
 from jounce.kinematics.linear import DenseFactor
+from jounce.modules import Module
 from jounce.rigid.spatial import body_axes, quaternion_spins
 from jounce.robot.articulated_bodies import ArticulatedBodies, RigidInertia
 from jounce.robot.newton_euler import Turn
@@ -87,7 +88,7 @@ class BaseBody:
     inertia: Any
 
 
-class TreeEquations(eqx.Module):
+class TreeEquations(Module):
     """The equations of motion of a tree.
 
     Parameters
@@ -287,7 +288,7 @@ class TreeEquations(eqx.Module):
         return whole
 
 
-class TreeFactor(eqx.Module):
+class TreeFactor(Module):
     """The factored inertia of a tree: by articulated bodies, or as a dense matrix where joints follow others."""
 
     bodies: ArticulatedBodies | None

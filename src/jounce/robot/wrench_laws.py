@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jounce.errors import RobotError
+from jounce.modules import Module
 from jounce.robot.arguments import floats
 from jounce.robot.kinematics import place_of
 from jounce.robot.robot import Robot
@@ -19,7 +20,7 @@ from jounce.robot.wrenches import Wrench, check_wrenches
 STATE = 3  # arguments of a function of time, coordinates and rates
 
 
-class _Part(eqx.Module):
+class _Part(Module):
     """The force, or the torque, of a wrench."""
 
     constant: Any
@@ -39,7 +40,7 @@ class _Part(eqx.Module):
         return jnp.asarray(self.function(*state), float)
 
 
-class WrenchLaws(eqx.Module):
+class WrenchLaws(Module):
     """Wrenches from outside as functions of time and state; see `wrench_laws`."""
 
     parts: tuple[tuple[_Part, _Part], ...]

@@ -13,13 +13,14 @@ from jaxtyping import Float
 
 from jounce.errors import MechanismError, check_choice
 from jounce.jet import Jet, compose
+from jounce.modules import Module
 from jounce.shapes import ArrayLike, Numbers, Real, is_traced
 from jounce.trajectory.expression import Expression
 from jounce.trajectory.sample_errors import derivative_errors
 from jounce.trajectory.splines import spline_through
 
 
-class AbstractMotion(eqx.Module):
+class AbstractMotion(Module):
     """A law ``f(t)``: maps a jet of time, in s, to the jet of the driven quantity, in m or rad."""
 
     @abc.abstractmethod

@@ -24,8 +24,8 @@ from jounce.kinematics.device import resident
 from jounce.kinematics.gauss_newton import put_together
 from jounce.kinematics.senses import drawn_senses, senses
 from jounce.mechanism import Mechanism, build, check_mechanism
-from jounce.mechanism.modules import with_fields
 from jounce.mechanism.preconditions import concrete
+from jounce.modules import with_fields
 
 BATCH = 256  # starts side by side
 OFTEN = 3  # times that each assembly is to be found before it is believed that none is left

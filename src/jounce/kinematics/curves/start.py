@@ -13,7 +13,7 @@ from jounce.kinematics.assembly import check_assembled, freely_moving, settled
 from jounce.kinematics.curves.walker import Place, Walker
 from jounce.kinematics.device import resident
 from jounce.mechanism import Mechanism, build, time_grid
-from jounce.mechanism.modules import with_fields
+from jounce.modules import with_fields
 from jounce.trajectory import ExpressionMotion
 
 TIME = "time"

@@ -8,6 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Float
 
 from jounce.kinematics.linear import DenseFactor
+from jounce.modules import Module
 from jounce.planning.tool_paths.tool_tasks import Tool, columns_of, task_rows
 from jounce.robot.tree import Tree
 from jounce.shapes import Numbers
@@ -19,7 +20,7 @@ Unknowns = Float[Numbers, "order unknown batch"]
 """Series of the coordinates in their scale, then of the multipliers of the task where a posture is held."""
 
 
-class PathEquations(eqx.Module):
+class PathEquations(Module):
     """What the coordinates meet along a path.
 
     With fewer rows than joints, the coordinates are those of the task that are nearest to a posture: the gradient of
@@ -128,7 +129,7 @@ class PathEquations(eqx.Module):
         return jax.lax.fori_loop(1, order + 1, level, start)
 
 
-class PathFactor(eqx.Module):
+class PathFactor(Module):
     """The factored Jacobian: square, or with more rows than unknowns, which agree where the path can be followed."""
 
     matrix: Float[Numbers, "row column batch"]

@@ -1,4 +1,4 @@
-"""Copies of modules with other values in some fields, made without the checks of a construction.
+"""Objects whose values JAX sees, and copies of them with other values, made without the checks of a construction.
 
 A model is put together of modules that were checked already, and of each several copies are made for every solution:
 `dataclasses.replace` and `equinox.tree_at` take longer for one than Newton's method for a step.
@@ -11,6 +11,17 @@ from typing import Any, TypeVar
 
 import equinox as eqx
 
+
+class Module(eqx.Module):
+    """A module whose attributes are looked up as those of any object.
+
+    Equinox looks at every attribute for bound methods, of which it makes modules, so that JAX takes them as arguments:
+    a tenth of the time of a short solution, for what no function here is given.
+    """
+
+    __getattribute__ = object.__getattribute__
+
+
 M = TypeVar("M", bound=eqx.Module)
 
 
@@ -20,7 +31,7 @@ def with_fields(module: M, **values: Any) -> M:
     Examples
     --------
     >>> import equinox as eqx
-    >>> from jounce.mechanism.modules import with_fields
+    >>> from jounce.modules import with_fields
     >>> class Spring(eqx.Module):
     ...     stiffness: float
     ...     length: float
