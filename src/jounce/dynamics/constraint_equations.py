@@ -64,7 +64,8 @@ def constraint_equations(
         the mechanism; columns "BODY.x", "BODY.y", "BODY.angle", in space "BODY.x", "BODY.y", "BODY.z", "BODY.wx",
         "BODY.wy", "BODY.wz": the global position of the origin, and the angular velocity along the axes of the body.
         A variable has at ``derivative=k`` its k-th derivative, or what belongs to q^(k); NaN where it has none, as
-        `right_side` at 0 where there are multipliers.
+        `right_side` at 0 where there are multipliers. The coordinate ``column_unit`` holds the units of the columns, m
+        or rad.
 
         ``residual`` (time, row)
             Phi; angles about axes within half a turn.
@@ -145,7 +146,12 @@ def constraint_equations(
     dataset.attrs = {"title": motion.mechanism.title or "equations of a mechanism", "source": "jounce"}
     dataset["time"].attrs = {"units": "s", "long_name": "time"}
     dataset["derivative"].attrs = {"long_name": "order of the time derivative"}
-    return dataset
+    for name, unit in (("position", "m"), ("angle", "rad"), ("attitude", "1")):
+        if name in dataset:
+            dataset[name].attrs["units"] = unit
+    turns = motion.model.pose_type.turns
+    units = (["m"] * motion.model.pose_type.shifts + ["rad"] * turns) * len(motion.mechanism.bodies)
+    return dataset.assign_coords(column_unit=("column", units))
 
 
 def _labels(motion: Motion) -> dict[str, Any]:

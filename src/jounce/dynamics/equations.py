@@ -18,11 +18,12 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.dynamics.driver_coordinates import in_driver_coordinates
-from jounce.dynamics.energies import differentiated, robot_energy
+from jounce.dynamics.energies import differentiated, error_for, robot_energy
+from jounce.errors import whole_number
 from jounce.jet import Jet, components
 from jounce.jet.algebra import stacked, total
 from jounce.kinematics import Motion
-from jounce.robot.arguments import checked_coordinates, whole_number
+from jounce.robot.arguments import checked_coordinates
 from jounce.robot.batches import Batched
 from jounce.robot.kinematics import body_frames
 from jounce.robot.robot import Robot
@@ -139,8 +140,12 @@ def _of_robot(tree: Tree, arrays: tuple[Series], _: Any, form: Callable[..., Any
     return form(energies, arrays[0], *static)
 
 
-def _evaluated(system: Robot | Motion, q: ArrayLike | None, least: int, form: Callable[..., Any], *static: Any) -> Any:
+def _evaluated(
+    system: Robot | Motion, q: ArrayLike | None, least: int, form: Callable[..., Any], *static: Any, power: int = 0
+) -> Any:
     """Return what a form gives for a robot, (..., levels, n), or for the drivers of a motion, labelled.
+
+    It is in units of forces, divided by a power of s.
 
     Raises
     ------
@@ -148,7 +153,7 @@ def _evaluated(system: Robot | Motion, q: ArrayLike | None, least: int, form: Ca
         If q does not fit the robot or has too few derivatives, or the motion is not that of a driven mechanism.
     """
     if isinstance(system, Motion):
-        return in_driver_coordinates(system, q, least, form, static)
+        return in_driver_coordinates(system, q, least, form, static, power=power)
     return _of_robot(system, (checked_coordinates(system, q, least, least),), (), (form, static))
 
 
@@ -179,7 +184,7 @@ def energy_slope(
     Returns
     -------
     array of shape (..., rates + 1, n)
-        For a motion an `xarray.DataArray` of dimensions time, derivative and driver.
+        For a motion an `xarray.DataArray` of dimensions time, derivative and driver, with the unit of each driver.
 
     Raises
     ------
@@ -198,8 +203,10 @@ def energy_slope(
     [[14.0]]
     """
     numbers = {"m": m, "order": order, "rate": rate, "rates": rates}
-    m, order, rate, rates = (whole_number(name, value) for name, value in numbers.items())
-    return _evaluated(system, q, order + rate + rates + 1, _slope, rates + 1, order, rate, m)
+    error = error_for(system)
+    m, order, rate, rates = (whole_number(name, value, error=error) for name, value in numbers.items())
+    least, power = order + rate + rates + 1, 2 * order + rate - m
+    return _evaluated(system, q, least, _slope, rates + 1, order, rate, m, power=power)
 
 
 def lagrange(system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0) -> Any:
@@ -221,7 +228,7 @@ def lagrange(system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0)
     -------
     array of shape (..., rates + 1, n)
         Forces and their rates, N m or N by s. For a motion an `xarray.DataArray` of dimensions time, derivative and
-        driver.
+        driver, with the unit of each driver.
 
     Raises
     ------
@@ -235,7 +242,7 @@ def lagrange(system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0)
     >>> lagrange(jn.robot.from_screws([slide]), [[0.0], [3.0], [5.0], [7.0]], rates=1).round(12).tolist()
     [[10.0], [14.0]]
     """
-    rates = whole_number("rates", rates)
+    rates = whole_number("rates", rates, error=error_for(system))
     return _evaluated(system, q, rates + 2, _lagrange, rates + 1)
 
 
@@ -255,7 +262,7 @@ def mangeron_nielsen(system: Robot | Motion, q: ArrayLike | None = None, rates: 
     -------
     array of shape (..., rates + 1, n)
         Forces and their rates, N m or N by s. For a motion an `xarray.DataArray` of dimensions time, derivative and
-        driver.
+        driver, with the unit of each driver.
 
     Raises
     ------
@@ -269,7 +276,7 @@ def mangeron_nielsen(system: Robot | Motion, q: ArrayLike | None = None, rates: 
     >>> mangeron_nielsen(jn.robot.from_screws([slide]), [[0.0], [3.0], [5.0], [7.0]], m=2).tolist()
     [[10.0]]
     """
-    m, rates = whole_number("m", m, 1), whole_number("rates", rates)
+    m, rates = whole_number("m", m, 1, error=error_for(system)), whole_number("rates", rates, error=error_for(system))
     return _evaluated(system, q, rates + m + 1, _mangeron, rates + 1, m)
 
 
@@ -289,7 +296,7 @@ def gibbs_appell(system: Robot | Motion, q: ArrayLike | None = None, rates: int 
     -------
     array of shape (..., rates + 1, n)
         Forces and their rates, N m or N by s. For a motion an `xarray.DataArray` of dimensions time, derivative and
-        driver.
+        driver, with the unit of each driver.
 
     Raises
     ------
@@ -303,7 +310,7 @@ def gibbs_appell(system: Robot | Motion, q: ArrayLike | None = None, rates: int 
     >>> gibbs_appell(jn.robot.from_screws([slide]), [[0.0], [3.0], [5.0], [7.0]], rates=1).round(12).tolist()
     [[10.0], [14.0]]
     """
-    m, rates = whole_number("m", m, 2), whole_number("rates", rates)
+    m, rates = whole_number("m", m, 2, error=error_for(system)), whole_number("rates", rates, error=error_for(system))
     return _evaluated(system, q, rates + m, _gibbs_appell, rates + 1, m)
 
 
@@ -333,7 +340,8 @@ def higher_order(
     Returns
     -------
     array of shape (..., n)
-        N m or N by s^(k - 1). For a motion an `xarray.DataArray` of dimensions time and driver.
+        N m or N by s^(k - 1). For a motion an `xarray.DataArray` of dimensions time and driver, with
+        the unit of each driver.
 
     Raises
     ------
@@ -349,8 +357,8 @@ def higher_order(
     >>> higher_order(jn.robot.from_screws([slide]), q, k=2).round(12).tolist()
     [14.0]
     """
-    k = whole_number("k", k, 1)
-    m = k + 1 if m is None else whole_number("m", m, k + 1)
+    k = whole_number("k", k, 1, error=error_for(system))
+    m = k + 1 if m is None else whole_number("m", m, k + 1, error=error_for(system))
     weights = tuple(float(coefficients(p)) for p in range(1, k + 1))
-    found = _evaluated(system, q, m + k - 1, _higher_order, k, m, weights)
+    found = _evaluated(system, q, m + k - 1, _higher_order, k, m, weights, power=k - 1)
     return found[:, 0] if isinstance(system, Motion) else found[..., 0, :]

@@ -44,7 +44,8 @@ from jounce.mechanism.preconditions import concrete
 from jounce.mechanism.time import Instants, instants_of
 
 LOWEST_ORDER = 4  # of the jets inside: predictions need some, also where the user wants positions only
-HIGHEST_ORDER = 30
+HIGHEST_ORDER = 30  # of derivatives of outputs
+HIGHEST_OF_MOTION = HIGHEST_ORDER + 2  # forces are two derivatives shorter than the motion
 LARGEST_TOLERANCE = 1e-2
 REHEARSED = 2  # instants: forces are computed for many at a time, however few there are
 
@@ -206,6 +207,12 @@ def checked_settings(mechanism: Mechanism, order: Any, tolerance: float) -> int:
     """Return the order of derivatives, or raise MechanismError unless mechanism, order and tolerance are valid."""
     check_mechanism(mechanism)
     order = checked_order(order)
+    for name, output in mechanism.outputs.items():
+        if order + output.lost_orders > HIGHEST_OF_MOTION:
+            message = f"needs the motion to order {order + output.lost_orders}, and {HIGHEST_OF_MOTION} is the highest"
+            raise MechanismError(
+                f"{message}: ask for derivatives of a lower order", name=f"outputs.{name}", value=order
+            )
     if not (isinstance(tolerance, numbers.Real) and 0 < tolerance <= LARGEST_TOLERANCE):
         message = f"the tolerance must be a number above zero and at most {LARGEST_TOLERANCE:g}"
         raise MechanismError(message, name="tolerance", value=tolerance)
