@@ -164,6 +164,33 @@ def test_armature_damping_and_friction_of_joints_with_their_actuators(pair):
             assert joint.friction == model.dof_frictionloss[dof]
 
 
+def test_a_drive_of_a_joint_in_its_parent_counts_like_one_in_the_child(tmp_path):
+    """For a hinge or a slide there is no difference: the mass matrix, the damping and the limit are MuJoCo's."""
+    drive = "<actuator><motor {}='j' gear='3' armature='0.2' damping='0.5' ctrlrange='-2 2'/></actuator>"
+    for kind in ("joint", "jointinparent"):
+        path = written(tmp_path, "<joint name='j' axis='0 1 0'/>", drive.format(kind))
+        robot, model = load_robot(path), mujoco.MjModel.from_xml_path(str(path))
+        data, matrix = mujoco.MjData(model), np.zeros((1, 1))
+        data.qvel[:] = 1
+        mujoco.mj_forward(model, data)
+        mujoco.mj_fullM(model, data, matrix)
+        np.testing.assert_allclose(jn.mass_matrix(robot, [0.0], drives=True), matrix, rtol=1e-15)
+        assert robot.joints["j"].damping == -data.qfrc_passive[0]
+        assert robot.limits["j"].effort == 6
+
+
+def test_a_height_field_that_weighs_has_a_part_in_the_mass_of_its_body(tmp_path):
+    field = "<asset><hfield name='h' nrow='2' ncol='2' size='1 1 0.1 0.1' elevation='0 1 1 0'/></asset>"
+    path = tmp_path / "field.xml"
+    path.write_text(
+        f"<mujoco>{field}<worldbody><body name='a'><joint/><geom size='0.1'/>"
+        "<geom type='hfield' hfield='h' mass='5' pos='0.1 0.2 0.3'/></body></worldbody></mujoco>"
+    )
+    inertia, model = load_robot(path).links["a"].inertia, mujoco.MjModel.from_xml_path(str(path))
+    assert inertia.mass == model.body_mass[1] > 5
+    np.testing.assert_allclose(np.linalg.eigvalsh(inertia.tensor), np.sort(model.body_inertia[1]), rtol=1e-14)
+
+
 def test_ranges_are_limits_and_symmetric_forces_too(pair):
     robot, model = pair
     for k in range(model.njnt):

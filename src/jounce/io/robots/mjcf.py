@@ -25,6 +25,7 @@ from jounce.robot.tree import quaternion_matrix, turn_about
 _Vector = Float[np.ndarray, "3"]
 _Matrix = Float[np.ndarray, "3 3"]
 DEFORMABLE = "has deformable parts (flex), which no rigid body stands for"
+NO_CLOSURE = "has no equivalent joint or closure; remove it, or set active='false'"
 PLACE = ("pos", "quat", "axisangle", "xyaxes", "zaxis", "euler")
 NUMERIC = {  # attributes whose numbers MuJoCo takes even when they are not finite
     **dict.fromkeys(("body", "site"), PLACE),
@@ -74,11 +75,17 @@ def read_mjcf(root: Element, faults: Faults, allow: Iterable[str | PathLike[str]
     try:
         with quiet_mujoco(mujoco):
             spec = mujoco.MjSpec.from_file(root.path)
+            _check_tendons(spec, mujoco, root)
+            scaled = spec.compiler.fusestatic and getattr(spec.compiler, "settotalmass", 0.0) > 0  # which is deprecated
             _strip(spec, mujoco)
             check_assets(spec, parts, allow)
             model = spec.compile()
     except (ValueError, RuntimeError, OSError) as error:
         raise _refused(str(error), root) from None
+    if scaled and model.body_mass[model.body_weldid == 0].any():
+        # MuJoCo counts bodies fixed to the world in the total or not, by whether a sensor or the like refers to them
+        message = "settotalmass with fusestatic depends on which bodies fixed to the world are kept"
+        raise root.error(f"{message}; remove fusestatic, or give masses instead", "compiler.settotalmass")
     return _Reader(root, mujoco, spec, model, faults).robot()
 
 
@@ -93,6 +100,15 @@ def _check_numbers(root: Element) -> None:
             words = text.split()
             if key in numeric or (text not in names and any(re.fullmatch(r"[+-]?nan", word, re.I) for word in words)):
                 element.numbers(key, len(words), element.attributes.get("name") or element.tag, key)
+
+
+def _check_tendons(spec: Any, mujoco: Any, root: Element) -> None:
+    """Refuse active equalities of tendons while there are tendons, which are taken away before the file is compiled."""
+    for equality in spec.equalities:
+        if equality.active and equality.type == mujoco.mjtEq.mjEQ_TENDON:
+            name = f"equality.{equality.name}" if equality.name else "equality"
+            message = f"an active equality of type tendon {NO_CLOSURE}"
+            raise RobotFileError(message, path=root.path, line=line_of(equality.info), name=ascii(name)[1:-1])
 
 
 def _refused(says: str, root: Element) -> RobotFileError:
@@ -116,8 +132,8 @@ def _strip(spec: Any, mujoco: Any) -> None:
     A shape stays where it gives a body its mass.
     """
     spec.compiler.fusestatic = False  # or bodies without joints would lose their frames
-    joint = mujoco.mjtTrn.mjTRN_JOINT
-    unused = [actuator for actuator in spec.actuators if actuator.trntype != joint]
+    joints = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)  # which differ for balls and free joints
+    unused = [actuator for actuator in spec.actuators if actuator.trntype not in joints]
     for parts in (spec.sensors, spec.pairs, spec.excludes, spec.tendons, spec.keys, spec.tuples, spec.skins):
         unused += list(parts)
     unused += [e for e in spec.equalities if e.type == mujoco.mjtEq.mjEQ_TENDON and not e.active]
@@ -129,8 +145,10 @@ def _strip(spec: Any, mujoco: Any) -> None:
             (kept if moves and _weighs(shape, spec.compiler) else unused).append(shape)
     for shape in kept:
         shape.material = ""
-    used = {shape.meshname for shape in kept}
-    unused += [*spec.materials, *spec.textures, *spec.hfields, *[mesh for mesh in spec.meshes if mesh.name not in used]]
+    meshes, fields = ({getattr(shape, name) for shape in kept} for name in ("meshname", "hfieldname"))
+    unused += [mesh for mesh in spec.meshes if mesh.name not in meshes]
+    unused += [field for field in spec.hfields if field.name not in fields]
+    unused += [*spec.materials, *spec.textures]
     for part in unused:
         spec.delete(part)
 
@@ -150,7 +168,10 @@ class _Reader:
         self.kind = {name: int(getattr(mujoco.mjtJoint, f"mjJNT_{name.upper()}")) for name in kinds}
         self.bodies = names_of_bodies(model)
         self.joint_names = _names([model.joint(k).name for k in range(model.njnt)], "joint")
-        self.lines = {f"joints.{self.joint_names[joint.id]}": line_of(joint.info) for joint in spec.joints}
+        self.lines = {  # a <freejoint> has no line of its own
+            f"joints.{self.joint_names[joint.id]}": line_of(joint.info) or line_of(joint.parent.info)
+            for joint in spec.joints
+        }
         self.lines |= {f"links.{self.bodies[body.id]}": line_of(body.info) for body in spec.bodies}
         self.links: list[Link] = []
         self.joints: list[Joint] = []
@@ -199,8 +220,7 @@ class _Reader:
                 continue
             if kind != int(kinds.mjEQ_JOINT):
                 word = kinds(int(kind)).name.removeprefix("mjEQ_").lower()
-                message = f"an active equality of type {word} has no equivalent joint or closure"
-                raise RobotFileError(f"{message}; remove it, or set active='false'", **place)
+                raise RobotFileError(f"an active equality of type {word} {NO_CLOSURE}", **place)
             first, second = int(model.eq_obj1id[k]), int(model.eq_obj2id[k])
             coefficients = model.eq_data[k][:5]
             name = self.joint_names[first]
@@ -323,6 +343,13 @@ class _Reader:
             if values.any():
                 message = f"{field} of a ball or free joint has no counterpart in slides and turns; set it to zero"
                 raise self.error(message, f"joints.{name}.{field}", value=values.tolist())
+        for k in np.flatnonzero(model.actuator_trnid[:, 0] == j):
+            for field in ("armature", "damping", "dampingpoly"):
+                values = getattr(model, f"actuator_{field}")[k]
+                if np.any(values):
+                    message = f"{field} of an actuator of a ball or free joint has no counterpart in slides and turns"
+                    value = np.ravel(values).tolist()
+                    raise self.error(f"{message}; set it to zero", f"joints.{name}.{field}", value=value)
         self.links += links[1:]
         first = dataclasses.replace(joints[0], parent=parent, position=position, rotation=rotation)
         self.joints += [first, *joints[1:]]
