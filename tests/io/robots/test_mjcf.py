@@ -253,6 +253,69 @@ def test_a_linear_equality_of_joints_is_a_joint_that_follows(tmp_path):
     assert mimic.offset == pytest.approx(np.radians(20) + 0.1 + 2 * 0.3, rel=1e-15)  # about the references, as MuJoCo
 
 
+TIED = """
+<mujoco><compiler angle="radian"/><worldbody>
+  <body><joint name="a" axis="0 1 0" ref="0.3"/><geom size="0.1"/>
+    <body pos="0.1 0 0"><joint name="b" type="slide" axis="1 0 0" ref="-0.2"/><geom size="0.1"/>
+      <body pos="0 0.1 0"><joint name="c" ref="0.5"/><geom size="0.1"/>
+        <body pos="0 0 0.1"><joint name="d" axis="1 0 0"/><geom size="0.1"/>
+          <body pos="0 0 0.2"><joint name="e" axis="0 1 0" ref="0.1"/><geom size="0.1"/></body>
+  </body></body></body></body></worldbody>
+  <tendon>
+    <fixed name="ab"><joint joint="a" coef="2"/><joint joint="b" coef="-3"/></fixed>
+    <fixed name="cb"><joint joint="c" coef="0.5"/><joint joint="b" coef="0.7"/></fixed>
+    <fixed name="d"><joint joint="d" coef="4"/></fixed>
+    <fixed name="e"><joint joint="e" coef="-2"/></fixed>
+  </tendon>
+  <equality>
+    <tendon tendon1="ab" polycoef="0.1 1 0 0 0"/>
+    <tendon tendon1="cb"/>
+    <tendon tendon1="d" tendon2="ab" polycoef="0.2 0 0 0 0"/>
+    <tendon tendon1="e" tendon2="cb" polycoef="0.3 2 0 0 0" active="{}"/>
+  </equality>
+</mujoco>
+"""
+
+
+def test_an_equality_of_tendons_along_joints_ties_these(tmp_path):
+    """Where the joints are as the robot has them, no equality of MuJoCo is off; b follows a, and c follows b."""
+    path = tmp_path / "tied.xml"
+    path.write_text(TIED.format("false"))
+    robot, model = load_robot(path), mujoco.MjModel.from_xml_path(str(path))
+    assert robot.joint_names == ("a", "e")
+    data = mujoco.MjData(model)
+    for values in ([0.0, 0.0], [0.8, -0.3]):
+        q = dict(zip(robot.joint_names, values, strict=True))
+        ours = body_poses(robot, q)
+        for name, joint in robot.joints.items():
+            if joint.mimic:
+                q[name] = joint.mimic.multiplier * q[joint.mimic.joint] + joint.mimic.offset
+        q["d"] = 0.2 / 4  # the joint that is held is none any more
+        data.qpos[:] = [q[name] for name in "abcde"]
+        mujoco.mj_forward(model, data)
+        assert data.ne == 3
+        np.testing.assert_allclose(data.efc_pos[:3], 0.0, rtol=0, atol=1e-15)
+        last = robot.frames["body_5"]
+        here = ours[last.body]
+        np.testing.assert_allclose(here[:3, 3] + here[:3, :3] @ last.position, data.xpos[5], rtol=0, atol=1e-15)
+    path.write_text(TIED.format("true"))
+    with pytest.raises(RobotFileError, match=r"one other only.*got \['e', 'c', 'b'\]"):
+        load_robot(path)
+
+
+def test_parts_that_are_only_seen_need_no_material(tmp_path):
+    """Published hands and arms colour their sites; materials go, because their textures need not be there."""
+    path = tmp_path / "seen.xml"
+    path.write_text(
+        "<mujoco><asset><texture name='t' type='2d' file='no.png'/><material name='m' texture='t'/></asset><default>"
+        "<site material='m'/><tendon material='m'/></default><worldbody><site name='mark' material='m'/><body>"
+        "<joint name='j'/><joint name='k' axis='0 1 0'/><geom size='0.1' material='m'/><site material='m'/></body>"
+        "</worldbody><tendon><fixed name='f'><joint joint='j' coef='1'/><joint joint='k' coef='1'/></fixed>"
+        "</tendon><equality><tendon tendon1='f'/></equality></mujoco>"
+    )
+    assert load_robot(path).joint_names == ("j",)
+
+
 def test_an_equality_that_holds_a_joint_locks_it(tmp_path):
     inside = "<joint name='j' axis='0 0 1'/><joint name='k' axis='1 0 0'/>"
     robot = load_robot(written(tmp_path, inside, "<equality><joint joint1='j' polycoef='0.4 0 0 0 0'/></equality>"))
