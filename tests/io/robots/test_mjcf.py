@@ -221,6 +221,15 @@ def test_a_body_on_a_ball_and_a_free_one_have_three_turns_each(tmp_path):
     assert names[6:] == (*(f"loose_{axis}" for axis in "xyz"), *(f"loose_angle_{k}" for k in (1, 2, 3)))
 
 
+def test_the_turns_and_slides_of_a_free_joint_have_names_that_no_other_joint_has(tmp_path):
+    inside = "<freejoint name='root'/><body name='root_frame_4'><joint name='root_x'/><geom size='0.1'/></body>"
+    robot = load_robot(written(tmp_path, inside))
+    assert robot.joint_names[:3] == ("root_x_", "root_y", "root_z")
+    assert robot.joint_names[-1] == "root_x"
+    assert robot.joints["root_angle_1"].child == "root_frame_4_"
+    assert robot.joints["root_x"].child == "root_frame_4"
+
+
 def test_the_arm_of_the_examples_has_its_pose_in_the_file_at_the_reference():
     robot = load_robot(FILES / "planar_arm.xml")
     assert robot.joint_names == ("shoulder", "elbow", "ram")

@@ -313,9 +313,9 @@ class _Reader:
     def _expand(self, j: int, parent: str, child: str, position: _Vector, rotation: _Matrix) -> None:
         """Add the slides and turns that a free joint or a ball stands for."""
         model, name, dof = self.model, self.joint_names[j], self.model.jnt_dofadr[j]
-        links, joints = floating_joints(child, prefix=name)
+        _, joints = floating_joints(child, prefix=name)
         if model.jnt_type[j] == self.kind["ball"]:
-            links, joints = links[3:], joints[3:]
+            joints = joints[3:]
         for field in ("armature", "damping", "frictionloss"):
             values = getattr(model, f"dof_{field}")[dof : dof + len(joints)]
             if values.any():
@@ -328,9 +328,14 @@ class _Reader:
                     message = f"{field} of an actuator of a ball or free joint has no counterpart in slides and turns"
                     value = np.ravel(values).tolist()
                     raise self.error(f"{message}; set it to zero", f"joints.{name}.{field}", value=value)
-        self.links += links[1:]
-        first = dataclasses.replace(joints[0], parent=parent, position=position, rotation=rotation)
-        self.joints += [first, *joints[1:]]
+        place = {"position": position, "rotation": rotation}
+        for made in joints:  # each with a name of its own: base_x may be that of another joint in the file
+            end = child if made is joints[-1] else self._unused(made.child)
+            if end != child:
+                self.links.append(Link(end))
+            own = {"name": self._unused(made.name), "parent": parent, "child": end}
+            self.joints.append(dataclasses.replace(made, **own, **place))
+            parent, place = end, {}
 
 
 def names_of_bodies(model: Any) -> list[str]:
