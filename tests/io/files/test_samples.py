@@ -41,6 +41,7 @@ def test_columns_are_found(tmp_path, text, names):
         ("time,lift\n0,1\n", {"time": "t"}, "line 1: no column has this name, got 't'; valid: lift, time"),
         ("time,lift\n0,1\n1,x\n", {}, "line 3, lift: must be a finite number, got 'x'"),
         ("time,lift\n0,1\n1\n", {}, "line 3, lift: must be a finite number, got ''"),
+        ("time,lift\n0,1\n1,1_5\n", {}, "line 3, lift: must be a finite number, got '1_5'"),
         ("time,lift\n0,1\nnan,2\n", {}, "line 3, time: must be a finite number, got 'nan'"),
         ("time,lift\n0,1\n1,1e300\n", {}, "line 3, lift: must be at most 1e+75, got '1e300'"),
         (b"time,lift\n\xff,1\n", {}, "the samples cannot be read"),

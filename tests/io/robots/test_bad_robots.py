@@ -80,7 +80,7 @@ def test_file_with_one_mistake(tmp_path, kind, what):
     case, (text, ending) = CASES[kind][what], FILES[kind]
     assert case["instead_of"] in text
     path = tmp_path / f"file{ending}"
-    path.write_text(text.replace(case["instead_of"], case["text"], 1))
+    path.write_text(text.replace(case["instead_of"], case["text"], 1).replace(*case.get("also", ("", ""))))
     with pytest.raises(RobotFileError) as caught:
         load_robot(path, strict=True)
     place = [
