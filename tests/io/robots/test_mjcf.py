@@ -251,6 +251,19 @@ def test_gravity_that_is_switched_off(tmp_path):
     np.testing.assert_array_equal(robot.gravity, [0, 0, 0])
 
 
+@pytest.mark.parametrize("flag, kept", [("damper", (0.0, 2.0)), ("frictionloss", (5.0, 0.0))])
+def test_damping_and_friction_that_are_switched_off(tmp_path, flag, kept):
+    inside = "<joint name='j' axis='0 1 0' damping='3' frictionloss='2'/>"
+    drive = "<actuator><motor joint='j' damping='2'/></actuator>"
+    path = written(tmp_path, inside, f"<option gravity='0 0 0'><flag {flag}='disable'/></option>{drive}")
+    joint, model = load_robot(path).joints["j"], mujoco.MjModel.from_xml_path(str(path))
+    assert (joint.damping, joint.friction) == kept
+    data = mujoco.MjData(model)
+    data.qvel[:] = 1
+    mujoco.mj_forward(model, data)
+    assert (-data.qfrc_passive[0], bool(data.nf)) == (kept[0], bool(kept[1]))
+
+
 def test_a_linear_equality_of_joints_is_a_joint_that_follows(tmp_path):
     inside = "<joint name='j' ref='20'/><joint name='k' type='slide' ref='0.3'/>"
     robot = load_robot(

@@ -187,11 +187,10 @@ class _Reader:
         if model.nflex:
             raise RobotFileError(DEFORMABLE, path=self.root.path)
         self._tie()
-        weightless = model.opt.disableflags & int(self.mujoco.mjtDisableBit.mjDSBL_GRAVITY)
         try:
             for k in range(model.nbody):
                 self._body(k)
-            gravity = (0.0, 0.0, 0.0) if weightless else model.opt.gravity
+            gravity = (0.0, 0.0, 0.0) if self._switched_off("GRAVITY") else model.opt.gravity
             name = self.root.attributes.get("model") or "robot"
             robot = Robot(name, self.links, self.joints, gravity, self.closures)
             return robot.locked(self.ties.held) if self.ties.held else robot
@@ -293,7 +292,8 @@ class _Reader:
         kind = "prismatic" if not turning else "revolute" if limited else "continuous"
         armature, damping = self._of_drives(j)
         limits = Limits(lower=lower, upper=upper, effort=self.efforts.get(j))
-        drive = {"armature": armature, "damping": damping, "friction": float(model.dof_frictionloss[dof])}
+        friction = 0.0 if self._switched_off("FRICTIONLOSS") else float(model.dof_frictionloss[dof])
+        drive = {"armature": armature, "damping": damping, "friction": friction}
         self.joints.append(
             Joint(name, parent, child, kind, position, rotation, axis, limits, self.mimics.get(name), **drive)
         )
@@ -308,7 +308,11 @@ class _Reader:
                 raise self.error("damping of an actuator must be one number", f"joints.{self.joint_names[j]}.damping")
             armature += gear * float(model.actuator_armature[k])
             damping += gear * float(np.ravel(model.actuator_damping[k])[0])
-        return armature, damping
+        return armature, 0.0 if self._switched_off("DAMPER") else damping
+
+    def _switched_off(self, part: str) -> bool:
+        """Whether a flag of the file takes a part of the dynamics away."""
+        return bool(self.model.opt.disableflags & int(getattr(self.mujoco.mjtDisableBit, f"mjDSBL_{part}")))
 
     def _expand(self, j: int, parent: str, child: str, position: _Vector, rotation: _Matrix) -> None:
         """Add the slides and turns that a free joint or a ball stands for."""
