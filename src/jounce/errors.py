@@ -282,7 +282,7 @@ class SingularityError(JounceError):
 
 
 class RobotWarning(UserWarning):
-    """A robot file holds what no real robot has, and is read all the same: negative moments of inertia, no mass."""
+    """A robot file holds what no real robot has, or forces that are left out; it is read all the same."""
 
 
 class SampleWarning(UserWarning):

@@ -1,4 +1,4 @@
-"""What robot files hold that no real robot has: read all the same, and told of in one warning."""
+"""What robot files hold that no real robot has, or that is left out: read all the same, and told of in one warning."""
 
 from __future__ import annotations
 
@@ -16,10 +16,16 @@ HEADINGS = {
     WITHOUT_MASS: "moments of inertia have no mass beside them",
 }
 SHOWN = 200  # names for each fault
+FEW = 6  # names for each part that is left out
+
+
+def left_out(heading: str) -> str:
+    """Return the message of an error about what is left out."""
+    return f"motions and forces are computed without {heading}; set it to zero, or read the file without strict"
 
 
 class Faults:
-    """Gathers the faults of a file; if it is strict, the first one is an error.
+    """Gathers the faults of a file, and what is left out of it; if it is strict, the first one is an error.
 
     Parameters
     ----------
@@ -32,6 +38,7 @@ class Faults:
     def __init__(self, path: str, strict: bool = False):
         self.path, self.strict = path, strict
         self.names: dict[str, list[str]] = {}
+        self.unread: dict[str, list[str]] = {}
 
     def add(self, heading: str, name: str, error: RobotFileError) -> None:
         """Note a fault of a link or joint.
@@ -41,10 +48,23 @@ class Faults:
         RobotFileError
             The error given, if faults are errors.
         """
+        self._note(self.names, heading, name, error)
+
+    def leave_out(self, heading: str, name: str, error: RobotFileError) -> None:
+        """Note what a link, a joint or another part has that bears on motions or forces and is not read.
+
+        Raises
+        ------
+        RobotFileError
+            The error given, if faults are errors.
+        """
+        self._note(self.unread, heading, name, error)
+
+    def _note(self, names: dict[str, list[str]], heading: str, name: str, error: RobotFileError) -> None:
         if self.strict:
             raise error
         line = "" if error.line is None else f" (line {error.line})"
-        self.names.setdefault(heading, []).append(ascii(name)[1:-1] + line)
+        names.setdefault(heading, []).append(ascii(name)[1:-1] + line)
 
     def check(self, inertia: Inertia, link: str, line: int | None) -> None:
         """Note what is wrong with the inertia of a link."""
@@ -55,17 +75,20 @@ class Faults:
             )
 
     def warning(self) -> RobotWarning | None:
-        """Return the warning that names the links, None if there is no fault."""
-        if not self.names:
+        """Return the warning that names links, joints and other parts, None if there is nothing to tell."""
+        parts = []
+        if self.names:
+            parts.append("values that no real robot has are used as they are in the file")
+            parts += [f"{heading}: {_listed(names, SHOWN)}" for heading, names in self.names.items()]
+        if self.unread:
+            parts.append("what follows is left out, and motions and forces are computed without it")
+            parts += [f"{heading}: {_listed(names, FEW)}" for heading, names in self.unread.items()]
+        if not parts:
             return None
-        parts = [f"{heading}: {_listed(names)}" for heading, names in self.names.items()]
-        message = (
-            f"{self.path}: values that no real robot has are used as they are in the file; "
-            f"{'; '.join(parts)}; correct the file, or make this an error with strict=True (--strict)"
-        )
-        return RobotWarning(message)
+        advice = "correct the file, or make this an error" if self.names else "make this an error"
+        return RobotWarning(f"{self.path}: {'; '.join(parts)}; {advice} with strict=True (--strict)")
 
 
-def _listed(names: list[str]) -> str:
-    more = len(names) - SHOWN
-    return ", ".join(names if more <= 0 else [*names[:SHOWN], f"and {more} more"])
+def _listed(names: list[str], most: int) -> str:
+    more = len(names) - most
+    return ", ".join(names if more <= 0 else [*names[:most], f"and {more} more"])

@@ -65,7 +65,8 @@ def load_robot(
     RobotWarning
         Links are as those of no real robot: negative moments of inertia, one that exceeds the sum of the other two by
         more than rounding, moments without mass, links that move and have no mass, links of SDF without a mass and all
-        moments. All is computed with the numbers of the file; one warning names the links.
+        moments. All is computed with the numbers of the file. Or the file has forces that are left out: springs,
+        compensated gravity, fluids, what tendons add. One warning names the links, joints and other parts.
 
     Examples
     --------

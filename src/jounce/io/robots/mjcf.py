@@ -13,8 +13,9 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.errors import JounceError, RobotError, RobotFileError
-from jounce.io.robots.faults import Faults
+from jounce.io.robots.faults import Faults, left_out
 from jounce.io.robots.mjcf_files import check_assets, included, line_of, quiet_mujoco
+from jounce.io.robots.mjcf_left_out import LeftOut, left_out_of_model, left_out_of_spec
 from jounce.io.robots.mjcf_ties import NO_CLOSURE, Ties, tied_tendons
 from jounce.io.robots.xml_elements import Element
 from jounce.rigid.inertia import Inertia
@@ -48,15 +49,16 @@ def read_mjcf(root: Element, faults: Faults, allow: Iterable[str | PathLike[str]
     damping and friction of joints are kept, with the armature and damping of actuators on them; ranges become limits,
     and symmetric ranges of force limits of effort. A joint tied to another by a linear equality, of joints or of
     tendons along joints, follows it; active equalities of type connect and weld become closures, named closure_0 and so
-    on where they have no name. Contacts, springs, tendons, gravity compensation and all else that is no body, joint or
-    actuator of a joint are left out.
+    on where they have no name. Contacts and all else that is no body, joint or actuator of a joint are left out; there
+    is a warning of springs, gravity compensation, fluids, and what tendons and the actuators on them add. What a flag
+    switches off is zero.
 
     Parameters
     ----------
     root : Element
         The element ``<mujoco>``; MuJoCo reads the file again itself.
     faults : Faults
-        Takes what no real robot has.
+        Takes what no real robot has, and what is left out.
     allow
         Folders besides that of the file that included files and meshes may be below.
 
@@ -77,6 +79,7 @@ def read_mjcf(root: Element, faults: Faults, allow: Iterable[str | PathLike[str]
         with quiet_mujoco(mujoco):
             spec = mujoco.MjSpec.from_file(root.path)
             scaled = spec.compiler.fusestatic and getattr(spec.compiler, "settotalmass", 0.0) > 0  # which is deprecated
+            unread = left_out_of_spec(spec, mujoco)
             _strip(spec, mujoco, tied_tendons(spec, mujoco, root.path))
             check_assets(spec, parts, allow)
             model = spec.compile()
@@ -86,7 +89,10 @@ def read_mjcf(root: Element, faults: Faults, allow: Iterable[str | PathLike[str]
         # MuJoCo counts bodies fixed to the world in the total or not, by whether a sensor or the like refers to them
         message = "settotalmass with fusestatic depends on which bodies fixed to the world are kept"
         raise root.error(f"{message}; remove fusestatic, or give masses instead", "compiler.settotalmass")
-    return _Reader(root, mujoco, spec, model, faults).robot()
+    reader = _Reader(root, mujoco, spec, model, faults)
+    robot = reader.robot()
+    reader.tell(unread, parts)
+    return robot
 
 
 def _check_numbers(root: Element) -> None:
@@ -198,6 +204,16 @@ class _Reader:
             raise
         except RobotError as error:
             raise self.error(error.message, error.name or "", value=error.value) from None
+
+    def tell(self, found: Iterable[LeftOut], parts: Iterable[Element]) -> None:
+        """Note what is left out, in tendons and actuators as found, and in what is compiled."""
+        options = [element for part in parts for element in part.walk() if element.tag == "option"]
+        self.lines |= {f"option.{key}": element.line for element in options for key in element.attributes}
+        more = left_out_of_model(self.model, self.mujoco, self.bodies, self.joint_names, self.ties.held)
+        for heading, shown, line, name, value in (*found, *more):
+            if line is not None:
+                self.lines[name] = line
+            self.faults.leave_out(heading, shown, self.error(left_out(heading), name, value=value))
 
     def _tie(self) -> None:
         """Read what joints have to do with one another, and what closes loops."""

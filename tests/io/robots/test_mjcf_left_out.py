@@ -1,0 +1,156 @@
+"""What MuJoCo's dynamics has and a robot has not is told of just where it changes what MuJoCo computes."""
+
+import mujoco
+import numpy as np
+import pytest
+
+import jounce as jn
+from jounce.errors import RobotFileError
+from jounce.io.robots.loader import load_robot
+from tests.problems.robots import FILES
+
+FLAG = '<flag {}="disable"/>'
+TENDON = '<tendon><fixed name="cord" {}><joint joint="knee" coef="1"/></fixed></tendon>'
+DRIVE = TENDON.format("") + '<actuator><general {} armature="{}" damping="{}"/></actuator>'
+CARRYING = '<default><joint actuatorgravcomp="true"/></default>'
+CASES = {  # what the option, the lower body, its joint and the end of the file hold; what is said
+    "a spring": ("", "", 'stiffness="3"', "", r"springs of joints: knee \(line 5\); make"),
+    "a progressive spring": (
+        "",
+        "",
+        'stiffness="0 0 3" springref="20"',
+        "",
+        r"springs of joints: knee \(line 5\); make",
+    ),
+    "a tuned spring": ("", "", 'springdamper="0.1 1"', "", r"springs of joints: knee \(line 5\); make"),
+    "carried weight": ("", 'gravcomp="1"', "", "", r"gravity compensation of bodies: shank \(line 4\); make"),
+    "water": ('density="1000"', "", "", "", r"forces of the fluid around: density 1000 kg/m\^3 \(line 2\); make"),
+    "air": (
+        'density="1.2" viscosity="2e-05" wind="1 0 0"',
+        *("", "", ""),
+        r"density 1.2 kg/m\^3 and viscosity 2e-05 Pa s \(line 2\); make",
+    ),
+    "a cord": ("", "", "", TENDON.format('stiffness="4"'), r"springs of tendons: cord \(line 7\); make"),
+    "a damped cord": ("", "", "", TENDON.format('damping="4"'), r"damping of tendons: cord \(line 7\); make"),
+    "a cord that rubs": ("", "", "", TENDON.format('frictionloss="4"'), r"friction of tendons: cord \(line 7\); make"),
+    "a heavy cord": ("", "", "", TENDON.format('armature="4"'), r"armature of tendons: cord \(line 7\); make"),
+    "a winch": (
+        *("", "", ""),
+        DRIVE.format('name="winch" tendon="cord"', 2, 0),
+        r"armature of actuators on tendons: winch \(line 7\); make",
+    ),
+    "a winch that rubs": (
+        *("", "", ""),
+        DRIVE.format('tendon="cord"', 0, 2),
+        r"damping of actuators on tendons: actuator_0 \(line 7\); make",
+    ),
+    "no spring": ("", "", 'stiffness="0" springref="20"', "", None),
+    "a spring switched off": (FLAG.format("spring"), "", 'stiffness="3"', "", None),
+    "a damped cord switched off": (FLAG.format("damper"), "", "", TENDON.format('damping="4"'), None),
+    "a cord that rubs switched off": (FLAG.format("frictionloss"), "", "", TENDON.format('frictionloss="4"'), None),
+    "no weight to carry": (FLAG.format("gravity"), 'gravcomp="1"', "", "", None),
+    "no gravity": ('gravity="0 0 0"', 'gravcomp="1"', "", "", None),
+    "a weight that all drives carry": ("", 'gravcomp="1"', "", CARRYING, None),
+    "a weight that one drive carries": ("", 'gravcomp="1"', 'actuatorgravcomp="true"', "", "bodies: shank "),
+    "all that is passive switched off": (
+        '<flag spring="disable" damper="disable"/>',
+        *('gravcomp="1"', 'stiffness="3"', TENDON.format('stiffness="2" damping="3"'), None),
+    ),
+    "wind without air": ('wind="3 0 0"', "", "", "", None),
+    "a drive of a joint": ("", "", "", '<actuator><motor joint="knee" armature="2" damping="3"/></actuator>', None),
+    "a drive without rotor": ("", "", "", DRIVE.format('tendon="cord"', 0, 0), None),
+}
+
+
+def written(tmp_path, option, body, joint, after):
+    """Write a leg: the hip has damping, which is read."""
+    attributes, flags = ("", option) if option.startswith("<") else (option, "")
+    text = f"""<mujoco><compiler angle="degree"/>
+<option {attributes}>{flags}</option><worldbody><site name="mark"/>
+<body name="thigh"><joint name="hip" axis="0 1 0" damping="0.3"/><geom size="0.1" pos="0 0 -0.2"/>
+<body name="shank" pos="0.1 0 -0.4" {body}>
+<joint name="knee" axis="0 1 0" {joint}/>
+<geom size="0.08" pos="0.2 0 -0.2"/><site name="nozzle" pos="0.1 0 -0.4"/></body></body></worldbody>
+{after}</mujoco>"""
+    path = tmp_path / "leg.xml"
+    path.write_text(text)
+    return path
+
+
+def forces(model):
+    """Return what MuJoCo needs for a motion without contact: its torques, and friction at this velocity."""
+    data = mujoco.MjData(model)
+    data.qpos[:], data.qvel[:] = [0.3, -0.5], [1.2, -0.7]
+    mujoco.mj_forward(model, data)
+    mass = np.zeros((2, 2))
+    mujoco.mj_fullM(model, data, mass)
+    torque = mass @ [0.4, 0.9] + data.qfrc_bias - data.qfrc_passive
+    works = not model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS)
+    for name in range(model.ntendon if works else 0):
+        torque += model.tendon_frictionloss[name] * np.array([0, np.sign(data.ten_velocity[name])])
+    return torque
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_it_is_told_of_where_mujoco_computes_other_forces(tmp_path, case):
+    """Without a warning the torques are those of MuJoCo; with one they are not."""
+    *parts, says = CASES[case]
+    path = written(tmp_path, *parts)
+    if says is None:
+        robot = load_robot(path, strict=True)
+    else:
+        with pytest.warns(jn.RobotWarning, match=says) as caught:
+            robot = load_robot(path)
+        assert len(caught) == 1
+        assert str(caught[0].message).startswith(f"{path}: what follows is left out, and motions and forces are")
+    ours = jn.inverse_dynamics(robot, [[0.3, -0.5], [1.2, -0.7], [0.4, 0.9]], drives=True)[0]
+    theirs = forces(mujoco.MjModel.from_xml_path(str(path)))
+    same = np.allclose(ours, theirs, rtol=0, atol=1e-12 * np.abs(theirs).max())
+    assert same == (says is None)
+
+
+@pytest.mark.parametrize(
+    "case, says",
+    {
+        "a spring": r"leg\.xml, line 5, joints\.knee\.stiffness: .* without springs of joints, got 3\.0; set it",
+        "carried weight": r"line 4, links\.shank\.gravcomp: .* without gravity compensation of bodies, got 1\.0;",
+        "water": r"line 2, option\.density: .* without forces of the fluid around, got 1000\.0;",
+        "a cord": r"line 7, tendons\.cord\.stiffness: .* without springs of tendons, got 4\.0;",
+        "a winch": r"line 7, actuators\.winch\.armature: .* without armature of actuators .*, got 2\.0;",
+    }.items(),
+)
+def test_strict_makes_an_error_of_it(tmp_path, case, says):
+    path = written(tmp_path, *CASES[case][:-1])
+    with pytest.raises(RobotFileError, match=says):
+        load_robot(path, strict=True)
+
+
+def test_a_spring_of_a_joint_that_an_equality_holds_moves_nothing(tmp_path):
+    held = '<equality><joint joint1="knee"/></equality>'
+    assert load_robot(written(tmp_path, "", "", 'stiffness="3"', held)).joint_names == ("hip",)
+
+
+def test_one_warning_names_the_first_six_of_each_kind_and_the_faults(tmp_path):
+    joints = "".join(
+        f'<body name="b{k}" gravcomp="{k % 2}"><joint name="j{k}" stiffness="2"/><geom size="0.1"/>' for k in range(8)
+    )
+    rotor = '<body name="rotor"><inertial pos="0 0 0" mass="0" diaginertia="0.2 0.3 0.4"/></body>'
+    path = tmp_path / "chain.xml"
+    path.write_text(f"<mujoco><worldbody>{joints}{rotor}{'</body>' * 8}</worldbody></mujoco>")
+    with pytest.warns(jn.RobotWarning) as caught:
+        load_robot(path)
+    (warning,) = caught
+    springs = ", ".join(f"j{k} (line 1)" for k in range(6))
+    carried = ", ".join(f"b{k} (line 1)" for k in range(1, 8, 2))
+    assert str(warning.message) == (
+        f"{path}: values that no real robot has are used as they are in the file; "
+        "moments of inertia have no mass beside them: rotor (line 1); "
+        "what follows is left out, and motions and forces are computed without it; "
+        f"springs of joints: {springs}, and 2 more; gravity compensation of bodies: {carried}; "
+        "correct the file, or make this an error with strict=True (--strict)"
+    )
+
+
+@pytest.mark.parametrize("name", ["five_bar", "human_arm", "planar_arm"])
+def test_of_the_examples_nothing_is_left_out(name):
+    load_robot(FILES / f"{name}.xml", strict=True)
