@@ -159,6 +159,15 @@ def test_a_universal_joint_and_a_ball(tmp_path):
     np.testing.assert_allclose(poses(robot, q)["c"][:3, :3], turn.as_matrix(), rtol=0, atol=1e-15)
 
 
+def test_the_turns_of_a_ball_have_names_that_nothing_else_has(tmp_path):
+    """A ball called s beside a hinge called s_angle_2 was refused because of a name that the file does not hold."""
+    text = model(*map(link, ("a", "s_frame_4", "c")), joint("s", "a", "s_frame_4", "ball", ""))
+    text = text.replace("</model>", joint("s_angle_2", "s_frame_4", "c") + "</model>")
+    robot = read(tmp_path, text)
+    assert robot.joint_names == ("s_angle_1", "s_angle_2_", "s_angle_3", "s_angle_2")
+    assert [robot.joints[name].child for name in robot.joint_names] == ["s_frame_4_", "s_frame_5", "s_frame_4", "c"]
+
+
 def test_a_universal_joint_toward_the_base_keeps_the_numbers_of_its_axes(tmp_path):
     axes = (
         "<axis><xyz>1 0 0</xyz></axis><axis2><xyz>0 1 0</xyz><limit><lower>-1</lower><upper>1</upper></limit></axis2>"

@@ -250,9 +250,7 @@ class _Reader:
     ) -> list[Joint]:
         """Return the joints that one stands for, from its parent to the link given, all at one place."""
         if joint.kind == "ball":
-            links, parts = floating_joints(child, prefix=joint.name)
-            self.links += links[4:]
-            return [dataclasses.replace(parts[3], parent=joint.parent), *parts[4:]]
+            return self._turns(joint, child)
         if joint.kind == "fixed":
             return [Joint(joint.name, joint.parent, child, "fixed")]
         made = []
@@ -269,6 +267,17 @@ class _Reader:
             kept: dict[str, Any] = {"axis": direction, "limits": axis.limits, "mimic": mimics.get(name)}
             made.append(Joint(name, start, end, kind, damping=axis.damping, friction=axis.friction, **kept))
         return made
+
+    def _turns(self, joint: SdfJoint, child: str) -> list[Joint]:
+        """Return the three turns of a ball, with names that nothing else in the file has."""
+        turns, parent = floating_joints(child, prefix=joint.name)[1][3:], joint.parent
+        for k, turn in enumerate(turns):
+            end = child if turn is turns[-1] else self._unused(turn.child)
+            if end != child:
+                self.links.append(Link(end))
+            turns[k] = dataclasses.replace(turn, name=self._unused(turn.name), parent=parent, child=end)
+            parent = end
+        return turns
 
     def _closure(self, joint: SdfJoint) -> Closure:
         """Return what closes a loop."""
