@@ -1,5 +1,6 @@
 """Robots from SDF files: the same ones built without a file, in every dialect; loops, gearboxes; Cassie."""
 
+import re
 import warnings
 from xml.etree import ElementTree
 
@@ -132,10 +133,74 @@ def test_links_that_feel_no_gravity(tmp_path, felt):
     assert torque_at_rest(robot) == pytest.approx(-2 * 0.5 * 9.81 if felt else 0.0, rel=1e-14)
 
 
-def test_a_static_model_is_fixed_to_the_world(tmp_path):
-    robot = read(tmp_path, model("<static>true</static>", link("a", "1 0 0 0 0 0"), link("b"), joint("j", "a", "b")))
+def test_a_static_model_is_fixed_to_the_world_and_that_its_joints_move_is_told(tmp_path):
+    text = model("<static>true</static>", link("a", "1 0 0 0 0 0"), link("b"), joint("j", "a", "b"))
+    with pytest.warns(RobotWarning, match=r"<static>, which holds all joints .* where they are: m \(line 1\)"):
+        robot = read(tmp_path, text)
     assert (robot.base, robot.joint_names) == ("world", ("j",))
     np.testing.assert_allclose(poses(robot, {"j": 0.0})["a"][:3, 3], [1, 0, 0])
+
+
+def test_a_static_model_without_joints_that_move_is_as_in_its_file(tmp_path):
+    parts = link("a"), link("b"), joint("j", "a", "b", "fixed", "")
+    assert read(tmp_path, model("<static>true</static>", *parts), strict=True).joint_names == ()
+
+
+AXIS = "<axis><xyz>0 0 1</xyz><dynamics>{}</dynamics></axis>"
+LEFT_OUT = {  # what the joint of a tree, that of a loop and a link hold; what is said in a warning and in an error
+    "a spring": (
+        *("<spring_stiffness>1500</spring_stiffness><spring_reference>0</spring_reference>", "", ""),
+        r"springs of joints: j \(line 1\); make",
+        r"joints\.j\.axis\.dynamics\.spring_stiffness: .* without springs of joints, got 1500\.0; set it to zero",
+    ),
+    "a spring in a loop": (
+        *("", "<spring_stiffness>2</spring_stiffness>", ""),
+        r"springs of joints: k \(line 1\); make",
+        r"joints\.k\.axis\.dynamics\.spring_stiffness",
+    ),
+    "damping in a loop": (
+        *("<damping>2</damping>", "<damping>3</damping>", ""),
+        r"damping of joints that close a loop: k \(line 1\); make",
+        r"joints\.k\.axis\.dynamics\.damping: .*, got 3\.0",
+    ),
+    "friction in a loop": (
+        *("<friction>2</friction>", "<friction>3</friction>", ""),
+        r"friction of joints that close a loop: k \(line 1\); make",
+        r"joints\.k\.axis\.dynamics\.friction: .*, got 3\.0",
+    ),
+    "decay": (
+        *("", "", "<velocity_decay><linear>0.1</linear><angular>0.2</angular></velocity_decay>"),
+        r"the decay of the velocities of links: b \(line 1\); make",
+        r"links\.b\.velocity_decay\.linear: .*, got 0\.1",
+    ),
+    "a link that no force moves": (
+        *("", "", "<kinematic>true</kinematic>"),
+        r"<kinematic>, by which no force moves these links: b \(line 1\); make",
+        r"links\.b\.kinematic: .*, got true; set it to false",
+    ),
+    "nothing": (
+        "<damping>2</damping><friction>1</friction><spring_stiffness>0</spring_stiffness>"
+        "<spring_reference>3</spring_reference>",
+        "<damping>0</damping><spring_reference>1</spring_reference>",
+        "<velocity_decay><linear>0</linear></velocity_decay><kinematic>false</kinematic>",
+        *(None, None),
+    ),
+}
+
+
+@pytest.mark.parametrize("case", LEFT_OUT)
+def test_what_bears_on_motions_and_is_left_out_is_told_of(tmp_path, case):
+    first, second, inside, warns, refuses = LEFT_OUT[case]
+    parts = link("a"), link("b", body=SOME + inside), joint("j", "a", "b", inside=AXIS.format(first))
+    text = model(*parts, joint("k", "b", "a", inside=AXIS.format(second)))
+    if warns is None:
+        assert list(read(tmp_path, text, strict=True).closures) == ["k"]
+        return
+    with pytest.warns(RobotWarning, match=warns) as caught:
+        assert list(read(tmp_path, text).closures) == ["k"]
+    assert len(caught) == 1
+    with pytest.raises(RobotFileError, match=refuses):
+        read(tmp_path, text, strict=True)
 
 
 def test_the_canonical_link_is_the_base(tmp_path):
@@ -417,9 +482,15 @@ def test_bad_files_are_refused_with_their_line(tmp_path, case):
 MOTORS = ("roll-op", "yaw-op", "pitch-op", "knee-op", "knee-shin-joint", "foot-op")
 
 
-def test_cassie_has_the_bodies_of_its_file():
+@pytest.fixture(scope="module")
+def cassie():
+    with pytest.warns(RobotWarning, match=r"springs of joints: left-knee-shin-joint \(line 313\), "):
+        return jn.load_robot(CASSIE)
+
+
+def test_cassie_has_the_bodies_of_its_file(cassie):
     """Masses, their centres, and the ends of its rods, from the file by a plain reading of SDF 1.6."""
-    robot = jn.load_robot(CASSIE)
+    robot = cassie
     here = poses(robot, dict.fromkeys(robot.joints, 0.0))
     root = ElementTree.parse(CASSIE).getroot().find("model")
     places = {}
@@ -439,11 +510,13 @@ def test_cassie_has_the_bodies_of_its_file():
 
 
 def test_all_files_of_cassie_are_read():
-    loops = {}
+    loops, springs = {}, {}
     for name, path in sdf_files().items():
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", RobotWarning)  # of a moment of inertia that no real body has
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always", RobotWarning)  # also of a moment of inertia that no real body has
             robot = jn.load_robot(path)
+        said = " ".join(str(warning.message) for warning in caught)
+        springs[name.rpartition("/")[2]] = re.findall(r"(\S+) \(line", said.partition("springs of joints: ")[2])
         loops[name.rpartition("/")[2]] = (len(robot.joint_names), len(robot.closures))
     assert loops == {
         "cassie.sdf": (24, 6),  # ten gears make as many joints follow the motors; springs of the shins slide
@@ -452,12 +525,19 @@ def test_all_files_of_cassie_are_read():
         "cassie_v2.sdf": (22, 4),
         "cassie_wo_gearbox_spring.sdf": (23, 4),
     }
+    for name, path in sdf_files().items():
+        stiff = [
+            joint.get("name")
+            for joint in ElementTree.parse(path).getroot().iterfind("model/joint")
+            if float(joint.findtext("axis/dynamics/spring_stiffness", "0"))
+        ]
+        assert sorted(springs[name.rpartition("/")[2]]) == sorted(stiff)
 
 
 @pytest.mark.slow
-def test_cassie_moves_as_in_pinocchio():
+def test_cassie_moves_as_in_pinocchio(cassie):
     """The torques found, with their forces in the rods, make Pinocchio's constrained model accelerate as ours does."""
-    robot = jn.load_robot(CASSIE)
+    robot = cassie
     drivers = {
         f"{side}-{name}": f"{0.03 * (k + 1)}*sin({2 + k % 3}*t)"
         for side in ("left", "right")

@@ -15,13 +15,14 @@ HEADINGS = {
     TRIANGLE: "a principal moment of inertia exceeds the sum of the others",
     WITHOUT_MASS: "moments of inertia have no mass beside them",
 }
+JOINT_SPRINGS = "springs of joints"
 SHOWN = 200  # names for each fault
 FEW = 6  # names for each part that is left out
 
 
-def left_out(heading: str) -> str:
-    """Return the message of an error about what is left out."""
-    return f"motions and forces are computed without {heading}; set it to zero, or read the file without strict"
+def left_out(heading: str, unless: str = "zero") -> str:
+    """Return the message of an error about what is left out unless it has a value."""
+    return f"motions and forces are computed without {heading}; set it to {unless}, or read the file without strict"
 
 
 class Faults:

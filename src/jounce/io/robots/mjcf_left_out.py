@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from jounce.io.robots.faults import JOINT_SPRINGS
 from jounce.io.robots.mjcf_files import line_of
 
-JOINT_SPRINGS = "springs of joints"
 COMPENSATION = "gravity compensation of bodies"
 FLUID = "forces of the fluid around"
 OF_TENDONS = {

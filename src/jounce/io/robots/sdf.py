@@ -14,6 +14,7 @@ from jounce.errors import RobotError
 from jounce.io.robots.faults import Faults
 from jounce.io.robots.named_elements import NamedElements
 from jounce.io.robots.sdf_joints import AXIS_TAGS, SdfJoint, read_joint
+from jounce.io.robots.sdf_left_out import note_left_out
 from jounce.io.robots.sdf_links import gravity_of, read_inertia
 from jounce.io.robots.sdf_poses import (
     HERE,
@@ -53,15 +54,16 @@ def read_sdf(root: Element, faults: Faults) -> Robot:
     that its coordinate stays that of the file. A universal joint becomes two turns, a ball three about moving axes z,
     y, x, with massless links between. A joint whose axis passes beside the origin of its child has a massless link
     there. A gearbox makes the second of its two joints follow the first. A link without ``<inertial>`` weighs 1 kg, as
-    SDF says; there is a warning of it. Springs, sensors and plugins are left out, and limits, damping and
-    friction of a joint that closes a loop.
+    SDF says; there is a warning of it. Sensors and plugins are left out, and limits of a joint that closes a loop; of
+    springs, of damping and friction there, and of decaying velocities, which are left out too, there is a warning. So
+    there is of a static model whose joints move: a simulator holds it still, and here its joints have coordinates.
 
     Parameters
     ----------
     root : Element
         The element ``<sdf>``.
     faults : Faults
-        Takes what no real robot has.
+        Takes what no real robot has, and what is left out.
 
     Raises
     ------
@@ -171,6 +173,7 @@ class _Reader:
         for joint in tree:
             self._add(joint, mimics)
         closures = [self._closure(joint) for joint in closing]
+        note_left_out(self.model, elements, tree, closing, self.faults)
         name = self.model.attributes.get("name", "robot")
         upright = self.place.then(self._place(base)).rotation if base != WORLD else np.eye(3)
         gravity = upright.T @ gravity_of(self.world, elements, inertias)

@@ -1,0 +1,67 @@
+"""What SDF files hold that bears on motions or forces and is not read: springs, decay, what holds models still."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from jounce.io.robots.faults import JOINT_SPRINGS, Faults, left_out
+from jounce.io.robots.sdf_joints import SdfJoint
+from jounce.io.robots.sdf_poses import flag_of, needed, number_of, only
+from jounce.io.robots.xml_elements import Element
+
+STATIC = "<static>, which holds all joints of this model where they are"
+KINEMATIC = "<kinematic>, by which no force moves these links"
+DECAY = "the decay of the velocities of links"
+IN_LOOPS = {"damping": "damping of joints that close a loop", "friction": "friction of joints that close a loop"}
+DECAYS = {"linear": DECAY, "angular": DECAY}
+SPRING = {"spring_stiffness": JOINT_SPRINGS}
+
+
+def note_left_out(
+    model: Element, links: Mapping[str, Element], tree: Iterable[SdfJoint], closing: Iterable[SdfJoint], faults: Faults
+) -> None:
+    """Note what is left out of a model.
+
+    Parameters
+    ----------
+    model : Element
+        The element ``<model>``.
+    links : dict of str to Element
+        Its links by name.
+    tree, closing : iterable of SdfJoint
+        The joints of the tree, and those that close its loops.
+    faults : Faults
+        Takes what is left out.
+
+    Raises
+    ------
+    RobotFileError
+        A value is no number, or none that it may be; or something is left out and that is an error.
+    """
+    tree = list(tree)
+    if flag_of(model, "static", "static") and any(joint.kind != "fixed" for joint in tree):
+        error = needed(model, "static").error(left_out(STATIC, "false"), "static", value=True)
+        faults.leave_out(STATIC, model.attributes.get("name", "robot"), error)
+    for joints, headings in ((tree, SPRING), (closing, SPRING | IN_LOOPS)):
+        for joint in joints:
+            for axis in joint.axes:
+                where = ("joints", joint.name, axis.tag, "dynamics")
+                _note_numbers(only(needed(joint.element, axis.tag), "dynamics"), joint.name, headings, faults, *where)
+    for name, link in links.items():
+        if flag_of(link, "kinematic", "links", name):
+            error = needed(link, "kinematic").error(
+                left_out(KINEMATIC, "false"), "links", name, "kinematic", value=True
+            )
+            faults.leave_out(KINEMATIC, name, error)
+        _note_numbers(only(link, "velocity_decay"), name, DECAYS, faults, "links", name, "velocity_decay")
+
+
+def _note_numbers(holder: Element | None, shown: str, headings: Mapping[str, str], faults: Faults, *where: str) -> None:
+    """Note the numbers within an element that are not zero, once for each heading."""
+    told = set()
+    for key, heading in headings.items():
+        value = number_of(holder, key, *where, default=0.0)
+        if holder is not None and value and heading not in told:
+            told.add(heading)
+            error = needed(holder, key).error(left_out(heading), *where, key, value=value)
+            faults.leave_out(heading, shown, error)
