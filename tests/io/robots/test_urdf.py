@@ -219,6 +219,19 @@ def test_a_planar_joint_of_any_axis_slides_across_it(tmp_path):
     np.testing.assert_allclose(axes[2], [1 / 3, 2 / 3, 2 / 3], rtol=1e-15)
 
 
+@pytest.mark.parametrize("kind", ["planar", "floating"])
+@pytest.mark.parametrize("key", ["damping", "friction"])
+def test_damping_and_friction_of_joints_of_several_coordinates_are_told_of(tmp_path, kind, key):
+    zero = small(tmp_path, f'type="{kind}"><dynamics damping="0" friction="0"/>')
+    load_robot(zero, strict=True)
+    path = small(tmp_path, f'type="{kind}"><dynamics {key}="0.5"/>')
+    with pytest.warns(jn.RobotWarning, match=rf"{key} of planar and floating joints: j \(line 1\); make"):
+        robot = load_robot(path)
+    assert not any(joint.damping or joint.friction for joint in robot.joints.values())
+    with pytest.raises(RobotFileError, match=rf"line 1, joints\.j\.dynamics\.{key}: .* without {key} of .*, got 0\.5"):
+        load_robot(path, strict=True)
+
+
 def test_an_inertial_of_zeros_is_a_frame():
     robot = load_robot(FILES / "panda.urdf")
     assert robot.links["panda_link8"].inertia is None

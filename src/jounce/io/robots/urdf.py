@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.errors import RobotError, RobotFileError, did_you_mean, no_such
-from jounce.io.robots.faults import FOLLOWS_NONE, IDLE, MASSLESS, Faults
+from jounce.io.robots.faults import FOLLOWS_NONE, IDLE, MASSLESS, Faults, left_out
 from jounce.io.robots.named_elements import NamedElements
 from jounce.io.robots.xml_elements import Element
 from jounce.rigid.inertia import Inertia
@@ -24,6 +24,7 @@ TYPES = ("continuous", "fixed", "prismatic", "revolute", *EXPANDED)
 LINK_PARTS = ("inertial", "visual", "collision", "contact", "material", "sensor")
 INERTIAL_PARTS = ("origin", "mass", "inertia")
 JOINT_PARTS = ("origin", "parent", "child", "axis", "limit", "dynamics", "mimic", "calibration", "safety_controller")
+OF_SEVERAL = {key: f"{key} of planar and floating joints" for key in ("damping", "friction")}
 SIZES = ("velocity", "acceleration", "deceleration", "jerk", "effort")
 _Pose = tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3 3"]]
 TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
@@ -34,16 +35,16 @@ def read_urdf(root: Element, faults: Faults, massless: bool = False) -> Robot:
 
     Revolute, continuous, prismatic and fixed joints are taken as they are. A floating joint becomes three slides and
     three turns, a planar one two slides and a turn, all massless between; what the file says of their limits, damping
-    and friction is left out, since it does not say to which of the coordinates it belongs. An ``<inertial>`` of zero
-    mass and zero inertia is a frame. Limits that are zero are not given, nor is a range from zero to zero. A joint that
-    follows one which itself follows another follows that one.
+    and friction is left out, since it does not say to which of the coordinates it belongs; of damping and friction
+    there is a warning. An ``<inertial>`` of zero mass and zero inertia is a frame. Limits that are zero are not given,
+    nor is a range from zero to zero. A joint that follows one which itself follows another follows that one.
 
     Parameters
     ----------
     root : Element
         The element ``<robot>``.
     faults : Faults
-        Takes what no real robot has.
+        Takes what no real robot has, and what is left out.
     massless : bool, default False
         Whether links that move and have no mass, but carry some, are no fault.
 
@@ -72,7 +73,7 @@ def read_urdf(root: Element, faults: Faults, massless: bool = False) -> Robot:
     mimics = _mimics(joints, faults)
     try:
         for name, element in joints.items():
-            more, expanded = _joints(name, element, mimics)
+            more, expanded = _joints(name, element, mimics, faults)
             made += more
             parts += expanded
             for part in expanded:
@@ -191,7 +192,7 @@ def _ends(element: Element) -> tuple[str, str]:
     return parent, child
 
 
-def _joints(name: str, element: Element, mimics: dict[str, Mimic]) -> tuple[list[Link], list[Joint]]:
+def _joints(name: str, element: Element, mimics: dict[str, Mimic], faults: Faults) -> tuple[list[Link], list[Joint]]:
     """Return a joint of the file, or those that it is expanded to and the massless links between them."""
     where = ("joints", name)
     kind, (parent, child), (position, rotation) = element.attributes["type"], _ends(element), _pose(element, *where)
@@ -204,6 +205,10 @@ def _joints(name: str, element: Element, mimics: dict[str, Mimic]) -> tuple[list
     )
     if kind == "fixed":
         return [], [Joint(name, parent, child, kind, position, rotation)]
+    for key, value in (("damping", damping), ("friction", friction)):
+        if kind in EXPANDED and value and dynamics is not None:
+            heading = OF_SEVERAL[key]
+            faults.leave_out(heading, name, dynamics.error(left_out(heading), *where, "dynamics", key, value=value))
     if kind == "floating":
         links, parts = floating_joints(child, prefix=name)
         first = dataclasses.replace(parts[0], parent=parent, position=position, rotation=rotation)
