@@ -5,7 +5,7 @@ everywhere: within the library `order` first, components next, `*batch` last; at
 then `derivative`, then `joint`, `row`, `column` or a component. An axis `order` or `derivative` counts from zero.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import jax
@@ -25,3 +25,20 @@ Real = Numbers | np.floating | np.integer | float | int
 def is_traced(values: Any) -> bool:
     """Tell whether JAX traces an array in a pytree: then there are no numbers to check or to choose by."""
     return any(isinstance(x, Tracer) for x in jax.tree.leaves(values))
+
+
+def real_numbers(name: str, values: Any, error: Callable[..., Exception]) -> np.ndarray:
+    """Return values as an array of double precision, the same one if they are one.
+
+    Raises
+    ------
+    Exception
+        That given, if they are no numbers in one rectangular array, or complex ones: NumPy would drop the imaginary
+        parts with no more than a warning.
+    """
+    try:
+        if not np.iscomplexobj(values):
+            return np.asarray(values, float)
+    except (TypeError, ValueError):
+        pass
+    raise error("must be real numbers", name=name, value=values)

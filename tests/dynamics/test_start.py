@@ -95,6 +95,19 @@ def body(**changes):
     return dataclasses.replace(mechanism, bodies={"bob": dataclasses.replace(mechanism.bodies["bob"], **changes)})
 
 
+@pytest.mark.parametrize(
+    "gravity", [np.array([0.0, -9.81 + 1j]), [0.0, -9.81 + 1j], [0.0, np.nan], [0.0, 0.0, -9.81], -9.81]
+)
+def test_gravity_is_a_vector_of_the_space(gravity):
+    mechanism = dataclasses.replace(simple_pendulum(0.3, 1.0), gravity=gravity)
+    refused(jn.MechanismError, "gravity: must be (a vector of 2 numbers|finite)", mechanism)
+
+
+def test_a_parameter_is_a_real_number():
+    mechanism = dataclasses.replace(simple_pendulum(0.3, 1.0), parameters={"a": np.complex128(1 + 1j)})
+    refused(jn.MechanismError, "parameters.a: a parameter must be one finite number, got", mechanism)
+
+
 def test_masses_that_determine_no_motion():
     refused(jn.MechanismError, "bodies: no body has a mass; the equations", body(mass=None))
     refused(jn.MechanismError, "bodies.bob.inertia: the body can move but has no inertia", body(center_of_mass=None))
@@ -202,7 +215,8 @@ def test_a_joint_is_no_initial_condition():
         ({"order": 31}, "order: the order of derivatives"),
         ({"time": [0.0, 0.0]}, r"time\[1\]: instants must increase strictly"),
         ({"time": [0.0, np.nan]}, r"time\[1\]: instants must be finite"),
-        ({"time": [0.0, "1 s"]}, "time: the instants must be numbers"),
+        ({"time": [0.0, "1 s"]}, "time: must be real numbers"),
+        ({"time": np.array([0.0, 1.0 + 1j])}, "time: must be real numbers"),
         ({"time": []}, "at least one instant"),
         ({"time": None}, "no time grid is given"),
     ],

@@ -247,6 +247,12 @@ def test_jet_of_no_coefficient():
         jn.Jet([])
 
 
+@pytest.mark.parametrize("derivatives", [np.array([[1.0], [1j]]), [jnp.ones(2), jnp.array([1.0, 1j])]])
+def test_derivatives_of_a_jet_are_real(derivatives):
+    with pytest.raises(ValueError, match="derivatives must be real numbers"):
+        jn.Jet.from_derivatives(derivatives)
+
+
 def test_jet_of_order_zero_has_no_derivative():
     with pytest.raises(ValueError, match="order 0 carries no derivative"):
         jn.Jet([1.0]).differentiate()

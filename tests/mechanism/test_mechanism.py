@@ -236,7 +236,7 @@ class TestTimeGrid:
             ([], "at least one instant"),
             ([[0.0, 1.0]], "list of at least one"),
             (5.0, "list of at least one"),
-            ("abc", "must be numbers"),
+            ("abc", "must be real numbers"),
             ([0, 0], r"time\[1\].*increase strictly"),
             ([0, 2, 1], r"time\[2\].*increase strictly"),
             ([0, np.nan], r"time\[1\].*finite"),

@@ -113,12 +113,16 @@ PRODUCTS = [[1.0, 0.1, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
         (lambda: jn.Inertia(0.0), "mass: must be greater than zero, got 0.0"),
         (lambda: jn.Inertia(-1.0), "mass: must be greater than zero, got -1.0"),
         (lambda: jn.Inertia(np.nan), "mass: must be finite, got nan"),
+        (
+            lambda: jn.Inertia(1.0, tensor=np.full(3, 1j)),
+            "tensor: must be real numbers, got array([0.+1.j, 0.+1.j, 0.+1.j])",
+        ),
         (lambda: jn.Inertia(1.0, [0, 0]), "center_of_mass: must have the shape (3,), not (2,)"),
         (lambda: jn.Inertia(1.0, [0, 0, np.inf]), "center_of_mass: must be finite, got [0.0, 0.0, inf]"),
         (lambda: jn.Inertia(1.0, tensor=1.0), "tensor: must have the shape (3, 3) or (3,), not ()"),
         (
             lambda: jn.Inertia(1.0, tensor=[[1.0], [2.0, 3.0]]),
-            "tensor: must be made of numbers, got [[1.0], [2.0, 3.0]]",
+            "tensor: must be real numbers, got [[1.0], [2.0, 3.0]]",
         ),
         (
             lambda: jn.Inertia(1.0, tensor=PRODUCTS),

@@ -66,7 +66,8 @@ REFUSED = [
         "joints.a.type: no joint has this type, got 'floating'; valid: continuous, fixed, prismatic, revolute",
     ),
     (lambda: joint(position=[0, 0]), "joints.a.position: must have the shape (3,), not (2,)"),
-    (lambda: joint(position="here"), "joints.a.position: must be made of numbers, got 'here'"),
+    (lambda: joint(position="here"), "joints.a.position: must be real numbers, got 'here'"),
+    (lambda: joint(position=np.array([1j])), "joints.a.position: must be real numbers, got array([0.+1.j])"),
     (lambda: joint(position=[0, 0, np.nan]), "joints.a.position: must be finite, got [0.0, 0.0, nan]"),
     (lambda: joint(rotation=np.eye(4)), "joints.a.rotation: must have the shape (3, 3), not (4, 4)"),
     (

@@ -54,7 +54,7 @@ def test_samples_of_uneven_steps_and_large_times(degree):
         ([0, 1, 2], [0, 1, 2], 12, "from 1 to 11"),
         ([0, 1, 2], [0, 1, 2], True, "from 1 to 11"),
         ([0, 1, 2], [0, 1, math.inf], 1, "finite"),
-        ([0, "a", 2], [0, 1, 2], 1, "must be lists of numbers"),
+        ([0, "a", 2], [0, 1, 2], 1, "times: must be real numbers"),
         ([0, 1, 2], [0, 1], 1, "one value for each time"),
     ],
 )

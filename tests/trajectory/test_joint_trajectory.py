@@ -223,6 +223,11 @@ BAD = [
         "a: must be greater|duration: must be",
     ),
     (lambda: JointTrajectory.point_to_point(["a"], [1.0], [1.0], limits=[1, 1, 1]), "the start is the end"),
+    (lambda: JointTrajectory.from_samples(SAMPLES, np.full((101, 1), 1j), ["a"]), "values: must be real numbers, got"),
+    (lambda: JointTrajectory.from_samples(SAMPLES + 0j, np.zeros((101, 1)), ["a"]), "times: must be real numbers, got"),
+    (lambda: JointTrajectory({"a": np.complex128(1j)}, 0.0, 1.0), r"laws\.a: a law is a motion"),
+    (lambda: JointTrajectory({"a": 1.0}, 0.0, 1.0).derivatives(np.array([0.5j]), 1), "times: must be real numbers"),
+    (lambda: JointTrajectory.point_to_point(["a"], np.array([1j]), [1.0], duration=1.0), "start: must be real numbers"),
 ]
 
 

@@ -173,7 +173,7 @@ def test_outside_the_knots_the_end_segments_go_on():
         (([0.0, 1.0, 1.0], [0.0] * 3), r"times\[2\]: times of samples must increase, got 1.0; this one repeats"),
         (([0.0, 2.0, 1.0], [0.0] * 3), r"times\[2\]: .*got 1.0; this one comes before"),
         (([0.0, 1.0, 2.0], [0.0, math.nan, 0.0]), r"values\[1\]: samples must be finite, got nan"),
-        ((["a", 1.0], [0.0, 1.0]), "lists of numbers"),
+        ((["a", 1.0], [0.0, 1.0]), "times: must be real numbers"),
         ((KNOTS[:5], VALUES[:5], 4), "at least 6 knots, got 5; give more, or conditions"),
         ((KNOTS, VALUES, 0), "continuity: must be a whole number from 1 to 10, got 0"),
         ((KNOTS, VALUES, 4, 5), "derivative: must be a whole number from 0 to 4, got 5"),

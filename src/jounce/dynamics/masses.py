@@ -10,7 +10,7 @@ from jaxtyping import Float
 from jounce.errors import MechanismError
 from jounce.mechanism import Mechanism
 from jounce.mechanism.masses import body_mass
-from jounce.mechanism.resolve import resolve
+from jounce.mechanism.resolve import resolved
 from jounce.mechanism.system import POSITION_COMPONENTS
 from jounce.shapes import Numbers
 
@@ -88,7 +88,13 @@ def check_loads(mechanism: Mechanism, name: str = "bodies") -> None:
 
 
 def gravity_of(mechanism: Mechanism) -> Gravity:
-    """Return the acceleration of free fall in a mechanism, m/s^2; zero unless given."""
+    """Return the acceleration of free fall in a mechanism, m/s^2; zero unless given.
+
+    Raises
+    ------
+    MechanismError
+        If it is no vector of finite numbers.
+    """
     size = POSITION_COMPONENTS[mechanism.space]
     given = [0.0] * size if mechanism.gravity is None else mechanism.gravity
-    return resolve(given, mechanism.parameter_values)[:, None, None]
+    return resolved(given, "gravity", "vector", size, mechanism.parameter_values)[:, None, None]

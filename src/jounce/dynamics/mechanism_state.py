@@ -18,6 +18,7 @@ from jounce.mechanism.law_checks import check_laws
 from jounce.rigid import SpatialPose
 from jounce.rigid.euler_parameters import euler_parameters
 from jounce.rigid.pose import Pose
+from jounce.shapes import real_numbers
 
 
 class MotionAtState(Motion):
@@ -118,10 +119,7 @@ def _check_order(name: str, found: int, order: int) -> None:
 
 def _array(name: str, value: Any, shape: tuple[int, ...]) -> Float[np.ndarray, "..."]:
     """Return finite numbers: of a shape, or where it is not empty, one of them or a list of them."""
-    try:
-        found = np.array(value, float)
-    except (TypeError, ValueError):
-        raise MechanismError("must be numbers", name=name, value=value) from None
+    found = np.array(real_numbers(name, value, MechanismError))
     if shape:
         scalar = shape == (1,)
         if found.ndim == len(shape) - scalar:

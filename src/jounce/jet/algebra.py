@@ -78,7 +78,10 @@ class Jet:
     @classmethod
     def from_derivatives(cls, derivatives: Iterable[ArrayLike]) -> "Jet":
         """Return the jet whose plain derivatives ``x, x', x'', ...`` stand along the leading axis."""
-        return cls(jnp.asarray(x, float) * (1 / math.factorial(k)) for k, x in enumerate(derivatives))
+        given = list(derivatives)
+        if any(jnp.issubdtype(getattr(x, "dtype", float), jnp.complexfloating) for x in given):
+            raise ValueError("derivatives must be real numbers, got complex ones")
+        return cls(jnp.asarray(x, float) * (1 / math.factorial(k)) for k, x in enumerate(given))
 
     def derivatives(self) -> jax.Array:
         """Return the plain derivatives ``x, x', x'', ...`` along a new leading axis."""

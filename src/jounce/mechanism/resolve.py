@@ -163,7 +163,8 @@ def parameter_value(name: str, value: Any) -> Any:
     if isinstance(value, Tracer):
         return value
     try:
-        number = float(value) if np.shape(value) == () and not isinstance(value, bool | np.bool_) else np.nan
+        real = np.shape(value) == () and not isinstance(value, bool | np.bool_ | np.complexfloating)
+        number = float(value) if real else np.nan
     except (TypeError, ValueError):
         number = np.nan
     if not np.isfinite(number):

@@ -9,6 +9,7 @@ from jaxtyping import Float, Int
 
 from jounce.errors import MechanismError
 from jounce.mechanism.resolve import resolve
+from jounce.shapes import real_numbers
 
 MAX_INSTANTS = 10_000_000
 
@@ -88,10 +89,7 @@ def instants_of(time: Any, parameters: Mapping[str, Any]) -> Instants:
         raise MechanismError("no time grid is given, by the mechanism or by the call", name="time")
     if isinstance(time, TimeGrid):
         return _spaced(time, parameters)
-    try:
-        instants = np.asarray(time, float)
-    except (TypeError, ValueError):
-        raise MechanismError("the instants must be numbers", name="time", value=time) from None
+    instants = real_numbers("time", time, MechanismError)
     if instants.ndim != 1 or not instants.size:
         raise MechanismError("the time grid must be a list of at least one instant", name="time", value=time)
     if not np.isfinite(instants).all():

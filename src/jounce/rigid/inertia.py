@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from jounce.errors import RobotError, check_choice, did_you_mean
 from jounce.rigid.solids import SOLIDS, pseudo_parts, solid_moments
-from jounce.shapes import Numbers
+from jounce.shapes import Numbers, real_numbers
 
 ROUNDING = 1e-5  # of the largest principal moment: what files with six digits may miss a possible tensor by
 ADVICE = "check the units, the signs of the products of inertia and the axes"
@@ -292,12 +292,9 @@ def finite_numbers(name: str, value: Any, *shapes: tuple[int, ...]) -> np.ndarra
     Raises
     ------
     RobotError
-        If the value is not made of numbers, its shape is another one, or a number is not finite.
+        If the value is not made of real numbers, its shape is another one, or a number is not finite.
     """
-    try:
-        array = np.array(value, float)
-    except (TypeError, ValueError):
-        raise RobotError("must be made of numbers", name=name, value=value) from None
+    array = np.array(real_numbers(name, value, RobotError))
     if shapes and array.shape not in shapes:
         wanted = " or ".join(map(str, shapes))
         raise RobotError(f"must have the shape {wanted}, not {array.shape}", name=name)

@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from jounce import errors
 from jounce.errors import JounceError, TrajectoryError
-from jounce.shapes import ArrayLike
+from jounce.shapes import ArrayLike, real_numbers
 
 whole_number = partial(errors.whole_number, error=TrajectoryError)
 
@@ -17,7 +17,7 @@ whole_number = partial(errors.whole_number, error=TrajectoryError)
 def finite(name: str, value: Any) -> float:
     """Return a finite number."""
     try:
-        number = float(value)
+        number = math.nan if np.iscomplexobj(value) else float(value)
     except (TypeError, ValueError):
         number = math.nan
     if isinstance(value, str | bool) or not math.isfinite(number):
@@ -35,10 +35,7 @@ def positive(name: str, value: Any) -> float:
 
 def finite_numbers(name: str, values: ArrayLike, shape: tuple[int, ...] | None) -> Float[np.ndarray, "..."]:
     """Return finite numbers of a shape; of any one axis when none is given."""
-    try:
-        array = np.asarray(values, float)
-    except (TypeError, ValueError):
-        raise TrajectoryError("must be numbers", name=name, value=values) from None
+    array = real_numbers(name, values, TrajectoryError)
     if (array.ndim != 1 or not array.size) if shape is None else array.shape != shape:
         wanted = "one axis of at least one number" if shape is None else f"the shape {shape}"
         raise TrajectoryError(f"must have {wanted}", name=name, value=f"shape {array.shape}")
@@ -51,10 +48,7 @@ def check_samples(
     times: ArrayLike, values: ArrayLike, error: type[JounceError] = TrajectoryError
 ) -> tuple[Float[np.ndarray, " samples"], Float[np.ndarray, "samples *columns"]]:
     """Return times and values of samples: finite, two at least, a value or row for each time, times that increase."""
-    try:
-        times, values = np.asarray(times, float), np.asarray(values, float)
-    except (TypeError, ValueError):
-        raise error("times and values must be lists of numbers of equal length") from None
+    times, values = (real_numbers(name, x, error) for name, x in (("times", times), ("values", values)))
     if times.ndim != 1 or values.ndim < 1 or len(times) != len(values):
         shapes = f"shapes {times.shape} and {values.shape}"
         raise error("samples need one value for each time; give lists of equal length", value=shapes)

@@ -353,7 +353,7 @@ def _law(name: Any, law: Any) -> AbstractMotion:
         raise TrajectoryError("the name of a joint must be text", name="laws", value=name)
     if isinstance(law, AbstractMotion):
         return law
-    if isinstance(law, bool) or not isinstance(law, str | int | float | np.number | Expression):
+    if isinstance(law, bool) or not isinstance(law, str | int | float | np.integer | np.floating | Expression):
         raise TrajectoryError("a law is a motion, an expression of t, or a number", name=f"laws.{name}", value=law)
     try:
         return ExpressionMotion(law if isinstance(law, str | Expression) else repr(float(law)))

@@ -139,6 +139,8 @@ def test_instants_outside_are_refused(arm, swing):
     for times in ([-0.1], [2.1], [np.nan], [[0.1]]):
         with pytest.raises(jn.TrajectoryError, match="from 0 to 2 s"):
             found.at(times)
+    with pytest.raises(jn.TrajectoryError, match="times: must be real numbers"):
+        found.at(np.array([0.1j]))
 
 
 @pytest.mark.parametrize("seed", [1, 2])
@@ -205,6 +207,8 @@ def test_loops_followers_and_shapes_are_refused(arm):
         jn.feedforward(arm, np.zeros((4, 2)), DRIVES)
     with pytest.raises(jn.JounceError, match="at most"):
         jn.feedforward(arm, np.zeros((5, 2)), DRIVES, rates=25)
+    with pytest.raises(jn.TrajectoryError, match="times: must be real numbers"):
+        jn.feedforward(arm, jn.JointTrajectory({"elbow": "t"}, 0.0, 1.0), DRIVES, times=np.array([0.5j]))
     with pytest.raises(jn.TrajectoryError, match="within"):
         jn.feedforward(arm, jn.JointTrajectory({"elbow": "t"}, 0.0, 1.0), DRIVES, times=[0.5, 1.5])
 

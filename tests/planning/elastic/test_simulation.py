@@ -32,6 +32,8 @@ def test_what_does_not_fit_is_refused(arm):
         jn.simulate_elastic(arm, DRIVES, [0.0, 1.0], driven={"elbow": "t"})
     with pytest.raises(jn.RobotError, match="shape"):
         jn.simulate_elastic(arm, DRIVES, [0.0, 1.0], state=[0.0, 1.0])
+    with pytest.raises(jn.RobotError, match="state: must be real numbers"):
+        jn.simulate_elastic(arm, DRIVES, [0.0, 1.0], state=np.zeros((2, 2)) + 1j)
     with pytest.raises(jn.RobotError, match="law of time"):
         jn.simulate_elastic(arm, DRIVES, [0.0, 1.0], {"elbow": [1.0]})
     hinge = jn.load("examples/hooke_joint.yaml")

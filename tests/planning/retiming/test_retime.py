@@ -217,6 +217,8 @@ def test_a_result_is_a_trajectory_like_others():
         ([[0.0], [0.0]], "does not move"),
         ([[0.0], [1.0], [1.0], [2.0]], "waypoint 3 is the same"),
         ([[0.0], [np.nan]], "finite"),
+        (np.array([[0.0], [1j]]), "path: must be waypoints of real numbers"),
+        ({"slide": [0.0, 1j]}, "path: must be waypoints of real numbers"),
         ({"slide": "abs(s - 0.3)"}, "kink"),
         ({"slide": "s + q"}, "unknown name 'q'"),
         ({"slid": "s"}, "did you mean 'slide'"),

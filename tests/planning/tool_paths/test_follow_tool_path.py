@@ -252,6 +252,7 @@ def test_bad_paths_are_told(make, words):
         ({"weights": [1.0, 0.0]}, "greater than zero"),
         ({"posture": [1.0]}, "2 finite numbers"),
         ({"time": [5.0]}, "instants from 0"),
+        ({"time": np.array([0.5j])}, "time: must be real numbers"),
         ({"order": -1}, "whole number"),
     ],
 )

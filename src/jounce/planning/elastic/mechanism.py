@@ -23,6 +23,7 @@ from jounce.mechanism.resolve import resolve
 from jounce.planning.elastic.driven_systems import DrivenMechanism
 from jounce.planning.elastic.drives import Drive, DriveArrays
 from jounce.planning.elastic.motor_torques import MOTOR, torques_of
+from jounce.shapes import real_numbers
 from jounce.trajectory import AbstractMotion
 
 
@@ -108,7 +109,7 @@ def _start(mechanism: Mechanism, arrays: DriveArrays, state: object, instant: fl
         motion = solve(mechanism, [instant], order=1)
         own = np.stack([motion.driver(name).values[0] for name in arrays.names], axis=-1)
         return np.stack([own, own])
-    found = np.asarray(state, float)
+    found = real_numbers("state", state, MechanismError)
     if found.shape != (2, 2, n) or not np.isfinite(found).all():
         message = f"must hold finite coordinates and rates of drivers and of motors, the shape (2, 2, {n})"
         raise MechanismError(message, name="state", value=found.tolist())

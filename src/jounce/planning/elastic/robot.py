@@ -22,6 +22,7 @@ from jounce.planning.elastic.drives import Drive, DriveArrays
 from jounce.planning.elastic.motor_torques import MOTOR, torques_of
 from jounce.robot import Joint, Link, Robot
 from jounce.robot.joint_laws import AbstractJointLaws
+from jounce.shapes import real_numbers
 from jounce.trajectory import AbstractMotion
 
 
@@ -149,7 +150,8 @@ def _start(
     arrays: DriveArrays, state: object, count: int, links: tuple[int, ...], motors: tuple[int, ...]
 ) -> np.ndarray:
     """Return q and q' of links and rotors; springs are relaxed, and rotors move with the links, unless given."""
-    n, given = len(arrays.names), np.zeros((2, len(arrays.names))) if state is None else np.asarray(state, float)
+    n = len(arrays.names)
+    given = np.zeros((2, n)) if state is None else real_numbers("state", state, RobotError)
     if given.shape not in ((2, n), (2, 2, n)) or not np.isfinite(given).all():
         message = f"must hold finite q and q' of the links, the shape (2, {n}), or of links and motors, (2, 2, {n})"
         raise RobotError(message, name="state", value=given.tolist())

@@ -75,7 +75,7 @@ def path_of(path: Any, names: Sequence[str] | None = None, order: int = 1) -> Pa
         names, lists = list(given), list(given.values())
         if len({np.shape(x) for x in lists}) != 1:
             raise TrajectoryError("waypoints of all joints must be equally many", name="path")
-        path = np.stack([np.asarray(x, float) for x in lists], axis=-1)
+        path = np.stack(lists, axis=-1)
     points = _numbers(path)
     if names is None or points.shape[1] != len(names):
         wanted = "" if names is None else f" with {len(names)} joints: {', '.join(names)}"
@@ -204,9 +204,12 @@ def _law(name: str, law: Any) -> AbstractMotion:
 
 def _numbers(path: Any) -> np.ndarray:
     try:
-        points = np.asarray(path, float)
+        points = None if np.iscomplexobj(path) else np.asarray(path, float)
     except (TypeError, ValueError):
-        raise TrajectoryError("must be waypoints, expressions of s, or a trajectory", name="path", value=path) from None
+        points = None
+    if points is None:
+        message = "must be waypoints of real numbers, expressions of s, or a trajectory"
+        raise TrajectoryError(message, name="path", value=path)
     if points.ndim != 2 or len(points) < 2:
         message = "waypoints have the shape (points, joints), two points at least"
         raise TrajectoryError(message, name="path", value=f"shape {points.shape}")

@@ -22,7 +22,7 @@ from jounce.robot.arguments import whole_number
 from jounce.robot.batches import Batched
 from jounce.robot.robot import Robot
 from jounce.robot.tree import Tree
-from jounce.shapes import ArrayLike
+from jounce.shapes import ArrayLike, real_numbers
 from jounce.trajectory import HermiteMotion
 from jounce.trajectory.joint_trajectory import MAX_ORDER, JointTrajectory
 
@@ -258,7 +258,8 @@ class ToolPathMotion(Displayed):
 
 
 def _instants(path: ToolPath, time: Any) -> np.ndarray:
-    instants = np.linspace(path.start, path.stop, INSTANTS) if time is None else np.atleast_1d(np.asarray(time, float))
+    given = np.linspace(path.start, path.stop, INSTANTS) if time is None else time
+    instants = np.atleast_1d(real_numbers("time", given, TrajectoryError))
     slack = 1e-9 * (path.stop - path.start)
     outside = ~((instants >= path.start - slack) & (instants <= path.stop + slack))
     if instants.ndim != 1 or outside.any():
