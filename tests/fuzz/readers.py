@@ -102,18 +102,23 @@ CAM_BESIDE = {"cam.yaml": SAMPLED.replace("lift.csv", "case.csv")}
 ROBOTS = EXAMPLES / "robots"
 INCLUDED = """<mujoco model="m"><include file="part.xml"/><default><joint damping="1"/></default>
 <worldbody><body name="a" pos="0 0 1"><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>
-<joint name="j" type="hinge" axis="0 1 0" range="-90 90"/><body name="b"><joint name="k" type="slide"/>
+<joint name="j" type="hinge" axis="0 1 0" range="-90 90" stiffness="2"/>
+<body name="b" gravcomp="1"><joint name="k" type="slide"/>
 <geom type="mesh" mesh="part" density="10"/></body></body></worldbody><asset><mesh name="part" file="part.obj"/></asset>
 <equality><joint joint1="k" joint2="j" polycoef="0 1 0 0 0"/></equality>
-<actuator><motor joint="j" forcerange="-3 3" ctrlrange="-1 1"/></actuator></mujoco>
+<actuator><motor joint="j" forcerange="-3 3" ctrlrange="-1 1"/>
+<motor tendon="f" armature="1"/></actuator><option density="1.2"/>
+<tendon><fixed name="f" damping="1"><joint joint="j" coef="1"/></fixed></tendon></mujoco>
 """
 EVERY_JOINT = """<sdf version="1.9"><model name="m"><frame name="f" attached_to="a">
 <pose degrees="true">1 0 0 0 90 0</pose></frame><link name="a"/><link name="b">
 <pose relative_to="f">1 0 0 0 0 0</pose></link><link name="c"><inertial><mass>2</mass><inertia>
-<ixx>1</ixx><ixy>0.1</ixy></inertia></inertial></link><link name="d"/><link name="e"/>
+<ixx>1</ixx><ixy>0.1</ixy></inertia></inertial></link>
+<link name="d"><velocity_decay><linear>1</linear></velocity_decay></link><link name="e"/>
 <joint name="j" type="revolute"><parent>a</parent><child>b</child><axis>
 <xyz expressed_in="f">1 0 0</xyz><limit><lower>-1</lower></limit></axis></joint>
-<joint name="k" type="continuous"><parent>c</parent><child>a</child><axis/></joint>
+<joint name="k" type="continuous"><parent>c</parent><child>a</child><axis><dynamics>
+<spring_stiffness>2</spring_stiffness></dynamics></axis></joint>
 <joint name="g" type="gearbox"><parent>b</parent><child>c</child><gearbox_ratio>3</gearbox_ratio>
 <gearbox_reference_body>a</gearbox_reference_body><axis><xyz>0 0 -1</xyz></axis><axis2/></joint>
 <joint name="u" type="universal"><parent>c</parent><child>d</child><axis><xyz>1 0 0</xyz></axis>
