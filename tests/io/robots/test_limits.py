@@ -187,6 +187,23 @@ def test_what_a_payload_cannot_be(robot, text, message):
     assert message in str(raised.value)
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "joints: {panda_joint1: {jounce: 100}}",
+        "joints: {panda_joint1: {velocity: {q: [0, 1], value: [1, 2]}}}",
+        "points: {panda_hand: {point: [0, 0, 0], speed: 1}}",
+    ],
+)
+def test_a_limit_of_any_further_kind_is_not_left_out(tmp_path, text):
+    path = tmp_path / "limits.yaml"
+    path.write_text(text)
+    robot = load_robot("examples/robots/panda.urdf")
+    load_motion_limits(path, robot)
+    with pytest.raises(jn.RobotError, match="load_motion_limits"):
+        load_limits(path, robot)
+
+
 def test_limits_of_all_kinds_are_read_for_retiming(tmp_path):
     robot = load_robot("examples/robots/panda.urdf")
     found = load_motion_limits("examples/limits/panda_careful.yaml", robot)
