@@ -6,7 +6,7 @@ by a jet, and all poses follow from it to first order by the factored Jacobian, 
 
 import dataclasses
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import equinox as eqx
 import jax
@@ -31,6 +31,9 @@ from jounce.modules import Module
 from jounce.rigid.pose import Pose
 from jounce.shapes import ArrayLike, Numbers
 
+if TYPE_CHECKING:
+    import xarray
+
 
 class ChangedLaw(Module):
     """The laws of a group of drivers, changed by jets."""
@@ -45,7 +48,7 @@ class ChangedLaw(Module):
 
 def in_driver_coordinates(
     motion: Motion, q: ArrayLike | None, least: int, form: Callable[..., Any], static: tuple[Any, ...]
-) -> Any:
+) -> "xarray.DataArray":
     """Return what a form of the equations of motion gives in the coordinates of the drivers.
 
     Parameters
@@ -106,7 +109,7 @@ def drivers_of(motion: Motion) -> tuple[str, ...]:
     return names
 
 
-def balanced(motion: Motion, rates: int, *, gravity: bool) -> Any:
+def balanced(motion: Motion, rates: int, *, gravity: bool) -> "xarray.DataArray":
     """Return what inertia asks of the drivers, and on request weight too, by multipliers: nothing applied acts.
 
     Parameters

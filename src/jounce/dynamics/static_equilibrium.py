@@ -22,6 +22,8 @@ from jounce.mechanism import Body, Mechanism, build, check_mechanism, time_grid
 from jounce.mechanism.law_checks import check_laws
 from jounce.mechanism.preconditions import concrete
 from jounce.robot import Robot
+from jounce.robot.closures import GivenCoordinates
+from jounce.shapes import Real
 
 METHODS = ("settle", "newton")
 SINGULAR = "the position is singular, joints can move there that cannot elsewhere; what is near is not told"
@@ -168,12 +170,12 @@ def _posed(body: Body, pose: dict[str, Any]) -> Body:
 
 @concrete
 def equilibrium(
-    mechanism: Any,
-    time: Any = None,
+    mechanism: Mechanism | Robot,
+    time: Real | None = None,
     *,
     without: Sequence[str] = (),
     method: str = "settle",
-    q: Any = None,
+    q: GivenCoordinates = None,
     hold: str | Sequence[str] = (),
     torques: Mapping[str, float] | None = None,
 ) -> Equilibrium:
@@ -239,7 +241,9 @@ def equilibrium(
     return told(found, start, of_robot=robot)
 
 
-def as_mechanism(subject: Any, q: Any, hold: Any, torques: Mapping[str, float] | None) -> Any:
+def as_mechanism(
+    subject: Mechanism | Robot, q: GivenCoordinates, hold: str | Sequence[str], torques: Mapping[str, float] | None
+) -> Mechanism:
     """Return a robot as the mechanism that stands with some joints held, or a mechanism as it is.
 
     Raises
@@ -255,7 +259,7 @@ def as_mechanism(subject: Any, q: Any, hold: Any, torques: Mapping[str, float] |
     return subject
 
 
-def at_rest_from(mechanism: Mechanism, time: Any, without: Sequence[str], method: str) -> Place:
+def at_rest_from(mechanism: Mechanism, time: Real | None, without: Sequence[str], method: str) -> Place:
     """Return the mechanism at rest where its bodies can be put together, or raise where something is not valid."""
     check_mechanism(mechanism)
     check_choice("method", method, METHODS, MechanismError)
@@ -290,7 +294,7 @@ def _outputs_without(mechanism: Mechanism, drivers: dict[str, Any]) -> dict[str,
     return {name: output for name, output in mechanism.outputs.items() if fits(output)}
 
 
-def _instant(mechanism: Mechanism, time: Any) -> float:
+def _instant(mechanism: Mechanism, time: Real | None) -> float:
     if time is None:
         given = mechanism.time
         return 0.0 if given is None else float(time_grid(given, mechanism.parameter_values)[0])

@@ -41,7 +41,7 @@ from jounce.mechanism.axis_angles import AttitudeHistory
 from jounce.mechanism.held_outputs import led_outputs
 from jounce.mechanism.law_checks import check_laws
 from jounce.mechanism.preconditions import concrete
-from jounce.mechanism.time import Instants, instants_of
+from jounce.mechanism.time import Instants, TimeLike, instants_of
 
 LOWEST_ORDER = 4  # of the jets inside: predictions need some, also where the user wants positions only
 HIGHEST_ORDER = 30
@@ -80,7 +80,7 @@ def lost_orders(mechanism: Mechanism) -> int:
 @partial(concrete, traced=_differentiated)
 def solve(
     mechanism: Mechanism,
-    time: Any = None,
+    time: TimeLike | None = None,
     order: int = 4,
     *,
     tolerance: float = 1e-12,
@@ -158,7 +158,7 @@ def solve(
 @concrete
 def solve_in_stretches(
     mechanism: Mechanism,
-    time: Any = None,
+    time: TimeLike | None = None,
     order: int = 4,
     *,
     tolerance: float = 1e-12,

@@ -17,6 +17,7 @@ from jounce.forces import AbstractForce
 from jounce.forces.actuators import SlideForce
 from jounce.forces.laws import ExpressionLaw, TimeLaw
 from jounce.integrate import Simulation, simulate
+from jounce.integrate.options import SimulationOptions
 from jounce.kinematics.solve import solve
 from jounce.mechanism import Body, Mechanism, time_grid
 from jounce.mechanism.resolve import resolve
@@ -83,7 +84,7 @@ def simulate_elastic_mechanism(
     torque: object,
     state: object,
     order: int,
-    options: Mapping[str, Any],
+    options: SimulationOptions,
 ) -> Simulation:
     """Return the motion of a mechanism with elastic drives under torques of its motors; see `simulate_elastic`."""
     arrays = DrivenMechanism(mechanism, time, drives).arrays
