@@ -2,7 +2,6 @@
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from typing import Any, Unpack, overload
 
 import jax
@@ -31,7 +30,7 @@ from jounce.kinematics.motion import check_output, output_group
 from jounce.kinematics.rehearsal import first_time, rehearsed
 from jounce.mechanism import Mechanism, check_mechanism
 from jounce.mechanism.law_checks import check_laws
-from jounce.mechanism.preconditions import concrete
+from jounce.mechanism.preconditions import concrete_or
 from jounce.mechanism.time import TimeLike
 from jounce.robot import BaseMotion, Robot
 from jounce.robot.joint_laws import GivenLaws
@@ -77,7 +76,7 @@ def simulate(
     base: BaseMotion | None = None,
     wrenches: Sequence[Wrench] = (),
 ) -> RobotSimulation: ...
-@partial(concrete, traced=traced_simulation)
+@concrete_or(traced_simulation)
 def simulate(
     mechanism: Mechanism | Robot,
     time: TimeLike | None = None,

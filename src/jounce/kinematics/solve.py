@@ -40,7 +40,7 @@ from jounce.mechanism import (
 from jounce.mechanism.axis_angles import AttitudeHistory
 from jounce.mechanism.held_outputs import led_outputs
 from jounce.mechanism.law_checks import check_laws
-from jounce.mechanism.preconditions import concrete
+from jounce.mechanism.preconditions import concrete, concrete_or
 from jounce.mechanism.time import Instants, TimeLike, instants_of
 
 LOWEST_ORDER = 4  # of the jets inside: predictions need some, also where the user wants positions only
@@ -77,7 +77,7 @@ def lost_orders(mechanism: Mechanism) -> int:
     return max((output.lost_orders for output in mechanism.outputs.values()), default=0)
 
 
-@partial(concrete, traced=_differentiated)
+@concrete_or(_differentiated)
 def solve(
     mechanism: Mechanism,
     time: TimeLike | None = None,
