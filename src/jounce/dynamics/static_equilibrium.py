@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from jounce.display import Displayed
+from jounce.dynamics.kinks import kinked
 from jounce.dynamics.masses import check_loads
 from jounce.dynamics.reduction import Place, Reduction, reduced
 from jounce.dynamics.robot_states import standing
@@ -96,8 +97,6 @@ class Equilibrium(Displayed):
     @cached_property
     def cautions(self) -> tuple[str, ...]:
         """What was left out of account."""
-        from jounce.dynamics.kinks import kinked
-
         found = (
             [
                 f"forces.{name} has a kink or a jump there: its slope is not the same on both sides"

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
+import jax.numpy as jnp
 import numpy as np
 
 from jounce.errors import TrajectoryError
+from jounce.jet import Jet
 from jounce.plot.style import GREY, LINE_COLOURS, blank_figure, set_ticks, shown_name, style
 
 __all__ = ["draw_retiming"]
@@ -67,10 +69,6 @@ def draw_retiming(found: Any, title: str = "") -> Any:
 
 
 def _draw_rate(found: Any, axes: Any) -> None:
-    import jax.numpy as jnp
-
-    from jounce.jet import Jet
-
     times = np.linspace(0.0, found.stop, 1001)
     s = np.asarray(found.progress(Jet.variable(jnp.asarray(times), 1)).derivatives())
     length = found.path.stop - found.path.start

@@ -208,10 +208,6 @@ class Feedforward(MotorMotion):
         """
         return self._laws(lambda times: self._found(times, friction=friction).torque[:, 0])
 
-    def position_laws(self) -> dict[str, AbstractMotion]:
-        """Return the motor positions, seen at the joints, as laws of time, of polynomials exact to rounding."""
-        return self._laws(lambda times: self._found(times).position[:, 0])
-
     def rigid_torque_laws(self, *, friction: bool = True) -> dict[str, AbstractMotion]:
         """Return what the motor torques are without the acceleration of the springs: ``tau + B q''``, as laws."""
 
