@@ -24,7 +24,7 @@ SAME = 1e-6  # rad or sizes of the mechanism: positions as near count as one
 @concrete
 def equilibria(
     mechanism: Mechanism | Robot,
-    time: Real | None = None,
+    time: Real | Refused | None = None,
     *,
     starts: int | Refused = 100,
     seed: int | Refused = 0,

@@ -24,7 +24,7 @@ from jounce.mechanism.law_checks import check_laws
 from jounce.mechanism.preconditions import concrete
 from jounce.robot import Robot
 from jounce.robot.closures import GivenCoordinates
-from jounce.shapes import Real
+from jounce.shapes import Real, Refused
 
 METHODS = ("settle", "newton")
 SINGULAR = "the position is singular, joints can move there that cannot elsewhere; what is near is not told"
@@ -170,7 +170,7 @@ def _posed(body: Body, pose: dict[str, Any]) -> Body:
 @concrete
 def equilibrium(
     mechanism: Mechanism | Robot,
-    time: Real | None = None,
+    time: Real | Refused | None = None,
     *,
     without: Sequence[str] = (),
     method: str = "settle",
@@ -258,7 +258,7 @@ def as_mechanism(
     return subject
 
 
-def at_rest_from(mechanism: Mechanism, time: Real | None, without: Sequence[str], method: str) -> Place:
+def at_rest_from(mechanism: Mechanism, time: Real | Refused | None, without: Sequence[str], method: str) -> Place:
     """Return the mechanism at rest where its bodies can be put together, or raise where something is not valid."""
     check_mechanism(mechanism)
     check_choice("method", method, METHODS, MechanismError)
@@ -293,7 +293,7 @@ def _outputs_without(mechanism: Mechanism, drivers: dict[str, Any]) -> dict[str,
     return {name: output for name, output in mechanism.outputs.items() if fits(output)}
 
 
-def _instant(mechanism: Mechanism, time: Real | None) -> float:
+def _instant(mechanism: Mechanism, time: Any) -> float:
     if time is None:
         given = mechanism.time
         return 0.0 if given is None else float(time_grid(given, mechanism.parameter_values)[0])

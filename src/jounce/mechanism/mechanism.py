@@ -327,7 +327,7 @@ def names_column(name: str) -> bool:
     return name in RESERVED_OUTPUTS or RATE_COLUMN.fullmatch(name) is not None
 
 
-def check_mechanism(given: Any) -> None:
+def check_mechanism(given: object) -> None:
     """Raise MechanismError for what is no mechanism, such as the name of a file."""
     if not isinstance(given, Mechanism):
         raise MechanismError("must be a jn.Mechanism; jn.load reads one from a file", name="mechanism", value=given)

@@ -2,7 +2,7 @@
 
 import dataclasses
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Float
@@ -14,6 +14,9 @@ from jounce.planning.elastic.drives import DriveArrays
 from jounce.planning.elastic.pieces import resolved
 from jounce.planning.elastic.spring_deflection import SpringDeflection
 from jounce.trajectory.motion import AbstractMotion
+
+if TYPE_CHECKING:
+    import xarray
 
 REST = 1e-9  # of the largest velocity of a motor, below which it is at rest
 INSTANTS = 2000  # at least, at which limits are looked at, before peaks are searched between them
@@ -224,7 +227,7 @@ class Feedforward(MotorMotion):
         return dict(zip(self.names, laws, strict=True))
 
     @property
-    def dataset(self) -> Any:
+    def dataset(self) -> "xarray.Dataset":
         """All of it as an `xarray.Dataset`, for each joint, with as many rates as there are of the torques.
 
         ``JOINT_motor`` is the motor's own position, ``JOINT_motor_velocity``, ``_acceleration`` and ``_torque`` go with
