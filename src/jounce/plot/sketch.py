@@ -18,7 +18,6 @@ from jounce.plot.name_placement import place_names
 from jounce.plot.scene import Scene, outline, scene_of
 from jounce.plot.style import GREY, blank_figure, printable, shown_name, style
 from jounce.reporting.peaks import rate_name
-from jounce.shapes import Refused
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -177,7 +176,7 @@ class SketchFigure:
 
 
 def sketch(
-    moving: Motion | Mechanism | Refused,
+    moving: Any,
     instant: float | None = None,
     *,
     names: str = "all",

@@ -21,6 +21,7 @@ from jounce.integrate.options import SimulationOptions
 from jounce.kinematics.solve import solve
 from jounce.mechanism import Body, Mechanism, time_grid
 from jounce.mechanism.resolve import resolve
+from jounce.mechanism.time import TimeLike
 from jounce.planning.elastic.driven_systems import DrivenMechanism
 from jounce.planning.elastic.drives import Drive, DriveArrays
 from jounce.planning.elastic.motor_torques import MOTOR, torques_of
@@ -80,7 +81,7 @@ SPRINGS: dict[type, type[_DriveSpring]] = {
 def simulate_elastic_mechanism(
     mechanism: Mechanism,
     drives: Mapping[str, Drive],
-    time: Any,
+    time: TimeLike | None,
     torque: object,
     state: object,
     order: int,

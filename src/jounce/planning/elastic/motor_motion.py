@@ -13,6 +13,7 @@ from jounce.planning.elastic.driven_systems import DrivenSystem
 from jounce.planning.elastic.drives import DriveArrays
 from jounce.planning.elastic.pieces import resolved
 from jounce.planning.elastic.spring_deflection import SpringDeflection
+from jounce.shapes import ArrayLike
 from jounce.trajectory.motion import AbstractMotion
 
 if TYPE_CHECKING:
@@ -131,7 +132,7 @@ class Feedforward(MotorMotion):
             deflection[..., self._arrays.elastic] = self._springs.at(times)
         return motor_motion(self._arrays, q, forces, deflection, self._rest if friction else np.inf)
 
-    def at(self, times: Any) -> "Feedforward":
+    def at(self, times: ArrayLike) -> "Feedforward":
         """Return the same at other instants of the trajectory, s.
 
         Raises

@@ -67,7 +67,7 @@ class ToolPath(Displayed):
     def __init__(
         self,
         position: Sequence[Any] | None = None,
-        orientation: Any = None,
+        orientation: "ArrayLike | AttitudeSamples | Rotation | None" = None,
         *,
         direction: Sequence[Any] | None = None,
         start: float,
