@@ -5,7 +5,7 @@ everywhere: within the library `order` first, components next, `*batch` last; at
 then `derivative`, then `joint`, `row`, `column` or a component. An axis `order` or `derivative` counts from zero.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import jax
@@ -20,6 +20,9 @@ ArrayLike = Numbers | Sequence | np.floating | np.integer | float | int
 
 Real = Numbers | np.floating | np.integer | float | int
 """Real numbers: an array or one number."""
+
+Refused = object
+"""Anything else, which a function takes only to refuse it in words: ``int | Refused`` is a whole number."""
 
 
 def is_traced(values: Any) -> bool:
@@ -42,3 +45,11 @@ def real_numbers(name: str, values: Any, error: Callable[..., Exception]) -> np.
     except (TypeError, ValueError):
         pass
     raise error("must be real numbers", name=name, value=values)
+
+
+def not_complex(derivatives: Iterable[Any]) -> list[Any]:
+    """Return derivatives as a list; a ValueError if one is complex, since JAX would drop its imaginary part."""
+    given = list(derivatives)
+    if any(np.issubdtype(getattr(x, "dtype", float), np.complexfloating) for x in given):
+        raise ValueError("derivatives must be real numbers, got complex ones")
+    return given

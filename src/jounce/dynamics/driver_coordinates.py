@@ -6,7 +6,7 @@ by a jet, and all poses follow from it to first order by the factored Jacobian, 
 
 import dataclasses
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import equinox as eqx
 import jax
@@ -33,6 +33,9 @@ from jounce.rigid.pose import Pose
 from jounce.shapes import ArrayLike, Numbers
 from jounce.trajectory.shown_units import derivative_unit
 
+if TYPE_CHECKING:
+    import xarray
+
 
 class ChangedLaw(Module):
     """The laws of a group of drivers, changed by jets."""
@@ -53,7 +56,7 @@ def in_driver_coordinates(
     static: tuple[Any, ...],
     *,
     power: int = 0,
-) -> Any:
+) -> "xarray.DataArray":
     """Return what a form of the equations of motion gives in the coordinates of the drivers.
 
     Parameters
@@ -125,7 +128,7 @@ def drivers_of(motion: Motion) -> tuple[str, ...]:
     return names
 
 
-def balanced(motion: Motion, rates: int, *, gravity: bool) -> Any:
+def balanced(motion: Motion, rates: int, *, gravity: bool) -> "xarray.DataArray":
     """Return what inertia asks of the drivers, and on request weight too, by multipliers: nothing applied acts.
 
     Parameters

@@ -8,7 +8,7 @@ for any motion. On jets the same two products give the rates.
 
 import dataclasses
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import jax.numpy as jnp
 import numpy as np
@@ -34,6 +34,9 @@ from jounce.robot.tree import Tree
 from jounce.robot.tree_scan import Series
 from jounce.shapes import ArrayLike, Numbers
 from jounce.trajectory.shown_units import derivative_unit
+
+if TYPE_CHECKING:
+    import xarray
 
 Energies = Float[Numbers, "order body time"]
 """Taylor coefficients of energies of bodies along a motion."""
@@ -275,7 +278,7 @@ def _of_bodies(
     return tuple(stacked(part) for part in function(pose_of(coordinates, pose_type), *masses, order))
 
 
-def potential_energy(motion: Motion) -> Any:
+def potential_energy(motion: Motion) -> "xarray.DataArray":
     """Return the potential energy of all bodies of a mechanism in its gravity, and its rates; zero at the origin.
 
     Parameters

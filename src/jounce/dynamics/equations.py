@@ -10,7 +10,7 @@ laws of the drivers of a mechanism (`driver_coordinates`).
 
 import math
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any, overload
 
 import jax
 import jax.numpy as jnp
@@ -30,6 +30,9 @@ from jounce.robot.robot import Robot
 from jounce.robot.tree import Tree
 from jounce.robot.tree_scan import Series
 from jounce.shapes import ArrayLike, Numbers
+
+if TYPE_CHECKING:
+    import xarray
 
 
 def catalan(p: int) -> int:
@@ -157,9 +160,17 @@ def _evaluated(
     return _of_robot(system, (checked_coordinates(system, q, least, least),), (), (form, static))
 
 
+@overload
+def energy_slope(
+    system: Robot, q: ArrayLike, *, m: int, order: int = 1, rate: int = 0, rates: int = 0
+) -> Float[Numbers, "*batch derivative joint"]: ...
+@overload
+def energy_slope(
+    system: Motion, q: None = None, *, m: int, order: int = 1, rate: int = 0, rates: int = 0
+) -> "xarray.DataArray": ...
 def energy_slope(
     system: Robot | Motion, q: ArrayLike | None = None, *, m: int, order: int = 1, rate: int = 0, rates: int = 0
-) -> Any:
+) -> "Numbers | xarray.DataArray":
     """Return the derivative of a rate of an energy with respect to ``q^(m)``: the terms of Negrean 2025, 126-134.
 
     ``dE_p^(n) / dq^(m)``, where ``E_p^(n)`` is a function of ``q, q', ..., q^(p + 1 + n)`` and all but one of them are

@@ -10,7 +10,7 @@ from jounce.dynamics.inverse import MotionForces
 from jounce.dynamics.masses import check_loads
 from jounce.errors import MechanismError, check_name, did_you_mean
 from jounce.kinematics import Motion, Status
-from jounce.mechanism import AbstractMotionOutput, AngularVelocityOutput, Mechanism, PointOutput
+from jounce.mechanism import AbstractMotionOutput, AbstractQuantity, AngularVelocityOutput, Mechanism, PointOutput
 from jounce.mechanism.driver_outputs import is_turning
 from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.resolve import resolve_element
@@ -178,7 +178,7 @@ class AppliedTorqueOutput(_AppliedOutput):
     rate_names = ("torque", *RATES)
 
 
-def component_labels(mechanism: Mechanism, output: Any) -> tuple[str, ...]:
+def component_labels(mechanism: Mechanism, output: AbstractQuantity) -> tuple[str, ...]:
     """Return the names of the components of an output of a mechanism; none where it is one number."""
     if isinstance(output, _AppliedOutput):
         several = len(mechanism.forces[output.force].velocity_names) > 1

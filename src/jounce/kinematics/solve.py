@@ -40,8 +40,8 @@ from jounce.mechanism import (
 from jounce.mechanism.axis_angles import AttitudeHistory
 from jounce.mechanism.held_outputs import led_outputs
 from jounce.mechanism.law_checks import check_laws
-from jounce.mechanism.preconditions import concrete
-from jounce.mechanism.time import Instants, instants_of
+from jounce.mechanism.preconditions import concrete, concrete_or
+from jounce.mechanism.time import Instants, TimeLike, instants_of
 
 LOWEST_ORDER = 4  # of the jets inside: predictions need some, also where the user wants positions only
 HIGHEST_ORDER = 30  # of derivatives of outputs
@@ -78,10 +78,10 @@ def lost_orders(mechanism: Mechanism) -> int:
     return max((output.lost_orders for output in mechanism.outputs.values()), default=0)
 
 
-@partial(concrete, traced=_differentiated)
+@concrete_or(_differentiated)
 def solve(
     mechanism: Mechanism,
-    time: Any = None,
+    time: TimeLike | None = None,
     order: int = 4,
     *,
     tolerance: float = 1e-12,
@@ -159,7 +159,7 @@ def solve(
 @concrete
 def solve_in_stretches(
     mechanism: Mechanism,
-    time: Any = None,
+    time: TimeLike | None = None,
     order: int = 4,
     *,
     tolerance: float = 1e-12,

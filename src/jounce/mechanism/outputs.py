@@ -10,7 +10,9 @@ from jounce.constraints.base import Vector, check_bodies
 from jounce.errors import MechanismError, check_choice
 from jounce.jet import Jet, sqrt
 from jounce.modules import Module
+from jounce.rigid import PlanarPose, SpatialPose
 from jounce.rigid.orientation import FRAMES
+from jounce.rigid.pose import Pose
 
 
 class AbstractQuantity(Module):
@@ -63,7 +65,7 @@ class AbstractOutput(AbstractQuantity):
         check_bodies(self, (self.body_count,), "takes", "be of")
 
     @abc.abstractmethod
-    def evaluate(self, *bodies: Any) -> Jet:
+    def evaluate(self, *bodies: Any, **_: Any) -> Jet:  # with both, type checkers let parameters be named
         """Return the jet of the quantity, of shape (...) or (components, ...), from the poses of the bodies."""
 
 
@@ -72,7 +74,7 @@ class PointOutput(AbstractOutput):
 
     point: Vector  # m, in the frame of the body
 
-    def evaluate(self, body):
+    def evaluate(self, body: Pose) -> Jet:
         return body.point(self.point)
 
 
@@ -82,7 +84,7 @@ class AngleOutput(AbstractOutput):
     unit = "rad"
     space = "planar"
 
-    def evaluate(self, body):
+    def evaluate(self, body: PlanarPose) -> Jet:
         return body.angle
 
 
@@ -102,7 +104,7 @@ class RelativeAngleOutput(AbstractOutput):
     turning = True
     body_count = 2
 
-    def evaluate(self, body_i, body_j):
+    def evaluate(self, body_i: SpatialPose, body_j: SpatialPose) -> Jet:
         return relative_angle(body_i, body_j, self.axis, self.vector_i, self.vector_j, self.datum)
 
 
@@ -113,7 +115,7 @@ class PlanarRelativeAngleOutput(AbstractOutput):
     space = "planar"
     body_count = 2
 
-    def evaluate(self, body_i, body_j):
+    def evaluate(self, body_i: PlanarPose, body_j: PlanarPose) -> Jet:
         return body_j.angle - body_i.angle
 
 
@@ -128,10 +130,12 @@ class AngularVelocityOutput(AbstractOutput):
     def __check_init__(self):
         check_choice("frame", self.frame, FRAMES, MechanismError)
 
-    def evaluate(self, body):
-        if hasattr(body, "angle"):
+    def evaluate(self, body: Pose) -> Jet:
+        if isinstance(body, PlanarPose):
             return body.angle.differentiate()
-        return body.global_angular_velocity() if self.frame == "global" else body.angular_velocity
+        if self.frame == "body" and body.angular_velocity is not None:
+            return body.angular_velocity
+        return body.global_angular_velocity()
 
 
 class DistanceOutput(AbstractOutput):
@@ -142,6 +146,6 @@ class DistanceOutput(AbstractOutput):
 
     body_count = 2
 
-    def evaluate(self, body_i, body_j):
+    def evaluate(self, body_i: Pose, body_j: Pose) -> Jet:
         d = body_j.point(self.point_j) - body_i.point(self.point_i)
         return sqrt(d.dot(d))

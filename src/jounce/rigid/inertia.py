@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from jounce.errors import RobotError, check_choice, did_you_mean
 from jounce.rigid.solids import SOLIDS, pseudo_parts, solid_moments
-from jounce.shapes import Numbers, real_numbers
+from jounce.shapes import ArrayLike, Numbers, Real, Refused, real_numbers
 
 ROUNDING = 1e-5  # of the largest principal moment: what files with six digits may miss a possible tensor by
 ADVICE = "check the units, the signs of the products of inertia and the axes"
@@ -106,7 +106,7 @@ class Inertia:
         moments[:3, :3] = self.second_moments
         return moments + self.mass * np.outer(c, c)
 
-    def moved(self, position: Any, rotation: Any) -> "Inertia":
+    def moved(self, position: ArrayLike, rotation: ArrayLike) -> "Inertia":
         """Return the inertia of the same body in another frame.
 
         Parameters
@@ -125,11 +125,11 @@ class Inertia:
         cls,
         kind: str,
         *,
-        mass: Any = None,
-        density: Any = None,
+        mass: Real | None = None,
+        density: Real | None = None,
         axis: str = "",
-        center_of_mass: Any = (0.0, 0.0, 0.0),
-        **sizes: Any,
+        center_of_mass: ArrayLike = (0.0, 0.0, 0.0),
+        **sizes: ArrayLike,
     ) -> "Inertia":
         """Return the inertia of a homogeneous solid.
 
@@ -166,7 +166,7 @@ class Inertia:
         return cls(mass, center_of_mass, np.array(moments, float) * mass)
 
     @classmethod
-    def from_pseudo(cls, pseudo: Any, strict: bool = True) -> "Inertia":
+    def from_pseudo(cls, pseudo: ArrayLike, strict: bool = True) -> "Inertia":
         """Return the inertia that a matrix of pseudo-inertia describes: the inverse of `pseudo_inertia`.
 
         Parameters
@@ -286,7 +286,7 @@ def _check_sizes(given: dict[str, Any]) -> None:
         raise RobotError(message, name="inner_radius", value=float(given["inner_radius"]))
 
 
-def finite_numbers(name: str, value: Any, *shapes: tuple[int, ...]) -> np.ndarray:
+def finite_numbers(name: str, value: ArrayLike | Refused, *shapes: tuple[int, ...]) -> np.ndarray:
     """Return a copy of finite numbers of one of the shapes, of any shape if none is given; it cannot be written to.
 
     Raises

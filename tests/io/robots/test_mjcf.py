@@ -476,7 +476,7 @@ def test_moments_without_mass_count_as_in_mujoco_and_are_warned_of(tmp_path):
     mujoco.mj_inverse(model, data)
     torque = jn.inverse_dynamics(robot, [[0.0], [0.0], [2.0]])
     np.testing.assert_allclose(torque[0], data.qfrc_inverse, rtol=1e-14)
-    with pytest.raises(RobotFileError, match=r"line 1, links\.rotor\.inertia: has moments of inertia but no mass"):
+    with pytest.raises(RobotFileError, match=r"line 1, links\.rotor\.inertia: .*no mass"):
         load_robot(path, strict=True)
 
 
