@@ -11,7 +11,6 @@ from jaxtyping import Float
 
 from jounce.design.design_space import Sobol
 from jounce.design.variations import Variation, read_variations, reader_of, spreads
-from jounce.dynamics.outputs import component_labels
 from jounce.errors import MechanismError, UnsupportedError, check_name, did_you_mean, whole_number
 from jounce.kinematics import Motion, Status, solve, solve_batch
 from jounce.mechanism import Mechanism, check_mechanism, time_grid
@@ -147,7 +146,7 @@ def column_of(mechanism: Mechanism, name: str) -> tuple[str, str, int]:
     for output, quantity in mechanism.outputs.items():
         if plain == output:
             return output, "", order
-        if plain.startswith(f"{output}_") and plain[len(output) + 1 :] in component_labels(mechanism, quantity):
+        if plain.startswith(f"{output}_") and plain[len(output) + 1 :] in quantity.component_labels(mechanism):
             return output, plain[len(output) + 1 :], order
     known = [*mechanism.outputs]
     message = f"no output has this name; {did_you_mean(plain, known)}; components and derivatives as in C_x_d3"

@@ -10,7 +10,7 @@ from jounce.dynamics.inverse import MotionForces
 from jounce.dynamics.masses import check_loads
 from jounce.errors import MechanismError, check_name, did_you_mean
 from jounce.kinematics import Motion, Status
-from jounce.mechanism import AbstractMotionOutput, AngularVelocityOutput, Mechanism, PointOutput
+from jounce.mechanism import AbstractMotionOutput, Mechanism
 from jounce.mechanism.driver_outputs import is_turning
 from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.resolve import resolve_element
@@ -123,6 +123,11 @@ class JointForceOutput(_JointOutput):
     unit = "N"
     rate_names = ("force", *RATES)
 
+    def is_vector(self, mechanism: Mechanism) -> bool:
+        """Tell that the force has components."""
+        del mechanism
+        return True
+
     def coefficients(self, motion: Motion) -> Numbers:
         """Return the Taylor coefficients of the force, (levels, components, time)."""
         return MotionForces.of(motion).unique(lambda forces: self._wrench(forces, motion.mechanism, None)[0])
@@ -139,6 +144,10 @@ class JointTorqueOutput(_JointOutput):
     unit = "N*m"
     rate_names = ("torque", *RATES)
 
+    def is_vector(self, mechanism: Mechanism) -> bool:
+        """Tell whether the torque has components: in space."""
+        return mechanism.space == "spatial"
+
     def coefficients(self, motion: Motion) -> Numbers:
         """Return the Taylor coefficients of the torque, (levels, components, time)."""
         mechanism = motion.mechanism
@@ -153,6 +162,10 @@ class _AppliedOutput(AbstractForceOutput):
     force: str = eqx.field(static=True)
 
     source = "force"
+
+    def is_vector(self, mechanism: Mechanism) -> bool:
+        """Tell whether the applied force has several components."""
+        return len(mechanism.forces[self.force].velocity_names) > 1
 
     def coefficients(self, motion: Motion) -> Numbers:
         """Return the Taylor coefficients of the force, (levels, components, time)."""
@@ -176,16 +189,3 @@ class AppliedTorqueOutput(_AppliedOutput):
 
     unit = "N*m"
     rate_names = ("torque", *RATES)
-
-
-def component_labels(mechanism: Mechanism, output: Any) -> tuple[str, ...]:
-    """Return the names of the components of an output of a mechanism; none where it is one number."""
-    if isinstance(output, _AppliedOutput):
-        several = len(mechanism.forces[output.force].velocity_names) > 1
-    else:
-        turning = isinstance(output, AngularVelocityOutput | JointTorqueOutput) and mechanism.space == "spatial"
-        several = turning or bool(output.axes) or isinstance(output, PointOutput | JointForceOutput)
-    if not several:
-        return ()
-    named = output.labels if output.axes else output.labels[: 2 if mechanism.space == "planar" else 3]
-    return tuple(named)

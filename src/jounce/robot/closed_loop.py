@@ -9,6 +9,7 @@ from jounce.errors import JounceError, RobotError, check_name, did_you_mean, fla
 from jounce.forces import AbstractForce
 from jounce.jet import Jet
 from jounce.mechanism import Body, Mechanism, time_grid
+from jounce.mechanism.mechanism import names_column
 from jounce.mechanism.resolve import resolve_motion
 from jounce.rigid.inertia import finite_numbers
 from jounce.robot.abstract_robot import AbstractRobot
@@ -55,7 +56,8 @@ def mechanism(
         Applied forces; their bodies are moving links, or ``"ground"``.
     outputs : dict of str to AbstractOutput or str, optional
         Quantities wanted; a word is the name of a joint whose coordinate is wanted. Unless given, the coordinates of
-        all joints in `joint_names` under their names. An angle starts between half a turn either side of zero.
+        all joints in `joint_names` under their names, with ``_`` behind those of columns of results, such as
+        ``time``. An angle starts between half a turn either side of zero.
     parameters : dict of str to number or expression, optional
         Named values for laws and forces.
     time : array_like or TimeGrid, optional
@@ -100,7 +102,7 @@ def mechanism(
                 message = f"no moving joint that follows no other has this name; {_known(robot, name)}"
                 raise RobotError(message, name=kind, value=name)
     parts = RobotParts(robot, {*driven, *(x for x in (outputs or {}).values() if isinstance(x, str))}, forces, outputs)
-    wanted = {name: name for name in parts.coordinates} if outputs is None else outputs
+    wanted = _coordinate_outputs(parts.coordinates) if outputs is None else outputs
     start = _start(robot, q, driven, parameters or {}, time)
     joints = parts.joints()
     if robot.closures:
@@ -127,6 +129,17 @@ def mechanism(
         redundant_reactions=redundant_reactions or "unique",
         title=robot.name,
     )
+
+
+def _coordinate_outputs(joints: tuple[str, ...]) -> dict[str, str]:
+    """Return joints by the names of the outputs of their coordinates: their own, unless results have such columns."""
+    found = {}
+    for joint in joints:
+        name = joint
+        while names_column(name) or (name != joint and name in joints):
+            name += "_"
+        found[name] = joint
+    return found
 
 
 def _known(robot: AbstractRobot, name: Any) -> str:

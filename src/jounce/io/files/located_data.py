@@ -54,8 +54,11 @@ class Source:
 
     def error(self, message: str, location: Location = (), **value: Any) -> JounceError:
         """Return an error that names the file, the line and the dotted name of an entry."""
-        name = dotted(location) or None
-        return self.error_type(message, path=self.path, line=self.line(location), name=name, **value)
+        return self.error_type(message, **self.place(location), **value)
+
+    def place(self, location: Location = ()) -> dict[str, Any]:
+        """Return where an entry stands, as errors take it: file, line and dotted name."""
+        return {"path": self.path, "line": self.line(location), "name": dotted(location) or None}
 
     def at(self, location: Location) -> Any:
         """Return what stands at a location, None where nothing does."""

@@ -21,7 +21,7 @@ from jounce.kinematics.cams.plate_cam import SENSES
 from jounce.mechanism.resolve import resolve_motion
 from jounce.trajectory import AbstractMotion, Expression, SplineMotion
 from jounce.trajectory.dimensions import Dimension
-from jounce.trajectory.expression import RESERVED
+from jounce.trajectory.expression import check_parameter_name
 
 KEYS = ("title", "parameters", "units", "cam", "follower", "law")
 CAM_KEYS = ("base_radius", "sense", "count")
@@ -86,8 +86,7 @@ class _CamFile:
             check_name("parameter", name, known, MechanismFileError, name="--set")
         for name, raw in known.items():
             at = ("parameters", name)
-            if not isinstance(name, str) or not name.isidentifier() or name in RESERVED:
-                raise source.error("this cannot be the name of a parameter", at)
+            check_parameter_name(name, source.error_type, **source.place(at))
             value = source.value(at, told.get(name, raw), "any", self.parameters, self.dimensions)
             if value.dimension is not None:
                 self.dimensions[name] = value.dimension
