@@ -12,6 +12,7 @@ from jaxtyping import Float
 from jounce.design.design_space import Sobol
 from jounce.design.variations import Variation, read_variations, reader_of, spreads
 from jounce.errors import MechanismError, UnsupportedError, check_name, did_you_mean, whole_number
+from jounce.jet.turns import whole_periods
 from jounce.kinematics import Motion, Status, solve, solve_batch
 from jounce.mechanism import Mechanism, check_mechanism, time_grid
 from jounce.mechanism.held_outputs import with_outputs
@@ -292,7 +293,7 @@ class _Spread:
         wraps = np.array(getattr(self.mechanism.outputs[name], "wraps", ()))
         if wraps.any():
             away = values[:, 0, 0] - self._variables[name].values[0, 0]
-            values[:, :, 0] -= (2 * math.pi * np.round(away / (2 * math.pi)) * wraps)[:, None]
+            values[:, :, 0] -= (whole_periods(away) * wraps)[:, None]
         return values
 
     def _add_statistics(self, name: str, of: str, dims: tuple[str, ...], values: np.ndarray) -> None:
