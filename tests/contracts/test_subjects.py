@@ -43,7 +43,7 @@ def test_robots_and_motions_are_asked_for():
     done = subprocess.run([sys.executable, "-c", CALLS], capture_output=True, text=True, check=False)
     assert not done.returncode, done.stderr
     told = json.loads(done.stdout)
-    assert told.pop("parts") == ["parts: no such part, got nothing; valid: centrifugal, coriolis, gravity"]
+    assert told.pop("parts") == ["parts: unknown part, got nothing; valid: centrifugal, coriolis, gravity"]
     assert len(told) == 18
     for name, words in told.items():
         if name in OF_MOTIONS:

@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from jounce.design.design_space import Sobol
 from jounce.design.variations import Variation, read_variations, reader_of, spreads
-from jounce.errors import MechanismError, UnsupportedError, check_name, did_you_mean, whole_number
+from jounce.errors import MechanismError, UnsupportedError, check_name, no_such, whole_number
 from jounce.jet.turns import whole_periods
 from jounce.kinematics import Motion, Status, solve, solve_batch
 from jounce.mechanism import Mechanism, check_mechanism, time_grid
@@ -149,8 +149,7 @@ def column_of(mechanism: Mechanism, name: str) -> tuple[str, str, int]:
             return output, "", order
         if plain.startswith(f"{output}_") and plain[len(output) + 1 :] in quantity.component_labels(mechanism):
             return output, plain[len(output) + 1 :], order
-    known = [*mechanism.outputs]
-    message = f"no output has this name; {did_you_mean(plain, known)}; components and derivatives as in C_x_d3"
+    message = f"{no_such('output', plain, mechanism.outputs)}; components and derivatives as in C_x_d3"
     raise MechanismError(message, name="of", value=name)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from jounce.constraints.base import Vector
 from jounce.dynamics.inverse import MotionForces
 from jounce.dynamics.masses import check_loads
-from jounce.errors import MechanismError, check_name, did_you_mean
+from jounce.errors import MechanismError, check_choice, check_name, did_you_mean
 from jounce.kinematics import Motion, Status
 from jounce.mechanism import AbstractMotionOutput, Mechanism
 from jounce.mechanism.driver_outputs import is_turning
@@ -96,9 +96,7 @@ class _JointOutput(AbstractForceOutput):
         if self.body is not None and self.body not in element.bodies:
             message = f"is not joined by '{self.joint}'; {did_you_mean(self.body, element.bodies)}"
             raise MechanismError(message, name="body", value=self.body)
-        if self.frame not in ("global", "body", *element.bodies):
-            message = f"unknown frame; {did_you_mean(self.frame, ['global', 'body', *element.bodies])}"
-            raise MechanismError(message, name="frame", value=self.frame)
+        check_choice("frame", self.frame, ("global", "body", *element.bodies), MechanismError)
 
     def _wrench(self, forces: MotionForces, mechanism: Mechanism, point: ArrayLike | None) -> tuple[Numbers, Numbers]:
         """Return force and moment about a point of the body, with rates; about that of the joint unless given."""

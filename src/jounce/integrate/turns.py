@@ -94,4 +94,4 @@ def attitudes_at(
     found = np.zeros((len(since), *series.shape[2:]))
     for k in range(series.shape[1])[::-1]:
         found = found * since[:, None, None] + np.asarray(series[:, k])
-    return turns_with_ground(np.moveaxis(found, 0, -1))
+    return np.asarray(turns_with_ground(np.moveaxis(found, 0, -1)))

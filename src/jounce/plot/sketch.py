@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from jounce.errors import MechanismError, did_you_mean
+from jounce.errors import MechanismError, check_choice, did_you_mean
 from jounce.kinematics import Motion
 from jounce.mechanism import PointOutput
 from jounce.mechanism.mechanism import Mechanism, check_mechanism
@@ -57,8 +57,7 @@ class Paths:
 
 def check_names(names: str) -> None:
     """Raise MechanismError unless a choice of names is known."""
-    if names not in NAMES:
-        raise MechanismError(f"unknown choice; {did_you_mean(names, NAMES)}", name="names", value=names)
+    check_choice("choice", names, NAMES, MechanismError, name="names")
 
 
 def paths_of(motion: Motion, wanted: Sequence[str] | None, order: int, view: View) -> Paths | None:

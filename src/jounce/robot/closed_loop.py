@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from jounce.errors import JounceError, RobotError, check_name, did_you_mean, flag
+from jounce.errors import JounceError, RobotError, check_name, flag
 from jounce.forces import AbstractForce
 from jounce.jet import Jet
 from jounce.mechanism import Body, Mechanism, time_grid
@@ -98,9 +98,7 @@ def mechanism(
     driven = {name: law for kind in laws.values() for name, law in kind.items()}
     for kind, given in laws.items():
         for name in given:
-            if name not in robot.joint_names:
-                message = f"no moving joint that follows no other has this name; {_known(robot, name)}"
-                raise RobotError(message, name=kind, value=name)
+            check_name("moving joint that follows no other", name, robot.joint_names, RobotError, name=kind)
     parts = RobotParts(robot, {*driven, *(x for x in (outputs or {}).values() if isinstance(x, str))}, forces, outputs)
     wanted = _coordinate_outputs(parts.coordinates) if outputs is None else outputs
     start = _start(robot, q, driven, parameters or {}, time)
@@ -140,10 +138,6 @@ def _coordinate_outputs(joints: tuple[str, ...]) -> dict[str, str]:
             name += "_"
         found[name] = joint
     return found
-
-
-def _known(robot: AbstractRobot, name: Any) -> str:
-    return did_you_mean(name, robot.joint_names)
 
 
 def _start(

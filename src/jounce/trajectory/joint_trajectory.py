@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.display import Displayed
-from jounce.errors import JounceError, MechanismError, SampleWarning, TrajectoryError, did_you_mean
+from jounce.errors import JounceError, MechanismError, SampleWarning, TrajectoryError, check_name
 from jounce.jet import Jet
 from jounce.shapes import ArrayLike
 from jounce.trajectory.checks import check_samples, finite_numbers, whole_number
@@ -332,9 +332,7 @@ class JointTrajectory(Displayed):
     def _chosen(self, names: Iterable[str] | None) -> tuple[str, ...]:
         chosen = self.names if names is None else _names(names)
         for name in chosen:
-            if name not in self.laws:
-                message = f"the trajectory has no joint of this name; {did_you_mean(name, self.names)}"
-                raise TrajectoryError(message, name="names", value=name)
+            check_name("joint of the trajectory", name, self.laws, TrajectoryError, name="names")
         return chosen
 
     def _inside(self, times: Float[np.ndarray, " time"]) -> Float[np.ndarray, " time"]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from jounce.errors import UNSET, ExpressionError, JounceError, MechanismFileError, did_you_mean
+from jounce.errors import UNSET, ExpressionError, JounceError, MechanismFileError, unknown
 from jounce.io.files.reading import named_file
 from jounce.trajectory.dimensions import Dimension
 from jounce.trajectory.units import Value, parse_value
@@ -74,7 +74,7 @@ class Source:
             raise self.error("must be a mapping with at least one entry", location, value=found)
         for key in found:
             if keys is not None and key not in keys:
-                raise self.error(f"unknown key; {did_you_mean(key, keys)}", (*location, key))
+                raise self.error(unknown("key", key, keys), (*location, key))
         return found
 
     def value(

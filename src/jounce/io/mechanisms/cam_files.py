@@ -10,7 +10,7 @@ from typing import Any
 
 from pydantic_core import PydanticCustomError
 
-from jounce.errors import JounceError, MechanismFileError, check_name, did_you_mean
+from jounce.errors import JounceError, MechanismFileError, check_choice, check_name, did_you_mean
 from jounce.io.files.assignments import assignments
 from jounce.io.files.located_data import Source
 from jounce.io.files.samples import rates, read_samples
@@ -101,8 +101,7 @@ class _CamFile:
         body = self.source.mapping(("cam",), CAM_KEYS)
         base = self._length(("cam", "base_radius"), body)
         sense = body.get("sense", "counterclockwise")
-        if sense not in SENSES:
-            raise self.source.error(f"unknown sense; {did_you_mean(sense, SENSES)}", ("cam", "sense"), value=sense)
+        check_choice("sense", sense, SENSES, self.source.error_type, **self.source.place(("cam", "sense")))
         follower = self._follower()
         law = self._law("angle" if follower.turning else "length")
         title = self.data.get("title", "")

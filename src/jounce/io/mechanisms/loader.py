@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from jounce.constraints import catalogue
-from jounce.errors import JounceError, MechanismFileError, did_you_mean
+from jounce.errors import JounceError, MechanismFileError, unknown
 from jounce.io.files.located_data import Location, Source
 from jounce.io.files.source import read_source
 from jounce.io.mechanisms.file_laws import FileLaws
@@ -88,7 +88,7 @@ def _space(source: Source) -> str:
         raise source.error("is missing; valid: planar, spatial", ("space",))
     space = source.data["space"]
     if not isinstance(space, str) or space not in POSITION_COMPONENTS:
-        raise source.error(f"unknown space; {did_you_mean(space, POSITION_COMPONENTS)}", ("space",), value=space)
+        raise source.error(unknown("space", space, POSITION_COMPONENTS), ("space",), value=space)
     return space
 
 

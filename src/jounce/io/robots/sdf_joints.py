@@ -8,7 +8,7 @@ import math
 import numpy as np
 from jaxtyping import Float
 
-from jounce.errors import RobotError, did_you_mean, no_such
+from jounce.errors import RobotError, no_such
 from jounce.io.robots.sdf_poses import (
     MODEL,
     Frames,
@@ -71,7 +71,7 @@ def read_joint(name: str, element: Element, frames: Frames, version: tuple[int, 
         message = "a screw joint is no joint of a robot; convert the robot to a mechanism and add a screw there"
         raise element.error(message, *where, "type", value=kind)
     if kind not in valid:
-        raise element.error(f"no joint has this type; {did_you_mean(kind, valid)}", *where, "type", value=kind)
+        raise element.error(no_such("joint", kind, valid, "type"), *where, "type", value=kind)
     ends = []
     for role in ("parent", "child"):
         part = needed(element, role, *where)
