@@ -23,7 +23,7 @@ from jounce.design.language import (
 from jounce.design.measures import (
     NO_KNOTS,
     Cells,
-    Curve,
+    PrescribedPath,
     at_instants,
     derivative,
     environment,
@@ -82,7 +82,7 @@ class Goals:
         What must hold.
     varied : sequence of str
         Parameters that differ from design to design.
-    curves : dict of str to Curve
+    curves : dict of str to PrescribedPath
         Points for paths, by name.
     instants : array of shape (time,)
         s.
@@ -114,7 +114,7 @@ class Goals:
         minimise: str,
         subject_to: Sequence[str],
         varied: Sequence[str],
-        curves: Mapping[str, Curve],
+        curves: Mapping[str, PrescribedPath],
         instants: Float[np.ndarray, " time"],
         knots: Float[np.ndarray, " knots"] = NO_KNOTS,
     ):

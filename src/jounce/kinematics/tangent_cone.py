@@ -25,7 +25,7 @@ Series = Float[np.ndarray, "order k"]
 
 
 @dataclasses.dataclass(frozen=True)
-class Curve:
+class LocalCurve:
     """A curve through the position.
 
     Attributes
@@ -48,7 +48,7 @@ class Curve:
         return self.series[self.multiplicity - 1]
 
 
-def curves(constraints: ReducedConstraints) -> list[Curve]:
+def curves(constraints: ReducedConstraints) -> list[LocalCurve]:
     """Return the curves through a position, one for each tangent that is found: those that go on, and the others.
 
     Of a continuum of tangents, as where two degrees of freedom are left, a few are told.
@@ -64,7 +64,7 @@ def curves(constraints: ReducedConstraints) -> list[Curve]:
     return found
 
 
-def _cusp(constraints: ReducedConstraints, tangent: Float[np.ndarray, " k"]) -> Curve | None:
+def _cusp(constraints: ReducedConstraints, tangent: Float[np.ndarray, " k"]) -> LocalCurve | None:
     for sense in (1.0, -1.0):
         curve = _continued(constraints, sense * tangent, 2)
         if curve.order == constraints.order:
@@ -127,7 +127,7 @@ def _distinct(tangents: Sequence[Float[np.ndarray, " k"]]) -> list[Float[np.ndar
     return [whole[k] for k in chosen]
 
 
-def _continued(constraints: ReducedConstraints, tangent: Float[np.ndarray, " k"], multiplicity: int) -> Curve:
+def _continued(constraints: ReducedConstraints, tangent: Float[np.ndarray, " k"], multiplicity: int) -> LocalCurve:
     """Return the curve along a tangent, as far as it can be continued."""
     series = np.zeros((constraints.order, len(tangent)))
     series[multiplicity - 1] = tangent
@@ -144,7 +144,7 @@ def _continued(constraints: ReducedConstraints, tangent: Float[np.ndarray, " k"]
                 break
         if reached < order:
             break
-    return Curve(series, multiplicity, reached)
+    return LocalCurve(series, multiplicity, reached)
 
 
 def _fulfilling(constraints: ReducedConstraints, series: Series, multiplicity: int, order: int) -> Series | None:

@@ -34,7 +34,7 @@ DYNAMICS = ("damping", "friction", "spring_reference", "spring_stiffness")
 
 
 @dataclasses.dataclass(frozen=True)
-class JointAxis:
+class SdfAxis:
     """An axis of a joint: its direction in the model, and what goes with it."""
 
     direction: Float[np.ndarray, "3"]
@@ -52,7 +52,7 @@ class SdfJoint:
     parent: str
     child: str
     origin: Float[np.ndarray, "3"]
-    axes: tuple[JointAxis, ...]
+    axes: tuple[SdfAxis, ...]
     element: Element
 
     def reversed(self) -> SdfJoint:
@@ -84,7 +84,7 @@ def read_joint(name: str, element: Element, frames: Frames, version: tuple[int, 
     return SdfJoint(name, kind, ends[0], ends[1], origin.position, axes, element)
 
 
-def _axis(axis: Element, place: Place, frames: Frames, version: tuple[int, ...], *where: str) -> JointAxis:
+def _axis(axis: Element, place: Place, frames: Frames, version: tuple[int, ...], *where: str) -> SdfAxis:
     check_known(axis, AXIS, *where)
     xyz = only(axis, "xyz", *where)
     direction = np.array([0.0, 0.0, 1.0]) if xyz is None else vector_of(xyz, *where, "xyz")
@@ -101,7 +101,7 @@ def _axis(axis: Element, place: Place, frames: Frames, version: tuple[int, ...],
         if part is not None:
             check_known(part, known, *where, part.tag)
     damping, friction = (number_of(dynamics, key, *where, "dynamics", default=0.0) for key in ("damping", "friction"))
-    return JointAxis(rotation @ direction, _limits(limit, *where), damping, friction)
+    return SdfAxis(rotation @ direction, _limits(limit, *where), damping, friction)
 
 
 def _limits(limit: Element | None, *where: str) -> Limits:
