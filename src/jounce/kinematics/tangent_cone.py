@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.kinematics.mobility_series import FULFILLED, ReducedConstraints
+from jounce.kinematics.quadratic_forms import polarised
 
 STARTS = 400  # directions from which tangents are sought
 MOST_CURVES = 16
@@ -98,18 +99,14 @@ def _quadratic_tangents(constraints: ReducedConstraints) -> Float[np.ndarray, "t
 
 
 def _quadratic_forms(constraints: ReducedConstraints) -> Float[np.ndarray, "s k k"]:
-    """Return the coefficients of order two of g as forms, by polarisation."""
-    count = constraints.free.shape[1]
-    pairs = [(i, j) for i in range(count) for j in range(i, count)]
-    series = np.zeros((len(pairs), constraints.order, count))
-    for lane, (i, j) in enumerate(pairs):
-        series[lane, 0, [i, j]] = 1.0
-    second = constraints.along(series)[0][:, 1]
-    forms = np.zeros((second.shape[1], count, count))
-    alone = {i: second[lane] for lane, (i, j) in enumerate(pairs) if i == j}
-    for lane, (i, j) in enumerate(pairs):
-        forms[:, i, j] = forms[:, j, i] = alone[i] if i == j else 0.5 * (second[lane] - alone[i] - alone[j])
-    return forms
+    """Return the coefficients of order two of g as forms."""
+
+    def second_order(directions: Float[np.ndarray, "pair k"]) -> Float[np.ndarray, "s pair"]:
+        series = np.zeros((len(directions), constraints.order, directions.shape[1]))
+        series[:, 0] = directions
+        return constraints.along(series)[0][:, 1].T
+
+    return polarised(second_order, constraints.free.shape[1])
 
 
 def _distinct(tangents: Sequence[Float[np.ndarray, " k"]]) -> list[Float[np.ndarray, " k"]]:
