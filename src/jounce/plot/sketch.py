@@ -11,8 +11,9 @@ from jounce.errors import MechanismError, check_choice, did_you_mean
 from jounce.kinematics import Motion
 from jounce.mechanism import PointOutput
 from jounce.mechanism.mechanism import Mechanism, check_mechanism
+from jounce.mechanism.time import nearest_instants
 from jounce.plot.drawing import VIEW, WHEELS, Label, Shape, View, screen_of
-from jounce.plot.instants import evenly_chosen, nearest_instants, solved_instants
+from jounce.plot.instants import evenly_chosen, solved_instants
 from jounce.plot.labels import rounded_down, scale_of, unit_label
 from jounce.plot.name_placement import place_names
 from jounce.plot.scene import Scene, outline, scene_of
