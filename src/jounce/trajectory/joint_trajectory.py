@@ -13,7 +13,7 @@ from jounce.display import Displayed
 from jounce.errors import JounceError, MechanismError, SampleWarning, TrajectoryError, check_name
 from jounce.jet import Jet
 from jounce.shapes import ArrayLike
-from jounce.trajectory.checks import check_samples, finite_numbers, whole_number
+from jounce.trajectory.checks import check_samples, finite_numbers, finite_row, whole_number
 from jounce.trajectory.expression import Expression
 from jounce.trajectory.motion import AbstractMotion, ExpressionMotion, SplineMotion
 from jounce.trajectory.profiles import motion_profile
@@ -249,7 +249,7 @@ class JointTrajectory(Displayed):
         """
         chosen = self._chosen(names)
         order = whole_number("order", order, 0, MAX_ORDER)
-        instants = self._inside(finite_numbers("times", times, None))
+        instants = self._inside(finite_row("times", times))
         self._warn(order, chosen)
         found = law_derivatives([self.laws[name] for name in chosen], jnp.asarray(instants), order)
         result = np.ascontiguousarray(np.moveaxis(np.asarray(found), -1, 0))
