@@ -21,6 +21,9 @@ ArrayLike = Numbers | Sequence | np.floating | np.integer | float | int
 Real = Numbers | np.floating | np.integer | float | int
 """Real numbers: an array or one number."""
 
+Refused = object
+"""Anything else, which a function takes only to refuse it in words: ``int | Refused`` is a whole number."""
+
 
 def is_traced(values: Any) -> bool:
     """Tell whether JAX traces an array in a pytree: then there are no numbers to check or to choose by."""

@@ -8,9 +8,9 @@ from jounce.constraints.base import field_kind, value_fields
 from jounce.io.mechanisms.user_classes import import_file
 
 
-def own(kind="mine", name="Own", **keywords):
-    """Define a class as if in a module."""
-    body = {"residual": lambda self, *_: None, "__qualname__": name, "__module__": "notebook"}
+def own(kind="mine", name="Own", body=None, **keywords):
+    """Define a class as if in a module, with more in its body."""
+    body = {"residual": lambda self, *_: None, "__qualname__": name, "__module__": "notebook"} | (body or {})
     return jn.AbstractConstraint.__class__(name, (jn.AbstractConstraint,), body, type=kind, **keywords)
 
 
@@ -96,6 +96,23 @@ def test_a_class_whose_definition_fails_is_not_in_the_catalogue():
 
     assert catalogue("planar", "joint") == before
     assert own("torn", space="planar") is catalogue("planar", "joint")["torn"]
+
+
+def test_a_definition_that_fails_leaves_the_class_before_it():
+    first = own(space="planar")
+    torn = {"__annotations__": {"size": jn.Scalar, "length": jn.Scalar}, "size": 1.0}
+    with pytest.raises(TypeError, match="default"):
+        own(space="planar", body=torn)
+    assert catalogue("planar", "joint")["mine"] is first
+    second = own(space="planar")
+    assert catalogue("planar", "joint")["mine"] is second
+
+
+def test_no_class_passes_itself_off_as_one_of_the_library():
+    body = {"__module__": jn.planar.Revolute.__module__}
+    with pytest.raises(jn.MechanismError, match=r"Revolute.*got 'revolute'"):
+        own("revolute", "Revolute", body=body, space="planar")
+    assert catalogue("planar", "joint")["revolute"] is jn.planar.Revolute
 
 
 @pytest.mark.parametrize("field", ["type", "bodies"])

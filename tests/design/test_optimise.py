@@ -82,7 +82,7 @@ def test_a_condition_is_kept_and_its_multiplier_is_the_slope_of_the_optimum():
 
 @pytest.mark.slow
 def test_conditions_that_cannot_be_met_are_told_with_how_far_they_are():
-    with pytest.raises(jn.DesignError, match=r"'at\(angle, 1, 1\) == 12': nearest is 9 against 12, off by 3 ") as error:
+    with pytest.raises(jn.DesignError, match=r"'at\(angle, 1, 1\) == 12': .*9 .* 12, .*3 ") as error:
         jn.optimise(CRANK, "mean(angle**2)", CUBIC, ["at(angle, 1, 1) == 12"], starts=1, iterations=4)
     assert error.value.design.status == "infeasible"
     assert list(error.value.design.parameters.values())[:2] == pytest.approx([2.0, 2.0], abs=1e-6)
@@ -199,7 +199,7 @@ def test_designs_that_lock_are_kept_away_from(four_bar):
     for change in (-1e-4, 1e-4):
         other = jn.solve(four_bar.with_parameters(BC=found.parameters["BC"] + change), np.linspace(0.0, 2.0, 4001))
         assert np.abs(other.outputs["psi"][:, 4]).max() > sampled
-    with pytest.raises(jn.DesignError, match="none of 16 designs within the bounds can be put together"):
+    with pytest.raises(jn.DesignError, match=r"none of 16 designs .*put together"):
         jn.optimise(four_bar, "peak(psi, 4)", {"BC": (0.5, 0.6)}, starts=2, samples=16)
 
 

@@ -20,7 +20,9 @@ def test_rows_and_columns_are_those_of_the_file_whatever_the_types():
     rows = ["E.1", "E.2", "F.1", "F.2", "slide.1", "slide.2", "G.1", "G.2", "d.1"]
     assert list(equations.row.values) == rows
     columns = [f"{body}.{c}" for body in ("guide", "block", "rocker") for c in ("x", "y", "angle")]
-    assert list(equations.column.values) == list(equations.column.values) == columns
+    assert list(equations.column.values) == columns
+    assert list(equations.column_unit.values) == ["m", "m", "rad"] * 3
+    assert (equations.position.attrs["units"], equations.angle.attrs["units"]) == ("m", "rad")
     pinned = equations.jacobian.isel(time=0).sel(row=["F.1", "F.2"])
     np.testing.assert_array_equal(pinned.sel(column=["rocker.x", "rocker.y"]), np.eye(2))
     assert not pinned.sel(column=columns[:6]).any()

@@ -72,6 +72,8 @@ FORMS = {  # the others, and their rates, are judged with the closed loop
 def test_an_open_chain_agrees_with_the_robot(form):
     found, right = FORMS[form](sled()), FORMS[form](robot(), laws())
     assert found.coords["driver"].values.tolist() == ["push", "turn"]
+    over = {"energy_slope": "/s^3"}.get(form, "")  # dE_2/dq': J/s^4 by m/s or rad/s
+    assert found.coords["unit"].values.tolist() == [f"N{over}", f"N*m{over}"]
     np.testing.assert_allclose(found.values, right, rtol=0, atol=1e-12 * np.abs(right).max())
 
 
@@ -132,6 +134,19 @@ def test_balances_of_a_closed_loop():
     np.testing.assert_allclose(weight[:, 0] * 3 * np.cos(3 * TIMES), power, rtol=0, atol=1e-12)
     with pytest.raises(jn.MechanismError, match="order 5"):
         newton_euler(heavy, rates=3)
+
+
+@pytest.mark.slow
+def test_numbers_are_refused_as_those_of_a_mechanism():
+    for call in (
+        lambda: jn.acceleration_energy(sled(), order=-1),
+        lambda: jn.energy_terms(sled(), order=99),
+        lambda: jn.energy_slope(sled(), m=-1),
+        lambda: lagrange(sled(), rates=-1),
+        lambda: newton_euler(sled(), rates=-1),
+    ):
+        with pytest.raises(jn.MechanismError, match="whole number"):
+            call()
 
 
 @pytest.mark.slow

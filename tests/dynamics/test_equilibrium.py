@@ -156,7 +156,7 @@ def test_what_no_force_resists_is_indifferent_and_what_flies_off_has_no_equilibr
     assert (found.stability, found.stable) == ("indifferent", None)
     assert "wheel" in found.reason
     driven = dataclasses.replace(wheel, forces={"T": forces.Torque(("ground", "wheel"), law="0.7 + 0*x")})
-    with pytest.raises(SolveError, match=r"no equilibrium .* a moment of 0.7 N m on wheel is balanced by nothing"):
+    with pytest.raises(SolveError, match=r"no equilibrium .* 0\.7 N m on wheel"):
         jn.equilibrium(driven)
     falling = dataclasses.replace(wheel, joints={})
     with pytest.raises(SolveError, match=r"a force of \(0, -19.62\) N on wheel"):
@@ -181,7 +181,7 @@ def test_bad_input_is_named_before_anything_is_computed():
 def test_dry_friction_that_has_no_value_at_rest_is_refused_by_name():
     pendulum = jn.load(example("simple_pendulum"))
     rubbing = {"brake": forces.Torque(("ground", "bob"), law="-0.1*v/abs(v)")}
-    with pytest.raises(SolveError, match=r"forces\.brake: the force has no finite value at rest"):
+    with pytest.raises(SolveError, match=r"forces\.brake: .*no finite value at rest"):
         jn.equilibrium(dataclasses.replace(pendulum, forces=rubbing))
 
 

@@ -280,7 +280,7 @@ def test_bad_input_is_named():
         with pytest.raises(kind) as caught:
             call()
         assert place in caught.value.name
-    with pytest.raises(MobilityError, match=r"nothing can move; leave a driver out of the equilibrium, or release it"):
+    with pytest.raises(MobilityError, match=r"nothing can move; .*release"):
         jn.linearise(motion, 0.1)
 
 

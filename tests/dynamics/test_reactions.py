@@ -198,7 +198,7 @@ def test_a_force_that_is_not_finite_is_named_with_its_time():
     law = "2/(t - 0.6)"
     mechanism = dataclasses.replace(arm(mass=2.0), forces={"brake": jn.forces.Torque(("ground", "arm"), law)})
     motion = jn.solve(mechanism, TIME, order=4)
-    with pytest.raises(MechanismError, match=r"forces\.brake: has no finite value at t = 0\.6 s; check its law"):
+    with pytest.raises(MechanismError, match=r"forces\.brake: .*finite value at t = 0\.6 s"):
         jn.driver_force(motion, "turn")
 
 

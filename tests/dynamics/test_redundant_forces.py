@@ -106,9 +106,7 @@ def test_bad_choices_are_refused(wanted, message):
 @pytest.mark.slow
 def test_a_stiffness_must_be_above_zero():
     motion = jn.solve(door(redundant_reactions={"lower": {"force": "0*3"}}), TIMES, order=4)
-    with pytest.raises(
-        jn.MechanismError, match=r"redundant_reactions\.lower\.force: a stiffness must be a number above"
-    ):
+    with pytest.raises(jn.MechanismError, match=r"redundant_reactions\.lower\.force: .*stiffness"):
         jn.joint_reaction(motion, "lower")
 
 
@@ -181,7 +179,7 @@ def test_initial_conditions_that_say_the_same_twice_must_agree_in_their_rates(ra
         np.testing.assert_allclose(state.attitude[:, 0, 0], half, rtol=1e-12, atol=1e-15)
         np.testing.assert_allclose(state.spin[:, 0, 0], [0, 0, 0.2], rtol=1e-12, atol=1e-15)
     else:
-        with pytest.raises(jn.AssemblyError, match=r"contradict each other in their rates .*initial\.two"):
+        with pytest.raises(jn.AssemblyError, match=r"contradict .*rates .*initial\.two"):
             jn.simulate(begun, [0.0])
 
 

@@ -185,11 +185,11 @@ def test_conditions_drivers_and_joints_that_say_the_same_twice_must_agree():
     driven = dataclasses.replace(simple_pendulum(0.3, 1.0), drivers={"a": turn("bob", 0.3)})
     refused(jn.AssemblyError, "redundant constraints contradict each other in their rates", driven)
     both = dataclasses.replace(driven, drivers={"a": turn("bob", 0.3), "b": turn("bob", 0.3)}, initial={})
-    assert jn.simulate(both, [0.0], order=1).mobility == "no degree of freedom: all motion is prescribed"
+    assert jn.simulate(both, [0.0], order=1).mobility.startswith("no degree of freedom")
 
 
 def test_a_joint_is_no_initial_condition():
-    with pytest.raises(jn.MechanismError, match=r"initial.pin: an initial condition is given by a driver"):
+    with pytest.raises(jn.MechanismError, match=r"initial\.pin: .*driver"):
         with_initial(pin=planar.Revolute(("ground", "bob"), [0, 0], [0, 0]))
 
 

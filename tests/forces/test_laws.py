@@ -162,7 +162,7 @@ def test_values_that_are_allowed():
 
 
 def test_a_parameter_may_not_hide_a_variable_of_a_law():
-    with pytest.raises(jn.MechanismError, match=r"forces\.F\.law: the parameter 'x' has the name of a variable"):
+    with pytest.raises(jn.MechanismError, match=r"forces\.F\.law: .*'x' .*variable"):
         built(forces.Torque(BOTH, "-x"), parameters={"x": 1.0})
     built(forces.Torque(BOTH, "-v"), parameters={"x": 1.0})
 

@@ -138,9 +138,7 @@ def test_what_was_computed_before_a_singularity_is_kept():
     assert motion.faults == {3: "body block"}
     assert motion.ended_at == pytest.approx(1.0, abs=1e-9)
     assert np.allclose(motion.outputs["x"][:3, 0, 0], [1.0, 0.8, 0.6], rtol=0, atol=1e-13)
-    with pytest.raises(
-        jn.SolveError, match=r"t = 1.5 s, body block: collapsed: .*\(3 of 5 instants were solved\)"
-    ) as e:
+    with pytest.raises(jn.SolveError, match=r"t = 1\.5 s, body block: collapsed.*3 of 5") as e:
         jn.simulate(block("-x**-3"), time, 1)
     assert e.value.motion.ended_at == motion.ended_at
 

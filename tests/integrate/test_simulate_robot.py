@@ -188,7 +188,7 @@ def test_bad_input_is_told():
         jn.simulate(robot, TIME, torque={"slide": "2*wheel"})
     with pytest.raises(jn.RobotError, match=r"state: must hold q and q', the shape"):
         jn.simulate(robot, TIME, state=[0.0])
-    with pytest.raises(jn.JounceError, match=r"torques: simulate has no such option; did you mean 'torque'"):
+    with pytest.raises(jn.JounceError, match=r"torques: .*did you mean 'torque'"):
         jn.simulate(robot, TIME, torques=[1.0])
     with pytest.raises(jn.RobotError, match=r"derivative"):
         jn.JointEvent(lambda t, q, v: q[0], derivative=2)

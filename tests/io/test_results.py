@@ -168,7 +168,7 @@ def test_nothing_is_left_half_written(tmp_path, monkeypatch, suffix):
 
     monkeypatch.setattr("jounce.io.results._write_csv", full)
     monkeypatch.setattr("jounce.io.results._write_netcdf", full)
-    with pytest.raises(OutputError, match=rf"motion.{suffix}: cannot be written: No space left on device"):
+    with pytest.raises(OutputError, match=rf"motion.{suffix}: .*No space left on device"):
         write(example(), path)
     assert path.read_text() == "precious"
     assert names(tmp_path) == [path.name]
@@ -241,12 +241,12 @@ def test_a_folder_without_the_right_to_write(tmp_path, monkeypatch):
 
 
 def test_columns_of_the_same_name_are_refused(tmp_path):
-    with pytest.raises(OutputError, match=r"motion.csv: two outputs make a column of the same name, 'C_x'"):
+    with pytest.raises(OutputError, match=r"motion\.csv: .*column of the same name, 'C_x'"):
         write(example().rename(psi="C_x"), tmp_path / "motion.csv")
 
 
 def test_names_that_netcdf_cannot_hold(tmp_path):
-    with pytest.raises(OutputError, match=r"motion.nc: the name 'a/b' cannot stand in a NetCDF file"):
+    with pytest.raises(OutputError, match=r"motion\.nc: .*'a/b' .*NetCDF"):
         write(example().rename(psi="a/b"), tmp_path / "motion.nc")
     assert names(tmp_path) == []
 

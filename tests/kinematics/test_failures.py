@@ -235,13 +235,13 @@ def test_python_function_that_is_no_motion_law(law):
 
 def test_what_is_no_mechanism():
     # of the public functions, the checks of types in the tests would say so first
-    with pytest.raises(jn.MechanismError, match=r"must be a jn\.Mechanism, got 'a\.yaml'; jn\.load reads one"):
+    with pytest.raises(jn.MechanismError, match=r"jn\.Mechanism, got 'a\.yaml'; jn\.load"):
         check_mechanism("a.yaml")
 
 
 def test_gaps_of_what_cannot_be_assembled_are_lengths_and_angles():
     free = dataclasses.replace(four_bar(BC=1.0), drivers={})  # AB and CD reach 0.0400 + 0.1321 + 0.2031 m
-    with pytest.raises(jn.AssemblyError, match=r"joints\.BC stays open, by 625 mm.*a joint may be missing"):
+    with pytest.raises(jn.AssemblyError, match=r"joints\.BC stays open, by 625 mm.*missing"):
         jn.solve(free, [0.0])
     base = four_bar()
     level = jn.planar.Parallel1(("ground", "crank"), [1, 0], [1, 0])

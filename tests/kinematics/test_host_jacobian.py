@@ -77,7 +77,7 @@ def test_degrees_of_freedom_of_a_long_chain_are_told_by_body():
     whole = chain(40)
     drivers = {name: driver for name, driver in whole.drivers.items() if name != "turn39"}
     one_free = jn.Mechanism(space="planar", bodies=whole.bodies, joints=whole.joints, drivers=drivers)
-    with pytest.raises(jn.MobilityError, match=r"give 119 equations, 119 of them independent.* with which link39 can"):
+    with pytest.raises(jn.MobilityError, match=r"119 equations, 119 of them .* link39"):
         jn.solve(one_free, [0.0])
 
 

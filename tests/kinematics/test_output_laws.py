@@ -81,7 +81,7 @@ def test_what_cannot_be_held_is_named(output, words):
 
 @pytest.mark.slow
 def test_where_the_output_does_not_determine_the_driver_it_is_refused():
-    with pytest.raises(jn.SolveError, match=r"stroke_x can go no further than 0\.199.*driver theta") as caught:
+    with pytest.raises(jn.SolveError, match=r"stroke_x .*no further than 0\.199.*theta") as caught:
         jn.solve(slider_crank("0.19 + 0.02*t"), GRID, order=0)
     assert caught.value.motion.status[0] == jn.Status.OK
     top = math.sqrt(0.2**2 - 0.01**2)
@@ -93,7 +93,7 @@ def test_where_the_output_does_not_determine_the_driver_it_is_refused():
 def test_what_needs_the_law_beforehand_says_so(motion):
     mechanism = slider_crank("0.17 + 0.015*cos(3*t)")
     for ask in (jn.simulate, jn.linearise, jn.trace):
-        with pytest.raises(jn.JounceError, match=r"follows from the output 'stroke_x'.*motion\.actuated"):
+        with pytest.raises(jn.JounceError, match=r"output 'stroke_x'.*motion\.actuated"):
             ask(mechanism)
     with pytest.raises(jn.UnsupportedError, match="go through numbers"):
         jax.grad(lambda r: jn.solve(mechanism.with_parameters(r=r), GRID).actuated)(0.05)

@@ -37,7 +37,7 @@ def test_screw_as_printed_turns_without_advancing():
 
 
 def test_screw_as_printed_with_the_driver_of_equation_104_has_a_row_of_zeros():
-    with pytest.raises(jn.MobilityError, match=r"6 coordinates; joints and drivers give 6 equations, 5 of them"):
+    with pytest.raises(jn.MobilityError, match=r"6 coordinates; .* 6 equations, 5 of them"):
         jn.solve(printed_screw(drivers.SpatialDistanceDriver(BODIES, ORIGIN, ORIGIN, 0.0)), TIME, order=1)
 
 

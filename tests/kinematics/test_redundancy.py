@@ -131,7 +131,7 @@ def test_drivers_that_agree_are_solved_and_others_refused():
     np.testing.assert_allclose(motion.outputs["angle"], [[0, 1, 0], [1, 1, 0]], atol=1e-15)
     with pytest.raises(jn.AssemblyError, match=r"drivers\.one, drivers\.two stay open, by .* deg"):
         jn.solve(turned("t", "t + 0.1"), [0.0])
-    with pytest.raises(jn.SolveError, match=r"drivers\.two, drivers\.one \(in their rates\): inconsistent"):
+    with pytest.raises(jn.SolveError, match=r"drivers\.two, drivers\.one .*: inconsistent"):
         jn.solve(turned("t", "2*t"), [0.0])
 
 

@@ -80,6 +80,7 @@ def test_the_change_points_of_a_parallelogram():
     curve = jn.trace(four_bar(1.0, 2.0, 1.0, 2.0, seed=0))
     along = rates_of(curve.directions(0)[0])
     assert len(curve.change_points) == 2
+    assert "2 branches" in repr(curve.change_points[0])
     values = np.sort([curve.value(point.arc_length) for point in curve.change_points]) / np.pi
     np.testing.assert_allclose(values, np.round(values), atol=1e-12)
     assert all(point.decided and point.dimension == 2 for point in curve.change_points)
@@ -109,6 +110,7 @@ def _ratio_of_halves(curve):
 def test_the_folded_branch_of_a_kite():
     curve = jn.trace(four_bar(1.0, 1.0, 2.0, 2.0))  # crank and rod alike, rocker and ground alike
     assert len(curve.change_points) == 2
+    assert "2 branches" in repr(curve.change_points[0])
     (folded,) = (k for k, x in enumerate(curve.change_points) if abs(np.cos(curve.value(x.arc_length)) - 1) < 1e-9)
     turns = rates_of(curve.directions(folded)[1])
     np.testing.assert_allclose(turns, [1.0, 0.0], atol=1e-9)  # crank and rod turn together about their hinge

@@ -24,7 +24,7 @@ def test_an_inertia_gives_mass_and_centre_of_mass_too():
     moved = dataclasses.replace(plane, angle=1.0)
     assert (moved.mass, moved.inertia) == (2.0, 0.06)
     for given in ({"mass": 1.0}, {"center_of_mass": [0, 0]}):
-        with pytest.raises(jn.MechanismError, match="inertia: an Inertia contains the mass and the centre of mass"):
+        with pytest.raises(jn.MechanismError, match="inertia: an Inertia contains the mass"):
             jn.Body([0, 0], inertia=ROD, **given)
 
 
@@ -73,7 +73,7 @@ def test_what_no_body_has(given, message):
 
 
 def test_no_negative_moment_in_the_plane():
-    with pytest.raises(jn.MechanismError, match=r"bodies\.a\.inertia: must not be negative, got -2\.0"):
+    with pytest.raises(jn.MechanismError, match=r"bodies\.a\.inertia: .*negative, got -2\.0"):
         body_mass("a", jn.Body([0, 0], inertia=-2.0), {}, 2)
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from jounce.errors import OutputError
 from jounce.papers import negrean_2025
-from jounce.papers.negrean_2025 import CASES, case, closed_forms, comparison, reproduce, segment
+from jounce.papers.negrean_2025 import CASES, case, closed_forms, comparison, figures, reproduce, segment
 from jounce.papers.negrean_2025.history import difference, history
 from jounce.papers.negrean_2025.measured_data import given_cases
 from tests.oracles import negrean_energies
@@ -173,6 +173,25 @@ def test_measurements_say_their_unit(tmp_path):
     case = given_cases(samples, None)["slow"]
     np.testing.assert_allclose(case.samples(), np.pi / 2, rtol=1e-15)
     np.testing.assert_allclose(case.knots, 0.1 * np.arange(9), rtol=1e-15)
+
+
+@pytest.mark.parametrize(
+    "samples, masses, said, unsaid",
+    [
+        (False, False, ["samples", "masses", "lengths"], []),
+        (True, False, ["masses", "lengths"], ["samples"]),
+        (False, True, ["samples"], ["masses", "lengths"]),
+        (True, True, [], ["stand-in"]),
+    ],
+)
+def test_pictures_say_which_data_are_stand_ins(tmp_path, samples, masses, said, unsaid):
+    measured, link = tmp_path / "mine.csv", tmp_path / "link.yaml"
+    measured.write_text("time,slow\n" + "".join(f"{0.1 * k},1\n" for k in range(9)))
+    link.write_text(LINK)
+    cases = given_cases(measured if samples else None, link if masses else None)
+    for note in map(figures.stand_in_note, cases.values()):
+        assert all(word in note for word in said)
+        assert not any(word in note for word in unsaid)
 
 
 @pytest.mark.parametrize(

@@ -318,7 +318,7 @@ def test_every_instant_has_its_neighbours_and_all_make_one_cycle(step):
 def test_a_directory_that_cannot_be_made_is_refused_before_any_computing(tmp_path, monkeypatch):
     monkeypatch.setattr(reproduction, "measure", lambda *_: pytest.fail("computed"))
     (tmp_path / "file").write_text("")
-    with pytest.raises(OutputError, match=r"file/out: files cannot be written there: Not a directory"):
+    with pytest.raises(OutputError, match=r"file/out: .*Not a directory"):
         reproduction.reproduce(tmp_path / "file" / "out")
     with pytest.raises(OutputError, match="files cannot be written there"):
         reproduction.reproduce(tmp_path / "file")

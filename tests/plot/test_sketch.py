@@ -139,7 +139,7 @@ def test_a_joint_of_ones_own_has_a_symbol():
 def test_what_cannot_be_drawn_is_told(four_bar):
     with pytest.raises(jn.MechanismError, match="did you mean 'bodies'"):
         sketch(four_bar, names="bodys")
-    with pytest.raises(jn.MechanismError, match=r"only the position of a point.*valid: C.*'psi'|'psi'.*valid: C"):
+    with pytest.raises(jn.MechanismError, match=r"position of a point.*'psi'.*valid: C"):
         sketch(four_bar, paths=["psi"])
     with pytest.raises(jn.MechanismError, match=r"up to order 3.*got 4"):
         sketch(four_bar, order=4)

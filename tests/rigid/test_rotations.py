@@ -222,7 +222,7 @@ def test_angle_rates_of_a_batch_of_values(sequence):
 def test_singular_orientations_are_reported(sequence, middle):
     angles = np.array([0.3, middle, -0.5])
     assert bool(rigid.is_singular_orientation(sequence, angles))
-    with pytest.raises(SingularityError, match=rf"{sequence}: .*parallel.*only [\d.e-]+ away.*got \[0.3") as caught:
+    with pytest.raises(SingularityError, match=rf"{sequence}: .*parallel.* [\d.e-]+ away.*\[0\.3") as caught:
         rigid.angle_rates(sequence, angles, [1.0, 2.0, 3.0])
     assert caught.value.value == pytest.approx(angles.tolist())
     with pytest.raises(SingularityError, match="parallel"):

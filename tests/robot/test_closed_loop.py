@@ -372,7 +372,7 @@ def test_bad_requests(ask, says):
 def test_drives_that_a_mechanism_cannot_have(field):
     robot = four_bar(on_crank={field: 0.5})
     assert robot.mechanism({"A": 0.1}).joints
-    with pytest.raises(jn.RobotError, match=rf"joints\.B\.{field}: {field} of this drive has no counterpart"):
+    with pytest.raises(jn.RobotError, match=rf"joints\.B\.{field}: .*no counterpart"):
         robot.mechanism({"A": 0.1}, drives=True)
 
 

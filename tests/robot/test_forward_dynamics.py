@@ -212,9 +212,7 @@ def test_joint_that_nothing_resists_is_named():
     joints = [jn.Joint("swing", "base", "arm", axis=[0, 1, 0]), jn.Joint("roll", "arm", "tip", armature=0.1)]
     robot = jn.Robot("needle", links, joints)
     state, torque = [[0.3, 0.1], [0.2, 0.5]], [[1.0, 0.2]]
-    with pytest.raises(
-        jn.SingularityError, match="roll: the bodies that this joint moves have no inertia about its axis"
-    ):
+    with pytest.raises(jn.SingularityError, match=r"roll: .*no inertia"):
         jn.forward_dynamics(robot, state, torque)
     assert np.isnan(jn.forward_dynamics(robot, state, torque, strict=False)[2]).all()
     assert np.isfinite(jn.forward_dynamics(robot, state, torque, driven="roll")).all()

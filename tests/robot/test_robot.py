@@ -68,7 +68,7 @@ def test_a_robot_of_no_joints():
 
 
 def test_robots_do_not_change():
-    with pytest.raises(AttributeError, match="gravity: a robot does not change; make another, as with_gravity"):
+    with pytest.raises(AttributeError, match=r"gravity: .*with_gravity"):
         MIMIC.gravity = np.zeros(3)
     with pytest.raises(ValueError, match="read-only"):
         MIMIC.gravity[2] = 0.0

@@ -207,7 +207,7 @@ def test_a_full_disk_loses_nothing(done, tmp_path, monkeypatch):
 
     monkeypatch.setattr(store, "_sync", sync)
     out = tmp_path / "full.zarr"
-    with pytest.raises(OutputError, match=r"No space left on device; 16 of 27 designs are done and kept"):
+    with pytest.raises(OutputError, match=r"No space left.*16 of 27 designs .*kept"):
         swept(out)
     assert [x.name for x in marks(out).iterdir()] == ["0"]
     assert np.isfinite(xarray.open_zarr(out)["psi_peak"].values[3:16]).any()
@@ -219,14 +219,14 @@ def test_a_full_disk_loses_nothing(done, tmp_path, monkeypatch):
 def test_an_attempt_of_which_nothing_was_computed_makes_way(tmp_path, monkeypatch):
     monkeypatch.setattr(cluster, "POLL", 0.2)
     out = tmp_path / "a.zarr"
-    with pytest.raises(JounceError, match=r"no Dask scheduler answers within 0.3 s.*0 of 27 designs are done"):
+    with pytest.raises(JounceError, match=r"no Dask scheduler .*0\.3 s.*0 of 27 designs"):
         swept(out, workers=None, scheduler="tcp://127.0.0.1:9", timeout=0.3)
     assert swept(out, vary={"BC": "12cm:14cm:27"})["BC"].size == 27
 
 
 def test_missing_packages_are_named(monkeypatch):
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    with pytest.raises(UnsupportedError, match=r"needs zarr and distributed.*pip install 'jounce\[sweep\]'"):
+    with pytest.raises(UnsupportedError, match=r"zarr and distributed.*'jounce\[sweep\]'"):
         cluster.check_installed("zarr", "distributed")
 
 

@@ -198,7 +198,7 @@ def test_noisy_samples_of_a_driver_warn_as_those_of_a_trajectory_do():
     law = jn.SplineMotion(TIMES, noisy)
     np.testing.assert_array_equal(law.errors, trajectory.estimate_error(5)[:, 0])
     worst = trajectory.supported_order() + 1
-    with pytest.warns(jn.SampleWarning, match=rf"'drivers.turn.motion' do not support its derivative of order {worst}"):
+    with pytest.warns(jn.SampleWarning, match=rf"'drivers\.turn\.motion' .*derivative of order {worst}"):
         jn.solve(arm(law), TIMES[::50], order=4)
     jn.solve(arm(law), TIMES[::50], order=worst - 1)  # no warning
     with pytest.warns(jn.SampleWarning, match="forces.load.law"):

@@ -155,7 +155,7 @@ def test_warning_when_samples_do_not_support_the_order():
 
 def test_warning_above_the_degree():
     trajectory = JointTrajectory.from_samples(SAMPLES, quintic(SAMPLES, 0)[:, None], ["a"])
-    with pytest.warns(SampleWarning, match=r"order [56].*splines of degree 5 have continuous derivatives to order 4"):
+    with pytest.warns(SampleWarning, match=r"order [56].*degree 5 .*continuous .*order 4"):
         trajectory.derivatives([1.0], 7)
 
 

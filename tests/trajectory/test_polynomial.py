@@ -197,5 +197,5 @@ def test_conditions_that_determine_nothing():
 
 
 def test_accelerations_need_continuity_two():
-    with pytest.raises(TrajectoryError, match="continuous, got 1; the order of continuity is at least 2"):
+    with pytest.raises(TrajectoryError, match=r"continuous, got 1; .*at least 2"):
         PolynomialMotion.from_accelerations(KNOTS, VALUES, 1)

@@ -309,7 +309,7 @@ def test_a_torque_in_newton_metres_is_one(tmp_path):
 
 @pytest.mark.parametrize("moment, law", [("5 N", "-M"), ("5 Nm", "-M/arm"), ("5 N", "-half"), ("5 tex", "-M*t")])
 def test_a_parameter_of_another_dimension_is_refused_with_its_place(tmp_path, moment, law):
-    with pytest.raises(jn.MechanismFileError, match=r"brake.yaml, line [36], (forces.brake.law|parameters.M)"):
+    with pytest.raises(jn.MechanismFileError, match=r"line [36], (forces\.brake\.law|parameters\.M)"):
         brake(tmp_path, moment, law)
 
 

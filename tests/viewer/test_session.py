@@ -32,7 +32,8 @@ def test_a_failure_is_told_and_keeps_the_last_motion():
     assert session.wait(20.0)
     assert session.recording is first
     assert isinstance(session.error, jn.AssemblyError)
-    assert [str(error) for error in errors] == ["value: the bodies cannot be put together, got -1.0"]
+    assert errors == [session.error]
+    assert (session.error.name, session.error.value) == ("value", -1.0)
     session.request({"value": 4.0})  # and a good value takes over again
     assert session.wait(20.0)
     session.close()
@@ -46,7 +47,7 @@ def test_a_part_of_a_motion_does_not_take_the_place_of_a_whole_one():
     session.request({"value": 200.0})
     assert session.wait(20.0)
     assert session.recording.values["value"] == 1.0
-    assert str(session.error) == "some instants are missing"
+    assert "missing" in str(session.error)
     session.close()
 
 

@@ -186,13 +186,15 @@ def test_shapes_of_an_mjcf_are_read(tmp_path):
 
 
 SDF = """<sdf version="1.9"><model name="m"><pose>0 0 1 0 0 0</pose>
-  <link name="base"><pose>1 0 0 0 0 0</pose><inertial><mass>1</mass></inertial>
+  <link name="base"><pose>1 0 0 0 0 0</pose>
+    <inertial><mass>1</mass><inertia><ixx>1</ixx><iyy>1</iyy><izz>1</izz></inertia></inertial>
     <visual name="v"><pose relative_to="lamp">0 0 1 0 0 0</pose><transparency>0.25</transparency>
       <geometry><box><size>1 2 3</size></box></geometry>
       <material><ambient>0 0 1 1</ambient><diffuse>1 0 0 1</diffuse></material></visual>
     <visual name="floor"><geometry><plane><normal>0 0 1</normal></plane></geometry></visual>
     <visual name="broken"><geometry><sphere><radius>wide</radius></sphere></geometry></visual></link>
-  <link name="arm"><pose relative_to="base">0 2 0 0 0 0</pose><inertial><mass>1</mass></inertial>
+  <link name="arm"><pose relative_to="base">0 2 0 0 0 0</pose>
+    <inertial><mass>1</mass><inertia><ixx>1</ixx><iyy>1</iyy><izz>1</izz></inertia></inertial>
     <visual name="a"><geometry><mesh><uri>model://pack/wedge.obj</uri><scale>2 2 2</scale></mesh></geometry></visual>
     <visual name="b"><geometry><cylinder><radius>0.5</radius><length>4</length></cylinder></geometry>
       <material><ambient>0 1 0 1</ambient></material></visual>

@@ -8,10 +8,12 @@ from typing import Annotated, Any, ClassVar
 
 import equinox as eqx
 import jax.numpy as jnp
+from jaxtyping import Bool
 
 from jounce.errors import MechanismError, check_choice
 from jounce.jet import Jet, concatenate
 from jounce.modules import Module
+from jounce.shapes import Numbers
 
 Scalar = Annotated[Any, "scalar"]
 Vector = Annotated[Any, "vector"]
@@ -23,7 +25,7 @@ WORDS = ("Scalar", "Vector", "Law", "Laws", "Wrenches", "Whole")  # annotations 
 SPACES = ("planar", "spatial")
 ROLES = ("joint", "driver", "force")
 RESERVED_KEYS = ("bodies", "type")  # keys that every element of a file has
-_REGISTRY: dict[tuple[str, str], dict[str, type[Any]]] = {}
+_REGISTRY: dict[tuple[str, str], dict[str, tuple[type[Any], ...]]] = {}  # the last counts whose definition succeeded
 
 
 def register(kind: type[Any], type: str, space: str, role: str) -> None:  # noqa: A002
@@ -33,7 +35,8 @@ def register(kind: type[Any], type: str, space: str, role: str) -> None:  # noqa
     ------
     MechanismError
         If another class has this type: files would silently mean the new one. The same class defined again, as in a
-        cell of a notebook that is run again, takes its own place. If a field has a name that files use otherwise.
+        cell of a notebook that is run again, takes its own place once it is whole; those of this package stay. If a
+        field has a name that files use otherwise.
     """
     check_choice("role", role, ROLES, MechanismError)
     if space:
@@ -44,15 +47,16 @@ def register(kind: type[Any], type: str, space: str, role: str) -> None:  # noqa
             raise MechanismError(message, name="field", value=field)
     catalogues = [_REGISTRY.setdefault((each, role), {}) for each in ((space,) if space else SPACES)]
     for taken in catalogues:
-        other = taken.get(type, kind)
-        if _is_whole(other) and (other.__module__, other.__qualname__) != (kind.__module__, kind.__qualname__):
+        other = _last_whole(taken.get(type, ()))
+        if other is not None and (_is_ours(other) or _full_name(other) != _full_name(kind)):
             message = (
                 f"the {role} type of {kind.__qualname__} is that of {other.__module__}.{other.__qualname__} already"
             )
             raise MechanismError(f"{message}; give it another one", name="type", value=type)
     kind.type_name, kind.space, kind.role = type, space, role
     for free in catalogues:
-        free[type] = kind
+        before = _last_whole(free.get(type, ()))
+        free[type] = (kind,) if before is None else (before, kind)
 
 
 class AbstractConstraint(Module):
@@ -93,14 +97,14 @@ class AbstractConstraint(Module):
         check_bodies(self, self.body_counts or (self.body_count,))
 
     @abc.abstractmethod
-    def residual(self, *bodies_and_time: Any) -> Jet:
+    def residual(self, *bodies_and_time: Any, **_: Any) -> Jet:  # with both, type checkers let parameters be named
         """Return the jet that vanishes when the joint holds: ``residual(self, body_i, body_j, time)``.
 
         Bodies are poses (`PlanarPose` or `SpatialPose`), `time` is a jet in s. The result has the shape of one row,
         (...), or of several, (rows, ...), as `rows` joins them.
         """
 
-    def admissible(self, time: Jet) -> Any:
+    def admissible(self, time: Jet) -> Bool[Numbers, "..."]:
         """Tell at which instants the motion law, if there is one, has a permitted value: a finite one, unless more."""
         motion = getattr(self, "motion", None)
         if motion is None:
@@ -117,12 +121,25 @@ def catalogue(space: str, role: str) -> dict[str, type[Any]]:
     >>> sorted(catalogue("planar", "driver"))
     ['coordinate', 'distance', 'slide']
     """
-    return {name: kind for name, kind in _REGISTRY.get((space, role), {}).items() if _is_whole(kind)}
+    found = {name: _last_whole(kinds) for name, kinds in _REGISTRY.get((space, role), {}).items()}
+    return {name: kind for name, kind in found.items() if kind is not None}
 
 
-def _is_whole(kind: type[Any]) -> bool:
-    """Tell a class from one whose definition failed after it was registered, as its fields were in no order."""
-    return "__match_args__" in vars(kind)  # the last that a dataclass gets
+def _last_whole(kinds: tuple[type[Any], ...]) -> type[Any] | None:
+    """Return the last of some classes that is whole: the definition of others failed, as their fields are in no order.
+
+    A class is registered before it gets its fields; the last that a dataclass gets tells that it has them.
+    """
+    return next((kind for kind in reversed(kinds) if "__match_args__" in vars(kind)), None)
+
+
+def _full_name(kind: type[Any]) -> tuple[str, str]:
+    return kind.__module__, kind.__qualname__
+
+
+def _is_ours(kind: type[Any]) -> bool:
+    """Tell whether a class is one of this package, for which another only passes itself off, by its module's name."""
+    return kind.__module__.partition(".")[0] == __name__.partition(".")[0]
 
 
 def check_bodies(element: Any, counts: tuple[int, ...], does: str = "joins", must: str = "join") -> None:

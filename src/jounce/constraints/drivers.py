@@ -5,12 +5,16 @@ Each can be evaluated as an output is: its value is the coordinate that it presc
 
 import equinox as eqx
 import jax.numpy as jnp
+from jaxtyping import Bool
 
 from jounce.constraints.angles import Datum, check_vectors, relative_angle
 from jounce.constraints.base import AbstractConstraint, MotionLaw, Scalar, Vector
 from jounce.constraints.planar import COORDINATES, coordinate_of, slide
 from jounce.errors import MechanismError, check_choice
-from jounce.jet import sqrt, wrap
+from jounce.jet import Jet, sqrt, wrap
+from jounce.rigid import PlanarPose, SpatialPose
+from jounce.rigid.pose import Pose
+from jounce.shapes import Numbers
 
 
 class CoordinateDriver(AbstractConstraint, type="coordinate", space="planar", role="driver"):
@@ -27,11 +31,11 @@ class CoordinateDriver(AbstractConstraint, type="coordinate", space="planar", ro
     def __check_init__(self):
         check_choice("coordinate", self.coordinate, COORDINATES, MechanismError)
 
-    def evaluate(self, body_i, body_j):
+    def evaluate(self, body_i: PlanarPose, body_j: PlanarPose) -> Jet:
         ratio = 1.0 if self.ratio is None else self.ratio
         return coordinate_of(body_j, self.coordinate) - ratio * body_i.angle - self.offset
 
-    def residual(self, body_i, body_j, time):
+    def residual(self, body_i: PlanarPose, body_j: PlanarPose, time: Jet) -> Jet:
         return self.evaluate(body_i, body_j) - self.motion(time)
 
 
@@ -43,10 +47,10 @@ class SlideDriver(AbstractConstraint, type="slide", space="planar", role="driver
     vector_i: Vector  # direction of travel
     motion: MotionLaw  # m
 
-    def evaluate(self, body_i, body_j):
+    def evaluate(self, body_i: Pose, body_j: Pose) -> Jet:
         return slide(body_i, body_j, self.point_i, self.point_j, self.vector_i)
 
-    def residual(self, body_i, body_j, time):
+    def residual(self, body_i: Pose, body_j: Pose, time: Jet) -> Jet:
         return self.evaluate(body_i, body_j) - self.motion(time)
 
 
@@ -57,15 +61,15 @@ class DistanceDriver(AbstractConstraint, type="distance", space="planar", role="
     point_j: Vector
     motion: MotionLaw  # m
 
-    def evaluate(self, body_i, body_j):
+    def evaluate(self, body_i: Pose, body_j: Pose) -> Jet:
         d = body_j.point(self.point_j) - body_i.point(self.point_i)
         return sqrt(d.dot(d))
 
-    def residual(self, body_i, body_j, time):
+    def residual(self, body_i: Pose, body_j: Pose, time: Jet) -> Jet:
         d = body_j.point(self.point_j) - body_i.point(self.point_i)
         return d.dot(d) - self.motion(time).square()
 
-    def admissible(self, time):
+    def admissible(self, time: Jet) -> Bool[Numbers, "..."]:
         distance = self.motion(time.truncate(0)).coefficients[0]
         return (distance > 0) & jnp.isfinite(distance)
 
@@ -96,8 +100,8 @@ class RotationDriver(AbstractConstraint, type="rotation", space="spatial", role=
 
     __check_init__ = check_vectors
 
-    def evaluate(self, body_i, body_j):
+    def evaluate(self, body_i: SpatialPose, body_j: SpatialPose) -> Jet:
         return relative_angle(body_i, body_j, self.axis_i, self.vector_i, self.vector_j, self.datum)
 
-    def residual(self, body_i, body_j, time):
+    def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
         return wrap(self.evaluate(body_i, body_j) - self.motion(time))

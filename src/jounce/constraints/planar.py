@@ -40,7 +40,7 @@ class Revolute(AbstractConstraint, type="revolute", space="planar"):
     point_i: Vector  # m, in the frame of body i
     point_j: Vector
 
-    def residual(self, body_i, body_j, time):
+    def residual(self, body_i: PlanarPose, body_j: PlanarPose, time: Jet) -> Jet:
         return body_j.point(self.point_j) - body_i.point(self.point_i)
 
 
@@ -51,7 +51,7 @@ class DoubleRevolute(AbstractConstraint, type="double_revolute", space="planar")
     point_j: Vector
     length: Scalar  # m
 
-    def residual(self, body_i, body_j, time):
+    def residual(self, body_i: PlanarPose, body_j: PlanarPose, time: Jet) -> Jet:
         d = body_j.point(self.point_j) - body_i.point(self.point_i)
         return d.dot(d) - self.length**2
 
@@ -62,7 +62,7 @@ class Parallel1(AbstractConstraint, type="parallel1", space="planar"):
     vector_i: Vector  # in the frame of body i
     vector_j: Vector
 
-    def residual(self, body_i, body_j, time):
+    def residual(self, body_i: PlanarPose, body_j: PlanarPose, time: Jet) -> Jet:
         return cross(body_i.direction(self.vector_i), body_j.direction(self.vector_j))
 
 
@@ -73,7 +73,7 @@ class Parallel2(AbstractConstraint, type="parallel2", space="planar"):
     point_j: Vector
     vector_i: Vector  # along the slot
 
-    def residual(self, body_i, body_j, time):
+    def residual(self, body_i: PlanarPose, body_j: PlanarPose, time: Jet) -> Jet:
         d = body_j.point(self.point_j) - body_i.point(self.point_i)
         return cross(body_i.direction(self.vector_i), d)
 
@@ -86,7 +86,7 @@ class Prismatic(AbstractConstraint, type="prismatic", space="planar"):
     vector_i: Vector  # along the slide, in each frame
     vector_j: Vector
 
-    def residual(self, body_i, body_j, time):
+    def residual(self, body_i: PlanarPose, body_j: PlanarPose, time: Jet) -> Jet:
         d = body_j.point(self.point_j) - body_i.point(self.point_i)
         along = body_i.direction(self.vector_i)
         return rows(cross(along, body_j.direction(self.vector_j)), cross(along, d))
@@ -106,7 +106,7 @@ class Coordinate(AbstractConstraint, type="coordinate", space="planar"):
     def __check_init__(self):
         check_choice("coordinate", self.coordinate, COORDINATES, MechanismError)
 
-    def residual(self, body_i, body_j, time):
+    def residual(self, body_i: PlanarPose, body_j: PlanarPose, time: Jet) -> Jet:
         ratio = 1.0 if self.ratio is None else self.ratio
         return coordinate_of(body_j, self.coordinate) - ratio * body_i.angle - self.offset
 
@@ -119,7 +119,7 @@ class Gear(AbstractConstraint, type="gear", space="planar"):
 
     body_count = 3
 
-    def residual(self, body_i, body_j, body_m, time):
+    def residual(self, body_i: PlanarPose, body_j: PlanarPose, body_m: PlanarPose, time: Jet) -> Jet:
         return (body_j.angle - body_m.angle) - self.ratio * (body_i.angle - body_m.angle) - self.offset
 
 
@@ -132,6 +132,6 @@ class Rolling(AbstractConstraint, type="rolling", space="planar"):
     radius: Scalar  # m
     offset: Scalar = None  # m
 
-    def residual(self, body_i, body_j, time):
+    def residual(self, body_i: PlanarPose, body_j: PlanarPose, time: Jet) -> Jet:
         travel = slide(body_i, body_j, self.point_i, self.point_j, self.vector_i)
         return travel - self.radius * (body_j.angle - body_i.angle) - self.offset

@@ -20,7 +20,7 @@ class Spherical(AbstractConstraint, type="spherical", space="spatial"):
     point_i: Vector  # m, in the frame of body i
     point_j: Vector
 
-    def residual(self, body_i, body_j, time):
+    def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
         return body_j.point(self.point_j) - body_i.point(self.point_i)
 
 
@@ -31,7 +31,7 @@ class DoubleSpherical(AbstractConstraint, type="double_spherical", space="spatia
     point_j: Vector
     length: Scalar  # m
 
-    def residual(self, body_i, body_j, time):
+    def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
         d = body_j.point(self.point_j) - body_i.point(self.point_i)
         return d.dot(d) - self.length**2
 
@@ -42,7 +42,7 @@ class Dot1(AbstractConstraint, type="dot1", space="spatial"):
     vector_i: Vector  # in the frame of body i
     vector_j: Vector
 
-    def residual(self, body_i, body_j, time):
+    def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
         return body_i.direction(self.vector_i).dot(body_j.direction(self.vector_j))
 
 
@@ -53,7 +53,7 @@ class Dot2(AbstractConstraint, type="dot2", space="spatial"):
     point_j: Vector
     vector_i: Vector  # normal of the plane
 
-    def residual(self, body_i, body_j, time):
+    def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
         d = body_j.point(self.point_j) - body_i.point(self.point_i)
         return body_i.direction(self.vector_i).dot(d)
 
@@ -66,7 +66,7 @@ class Universal(AbstractConstraint, type="universal", space="spatial"):
     vector_i: Vector  # the arm of the cross held by each body
     vector_j: Vector
 
-    def residual(self, body_i, body_j, time):
+    def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
         d = body_j.point(self.point_j) - body_i.point(self.point_i)
         return rows(d, body_i.direction(self.vector_i).dot(body_j.direction(self.vector_j)))
 
@@ -79,7 +79,7 @@ class Revolute(AbstractConstraint, type="revolute", space="spatial"):
     axis_i: Vector
     axis_j: Vector
 
-    def residual(self, body_i, body_j, time):
+    def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
         d = body_j.point(self.point_j) - body_i.point(self.point_i)
         return rows(d, *_parallel(body_i, body_j, self.axis_i, self.axis_j))
 
@@ -92,7 +92,7 @@ class Cylindrical(AbstractConstraint, type="cylindrical", space="spatial"):
     axis_i: Vector
     axis_j: Vector
 
-    def residual(self, body_i, body_j, time):
+    def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
         return rows(*_collinear(self, body_i, body_j))
 
 
@@ -106,7 +106,7 @@ class Prismatic(AbstractConstraint, type="prismatic", space="spatial"):
     normal_i: Vector  # a perpendicular to the axis on each body that stays parallel
     normal_j: Vector
 
-    def residual(self, body_i, body_j, time):
+    def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
         side = body_i.direction(cross(self.axis_i, self.normal_i) / length_of(self.axis_i)[None])
         return rows(*_collinear(self, body_i, body_j), side.dot(body_j.direction(self.normal_j)))
 
@@ -125,7 +125,7 @@ class Screw(AbstractConstraint, type="screw", space="spatial"):
     lead: Scalar  # m per turn of j about the axis of i; negative for a left-hand thread
     offset: Scalar = None  # m
 
-    def residual(self, body_i, body_j, time):
+    def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
         advance = slide(body_i, body_j, self.point_i, self.point_j, self.axis_i)
         angle = relative_angle(body_i, body_j, self.axis_i, datum=coaxial(self.axis_i, self.axis_j))
         excess = advance - self.lead / (2 * jnp.pi) * angle - self.offset

@@ -16,6 +16,7 @@ from jounce.errors import DesignError, JounceError, MechanismError, check_name, 
 from jounce.kinematics import assemblies as all_assemblies
 from jounce.mechanism import Mechanism, build, check_mechanism, time_grid, with_outputs_held
 from jounce.mechanism.preconditions import concrete
+from jounce.mechanism.time import TimeLike
 from jounce.shapes import ArrayLike
 
 
@@ -26,7 +27,7 @@ def optimise(
     vary: Mapping[str, Any],
     subject_to: Sequence[str] = (),
     *,
-    time: Any = None,
+    time: TimeLike | None = None,
     curves: Mapping[str, ArrayLike | tuple[ArrayLike, ArrayLike]] | None = None,
     assemblies: str | Sequence[int] | None = None,
     starts: int = 8,
@@ -174,7 +175,9 @@ def _bound(mechanism: Mechanism, name: str, given: Any) -> float:
     return value
 
 
-def _instants(mechanism: Mechanism, time: Any, bounds: Mapping[str, tuple[float, float]]) -> Float[np.ndarray, " time"]:
+def _instants(
+    mechanism: Mechanism, time: TimeLike | None, bounds: Mapping[str, tuple[float, float]]
+) -> Float[np.ndarray, " time"]:
     """Return the instants, which must be the same in all designs."""
     given = mechanism.time if time is None else time
     instants = time_grid(given, mechanism.parameter_values)

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import jax
 import jax.numpy as jnp
@@ -17,6 +17,10 @@ from jounce.kinematics import Motion, Status, solve, solve_batch
 from jounce.mechanism import Mechanism, check_mechanism, time_grid
 from jounce.mechanism.held_outputs import with_outputs
 from jounce.mechanism.preconditions import concrete
+from jounce.mechanism.time import TimeLike
+
+if TYPE_CHECKING:
+    import xarray
 
 TOGETHER = 256  # designs that are solved in one program
 MOST_NUMBERS = 100_000_000  # of the histories of all samples: 0.8 GB
@@ -31,7 +35,7 @@ Histories = dict[str, Float[np.ndarray, "sample time derivative *axes"]]
 def tolerance(
     mechanism: Mechanism,
     vary: Mapping[str, Any],
-    time: Any = None,
+    time: TimeLike | None = None,
     order: int = 4,
     *,
     of: Sequence[str] | None = None,
@@ -39,7 +43,7 @@ def tolerance(
     linear: bool = True,
     indices: bool = False,
     progress: Progress | None = None,
-) -> Any:
+) -> "xarray.Dataset":
     """Return how far outputs and their derivatives spread where parameters deviate independently of one another.
 
     Twice: to first order, by exact gradients; and by a Monte Carlo method on a scrambled Sobol sequence with a fixed

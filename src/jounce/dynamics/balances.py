@@ -5,8 +5,10 @@ from typing import Any
 import jax.numpy as jnp
 
 from jounce.dynamics.driver_coordinates import balanced
+from jounce.dynamics.energies import error_for
+from jounce.errors import whole_number
 from jounce.kinematics import Motion
-from jounce.robot.arguments import checked_coordinates, whole_number
+from jounce.robot.arguments import checked_coordinates
 from jounce.robot.batches import Batched
 from jounce.robot.equations_of_motion import centers_of, partial_velocities, times_inertia, work, work_of_weight
 from jounce.robot.inverse_dynamics import inverse_dynamics
@@ -57,7 +59,7 @@ def newton_euler(system: Robot | Motion, q: ArrayLike | None = None, rates: int 
     >>> newton_euler(jn.robot.from_screws([slide]), [[0.0], [3.0], [5.0], [7.0]], rates=1).round(12).tolist()
     [[10.0], [14.0]]
     """
-    rates = whole_number("rates", rates)
+    rates = whole_number("rates", rates, error=error_for(system))
     if isinstance(system, Motion):
         return balanced(system, rates, gravity=False)
     return inverse_dynamics(system.with_gravity((0.0, 0.0, 0.0)), checked_coordinates(system, q, rates + 2, rates + 2))
@@ -91,7 +93,7 @@ def virtual_work(system: Robot | Motion, q: ArrayLike | None = None, rates: int 
     >>> virtual_work(jn.robot.from_screws([slide]), [[0.0], [3.0], [5.0], [7.0]], rates=1).round(12).tolist()
     [[10.0], [14.0]]
     """
-    rates = whole_number("rates", rates)
+    rates = whole_number("rates", rates, error=error_for(system))
     if isinstance(system, Motion):
         return balanced(system, rates, gravity=False)
     return _virtual_work(system, (checked_coordinates(system, q, rates + 2, rates + 2),), (), (True,))
@@ -124,7 +126,7 @@ def gravity_forces(system: Robot | Motion, q: ArrayLike | None = None, rates: in
     >>> gravity_forces(jn.robot.from_screws([lift]), [[0.0]]).tolist()
     [[19.62]]
     """
-    rates = whole_number("rates", rates)
+    rates = whole_number("rates", rates, error=error_for(system))
     if isinstance(system, Motion):
         return balanced(system, rates, gravity=True) - balanced(system, rates, gravity=False)
     return _virtual_work(system, (checked_coordinates(system, q, rates, rates),), (), (False,))

@@ -7,7 +7,7 @@ the solver scales rows and columns, and keeps joints of one type together.
 import dataclasses
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any, cast
 
 import jax.numpy as jnp
 import numpy as np
@@ -32,13 +32,16 @@ from jounce.mechanism.system import System
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
 
+if TYPE_CHECKING:
+    import xarray
+
 COLUMNS = {"planar": ("x", "y", "angle"), "spatial": ("x", "y", "z", "wx", "wy", "wz")}
 
 
 @concrete
 def constraint_equations(
     motion: Motion | Mechanism, state: Mapping[str, Any] | None = None, time: float | None = None
-) -> Any:
+) -> "xarray.Dataset":
     """Return the constraint equations of a mechanism along a motion, or at one state: Sommer 2024, equations 1-8.
 
     Joints and drivers are ``Phi(q, t) = 0``, and each time derivative of it is linear in the highest derivative of the
@@ -64,7 +67,8 @@ def constraint_equations(
         the mechanism; columns "BODY.x", "BODY.y", "BODY.angle", in space "BODY.x", "BODY.y", "BODY.z", "BODY.wx",
         "BODY.wy", "BODY.wz": the global position of the origin, and the angular velocity along the axes of the body.
         A variable has at ``derivative=k`` its k-th derivative, or what belongs to q^(k); NaN where it has none, as
-        `right_side` at 0 where there are multipliers.
+        `right_side` at 0 where there are multipliers. The coordinate ``column_unit`` holds the units of the columns, m
+        or rad.
 
         ``residual`` (time, row)
             Phi; angles about axes within half a turn.
@@ -141,11 +145,16 @@ def constraint_equations(
             coordinates["derivative"] = np.arange(first[0], first[0] + values.shape[1])
         values = np.where(solved.reshape(-1, *[1] * (values.ndim - 1)), values, np.nan)
         parts.append(xarray.DataArray(values, coordinates, dims, name))
-    dataset = xarray.merge(parts, join="outer", compat="no_conflicts")
+    dataset = cast("xarray.Dataset", xarray.merge(parts, join="outer", compat="no_conflicts"))  # not a DataTree
     dataset.attrs = {"title": motion.mechanism.title or "equations of a mechanism", "source": "jounce"}
     dataset["time"].attrs = {"units": "s", "long_name": "time"}
     dataset["derivative"].attrs = {"long_name": "order of the time derivative"}
-    return dataset
+    for name, unit in (("position", "m"), ("angle", "rad"), ("attitude", "1")):
+        if name in dataset:
+            dataset[name].attrs["units"] = unit
+    turns = motion.model.pose_type.turns
+    units = (["m"] * motion.model.pose_type.shifts + ["rad"] * turns) * len(motion.mechanism.bodies)
+    return dataset.assign_coords(column_unit=("column", units))
 
 
 def _labels(motion: Motion) -> dict[str, Any]:

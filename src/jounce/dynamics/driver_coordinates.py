@@ -6,7 +6,7 @@ by a jet, and all poses follow from it to first order by the factored Jacobian, 
 
 import dataclasses
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import equinox as eqx
 import jax
@@ -26,10 +26,15 @@ from jounce.kinematics import Motion
 from jounce.kinematics.change_points import spoiled
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.factors import Factor, factored
+from jounce.mechanism.driver_outputs import is_turning
 from jounce.mechanism.system import System
 from jounce.modules import Module
 from jounce.rigid.pose import Pose
 from jounce.shapes import ArrayLike, Numbers
+from jounce.trajectory.shown_units import derivative_unit
+
+if TYPE_CHECKING:
+    import xarray
 
 
 class ChangedLaw(Module):
@@ -44,8 +49,14 @@ class ChangedLaw(Module):
 
 
 def in_driver_coordinates(
-    motion: Motion, q: ArrayLike | None, least: int, form: Callable[..., Any], static: tuple[Any, ...]
-) -> Any:
+    motion: Motion,
+    q: ArrayLike | None,
+    least: int,
+    form: Callable[..., Any],
+    static: tuple[Any, ...],
+    *,
+    power: int = 0,
+) -> "xarray.DataArray":
     """Return what a form of the equations of motion gives in the coordinates of the drivers.
 
     Parameters
@@ -61,11 +72,14 @@ def in_driver_coordinates(
         `static` to coefficients of shape (levels, coordinates, batch).
     static : tuple
         What else the form takes.
+    power : int, default 0
+        By which power of s what the form gives is divided, in units of forces.
 
     Returns
     -------
     xarray.DataArray
-        Dimensions time, derivative and driver; NaN at instants that were not solved, and at change points.
+        Dimensions time, derivative and driver, with the unit of each driver; NaN at instants that were not solved, and
+        at change points.
 
     Raises
     ------
@@ -87,7 +101,15 @@ def in_driver_coordinates(
 
     values = in_chunks(chunk, len(motion.time))
     values = np.where(spoiled(motion.passages, motion.time, least), np.nan, values)
-    return labelled(motion, values, driver=names)
+    return _of_drivers(motion, values, power)
+
+
+def _of_drivers(motion: Motion, values: Float[np.ndarray, "order driver time"], power: int = 0) -> Any:
+    """Return what acts along the coordinates of drivers, labelled, with the unit of each, N or N*m over s^power."""
+    drivers = motion.mechanism.drivers
+    efforts = ["N*m" if is_turning(driver) else "N" for driver in drivers.values()]
+    units = [derivative_unit(unit, power) if power >= 0 else f"{unit}*s^{-power}" for unit in efforts]
+    return labelled(motion, values, driver=tuple(drivers)).assign_coords(unit=("driver", units))
 
 
 def drivers_of(motion: Motion) -> tuple[str, ...]:
@@ -106,7 +128,7 @@ def drivers_of(motion: Motion) -> tuple[str, ...]:
     return names
 
 
-def balanced(motion: Motion, rates: int, *, gravity: bool) -> Any:
+def balanced(motion: Motion, rates: int, *, gravity: bool) -> "xarray.DataArray":
     """Return what inertia asks of the drivers, and on request weight too, by multipliers: nothing applied acts.
 
     Parameters
@@ -121,7 +143,7 @@ def balanced(motion: Motion, rates: int, *, gravity: bool) -> Any:
     Returns
     -------
     xarray.DataArray
-        Dimensions time, derivative and driver; NaN at instants that were not solved.
+        Dimensions time, derivative and driver, with the unit of each driver; NaN at instants that were not solved.
 
     Raises
     ------
@@ -134,7 +156,7 @@ def balanced(motion: Motion, rates: int, *, gravity: bool) -> Any:
         raise MechanismError(f"this needs a motion solved to order {rates + 2}", name="order", value=motion.order)
     forces = MotionForces(motion, gravity=gravity, applied=False)
     values = np.stack([forces.driver_force(name)[: rates + 1, 0] for name in names], axis=1)
-    return labelled(motion, values, driver=names)
+    return _of_drivers(motion, values)
 
 
 @compiled("pose_type", "order", "least", "form", "static")

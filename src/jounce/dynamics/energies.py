@@ -8,7 +8,7 @@ for any motion. On jets the same two products give the rates.
 
 import dataclasses
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import jax.numpy as jnp
 import numpy as np
@@ -16,22 +16,27 @@ from jaxtyping import Float
 
 from jounce.dynamics.masses import Gravity, Masses, gravity_of, required_masses, second_moments
 from jounce.dynamics.motion_values import Coordinates, check_motion, cut, held, labelled, pose_of
-from jounce.errors import MechanismError
+from jounce.errors import JounceError, MechanismError, RobotError, whole_number
 from jounce.jet import Jet, dot
 from jounce.jet.algebra import stacked, total
 from jounce.kinematics import Motion
 from jounce.kinematics.compilation import compiled
+from jounce.kinematics.solve import HIGHEST_ORDER
 from jounce.mechanism.system import Group
 from jounce.rigid import PlanarPose
 from jounce.rigid.frames import Frames
 from jounce.rigid.pose import Pose
-from jounce.robot.arguments import checked_coordinates, whole_number
+from jounce.robot.arguments import checked_coordinates
 from jounce.robot.batches import Batched
 from jounce.robot.kinematics import body_frames
 from jounce.robot.robot import Robot
 from jounce.robot.tree import Tree
 from jounce.robot.tree_scan import Series
 from jounce.shapes import ArrayLike, Numbers
+from jounce.trajectory.shown_units import derivative_unit
+
+if TYPE_CHECKING:
+    import xarray
 
 Energies = Float[Numbers, "order body time"]
 """Taylor coefficients of energies of bodies along a motion."""
@@ -179,6 +184,23 @@ def acceleration_energy(system: Robot | Motion, q: ArrayLike | None = None, *, o
     return Energy(*energies_of(system, q, order, body_energy))
 
 
+def energy_unit(order: int) -> str:
+    """Return the unit of the acceleration energy of an order.
+
+    Examples
+    --------
+    >>> from jounce.dynamics.energies import energy_unit
+    >>> energy_unit(0), energy_unit(1)
+    ('J', 'J/s^2')
+    """
+    return derivative_unit("J", 2 * order)
+
+
+def error_for(system: Any) -> type[JounceError]:
+    """Return the class of errors about a robot, or about the motion of a mechanism."""
+    return MechanismError if isinstance(system, Motion) else RobotError
+
+
 def energies_of(system: Robot | Motion, q: ArrayLike | None, order: int, function: EnergyFunction) -> tuple[Any, ...]:
     """Return what `body_energy`, or a function like it, gives for the bodies of a system, their names, and the order.
 
@@ -187,14 +209,14 @@ def energies_of(system: Robot | Motion, q: ArrayLike | None, order: int, functio
     RobotError, MechanismError
         As for `acceleration_energy`.
     """
-    order = whole_number("order", order)
+    order = whole_number("order", order, 0, HIGHEST_ORDER, error=error_for(system))
     if isinstance(system, Motion):
         if q is not None:
             raise MechanismError("a motion has its coordinates already", name="q", value=q)
         _check_known(system, order, system.order)
         bodies = tuple(system.mechanism.bodies)
         found = energy_coefficients(system, order, function)
-        parts = tuple(labelled(system, x[: system.order - order, 1:], f"J/s^{2 * order}", body=bodies) for x in found)
+        parts = tuple(labelled(system, x[: system.order - order, 1:], energy_unit(order), body=bodies) for x in found)
         return *parts, bodies, order
     parts = _of_robot(system, (checked_coordinates(system, q, order + 1),), (), (order, function))
     return *parts, system.moving_links, order
@@ -256,7 +278,7 @@ def _of_bodies(
     return tuple(stacked(part) for part in function(pose_of(coordinates, pose_type), *masses, order))
 
 
-def potential_energy(motion: Motion) -> Any:
+def potential_energy(motion: Motion) -> "xarray.DataArray":
     """Return the potential energy of all bodies of a mechanism in its gravity, and its rates; zero at the origin.
 
     Parameters

@@ -6,12 +6,12 @@ from typing import ClassVar
 import equinox as eqx
 
 from jounce.constraints.base import Whole
-from jounce.dynamics.energies import energy_coefficients, potential_coefficients
+from jounce.dynamics.energies import energy_coefficients, energy_unit, potential_coefficients
 from jounce.dynamics.motion_values import held
-from jounce.errors import MechanismError, check_name
+from jounce.errors import MechanismError, check_name, whole_number
 from jounce.kinematics import Motion
+from jounce.kinematics.solve import HIGHEST_ORDER
 from jounce.mechanism import AbstractMotionOutput, Mechanism
-from jounce.robot.arguments import whole_number
 from jounce.shapes import Numbers
 
 
@@ -64,7 +64,7 @@ class AccelerationEnergyOutput(AbstractEnergyOutput):
     order: Whole = eqx.field(static=True, default=1)
 
     def __check_init__(self):
-        whole_number("order", self.order, error=MechanismError)
+        whole_number("order", self.order, 0, HIGHEST_ORDER, error=MechanismError)
 
     @property
     def lost_orders(self) -> int:  # type: ignore[override] - of an instance, as it depends on the order
@@ -74,7 +74,7 @@ class AccelerationEnergyOutput(AbstractEnergyOutput):
     @property
     def unit(self) -> str:
         """Unit of the energy."""
-        return f"J/s^{2 * self.order}" if self.order else "J"
+        return energy_unit(int(self.order))
 
     def _of_bodies(self, motion):
         return sum(energy_coefficients(motion, int(self.order)))

@@ -10,7 +10,7 @@ laws of the drivers of a mechanism (`driver_coordinates`).
 
 import math
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any, overload
 
 import jax
 import jax.numpy as jnp
@@ -18,17 +18,21 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.dynamics.driver_coordinates import in_driver_coordinates
-from jounce.dynamics.energies import differentiated, robot_energy
+from jounce.dynamics.energies import differentiated, error_for, robot_energy
+from jounce.errors import whole_number
 from jounce.jet import Jet, components
 from jounce.jet.algebra import stacked, total
 from jounce.kinematics import Motion
-from jounce.robot.arguments import checked_coordinates, whole_number
+from jounce.robot.arguments import checked_coordinates
 from jounce.robot.batches import Batched
 from jounce.robot.kinematics import body_frames
 from jounce.robot.robot import Robot
 from jounce.robot.tree import Tree
 from jounce.robot.tree_scan import Series
 from jounce.shapes import ArrayLike, Numbers
+
+if TYPE_CHECKING:
+    import xarray
 
 
 def catalan(p: int) -> int:
@@ -139,8 +143,12 @@ def _of_robot(tree: Tree, arrays: tuple[Series], _: Any, form: Callable[..., Any
     return form(energies, arrays[0], *static)
 
 
-def _evaluated(system: Robot | Motion, q: ArrayLike | None, least: int, form: Callable[..., Any], *static: Any) -> Any:
+def _evaluated(
+    system: Robot | Motion, q: ArrayLike | None, least: int, form: Callable[..., Any], *static: Any, power: int = 0
+) -> Any:
     """Return what a form gives for a robot, (..., levels, n), or for the drivers of a motion, labelled.
+
+    It is in units of forces, divided by a power of s.
 
     Raises
     ------
@@ -148,13 +156,21 @@ def _evaluated(system: Robot | Motion, q: ArrayLike | None, least: int, form: Ca
         If q does not fit the robot or has too few derivatives, or the motion is not that of a driven mechanism.
     """
     if isinstance(system, Motion):
-        return in_driver_coordinates(system, q, least, form, static)
+        return in_driver_coordinates(system, q, least, form, static, power=power)
     return _of_robot(system, (checked_coordinates(system, q, least, least),), (), (form, static))
 
 
+@overload
+def energy_slope(
+    system: Robot, q: ArrayLike, *, m: int, order: int = 1, rate: int = 0, rates: int = 0
+) -> Float[Numbers, "*batch derivative joint"]: ...
+@overload
+def energy_slope(
+    system: Motion, q: None = None, *, m: int, order: int = 1, rate: int = 0, rates: int = 0
+) -> "xarray.DataArray": ...
 def energy_slope(
     system: Robot | Motion, q: ArrayLike | None = None, *, m: int, order: int = 1, rate: int = 0, rates: int = 0
-) -> Any:
+) -> "Numbers | xarray.DataArray":
     """Return the derivative of a rate of an energy with respect to ``q^(m)``: the terms of Negrean 2025, 126-134.
 
     ``dE_p^(n) / dq^(m)``, where ``E_p^(n)`` is a function of ``q, q', ..., q^(p + 1 + n)`` and all but one of them are
@@ -179,7 +195,7 @@ def energy_slope(
     Returns
     -------
     array of shape (..., rates + 1, n)
-        For a motion an `xarray.DataArray` of dimensions time, derivative and driver.
+        For a motion an `xarray.DataArray` of dimensions time, derivative and driver, with the unit of each driver.
 
     Raises
     ------
@@ -198,8 +214,10 @@ def energy_slope(
     [[14.0]]
     """
     numbers = {"m": m, "order": order, "rate": rate, "rates": rates}
-    m, order, rate, rates = (whole_number(name, value) for name, value in numbers.items())
-    return _evaluated(system, q, order + rate + rates + 1, _slope, rates + 1, order, rate, m)
+    error = error_for(system)
+    m, order, rate, rates = (whole_number(name, value, error=error) for name, value in numbers.items())
+    least, power = order + rate + rates + 1, 2 * order + rate - m
+    return _evaluated(system, q, least, _slope, rates + 1, order, rate, m, power=power)
 
 
 def lagrange(system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0) -> Any:
@@ -221,7 +239,7 @@ def lagrange(system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0)
     -------
     array of shape (..., rates + 1, n)
         Forces and their rates, N m or N by s. For a motion an `xarray.DataArray` of dimensions time, derivative and
-        driver.
+        driver, with the unit of each driver.
 
     Raises
     ------
@@ -235,7 +253,7 @@ def lagrange(system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0)
     >>> lagrange(jn.robot.from_screws([slide]), [[0.0], [3.0], [5.0], [7.0]], rates=1).round(12).tolist()
     [[10.0], [14.0]]
     """
-    rates = whole_number("rates", rates)
+    rates = whole_number("rates", rates, error=error_for(system))
     return _evaluated(system, q, rates + 2, _lagrange, rates + 1)
 
 
@@ -255,7 +273,7 @@ def mangeron_nielsen(system: Robot | Motion, q: ArrayLike | None = None, rates: 
     -------
     array of shape (..., rates + 1, n)
         Forces and their rates, N m or N by s. For a motion an `xarray.DataArray` of dimensions time, derivative and
-        driver.
+        driver, with the unit of each driver.
 
     Raises
     ------
@@ -269,7 +287,7 @@ def mangeron_nielsen(system: Robot | Motion, q: ArrayLike | None = None, rates: 
     >>> mangeron_nielsen(jn.robot.from_screws([slide]), [[0.0], [3.0], [5.0], [7.0]], m=2).tolist()
     [[10.0]]
     """
-    m, rates = whole_number("m", m, 1), whole_number("rates", rates)
+    m, rates = whole_number("m", m, 1, error=error_for(system)), whole_number("rates", rates, error=error_for(system))
     return _evaluated(system, q, rates + m + 1, _mangeron, rates + 1, m)
 
 
@@ -289,7 +307,7 @@ def gibbs_appell(system: Robot | Motion, q: ArrayLike | None = None, rates: int 
     -------
     array of shape (..., rates + 1, n)
         Forces and their rates, N m or N by s. For a motion an `xarray.DataArray` of dimensions time, derivative and
-        driver.
+        driver, with the unit of each driver.
 
     Raises
     ------
@@ -303,7 +321,7 @@ def gibbs_appell(system: Robot | Motion, q: ArrayLike | None = None, rates: int 
     >>> gibbs_appell(jn.robot.from_screws([slide]), [[0.0], [3.0], [5.0], [7.0]], rates=1).round(12).tolist()
     [[10.0], [14.0]]
     """
-    m, rates = whole_number("m", m, 2), whole_number("rates", rates)
+    m, rates = whole_number("m", m, 2, error=error_for(system)), whole_number("rates", rates, error=error_for(system))
     return _evaluated(system, q, rates + m, _gibbs_appell, rates + 1, m)
 
 
@@ -333,7 +351,8 @@ def higher_order(
     Returns
     -------
     array of shape (..., n)
-        N m or N by s^(k - 1). For a motion an `xarray.DataArray` of dimensions time and driver.
+        N m or N by s^(k - 1). For a motion an `xarray.DataArray` of dimensions time and driver, with
+        the unit of each driver.
 
     Raises
     ------
@@ -349,8 +368,8 @@ def higher_order(
     >>> higher_order(jn.robot.from_screws([slide]), q, k=2).round(12).tolist()
     [14.0]
     """
-    k = whole_number("k", k, 1)
-    m = k + 1 if m is None else whole_number("m", m, k + 1)
+    k = whole_number("k", k, 1, error=error_for(system))
+    m = k + 1 if m is None else whole_number("m", m, k + 1, error=error_for(system))
     weights = tuple(float(coefficients(p)) for p in range(1, k + 1))
-    found = _evaluated(system, q, m + k - 1, _higher_order, k, m, weights)
+    found = _evaluated(system, q, m + k - 1, _higher_order, k, m, weights, power=k - 1)
     return found[:, 0] if isinstance(system, Motion) else found[..., 0, :]

@@ -133,4 +133,4 @@ def expressed(
     for other in frame:
         force = other.to_body(force)
         moment = moment if pose.turns == 1 else other.to_body(moment)
-    return tuple(stacked(jet)[:, :, 0] for jet in (force, moment))
+    return stacked(force)[:, :, 0], stacked(moment)[:, :, 0]

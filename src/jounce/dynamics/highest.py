@@ -36,7 +36,10 @@ def local_heights(measures: Float[np.ndarray, "time curve"]) -> Float[np.ndarray
 
 
 def highest_of(height: Float[np.ndarray, "time curve"], count: int) -> Int[np.ndarray, "{count} curve"]:
-    """Return the indices of the highest values of curves, the best first, of equal ones the earlier."""
+    """Return the indices of the highest values of curves, the best first, of equal ones the earlier.
+
+    Where fewer are finite than are wanted, an index may stand twice.
+    """
     left, every, order = height.copy(), np.arange(height.shape[1]), []
     for _ in range(count):
         order.append(np.argmax(left, axis=0))

@@ -14,6 +14,7 @@ from jounce.dynamics.static_equilibrium import Equilibrium
 from jounce.dynamics.variations import reaches
 from jounce.errors import MechanismError, check_name
 from jounce.mechanism import Mechanism
+from jounce.shapes import Refused
 
 
 class StateSpace(NamedTuple):
@@ -174,7 +175,7 @@ class Linearisation(Displayed):
         return self.state_space().D
 
 
-def named(kind: str, names: Any) -> tuple[str, ...]:
+def named(kind: str, names: str | Sequence[str] | Refused) -> tuple[str, ...]:
     """Return names given one by one or alone, or raise MechanismError."""
     if isinstance(names, str):
         return (names,)

@@ -1,7 +1,6 @@
 """All positions in which a mechanism or a robot stands still that many searches find."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from jounce.mechanism import Mechanism, build
 from jounce.mechanism.preconditions import concrete
 from jounce.robot import Robot
 from jounce.robot.closures import GivenCoordinates, given_coordinates
+from jounce.shapes import Real, Refused
 
 SAME = 1e-6  # rad or sizes of the mechanism: positions as near count as one
 
@@ -24,10 +24,10 @@ SAME = 1e-6  # rad or sizes of the mechanism: positions as near count as one
 @concrete
 def equilibria(
     mechanism: Mechanism | Robot,
-    time: Any = None,
+    time: Real | Refused | None = None,
     *,
-    starts: Any = 100,
-    seed: Any = 0,
+    starts: int | Refused = 100,
+    seed: int | Refused = 0,
     without: Sequence[str] = (),
     q: GivenCoordinates = None,
     hold: str | Sequence[str] = (),

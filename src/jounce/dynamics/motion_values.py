@@ -1,7 +1,7 @@
 """Values along a motion: computed in chunks of instants, turned into plain derivatives, labelled."""
 
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -16,6 +16,9 @@ from jounce.kinematics.device import on_processor
 from jounce.kinematics.threads import Threads, thread_count
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
+
+if TYPE_CHECKING:
+    import xarray
 
 Coordinates = Mapping[str, Float[Numbers, "_ ... _"]]
 """Taylor coefficients of the coordinates of poses, by name: as `Motion.poses` has them."""
@@ -134,7 +137,7 @@ def labelled(
     coefficients: Float[Numbers, "order *shape time"],
     units: str | None = None,
     **axes: Iterable[str],
-) -> Any:
+) -> "xarray.DataArray":
     """Return plain derivatives as an xarray.DataArray of dimensions time, derivative, and those that are named."""
     import xarray
 

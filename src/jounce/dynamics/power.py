@@ -1,7 +1,7 @@
 """The power balance of a mechanism in motion: a check of all forces that needs no second solver."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import jax.numpy as jnp
 import numpy as np
@@ -21,10 +21,13 @@ from jounce.rigid import PlanarPose
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
 
+if TYPE_CHECKING:
+    import xarray
+
 FAINT = 1e-3  # of what turning bodies would move: coefficients that vanish have its rounding, 1e-12 of this or less
 
 
-def power_balance(motion: Motion) -> Any:
+def power_balance(motion: Motion) -> "xarray.Dataset":
     """Return where the power in a moving mechanism comes from and goes to, with rates: a check of all its forces.
 
     What drivers and applied forces put in is what the kinetic energy of the bodies, and their potential energy in

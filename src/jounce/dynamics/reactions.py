@@ -2,7 +2,7 @@
 
 import copy
 import dataclasses
-from typing import Any
+from typing import TYPE_CHECKING
 
 from jounce.dynamics.motion_values import check_motion
 from jounce.dynamics.outputs import (
@@ -15,10 +15,14 @@ from jounce.dynamics.outputs import (
     is_turning,
 )
 from jounce.kinematics import Motion
+from jounce.mechanism.redundant_reactions import RedundantReactions
 from jounce.shapes import ArrayLike
 
+if TYPE_CHECKING:
+    import xarray
 
-def driver_force(motion: Motion, name: str, *, redundant: Any = None) -> Any:
+
+def driver_force(motion: Motion, name: str, *, redundant: RedundantReactions | None = None) -> "xarray.DataArray":
     """Return the force or torque of a driver with its rates: yank, second rate and so on.
 
     It is conjugate to the motion law: a torque, N m, where the law is an angle, else a force, N, and its product with
@@ -78,8 +82,8 @@ class Reaction:
         N m, N m/s, ..., about the point asked for; without components in the plane.
     """
 
-    force: Any
-    torque: Any
+    force: "xarray.DataArray"
+    torque: "xarray.DataArray"
 
 
 def joint_reaction(
@@ -89,7 +93,7 @@ def joint_reaction(
     frame: str = "global",
     point: ArrayLike | None = None,
     *,
-    redundant: Any = None,
+    redundant: RedundantReactions | None = None,
 ) -> Reaction:
     """Return the force and torque that a joint, or a driver, exerts on one of its bodies, with rates.
 
@@ -143,7 +147,7 @@ def joint_reaction(
     return Reaction(chosen.evaluate(force, name), chosen.evaluate(torque, name))
 
 
-def _choosing(motion: Motion, redundant: Any) -> Motion:
+def _choosing(motion: Motion, redundant: RedundantReactions | None) -> Motion:
     """Return a motion whose mechanism has another choice of reactions that redundant constraints leave open."""
     if redundant is None or redundant == motion.mechanism.redundant_reactions:
         return motion
@@ -153,7 +157,7 @@ def _choosing(motion: Motion, redundant: Any) -> Motion:
     return other
 
 
-def applied_force(motion: Motion, name: str) -> Any:
+def applied_force(motion: Motion, name: str) -> "xarray.DataArray":
     """Return an applied force or torque with its rates, along its displacement or by components.
 
     Parameters

@@ -17,11 +17,17 @@ from jounce.robot import Robot
 from jounce.robot.arguments import floats
 from jounce.robot.closures import GivenCoordinates, given_coordinates
 from jounce.robot.mechanism_parts import RobotParts
+from jounce.shapes import ArrayLike
 
 DRIVE = "_drive"
 
+GivenState = Mapping[str, float] | ArrayLike | None
+"""Coordinates, alone or with their rates and second derivatives, or by name of the joint; those not given are zero."""
 
-def standing(robot: Robot, q: GivenCoordinates, hold: Any, torques: Mapping[str, float] | None) -> Mechanism:
+
+def standing(
+    robot: Robot, q: GivenCoordinates, hold: str | Sequence[str], torques: Mapping[str, float] | None
+) -> Mechanism:
     """Return a robot as a mechanism, joints held at their coordinates, constant torques or forces in others.
 
     Raises
@@ -58,7 +64,7 @@ def standing(robot: Robot, q: GivenCoordinates, hold: Any, torques: Mapping[str,
 
 
 def through_state(
-    robot: Robot, state: Any, coordinates: Sequence[str] | None, drives: bool
+    robot: Robot, state: GivenState, coordinates: Sequence[str] | None, drives: bool
 ) -> tuple[Place, tuple[str, ...]]:
     """Return a robot in a state, driven in independent joints, and their names.
 
@@ -92,7 +98,7 @@ def through_state(
     return driven(placed(mechanism, model, found, 0.0)), names
 
 
-def _levels(robot: Robot, state: Any) -> Float[np.ndarray, "3 joint"]:
+def _levels(robot: Robot, state: GivenState) -> Float[np.ndarray, "3 joint"]:
     """Return coordinates, rates and second derivatives, zero where they are not given."""
     count = len(robot.joint_names)
     values = robot.coordinates(**state) if isinstance(state, Mapping) else np.zeros(count) if state is None else state

@@ -11,7 +11,7 @@ from jounce.dynamics.linearisation import Linearisation, named
 from jounce.dynamics.masses import gravity_of, masses_of, required_masses
 from jounce.dynamics.motion_values import cut
 from jounce.dynamics.reduction import Place, Reduction, reduced, with_joints
-from jounce.dynamics.robot_states import DRIVE, through_state
+from jounce.dynamics.robot_states import DRIVE, GivenState, through_state
 from jounce.dynamics.static_equilibrium import Equilibrium, equilibrium
 from jounce.dynamics.statics import BALANCED, Found, remains
 from jounce.dynamics.variations import clock_at
@@ -23,18 +23,19 @@ from jounce.mechanism.axis_angles import at_lanes
 from jounce.mechanism.preconditions import concrete
 from jounce.modules import with_fields
 from jounce.robot import Robot
+from jounce.shapes import Real, Refused
 
 INSTANT = 1e-9  # of the time between the ends of a motion: an instant as near to one of its own is that one
 
 
 @concrete
 def linearise(
-    subject: Any,
-    time: Any = None,
+    subject: Mechanism | Equilibrium | Motion | Robot | Refused,
+    time: Real | None = None,
     *,
     coordinates: Sequence[str] | None = None,
     release: Sequence[str] = (),
-    q: Any = None,
+    q: GivenState = None,
     drives: bool = False,
 ) -> Linearisation:
     """Return the equations of small motions of a mechanism: mass, damping and stiffness matrix, state space, modes.
@@ -115,7 +116,7 @@ def linearise(
     return Linearisation(reduction, about)
 
 
-def _of_robot(robot: Robot, q: Any, coordinates: Sequence[str] | None, drives: bool) -> Linearisation:
+def _of_robot(robot: Robot, q: GivenState, coordinates: Sequence[str] | None, drives: bool) -> Linearisation:
     """Return the equations of small motions of a robot about a state, in the coordinates of its joints."""
     wanted = None if coordinates is None else named("coordinates", coordinates)
     place, names = through_state(robot, q, wanted, drives and bool(robot.closures))
@@ -128,7 +129,7 @@ def _of_robot(robot: Robot, q: Any, coordinates: Sequence[str] | None, drives: b
     return Linearisation(with_joints(found, names, extra), None)
 
 
-def place_along(motion: Motion, time: Any) -> Place:
+def place_along(motion: Motion, time: Real | None) -> Place:
     """Return a mechanism at an instant of its motion.
 
     Raises

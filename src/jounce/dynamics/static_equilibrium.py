@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from jounce.display import Displayed
+from jounce.dynamics.kinks import kinked
 from jounce.dynamics.masses import check_loads
 from jounce.dynamics.reduction import Place, Reduction, reduced
 from jounce.dynamics.robot_states import standing
@@ -22,6 +23,8 @@ from jounce.mechanism import Body, Mechanism, build, check_mechanism, time_grid
 from jounce.mechanism.law_checks import check_laws
 from jounce.mechanism.preconditions import concrete
 from jounce.robot import Robot
+from jounce.robot.closures import GivenCoordinates
+from jounce.shapes import Real, Refused
 
 METHODS = ("settle", "newton")
 SINGULAR = "the position is singular, joints can move there that cannot elsewhere; what is near is not told"
@@ -94,8 +97,6 @@ class Equilibrium(Displayed):
     @cached_property
     def cautions(self) -> tuple[str, ...]:
         """What was left out of account."""
-        from jounce.dynamics.kinks import kinked
-
         found = (
             [
                 f"forces.{name} has a kink or a jump there: its slope is not the same on both sides"
@@ -168,12 +169,12 @@ def _posed(body: Body, pose: dict[str, Any]) -> Body:
 
 @concrete
 def equilibrium(
-    mechanism: Any,
-    time: Any = None,
+    mechanism: Mechanism | Robot,
+    time: Real | Refused | None = None,
     *,
     without: Sequence[str] = (),
     method: str = "settle",
-    q: Any = None,
+    q: GivenCoordinates = None,
     hold: str | Sequence[str] = (),
     torques: Mapping[str, float] | None = None,
 ) -> Equilibrium:
@@ -239,7 +240,9 @@ def equilibrium(
     return told(found, start, of_robot=robot)
 
 
-def as_mechanism(subject: Any, q: Any, hold: Any, torques: Mapping[str, float] | None) -> Any:
+def as_mechanism(
+    subject: Mechanism | Robot, q: GivenCoordinates, hold: str | Sequence[str], torques: Mapping[str, float] | None
+) -> Mechanism:
     """Return a robot as the mechanism that stands with some joints held, or a mechanism as it is.
 
     Raises
@@ -255,7 +258,7 @@ def as_mechanism(subject: Any, q: Any, hold: Any, torques: Mapping[str, float] |
     return subject
 
 
-def at_rest_from(mechanism: Mechanism, time: Any, without: Sequence[str], method: str) -> Place:
+def at_rest_from(mechanism: Mechanism, time: Real | Refused | None, without: Sequence[str], method: str) -> Place:
     """Return the mechanism at rest where its bodies can be put together, or raise where something is not valid."""
     check_mechanism(mechanism)
     check_choice("method", method, METHODS, MechanismError)

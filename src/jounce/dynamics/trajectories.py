@@ -2,7 +2,7 @@
 
 import warnings
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Float
@@ -15,6 +15,9 @@ from jounce.robot.model import Limits
 from jounce.robot.robot import Robot
 from jounce.shapes import ArrayLike
 from jounce.trajectory.joint_trajectory import JointTrajectory
+
+if TYPE_CHECKING:
+    import xarray
 
 BLOCK = 2048  # instants evaluated at once, always as many, so that all is compiled once
 QUANTITIES = ("position", "velocity", "acceleration", "jerk")
@@ -102,7 +105,7 @@ class FollowedTrajectory:
 
 def trajectory_torques(
     robot: Robot, trajectory: JointTrajectory, rates: int = 0, *, times: ArrayLike | None = None, drives: bool = True
-) -> Any:
+) -> "xarray.Dataset":
     """Return the torques and forces that a trajectory needs of the joints of a robot, with rates, labelled.
 
     Parameters

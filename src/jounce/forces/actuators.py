@@ -7,6 +7,7 @@ from jounce.constraints.base import Vector
 from jounce.constraints.planar import slide
 from jounce.forces.base import AbstractForce, Law, by_law
 from jounce.jet import Jet, sqrt
+from jounce.rigid import PlanarPose, SpatialPose
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
 
@@ -26,7 +27,7 @@ class DistanceForce(AbstractForce, type="distance_force"):
 
     dimensions = {"law": "force"}
 
-    def displacement(self, body_i, body_j, time):
+    def displacement(self, body_i: Pose, body_j: Pose, time: Jet) -> Jet:
         return distance(body_i, body_j, self.point_i, self.point_j)
 
     force = by_law
@@ -45,7 +46,7 @@ class SlideForce(AbstractForce, type="slide_force"):
 
     dimensions = {"law": "force"}
 
-    def displacement(self, body_i, body_j, time):
+    def displacement(self, body_i: Pose, body_j: Pose, time: Jet) -> Jet:
         return slide(body_i, body_j, self.point_i, self.point_j, self.vector_i)
 
     force = by_law
@@ -59,7 +60,7 @@ class Torque(AbstractForce, type="torque", space="planar"):
     unit = "N*m"
     dimensions = {"law": "torque"}
 
-    def displacement(self, body_i, body_j, time):
+    def displacement(self, body_i: PlanarPose, body_j: PlanarPose, time: Jet) -> Jet:
         return body_j.angle - body_i.angle
 
     force = by_law
@@ -82,7 +83,7 @@ class SpatialTorque(AbstractForce, type="torque", space="spatial"):
 
     __check_init__ = check_vectors
 
-    def displacement(self, body_i, body_j, time):
+    def displacement(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
         return relative_angle(body_i, body_j, self.axis_i, self.vector_i, self.vector_j, self.datum)
 
     force = by_law

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 from jounce.constraints.base import catalogue, check_bodies, register
 from jounce.jet import Jet
 from jounce.modules import Module
+from jounce.rigid.pose import Pose
 
 Law = Annotated[Any, "law"]
 Laws = Annotated[Any, "laws"]
@@ -71,7 +72,7 @@ class AbstractForce(Module):
         check_bodies(self, (self.body_count,), "acts on", "act between")
 
     @abc.abstractmethod
-    def displacement(self, *bodies_and_time: Any) -> Jet:
+    def displacement(self, *bodies_and_time: Any, **_: Any) -> Jet:  # with both, parameters may be named
         """Return the jet of the displacement: ``displacement(self, body_i, body_j, time)``.
 
         Bodies are poses (`PlanarPose` or `SpatialPose`), `time` is a jet in s. The result is a scalar, of shape (...),
@@ -86,11 +87,11 @@ class AbstractForce(Module):
         displacement. It may be as short as the velocity, which has one order less than the displacement.
         """
 
-    def velocity(self, *bodies_and_time: Any) -> Jet:
+    def velocity(self, *bodies_and_time: Any, **_: Any) -> Jet:
         """Return the jet of the velocity on which the force works: the rate of the displacement, unless told."""
         return self.displacement(*bodies_and_time).differentiate()
 
-    def variation(self, bodies: tuple[Any, ...], changes: tuple[Any, ...], time: Jet) -> Jet:
+    def variation(self, bodies: tuple[Pose, ...], changes: tuple[Pose, ...], time: Jet) -> Jet:
         """Return how far the force acts along as the bodies move by changes; linear in them.
 
         It follows from the displacement, unless the force works on what is no change of any displacement, as a moment

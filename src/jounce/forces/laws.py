@@ -17,7 +17,7 @@ class AbstractLaw(Module):
     """A law of a force: maps displacement, velocity and time, all jets, to the jet of the force, in SI units."""
 
     @abc.abstractmethod
-    def value(self, displacement: Jet, velocity: Jet, time: Jet) -> Any:
+    def value(self, displacement: Jet, velocity: Jet, time: Jet) -> Quantity:
         """Return the force: a jet, or what does not change in time; its axes need not be all there."""
 
     def __call__(self, displacement: Jet, velocity: Jet, time: Jet) -> Jet:
@@ -69,7 +69,7 @@ class ExpressionLaw(AbstractLaw):
         self.displacements, self.velocities = tuple(displacements), tuple(velocities)
         self.expression.check({*self.parameters, "t", *self.displacements, *self.velocities})
 
-    def value(self, displacement: Jet, velocity: Jet, time: Jet) -> Any:
+    def value(self, displacement: Jet, velocity: Jet, time: Jet) -> Quantity:
         """Return what the expression evaluates to."""
         moving = _named(self.displacements, displacement) | _named(self.velocities, velocity)
         return self.expression.evaluate({**self.parameters, "t": time, **moving})
@@ -89,7 +89,7 @@ class TimeLaw(AbstractLaw):
 
     motion: AbstractMotion
 
-    def value(self, displacement: Jet, velocity: Jet, time: Jet) -> Any:
+    def value(self, displacement: Jet, velocity: Jet, time: Jet) -> Jet:
         """Return the jet of the law of time."""
         return self.motion(time)
 
@@ -114,7 +114,7 @@ class FunctionLaw(AbstractLaw):
 
     function: Callable[[Jet, Jet, Jet], Any] = eqx.field(static=True)
 
-    def value(self, displacement: Jet, velocity: Jet, time: Jet) -> Any:
+    def value(self, displacement: Jet, velocity: Jet, time: Jet) -> Quantity:
         """Return what the function returns."""
         return self.function(displacement, velocity, time)
 
@@ -134,7 +134,7 @@ class VectorLaw(AbstractLaw):
 
     parts: Sequence[AbstractLaw] = eqx.field(converter=lambda parts: tuple(parts))
 
-    def value(self, displacement: Jet, velocity: Jet, time: Jet) -> Any:
+    def value(self, displacement: Jet, velocity: Jet, time: Jet) -> Jet:
         """Return the jet of the force, a vector."""
         parts = [part.value(displacement, velocity, time) for part in self.parts]
         return stack([_spread(part, displacement[0], time) for part in parts])

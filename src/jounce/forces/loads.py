@@ -7,6 +7,7 @@ from jounce.constraints.base import Vector
 from jounce.errors import MechanismError, check_choice
 from jounce.forces.base import AbstractForce, Law, Laws, by_law
 from jounce.jet import Jet
+from jounce.rigid import PlanarPose, SpatialPose
 from jounce.rigid.orientation import FRAMES
 from jounce.rigid.pose import Pose
 
@@ -30,13 +31,13 @@ class PointForce(AbstractForce, type="point_force", space="planar"):
     def __check_init__(self):
         check_choice("frame", self.frame, FRAMES, MechanismError)
 
-    def displacement(self, body, time):
+    def displacement(self, body: Pose, time: Jet) -> Jet:
         return body.point(self.point)
 
-    def velocity(self, body, time):
+    def velocity(self, body: Pose, time: Jet) -> Jet:
         return self._components(body, body.point(self.point).differentiate())
 
-    def variation(self, bodies, changes, time):
+    def variation(self, bodies: tuple[Pose, ...], changes: tuple[Pose, ...], time: Jet) -> Jet:
         return self._components(bodies[0], super().variation(bodies, changes, time))
 
     def _components(self, body: Pose, vector: Jet) -> Jet:
@@ -65,7 +66,7 @@ class Moment(AbstractForce, type="moment", space="planar"):
     unit = "N*m"
     dimensions = {"law": "torque"}
 
-    def displacement(self, body, time):
+    def displacement(self, body: PlanarPose, time: Jet) -> Jet:
         return body.angle
 
     force = by_law
@@ -89,16 +90,16 @@ class SpatialMoment(AbstractForce, type="moment", space="spatial"):
     def __check_init__(self):
         check_choice("frame", self.frame, FRAMES, MechanismError)
 
-    def displacement(self, body, time):
+    def displacement(self, body: SpatialPose, time: Jet) -> Jet:
         # no vector changes at the rate of the angular velocity: what the moment works on is told by the rates below
         return Jet.constant(jnp.zeros_like(body.position.coefficients[0]), body.order)
 
-    def velocity(self, body, time):
+    def velocity(self, body: SpatialPose, time: Jet) -> Jet:
         if self.frame == "body" and body.angular_velocity is not None:
             return body.angular_velocity
         return body.global_angular_velocity()
 
-    def variation(self, bodies, changes, time):
+    def variation(self, bodies: tuple[SpatialPose, ...], changes: tuple[SpatialPose, ...], time: Jet) -> Jet:
         turn = bodies[0].turning(changes[0])
         return turn if self.frame == "body" else bodies[0].direction(turn)
 

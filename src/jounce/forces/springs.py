@@ -10,6 +10,8 @@ from jounce.constraints.planar import slide
 from jounce.forces.actuators import distance
 from jounce.forces.base import AbstractForce
 from jounce.jet import Jet
+from jounce.rigid import PlanarPose, SpatialPose
+from jounce.rigid.pose import Pose
 
 
 def linear_force(self: Any, displacement: Jet, velocity: Jet, time: Jet) -> Jet:  # noqa: ARG001
@@ -41,7 +43,7 @@ class Spring(AbstractForce, type="spring"):
     dimensions = {"stiffness": "stiffness", "damping": "damping"}
     signs = {"length": "not negative"}
 
-    def displacement(self, body_i, body_j, time):
+    def displacement(self, body_i: Pose, body_j: Pose, time: Jet) -> Jet:
         return distance(body_i, body_j, self.point_i, self.point_j)
 
     force, energy = linear_force, stored_energy
@@ -60,7 +62,7 @@ class SlideSpring(AbstractForce, type="slide_spring"):
     dimensions = {"stiffness": "stiffness", "damping": "damping"}
     signs = {"length": "any"}
 
-    def displacement(self, body_i, body_j, time):
+    def displacement(self, body_i: Pose, body_j: Pose, time: Jet) -> Jet:
         return slide(body_i, body_j, self.point_i, self.point_j, self.vector_i)
 
     force, energy = linear_force, stored_energy
@@ -76,7 +78,7 @@ class TorsionalSpring(AbstractForce, type="torsional_spring", space="planar"):
     unit = "N*m"
     dimensions = {"stiffness": "torsional stiffness", "damping": "torsional damping", "angle": "angle"}
 
-    def displacement(self, body_i, body_j, time):
+    def displacement(self, body_i: PlanarPose, body_j: PlanarPose, time: Jet) -> Jet:
         return body_j.angle - body_i.angle
 
     force, energy = linear_force, stored_energy
@@ -101,7 +103,7 @@ class SpatialTorsionalSpring(AbstractForce, type="torsional_spring", space="spat
 
     __check_init__ = check_vectors
 
-    def displacement(self, body_i, body_j, time):
+    def displacement(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
         return relative_angle(body_i, body_j, self.axis_i, self.vector_i, self.vector_j, self.datum)
 
     force, energy = linear_force, stored_energy

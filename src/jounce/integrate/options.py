@@ -1,7 +1,7 @@
 """Options of simulations: what is valid, and the instants that are asked for."""
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Callable, Mapping
+from typing import Any, TypedDict
 
 import numpy as np
 from jaxtyping import Float
@@ -10,8 +10,20 @@ from jounce.errors import MechanismError
 from jounce.integrate.methods import AbstractMethod, Taylor
 from jounce.kinematics.solve import checked_order
 from jounce.mechanism import time_grid
+from jounce.mechanism.time import TimeLike
 
 TOLERANCES = (1e-17, 1e-2)  # below rounding there is still energy to be kept: what series leave out adds up
+
+
+class SimulationOptions(TypedDict, total=False):
+    """How a simulation is computed: the options of `jounce.simulate` that are for all systems."""
+
+    method: AbstractMethod | None
+    tolerance: float
+    events: object
+    longest_step: float
+    strict: bool
+    progress: Callable[[int, int], None] | None
 
 
 def checked_options(
@@ -31,7 +43,7 @@ def checked_options(
     return order, method
 
 
-def instants_of(time: Any, parameters: Mapping[str, Any]) -> Float[np.ndarray, " time"]:
+def instants_of(time: TimeLike | None, parameters: Mapping[str, Any]) -> Float[np.ndarray, " time"]:
     """Return the instants of a run, which may go backward."""
     if not isinstance(time, (list, tuple, np.ndarray)) or np.ndim(time) != 1 or len(time) < 2:
         return time_grid(time, parameters)

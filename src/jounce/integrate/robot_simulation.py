@@ -4,7 +4,7 @@ import dataclasses
 import inspect
 import math
 from functools import cached_property, partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import jax
 import jax.numpy as jnp
@@ -30,6 +30,9 @@ from jounce.robot.robot import Robot
 from jounce.robot.wrench_laws import STATE
 from jounce.robot.wrenches import Wrench
 from jounce.shapes import ArrayLike
+
+if TYPE_CHECKING:
+    import xarray
 
 WIDTHS = (64,)  # instants that are computed together: one program for few and for many
 MUCH_LONGER = 1e3  # than the step over a jump are those beside it
@@ -219,7 +222,7 @@ class RobotSimulation(Displayed):
         )
 
     @property
-    def dataset(self) -> Any:
+    def dataset(self) -> "xarray.Dataset":
         """Coordinates as an `xarray.Dataset`, a variable for each joint with dimensions time and derivative."""
         import xarray
 

@@ -2,8 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
-from typing import Any, overload
+from typing import Any, Unpack, overload
 
 import jax
 import numpy as np
@@ -22,29 +21,32 @@ from jounce.integrate.methods import AbstractMethod, evaluated
 from jounce.integrate.options import checked_options, instants_of
 from jounce.integrate.robot_simulation import RobotSimulation
 from jounce.integrate.sensitivities import traced_simulation
-from jounce.integrate.simulate_robot import simulate_robot
+from jounce.integrate.simulate_robot import RobotOptions, simulate_robot
 from jounce.integrate.simulation import FEW_INSTANTS, Simulation
 from jounce.jet import Jet
 from jounce.kinematics import Status, raise_for_status
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.motion import check_output, output_group
 from jounce.kinematics.rehearsal import first_time, rehearsed
-from jounce.mechanism import Mechanism, TimeGrid, check_mechanism
+from jounce.mechanism import Mechanism, check_mechanism
 from jounce.mechanism.law_checks import check_laws
-from jounce.mechanism.preconditions import concrete
+from jounce.mechanism.preconditions import concrete_or
+from jounce.mechanism.time import TimeLike
 from jounce.robot import BaseMotion, Robot
+from jounce.robot.joint_laws import GivenLaws
+from jounce.robot.wrenches import Wrench
 from jounce.shapes import ArrayLike, Numbers
 
 AHEAD = 1e-9  # of the time so far: where steps collapse, what is not finite lies that close
 FEW = 4  # derivatives that are looked at for one that is not finite
 STEPS = 64  # tried between two looks at progress and events
-ROBOT_OPTIONS = ("state", "torque", "driven", "drives", "base", "wrenches")
+ROBOT_OPTIONS = tuple(RobotOptions.__annotations__)
 
 
 @overload
 def simulate(
     mechanism: Mechanism,
-    time: ArrayLike | TimeGrid | None = None,
+    time: TimeLike | None = None,
     order: int = 4,
     *,
     method: AbstractMethod | None = None,
@@ -58,7 +60,7 @@ def simulate(
 @overload
 def simulate(
     mechanism: Robot,
-    time: ArrayLike | TimeGrid,
+    time: TimeLike,
     order: int = 4,
     *,
     method: AbstractMethod | None = None,
@@ -68,15 +70,16 @@ def simulate(
     strict: bool = True,
     progress: Callable[[int, int], None] | None = None,
     state: ArrayLike | Mapping[str, float] | None = None,
-    torque: Any = None,
+    torque: GivenLaws | None = None,
     driven: Mapping[str, Any] | None = None,
     drives: bool = False,
     base: BaseMotion | None = None,
+    wrenches: Sequence[Wrench] = (),
 ) -> RobotSimulation: ...
-@partial(concrete, traced=traced_simulation)
+@concrete_or(traced_simulation)
 def simulate(
     mechanism: Mechanism | Robot,
-    time: ArrayLike | TimeGrid | None = None,
+    time: TimeLike | None = None,
     order: int = 4,
     *,
     method: AbstractMethod | None = None,
@@ -86,7 +89,7 @@ def simulate(
     longest_step: float = np.inf,
     strict: bool = True,
     progress: Callable[[int, int], None] | None = None,
-    **robot: Any,
+    **robot: Unpack[RobotOptions],
 ) -> Simulation | RobotSimulation:
     """Return the motion of a mechanism, or of a robot, under forces, with time derivatives of any order.
 

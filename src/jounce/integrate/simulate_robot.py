@@ -1,7 +1,7 @@
 """From a robot and the forces of its joints to its motion, in joint coordinates."""
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, TypedDict
 
 import jax
 import numpy as np
@@ -17,17 +17,28 @@ from jounce.kinematics import Status
 from jounce.kinematics.solve import raise_for_status
 from jounce.robot.arguments import checked_state, floats
 from jounce.robot.base_motion import BaseMotion, base_arrays, base_body
-from jounce.robot.joint_laws import joint_laws
+from jounce.robot.joint_laws import GivenLaws, joint_laws
 from jounce.robot.robot import Robot
 from jounce.robot.robot_size import robot_size
 from jounce.robot.tree_equations import TreeEquations
 from jounce.robot.wrench_laws import wrench_laws
 from jounce.robot.wrenches import Wrench
-from jounce.shapes import is_traced
+from jounce.shapes import ArrayLike, is_traced
 from jounce.trajectory.motion import AbstractMotion
 
 STEPS = 64  # taken between two looks at progress and events
 MOST = 1_000_000
+
+
+class RobotOptions(TypedDict, total=False):
+    """The options of `jounce.simulate` that are for robots in joint coordinates."""
+
+    state: ArrayLike | Mapping[str, float] | None
+    torque: GivenLaws | None
+    driven: Mapping[str, Any] | None
+    drives: bool
+    base: BaseMotion | None
+    wrenches: Sequence[Wrench]
 
 
 def simulate_robot(
@@ -35,8 +46,8 @@ def simulate_robot(
     instants: np.ndarray,
     order: int,
     *,
-    state: Any = None,
-    torque: Any = None,
+    state: ArrayLike | Mapping[str, float] | None = None,
+    torque: GivenLaws | None = None,
     driven: Mapping[str, Any] | None = None,
     drives: bool = False,
     base: BaseMotion | None = None,
@@ -74,7 +85,7 @@ def simulate_robot(
 
 def _problem(
     robot: Robot,
-    torque: Any,
+    torque: GivenLaws | None,
     driven: Mapping[str, Any] | None,
     drives: bool,
     base: BaseMotion | None,
@@ -101,7 +112,13 @@ def _problem(
     return RobotProblem(equations, joint_laws(names, torque), prescribed, scale, np.float64(length), pushes)
 
 
-def _start(robot: Robot, problem: RobotProblem, state: Any, base: BaseMotion | None, instant: float) -> RobotState:
+def _start(
+    robot: Robot,
+    problem: RobotProblem,
+    state: ArrayLike | Mapping[str, float] | None,
+    base: BaseMotion | None,
+    instant: float,
+) -> RobotState:
     """Return the state at the beginning: at rest at coordinates zero unless given, driven joints on their laws."""
     n = len(robot.joint_names)
     if isinstance(state, Mapping):

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import wraps
-from typing import Any
+from typing import Any, overload
 
 import jax
 import jax.numpy as jnp
@@ -164,11 +164,11 @@ class Jet:
             value = plus(c, None if value is None else multiplied(value, step))
         return value
 
-    def dot(self, other: "Jet | Numbers") -> Any:
+    def dot(self, other: "Jet | Numbers") -> "Jet":
         """Return the scalar product along the component axis."""
         return dot(self, other)
 
-    def cross(self, other: "Jet | Numbers") -> Any:
+    def cross(self, other: "Jet | Numbers") -> "Jet":
         """Return the vector product along the component axis (a scalar in the plane)."""
         return cross(self, other)
 
@@ -241,7 +241,7 @@ def _checked(order: int) -> int:
     return order
 
 
-def stacked(jet: Jet) -> Any:
+def stacked(jet: Jet) -> jax.Array:
     """Return the Taylor coefficients of a jet as one array, order first.
 
     Examples
@@ -277,7 +277,13 @@ def components(vector: Jet | Numbers) -> list[Any]:
     return [vector[i : i + 1] for i in range(vector.shape[0])]
 
 
-def dot(a: Jet | Numbers, b: Jet | Numbers) -> Any:
+@overload
+def dot(a: Jet, b: Jet | Numbers) -> Jet: ...
+@overload
+def dot(a: Numbers, b: Jet) -> Jet: ...
+@overload
+def dot(a: Numbers, b: Numbers) -> jax.Array: ...
+def dot(a: Jet | Numbers, b: Jet | Numbers) -> Jet | jax.Array:
     """Return the scalar product of two vectors, of shape (components, ...), as shape (...)."""
     if isinstance(a, Jet) and a is b:
         return total(symmetric(multiplied, x) for x in components(a))[0]

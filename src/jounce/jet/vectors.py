@@ -1,8 +1,9 @@
 """Vector and matrix products of jets; components stand on the leading axes, batches behind them."""
 
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, overload
 
+import jax
 import jax.numpy as jnp
 
 from jounce.jet.algebra import Jet, Quantity, bilinear, components, concatenate
@@ -10,18 +11,34 @@ from jounce.jet.coefficients import total
 from jounce.shapes import Numbers
 
 
-def matvec(matrix: Jet | Numbers, vector: Jet | Numbers) -> Any:
+@overload
+def matvec(matrix: Jet, vector: Jet | Numbers) -> Jet: ...
+@overload
+def matvec(matrix: Numbers, vector: Jet) -> Jet: ...
+@overload
+def matvec(matrix: Numbers, vector: Numbers) -> jax.Array: ...
+def matvec(matrix: Jet | Numbers, vector: Jet | Numbers) -> Jet | jax.Array:
     """Return matrix times vector: shapes (rows, columns, ...) and (columns, ...)."""
     parts = components(vector)
     return total(bilinear(jnp.multiply, matrix[:, i], part) for i, part in enumerate(parts))
 
 
-def matmul(a: Jet | Numbers, b: Jet | Numbers) -> Any:
+@overload
+def matmul(a: Jet, b: Jet | Numbers) -> Jet: ...
+@overload
+def matmul(a: Numbers, b: Jet) -> Jet: ...
+@overload
+def matmul(a: Numbers, b: Numbers) -> jax.Array: ...
+def matmul(a: Jet | Numbers, b: Jet | Numbers) -> Jet | jax.Array:
     """Return matrix times matrix: shapes (rows, inner, ...) and (inner, columns, ...)."""
     return total(bilinear(jnp.multiply, a[:, i : i + 1], b[i : i + 1]) for i in range(b.shape[0]))
 
 
-def transpose(matrix: Jet | Numbers) -> Any:
+@overload
+def transpose(matrix: Jet) -> Jet: ...
+@overload
+def transpose(matrix: Numbers) -> jax.Array: ...
+def transpose(matrix: Jet | Numbers) -> Jet | jax.Array:
     """Exchange the rows and columns of a matrix of shape (rows, columns, ...)."""
     if isinstance(matrix, Jet):
         return matrix.map(transpose)

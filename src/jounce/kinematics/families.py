@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -28,7 +28,11 @@ from jounce.mechanism import (
 from jounce.mechanism.axis_angles import measures_angle
 from jounce.mechanism.law_checks import check_laws
 from jounce.mechanism.preconditions import concrete
+from jounce.mechanism.time import TimeLike
 from jounce.shapes import ArrayLike
+
+if TYPE_CHECKING:
+    import xarray
 
 SPOILED = (AssemblyError, MobilityError, SolveError)  # a design, not the family
 
@@ -65,14 +69,14 @@ def checked_values(mechanism: Mechanism, parameters: Mapping[str, Any], each: st
 def solve_batch(
     mechanism: Mechanism,
     parameters: Mapping[str, ArrayLike],
-    time: Any = None,
+    time: TimeLike | None = None,
     order: int = 4,
     *,
     tolerance: float = 1e-12,
     progress: Callable[[int, int], None] | None = None,
     threads: int | None = None,
     alone: bool = True,
-) -> Any:
+) -> "xarray.Dataset":
     """Return the motions of many designs of a mechanism that differ in its parameters, solved side by side.
 
     Each design is followed in steps of its own, as `jounce.solve` does it alone. One that locks, or that comes to a

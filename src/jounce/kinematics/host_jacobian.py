@@ -154,8 +154,8 @@ def _factored(matrix: Any) -> Any:
         return None
 
 
-def _saddle(matrix: Any, damping: float) -> Any:
-    """Return ``[[I, A^T], [A, -damping I]]``."""
+def _augmented(matrix: Any, damping: float) -> Any:
+    """Return ``[[I, A^T], [A, -damping I]]``, the augmented system of damped least squares."""
     from scipy.sparse import block_array, eye_array
 
     rows, columns = matrix.shape
@@ -168,7 +168,7 @@ def _shortest(matrix: Any, right: Float[np.ndarray, " row"]) -> Float[np.ndarray
     found, smallest = _solved(matrix, right[:, None])
     if smallest > STEP_TOLERANCE * _largest_size(matrix):
         return found[:, 0]
-    damped = _factored(_saddle(matrix, (DAMPING * _largest_size(matrix)) ** 2))
+    damped = _factored(_augmented(matrix, (DAMPING * _largest_size(matrix)) ** 2))
     return damped.solve(np.concatenate([np.zeros(columns), right]))[:columns]
 
 
@@ -179,7 +179,7 @@ def _solved(matrix: Any, right: Float[np.ndarray, "row k"]) -> tuple[Float[np.nd
     """
     (rows, columns), count = matrix.shape, right.shape[1]
     square = rows == columns
-    factors = _factored(matrix if square else _saddle(matrix, 0.0)) if rows <= columns else None
+    factors = _factored(matrix if square else _augmented(matrix, 0.0)) if rows <= columns else None
     if factors is None:
         return np.zeros((columns, count)), 0.0
     right = np.column_stack([right, _probes(rows, PROBES)])
@@ -225,7 +225,7 @@ def _null_space(matrix: Any, count: int | None = None) -> Float[np.ndarray, "col
     if count == 0 or (count is None and _clearly_independent(matrix.T)):
         return np.zeros((columns, 0))
     size = _largest_size(matrix)
-    factors = _factored(_saddle(matrix, (DAMPING * size) ** 2))
+    factors = _factored(_augmented(matrix, (DAMPING * size) ** 2))
 
     def nearest(width: int) -> Any:
         block = _probes(columns, width)

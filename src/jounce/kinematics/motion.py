@@ -3,7 +3,7 @@
 import dataclasses
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Float
@@ -39,11 +39,16 @@ from jounce.mechanism.system import POSITION_COMPONENTS, Group, group_elements
 from jounce.shapes import ArrayLike, Numbers
 from jounce.trajectory import HermiteMotion
 
+if TYPE_CHECKING:
+    import xarray
+
 _UNDEFINED = Status.UNDEFINED.advice.partition(": ")[2]
 
 
 @compiled("pose_type")
-def output_series(group: Group, coordinates: dict[str, Any], pose_type: type) -> Any:
+def output_series(
+    group: Group, coordinates: dict[str, Any], pose_type: type
+) -> Float[Numbers, "order component instance batch"]:
     """Return the Taylor coefficients of outputs, (order + 1, components, instances, batch)."""
     pose = pose_type.from_coordinates({name: Jet(tuple(c)) for name, c in coordinates.items()})
     return stacked(group.evaluate(pose))
@@ -170,7 +175,7 @@ class Motion(Displayed):
         """
         return self.mechanism if self._actuated is None else self._actuated
 
-    def driver(self, name: str) -> Any:
+    def driver(self, name: str) -> "xarray.DataArray":
         """Return the coordinate of a driver and its derivatives, as the bodies have it: what its law must be.
 
         Parameters
@@ -237,7 +242,7 @@ class Motion(Displayed):
         return {name: found[name] for name in self.mechanism.outputs}
 
     @cached_property
-    def dataset(self) -> Any:
+    def dataset(self) -> "xarray.Dataset":
         """Outputs as an `xarray.Dataset` with dimensions time, derivative and component; units in the attributes.
 
         Euler parameters have the dimension euler_parameter instead of component, Euler angles euler_angle, and rotation
@@ -258,7 +263,7 @@ class Motion(Displayed):
         dataset["derivative"].attrs = {"long_name": "order of the time derivative"}
         return dataset
 
-    def point(self, body: str, point: ArrayLike) -> Any:
+    def point(self, body: str, point: ArrayLike) -> "xarray.DataArray":
         """Return the position of any point of a body in the global frame and its derivatives.
 
         Parameters
@@ -275,18 +280,18 @@ class Motion(Displayed):
         """
         return self.evaluate(PointOutput(body, point), name="position")
 
-    def angle(self, body: str) -> Any:
+    def angle(self, body: str) -> "xarray.DataArray":
         """Return the angle of a planar body and its derivatives, rad, with dimensions time and derivative."""
         return self.evaluate(AngleOutput(body), name="angle")
 
-    def angular_velocity(self, body: str, frame: str = "global") -> Any:
+    def angular_velocity(self, body: str, frame: str = "global") -> "xarray.DataArray":
         """Return the angular velocity of a body and its derivatives, rad/s, in the frame ``global`` or ``body``.
 
         The highest derivative of the motion is used up: the result has one order less.
         """
         return self.evaluate(AngularVelocityOutput(body, frame), name="angular_velocity")
 
-    def evaluate(self, output: AbstractOutput | AbstractMotionOutput, name: str = "output") -> Any:
+    def evaluate(self, output: AbstractOutput | AbstractMotionOutput, name: str = "output") -> "xarray.DataArray":
         """Return any output, as an `xarray.DataArray`, without solving again.
 
         Raises
@@ -354,7 +359,7 @@ class Motion(Displayed):
 
     def _labelled(
         self, name: str, values: Float[Numbers, "time derivative *component"], output: AbstractQuantity
-    ) -> Any:
+    ) -> "xarray.DataArray":
         import xarray
 
         coordinates = {"time": self.time, "derivative": np.arange(values.shape[1])}

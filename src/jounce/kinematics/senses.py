@@ -5,7 +5,7 @@ no assembly that anybody means, and no motion leads from one to the other.
 """
 
 from collections.abc import Iterator
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import jax.numpy as jnp
 import numpy as np
@@ -21,6 +21,7 @@ from jounce.mechanism import Model
 from jounce.mechanism.builder import group_rows, model_of
 from jounce.mechanism.system import Group, System
 from jounce.modules import Module
+from jounce.rigid.pose import Pose
 
 AXES, NORMALS, VECTORS = ("axis_i", "axis_j"), ("normal_i", "normal_j"), ("vector_i", "vector_j")
 HELD_PARALLEL = (  # a user's own joint may have axes that are not
@@ -47,7 +48,7 @@ class SameDirection(Module):
     role: ClassVar[str] = "joint"
     periodic: ClassVar[bool] = False
 
-    def residual(self, body_i: Any, body_j: Any, _time: Jet) -> Jet:
+    def residual(self, body_i: Pose, body_j: Pose, _time: Jet) -> Jet:
         """Return the rows, shape (1, ...) in the plane, (2, ...) in space."""
         if len(self.vector_i) == 2:
             sides = (jnp.stack([-self.vector_i[1], self.vector_i[0]]),)

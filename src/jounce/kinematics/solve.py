@@ -40,11 +40,12 @@ from jounce.mechanism import (
 from jounce.mechanism.axis_angles import AttitudeHistory
 from jounce.mechanism.held_outputs import led_outputs
 from jounce.mechanism.law_checks import check_laws
-from jounce.mechanism.preconditions import concrete
-from jounce.mechanism.time import Instants, instants_of
+from jounce.mechanism.preconditions import concrete, concrete_or
+from jounce.mechanism.time import Instants, TimeLike, instants_of
 
 LOWEST_ORDER = 4  # of the jets inside: predictions need some, also where the user wants positions only
-HIGHEST_ORDER = 30
+HIGHEST_ORDER = 30  # of derivatives of outputs
+HIGHEST_OF_MOTION = HIGHEST_ORDER + 2  # forces are two derivatives shorter than the motion
 LARGEST_TOLERANCE = 1e-2
 REHEARSED = 2  # instants: forces are computed for many at a time, however few there are
 
@@ -77,10 +78,10 @@ def lost_orders(mechanism: Mechanism) -> int:
     return max((output.lost_orders for output in mechanism.outputs.values()), default=0)
 
 
-@partial(concrete, traced=_differentiated)
+@concrete_or(_differentiated)
 def solve(
     mechanism: Mechanism,
-    time: Any = None,
+    time: TimeLike | None = None,
     order: int = 4,
     *,
     tolerance: float = 1e-12,
@@ -158,7 +159,7 @@ def solve(
 @concrete
 def solve_in_stretches(
     mechanism: Mechanism,
-    time: Any = None,
+    time: TimeLike | None = None,
     order: int = 4,
     *,
     tolerance: float = 1e-12,
@@ -206,6 +207,12 @@ def checked_settings(mechanism: Mechanism, order: Any, tolerance: float) -> int:
     """Return the order of derivatives, or raise MechanismError unless mechanism, order and tolerance are valid."""
     check_mechanism(mechanism)
     order = checked_order(order)
+    for name, output in mechanism.outputs.items():
+        if order + output.lost_orders > HIGHEST_OF_MOTION:
+            message = f"needs the motion to order {order + output.lost_orders}, and {HIGHEST_OF_MOTION} is the highest"
+            raise MechanismError(
+                f"{message}: ask for derivatives of a lower order", name=f"outputs.{name}", value=order
+            )
     if not (isinstance(tolerance, numbers.Real) and 0 < tolerance <= LARGEST_TOLERANCE):
         message = f"the tolerance must be a number above zero and at most {LARGEST_TOLERANCE:g}"
         raise MechanismError(message, name="tolerance", value=tolerance)

@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 import jax
 
 from jounce.errors import MechanismError
+from jounce.shapes import Refused
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -18,7 +19,7 @@ VARIABLE = "JOUNCE_THREADS"
 AHEAD = 2  # results for each thread that may wait to be fetched
 
 
-def thread_count(given: Any = None) -> int:
+def thread_count(given: int | Refused | None = None) -> int:
     """Return how many threads compute: those given, or told by the environment, or the cores that this process has.
 
     Raises

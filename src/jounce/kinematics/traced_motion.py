@@ -1,7 +1,7 @@
 """The motion of a mechanism that JAX differentiates, maps or compiles: the same questions, answered as its arrays."""
 
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import jax.numpy as jnp
 import numpy as np
@@ -17,6 +17,9 @@ from jounce.mechanism import AbstractMotionOutput, AbstractOutput, Mechanism, Mo
 from jounce.mechanism.held_outputs import led_outputs
 from jounce.mechanism.system import Group
 from jounce.shapes import Numbers
+
+if TYPE_CHECKING:
+    import xarray
 
 
 class TracedMotion(Motion):
@@ -45,7 +48,7 @@ class TracedMotion(Motion):
         return f"<Motion of a design that JAX traces, {len(self.time)} instants, order {self.order}>"
 
     @cached_property
-    def dataset(self) -> Any:
+    def dataset(self) -> NoReturn:
         """There is none.
 
         Raises
@@ -69,7 +72,7 @@ class TracedMotion(Motion):
             raise UnsupportedError(message, name="motion.actuated")
         return self.mechanism
 
-    def evaluate(self, output: AbstractOutput | AbstractMotionOutput, name: str = "output") -> Any:
+    def evaluate(self, output: AbstractOutput | AbstractMotionOutput, name: str = "output") -> "xarray.DataArray":
         """Return any output, as an `xarray.DataArray` whose ``.data`` is an array that JAX traces.
 
         Raises

@@ -10,6 +10,7 @@ from jounce.errors import MechanismError
 from jounce.jet import Jet, concatenate, stack
 from jounce.jet.turns import counted_on
 from jounce.mechanism.outputs import AbstractOutput
+from jounce.rigid import SpatialPose
 from jounce.rigid.orientation import euler_angles
 from jounce.rigid.rotations import check_sequence
 
@@ -30,7 +31,7 @@ class EulerParametersOutput(AbstractOutput):
     axes = (("euler_parameter", labels),)
     rate_names = RATES
 
-    def evaluate(self, *bodies):
+    def evaluate(self, *bodies: SpatialPose) -> Jet:
         *base, body = bodies
         if not base:
             return body.quaternion
@@ -54,7 +55,7 @@ class RotationMatrixOutput(AbstractOutput):
     axes = (("row_axis", LETTERS), ("column_axis", LETTERS))
     rate_names = RATES
 
-    def evaluate(self, *bodies):
+    def evaluate(self, *bodies: SpatialPose) -> Jet:
         return stack([entry for row in _matrix(bodies) for entry in row])
 
 
@@ -85,7 +86,7 @@ class EulerAnglesOutput(AbstractOutput):
     def __check_init__(self):
         check_sequence(self.sequence, MechanismError)
 
-    def evaluate(self, *bodies):
+    def evaluate(self, *bodies: SpatialPose) -> Jet:
         return euler_angles(self.sequence, stack([stack(row) for row in _matrix(bodies)]))
 
 

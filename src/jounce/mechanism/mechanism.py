@@ -11,7 +11,7 @@ from jounce.display import Displayed
 from jounce.errors import ExpressionError, JounceError, MechanismError, check_choice, check_name
 from jounce.forces import AbstractForce
 from jounce.mechanism.outputs import AbstractQuantity
-from jounce.mechanism.redundant_reactions import check_redundant_reactions
+from jounce.mechanism.redundant_reactions import RedundantReactions, check_redundant_reactions
 from jounce.mechanism.resolve import parameter_value
 from jounce.rigid.inertia import Inertia
 from jounce.trajectory import Expression
@@ -164,7 +164,7 @@ class Mechanism(Displayed):
     parameters: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     gravity: Any = None
     time: Any = None
-    redundant_reactions: str | Mapping[str, Any] = "unique"
+    redundant_reactions: RedundantReactions = "unique"
     title: str = ""
     units: Mapping[str, str] = dataclasses.field(default_factory=dict)
     assembly: Any = None
@@ -352,7 +352,7 @@ def check_output_name(given: object, error: type[JounceError], **place: Any) -> 
         raise error(f"the name '{given}' is reserved for columns of the results; give another one", **place)
 
 
-def check_mechanism(given: Any) -> None:
+def check_mechanism(given: object) -> None:
     """Raise MechanismError for what is no mechanism, such as the name of a file."""
     if not isinstance(given, Mechanism):
         raise MechanismError("must be a jn.Mechanism; jn.load reads one from a file", name="mechanism", value=given)

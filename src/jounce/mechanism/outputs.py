@@ -10,7 +10,9 @@ from jounce.constraints.base import Vector, check_bodies
 from jounce.errors import MechanismError, check_choice
 from jounce.jet import Jet, sqrt
 from jounce.modules import Module
+from jounce.rigid import PlanarPose, SpatialPose
 from jounce.rigid.orientation import FRAMES
+from jounce.rigid.pose import Pose
 
 
 class AbstractQuantity(Module):
@@ -74,7 +76,7 @@ class AbstractOutput(AbstractQuantity):
         check_bodies(self, (self.body_count,), "takes", "be of")
 
     @abc.abstractmethod
-    def evaluate(self, *bodies: Any) -> Jet:
+    def evaluate(self, *bodies: Any, **_: Any) -> Jet:  # with both, type checkers let parameters be named
         """Return the jet of the quantity, of shape (...) or (components, ...), from the poses of the bodies."""
 
 
@@ -87,7 +89,7 @@ class PointOutput(AbstractOutput):
         del mechanism
         return True
 
-    def evaluate(self, body):
+    def evaluate(self, body: Pose) -> Jet:
         return body.point(self.point)
 
 
@@ -97,7 +99,7 @@ class AngleOutput(AbstractOutput):
     unit = "rad"
     space = "planar"
 
-    def evaluate(self, body):
+    def evaluate(self, body: PlanarPose) -> Jet:
         return body.angle
 
 
@@ -117,7 +119,7 @@ class RelativeAngleOutput(AbstractOutput):
     turning = True
     body_count = 2
 
-    def evaluate(self, body_i, body_j):
+    def evaluate(self, body_i: SpatialPose, body_j: SpatialPose) -> Jet:
         return relative_angle(body_i, body_j, self.axis, self.vector_i, self.vector_j, self.datum)
 
 
@@ -128,7 +130,7 @@ class PlanarRelativeAngleOutput(AbstractOutput):
     space = "planar"
     body_count = 2
 
-    def evaluate(self, body_i, body_j):
+    def evaluate(self, body_i: PlanarPose, body_j: PlanarPose) -> Jet:
         return body_j.angle - body_i.angle
 
 
@@ -146,10 +148,12 @@ class AngularVelocityOutput(AbstractOutput):
     def is_vector(self, mechanism):
         return mechanism.space == "spatial"
 
-    def evaluate(self, body):
-        if hasattr(body, "angle"):
+    def evaluate(self, body: Pose) -> Jet:
+        if isinstance(body, PlanarPose):
             return body.angle.differentiate()
-        return body.global_angular_velocity() if self.frame == "global" else body.angular_velocity
+        if self.frame == "body" and body.angular_velocity is not None:
+            return body.angular_velocity
+        return body.global_angular_velocity()
 
 
 class DistanceOutput(AbstractOutput):
@@ -160,6 +164,6 @@ class DistanceOutput(AbstractOutput):
 
     body_count = 2
 
-    def evaluate(self, body_i, body_j):
+    def evaluate(self, body_i: Pose, body_j: Pose) -> Jet:
         d = body_j.point(self.point_j) - body_i.point(self.point_i)
         return sqrt(d.dot(d))

@@ -6,13 +6,17 @@ from typing import Any
 
 from jounce.errors import JounceError, MechanismError, check_name
 from jounce.mechanism.resolve import resolve
+from jounce.shapes import Refused
 
 CHOICES = ("unique", "least_norm")
 STIFFNESSES = {"force": "stiffness", "torque": "torsional stiffness"}
 PLACE = "redundant_reactions"
 
+RedundantReactions = str | Mapping[str, Any]
+"""One of the choices, or stiffnesses, force and torque, by the names of joints."""
 
-def check_redundant_reactions(wanted: Any, names: Collection[str]) -> None:
+
+def check_redundant_reactions(wanted: RedundantReactions | Refused, names: Collection[str]) -> None:
     """Raise MechanismError unless it is one of the choices, or stiffnesses by the names of joints."""
     if not isinstance(wanted, Mapping):
         if wanted not in CHOICES:
@@ -28,7 +32,7 @@ def check_redundant_reactions(wanted: Any, names: Collection[str]) -> None:
             raise MechanismError(message, name=f"{PLACE}.{name}", value=stiffness)
 
 
-def resolved_reactions(wanted: Any, parameters: Mapping[str, Any]) -> str | dict[str, dict[str, float]]:
+def resolved_reactions(wanted: RedundantReactions, parameters: Mapping[str, Any]) -> str | dict[str, dict[str, float]]:
     """Return what is wanted with numbers for expressions of the parameters.
 
     Raises

@@ -9,6 +9,7 @@ from jaxtyping import Float, Int
 
 from jounce.errors import MechanismError
 from jounce.mechanism.resolve import resolve
+from jounce.shapes import ArrayLike
 
 MAX_INSTANTS = 10_000_000
 
@@ -29,6 +30,10 @@ class TimeGrid:
     stop: Any
     step: Any = None
     count: Any = None
+
+
+TimeLike = ArrayLike | TimeGrid
+"""Instants, s: a list or an array of them, or an evenly spaced grid."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -71,12 +76,12 @@ class SpacedInstants:
 Instants = Float[np.ndarray, " time"] | SpacedInstants
 
 
-def time_grid(time: Any, parameters: Mapping[str, Any]) -> Float[np.ndarray, " time"]:
+def time_grid(time: TimeLike | None, parameters: Mapping[str, Any]) -> Float[np.ndarray, " time"]:
     """Return the instants of a grid, shape (time,), s; raise MechanismError as `instants_of` does."""
     return np.asarray(instants_of(time, parameters))
 
 
-def instants_of(time: Any, parameters: Mapping[str, Any]) -> Instants:
+def instants_of(time: TimeLike | None, parameters: Mapping[str, Any]) -> Instants:
     """Return the instants of a grid, s, those of an evenly spaced one without a place in memory.
 
     Raises

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,6 +11,10 @@ from jounce.errors import MechanismError
 from jounce.plot.labels import scale_of, symbol, unit_label
 from jounce.plot.style import GREY, LINE_COLOURS, blank_figure, set_ticks, shown_name, style
 from jounce.reporting.spread_facts import Column, chosen
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.figure import Figure
 
 __all__ = ["draw_bands"]
 
@@ -20,7 +24,7 @@ TWO_SIDED = 1.959964  # standard deviations that hold 95 percent of a normal dis
 MOST_SHARES = 8
 
 
-def draw_bands(spread: Any, columns: Sequence[Column], title: str = "") -> Any:
+def draw_bands(spread: xarray.Dataset, columns: Sequence[Column], title: str = "") -> Figure:
     """Draw the band of each column over time, how far it is from the nominal motion, and which parameter causes it.
 
     Parameters

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,13 +15,16 @@ from jounce.plot.labels import axis_range
 from jounce.plot.style import BLUE, GREY, ORANGE, PALE_GREY, VERMILION, blank_figure, set_ticks, shown_name, style
 from jounce.trajectory.shown_units import ShownUnits
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 __all__ = ["draw_cam"]
 
 WIDTH, HEIGHT = 8.4, 4.6  # inches
 MOST_RADII = 12  # base radii, to which the axis of radii of curvature goes
 
 
-def draw_cam(cam: PlateCam, units: Mapping[str, str] | ShownUnits | None = None) -> Any:
+def draw_cam(cam: PlateCam, units: Mapping[str, str] | ShownUnits | None = None) -> Figure:
     """Draw a plate cam with its follower at the cam angle zero, and its lift, pressure angle and radii of curvature.
 
     Parameters

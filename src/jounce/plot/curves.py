@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,6 +13,9 @@ from jounce.mechanism import PointOutput
 from jounce.plot.labels import scale_of, symbol, unit_label
 from jounce.plot.style import GREY, LINE_COLOURS, blank_figure, set_ticks, shown_name, style
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 __all__ = ["draw_curves"]
 
 SIDE = 3.6  # inches
@@ -20,7 +23,7 @@ MARKS = {"maximum": "^", "minimum": "v", "stationary": "s"}
 PROJECTIONS = ((0, 1), (0, 2), (1, 2))
 
 
-def draw_curves(curves: Curve | Sequence[Curve], outputs: Sequence[str] | None = None) -> Any:
+def draw_curves(curves: Curve | Sequence[Curve], outputs: Sequence[str] | None = None) -> Figure:
     r"""Draw curves of configurations of one mechanism: paths of points, and other outputs against the driver's value.
 
     Parameters

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -10,6 +10,9 @@ from jounce.planning.elastic.link_errors import LinkErrors
 from jounce.planning.elastic.motor_motion import Feedforward
 from jounce.plot.instants import evenly_chosen
 from jounce.plot.style import BLUE, GREY, LINE_COLOURS, PALE_GREY, VERMILION, blank_figure, set_ticks, shown_name, style
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = ["draw_feedforward"]
 
@@ -19,7 +22,7 @@ LEAST = 1e-17  # what is exact is drawn there
 DASHES = ("-", (0, (4, 1.5)), (0, (1, 1.2)))
 
 
-def draw_feedforward(feedforward: Feedforward, errors: LinkErrors, title: str = "") -> Any:
+def draw_feedforward(feedforward: Feedforward, errors: LinkErrors, title: str = "") -> Figure:
     """Draw deflections of springs, and how far links err in a simulation under the motor torques.
 
     Parameters

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from os import PathLike, fspath
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Float
@@ -17,6 +17,9 @@ from jounce.mechanism.outputs import AbstractQuantity
 from jounce.plot.instants import unsolved_runs
 from jounce.plot.labels import axis_range, quantity_word, scale_of, symbol, unit_label
 from jounce.plot.style import COLOURS, PALE_GREY, RESOLUTION, blank_figure, set_ticks, shown_name, style
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = ["check_figure", "draw", "draw_columns", "finish", "save"]
 
@@ -31,7 +34,7 @@ LEGEND = {"borderaxespad": 0.1, "handlelength": 1.2, "handletextpad": 0.5, "colu
 STROKES = ("-", "--", ":")  # of more components than there are colours
 
 
-def draw(motion: Motion, outputs: Sequence[str] | None = None) -> Any:
+def draw(motion: Motion, outputs: Sequence[str] | None = None) -> Figure:
     r"""Draw outputs of a motion and their derivatives over time.
 
     Parameters
@@ -68,7 +71,7 @@ def draw(motion: Motion, outputs: Sequence[str] | None = None) -> Any:
     return draw_columns(motion, {name: (motion.mechanism.outputs[name], motion.outputs[name]) for name in names})
 
 
-def draw_columns(motion: Motion, columns: Mapping[str, Column]) -> Any:
+def draw_columns(motion: Motion, columns: Mapping[str, Column]) -> Figure:
     """Draw outputs of a motion beside each other, each in a column with its derivatives below each other."""
     lost = [output.lost_orders for output, _ in columns.values()]
     first = min(lost)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Float
@@ -16,6 +16,9 @@ from jounce.plot.figure import draw_columns, finish
 from jounce.plot.geometry import skeleton
 from jounce.plot.labels import scale_of, unit_label
 from jounce.plot.style import BLUE, GREEN, ORANGE, VERMILION, blank_figure, style
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = ["draw_energy", "draw_power", "draw_reactions"]
 
@@ -33,7 +36,7 @@ WORDS = {"drivers": "put in by drivers", "forces": "put in by forces", "kinetic"
 PANEL = (6.4, 1.9)  # inches
 
 
-def draw_reactions(motion: Motion, names: Sequence[str] | None = None) -> Any:
+def draw_reactions(motion: Motion, names: Sequence[str] | None = None) -> Figure:
     """Draw the reactions of joints, the forces of drivers and the applied forces, with their rates.
 
     Parameters
@@ -98,7 +101,7 @@ def _largest(values: Float[np.ndarray, "..."]) -> float:
     return float(np.max(np.abs(values), initial=0.0, where=np.isfinite(values)))
 
 
-def draw_energy(motion: Motion) -> Any:
+def draw_energy(motion: Motion) -> Figure:
     """Draw the energies of a mechanism: kinetic, potential in gravity, stored in springs, and all together.
 
     Parameters
@@ -138,7 +141,7 @@ def draw_energy(motion: Motion) -> Any:
     return figure
 
 
-def draw_power(motion: Motion) -> Any:
+def draw_power(motion: Motion) -> Figure:
     """Draw where the power in a mechanism comes from and goes to, with its rates.
 
     Parameters

@@ -9,6 +9,7 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
@@ -89,8 +90,6 @@ def _by_body(mechanism: Mechanism, whole: Any) -> dict[str, Frame]:
 @compiled("pose_type")
 def _frames(pose_type: Any, coordinates: Mapping[str, Any]) -> Any:
     """Return origin and axes of all bodies, shape (components, 1 + components, bodies, time)."""
-    import jax.numpy as jnp
-
     pose = pose_type.from_coordinates({name: Jet((value,)) for name, value in coordinates.items()})
     columns = [pose.position, *(pose.direction(unit) for unit in np.eye(pose_type.shifts))]
     return jnp.stack([stacked(column)[0] for column in columns], axis=1)

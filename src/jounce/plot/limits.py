@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,6 +11,9 @@ from jounce.errors import RobotError
 from jounce.plot.instants import evenly_chosen
 from jounce.plot.labels import unit_label
 from jounce.plot.style import GREY, LINE_COLOURS, PALE_GREY, blank_figure, set_ticks, shown_name, style
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = ["draw_limits"]
 
@@ -21,7 +24,7 @@ BEYOND = 1.3  # times what is drawn, where what is infinite is marked
 DRAWN = 4000  # instants at most, or files of lines grow large; the worst ones are marked exactly
 
 
-def draw_limits(report: LimitReport, title: str = "") -> Any:
+def draw_limits(report: LimitReport, title: str = "") -> Figure:
     """Draw what each joint uses of its limits over time, from -1 at the lower to 1 at the upper one.
 
     Parameters

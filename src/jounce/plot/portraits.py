@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Float
@@ -14,6 +14,9 @@ from jounce.plot.labels import axis_range, quantity_word, scale_of, symbol, unit
 from jounce.plot.style import COLOURS, GREY, PALE_GREY, blank_figure, set_ticks, style
 from jounce.reporting.peaks import rate_name
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 __all__ = ["hodograph", "phase_portrait"]
 
 ARROWS = 12  # vectors drawn from the origin of a hodograph
@@ -21,7 +24,7 @@ PROJECTIONS = ((0, 1), (0, 2), (1, 2))
 SIDE = 3.4  # inches
 
 
-def hodograph(motion: Motion, output: str, order: int = 1) -> Any:
+def hodograph(motion: Motion, output: str, order: int = 1) -> Figure:
     r"""Draw the curve that the tip of a vector runs through: the hodograph of a point's velocity, acceleration, ...
 
     Parameters
@@ -77,7 +80,7 @@ def hodograph(motion: Motion, output: str, order: int = 1) -> Any:
     return figure
 
 
-def phase_portrait(motion: Motion, output: str, orders: tuple[int, int] = (0, 1)) -> Any:
+def phase_portrait(motion: Motion, output: str, orders: tuple[int, int] = (0, 1)) -> Figure:
     r"""Draw one derivative of an output against another, by default velocity against position.
 
     Parameters

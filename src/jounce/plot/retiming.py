@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+import jax.numpy as jnp
 import numpy as np
 
 from jounce.errors import TrajectoryError
+from jounce.jet import Jet
 from jounce.plot.style import GREY, LINE_COLOURS, blank_figure, set_ticks, shown_name, style
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from jounce.planning import RetimedTrajectory
 
 __all__ = ["draw_retiming"]
 
@@ -15,7 +22,7 @@ WIDTH, BAR, RATE = 7.0, 0.24, 1.7  # inches
 MOST = 24  # bars: those of the highest price
 
 
-def draw_retiming(found: Any, title: str = "") -> Any:
+def draw_retiming(found: RetimedTrajectory, title: str = "") -> Figure:
     """Draw which limits bind a trajectory where, with their prices, above the rate along its path.
 
     Parameters
@@ -66,11 +73,7 @@ def draw_retiming(found: Any, title: str = "") -> Any:
     return figure
 
 
-def _draw_rate(found: Any, axes: Any) -> None:
-    import jax.numpy as jnp
-
-    from jounce.jet import Jet
-
+def _draw_rate(found: RetimedTrajectory, axes: Any) -> None:
     times = np.linspace(0.0, found.stop, 1001)
     s = np.asarray(found.progress(Jet.variable(jnp.asarray(times), 1)).derivatives())
     length = found.path.stop - found.path.start

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,6 +19,9 @@ from jounce.plot.name_placement import place_names
 from jounce.plot.scene import Scene, outline, scene_of
 from jounce.plot.style import GREY, blank_figure, printable, shown_name, style
 from jounce.reporting.peaks import rate_name
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = ["Paths", "SketchFigure", "check_names", "draw_scale", "length_text", "limits_with", "paths_of", "sketch"]
 
@@ -180,7 +183,7 @@ def sketch(
     paths: Sequence[str] | None = None,
     order: int = 0,
     view: View = VIEW,
-) -> Any:
+) -> Figure:
     """Draw a mechanism as textbooks do: links, joint symbols, names, and the paths of its points.
 
     Parameters

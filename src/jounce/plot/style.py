@@ -6,7 +6,10 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.resources import as_file, files
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = [
     "BLUE",
@@ -69,7 +72,7 @@ def style(**changes: Any) -> Iterator[None]:
         yield
 
 
-def blank_figure(width: float, height: float, title: str = "", **pads: float) -> Any:
+def blank_figure(width: float, height: float, title: str = "", **pads: float) -> Figure:
     """Return an empty figure, in inches, that lays out its panels itself; no window and no global state.
 
     A title that is too long for its width is written smaller, or cut where it could not be read any more.

@@ -63,8 +63,11 @@ class Highest:
         places = np.arange(len(time))[inner]
         top = highest_of(height, self._count)
         index = places[top]
+        heights = np.take_along_axis(height, top, axis=0)
+        for k in range(1, self._count):  # one that stands twice, for want of others, counts once
+            heights[k, (top[:k] == top[k]).any(axis=0)] = -np.inf
         found = [
-            np.take_along_axis(height, top, axis=0),
+            heights,
             time[np.maximum(index - 1, 0)],
             time[np.minimum(index + 1, len(time) - 1)],
         ]

@@ -16,6 +16,7 @@ from jounce.io.mechanisms.keys import OUTPUTS, output_holder
 from jounce.kinematics.curves.choice import chosen
 from jounce.mechanism import Mechanism, Model, build, time_grid, with_outputs_held
 from jounce.mechanism.masses import body_mass
+from jounce.mechanism.resolve import resolve
 from jounce.mechanism.system import POSITION_COMPONENTS
 from jounce.reporting.freedom_facts import AssemblyFacts, FreedomFacts, MobilityFacts, StartingState
 from jounce.reporting.law_facts import LawFacts, law_facts
@@ -189,8 +190,6 @@ def _time(mechanism: Mechanism) -> dict[str, Any] | None:
 
 
 def _numbers(mechanism: Mechanism, value: Any, size: int) -> list[float] | None:
-    from jounce.mechanism.resolve import resolve
-
     if value is None:
         return None
     return np.reshape(np.asarray(resolve(value, mechanism.parameter_values), float), size).tolist()

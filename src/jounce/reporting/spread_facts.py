@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from jounce.reporting.peaks import derivative_unit
 from jounce.reporting.tables import Table, number
 
+if TYPE_CHECKING:
+    import xarray
+
 Column = tuple[str, str, int]
 """An output, a component or nothing, and a derivative."""
 
 
-def columns_of(spread: Any, wanted: Sequence[Column] | None) -> list[Column]:
+def columns_of(spread: xarray.Dataset, wanted: Sequence[Column] | None) -> list[Column]:
     """Return the columns that are meant, one for each component; all of the outputs unless some are wanted."""
     outputs = [str(name) for name in spread.data_vars if f"{name}_peak" in spread.data_vars]
     levels = [int(order) for order in spread["derivative"].values]
@@ -28,7 +31,7 @@ def columns_of(spread: Any, wanted: Sequence[Column] | None) -> list[Column]:
     return list(dict.fromkeys(found))
 
 
-def spread_facts(spread: Any, columns: Sequence[Column]) -> dict[str, Any]:
+def spread_facts(spread: xarray.Dataset, columns: Sequence[Column]) -> dict[str, Any]:
     """Return the facts of a spread."""
     names = [str(name) for name in spread["parameter"].values]
     deviations = dict(zip(names, spread["deviation"].values.tolist(), strict=True))
@@ -68,7 +71,7 @@ def _facts(spread: Any, column: Column, names: Sequence[str]) -> dict[str, Any]:
     return found
 
 
-def chosen(spread: Any, variable: str, column: Column) -> np.ndarray:
+def chosen(spread: xarray.Dataset, variable: str, column: Column) -> np.ndarray:
     """Return what a variable holds of a column: numbers over time, for each parameter, or one."""
     _, component, order = column
     found = spread[variable].sel(derivative=order)

@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from jounce.errors import JounceError, RobotError, check_choice, did_you_mean
 from jounce.rigid.solids import SOLIDS, pseudo_parts, solid_moments
-from jounce.shapes import Numbers
+from jounce.shapes import ArrayLike, Numbers, Real, Refused
 
 ROUNDING = 1e-5  # of the largest principal moment: what files with six digits may miss a possible tensor by
 MOST_SHOWN = 9  # numbers in a message
@@ -107,7 +107,7 @@ class Inertia:
         moments[:3, :3] = self.second_moments
         return moments + self.mass * np.outer(c, c)
 
-    def moved(self, position: Any, rotation: Any) -> "Inertia":
+    def moved(self, position: ArrayLike, rotation: ArrayLike) -> "Inertia":
         """Return the inertia of the same body in another frame.
 
         Parameters
@@ -126,11 +126,11 @@ class Inertia:
         cls,
         kind: str,
         *,
-        mass: Any = None,
-        density: Any = None,
+        mass: Real | None = None,
+        density: Real | None = None,
         axis: str = "",
-        center_of_mass: Any = (0.0, 0.0, 0.0),
-        **sizes: Any,
+        center_of_mass: ArrayLike = (0.0, 0.0, 0.0),
+        **sizes: ArrayLike,
     ) -> "Inertia":
         """Return the inertia of a homogeneous solid.
 
@@ -167,7 +167,7 @@ class Inertia:
         return cls(mass, center_of_mass, np.array(moments, float) * mass)
 
     @classmethod
-    def from_pseudo(cls, pseudo: Any, strict: bool = True) -> "Inertia":
+    def from_pseudo(cls, pseudo: ArrayLike, strict: bool = True) -> "Inertia":
         """Return the inertia that a matrix of pseudo-inertia describes: the inverse of `pseudo_inertia`.
 
         Parameters
@@ -288,7 +288,7 @@ def _check_sizes(given: dict[str, Any]) -> None:
 
 
 def finite_numbers(
-    name: str, value: Any, *shapes: tuple[int, ...], error: type[JounceError] = RobotError
+    name: str, value: ArrayLike | Refused, *shapes: tuple[int, ...], error: type[JounceError] = RobotError
 ) -> np.ndarray:
     """Return a copy of finite numbers of one of the shapes, of any shape if none is given; it cannot be written to.
 

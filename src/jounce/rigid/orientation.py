@@ -4,7 +4,7 @@ from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from jounce.errors import JounceError, SingularityError, check_choice
 from jounce.jet import Jet, atan2, cos, cross, dot, matvec, sin, sqrt, stack, transpose
@@ -202,7 +202,7 @@ def angle_rates(sequence: str, angles: JetLike, angular_velocity: JetLike, frame
         known = rates.integrate(value)
 
 
-def singularity_distance(sequence: str, angles: JetLike) -> Any:
+def singularity_distance(sequence: str, angles: JetLike) -> Float[Numbers, "*batch"]:
     """Return how far an orientation is from a singular one: the volume that the three axes of rotation span.
 
     Parameters
@@ -235,7 +235,7 @@ def singularity_distance(sequence: str, angles: JetLike) -> Any:
     return jnp.abs((sin if sequence[0] == sequence[2] else cos)(second))
 
 
-def is_singular_orientation(sequence: str, angles: JetLike, tolerance: float = SINGULAR) -> Any:
+def is_singular_orientation(sequence: str, angles: JetLike, tolerance: float = SINGULAR) -> Bool[Numbers, "*batch"]:
     """Tell where Euler angles are at a singular orientation (gimbal lock).
 
     Parameters

@@ -1,7 +1,7 @@
 """Planar rigid bodies on jets: poses, points and directions. Sommer 2024, equations 9-20."""
 
 import dataclasses
-from typing import Any
+from typing import overload
 
 import jax
 import jax.numpy as jnp
@@ -13,7 +13,11 @@ from jounce.rigid.body_arrays import body_vector, each_jet, take_bodies
 from jounce.shapes import Numbers, Real
 
 
-def perpendicular(vector: Jet | Numbers) -> Any:
+@overload
+def perpendicular(vector: Jet) -> Jet: ...
+@overload
+def perpendicular(vector: Numbers) -> jax.Array: ...
+def perpendicular(vector: Jet | Numbers) -> Jet | jax.Array:
     """Turn a plane vector by +90 degrees: the matrix R of Sommer 2024, equation 9."""
     return jnp.stack([-vector[1], vector[0]]) if not isinstance(vector, Jet) else vector.map(perpendicular)
 

@@ -14,7 +14,7 @@ from jounce.rigid.inertia import Inertia, TracedInertia, finite_numbers
 from jounce.robot.floating_base import floating_joints
 from jounce.robot.model import Closure, Joint, Limits, Link, limits_with_followers
 from jounce.robot.tree import Tree, arrange, ordered, turn_about
-from jounce.shapes import is_traced
+from jounce.shapes import ArrayLike, Real, is_traced
 
 Made = TypeVar("Made", bound="AbstractRobot")
 
@@ -172,7 +172,7 @@ class AbstractRobot(Displayed, abc.ABC):
         """Mass of all links, the base included, kg."""
         return sum((link.inertia.mass for link in self.links.values() if link.inertia is not None), 0.0)
 
-    def with_gravity(self: Made, gravity: Any) -> Made:
+    def with_gravity(self: Made, gravity: ArrayLike) -> Made:
         """Return the same robot under another acceleration of free fall, m/s^2 in the frame of the base."""
         return self._changed(gravity=gravity)
 
@@ -199,7 +199,12 @@ class AbstractRobot(Displayed, abc.ABC):
         return self._changed(links=list(links.values()))
 
     def with_inertia(
-        self: Made, link: str, *, mass: Any = None, center_of_mass: Any = None, tensor: Any = None
+        self: Made,
+        link: str,
+        *,
+        mass: Real | None = None,
+        center_of_mass: ArrayLike | None = None,
+        tensor: ArrayLike | None = None,
     ) -> Made:
         """Return the robot with another inertia of a link; what is not given stays, zero where the link had none.
 
@@ -237,14 +242,12 @@ class AbstractRobot(Displayed, abc.ABC):
         """
         check_name("link", link, self.links, RobotError, name="link")
         held = self.links[link].inertia or Inertia(0.0, strict=False)
-        mass = held.mass if mass is None else mass
-        center_of_mass = held.center_of_mass if center_of_mass is None else center_of_mass
-        tensor = held.tensor if tensor is None else tensor
-        traced = is_traced((mass, center_of_mass, tensor))
-        if traced or isinstance(held, TracedInertia):
-            inertia = TracedInertia(mass, center_of_mass, tensor)
+        given = {"mass": mass, "center_of_mass": center_of_mass, "tensor": tensor}
+        values: dict[str, Any] = {k: getattr(held, k) if v is None else v for k, v in given.items()}
+        if is_traced(values) or isinstance(held, TracedInertia):
+            inertia = TracedInertia(**values)
         else:
-            inertia = Inertia(mass, center_of_mass, tensor, strict=self.strict)
+            inertia = Inertia(**values, strict=self.strict)
         links = {**self.links, link: Link(link, inertia)}
         return self._changed(links=list(links.values()))
 

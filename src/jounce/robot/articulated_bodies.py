@@ -21,7 +21,6 @@ from jounce.shapes import Numbers
 
 Joints = Float[Numbers, "body batch"]
 """One number for each moving body, or its joint."""
-BodyTensors = Float[Numbers, "3 3 body batch"]
 LEAST_INERTIA = 1e-13  # of a joint, of that of the articulated body that it moves: less is rounding
 
 

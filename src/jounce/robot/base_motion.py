@@ -98,14 +98,14 @@ def scene_axes(quaternion: Float[Numbers, "4 batch"], twist: TwistSeries) -> tup
     return found[0], found[1], found[2]
 
 
-def in_base(axes: tuple[Jet, Jet, Jet], vector: Any) -> Jet:
+def in_base(axes: tuple[Jet, Jet, Jet], vector: Jet | Numbers) -> Jet:
     """Return a vector in the axes of the base, from its components in those of the scene."""
     parts = [vector[i : i + 1] for i in range(3)]
     found = axes[0] * parts[0] + axes[1] * parts[1] + axes[2] * parts[2]
     return found.dense()
 
 
-def falling(axes: tuple[Jet, Jet, Jet], gravity: Any, levels: int) -> Any:
+def falling(axes: tuple[Jet, Jet, Jet], gravity: Numbers, levels: int) -> Float[Numbers, "level 3 batch"]:
     """Return the velocity, zero now, of a base that accelerates against gravity, in its axes, (levels, 3, batch)."""
     against = stacked(in_base(axes, -jnp.asarray(gravity)[:, None]))[: levels - 1]
     return jnp.concatenate([jnp.zeros_like(against[:1]), against])

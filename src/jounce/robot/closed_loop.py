@@ -10,27 +10,31 @@ from jounce.forces import AbstractForce
 from jounce.jet import Jet
 from jounce.mechanism import Body, Mechanism, time_grid
 from jounce.mechanism.mechanism import names_column
+from jounce.mechanism.redundant_reactions import RedundantReactions
 from jounce.mechanism.resolve import resolve_motion
+from jounce.mechanism.time import TimeLike
 from jounce.rigid.inertia import finite_numbers
 from jounce.robot.abstract_robot import AbstractRobot
-from jounce.robot.closures import Loops, given_coordinates
+from jounce.robot.closures import GivenCoordinates, Loops, given_coordinates
 from jounce.robot.mechanism_parts import RobotParts, on_body
+from jounce.shapes import ArrayLike
+from jounce.trajectory.joint_trajectory import JointTrajectory
 
 DRIVE, START = "_drive", "_start"
 
 
 def mechanism(
     robot: AbstractRobot,
-    q: Any = None,
+    q: GivenCoordinates = None,
     *,
-    drivers: Any = None,
+    drivers: Mapping[str, Any] | JointTrajectory | None = None,
     initial: Mapping[str, Any] | None = None,
     forces: Mapping[str, AbstractForce] | None = None,
     outputs: Mapping[str, Any] | None = None,
     parameters: Mapping[str, Any] | None = None,
-    time: Any = None,
+    time: TimeLike | None = None,
     drives: bool = False,
-    redundant_reactions: Any = None,
+    redundant_reactions: RedundantReactions | None = None,
 ) -> Mechanism:
     """Return a robot as a spatial mechanism, with masses and gravity, its loops closed.
 
@@ -162,7 +166,7 @@ def _start(
     return start
 
 
-def body_point(robot: AbstractRobot, link: str, point: Any = (0.0, 0.0, 0.0)) -> tuple[str, np.ndarray]:
+def body_point(robot: AbstractRobot, link: str, point: ArrayLike = (0.0, 0.0, 0.0)) -> tuple[str, np.ndarray]:
     """Return the body of a mechanism that a link is part of, and where a point of the link is in the frame of the body.
 
     Parameters

@@ -19,6 +19,7 @@ from jounce.constraints.base import Wrenches
 from jounce.errors import MechanismError, RobotError
 from jounce.jet import Jet, cross, dot, stack
 from jounce.jet.algebra import stacked, total
+from jounce.rigid import SpatialPose
 from jounce.rigid.inertia import finite_numbers
 from jounce.robot.abstract_robot import AbstractRobot
 from jounce.robot.batches import Batched
@@ -59,7 +60,7 @@ class LinkClosure(AbstractConstraint, type="closure", space="spatial"):
             message = "a closure that bears moments needs vector_part and scalar_part, the attitude when closed"
             raise MechanismError(message, name="vector_part")
 
-    def residual(self, body_i, body_j, _time):
+    def residual(self, body_i: SpatialPose, body_j: SpatialPose, _time: Jet) -> Jet:
         """Return the rows, shape (rows, ...)."""
         offset = body_i.to_body(body_j.point(self.point_j) - body_i.point(self.point_i))
         force, moment = self.wrenches[:, :3], self.wrenches[:, 3:]
@@ -71,7 +72,7 @@ class LinkClosure(AbstractConstraint, type="closure", space="spatial"):
         turn = turn if self.sense is None else turn * self.sense
         return rows + turn.map(lambda x: jnp.sum(moment * x[None], axis=1))
 
-    def sense_at(self, body_i, body_j):
+    def sense_at(self, body_i: SpatialPose, body_j: SpatialPose) -> Float[Numbers, "..."] | None:
         """Return the sign of the Euler parameters at a pose, (...), as either sign tells the same attitude; or None.
 
         A row of force and moment both would else be another one. The sign stays along a motion: none is looked for on

@@ -11,6 +11,7 @@ from jounce.rigid.inertia import Inertia, finite_numbers
 from jounce.robot.model import UNLIMITED, Joint, Limits, Link
 from jounce.robot.robot import Robot
 from jounce.robot.tree import turn_about
+from jounce.shapes import ArrayLike
 
 CONVENTIONS = ("standard", "modified")
 X, Y, Z = np.eye(3)
@@ -126,7 +127,7 @@ def from_denavit_hartenberg(
     return Robot(name, links, joints)
 
 
-def from_screws(screws: Sequence[JointAxis], tool: Any = None, name: str = "robot") -> Robot:
+def from_screws(screws: Sequence[JointAxis], tool: ArrayLike | None = None, name: str = "robot") -> Robot:
     """Return a serial robot from the screw axes of its joints, as a product of exponentials has them.
 
     Links are named link_1 to link_n; at coordinates zero their frames coincide with that of the base. The frame tool is

@@ -14,6 +14,8 @@ from jounce.errors import MechanismError, check_choice
 from jounce.jet import Jet, wrap
 from jounce.jet.turns import WHOLE_TURN
 from jounce.mechanism import AbstractOutput
+from jounce.rigid import SpatialPose
+from jounce.shapes import Numbers
 
 KINDS = ("turn-turn", "turn-slide", "slide-turn", "slide-slide")
 PLACES = "ijmn"
@@ -47,7 +49,9 @@ class JointPlacement:
     vector_j: Any
 
 
-def coordinate(body_i: Any, body_j: Any, turning: bool, parts: Any) -> Jet:
+def coordinate(
+    body_i: SpatialPose, body_j: SpatialPose, turning: bool, parts: tuple[Numbers, Numbers, Numbers, Numbers]
+) -> Jet:
     """Return the coordinate of a joint, rad up to whole turns, or m."""
     point, axis, vector_i, vector_j = parts
     if turning:
@@ -93,7 +97,7 @@ class CoupledJoints(AbstractConstraint, type="coupled", space="spatial"):
             message = f"must name two bodies of each joint by {', '.join(places)}, such as ijim"
             raise MechanismError(message, name="roles", value=self.roles)
 
-    def residual(self, *bodies_and_time):
+    def residual(self, *bodies_and_time: Any) -> Jet:
         """Return what the second joint lacks of following the first."""
         bodies = [bodies_and_time[PLACES.index(place)] for place in self.roles]
         turning = [kind == "turn" for kind in self.kinds.split("-")]
@@ -144,6 +148,6 @@ class SlideOutput(AbstractOutput):
 
     body_count = 2
 
-    def evaluate(self, body_i, body_j):
+    def evaluate(self, body_i: SpatialPose, body_j: SpatialPose) -> Jet:
         """Return the distance."""
         return slide(body_i, body_j, self.point_i, self.point_j, self.vector_i)

@@ -62,7 +62,7 @@ def forward_dynamics(
     drives: bool = False,
     base: BaseMotion | None = None,
     strict: bool = True,
-) -> Any:
+) -> Float[Numbers, "*batch derivative joint"] | tuple[BaseMotion, Float[Numbers, "*batch derivative joint"]]:
     """Return the motion that joint torques or forces cause, to any order: the inverse of `inverse_dynamics`.
 
     Articulated bodies (Featherstone 2008, Rigid Body Dynamics Algorithms, chapter 7), in a time linear in the number of

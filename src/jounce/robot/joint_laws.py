@@ -14,7 +14,7 @@ from jounce.errors import JounceError, RobotError, check_name
 from jounce.jet import Jet
 from jounce.modules import Module
 from jounce.robot.arguments import floats
-from jounce.shapes import Numbers
+from jounce.shapes import ArrayLike, Numbers
 from jounce.trajectory.expression import Expression
 from jounce.trajectory.joint_trajectory import JointTrajectory
 from jounce.trajectory.motion import AbstractMotion
@@ -109,7 +109,11 @@ class JointLaws(AbstractJointLaws):
         return jnp.stack([jnp.broadcast_to(rows[k], shape) if k in rows else found[k] for k in range(len(found))])
 
 
-def joint_laws(names: Sequence[str], given: Any, what: str = "torque") -> AbstractJointLaws:
+GivenLaws = ArrayLike | Callable[..., Any] | Mapping[str, Any] | JointTrajectory | AbstractJointLaws
+"""Forces of joints: constants, a function of time and state, or by name of the joint a law of its own."""
+
+
+def joint_laws(names: Sequence[str], given: GivenLaws | None, what: str = "torque") -> AbstractJointLaws:
     """Return what a user gives for the forces of joints, checked.
 
     Parameters

@@ -9,7 +9,7 @@ from jounce.constraints.drivers import RotationDriver, SpatialSlideDriver
 from jounce.errors import RobotError, check_name
 from jounce.forces import AbstractForce
 from jounce.forces.springs import SlideSpring, SpatialTorsionalSpring
-from jounce.mechanism import Body, RelativeAngleOutput
+from jounce.mechanism import AbstractOutput, Body, RelativeAngleOutput
 from jounce.mechanism.mechanism import GROUND
 from jounce.rigid.euler_parameters import from_rotation_matrices
 from jounce.rigid.inertia import Inertia
@@ -157,7 +157,7 @@ class RobotParts:
             return RotationDriver(at.bodies, at.axis_i, law, at.vector_i, at.vector_j)
         return SpatialSlideDriver(at.bodies, at.point, np.zeros(3), at.axis_i, law)
 
-    def output(self, name: str, joint: str) -> Any:
+    def output(self, name: str, joint: str) -> AbstractOutput:
         """Return the coordinate of a joint as an output."""
         check_name("moving joint", joint, [j.name for j in self.moving], RobotError, name=f"outputs.{name}")
         at = self._named(joint)

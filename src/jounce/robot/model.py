@@ -10,6 +10,7 @@ import numpy as np
 
 from jounce.errors import RobotError, check_name
 from jounce.rigid.inertia import Inertia, finite_numbers, unchanging
+from jounce.shapes import ArrayLike
 
 MOVING = ("revolute", "continuous", "prismatic")
 TYPES = (*MOVING, "fixed")
@@ -312,7 +313,7 @@ class Closure:
             object.__setattr__(self, "rotation", rotation_matrix(f"{where}.rotation", self.rotation))
 
 
-def rotation_matrix(name: str, value: Any) -> np.ndarray:
+def rotation_matrix(name: str, value: ArrayLike) -> np.ndarray:
     """Return a rotation matrix, checked.
 
     Raises

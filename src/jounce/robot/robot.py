@@ -5,6 +5,7 @@ from typing import Any
 from jounce.mechanism import Mechanism
 from jounce.robot.abstract_robot import AbstractRobot
 from jounce.robot.closed_loop import mechanism
+from jounce.robot.closures import GivenCoordinates
 
 
 class Robot(AbstractRobot):
@@ -53,7 +54,7 @@ class Robot(AbstractRobot):
     ('pin',)
     """
 
-    def mechanism(self, q: Any = None, **settings: Any) -> Mechanism:
+    def mechanism(self, q: GivenCoordinates = None, **settings: Any) -> Mechanism:
         """Return the `jounce.Mechanism` that the robot is, with its masses, for `jounce.solve`; loops may be closed.
 
         See Also

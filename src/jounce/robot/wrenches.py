@@ -14,7 +14,7 @@ from jounce.jet import Jet, compose
 from jounce.rigid.inertia import finite_numbers
 from jounce.robot.arguments import floats
 from jounce.robot.robot import Robot
-from jounce.shapes import is_traced
+from jounce.shapes import ArrayLike, Refused, is_traced
 
 FRAMES = ("base", "link")
 
@@ -54,7 +54,13 @@ class Wrench:
 
 
 def wrench_arrays(
-    robot: Robot, wrenches: Sequence[Wrench], lead: tuple[int, ...], levels: int, time: Any, *, free: bool = False
+    robot: Robot,
+    wrenches: Sequence[Wrench],
+    lead: tuple[int, ...],
+    levels: int,
+    time: ArrayLike | None,
+    *,
+    free: bool = False,
 ) -> tuple[Any, ...]:
     """Return the wrenches as arrays of plain derivatives, of shape (..., levels, 6): force, then torque.
 
@@ -77,7 +83,7 @@ def wrench_arrays(
     return tuple(arrays)
 
 
-def check_wrenches(robot: Robot, wrenches: Any, *, free: bool) -> None:
+def check_wrenches(robot: Robot, wrenches: Sequence[Wrench] | Refused, *, free: bool) -> None:
     """Raise RobotError unless these are wrenches on links that move; on the base where it is free."""
     if not isinstance(wrenches, Sequence) or isinstance(wrenches, str):
         raise RobotError("must be a list of jn.Wrench", name="wrenches", value=type(wrenches).__name__)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import contextmanager
 from os import PathLike, fspath
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Bool
@@ -17,6 +17,7 @@ from jounce.errors import DamageWarning, JounceError, MechanismError, OutputErro
 from jounce.integrate.methods import AbstractMethod
 from jounce.io.files.reading import recording
 from jounce.mechanism import Mechanism
+from jounce.mechanism.time import TimeLike
 from jounce.robot.robot import Robot
 from jounce.sweeps.chunks import Plan
 from jounce.sweeps.cluster import check_installed, compute_on_cluster
@@ -27,6 +28,9 @@ from jounce.sweeps.statistics import variables_of
 from jounce.sweeps.store import Store, create, find
 from jounce.trajectory.joint_trajectory import JointTrajectory
 
+if TYPE_CHECKING:
+    import xarray
+
 LARGEST_CHUNK, SMALLEST_CHUNK = 1024, 16
 NUMBERS = 4_000_000  # of the histories of a chunk
 LEAST_CHUNKS = 8  # so that several workers have something to do
@@ -36,7 +40,7 @@ def sweep(
     model: Mechanism | Robot | str | PathLike[str],
     vary: Mapping[str, Any],
     out: str | PathLike[str],
-    time: Any = None,
+    time: TimeLike | None = None,
     order: int = 4,
     *,
     trajectory: JointTrajectory | str | PathLike[str] | None = None,
@@ -50,7 +54,7 @@ def sweep(
     timeout: float = 10.0,
     chunk: int | None = None,
     progress: Callable[[int, int], None] | None = None,
-) -> Any:
+) -> "xarray.Dataset":
     """Compute designs by the million and keep what each comes to, in a Zarr folder that the same call goes on with.
 
     Chunks of designs are computed by worker processes, which write them as they finish; memory does not grow with the
@@ -226,7 +230,7 @@ def _whole(plan: Plan) -> Bool[np.ndarray, " chunk"]:
     return done
 
 
-def opened(folder: Path) -> Any:
+def opened(folder: Path) -> "xarray.Dataset":
     """Return the result of a sweep, of which nothing is read yet."""
     import xarray
 
@@ -283,7 +287,9 @@ def _problem(
     return Motions(model, time, order, **given), _title(model)
 
 
-def robot_problem(robot: Robot, trajectory: Any, time: Any, order: int) -> Torques:
+def robot_problem(
+    robot: Robot, trajectory: JointTrajectory | str | PathLike[str] | None, time: TimeLike | None, order: int
+) -> Torques:
     """Return the torques of a robot as what is computed, to rates of two orders less than the motion."""
     order = whole_number("order", order, 2, 30, error=MechanismError)
     if trajectory is None:

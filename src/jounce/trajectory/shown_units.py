@@ -151,11 +151,6 @@ class ShownUnits:
         """Return these units with others in their place."""
         return ShownUnits({**self.chosen, **(others or {})}, self.outputs)
 
-    @property
-    def are_si(self) -> bool:
-        """Whether nothing is shown in another unit than that of SI."""
-        return all(unit_size(unit)[0] == 1.0 for unit in self.chosen.values())
-
 
 def _dimension(unit: str) -> Dimension:
     """Return the dimension of a unit that an output has."""

@@ -1,9 +1,10 @@
 """Samples of motion laws from CSV files."""
 
+import numpy as np
 import pytest
 
 from jounce.errors import MechanismFileError
-from jounce.io.files.samples import read_samples
+from jounce.io.files.samples import read_points, read_samples
 
 
 def write(folder, text):
@@ -41,6 +42,7 @@ def test_columns_are_found(tmp_path, text, names):
         ("time,lift\n0,1\n", {"time": "t"}, "line 1: no column has this name, got 't'; valid: lift, time"),
         ("time,lift\n0,1\n1,x\n", {}, "line 3, lift: must be a finite number, got 'x'"),
         ("time,lift\n0,1\n1\n", {}, "line 3, lift: must be a finite number, got ''"),
+        ("time,lift\n0,1\n1,1_5\n", {}, "line 3, lift: must be a finite number, got '1_5'"),
         ("time,lift\n0,1\nnan,2\n", {}, "line 3, time: must be a finite number, got 'nan'"),
         ("time,lift\n0,1\n1,1e300\n", {}, "line 3, lift: must be at most 1e+75, got '1e300'"),
         (b"time,lift\n\xff,1\n", {}, "the samples cannot be read"),
@@ -63,3 +65,38 @@ def test_files_that_cannot_be_read(tmp_path, monkeypatch):
     monkeypatch.setattr("jounce.io.files.reading.MAX_SAMPLES", 10)
     with pytest.raises(MechanismFileError, match="at most 1e-05 MB are read"):
         read_samples(write(tmp_path, "time,lift\n0,1\n"))
+
+
+@pytest.mark.parametrize(
+    "text, times, points",
+    [
+        ("1,2\n3,4\n", None, [[1, 2], [3, 4]]),
+        ("1,2,3\n4,5,6\n", None, [[1, 2, 3], [4, 5, 6]]),
+        ("y,x\n1,2\n3,4\n", None, [[2, 1], [4, 3]]),
+        ("tip_x,tip_y,note\n1,2,0\n3,4,0\n", None, [[1, 2], [3, 4]]),
+        ("time [ms],x [mm],y [cm],z\n0,1,2,3\n500,4,5,6\n", [0, 0.5], [[0.001, 0.02, 3], [0.004, 0.05, 6]]),
+        ("x,tip_x,y\n1,9,2\n3,9,4\n", None, [[1, 2], [3, 4]]),
+    ],
+)
+def test_points_and_their_times(tmp_path, text, times, points):
+    found_times, found = read_points(write(tmp_path, text))
+    np.testing.assert_allclose(found, points, rtol=1e-15)
+    assert (found_times is None) == (times is None)
+    if times is not None:
+        np.testing.assert_allclose(found_times, times, rtol=1e-15)
+
+
+@pytest.mark.parametrize(
+    "text, words",
+    [
+        ("1\n2\n", ("line 1", "two or three")),
+        ("x,z\n1,2\n", ("line 1", "columns x and y", "x, z")),
+        ("a_x,b_x,y\n1,2,3\n", ("line 1", "several", "'x'")),
+        ("x,y\n1,inf\n", ("line 2", "y", "inf")),
+        ("x [s],y\n1,2\n", ("x", "s")),
+    ],
+)
+def test_what_are_no_points(tmp_path, text, words):
+    with pytest.raises(MechanismFileError) as raised:
+        read_points(write(tmp_path, text))
+    assert all(word in str(raised.value) for word in words), str(raised.value)

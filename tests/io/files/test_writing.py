@@ -13,7 +13,7 @@ from xarray import Dataset
 
 import jounce as jn
 from jounce.errors import OutputError
-from jounce.io import read, write
+from jounce.io import read, write, write_parts
 from jounce.io.files.writing import replacing
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
@@ -56,8 +56,9 @@ def test_an_input_is_no_place_for_results(run, alias):
     assert pathlib.Path("lift.csv").read_text() == TABLE
     assert names() == before
     jn.load("cam.yaml")
-    with pytest.raises(OutputError, match="overwrite=True"):
-        write(results(), alias)
+    for put in (lambda: write(results(), alias), lambda: write_parts([results()], alias, 1)):
+        with pytest.raises(OutputError, match="overwrite=True"):
+            put()
     assert pathlib.Path("lift.csv").read_text() == TABLE
 
 

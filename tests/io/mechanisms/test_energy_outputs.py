@@ -85,6 +85,8 @@ def test_closed_forms(motion):
 def test_units_and_names_of_peaks(motion):
     assert motion.dataset["T"].attrs["units"] == "J"
     assert motion.dataset["E2"].attrs["units"] == "J/s^4"
+    assert jn.kinetic_energy(motion).total.attrs["units"] == "J"
+    assert jn.acceleration_energy(motion, order=1).total.attrs["units"] == "J/s^2"
     told = {(p.output, p.derivative): p.unit for p in peaks(motion)}
     assert told["T", "energy"] == "J"
     assert told["E1", "first rate"] == "J/s^3"
@@ -108,6 +110,18 @@ def test_inspection_tells_of_what_they_are(path, run):
     found = {row["name"]: (row["quantity"], row["unit"], row["of"]) for row in json.loads(told)["outputs"]}
     assert found["T"] == ("kinetic_energy", "J", ["mechanism"])
     assert found["E2"] == ("acceleration_energy", "J/s^4", ["cart"])
+
+
+def test_orders_that_no_motion_has_are_refused_before_computing(path, run):
+    text = path.read_text()
+    path.write_text(text.replace("order: 2", "order: 99"))
+    status, _, complaint = run("inspect", path)
+    assert status == 2
+    assert all(word in complaint for word in ("order", "99", "30", "line")), complaint
+    path.write_text(text.replace("order: 2", "order: 30"))
+    status, _, complaint = run("run", path, "--order", "10")
+    assert status == 2
+    assert all(word in complaint for word in ("outputs.E2", "41", "32")), complaint
 
 
 @pytest.mark.slow

@@ -233,7 +233,7 @@ def test_a_force_of_ones_own_in_a_file(tmp_path):
 
     force = written(tmp_path, "planar", "{F: {type: wind, body: a, strength: 3 N, law: 1 - v**2}}").forces["F"]
     assert isinstance(force, Wind)
-    with pytest.raises(jn.MechanismFileError, match=r"line 4, forces\.F\.strength: expected a force, such as 10 N"):
+    with pytest.raises(jn.MechanismFileError, match=r"line 4, forces\.F\.strength: .*such as 10 N"):
         written(tmp_path, "planar", "{F: {type: wind, body: a, strength: 3 m, law: 1 - v**2}}")
 
 

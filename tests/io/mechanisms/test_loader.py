@@ -281,7 +281,7 @@ def test_motion_by_samples_beside_the_file(tmp_path):
 def test_samples_of_a_spline_that_does_not_work_name_both_files(tmp_path):
     (tmp_path / "lift.csv").write_text("0,1\n1,2\n")
     entry = "{type: slide, bodies: [ground, b], points: [[0, 0], [0, 0]], vector: [1, 0], motion: {samples: lift.csv}}"
-    with pytest.raises(MechanismFileError, match=r"line 8, drivers.J.motion: .*a spline of degree 5 needs at least 6"):
+    with pytest.raises(MechanismFileError, match=r"line 8, drivers\.J\.motion: .*degree 5 .*least 6"):
         joint(tmp_path, "planar", entry, "drivers")
 
 
@@ -303,7 +303,7 @@ def test_a_joint_of_ones_own_is_read_at_once(tmp_path):
     made = joint(tmp_path, "planar", entry)
     assert isinstance(made, PointOnCircle)
     assert (made.radius, made.point_j, made.copy) == (0.02, (Expression("AB"), 0.0), "other")
-    with pytest.raises(MechanismFileError, match=r"joints.J.radius: must be greater than zero, got -0.02"):
+    with pytest.raises(MechanismFileError, match=r"joints\.J\.radius: .*zero, got -0\.02"):
         joint(tmp_path, "planar", entry.replace("2 cm", "-2 cm"))
     with pytest.raises(MechanismFileError, match=r"unknown key 'radios'; did you mean 'radius'"):
         joint(tmp_path, "planar", entry.replace("radius", "radios"))

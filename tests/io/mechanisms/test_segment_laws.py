@@ -123,9 +123,7 @@ def test_what_is_wrong_is_named_with_its_line(tmp_path, old, new, name, words):
 def test_a_driver_that_has_the_law_of_an_output_is_not_followed(tmp_path):
     text = FILE.replace("motion: speed*t", "motion: {output: y, law: 0.1*t}")
     assert text != FILE
-    with pytest.raises(
-        jn.MechanismFileError, match=r"law of the output y, and none of its own, got .shaft_angle."
-    ) as e:
+    with pytest.raises(jn.MechanismFileError, match=r"output y, .*none of its own, got .shaft_angle.") as e:
         loaded(tmp_path, text)
     assert e.value.line is not None
     assert e.value.name == "drivers.cam.motion.of"

@@ -80,7 +80,7 @@ def test_file_with_one_mistake(tmp_path, kind, what):
     case, (text, ending) = CASES[kind][what], FILES[kind]
     assert case["instead_of"] in text
     path = tmp_path / f"file{ending}"
-    path.write_text(text.replace(case["instead_of"], case["text"], 1))
+    path.write_text(text.replace(case["instead_of"], case["text"], 1).replace(*case.get("also", ("", ""))))
     with pytest.raises(RobotFileError) as caught:
         load_robot(path, strict=True)
     place = [
@@ -170,7 +170,7 @@ def test_a_name_nearly_right(tmp_path):
 def test_bodies_nested_deeper_than_mujoco_takes(tmp_path):
     path = tmp_path / "chain.xml"
     path.write_text("<mujoco><worldbody>" + "<body>" * 1500 + "</body>" * 1500 + "</worldbody></mujoco>")
-    with pytest.raises(RobotFileError, match=r"line 1: MuJoCo cannot use this: .*nesting is too deep") as caught:
+    with pytest.raises(RobotFileError, match=r"line 1: MuJoCo .*nesting is too deep") as caught:
         load_robot(path)
     assert str(caught.value).isprintable()
 
@@ -183,9 +183,7 @@ def test_no_name():
 def test_a_sequence_of_turns_that_is_none(tmp_path):
     path = tmp_path / "file.urdf"
     path.write_text(URDF)
-    with pytest.raises(
-        RobotError, match=r"sequence: must be three letters X, Y, Z of which neighbours differ, got 'XXY'"
-    ):
+    with pytest.raises(RobotError, match=r"sequence: .*neighbours differ, got 'XXY'"):
         load_robot(path, floating_base="XXY")
 
 
@@ -195,9 +193,7 @@ def test_names_that_an_expanded_joint_needs(tmp_path):
         '<link name="tool"/>', '<link name="tool"/><link name="x"/>'
     )
     path.write_text(text.replace('"x"', '"flange_frame_1"'))
-    with pytest.raises(
-        RobotFileError, match=r"line 2, links: a joint that is expanded needs this name, got 'flange_frame_1'"
-    ):
+    with pytest.raises(RobotFileError, match=r"line 2, links: .*name, got 'flange_frame_1'"):
         load_robot(path)
 
 

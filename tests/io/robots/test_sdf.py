@@ -105,6 +105,33 @@ def test_the_world_holds_a_model(tmp_path):
     np.testing.assert_allclose(poses(robot, {"pin": 0.7})["arm"][:3, :3], turn.as_matrix(), rtol=0, atol=1e-15)
 
 
+def pendulum(inside=""):
+    """Return a link of 2 kg on a horizontal hinge, its centre 0.5 m beside it."""
+    body = SOME.replace("<inertial>", "<inertial><pose>0.5 0 0 0 0 0</pose>") + inside
+    hinge = joint("j", "a", "b", inside="<axis><xyz>0 1 0</xyz></axis>")
+    return link("a", body=body) + link("b", body=body) + hinge
+
+
+def torque_at_rest(robot):
+    """Return the torque that holds the pendulum where it is, N m."""
+    return float(jn.inverse_dynamics(robot, np.zeros((3, 1)))[0, 0])
+
+
+@pytest.mark.parametrize("version, holder", [("1.9", "{}"), ("1.4", "<physics type='ode'>{}</physics>")])
+def test_the_gravity_of_the_world_in_the_file(tmp_path, version, holder):
+    moon = holder.format("<gravity>0 0 -1.62</gravity>")
+    inside = f"<model name='m'><pose>0 0 1 0.5 0 0</pose>{pendulum()}</model>"
+    robot = read(tmp_path, f'<sdf version="{version}"><world name="w">{moon}{inside}</world></sdf>')
+    np.testing.assert_allclose(robot.gravity, [0, -1.62 * np.sin(0.5), -1.62 * np.cos(0.5)], rtol=0, atol=1e-15)
+    assert torque_at_rest(robot) == pytest.approx(-2 * 0.5 * 1.62 * np.cos(0.5), rel=1e-14)
+
+
+@pytest.mark.parametrize("felt", [True, False])
+def test_links_that_feel_no_gravity(tmp_path, felt):
+    robot = read(tmp_path, model(pendulum(f"<gravity>{felt}</gravity>")))
+    assert torque_at_rest(robot) == pytest.approx(-2 * 0.5 * 9.81 if felt else 0.0, rel=1e-14)
+
+
 def test_a_static_model_is_fixed_to_the_world(tmp_path):
     robot = read(tmp_path, model("<static>true</static>", link("a", "1 0 0 0 0 0"), link("b"), joint("j", "a", "b")))
     assert (robot.base, robot.joint_names) == ("world", ("j",))
@@ -130,6 +157,38 @@ def test_a_universal_joint_and_a_ball(tmp_path):
     q = dict(zip(robot.joint_names, (0.3, -0.4, 0.5, 0.6, 0.7), strict=True))
     turn = Rotation.from_euler("XY", [0.3, -0.4]) * Rotation.from_euler("ZYX", [0.5, 0.6, 0.7])
     np.testing.assert_allclose(poses(robot, q)["c"][:3, :3], turn.as_matrix(), rtol=0, atol=1e-15)
+
+
+def test_a_universal_joint_toward_the_base_keeps_the_numbers_of_its_axes(tmp_path):
+    axes = (
+        "<axis><xyz>1 0 0</xyz></axis><axis2><xyz>0 1 0</xyz><limit><lower>-1</lower><upper>1</upper></limit></axis2>"
+    )
+    robot = read(tmp_path, model(link("a"), link("b"), joint("u", "b", "a", "universal", axes)))
+    assert (robot.base, robot.joint_names) == ("a", ("u_2", "u_1"))
+    assert robot.limits["u_2"].upper == 1
+    turn = Rotation.from_euler("XY", [0.3, -0.4])  # of a, the child in the file, seen from b
+    here = poses(robot, {"u_1": 0.3, "u_2": -0.4})["b"][:3, :3]
+    np.testing.assert_allclose(here, turn.inv().as_matrix(), rtol=0, atol=1e-15)
+
+
+def test_axes_of_universal_joints_follow_and_are_followed(tmp_path):
+    """Twice the first turn of one universal joint is the second turn of the next, whose first a hinge follows."""
+    first = "<axis><xyz>1 0 0</xyz></axis><axis2><xyz>0 1 0</xyz></axis2>"
+    follows = '<mimic joint="{}" axis="{}"><multiplier>{}</multiplier></mimic>'
+    second = f"<axis><xyz>1 0 0</xyz></axis><axis2><xyz>0 1 0</xyz>{follows.format('u', 'axis', 2)}</axis2>"
+    third = f"<axis><xyz>0 0 1</xyz>{follows.format('u', 'axis2', 3)}</axis>"
+    text = model(
+        *map(link, "abcd"),
+        joint("u", "a", "b", "universal", first),
+        joint("v", "b", "c", "universal", second),
+        joint("w", "c", "d", inside=third),
+    )
+    robot = read(tmp_path, text)
+    assert robot.joint_names == ("u_1", "u_2", "v_1")
+    followed = {
+        name: (joint.mimic.joint, joint.mimic.multiplier) for name, joint in robot.joints.items() if joint.mimic
+    }
+    assert followed == {"v_2": ("u_1", 2.0), "w": ("u_2", 3.0)}
 
 
 def test_a_gearbox_and_a_mimic(tmp_path):
@@ -204,6 +263,23 @@ def test_a_link_without_inertia_weighs_a_kilogram_and_is_told_of(tmp_path):
         read(tmp_path, text, strict=True)
 
 
+def test_what_an_inertia_does_not_give_is_one_and_is_told_of(tmp_path):
+    body = "<inertial><mass>2</mass><inertia><ixx>0.5</ixx><iyy>0.5</iyy></inertia></inertial>"
+    with pytest.warns(RobotWarning, match=r"lack their mass or moments .*: bare \(line 1\)"):
+        robot = read(tmp_path, model(link("a"), link("bare", body=body), joint("j", "a", "bare")))
+    np.testing.assert_array_equal(robot.links["bare"].inertia.tensor, np.diag([0.5, 0.5, 1.0]))
+    with pytest.raises(RobotFileError, match="does not give izz, which SDF takes for 1"):
+        read(tmp_path, model(link("a"), link("bare", body=body), joint("j", "a", "bare")), strict=True)
+
+
+def test_an_inertia_may_say_that_it_is_placed_in_its_own_link(tmp_path):
+    body = SOME.replace("<inertial>", '<inertial><pose relative_to="{}">1 2 3 0 0 0</pose>')
+    robot = read(tmp_path, model(link("a"), link("b", body=body.format("b")), joint("j", "a", "b")))
+    np.testing.assert_array_equal(robot.links["b"].inertia.center_of_mass, [1, 2, 3])
+    with pytest.raises(RobotFileError, match=r"links\.b\.inertial\.pose: .*frame of its link.*got 'a'"):
+        read(tmp_path, model(link("a"), link("b", body=body.format("a")), joint("j", "a", "b")))
+
+
 def test_a_link_of_no_mass_and_no_moments_is_a_frame(tmp_path):
     body = "<inertial><mass>0</mass>" + NOTHING
     robot = read(tmp_path, model(link("a"), link("tip", body=body), joint("j", "a", "tip", "fixed", "")))
@@ -223,6 +299,35 @@ BAD = {
     "an unknown element of an axis": (
         model(link("a"), link("b"), joint("j", "a", "b", inside="<axis><xzy>0 0 1</xzy></axis>")),
         "'xyz'",
+    ),
+    "an axis that the leader does not have": (
+        model(
+            *map(link, "abc"),
+            joint("j", "a", "b"),
+            joint("k", "b", "c", inside='<axis><xyz>0 0 1</xyz><mimic joint="j" axis="axis2"/></axis>'),
+        ),
+        "j has no axis of this name, got 'axis2'",
+    ),
+    "a negative damping": (
+        model(*map(link, "ab"), joint("j", "a", "b", inside="<axis><dynamics><damping>-1</damping></dynamics></axis>")),
+        "zero or greater, got -1.0",
+    ),
+    "gravity for some links": (
+        model(link("a"), link("b", body=SOME + "<gravity>0</gravity>"), joint("j", "a", "b")),
+        "switched off for some links only",
+    ),
+    "the mass of a fluid": (
+        model(link("a", body=SOME.replace("<mass>", "<fluid_added_mass><xx>1</xx></fluid_added_mass><mass>"))),
+        "fluid_added_mass: the mass of a fluid",
+    ),
+    "a joint of the world": (
+        f'<sdf version="1.11"><world name="w">{model(link("a")).partition(">")[2].removesuffix("</sdf>")}'
+        '<joint name="j" type="revolute"><parent>world</parent><child>m::a</child></joint></world></sdf>',
+        "joints of a world are not read, got 'j'",
+    ),
+    "a world of included models": (
+        '<sdf version="1.7"><world name="w"><include><uri>model://b</uri></include></world></sdf>',
+        "besides those that it includes",
     ),
     "an unknown type": (model(link("a"), link("b"), joint("j", "a", "b", "hinge")), "'hinge'"),
     "a screw": (model(link("a"), link("b"), joint("j", "a", "b", "screw")), "'screw'"),

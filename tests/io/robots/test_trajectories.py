@@ -139,7 +139,7 @@ def test_the_units_of_laws_are_kept(tmp_path, text, measures):
 
 def test_a_joint_is_not_both_angle_and_length(tmp_path):
     text = PICK.replace("a: 0,", "a: 1 m,")
-    with pytest.raises(TrajectoryError, match=r"motion.yaml, line 1, point_to_point.to.a: .* 'a' .* length"):
+    with pytest.raises(TrajectoryError, match=r"line 1, point_to_point\.to\.a: .* 'a' .* length"):
         load_trajectory(write(tmp_path, text, "motion.yaml"))
 
 

@@ -236,7 +236,7 @@ def test_a_massless_link_between_joints_is_warned_of_unless_it_is_meant(tmp_path
         robot = load_robot(path)
     np.testing.assert_array_equal(robot.tree.mass, [0.0, 1.0])
     assert load_robot(path, massless=True).joint_names == robot.joint_names
-    with pytest.raises(RobotFileError, match=r"line 1, links.ring: <inertial> is missing .*massless=True"):
+    with pytest.raises(RobotFileError, match=r"line 1, links\.ring: <inertial> .*massless=True"):
         load_robot(path, strict=True)
 
 
@@ -383,5 +383,5 @@ def test_a_frame_that_only_carries_the_base_is_left_out_of_a_floating_robot(tmp_
 def test_no_floating_base_where_a_link_is_named_world_already(tmp_path):
     path = tmp_path / "world.urdf"
     path.write_text(f'<robot name="r"><link name="world">{INERTIAL}</link></robot>')
-    with pytest.raises(RobotFileError, match=r"links.world: the robot cannot have a floating base: a link named world"):
+    with pytest.raises(RobotFileError, match=r"links\.world: .*floating base"):
         load_robot(path, floating_base=True)

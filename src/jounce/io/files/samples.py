@@ -301,8 +301,8 @@ class _Table:
 
 
 def _number(text: str) -> float | None:
-    """Return the number that a text is."""
+    """Return the number that a text is, None also for 1_5, which only Python takes for 15."""
     try:
-        return float(text)
+        return None if "_" in text else float(text)
     except ValueError:
         return None

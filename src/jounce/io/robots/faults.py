@@ -9,6 +9,7 @@ MASSLESS = "these links move but have no mass"
 IDLE = "these links move and neither have nor carry mass, so that a simulation has no answer unless they are driven"
 FOLLOWS_NONE = "these joints follow one that the file does not have, and are taken as free"
 WITHOUT_INERTIAL = "these links have no inertia of their own, which SDF takes for 1 kg with moments of 1 kg m^2"
+PARTLY_INERTIAL = "these links lack their mass or moments of inertia, which SDF takes for 1 kg and 1 kg m^2"
 HEADINGS = {
     NEGATIVE: "a principal moment of inertia is negative",
     TRIANGLE: "a principal moment of inertia exceeds the sum of the others",

@@ -64,8 +64,8 @@ def load_robot(
     -----
     RobotWarning
         Links are as those of no real robot: negative moments of inertia, one that exceeds the sum of the other two by
-        more than rounding, moments without mass, links that move and have no mass, links of SDF without inertia. All is
-        computed with the numbers of the file; one warning names the links.
+        more than rounding, moments without mass, links that move and have no mass, links of SDF without a mass and all
+        moments. All is computed with the numbers of the file; one warning names the links.
 
     Examples
     --------

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import importlib
 import re
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 from os import PathLike
 from typing import Any
 
@@ -15,6 +15,7 @@ from jaxtyping import Float
 from jounce.errors import JounceError, RobotError, RobotFileError
 from jounce.io.robots.faults import Faults
 from jounce.io.robots.mjcf_files import check_assets, included, line_of, quiet_mujoco
+from jounce.io.robots.mjcf_ties import NO_CLOSURE, Ties, tied_tendons
 from jounce.io.robots.xml_elements import Element
 from jounce.rigid.inertia import Inertia
 from jounce.robot.floating_base import floating_joints
@@ -45,9 +46,10 @@ def read_mjcf(root: Element, faults: Faults, allow: Iterable[str | PathLike[str]
     turns, zero where its axes are those of the world. Several joints on one body have massless links between them.
     Bodies and joints without a name are called ``body_1``, ``joint_0`` and so on, by their number in MuJoCo. Armature,
     damping and friction of joints are kept, with the armature and damping of actuators on them; ranges become limits,
-    and symmetric ranges of force limits of effort. A joint tied to another by a linear equality follows it; active
-    equalities of type connect and weld become closures, named closure_0 and so on where they have no name. Contacts,
-    springs, tendons, gravity compensation and all else that is no body, joint or actuator of a joint are left out.
+    and symmetric ranges of force limits of effort. A joint tied to another by a linear equality, of joints or of
+    tendons along joints, follows it; active equalities of type connect and weld become closures, named closure_0 and so
+    on where they have no name. Contacts, springs, tendons, gravity compensation and all else that is no body, joint or
+    actuator of a joint are left out.
 
     Parameters
     ----------
@@ -74,11 +76,16 @@ def read_mjcf(root: Element, faults: Faults, allow: Iterable[str | PathLike[str]
     try:
         with quiet_mujoco(mujoco):
             spec = mujoco.MjSpec.from_file(root.path)
-            _strip(spec, mujoco)
+            scaled = spec.compiler.fusestatic and getattr(spec.compiler, "settotalmass", 0.0) > 0  # which is deprecated
+            _strip(spec, mujoco, tied_tendons(spec, mujoco, root.path))
             check_assets(spec, parts, allow)
             model = spec.compile()
     except (ValueError, RuntimeError, OSError) as error:
         raise _refused(str(error), root) from None
+    if scaled and model.body_mass[model.body_weldid == 0].any():
+        # MuJoCo counts bodies fixed to the world in the total or not, by whether a sensor or the like refers to them
+        message = "settotalmass with fusestatic depends on which bodies fixed to the world are kept"
+        raise root.error(f"{message}; remove fusestatic, or give masses instead", "compiler.settotalmass")
     return _Reader(root, mujoco, spec, model, faults).robot()
 
 
@@ -110,15 +117,16 @@ def _refused(says: str, root: Element) -> RobotFileError:
     return RobotFileError(message, path=root.path, line=line_of(says), name=named)
 
 
-def _strip(spec: Any, mujoco: Any) -> None:
+def _strip(spec: Any, mujoco: Any, tied: Container[str]) -> None:
     """Take away what does not bear on the motion of rigid bodies, so that no mesh or texture has to be there.
 
-    A shape stays where it gives a body its mass.
+    A shape stays where it gives a body its mass, a tendon where it is tied.
     """
     spec.compiler.fusestatic = False  # or bodies without joints would lose their frames
-    joint = mujoco.mjtTrn.mjTRN_JOINT
-    unused = [actuator for actuator in spec.actuators if actuator.trntype != joint]
-    for parts in (spec.sensors, spec.pairs, spec.excludes, spec.tendons, spec.keys, spec.tuples, spec.skins):
+    joints = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)  # which differ for balls and free joints
+    unused = [actuator for actuator in spec.actuators if actuator.trntype not in joints]
+    unused += [tendon for tendon in spec.tendons if tendon.name not in tied]
+    for parts in (spec.sensors, spec.pairs, spec.excludes, spec.keys, spec.tuples, spec.skins):
         unused += list(parts)
     unused += [e for e in spec.equalities if e.type == mujoco.mjtEq.mjEQ_TENDON and not e.active]
     always = spec.compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
@@ -127,10 +135,14 @@ def _strip(spec: Any, mujoco: Any) -> None:
         moves = body.name != "world" and (always or not body.explicitinertial)
         for shape in body.geoms:
             (kept if moves and _weighs(shape, spec.compiler) else unused).append(shape)
-    for shape in kept:
-        shape.material = ""
-    used = {shape.meshname for shape in kept}
-    unused += [*spec.materials, *spec.textures, *spec.hfields, *[mesh for mesh in spec.meshes if mesh.name not in used]]
+    for shown in (*kept, *spec.sites):
+        shown.material = ""
+    for material in spec.materials:  # which stay, for tendons keep their names whatever is set here
+        material.textures = [""] * len(material.textures)
+    meshes, fields = ({getattr(shape, name) for shape in kept} for name in ("meshname", "hfieldname"))
+    unused += [mesh for mesh in spec.meshes if mesh.name not in meshes]
+    unused += [field for field in spec.hfields if field.name not in fields]
+    unused += list(spec.textures)
     for part in unused:
         spec.delete(part)
 
@@ -150,11 +162,14 @@ class _Reader:
         self.kind = {name: int(getattr(mujoco.mjtJoint, f"mjJNT_{name.upper()}")) for name in kinds}
         self.bodies = names_of_bodies(model)
         self.joint_names = _names([model.joint(k).name for k in range(model.njnt)], "joint")
-        self.lines = {f"joints.{self.joint_names[joint.id]}": line_of(joint.info) for joint in spec.joints}
+        self.lines = {  # a <freejoint> has no line of its own
+            f"joints.{self.joint_names[joint.id]}": line_of(joint.info) or line_of(joint.parent.info)
+            for joint in spec.joints
+        }
         self.lines |= {f"links.{self.bodies[body.id]}": line_of(body.info) for body in spec.bodies}
         self.links: list[Link] = []
         self.joints: list[Joint] = []
-        self.held: dict[str, float] = {}
+        self.ties = Ties(model, mujoco, self.joint_names)
         self.mimics: dict[str, Mimic] = {}
         self.closures: list[Closure] = []
         self.efforts = _efforts(model, mujoco)
@@ -179,7 +194,7 @@ class _Reader:
             gravity = (0.0, 0.0, 0.0) if weightless else model.opt.gravity
             name = self.root.attributes.get("model") or "robot"
             robot = Robot(name, self.links, self.joints, gravity, self.closures)
-            return robot.locked(self.held) if self.held else robot
+            return robot.locked(self.ties.held) if self.ties.held else robot
         except RobotFileError:
             raise
         except RobotError as error:
@@ -197,28 +212,14 @@ class _Reader:
             if kind in (int(kinds.mjEQ_CONNECT), int(kinds.mjEQ_WELD)):
                 self.closures.append(self._closure(k, names[k]))
                 continue
-            if kind != int(kinds.mjEQ_JOINT):
-                word = kinds(int(kind)).name.removeprefix("mjEQ_").lower()
-                message = f"an active equality of type {word} has no equivalent joint or closure"
-                raise RobotFileError(f"{message}; remove it, or set active='false'", **place)
-            first, second = int(model.eq_obj1id[k]), int(model.eq_obj2id[k])
-            coefficients = model.eq_data[k][:5]
-            name = self.joint_names[first]
-            kinds_tied = {int(model.jnt_type[j]) for j in (first, second) if j >= 0}
-            if kinds_tied - {self.kind["hinge"], self.kind["slide"]} or name in self.mimics or name in self.held:
-                message = "ties a joint of several coordinates, or one that is tied already"
-                raise RobotFileError(message, **place, value=name)
-            start = self._reference(first) + coefficients[0]
-            if second < 0:
-                self.held[name] = float(start)
-            elif any(coefficients[2:]):
-                message = "a joint can follow another linearly only; make the last three of polycoef zero"
-                raise RobotFileError(message, **place, value=coefficients.tolist())
+            if kind == int(kinds.mjEQ_JOINT):
+                self.ties.add_joints(k, place)
+            elif kind == int(kinds.mjEQ_TENDON):
+                self.ties.add_tendons(k, place)
             else:
-                slope = float(coefficients[1])
-                offset = float(start - slope * self._reference(second))
-                self.mimics[name] = Mimic(self.joint_names[second], slope, offset)
-        self.mimics = leaders(self.mimics)
+                word = kinds(int(kind)).name.removeprefix("mjEQ_").lower()
+                raise RobotFileError(f"an active equality of type {word} {NO_CLOSURE}", **place)
+        self.mimics = leaders(self.ties.mimics)
 
     def _closure(self, k: Any, name: str) -> Closure:
         """Return a connect or weld: its anchors and its relative pose as MuJoCo holds them."""
@@ -236,9 +237,6 @@ class _Reader:
         turning = weld and data[10] != 0  # a weld without torque holds a point only
         links = (self.bodies[numbers[0]], self.bodies[numbers[1]])
         return Closure(name, links, "weld" if turning else "connect", points, rotation=rotation if turning else None)
-
-    def _reference(self, joint: int) -> float:
-        return float(self.model.qpos0[self.model.jnt_qposadr[joint]])
 
     def _body(self, k: int) -> None:
         """Add the link of a body, the joints that move it, and the massless links between these."""
@@ -283,7 +281,7 @@ class _Reader:
     def _single(self, j: int, parent: str, child: str, position: _Vector, rotation: _Matrix) -> None:
         """Add a hinge or a slide; the pose in the file is that at its reference coordinate."""
         model, dof, name = self.model, self.model.jnt_dofadr[j], self.joint_names[j]
-        turning, axis, reference = model.jnt_type[j] == self.kind["hinge"], model.jnt_axis[j], self._reference(j)
+        turning, axis, reference = model.jnt_type[j] == self.kind["hinge"], model.jnt_axis[j], self.ties.reference(j)
         if turning and reference:
             rotation = rotation @ turn_about(axis, -reference)
         elif reference:
@@ -315,17 +313,29 @@ class _Reader:
     def _expand(self, j: int, parent: str, child: str, position: _Vector, rotation: _Matrix) -> None:
         """Add the slides and turns that a free joint or a ball stands for."""
         model, name, dof = self.model, self.joint_names[j], self.model.jnt_dofadr[j]
-        links, joints = floating_joints(child, prefix=name)
+        _, joints = floating_joints(child, prefix=name)
         if model.jnt_type[j] == self.kind["ball"]:
-            links, joints = links[3:], joints[3:]
+            joints = joints[3:]
         for field in ("armature", "damping", "frictionloss"):
             values = getattr(model, f"dof_{field}")[dof : dof + len(joints)]
             if values.any():
                 message = f"{field} of a ball or free joint has no counterpart in slides and turns; set it to zero"
                 raise self.error(message, f"joints.{name}.{field}", value=values.tolist())
-        self.links += links[1:]
-        first = dataclasses.replace(joints[0], parent=parent, position=position, rotation=rotation)
-        self.joints += [first, *joints[1:]]
+        for k in np.flatnonzero(model.actuator_trnid[:, 0] == j):
+            for field in ("armature", "damping", "dampingpoly"):
+                values = getattr(model, f"actuator_{field}")[k]
+                if np.any(values):
+                    message = f"{field} of an actuator of a ball or free joint has no counterpart in slides and turns"
+                    value = np.ravel(values).tolist()
+                    raise self.error(f"{message}; set it to zero", f"joints.{name}.{field}", value=value)
+        place = {"position": position, "rotation": rotation}
+        for made in joints:  # each with a name of its own: base_x may be that of another joint in the file
+            end = child if made is joints[-1] else self._unused(made.child)
+            if end != child:
+                self.links.append(Link(end))
+            own = {"name": self._unused(made.name), "parent": parent, "child": end}
+            self.joints.append(dataclasses.replace(made, **own, **place))
+            parent, place = end, {}
 
 
 def names_of_bodies(model: Any) -> list[str]:

@@ -11,9 +11,10 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.errors import RobotError
-from jounce.io.robots.faults import WITHOUT_INERTIAL, Faults
+from jounce.io.robots.faults import Faults
 from jounce.io.robots.named_elements import NamedElements
-from jounce.io.robots.sdf_joints import SdfJoint, read_joint
+from jounce.io.robots.sdf_joints import AXIS_TAGS, SdfJoint, read_joint
+from jounce.io.robots.sdf_links import gravity_of, read_inertia
 from jounce.io.robots.sdf_poses import (
     HERE,
     WORLD,
@@ -28,22 +29,15 @@ from jounce.io.robots.sdf_poses import (
     text_of,
 )
 from jounce.io.robots.xml_elements import Element
-from jounce.rigid.inertia import Inertia
 from jounce.robot.floating_base import floating_joints
 from jounce.robot.model import Closure, Joint, Link, Mimic, leaders
 from jounce.robot.robot import Robot
 
-GRAVITY = (0.0, 0.0, -9.81)
 CLOSED_BY = {"fixed": "weld", "revolute": "pin", "continuous": "pin", "prismatic": "slider", "ball": "connect"}
 TREE_FIRST = ("fixed", "revolute", "continuous", "prismatic", "universal", "revolute2", "ball")
-TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 AXIS_TOLERANCE = 1e-5  # files give directions with six digits
-SHOWN = ("visual", "collision", "sensor", "light", "audio_sink", "audio_source", "projector", "particle_emitter")
-LINK = ("pose", "inertial", "gravity", "enable_wind", "self_collide", "kinematic", "must_be_base_link", "battery")
-LINK += ("velocity_decay", "material", "plugin", "frame", *SHOWN)
 MODEL_PARTS = ("static", "self_collide", "allow_auto_disable", "enable_wind", "pose", "link", "joint", "frame")
 MODEL_PARTS += ("plugin", "gripper", "include", "model")
-INERTIAL = ("pose", "mass", "inertia", "density", "auto_inertia_params", "fluid_added_mass", "frame")
 ROOT = ("model", "world")
 
 
@@ -51,7 +45,8 @@ def read_sdf(root: Element, faults: Faults) -> Robot:
     """Return the robot that an SDF file describes; its loops become closures.
 
     The file holds one model, alone or in a world. The base is the link ``world`` if a joint holds the model there or it
-    is static, else the model's canonical link; gravity, 9.81 m/s^2, points down in the world where the file puts it.
+    is static, else the model's canonical link. Gravity is that of the world in the file, or else 9.81 m/s^2 along its
+    -z; there is none if no link feels it.
     Joints of one axis come into the tree before those of two, and balls last, each kind in the order of the file; what
     closes a loop then is a closure: a revolute joint a pin, a prismatic one a slider, a ball a point, a fixed one a
     weld. A joint of the tree whose child is nearer the base is taken the other way round, about the opposite axis, so
@@ -74,7 +69,8 @@ def read_sdf(root: Element, faults: Faults) -> Robot:
         Something is missing, unknown or impossible; the message has the line.
     """
     version = _version(root)
-    return _Reader(*model_frames(root), version, faults).robot()
+    world = next((world for world in root.every("world") if world.first("model")), None)
+    return _Reader(*model_frames(root), world, version, faults).robot()
 
 
 def model_frames(root: Element) -> tuple[Frames, Place]:
@@ -98,7 +94,12 @@ def _model(root: Element) -> tuple[Element, Place]:
     models = [model for holder in (root, *worlds) for model in holder.every("model")]
     if len(models) != 1:
         message = f"must hold one <model>, it holds {len(models)}"
+        if any(holder.first("include") for holder in (root, *worlds)):
+            message += " besides those that it includes, which are not read"
         raise (models[1] if models else root).error(message, value=[m.attributes.get("name") for m in models])
+    for joint in (joint for world in worlds for joint in world.every("joint")):
+        message = 'joints of a world are not read; write this one into the model, with "world" as its parent'
+        raise joint.error(message, value=joint.attributes.get("name"))
     pose = only(models[0], "pose")
     relative = "" if pose is None else pose.attributes.get("relative_to", "")
     if pose is not None and relative not in ("", WORLD):
@@ -136,19 +137,21 @@ def _named(model: Element) -> dict[str, Element]:
 class _Reader:
     """Turns the links and joints of a model into those of a tree, and closures."""
 
-    def __init__(self, frames: Frames, place: Place, version: tuple[int, ...], faults: Faults):
-        self.frames, self.place, self.version, self.faults = frames, place, version, faults
+    def __init__(self, frames: Frames, place: Place, world: Element | None, version: tuple[int, ...], faults: Faults):
+        self.frames, self.place, self.world, self.version, self.faults = frames, place, world, version, faults
         self.model, self.elements, self.lines = frames.model, frames.elements, NamedElements(frames.model)
         self.links: list[Link] = []
         self.joints: list[Joint] = []
         self.taken = {WORLD, *self.elements}
+        self.coordinates: dict[tuple[str, str], str] = {}  # of joints of two axes, by joint and axis
         for name, element in self.elements.items():
             self.lines.add(element, f"{element.tag}s", name)
             self.lines.add(element, "closures", name)
 
     def robot(self) -> Robot:
         """Return the robot."""
-        inertias = {n: self._inertia(n, x) for n, x in self.elements.items() if x.tag == "link"}
+        elements = {name: element for name, element in self.elements.items() if element.tag == "link"}
+        inertias = {name: read_inertia(name, element, self.faults) for name, element in elements.items()}
         every = [
             read_joint(name, x, self.frames, self.version) for name, x in self.elements.items() if x.tag == "joint"
         ]
@@ -160,53 +163,25 @@ class _Reader:
         tree, closing = self._divided(joints, base, [*inertias, *([WORLD] if base == WORLD else [])], fixed)
         self.links += [Link(WORLD)] if base == WORLD else []
         self.links += [Link(name, inertia) for name, inertia in inertias.items()]
+        for joint in tree:
+            if len(joint.axes) == 2:
+                numbered = ((joint.name, tag, self._unused(f"{joint.name}_{k}")) for k, tag in enumerate(AXIS_TAGS, 1))
+                self.coordinates |= {(name, tag): coordinate for name, tag, coordinate in numbered}
         mimics = self._mimics(tree, gears)
         for joint in tree:
             self._add(joint, mimics)
         closures = [self._closure(joint) for joint in closing]
         name = self.model.attributes.get("name", "robot")
         upright = self.place.then(self._place(base)).rotation if base != WORLD else np.eye(3)
+        gravity = upright.T @ gravity_of(self.world, elements, inertias)
         try:
-            return Robot(name, self.links, self.joints, upright.T @ GRAVITY, closures, strict=False)
+            return Robot(name, self.links, self.joints, gravity, closures, strict=False)
         except RobotError as error:
             raise self.lines.placed(error) from None
 
     def _place(self, link: str) -> Place:
         """Return where a link is in the model."""
         return HERE.seen_from(self.place) if link == WORLD else self.frames.place(link)
-
-    def _inertia(self, name: str, element: Element) -> Inertia | None:
-        where = ("links", name)
-        check_known(element, LINK, *where)
-        inertial = only(element, "inertial", *where)
-        if inertial is None:
-            message = "<inertial> is missing: SDF takes the link for 1 kg with moments of 1 kg m^2; give it its own"
-            self.faults.add(WITHOUT_INERTIAL, name, element.error(message, *where))
-            return Inertia(1.0, tensor=np.eye(3))
-        where = (*where, "inertial")
-        check_known(inertial, INERTIAL, *where)
-        if inertial.attributes.get("auto", "false").strip() in ("true", "1"):
-            message = 'auto="true" asks for an inertia from shapes, which are not read; write mass and inertia'
-            raise inertial.error(message, *where)
-        moments = only(inertial, "inertia", *where)
-        if moments is not None:
-            check_known(moments, TENSOR, *where, "inertia")
-        mass = number_of(inertial, "mass", *where, default=1.0)
-        given = (
-            number_of(moments, key, *where, "inertia", default=float(key[1] == key[2]))
-            if moments is not None
-            else float(key[1] == key[2])
-            for key in TENSOR
-        )
-        xx, xy, xz, yy, yz, zz = given
-        if mass < 0:
-            raise inertial.error("must be greater than zero", *where, "mass", value=mass)
-        tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        if mass == 0 and not tensor.any():
-            return None
-        inertia = Inertia(mass, tensor=tensor, strict=False)
-        self.faults.check(inertia, name, (moments or inertial).line)
-        return inertia.moved(*pose_of(inertial, *where))
 
     def _divided(
         self, joints: Sequence[SdfJoint], base: str, links: Sequence[str], fixed: bool
@@ -280,10 +255,10 @@ class _Reader:
             return [dataclasses.replace(parts[3], parent=joint.parent), *parts[4:]]
         if joint.kind == "fixed":
             return [Joint(joint.name, joint.parent, child, "fixed")]
-        made, single = [], len(joint.axes) == 1
-        for k, axis in enumerate(joint.axes, 1):
-            last = k == len(joint.axes)
-            name = joint.name if single else self._unused(f"{joint.name}_{k}")
+        made = []
+        for axis in joint.axes:
+            last = axis is joint.axes[-1]
+            name = self.coordinates.get((joint.name, axis.tag), joint.name)
             end = child if last else self._unused(f"{joint.name}_frame")
             if not last:
                 self.links.append(Link(end))
@@ -319,17 +294,17 @@ class _Reader:
     def _mimics(self, tree: Sequence[SdfJoint], gears: Sequence[SdfJoint]) -> dict[str, Mimic]:
         """Return what joints follow: by ``<mimic>``, and by gearboxes."""
         found: dict[str, Mimic] = {}
-        for joint in tree:
-            axis = only(joint.element, "axis") if len(joint.axes) == 1 else None
-            mimic = None if axis is None else only(axis, "mimic", "joints", joint.name)
+        for joint, tag in ((follower, axis.tag) for follower in tree for axis in follower.axes):
+            name = self.coordinates.get((joint.name, tag), joint.name)
+            mimic = only(needed(joint.element, tag), "mimic", "joints", joint.name)
             if mimic is not None:
-                where = ("joints", joint.name, "mimic")
-                leader = mimic.text("joint", *where)
+                where = ("joints", name, "mimic")
+                leader = self._leader(mimic, *where)
                 factor, offset, reference = (
                     number_of(mimic, key, *where, default=float(key == "multiplier"))
                     for key in ("multiplier", "offset", "reference")
                 )
-                found[joint.name] = Mimic(leader, factor, offset - factor * reference)
+                found[name] = Mimic(leader, factor, offset - factor * reference)
                 self.lines.add(mimic, *where)
         for gear in gears:
             name, mimic = self._gearing(gear, tree)
@@ -338,6 +313,13 @@ class _Reader:
                 raise gear.element.error(message, "joints", gear.name)
             found[name] = mimic
         return leaders(found)
+
+    def _leader(self, mimic: Element, *where: str) -> str:
+        """Return the coordinate that one follows, which may be about the first or the second axis of a joint."""
+        joint, tag = mimic.text("joint", *where), mimic.attributes.get("axis", AXIS_TAGS[0])
+        if tag != AXIS_TAGS[0] and (joint, tag) not in self.coordinates:
+            raise mimic.error(f"{joint} has no axis of this name", *where, "axis", value=tag)
+        return self.coordinates.get((joint, tag), joint)
 
     def _gearing(self, gear: SdfJoint, tree: Sequence[SdfJoint]) -> tuple[str, Mimic]:
         """Return which joint a gearbox makes follow, and how: theta_2 = -ratio theta_1 about its own axes."""

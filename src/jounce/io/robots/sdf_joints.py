@@ -24,6 +24,7 @@ from jounce.io.robots.sdf_poses import (
 from jounce.io.robots.xml_elements import Element
 from jounce.robot.model import Limits
 
+AXIS_TAGS = ("axis", "axis2")
 AXES = {"revolute": 1, "continuous": 1, "prismatic": 1, "fixed": 0, "universal": 2, "revolute2": 2, "ball": 0}
 UNBOUNDED = 1e16  # SDF writes it for no bound
 JOINT = ("parent", "child", "pose", "axis", "axis2", "physics", "sensor", "plugin", "frame", "thread_pitch")
@@ -35,8 +36,9 @@ DYNAMICS = ("damping", "friction", "spring_reference", "spring_stiffness")
 
 @dataclasses.dataclass(frozen=True)
 class SdfAxis:
-    """An axis of a joint: its direction in the model, and what goes with it."""
+    """An axis of a joint: its tag in the file, its direction in the model, and what goes with it."""
 
+    tag: str
     direction: Float[np.ndarray, "3"]
     limits: Limits
     damping: float
@@ -79,7 +81,7 @@ def read_joint(name: str, element: Element, frames: Frames, version: tuple[int, 
     if ends[0] == ends[1]:
         raise element.error("must join two different links", *where, value=ends[0])
     origin = frames.place(name)
-    tags = ("axis", "axis2")[: 2 if kind == "gearbox" else AXES[kind]]
+    tags = AXIS_TAGS[: 2 if kind == "gearbox" else AXES[kind]]
     axes = tuple(_axis(needed(element, tag, *where), origin, frames, version, *where, tag) for tag in tags)
     return SdfJoint(name, kind, ends[0], ends[1], origin.position, axes, element)
 
@@ -101,7 +103,10 @@ def _axis(axis: Element, place: Place, frames: Frames, version: tuple[int, ...],
         if part is not None:
             check_known(part, known, *where, part.tag)
     damping, friction = (number_of(dynamics, key, *where, "dynamics", default=0.0) for key in ("damping", "friction"))
-    return SdfAxis(rotation @ direction, _limits(limit, *where), damping, friction)
+    for key, value in (("damping", damping), ("friction", friction)):
+        if value < 0:
+            raise (dynamics or axis).error("must be zero or greater", *where, "dynamics", key, value=value)
+    return SdfAxis(axis.tag, rotation @ direction, _limits(limit, *where), damping, friction)
 
 
 def _limits(limit: Element | None, *where: str) -> Limits:

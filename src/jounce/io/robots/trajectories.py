@@ -17,6 +17,7 @@ from jounce.io.files.reading import fault_of_number
 from jounce.io.files.samples import rates, read_columns, read_samples, sampled_dimension
 from jounce.io.files.source import read_source
 from jounce.io.robots.controller_files import is_message, read_message, read_table
+from jounce.mechanism import TimeGrid, time_grid
 from jounce.shapes import ArrayLike
 from jounce.trajectory import (
     AbstractMotion,
@@ -264,8 +265,6 @@ class _LawFile:
 
     def _times(self) -> np.ndarray:
         """Return the instants of the time grid."""
-        from jounce.mechanism import TimeGrid, time_grid
-
         if "time" not in self.data:
             raise self.source.error("is missing; give start, stop and step", ("time",))
         data = self.source.mapping(("time",), ("start", "stop", "step", "count"))

@@ -8,7 +8,7 @@ curvatures are read off derivatives of these jets; no formula for one is written
 import dataclasses
 from collections.abc import Mapping
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -30,6 +30,9 @@ from jounce.trajectory import (
 )
 from jounce.trajectory.checks import positive
 from jounce.trajectory.shown_units import ShownUnits
+
+if TYPE_CHECKING:
+    import xarray
 
 SENSES = {"counterclockwise": 1.0, "clockwise": -1.0}
 CLOSED = 1e-9  # of the rise: so near to where it began a law ends
@@ -139,7 +142,7 @@ class PlateCam:
         return Cutter(self.follower, self.base_radius, SENSES[self.sense]).followed(self.angle, self.table, self.at)
 
     @cached_property
-    def dataset(self) -> Any:
+    def dataset(self) -> "xarray.Dataset":
         """The table as an `xarray.Dataset` along the cam angle, SI, units in the attributes."""
         import xarray
 

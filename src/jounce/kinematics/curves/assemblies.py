@@ -26,6 +26,7 @@ from jounce.kinematics.senses import drawn_senses, senses
 from jounce.mechanism import Mechanism, build, check_mechanism
 from jounce.mechanism.preconditions import concrete
 from jounce.modules import with_fields
+from jounce.shapes import Real
 
 BATCH = 256  # starts side by side
 OFTEN = 3  # times that each assembly is to be found before it is believed that none is left
@@ -135,7 +136,7 @@ class Assemblies(Displayed, Sequence[Assembly]):
 @concrete
 def assemblies(
     mechanism: Mechanism,
-    time: Any = None,
+    time: Real | None = None,
     *,
     count: int = 1024,
     seed: int = 0,

@@ -51,6 +51,10 @@ class ChangePoint:
     dimension: int
     decided: bool
 
+    def __repr__(self) -> str:
+        where = f"arc length {self.arc_length:.6g}, driver value {self.place.value[0]:.6g}"
+        return f"<ChangePoint at {where}, {len(self.tangents)} branches>"
+
     @property
     def arc_length(self) -> float:
         """Where on the curve."""

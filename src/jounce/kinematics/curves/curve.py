@@ -4,7 +4,7 @@ import bisect
 import dataclasses
 import itertools
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Float
@@ -22,6 +22,9 @@ from jounce.kinematics.status import Status
 from jounce.mechanism import AbstractOutput, Mechanism
 from jounce.mechanism.axis_angles import AttitudeHistory
 from jounce.mechanism.outputs import AbstractMotionOutput
+
+if TYPE_CHECKING:
+    import xarray
 
 PLACES = 8  # in each step at which attitudes are looked at for turns
 AXES = ("point", "arc_length", "driver_value")
@@ -357,7 +360,7 @@ class Curve(Displayed):
         return self._motion.outputs
 
     @cached_property
-    def dataset(self) -> Any:
+    def dataset(self) -> "xarray.Dataset":
         """Outputs as an `xarray.Dataset` with dimensions point, derivative and component.
 
         The coordinates of a point are ``arc_length`` and, where something is driven, ``driver_value``; derivatives are
@@ -374,7 +377,7 @@ class Curve(Displayed):
         dataset.attrs |= {"limit_positions": np.array([x.value for x in self.limits])}
         return dataset
 
-    def evaluate(self, output: AbstractOutput, name: str = "output") -> Any:
+    def evaluate(self, output: AbstractOutput, name: str = "output") -> "xarray.DataArray":
         """Return any output along the curve, as an `xarray.DataArray`."""
         return self._motion.evaluate(output, name).rename(time="point")
 

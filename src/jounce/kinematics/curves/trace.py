@@ -1,7 +1,6 @@
 """From a mechanism to its curve of configurations."""
 
 import math
-from typing import Any
 
 from jounce.kinematics.curves.choice import chosen
 from jounce.kinematics.curves.curve import Curve
@@ -9,6 +8,7 @@ from jounce.kinematics.curves.start import first_instant
 from jounce.kinematics.curves.tracing import check_number, traced
 from jounce.mechanism import Mechanism, check_mechanism
 from jounce.mechanism.preconditions import concrete
+from jounce.shapes import Real
 
 HIGHEST_ORDER = 8  # of derivatives with respect to arc length: those above are worse than rounding between the places
 
@@ -16,7 +16,7 @@ HIGHEST_ORDER = 8  # of derivatives with respect to arc length: those above are 
 @concrete
 def trace(
     mechanism: Mechanism,
-    time: Any = None,
+    time: Real | None = None,
     *,
     driver: str | None = None,
     order: int = 2,

@@ -12,6 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from jounce.papers.figures import legend_below, panels
+from jounce.papers.negrean_2025.case import STAND_IN, Case
 from jounce.papers.negrean_2025.history import STEPS, History
 from jounce.plot.style import BLUE, GREEN, GREY, PALE_GREY, VERMILION
 
@@ -20,12 +21,26 @@ TORQUES = (
     ("torque rate", "First rate of the driving torque", "N m/s"),
     ("second rate", "Second rate of the driving torque", r"N m/s$^2$"),
 )
-STAND_IN = "stand-in data: samples, masses and lengths are not those of the paper"
 ENERGY_COLOURS = (BLUE, VERMILION, GREEN)
 
 
+def stand_in_note(case: Case) -> str:
+    """Word which data are stand-ins for those of the paper: samples, masses and lengths, unless files gave them."""
+    chosen = [] if case.measured else ["samples"]
+    chosen += ["masses", "lengths"] if case.link is STAND_IN else []
+    if not chosen:
+        return ""
+    *others, last = chosen
+    first = f"{', '.join(others)} and " if others else ""
+    return f"stand-in data: {first}{last} are not those of the paper"
+
+
+def _any_case(histories: Mapping[str, History]) -> Case:
+    return next(iter(histories.values())).case
+
+
 def _panels(
-    rows: int, columns: int, size: tuple[float, float], title: str, note: str = STAND_IN
+    rows: int, columns: int, size: tuple[float, float], title: str, note: str = ""
 ) -> tuple[Figure, np.ndarray]:
     figure, grid = panels(rows, columns, size, title, note, sharex=True)
     for panel in grid.flat:
@@ -40,7 +55,8 @@ def accelerations(histories: Mapping[str, History], *, tangential: bool, number:
     """Draw the samples and the law through them, one panel for each motion (figures 4 and 5)."""
     what = "Tangential acceleration" if tangential else "Generalised angular acceleration"
     unit = r"m/s$^2$" if tangential else r"rad/s$^2$"
-    figure, grid = _panels(len(histories), 1, (6.0, 4.8), f"{what} (figure {number} of Negrean 2025)")
+    note = stand_in_note(_any_case(histories))
+    figure, grid = _panels(len(histories), 1, (6.0, 4.8), f"{what} (figure {number} of Negrean 2025)", note)
     for panel, history in zip(grid[:, 0], histories.values(), strict=True):
         factor = history.case.link.radius if tangential else 1.0
         panel.plot(history.time, factor * history.motion[:, 2], color=BLUE, label="quintic segments")
@@ -57,7 +73,7 @@ def accelerations(histories: Mapping[str, History], *, tangential: bool, number:
 def torque(histories: Mapping[str, History], *, rate: int, number: int) -> Figure:
     """Draw the driving torque or one of its rates, and the part of inertia in it (figures 7 to 9)."""
     name, title, unit = TORQUES[rate]
-    figure, grid = _panels(len(histories), 1, (6.0, 4.8), f"{title} (figure {number} of Negrean 2025)", note="")
+    figure, grid = _panels(len(histories), 1, (6.0, 4.8), f"{title} (figure {number} of Negrean 2025)")
     for panel, history in zip(grid[:, 0], histories.values(), strict=True):
         whole = history.torques[:, rate]
         gravity = history.gravity[:, rate]
@@ -67,7 +83,7 @@ def torque(histories: Mapping[str, History], *, rate: int, number: int) -> Figur
         panel.plot(history.time, gravity, color=GREEN, linestyle=":", linewidth=1.3, label="share of gravity")
         panel.set_title(history.case.title)
         panel.set_ylabel(f"{name} / ({unit})")
-    legend_below(figure, grid[0, 0], 3, STAND_IN)
+    legend_below(figure, grid[0, 0], 3, stand_in_note(_any_case(histories)))
     figure.align_ylabels()
     return figure
 
@@ -75,7 +91,7 @@ def torque(histories: Mapping[str, History], *, rate: int, number: int) -> Figur
 def energies(histories: Mapping[str, History]) -> Figure:
     """Draw the acceleration energies of orders 1 to 3, by the library and by the closed forms (equations 141-143)."""
     title = "Acceleration energies of orders 1 to 3 (equations 141-143 of Negrean 2025)"
-    figure, grid = _panels(3, len(histories), (7.2, 6.0), title)
+    figure, grid = _panels(3, len(histories), (7.2, 6.0), title, stand_in_note(_any_case(histories)))
     for column, history in enumerate(histories.values()):
         for p, panel in enumerate(grid[:, column], 1):
             found, closed = history.energies[:, p - 1], history.closed_energies[:, p - 1]

@@ -58,7 +58,7 @@ def read_link(path: Path) -> Link:
     JounceError
         If the file cannot be read, a value is missing, is none or has another unit, or no body has these moments.
     """
-    source = read_source(path)
+    source = read_source(path, kind="masses")
     data = source.mapping((), UNITS)
     for key in NEEDED:
         if key not in data:

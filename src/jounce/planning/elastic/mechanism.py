@@ -17,9 +17,11 @@ from jounce.forces import AbstractForce
 from jounce.forces.actuators import SlideForce
 from jounce.forces.laws import ExpressionLaw, TimeLaw
 from jounce.integrate import Simulation, simulate
+from jounce.integrate.options import SimulationOptions
 from jounce.kinematics.solve import solve
 from jounce.mechanism import Body, Mechanism, time_grid
 from jounce.mechanism.resolve import resolve
+from jounce.mechanism.time import TimeLike
 from jounce.planning.elastic.driven_systems import DrivenMechanism
 from jounce.planning.elastic.drives import Drive, DriveArrays
 from jounce.planning.elastic.motor_torques import MOTOR, torques_of
@@ -79,11 +81,11 @@ SPRINGS: dict[type, type[_DriveSpring]] = {
 def simulate_elastic_mechanism(
     mechanism: Mechanism,
     drives: Mapping[str, Drive],
-    time: Any,
+    time: TimeLike | None,
     torque: object,
     state: object,
     order: int,
-    options: Mapping[str, Any],
+    options: SimulationOptions,
 ) -> Simulation:
     """Return the motion of a mechanism with elastic drives under torques of its motors; see `simulate_elastic`."""
     arrays = DrivenMechanism(mechanism, time, drives).arrays

@@ -2,7 +2,7 @@
 
 import dataclasses
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Float
@@ -13,7 +13,11 @@ from jounce.planning.elastic.driven_systems import DrivenSystem
 from jounce.planning.elastic.drives import DriveArrays
 from jounce.planning.elastic.pieces import resolved
 from jounce.planning.elastic.spring_deflection import SpringDeflection
+from jounce.shapes import ArrayLike
 from jounce.trajectory.motion import AbstractMotion
+
+if TYPE_CHECKING:
+    import xarray
 
 REST = 1e-9  # of the largest velocity of a motor, below which it is at rest
 INSTANTS = 2000  # at least, at which limits are looked at, before peaks are searched between them
@@ -128,7 +132,7 @@ class Feedforward(MotorMotion):
             deflection[..., self._arrays.elastic] = self._springs.at(times)
         return motor_motion(self._arrays, q, forces, deflection, self._rest if friction else np.inf)
 
-    def at(self, times: Any) -> "Feedforward":
+    def at(self, times: ArrayLike) -> "Feedforward":
         """Return the same at other instants of the trajectory, s.
 
         Raises
@@ -208,10 +212,6 @@ class Feedforward(MotorMotion):
         """
         return self._laws(lambda times: self._found(times, friction=friction).torque[:, 0])
 
-    def position_laws(self) -> dict[str, AbstractMotion]:
-        """Return the motor positions, seen at the joints, as laws of time, of polynomials exact to rounding."""
-        return self._laws(lambda times: self._found(times).position[:, 0])
-
     def rigid_torque_laws(self, *, friction: bool = True) -> dict[str, AbstractMotion]:
         """Return what the motor torques are without the acceleration of the springs: ``tau + B q''``, as laws."""
 
@@ -228,7 +228,7 @@ class Feedforward(MotorMotion):
         return dict(zip(self.names, laws, strict=True))
 
     @property
-    def dataset(self) -> Any:
+    def dataset(self) -> "xarray.Dataset":
         """All of it as an `xarray.Dataset`, for each joint, with as many rates as there are of the torques.
 
         ``JOINT_motor`` is the motor's own position, ``JOINT_motor_velocity``, ``_acceleration`` and ``_torque`` go with

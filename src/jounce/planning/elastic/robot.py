@@ -16,6 +16,7 @@ import numpy as np
 
 from jounce.errors import RobotError
 from jounce.integrate import RobotSimulation, simulate
+from jounce.integrate.options import SimulationOptions
 from jounce.jet import Jet
 from jounce.planning.elastic.driven_systems import robot_drives
 from jounce.planning.elastic.drives import Drive, DriveArrays
@@ -125,7 +126,7 @@ def simulate_elastic_robot(
     state: object,
     losses: tuple[bool, bool],
     order: int,
-    options: Mapping[str, Any],
+    options: SimulationOptions,
 ) -> RobotSimulation:
     """Return the motion of a robot with elastic joints under torques of its motors; see `simulate_elastic`."""
     arrays = robot_drives(robot, drives, losses[0])

@@ -1,11 +1,13 @@
 """Simulation of robots and mechanisms with elastic drives, under torques of their motors."""
 
 from collections.abc import Mapping
-from typing import Any, overload
+from typing import Unpack, overload
 
 from jounce.errors import JounceError
 from jounce.integrate import RobotSimulation, Simulation
-from jounce.mechanism import Mechanism, TimeGrid
+from jounce.integrate.options import SimulationOptions
+from jounce.mechanism import Mechanism
+from jounce.mechanism.time import TimeLike
 from jounce.planning.elastic.drives import Drive
 from jounce.planning.elastic.mechanism import simulate_elastic_mechanism
 from jounce.planning.elastic.robot import simulate_elastic_robot
@@ -19,39 +21,39 @@ OWN = ("torque", "state", "driven", "drives", "base", "initial")  # what this si
 def simulate_elastic(
     system: Robot,
     drives: Mapping[str, Drive],
-    time: ArrayLike | TimeGrid,
+    time: TimeLike,
     torque: object = None,
     state: ArrayLike | None = None,
     *,
     order: int = 2,
     losses: bool = True,
     friction: bool = True,
-    **options: Any,
+    **options: Unpack[SimulationOptions],
 ) -> RobotSimulation: ...
 @overload
 def simulate_elastic(
     system: Mechanism,
     drives: Mapping[str, Drive],
-    time: ArrayLike | TimeGrid | None = None,
+    time: TimeLike | None = None,
     torque: object = None,
     state: ArrayLike | None = None,
     *,
     order: int = 2,
     losses: bool = True,
     friction: bool = True,
-    **options: Any,
+    **options: Unpack[SimulationOptions],
 ) -> Simulation: ...
 def simulate_elastic(
     system: Robot | Mechanism,
     drives: Mapping[str, Drive],
-    time: ArrayLike | TimeGrid | None = None,
+    time: TimeLike | None = None,
     torque: object = None,
     state: ArrayLike | None = None,
     *,
     order: int = 2,
     losses: bool = True,
     friction: bool = True,
-    **options: Any,
+    **options: Unpack[SimulationOptions],
 ) -> RobotSimulation | Simulation:
     """Return the motion of a robot or mechanism with elastic drives under torques of its motors.
 

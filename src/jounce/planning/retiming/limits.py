@@ -91,7 +91,11 @@ class MotionLimits:
         object.__setattr__(self, "points", tuple(self.points))
 
 
-def limits_of(robot: Robot, limits: Any) -> MotionLimits:
+GivenLimits = Mapping[str, Limits] | MotionLimits
+"""Limits by the names of joints, or all that bounds a motion."""
+
+
+def limits_of(robot: Robot, limits: GivenLimits | None) -> MotionLimits:
     """Return limits as `MotionLimits` whose joints are all of the robot's.
 
     Raises

@@ -12,6 +12,7 @@ from jounce.errors import JounceError, TrajectoryError
 from jounce.jet import Jet
 from jounce.planning.retiming.path import Path
 from jounce.planning.retiming.trajectory_paths import path_of_trajectory
+from jounce.shapes import ArrayLike
 from jounce.trajectory import AbstractMotion, Expression, JointTrajectory, PiecewiseMotion, SplineMotion
 from jounce.trajectory.knots import knot_jumps
 from jounce.trajectory.seen_jumps import level_sizes, unexplained
@@ -25,6 +26,9 @@ RESOLVED = 0.05  # of the range of a derivative: what straight lines between loo
 SLIGHT = 1e-3  # of what the length of the path makes of it: a derivative this small does not matter
 ENDS = 0.02  # of a path
 REPEATED = 1e-9  # of the length of a path: waypoints that are nearer to each other are one
+
+GivenPath = Path | JointTrajectory | Mapping[str, ArrayLike | str | AbstractMotion] | ArrayLike
+"""A path: waypoints, positions or expressions of ``s`` by the names of joints, or a trajectory without its times."""
 
 
 class PathExpression(AbstractMotion):
@@ -46,7 +50,7 @@ class PathExpression(AbstractMotion):
         )
 
 
-def path_of(path: Any, names: Sequence[str] | None = None, order: int = 1) -> Path:
+def path_of(path: GivenPath | None, names: Sequence[str] | None = None, order: int = 1) -> Path:
     """Return the path that was given as waypoints, as expressions, or as a trajectory whose times do not count.
 
     Parameters
@@ -69,7 +73,7 @@ def path_of(path: Any, names: Sequence[str] | None = None, order: int = 1) -> Pa
     if isinstance(path, JointTrajectory):
         return checked(path_of_trajectory(path, order))
     if isinstance(path, Mapping):
-        given = {str(name): x for name, x in path.items()}
+        given: dict[str, Any] = {str(name): x for name, x in path.items()}
         if any(isinstance(x, str | AbstractMotion) for x in given.values()):
             return checked(Path({name: _law(name, x) for name, x in given.items()}, 0.0, 1.0))
         names, lists = list(given), list(given.values())

@@ -9,11 +9,11 @@ from jounce.dynamics.trajectories import FollowedTrajectory
 from jounce.errors import SolveError, TrajectoryError, flag, whole_number
 from jounce.mechanism import Mechanism
 from jounce.planning.retiming.fastest import Search, fastest, slowed_only
-from jounce.planning.retiming.limits import MotionLimits, limits_of
+from jounce.planning.retiming.limits import GivenLimits, MotionLimits, limits_of
 from jounce.planning.retiming.mechanism import retime_mechanism
 from jounce.planning.retiming.motion_limits_check import check_motion
 from jounce.planning.retiming.path import Path
-from jounce.planning.retiming.paths import cells_needed, checked, path_of
+from jounce.planning.retiming.paths import GivenPath, cells_needed, checked, path_of
 from jounce.planning.retiming.program import require_solver
 from jounce.planning.retiming.quantities import Curves
 from jounce.planning.retiming.rate_law import Conditions, RateLaw
@@ -33,8 +33,8 @@ SPEEDS = 1e-9  # of the largest: what is slower at an end of a trajectory is at 
 
 def retime(
     robot: Robot | Mechanism,
-    path: Any = None,
-    limits: Any = None,
+    path: GivenPath | None = None,
+    limits: GivenLimits | None = None,
     *,
     names: Sequence[str] | None = None,
     rates: tuple[float, float] = (0.0, 0.0),
@@ -133,7 +133,12 @@ def retime(
 
 
 def _repaired(
-    robot: Robot, trajectory: Any, limits: Any, order: int | None, cells: int | None, drives: bool
+    robot: Robot,
+    trajectory: GivenPath | None,
+    limits: GivenLimits | None,
+    order: int | None,
+    cells: int | None,
+    drives: bool,
 ) -> RetimedTrajectory:
     if not isinstance(trajectory, JointTrajectory):
         raise TrajectoryError("only a trajectory can be repaired", name="path", value=type(trajectory).__name__)
@@ -179,7 +184,7 @@ def _certified(
     raise AssertionError
 
 
-def _of_mechanism(limits: Any) -> dict[str, Limits]:
+def _of_mechanism(limits: GivenLimits | None) -> dict[str, Limits]:
     if not isinstance(limits, Mapping) or not limits:
         raise TrajectoryError("must be Limits of drivers and outputs by name", name="limits", value=limits)
     return dict(limits)

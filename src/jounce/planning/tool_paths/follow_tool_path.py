@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from jounce.errors import JounceError, RobotError, SingularityError, check_name
+from jounce.jet.derivatives import taylor_coefficients
 from jounce.kinematics import Status
 from jounce.planning.tool_paths.inverse_kinematics import coordinate_scale, joint_ranges, middle, poses_within
 from jounce.planning.tool_paths.path_equations import PathEquations
@@ -230,6 +231,4 @@ def _numbers(name: str, value: Any, n: int) -> np.ndarray | None:
 
 def _coefficients(derivatives: np.ndarray) -> np.ndarray:
     """Return Taylor coefficients, joints first and instants last, from (time, derivative, joint)."""
-    from jounce.jet.derivatives import taylor_coefficients
-
     return np.asarray(taylor_coefficients(np.moveaxis(derivatives, 0, -1)))

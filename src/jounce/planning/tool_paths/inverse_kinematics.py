@@ -1,6 +1,6 @@
 """Joint coordinates that bring a tool to poses, within the limits of the joints."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Float
@@ -23,6 +23,9 @@ from jounce.robot.kinematics import forward_kinematics
 from jounce.robot.robot import Robot
 from jounce.shapes import ArrayLike
 
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
+
 STATIONARY = 1e-5  # of the slope that what is missed could have: less is none
 WIDTHS = {"position": (3,), "rotation": (3, 3), "direction": (3,)}
 SOON = 16  # steps in which most poses are reached; the others take twice as many, and so on
@@ -33,7 +36,7 @@ def inverse_kinematics(
     robot: Robot,
     link: str,
     position: ArrayLike | None = None,
-    orientation: Any = None,
+    orientation: "ArrayLike | Rotation | None" = None,
     *,
     direction: ArrayLike | None = None,
     axis: ArrayLike = (0.0, 0.0, 1.0),

@@ -1,7 +1,7 @@
 """Paths of a tool: laws of its position, and of its orientation or of the direction of its axis."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import jax.numpy as jnp
 import numpy as np
@@ -12,6 +12,7 @@ from jounce.dynamics.highest import local_maxima
 from jounce.errors import JounceError, TrajectoryError
 from jounce.jet import Jet, dot, sqrt
 from jounce.jet.algebra import stacked
+from jounce.jet.derivatives import plain_derivatives
 from jounce.planning.tool_paths.tool_tasks import Goal, rotation_matrices
 from jounce.rigid.attitude_samples import AttitudeSamples
 from jounce.rigid.rotations import check_sequence, rotation_matrix
@@ -20,6 +21,9 @@ from jounce.trajectory import SplineMotion
 from jounce.trajectory.checks import check_samples
 from jounce.trajectory.joint_trajectory import MAX_ORDER, JointTrajectory
 from jounce.trajectory.smoothness import knots
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 XYZ = ("x", "y", "z")
 ANGLES = ("angle_1", "angle_2", "angle_3")
@@ -63,7 +67,7 @@ class ToolPath(Displayed):
     def __init__(
         self,
         position: Sequence[Any] | None = None,
-        orientation: Any = None,
+        orientation: "ArrayLike | AttitudeSamples | Rotation | None" = None,
         *,
         direction: Sequence[Any] | None = None,
         start: float,
@@ -86,7 +90,12 @@ class ToolPath(Displayed):
 
     @classmethod
     def through(
-        cls, times: ArrayLike, positions: ArrayLike, orientations: Any = None, degree: int = 7, **settings: Any
+        cls,
+        times: ArrayLike,
+        positions: ArrayLike,
+        orientations: "ArrayLike | Rotation | None" = None,
+        degree: int = 7,
+        **settings: Any,
     ) -> "ToolPath":
         """Return the path of splines through poses at instants.
 
@@ -121,14 +130,11 @@ class ToolPath(Displayed):
         if places.ndim != 2 or places.shape[1] != 3:
             raise TrajectoryError(f"must have the shape (samples, 3), not {places.shape}", name="positions")
         laws = [SplineMotion(times, column, degree) for column in places.T]
-        if orientations is not None:
-            turned = rotation_matrices("orientations", orientations)
-            if turned.ndim == 2:
-                orientations = turned
-            else:
-                orientations = AttitudeSamples.from_rotation_matrices(times, turned, degree)
+        turned = None if orientations is None else rotation_matrices("orientations", orientations)
+        if turned is not None and turned.ndim > 2:
+            turned = AttitudeSamples.from_rotation_matrices(times, turned, degree)
         bounds = {"start": float(times[0]), "stop": float(times[-1]), **settings}
-        return cls(laws, orientations, **bounds)
+        return cls(laws, turned, **bounds)
 
     @property
     def kinds(self) -> tuple[str, ...]:
@@ -177,8 +183,6 @@ class ToolPath(Displayed):
             raise TrajectoryError("this path has an orientation only", name="position")
         if self._progress is None:
             return self._position.derivatives(times, order)
-        from jounce.jet.derivatives import plain_derivatives
-
         return np.moveaxis(
             np.asarray(plain_derivatives(self.series(np.asarray(times, float), order)["position"])), -1, 0
         )

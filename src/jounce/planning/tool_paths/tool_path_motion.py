@@ -10,12 +10,13 @@ from jaxtyping import Float, Int
 from jounce.display import Displayed
 from jounce.dynamics.motion_values import in_chunks
 from jounce.errors import TrajectoryError
+from jounce.jet.derivatives import plain_derivatives
 from jounce.kinematics import Status
 from jounce.kinematics.linear import singular_values
 from jounce.planning.tool_paths.joint_laws import followed_closely
 from jounce.planning.tool_paths.path_equations import PathEquations
 from jounce.planning.tool_paths.path_marching import Nodes, predicted
-from jounce.planning.tool_paths.task_rank import SINGULAR, losing_joints
+from jounce.planning.tool_paths.task_rank import SINGULAR, losing_joints, task_columns
 from jounce.planning.tool_paths.tool_path import ToolPath
 from jounce.planning.tool_paths.tool_tasks import task_rows
 from jounce.robot.arguments import whole_number
@@ -270,15 +271,11 @@ def _instants(path: ToolPath, time: Any) -> np.ndarray:
 
 def _by_instant(series: np.ndarray) -> np.ndarray:
     """Return plain derivatives with the instants first, from Taylor coefficients with them last."""
-    from jounce.jet.derivatives import plain_derivatives
-
     return np.moveaxis(np.asarray(plain_derivatives(series)), -1, 0)
 
 
 def _singular(robot: Robot, equations: PathEquations, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return singular values and right singular vectors of a task where it is done."""
-    from jounce.planning.tool_paths.task_rank import task_columns
-
     columns = task_columns(robot, equations.tool, (x * equations.scale)[None], equations.kinds, equations.scale)[0]
     columns = equations.basis.T @ np.concatenate([columns, np.eye(equations.count)[list(equations.held)]])
     _, values, shares = np.linalg.svd(columns, full_matrices=False)

@@ -1,6 +1,6 @@
 """What a tool is to do: be at a place, have an orientation, or point in a direction; as rows that vanish, on jets."""
 
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -18,6 +18,9 @@ from jounce.robot.kinematics import link_frame, place_of
 from jounce.robot.robot_size import robot_size
 from jounce.robot.tree import Frame, Tree, axes_with_z_along
 from jounce.shapes import ArrayLike, Numbers
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 UNIT = 1e-6  # by which a quaternion or a direction may miss the length of one: printed digits
 
@@ -106,7 +109,7 @@ def columns_of(function: Any, at: Float[Numbers, "column batch"]) -> Float[Numbe
     return jax.vmap(lambda unit: jax.jvp(function, (at,), (unit,))[1], out_axes=1)(units)
 
 
-def rotation_matrices(name: str, value: Any) -> Float[np.ndarray, "*batch 3 3"]:
+def rotation_matrices(name: str, value: "ArrayLike | Rotation") -> Float[np.ndarray, "*batch 3 3"]:
     """Return rotation matrices from such, from unit quaternions with the scalar first, or from SciPy's rotations.
 
     Raises
@@ -116,8 +119,8 @@ def rotation_matrices(name: str, value: Any) -> Float[np.ndarray, "*batch 3 3"]:
     """
     from scipy.spatial.transform import Rotation
 
-    if hasattr(value, "as_matrix"):
-        return np.asarray(value.as_matrix(), float)
+    if (matrices := getattr(value, "as_matrix", None)) is not None:
+        return np.asarray(matrices(), float)
     array = np.asarray(floats(name, value))
     if array.ndim >= 2 and array.shape[-2:] == (3, 3):
         flat = array.reshape(-1, 3, 3)
@@ -130,7 +133,7 @@ def rotation_matrices(name: str, value: Any) -> Float[np.ndarray, "*batch 3 3"]:
     raise RobotError(message, name=name)
 
 
-def unit_vectors(name: str, value: Any) -> Float[np.ndarray, "*batch 3"]:
+def unit_vectors(name: str, value: ArrayLike) -> Float[np.ndarray, "*batch 3"]:
     """Return directions of unit length.
 
     Raises

@@ -1,0 +1,104 @@
+"""Links of SDF files: their inertias, and the gravity that they feel."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.io.robots.faults import PARTLY_INERTIAL, WITHOUT_INERTIAL, Faults
+from jounce.io.robots.sdf_poses import check_known, flag_of, number_of, only, pose_of
+from jounce.io.robots.xml_elements import Element
+from jounce.rigid.inertia import Inertia
+
+GRAVITY = (0.0, 0.0, -9.81)
+TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+SHOWN = ("visual", "collision", "sensor", "light", "audio_sink", "audio_source", "projector", "particle_emitter")
+LINK = ("pose", "inertial", "gravity", "enable_wind", "self_collide", "kinematic", "must_be_base_link", "battery")
+LINK += ("velocity_decay", "material", "plugin", "frame", *SHOWN)
+INERTIAL = ("pose", "mass", "inertia", "density", "auto_inertia_params", "fluid_added_mass", "frame")
+
+
+def read_inertia(name: str, element: Element, faults: Faults) -> Inertia | None:
+    """Return the inertia of a link in its frame, None where all of it is zero."""
+    where = ("links", name)
+    check_known(element, LINK, *where)
+    inertial = only(element, "inertial", *where)
+    if inertial is None:
+        message = "<inertial> is missing: SDF takes the link for 1 kg with moments of 1 kg m^2; give it its own"
+        faults.add(WITHOUT_INERTIAL, name, element.error(message, *where))
+        return Inertia(1.0, tensor=np.eye(3))
+    where = (*where, "inertial")
+    check_known(inertial, INERTIAL, *where)
+    _check_readable(name, inertial, *where)
+    moments = only(inertial, "inertia", *where)
+    if moments is not None:
+        check_known(moments, TENSOR, *where, "inertia")
+    _check_whole(name, inertial, moments, faults)
+    mass = number_of(inertial, "mass", *where, default=1.0)
+    xx, xy, xz, yy, yz, zz = (
+        number_of(moments, key, *where, "inertia", default=float(key[1] == key[2])) for key in TENSOR
+    )
+    if mass < 0:
+        raise inertial.error("must be greater than zero", *where, "mass", value=mass)
+    tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    if mass == 0 and not tensor.any():
+        return None
+    inertia = Inertia(mass, tensor=tensor, strict=False)
+    faults.check(inertia, name, (moments or inertial).line)
+    return inertia.moved(*pose_of(inertial, *where))
+
+
+def _check_readable(name: str, inertial: Element, *where: str) -> None:
+    """Refuse what changes the inertia of a link and is not read."""
+    if inertial.attributes.get("auto", "false").strip() in ("true", "1"):
+        message = 'auto="true" asks for an inertia from shapes, which are not read; write mass and inertia'
+        raise inertial.error(message, *where)
+    pose, added = only(inertial, "pose", *where), only(inertial, "fluid_added_mass", *where)
+    given = {} if pose is None else pose.attributes
+    frame = given.get("relative_to") or given.get("frame") or name
+    if pose is not None and frame != name:
+        message = "an inertia is placed in the frame of its link, relative to nothing else"
+        raise pose.error(message, *where, "pose", value=frame)
+    for entry in [] if added is None else added.children:
+        if entry.content_numbers(1, *where, added.tag if added else "", entry.tag)[0]:
+            message = "the mass of a fluid that a link moves is not read; leave <fluid_added_mass> out"
+            raise entry.error(message, *where, "fluid_added_mass")
+
+
+def _check_whole(name: str, inertial: Element, moments: Element | None, faults: Faults) -> None:
+    """Note a mass or moments that are not given, which SDF takes for 1."""
+    missing = [] if inertial.first("mass") is not None else ["mass"]
+    missing += [key for key in ("ixx", "iyy", "izz") if moments is None or moments.first(key) is None]
+    if missing:
+        message = f"<inertial> does not give {', '.join(missing)}, which SDF takes for 1; give all of it"
+        faults.add(PARTLY_INERTIAL, name, inertial.error(message, "links", name, "inertial"))
+
+
+def gravity_of(
+    world: Element | None, links: Mapping[str, Element], inertias: Mapping[str, Inertia | None]
+) -> Float[np.ndarray, "3"]:
+    """Return the gravity in the axes of the world: that of the world, or none where no link feels it.
+
+    Parameters
+    ----------
+    world : Element or None
+        The element ``<world>`` that holds the model.
+    links : dict of str to Element
+        The links by name.
+    inertias : dict of str to Inertia or None
+        Their inertias.
+    """
+    heavy = [name for name, inertia in inertias.items() if inertia is not None and inertia.mass > 0]
+    floats = [name for name in heavy if not flag_of(links[name], "gravity", "links", name, default=True)]
+    if floats and len(floats) < len(heavy):
+        message = "gravity is switched off for some links only, but a robot feels one; give all links the same"
+        raise links[floats[0]].error(message, "links", floats[0], "gravity")
+    if floats:
+        return np.zeros(3)
+    holders = [] if world is None else [world, *world.every("physics")]  # up to SDF 1.5 it was a matter of the physics
+    for holder in holders:
+        if (found := only(holder, "gravity", "world")) is not None:
+            return np.array(found.content_numbers(3, "world", "gravity"))
+    return np.array(GRAVITY)
