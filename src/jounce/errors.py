@@ -38,6 +38,7 @@ __all__ = [
     "did_you_mean",
     "no_such",
     "show_value",
+    "unknown",
     "whole_number",
 ]
 
@@ -107,27 +108,40 @@ def _printable(text: str) -> str:
     return text if text.isprintable() else "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
 
 
-def no_such(kind: str, name: object, known: Iterable[str]) -> str:
-    """Word that nothing of a kind has a name, and which names there are.
+def no_such(kind: str, name: object, known: Iterable[str], what: str = "name") -> str:
+    """Word that nothing of a kind has a name, or another word such as a type, and which ones there are.
 
     Examples
     --------
     >>> print(no_such("body", "rokcer", ["crank", "rocker"]))
     no body has this name; did you mean 'rocker'? valid: crank, rocker
     """
-    return f"no {kind} has this name; {did_you_mean(name, known)}"
+    return f"no {kind} has this {what}; {did_you_mean(name, known)}"
 
 
-def check_name(kind: str, given: object, known: Collection[str], error: type[JounceError], **place: Any) -> None:
+def unknown(what: str, given: object, valid: Iterable[str]) -> str:
+    """Word that a word is none of those that may stand in its place.
+
+    Examples
+    --------
+    >>> print(unknown("frame", "bodi", ["global", "body"]))
+    unknown frame; did you mean 'body'? valid: body, global
+    """
+    return f"unknown {what}; {did_you_mean(given, valid)}"
+
+
+def check_name(
+    kind: str, given: object, known: Collection[str], error: type[JounceError], what: str = "name", **place: Any
+) -> None:
     """Raise an error unless something of a kind has the name given; `place` says where it was given."""
     if given not in known:
-        raise error(no_such(kind, given, known), value=given, **place)
+        raise error(no_such(kind, given, known, what), value=given, **place)
 
 
-def check_choice(field: str, value: object, valid: Collection[str], error: type[JounceError]) -> None:
-    """Raise an error unless a word, such as the name of a frame, is one of those valid."""
+def check_choice(field: str, value: object, valid: Collection[str], error: type[JounceError], **place: Any) -> None:
+    """Raise an error unless a word, such as the name of a frame, is one of those valid; `place` is the field's name."""
     if value not in valid:
-        raise error(f"unknown {field}; {did_you_mean(value, valid)}", name=field, value=value)
+        raise error(unknown(field, value, valid), value=value, **{"name": field, **place})
 
 
 def whole_number(name: str, value: object, least: int = 0, most: int | None = None, *, error: type[JounceError]) -> int:

@@ -80,6 +80,8 @@ def test_a_flat_face_is_pressed_straight_and_no_rounding_is_told(tmp_path, capsy
         ("duration: 120 deg}\n  beyond", "duration: 100 deg}\n  beyond", "law", "period"),
         ("length: mm", "length: deg", "units.length", "not a length"),
         ("lift: 9 mm", "lift: 9 mmm", "parameters.lift", "unknown unit"),
+        ("lift: 9 mm", "lift: 9 mm\n  if: 1", "parameters.if", "the word 'if' cannot be a name in expressions"),
+        ("lift: 9 mm", "lift: 9 mm\n  t: 1", "parameters.t", "the name 't' is reserved for expressions"),
     ],
 )
 def test_what_is_wrong_is_named_with_its_line(tmp_path, old, new, name, words):

@@ -192,7 +192,7 @@ def test_a_terminal_gets_a_coloured_table(run, monkeypatch, files):
 HOLD = "joints: {pin: 0.5}\ntime: {stop: 1, step: 0.1}"
 LINE = "0.1,1\n0.2,2\n0.3,3\n0.4,4\n0.5,5\n0.6,6\n"
 BAD_TRAJECTORIES = {
-    "unknown joint": ("csv", samples(lambda t: t, names="pim"), "pendulum has no moving joint of this name, got 'pim'"),
+    "unknown joint": ("csv", samples(lambda t: t, names="pim"), "no moving joint of pendulum has this name, got 'pim'"),
     "unknown joint in a law": ("yaml", HOLD.replace("pin", "pim"), "did you mean 'pin'?"),
     "unsorted times": ("csv", f"time,pin\n0.3,1\n{LINE}", "motion.csv, line 3, time: times must increase"),
     "repeated times": (
@@ -253,7 +253,7 @@ def test_a_robot_as_no_real_one_is_warned_of_in_one_line_and_refused_if_strict(r
 
 
 BAD_OPTIONS = {
-    "no such joint in limits": (["--limits", "FILE"], "joints.pim: pendulum has no moving joint of this name"),
+    "no such joint in limits": (["--limits", "FILE"], "joints.pim: no moving joint of pendulum has this name"),
     "no file of limits": (["--limits", "none.yaml"], "none.yaml: file not found"),
     "figure of another kind": (["--out", "limits.gif"], "limits.gif: the kind of a figure is given by its extension"),
     "no such link": (["--payload", "hand=3 kg"], "--payload: no link has this name, got 'hand'"),

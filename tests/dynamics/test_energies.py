@@ -418,7 +418,7 @@ def test_spatial_mechanism_against_point_masses():
 
 @pytest.mark.parametrize("order", [-1, True])
 def test_an_order_that_is_none(order):
-    with pytest.raises(jn.RobotError, match="must be a whole number, 0 or greater"):
+    with pytest.raises(jn.RobotError, match="order: must be a whole number from 0"):
         acceleration_energy(arm(), [[0.0], [1.0], [2.0]], order=order)
 
 

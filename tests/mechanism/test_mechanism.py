@@ -15,6 +15,7 @@ from jounce.mechanism.time import instants_of
 from tests.problems.small import crank, four_bar
 
 PIN = planar.Revolute(("ground", "crank"), [0, 0], [0, 0])
+TURN = {"theta": jn.drivers.CoordinateDriver(("ground", "crank"), "angle", "t")}
 
 
 def mechanism(**changes):
@@ -59,10 +60,29 @@ def test_structure(changes, message):
         mechanism(**changes)
 
 
-@pytest.mark.parametrize("name", ["time", "derivative", "component"])
-def test_output_named_like_an_axis_of_the_dataset(name):
-    with pytest.raises(jn.MechanismError, match=rf"outputs\.{name}"):
+@pytest.mark.parametrize("name", ["time", "derivative", "component", "psi_d1"])
+def test_output_named_like_an_axis_of_the_dataset_or_a_rate(name):
+    with pytest.raises(jn.MechanismError, match=rf"outputs\.{name}: the name '{name}' is reserved for columns"):
         mechanism(outputs={name: jn.AngleOutput("crank")})
+
+
+def test_output_named_like_a_component_of_another():
+    outputs = {"C": jn.PointOutput("crank", [0.1, 0]), "C_x": jn.AngleOutput("crank")}
+    with pytest.raises(jn.MechanismError, match=r"outputs\.C_x: this name is taken by a component of the output 'C'"):
+        mechanism(outputs=outputs)
+    assert mechanism(outputs={**outputs, "C": jn.AngleOutput("crank")}).outputs.keys() == outputs.keys()
+
+
+@pytest.mark.parametrize("name", ["a b", 'a "b", c', "a [deg]", "a/b", "C_z", "psi_d"])
+def test_unusual_names_of_outputs(name):
+    outputs = {"C": jn.PointOutput("crank", [0.1, 0]), name: jn.AngleOutput("crank")}
+    assert name in jn.solve(mechanism(outputs=outputs, drivers=TURN), [0.0]).dataset
+
+
+@pytest.mark.parametrize("name", ["lambda", "1a", "a-b", "a b", "", "\u00e4", "a" * 101])
+def test_parameters_have_names_that_expressions_can_use(name):
+    with pytest.raises(jn.MechanismError, match=r"parameters\..*a name (is up to|in expressions)"):
+        mechanism(parameters={name: 1.0})
 
 
 def test_an_output_of_two_bodies_is_of_different_ones():

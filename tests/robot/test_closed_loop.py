@@ -333,6 +333,16 @@ def test_bad_closures(settings, says):
     assert str(caught.value).startswith(says)
 
 
+def test_coordinates_of_joints_whose_names_columns_have():
+    names = ("time", "time_", "a_d1")
+    links = [jn.Link("base"), *(jn.Link(f"link {k}", ROD) for k in range(3))]
+    joints = [jn.Joint(name, "base", link.name, axis=[0, 1, 0]) for name, link in zip(names, links[1:], strict=True)]
+    robot = jn.Robot("three", links, joints)
+    motion = jn.solve(robot.mechanism(drivers={name: f"{k}*t" for k, name in enumerate(names, 1)}), [0.0, 0.1], order=1)
+    rates = {name: round(float(values[0, 1]), 9) for name, values in motion.outputs.items()}
+    assert rates == {"time__": 1.0, "time_": 2.0, "a_d1_": 3.0}
+
+
 @pytest.mark.parametrize(
     "ask, says",
     [

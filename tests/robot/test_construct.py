@@ -122,7 +122,7 @@ SKEWED = np.diag([1.0, 1.0, 1.0, 2.0])
     [
         (
             lambda: from_denavit_hartenberg(table(), "classic"),
-            "convention: no such convention, got 'classic'; valid: modified, standard",
+            "convention: unknown convention, got 'classic'; valid: modified, standard",
         ),
         (lambda: from_denavit_hartenberg([DenavitHartenberg(a=math.nan)]), "row 1.a: must be finite, got nan"),
         (

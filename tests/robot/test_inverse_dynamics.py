@@ -317,4 +317,4 @@ def test_torque_is_the_part_of_the_wrench_along_the_axis(torque):
 def test_frames_of_reactions_are_checked():
     with pytest.raises(jn.RobotError) as caught:
         jn.joint_wrenches(ROBOT, Q, frame="world")
-    assert str(caught.value) == "frame: no such frame, got 'world'; valid: base, link"
+    assert str(caught.value) == "frame: unknown frame, got 'world'; valid: base, link"

@@ -196,7 +196,7 @@ WANTED = np.ones((1, 3))
     [
         (
             lambda: jn.joint_motion(ARM, STRETCHED, WANTED, *TIP, task="point"),
-            "task: no such task, got 'point'; did you mean 'position'? valid: orientation, pose, position",
+            "task: unknown task, got 'point'; did you mean 'position'? valid: orientation, pose, position",
         ),
         (
             lambda: jn.joint_motion(ARM, STRETCHED, WANTED, *TIP, task=(0, 6)),

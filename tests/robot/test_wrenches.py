@@ -140,7 +140,7 @@ FINGER = jn.Robot("one", [jn.Link("base"), jn.Link("rod", jn.Inertia(1.0))], [jn
     [
         (
             lambda: jn.Wrench("rod", frame="world"),
-            "wrench.frame: no such frame, got 'world'; valid: base, link",
+            "wrench.frame: unknown frame, got 'world'; valid: base, link",
         ),
         (lambda: jn.Wrench("rod", point=[0, 0]), "wrench.point: must have the shape (3,), not (2,)"),
         (

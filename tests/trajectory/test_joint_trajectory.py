@@ -200,7 +200,7 @@ BAD = [
     (lambda: JointTrajectory({"a": 1.0}, 1.0, 1.0), "stop: must come after the start, 1 s, got 1.0"),
     (lambda: JointTrajectory({"a": 1.0}, 0.0, 1.0, [0.0, 2.0]), r"times\[1\]: the trajectory goes from 0 to 1 s"),
     (lambda: JointTrajectory({"a": 1.0}, 0.0, 1.0).derivatives([0.5, 1.1], 1), r"times\[1\]: .* got 1.1"),
-    (lambda: JointTrajectory({"a": 1.0}, 0.0, 1.0).derivatives([np.nan], 1), "times: must be finite numbers, got nan"),
+    (lambda: JointTrajectory({"a": 1.0}, 0.0, 1.0).derivatives([np.nan], 1), r"times: must be finite, got \[nan\]"),
     (lambda: JointTrajectory({"a": 1.0}, 0.0, 1.0).derivatives([0.5], -1), "order: must be a whole number"),
     (lambda: JointTrajectory({"elbow": 1.0}, 0.0, 1.0).derivatives([0.5], 1, ["elbo"]), "did you mean 'elbow'"),
     (lambda: JointTrajectory({"a": 1.0}, 0.0, 1.0).derivatives([0.5], 1, ["a", "a"]), "named twice, got 'a'"),

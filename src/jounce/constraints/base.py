@@ -24,7 +24,7 @@ WORDS = ("Scalar", "Vector", "Law", "Laws", "Wrenches", "Whole")  # annotations 
 
 SPACES = ("planar", "spatial")
 ROLES = ("joint", "driver", "force")
-RESERVED = ("bodies", "type")  # keys that every element of a file has
+RESERVED_KEYS = ("bodies", "type")  # keys that every element of a file has
 _REGISTRY: dict[tuple[str, str], dict[str, tuple[type[Any], ...]]] = {}  # the last counts whose definition succeeded
 
 
@@ -42,7 +42,7 @@ def register(kind: type[Any], type: str, space: str, role: str) -> None:  # noqa
     if space:
         check_choice("space", space, SPACES, MechanismError)
     for field in vars(kind).get("__annotations__", {}):
-        if field in RESERVED:
+        if field in RESERVED_KEYS:
             message = f"no field of {kind.__qualname__} may have this name, which files use otherwise; rename it"
             raise MechanismError(message, name="field", value=field)
     catalogues = [_REGISTRY.setdefault((each, role), {}) for each in ((space,) if space else SPACES)]

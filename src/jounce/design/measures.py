@@ -174,7 +174,7 @@ def gaps(
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Curve:
+class PrescribedPath:
     """Points that a point of a mechanism is to pass, in an order or at times.
 
     Parameters

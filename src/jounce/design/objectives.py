@@ -23,7 +23,7 @@ from jounce.design.language import (
 from jounce.design.measures import (
     NO_KNOTS,
     Cells,
-    Curve,
+    PrescribedPath,
     at_instants,
     derivative,
     environment,
@@ -35,7 +35,6 @@ from jounce.design.measures import (
     value,
 )
 from jounce.design.quantities import Quantities, Quantity, told_about
-from jounce.dynamics.outputs import component_labels
 from jounce.errors import ExpressionError, did_you_mean
 from jounce.jet.derivatives import taylor_coefficients
 from jounce.kinematics.solve import HIGHEST_ORDER
@@ -83,7 +82,7 @@ class Goals:
         What must hold.
     varied : sequence of str
         Parameters that differ from design to design.
-    curves : dict of str to Curve
+    curves : dict of str to PrescribedPath
         Points for paths, by name.
     instants : array of shape (time,)
         s.
@@ -115,7 +114,7 @@ class Goals:
         minimise: str,
         subject_to: Sequence[str],
         varied: Sequence[str],
-        curves: Mapping[str, Curve],
+        curves: Mapping[str, PrescribedPath],
         instants: Float[np.ndarray, " time"],
         knots: Float[np.ndarray, " knots"] = NO_KNOTS,
     ):
@@ -333,7 +332,7 @@ class Goals:
         """Return how far the points of a curve are from the path of a point, (component, point), and how many."""
         point, curve = (part.word for part in node.parts)
         output = self._original.outputs.get(point) if isinstance(point, str) else None
-        labels = () if output is None else component_labels(self._original, output)
+        labels = () if output is None else output.component_labels(self._original)
         points = [x for x in self._original.outputs if self._original.outputs[x].unit == "m" and self._is_point(x)]
         if point not in points:
             message = f"'{node.parts[0].text}' in {node.text} must be an output that is a point"
@@ -361,7 +360,7 @@ class Goals:
         return found, len(target.points)
 
     def _is_point(self, name: str) -> bool:
-        return bool(component_labels(self._original, self._original.outputs[name]))
+        return bool(self._original.outputs[name].component_labels(self._original))
 
     def _squared(self, node: Node) -> Numbers | None:
         """Return the square of an objective that is a root, None for any other: it is smooth where it is zero."""
@@ -370,7 +369,7 @@ class Goals:
         subject, *rest = node.parts
         if node.word == "path_error":
             apart, count = self._gaps(node)
-            size = len(component_labels(self._original, self._original.outputs[subject.word]))
+            size = len(self._original.outputs[subject.word].component_labels(self._original))
             block = self.gaps = self._smooth_block(apart, size * count)
             return lambda *known: jnp.sum(known[2][block.start : block.stop] ** 2) / count
         series = self._series(subject, self._arguments.derivative(rest[0]) if rest else 0)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from jounce.design.measures import Curve
+from jounce.design.measures import PrescribedPath
 from jounce.design.result import OptimisedDesign
 from jounce.design.study import Asked, Study
 from jounce.errors import DesignError, JounceError, MechanismError, check_name, whole_number
@@ -192,7 +192,7 @@ def _instants(
     return instants
 
 
-def _curve(name: str, given: Any) -> Curve:
+def _curve(name: str, given: Any) -> PrescribedPath:
     """Return points, and their times where they have some."""
     timed = isinstance(given, tuple) and len(given) == 2 and np.ndim(given[0]) == 1 and np.ndim(given[1]) == 2
     try:
@@ -203,7 +203,7 @@ def _curve(name: str, given: Any) -> Curve:
     if not whole or (times is not None and (times.shape != points.shape[:1] or not np.isfinite(times).all())):
         message = "must be points, (points, components), or a pair of times and points, all finite"
         raise MechanismError(message, name=f"curves.{name}", value=given)
-    return Curve(points, times)
+    return PrescribedPath(points, times)
 
 
 def _assemblies(mechanism: Mechanism, wanted: Any) -> list[tuple[int | None, Mechanism]]:

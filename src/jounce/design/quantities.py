@@ -6,9 +6,9 @@ from typing import Any
 
 from jounce.design.language import EXERTED, MEASURES, Node, operated, refuse_name
 from jounce.dynamics import DriverForceOutput, DriverTorqueOutput, JointForceOutput, JointTorqueOutput
-from jounce.dynamics.outputs import component_labels, is_turning
 from jounce.errors import ExpressionError, JounceError, MechanismError
 from jounce.mechanism import AbstractQuantity, Mechanism
+from jounce.mechanism.driver_outputs import is_turning
 from jounce.trajectory import Expression
 
 Quantity = Callable[[Mapping[str, Any]], Any]
@@ -50,7 +50,7 @@ class Quantities:
         """Return what names mean, by kind: a quantity, a parameter, a driver or a joint."""
         found: dict[str, str] = {}
         for name, output in self.mechanism.outputs.items():
-            labels = component_labels(self.mechanism, output)
+            labels = output.component_labels(self.mechanism)
             found |= {f"{name}_{label}": "quantities" for label in labels} or {name: "quantities"}
             if labels:
                 found[name] = "points and vectors"
@@ -63,7 +63,7 @@ class Quantities:
         meanings = ["the time"] * (name == "t") + ["a parameter"] * (name in self.mechanism.parameters)
         meanings += ["an output"] * (name in self.mechanism.outputs)
         for output, quantity in self.mechanism.outputs.items():
-            labels = [f"{output}_{label}" for label in component_labels(self.mechanism, quantity)]
+            labels = [f"{output}_{label}" for label in quantity.component_labels(self.mechanism)]
             meanings += [f"a component of {output}"] * (name in labels)
             differentiated = order and (stem in labels or (stem == output and not labels))
             meanings += [f"a derivative of {stem}"] * bool(differentiated)
@@ -75,7 +75,7 @@ class Quantities:
         """Return a quantity of the mechanism by its name, with a derivative such as ``psi_d2``."""
         name, lost = (text, 0) if text in self.known else _derivative_name(text)
         if self.known.get(name) == "points and vectors":
-            labels = component_labels(self.mechanism, self.mechanism.outputs[name])
+            labels = self.mechanism.outputs[name].component_labels(self.mechanism)
             message = f"'{name}' has components; take {' or '.join(f'{name}_{label}' for label in labels)}"
             raise ExpressionError(message)
         if self.known.get(name) != "quantities":
@@ -89,7 +89,7 @@ class Quantities:
         if name in self.mechanism.outputs:
             return name, None
         stem, _, label = name.rpartition("_")
-        return stem, component_labels(self.mechanism, self.mechanism.outputs[stem]).index(label)
+        return stem, self.mechanism.outputs[stem].component_labels(self.mechanism).index(label)
 
     def _exerted(self, node: Node) -> Quantity:
         """Return a force or torque of a driver or a joint."""
@@ -104,7 +104,7 @@ class Quantities:
         with told_about(place):
             output.check(mechanism)
         self.added[place] = output
-        labels = component_labels(mechanism, output)
+        labels = output.component_labels(mechanism)
         if not component and labels:
             each = [self._component(place, k, label) for k, label in enumerate(labels)]
             squares = [Node("call", "**", (Node("name", x), Node("number", 2.0))) for x in each]

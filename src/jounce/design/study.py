@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.design.law_knots import law_knots
-from jounce.design.measures import Curve
+from jounce.design.measures import PrescribedPath
 from jounce.design.objectives import Goals
 from jounce.design.problem import LOCKS, Locked, Problem
 from jounce.design.result import Comparison, OptimisedDesign
@@ -36,7 +36,7 @@ class Asked:
     minimise: str
     subject_to: tuple[str, ...]
     bounds: dict[str, tuple[float, float]]
-    curves: dict[str, Curve]
+    curves: dict[str, PrescribedPath]
     instants: Float[np.ndarray, " time"]
 
 

@@ -11,8 +11,8 @@ from jaxtyping import Float
 
 from jounce.design.design_space import Sobol
 from jounce.design.variations import Variation, read_variations, reader_of, spreads
-from jounce.dynamics.outputs import component_labels
-from jounce.errors import MechanismError, UnsupportedError, check_name, did_you_mean, whole_number
+from jounce.errors import MechanismError, UnsupportedError, check_name, no_such, whole_number
+from jounce.jet.turns import whole_periods
 from jounce.kinematics import Motion, Status, solve, solve_batch
 from jounce.mechanism import Mechanism, check_mechanism, time_grid
 from jounce.mechanism.held_outputs import with_outputs
@@ -151,10 +151,9 @@ def column_of(mechanism: Mechanism, name: str) -> tuple[str, str, int]:
     for output, quantity in mechanism.outputs.items():
         if plain == output:
             return output, "", order
-        if plain.startswith(f"{output}_") and plain[len(output) + 1 :] in component_labels(mechanism, quantity):
+        if plain.startswith(f"{output}_") and plain[len(output) + 1 :] in quantity.component_labels(mechanism):
             return output, plain[len(output) + 1 :], order
-    known = [*mechanism.outputs]
-    message = f"no output has this name; {did_you_mean(plain, known)}; components and derivatives as in C_x_d3"
+    message = f"{no_such('output', plain, mechanism.outputs)}; components and derivatives as in C_x_d3"
     raise MechanismError(message, name="of", value=name)
 
 
@@ -297,7 +296,7 @@ class _Spread:
         wraps = np.array(getattr(self.mechanism.outputs[name], "wraps", ()))
         if wraps.any():
             away = values[:, 0, 0] - self._variables[name].values[0, 0]
-            values[:, :, 0] -= (2 * math.pi * np.round(away / (2 * math.pi)) * wraps)[:, None]
+            values[:, :, 0] -= (whole_periods(away) * wraps)[:, None]
         return values
 
     def _add_statistics(self, name: str, of: str, dims: tuple[str, ...], values: np.ndarray) -> None:

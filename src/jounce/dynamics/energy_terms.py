@@ -10,7 +10,7 @@ import math
 from typing import Any
 
 from jounce.dynamics.energies import axes_of, differentiated, energies_of, summed
-from jounce.errors import RobotError, did_you_mean
+from jounce.errors import RobotError, check_choice
 from jounce.jet import Jet, cross, dot
 from jounce.jet.algebra import total
 from jounce.kinematics import Motion
@@ -114,8 +114,7 @@ def energy_terms(
     >>> float(terms.total[0].round(12))  # (3^2 + 2^4) / 3 / 2
     4.166666666667
     """
-    if about not in POINTS:
-        raise RobotError(f"no such point; {did_you_mean(about, POINTS)}", name="about", value=about)
+    check_choice("point", about, POINTS, RobotError, name="about")
     function = terms_about_center if about == "center_of_mass" else terms_about_origin
     return EnergyTerms(*energies_of(system, q, order, function))
 

@@ -6,6 +6,7 @@ their coefficient k is affine in the unknowns ``(q''[k], lambda[k])``, with the 
 """
 
 import dataclasses
+import math
 from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple
@@ -150,10 +151,7 @@ class Equations(Module):
         origins = Jet([with_ground(position)])
         if self.pose_type is PlanarPose:
             return PlanarPose.from_jets(origins, Jet([with_ground(attitude)[0]]))
-        fixed = np.eye(1, 4).reshape(4, 1, 1)  # no turn
-        quaternion = jnp.concatenate(
-            [jnp.broadcast_to(fixed, attitude[:, :1].shape), attitude], axis=1
-        )  # of unit length already: it is kept so
+        quaternion = turns_with_ground(attitude)  # of unit length already: it is kept so
         spins, axes = (tuple(Jet([x]) for x in f(quaternion)) for f in (quaternion_spins, body_axes))
         return SpatialPose(origins, Jet([quaternion]), spins, axes, None)
 
@@ -266,9 +264,19 @@ class Equations(Module):
         return state._replace(velocity=state.velocity + change[:shifts], spin=state.spin + change[shifts:])
 
 
-def with_ground(moving: Float[Numbers, "component body batch"]) -> Float[Numbers, "component body+1 batch"]:
-    """Put the ground, which has none of a quantity, before the moving bodies."""
-    return jnp.concatenate([jnp.zeros_like(moving[:, :1]), moving], axis=1)
+def with_ground(
+    moving: Float[Numbers, "*components body batch"], of_ground: float | np.ndarray = 0.0
+) -> Float[Numbers, "*components body+1 batch"]:
+    """Put the ground, which has none of most quantities, before the moving bodies; in NumPy what is there."""
+    array: Any = np if isinstance(moving, np.ndarray) else jnp
+    ground = array.broadcast_to(of_ground, (*moving.shape[:-2], 1, moving.shape[-1]))
+    return array.concatenate([ground, moving], axis=-2)
+
+
+def turns_with_ground(moving: Float[Numbers, "*orders 4 body batch"]) -> Float[Numbers, "*orders 4 body+1 batch"]:
+    """Put the ground, which does not turn, before the moving bodies: Euler parameters, or their series."""
+    components = moving.shape[:-2]
+    return with_ground(moving, np.eye(1, math.prod(components)).reshape(*components, 1, 1))
 
 
 def conjugate(variation: Callable[[Pose], Any], pose: Pose, weights: Float[Numbers, "*rows batch"]) -> ByBody:

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.dynamics.motion_values import Coordinates, cut
-from jounce.errors import MechanismError
+from jounce.errors import MechanismError, check_choice, check_name
 from jounce.jet.derivatives import taylor_coefficients
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.solve import HIGHEST_ORDER
@@ -60,10 +60,7 @@ def _coordinates(mechanism: Mechanism, model: Model, state: object) -> Coordinat
             "must be a mapping of bodies to where they are and how they move", name="state", value=state
         )
     for name in state:
-        if name not in mechanism.bodies:
-            raise MechanismError(
-                f"no moving body has this name; there are {', '.join(mechanism.bodies)}", name="state", value=name
-            )
+        check_name("moving body", name, mechanism.bodies, MechanismError, name="state")
     missing = [name for name in mechanism.bodies if name not in state]
     if missing:
         raise MechanismError("is missing: a state must contain every moving body", name=f"state.{missing[0]}")
@@ -91,8 +88,7 @@ def _body_state(place: str, given: object, pose_type: type[Pose]) -> dict[str, F
     if not isinstance(given, Mapping):
         raise MechanismError(f"must be a mapping with {', '.join(keys)}", name=place, value=given)
     for key in given:
-        if key not in keys:
-            raise MechanismError(f"unknown key; valid: {', '.join(keys)}", name=place, value=key)
+        check_choice("key", key, keys, MechanismError, name=place)
     for key in keys[:2]:
         if key not in given:
             raise MechanismError("is missing", name=f"{place}.{key}")

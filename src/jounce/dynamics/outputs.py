@@ -8,9 +8,9 @@ import numpy as np
 from jounce.constraints.base import Vector
 from jounce.dynamics.inverse import MotionForces
 from jounce.dynamics.masses import check_loads
-from jounce.errors import MechanismError, check_name, did_you_mean
+from jounce.errors import MechanismError, check_choice, check_name, did_you_mean
 from jounce.kinematics import Motion, Status
-from jounce.mechanism import AbstractMotionOutput, AbstractQuantity, AngularVelocityOutput, Mechanism, PointOutput
+from jounce.mechanism import AbstractMotionOutput, Mechanism
 from jounce.mechanism.driver_outputs import is_turning
 from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.resolve import resolve_element
@@ -96,9 +96,7 @@ class _JointOutput(AbstractForceOutput):
         if self.body is not None and self.body not in element.bodies:
             message = f"is not joined by '{self.joint}'; {did_you_mean(self.body, element.bodies)}"
             raise MechanismError(message, name="body", value=self.body)
-        if self.frame not in ("global", "body", *element.bodies):
-            message = f"unknown frame; {did_you_mean(self.frame, ['global', 'body', *element.bodies])}"
-            raise MechanismError(message, name="frame", value=self.frame)
+        check_choice("frame", self.frame, ("global", "body", *element.bodies), MechanismError)
 
     def _wrench(self, forces: MotionForces, mechanism: Mechanism, point: ArrayLike | None) -> tuple[Numbers, Numbers]:
         """Return force and moment about a point of the body, with rates; about that of the joint unless given."""
@@ -123,6 +121,11 @@ class JointForceOutput(_JointOutput):
     unit = "N"
     rate_names = ("force", *RATES)
 
+    def is_vector(self, mechanism: Mechanism) -> bool:
+        """Tell that the force has components."""
+        del mechanism
+        return True
+
     def coefficients(self, motion: Motion) -> Numbers:
         """Return the Taylor coefficients of the force, (levels, components, time)."""
         return MotionForces.of(motion).unique(lambda forces: self._wrench(forces, motion.mechanism, None)[0])
@@ -139,6 +142,10 @@ class JointTorqueOutput(_JointOutput):
     unit = "N*m"
     rate_names = ("torque", *RATES)
 
+    def is_vector(self, mechanism: Mechanism) -> bool:
+        """Tell whether the torque has components: in space."""
+        return mechanism.space == "spatial"
+
     def coefficients(self, motion: Motion) -> Numbers:
         """Return the Taylor coefficients of the torque, (levels, components, time)."""
         mechanism = motion.mechanism
@@ -153,6 +160,10 @@ class _AppliedOutput(AbstractForceOutput):
     force: str = eqx.field(static=True)
 
     source = "force"
+
+    def is_vector(self, mechanism: Mechanism) -> bool:
+        """Tell whether the applied force has several components."""
+        return len(mechanism.forces[self.force].velocity_names) > 1
 
     def coefficients(self, motion: Motion) -> Numbers:
         """Return the Taylor coefficients of the force, (levels, components, time)."""
@@ -176,16 +187,3 @@ class AppliedTorqueOutput(_AppliedOutput):
 
     unit = "N*m"
     rate_names = ("torque", *RATES)
-
-
-def component_labels(mechanism: Mechanism, output: AbstractQuantity) -> tuple[str, ...]:
-    """Return the names of the components of an output of a mechanism; none where it is one number."""
-    if isinstance(output, _AppliedOutput):
-        several = len(mechanism.forces[output.force].velocity_names) > 1
-    else:
-        turning = isinstance(output, AngularVelocityOutput | JointTorqueOutput) and mechanism.space == "spatial"
-        several = turning or bool(output.axes) or isinstance(output, PointOutput | JointForceOutput)
-    if not several:
-        return ()
-    named = output.labels if output.axes else output.labels[: 2 if mechanism.space == "planar" else 3]
-    return tuple(named)

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.dynamics.motion_values import in_chunks
-from jounce.errors import RobotError, SampleWarning, TrajectoryError, did_you_mean, flag
+from jounce.errors import RobotError, SampleWarning, TrajectoryError, flag, no_such
 from jounce.robot.arguments import joints_of, whole_number
 from jounce.robot.inverse_dynamics import inverse_dynamics
 from jounce.robot.model import Limits
@@ -173,7 +173,7 @@ def why_not(robot: Robot, name: str) -> str:
     """Say why a name is not that of a joint that can be moved."""
     joint = robot.joints.get(name)
     if joint is None:
-        return f"{robot.name} has no moving joint of this name; {did_you_mean(name, robot.joint_names)}"
+        return no_such(f"moving joint of {robot.name}", name, robot.joint_names)
     if joint.mimic is not None:
         return f"this joint follows {joint.mimic.joint}; leave it out"
     return "this joint is fixed; leave it out"

@@ -10,7 +10,7 @@ import jax
 import numpy as np
 from jaxtyping import Float, Int
 
-from jounce.dynamics.forward import State
+from jounce.dynamics.forward import State, turns_with_ground, with_ground
 from jounce.dynamics.motion_values import Coordinates, in_chunks
 from jounce.errors import MechanismError
 from jounce.jet.turns import counted_by_rates
@@ -18,6 +18,7 @@ from jounce.kinematics.motion import output_series
 from jounce.mechanism import AbstractOutput
 from jounce.mechanism.system import Group
 from jounce.robot.arguments import whole_number
+from jounce.shapes import is_traced
 
 _ANGLES = np.pi * (np.arange(20)[::-1] + 0.5) / 20
 NODES = 0.5 + 0.5 * np.cos(_ANGLES)  # of Chebyshev, in a step or a piece of one
@@ -94,18 +95,19 @@ class Event:
             raise MechanismError("must be -1, 0 or 1", name="direction", value=self.direction)
 
 
-def pose_coordinates(state: State) -> dict[str, np.ndarray]:
-    """Return Taylor coefficients of states, order first, as those of the pose of all bodies, the ground first."""
-    position, attitude, _, spin = (np.asarray(part) for part in state)
+def pose_coordinates(state: State) -> dict[str, Any]:
+    """Return Taylor coefficients of states, order first, as those of the pose of all bodies, the ground first.
 
-    def with_ground(part: np.ndarray) -> np.ndarray:
-        return np.concatenate([np.zeros_like(part[:, :, :1]), part], axis=2)
-
+    Those that JAX does not trace become arrays of NumPy.
+    """
+    position, attitude, _, spin = state if is_traced(state) else state.map(np.asarray)
     if attitude.shape[1] == 1:
         return {"position": with_ground(position), "angle": with_ground(attitude)[:, 0]}
-    quaternion = with_ground(attitude)
-    quaternion[0, 0, 0] = 1.0
-    return {"position": with_ground(position), "quaternion": quaternion, "angular_velocity": with_ground(spin)[:-1]}
+    return {
+        "position": with_ground(position),
+        "quaternion": turns_with_ground(attitude),
+        "angular_velocity": with_ground(spin)[:-1],
+    }
 
 
 def series_of(

@@ -38,7 +38,7 @@ JUMP = 1e-6  # rad or sizes of the mechanism: no motion law jumps by more in suc
 NEAR = 1.0 / 16.0  # of the way to where forces and laws are no longer known: a step ends that close
 
 
-Mobility = Float[Numbers, "body batch"]
+BodyMobility = Float[Numbers, "body batch"]
 """How readily each body moves, the ground first, as `mobility_of` gives it."""
 
 Signals = Float[Numbers, "instance batch"]
@@ -54,7 +54,7 @@ class Lookahead(NamedTuple):
     limiting: Indices  # index of the one for which it was shortened
 
 
-def mobility_of(equations: Equations, inverse: Inverse) -> Mobility:
+def mobility_of(equations: Equations, inverse: Inverse) -> BodyMobility:
     """Return how readily generalised forces on each body move the mechanism, from the inverse of the matrix.
 
     The largest acceleration, in rad or sizes of the mechanism by s^2, by a force of one on one of the scaled
@@ -75,7 +75,7 @@ def look_ahead(
     equations: Equations,
     path: State,
     angles: Angles,
-    mobility: Mobility,
+    mobility: BodyMobility,
     time: Lanes,
     step: Lanes,
     span: Lanes,
@@ -161,7 +161,7 @@ class _Signals:
         laws = jnp.full((sum(group.instances for group in self._drivers), *bound.shape), JUMP)
         return jnp.concatenate([forces, jnp.maximum(laws, bound[None])])
 
-    def departure(self, step: Lanes, span: Lanes, mobility: Mobility) -> tuple[Signals, Signals]:
+    def departure(self, step: Lanes, span: Lanes, mobility: BodyMobility) -> tuple[Signals, Signals]:
         """Return how far forces and laws are from the polynomials through the nodes of a step, and what that moves.
 
         What may be rounding is taken off. The second is in rad or sizes of the mechanism:
@@ -188,7 +188,7 @@ class _Signals:
         largest, mean = jnp.max(largest, axis=0), jnp.max(total, axis=0) / count
         return largest, self._moved(largest, mean * jnp.abs(step * span)[None], mobility)
 
-    def _moved(self, largest: Signals, impulse: Signals, mobility: Mobility) -> Signals:
+    def _moved(self, largest: Signals, impulse: Signals, mobility: BodyMobility) -> Signals:
         """Return by how much bodies move for departures of forces, by their impulses in N s^2, and of laws."""
         length, parts, first = self._equations.system.column_scale[0], [], 0
         for group in self._given:

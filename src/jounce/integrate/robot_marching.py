@@ -18,7 +18,7 @@ from jounce.kinematics.compilation import compiled
 from jounce.modules import Module
 from jounce.robot.joint_laws import AbstractJointLaws
 from jounce.robot.motion_series import MotionSeries, motion_series
-from jounce.robot.tree_equations import Motion, TreeEquations, Unknowns, free_base
+from jounce.robot.tree_equations import TreeEquations, TreeState, Unknowns, free_base
 from jounce.robot.wrench_laws import WrenchLaws
 from jounce.shapes import Numbers
 
@@ -76,14 +76,14 @@ class RobotProblem(Module):
         """Whether nothing of it could be overlooked: no law changes."""
         return not (self.forces.changing or self.prescribed.changing or self.wrenches.changing)
 
-    def motion(self, state: RobotState) -> Motion:
+    def motion(self, state: RobotState) -> TreeState:
         """Return where all bodies are."""
         base = None
         if state.position is not None:
             base = free_base(state.position, state.quaternion, state.twist)
         return self.equations.motion(state.coordinates, state.rates, base)
 
-    def applied(self, motion: Motion, time: Float[Numbers, "1 batch"]) -> tuple[Unknowns, tuple[Any, ...]]:
+    def applied(self, motion: TreeState, time: Float[Numbers, "1 batch"]) -> tuple[Unknowns, tuple[Any, ...]]:
         """Return the forces and the wrenches in a state; what drives a joint is what it takes."""
         free = 1.0 - jnp.asarray(self.equations.driven)[:, None]
         forces = free * self.forces(time, motion.coordinates, motion.rates)

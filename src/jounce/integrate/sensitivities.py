@@ -291,16 +291,7 @@ def _coordinates(
     highest = pieces.kept.shape[1] - 1
     path = pieces.kept, *pieces[:2], pieces.kinks
     state = _marched(equations, start, known, *path, chosen, since, instants, order=order, highest=highest)
-    return _with_ground(state)
-
-
-def _with_ground(state: State) -> dict[str, Any]:
-    """Return the series of states as those of the pose of all bodies; see `pose_coordinates`."""
-    whole: Any = state.map(lambda part: jnp.pad(part, ((0, 0), (0, 0), (1, 0), (0, 0))))
-    position, attitude, _, spin = whole
-    if attitude.shape[1] == 1:
-        return {"position": position, "angle": attitude[:, 0]}
-    return {"position": position, "quaternion": attitude.at[0, 0, 0].set(1.0), "angular_velocity": spin[:-1]}
+    return pose_coordinates(state)
 
 
 @compiled("order", "highest", narrow=True)

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.dynamics.forward import Equations, Lanes, State
+from jounce.dynamics.forward import Equations, Lanes, State, turns_with_ground
 from jounce.integrate.methods import evaluated
 from jounce.jet import Jet
 from jounce.mechanism.axis_angles import measures_angle
@@ -94,6 +94,4 @@ def attitudes_at(
     found = np.zeros((len(since), *series.shape[2:]))
     for k in range(series.shape[1])[::-1]:
         found = found * since[:, None, None] + np.asarray(series[:, k])
-    ground = np.zeros((4, 1, len(since)))
-    ground[0] = 1.0
-    return np.concatenate([ground, np.moveaxis(found, 0, -1)], axis=1)
+    return np.asarray(turns_with_ground(np.moveaxis(found, 0, -1)))

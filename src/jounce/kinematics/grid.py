@@ -16,8 +16,8 @@ from jounce.kinematics.advance import Arrival, SolvedState
 from jounce.kinematics.change_points import LARGEST_DISAGREEMENT, bridged, half_width, spoiled_width
 from jounce.kinematics.path_following import (
     PASSABLE,
-    ChangePoint,
     FollowedPath,
+    Passage,
     follow,
 )
 from jounce.kinematics.solver import SMALL_BATCH, Solver
@@ -142,7 +142,7 @@ class GridSolver:
             self.faults.pop(lane)
             self._keep(slice(lane, lane + 1), local.anchors[-1].state)
 
-    def _bridge(self, point: ChangePoint) -> None:
+    def _bridge(self, point: Passage) -> None:
         """Replace the instants next to a change point, and the one at it, by what the motion on both sides gives."""
         away = np.abs(self.time - point.instant)
         lanes = np.flatnonzero((away < half_width(point, self.solver.order)) & (self.time < self.path.ended_at))

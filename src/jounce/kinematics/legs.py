@@ -70,7 +70,7 @@ class Place(NamedTuple):
         return jnp.where(rate > 0, 1 / jnp.where(rate > 0, rate, 1.0), jnp.inf)
 
 
-class Limits(NamedTuple):
+class LegLimits(NamedTuple):
     """Where a leg goes to, s; what step is too small to be halved, s; and the most batches that it may solve."""
 
     stop: Number
@@ -126,7 +126,7 @@ def leg(
     system: System,
     way: Way,
     grid: Float[Numbers, " time"],
-    limits: Limits,
+    limits: LegLimits,
     settings: Settings,
     *,
     pose_type: type[Pose],
@@ -180,7 +180,7 @@ def _typed(values: Any, like: Any) -> Any:
     return jax.tree.map(lambda x, y: jax.lax.convert_element_type(x, np.result_type(y)), values, like)
 
 
-def _planned(way: Way, grid: Float[Numbers, " time"], limits: Limits) -> Way:
+def _planned(way: Way, grid: Float[Numbers, " time"], limits: LegLimits) -> Way:
     """Return the way with its next step, or why there is none."""
     place = way.place
     left = limits.stop - place.instant
@@ -213,7 +213,7 @@ def _next_up(way: Way, grid: Float[Numbers, " time"]) -> Float[Numbers, " lane"]
 
 
 def _after(
-    way: Way, arrival: Arrival, known: SolvedState, grid: Float[Numbers, " time"], limits: Limits
+    way: Way, arrival: Arrival, known: SolvedState, grid: Float[Numbers, " time"], limits: LegLimits
 ) -> tuple[Way, Records]:
     """Return how the way stands after a batch, and what is recorded of it; `known` is of the arrival."""
     target, status, lanes = way.instant[0], arrival.status[0], len(way.instant) - 1

@@ -18,7 +18,7 @@ from jounce.kinematics.host_jacobian import HostJacobian
 from jounce.kinematics.initial_turns import Coordinates, Mover
 from jounce.kinematics.mobility_series import SINGULAR, ReducedConstraints
 from jounce.kinematics.redundancy import Repetition, closed_nearby
-from jounce.kinematics.tangent_cone import Curve, curves
+from jounce.kinematics.tangent_cone import LocalCurve, curves
 from jounce.mechanism import Mechanism, Model, build, check_mechanism, time_grid
 from jounce.mechanism.builder import with_reference
 from jounce.mechanism.preconditions import concrete
@@ -241,9 +241,9 @@ def _whole(constraints: ReducedConstraints) -> Branch:
     return Branch(constraints.free.shape[1], _by_body(constraints, constraints.free.T))
 
 
-def _branches(constraints: ReducedConstraints, going: Sequence[Curve], moved: Mover) -> tuple[Branch, ...]:
+def _branches(constraints: ReducedConstraints, going: Sequence[LocalCurve], moved: Mover) -> tuple[Branch, ...]:
     """Return the branches that curves belong to: those whose tangent spaces a little way on are alike are one."""
-    members: list[tuple[np.ndarray, list[Curve]]] = []
+    members: list[tuple[np.ndarray, list[LocalCurve]]] = []
     for curve in going:
         coefficients = constraints.along(curve.series[None])[2][0]
         step = NEARBY ** (1.0 / curve.multiplicity)

@@ -16,7 +16,7 @@ from jounce.jet.algebra import stacked
 from jounce.jet.derivatives import plain_derivatives
 from jounce.jet.turns import brought_near
 from jounce.kinematics.compilation import compiled
-from jounce.kinematics.path_following import ChangePoint
+from jounce.kinematics.path_following import Passage
 from jounce.kinematics.status import Status
 from jounce.mechanism import (
     AbstractMotionOutput,
@@ -102,7 +102,7 @@ class Motion(Displayed):
         When the motion passed a singular position smoothly, where assembly branches cross, s: there another motion
         could have branched off, and forces are not determined: they are NaN there, and so are their rates where
         rounding decides them.
-    passages : tuple of ChangePoint
+    passages : tuple of Passage
         The same, each with the radius of the Taylor series of the motion there.
     derived : dict
         What was computed of the motion and may be wanted again, by name: the forces, for one.
@@ -119,7 +119,7 @@ class Motion(Displayed):
         state: tuple[dict[str, Any] | Callable[[], dict[str, Any]], tuple[Any, ...]],
         status: Numbers,
         faults: dict[int, str],
-        passages: Sequence[ChangePoint] = (),
+        passages: Sequence[Passage] = (),
         history: AttitudeHistory | None = None,
     ):
         self.mechanism, self.time, self.order, self.status = mechanism, time, order, status

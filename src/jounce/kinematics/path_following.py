@@ -78,7 +78,7 @@ def _instant(anchor: Anchor) -> float:
 
 
 @dataclasses.dataclass(frozen=True)
-class ChangePoint:
+class Passage:
     """A singular position that a motion passes smoothly: when, s, and the radius of its Taylor series there, s."""
 
     instant: float
@@ -94,7 +94,7 @@ class FollowedPath:
 
     anchors: list[Anchor]
     on_the_way: list[tuple[Int[np.ndarray, " lane"], SolvedState]] = dataclasses.field(default_factory=list)
-    change_points: list[ChangePoint] = dataclasses.field(default_factory=list)
+    change_points: list[Passage] = dataclasses.field(default_factory=list)
     status: Status = Status.OK
     ended_at: float = np.inf
     fault: str = ""
@@ -137,15 +137,15 @@ class FollowedPath:
         self.status, self.ended_at, self.fault = status, instant, fault
         return self
 
-    def singular_positions_outside(self) -> list[ChangePoint]:
+    def singular_positions_outside(self) -> list[Passage]:
         """Return where the motion would be singular just before its start or after its end, and smooth all the same."""
         first = self.anchors[0]
         found = self._just_ahead() if self.status == Status.OK else []
         if first.turnover > 0 and first.reach < NEARBY * first.radius:
-            found.append(ChangePoint(first.instant - first.reach, first.radius))
+            found.append(Passage(first.instant - first.reach, first.radius))
         return found
 
-    def _just_ahead(self) -> list[ChangePoint]:
+    def _just_ahead(self) -> list[Passage]:
         """Return the singular position that the motion was nearing when it ended.
 
         Where it ends next to it, or just beyond, rounding spoils what is known there: it is told from farther off.
@@ -155,7 +155,7 @@ class FollowedPath:
         nearing = [x for x in since if x.turnover < 0 and x.reach < NEARBY * x.radius]
         ahead = [x for x in nearing if end - (x.instant + x.reach) < LEAST_PASSAGE * x.reach]
         largest = max((x.radius for x in ahead), default=0.0)
-        return [ChangePoint(x.instant + x.reach, x.radius) for x in ahead if x.radius >= 0.5 * largest][:1]
+        return [Passage(x.instant + x.reach, x.radius) for x in ahead if x.radius >= 0.5 * largest][:1]
 
 
 def follow(
@@ -231,7 +231,7 @@ def _ended(solver: Solver, path: FollowedPath, done: Leg, span: float) -> Follow
     return path.ended(status, target, solver.fault(arrival, 0))
 
 
-def _passed(solver: Solver, here: Anchor, stop: float) -> tuple[Anchor, ChangePoint] | None:
+def _passed(solver: Solver, here: Anchor, stop: float) -> tuple[Anchor, Passage] | None:
     """Return the anchor beyond a change point just ahead, as far from it as this one is, if there is one to pass.
 
     The far side must lie on the series that leads there, to rounding, and the Jacobian must leave the singular position
@@ -251,7 +251,7 @@ def _passed(solver: Solver, here: Anchor, stop: float) -> tuple[Anchor, ChangePo
     if not (beyond.turnover > 0 and abs(beyond.reach - (target - middle)) <= 0.5 * (target - middle)):
         return None
     located = 0.5 * (middle + target - beyond.reach)  # what each side errs by cancels to the second order
-    return beyond, ChangePoint(located, min(here.radius, beyond.radius))
+    return beyond, Passage(located, min(here.radius, beyond.radius))
 
 
 def attitudes_between(

@@ -18,6 +18,7 @@ from jounce.jet import Jet
 from jounce.kinematics.gauss_newton import Trial, put_together
 from jounce.kinematics.initial_turns import Coordinates
 from jounce.mechanism import Model
+from jounce.mechanism.axis_angles import turned
 from jounce.mechanism.builder import group_rows, model_of
 from jounce.mechanism.system import Group, System
 from jounce.modules import Module
@@ -175,14 +176,14 @@ def _cosines(system: System, coordinates: Coordinates) -> Float[np.ndarray, " pa
     found = []
     for group, names in _pairs(system):
         first, second = (
-            _turned(_unit(group, name), coordinates, np.array(slot))
+            _globally(_unit(group, name), coordinates, np.array(slot))
             for name, slot in zip(names, group.bodies[:2], strict=True)
         )
         found.append(np.sum(first * second, axis=0))
     return np.concatenate([*found, np.zeros(0)])
 
 
-def _turned(
+def _globally(
     vectors: Float[np.ndarray, "component instance"], coordinates: Coordinates, bodies: Int[np.ndarray, " instance"]
 ) -> Float[np.ndarray, "component instance"]:
     """Return vectors given in the axes of bodies in global ones."""
@@ -190,6 +191,4 @@ def _turned(
         angle = np.asarray(coordinates["angle"])[bodies, 0]
         c, s = np.cos(angle), np.sin(angle)
         return np.stack([c * vectors[0] - s * vectors[1], s * vectors[0] + c * vectors[1]])
-    e0, *e = np.asarray(coordinates["quaternion"])[:, bodies, 0]
-    across = np.cross(e, vectors, axis=0)
-    return vectors + 2.0 * (e0 * across + np.cross(e, across, axis=0))
+    return turned(np.asarray(coordinates["quaternion"])[:, bodies, 0], vectors)

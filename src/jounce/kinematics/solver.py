@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float, Shaped
 
 from jounce.kinematics.advance import LARGEST_GAP, Arrival, SolvedState, predictor
-from jounce.kinematics.legs import Leg, Limits, Place, Settings, Way, leg
+from jounce.kinematics.legs import Leg, LegLimits, Place, Settings, Way, leg
 from jounce.kinematics.status import Status
 from jounce.kinematics.wide_batches import advance_in_lots, lot_width, lots_in_a_call
 from jounce.mechanism import Model
@@ -105,7 +105,7 @@ class Solver:
     def _settings(self) -> Settings:
         return Settings(*map(np.asarray, (self.tolerance, self.refine, True, self.wanted)))
 
-    def _leg(self, way: Way, grid: Float[np.ndarray, " time"], limits: Limits, *, survey: bool) -> Leg:
+    def _leg(self, way: Way, grid: Float[np.ndarray, " time"], limits: LegLimits, *, survey: bool) -> Leg:
         room = (self._batches + 1) * (SMALL_BATCH - 1)
         window = np.full(room, np.inf)
         window[: len(grid)] = grid[:room]
@@ -158,8 +158,8 @@ def _way(known: SolvedState, place: Sequence[float], **given: Any) -> Way:
     return way._replace(**{name: np.asarray(value) for name, value in given.items()})
 
 
-def _limits(stop: float, smallest: float, batches: int) -> Limits:
-    return Limits(*map(np.asarray, (stop, smallest, batches)))
+def _limits(stop: float, smallest: float, batches: int) -> LegLimits:
+    return LegLimits(*map(np.asarray, (stop, smallest, batches)))
 
 
 def _filled(x: Shaped[np.ndarray, "*rest batch"], width: int, room: int = 0) -> Shaped[np.ndarray, "*rest room"]:

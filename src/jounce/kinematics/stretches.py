@@ -33,7 +33,7 @@ class Stretches:
         For the instants that failed so far, by index, as those of a `Motion`.
     change_points : numpy.ndarray of shape (points,)
         When the motion passes a singular position smoothly, s, as those of a `Motion`; known from the start.
-    passages : tuple of ChangePoint
+    passages : tuple of Passage
         The change points, with how far the motion carries as a Taylor series at each, as those of a `Motion`.
     derived : dict
         What was computed of the stretches and may be wanted again, by name.

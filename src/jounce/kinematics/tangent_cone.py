@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.kinematics.mobility_series import FULFILLED, ReducedConstraints
+from jounce.kinematics.quadratic_forms import polarised
 
 STARTS = 400  # directions from which tangents are sought
 MOST_CURVES = 16
@@ -25,7 +26,7 @@ Series = Float[np.ndarray, "order k"]
 
 
 @dataclasses.dataclass(frozen=True)
-class Curve:
+class LocalCurve:
     """A curve through the position.
 
     Attributes
@@ -48,7 +49,7 @@ class Curve:
         return self.series[self.multiplicity - 1]
 
 
-def curves(constraints: ReducedConstraints) -> list[Curve]:
+def curves(constraints: ReducedConstraints) -> list[LocalCurve]:
     """Return the curves through a position, one for each tangent that is found: those that go on, and the others.
 
     Of a continuum of tangents, as where two degrees of freedom are left, a few are told.
@@ -64,7 +65,7 @@ def curves(constraints: ReducedConstraints) -> list[Curve]:
     return found
 
 
-def _cusp(constraints: ReducedConstraints, tangent: Float[np.ndarray, " k"]) -> Curve | None:
+def _cusp(constraints: ReducedConstraints, tangent: Float[np.ndarray, " k"]) -> LocalCurve | None:
     for sense in (1.0, -1.0):
         curve = _continued(constraints, sense * tangent, 2)
         if curve.order == constraints.order:
@@ -98,18 +99,14 @@ def _quadratic_tangents(constraints: ReducedConstraints) -> Float[np.ndarray, "t
 
 
 def _quadratic_forms(constraints: ReducedConstraints) -> Float[np.ndarray, "s k k"]:
-    """Return the coefficients of order two of g as forms, by polarisation."""
-    count = constraints.free.shape[1]
-    pairs = [(i, j) for i in range(count) for j in range(i, count)]
-    series = np.zeros((len(pairs), constraints.order, count))
-    for lane, (i, j) in enumerate(pairs):
-        series[lane, 0, [i, j]] = 1.0
-    second = constraints.along(series)[0][:, 1]
-    forms = np.zeros((second.shape[1], count, count))
-    alone = {i: second[lane] for lane, (i, j) in enumerate(pairs) if i == j}
-    for lane, (i, j) in enumerate(pairs):
-        forms[:, i, j] = forms[:, j, i] = alone[i] if i == j else 0.5 * (second[lane] - alone[i] - alone[j])
-    return forms
+    """Return the coefficients of order two of g as forms."""
+
+    def second_order(directions: Float[np.ndarray, "pair k"]) -> Float[np.ndarray, "s pair"]:
+        series = np.zeros((len(directions), constraints.order, directions.shape[1]))
+        series[:, 0] = directions
+        return constraints.along(series)[0][:, 1].T
+
+    return polarised(second_order, constraints.free.shape[1])
 
 
 def _distinct(tangents: Sequence[Float[np.ndarray, " k"]]) -> list[Float[np.ndarray, " k"]]:
@@ -127,7 +124,7 @@ def _distinct(tangents: Sequence[Float[np.ndarray, " k"]]) -> list[Float[np.ndar
     return [whole[k] for k in chosen]
 
 
-def _continued(constraints: ReducedConstraints, tangent: Float[np.ndarray, " k"], multiplicity: int) -> Curve:
+def _continued(constraints: ReducedConstraints, tangent: Float[np.ndarray, " k"], multiplicity: int) -> LocalCurve:
     """Return the curve along a tangent, as far as it can be continued."""
     series = np.zeros((constraints.order, len(tangent)))
     series[multiplicity - 1] = tangent
@@ -144,7 +141,7 @@ def _continued(constraints: ReducedConstraints, tangent: Float[np.ndarray, " k"]
                 break
         if reached < order:
             break
-    return Curve(series, multiplicity, reached)
+    return LocalCurve(series, multiplicity, reached)
 
 
 def _fulfilling(constraints: ReducedConstraints, series: Series, multiplicity: int, order: int) -> Series | None:

@@ -188,7 +188,7 @@ def _with_datum(group: Group, coordinates: Coordinates, prescribed: Sequence[Pre
     angle = before + principal(angle - before) if known is not None else principal(angle)
     for k, bodies in enumerate(zip(*group.bodies, strict=True)):
         for given in prescribed:
-            sense = _sense(bodies, _turned(coordinates["quaternion"][:, bodies[0], 0], axis[:, k, 0]), given)
+            sense = _sense(bodies, turned(coordinates["quaternion"][:, bodies[0], 0], axis[:, k, 0]), given)
             if sense:
                 expected = sense * given.angle
                 angle[k] = expected + principal(angle[k] - expected)
@@ -228,7 +228,7 @@ def prescribed_angles(
     found = []
     for group, values in zip((g for g in groups if measures_angle(g)), laws, strict=True):
         for k, bodies in enumerate(zip(*group.bodies, strict=True)):
-            axis = _turned(coordinates["quaternion"][:, bodies[0], 0], axis_of(group)[:, k, 0])
+            axis = turned(coordinates["quaternion"][:, bodies[0], 0], axis_of(group)[:, k, 0])
             found.append(PrescribedAngle(bodies, axis, float(np.broadcast_to(values, (group.instances, 1))[k, 0])))
     return [given for given in found if np.isfinite(given.angle)]
 
@@ -269,14 +269,14 @@ def since(datum: Datum, attitude: Quaternions, axis: Vectors) -> Angles:
 
 def _between(attitude: Quaternions, axis: Vectors, first: Vectors, second: Vectors) -> Angles:
     """Return the signed angle about an axis from a vector of body i to one of body j."""
-    b = _turned(attitude, second)
+    b = turned(attitude, second)
     across = b - (b * axis).sum(axis=0) * axis
     return np.arctan2((_cross(axis, first) * across).sum(axis=0), (first * across).sum(axis=0))
 
 
 def _across(second: Numbers, attitude: Quaternions, axis: Vectors) -> Numbers:
     """Return the part of vectors of bodies j across axes of bodies i."""
-    along = _turned(_inverse(attitude), axis)
+    along = turned(_inverse(attitude), axis)
     return second - (second * along).sum(axis=0) * along
 
 
@@ -295,7 +295,8 @@ def _product(p: Quaternions, q: Quaternions) -> Quaternions:
     return _bilinear(_HAMILTON, p, q)
 
 
-def _turned(p: Quaternions, vector: Vectors) -> Vectors:
+def turned(p: Quaternions, vector: Vectors) -> Vectors:
+    """Return vectors given in the axes of bodies, by Euler parameters of these, in global ones."""
     twice = 2 * _cross(p[1:], vector)
     return vector + p[:1] * twice + _cross(p[1:], twice)
 

@@ -16,7 +16,7 @@ from jounce.mechanism.resolve import parameter_value
 from jounce.rigid.inertia import Inertia
 from jounce.trajectory import Expression
 from jounce.trajectory.dimensions import Dimension, check_one_of
-from jounce.trajectory.expression import RESERVED
+from jounce.trajectory.expression import check_parameter_name
 from jounce.trajectory.shown_units import ShownUnits
 from jounce.trajectory.units import parse_value
 
@@ -34,7 +34,7 @@ RESERVED_OUTPUTS = (  # the axes of a result
 NEAREST = "nearest"
 SIDES = {"above": (-1, 1), "below": (-1, -1), "right": (0, 1), "left": (0, -1)}
 """Where a body may be wished to lie: the component of the global frame, and its sign."""
-RATE_COLUMN = re.compile(r".*_d[0-9]+")
+RATE_COLUMN = re.compile(r".*_d[0-9]+", re.DOTALL)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -175,14 +175,13 @@ class Mechanism(Displayed):
             raise MechanismError("space is planar or spatial", name="space", value=self.space)
         if not self.bodies:
             raise MechanismError("a mechanism needs at least one moving body", name="bodies", value=dict(self.bodies))
-        if GROUND in self.bodies:
-            raise MechanismError("the body 'ground' always exists and never moves", name="bodies.ground")
         self._check_names()
         check_redundant_reactions(self.redundant_reactions, (*self.joints, *self.drivers))
         self._check_assembly()
         for kind, elements in self.elements.items():
             for name, element in elements.items():
                 self._check_element(kind, name, element)
+        self._check_columns()
         _ = self.shown_units
 
     @property
@@ -192,12 +191,13 @@ class Mechanism(Displayed):
 
     def _check_names(self) -> None:
         for name, body in self.bodies.items():
+            check_body_name(name, MechanismError, name=f"bodies.{name}")
             if not isinstance(body, Body):
                 raise MechanismError("must be a Body", name=f"bodies.{name}", value=body)
-        for name in self.parameters.keys() & RESERVED:
-            raise MechanismError(f"the name '{name}' is reserved for expressions", name=f"parameters.{name}")
-        for name in self.outputs.keys() & set(RESERVED_OUTPUTS):
-            raise MechanismError(f"the name '{name}' is reserved for an axis of results", name=f"outputs.{name}")
+        for name in self.parameters:
+            check_parameter_name(name, MechanismError, name=f"parameters.{name}")
+        for name in self.outputs:
+            check_output_name(name, MechanismError, name=f"outputs.{name}")
         for name in self.joints.keys() & self.drivers.keys():
             raise MechanismError("a joint and a driver have the same name", name=f"drivers.{name}")
         for kind in ("joints", "drivers"):
@@ -232,6 +232,14 @@ class Mechanism(Displayed):
             except MechanismError as error:
                 error.name = f"{place}.{error.name}"  # it knows its fields only
                 raise
+
+    def _check_columns(self) -> None:
+        """Refuse outputs whose columns in a table would have the same name: a point C and an angle C_x."""
+        for name in self.outputs:
+            stem, _, label = name.rpartition("_")
+            if stem in self.outputs and label in self.outputs[stem].component_labels(self):
+                message = f"this name is taken by a component of the output '{stem}'; give another one"
+                raise MechanismError(message, name=f"outputs.{name}")
 
     def check_fit(self, element: AbstractConstraint | AbstractForce | AbstractQuantity, place: str) -> None:
         """Raise MechanismError unless an element exists in this space and names bodies that there are."""
@@ -325,6 +333,23 @@ class Mechanism(Displayed):
 def names_column(name: str) -> bool:
     """Tell whether a name is that of an axis of results, or of a rate in a table of them: no output may have it."""
     return name in RESERVED_OUTPUTS or RATE_COLUMN.fullmatch(name) is not None
+
+
+def check_body_name(given: object, error: type[JounceError], **place: Any) -> None:
+    """Raise an error unless a moving body may have a name; `place` says where it stands."""
+    if given == GROUND:
+        raise error("the body 'ground' always exists and never moves; give another name", **place)
+
+
+def check_output_name(given: object, error: type[JounceError], **place: Any) -> None:
+    """Raise an error unless an output may have a name; `place` says where it stands.
+
+    Spaces, brackets and quotes are allowed: tables keep them. Files of mechanisms allow less.
+    """
+    if not isinstance(given, str) or not given:
+        raise error("the name of an output is text that is not empty", value=given, **place)
+    if names_column(given):
+        raise error(f"the name '{given}' is reserved for columns of the results; give another one", **place)
 
 
 def check_mechanism(given: object) -> None:

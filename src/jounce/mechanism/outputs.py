@@ -30,6 +30,17 @@ class AbstractQuantity(Module):
     def check(self, mechanism: Any) -> None:
         """Raise MechanismError unless the quantity exists in a mechanism; names of bodies are checked elsewhere."""
 
+    def is_vector(self, mechanism: Any) -> bool:
+        """Tell whether the quantity has components along the axes of a frame."""
+        del mechanism
+        return False
+
+    def component_labels(self, mechanism: Any) -> tuple[str, ...]:
+        """Return the names of the components of the quantity in a mechanism; none where it is one number."""
+        if self.axes:
+            return tuple(self.labels)
+        return tuple(self.labels[: 2 if mechanism.space == "planar" else 3]) if self.is_vector(mechanism) else ()
+
 
 class AbstractMotionOutput(AbstractQuantity):
     """A quantity that follows from the whole motion and the mechanism, such as a force."""
@@ -73,6 +84,10 @@ class PointOutput(AbstractOutput):
     """Global position of a point of a body, m."""
 
     point: Vector  # m, in the frame of the body
+
+    def is_vector(self, mechanism):
+        del mechanism
+        return True
 
     def evaluate(self, body: Pose) -> Jet:
         return body.point(self.point)
@@ -129,6 +144,9 @@ class AngularVelocityOutput(AbstractOutput):
 
     def __check_init__(self):
         check_choice("frame", self.frame, FRAMES, MechanismError)
+
+    def is_vector(self, mechanism):
+        return mechanism.space == "spatial"
 
     def evaluate(self, body: Pose) -> Jet:
         if isinstance(body, PlanarPose):

@@ -256,11 +256,18 @@ def _check_sideways(values: Mapping[str, Any], name: str) -> None:
         for other in others if axis is not None else ():
             vector = values.get(other)
             if isinstance(axis, np.ndarray) and isinstance(vector, np.ndarray):
-                first, second = (v / np.max(np.abs(v)) for v in (axis, vector))  # no overflow in the squares
-                sine = np.linalg.norm(np.cross(first, second)) / (np.linalg.norm(first) * np.linalg.norm(second))
-                if sine < 1e-9:
+                (a, b, c), (x, y, z) = _of_size_one(axis), _of_size_one(vector)
+                across = math.hypot(b * z - c * y, c * x - a * z, a * y - b * x)
+                if across < 1e-9 * math.hypot(a, b, c) * math.hypot(x, y, z):
                     message = "must not be parallel to the axis"
                     raise MechanismError(message, name=f"{name}.{other}", value=_plain(vector))
+
+
+def _of_size_one(vector: np.ndarray) -> list[float]:
+    """Return entries of a vector over the largest: no product of them overflows; of so few Python is sooner done."""
+    entries = vector.tolist()
+    size = max(map(abs, entries))
+    return [entry / size for entry in entries]
 
 
 @lru_cache(maxsize=1000)

@@ -136,7 +136,15 @@ def _spaced(grid: TimeGrid, parameters: Mapping[str, Any]) -> SpacedInstants:
 def nearest_instants(
     known: Float[np.ndarray, " known"], instants: Float[np.ndarray, " time"]
 ) -> Int[np.ndarray, " time"]:
-    """Return, for each instant, the index of the nearest of some that increase, the earlier one of two."""
-    after = np.clip(np.searchsorted(known, instants), 1, max(len(known) - 1, 1))
+    """Return, for each instant, the index of the nearest of some in any order, the earlier one of two.
+
+    Examples
+    --------
+    >>> nearest_instants(np.array([0.0, 1.0, 2.0]), np.array([-1.0, 0.6, 1.5])).tolist()
+    [0, 1, 1]
+    """
+    order = np.argsort(known, kind="stable")
+    rising = known[order]
+    after = np.clip(np.searchsorted(rising, instants), 1, max(len(known) - 1, 1))
     before, after = after - 1, np.minimum(after, len(known) - 1)
-    return np.where(instants - known[before] <= known[after] - instants, before, after)
+    return order[np.where(instants - rising[before] <= rising[after] - instants, before, after)]

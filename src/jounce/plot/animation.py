@@ -17,8 +17,9 @@ from jounce.errors import MechanismError, OutputError
 from jounce.interrupts import undoing
 from jounce.io.files.writing import check_target, replacing
 from jounce.kinematics import Motion
+from jounce.mechanism.time import nearest_instants
 from jounce.plot.drawing import VIEW, View
-from jounce.plot.instants import nearest_instants, solved_instants
+from jounce.plot.instants import solved_instants
 from jounce.plot.scene import scene_of
 from jounce.plot.sketch import SketchFigure, check_names, paths_of
 from jounce.plot.style import GREY, style

@@ -25,7 +25,7 @@ from jounce.mechanism.system import POSITION_COMPONENTS
 from jounce.plot.frames import guessed, points_at
 from jounce.plot.gears import pitch_radii
 
-__all__ = ["Link", "Point", "Points", "Skeleton", "Symbol", "Wheel", "frame_along", "skeleton"]
+__all__ = ["DrawnLink", "Point", "Points", "Skeleton", "Symbol", "Wheel", "frame_along", "skeleton"]
 
 Point = Float[np.ndarray, " components"]
 Points = Float[np.ndarray, "points components"]
@@ -38,7 +38,7 @@ SAME = 1e-9  # points nearer than this, in sizes of the mechanism, are one
 
 
 @dataclass(frozen=True)
-class Link:
+class DrawnLink:
     """What a body looks like: the points where something touches it, and the bars between them.
 
     Parameters
@@ -138,7 +138,7 @@ class Skeleton:
 
     Parameters
     ----------
-    links : dict of str to Link
+    links : dict of str to DrawnLink
         By name of the body.
     symbols, drivers, forces : tuple of Symbol
         Joints, drivers and applied forces, in the order of the mechanism.
@@ -146,7 +146,7 @@ class Skeleton:
         Diagonal of the box around all points at the starting guess, m.
     """
 
-    links: dict[str, Link]
+    links: dict[str, DrawnLink]
     symbols: tuple[Symbol, ...]
     drivers: tuple[Symbol, ...]
     forces: tuple[Symbol, ...]
@@ -237,7 +237,7 @@ def skeleton(mechanism: Mechanism) -> Skeleton:
         places = np.array(points.places)
         held = [bool(holding.intersection(names)) for names in points.names]  # others are only watched
         bars = () if body == GROUND else _bars(places, SAME * size, held)
-        links[body] = Link(body, places, tuple(map(tuple, points.names)), bars)
+        links[body] = DrawnLink(body, places, tuple(map(tuple, points.names)), bars)
     joints, drivers, forces = (
         tuple(
             _symbol(mechanism, name, element, kinds[kind][name], components)

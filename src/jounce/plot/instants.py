@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Int
 
 from jounce.errors import MechanismError
 from jounce.kinematics import Motion
 
-__all__ = ["evenly_chosen", "nearest_instants", "solved_instants", "unsolved_runs"]
+__all__ = ["evenly_chosen", "solved_instants", "unsolved_runs"]
 
 Indices = Int[np.ndarray, " chosen"]
-Times = Float[np.ndarray, " time"]
 
 
 def evenly_chosen(indices: Int[np.ndarray, " some"], most: int) -> Indices:
@@ -23,20 +22,6 @@ def evenly_chosen(indices: Int[np.ndarray, " some"], most: int) -> Indices:
     [10, 13, 16]
     """
     return indices[np.unique(np.linspace(0, len(indices) - 1, min(most, len(indices))).round().astype(int))]
-
-
-def nearest_instants(time: Times, wanted: Float[np.ndarray, " wanted"]) -> Int[np.ndarray, " wanted"]:
-    """Return the index of the instant nearest to each time; instants may run backward.
-
-    Examples
-    --------
-    >>> nearest_instants(np.array([0.0, 1.0, 2.0]), np.array([-1.0, 0.6, 1.5])).tolist()
-    [0, 1, 1]
-    """
-    order = np.argsort(time)
-    rising = time[order]
-    after = np.searchsorted(0.5 * (rising[:-1] + rising[1:]), wanted)
-    return order[after]
 
 
 def solved_instants(motion: Motion) -> Indices:

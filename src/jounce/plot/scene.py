@@ -16,7 +16,7 @@ from jounce.mechanism import Mechanism
 from jounce.mechanism.mechanism import GROUND
 from jounce.plot.drawing import BARS, PLATES, VIEW, Drawing, Label, Shape, View, tinted
 from jounce.plot.frames import assembled, frames
-from jounce.plot.geometry import Link, skeleton
+from jounce.plot.geometry import DrawnLink, skeleton
 from jounce.plot.joint_symbols import draw_symbols
 
 __all__ = ["Scene", "drawing_of", "outline", "scene_of"]
@@ -107,7 +107,7 @@ def drawing_of(moving: Motion | Mechanism, *, view: View = VIEW, instants: Insta
     return drawing
 
 
-def _draw_link(drawing: Drawing, link: Link) -> None:
+def _draw_link(drawing: Drawing, link: DrawnLink) -> None:
     """Draw the bars of a body, or its plate, and write its name."""
     colour, drawing.owner = drawing.colours[link.body], f"bodies.{link.body}"
     places = drawing.flat(drawing.at(link.body, link.points))  # time, n, 2
@@ -120,7 +120,7 @@ def _draw_link(drawing: Drawing, link: Link) -> None:
     drawing.name(link.body, places[:, ring or [*longest]].mean(axis=1), colour)
 
 
-def _ring(link: Link) -> list[int]:
+def _ring(link: DrawnLink) -> list[int]:
     """Return the corners of the plate with which the bars of a link begin; none where it has no plate."""
     corners: list[int] = []
     for first, second in link.edges:

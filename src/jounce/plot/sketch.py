@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from jounce.errors import MechanismError, did_you_mean
+from jounce.errors import MechanismError, check_choice, did_you_mean
 from jounce.kinematics import Motion
 from jounce.mechanism import PointOutput
 from jounce.mechanism.mechanism import Mechanism, check_mechanism
+from jounce.mechanism.time import nearest_instants
 from jounce.plot.drawing import VIEW, WHEELS, Label, Shape, View, screen_of
-from jounce.plot.instants import evenly_chosen, nearest_instants, solved_instants
+from jounce.plot.instants import evenly_chosen, solved_instants
 from jounce.plot.labels import rounded_down, scale_of, unit_label
 from jounce.plot.name_placement import place_names
 from jounce.plot.scene import Scene, outline, scene_of
@@ -60,8 +61,7 @@ class Paths:
 
 def check_names(names: str) -> None:
     """Raise MechanismError unless a choice of names is known."""
-    if names not in NAMES:
-        raise MechanismError(f"unknown choice; {did_you_mean(names, NAMES)}", name="names", value=names)
+    check_choice("choice", names, NAMES, MechanismError, name="names")
 
 
 def paths_of(motion: Motion, wanted: Sequence[str] | None, order: int, view: View) -> Paths | None:

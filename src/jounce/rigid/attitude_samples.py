@@ -8,8 +8,8 @@ from jounce.errors import JounceError, TrajectoryError
 from jounce.jet import Jet, cross, dot, sqrt, stack, transpose
 from jounce.rigid.euler_parameters import from_rotation_matrices
 from jounce.rigid.orientation import angular_velocity, check_rotation
-from jounce.rigid.rotations import is_traced, rotation_matrix
-from jounce.shapes import ArrayLike, Numbers, Real
+from jounce.rigid.rotations import rotation_matrix
+from jounce.shapes import ArrayLike, Numbers, Real, is_traced
 
 HIGHEST_DEGREE = 11
 UNIT = 1e-6  # how far the length of a sampled quaternion may be from one: printed digits, single precision

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from jounce.errors import MechanismError, did_you_mean, show_value
+from jounce.errors import MechanismError, show_value, unknown
 from jounce.rigid.rotations import check_sequence
 
 __all__ = [
@@ -45,7 +45,7 @@ def form_of(keys: Mapping[str, Any]) -> str | None:
     valid = FORMS[form] if form else [key for names in FORMS.values() for key in names]
     for key in keys:
         if key not in valid:
-            raise MechanismError(f"unknown key {show_value(key)}; {did_you_mean(key, valid)}", name=str(key))
+            raise MechanismError(unknown(f"key {show_value(key)}", key, valid), name=str(key))
     for key in valid if form else ("quaternion",):
         if key not in keys:
             raise MechanismError("is missing", name=key)

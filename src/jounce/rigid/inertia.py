@@ -8,11 +8,12 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.errors import RobotError, check_choice, did_you_mean
+from jounce.errors import JounceError, RobotError, check_choice, did_you_mean
 from jounce.rigid.solids import SOLIDS, pseudo_parts, solid_moments
 from jounce.shapes import ArrayLike, Numbers, Real, Refused, real_numbers
 
 ROUNDING = 1e-5  # of the largest principal moment: what files with six digits may miss a possible tensor by
+MOST_SHOWN = 9  # numbers in a message
 ADVICE = "check the units, the signs of the products of inertia and the axes"
 WITHOUT_MASS = "has moments of inertia but no mass"
 NEGATIVE = "has a negative principal moment"
@@ -286,20 +287,24 @@ def _check_sizes(given: dict[str, Any]) -> None:
         raise RobotError(message, name="inner_radius", value=float(given["inner_radius"]))
 
 
-def finite_numbers(name: str, value: ArrayLike | Refused, *shapes: tuple[int, ...]) -> np.ndarray:
+def finite_numbers(
+    name: str, value: ArrayLike | Refused, *shapes: tuple[int, ...], error: type[JounceError] = RobotError
+) -> np.ndarray:
     """Return a copy of finite numbers of one of the shapes, of any shape if none is given; it cannot be written to.
 
     Raises
     ------
     RobotError
-        If the value is not made of real numbers, its shape is another one, or a number is not finite.
+        Or the error given, if the value is not made of real numbers, its shape is another one, or a number is not
+        finite.
     """
-    array = np.array(real_numbers(name, value, RobotError))
+    array = np.array(real_numbers(name, value, error))
     if shapes and array.shape not in shapes:
         wanted = " or ".join(map(str, shapes))
-        raise RobotError(f"must have the shape {wanted}, not {array.shape}", name=name)
-    if not np.isfinite(array).all():
-        raise RobotError("must be finite", name=name, value=array.tolist())
+        raise error(f"must have the shape {wanted}, not {array.shape}", name=name)
+    bad = array[~np.isfinite(array)]
+    if bad.size:  # of many numbers the first that is not
+        raise error("must be finite", name=name, value=array.tolist() if array.size <= MOST_SHOWN else bad[0].item())
     return unchanging(array)
 
 

@@ -15,11 +15,10 @@ from jounce.rigid.rotations import (
     check_sequence,
     checked_angles,
     is_moving,
-    is_traced,
     simple_rotations,
     uniform,
 )
-from jounce.shapes import Numbers
+from jounce.shapes import Numbers, is_traced
 
 FRAMES = ("global", "body")
 

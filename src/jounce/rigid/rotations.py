@@ -6,11 +6,11 @@ from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
-from jax.core import Tracer
 
 from jounce.errors import JounceError, check_choice
 from jounce.jet import Jet, components, cos, matmul, sin, sqrt, stack
 from jounce.jet.algebra import JetLike, total
+from jounce.shapes import is_traced
 
 AXES = "xyz"
 
@@ -202,11 +202,6 @@ def checked_direction(axis: JetLike, name: str = "axis") -> Any:
             message = "the direction of an axis must be finite and not of zero length"
             raise JounceError(message, name=name, value=np.asarray(value).tolist())
     return axis
-
-
-def is_traced(value: Any) -> bool:
-    """Tell whether a value is not known yet, because JAX is tracing a function of it."""
-    return any(isinstance(leaf, Tracer) for leaf in (value if isinstance(value, list | tuple) else [value]))
 
 
 def unit(vector: Jet) -> list[Jet]:

@@ -12,8 +12,8 @@ from jaxtyping import Float
 from jounce.errors import JounceError, check_choice
 from jounce.jet import Jet, concatenate, cross, dot, matmul, sin, stack
 from jounce.jet.algebra import JetLike
-from jounce.rigid.rotations import checked_direction, is_traced, rotation_about, stacked_if_jets, uniform, unit
-from jounce.shapes import ArrayLike
+from jounce.rigid.rotations import checked_direction, rotation_about, stacked_if_jets, uniform, unit
+from jounce.shapes import ArrayLike, is_traced
 
 KINDS = ("revolute", "prismatic")
 

@@ -5,10 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from jounce.errors import JounceError, RobotError, check_name, did_you_mean, flag
+from jounce.errors import JounceError, RobotError, check_name, flag
 from jounce.forces import AbstractForce
 from jounce.jet import Jet
 from jounce.mechanism import Body, Mechanism, time_grid
+from jounce.mechanism.mechanism import names_column
 from jounce.mechanism.redundant_reactions import RedundantReactions
 from jounce.mechanism.resolve import resolve_motion
 from jounce.mechanism.time import TimeLike
@@ -59,7 +60,8 @@ def mechanism(
         Applied forces; their bodies are moving links, or ``"ground"``.
     outputs : dict of str to AbstractOutput or str, optional
         Quantities wanted; a word is the name of a joint whose coordinate is wanted. Unless given, the coordinates of
-        all joints in `joint_names` under their names. An angle starts between half a turn either side of zero.
+        all joints in `joint_names` under their names, with ``_`` behind those of columns of results, such as
+        ``time``. An angle starts between half a turn either side of zero.
     parameters : dict of str to number or expression, optional
         Named values for laws and forces.
     time : array_like or TimeGrid, optional
@@ -100,11 +102,9 @@ def mechanism(
     driven = {name: law for kind in laws.values() for name, law in kind.items()}
     for kind, given in laws.items():
         for name in given:
-            if name not in robot.joint_names:
-                message = f"no moving joint that follows no other has this name; {_known(robot, name)}"
-                raise RobotError(message, name=kind, value=name)
+            check_name("moving joint that follows no other", name, robot.joint_names, RobotError, name=kind)
     parts = RobotParts(robot, {*driven, *(x for x in (outputs or {}).values() if isinstance(x, str))}, forces, outputs)
-    wanted = {name: name for name in parts.coordinates} if outputs is None else outputs
+    wanted = _coordinate_outputs(parts.coordinates) if outputs is None else outputs
     start = _start(robot, q, driven, parameters or {}, time)
     joints = parts.joints()
     if robot.closures:
@@ -133,8 +133,15 @@ def mechanism(
     )
 
 
-def _known(robot: AbstractRobot, name: Any) -> str:
-    return did_you_mean(name, robot.joint_names)
+def _coordinate_outputs(joints: tuple[str, ...]) -> dict[str, str]:
+    """Return joints by the names of the outputs of their coordinates: their own, unless results have such columns."""
+    found = {}
+    for joint in joints:
+        name = joint
+        while names_column(name) or (name != joint and name in joints):
+            name += "_"
+        found[name] = joint
+    return found
 
 
 def _start(

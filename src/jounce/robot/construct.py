@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from jounce.errors import RobotError, did_you_mean
+from jounce.errors import RobotError, check_choice
 from jounce.rigid.inertia import Inertia, finite_numbers
 from jounce.robot.model import UNLIMITED, Joint, Limits, Link
 from jounce.robot.robot import Robot
@@ -108,10 +108,7 @@ def from_denavit_hartenberg(
     >>> arm.joint_names
     ('joint_1', 'joint_2')
     """
-    if convention not in CONVENTIONS:
-        raise RobotError(
-            f"no such convention; {did_you_mean(convention, CONVENTIONS)}", name="convention", value=convention
-        )
+    check_choice("convention", convention, CONVENTIONS, RobotError)
     links, joints = [Link("base")], []
     for k, row in enumerate(rows, 1):
         for field in ("a", "alpha", "d", "theta"):

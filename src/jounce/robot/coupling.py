@@ -6,13 +6,13 @@ from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
-import numpy as np
 
 from jounce.constraints import AbstractConstraint, Scalar, Vector
 from jounce.constraints.angles import relative_angle
 from jounce.constraints.planar import slide
 from jounce.errors import MechanismError, check_choice
 from jounce.jet import Jet, wrap
+from jounce.jet.turns import WHOLE_TURN
 from jounce.mechanism import AbstractOutput
 from jounce.rigid import SpatialPose
 from jounce.shapes import Numbers
@@ -121,11 +121,11 @@ def coupled(leader: JointPlacement, follower: JointPlacement, multiplier: float,
         ratio = Fraction(multiplier).limit_denominator(LARGEST_DENOMINATOR)
         if abs(ratio - Fraction(multiplier)) <= 1e-15 * abs(Fraction(multiplier)):
             weights = (float(ratio.numerator), float(ratio.denominator))
-        period = 2 * np.pi
+        period = WHOLE_TURN
     elif leader.turning:
-        period = 2 * np.pi * abs(multiplier) or None
+        period = WHOLE_TURN * abs(multiplier) or None
     elif follower.turning:
-        period = 2 * np.pi
+        period = WHOLE_TURN
     return CoupledJoints(
         tuple(bodies),
         "".join(PLACES[bodies.index(body)] for body in (*leader.bodies, *follower.bodies)),

@@ -13,7 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.errors import RobotError, did_you_mean, flag
+from jounce.errors import RobotError, check_choice, flag
 from jounce.jet import Jet, components, cross, dot
 from jounce.jet.algebra import stacked, total
 from jounce.rigid.frames import Frames
@@ -266,8 +266,7 @@ def bias_forces(
     """
     chosen = (parts,) if isinstance(parts, str) or not isinstance(parts, Iterable) else tuple(parts)
     for part in chosen:
-        if part not in PARTS:
-            raise RobotError(f"no such part; {did_you_mean(str(part), PARTS)}", name="parts", value=part)
+        check_choice("part", part, PARTS, RobotError, name="parts")
     rates, drives = flag("rates", rates, error=RobotError), flag("drives", drives, error=RobotError)
     q = checked_coordinates(robot, q, 1, most=None if rates else 1)
     found = _bias(robot, (q,), (), (frozenset(chosen), drives))

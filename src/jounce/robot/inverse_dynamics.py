@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.errors import RobotError, did_you_mean, flag
+from jounce.errors import RobotError, check_choice, flag
 from jounce.jet import Jet, concatenate, cross, matvec
 from jounce.jet.algebra import stacked, total
 from jounce.robot.arguments import checked_coordinates
@@ -116,8 +116,7 @@ def joint_wrenches(
     >>> jn.joint_wrenches(jn.Robot("pendulum", links, [pin]), [[0.0], [0.0], [0.0]])[0, 0].round(12).tolist()
     [0.0, 0.0, 19.62, 0.0, -9.81, 0.0]
     """
-    if frame not in FRAMES:
-        raise RobotError(f"no such frame; {did_you_mean(frame, FRAMES)}", name="frame", value=frame)
+    check_choice("frame", frame, FRAMES, RobotError)
     q = checked_coordinates(robot, q, 2)
     arrays, static = _applied(robot, q, wrenches, time)
     turned = [robot.frames[link].rotation for link in robot.moving_links]

@@ -10,7 +10,7 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Bool, Float
 
-from jounce.errors import RobotError, SingularityError, did_you_mean
+from jounce.errors import RobotError, SingularityError, check_choice
 from jounce.jet.algebra import stacked
 from jounce.kinematics.linear import singular_values
 from jounce.rigid.inertia import finite_numbers
@@ -165,8 +165,7 @@ def joint_motion(
 def _rows(task: str | Sequence[int]) -> tuple[int, ...]:
     """Return the rows of the Jacobian that a task has."""
     if isinstance(task, str):
-        if task not in TASKS:
-            raise RobotError(f"no such task; {did_you_mean(task, TASKS)}", name="task", value=task)
+        check_choice("task", task, TASKS, RobotError)
         return TASKS[task]
     rows = tuple(task)
     whole = all(isinstance(row, int | np.integer) and 0 <= row <= 5 for row in rows)

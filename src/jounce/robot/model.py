@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from jounce.errors import RobotError, did_you_mean
+from jounce.errors import RobotError, check_name
 from jounce.rigid.inertia import Inertia, finite_numbers, unchanging
 from jounce.shapes import ArrayLike
 
@@ -182,9 +182,7 @@ class Joint:
 
     def __post_init__(self) -> None:
         where = f"joints.{self.name}"
-        if self.type not in TYPES:
-            message = f"no joint has this type; {did_you_mean(self.type, TYPES)}"
-            raise RobotError(message, name=f"{where}.type", value=self.type)
+        check_name("joint", self.type, TYPES, RobotError, "type", name=f"{where}.type")
         for field, shape in (("position", (3,)), ("rotation", (3, 3)), ("axis", (3,))):
             object.__setattr__(self, field, finite_numbers(f"{where}.{field}", getattr(self, field), shape))
         rotation_matrix(f"{where}.rotation", self.rotation)
@@ -297,9 +295,7 @@ class Closure:
 
     def __post_init__(self) -> None:
         where = f"closures.{self.name}"
-        if self.type not in CLOSURES:
-            message = f"no closure has this type; {did_you_mean(self.type, CLOSURES)}"
-            raise RobotError(message, name=f"{where}.type", value=self.type)
+        check_name("closure", self.type, CLOSURES, RobotError, "type", name=f"{where}.type")
         links = () if isinstance(self.links, str) else tuple(self.links)
         if len(links) != 2 or links[0] == links[1]:
             raise RobotError("must be two different links", name=f"{where}.links", value=self.links)

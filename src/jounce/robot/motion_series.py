@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 
 from jounce.jet.series import Recursion
-from jounce.robot.tree_equations import Motion, TreeEquations, TreeFactor, Unknowns, Wrenches
+from jounce.robot.tree_equations import TreeEquations, TreeFactor, TreeState, Unknowns, Wrenches
 
 Series = Any
 """A pytree of arrays of Taylor coefficients, order first."""
@@ -18,22 +18,22 @@ class MotionSeries(NamedTuple):
 
     Attributes
     ----------
-    motion : Motion
+    motion : TreeState
         To one order more than the accelerations.
     accelerations : Unknowns
     factor : TreeFactor
         Of the inertias at order zero.
     """
 
-    motion: Motion
+    motion: TreeState
     accelerations: Unknowns
     factor: TreeFactor
 
 
 def motion_series(
     equations: TreeEquations,
-    motion: Motion,
-    applied: Callable[[Motion, Any], tuple[Unknowns, Wrenches]],
+    motion: TreeState,
+    applied: Callable[[TreeState, Any], tuple[Unknowns, Wrenches]],
     given: Series,
     driven: Series,
     order: int,
@@ -46,7 +46,7 @@ def motion_series(
     ----------
     equations : TreeEquations
         Of the robot.
-    motion : Motion
+    motion : TreeState
         The state.
     applied : callable
         Maps a motion and what is given to the forces of the coordinates, those on a free base, and wrenches on bodies.
@@ -65,7 +65,7 @@ def motion_series(
     base = None if motion.base is None else jnp.zeros((6, lanes))
     trial = Unknowns(jnp.broadcast_to(driven[0], motion.rates.shape), base)
 
-    def missing(motion: Motion, accelerations: Unknowns, given: Any) -> Unknowns:
+    def missing(motion: TreeState, accelerations: Unknowns, given: Any) -> Unknowns:
         forces, wrenches = applied(motion, given)
         return jax.tree.map(jnp.subtract, forces, equations.needed(motion, accelerations, wrenches))
 
@@ -110,7 +110,7 @@ def motion_series(
     return MotionSeries(series, accelerations, factor)
 
 
-def _with_accelerations(rates: Motion, accelerations: Unknowns) -> Motion:
+def _with_accelerations(rates: TreeState, accelerations: Unknowns) -> TreeState:
     """Return rates in which the accelerations are those found, in the place of those tried."""
     base = None if rates.base is None else rates.base._replace(twist=accelerations.base)
     return rates._replace(rates=accelerations.joints, base=base)

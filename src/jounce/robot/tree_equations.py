@@ -50,7 +50,7 @@ class FreeBase(NamedTuple):
     twist: Numbers
 
 
-class Motion(NamedTuple):
+class TreeState(NamedTuple):
     """Where a tree is and how it moves.
 
     Attributes
@@ -114,7 +114,7 @@ class TreeEquations(Module):
     global_axes: tuple[bool, ...] = eqx.field(static=True, default=())
     drives: bool = eqx.field(static=True, default=False)
 
-    def motion(self, coordinates: Coordinates, rates: Coordinates, base: FreeBase | None = None) -> Motion:
+    def motion(self, coordinates: Coordinates, rates: Coordinates, base: FreeBase | None = None) -> TreeState:
         """Return where all bodies are, from the coordinates."""
         tree, lanes = self.tree, coordinates.shape[-1]
         joints = self._at_joints(coordinates) + (0.0 if tree.shape.direct else jnp.asarray(tree.offset)[:, None])
@@ -133,9 +133,9 @@ class TreeEquations(Module):
         each = (tree.slot, tree.parent_slot, tree.position, 1 - jnp.asarray(tree.turning))
         bodies = (*map(jnp.asarray, each), turn, joints)
         _, (axes, arm) = jax.lax.scan(outward, fill_slots(tree, start), bodies)
-        return Motion(coordinates, rates, jnp.moveaxis(axes, 0, 2), jnp.moveaxis(arm, 0, 1), base)
+        return TreeState(coordinates, rates, jnp.moveaxis(axes, 0, 2), jnp.moveaxis(arm, 0, 1), base)
 
-    def factored(self, motion: Motion) -> "TreeFactor":
+    def factored(self, motion: TreeState) -> "TreeFactor":
         """Return what gives accelerations for forces, at this position; made once for all orders."""
         tree = self.tree
         armature = jnp.asarray(tree.armature) if self.drives else jnp.zeros(tree.shape.coordinates)
@@ -149,7 +149,7 @@ class TreeEquations(Module):
             return TreeFactor(bodies, None, free, motion.base)
         return TreeFactor(None, self._coupled(motion, free), free, motion.base)
 
-    def _coupled(self, motion: Motion, free: Any) -> tuple[DenseFactor, Any]:
+    def _coupled(self, motion: TreeState, free: Any) -> tuple[DenseFactor, Any]:
         """Return the factored mass matrix of a tree in which joints follow others, scaled, and the scales."""
         lanes, count = motion.axes.shape[-1], self.tree.shape.coordinates
         size = count + (6 if motion.base is not None else 0)
@@ -168,7 +168,7 @@ class TreeEquations(Module):
         scale = 1.0 / jnp.sqrt(jnp.stack([matrix[k, k] for k in range(size)]))
         return DenseFactor.of(matrix * scale[:, None] * scale[None]), scale
 
-    def needed(self, motion: Motion, unknowns: Unknowns, wrenches: Wrenches = ()) -> Unknowns:
+    def needed(self, motion: TreeState, unknowns: Unknowns, wrenches: Wrenches = ()) -> Unknowns:
         """Return the forces that accelerations need: of the coordinates, and on a free base, in its axes."""
         tree, lanes, base = self.tree, motion.axes.shape[-1], motion.base
         turning = jnp.asarray(tree.turning)[None, :, None]
@@ -218,7 +218,7 @@ class TreeEquations(Module):
             base_force, base_moment = base_force - pushed[:3, -1], base_moment - pushed[3:, -1]
         return Unknowns(found, jnp.concatenate([_local(base.axes, x) for x in (base_force, base_moment)]))
 
-    def motion_rates(self, motion: Motion, unknowns: Unknowns) -> Motion:
+    def motion_rates(self, motion: TreeState, unknowns: Unknowns) -> TreeState:
         """Return how all that a motion consists of changes."""
         tree, base = self.tree, motion.base
         turning = jnp.asarray(tree.turning)[None, :, None]
@@ -236,9 +236,9 @@ class TreeEquations(Module):
         if tree.shape.sliding:
             arm = arm + z * ((1 - turning) * rates)
         axes = cross((before + turn)[:, None], motion.axes)
-        return Motion(motion.rates, unknowns.joints, axes, arm, moved)
+        return TreeState(motion.rates, unknowns.joints, axes, arm, moved)
 
-    def energy(self, motion: Motion) -> tuple[Float[Numbers, " batch"], Float[Numbers, " batch"]]:
+    def energy(self, motion: TreeState) -> tuple[Float[Numbers, " batch"], Float[Numbers, " batch"]]:
         """Return kinetic energy, that of the armatures of drives included, and potential energy in gravity, J."""
         tree, base = self.tree, motion.base
         turning = jnp.asarray(tree.turning)[None, :, None]
@@ -269,7 +269,7 @@ class TreeEquations(Module):
             return values
         return jnp.take(values, jnp.asarray(self.tree.coordinate), axis=0) * jnp.asarray(self.tree.multiplier)[:, None]
 
-    def _pushed(self, motion: Motion, wrenches: Wrenches) -> Any:
+    def _pushed(self, motion: TreeState, wrenches: Wrenches) -> Any:
         """Return forces and moments from outside about the origins of the bodies and, last, of the base."""
         if not wrenches:
             return None

@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jounce.errors import RobotError, check_name, did_you_mean
+from jounce.errors import RobotError, check_choice, check_name
 from jounce.jet import Jet, compose
 from jounce.rigid.inertia import finite_numbers
 from jounce.robot.arguments import floats
@@ -49,9 +49,7 @@ class Wrench:
     frame: str = "base"
 
     def __post_init__(self) -> None:
-        if self.frame not in FRAMES:
-            message = f"no such frame; {did_you_mean(self.frame, FRAMES)}"
-            raise RobotError(message, name="wrench.frame", value=self.frame)
+        check_choice("frame", self.frame, FRAMES, RobotError, name="wrench.frame")
         object.__setattr__(self, "point", finite_numbers("wrench.point", self.point, (3,)))
 
 

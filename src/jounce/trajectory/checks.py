@@ -9,9 +9,11 @@ from jaxtyping import Float
 
 from jounce import errors
 from jounce.errors import JounceError, TrajectoryError
+from jounce.rigid import inertia
 from jounce.shapes import ArrayLike, real_numbers
 
 whole_number = partial(errors.whole_number, error=TrajectoryError)
+finite_numbers = partial(inertia.finite_numbers, error=TrajectoryError)
 
 
 def finite(name: str, value: Any) -> float:
@@ -33,15 +35,12 @@ def positive(name: str, value: Any) -> float:
     return number
 
 
-def finite_numbers(name: str, values: ArrayLike, shape: tuple[int, ...] | None) -> Float[np.ndarray, "..."]:
-    """Return finite numbers of a shape; of any one axis when none is given."""
-    array = real_numbers(name, values, TrajectoryError)
-    if (array.ndim != 1 or not array.size) if shape is None else array.shape != shape:
-        wanted = "one axis of at least one number" if shape is None else f"the shape {shape}"
-        raise TrajectoryError(f"must have {wanted}", name=name, value=f"shape {array.shape}")
-    if not np.isfinite(array).all():
-        raise TrajectoryError("must be finite numbers", name=name, value=array[~np.isfinite(array)][0].item())
-    return array
+def finite_row(name: str, values: ArrayLike) -> Float[np.ndarray, " number"]:
+    """Return finite numbers along one axis, at least one."""
+    row = finite_numbers(name, values)
+    if row.ndim != 1 or not row.size:
+        raise TrajectoryError(f"must have one axis of at least one number, not the shape {row.shape}", name=name)
+    return row
 
 
 def check_samples(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import difflib
+import keyword
 import math
 import numbers
 import operator
@@ -14,7 +15,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any, NoReturn
 
-from jounce.errors import ExpressionError, did_you_mean, show_value
+from jounce.errors import ExpressionError, JounceError, did_you_mean, show_value
 
 CONSTANTS: dict[str, float] = {"pi": math.pi, "deg": math.pi / 180.0}
 """Constants that every expression knows."""
@@ -27,6 +28,9 @@ FUNCTIONS: dict[str, tuple[int, Callable[..., float]]] = {
 
 RESERVED = frozenset({"t", *CONSTANTS, *FUNCTIONS})
 """Names that no parameter can have."""
+
+PARAMETER_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,99}")
+"""Form of the name of a parameter."""
 
 MAX_CHARACTERS = 2000
 MAX_NESTING = 50
@@ -62,6 +66,16 @@ _ALLOWED = "allowed are numbers, names, + - * / **, parentheses and the usual fu
 
 # One instruction of the postfix program: kind, operand, number of arguments, column.
 _Instruction = tuple[str, Any, int, int]
+
+
+def check_parameter_name(given: object, error: type[JounceError], **place: Any) -> None:
+    """Raise an error unless a parameter may have a name: expressions must be able to use it; `place` says where."""
+    if not isinstance(given, str) or not PARAMETER_NAME.fullmatch(given):
+        raise error("a name is up to 100 letters, digits, _, not starting with a digit", value=given, **place)
+    if given in RESERVED:
+        raise error(f"the name '{given}' is reserved for expressions; give another one", **place)
+    if keyword.iskeyword(given):
+        raise error(f"the word '{given}' cannot be a name in expressions; give another one", **place)
 
 
 @dataclass(frozen=True, init=False, repr=False)

@@ -10,10 +10,10 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.display import Displayed
-from jounce.errors import JounceError, MechanismError, SampleWarning, TrajectoryError, did_you_mean
+from jounce.errors import JounceError, MechanismError, SampleWarning, TrajectoryError, check_name
 from jounce.jet import Jet
 from jounce.shapes import ArrayLike
-from jounce.trajectory.checks import check_samples, finite_numbers, whole_number
+from jounce.trajectory.checks import check_samples, finite_numbers, finite_row, whole_number
 from jounce.trajectory.expression import Expression
 from jounce.trajectory.motion import AbstractMotion, ExpressionMotion, SplineMotion
 from jounce.trajectory.profiles import motion_profile
@@ -249,7 +249,7 @@ class JointTrajectory(Displayed):
         """
         chosen = self._chosen(names)
         order = whole_number("order", order, 0, MAX_ORDER)
-        instants = self._inside(finite_numbers("times", times, None))
+        instants = self._inside(finite_row("times", times))
         self._warn(order, chosen)
         found = law_derivatives([self.laws[name] for name in chosen], jnp.asarray(instants), order)
         result = np.ascontiguousarray(np.moveaxis(np.asarray(found), -1, 0))
@@ -332,9 +332,7 @@ class JointTrajectory(Displayed):
     def _chosen(self, names: Iterable[str] | None) -> tuple[str, ...]:
         chosen = self.names if names is None else _names(names)
         for name in chosen:
-            if name not in self.laws:
-                message = f"the trajectory has no joint of this name; {did_you_mean(name, self.names)}"
-                raise TrajectoryError(message, name="names", value=name)
+            check_name("joint of the trajectory", name, self.laws, TrajectoryError, name="names")
         return chosen
 
     def _inside(self, times: Float[np.ndarray, " time"]) -> Float[np.ndarray, " time"]:

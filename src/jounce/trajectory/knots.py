@@ -9,7 +9,7 @@ from jounce.jet import Jet
 from jounce.trajectory.motion import AbstractMotion, SplineMotion
 
 SMOOTH = 1e-9  # of the peak of a derivative: a smaller jump is rounding
-LOOKS = 33  # at a law of which no pieces are known, for these peaks
+INSTANTS = 33  # at a law of which no pieces are known, for these peaks
 
 Jumps = tuple[Float[np.ndarray, " knots"], Float[np.ndarray, "levels knots"]]
 """Where derivatives may jump, and by how much: the value from the right less that from the left, by order."""
@@ -49,7 +49,7 @@ def derivative_sizes(law: AbstractMotion, first: float, last: float, order: int)
 
     The derivatives where two laws meet are no measure of rounding there: one that vanishes is nothing but rounding.
     """
-    looks = np.linspace(first, last, LOOKS)
+    looks = np.linspace(first, last, INSTANTS)
     found = [np.abs(np.asarray(x, float)) for x in law(Jet.variable(looks, order)).dense().derivatives()]
     return np.array([np.max(x, initial=0.0, where=np.isfinite(x)) for x in found])
 

@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-from jounce.errors import JounceError, UnitError, did_you_mean
+from jounce.errors import JounceError, UnitError, no_such
 from jounce.trajectory.dimensions import (
     ANGLE,
     FORCE,
@@ -101,7 +101,7 @@ class ShownUnits:
             raise UnitError("must be units by kind of quantity or name of an output", name="units", value=self.chosen)
         for name, unit in self.chosen.items():
             if name not in QUANTITIES and name not in self.outputs:
-                message = f"no quantity and no output has this name; {did_you_mean(name, [*QUANTITIES, *self.outputs])}"
+                message = no_such("quantity and no output", name, [*QUANTITIES, *self.outputs])
                 raise UnitError(message, name=f"units.{name}")
             try:
                 _, dimension = unit_size(unit)

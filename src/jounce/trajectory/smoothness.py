@@ -15,7 +15,7 @@ from jounce.trajectory.profiles import AbstractProfile
 
 HIGHEST = 10  # derivative that is looked at
 MOST_CROSSINGS = 10_000
-LOOKS = 4000  # at a leader, for where it passes a knot of the law that follows it
+INTERVALS = 4000  # at a leader, for where it passes a knot of the law that follows it
 STEPS = 60  # of bisection
 SLACK = 1e-6  # of the time between two looks, by which a crossing at an end may be beyond it
 ROUNDING = 1e-9  # of the way of a profile by its duration to the power of the order: a smaller jump is none
@@ -252,14 +252,15 @@ def _followed(
         unknown = "its leader has jumps of its own"
     if isinstance(law, SplineMotion) and not knot_jumps(law, order)[1].any():
         return *none, unknown
-    looks = np.linspace(first, last, LOOKS + 1)
+    looks = np.linspace(first, last, INTERVALS + 1)
     values = np.asarray(leader(Jet([looks])).coefficients[0])
     knots, jumps, less = _jumps(law, float(values.min()), float(values.max()), order)
     if not jumps.any():
         return *none, unknown or less
     peaks = Jet(np.max(np.abs(c)) for c in leader(Jet.variable(looks, order)).dense().coefficients)
     peaks = Jet((0.0, *peaks.coefficients[1:]))
-    step = (last - first) / LOOKS  # a knot at which the leader begins or ends is passed on the way there, or from there
+    step = (last - first) / INTERVALS
+    # a knot at which the leader begins or ends is passed on the way there, or from there
     looks = np.concatenate([[first - step], looks, [last + step]])
     values = np.asarray(leader(Jet([looks])).coefficients[0])
     jumping = jumps.any(axis=0)

@@ -16,6 +16,7 @@ from decimal import Decimal, InvalidOperation, Overflow, localcontext
 from functools import lru_cache
 
 from jounce.errors import ExpressionError, UnitError, did_you_mean, show_value
+from jounce.jet.turns import WHOLE_TURN
 from jounce.trajectory.dimensions import (
     ANGLE,
     FORCE,
@@ -34,8 +35,6 @@ from jounce.trajectory.expression import CONSTANTS, FUNCTIONS, MAX_CHARACTERS, E
 
 Size = Decimal | float
 
-_TURN = 2 * math.pi
-
 
 def _sizes(dimension: Dimension, text: str) -> dict[str, tuple[Size, Dimension]]:
     pairs = (pair.split("=") for pair in text.split())
@@ -46,9 +45,9 @@ COMMON: dict[str, tuple[Size, Dimension]] = {
     **_sizes(LENGTH, "m=1 dm=0.1 cm=0.01 mm=0.001 um=1e-6 km=1e3 in=0.0254 inch=0.0254 ft=0.3048"),
     **_sizes(LENGTH, "mil=2.54e-5 thou=2.54e-5"),
     **dict.fromkeys(("deg", "degree", "degrees", "\N{DEGREE SIGN}"), (CONSTANTS["deg"], ANGLE)),
-    **dict.fromkeys(("rev", "turn", "turns", "U", "r", "tr"), (_TURN, ANGLE)),
+    **dict.fromkeys(("rev", "turn", "turns", "U", "r", "tr"), (WHOLE_TURN, ANGLE)),
     **_sizes(ANGLE, "rad=1 mrad=0.001"),
-    **dict.fromkeys(("rpm", "RPM"), (_TURN / 60, dimension_of(angle=1, time=-1))),
+    **dict.fromkeys(("rpm", "RPM"), (WHOLE_TURN / 60, dimension_of(angle=1, time=-1))),
     **_sizes(TIME, "s=1 sec=1 ms=1e-3 us=1e-6 min=60 h=3600"),
     **_sizes(dimension_of(time=-1), "Hz=1 kHz=1000"),
     **_sizes(MASS, "kg=1 g=0.001 mg=1e-6 t=1000"),

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from jounce.errors import JounceError
-from jounce.plot.instants import nearest_instants
+from jounce.mechanism.time import nearest_instants
 from jounce.viewer.local_server import quiet_server, quiet_stop
 from jounce.viewer.overlay import Overlay
 from jounce.viewer.recording import Recording

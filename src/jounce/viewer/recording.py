@@ -12,7 +12,7 @@ from jaxtyping import Float
 from xarray import Dataset
 
 from jounce.kinematics import Motion
-from jounce.plot.instants import nearest_instants
+from jounce.mechanism.time import nearest_instants
 from jounce.viewer.appearance import Appearance, BodyPoint, Place
 
 __all__ = ["Load", "Parameter", "Quantity", "Recording", "Vectors", "poses", "rotated", "spatial_vectors"]

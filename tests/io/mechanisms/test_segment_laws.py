@@ -109,7 +109,7 @@ def test_samples_may_be_those_of_a_cam(tmp_path):
         ("by: lift", "by: 20 deg", "drivers.cam.motion.profile[1].by", "a length"),
         ("until: 0.5 s", "until: 0.5 m", "drivers.index.motion.piecewise[0].until", "a time"),
         ("until: 0.5 s, ", "", "drivers.index.motion.piecewise[0]", "expression and until"),
-        ("beyond: repeat", "beyond: again", "drivers.cam.motion.beyond", "no such way"),
+        ("beyond: repeat", "beyond: again", "drivers.cam.motion.beyond", "unknown way"),
     ],
 )
 def test_what_is_wrong_is_named_with_its_line(tmp_path, old, new, name, words):

@@ -116,7 +116,7 @@ def test_toml_and_json_are_read_too(read):
     [
         (
             "joints:\n  pim: {jerk: 1}",
-            "line 2, joints.pim: crane has no moving joint of this name; did you mean 'pin'? valid: pin, slide",
+            "line 2, joints.pim: no moving joint of crane has this name; did you mean 'pin'? valid: pin, slide",
         ),
         ("joints:\n  finger: {jerk: 1}", "line 2, joints.finger: this joint follows pin; give limits of that one"),
         ("joints: {plate: {jerk: 1}}", "line 1, joints.plate: this joint is fixed and has no limits; leave it out"),

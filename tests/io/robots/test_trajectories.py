@@ -199,6 +199,7 @@ def test_json_and_toml(tmp_path):
             r"line 4, time\.stop: stop must not come",
         ),
         ("parameters: {t: 1}\njoints: {a: t}\n" + GRID, r"parameters\.t: the name 't' is reserved"),
+        ("parameters: {if: 1}\njoints: {a: t}\n" + GRID, r"line 1, parameters\.if: the word 'if' cannot be a name"),
         ("parameters: {w: 1/0}\njoints: {a: t}\n" + GRID, r"parameters\.w: .*1 ?/ ?0"),
         ("parameters: {T: 2 s}\njoints: {a: T}\n" + GRID, r"joints\.a: must be an angle or a length, not a time"),
         (PICK.replace("to: {b: 2 m, a", "to: {b: 2 m, c"), "line 1, point_to_point.to: the joint 'a' is missing"),

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from jounce.errors import UNSET, ExpressionError, JounceError, MechanismFileError, did_you_mean
+from jounce.errors import UNSET, ExpressionError, JounceError, MechanismFileError, unknown
 from jounce.io.files.reading import named_file
 from jounce.trajectory.dimensions import Dimension
 from jounce.trajectory.units import Value, parse_value
@@ -54,8 +54,11 @@ class Source:
 
     def error(self, message: str, location: Location = (), **value: Any) -> JounceError:
         """Return an error that names the file, the line and the dotted name of an entry."""
-        name = dotted(location) or None
-        return self.error_type(message, path=self.path, line=self.line(location), name=name, **value)
+        return self.error_type(message, **self.place(location), **value)
+
+    def place(self, location: Location = ()) -> dict[str, Any]:
+        """Return where an entry stands, as errors take it: file, line and dotted name."""
+        return {"path": self.path, "line": self.line(location), "name": dotted(location) or None}
 
     def at(self, location: Location) -> Any:
         """Return what stands at a location, None where nothing does."""
@@ -71,7 +74,7 @@ class Source:
             raise self.error("must be a mapping with at least one entry", location, value=found)
         for key in found:
             if keys is not None and key not in keys:
-                raise self.error(f"unknown key; {did_you_mean(key, keys)}", (*location, key))
+                raise self.error(unknown("key", key, keys), (*location, key))
         return found
 
     def value(

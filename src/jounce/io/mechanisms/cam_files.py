@@ -10,7 +10,7 @@ from typing import Any
 
 from pydantic_core import PydanticCustomError
 
-from jounce.errors import JounceError, MechanismFileError, check_name, did_you_mean
+from jounce.errors import JounceError, MechanismFileError, check_choice, check_name, did_you_mean
 from jounce.io.files.assignments import assignments
 from jounce.io.files.located_data import Source
 from jounce.io.files.samples import rates, read_samples
@@ -21,7 +21,7 @@ from jounce.kinematics.cams.plate_cam import SENSES
 from jounce.mechanism.resolve import resolve_motion
 from jounce.trajectory import AbstractMotion, Expression, SplineMotion
 from jounce.trajectory.dimensions import Dimension
-from jounce.trajectory.expression import RESERVED
+from jounce.trajectory.expression import check_parameter_name
 
 KEYS = ("title", "parameters", "units", "cam", "follower", "law")
 CAM_KEYS = ("base_radius", "sense", "count")
@@ -86,8 +86,7 @@ class _CamFile:
             check_name("parameter", name, known, MechanismFileError, name="--set")
         for name, raw in known.items():
             at = ("parameters", name)
-            if not isinstance(name, str) or not name.isidentifier() or name in RESERVED:
-                raise source.error("this cannot be the name of a parameter", at)
+            check_parameter_name(name, source.error_type, **source.place(at))
             value = source.value(at, told.get(name, raw), "any", self.parameters, self.dimensions)
             if value.dimension is not None:
                 self.dimensions[name] = value.dimension
@@ -102,8 +101,7 @@ class _CamFile:
         body = self.source.mapping(("cam",), CAM_KEYS)
         base = self._length(("cam", "base_radius"), body)
         sense = body.get("sense", "counterclockwise")
-        if sense not in SENSES:
-            raise self.source.error(f"unknown sense; {did_you_mean(sense, SENSES)}", ("cam", "sense"), value=sense)
+        check_choice("sense", sense, SENSES, self.source.error_type, **self.source.place(("cam", "sense")))
         follower = self._follower()
         law = self._law("angle" if follower.turning else "length")
         title = self.data.get("title", "")

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from jounce.errors import UNSET, MechanismError, RobotError, did_you_mean, show_value
+from jounce.errors import UNSET, MechanismError, RobotError, show_value, unknown
 from jounce.io.mechanisms.values import (
     ANY_VALUE,
     Checked,
@@ -65,7 +65,7 @@ def _tensor(raw: object, info: Any) -> tuple[Any, ...]:
 def _pseudo(raw: dict[str, Any], size: int, info: Any) -> dict[str, Any]:
     for key in raw:
         if key != "pseudo":
-            raise problem(f"unknown key {show_value(key)}; valid: pseudo", key, value=UNSET)
+            raise problem(unknown(f"key {show_value(key)}", key, ("pseudo",)), key, value=UNSET)
     matrix = raw["pseudo"]
     if not isinstance(matrix, (list, tuple)) or len(matrix) != size:
         raise problem(f"must be {size} rows of {size}", "pseudo", value=matrix)
@@ -84,11 +84,11 @@ def _solid(raw: dict[str, Any], info: Any) -> dict[str, Any]:
     if kind is None:
         raise problem("is missing; give solid or pseudo", "solid", value=UNSET)
     if not isinstance(kind, str) or kind not in SOLIDS:
-        raise problem(f"unknown solid; {did_you_mean(kind, SOLIDS)}", "solid", value=kind)
+        raise problem(unknown("solid", kind, SOLIDS), "solid", value=kind)
     valid = _solid_keys(kind)
     for key in raw:
         if key not in valid:
-            raise problem(f"unknown key {show_value(key)}; {did_you_mean(key, valid)}", key, value=UNSET)
+            raise problem(unknown(f"key {show_value(key)}", key, valid), key, value=UNSET)
     for key in SOLIDS[kind].sizes:
         if key not in raw:
             raise problem("is missing", key, value=UNSET)

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from jounce.constraints import catalogue
-from jounce.dynamics.outputs import component_labels
-from jounce.errors import JounceError, MechanismFileError, did_you_mean
+from jounce.errors import JounceError, MechanismFileError, unknown
 from jounce.io.files.located_data import Location, Source
 from jounce.io.files.source import read_source
 from jounce.io.mechanisms.file_laws import FileLaws
@@ -89,7 +88,7 @@ def _space(source: Source) -> str:
         raise source.error("is missing; valid: planar, spatial", ("space",))
     space = source.data["space"]
     if not isinstance(space, str) or space not in POSITION_COMPONENTS:
-        raise source.error(f"unknown space; {did_you_mean(space, POSITION_COMPONENTS)}", ("space",), value=space)
+        raise source.error(unknown("space", space, POSITION_COMPONENTS), ("space",), value=space)
     return space
 
 
@@ -167,7 +166,7 @@ def _build(source: Source, space: str, model: dict[str, Any], places: _Places) -
     except JounceError as error:
         raise error.located(name="parameters") from None
     laws = FileLaws(source, {name: _plain(driver) for name, driver in model["drivers"].items()})
-    mechanism = Mechanism(
+    return Mechanism(
         space=space,
         bodies={name: _body(source, space, name, _plain(body), values) for name, body in model["bodies"].items()},
         **{kind: _elements(laws, space, kind, model[kind], places) for kind in (*ROLES, "outputs")},
@@ -180,8 +179,6 @@ def _build(source: Source, space: str, model: dict[str, Any], places: _Places) -
         assembly=model["assembly"],
         dimensions=model["dimensions"],
     )
-    _check_columns(source, mechanism)
-    return mechanism
 
 
 def _body(source: Source, space: str, name: str, given: dict[str, Any], parameters: dict[str, Any]) -> Body:
@@ -234,15 +231,6 @@ def _elements(laws: FileLaws, space: str, section: str, models: dict[str, Any], 
             error.name = f"{place}.{error.name}" if error.name else place
             raise
     return found
-
-
-def _check_columns(source: Source, mechanism: Mechanism) -> None:
-    """Refuse outputs whose columns in a table would have the same name: a point C and an angle C_x."""
-    for name in mechanism.outputs:
-        stem, _, component = name.rpartition("_")
-        output = mechanism.outputs.get(stem)
-        if output is not None and component in component_labels(mechanism, output):
-            raise source.error(f"this name is taken by a component of the output '{stem}'", ("outputs", name))
 
 
 def _check_values(mechanism: Mechanism) -> None:

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr
 from pydantic_core import PydanticCustomError
 
-from jounce.errors import UNSET, did_you_mean, no_such, show_value
+from jounce.errors import UNSET, no_such, show_value, unknown
 from jounce.io.files.samples import rates
 from jounce.io.mechanisms.segment_values import (
     LEADER_SCHEMA,
@@ -97,7 +97,7 @@ def motion(quantity: str, variables: dict[str, Dimension | None] | None = None) 
         form = next((key for key in FORMS if key in raw), None)
         valid = list(FORMS[form]) if form else sorted({key for keys in FORMS.values() for key in keys})
         for key in raw.keys() - set(valid):
-            raise problem(f"unknown key {show_value(key)}; {did_you_mean(key, valid)}", key, value=UNSET)
+            raise problem(unknown(f"key {show_value(key)}", key, valid), key, value=UNSET)
         if form == "profile":
             return segmented(raw, quantity, info)
         if form == "piecewise":
@@ -177,7 +177,7 @@ def _samples(raw: dict[str, Any], quantity: str, info: Any) -> Samples:
             raise problem(f"must be a whole number from {least} to {most}; {words}", key, value=value)
     derivative, initial, beyond = raw.get("derivative", 0), raw.get("initial", []), raw.get("beyond", WAYS[0])
     if beyond not in WAYS:
-        raise problem(f"no such way; {did_you_mean(beyond, WAYS)}", "beyond", value=beyond)
+        raise problem(unknown("way", beyond, WAYS), "beyond", value=beyond)
     if derivative and beyond == "repeat":
         raise problem("samples of a derivative cannot repeat; valid: refuse, hold", "beyond", value=beyond)
     if not isinstance(initial, list | tuple) or len(initial) > derivative:

@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, create_mo
 
 from jounce.constraints import catalogue
 from jounce.constraints.planar import COORDINATES
-from jounce.errors import no_such
+from jounce.errors import JounceError, MechanismFileError, no_such
 from jounce.io.mechanisms.inertia_forms import inertia
 from jounce.io.mechanisms.keys import HOLDERS, FileKey, file_keys, output_holder, output_tag, output_types
 from jounce.io.mechanisms.motion_values import laws, motion
@@ -29,17 +29,16 @@ from jounce.io.mechanisms.values import (
     vectors,
     wrenches,
 )
-from jounce.mechanism.mechanism import NEAREST, SIDES, names_column
+from jounce.mechanism.mechanism import NEAREST, SIDES, check_body_name, check_output_name
 from jounce.mechanism.system import POSITION_COMPONENTS
 from jounce.rigid.orientation import FRAMES
 from jounce.rigid.rotations import SEQUENCES
 from jounce.trajectory.dimensions import variables_of
-from jounce.trajectory.expression import RESERVED
+from jounce.trajectory.expression import PARAMETER_NAME, check_parameter_name
 
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]{0,99}")
 _CHOICES = {"coordinate": COORDINATES, "frame": FRAMES, "sequence": SEQUENCES}
 _Types = tuple[tuple[str, type[Any]], ...]
-_PARAMETER = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,99}")
 
 
 def _text(raw: object, _info: Any) -> str:
@@ -116,37 +115,25 @@ def _check_body(name: Any, info: Any, *at: int) -> str:
     return name
 
 
-def _named(item: Any, pattern: re.Pattern[str], check: Callable[[str], str | None] | None = None) -> Any:
-    """Return the annotation of a mapping of names to items."""
+def _check_file_name(name: object, error: type[JounceError]) -> None:
+    if not isinstance(name, str) or not _NAME.fullmatch(name):
+        raise error("a name is up to 100 letters, digits, _ and -")
 
-    def name_of(raw: object, _info: Any) -> str:
-        if not isinstance(raw, str) or not pattern.fullmatch(raw):
-            allowed = "_ and -" if pattern is _NAME else "_, not starting with a digit"
-            raise problem(f"a name is up to 100 letters, digits, {allowed}")
-        if check is not None and (message := check(raw)):
-            raise problem(message)
+
+def _named(item: Any, *checks: Callable[[Any, type[JounceError]], None], pattern: re.Pattern[str] | None = None) -> Any:
+    """Return the annotation of a mapping of names to items; names that files allow by default."""
+    whole = checks if pattern else (_check_file_name, *checks)
+
+    def name_of(raw: object, _info: Any) -> Any:
+        try:
+            for check in whole:
+                check(raw, MechanismFileError)
+        except JounceError as error:
+            raise problem(error.message) from None
         return raw
 
-    key = Annotated[str, Checked(name_of, {"type": "string", "pattern": f"^{pattern.pattern}$"})]
+    key = Annotated[str, Checked(name_of, {"type": "string", "pattern": f"^{(pattern or _NAME).pattern}$"})]
     return dict[key, item]
-
-
-def _body_name(name: str) -> str | None:
-    return "the body 'ground' always exists, give this one another name" if name == "ground" else None
-
-
-def _parameter_name(name: str) -> str | None:
-    import keyword
-
-    if name in RESERVED:
-        return f"the name '{name}' is reserved for expressions"
-    return f"the word '{name}' cannot be a name in expressions" if keyword.iskeyword(name) else None
-
-
-def _output_name(name: str) -> str | None:
-    if names_column(name):
-        return f"the name '{name}' is reserved for columns of the results"
-    return None
 
 
 def _model(name: str, doc: str | None, fields: dict[str, tuple[Any, Any]]) -> type[BaseModel]:
@@ -246,17 +233,17 @@ def _file_model(space: str, joints: _Types, drivers: _Types, forces: _Types) -> 
     time |= {"step": (scalar("time"), None), "count": (scalar("ratio"), None)}
     fields = {
         "space": (Literal[space], ...),
-        "bodies": (_named(_body_model(space), _NAME, _body_name), ...),
+        "bodies": (_named(_body_model(space), check_body_name), ...),
         "title": (Annotated[Any, Checked(_text, {"type": "string"})], ""),
         "units": (Annotated[Any, Checked(_units, UNITS)], {}),
         "assembly": (Annotated[Any, Checked(_assembly, ASSEMBLY)], None),
         "gravity": (vector(POSITION_COMPONENTS[space], "acceleration"), None),
-        "parameters": (_named(scalar("any"), _PARAMETER, _parameter_name), {}),
-        "joints": (_named(_constraint_union(space, "joint", joints), _NAME), {}),
-        "drivers": (_named(_constraint_union(space, "driver", drivers), _NAME), {}),
-        "forces": (_named(_constraint_union(space, "force", forces), _NAME), {}),
-        "initial": (_named(_constraint_union(space, "driver", drivers), _NAME), {}),
-        "outputs": (_named(_output_union(space), _NAME, _output_name), {}),
+        "parameters": (_named(scalar("any"), check_parameter_name, pattern=PARAMETER_NAME), {}),
+        "joints": (_named(_constraint_union(space, "joint", joints)), {}),
+        "drivers": (_named(_constraint_union(space, "driver", drivers)), {}),
+        "forces": (_named(_constraint_union(space, "force", forces)), {}),
+        "initial": (_named(_constraint_union(space, "driver", drivers)), {}),
+        "outputs": (_named(_output_union(space), check_output_name), {}),
         "redundant_reactions": (redundant_reactions(), "unique"),
         "time": (_model(f"{space}_time", "Instants from start to stop, by step or by count.", time), None),
     }

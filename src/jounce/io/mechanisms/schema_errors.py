@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from jounce.constraints import catalogue
-from jounce.errors import JounceError, did_you_mean, show_value
+from jounce.errors import JounceError, did_you_mean, no_such, show_value
 from jounce.io.files.located_data import Location, Source
 from jounce.io.mechanisms.keys import ROLES, file_keys, output_holder, output_types
 from jounce.io.mechanisms.schema import file_model, output_form
@@ -132,4 +132,4 @@ def _unknown_output(source: Source, space: str, at: Location, entry: dict[str, A
     if quantity is None:
         message = "give a point of one body, or a quantity"
         return source.error(f"{message}; {did_you_mean('', quantities)}", at, value=entry)
-    return source.error(f"no output has this quantity; {did_you_mean(quantity, quantities)}", place, value=quantity)
+    return source.error(no_such("output", quantity, quantities, "quantity"), place, value=quantity)

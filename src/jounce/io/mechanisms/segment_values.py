@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
-from jounce.errors import UNSET, TrajectoryError, did_you_mean, show_value
+from jounce.errors import UNSET, TrajectoryError, show_value, unknown
 from jounce.io.mechanisms.values import ANY_VALUE, defined, list_schema, object_schema, parse, problem, scalar_schema
 from jounce.trajectory import AbstractMotion, Expression, FollowingMotion, PiecewiseMotion, Segment, SegmentedMotion
 from jounce.trajectory.dimensions import Dimension, is_rate, per_power
@@ -65,7 +65,7 @@ def segmented(raw: dict[str, Any], quantity: str, info: Any) -> AbstractMotion |
     start = parse(raw.get("start", 0.0), lapse, info, "start").value
     beyond = raw.get("beyond", BEYOND[0])
     if beyond not in BEYOND:
-        raise problem(f"no such way; {did_you_mean(beyond, BEYOND)}", "beyond", value=beyond)
+        raise problem(unknown("way", beyond, BEYOND), "beyond", value=beyond)
     try:
         return led(SegmentedMotion(segments, initial, start, beyond), by)
     except TrajectoryError as error:
@@ -93,13 +93,11 @@ def _segment(entry: object, k: int, quantity: str, lapse: str, info: Any) -> Seg
     if not isinstance(entry, dict):
         raise problem("must be a segment, such as {profile: dwell, duration: 1 s}", "profile", k, value=entry)
     for key in entry.keys() - set(SEGMENT_KEYS):
-        words = f"unknown key {show_value(key)}; {did_you_mean(key, SEGMENT_KEYS)}"
+        words = unknown(f"key {show_value(key)}", key, SEGMENT_KEYS)
         raise problem(words, "profile", k, key, value=UNSET)
     profile = entry.get("profile")
     if not isinstance(profile, str) or profile not in SEGMENT_PROFILES:
-        words = (
-            f"no such profile; {did_you_mean(profile, SEGMENT_PROFILES)}" if isinstance(profile, str) else "is missing"
-        )
+        words = unknown("profile", profile, SEGMENT_PROFILES) if isinstance(profile, str) else "is missing"
         raise problem(words, "profile", k, "profile", value=UNSET if profile is None else profile)
     found: dict[str, Any] = {"profile": profile}
     for key, kind in (("duration", lapse), ("to", quantity), ("by", quantity)):

@@ -6,7 +6,7 @@ import dataclasses
 import re
 from collections.abc import Sequence
 
-from jounce.errors import TrajectoryError, did_you_mean
+from jounce.errors import TrajectoryError, check_name
 
 
 @dataclasses.dataclass(frozen=True)
@@ -79,8 +79,5 @@ def checked_format(name: str) -> str:
     TrajectoryError
         If there is none of this name.
     """
-    if name not in NAMES:
-        raise TrajectoryError(
-            f"no controller format has this name; {did_you_mean(name, NAMES)}", name="format", value=name
-        )
+    check_name("controller format", name, NAMES, TrajectoryError, name="format")
     return name

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from os import PathLike
 from typing import Any
 
-from jounce.errors import RobotError, did_you_mean
+from jounce.errors import RobotError, no_such
 from jounce.io.files.located_data import Location, Source
 from jounce.io.files.source import read_source
 from jounce.mechanism import Mechanism
@@ -160,7 +160,7 @@ class _DrivesFile:
         if joint is not None:
             return "this joint is fixed and has no drive; leave it out"
         title = self.system.name if isinstance(self.system, Robot) else self.system.title or "the mechanism"
-        return f"{title} has no {self.noun} of this name; {did_you_mean(name, self.turning)}"
+        return no_such(f"{self.noun} of {title}", name, self.turning)
 
 
 PER_ANGLE = dimension_of(length=1, angle=-1)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from jounce.errors import RobotError, did_you_mean, no_such
+from jounce.errors import RobotError, no_such
 from jounce.io.files.located_data import Location, Source
 from jounce.io.files.source import read_source
 from jounce.jet import Jet
@@ -269,7 +269,7 @@ class _LimitsFile:
             return f"this joint follows {joint.mimic.joint}; give limits of that one"
         if joint is not None:
             return "this joint is fixed and has no limits; leave it out"
-        return f"{self.robot.name} has no moving joint of this name; {did_you_mean(name, self.robot.joint_names)}"
+        return no_such(f"moving joint of {self.robot.name}", name, self.robot.joint_names)
 
 
 def _wrong_unit(dimension: Dimension) -> str:

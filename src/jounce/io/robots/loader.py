@@ -17,7 +17,7 @@ from jounce.io.robots.urdf import read_urdf
 from jounce.io.robots.xml_elements import Element, read_markup
 from jounce.robot.robot import Robot
 
-LOOKS = ("visual", "collision")
+SHAPES = ("visual", "collision")
 XACRO = "is a xacro file, from which a URDF has yet to be made; run: xacro FILE.urdf.xacro > FILE.urdf"
 
 
@@ -112,7 +112,7 @@ def _check_expanded(root: Element) -> None:
     used = [root]
     for child in root.children:
         if child.tag in ("link", "joint"):
-            used += [element for part in child.children if part.tag not in LOOKS for element in part.walk()]
+            used += [element for part in child.children if part.tag not in SHAPES for element in part.walk()]
         if child.tag in ("link", "joint") or child.tag.startswith("xacro:"):
             used.append(child)
     for element in used:

@@ -8,7 +8,7 @@ import math
 import numpy as np
 from jaxtyping import Float
 
-from jounce.errors import RobotError, did_you_mean, no_such
+from jounce.errors import RobotError, no_such
 from jounce.io.robots.sdf_poses import (
     MODEL,
     Frames,
@@ -35,7 +35,7 @@ DYNAMICS = ("damping", "friction", "spring_reference", "spring_stiffness")
 
 
 @dataclasses.dataclass(frozen=True)
-class JointAxis:
+class SdfAxis:
     """An axis of a joint: its tag in the file, its direction in the model, and what goes with it."""
 
     tag: str
@@ -54,7 +54,7 @@ class SdfJoint:
     parent: str
     child: str
     origin: Float[np.ndarray, "3"]
-    axes: tuple[JointAxis, ...]
+    axes: tuple[SdfAxis, ...]
     element: Element
 
     def reversed(self) -> SdfJoint:
@@ -73,7 +73,7 @@ def read_joint(name: str, element: Element, frames: Frames, version: tuple[int, 
         message = "a screw joint is no joint of a robot; convert the robot to a mechanism and add a screw there"
         raise element.error(message, *where, "type", value=kind)
     if kind not in valid:
-        raise element.error(f"no joint has this type; {did_you_mean(kind, valid)}", *where, "type", value=kind)
+        raise element.error(no_such("joint", kind, valid, "type"), *where, "type", value=kind)
     ends = []
     for role in ("parent", "child"):
         part = needed(element, role, *where)
@@ -86,7 +86,7 @@ def read_joint(name: str, element: Element, frames: Frames, version: tuple[int, 
     return SdfJoint(name, kind, ends[0], ends[1], origin.position, axes, element)
 
 
-def _axis(axis: Element, place: Place, frames: Frames, version: tuple[int, ...], *where: str) -> JointAxis:
+def _axis(axis: Element, place: Place, frames: Frames, version: tuple[int, ...], *where: str) -> SdfAxis:
     check_known(axis, AXIS, *where)
     xyz = only(axis, "xyz", *where)
     direction = np.array([0.0, 0.0, 1.0]) if xyz is None else vector_of(xyz, *where, "xyz")
@@ -106,7 +106,7 @@ def _axis(axis: Element, place: Place, frames: Frames, version: tuple[int, ...],
     for key, value in (("damping", damping), ("friction", friction)):
         if value < 0:
             raise (dynamics or axis).error("must be zero or greater", *where, "dynamics", key, value=value)
-    return JointAxis(axis.tag, rotation @ direction, _limits(limit, *where), damping, friction)
+    return SdfAxis(axis.tag, rotation @ direction, _limits(limit, *where), damping, friction)
 
 
 def _limits(limit: Element | None, *where: str) -> Limits:

@@ -28,7 +28,7 @@ from jounce.trajectory import (
     SplineMotion,
 )  # fmt: skip
 from jounce.trajectory.dimensions import TIME, Dimension, describe_dimension, is_rate, per_power
-from jounce.trajectory.expression import RESERVED
+from jounce.trajectory.expression import check_parameter_name
 from jounce.trajectory.trapezoid import LIMITS
 
 _DERIVATIVE = re.compile(r"_d[0-9]+$")
@@ -153,10 +153,7 @@ class _LawFile:
 
     def _add_parameter(self, name: str, raw: Any) -> None:
         at = ("parameters", name)
-        if not re.fullmatch(r"[A-Za-z_][A-Za-z_0-9]{0,99}", name):
-            raise self.source.error("a name of a parameter is letters, digits and _", at)
-        if name in RESERVED:
-            raise self.source.error(f"the name '{name}' is reserved for expressions", at)
+        check_parameter_name(name, self.source.error_type, **self.source.place(at))
         value = self.source.value(at, raw, "any", self.parameters, self.dimensions)
         if value.dimension is not None:
             self.dimensions[name] = value.dimension

@@ -171,7 +171,7 @@ def _check_joint(element: Element, name: str, links: dict[str, Element]) -> None
     element.check_children(JOINT_PARTS, *where)
     kind = element.text("type", *where, "type")
     if kind not in TYPES:
-        raise element.error(f"no joint has this type; {did_you_mean(kind, TYPES)}", *where, "type", value=kind)
+        raise element.error(no_such("joint", kind, TYPES, "type"), *where, "type", value=kind)
     for role in ("parent", "child"):
         part = _part(element, role, "", *where)
         link = part.text("link", *where, role)

@@ -14,9 +14,10 @@ import numpy as np
 
 from jounce.errors import MechanismError, TrajectoryError, check_choice, whole_number
 from jounce.jet import Jet, atan2, sqrt
+from jounce.jet.turns import WHOLE_TURN
 from jounce.kinematics.cams.followers import AbstractFollower, Follower, across, rotated, unit
 from jounce.kinematics.cams.results import Extreme, Geometry, Numbers1, Undercut
-from jounce.kinematics.cams.undercut import TURN, Cutter, runs
+from jounce.kinematics.cams.undercut import Cutter, runs
 from jounce.shapes import ArrayLike
 from jounce.trajectory import (
     AbstractMotion,
@@ -88,7 +89,7 @@ class PlateCam:
     @cached_property
     def continuity(self) -> Continuity:
         """To which derivative the law is continuous, over a turn of the cam and where the next one begins."""
-        return continuity(self.law, 0.0, TURN, periodic=True)
+        return continuity(self.law, 0.0, WHOLE_TURN, periodic=True)
 
     @cached_property
     def largest_pressure_angle(self) -> Extreme:
@@ -175,13 +176,13 @@ class PlateCam:
 
     def _extreme(self, size: Any, value: Any) -> Extreme:
         """Return the largest of a size, looked for nearer and nearer around the largest of the table."""
-        step = TURN / max(len(self.angle) - 1, 1)
+        step = WHOLE_TURN / max(len(self.angle) - 1, 1)
         best = float(self.angle[int(np.nanargmax(size(self.table)))])
         for _ in range(ROUNDS):
             near = best + step * np.linspace(-1, 1, POINTS)
             best = float(near[int(np.nanargmax(size(self.at(near))))])
             step *= 2 / (POINTS - 1)
-        return Extreme(float(value(self.at(best))[0]), float(best % TURN))
+        return Extreme(float(value(self.at(best))[0]), float(best % WHOLE_TURN))
 
 
 def plate_cam(
@@ -238,9 +239,10 @@ def plate_cam(
         raise MechanismError("must be a TranslatingFollower or an OscillatingFollower", name="follower", value=follower)
     check_choice("sense", sense, tuple(SENSES), MechanismError)
     count = whole_number("count", count, 16, MOST, error=TrajectoryError)
-    cam = PlateCam(law, follower, positive("base_radius", base_radius), sense, np.linspace(0.0, TURN, count), title)
-    law.check_instants(0.0, TURN)
-    if isinstance(law, SegmentedMotion) and law.beyond != "repeat" and law.lasts(TURN):
+    angle = np.linspace(0.0, WHOLE_TURN, count)
+    cam = PlateCam(law, follower, positive("base_radius", base_radius), sense, angle, title)
+    law.check_instants(0.0, WHOLE_TURN)
+    if isinstance(law, SegmentedMotion) and law.beyond != "repeat" and law.lasts(WHOLE_TURN):
         cam = dataclasses.replace(cam, law=law.repeated())
     _check(cam)
     return cam
@@ -250,7 +252,7 @@ def _check(cam: PlateCam) -> None:
     """Raise for a law that does not close, or that takes the follower where it cannot be."""
     if isinstance(cam.law, SplineMotion) and cam.law.beyond == "repeat":
         period = float(cam.law.stop) - float(np.asarray(cam.law.breakpoints)[0])
-        if abs(TURN / period - round(TURN / period)) > CLOSED * TURN / period:
+        if abs(WHOLE_TURN / period - round(WHOLE_TURN / period)) > CLOSED * WHOLE_TURN / period:
             message = f"has a period of {period:.9g} rad, which does not go into a turn of the cam"
             raise TrajectoryError(message, name="law", value=period)
     follower, start = cam.follower, cam.follower.start(cam.base_radius)

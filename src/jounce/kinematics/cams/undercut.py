@@ -6,10 +6,10 @@ from collections.abc import Callable
 import numpy as np
 from jaxtyping import Bool, Float
 
+from jounce.jet.turns import WHOLE_TURN
 from jounce.kinematics.cams.followers import AbstractFollower
 from jounce.kinematics.cams.results import Geometry, Numbers1, Undercut
 
-TURN = 2 * np.pi
 LOST = 1e-9  # of the size of the cam: less lift is lost to rounding only
 FINEST = 3601  # points of an undercut profile, at least
 CHUNK = 200  # positions of the follower that are compared with all points at a time
@@ -50,7 +50,7 @@ class Cutter:
             return table.lift  # an edge is as sharp as what it cuts
         points = self._left(angle, table)
         if points.shape[1] < len(angle) < FINEST:  # where branches cross is found to the spacing of the points
-            finer = np.linspace(0.0, TURN, FINEST)
+            finer = np.linspace(0.0, WHOLE_TURN, FINEST)
             points = self._left(finer, at(finer))
         turns, lift = self.sense * angle, np.full(len(angle), -np.inf)
         if points.shape[1]:
@@ -90,7 +90,7 @@ def runs(angle: Numbers1, lost: Numbers1, where: Bool[np.ndarray, " angle"]) -> 
     found, marks = [], where[:-1]  # the last angle is the first one
     if marks.all():
         worst = int(np.argmax(lost))
-        return [Undercut(0.0, TURN, float(angle[worst]), float(lost[worst]))]
+        return [Undercut(0.0, WHOLE_TURN, float(angle[worst]), float(lost[worst]))]
     first = int(np.argmin(marks))  # begin where nothing is lost
     order = np.roll(np.arange(len(marks)), -first)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], marks[order].astype(int), [0]])))

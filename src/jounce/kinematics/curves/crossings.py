@@ -12,6 +12,7 @@ from jaxtyping import Float
 
 from jounce.errors import SolveError
 from jounce.kinematics.curves.walker import Place, Walker, all_finite
+from jounce.kinematics.quadratic_forms import polarised
 from jounce.kinematics.status import Status
 
 PASSAGE_ORDER = 8  # of the series that leads through: rounding spoils higher coefficients near a singular place
@@ -149,7 +150,8 @@ def _tangents(
 ) -> tuple[Float[np.ndarray, "branch unknown"], bool]:
     """Return the directions of all branches that the second order allows, and whether it tells them apart."""
     rows = walker.left_null_space(place.jacobian, NEARLY_SINGULAR)
-    forms = _quadratic_forms(walker, place, null, rows)
+    # how combinations of rows that vanish see directions of the first order
+    forms = polarised(lambda along: rows.T @ walker.second_order(place, null @ along.T), null.shape[1])
     size = np.max(np.abs(forms), initial=0.0)
     known = null.T @ own
     if not size > VANISHING:
@@ -160,23 +162,6 @@ def _tangents(
     others = [null @ x for x in along]
     scaled = [x / np.linalg.norm(x[: walker.columns]) for x in others]
     return np.stack([own, *scaled]), decided
-
-
-def _quadratic_forms(
-    walker: Walker, place: Place, null: Float[np.ndarray, "unknown k"], rows: Float[np.ndarray, "row form"]
-) -> Float[np.ndarray, "form k k"]:
-    """Return the forms by which combinations of rows that vanish see directions of the first order."""
-    count = null.shape[1]
-    first, second = np.triu_indices(count)
-    sums = null[:, first] + np.where(first == second, 0.0, null[:, second])
-    halves = rows.T @ walker.second_order(place, sums)
-    forms = np.zeros((rows.shape[1], count, count))
-    forms[:, first, second] = forms[:, second, first] = halves
-    diagonal = forms[:, np.arange(count), np.arange(count)].copy()
-    for i, j in zip(first, second, strict=True):
-        if i != j:
-            forms[:, i, j] = forms[:, j, i] = 0.5 * (forms[:, i, j] - diagonal[:, i] - diagonal[:, j])
-    return forms
 
 
 def _common_zeros(forms: Float[np.ndarray, "form k k"]) -> tuple[list[np.ndarray], bool]:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from jounce.jet.turns import WHOLE_TURN, brought_near
 from jounce.mechanism import Mechanism, build
 from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.system import Group
@@ -118,8 +119,7 @@ def extremes(linkage: Linkage, low: float, high: float) -> tuple[tuple[float, fl
         low, high = linkage.offset - math.pi, linkage.offset + math.pi
     values = [low, high]
     for value in linkage.turning_values:
-        first = value + 2 * math.pi * math.ceil((low - value) / (2 * math.pi))
-        values += list(np.arange(first, high, 2 * math.pi))
+        values += list(np.arange(brought_near(value, low + math.pi), high, WHOLE_TURN))
     angles = [(linkage.transmission(value), value) for value in values]
     return min(angles), max(angles)
 

@@ -18,13 +18,17 @@ from jounce.papers.sommer_2024.comparison import STANDS_IN
 from jounce.papers.sommer_2024.measure import Results
 from jounce.plot.style import BLUE, GREEN, GREY, PURPLE, VERMILION
 
-LOOKS = {
+LINE_STYLES = {
     "velocity": {"color": BLUE, "marker": "o", "linestyle": "-"},
     "acceleration": {"color": VERMILION, "marker": "s", "linestyle": "--"},
     "jerk": {"color": GREEN, "marker": "^", "linestyle": "-."},
     "jounce": {"color": PURPLE, "marker": "D", "linestyle": ":"},
 }
-LOOKS |= {"simulation": LOOKS["velocity"], "second order": LOOKS["acceleration"], "fourth order": LOOKS["jerk"]}
+LINE_STYLES |= {
+    "simulation": LINE_STYLES["velocity"],
+    "second order": LINE_STYLES["acceleration"],
+    "fourth order": LINE_STYLES["jerk"],
+}
 METHODS = {
     "second order": "central differences of acceleration, order 2",
     "fourth order": "central differences of acceleration, order 4",
@@ -69,7 +73,7 @@ def tolerance_sweep(results: Mapping[str, Results], *, names: Sequence[str], num
     figure, axes = panels(1, len(names), (wide, 3.9), title, _note(names), sharex=True, sharey=True)
     for panel, name in zip(axes[0], names, strict=True):
         for k, quantity in enumerate(cases.QUANTITIES):
-            panel.loglog(cases.TOLERANCES, results[name].by_tolerance[:, k], label=quantity, **LOOKS[quantity])
+            panel.loglog(cases.TOLERANCES, results[name].by_tolerance[:, k], label=quantity, **LINE_STYLES[quantity])
         panel.loglog(
             cases.TOLERANCES, cases.TOLERANCES, color=GREY, linewidth=0.8, zorder=1, label="the tolerance itself"
         )
@@ -91,7 +95,7 @@ def step_sweep(results: Mapping[str, Results], *, names: Sequence[str], number: 
         for row, quantity in enumerate(("jerk", "jounce")):
             panel: Axes = axes[row, column]
             for method, label in METHODS.items():
-                panel.loglog(cases.STEPS, results[name].by_step[method][:, row], label=label, **LOOKS[method])
+                panel.loglog(cases.STEPS, results[name].by_step[method][:, row], label=label, **LINE_STYLES[method])
             panel.set_title(f"{cases.VALIDATION_CASES[name].title}: {quantity}")
             _decades(panel.yaxis, 2)
     for panel in axes[-1]:
@@ -111,8 +115,10 @@ def phase_lag(results: Mapping[str, Results], *, name: str, step: float) -> Figu
     chosen = [lag for lag in results[name].lags if lag.step == step]
     for panel, lag in zip(axes[:, 0], chosen, strict=True):
         panel.plot(lag.time, lag.explicit, color=GREY, linewidth=1.0, label="explicit solution")
-        panel.plot(lag.time, lag.simulated, **LOOKS["simulation"] | {"linestyle": ""}, label="jounce")
-        panel.plot(lag.time, lag.difference, **LOOKS["second order"], label="backward differences of acceleration")
+        panel.plot(lag.time, lag.simulated, **LINE_STYLES["simulation"] | {"linestyle": ""}, label="jounce")
+        panel.plot(
+            lag.time, lag.difference, **LINE_STYLES["second order"], label="backward differences of acceleration"
+        )
         panel.set_ylabel(f"{lag.quantity} / ({RATE_UNITS[lag.quantity]})")
         panel.set_title(
             f"{lag.quantity}: late by {1e3 * lag.late(lag.difference):.4g} ms,"

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from jounce.errors import RobotError, did_you_mean
+from jounce.errors import RobotError, check_name
 from jounce.rigid.inertia import finite_numbers
 
 POSITIVE = ("stiffness", "lead", "deflection_limit", "torque_limit", "velocity_limit")
@@ -172,9 +172,7 @@ class DriveArrays:
                 "must be a mapping of names to jn.Drive, as jn.load_drives gives it", name="drives", value=drives
             )
         for name, drive in drives.items():
-            if name not in names:
-                message = f"there is no {kind} of this name; {did_you_mean(str(name), names)}"
-                raise RobotError(message, name="drives", value=name)
+            check_name(kind, name, names, RobotError, name="drives")
             if not isinstance(drive, Drive):
                 raise RobotError("must be a jn.Drive", name=f"drives.{name}", value=drive)
             if drive.lead is not None and turning[names.index(name)]:

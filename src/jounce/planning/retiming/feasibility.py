@@ -6,14 +6,14 @@ from jaxtyping import Float
 from jounce.errors import TrajectoryError
 from jounce.planning.retiming.quantities import G, Labels, PathQuantities, Source
 
-LOOKS = 1001  # places on the path
+PLACES = 1001  # places on the path
 STATIC = 1e-6  # of a limit, which what stands still must leave
 IDLE = 1e-9  # of its largest value: what moves by less does not move
 
 
 def check_possible(source: Source, labels: Labels, start: float, stop: float, *, bounded: bool = False) -> None:
     """Raise TrajectoryError where standing still breaks a limit, or nothing that has one moves."""
-    s = np.linspace(start, stop, LOOKS)
+    s = np.linspace(start, stop, PLACES)
     found = source(s)
     still = found.second[:, :, G]
     spare = np.minimum(_spare(found.upper, still), _spare(-found.lower, -still))
@@ -47,7 +47,7 @@ def _spare(bound: np.ndarray, still: np.ndarray) -> np.ndarray:
 
 def bounded_everywhere(source: Source, start: float, stop: float) -> bool:
     """Tell whether on the whole path something moves whose velocity, acceleration or force has a limit."""
-    return bool((_moving(source(np.linspace(start, stop, LOOKS)), rates=False) >= IDLE).all())
+    return bool((_moving(source(np.linspace(start, stop, PLACES)), rates=False) >= IDLE).all())
 
 
 def _moving(found: PathQuantities, *, rates: bool) -> Float[np.ndarray, " point"]:

@@ -18,10 +18,10 @@ from jounce.trajectory.knots import knot_jumps
 from jounce.trajectory.seen_jumps import level_sizes, unexplained
 
 DEGREE = 5  # of the splines through waypoints
-LOOKS = 2000  # cells in which kinks are looked for
+KINK_CELLS = 2000  # cells in which kinks are looked for
 CELLS = (160, 320, 640, 1280)  # of the spline of a time law
-LOOKS_IN_CELL = 4
-FINEST = 4 * LOOKS_IN_CELL * CELLS[-1]  # places at which a path is looked at
+PLACES_IN_CELL = 4
+FINEST = 4 * PLACES_IN_CELL * CELLS[-1]  # places at which a path is looked at
 RESOLVED = 0.05  # of the range of a derivative: what straight lines between looks may miss
 SLIGHT = 1e-3  # of what the length of the path makes of it: a derivative this small does not matter
 ENDS = 0.02  # of a path
@@ -123,7 +123,7 @@ def checked(path: Path, order: int = 1) -> Path:
         for instant, jumped in _jumps(law, order):
             if path.start < instant < path.stop and np.any(jumped):
                 raise _kink(instant, int(np.argmax(jumped != 0)), name)
-    s = np.linspace(path.start, path.stop, LOOKS + 1)
+    s = np.linspace(path.start, path.stop, KINK_CELLS + 1)
     values = path.derivatives(s, order + 1)
     bad = np.argwhere(~np.isfinite(values))
     if len(bad):
@@ -160,7 +160,7 @@ def cells_needed(path: Path, order: int) -> int:
     size = np.ptp(curves[inside], axis=0).max() + SLIGHT * scale
     at, joint, step = 0, 0, 1
     for cells in CELLS:
-        step = FINEST // (cells * LOOKS_IN_CELL)
+        step = FINEST // (cells * PLACES_IN_CELL)
         ends = curves[::step]
         off = np.abs(curves[step // 2 :: step] - (ends[1:] + ends[:-1]) / 2) / size
         off[: int(ENDS * len(off))] = off[int((1 - ENDS) * len(off)) :] = 0.0  # cells are narrow at the ends

@@ -21,7 +21,7 @@ from jounce.trajectory import AbstractMotion, FollowingMotion, JointTrajectory, 
 STILL = 1e-3  # of the largest speed: a trajectory that is slower than this at its ends stands still there
 RESTING = 1e-5  # of the largest speed: what is slower within stands still
 SLOW = 0.2  # of the largest speed: where the lowest speed is sought closely
-LOOKS = 4000  # intervals in which a trajectory is looked at to begin with
+INTERVALS = 4000  # intervals in which a trajectory is looked at to begin with
 ZOOM, ZOOMS = 9, 20  # instants about each lowest speed, and how often they are laid closer
 NODES = (250, 500, 1000, 2000)  # of the splines along the whole path; more where fewer do not come near
 PART = 24  # of them at least between two stops
@@ -157,7 +157,7 @@ def path_of_trajectory(trajectory: JointTrajectory, order: int) -> Path:
 def _instants(path: Path, own: np.ndarray) -> Float[np.ndarray, " time"]:
     """Return many instants, and all at which pieces of laws meet."""
     knots = [np.asarray(law.breakpoints) for law in path.laws.values() if isinstance(law, SplineMotion)]
-    every = np.concatenate([np.linspace(path.start, path.stop, LOOKS + 1), own, *knots])
+    every = np.concatenate([np.linspace(path.start, path.stop, INTERVALS + 1), own, *knots])
     found = np.unique(every[(every >= path.start) & (every <= path.stop)])
     apart = np.diff(found, append=np.inf) > 1e-12 * (path.stop - path.start)
     return found[apart]

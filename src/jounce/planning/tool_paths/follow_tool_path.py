@@ -11,7 +11,7 @@ from jounce.kinematics import Status
 from jounce.planning.tool_paths.inverse_kinematics import coordinate_scale, joint_ranges, middle, poses_within
 from jounce.planning.tool_paths.path_equations import PathEquations
 from jounce.planning.tool_paths.path_marching import Nodes, followed
-from jounce.planning.tool_paths.task_rank import LOOKS, random_coordinates, reachable_rows, task_columns
+from jounce.planning.tool_paths.task_rank import CONFIGURATIONS, random_coordinates, reachable_rows, task_columns
 from jounce.planning.tool_paths.tool_path import ToolPath
 from jounce.planning.tool_paths.tool_path_motion import ToolPathMotion
 from jounce.planning.tool_paths.tool_tasks import tool_of
@@ -114,7 +114,7 @@ def follow_tool_path(
     if (weight <= 0).any():
         raise RobotError("must be greater than zero", name="weights", value=weight.tolist())
     kinds = tuple(kind for kind in ("position", "rotation", "direction") if kind in path.kinds)
-    columns = task_columns(robot, tool, random_coordinates(*ranges, scale, LOOKS, 0), kinds, scale)
+    columns = task_columns(robot, tool, random_coordinates(*ranges, scale, CONFIGURATIONS, 0), kinds, scale)
     if held:
         units = np.broadcast_to(np.eye(n)[list(held)], (len(columns), len(held), n))
         columns = np.concatenate([columns, units], axis=1)

@@ -9,7 +9,13 @@ from jounce.errors import RobotError
 from jounce.kinematics import Status
 from jounce.planning.tool_paths.joint_poses import JointPoses
 from jounce.planning.tool_paths.pose_solver import solve_poses
-from jounce.planning.tool_paths.task_rank import LOOKS, SINGULAR, random_coordinates, reachable_rows, task_columns
+from jounce.planning.tool_paths.task_rank import (
+    CONFIGURATIONS,
+    SINGULAR,
+    random_coordinates,
+    reachable_rows,
+    task_columns,
+)
 from jounce.planning.tool_paths.tool_tasks import Tool, rotation_matrices, tool_of, unit_vectors
 from jounce.robot.abstract_robot import AbstractRobot
 from jounce.robot.arguments import checked_position, floats, whole_number
@@ -122,7 +128,8 @@ def inverse_kinematics(
     begin = np.broadcast_to(begin, (*lead, n)).reshape(count, n)
     goal = {kind: np.broadcast_to(x, (*lead, *WIDTHS[kind])).reshape(count, *WIDTHS[kind]) for kind, x in goal.items()}
     found = poses_within(robot, tool, goal, (lower, upper, scale), begin, starts, within, most_steps, seed)
-    basis = task_columns(robot, tool, random_coordinates(lower, upper, scale, LOOKS, seed), tuple(goal), scale)
+    anywhere = random_coordinates(lower, upper, scale, CONFIGURATIONS, seed)
+    basis = task_columns(robot, tool, anywhere, tuple(goal), scale)
     return _result(robot, link, point, found, goal, lead, within, (lower, upper, scale), reachable_rows(basis)[1], tool)
 
 

@@ -10,7 +10,7 @@ from jounce.errors import TrajectoryError
 from jounce.trajectory import HermiteMotion
 from jounce.trajectory.motion import SplineMotion
 
-LOOKS = np.array([0.04, 0.15, 0.29, 0.43, 0.57, 0.71, 0.85, 0.96])  # in an interval, where laws are compared
+SHARES = np.array([0.04, 0.15, 0.29, 0.43, 0.57, 0.71, 0.85, 0.96])  # in an interval, where laws are compared
 NEAR = 1e-9  # rad or m, or of the largest coordinate: what laws may miss
 SHORT = 2.0**-17  # of the time: where an interval would have to be shorter, a kink is sought in it
 SIDE = 1e-9  # of the time: how far from a kink its sides are looked at
@@ -146,8 +146,8 @@ def _missed(
     """Return how far laws are from the motion in some of the intervals, and where they are."""
     chosen = np.flatnonzero(open_)
     steps = times[chosen + 1] - times[chosen]
-    looks = times[chosen, None] + LOOKS * steps[:, None]
-    wanted = exact(looks.reshape(-1))[:, 0].reshape(len(chosen), len(LOOKS), -1)
+    looks = times[chosen, None] + SHARES * steps[:, None]
+    wanted = exact(looks.reshape(-1))[:, 0].reshape(len(chosen), len(SHARES), -1)
     found = [_within(HermiteMotion(times, column), looks) for column in np.moveaxis(q, -1, 0)]
     missed = np.abs(np.stack(found, axis=-1) - wanted).max(axis=2)
     worst = np.argmax(missed, axis=1)[:, None]
@@ -178,7 +178,7 @@ def _kink(exact: Callable[[_Times], _Motion], ends: Float[np.ndarray, " 2"], q: 
         left, right = _shifted(q[:1], at - ends[0])[0], _shifted(q[1:], at - ends[1])[0]
         slope = right[1, joint] - left[1, joint]
         at = float(np.clip(at - (right[0, joint] - left[0, joint]) / slope, *ends)) if slope else at
-    looks = np.sort(np.append(ends[0] + LOOKS * (ends[1] - ends[0]), at))
+    looks = np.sort(np.append(ends[0] + SHARES * (ends[1] - ends[0]), at))
     left, right = (
         np.concatenate([_shifted(q[k : k + 1], float(by))[:, 0] for by in looks - ends[k]]) for k in range(2)
     )

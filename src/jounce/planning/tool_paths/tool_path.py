@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 XYZ = ("x", "y", "z")
 ANGLES = ("angle_1", "angle_2", "angle_3")
-LOOKS, POINTS, ROUNDS = 1025, 9, 9  # at a law of progress: over the time, around its extremes, and how often
+INSTANTS, POINTS, ROUNDS = 1025, 9, 9  # at a law of progress: over the time, around its extremes, and how often
 ROUNDING = 1e-9  # of what a law of progress goes through
 
 
@@ -259,10 +259,10 @@ def _reach(progress: JointTrajectory) -> tuple[float, float]:
         values = progress.derivatives(times, 0)[:, 0, 0]
         return np.stack([-values, values], axis=-1)
 
-    grid = np.linspace(progress.start, progress.stop, LOOKS)
+    grid = np.linspace(progress.start, progress.stop, INSTANTS)
     measures = both(grid)
     peaks, found = local_maxima(measures), measures.max(axis=0)
-    low, high = grid[np.maximum(peaks - 1, 0)], grid[np.minimum(peaks + 1, LOOKS - 1)]
+    low, high = grid[np.maximum(peaks - 1, 0)], grid[np.minimum(peaks + 1, INSTANTS - 1)]
     for _ in range(ROUNDS):
         near = np.linspace(low, high, POINTS)
         there = both(near.ravel()).reshape(*near.shape, 2)[:, :, [0, 1], [0, 1]]
