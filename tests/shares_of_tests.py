@@ -1,6 +1,6 @@
 """Which of the collected tests run: dear examples of docstrings are slow tests, of which a run may take a share.
 
-The slow tests take forty minutes, nine tenths of it in JAX and XLA, which compile each mechanism anew. A check before
+The slow tests take half an hour, nine tenths of it in JAX and XLA, which compile each mechanism anew. A check before
 each submission has not that long: it runs one share of them, by turns, and whoever changes what they test runs all.
 """
 
@@ -12,10 +12,12 @@ SLOW_EXAMPLES = frozenset(
     """
     jounce.design.optimise.optimise
     jounce.design.tolerance.tolerance
+    jounce.dynamics.reactions.applied_force
     jounce.integrate.batch.simulate_batch
     jounce.integrate.diffrax_term.ode_term
     jounce.integrate.simulate.simulate
     jounce.io.results.write_parts
+    jounce.kinematics.cams.plate_cam.plate_cam
     jounce.kinematics.curves.assemblies.assemblies
     jounce.kinematics.curves.limits.LimitPosition
     jounce.kinematics.families.solve_batch
@@ -23,13 +25,15 @@ SLOW_EXAMPLES = frozenset(
     jounce.planning.tool_paths.follow_tool_path.follow_tool_path
     jounce.plot.bands.draw_bands
     jounce.plot.forces.draw_power
+    jounce.robot.abstract_robot.AbstractRobot.with_inertia
     jounce.robot.closed_loop.mechanism
     jounce.sweeps.sweep.sweep
     jounce.trajectory.composed.OutputMotion
     jounce.viewer.cams.cam_mechanism
+    jounce.viewer.slopes.peak_slopes
     """.split()
 )
-"""Docstrings whose examples take more than two seconds, most of them to compile."""
+"""Docstrings whose examples take more than a second and a half, most of them to compile."""
 
 
 def share(text):

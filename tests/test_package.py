@@ -5,6 +5,7 @@ import pathlib
 import subprocess
 import sys
 
+import jaxtyping
 import pytest
 
 import jounce
@@ -89,3 +90,10 @@ def test_rooms_do_not_import_one_another_through_the_package():
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
             if isinstance(node, ast.ImportFrom) and node.module == "jounce":
                 assert {alias.name for alias in node.names} <= {"__version__", "errors"}, file
+
+
+def test_annotations_are_checked_while_quick_tests_run():
+    if jaxtyping.config.jaxtyping_disable:
+        pytest.skip("JAXTYPING_DISABLE is set, as for the slow tests")
+    with pytest.raises(TypeError, match="order"):
+        jounce.Jet.variable(0.0, order="two")

@@ -27,6 +27,7 @@ def slow(*values):
     return pytest.param(*values, marks=pytest.mark.slow)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size, turn", [slow(1.0, 0.0), (1e-3, 0.7), slow(1e3, -1.1)])
 def test_sprung_four_bar_swings_as_its_lagrange_equation_in_mpmath(size, turn):
     small = jn.linearise(sprung_four_bar(size, turn))

@@ -71,6 +71,7 @@ def test_rates_are_those_of_differenced_multipliers_at_the_order_of_the_differen
     np.testing.assert_allclose(order, 2.0, atol=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["slider_crank", pytest.param("rspu_slide", marks=pytest.mark.slow)])
 def test_a_joint_does_to_one_body_the_opposite_of_what_it_does_to_the_other(name):
     mechanism = massed_example(name)

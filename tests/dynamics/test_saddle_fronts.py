@@ -54,6 +54,7 @@ def through_fronts(equations, state, right):
     return equations.matrix(state, CLOCK), inverse.solve(right), *responses
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
     ["free_four_bar", "gear_pair", pytest.param("spatial_double_pendulum", marks=pytest.mark.slow), "chain", "tree"],

@@ -34,6 +34,7 @@ def test_without_a_condition_the_guess_is_kept_and_the_body_rests():
     assert np.allclose([*state.spin.ravel(), *state.velocity.ravel()], 0.0, atol=1e-14)
 
 
+@pytest.mark.slow
 def test_velocities_left_open_are_those_of_least_kinetic_energy():
     # a double rod: only the tip's vertical speed is told; minimise 1/2 v^T M v by hand over the two rates
     rods = jn.Mechanism(

@@ -55,6 +55,7 @@ def test_what_begins_at_the_value_does_not_cross_it():
     assert happened(height(0.0, derivative=1), mechanism=stone(speed=0.0)) == [[]]
 
 
+@pytest.mark.slow
 def test_what_touches_the_value_and_turns_back_does_not_cross_it():
     assert happened(height(1.25), height(1.25 - 1e-9), height(1.25 + 1e-9)) == [
         [],

@@ -37,6 +37,7 @@ def twin_slider_cranks(law="6*t"):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [31, 301])
 def test_two_loops_that_miss_their_dead_points_together(count):
     """The determinant of the whole would change its sign twice at once, if both went over to the other branch."""
@@ -202,6 +203,7 @@ def excursion(law):
     return dataclasses.replace(crank_rocker, drivers={"theta": driver}, time=[0.0, 2.0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", EXCURSIONS)
 def test_a_motion_that_begins_at_rest_and_comes_back_is_not_stepped_over(law):
     """Between two instants of the same position lies one that cannot be reached; the series of the law is zero."""

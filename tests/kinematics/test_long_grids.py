@@ -34,6 +34,7 @@ def test_stretches_make_one_motion(short_stretches):
     assert told[-1] == (2501, 2501)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("keep", [None, True, False])
 def test_points_are_there_whether_bodies_were_kept_or_not(short_stretches, keep):
     motion = jn.solve(four_bar(), TIME, order=2, keep=keep)

@@ -26,6 +26,7 @@ def test_coarse_grid_follows_the_motion_over_turns():
     np.testing.assert_allclose(motion.outputs["x"][:, 0, 0], slider_position(time), rtol=1e-14)
 
 
+@pytest.mark.slow
 def test_fifty_turns_with_three_instants_after_the_first():
     time = np.array([0.0, 1 / 3, 2 / 3, 1.0])
     motion = jn.solve(crank(law(rate=50 * TURN)), time, order=2)

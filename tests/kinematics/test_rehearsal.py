@@ -39,6 +39,7 @@ def compiled_later(monkeypatch):
     return lambda: {name for name, count in compilations().items() if count > before[name]}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["press", pytest.param("sarrus", marks=pytest.mark.slow)])
 def test_forces_of_a_motion_are_rehearsed(name, compiled_later):
     motion = jn.solve(jn.load(f"examples/{name}.yaml"), order=1)

@@ -36,6 +36,7 @@ def rates_of(way):
     return turns / turns[np.argmax(np.abs(turns))]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [0, 3])
 def test_limit_positions_of_random_four_bars(number):
     verdict = limit_study.judged(limit_study.random_linkage("four-bar", 7, number))

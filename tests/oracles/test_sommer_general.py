@@ -109,6 +109,7 @@ def test_general_equations_with_mixed_derivatives(rheonomic):
         assert D(rate) - right == pytest.approx(float(derivative(0.0)), rel=1e-11)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_simplified_equations_give_revolute_and_spherical(seed):
     i, j, s_i, s_j, _, q, rates = planar_state(seed)

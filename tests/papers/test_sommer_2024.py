@@ -198,6 +198,7 @@ def test_comparison_says_what_is_chosen_before_any_number(small_run):
     assert "NOT reproduced" not in text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("figure", [2, 3, 4, 5])
 def test_each_figure_has_a_verdict_that_the_numbers_decide(small_run, figure):
     result = small_run[3]
@@ -235,6 +236,7 @@ def plain_newton_raphson(tolerance, unit):
     return np.array(found)
 
 
+@pytest.mark.slow
 def test_the_floor_of_the_paper_is_that_of_residuals_in_centimetres(small_run):
     """Figure 4 has its floor at tolerances below 1e-11: so has the iteration on residuals in cm, not that in m."""
     right = small_run[3].cycle.explicit[:, 0]
@@ -247,6 +249,7 @@ def test_the_floor_of_the_paper_is_that_of_residuals_in_centimetres(small_run):
     assert error(1e-14, 1.0) > 1e-15
 
 
+@pytest.mark.slow
 def test_errors_fall_with_the_tolerance_until_the_floor(small_run):
     errors = small_run[3].by_tolerance
     assert errors.shape == (len(TOLERANCES), 4)
@@ -256,11 +259,13 @@ def test_errors_fall_with_the_tolerance_until_the_floor(small_run):
     assert (errors[-1] > 1e-7).all()
 
 
+@pytest.mark.slow
 def test_jerk_and_jounce_are_as_precise_as_velocity_and_acceleration(small_run):
     errors = small_run[3].by_tolerance
     assert (errors.max(axis=1) < 10 * errors.min(axis=1)).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method, order", [("second order", 2), ("fourth order", 4)])
 def test_differences_converge_at_their_order(small_run, method, order):
     steps, errors = np.array(STEPS), small_run[3].by_step[method]
@@ -269,12 +274,14 @@ def test_differences_converge_at_their_order(small_run, method, order):
     np.testing.assert_allclose(slopes, order, atol=0.05)
 
 
+@pytest.mark.slow
 def test_the_simulation_does_not_depend_on_the_time_step(small_run):
     by_step = small_run[3].by_step
     assert (by_step["simulation"] <= FLOOR).all()
     assert all((by_step["simulation"] < 1e-3 * by_step[method]).all() for method in ("second order", "fourth order"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("quantity, steps_late", [("jerk", 0.5), ("jounce", 1.0)])
 def test_backward_differences_are_late_by_half_a_step_and_by_a_step(small_run, quantity, steps_late):
     lags = [lag for lag in small_run[3].lags if lag.quantity == quantity]

@@ -63,6 +63,7 @@ def test_attitude_at_the_samples_is_the_sampled_one():
     np.testing.assert_allclose(np.moveaxis(found, -1, 0), Rotation.from_euler("ZYX", angles(t)).as_matrix(), atol=1e-14)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("frame", ["global", "body"])
 def test_angular_velocity_and_derivatives_approach_the_truth(frame):
     bounds = [2e-9, 4e-7, 3e-5, 3e-3]  # measured 4e-10, 9e-8, 7e-6, 6e-4

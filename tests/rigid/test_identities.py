@@ -90,6 +90,7 @@ def test_equations_052_and_054_rate_of_the_slope_of_position(seed):
         close(case.dr[m + s, :, m] / math.comb(m + s, m), case.columns[s])
 
 
+@pytest.mark.slow
 @SEEDS
 def test_equation_053_fails_for_rotations_and_what_holds_instead(seed):
     """Axes of rotation do not commute: the printed rate lacks the vector product of the axis and w."""

@@ -333,6 +333,7 @@ def test_bad_closures(settings, says):
     assert str(caught.value).startswith(says)
 
 
+@pytest.mark.slow
 def test_coordinates_of_joints_whose_names_columns_have():
     names = ("time", "time_", "a_d1")
     links = [jn.Link("base"), *(jn.Link(f"link {k}", ROD) for k in range(3))]

@@ -80,6 +80,7 @@ def test_a_design_that_fails_has_a_status_and_no_statistics(done):
     assert ((status != 0).sum(axis=1) == found["failed_instants"].values).all()
 
 
+@pytest.mark.slow
 def test_it_opens_lazily_and_says_what_it_is(done):
     folder, _ = done
     found = xarray.open_zarr(folder)
@@ -158,6 +159,7 @@ def test_a_folder_that_is_no_sweep_stays_as_it_is(tmp_path):
     assert [x.name for x in tmp_path.iterdir()] == ["mine.zarr"]
 
 
+@pytest.mark.slow
 def test_two_processes_do_not_write_the_same_sweep(done):
     import fcntl
 

@@ -23,6 +23,7 @@ def along(*laws, order=4):
     return gantry, path, jn.follow_tool_path(gantry, "c", path, order=order).trajectory()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "laws, kink",
     [
@@ -49,6 +50,7 @@ def test_a_corner_is_kept_and_its_velocities_jump(laws, kink):
     assert jumps[1][broken] == pytest.approx([after - before], abs=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("order", [0, pytest.param(4, marks=pytest.mark.slow)])
 def test_a_spike_between_instants_is_followed(order):
     _, path, laws = along("0.5*t + 0.3*exp(-((t - 0.9871)/0.002)**2)", "t", 0.0, order=order)
