@@ -25,7 +25,6 @@ SLOW_EXAMPLES = frozenset(
     jounce.planning.tool_paths.follow_tool_path.follow_tool_path
     jounce.plot.bands.draw_bands
     jounce.plot.forces.draw_power
-    jounce.robot.abstract_robot.AbstractRobot.with_inertia
     jounce.robot.closed_loop.mechanism
     jounce.sweeps.sweep.sweep
     jounce.trajectory.composed.OutputMotion
