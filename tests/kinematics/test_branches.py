@@ -42,6 +42,7 @@ def test_slider_crank_that_misses_its_dead_point_by_three_hundredths(order, inst
     np.testing.assert_allclose(motion.outputs["B"][:, 0, 0], expected, rtol=0, atol=1e-11)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("instants", GRIDS)
 @pytest.mark.parametrize("order", ORDERS)
 def test_four_bar_that_cannot_pass_its_dead_point(order, instants):
@@ -65,6 +66,7 @@ def test_four_bar_that_cannot_pass_its_dead_point(order, instants):
     assert np.isnan(found[~reached]).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", [SLIDER_CRANK, FOUR_BAR], ids=["slider-crank", "four-bar"])
 def test_random_linkages_are_followed_as_far_as_they_go_and_no_further(family):
     total = Counter()

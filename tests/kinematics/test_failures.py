@@ -64,6 +64,7 @@ def test_slider_driven_to_its_dead_centre_is_singular():
     assert not error.motion.status[:4].any()
 
 
+@pytest.mark.slow
 def test_slider_driven_beyond_its_reach():
     time = np.linspace(0, 4, 9)
     motion = jn.solve(slider_crank("3.52 + 0.2*t"), time, strict=False)
@@ -102,6 +103,7 @@ def test_change_point_of_a_parallelogram_is_passed_on_the_same_branch():
     np.testing.assert_allclose(motion.outputs["psi"], np.stack([time, np.ones(15)], axis=1), rtol=1e-11)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("beyond", [-1e-11, 0.0, 1e-9, 1e-8])
 def test_a_motion_that_ends_at_a_change_point_has_no_derivatives_there(beyond):
     """Stretched out: whether it goes on as a parallelogram cannot be seen, and rounding decides all rates."""
@@ -111,6 +113,7 @@ def test_a_motion_that_ends_at_a_change_point_has_no_derivatives_there(beyond):
     assert list(error.motion.status) == [Status.OK, Status.OK, Status.SINGULAR]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("time", [[0.0, 0.5, 1.0, 1.5], [0.0, 0.3, 0.7, 1.1]])
 def test_distance_driver_that_reaches_zero(time):
     error = failure(distance_slider("0.5 - 0.5*t"), time)
@@ -189,6 +192,7 @@ def test_degrees_of_freedom_are_explained(bodies, joints, drivers, message):
         jn.solve(mechanism, [0.0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "law, stop, count, end, status",
     [

@@ -56,6 +56,7 @@ def assembled(name):
 
 
 # from some of these guesses a hinge was put together turned over before, and from others nothing was
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
     [

@@ -30,6 +30,7 @@ def test_results_are_the_same_in_all_sizes(torque, count):
     np.testing.assert_allclose(found, torque[:count], rtol=0, atol=1e-14 * np.abs(torque).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lead", [(), (3,), (2, 3), (0,), (2, 0), (1, 1, 2)])
 def test_shapes_of_batches_are_kept(torque, lead):
     count = int(np.prod(lead))
