@@ -101,7 +101,8 @@ def newton_raphson(
         first = jnp.where(count == 0, size, correction.first)
         simplified = jnp.where(compared, size, correction.simplified)
         rate = jnp.where(anew, size, size / jnp.maximum(correction.last, 1e-300))
-        away = jnp.where(moved, 0.0, away) + jnp.where(made, size, 0.0)
+        counts = made & (on | ~moved)  # what is at rest already is corrected by rounding, which may exceed `ROUNDING`
+        away = jnp.where(moved, 0.0, away) + jnp.where(counts, size, 0.0)
         return _Iteration(pose, factor, Correction(size, first, simplified), rate, away, count + 1)
 
     lanes = time.coefficients[0].shape[-1]
