@@ -6,6 +6,7 @@ with one Jacobian, tell whether one solution only is near (Deuflhard 2011, Newto
 chapter 5).
 """
 
+from functools import partial
 from typing import Any, NamedTuple
 
 import jax
@@ -92,14 +93,21 @@ def newton_raphson(
         on, slow = going(state), ~(rate <= SLOWEST)
         anew = (count == 0) | (count > 1) & jnp.any(on & slow)  # the second correction tells whether they contract
         moved = anew | ~jnp.any(on)
-        factor = jax.lax.cond(moved, lambda: refactored(system, pose, time, before, anew), lambda: before)
+        if system.fronts is None:
+            factor = jax.lax.cond(moved, lambda: refactored(system, pose, time, before, anew), lambda: before)
+        else:  # what goes through a branch is copied, and so many fronts take longer to copy than to factor again
+            moved = anew = np.ones((), bool)
+            factor = refactored(system, pose, time, before, anew)
         step = factor.solve(-residual, refined=False)
-        size = sized(pose, step)
+        size = again = sized(pose, step)
+        if system.fronts is not None:  # what the Jacobian of before says of the second correction, for `contracts`
+            second = partial(sized, pose)
+            again = jax.lax.cond(count == 1, lambda: second(before.solve(-residual, refined=False)), lambda: size)
         made = refine | ~(size <= tolerance)
         pose = pose.displaced(*system.coordinates(jnp.where(made, step, 0.0), pose.shifts))
         compared = (count == 1) & (refine | ~(correction.last <= tolerance))  # else the pose was left as it was
         first = jnp.where(count == 0, size, correction.first)
-        simplified = jnp.where(compared, size, correction.simplified)
+        simplified = jnp.where(compared, again, correction.simplified)
         rate = jnp.where(anew, size, size / jnp.maximum(correction.last, 1e-300))
         counts = made & (on | ~moved)  # what is at rest already is corrected by rounding, which may exceed `ROUNDING`
         away = jnp.where(moved, 0.0, away) + jnp.where(counts, size, 0.0)
