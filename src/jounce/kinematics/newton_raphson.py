@@ -65,7 +65,8 @@ def newton_raphson(
     """Return the assembled pose, the factored Jacobian there, and how large the corrections were.
 
     A Jacobian serves several corrections (simplified Newton iteration): it is factored again only where they shrink
-    slowly, and at the end, unless what was factored still solves the equations there (`refactored`).
+    slowly, and at the end, unless what was factored still solves the equations there (`refactored`). Only fronts are
+    factored at each correction.
 
     An instant is accepted when its correction is at most the tolerance. With `refine` that correction is still made,
     and others until the next one would be rounding.

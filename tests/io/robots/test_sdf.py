@@ -178,29 +178,34 @@ LEFT_OUT = {  # what the joint of a tree, that of a loop and a link hold; what i
         r"<kinematic>, by which no force moves these links: b \(line 1\); make",
         r"links\.b\.kinematic: .*, got true; set it to false",
     ),
-    "nothing": (
-        "<damping>2</damping><friction>1</friction><spring_stiffness>0</spring_stiffness>"
-        "<spring_reference>3</spring_reference>",
-        "<damping>0</damping><spring_reference>1</spring_reference>",
-        "<velocity_decay><linear>0</linear></velocity_decay><kinematic>false</kinematic>",
-        *(None, None),
-    ),
 }
+
+
+def looped(first, second, inside):
+    """Return a model of two links whose second joint closes a loop, with what both joints and the second link hold."""
+    parts = link("a"), link("b", body=SOME + inside), joint("j", "a", "b", inside=AXIS.format(first))
+    return model(*parts, joint("k", "b", "a", inside=AXIS.format(second)))
 
 
 @pytest.mark.parametrize("case", LEFT_OUT)
 def test_what_bears_on_motions_and_is_left_out_is_told_of(tmp_path, case):
-    first, second, inside, warns, refuses = LEFT_OUT[case]
-    parts = link("a"), link("b", body=SOME + inside), joint("j", "a", "b", inside=AXIS.format(first))
-    text = model(*parts, joint("k", "b", "a", inside=AXIS.format(second)))
-    if warns is None:
-        assert list(read(tmp_path, text, strict=True).closures) == ["k"]
-        return
+    *parts, warns, refuses = LEFT_OUT[case]
+    text = looped(*parts)
     with pytest.warns(RobotWarning, match=warns) as caught:
         assert list(read(tmp_path, text).closures) == ["k"]
     assert len(caught) == 1
     with pytest.raises(RobotFileError, match=refuses):
         read(tmp_path, text, strict=True)
+
+
+def test_what_is_zero_or_read_is_not_left_out(tmp_path):
+    first = "<damping>2</damping><friction>1</friction><spring_stiffness>0</spring_stiffness>"
+    text = looped(
+        first + "<spring_reference>3</spring_reference>",
+        "<damping>0</damping><spring_reference>1</spring_reference>",
+        "<velocity_decay><linear>0</linear></velocity_decay><kinematic>false</kinematic>",
+    )
+    assert list(read(tmp_path, text, strict=True).closures) == ["k"]
 
 
 def test_the_canonical_link_is_the_base(tmp_path):
