@@ -5,6 +5,7 @@ import json
 import subprocess
 import sys
 import tempfile
+from datetime import UTC, datetime
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -20,7 +21,7 @@ def main() -> int:
     """Measure, print, write; return 1 if a benchmark did not run to its end."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=import_module("benchmarks").__doc__)
     parser.add_argument("--list", action="store_true", help="say what there is, and stop")
-    parser.add_argument("--only", nargs="+", metavar="NAME", choices=BENCHMARKS, help="these alone")
+    parser.add_argument("--only", nargs="+", metavar="NAME", choices=BENCHMARKS, help="these; others stay in the table")
     parser.add_argument("--quick", action="store_true", help="small sizes and three rounds: does it run?")
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder for the tables and figures")
     parser.add_argument("--here", type=Path, help=argparse.SUPPRESS)  # measure in this process, rows into this file
@@ -33,8 +34,13 @@ def main() -> int:
     if options.here is not None:
         _measure(names[0], options.quick, options.here)
         return 0
-    from benchmarks import tables
+    from benchmarks import records, tables
 
+    added_to: Path | None = options.out if options.only else None
+    try:
+        there = {row["benchmark"] for row in records.read(added_to)} if added_to else set()
+    except records.TableError as error:  # told before hours of measuring
+        parser.error(str(error))
     rows, failed = [], []
     for name in names:
         print(f"{name}: {BENCHMARKS[name].about}", flush=True)
@@ -43,11 +49,15 @@ def main() -> int:
         rows += found
         if fault:
             failed.append(name)
-            print(f"{name} did not run to its end: {fault}", file=sys.stderr)
-    if options.out is not None:
+            stay = "; its rows in the table stay as they were" if name in there else ""
+            print(f"{name} did not run to its end: {fault}{stay}", file=sys.stderr)
+    if options.out is not None and rows:
         from benchmarks import figures
 
-        tables.write(rows, tables.circumstances(options.quick), options.out)
+        about = tables.circumstances(options.quick)
+        rows = [row | {"circumstances": about} for row in rows]
+        rows = records.merged(records.read(added_to) if added_to else [], rows, failed)
+        records.write(rows, options.out)
         figures.draw(rows, options.out)
     return int(bool(failed))
 
@@ -59,7 +69,8 @@ def _measure(name: str, quick: bool, file: Path) -> None:
     with file.open("w", encoding="utf-8") as stream:
         for case in import_module(f"benchmarks.{BENCHMARKS[name].module}").cases(quick):
             for row in measured(case, quick):
-                print(json.dumps({"benchmark": name} | row), file=stream, flush=True)
+                known = {"benchmark": name, "day": datetime.now(UTC).date().isoformat()}
+                print(json.dumps(known | row), file=stream, flush=True)
 
 
 def _in_own_process(name: str, quick: bool) -> tuple[list[dict[str, Any]], str]:

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from jounce.io.files.writing import replacing
 from jounce.plot.style import GREY, LINE_COLOURS, RESOLUTION, blank_figure, style
 
 Rows = Sequence[Mapping[str, Any]]
@@ -12,12 +13,13 @@ MARKERS = "osDv^Pp"
 
 
 def draw(rows: Rows, folder: Path) -> None:
-    """Write every figure that the rows have points for, as PNG and SVG."""
+    """Write every figure that the rows have points for, as PNG and SVG; others stay as they are."""
     for name, make in FIGURES.items():
         figure = make([row for row in rows if row["at"] and not row["left out"]])
         if figure is not None:
             for suffix in ("png", "svg"):
-                figure.savefig(folder / f"{name}.{suffix}", dpi=RESOLUTION)
+                with replacing(folder / f"{name}.{suffix}") as scratch:
+                    figure.savefig(scratch, dpi=RESOLUTION)
 
 
 def _lines(rows: Rows, benchmark: str, key: str, value: Callable[[Any], float], title: str = "") -> Lines:

@@ -1,12 +1,11 @@
-"""Rows as a table: on the terminal, as Markdown, CSV and JSON."""
+"""Rows as a table: on the terminal, as Markdown, as CSV."""
 
 import csv
-import json
+import io
 import os
 import platform
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
-from datetime import UTC, datetime
 from importlib import metadata
 from itertools import groupby
 from pathlib import Path
@@ -25,7 +24,7 @@ TIME, MEMORY = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}, {"GB": 1e9, "MB":
 
 
 def circumstances(quick: bool) -> dict[str, str]:
-    """Return what the figures hold for: machine, versions, day."""
+    """Return what the figures hold for: machine, versions, other work."""
     info = Path("/proc/cpuinfo")
     lines = info.read_text(encoding="utf-8").splitlines() if info.exists() else []
     model = next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), "")
@@ -35,7 +34,6 @@ def circumstances(quick: bool) -> dict[str, str]:
         "processor": f"{model or platform.processor() or platform.machine()}, {cores} cores",
         "system": f"{platform.system()} {platform.machine()}, Python {platform.python_version()}",
         "versions": f"jounce {own}, " + ", ".join(f"{name} {metadata.version(name)}" for name in ("jax", "numpy")),
-        "day": datetime.now(UTC).date().isoformat(),
     }
     if hasattr(os, "getloadavg"):
         found["other work"] = f"{os.getloadavg()[2]:.1f} processes wanted a core, on average over the last 15 minutes"
@@ -52,39 +50,50 @@ def show(rows: Rows) -> None:
     Console(width=max(Console().width, WIDTH)).print(table, soft_wrap=True)
 
 
-def write(rows: Rows, about: Mapping[str, str], folder: Path) -> None:
-    """Write ``table.md``, ``table.csv`` and ``table.json``."""
-    folder.mkdir(parents=True, exist_ok=True)
-    whole = {"circumstances": about, "rows": rows}
-    (folder / "table.json").write_text(json.dumps(whole, indent=1) + "\n", encoding="utf-8")
-    (folder / "table.md").write_text("\n".join(_markdown(rows, about)) + "\n", encoding="utf-8")
+def as_markdown(rows: Rows, about: Mapping[str, str]) -> str:
+    """Return a section for each benchmark, with the day, and with the circumstances that differ from those given."""
+    return "\n".join(_markdown(rows, about)) + "\n"
+
+
+def _markdown(rows: Rows, about: Mapping[str, str]) -> Iterator[str]:
+    yield f"Written by `python -m benchmarks`. Unless a section says otherwise, {_told(about)}."
+    for name, group in groupby(rows, key=lambda row: row["benchmark"]):
+        own = list(group)
+        days = " and ".join(sorted({row["day"] for row in own}))
+        measured = "; ".join(filter(None, (f"measured on {days}", _told(own[0].get("circumstances", {})))))
+        yield f"\n### {BENCHMARKS[name].about}\n"
+        yield f"`python -m benchmarks --only {name}`, {own[0]['clock']}, {measured}.\n"
+        yield "| " + " | ".join(HEADINGS) + " |"
+        yield "|" + "---|" * len(HEADINGS)
+        yield from ("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |" for cells in _cells(own))
+        references = dict.fromkeys(row["reference"] for row in own if row["reference"])
+        yield from (f"\nErrors are against {reference}." for reference in references)
+
+
+def _told(about: Mapping[str, str]) -> str:
+    return "; ".join(f"{key}: {value}" for key, value in about.items())
+
+
+def as_csv(rows: Rows, about: Mapping[str, str]) -> str:
+    """Return a line for each row, with a column for each circumstance in which rows differ."""
     spreads, at = ("cost", "ratio"), sorted({key for row in rows for key in row["at"]})
+    differing = sorted({key for row in rows for key in row.get("circumstances", {})})
     flat = [
-        {key: value for key, value in row.items() if key not in (*spreads, "at")}
+        {key: value for key, value in row.items() if key not in (*spreads, "at", "circumstances")}
         | {
             f"{key} {which}": x
             for key in spreads
             for which, x in zip(("low", "median", "high"), row[key] or [""] * 3, strict=True)
         }
         | {key: row["at"].get(key, "") for key in at}
+        | {key: (about | row.get("circumstances", {})).get(key, "") for key in differing}
         for row in rows
     ]
-    with (folder / "table.csv").open("w", encoding="utf-8", newline="") as stream:
-        table = csv.DictWriter(stream, list(flat[0]) if flat else ["benchmark"])
-        table.writeheader()
-        table.writerows(flat)
-
-
-def _markdown(rows: Rows, about: Mapping[str, str]) -> Iterator[str]:
-    yield "Written by `python -m benchmarks`. " + "; ".join(f"{key}: {value}" for key, value in about.items()) + "."
-    for name, group in groupby(rows, key=lambda row: row["benchmark"]):
-        own = list(group)
-        yield f"\n### {BENCHMARKS[name].about}\n\n`python -m benchmarks --only {name}`, {own[0]['clock']}.\n"
-        yield "| " + " | ".join(HEADINGS) + " |"
-        yield "|" + "---|" * len(HEADINGS)
-        yield from ("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |" for cells in _cells(own))
-        references = dict.fromkeys(row["reference"] for row in own if row["reference"])
-        yield from (f"\nErrors are against {reference}." for reference in references)
+    text = io.StringIO(newline="")
+    table = csv.DictWriter(text, list(dict.fromkeys(key for line in flat for key in line)) or ["benchmark"])
+    table.writeheader()
+    table.writerows(flat)
+    return text.getvalue()
 
 
 def _cells(rows: Rows) -> Iterator[tuple[str, ...]]:

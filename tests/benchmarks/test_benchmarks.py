@@ -6,12 +6,13 @@ import json
 import os
 import subprocess
 import sys
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
 
 import benchmarks
-from benchmarks import figures, tables
+from benchmarks import figures, records, tables
 from benchmarks.cases import CannotRunError, Case, Contestant, Told, ready
 from benchmarks.timing import measured, spread
 
@@ -74,6 +75,7 @@ def test_a_peer_that_fails_is_told_and_the_others_run():
 @pytest.mark.slow
 def test_tables_and_figures_of_all_rows(tmp_path):
     errors = {"error": lambda found: 1e-9, "aim": 2.0}
+    about = tables.circumstances(quick=True)
     found = []
     for benchmark, name, key in (
         ("orders", "four-bar to order", "order"),
@@ -86,10 +88,11 @@ def test_tables_and_figures_of_all_rows(tmp_path):
     ):
         for value in (2.0, 4.0):
             pair = costing("jounce", 1, 1, 1, 1, **errors), costing("peer | other", 1, 2, 2, 2, **errors)
-            found += [{"benchmark": benchmark} | row for row in rows(*pair, at={key: value})]
+            known = {"benchmark": benchmark, "day": "2026-01-01", "circumstances": about}
+            found += [known | row for row in rows(*pair, at={key: value})]
             for row in found[-2:]:
                 row["case"] = f"{name}"
-    tables.write(found, tables.circumstances(quick=True), tmp_path)
+    records.write(found, tmp_path)
     figures.draw(found, tmp_path)
     assert {file.name for file in tmp_path.iterdir()} == {
         "table.md",
@@ -97,7 +100,7 @@ def test_tables_and_figures_of_all_rows(tmp_path):
         "table.json",
         *(f"{name}.{suffix}" for name in figures.FIGURES for suffix in ("png", "svg")),
     }
-    assert json.loads((tmp_path / "table.json").read_text())["rows"] == found
+    assert records.read(tmp_path) == found
     text = (tmp_path / "table.md").read_text()
     assert "0.5 times (0.5 to 0.5; aim 2)" in text
     assert "peer \\| other" in text
@@ -130,10 +133,13 @@ def test_the_command_lists_what_there_is():
 
 @pytest.mark.slow
 def test_the_command_measures_one(tmp_path):
+    before = datetime.now(UTC)
     told = command("--only", "files", "--quick", "--out", str(tmp_path))
     assert told.returncode == 0, told.stderr
     found = json.loads((tmp_path / "table.json").read_text())
     assert "quick" in found["circumstances"]["sizes"]
+    days = {moment.date().isoformat() for moment in (before, datetime.now(UTC))}
+    assert all(row["day"] in days for row in found["rows"])
     assert {row["contestant"] for row in found["rows"]} >= {"jounce", "ruamel.yaml alone, safe loader"}
     assert all(row["cost"][1] > 0 for row in found["rows"])
     assert "four_bar.yaml" in told.stdout
