@@ -144,7 +144,8 @@ def obreshkov(rows: Rows) -> Any:
 
 
 def _over(points: list[tuple[float, float]], base: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    return [(x, y / z) for (x, y), (_, z) in zip(points, base, strict=True)]
+    below = dict(base)  # a contestant may have been left out at some step
+    return [(x, y / below[x]) for x, y in points if x in below]
 
 
 FIGURES: dict[str, Callable[[Rows], Any]] = {

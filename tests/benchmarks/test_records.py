@@ -241,6 +241,10 @@ def test_a_figure_is_replaced_when_it_is_complete(tmp_path, monkeypatch):
     assert contents(tmp_path) == {"orders.png": b"drawn before"}
 
 
+def test_errors_are_compared_where_both_were_measured():
+    assert figures._over([(1.0, 6.0), (2.0, 8.0)], [(2.0, 4.0), (3.0, 1.0)]) == [(2.0, 2.0)]
+
+
 def test_the_table_of_the_documentation_is_what_its_rows_give(tmp_path):
     records.write(records.read(KEPT), tmp_path)
     for name in ("table.json", "table.md", "table.csv"):
