@@ -141,7 +141,7 @@ def cases(quick: bool) -> Cases:
     yield Case(
         f"{all_of_them:,} four-bars x {INSTANTS} instants to jounce, on all cores, start counted",
         [Contestant("jounce", ready(whole(all_of_them)), told)],
-        clock="wall",
+        clock="wall time",
         rounds=0,
         reference="three designs solved alone, relative, of the peaks",
     )

@@ -84,6 +84,11 @@ def keep_programs(store: Store | None) -> None:
     _store = store
 
 
+def current_store() -> Store | None:
+    """Return the store that programs go to."""
+    return _store
+
+
 UNENDING = ("simplify-while-loops", "while-loop-invariant-code-motion", "while-loop-constant-sinking", "reshape-mover")
 """XLA's passes that undo each other's work, some twenty or thirty times: those over loops, which have nothing for them
 to do here, and one that moves reshapes to where its simplifier does not want them."""

@@ -11,11 +11,12 @@ from jounce.jet import Jet
 from jounce.kinematics.frontal import FrontalFactor
 from jounce.kinematics.least_squares import LeastSquaresFactor
 from jounce.kinematics.linear import DenseFactor
+from jounce.kinematics.reflections import ReflectedFactor
 from jounce.mechanism.system import System
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
 
-Factor = DenseFactor | FrontalFactor | LeastSquaresFactor
+Factor = DenseFactor | ReflectedFactor | FrontalFactor | LeastSquaresFactor
 STALE = 1e-9  # part by which solutions may be off before they are refined, which squares it
 
 
@@ -32,12 +33,12 @@ def refactored(system: System, pose: Pose, time: Jet, known: Factor, anew: Bool[
     Unless it is to be factored anew, what was factored there is kept, with the matrices of here, where refinement by
     these brings solutions to rounding.
     """
-    if not isinstance(known, DenseFactor):
+    if not isinstance(known, DenseFactor | ReflectedFactor):
         return factored(system, pose, time)
     matrix = system.jacobian(pose, time)
     kept = known.refining(matrix)
-    stale = jnp.any(kept.defect() > STALE)
-    return jax.lax.cond(anew | stale, lambda: DenseFactor.of(matrix), lambda: kept)
+    stale = jnp.any(~(kept.defect() <= STALE))
+    return jax.lax.cond(anew | stale, lambda: type(known).of(matrix), lambda: kept)
 
 
 def blank_factor(system: System, lanes: int) -> Factor:
@@ -47,5 +48,7 @@ def blank_factor(system: System, lanes: int) -> Factor:
     return FrontalFactor.blank(system.fronts, lanes)
 
 
-def _dense(system: System) -> type[DenseFactor] | type[LeastSquaresFactor]:
-    return DenseFactor if system.rank is None else LeastSquaresFactor
+def _dense(system: System) -> type[DenseFactor] | type[ReflectedFactor] | type[LeastSquaresFactor]:
+    if system.rank is not None:
+        return LeastSquaresFactor
+    return ReflectedFactor if system.reflected else DenseFactor

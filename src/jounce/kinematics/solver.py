@@ -1,7 +1,7 @@
 """A mechanism with the settings under which it is solved: what turns known neighbours into solved instants."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -12,12 +12,13 @@ from jaxtyping import Float, Shaped
 from jounce.kinematics.advance import LARGEST_GAP, Arrival, SolvedState, predictor
 from jounce.kinematics.legs import Leg, LegLimits, Place, Settings, Way, leg
 from jounce.kinematics.status import Status
-from jounce.kinematics.wide_batches import advance_in_lots, lot_width, lots_in_a_call
+from jounce.kinematics.wide_batches import advance_in_lots, advance_one, lot_width, lots_in_a_call
 from jounce.mechanism import Model
 
 SMALL_BATCH = 16  # lanes; a batch width compiles once, so a short grid uses one, and so do anchors
 LONGEST_LEG = 32  # batches
 LEG_ENTRIES = 2**19  # of what a leg keeps: a large mechanism has shorter ones
+FEWEST_SIDE_BY_SIDE = 64
 NO_GRID = np.empty(0)
 
 
@@ -54,6 +55,8 @@ class Solver:
     def _wide(
         self, known: SolvedState, step: Float[np.ndarray, " batch"], instant: Float[np.ndarray, " batch"]
     ) -> Arrival:
+        if self._side_by_side is not None:
+            return self._side_by_side((known, step, instant))
         lots = -(-len(instant) // self.width)
         given = jax.tree.map(lambda x: _filled(x, lots * self.width, self.together), (known, step, instant))
         tolerance, refine, _, wanted = self._settings
@@ -83,13 +86,24 @@ class Solver:
 
     @cached_property
     def width(self) -> int:
-        """How many instants of a long grid are solved side by side."""
-        return lot_width(self.model.system)
+        """How many instants of a long grid are solved side by side at least."""
+        return lot_width(self.model.system) if self._side_by_side is None else FEWEST_SIDE_BY_SIDE
 
     @cached_property
     def together(self) -> int:
         """How many instants of a long grid are solved in one call at most."""
         return self.width * lots_in_a_call(self.width, self._entries)
+
+    @cached_property
+    def _side_by_side(self) -> Callable[[Any], Arrival] | None:
+        """Machine code for many instants; None where they are solved in arrays."""
+        system, (tolerance, refine, _, wanted) = self.model.system, self._settings
+        nothing = np.zeros(1)
+        still = {name: np.zeros((self.order + 1, *x.shape)) for name, x in self.model.guess.items()}
+        outputs = tuple(np.zeros((self.order + 1, 1, group.instances, 1)) for group in system.outputs)
+        instants = self._predictor((still, outputs, nothing)), nothing, nothing
+        kind = self.model.pose_type
+        return advance_one.program((system, tolerance, refine, wanted), instants, pose_type=kind, order=self.order)
 
     @cached_property
     def _batches(self) -> int:

@@ -177,6 +177,7 @@ class System(Module):
     forces: tuple[Group, ...] = ()
     fronts: Fronts | None = None  # how a large Jacobian is eliminated
     rank: int | None = eqx.field(static=True, default=None)  # of the Jacobian in general, where rows are redundant
+    reflected: bool = eqx.field(static=True, default=False)  # whether the Jacobian is eliminated by reflections
 
     @property
     def shape(self) -> tuple[int, int]:

@@ -1,0 +1,79 @@
+"""Text for LLVM as machine code of this computer, in the memory of this process or as bytes for another one."""
+
+import ctypes
+import threading
+from functools import lru_cache
+from importlib.util import find_spec
+from typing import Any
+
+CODE_MODEL = "large"  # what is compiled may lie far from the libraries that it calls
+_lock = threading.Lock()  # LLVM's state is one for the process
+
+
+@lru_cache(maxsize=1)
+def is_installed() -> bool:
+    """Tell whether there is a compiler: llvmlite is an extra of this package."""
+    return find_spec("llvmlite") is not None
+
+
+@lru_cache(maxsize=1)
+def _binding() -> Any:
+    import llvmlite.binding as binding  # here, since most commands need no compiler
+
+    binding.initialize_native_target()
+    binding.initialize_native_asmprinter()
+    return binding
+
+
+@lru_cache(maxsize=1)
+def processor() -> tuple[str, str, str]:
+    """Return the compiler's release, the processor and what it can do, on which machine code depends."""
+    import llvmlite
+
+    with _lock:
+        binding = _binding()
+        return llvmlite.__version__, binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()
+
+
+def vector_width() -> int:
+    """Return how many doubles a vector of this processor has."""
+    can = processor()[2].split(",")
+    return 8 if "+avx512f" in can else 4 if "+avx" in can else 2
+
+
+def _target() -> Any:
+    binding = _binding()
+    _, name, features = processor()
+    return binding.Target.from_default_triple().create_target_machine(cpu=name, features=features, opt=1, jit=True)
+
+
+def compiled(text: str) -> bytes:
+    """Return the machine code of a module, as an object file."""
+    processor()
+    with _lock:
+        module = _binding().parse_assembly(text)
+        return _target().emit_object(module)
+
+
+class MachineCode:
+    """The function `run` of an object file, in memory.
+
+    Parameters
+    ----------
+    binary : bytes
+        The object file, made by `compiled` on a processor like this one.
+    """
+
+    def __init__(self, binary: bytes):
+        processor()
+        with _lock:
+            binding = _binding()
+            self._engine = binding.create_mcjit_compiler(binding.parse_assembly(""), _target())
+            self._engine.add_object_file(binding.object_file.ObjectFileRef.from_data(binary))
+            self._engine.finalize_object()
+            address = self._engine.get_function_address("run")
+        self._run = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_int64)(address)
+
+    def __call__(self, addresses: Any, lanes: int) -> None:
+        """Run it: without Python's lock, so in several threads at once."""
+        self._run(addresses, lanes)

@@ -1,0 +1,147 @@
+"""A function of one instant as a program that runs it for many side by side."""
+
+import ctypes
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import jax
+import numpy as np
+
+from jounce.native.code import Code, Region, UnsupportedOperationError, flat
+from jounce.native.machine import MachineCode, compiled, vector_width
+from jounce.native.operations import Values, constants, kind_of
+from jounce.native.translation import translate
+
+MOST_MEMORY = 2**20  # bytes of the stack: threads have little
+ATTRIBUTES = """attributes #0 = { nounwind willreturn memory(none) }
+attributes #2 = { nounwind willreturn memory(none) "min-legal-vector-width"="512" "prefer-vector-width"="512" }
+attributes #1 = { nounwind "min-legal-vector-width"="512" "prefer-vector-width"="512" }
+!0 = !{}"""
+
+
+def object_file(function: Callable[..., Any], shared: Any, lanes: Any, known: Mapping[int, np.ndarray]) -> bytes:
+    """Return the machine code of a function of one instant, as an object file.
+
+    Parameters
+    ----------
+    function : callable
+        Of two pytrees of arrays, those that all instants share and those of the instant; their last axis is of length
+        one, as is that of all results.
+    shared, lanes : pytree
+        Of arrays, or of what has the shape and type of one.
+    known : mapping
+        Leaves of `shared`, by their numbers, whose values are part of the program.
+
+    Raises
+    ------
+    UnsupportedOperationError
+        Where there is no code for it, or too much.
+    """
+    return compiled(_text(jax.make_jaxpr(function)(shared, lanes), len(jax.tree.leaves(shared)), known, vector_width()))
+
+
+class Program:
+    """Machine code that runs a function of one instant for many.
+
+    Parameters
+    ----------
+    binary : bytes
+        From `object_file`.
+    results : pytree
+        Of what has the shapes and types of the results for one instant.
+    """
+
+    def __init__(self, binary: bytes, results: Any):
+        self._run = MachineCode(binary)
+        leaves, self._structure = jax.tree.flatten(results)
+        self._results = [(leaf.shape[:-1], leaf.dtype) for leaf in leaves]
+        self._width = vector_width()
+
+    def __call__(self, shared: Sequence[np.ndarray], lanes: Sequence[np.ndarray]) -> Any:
+        """Return the results.
+
+        Parameters
+        ----------
+        shared, lanes : sequence of array
+            Leaves of the arguments, of the types that the program was made for; instants along the last axis.
+        """
+        count = lanes[0].shape[-1]
+        total = max(count, self._width)
+        if total > count:
+            lanes = [np.concatenate([x, np.repeat(x[..., -1:], total - count, axis=-1)], axis=-1) for x in lanes]
+        given = [np.ascontiguousarray(x) for x in (*shared, *lanes)]
+        found = [np.empty((*shape, total), dtype) for shape, dtype in self._results]
+        addresses = [array.__array_interface__["data"][0] for array in (*given, *found)]
+        self._run((ctypes.c_void_p * len(addresses))(*addresses), total)
+        return jax.tree.unflatten(self._structure, [x[..., :count] for x in found])
+
+
+def _text(closed: Any, shared: int, known: Mapping[int, np.ndarray], width: int) -> str:
+    """Return the text of a module with a function `run` of the addresses of all arrays and the number of lanes."""
+    code, given = Code(width), []
+    for number, variable in enumerate(closed.jaxpr.invars):
+        if number in known:
+            given.append(constants(code, known[number]))
+            continue
+        region = _region(code, number, kind_of(variable.aval.dtype), lanes=number >= shared)
+        array = np.empty(variable.aval.shape, object)
+        array.ravel()[:] = [code.load(region, k) for k in range(array.size)]
+        given.append(array)
+    results = translate(code, closed.jaxpr, [constants(code, number) for number in closed.consts], given)
+    for number, array in enumerate(results, len(given)):
+        _write(code, number, array)
+    if code.memory > MOST_MEMORY:
+        raise UnsupportedOperationError(f"{code.memory} bytes of memory")
+    lines = [
+        "define void @run(ptr noalias %arguments, i64 %total) #1 {",
+        "begin:",
+        *code.entry,
+        f"%most = sub i64 %total, {width}",
+        "br label %lanes",
+        "lanes:",
+        "%done = phi i64 [0, %begin], [%next, %more]",
+        "%lane = call i64 @llvm.smin.i64(i64 %done, i64 %most)",  # the last vectors may share lanes
+        *code.lines,
+        "br label %more",
+        "more:",
+        f"%next = add i64 %done, {width}",
+        "%over = icmp sge i64 %next, %total",
+        "br i1 %over, label %end, label %lanes",
+        "end:",
+        "ret void",
+        "}",
+        *sorted(code.intrinsics | {"declare i64 @llvm.smin.i64(i64, i64)"}),
+    ]
+    for name, count in sorted(code.functions):
+        lines += [f"declare double @{name}({', '.join(['double'] * count)}) #0", _lane_by_lane(name, count, width)]
+    return "\n".join([*lines, ATTRIBUTES])
+
+
+def _region(code: Code, number: int, kind: str, *, lanes: bool) -> Region:
+    """Return the memory of an argument or a result."""
+    code.entry.append(f"%q{number} = getelementptr ptr, ptr %arguments, i64 {number}")
+    code.entry.append(f"%a{number} = load ptr, ptr %q{number}, align 8, !invariant.load !0")
+    return Region(f"%a{number}", kind, lanes, given=True)
+
+
+def _write(code: Code, number: int, array: Values) -> None:
+    values = flat(array)
+    if not values:
+        return
+    region = _region(code, number, values[0].kind, lanes=True)
+    for k, value in enumerate(values):
+        code.store(region, k, value)
+
+
+def _lane_by_lane(name: str, count: int, width: int) -> str:
+    """Return the text of a function of C's library for a vector."""
+    vector, lines = f"<{width} x double>", []
+    for lane in range(width):
+        lines += [f"%e{lane}_{k} = extractelement {vector} %a{k}, i64 {lane}" for k in range(count)]
+        given = ", ".join(f"double %e{lane}_{k}" for k in range(count))
+        lines.append(f"%r{lane} = call double @{name}({given})")
+        before = "poison" if lane == 0 else f"%s{lane - 1}"
+        lines.append(f"%s{lane} = insertelement {vector} {before}, double %r{lane}, i64 {lane}")
+    listed = ", ".join(f"{vector} %a{k}" for k in range(count))
+    body = "\n".join([*lines, f"ret {vector} %s{width - 1}"])
+    return f'define internal {vector} @{name}_of_lanes({listed}) noinline #2 {{\n{body}\n}}'
