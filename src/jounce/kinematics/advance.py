@@ -279,12 +279,14 @@ def advance(
     """
     given = coordinates, angles, sign, step, instant, tolerance, refine, wanted
     arrival, factor, reached = solved_batch(system, *given, pose_type=pose_type, order=order, pieces=pieces)
-    turnover = jax.lax.cond(
-        survey, lambda: turnover_of(system, pose_type, reached, factor, instant), lambda: np.zeros(1)
-    )
-    first = hidden_by_laws(system, arrival.status[:1], instant[:1], step[:1], order)
-    status = jnp.concatenate([jnp.where(survey, first, arrival.status[:1]), arrival.status[1:]])
-    return arrival._replace(turnover=turnover, status=status)
+    first = arrival.status[:1]
+
+    def surveyed() -> Any:
+        hidden = hidden_by_laws(system, first, instant[:1], step[:1], order)
+        return turnover_of(system, pose_type, reached, factor, instant), hidden
+
+    turnover, first = jax.lax.cond(survey, surveyed, lambda: (np.zeros(1), first))
+    return arrival._replace(turnover=turnover, status=jnp.concatenate([first, arrival.status[1:]]))
 
 
 def solved_batch(

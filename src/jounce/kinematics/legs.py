@@ -21,6 +21,7 @@ from jaxtyping import Bool, Float, Int
 from jounce.kinematics.advance import SAFE_FRACTION, Arrival, Pieces, SolvedState, advance, predictor
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.kernels import LIBRARIES
+from jounce.kinematics.side_by_side import called
 from jounce.kinematics.status import Status
 from jounce.mechanism.system import System
 from jounce.rigid.pose import Pose
@@ -121,7 +122,7 @@ PIECES = Pieces(corrections=3000, derivatives=0)
 _batch = jax.jit(partial(advance, pieces=PIECES), static_argnames=("pose_type", "order"))  # traced once
 
 
-@compiled("pose_type", "order", "batches", narrow=True, without=LIBRARIES)
+@compiled("pose_type", "order", "batches", "native", narrow=True, without=LIBRARIES)
 def leg(
     system: System,
     way: Way,
@@ -132,6 +133,7 @@ def leg(
     pose_type: type[Pose],
     order: int,
     batches: int,
+    native: str | None = None,
 ) -> Leg:
     """Go on along a way until it arrives, something is out of the ordinary, or enough batches are solved.
 
@@ -149,9 +151,17 @@ def leg(
         PlanarPose or SpatialPose; derivatives wanted.
     batches : int
         As many as there is room for.
+    native : str, optional
+        Name of the machine code that solves a batch, see `advance_instant`; XLA's own does, unless it is given.
     """
 
     def solved(way: Way) -> Any:
+        if native is not None:
+            tolerance, refine, survey, wanted = settings
+            first = np.arange(len(way.instant)) == 0
+            lanes = way.known, way.away, way.instant, survey & first
+            arrival = called(native, (system, tolerance, refine, wanted), lanes)
+            return arrival._replace(turnover=arrival.turnover[:1])
         return _batch(system, *way.known, way.away, way.instant, *settings, pose_type=pose_type, order=order)
 
     def going(state: Leg) -> Any:

@@ -4,6 +4,7 @@ Each entry is an operation of its own here, which suits code for one instant at 
 a choice of pivots would cost more than the arithmetic; on arrays `DenseFactor` takes less time.
 """
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
@@ -92,6 +93,11 @@ class ReflectedFactor(Module):
             rest = right[k] - jnp.sum(self.reduced[k, k + 1 :] * found, axis=0)
             found = jnp.concatenate([(rest / self.pivots[k])[None], found])
         return found
+
+    def applied_inverse(self, matrix: Float[Numbers, "row column"]) -> Float[Numbers, "row column"]:
+        """Return the products of the inverse of the first matrix with the columns of another, shape (rows, columns)."""
+        first = ReflectedFactor(*(x[..., :1] for x in (self.matrix, self.reduced, self.pivots, self.shares)))
+        return jax.lax.map(lambda column: first.solve(column[:, None], refined=False)[:, 0], matrix.T).T
 
     def pivot_ratio(self) -> Float[Numbers, " batch"]:
         """Return the smallest pivot over the largest, shape (batch,): near zero at a singular position."""

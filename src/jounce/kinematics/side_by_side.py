@@ -4,12 +4,13 @@ XLA calls an operation on arrays after another, each of which goes through memor
 follow one another in the registers of the processor, eight instants at a time (see `jounce.native`).
 """
 
+import dataclasses
 import os
 import pickle
 import threading
 import zlib
 from collections.abc import Callable
-from functools import partial, update_wrapper
+from functools import cached_property, partial, update_wrapper
 from typing import Any
 
 import jax
@@ -24,6 +25,36 @@ from jounce.native.code import UnsupportedOperationError
 from jounce.native.programs import Program, object_file
 
 VARIABLE = "JOUNCE_NATIVE"  # 0 leaves everything to XLA
+
+
+_registered: dict[str, Program] = {}  # by the names under which XLA calls them
+
+
+@dataclasses.dataclass(frozen=True)
+class Prepared:
+    """Machine code of a function of one instant, with what all instants share."""
+
+    machine_code: Program
+    shared: list[np.ndarray]
+
+    def __call__(self, lanes: Any) -> Any:
+        """Return the results for instants along the last axis."""
+        return self.machine_code(self.shared, [np.asarray(leaf) for leaf in jax.tree.leaves(lanes)])
+
+    @cached_property
+    def name(self) -> str | None:
+        """Name by which programs of XLA call it, as `called` has it; None if they cannot."""
+        name = self.machine_code.name
+        if name not in _registered:
+            if not self.machine_code.register():
+                return None
+            _registered[name] = self.machine_code
+        return name
+
+
+def called(name: str, shared: Any, lanes: Any) -> Any:
+    """Return the results of machine code as part of a program of XLA."""
+    return _registered[name].in_program(jax.tree.leaves(shared), jax.tree.leaves(lanes))
 
 
 class SideBySide:
@@ -42,8 +73,8 @@ class SideBySide:
         self._lock = threading.Lock()
         update_wrapper(self, function)
 
-    def program(self, shared: Any, lanes: Any, **static: Any) -> "Callable[[Any], Any] | None":
-        """Return what gives the results for instants along the last axis; None where there is no code for it.
+    def program(self, shared: Any, lanes: Any, **static: Any) -> Prepared | None:
+        """Return its machine code; None where there is none.
 
         Whole numbers among what is shared, which say what is joined to what, are part of the program.
         """
@@ -65,7 +96,7 @@ class SideBySide:
             if key not in self._programs:
                 self._programs[key] = self._made(shared, one, places, static)
             program = self._programs[key]
-        return None if program is None else partial(_called, program, arrays)
+        return None if program is None else Prepared(program, arrays)
 
     def _made(self, shared: Any, one: Any, places: dict[int, np.ndarray], static: dict[str, Any]) -> Program | None:
         """Return a program from the store of programs, or one that is made, and kept there."""
@@ -96,10 +127,6 @@ class SideBySide:
             except (TypeError, ValueError, AttributeError, pickle.PicklingError):
                 pass
         return Program(binary, results)
-
-
-def _called(program: Program, shared: list[np.ndarray], lanes: Any) -> Any:
-    return program(shared, [np.asarray(leaf) for leaf in jax.tree.leaves(lanes)])
 
 
 def _wanted() -> bool:

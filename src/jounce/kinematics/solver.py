@@ -1,7 +1,7 @@
 """A mechanism with the settings under which it is solved: what turns known neighbours into solved instants."""
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
@@ -10,9 +10,11 @@ import numpy as np
 from jaxtyping import Float, Shaped
 
 from jounce.kinematics.advance import LARGEST_GAP, Arrival, SolvedState, predictor
+from jounce.kinematics.instant_program import advance_instant
 from jounce.kinematics.legs import Leg, LegLimits, Place, Settings, Way, leg
+from jounce.kinematics.side_by_side import Prepared
 from jounce.kinematics.status import Status
-from jounce.kinematics.wide_batches import advance_in_lots, advance_one, lot_width, lots_in_a_call
+from jounce.kinematics.wide_batches import advance_in_lots, lot_width, lots_in_a_call
 from jounce.mechanism import Model
 
 SMALL_BATCH = 16  # lanes; a batch width compiles once, so a short grid uses one, and so do anchors
@@ -55,8 +57,8 @@ class Solver:
     def _wide(
         self, known: SolvedState, step: Float[np.ndarray, " batch"], instant: Float[np.ndarray, " batch"]
     ) -> Arrival:
-        if self._side_by_side is not None:
-            return self._side_by_side((known, step, instant))
+        if self._native is not None:
+            return self._native((known, step, instant, np.zeros(step.shape, bool)))
         lots = -(-len(instant) // self.width)
         given = jax.tree.map(lambda x: _filled(x, lots * self.width, self.together), (known, step, instant))
         tolerance, refine, _, wanted = self._settings
@@ -87,7 +89,7 @@ class Solver:
     @cached_property
     def width(self) -> int:
         """How many instants of a long grid are solved side by side at least."""
-        return lot_width(self.model.system) if self._side_by_side is None else FEWEST_SIDE_BY_SIDE
+        return lot_width(self.model.system) if self._native is None else FEWEST_SIDE_BY_SIDE
 
     @cached_property
     def together(self) -> int:
@@ -95,15 +97,15 @@ class Solver:
         return self.width * lots_in_a_call(self.width, self._entries)
 
     @cached_property
-    def _side_by_side(self) -> Callable[[Any], Arrival] | None:
-        """Machine code for many instants; None where they are solved in arrays."""
+    def _native(self) -> Prepared | None:
+        """Machine code of `advance_instant`; None where instants are solved in arrays of XLA."""
         system, (tolerance, refine, _, wanted) = self.model.system, self._settings
         nothing = np.zeros(1)
         still = {name: np.zeros((self.order + 1, *x.shape)) for name, x in self.model.guess.items()}
         outputs = tuple(np.zeros((self.order + 1, 1, group.instances, 1)) for group in system.outputs)
-        instants = self._predictor((still, outputs, nothing)), nothing, nothing
+        instants = self._predictor((still, outputs, nothing)), nothing, nothing, np.zeros(1, bool)
         kind = self.model.pose_type
-        return advance_one.program((system, tolerance, refine, wanted), instants, pose_type=kind, order=self.order)
+        return advance_instant.program((system, tolerance, refine, wanted), instants, pose_type=kind, order=self.order)
 
     @cached_property
     def _batches(self) -> int:
@@ -125,7 +127,15 @@ class Solver:
         window[: len(grid)] = grid[:room]
         settings, kind = self._settings._replace(survey=np.asarray(survey)), self.model.pose_type
         return leg(
-            self.model.system, way, window, limits, settings, pose_type=kind, order=self.order, batches=self._batches
+            self.model.system,
+            way,
+            window,
+            limits,
+            settings,
+            pose_type=kind,
+            order=self.order,
+            batches=self._batches,
+            native=None if self._native is None else self._native.name,
         )
 
     def fault(self, arrival: Arrival, lane: int) -> str:

@@ -84,10 +84,14 @@ def turnovers_of(
 
 def _of_matrix(relative: Float[Numbers, "column column"]) -> Float[Numbers, " 1"]:
     """Return it for a matrix, from a power of it: the root of its norm is never too small, and tends to the size."""
-    power, grown = relative, np.zeros(())
-    for k in range(1, SQUARINGS + 1):
+
+    def squared(k: Any, carry: Any) -> Any:
+        power, grown = carry
         size = jnp.maximum(jnp.sqrt(jnp.sum(power * power)), 1e-300)
-        power, grown = (power / size) @ (power / size), grown + jnp.log(size) / 2 ** (k - 1)
+        scaled = power / size
+        return jax.lax.map(lambda row: row @ scaled, scaled), grown + jnp.log(size) * 0.5**k
+
+    power, grown = jax.lax.fori_loop(0, SQUARINGS, squared, (relative, np.zeros(())))
     size = jnp.exp(grown + jnp.log(jnp.maximum(jnp.sqrt(jnp.sum(power * power)), 1e-300)) / 2**SQUARINGS)
     along, trace = jnp.sum(power * relative.T), jnp.trace(power)
     return _leading(along / jnp.where(trace == 0, 1.0, trace), size, along, size)[None]
@@ -109,7 +113,8 @@ def _of_products(
         size = jnp.maximum(jnp.sqrt(jnp.mean(jnp.sum(vectors * vectors, axis=0))), 1e-300)
         return product(vectors / size), grown + jnp.log(size)
 
-    start = jax.random.normal(jax.random.key(0), (columns, PROBES))
+    with jax.ensure_compile_time_eval():
+        start = jax.random.normal(jax.random.key(0), (columns, PROBES))
     power = 2**SQUARINGS
     vectors, grown = jax.lax.fori_loop(0, power, multiplied, (start / np.sqrt(columns), np.zeros(())))
     square = jnp.sum(vectors * vectors)

@@ -15,9 +15,7 @@ from jounce.kinematics.advance import Arrival, Lanes, Pieces, SolvedState, solve
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.device import on_processor
 from jounce.kinematics.kernels import LIBRARIES
-from jounce.kinematics.side_by_side import SideBySide
 from jounce.mechanism.system import System
-from jounce.modules import with_fields
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
 
@@ -88,22 +86,3 @@ def advance_in_lots(
 
     blank = jax.tree.map(lambda x: jnp.zeros((*x.shape[:-1], len(step)), x.dtype), jax.eval_shape(solved, 0))
     return jax.lax.fori_loop(0, lots, go_on, blank)
-
-
-@SideBySide
-def advance_one(shared: Any, instants: Any, *, pose_type: type[Pose], order: int) -> Arrival:
-    """Solve an instant from a neighbour solved before; nothing is surveyed.
-
-    Parameters
-    ----------
-    shared : tuple
-        System, tolerance, whether to refine, and the highest derivative that must be finite.
-    instants : tuple
-        Coordinates, angles and signs of the neighbour, the time from there, and the instant, s: each of length one.
-    pose_type, order
-        As those of `advance`.
-    """
-    (system, *settings), ((coordinates, angles, sign), step, instant) = shared, instants
-    given = coordinates, angles, sign, step, instant, *settings
-    arrival, _, _ = solved_batch(with_fields(system, reflected=True), *given, pose_type=pose_type, order=order)
-    return arrival._replace(turnover=np.zeros(1))

@@ -120,8 +120,10 @@ class Code:
     def scope(self) -> Iterator[None]:
         """Forget afterwards what was found meanwhile: it is not found on every way on."""
         self._known.append({})
-        yield
-        self._known.pop()
+        try:
+            yield
+        finally:
+            self._known.pop()
 
     # -- operations ---------------------------------------------------------------------------------------------------
 

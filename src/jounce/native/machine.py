@@ -56,7 +56,7 @@ def compiled(text: str) -> bytes:
 
 
 class MachineCode:
-    """The function `run` of an object file, in memory.
+    """The functions `run` and `handle` of an object file, in memory.
 
     Parameters
     ----------
@@ -71,8 +71,9 @@ class MachineCode:
             self._engine = binding.create_mcjit_compiler(binding.parse_assembly(""), _target())
             self._engine.add_object_file(binding.object_file.ObjectFileRef.from_data(binary))
             self._engine.finalize_object()
-            address = self._engine.get_function_address("run")
+            address, handler = map(self._engine.get_function_address, ("run", "handle"))
         self._run = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_int64)(address)
+        self.handler = ctypes.CFUNCTYPE(ctypes.c_void_p, ctypes.c_void_p)(handler)  # for XLA
 
     def __call__(self, addresses: Any, lanes: int) -> None:
         """Run it: without Python's lock, so in several threads at once."""

@@ -72,7 +72,7 @@ def _intrinsic(operation: str) -> Rule:
 
 
 def _function(name: str) -> Rule:
-    return lambda code, _, given: [each(lambda *a: code.call(name, *a), *given)]
+    return lambda code, _, given: [each(lambda *a: code.call(name, *(code.converted(x, "f") for x in a)), *given)]
 
 
 def _unary(function: Callable[[Code, Value], Value]) -> Rule:
@@ -305,7 +305,7 @@ def _in_memory(code: Code, values: Sequence[Value]) -> tuple[Any, int]:
 
 def loaded(code: Code, array: Values, index: Value) -> Values:
     """Return a row of an array in memory, whose index is the same in all lanes."""
-    size = array[0].size
+    size = array[0, ...].size
     region, first = _in_memory(code, flat(array))
     start = code.arithmetic("mul", code.converted(index, "l"), code.constant(np.int64(size)))
     found = np.empty(array.shape[1:], object)

@@ -1,6 +1,7 @@
 """A function of one instant as a program that runs it for many side by side."""
 
 import ctypes
+import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -8,6 +9,7 @@ import jax
 import numpy as np
 
 from jounce.native.code import Code, Region, UnsupportedOperationError, flat
+from jounce.native.handler import handler_text, version
 from jounce.native.machine import MachineCode, compiled, vector_width
 from jounce.native.operations import Values, constants, kind_of
 from jounce.native.translation import translate
@@ -53,6 +55,7 @@ class Program:
 
     def __init__(self, binary: bytes, results: Any):
         self._run = MachineCode(binary)
+        self.name = f"jounce_{hashlib.sha256(binary).hexdigest()[:32]}"
         leaves, self._structure = jax.tree.flatten(results)
         self._results = [(leaf.shape[:-1], leaf.dtype) for leaf in leaves]
         self._width = vector_width()
@@ -74,6 +77,22 @@ class Program:
         addresses = [array.__array_interface__["data"][0] for array in (*given, *found)]
         self._run((ctypes.c_void_p * len(addresses))(*addresses), total)
         return jax.tree.unflatten(self._structure, [x[..., :count] for x in found])
+
+
+    def register(self) -> bool:
+        """Make it known to XLA by its name, for `in_program`; tell whether that goes."""
+        if version() is None:
+            return False
+        jax.ffi.register_ffi_target(self.name, jax.ffi.pycapsule(self._run.handler), platform="cpu")
+        return True
+
+    def in_program(self, shared: Sequence[Any], lanes: Sequence[Any]) -> Any:
+        """Return the results as part of a program of JAX, for arguments as in a call; at least a vector of lanes."""
+        count = lanes[0].shape[-1]
+        if count < self._width:
+            raise ValueError(f"{count} lanes, where a vector has {self._width}")
+        shapes = [jax.ShapeDtypeStruct((*shape, count), dtype) for shape, dtype in self._results]
+        return jax.tree.unflatten(self._structure, jax.ffi.ffi_call(self.name, shapes)(*shared, *lanes))
 
 
 def _text(closed: Any, shared: int, known: Mapping[int, np.ndarray], width: int) -> str:
@@ -114,6 +133,7 @@ def _text(closed: Any, shared: int, known: Mapping[int, np.ndarray], width: int)
     ]
     for name, count in sorted(code.functions):
         lines += [f"declare double @{name}({', '.join(['double'] * count)}) #0", _lane_by_lane(name, count, width)]
+    lines.append(handler_text(len(given), len(results), shared))
     return "\n".join([*lines, ATTRIBUTES])
 
 

@@ -8,12 +8,12 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from jax.extend.core import Literal
+from jax.extend.core import Literal, jaxprs_in_params
 
 from jounce.native.code import DTYPES, Code, Region, UnsupportedOperationError, Value, flat
 from jounce.native.operations import RULES, Values, constants, kind_of, loaded
 
-MOST_UNROLLED = 12_000
+MOST_UNROLLED = 4_000
 MOST_LINES = 120_000  # of text: LLVM makes some 20,000 of them into machine code in a second
 
 
@@ -101,6 +101,11 @@ def _in_lanes(arrays: Sequence[Values]) -> list[bool]:
     return [any(value.lanes for value in flat(array)) for array in arrays]
 
 
+def _likely_in_lanes(arrays: Sequence[Values]) -> list[bool]:
+    """Tell which arrays that a loop changes are taken to differ from lane to lane: all but counts that do not yet."""
+    return [lanes or any(value.kind == "f" for value in flat(array)) for lanes, array in zip(_in_lanes(arrays), arrays, strict=True)]
+
+
 def _closed(code: Code, closed: Any, *given: Sequence[Values]) -> list[Values]:
     numbers = [constants(code, number) for number in closed.consts]
     return translate(code, closed.jaxpr, numbers, [array for part in given for array in part])
@@ -111,7 +116,7 @@ def _while(code: Code, equation: Any, given: Sequence[Values]) -> list[Values]:
     p = equation.params
     split = p["cond_nconsts"], p["cond_nconsts"] + p["body_nconsts"]
     asked, needed, start = given[: split[0]], given[split[0] : split[1]], given[split[1] :]
-    avals, lanes = [variable.aval for variable in equation.outvars], _in_lanes(start)
+    avals, lanes = [variable.aval for variable in equation.outvars], _likely_in_lanes(start)
     while True:  # until no array is found to differ from lane to lane that was thought not to
         mark = code.mark()
         carried = _Carried(code, avals, lanes)
@@ -124,11 +129,13 @@ def _while(code: Code, equation: Any, given: Sequence[Values]) -> list[Values]:
             goes = _closed(code, p["cond_jaxpr"], asked, before)[0].item()
             code.branch(code.anywhere(goes), body, end)
             code.begin(body)
-            after = _closed(code, p["body_jaxpr"], needed, before)
-            if goes.lanes:
-                after = [_chosen(code, goes, new, old) for new, old in zip(after, before, strict=True)]
-            found = [a or b for a, b in zip(lanes, _in_lanes(after), strict=True)]
-            carried.store(after)
+            found = [True] * len(lanes)
+            if not goes.lanes or found == lanes:  # where lanes leave at different turns, all that they keep differs
+                after = _closed(code, p["body_jaxpr"], needed, before)
+                if goes.lanes:
+                    after = [_chosen(code, goes, new, old) for new, old in zip(after, before, strict=True)]
+                found = [a or b for a, b in zip(lanes, _in_lanes(after), strict=True)]
+                carried.store(after)
             code.jump(head)
         if found == lanes:
             code.begin(end)
@@ -155,9 +162,34 @@ def _scan(code: Code, equation: Any, given: Sequence[Values]) -> list[Values]:
     if length == 1:
         results = _closed(code, closed, needed, start, [row[0, ...] for row in rows])
         return [*results[:carries], *(_as_array(row, aval.shape[1:])[None] for row, aval in zip(results[carries:], avals[carries:], strict=True))]
-    if (unrolled := _unrolled(code, equation, needed, start, rows)) is not None:
+    most = MOST_LINES if _needs_known_places(closed.jaxpr) else MOST_UNROLLED
+    if (unrolled := _unrolled(code, equation, needed, start, rows, most)) is not None:
         return unrolled
-    lanes = [*_in_lanes(start), *([False] * (len(avals) - carries))]
+    mark = code.mark()
+    try:
+        return _rolled(code, equation, needed, start, rows)
+    except UnsupportedOperationError:  # of places that change from turn to turn
+        code.back_to(mark)
+        if (unrolled := _unrolled(code, equation, needed, start, rows, MOST_LINES)) is None:
+            raise
+        return unrolled
+
+
+def _needs_known_places(program: Any) -> bool:
+    """Tell whether a program has operations for which there is code only where their indices are known."""
+    return any(
+        equation.primitive.name in ("scatter", "scatter-add") or any(map(_needs_known_places, jaxprs_in_params(equation.params)))
+        for equation in program.eqns
+    )
+
+
+def _rolled(
+    code: Code, equation: Any, needed: Sequence[Values], start: Sequence[Values], rows: Sequence[Values]
+) -> list[Values]:
+    """Return the results of a loop that is one in the code, too."""
+    p, avals = equation.params, [variable.aval for variable in equation.outvars]
+    carries, length, closed = p["num_carry"], p["length"], p["jaxpr"]
+    lanes = [*_likely_in_lanes(start), *(kind_of(aval.dtype) == "f" for aval in avals[carries:])]
     one, last = code.constant(np.int64(1)), code.constant(np.int64(length - 1))
     while True:
         mark = code.mark()
@@ -190,15 +222,15 @@ def _scan(code: Code, equation: Any, given: Sequence[Values]) -> list[Values]:
 
 
 def _unrolled(
-    code: Code, equation: Any, needed: Sequence[Values], start: Sequence[Values], rows: Sequence[Values]
+    code: Code, equation: Any, needed: Sequence[Values], start: Sequence[Values], rows: Sequence[Values], most: int
 ) -> list[Values] | None:
-    """Return the results of a loop turn after turn; None where that takes many lines."""
-    p, mark, most = equation.params, code.mark(), len(code.lines) + MOST_UNROLLED
+    """Return the results of a loop turn after turn; None where that takes more lines than `most`."""
+    p, mark, begin = equation.params, code.mark(), len(code.lines)
     carries, found = p["num_carry"], {}
     for k in reversed(range(p["length"])) if p["reverse"] else range(p["length"]):
         results = _closed(code, p["jaxpr"], needed, start, [row[k, ...] for row in rows])
         start, found[k] = results[:carries], results[carries:]
-        if len(code.lines) > most:
+        if (len(code.lines) - begin) * p["length"] / len(found) > most:
             code.back_to(mark)
             return None
     made = [[found[k][place] for k in range(p["length"])] for place in range(len(equation.outvars) - carries)]
@@ -231,7 +263,7 @@ def _cond(code: Code, equation: Any, given: Sequence[Values]) -> list[Values]:
     avals = [variable.aval for variable in equation.outvars]
     if which.kind == "b":
         raise UnsupportedOperationError("a choice by a truth value")
-    lanes = [which.lanes] * len(avals)
+    lanes = [which.lanes or kind_of(aval.dtype) == "f" for aval in avals]
     while True:
         mark = code.mark()
         results, found = _Carried(code, avals, lanes), list(lanes)
