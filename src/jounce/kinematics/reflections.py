@@ -40,7 +40,7 @@ class ReflectedFactor(Module):
             share = jnp.where(square == 0, 0.0, 1.0 / jnp.where(square == 0, 1.0, square))
             column = jnp.concatenate([head[None], first[1:]])
             others = rest[:, 1:]
-            part = jnp.sum(column[:, None] * others, axis=0) * share
+            part = jnp.sum(column[:, None] * others, axis=0) * share[None]
             others = others - column[:, None] * part[None]
             columns.append(column)
             pivots.append(pivot)

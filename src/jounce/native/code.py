@@ -353,7 +353,7 @@ def literal(number: Any, kind: str) -> str:
 
 
 def _same(a: Any, b: Any) -> bool:
-    return b is not None and a == b and math.copysign(1, a) == math.copysign(1, b)
+    return b is not None and bool(a == b) and math.copysign(1, a) == math.copysign(1, b)
 
 
 def _neutral(operation: str, a: Value, b: Value) -> Value | None:

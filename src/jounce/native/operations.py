@@ -79,7 +79,7 @@ def _unary(function: Callable[[Code, Value], Value]) -> Rule:
     return lambda code, _, given: [each(lambda a: function(code, a), given[0])]
 
 
-def _number(code: Code, number: float, like: Value) -> Value:
+def _number(code: Code, number: float | int, like: Value) -> Value:
     return code.constant(np.asarray(number, DTYPES[like.kind]))
 
 
