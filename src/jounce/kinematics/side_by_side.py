@@ -1,7 +1,7 @@
 """Functions of one instant as machine code for many, where there is a compiler for it and the code is not too long.
 
-XLA calls an operation on arrays after another, each of which goes through memory. Here all operations of an instant
-follow one another in the registers of the processor, eight instants at a time (see `jounce.native`).
+XLA calls one operation on arrays after another, and each goes through memory. Here all operations on an instant follow
+one another in the registers of the processor, several instants at a time (see `jounce.native`).
 """
 
 import dataclasses
@@ -9,23 +9,23 @@ import os
 import pickle
 import threading
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from functools import cached_property, partial, update_wrapper
 from typing import Any
 
 import jax
 import numpy as np
-from jax.core import Tracer
 
 from jounce.kinematics.compilation import current_store
 from jounce.kinematics.device import on_processor
-from jounce.kinematics.structure import UndescribedError, being_debugged, program_key
+from jounce.kinematics.structure import UndescribedError, being_debugged, program_key, settings
 from jounce.native import machine
 from jounce.native.code import UnsupportedOperationError
 from jounce.native.programs import Program, object_file
+from jounce.shapes import is_traced
 
 VARIABLE = "JOUNCE_NATIVE"  # 0 leaves everything to XLA
-
 
 _registered: dict[str, Program] = {}  # by the names under which XLA calls them
 
@@ -74,59 +74,56 @@ class SideBySide:
         update_wrapper(self, function)
 
     def program(self, shared: Any, lanes: Any, **static: Any) -> Prepared | None:
-        """Return its machine code; None where there is none.
+        """Return its machine code; None where there is none: no compiler, or no code for what it does.
 
         Whole numbers among what is shared, which say what is joined to what, are part of the program.
         """
-        if not _wanted() or any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves((shared, lanes))):
+        if not _wanted() or is_traced((shared, lanes)):
             return None
         leaves, structure = jax.tree.flatten(shared)
         arrays = [np.asarray(leaf) for leaf in leaves]
+        shapes = jax.tree.unflatten(structure, [jax.ShapeDtypeStruct(x.shape, x.dtype) for x in arrays])
         one = jax.tree.map(lambda x: jax.ShapeDtypeStruct((*x.shape[:-1], 1), x.dtype), lanes)
-        places = {k: array for k, array in enumerate(arrays) if array.dtype.kind in "iu" and array.ndim}
-        kinds = tuple((array.shape, array.dtype.str) for array in arrays)
-        key = (
-            structure,
-            kinds,
-            tuple(array.tobytes() for array in places.values()),
-            tuple((leaf.shape, leaf.dtype) for leaf in jax.tree.leaves(one)),
-            tuple(static.items()),
-        )
+        places = {k: x for k, x in enumerate(arrays) if x.dtype.kind in "iu" and x.ndim}
+        kinds = tuple((x.shape, x.dtype.str) for x in (*arrays, *jax.tree.leaves(one)))
+        known = tuple(x.tobytes() for x in places.values())
+        key = structure, jax.tree.structure(one), kinds, known, tuple(static.items()), settings()
         with self._lock:
             if key not in self._programs:
-                self._programs[key] = self._made(shared, one, places, static)
+                self._programs[key] = self._made((shapes, one), places, static)
             program = self._programs[key]
         return None if program is None else Prepared(program, arrays)
 
-    def _made(self, shared: Any, one: Any, places: dict[int, np.ndarray], static: dict[str, Any]) -> Program | None:
-        """Return a program from the store of programs, or one that is made, and kept there."""
-        function, store = partial(self.function, **static), current_store()
-        shapes = jax.tree.map(lambda x: jax.ShapeDtypeStruct(np.shape(x), np.asarray(x).dtype), shared)
-        key = None
-        if store is not None:
-            leaves, tree = jax.tree.flatten((shapes, one))
-            kinds = [*((leaf.shape, str(leaf.dtype)) for leaf in leaves), *places.values(), machine.processor()]
-            try:
-                key = program_key((self.function,), tree, kinds, static)
-            except UndescribedError:
-                store = None
+    def _made(
+        self, given: tuple[Any, Any], places: Mapping[int, np.ndarray], static: Mapping[str, Any]
+    ) -> Program | None:
+        """Return a program from the store of programs, or one that is made, and kept there if it has a name."""
+        store, function = current_store(), partial(self.function, **static)
+        key = self._key(given, places, static) if store is not None else None
         if store is not None and key is not None and (kept := store.get(key)) is not None:
             try:
-                binary, results = pickle.loads(zlib.decompress(kept))
-                return Program(binary, results)
+                return Program(*pickle.loads(zlib.decompress(kept)))
             except Exception:  # noqa: BLE001 - whatever is wrong with it, it is made again
                 store.drop(key)
         try:
-            binary = object_file(function, shapes, one, places)
+            binary = object_file(function, *given, places)
         except UnsupportedOperationError:
             return None
-        results = jax.eval_shape(function, shapes, one)
+        made = binary, tuple(map(jax.tree.leaves, given)), jax.eval_shape(function, *given)
         if store is not None and key is not None:
-            try:
-                store.put(key, zlib.compress(pickle.dumps((binary, results)), level=1))
-            except (TypeError, ValueError, AttributeError, pickle.PicklingError):
-                pass
-        return Program(binary, results)
+            with suppress(pickle.PicklingError, TypeError, AttributeError):
+                store.put(key, zlib.compress(pickle.dumps(made), level=1))
+        return Program(*made)
+
+    def _key(
+        self, given: tuple[Any, Any], places: Mapping[int, np.ndarray], static: Mapping[str, Any]
+    ) -> str | None:
+        """Return the name of a program in other processes, None where it holds something of a user's own."""
+        leaves, tree = jax.tree.flatten(given)
+        kinds = [*((leaf.shape, str(leaf.dtype)) for leaf in leaves), *places.values(), machine.processor()]
+        with suppress(UndescribedError):
+            return program_key((self.function,), tree, kinds, static)
+        return None
 
 
 def _wanted() -> bool:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import jax
 
-MAJOR = 0  # version of the interface: another one may have other records
+TRIED = (0, 3)  # version of the interface: the records of another one may be laid out otherwise
 EXTENSION, ARGUMENTS, RESULTS = 8, 72, 112  # places in the record of a call, in bytes
 KIND, METADATA = 8, 24  # in an extension, of which the first kind asks for the version
 VERSION = 24  # in the metadata
@@ -18,15 +18,14 @@ DATA, RANK, SIZES = 24, 32, 40  # in the record of an array
 
 
 @lru_cache(maxsize=1)
-def version() -> tuple[int, int] | None:
-    """Return the version of XLA's interface, None if there is none or its records are not known."""
+def is_known() -> bool:
+    """Tell whether the records of the installed version of XLA's interface are those that are read here."""
     try:
         header = (Path(jax.ffi.include_dir()) / "xla/ffi/api/c_api.h").read_text()
     except (AttributeError, OSError):
-        return None
+        return False
     found = re.findall(r"#define XLA_FFI_API_(?:MAJOR|MINOR) (\d+)", header)
-    major, minor = map(int, found) if len(found) == 2 else (None, None)
-    return (major, minor) if major == MAJOR and minor is not None else None
+    return tuple(map(int, found)) == TRIED
 
 
 def handler_text(arguments: int, results: int, first_of_lanes: int) -> str:
@@ -39,7 +38,7 @@ def handler_text(arguments: int, results: int, first_of_lanes: int) -> str:
     first_of_lanes : int
         The first argument that has lanes, along its last axis.
     """
-    major, minor = version() or (MAJOR, 0)
+    major, minor = TRIED
     lines = [
         "define ptr @handle(ptr %frame) {",
         f"%p0 = getelementptr i8, ptr %frame, i64 {EXTENSION}",

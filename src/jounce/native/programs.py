@@ -9,7 +9,7 @@ import jax
 import numpy as np
 
 from jounce.native.code import Code, Region, UnsupportedOperationError, flat
-from jounce.native.handler import handler_text, version
+from jounce.native.handler import handler_text, is_known
 from jounce.native.machine import MachineCode, compiled, vector_width
 from jounce.native.operations import Values, constants, kind_of
 from jounce.native.translation import translate
@@ -49,15 +49,18 @@ class Program:
     ----------
     binary : bytes
         From `object_file`.
-    results : pytree
-        Of what has the shapes and types of the results for one instant.
+    given, results : pytree
+        Of what has the shapes and types of the arguments, shared and of an instant, and of the results for an instant.
     """
 
-    def __init__(self, binary: bytes, results: Any):
+    def __init__(self, binary: bytes, given: tuple[Any, Any], results: Any):
         self._run = MachineCode(binary)
         self.name = f"jounce_{hashlib.sha256(binary).hexdigest()[:32]}"
+        shared, lanes = map(jax.tree.leaves, given)
+        self._shared = [(x.shape, x.dtype) for x in shared]
+        self._lanes = [(x.shape[:-1], x.dtype) for x in lanes]
         leaves, self._structure = jax.tree.flatten(results)
-        self._results = [(leaf.shape[:-1], leaf.dtype) for leaf in leaves]
+        self._results = [(x.shape[:-1], x.dtype) for x in leaves]
         self._width = vector_width()
 
     def __call__(self, shared: Sequence[np.ndarray], lanes: Sequence[np.ndarray]) -> Any:
@@ -66,33 +69,41 @@ class Program:
         Parameters
         ----------
         shared, lanes : sequence of array
-            Leaves of the arguments, of the types that the program was made for; instants along the last axis.
+            Leaves of the arguments; instants along the last axis.
         """
         count = lanes[0].shape[-1]
         total = max(count, self._width)
+        self._check(shared, lanes, count)
         if total > count:
             lanes = [np.concatenate([x, np.repeat(x[..., -1:], total - count, axis=-1)], axis=-1) for x in lanes]
         given = [np.ascontiguousarray(x) for x in (*shared, *lanes)]
         found = [np.empty((*shape, total), dtype) for shape, dtype in self._results]
         addresses = [array.__array_interface__["data"][0] for array in (*given, *found)]
-        self._run((ctypes.c_void_p * len(addresses))(*addresses), total)
+        if count:
+            self._run((ctypes.c_void_p * len(addresses))(*addresses), total)
         return jax.tree.unflatten(self._structure, [x[..., :count] for x in found])
-
 
     def register(self) -> bool:
         """Make it known to XLA by its name, for `in_program`; tell whether that goes."""
-        if version() is None:
-            return False
-        jax.ffi.register_ffi_target(self.name, jax.ffi.pycapsule(self._run.handler), platform="cpu")
-        return True
+        if is_known():
+            jax.ffi.register_ffi_target(self.name, jax.ffi.pycapsule(self._run.handler), platform="cpu")
+        return is_known()
 
     def in_program(self, shared: Sequence[Any], lanes: Sequence[Any]) -> Any:
         """Return the results as part of a program of JAX, for arguments as in a call; at least a vector of lanes."""
         count = lanes[0].shape[-1]
         if count < self._width:
             raise ValueError(f"{count} lanes, where a vector has {self._width}")
+        self._check(shared, lanes, count)
         shapes = [jax.ShapeDtypeStruct((*shape, count), dtype) for shape, dtype in self._results]
         return jax.tree.unflatten(self._structure, jax.ffi.ffi_call(self.name, shapes)(*shared, *lanes))
+
+    def _check(self, shared: Sequence[Any], lanes: Sequence[Any], count: int) -> None:
+        """Raise ValueError unless arrays are of the shapes and types that the machine code reads."""
+        wanted = [*self._shared, *(((*shape, count), dtype) for shape, dtype in self._lanes)]
+        found = [(x.shape, x.dtype) for x in (*shared, *lanes)]
+        if found != wanted:
+            raise ValueError(f"arrays of {found}, where the program was made for {wanted}")
 
 
 def _text(closed: Any, shared: int, known: Mapping[int, np.ndarray], width: int) -> str:
