@@ -6,6 +6,7 @@ Between two anchors lies no singular position, so that the sign of the determina
 """
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import jax
@@ -48,10 +49,7 @@ class GridSolver:
         anchors = np.array([anchor.instant for anchor in self._anchors])
         self._instants = np.concatenate([time, anchors])
         self._nearest = len(time) + nearest_instants(anchors, time)
-        self._store = jax.tree.map(
-            lambda *xs: np.concatenate([np.zeros((*xs[0].shape[:-1], len(time))), *xs], axis=-1),
-            *(anchor.state for anchor in self._anchors),
-        )
+        self._store = jax.tree.map(partial(_with_room, len(time)), *(anchor.state for anchor in self._anchors))
         for lanes, state in path.on_the_way:
             self._keep(lanes, state)
             self.status[lanes] = Status.OK
@@ -174,6 +172,14 @@ class GridSolver:
         arrival = self.solver(last.state, instant - last.instant, instant)
         if arrival.status[0] == Status.INADMISSIBLE:  # the fault is the law's, not that of the position before
             self.status[lost], self.faults[lost] = Status.INADMISSIBLE, self.solver.fault(arrival, 0)
+
+
+def _with_room(count: int, *arrays: np.ndarray) -> np.ndarray:
+    """Return arrays one after another along the last axis, behind room for as many lanes as asked for."""
+    parts = np.concatenate(arrays, axis=-1)
+    whole = np.zeros((*parts.shape[:-1], count + parts.shape[-1]))
+    whole[..., count:] = parts
+    return whole
 
 
 def _lots(count: int, width: int, most: int, threads: int) -> int:

@@ -14,13 +14,13 @@ from jounce.kinematics.instant_program import advance_instant
 from jounce.kinematics.legs import Leg, LegLimits, Place, Settings, Way, leg
 from jounce.kinematics.side_by_side import Prepared
 from jounce.kinematics.status import Status
-from jounce.kinematics.wide_batches import advance_in_lots, lot_width, lots_in_a_call
+from jounce.kinematics.wide_batches import CALL_ENTRIES, advance_in_lots, lot_width, lots_in_a_call
 from jounce.mechanism import Model
 
 SMALL_BATCH = 16  # lanes; a batch width compiles once, so a short grid uses one, and so do anchors
 LONGEST_LEG = 32  # batches
 LEG_ENTRIES = 2**19  # of what a leg keeps: a large mechanism has shorter ones
-FEWEST_SIDE_BY_SIDE = 64
+FEWEST_SIDE_BY_SIDE, MOST_SIDE_BY_SIDE = 64, 4096  # instants of a long grid in a call of machine code
 NO_GRID = np.empty(0)
 
 
@@ -94,7 +94,9 @@ class Solver:
     @cached_property
     def together(self) -> int:
         """How many instants of a long grid are solved in one call at most."""
-        return self.width * lots_in_a_call(self.width, self._entries)
+        if self._native is None:
+            return self.width * lots_in_a_call(self.width, self._entries)
+        return max(self.width, min(MOST_SIDE_BY_SIDE, CALL_ENTRIES // self._entries))
 
     @cached_property
     def _native(self) -> Prepared | None:
