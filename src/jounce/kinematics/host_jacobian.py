@@ -134,10 +134,10 @@ class HostJacobian:
 
 
 def _largest_size(matrix: Any) -> float:
-    """Return a bound of the largest singular value, near it where rows have few entries."""
-    from scipy.sparse.linalg import norm
-
-    return float(np.sqrt(norm(matrix, 1) * norm(matrix, np.inf)))
+    """Return a bound of the largest singular value, near it where rows have few entries: by its rows and columns."""
+    sizes, begun = np.abs(matrix.data), matrix.indptr[:-1][np.diff(matrix.indptr) > 0]
+    sums = np.add.reduceat(sizes, begun), np.bincount(matrix.indices, sizes)
+    return float(np.sqrt(np.prod([part.max(initial=0.0) for part in sums])))
 
 
 def _probes(rows: int, count: int) -> Float[np.ndarray, "row probe"]:
@@ -156,10 +156,14 @@ def _factored(matrix: Any) -> Any:
 
 def _augmented(matrix: Any, damping: float) -> Any:
     """Return ``[[I, A^T], [A, -damping I]]``, the augmented system of damped least squares."""
-    from scipy.sparse import block_array, eye_array
+    from scipy.sparse import coo_array
 
-    rows, columns = matrix.shape
-    return block_array([[eye_array(columns), matrix.T], [matrix, -damping * eye_array(rows)]])
+    (rows, columns), entries = matrix.shape, matrix.tocoo()
+    size = rows + columns
+    below, diagonal = columns + entries.row, np.arange(size if damping else columns, dtype=entries.row.dtype)
+    values = np.concatenate([entries.data, entries.data, np.where(diagonal < columns, 1.0, -damping)])
+    where = [below, entries.col, diagonal], [entries.col, below, diagonal]
+    return coo_array((values, tuple(map(np.concatenate, where))), shape=(size, size))
 
 
 def _shortest(matrix: Any, right: Float[np.ndarray, " row"]) -> Float[np.ndarray, " column"]:
