@@ -107,13 +107,13 @@ def _nearby(model: Model, instant: float, tolerance: float) -> tuple[Model, Tria
     counted from the guess, and it takes another turn to get to those that the drivers prescribe.
     """
     moved, told = Displacements(model, instant), model.prescribed
-    residual, found = moved.closed(model.guess, tolerance)
+    residual, found, known = moved.closed(model.guess, tolerance)
     lag = driver_lag(model, instant, residual)
     model, start = _turned(model, instant, tolerance, lag)
     if start is not None:
         found = put_together(model, instant, tolerance, start)
     elif found is None:
-        found = put_together(model, instant, tolerance, known=moved.at(model.guess))
+        found = put_together(model, instant, tolerance, known=known or moved.at(model.guess))
     if not found.closed and any(map(measures_angle, model.system.groups)):
         # angles counted from a tilted guess may be far off: first the joints alone, with the drivers as they are
         begin = found if lag is None else put_together(model, instant, tolerance, lag=lag)

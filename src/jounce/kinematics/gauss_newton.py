@@ -128,10 +128,16 @@ class Displacements:
         """Return the place after an increment."""
         return self._moved(coordinates, increment, 0, 0.0)[0]
 
-    def closed(self, start: Coordinates, tolerance: float) -> tuple[Float[np.ndarray, " row"], Trial | None]:
-        """Return the residual at some coordinates, and the bodies put together from there if no step needs a check."""
+    def closed(
+        self, start: Coordinates, tolerance: float
+    ) -> tuple[Float[np.ndarray, " row"], Trial | None, Place | None]:
+        """Return the residual at some coordinates, and the bodies put together from there if no step needs a check.
+
+        The place with those coordinates comes last, where none of its steps was tried: the one to go on from.
+        """
         there, begun, closed = self._moved(start, self._still, MAX_STEPS if self._dense else 0, tolerance)
-        return begun, _trial(*there, there[2].row_scale, tolerance) if closed else None
+        found = _trial(*there, there[2].row_scale, tolerance) if closed else None
+        return begun, found, None if self._dense else there
 
     def at(self, coordinates: Coordinates) -> Place:
         """Return the place with some coordinates."""
@@ -187,9 +193,11 @@ def put_together(
 
     if known is None:
         begin = model.guess if start is None else start
-        if lag is None and (found := moved.closed(begin, tolerance)[1]) is not None:
-            return found
-        known = moved.at(begin)
+        if lag is None:
+            _, found, known = moved.closed(begin, tolerance)
+            if found is not None:
+                return found
+        known = moved.at(begin) if known is None else known
     coordinates, residual, jacobian = opened(known)
     scale = jacobian.row_scale
     for _ in range(MAX_STEPS):
