@@ -311,9 +311,11 @@ class _Run:
             while current.outcome.item() in MOVING and self.events.stopped_at is None:
                 current, steps, tried = march(equations, current, *how, **options)
                 found, taken = steps
-                taken = np.flatnonzero(np.asarray(taken)[: int(tried), 0])
-                if len(taken):
-                    part = jax.tree.map(lambda x, k=taken: np.asarray(x)[k][..., 0], found)
+                taken = np.asarray(taken)[: int(tried), 0]
+                if taken.any():
+                    # a view, unless some were refused: they are joined, and so copied, at the end
+                    chosen = slice(len(taken)) if taken.all() else np.flatnonzero(taken)
+                    part = jax.tree.map(lambda x, k=chosen: np.asarray(x)[k, ..., 0], found)
                     self.parts.append(self.events.noted(part))
                 if progress is not None:
                     progress(int(np.sum(sense * instants <= sense * current.time.item())), len(instants))
