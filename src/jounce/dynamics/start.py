@@ -12,7 +12,7 @@ from jounce.dynamics.forward import Equations, Instants, State
 from jounce.dynamics.masses import Masses, gravity_of, required_masses
 from jounce.dynamics.saddle_fronts import SaddleFronts
 from jounce.dynamics.saddle_point import even_scale
-from jounce.errors import AssemblyError, JounceError, MechanismError, MobilityError
+from jounce.errors import AssemblyError, MechanismError, MobilityError
 from jounce.jet import Jet
 from jounce.kinematics.advance import LARGEST_CONTRADICTION
 from jounce.kinematics.assembly import assemble, freely_moving
@@ -21,7 +21,8 @@ from jounce.kinematics.curves.choice import chosen
 from jounce.kinematics.host_jacobian import RANK_TOLERANCE, HostJacobian, is_clearly_regular
 from jounce.kinematics.status import Status
 from jounce.mechanism import Mechanism, Model, build
-from jounce.modules import with_fields
+from jounce.mechanism.builder import released
+from jounce.modules import unchecked, with_fields
 from jounce.shapes import Numbers
 
 TOLERANCE = 1e-12  # of the assembled positions, rad or sizes of the mechanism
@@ -85,9 +86,10 @@ def consistent_start(mechanism: Mechanism, instant: float) -> ConsistentStart:
     """
     mechanism = chosen(mechanism, instant)
     masses = required_masses(mechanism, "the equations of motion")
-    model, state = build(mechanism), None
+    model, state = build(mechanism, initial=True), None
     if mechanism.initial:
-        whole, coordinates = _assembled(mechanism, instant)
+        whole, coordinates = _assembled(model, instant)
+        model = released(model)
         driven = equations_of(mechanism, whole, masses)
         state = _set_in_motion(driven, whole, coordinates, instant)
         _check_rates(driven, whole, state, instant)
@@ -108,21 +110,22 @@ def consistent_start(mechanism: Mechanism, instant: float) -> ConsistentStart:
 
 def equations_of(mechanism: Mechanism, model: Model, masses: Masses) -> Equations:
     """Return the equations of motion of a mechanism."""
-    system, scale = with_fields(model.system, outputs=()), masses.scale(model.length)
-    saddle = SaddleFronts.of(system.pattern)
-    return Equations(system, masses, gravity_of(mechanism), scale, model.pose_type, saddle)
+    system = with_fields(model.system, outputs=())
+    values = {
+        "system": system,
+        "masses": masses,
+        "gravity": gravity_of(mechanism),
+        "scale": masses.scale(model.length),
+        "pose_type": model.pose_type,
+        "saddle": SaddleFronts.of(system.pattern),
+    }
+    return unchecked(Equations, values)
 
 
-def _assembled(mechanism: Mechanism, instant: float) -> tuple[Model, dict[str, np.ndarray]]:
-    """Return the mechanism with its initial conditions as drivers, assembled."""
+def _assembled(model: Model, instant: float) -> tuple[Model, dict[str, np.ndarray]]:
+    """Return the model with initial conditions, assembled."""
     try:
-        model = build(initial_as_drivers(mechanism))
-    except JounceError as error:
-        error.name = _renamed(error.name or "", mechanism) or None
-        raise
-    rows = tuple(_renamed(name, mechanism) for name in model.rows)
-    try:
-        return assemble(dataclasses.replace(model, rows=rows), instant, TOLERANCE, free=True)
+        return assemble(model, instant, TOLERANCE, free=True)
     except AssemblyError as error:
         message = f"{error.message}; joints, drivers and initial conditions contradict each other there"
         raise AssemblyError(message, status=error.status) from None
@@ -134,11 +137,6 @@ def _assembled(mechanism: Mechanism, instant: float) -> tuple[Model, dict[str, n
 def initial_as_drivers(mechanism: Mechanism) -> Mechanism:
     """Return the mechanism with its initial conditions as drivers."""
     return dataclasses.replace(mechanism, drivers={**mechanism.drivers, **mechanism.initial}, initial={})
-
-
-def _renamed(row: str, mechanism: Mechanism) -> str:
-    kind, _, name = row.partition(".")
-    return f"initial.{name}" if kind == "drivers" and name.partition(".")[0] in mechanism.initial else row
 
 
 def at_rest(model: Model, coordinates: dict[str, np.ndarray]) -> State:

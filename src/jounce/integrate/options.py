@@ -12,6 +12,7 @@ from jounce.kinematics.solve import checked_order
 from jounce.mechanism import time_grid
 from jounce.mechanism.time import TimeLike
 
+TAYLOR = Taylor()
 TOLERANCES = (1e-17, 1e-2)  # below rounding there is still energy to be kept: what series leave out adds up
 
 
@@ -31,7 +32,7 @@ def checked_options(
 ) -> tuple[int, AbstractMethod]:
     """Return order and method of a simulation, or raise MechanismError for an option that is not valid."""
     order = checked_order(order)
-    method = Taylor() if method is None else method
+    method = TAYLOR if method is None else method
     if not isinstance(method, AbstractMethod):
         raise MechanismError("must be a method, such as jn.Taylor()", name="method", value=method)
     low, high = TOLERANCES

@@ -11,7 +11,7 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Float
 
-from jounce.constraints.base import field_kind, value_fields
+from jounce.constraints.base import field_kinds, value_fields
 from jounce.errors import JounceError
 from jounce.jet import Jet
 from jounce.mechanism.axis_angles import (
@@ -30,7 +30,7 @@ from jounce.mechanism.outputs import AbstractMotionOutput
 from jounce.mechanism.pattern import Pattern
 from jounce.mechanism.resolve import resolve, resolved
 from jounce.mechanism.system import POSITION_COMPONENTS, Group, System, group_elements, holding
-from jounce.modules import with_fields
+from jounce.modules import unchecked, with_fields
 from jounce.rigid import PlanarPose, SpatialPose
 from jounce.rigid.euler_parameters import euler_parameters
 from jounce.rigid.pose import Pose
@@ -99,7 +99,7 @@ def group_rows(model: Model) -> list[slice]:
     return found
 
 
-def build(mechanism: Mechanism, like: Model | None = None) -> Model:
+def build(mechanism: Mechanism, like: Model | None = None, *, initial: bool = False) -> Model:
     """Return the numeric model of a mechanism.
 
     Parameters
@@ -109,6 +109,8 @@ def build(mechanism: Mechanism, like: Model | None = None) -> Model:
     like : Model, optional
         Of the same mechanism with other values of its parameters, which may be traced by JAX here: its starting guess,
         its size, and the offsets that follow from them, are taken over.
+    initial : bool, default False
+        Whether its initial conditions hold, beside the drivers.
 
     Raises
     ------
@@ -118,7 +120,7 @@ def build(mechanism: Mechanism, like: Model | None = None) -> Model:
         If an expression uses a name that is not a parameter.
     """
     parameters, components = mechanism.parameter_values, POSITION_COMPONENTS[mechanism.space]
-    (groups, names), (forces, force_names), (outputs, output_names) = grouped_elements(mechanism)
+    (groups, names), (forces, force_names), (outputs, output_names) = grouped_elements(mechanism, initial=initial)
     if like is not None:
         parts = {"groups": groups, "forces": forces, "outputs": outputs}
         known = {name: tuple(map(_with_found_of, part, getattr(like.system, name))) for name, part in parts.items()}
@@ -132,6 +134,24 @@ def build(mechanism: Mechanism, like: Model | None = None) -> Model:
     history = AttitudeHistory(guess["quaternion"], np.zeros(1)) if components == 3 else None
     parts = ((groups, names), (forces, force_names), (outputs, output_names))
     return model_of(tuple(mechanism.bodies), parts, guess, length, history)
+
+
+def released(model: Model) -> Model:
+    """Return the model without the initial conditions with which it was built."""
+    system, groups, names = model.system, [], []
+    for group, rows in zip(model.system.groups, group_rows(model), strict=True):
+        its = model.rows[rows][: group.instances]
+        kept = [k for k, name in enumerate(its) if not name.startswith("initial.")]
+        if len(kept) < len(its):  # drivers of the same kind may be among them
+            element = jax.tree.map(lambda values, kept=kept: values[..., kept, :], group.element)
+            group = with_fields(group, element=element, bodies=tuple(tuple(s[k] for k in kept) for s in group.bodies))
+        if kept:
+            groups.append(group)
+            names.append(tuple(its[k] for k in kept))
+    parts = ((tuple(groups), tuple(names)), ((), ()), ((), ()))
+    bare = model_of(model.bodies, parts, model.guess, _size(tuple(groups), model.guess), model.history)
+    system = with_fields(bare.system, forces=system.forces, outputs=system.outputs)
+    return dataclasses.replace(bare, system=system, forces=model.forces, outputs=model.outputs)
 
 
 def model_of(
@@ -149,9 +169,19 @@ def model_of(
     drivers = tuple(n for group, members in zip(groups, names, strict=True) if group.is_driver for n in members)
     joined = tuple(group.bodies for group in groups)
     pattern, fronts = _layout(joined, tuple(row_counts), pose_type.shifts + pose_type.turns, len(bodies))
-    scale = np.array([length] * pose_type.shifts + [1.0] * pose_type.turns)
+    system = {
+        "groups": groups,
+        "outputs": outputs,
+        "pattern": pattern,
+        "row_scale": np.ones((len(rows), 1)),
+        "column_scale": np.array([length] * pose_type.shifts + [1.0] * pose_type.turns),
+        "body_count": len(bodies),
+        "forces": forces,
+        "fronts": fronts,
+        "rank": None,
+    }
     return Model(
-        System(groups, outputs, pattern, np.ones((len(rows), 1)), scale, len(bodies), forces, fronts),
+        unchecked(System, system),
         pose_type,
         guess,
         tuple(rows),
@@ -165,8 +195,11 @@ def model_of(
     )
 
 
-def grouped_elements(mechanism: Mechanism) -> tuple[Grouped, Grouped, Grouped]:
-    """Return the groups of joints and drivers, of forces and of outputs; values may be traced by JAX."""
+def grouped_elements(mechanism: Mechanism, *, initial: bool = False) -> tuple[Grouped, Grouped, Grouped]:
+    """Return the groups of joints and drivers, of forces and of outputs; values may be traced by JAX.
+
+    Initial conditions are among the drivers, where they are asked for.
+    """
     parameters, components = mechanism.parameter_values, POSITION_COMPONENTS[mechanism.space]
     body_index = {name: k for k, name in enumerate((GROUND, *mechanism.bodies))}
 
@@ -175,7 +208,8 @@ def grouped_elements(mechanism: Mechanism) -> tuple[Grouped, Grouped, Grouped]:
         posed = {name: v for name, v in elements.items() if not isinstance(v, AbstractMotionOutput)}
         return group_elements(posed, parameters, body_index, components)
 
-    return grouped("joints", "drivers"), grouped("forces"), grouped("outputs")
+    held = grouped("joints", "drivers", "initial") if initial else grouped("joints", "drivers")
+    return held, grouped("forces"), grouped("outputs")
 
 
 def with_reference(
@@ -356,9 +390,9 @@ def _size(groups: tuple[Group, ...], guess: dict[str, Any]) -> float:
     """Return the largest distance among the points of the joints and the bodies of the guess, 1 if there is none."""
     sizes = [np.max(np.linalg.norm(guess["position"], axis=0))]
     for group in groups:
-        for name, field in value_fields(type(group.element)).items():
+        for name, kind in field_kinds(type(group.element)).items():
             value = getattr(group.element, name)
-            if field_kind(field) == "vector" and name.startswith("point") and not isinstance(value, Tracer):
+            if kind == "vector" and name.startswith("point") and not isinstance(value, Tracer):
                 sizes.append(np.max(np.linalg.norm(value, axis=0)))
             elif name in ("length", "radius") and not isinstance(value, Tracer):
                 sizes.append(np.max(value))
