@@ -90,20 +90,20 @@ def concrete_or(
 
 def _traced(given: Mapping[str, Any]) -> str | None:
     """Return the dotted name of the first value that JAX traces, None if there is none."""
-    pending: list[tuple[tuple[str, ...], Any]] = [((), given)]
+    pending: list[tuple[tuple[str | int, ...], Any]] = [((), given)]
     while pending:
         place, value = pending.pop()
         if isinstance(value, Tracer):
-            return "".join(place).removeprefix(".")
+            return "".join(f"[{k}]" if isinstance(k, int) else f".{k}" for k in place).removeprefix(".")
         names = _fields(type(value))
         if names is None:
-            entries = [(f".{key}", entry) for key, entry in value.items()]
+            entries = list(value.items())
         elif names:  # those of an object are looked up at once: Equinox has a slow way of its own for each
             own = getattr(value, "__dict__", None)
             held = partial(getattr, value) if own is None else own.get
-            entries = [(name, held(name[1:], None)) for name in names]
+            entries = [(name, held(name, None)) for name in names]
         elif isinstance(value, (list, tuple)):
-            entries = [(f"[{k}]", entry) for k, entry in enumerate(value)]
+            entries = list(enumerate(value))
         else:
             continue
         pending += [((*place, name), entry) for name, entry in reversed(entries) if type(entry) not in PLAIN]
@@ -112,7 +112,7 @@ def _traced(given: Mapping[str, Any]) -> str | None:
 
 @lru_cache(maxsize=1000)
 def _fields(kind: type[Any]) -> tuple[str, ...] | None:
-    """Return the names of the fields of a class, each after a dot; none for one without; None for a mapping."""
+    """Return the names of the fields of a class; none for one without; None for a mapping."""
     if issubclass(kind, Mapping):
         return None
-    return tuple(f".{field.name}" for field in dataclasses.fields(kind)) if dataclasses.is_dataclass(kind) else ()
+    return tuple(field.name for field in dataclasses.fields(kind)) if dataclasses.is_dataclass(kind) else ()
