@@ -2,7 +2,6 @@
 
 from typing import Any, NamedTuple
 
-import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
 from jaxtyping import Float
@@ -10,7 +9,7 @@ from jaxtyping import Float
 from jounce.errors import MechanismError
 from jounce.mechanism import Mechanism
 from jounce.mechanism.masses import body_mass
-from jounce.mechanism.resolve import resolved
+from jounce.mechanism.resolve import along_instances, resolved
 from jounce.mechanism.system import POSITION_COMPONENTS
 from jounce.shapes import Numbers
 
@@ -42,22 +41,17 @@ def masses_of(mechanism: Mechanism) -> Masses:
         If a body has an inertia without a mass, or a value is not valid.
     """
     size = POSITION_COMPONENTS[mechanism.space]
-    columns: list[tuple[Any, ...]] = [(0.0, np.zeros(size), np.zeros((size, size)))]
+    tensor = size == 3
+    columns: list[tuple[Any, ...]] = [(0.0, np.zeros(size), np.zeros((3, 3)) if tensor else 0.0)]
     for name, body in mechanism.bodies.items():
         if body.mass is None and body.inertia is not None:
             raise MechanismError("an inertia needs a mass beside it", name=f"bodies.{name}.mass")
         mass, center, inertia = body_mass(name, body, mechanism.parameter_values, size, solid=False)
-        if size == 2:  # the second moments of a plane body about its axes are not known apart; only their sum counts
-            moments = np.eye(2) * 0.5 * inertia
-        else:
-            tensor = inertia * np.eye(3) if np.ndim(inertia) < 2 else inertia
-            moments = second_moments(tensor)
-        columns.append((mass, center, moments))
-    traced = any(isinstance(value, Tracer) for column in columns for value in column)
-    library = jnp if traced else np
-    return Masses(
-        *(library.stack([library.asarray(x) for x in part], -1)[..., None] for part in zip(*columns, strict=True))
-    )
+        columns.append((mass, center, inertia * np.eye(3) if tensor and np.ndim(inertia) < 2 else inertia))
+    masses, centers, inertias = (along_instances(*part) for part in zip(*columns, strict=True))
+    # those of a plane body about its axes are not known apart; only their sum counts
+    moments = second_moments(inertias) if tensor else np.eye(2)[..., None, None] * 0.5 * inertias
+    return Masses(masses, centers, moments)
 
 
 def second_moments(tensor: Float[Numbers, "3 3 *batch"]) -> Float[Numbers, "3 3 *batch"]:

@@ -28,7 +28,7 @@ from jounce.mechanism.fronts import Fronts, elimination
 from jounce.mechanism.mechanism import GROUND, Mechanism
 from jounce.mechanism.outputs import AbstractMotionOutput
 from jounce.mechanism.pattern import Pattern
-from jounce.mechanism.resolve import resolve, resolved
+from jounce.mechanism.resolve import along_instances, resolve, resolved
 from jounce.mechanism.system import POSITION_COMPONENTS, Group, System, group_elements, holding
 from jounce.modules import unchecked, with_fields
 from jounce.rigid import PlanarPose, SpatialPose
@@ -287,14 +287,8 @@ def starting_guess(mechanism: Mechanism, parameters: dict[str, Any], components:
             attitudes.append(resolved(body.angle, f"{place}.angle", "scalar", components, parameters))
         else:
             attitudes.append(_attitude(body.orientation, f"{place}.orientation", parameters))
-    position, attitude = (_stacked(xs) for xs in (positions, attitudes))
-    return {"position": position, "angle" if components == 2 else "quaternion": attitude}
-
-
-def _stacked(values: list[Any]) -> Any:
-    """Return coordinates of bodies as one array, (..., bodies, 1); they may be traced by JAX."""
-    library = jnp if any(isinstance(value, Tracer) for value in values) else np
-    return library.stack([library.asarray(x) for x in values], axis=-1)[..., None]
+    attitude = "angle" if components == 2 else "quaternion"
+    return {"position": along_instances(*positions), attitude: along_instances(*attitudes)}
 
 
 def _attitude(orientation: Any, name: str, parameters: dict[str, Any]) -> np.ndarray:
