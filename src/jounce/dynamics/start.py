@@ -18,6 +18,7 @@ from jounce.kinematics.advance import LARGEST_CONTRADICTION
 from jounce.kinematics.assembly import assemble, freely_moving
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.curves.choice import chosen
+from jounce.kinematics.device import resident
 from jounce.kinematics.host_jacobian import RANK_TOLERANCE, HostJacobian, is_clearly_regular
 from jounce.kinematics.status import Status
 from jounce.mechanism import Mechanism, Model, build
@@ -98,7 +99,7 @@ def consistent_start(mechanism: Mechanism, instant: float) -> ConsistentStart:
             model, guess=coordinates, system=system, prescribed=whole.prescribed, history=whole.history
         )
     model, coordinates = assemble(model, instant, TOLERANCE, free=True)
-    equations = jax.device_put(equations_of(mechanism, model, masses))
+    equations = resident(equations_of(mechanism, model, masses))
     if state is None:
         state = _set_in_motion(equations, model, coordinates, instant)
     else:

@@ -75,10 +75,11 @@ def ode_term(mechanism: Mechanism, time: float = 0.0) -> "OrdinaryEquation":
         raise MechanismError(message) from None
     start = consistent_start(mechanism, float(time))
     state: State | CountedState = State(*(jnp.asarray(part[..., 0]) for part in start.state))
-    if angles := measured(start.equations, start.state):
+    equations = jax.device_put(start.equations)  # diffrax takes arrays of JAX
+    if angles := measured(equations, start.state):
         known = tuple(part[..., 0] for part in angles)
         state = CountedState(state.position, state.attitude, state.velocity, state.spin, known)
-    return OrdinaryEquation(diffrax.ODETerm(state_rates), state, start.equations, mechanism, start)
+    return OrdinaryEquation(diffrax.ODETerm(state_rates), state, equations, mechanism, start)
 
 
 class CountedState(NamedTuple):

@@ -265,7 +265,8 @@ def unfit_rates(start: ConsistentStart, coordinates: Coordinates, instant: float
     pose = pose_of(cut(coordinates, order), start.model.pose_type)
     clock, found = Jet.variable(np.array([[instant]]), order), []
     for group, members in zip(start.equations.system.forces, start.model.forces, strict=True):
-        sizes = np.stack([np.asarray(c) for c in group.force(pose, clock).dense().coefficients])
+        with np.errstate(all="ignore"):  # what is not finite is told by name
+            sizes = np.stack([np.asarray(c) for c in group.force(pose, clock).dense().coefficients])
         sizes = np.broadcast_to(sizes, (*sizes.shape[:2], len(members), 1))
         good = np.atleast_1d(np.isfinite(sizes).all(axis=(0, 1, 3)))
         found += [f"forces.{name}" for name, fit in zip(members, good, strict=True) if not fit]
