@@ -105,8 +105,8 @@ class GridSolver:
         """Return what comes of a batch of instants, with their sources; nothing is kept but the state at its lanes."""
         lanes, source = batch
         chosen = _slice_of(source)
-        known = jax.tree.map(lambda x: x[..., chosen], self._store)
-        arrival = self.solver(known, self.time[lanes] - self._instants[source], self.time[lanes])
+        known = jax.tree.map(lambda x: x[..., chosen], self.solver.needed(self._store))
+        arrival = self.solver.advanced(known, self.time[lanes] - self._instants[source], self.time[lanes])
         self._keep(_slice_of(lanes), arrival.state(slice(None)))
         return arrival
 

@@ -20,7 +20,7 @@ from jounce.mechanism import Model
 SMALL_BATCH = 16  # lanes; a batch width compiles once, so a short grid uses one, and so do anchors
 LONGEST_LEG = 32  # batches
 LEG_ENTRIES = 2**19  # of what a leg keeps: a large mechanism has shorter ones
-FEWEST_SIDE_BY_SIDE, MOST_SIDE_BY_SIDE = 64, 4096  # instants of a long grid in a call of machine code
+FEWEST_SIDE_BY_SIDE, MOST_SIDE_BY_SIDE = 64, 1024  # instants of a long grid in a call of machine code
 NO_GRID = np.empty(0)
 
 
@@ -43,16 +43,29 @@ class Solver:
         survey: bool = False,
     ) -> Arrival:
         """Solve instants from known neighbours, `together` at most; of a few, `survey` looks for singular positions."""
+        return self.advanced(self.needed(known), step, instant, survey=survey)
+
+    def advanced(
+        self,
+        needed: SolvedState,
+        step: Float[np.ndarray, " batch"],
+        instant: Float[np.ndarray, " batch"],
+        *,
+        survey: bool = False,
+    ) -> Arrival:
+        """Solve instants from what is `needed` of neighbours."""
         lanes = len(instant)
         if lanes <= SMALL_BATCH:
-            known, step, instant = jax.tree.map(
-                lambda x: _filled(x, SMALL_BATCH), (self._predictor(known), step, instant)
-            )
+            known, step, instant = jax.tree.map(lambda x: _filled(x, SMALL_BATCH), (needed, step, instant))
             way = _way(known, (0.0,) * 4, away=step, instant=instant, planned=True)
             arrival = self._leg(way, NO_GRID, _limits(0.0, 0.0, 1), survey=survey).last
         else:
-            arrival = self._wide(self._predictor(known), step, instant)
+            arrival = self._wide(needed, step, instant)
         return jax.tree.map(lambda x: np.asarray(x)[..., :lanes], arrival)
+
+    def needed(self, known: SolvedState) -> SolvedState:
+        """Return what predictions need of solved instants, see `predictor`."""
+        return predictor(self.model.system, self.model.pose_type, known)
 
     def _wide(
         self, known: SolvedState, step: Float[np.ndarray, " batch"], instant: Float[np.ndarray, " batch"]
@@ -78,12 +91,12 @@ class Solver:
 
     def way(self, solved: SolvedState, place: Sequence[float], largest: float, crawled: int = 0) -> Way:
         """Return the way that begins at a solved instant, the place of an anchor, with a largest first step, s."""
-        known = jax.tree.map(lambda x: _filled(x, SMALL_BATCH), self._predictor(solved))
+        known = jax.tree.map(lambda x: _filled(x, SMALL_BATCH), self.needed(solved))
         return _way(known, place, largest=largest, crawled=crawled)
 
     def beginning(self, guess: SolvedState, instant: float) -> Way:
         """Return the way that begins with solving an instant, from a position put together there."""
-        known = jax.tree.map(lambda x: _filled(x, SMALL_BATCH), self._predictor(guess))
+        known = jax.tree.map(lambda x: _filled(x, SMALL_BATCH), self.needed(guess))
         return _way(known, (instant, 0.0, 0.0, 0.0), instant=np.full(SMALL_BATCH, instant), planned=True)
 
     @cached_property
@@ -105,7 +118,7 @@ class Solver:
         nothing = np.zeros(1)
         still = {name: np.zeros((self.order + 1, *x.shape)) for name, x in self.model.guess.items()}
         outputs = tuple(np.zeros((self.order + 1, 1, group.instances, 1)) for group in system.outputs)
-        instants = self._predictor((still, outputs, nothing)), nothing, nothing, np.zeros(1, bool)
+        instants = self.needed((still, outputs, nothing)), nothing, nothing, np.zeros(1, bool)
         kind = self.model.pose_type
         return advance_instant.program((system, tolerance, refine, wanted), instants, pose_type=kind, order=self.order)
 
@@ -159,9 +172,6 @@ class Solver:
         wide = size.max()
         told = f"open by {wide:.2g} rad, or sizes of the mechanism" if wide > LARGEST_GAP else "in their rates"
         return f"{', '.join(list(names)[:4])} ({told})"
-
-    def _predictor(self, known: SolvedState) -> SolvedState:
-        return predictor(self.model.system, self.model.pose_type, known)
 
 
 def _way(known: SolvedState, place: Sequence[float], **given: Any) -> Way:
