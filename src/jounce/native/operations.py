@@ -12,6 +12,7 @@ from jounce.native.code import DTYPES, KINDS, Code, UnsupportedOperationError, V
 
 Values = np.ndarray  # of objects, each a Value
 Rule = Callable[[Code, Any, Sequence[Values]], Sequence[Values]]
+MOST_SORTED = 16  # numbers
 MOST_CANDIDATES = 64  # places of an array among which a number is picked by comparing
 
 FUNCTIONS = {  # of C's library, by the names that JAX has for them
@@ -176,6 +177,28 @@ def _extreme(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Val
             best, at = code.select(better, value, best), code.select(better, code.constant(np.asarray(k, DTYPES[kind])), at)
         found[place] = at
     return [found]
+
+
+def _sort(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
+    """Sort arrays by the first of them, NaN last: neighbours change places until all are in order."""
+    if equation.params["num_keys"] != 1:
+        raise UnsupportedOperationError("sorting by several keys")
+    arrays = [np.moveaxis(array, equation.params["dimension"], -1).copy() for array in given]
+    size = arrays[0].shape[-1]
+    if size > MOST_SORTED:
+        raise UnsupportedOperationError(f"sorting {size} numbers")
+    for place in np.ndindex(arrays[0].shape[:-1]):
+        rows = [array[place] for array in arrays]
+        for turn in range(size):
+            for k in range(turn % 2, size - 1, 2):
+                a, b = rows[0][k : k + 2].tolist()
+                change = code.compare("lt", b, a)
+                if a.kind == "f":
+                    change = code.logic("or", change, code.logic("and", code.compare("ne", a, a), code.compare("eq", b, b)))
+                for row in rows:
+                    x, y = row[k : k + 2].tolist()
+                    row[k], row[k + 1] = code.select(change, y, x), code.select(change, x, y)
+    return [np.moveaxis(array, -1, equation.params["dimension"]) for array in arrays]
 
 
 def _cumulative(operation: str) -> Rule:
@@ -456,6 +479,7 @@ RULES: Mapping[str, Rule] = {
     "reduce_or": _reduce(lambda code, a, b: code.logic("or", a, b), lambda _: np.False_),
     "argmax": _extreme,
     "argmin": _extreme,
+    "sort": _sort,
     "cumsum": _cumulative("add"),
     "cumprod": _cumulative("mul"),
     "cummax": _cumulative("max"),
