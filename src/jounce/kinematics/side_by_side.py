@@ -20,8 +20,9 @@ import numpy as np
 from jounce.kinematics.compilation import current_store
 from jounce.kinematics.device import on_processor
 from jounce.kinematics.structure import UndescribedError, being_debugged, program_key, settings
+from jounce.kinematics.threads import Threads
 from jounce.native import machine
-from jounce.native.code import UnsupportedOperationError
+from jounce.native.values import MOST_LINES, UnsupportedOperationError
 from jounce.native.programs import Program, object_file
 from jounce.shapes import is_traced
 
@@ -37,9 +38,13 @@ class Prepared:
     machine_code: Program
     shared: list[np.ndarray]
 
-    def __call__(self, lanes: Any) -> Any:
-        """Return the results for instants along the last axis."""
-        return self.machine_code(self.shared, [np.asarray(leaf) for leaf in jax.tree.leaves(lanes)])
+    def __call__(self, lanes: Any, threads: int = 1) -> Any:
+        """Return the results for many instants, which are shared among threads where they lie along the first axis."""
+        leaves = [np.asarray(leaf) for leaf in jax.tree.leaves(lanes)]
+        if threads == 1:
+            return self.machine_code(self.shared, leaves)
+        with Threads(threads, compiled=True) as pool:
+            return self.machine_code(self.shared, leaves, threads, pool.map)
 
     @cached_property
     def name(self) -> str | None:
@@ -65,13 +70,31 @@ class SideBySide:
     function : callable
         Of two pytrees of arrays, shared by all instants and of the instant, with a last axis of length one, as its
         results have; and of static arguments.
+    rows : bool, default False
+        Whether arrays of many instants, those given and the results, have the instants along their first axis.
+    made_of : tuple of callable, optional
+        Functions of the package that say what it computes, where it is none of them itself.
+    most_lines : int, optional
+        Of LLVM's text: what is longer takes too long to compile for what it gains.
     """
 
-    def __init__(self, function: Callable[..., Any]):
-        self.function = function
+    def __init__(
+        self,
+        function: Callable[..., Any],
+        *,
+        rows: bool = False,
+        made_of: tuple[Callable[..., Any], ...] = (),
+        most_lines: int = MOST_LINES,
+    ):
+        self.function, self.rows, self.made_of = function, rows, made_of or (function,)
+        self.most_lines = most_lines
         self._programs: dict[Any, Program | None] = {}
         self._lock = threading.Lock()
         update_wrapper(self, function)
+
+    def __len__(self) -> int:
+        """How many programs were wanted, those that there is no code for included."""
+        return len(self._programs)
 
     def program(self, shared: Any, lanes: Any, **static: Any) -> Prepared | None:
         """Return its machine code; None where there is none: no compiler, or no code for what it does.
@@ -83,7 +106,7 @@ class SideBySide:
         leaves, structure = jax.tree.flatten(shared)
         arrays = [np.asarray(leaf) for leaf in leaves]
         shapes = jax.tree.unflatten(structure, [jax.ShapeDtypeStruct(x.shape, x.dtype) for x in arrays])
-        one = jax.tree.map(lambda x: jax.ShapeDtypeStruct((*x.shape[:-1], 1), x.dtype), lanes)
+        one = jax.tree.map(lambda x: jax.ShapeDtypeStruct(self._one(x.shape), x.dtype), lanes)
         places = {k: x for k, x in enumerate(arrays) if x.dtype.kind in "iu" and x.ndim}
         kinds = tuple((x.shape, x.dtype.str) for x in (*arrays, *jax.tree.leaves(one)))
         known = tuple(x.tobytes() for x in places.values())
@@ -94,6 +117,10 @@ class SideBySide:
             program = self._programs[key]
         return None if program is None else Prepared(program, arrays)
 
+    def _one(self, shape: tuple[int, ...]) -> tuple[int, ...]:
+        """Return the shape of an instant's part of an array."""
+        return (*(shape[1:] if self.rows else shape[:-1]), 1)
+
     def _made(
         self, given: tuple[Any, Any], places: Mapping[int, np.ndarray], static: Mapping[str, Any]
     ) -> Program | None:
@@ -102,18 +129,22 @@ class SideBySide:
         key = self._key(given, places, static) if store is not None else None
         if store is not None and key is not None and (kept := store.get(key)) is not None:
             try:
-                return Program(*pickle.loads(zlib.decompress(kept)))
+                return self._loaded(*pickle.loads(zlib.decompress(kept)))
             except Exception:  # noqa: BLE001 - whatever is wrong with it, it is made again
                 store.drop(key)
+        made: tuple[Any, ...]
         try:
-            binary = object_file(function, *given, places)
-        except UnsupportedOperationError:
-            return None
-        made = binary, tuple(map(jax.tree.leaves, given)), jax.eval_shape(function, *given)
+            binary = object_file(function, *given, places, rows=self.rows, most_lines=self.most_lines)
+            made = binary, tuple(map(jax.tree.leaves, given)), jax.eval_shape(function, *given)
+        except UnsupportedOperationError:  # which is kept, too: to find it out takes long
+            made = b"", None, None
         if store is not None and key is not None:
             with suppress(pickle.PicklingError, TypeError, AttributeError):
                 store.put(key, zlib.compress(pickle.dumps(made), level=1))
-        return Program(*made)
+        return self._loaded(*made)
+
+    def _loaded(self, binary: bytes, given: Any, results: Any) -> Program | None:
+        return Program(binary, given, results, rows=self.rows) if binary else None
 
     def _key(
         self, given: tuple[Any, Any], places: Mapping[int, np.ndarray], static: Mapping[str, Any]
@@ -122,7 +153,7 @@ class SideBySide:
         leaves, tree = jax.tree.flatten(given)
         kinds = [*((leaf.shape, str(leaf.dtype)) for leaf in leaves), *places.values(), machine.processor()]
         with suppress(UndescribedError):
-            return program_key((self.function,), tree, kinds, static)
+            return program_key(self.made_of, tree, kinds, static)
         return None
 
 

@@ -50,12 +50,14 @@ class Threads:
     ----------
     count : int
         1 computes in the thread that asks.
+    compiled : bool, default False
+        Whether what they are to compute is compiled already, so that none has to go before the others.
     """
 
-    def __init__(self, count: int):
+    def __init__(self, count: int, *, compiled: bool = False):
         self.count = count
         self._pool: ThreadPoolExecutor | None = None
-        self._compiled = False
+        self._compiled = compiled
         self._context = callers_device()
 
     def __enter__(self) -> "Threads":

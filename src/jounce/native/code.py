@@ -66,6 +66,8 @@ class Code:
     ----------
     width : int
         Lanes of a vector.
+    most : int
+        Lines that there may be.
     lines, entry : list of str
         Text of what is run for each vector of lanes, and before the first.
     functions : set
@@ -73,6 +75,7 @@ class Code:
     """
 
     width: int
+    most: int
     lines: list[str] = field(default_factory=list)
     entry: list[str] = field(default_factory=list)
     memory: int = 0

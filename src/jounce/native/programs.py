@@ -8,11 +8,12 @@ from typing import Any
 import jax
 import numpy as np
 
+from jounce.native import rows as rows_
 from jounce.native.code import Code, Region, UnsupportedOperationError, flat
 from jounce.native.handler import handler_text, is_known
 from jounce.native.machine import MachineCode, compiled, vector_width
 from jounce.native.operations import Values, constants, kind_of
-from jounce.native.translation import translate
+from jounce.native.translation import MOST_LINES, translate
 
 MOST_MEMORY = 2**20  # bytes of the stack: threads have little
 ATTRIBUTES = """attributes #0 = { nounwind willreturn memory(none) }
@@ -21,7 +22,15 @@ attributes #1 = { nounwind "min-legal-vector-width"="512" "prefer-vector-width"=
 !0 = !{}"""
 
 
-def object_file(function: Callable[..., Any], shared: Any, lanes: Any, known: Mapping[int, np.ndarray]) -> bytes:
+def object_file(
+    function: Callable[..., Any],
+    shared: Any,
+    lanes: Any,
+    known: Mapping[int, np.ndarray],
+    *,
+    rows: bool = False,
+    most_lines: int = MOST_LINES,
+) -> bytes:
     """Return the machine code of a function of one instant, as an object file.
 
     Parameters
@@ -33,13 +42,18 @@ def object_file(function: Callable[..., Any], shared: Any, lanes: Any, known: Ma
         Of arrays, or of what has the shape and type of one.
     known : mapping
         Leaves of `shared`, by their numbers, whose values are part of the program.
+    rows : bool, default False
+        Whether arrays of many instants, those given and the results, have the instants along their first axis.
+    most_lines : int, optional
+        Of LLVM's text.
 
     Raises
     ------
     UnsupportedOperationError
         Where there is no code for it, or too much.
     """
-    return compiled(_text(jax.make_jaxpr(function)(shared, lanes), len(jax.tree.leaves(shared)), known, vector_width()))
+    closed, count = jax.make_jaxpr(function)(shared, lanes), len(jax.tree.leaves(shared))
+    return compiled(_text(closed, count, known, vector_width(), rows=rows, most_lines=most_lines))
 
 
 class Program:
@@ -51,43 +65,66 @@ class Program:
         From `object_file`.
     given, results : pytree
         Of what has the shapes and types of the arguments, shared and of an instant, and of the results for an instant.
+    rows : bool, default False
+        As for `object_file`.
     """
 
-    def __init__(self, binary: bytes, given: tuple[Any, Any], results: Any):
+    def __init__(self, binary: bytes, given: tuple[Any, Any], results: Any, *, rows: bool = False):
         self._run = MachineCode(binary)
         self.name = f"jounce_{hashlib.sha256(binary).hexdigest()[:32]}"
         shared, lanes = map(jax.tree.leaves, given)
         self._shared = [(x.shape, x.dtype) for x in shared]
         self._lanes = [(x.shape[:-1], x.dtype) for x in lanes]
         leaves, self._structure = jax.tree.flatten(results)
-        self._results = [(x.shape[:-1], x.dtype) for x in leaves]
-        self._width = vector_width()
+        self._results = [(leaf.shape[:-1], leaf.dtype) for leaf in leaves]
+        self._width, self._rows = vector_width(), rows
 
-    def __call__(self, shared: Sequence[np.ndarray], lanes: Sequence[np.ndarray]) -> Any:
+    def __call__(
+        self, shared: Sequence[np.ndarray], lanes: Sequence[np.ndarray], parts: int = 1, each: Callable[..., Any] = map
+    ) -> Any:
         """Return the results.
 
         Parameters
         ----------
         shared, lanes : sequence of array
-            Leaves of the arguments; instants along the last axis.
+            Leaves of the arguments; instants along the last axis, or along the first.
+        parts : int, default 1
+            Among how many calls of the machine code the instants are shared, where they lie along the first axis.
+        each : callable, optional
+            What makes these calls, in the manner of `map`; the machine code may run in several threads.
         """
-        count = lanes[0].shape[-1]
+        axis = 0 if self._rows else -1
+        count = lanes[0].shape[axis]
         total = max(count, self._width)
         self._check(shared, lanes, count)
         if total > count:
-            lanes = [np.concatenate([x, np.repeat(x[..., -1:], total - count, axis=-1)], axis=-1) for x in lanes]
+            lanes = [_filled(x, total, axis) for x in lanes]
         given = [np.ascontiguousarray(x) for x in (*shared, *lanes)]
-        found = [np.empty((*shape, total), dtype) for shape, dtype in self._results]
-        addresses = [array.__array_interface__["data"][0] for array in (*given, *found)]
-        if count:
+        shapes = [((total, *shape) if self._rows else (*shape, total), dtype) for shape, dtype in self._results]
+        found = [np.empty(*shape) for shape in shapes]
+        arrays = [*given, *found]
+        addresses = [array.__array_interface__["data"][0] for array in arrays]
+        if not self._rows or (vectors := total // self._width) < 2 or parts == 1:
             self._run((ctypes.c_void_p * len(addresses))(*addresses), total)
-        return jax.tree.unflatten(self._structure, [x[..., :count] for x in found])
+        else:
+            steps = [0] * len(shared) + [x.strides[0] for x in arrays[len(shared) :]]
+            ends = [vectors * k // parts * self._width for k in range(parts)] + [total]
+
+            def run(part: int) -> None:
+                start, stop = ends[part : part + 2]
+                if start < stop:
+                    here = [address + start * step for address, step in zip(addresses, steps, strict=True)]
+                    self._run((ctypes.c_void_p * len(here))(*here), stop - start)
+
+            list(each(run, range(parts)))
+        return jax.tree.unflatten(self._structure, [x[:count] if self._rows else x[..., :count] for x in found])
 
     def register(self) -> bool:
         """Make it known to XLA by its name, for `in_program`; tell whether that goes."""
-        if is_known():
-            jax.ffi.register_ffi_target(self.name, jax.ffi.pycapsule(self._run.handler), platform="cpu")
-        return is_known()
+        if self._rows or not is_known():
+            return False
+        jax.ffi.register_ffi_target(self.name, jax.ffi.pycapsule(self._run.handler), platform="cpu")
+        return True
 
     def in_program(self, shared: Sequence[Any], lanes: Sequence[Any]) -> Any:
         """Return the results as part of a program of JAX, for arguments as in a call; at least a vector of lanes."""
@@ -100,26 +137,46 @@ class Program:
 
     def _check(self, shared: Sequence[Any], lanes: Sequence[Any], count: int) -> None:
         """Raise ValueError unless arrays are of the shapes and types that the machine code reads."""
-        wanted = [*self._shared, *(((*shape, count), dtype) for shape, dtype in self._lanes)]
-        found = [(x.shape, x.dtype) for x in (*shared, *lanes)]
+        many = [((count, *shape) if self._rows else (*shape, count), dtype) for shape, dtype in self._lanes]
+        wanted, found = [*self._shared, *many], [(x.shape, x.dtype) for x in (*shared, *lanes)]
         if found != wanted:
             raise ValueError(f"arrays of {found}, where the program was made for {wanted}")
 
 
-def _text(closed: Any, shared: int, known: Mapping[int, np.ndarray], width: int) -> str:
+def _filled(x: np.ndarray, total: int, axis: int) -> np.ndarray:
+    """Repeat the last instant until there are so many; zeros where there is none."""
+    x = np.moveaxis(x, axis, 0)
+    found = np.zeros((total, *x.shape[1:]), x.dtype)
+    if len(x):
+        found[: len(x)], found[len(x) :] = x, x[-1]
+    return np.moveaxis(found, 0, axis)
+
+
+def _text(
+    closed: Any,
+    shared: int,
+    known: Mapping[int, np.ndarray],
+    width: int,
+    *,
+    rows: bool = False,
+    most_lines: int = MOST_LINES,
+) -> str:
     """Return the text of a module with a function `run` of the addresses of all arrays and the number of lanes."""
-    code, given = Code(width), []
+    code, given = Code(width, most_lines), []
     for number, variable in enumerate(closed.jaxpr.invars):
         if number in known:
             given.append(constants(code, known[number]))
             continue
         region = _region(code, number, kind_of(variable.aval.dtype), lanes=number >= shared)
         array = np.empty(variable.aval.shape, object)
-        array.ravel()[:] = [code.load(region, k) for k in range(array.size)]
+        if rows and region.lanes:
+            array.ravel()[:] = rows_.read(code, region.pointer, array.size, region.kind)
+        else:
+            array.ravel()[:] = [code.load(region, k) for k in range(array.size)]
         given.append(array)
     results = translate(code, closed.jaxpr, [constants(code, number) for number in closed.consts], given)
     for number, array in enumerate(results, len(given)):
-        _write(code, number, array)
+        _write(code, number, array, rows=rows)
     if code.memory > MOST_MEMORY:
         raise UnsupportedOperationError(f"{code.memory} bytes of memory")
     lines = [
@@ -155,11 +212,14 @@ def _region(code: Code, number: int, kind: str, *, lanes: bool) -> Region:
     return Region(f"%a{number}", kind, lanes, given=True)
 
 
-def _write(code: Code, number: int, array: Values) -> None:
+def _write(code: Code, number: int, array: Values, *, rows: bool) -> None:
     values = flat(array)
     if not values:
         return
     region = _region(code, number, values[0].kind, lanes=True)
+    if rows:
+        rows_.write(code, region.pointer, values)
+        return
     for k, value in enumerate(values):
         code.store(region, k, value)
 

@@ -48,8 +48,8 @@ def translate(code: Code, program: Any, constants_: Sequence[Values], given: Seq
             raise UnsupportedOperationError(name)
         for variable, values in zip(equation.outvars, rule(code, equation, inputs), strict=True):
             known[variable] = _as_array(values, variable.aval.shape)
-        if len(code.lines) > MOST_LINES:
-            raise UnsupportedOperationError(f"more than {MOST_LINES} lines")
+        if len(code.lines) > code.most:
+            raise UnsupportedOperationError(f"more than {code.most} lines")
     return [read(variable) for variable in program.outvars]
 
 
@@ -162,7 +162,7 @@ def _scan(code: Code, equation: Any, given: Sequence[Values]) -> list[Values]:
     if length == 1:
         results = _closed(code, closed, needed, start, [row[0, ...] for row in rows])
         return [*results[:carries], *(_as_array(row, aval.shape[1:])[None] for row, aval in zip(results[carries:], avals[carries:], strict=True))]
-    most = MOST_LINES if _needs_known_places(closed.jaxpr) else MOST_UNROLLED
+    most = code.most if _needs_known_places(closed.jaxpr) else MOST_UNROLLED
     if (unrolled := _unrolled(code, equation, needed, start, rows, most)) is not None:
         return unrolled
     mark = code.mark()
@@ -170,7 +170,7 @@ def _scan(code: Code, equation: Any, given: Sequence[Values]) -> list[Values]:
         return _rolled(code, equation, needed, start, rows)
     except UnsupportedOperationError:  # of places that change from turn to turn
         code.back_to(mark)
-        if (unrolled := _unrolled(code, equation, needed, start, rows, MOST_LINES)) is None:
+        if (unrolled := _unrolled(code, equation, needed, start, rows, code.most)) is None:
             raise
         return unrolled
 
