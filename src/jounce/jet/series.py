@@ -59,6 +59,8 @@ class Recursion(ProgramReader):
         Highest coefficient that will be wanted.
     reversible : bool, default False
         Whether loops are of known length, as JAX wants them for derivatives in reverse mode; they take longer then.
+    unrolled : bool, default False
+        Whether orders are whole numbers of Python, each with code of its own, which is faster where it is not too much.
 
     Attributes
     ----------
@@ -75,8 +77,16 @@ class Recursion(ProgramReader):
 
     moving = int  # the number of a variable
 
-    def __init__(self, function: Callable[..., Any], values: Sequence[Any], order: int, *, reversible: bool = False):
-        self.order, self.reversible = order, reversible
+    def __init__(
+        self,
+        function: Callable[..., Any],
+        values: Sequence[Any],
+        order: int,
+        *,
+        reversible: bool = False,
+        unrolled: bool = False,
+    ):
+        self.order, self.reversible, self.unrolled = order, reversible, unrolled
         self._nodes: list[_Node] = []
         self._values: dict[int, Any] = {}  # of order zero, by number of the variable
         self._known: dict[Any, Any] = {}  # results of operations already read, which programs often repeat
@@ -90,7 +100,7 @@ class Recursion(ProgramReader):
         self._products = list(dict.fromkeys(pair for node in self._nodes for pair in node.pairs))
         self._stored = list(dict.fromkeys(x for pair in self._products for x in pair[:2]))
         width = sum(jnp.size(self._values[pair.left]) for pair in self._products)
-        left, right = (jnp.zeros((order + size * _BLOCK, width)) for size in (1, 2))
+        left, right = ((), ()) if unrolled else (jnp.zeros((order + size * _BLOCK, width)) for size in (1, 2))
         self.history = (left, right, tuple(self._values[x] for x in self._stored))
 
     def advanced(self, history: Any, k: Any, coefficients: Sequence[Any]) -> tuple[Any, Any]:
@@ -169,6 +179,9 @@ class Recursion(ProgramReader):
         if not self._products:
             return left, right
         rows = {x: jnp.ravel(c) for x, c in zip(self._stored, newest, strict=True)}
+        if self.unrolled:
+            newest_left = tuple(rows[pair.left] * (k if pair.weighted else 1.0) for pair in self._products)
+            return (*left, newest_left), (*right, tuple(rows[pair.right] for pair in self._products))
         a, b = (jnp.concatenate([rows[pair[i]] for pair in self._products])[None] for i in (0, 1))
         weighted = [pair.weighted for pair in self._products for _ in range(rows[pair.left].size)]
         left = jax.lax.dynamic_update_slice_in_dim(left, a * jnp.where(np.array(weighted), k, 1.0)[None], k, 0)
@@ -176,6 +189,8 @@ class Recursion(ProgramReader):
 
     def _sums(self, left: Any, right: Any, k: Any) -> dict[_Pair, Any]:
         """Return the sums over the products of coefficients of orders 1 to k - 1, those of order k left out."""
+        if self.unrolled:
+            return self._few_sums(left, right, k)
 
         def block(i: Any, found: Any) -> Any:
             first = 1 + i * _BLOCK
@@ -190,6 +205,15 @@ class Recursion(ProgramReader):
             shape = jnp.shape(self._values[pair.left])
             size = math.prod(shape)
             part, place = found[place : place + size].reshape(shape), place + size
+            sums[pair] = part / k if pair.weighted else part
+        return sums
+
+    def _few_sums(self, left: Any, right: Any, k: int) -> dict[_Pair, Any]:
+        sums = {}
+        for place, pair in enumerate(self._products):
+            value = self._values[pair.left]
+            parts = [left[j][place] * right[k - j][place] for j in range(1, k)]
+            part = jnp.reshape(total(parts), jnp.shape(value)) if parts else jnp.zeros_like(value)
             sums[pair] = part / k if pair.weighted else part
         return sums
 

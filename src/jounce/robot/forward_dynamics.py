@@ -22,6 +22,7 @@ from jounce.robot.tree_equations import TreeEquations, Unknowns, free_base
 from jounce.robot.wrenches import Wrench, wrench_arrays
 from jounce.shapes import ArrayLike, Numbers, is_traced
 
+MOST_UNROLLED = 5  # orders, each with code of its own
 WIDE = 32  # samples side by side where there are rates: their histories shall stay in the cache
 
 
@@ -201,8 +202,10 @@ def _coefficients(equations: TreeEquations, arrays: tuple[Any, ...], reversible:
     order = len(forces) - 1
     # forces of driven joints are what they have to be: nothing is missing there
     given = ((1.0 - mask) * forces, at_base, pushes)
+    # one sample, of whose program machine code is made: that of long histories is too long
+    alone = state.shape[-1] == 1 and not reversible and len(forces) <= MOST_UNROLLED
     motion = equations.motion(state[0], state[1], base)
-    series = motion_series(equations, motion, applied, given, driven, order, reversible=reversible)
+    series = motion_series(equations, motion, applied, given, driven, order, reversible=reversible, unrolled=alone)
     q, margin = coordinates_of(series, order), series.factor.margin[None]
     moved, rates = series.motion.base, series.accelerations.base
     if moved is None or rates is None:

@@ -39,6 +39,7 @@ def motion_series(
     order: int,
     *,
     reversible: bool = False,
+    unrolled: bool = False,
 ) -> MotionSeries:
     """Return the series of the motion through a state.
 
@@ -58,6 +59,8 @@ def motion_series(
         Of the accelerations.
     reversible : bool, default False
         Whether JAX may differentiate it in reverse mode.
+    unrolled : bool, default False
+        Whether each order has code of its own.
     """
     factor = equations.factored(motion)
     start = jax.tree.map(lambda x: x[0], given)
@@ -82,7 +85,9 @@ def motion_series(
         return missing(motion, accelerations, given), equations.motion_rates(motion, accelerations)
 
     before, after = ([None] * len(jax.tree.leaves(part)) for part in (motion, start))  # of the unknowns
-    recursion = Recursion(program, jax.tree.leaves((motion, found, start)), order, reversible=reversible)
+    recursion = Recursion(
+        program, jax.tree.leaves((motion, found, start)), order, reversible=reversible, unrolled=unrolled
+    )
     put = jax.lax.dynamic_update_index_in_dim
 
     def level(k: Any, carry: Any) -> Any:
@@ -106,7 +111,12 @@ def motion_series(
         return jax.tree.map(begun, *first)
 
     carry = recursion.history, rates, room(order + 2, motion, rates), room(order + 1, found)
-    _, _, series, accelerations = jax.lax.fori_loop(1, order + 1, level, carry)
+    if unrolled:
+        for k in range(1, order + 1):
+            carry = level(k, carry)
+    else:
+        carry = jax.lax.fori_loop(1, order + 1, level, carry)
+    _, _, series, accelerations = carry
     return MotionSeries(series, accelerations, factor)
 
 
