@@ -18,7 +18,7 @@ from jounce.robot.kinematics import body_frames, place_of
 from jounce.robot.newton_euler import BodyWrenches, inertial_wrench, recursive_newton_euler
 from jounce.robot.robot import Robot
 from jounce.robot.tree import Frame, Tree
-from jounce.robot.tree_scan import to_coordinates
+from jounce.robot.tree_scan import of_one_body, to_coordinates
 from jounce.robot.wrenches import FRAMES, Wrench, wrench_arrays
 from jounce.shapes import ArrayLike, Numbers
 
@@ -160,7 +160,7 @@ def _on_bodies(
         else:
             force, torque = (matvec(rotation[:, :, None], part) for part in (force, torque))
         moment = torque + cross(point[:, None], force)
-        whole = whole.at[:, body].add(stacked(concatenate([force, moment])))
+        whole = whole + of_one_body(stacked(concatenate([force, moment])), body, tree.shape.bodies + 1)
     return whole
 
 

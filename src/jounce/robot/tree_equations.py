@@ -20,7 +20,7 @@ from jounce.rigid.spatial import body_axes, quaternion_spins
 from jounce.robot.articulated_bodies import ArticulatedBodies, RigidInertia
 from jounce.robot.newton_euler import Turn
 from jounce.robot.tree import Frame, Tree
-from jounce.robot.tree_scan import fill_slots, read_slot, to_coordinates, write_slot
+from jounce.robot.tree_scan import fill_slots, of_one_body, read_slot, to_coordinates, write_slot
 from jounce.robot.tree_sums import sums_at_parents, totals
 from jounce.shapes import Numbers
 
@@ -284,7 +284,7 @@ class TreeEquations(Module):
                 turned = jnp.stack([total(own[:, k] * rotation[k, j] for k in range(3)) for j in range(3)], axis=1)
                 force, torque = _combined(turned, force), _combined(turned, torque)
             arm = total(own[:, k] * point[k] for k in range(3))
-            whole = whole.at[:, body].add(jnp.concatenate([force, torque + cross(arm, force)]))
+            whole = whole + of_one_body(jnp.concatenate([force, torque + cross(arm, force)]), body, whole.shape[1])
         return whole
 
 

@@ -61,6 +61,15 @@ def write_slot(tree: Tree, state: Any, slot: Any, value: Any) -> Any:
     return jax.tree.map(lambda x, y: jax.lax.dynamic_update_index_in_dim(x, y, slot, 0), state, value)
 
 
+def of_one_body(value: Any, body: Any, count: int) -> Any:
+    """Return values of one of many bodies as those of all, along the second axis: zero for the others.
+
+    Places are compared, and not one of them indexed: machine code has no place that is not known beforehand.
+    """
+    here = jnp.reshape(jnp.arange(count) == body, (1, count) + (1,) * (value.ndim - 1))
+    return jnp.where(here, value[:, None], 0.0)
+
+
 def materialised(value: Any) -> Any:
     """Return a value as it is, kept by XLA, which otherwise computes it again for every use: this halves the time."""
     return jax.lax.optimization_barrier(value)
